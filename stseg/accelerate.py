@@ -1,0 +1,25 @@
+"""The one place that names numba's options.
+
+A kernel keeps its signature for type checkers, fills arrays that it is given, and is cached on disk. Kernels never use
+fast-math: the same input gives the same bits. With `NUMBA_DISABLE_JIT=1` every kernel is plain Python.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import ParamSpec, TypeVar, cast
+
+import numba
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+def kernel(function: Callable[P, R]) -> Callable[P, R]:
+    """Compile `function` without the interpreter, releasing its lock."""
+    return cast("Callable[P, R]", numba.njit(cache=True, nogil=True)(function))
+
+
+def python_form(compiled: Callable[P, R]) -> Callable[P, R]:
+    """The kernel as plain Python, for tests that compare the two."""
+    return cast("Callable[P, R]", getattr(compiled, "py_func", compiled))

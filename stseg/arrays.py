@@ -1,0 +1,48 @@
+"""Array aliases, and the few records that every stage speaks.
+
+Volumes are always `(time, plane, y, x)`, one frame of a volume `(plane, y, x)`, images `(v, u)` with pixel centres at
+integer coordinates (u to the right, v down). Names carry the frame of reference: `ground` is metres on the ground
+plane, `pixel` is image coordinates, `cell` is an index into the grid.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Singles = NDArray[np.float32]
+Ints = NDArray[np.int64]
+Labels = NDArray[np.int32]
+Bytes = NDArray[np.uint8]
+Flags = NDArray[np.bool_]
+Rows = NDArray[np.void]
+"""A structured array; its dtype is one of those in `stseg.tracks`."""
+AnyArray = NDArray[Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Boxes:
+    """What a detector found in one view of one frame.
+
+    Attributes
+    ----------
+    pixel : float64 (n, 4)
+        left, top, width, height in pixels; edges, not pixel centres, of the distorted image.
+    score : float64 (n,)
+        The detector's belief in each box, 0..1; 1 where it does not say.
+    """
+
+    pixel: Floats
+    score: Floats
+
+    def __len__(self) -> int:
+        return len(self.pixel)
+
+
+Observation = Bytes | NDArray[np.uint16] | Boxes | None
+"""What one camera delivers for one frame: a colour image uint8 (v, u, 3), a mask uint8 (v, u), an instance image
+uint16 (v, u), boxes, or None where it is blind."""

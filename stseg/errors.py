@@ -1,0 +1,62 @@
+"""What can go wrong, as a tree.
+
+    StsegError
+    +-- InputError             what the user can mend: which place, which key, what was found, what was expected
+        +-- RigError           the rig file and what it says of cameras
+        +-- ConfigError        the configuration and the command line
+        +-- CalibrationError   a geometry that cannot be: singular, mirrored, sees nothing
+        +-- SourceError        recordings: missing, broken, of unequal length or of the wrong size
+        +-- FormatError        the contents of any other file that is read
+        +-- OutputError        what is written: exists already, cannot be written, disk full
+
+A command turns an `StsegError` into one line on standard error and exit status 2.
+"""
+
+from __future__ import annotations
+
+
+class StsegError(Exception):
+    """Any error that this package raises on purpose."""
+
+
+class InputError(StsegError):
+    """Something that the user can mend.
+
+    Parameters
+    ----------
+    place
+        The file (or the part of the command line) at fault.
+    key
+        The key, camera, frame or column inside it; empty where the place says it all.
+    found, expected
+        What stands there and what should.
+    """
+
+    def __init__(self, place: object, key: str, found: object, expected: str) -> None:
+        self.place, self.key, self.found, self.expected = str(place), key, str(found), expected
+        where = f"{self.place}: {key}" if key else self.place
+        super().__init__(f"{where}: found {self.found}, expected {expected}")
+
+
+class RigError(InputError):
+    """The rig file does not say what it must."""
+
+
+class ConfigError(InputError):
+    """An option or a configuration key is unknown or out of its range."""
+
+
+class CalibrationError(InputError):
+    """A camera's geometry cannot be what it claims."""
+
+
+class SourceError(InputError):
+    """A recording is missing, broken, or does not fit the rig."""
+
+
+class FormatError(InputError):
+    """A file's contents are not what its kind promises."""
+
+
+class OutputError(InputError):
+    """A result cannot be written."""

@@ -1,0 +1,132 @@
+"""One view: a ground homography, a vertical, perhaps a lens. Never more is needed (METHODS 1)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stseg.arrays import Flags, Floats
+from stseg.errors import CalibrationError
+from stseg.geometry.lens import Lens
+from stseg.geometry.planes import plane_homography
+
+_SINGULAR = 1e12
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A view of the scene.
+
+    Attributes
+    ----------
+    name
+        Its name in the rig.
+    size
+        Width and height of its image, pixels.
+    ground : float64 (3, 3)
+        Homography from ground metres to pixels (undistorted pixels where there is a lens), signed so that points in
+        front of the camera have a positive third coordinate.
+    vertical : float64 (3,)
+        a v: what one metre of height adds to the third column of `ground`.
+    lens
+        The lens, or None for an ideal image.
+
+    Raises
+    ------
+    CalibrationError
+        Where the homography is singular or the vertical lies in the ground plane.
+    """
+
+    name: str
+    size: tuple[int, int]
+    ground: Floats
+    vertical: Floats
+    lens: Lens | None = None
+
+    def __post_init__(self) -> None:
+        ground = np.asarray(self.ground, float)
+        vertical = np.asarray(self.vertical, float)
+        if not (np.isfinite(ground).all() and np.isfinite(vertical).all()):
+            raise CalibrationError(f"camera {self.name}", "ground, vertical", "a number that is not finite", "numbers")
+        condition = _condition(ground)
+        if condition > _SINGULAR:
+            raise CalibrationError(f"camera {self.name}", "ground", "a singular homography", "one that can be inverted")
+        handedness = float(np.linalg.det(np.column_stack([ground[:, :2], vertical])))
+        if abs(handedness) < 1e-12 * float(np.prod(np.linalg.norm(np.column_stack([ground[:, :2], vertical]), axis=0))):
+            raise CalibrationError(
+                f"camera {self.name}", "vertical", "a direction within the ground plane", "one that leaves it"
+            )
+        sign = float(np.sign(handedness))
+        object.__setattr__(self, "ground", ground * sign)
+        object.__setattr__(self, "vertical", vertical * sign)
+
+    @classmethod
+    def from_projection(cls, name: str, size: tuple[int, int], projection: Floats, lens: Lens | None = None) -> Camera:
+        """A camera from its 3x4 projection matrix [p1 p2 p3 p4] (metres to pixels): H = [p1 p2 p4], a v = p3."""
+        p = np.asarray(projection, float)
+        return cls(name, size, p[:, [0, 1, 3]], p[:, 2], lens)
+
+    @property
+    def projection(self) -> Floats:
+        """The 3x4 matrix [h1 h2 av h3], metres to (undistorted) pixels."""
+        return np.column_stack([self.ground[:, :2], self.vertical, self.ground[:, 2]])
+
+    @property
+    def centre(self) -> Floats:
+        """The camera's centre in metres (x, y, z), float64 (3,)."""
+        return np.asarray(-np.linalg.solve(self.projection[:, :3], self.projection[:, 3]))
+
+    def plane(self, height: float) -> Floats:
+        """Homography of the plane at `height` metres, float64 (3, 3)."""
+        return plane_homography(self.ground, self.vertical, height)
+
+    def project(self, ground: Floats, height: Floats | float) -> tuple[Floats, Flags]:
+        """Pixels of points in space.
+
+        Parameters
+        ----------
+        ground : float64 (..., 2)
+            Metres on the ground.
+        height : float64, broadcast with `ground[..., 0]`
+            Metres above it.
+
+        Returns
+        -------
+        float64 (..., 2), bool (...)
+            Pixels of the real image, and whether the point is in front of the camera and before the lens's fold. The
+            pixel may lie outside the image: see `inside`.
+        """
+        x, y = ground[..., 0], ground[..., 1]
+        x, y, z = np.broadcast_arrays(x, y, np.asarray(height, float))
+        image = np.stack([x, y, z, np.ones_like(x)], -1) @ self.projection.T
+        ahead = image[..., 2] > 0
+        pixel = image[..., :2] / np.where(ahead, image[..., 2], np.nan)[..., None]
+        if self.lens is None:
+            return pixel, ahead
+        bent, unfolded = self.lens.distort(pixel)
+        return bent, ahead & unfolded
+
+    def back_project(self, pixel: Floats, height: float = 0.0) -> Floats:
+        """Ground metres of the points at `height` that the pixels show, float64 (..., 2); nan above the horizon."""
+        ideal = np.asarray(pixel, float) if self.lens is None else self.lens.undistort(pixel)
+        inverse = np.linalg.inv(self.plane(height))
+        ground = np.concatenate([ideal, np.ones_like(ideal[..., :1])], -1) @ inverse.T
+        ahead = ground[..., 2] > 0
+        return np.asarray(ground[..., :2] / np.where(ahead, ground[..., 2], np.nan)[..., None])
+
+    def inside(self, pixel: Floats) -> Flags:
+        """Whether pixels lie on the image; pixel centres are integers, so it spans -0.5 .. size - 0.5."""
+        width, height = self.size
+        u, v = pixel[..., 0], pixel[..., 1]
+        return np.asarray((u >= -0.5) & (u < width - 0.5) & (v >= -0.5) & (v < height - 0.5))
+
+
+def _condition(ground: Floats) -> float:
+    """Condition number after scaling rows and columns, so that units alone do not make a matrix look singular."""
+    rows = np.abs(ground).max(axis=1, keepdims=True)
+    if not rows.all():
+        return float("inf")
+    scaled = ground / rows
+    columns = np.abs(scaled).max(axis=0, keepdims=True)
+    return float("inf") if not columns.all() else float(np.linalg.cond(scaled / columns))

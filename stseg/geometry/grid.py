@@ -1,0 +1,85 @@
+"""The cells that are asked: a rectangle of ground, and planes above it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stseg.arrays import Flags, Floats
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Ground cells and planes.
+
+    Attributes
+    ----------
+    x, y
+        Lower and upper bound of the ground rectangle, metres.
+    cell
+        Side of a cell, metres.
+    top
+        Height of the uppermost plane, metres.
+    planes
+        Number of planes, at linspace(0, top, planes).
+    polygon : float64 (n, 2) or None
+        The part of the rectangle that counts, metres; None for the whole.
+    """
+
+    x: tuple[float, float]
+    y: tuple[float, float]
+    cell: float = 0.10
+    top: float = 1.80
+    planes: int = 10
+    polygon: Floats | None = None
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """(plane, y, x)."""
+        return self.planes, _count(self.y, self.cell), _count(self.x, self.cell)
+
+    @property
+    def ground_x(self) -> Floats:
+        """Cell centres along x, metres, float64 (x,)."""
+        return self.x[0] + (np.arange(self.shape[2]) + 0.5) * self.cell
+
+    @property
+    def ground_y(self) -> Floats:
+        """Cell centres along y, metres, float64 (y,)."""
+        return self.y[0] + (np.arange(self.shape[1]) + 0.5) * self.cell
+
+    @property
+    def heights(self) -> Floats:
+        """Heights of the planes, metres, float64 (plane,)."""
+        return np.linspace(0.0, self.top, self.planes)
+
+    @property
+    def ground(self) -> Floats:
+        """Cell centres, metres, float64 (y, x, 2)."""
+        return np.stack(np.meshgrid(self.ground_x, self.ground_y), -1)
+
+    def cell_of(self, ground: Floats) -> Floats:
+        """Cell coordinates (x, y) of ground points; cell centres are integers, float64 (..., 2)."""
+        return (np.asarray(ground, float) - (self.x[0], self.y[0])) / self.cell - 0.5
+
+    def inside(self) -> Flags:
+        """Cells whose centre counts: inside the polygon where there is one, bool (y, x)."""
+        if self.polygon is None:
+            return np.ones(self.shape[1:], bool)
+        return inside_polygon(self.ground, self.polygon)
+
+
+def inside_polygon(ground: Floats, polygon: Floats) -> Flags:
+    """Even-odd rule for points (..., 2) and a closed polygon (n, 2), both metres; bool (...)."""
+    x, y = ground[..., 0], ground[..., 1]
+    within = np.zeros(x.shape, bool)
+    for (x0, y0), (x1, y1) in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
+        crosses = (y0 > y) != (y1 > y)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            within ^= crosses & (x < (x1 - x0) * (y - y0) / (y1 - y0) + x0)
+    return within
+
+
+def _count(bounds: tuple[float, float], cell: float) -> int:
+    return max(1, round((bounds[1] - bounds[0]) / cell))

@@ -1,0 +1,105 @@
+"""The tables that every tracker returns and every writer takes.
+
+Each is a structured array; positions are metres on the ground, boxes pixels of the real image, frames count from 0 at
+the recording's first frame, track ids from 1.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from stseg.arrays import Rows
+
+TRAJECTORY = np.dtype(
+    [
+        ("frame", "<i8"),
+        ("id", "<i8"),
+        ("x", "<f8"),  # metres, ground position
+        ("y", "<f8"),
+        ("z", "<f8"),  # always 0: the ground; viewers of trajectories ask for it
+        ("xx", "<f8"),  # covariance of the position, square metres
+        ("xy", "<f8"),
+        ("yy", "<f8"),
+        ("height", "<f4"),  # metres
+        ("extent", "<f4"),  # ground area of the labelled cells, square metres
+        ("score", "<f4"),  # log-odds of a person, nats
+        ("views", "u1"),  # number of views that see the place
+    ]
+)
+"""One row per person and frame."""
+
+TRACK = np.dtype(
+    [
+        ("id", "<i8"),
+        ("first", "<i8"),  # frames, both included
+        ("last", "<i8"),
+        ("frames", "<i8"),  # number of frames with a position
+        ("score", "<f4"),  # mean log-odds, nats
+        ("height", "<f4"),  # median, metres
+    ]
+)
+"""One row per track."""
+
+BOX = np.dtype(
+    [
+        ("frame", "<i8"),
+        ("id", "<i8"),
+        ("view", "<i4"),
+        ("left", "<f4"),  # pixels
+        ("top", "<f4"),
+        ("width", "<f4"),
+        ("height", "<f4"),
+    ]
+)
+"""A track's box in one view: around its localisation over all planes."""
+
+EVENT = np.dtype([("frame", "<i8"), ("kind", "S12"), ("id", "<i8"), ("other", "<i8"), ("reason", "S96")])
+"""birth, death, merge, split, hand-over, dropped; `other` is the other track, 0 for none."""
+
+CANDIDATE = np.dtype(
+    [
+        ("frame", "<i8"),
+        ("x", "<f8"),
+        ("y", "<f8"),
+        ("xx", "<f8"),
+        ("xy", "<f8"),
+        ("yy", "<f8"),
+        ("height", "<f4"),
+        ("status", "u1"),  # 1 true, 0 ghost
+        ("evidence", "<f4"),  # what all views and the prior say, nats; below 0 speaks for a ghost
+        ("origin", "S8"),  # where the candidate came from: volume or track
+    ]
+)
+"""One row per candidate and frame, true or ghost. In the run file each row also has one column a view."""
+
+
+@dataclass(frozen=True)
+class Tracks:
+    """What a tracker found.
+
+    Attributes
+    ----------
+    trajectory : TRAJECTORY (n,)
+        Sorted by frame, then id.
+    boxes : BOX (m,)
+    events : EVENT (k,)
+    """
+
+    trajectory: Rows
+    boxes: Rows = field(default_factory=lambda: np.zeros(0, BOX))
+    events: Rows = field(default_factory=lambda: np.zeros(0, EVENT))
+
+    def summary(self) -> Rows:
+        """One TRACK row per id, sorted by id."""
+        ids, inverse = np.unique(self.trajectory["id"], return_inverse=True)
+        rows = np.zeros(len(ids), TRACK)
+        rows["id"] = ids
+        order = np.argsort(inverse, kind="stable")
+        bounds = np.searchsorted(inverse[order], np.arange(len(ids) + 1))
+        for row, start, stop in zip(rows, bounds[:-1], bounds[1:], strict=True):
+            own = self.trajectory[order[start:stop]]
+            row["first"], row["last"], row["frames"] = own["frame"].min(), own["frame"].max(), len(own)
+            row["score"], row["height"] = own["score"].mean(), np.median(own["height"])
+        return rows
