@@ -52,8 +52,9 @@ class Camera:
         condition = _condition(ground)
         if condition > _SINGULAR:
             raise CalibrationError(f"camera {self.name}", "ground", "a singular homography", "one that can be inverted")
-        handedness = float(np.linalg.det(np.column_stack([ground[:, :2], vertical])))
-        if abs(handedness) < 1e-12 * float(np.prod(np.linalg.norm(np.column_stack([ground[:, :2], vertical]), axis=0))):
+        frame = np.column_stack([ground[:, :2], vertical])
+        handedness = float(np.linalg.det(frame))
+        if abs(handedness) <= 1e-12 * float(np.prod(np.linalg.norm(frame, axis=0))):
             raise CalibrationError(
                 f"camera {self.name}", "vertical", "a direction within the ground plane", "one that leaves it"
             )

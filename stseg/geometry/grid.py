@@ -42,12 +42,12 @@ class Grid:
     @property
     def ground_x(self) -> Floats:
         """Cell centres along x, metres, float64 (x,)."""
-        return self.x[0] + (np.arange(self.shape[2]) + 0.5) * self.cell
+        return np.asarray(self.x[0] + (np.arange(self.shape[2]) + 0.5) * self.cell, float)
 
     @property
     def ground_y(self) -> Floats:
         """Cell centres along y, metres, float64 (y,)."""
-        return self.y[0] + (np.arange(self.shape[1]) + 0.5) * self.cell
+        return np.asarray(self.y[0] + (np.arange(self.shape[1]) + 0.5) * self.cell, float)
 
     @property
     def heights(self) -> Floats:

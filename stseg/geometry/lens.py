@@ -57,15 +57,20 @@ class Lens:
         return self._pixel(self._bend(ray)), radius < self.fold
 
     def undistort(self, pixel: Floats) -> Floats:
-        """The inverse of `distort` by Newton's method on the ray, float64 (..., 2)."""
+        """The inverse of `distort` by Newton's method on the ray, float64 (..., 2); nan where no ray before the fold
+        comes to the pixel, as in the corners of a strong barrel's image.
+        """
         target = self._ray(pixel)
         ray = target
-        for _ in range(_UNDISTORT_ROUNDS):
-            step = np.linalg.solve(self._slope(ray), (target - self._bend(ray))[..., None])[..., 0]
-            ray = ray + step
-            if np.abs(step).max(initial=0.0) < 1e-13:
-                break
-        return self._pixel(ray)
+        with np.errstate(all="ignore"):  # rays beyond the fold may run away; they end as nan
+            for _ in range(_UNDISTORT_ROUNDS):
+                step = _solve(self._slope(ray), target - self._bend(ray))
+                ray = ray + step
+                if np.abs(step).max(initial=0.0) < 1e-13:
+                    break
+            miss = np.abs(target - self._bend(ray)).max(axis=-1)
+            unfolded = (miss < 1e-9) & (np.hypot(ray[..., 0], ray[..., 1]) < self.fold)
+        return self._pixel(np.where(unfolded[..., None], ray, np.nan))
 
     def _ray(self, pixel: Floats) -> Floats:
         offset = np.asarray(pixel, float) - self.matrix[:2, 2]
@@ -103,6 +108,13 @@ class Lens:
             ],
             -2,
         )
+
+
+def _solve(slope: Floats, miss: Floats) -> Floats:
+    """Cramer's rule for (..., 2, 2) and (..., 2): unlike LAPACK, a singular point spoils itself alone."""
+    (a, b), (c, d) = np.moveaxis(slope, (-2, -1), (0, 1))
+    x, y = miss[..., 0], miss[..., 1]
+    return np.asarray(np.stack([d * x - b * y, a * y - c * x], -1) / (a * d - b * c)[..., None])
 
 
 def _fold(distortion: Floats) -> float:

@@ -1,0 +1,145 @@
+"""A TOML table read strictly: every value is checked, unknown keys are refused, every error says where it is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+
+from stseg.arrays import Floats
+from stseg.errors import RigError
+
+ANY = -1
+"""In a shape: any number of rows."""
+
+T = TypeVar("T", bound=str)
+
+
+@dataclass(frozen=True)
+class Table:
+    """One table of a TOML file.
+
+    Attributes
+    ----------
+    file
+        The file, for errors.
+    place
+        Where in the file the table stands (`camera[1] (cam2)`); empty for the file itself.
+    values
+        What tomllib read there.
+    """
+
+    file: Path
+    place: str
+    values: Mapping[str, object]
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.values
+
+    def key(self, name: str) -> str:
+        """The key's full name."""
+        return f"{self.place}.{name}" if self.place else name
+
+    def error(self, name: str, found: object, expected: str) -> RigError:
+        """An error at the key `name`."""
+        return RigError(self.file, self.key(name), found, expected)
+
+    def allow(self, *names: str) -> None:
+        """Refuse every key but these, with a suggestion."""
+        for name in self.values:
+            if name not in names:
+                close = get_close_matches(name, names, 1)
+                hint = f"; did you mean {close[0]}?" if close else ""
+                raise self.error(name, "an unknown key", f"one of {', '.join(names)}{hint}")
+
+    def text(self, name: str) -> str:
+        """A string that is not empty."""
+        value = self._get(name, "a text")
+        if not isinstance(value, str) or not value.strip():
+            raise self.error(name, _shown(value), "a text")
+        return value
+
+    def choice(self, name: str, choices: Iterable[T]) -> T:
+        """One of a few strings."""
+        choices = tuple(choices)
+        expected = f"one of {', '.join(choices)}"
+        value = self._get(name, expected)
+        for choice in choices:
+            if value == choice:
+                return choice
+        close = get_close_matches(str(value), choices, 1)
+        raise self.error(name, _shown(value), expected + (f"; did you mean {close[0]}?" if close else ""))
+
+    def integer(self, name: str, least: int | None = None) -> int:
+        """A whole number, at least `least`."""
+        expected = "a whole number" if least is None else f"a whole number, at least {least}"
+        value = self._get(name, expected)
+        if not isinstance(value, int) or isinstance(value, bool) or (least is not None and value < least):
+            raise self.error(name, _shown(value), expected)
+        return value
+
+    def positive(self, name: str) -> float:
+        """A finite number above 0."""
+        number = float(self.numbers(name))
+        if number <= 0:
+            raise self.error(name, repr(number), "a number above 0")
+        return number
+
+    def numbers(self, name: str, *shape: int) -> Floats:
+        """Finite numbers in nested lists of this shape (none: one number), float64; `ANY` stands for any length."""
+        expected = _in_words(shape)
+        value = self._get(name, expected)
+        if not _has_shape(value, shape):
+            raise self.error(name, _shown(value), expected)
+        array = np.array(value, float)
+        if not np.isfinite(array).all():
+            raise self.error(name, f"{array[~np.isfinite(array)][0]} in it", f"{expected}, all finite")
+        return array
+
+    def table(self, name: str) -> Table:
+        """The table below this key."""
+        value = self._get(name, "a table")
+        if not isinstance(value, dict):
+            raise self.error(name, _shown(value), "a table")
+        return Table(self.file, self.key(name), value)
+
+    def tables(self, name: str) -> tuple[Table, ...]:
+        """The tables of an array of tables, at least one, counted from 0."""
+        expected = f"at least one [[{name}]]"
+        value = self._get(name, expected)
+        if not isinstance(value, list) or not value or not all(isinstance(row, dict) for row in value):
+            raise self.error(name, _shown(value), expected)
+        return tuple(Table(self.file, f"{self.key(name)}[{index}]", row) for index, row in enumerate(value))
+
+    def _get(self, name: str, expected: str) -> object:
+        if name not in self.values:
+            raise self.error(name, "nothing", expected)
+        return self.values[name]
+
+
+def _has_shape(value: object, shape: tuple[int, ...]) -> bool:
+    if not shape:
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            return False
+        return isinstance(value, float) or abs(value) < 2**1000  # TOML's integers may be too large for a float
+    if not isinstance(value, list) or (shape[0] != ANY and len(value) != shape[0]):
+        return False
+    return all(_has_shape(row, shape[1:]) for row in value)
+
+
+def _in_words(shape: tuple[int, ...]) -> str:
+    if not shape:
+        return "a number"
+    if len(shape) == 1:
+        return "numbers" if shape[0] == ANY else f"{shape[0]} numbers"
+    rows = "rows" if shape[0] == ANY else f"{shape[0]} rows"
+    return f"{rows} of {_in_words(shape[1:])}"
+
+
+def _shown(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."

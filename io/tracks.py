@@ -1,0 +1,155 @@
+"""Tables of ground positions as CSV: `frame,id,x,y` with a header, metres, one row per person and frame."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from stseg.arrays import Flags, Floats, Ints, Rows
+from stseg.errors import FormatError, OutputError
+
+POSITION = np.dtype([("frame", "<i8"), ("id", "<i8"), ("x", "<f8"), ("y", "<f8"), ("flag", "<i8")])
+"""One row per person and frame: metres on the ground; a flag other than 0 marks a row not to be relied on."""
+
+_NEEDED = ("frame", "id", "x", "y")
+_WRITTEN = {
+    "frame": "%d",
+    "id": "%d",
+    "x": "%.4f",
+    "y": "%.4f",
+    "height": "%.3f",
+    "score": "%.3f",
+    "xx": "%.4g",
+    "xy": "%.4g",
+    "yy": "%.4g",
+    "views": "%d",
+}
+
+
+def read_tracks_csv(path: Path) -> Rows:
+    """Read tracks or truth.
+
+    Further columns are passed over. Ids that are not all whole numbers are numbered from 1 in order of appearance.
+
+    Returns
+    -------
+    POSITION (n,)
+        In the order of the file; flag is 0 where there is no such column.
+
+    Raises
+    ------
+    FormatError
+        Where the file cannot be read, a column is missing, a cell is not a (whole, finite) number, or an id occurs
+        twice in a frame; it names the line and the column.
+    """
+    sheet = _read_sheet(path)
+    table = np.zeros(len(sheet.lines), POSITION)
+    table["frame"] = sheet.whole("frame")
+    table["id"] = sheet.identities()
+    table["x"], table["y"] = sheet.numbers("x"), sheet.numbers("y")
+    if "flag" in sheet.cells:
+        table["flag"] = sheet.whole("flag", empty="0")
+    sheet.refuse(_repeats(table), "id", "an id once a frame", "{} again in the same frame")
+    return table
+
+
+def write_tracks_csv(path: Path, trajectory: Rows) -> None:
+    """Write a TRAJECTORY table as frame, id, x, y, height, score, xx, xy, yy, views; positions to 0.1 mm."""
+    _write(path, trajectory, _WRITTEN)
+
+
+def write_truth_csv(path: Path, truth: Rows) -> None:
+    """Write a POSITION table as frame, id, x, y, flag; positions to 0.1 mm."""
+    _write(path, truth, {name: _WRITTEN.get(name, "%d") for name in (*_NEEDED, "flag")})
+
+
+@dataclass(frozen=True, slots=True)
+class _Sheet:
+    """The cells of a CSV file by column, and the line that each row stands on."""
+
+    path: Path
+    lines: list[int]
+    cells: dict[str, list[str]]
+
+    def numbers(self, column: str, empty: str = "") -> Floats:
+        """A column of finite numbers, float64 (n,); an empty cell reads as `empty`."""
+        values = np.array([_number(cell or empty) for cell in self.cells[column]], float)
+        self.refuse(~np.isfinite(values), column, "a finite number")
+        return values
+
+    def whole(self, column: str, empty: str = "") -> Ints:
+        """A column of whole numbers, int64 (n,)."""
+        values = self.numbers(column, empty)
+        self.refuse((values != np.floor(values)) | (np.abs(values) > 2**53), column, "a whole number")
+        return values.astype(np.int64)
+
+    def identities(self) -> Ints:
+        """The column id, int64 (n,)."""
+        cells = self.cells["id"]
+        self.refuse(np.array([not cell for cell in cells], bool), "id", "an id")
+        try:
+            values = np.array([int(cell) for cell in cells], np.int64)
+        except (ValueError, OverflowError):
+            values = None
+        # 07 beside 7 are two names: only plain numbers may stand for themselves
+        if values is None or [str(value) for value in values.tolist()] != cells:
+            first = {cell: number for number, cell in enumerate(dict.fromkeys(cells), start=1)}
+            values = np.array([first[cell] for cell in cells], np.int64)
+        return values
+
+    def refuse(self, wrong: Flags, column: str, expected: str, found: str = "{}") -> None:
+        """Raise a FormatError that names the first wrong row, if there is one."""
+        if wrong.any():
+            row = int(np.argmax(wrong))
+            cell = repr(self.cells[column][row])
+            raise FormatError(self.path, f"line {self.lines[row]}, column {column}", found.format(cell), expected)
+
+
+def _read_sheet(path: Path) -> _Sheet:
+    try:
+        with Path(path).open(newline="", encoding="utf-8-sig") as file:
+            reader = csv.reader(file)
+            header = [name.strip() for name in next(reader, [])]
+            rows = [(reader.line_num, row) for row in reader if row]
+    except OSError as error:
+        raise FormatError(path, "", error.strerror or error, "a CSV file that can be read") from error
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise FormatError(path, "", "something that is not text", "a CSV file") from error
+    if missing := [name for name in _NEEDED if name not in header]:
+        found = ",".join(header) or "nothing"
+        raise FormatError(path, "header", found, f"columns {','.join(_NEEDED)} (no {', '.join(missing)})")
+    for line, row in rows:
+        if len(row) != len(header):
+            raise FormatError(path, f"line {line}", f"{len(row)} cells", f"{len(header)}, as in the header")
+    wanted = [name for name in (*_NEEDED, "flag") if name in header]
+    cells = {name: [row[header.index(name)].strip() for _, row in rows] for name in wanted}
+    return _Sheet(Path(path), [line for line, _ in rows], cells)
+
+
+def _number(cell: str) -> float:
+    try:
+        return float(cell)
+    except ValueError:
+        return np.nan
+
+
+def _repeats(table: Rows) -> Flags:
+    """Rows whose frame and id stand in an earlier row, bool (n,)."""
+    order = np.lexsort((table["id"], table["frame"]))
+    frame, identity = table["frame"][order], table["id"][order]
+    repeats = np.zeros(len(table), bool)
+    repeats[order[1:]] = (frame[1:] == frame[:-1]) & (identity[1:] == identity[:-1])
+    return repeats
+
+
+def _write(path: Path, table: Rows, columns: dict[str, str]) -> None:
+    """Write the columns, each in its format."""
+    try:
+        with Path(path).open("w", newline="", encoding="utf-8") as file:
+            file.write(",".join(columns) + "\n")
+            np.savetxt(file, table[list(columns)], fmt=",".join(columns.values()))
+    except OSError as error:
+        raise OutputError(path, "", error.strerror or error, "a place that can be written") from error

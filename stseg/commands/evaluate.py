@@ -1,0 +1,155 @@
+"""`stseg evaluate`: scores of a run against truth."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from cyclopts import Parameter
+from rich.console import Console
+from rich.table import Table
+
+from stseg.arrays import Ints, Rows
+from stseg.errors import ConfigError
+from stseg.evaluation import Scores
+from stseg.evaluation import evaluate as score
+from stseg.evaluation.sequence import Area
+from stseg.io.tracks import read_tracks_csv
+
+
+def evaluate(
+    tracks: Path,
+    truth: Path,
+    /,
+    *,
+    gate: float = 0.5,
+    frames: str | None = None,
+    area: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
+    ignore_flagged: Annotated[bool, Parameter(negative="")] = False,
+    as_json: Annotated[bool, Parameter(name="--json", negative="")] = False,
+) -> None:
+    """Score tracks on the ground against the truth.
+
+    Example: stseg evaluate night.h5 truth.csv --frames 0:136 --area=1.9,-0.3,6.2,3.5
+
+    Every frame of the truth counts, also one in which nothing was found. Percentages: MODA, MODP, precision and recall
+    judge each frame by itself; MOTA, IDF1 and HOTA judge who is who as well. HOTA asks for places within the gate, and
+    "2 gates" is HOTA within twice the gate. MT and ML are the people mostly tracked (over 80 % of their frames) and
+    mostly lost (under 20 %).
+
+    Parameters
+    ----------
+    tracks
+        A run file (.h5), or CSV with a header and the columns frame,id,x,y (metres).
+    truth
+        CSV with the same columns; a column flag may mark rows that are not to be relied on.
+    gate
+        Metres within which a track matches a person.
+    frames
+        The frames to judge, A:B without B, or a list A,B,C. By default those of the truth.
+    area
+        x0,y0,x1,y1 in metres: people outside, and what matches them, are not judged.
+    ignore_flagged
+        Do not judge rows of the truth whose flag is not 0, nor what matches them.
+    as_json
+        Print one JSON object.
+    """
+    asked_frames = None if frames is None else _frames(frames)
+    asked_area = None if area is None else _area(area)
+    scores = score(read_tracks_csv(truth), _read(tracks), gate, asked_area, asked_frames, ignore_flagged)
+    if as_json:
+        print(json.dumps(scores.as_dict(), indent=1))
+    else:
+        Console(highlight=False).print(_table(scores))
+
+
+def _read(tracks: Path) -> Rows:
+    if tracks.suffix.lower() not in (".h5", ".hdf5"):
+        return read_tracks_csv(tracks)
+    from stseg.io.runs import read_trajectory
+
+    return read_trajectory(tracks)
+
+
+def _frames(text: str) -> Ints:
+    try:
+        if ":" in text:
+            first, end = (int(part) for part in text.split(":"))
+            numbers = np.arange(first, end)
+        else:
+            numbers = np.array([int(part) for part in text.split(",")])
+    except ValueError:
+        numbers = np.zeros(0, int)
+    if not len(numbers):
+        raise ConfigError("command line", "--frames", repr(text), "A:B with B above A, or a list A,B,C")
+    return numbers.astype(np.int64)
+
+
+def _area(text: str) -> Area:
+    expected = "x0,y0,x1,y1 in metres with x0 below x1 and y0 below y1"
+    try:
+        x0, y0, x1, y1 = (float(part) for part in text.split(","))
+    except ValueError as error:
+        raise ConfigError("command line", "--area", repr(text), expected) from error
+    if not (x0 < x1 and y0 < y1):
+        raise ConfigError("command line", "--area", repr(text), expected)
+    return x0, y0, x1, y1
+
+
+def _table(scores: Scores) -> Table:
+    """Five short rows; what the figures were taken on stands above them."""
+    place = (
+        "all the ground" if scores.area is None else "x {:g} .. {:g}, y {:g} .. {:g} m".format(*_by_axis(scores.area))
+    )
+    title = f"{scores.frames} frames, gate {scores.gate:g} m, {place}"
+    table = Table(title=title, title_justify="left", show_header=False, box=None, padding=(0, 2, 0, 0))
+    table.add_row(
+        "found",
+        f"MODA {_percent(scores.moda)}",
+        f"precision {_percent(scores.precision)}",
+        f"recall {_percent(scores.recall)}",
+        f"MODP {_percent(scores.modp)}",
+    )
+    table.add_row(
+        "followed",
+        f"MOTA {_percent(scores.mota)}",
+        f"IDF1 {_percent(scores.idf1)}",
+        f"HOTA {_percent(scores.hota)}",
+        f"2 gates {_percent(scores.hota_2gate)}",
+    )
+    table.add_row(
+        "placed",
+        f"mean {_metres(scores.location_mean)}",
+        f"median {_metres(scores.location_median)}",
+        f"MOTP {_metres(scores.motp)}",
+    )
+    table.add_row(
+        f"people {scores.people}",
+        f"MT {scores.mostly_tracked}",
+        f"ML {scores.mostly_lost}",
+        f"switches {scores.switches}",
+        f"fragments {scores.fragments}",
+    )
+    table.add_row(
+        f"tracks {scores.tracks}",
+        f"misses {scores.misses}",
+        f"false alarms {scores.false_alarms}",
+        f"false tracks {scores.false_tracks}",
+        "" if scores.false_track_frames is None else f"mean {scores.false_track_frames:.1f} frames",
+    )
+    return table
+
+
+def _by_axis(area: Area) -> tuple[float, float, float, float]:
+    x0, y0, x1, y1 = area
+    return x0, x1, y0, y1
+
+
+def _percent(value: float | None) -> str:
+    return "-" if value is None else f"{value:.1f} %"
+
+
+def _metres(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3f} m"

@@ -1,0 +1,80 @@
+"""HOTA: detection and association in equal parts, over nineteen degrees of strictness.
+
+Source: Luiten et al., "HOTA: a higher order metric for evaluating multi-object tracking", IJCV 129, 2021.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from stseg.arrays import Floats, Ints
+from stseg.evaluation.matching import similarity
+from stseg.evaluation.sequence import Sequence
+
+ALPHAS = np.arange(0.05, 0.99, 0.05)
+"""The least similarity of a match, from lenient to strict."""
+_ROUNDING = float(np.finfo(float).eps)
+
+
+def hota(sequence: Sequence, radius: float) -> float:
+    """Mean over alpha of sqrt(DetA AssA), 0..1; 0 where there are no people or no tracks.
+
+    The similarity of a person and a track falls from 1 to 0 over `radius` metres.
+    """
+    if not (sequence.people and sequence.tracks):
+        return 0.0
+    pair, alike = _matches(sequence, radius)
+    return float(np.mean([_hota_at(alpha, sequence, pair, alike) for alpha in ALPHAS]))
+
+
+def _hota_at(alpha: float, sequence: Sequence, pair: Ints, alike: Floats) -> float:
+    """sqrt(DetA AssA) at one alpha, from the matches' pair number and similarity."""
+    pairs, together = np.unique(pair[alike >= alpha - _ROUNDING], return_counts=True)
+    hits = together.sum()
+    if not hits:
+        return 0.0
+    either = _frames_of(pairs, sequence) - together
+    detection = hits / (sequence.truths + sequence.detections - hits)
+    association = (together * (together / either)).sum() / hits
+    return float(np.sqrt(detection * association))
+
+
+def _matches(sequence: Sequence, radius: float) -> tuple[Ints, Floats]:
+    """Pair number and similarity of every match, where matches favour pairs that agree over the whole sequence."""
+    alike = [similarity(frame.distance, radius) for frame in sequence.frames]
+    places = [np.nonzero(one) for one in alike]
+    numbers = [
+        frame.person[rows] * sequence.tracks + frame.track[columns]
+        for frame, (rows, columns) in zip(sequence.frames, places, strict=True)
+    ]
+    shares = [_shares(one)[place] for one, place in zip(alike, places, strict=True)]
+    aligned = np.split(_alignment(sequence, numbers, shares), np.cumsum([len(number) for number in numbers])[:-1])
+
+    pairs, similarities = [], []
+    for one, place, number, alignment in zip(alike, places, numbers, aligned, strict=True):
+        score, pair = np.zeros(one.shape), np.zeros(one.shape, np.int64)
+        score[place], pair[place] = alignment * one[place], number
+        chosen = linear_sum_assignment(-score)
+        pairs.append(pair[chosen])
+        similarities.append(one[chosen])
+    return np.concatenate(pairs), np.concatenate(similarities)
+
+
+def _alignment(sequence: Sequence, numbers: list[Ints], shares: list[Floats]) -> Floats:
+    """How well person and track agree over the sequence (a Jaccard index, 0..1), for every entry of `numbers`."""
+    pairs, index = np.unique(np.concatenate(numbers), return_inverse=True)
+    agreed = np.bincount(index, np.concatenate(shares), minlength=len(pairs))
+    return np.asarray((agreed / (_frames_of(pairs, sequence) - agreed))[index])
+
+
+def _shares(alike: Floats) -> Floats:
+    """Each similarity as a share of all that its person and its track have in the frame, float64 (n, m)."""
+    rivals = alike.sum(axis=0)[None] + alike.sum(axis=1)[:, None] - alike
+    return np.asarray(np.divide(alike, rivals, out=np.zeros_like(alike), where=rivals > _ROUNDING))
+
+
+def _frames_of(pairs: Ints, sequence: Sequence) -> Ints:
+    """Frames of the person plus frames of the track, for pair numbers person * tracks + track."""
+    person, track = np.divmod(pairs, sequence.tracks)
+    return np.asarray(sequence.person_frames[person] + sequence.track_frames[track])

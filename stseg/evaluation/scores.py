@@ -1,0 +1,203 @@
+"""Every score of one run."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from stseg.arrays import Floats, Ints, Rows
+from stseg.errors import ConfigError
+from stseg.evaluation.clear import (
+    Pairs,
+    false_tracks,
+    fragments,
+    match_afresh,
+    match_keeping,
+    matched_share,
+    switches,
+)
+from stseg.evaluation.hota import hota
+from stseg.evaluation.identity import idf1
+from stseg.evaluation.sequence import Area, Sequence, line_up
+
+
+@dataclass(frozen=True, slots=True)
+class Scores:
+    """How tracks compare with the truth; None where there is nothing to divide by.
+
+    Attributes
+    ----------
+    gate, area, frames
+        What the figures were taken on: gate in metres, ground rectangle in metres, number of frames.
+    truths, detections
+        Rows of the truth and of the tracks that were judged.
+    people, tracks
+        Ids in them.
+    hits, false_alarms, misses
+        Matches of each frame by itself, detections and truths without one.
+    moda, modp, precision, recall
+        Percent, from those matches; MODP is the mean of 1 - distance / gate.
+    location_mean, location_median
+        Distance of those matches, metres.
+    mota
+        Percent, from CLEAR's matches.
+    motp
+        Mean distance of CLEAR's matches, metres.
+    idf1, hota, hota_2gate
+        Percent. HOTA's similarity falls to 0 at the gate; hota_2gate's at twice the gate.
+    switches, fragments
+        How often a person's track changes; how often a person is found again after a gap.
+    mostly_tracked, mostly_lost
+        People matched in more than 80 % and in less than 20 % of their frames.
+    false_tracks, false_track_frames
+        Tracks matched in at most half of their frames, and the mean number of their frames.
+    """
+
+    gate: float
+    area: Area | None
+    frames: int
+    truths: int
+    detections: int
+    people: int
+    tracks: int
+    hits: int
+    false_alarms: int
+    misses: int
+    moda: float | None
+    modp: float | None
+    precision: float | None
+    recall: float | None
+    location_mean: float | None
+    location_median: float | None
+    mota: float | None
+    motp: float | None
+    idf1: float
+    hota: float
+    hota_2gate: float
+    switches: int
+    fragments: int
+    mostly_tracked: int
+    mostly_lost: int
+    false_tracks: int
+    false_track_frames: float | None
+
+    def as_dict(self) -> dict[str, object]:
+        """The figures under the names that papers use, percent to two decimals and metres to four."""
+        return {
+            "frames": self.frames,
+            "n_truth": self.truths,
+            "n_det": self.detections,
+            "n_people": self.people,
+            "n_tracks": self.tracks,
+            "TP": self.hits,
+            "FP": self.false_alarms,
+            "FN": self.misses,
+            "MODA": _rounded(self.moda, 2),
+            "MODP": _rounded(self.modp, 2),
+            "precision": _rounded(self.precision, 2),
+            "recall": _rounded(self.recall, 2),
+            "MOTA": _rounded(self.mota, 2),
+            "MOTP_m": _rounded(self.motp, 4),
+            "IDF1": _rounded(self.idf1, 2),
+            "HOTA": _rounded(self.hota, 2),
+            "HOTA_2gate": _rounded(self.hota_2gate, 2),
+            "IDSW": self.switches,
+            "MT": self.mostly_tracked,
+            "ML": self.mostly_lost,
+            "Frag": self.fragments,
+            "false_tracks": self.false_tracks,
+            "false_track_mean_frames": _rounded(self.false_track_frames, 4),
+            "location_error_m": {"mean": _rounded(self.location_mean, 4), "median": _rounded(self.location_median, 4)},
+            "gate_m": self.gate,
+            "area": None if self.area is None else list(self.area),
+            "HOTA_similarity": "1 - d/gate",
+        }
+
+
+def evaluate(
+    truth: Rows,
+    trajectory: Rows,
+    gate: float = 0.5,
+    area: Area | None = None,
+    frames: Ints | None = None,
+    ignore_flagged: bool = False,
+) -> Scores:
+    """Score ground tracks against the truth.
+
+    Parameters
+    ----------
+    truth, trajectory
+        Tables with the columns frame, id, x, y (metres), such as TRAJECTORY; the truth may have a column flag. The ids
+        of the two need not correspond.
+    gate
+        Metres within which a track matches a person.
+    area
+        Lower x, lower y, upper x, upper y, metres: people outside are not judged, nor the tracks matched to them, nor
+        unmatched tracks outside.
+    frames : int64, optional
+        The frames to judge; by default those of the truth. A frame in which nothing was found counts.
+    ignore_flagged
+        Treat rows of the truth whose flag is not 0 as people outside the area.
+
+    Raises
+    ------
+    ConfigError
+        Where the gate is not above 0 or the area is turned inside out.
+    FormatError
+        Where a position is not finite or an id occurs twice in a frame.
+    """
+    if not (math.isfinite(gate) and gate > 0):
+        raise ConfigError("evaluation", "gate", gate, "metres, above 0")
+    if area is not None and not (area[0] < area[2] and area[1] < area[3]):
+        raise ConfigError("evaluation", "area", area, "x0, y0, x1, y1 in metres with x0 below x1 and y0 below y1")
+    sequence = line_up(truth, trajectory, gate, area, frames, ignore_flagged)
+    return _score(sequence, match_afresh(sequence, gate), match_keeping(sequence, gate), gate, area)
+
+
+def _score(sequence: Sequence, afresh: Pairs, kept: Pairs, gate: float, area: Area | None) -> Scores:
+    truths, detections, hits, swaps = sequence.truths, sequence.detections, len(afresh), switches(kept)
+    share, false = matched_share(kept, sequence), false_tracks(kept, sequence)
+    return Scores(
+        gate=gate,
+        area=area,
+        frames=len(sequence.frames),
+        truths=truths,
+        detections=detections,
+        people=sequence.people,
+        tracks=sequence.tracks,
+        hits=hits,
+        false_alarms=detections - hits,
+        misses=truths - hits,
+        # 1 - (misses + false alarms) / truths = (2 hits - detections) / truths
+        moda=_percent(2 * hits - detections, truths),
+        modp=_percent(float((1 - afresh.distance / gate).sum()), hits),
+        precision=_percent(hits, detections),
+        recall=_percent(hits, truths),
+        location_mean=_mean(afresh.distance),
+        location_median=float(np.median(afresh.distance)) if hits else None,
+        mota=_percent(2 * len(kept) - detections - swaps, truths),
+        motp=_mean(kept.distance),
+        idf1=100 * idf1(sequence, gate),
+        hota=100 * hota(sequence, gate),
+        hota_2gate=100 * hota(sequence, 2 * gate),
+        switches=swaps,
+        fragments=fragments(kept),
+        mostly_tracked=int((share > 0.8).sum()),
+        mostly_lost=int((share < 0.2).sum()),
+        false_tracks=int(false.sum()),
+        false_track_frames=_mean(sequence.track_frames[false]),
+    )
+
+
+def _percent(part: float, whole: int) -> float | None:
+    return 100.0 * part / whole if whole else None
+
+
+def _mean(values: Floats | Ints) -> float | None:
+    return float(values.mean()) if len(values) else None
+
+
+def _rounded(value: float | None, decimals: int) -> float | None:
+    return None if value is None else round(value, decimals)

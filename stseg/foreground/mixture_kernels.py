@@ -1,0 +1,130 @@
+"""The two passes of the Gaussian mixture over a frame: what shows foreground, and what is learned from it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from stseg.accelerate import kernel
+from stseg.arrays import Bytes, Floats, Singles
+
+_UNIFORM = 1.0 / 256.0**3  # density of a colour of which nothing is known, per cubed grey level
+_CERTAIN = 5.0  # nats; beyond it one pixel would outvote all its neighbours
+_FAR = 50.0  # half a squared Mahalanobis distance; beyond it the density is below every constant here
+_WHITE, _ONE, _HALF, _THIRD = np.float32(255), np.float32(1), np.float32(0.5), np.float32(1 / 3)
+
+
+@kernel
+def evaluate(
+    image: Bytes,
+    gain: Floats,
+    mean: Singles,
+    variance: Singles,
+    weight: Singles,
+    share: float,
+    foreground: float,
+    unexplained: float,
+    shadow: float,
+    darkest: float,
+    mimicry: float,
+    log_odds: Singles,
+) -> None:
+    """Fill `log_odds` (v, u) with the log-odds of foreground; the densities are those in `stseg.foreground.mixture`."""
+    known = 1.0 - unexplained
+    doubt = foreground * math.exp(_CERTAIN) / ((1.0 - foreground) * known * (1.0 - shadow))
+    g0, g1, g2 = gain[0], gain[1], gain[2]
+    for v in range(image.shape[0]):
+        for u in range(image.shape[1]):
+            x0, x1, x2 = float(image[v, u, 0]), float(image[v, u, 1]), float(image[v, u, 2])
+            lit, dimmed = 0.0, 0.0
+            certain = False
+            for k in range(weight.shape[2]):
+                w = float(weight[v, u, k])
+                if w < share:
+                    continue
+                m0 = min(g0 * mean[v, u, k, 0], 255.0)
+                m1 = min(g1 * mean[v, u, k, 1], 255.0)
+                m2 = min(g2 * mean[v, u, k, 2], 255.0)
+                brightness = m0 * m0 + m1 * m1 + m2 * m2 + 1e-9
+                area = 2.0 * math.pi * variance[v, u, k]
+                span = math.sqrt(area)
+                line = span + (1.0 - darkest) * math.sqrt(brightness)
+                decay = math.pi / area
+                from_mean = decay * ((x0 - m0) ** 2 + (x1 - m1) ** 2 + (x2 - m2) ** 2)
+                # exp(-z) >= 1 - z, so most background is known for certain before any exponential
+                most = _UNIFORM * area * span * line + 2.0 * mimicry * w * span
+                if w > 1.0 - share and doubt * most <= w * (1.0 - from_mean) * line:
+                    certain = True
+                    break
+                ratio = min(max((x0 * m0 + x1 * m1 + x2 * m2) / brightness, darkest), 1.0)
+                from_ray = decay * ((x0 - ratio * m0) ** 2 + (x1 - ratio * m1) ** 2 + (x2 - ratio * m2) ** 2)
+                if from_ray > _FAR:
+                    continue
+                slope = 2.0 * (ratio - darkest) / (1.0 - darkest)
+                lit += w * math.exp(-from_mean) / (area * span)
+                dimmed += w * slope * math.exp(-from_ray) / (area * line)
+            if certain:
+                log_odds[v, u] = -_CERTAIN
+                continue
+            person = (1.0 - mimicry) * _UNIFORM + mimicry * dimmed
+            scene = known * ((1.0 - shadow) * lit + shadow * dimmed) + unexplained * _UNIFORM
+            odds = math.log(foreground * person / ((1.0 - foreground) * scene))
+            log_odds[v, u] = min(max(odds, -_CERTAIN), _CERTAIN)
+
+
+@kernel
+def update(
+    image: Bytes,
+    gain: Singles,
+    likelihood: Singles,
+    fast: np.float32,
+    slow: np.float32,
+    share: np.float32,
+    match: np.float32,
+    minimum_sd: np.float32,
+    initial_sd: np.float32,
+    mean: Singles,
+    variance: Singles,
+    weight: Singles,
+) -> None:
+    """Teach the modes one frame, in place; the rules are those in `stseg.foreground.mixture`.
+
+    Single precision throughout: the arrays are no finer, and conversions would cost a third of the time.
+    """
+    modes = weight.shape[2]
+    g0, g1, g2 = gain[0], gain[1], gain[2]
+    least_variance = minimum_sd * minimum_sd
+    for v in range(image.shape[0]):
+        for u in range(image.shape[1]):
+            x0, x1, x2 = np.float32(image[v, u, 0]), np.float32(image[v, u, 1]), np.float32(image[v, u, 2])
+            chance = likelihood[v, u]
+            nearest, distance, squared = -1, match * match, np.float32(0)
+            for k in range(modes):
+                if weight[v, u, k] > 0:
+                    r0 = x0 - min(g0 * mean[v, u, k, 0], _WHITE)
+                    r1 = x1 - min(g1 * mean[v, u, k, 1], _WHITE)
+                    r2 = x2 - min(g2 * mean[v, u, k, 2], _WHITE)
+                    length = r0 * r0 + r1 * r1 + r2 * r2
+                    if length <= distance * variance[v, u, k]:
+                        nearest, distance, squared = k, length / variance[v, u, k], length
+            weakest = weight[v, u].argmin()
+            if nearest < 0 and (chance < _HALF or weight[v, u, weakest] >= share):
+                continue  # a shadow, noise among background, or no mode to spare for what is new
+            rate = slow
+            if nearest >= 0 and weight[v, u, nearest] >= share:
+                rate = slow * chance + fast * (_ONE - chance)
+            for k in range(modes):
+                weight[v, u, k] *= _ONE - rate
+            if nearest < 0:
+                weight[v, u, weakest] = rate
+                variance[v, u, weakest] = initial_sd * initial_sd
+                mean[v, u, weakest, 0], mean[v, u, weakest, 1], mean[v, u, weakest, 2] = x0 / g0, x1 / g1, x2 / g2
+                continue
+            weight[v, u, nearest] += rate
+            step = min(rate / weight[v, u, nearest], _ONE)
+            mean[v, u, nearest, 0] += step * (x0 - min(g0 * mean[v, u, nearest, 0], _WHITE)) / g0
+            mean[v, u, nearest, 1] += step * (x1 - min(g1 * mean[v, u, nearest, 1], _WHITE)) / g1
+            mean[v, u, nearest, 2] += step * (x2 - min(g2 * mean[v, u, nearest, 2], _WHITE)) / g2
+            spread = variance[v, u, nearest] + step * (squared * _THIRD - variance[v, u, nearest])
+            variance[v, u, nearest] = max(spread, least_variance)

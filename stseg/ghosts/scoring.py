@@ -1,0 +1,120 @@
+"""How well a set of people explains a frame: log-odds against nobody at all, each piece of evidence used once.
+
+    score(S) = sum_j [person + height_j] + sum_views sum_j part_j(S) - crowding(S)
+
+In a view with boxes, part_j is the best box that nobody else in S takes, or the cost of a missing one; both weigh less
+the more of j is hidden by nearer members. In a view with pixels, part_j is the mean log-odds over j's outline of the
+pixels that no nearer member covers (HW12's detection energy, eqs 13 to 15, in soft form, for the labels of eq. 24).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stseg.accelerate import kernel
+from stseg.arrays import Floats, Ints
+from stseg.ghosts.evidence import BoxEvidence, PixelEvidence, Terms
+
+_CROWDED = 20.0
+
+
+@kernel
+def set_score(
+    members: Ints,
+    count: int,
+    boxes: BoxEvidence,
+    pixels: PixelEvidence,
+    own: Floats,
+    ground: Floats,
+    terms: Terms,
+    owner: Ints,
+    parts: Floats,
+) -> float:
+    """Score of the first `count` members; fills parts (view, member), boxes' views first, then pixels'.
+
+    `owner` is scratch: int64 at least (boxes,) and (v * u,).
+    """
+    total = -crowding(members, count, ground, terms.apart)
+    for a in range(count):
+        total += terms.person + own[members[a]]
+    box_views = boxes.match.shape[0]
+    for view in range(box_views):
+        total += box_score(view, members, count, boxes, terms, owner, parts[view])
+    for view in range(pixels.raster.shape[0]):
+        total += pixel_score(view, members, count, pixels, terms, owner, parts[box_views + view])
+    return total
+
+
+@kernel
+def crowding(members: Ints, count: int, ground: Floats, apart: float) -> float:
+    """What it costs that bodies cannot stand inside each other, nats."""
+    total = 0.0
+    for a in range(count):
+        for b in range(a):
+            i, j = members[a], members[b]
+            distance = np.hypot(ground[i, 0] - ground[j, 0], ground[i, 1] - ground[j, 1])
+            if distance < apart:
+                total += 2.0 + _CROWDED * (1.0 - distance / apart)
+    return total
+
+
+@kernel
+def box_score(
+    view: int, members: Ints, count: int, boxes: BoxEvidence, terms: Terms, taken_by: Ints, parts: Floats
+) -> float:
+    """One view of boxes; fills parts (member,) and taken_by (box,) with the place in `members`, -1 for nobody.
+
+    Boxes go to members in falling order of what they gain, one to one.
+    """
+    number = boxes.boxes[view]
+    gain = np.empty((count, number))
+    for a in range(count):
+        i = members[a]
+        visible = boxes.inside[view, i]
+        for b in range(count):
+            visible *= 1.0 - boxes.cover[view, i, members[b]]
+        share = (visible - terms.hidden_below) / (terms.whole_above - terms.hidden_below)
+        found = min(max(share, terms.least), 1.0)
+        parts[a] = np.log(1.0 - (1.0 - terms.box_miss) * found)
+        for b in range(number):
+            gain[a, b] = terms.hit + 0.3 * np.log(found) + boxes.match[view, i, b] - parts[a]
+    taken_by[:number] = -1
+    served = np.zeros(count, np.bool_)
+    while True:
+        best, best_a, best_b = 0.0, -1, -1
+        for a in range(count):
+            if not served[a]:
+                for b in range(number):
+                    if taken_by[b] < 0 and gain[a, b] > best:
+                        best, best_a, best_b = gain[a, b], a, b
+        if best_a < 0:
+            break
+        served[best_a], taken_by[best_b] = True, best_a
+        parts[best_a] += best
+    return parts[:count].sum()
+
+
+@kernel
+def pixel_score(
+    view: int, members: Ints, count: int, pixels: PixelEvidence, terms: Terms, owner: Ints, parts: Floats
+) -> float:
+    """One view of pixels; fills parts (member,) and owner (v * u,) with the place in `members`, -1 for nobody."""
+    raster = pixels.raster[view]
+    rows, columns = raster.shape
+    owner[: rows * columns] = -1
+    order = np.argsort(pixels.order[view][members[:count]])
+    for a in order:
+        parts[a] = 0.0
+        i = members[a]
+        first = pixels.first[view, i]
+        if first < 0:
+            continue
+        total = 0.0
+        for k in range(min(pixels.spans.shape[2], rows - first)):
+            line = (first + k) * columns
+            for u in range(pixels.spans[view, i, k, 0], pixels.spans[view, i, k, 1]):
+                if owner[line + u] < 0:
+                    owner[line + u] = a
+                    total += raster[first + k, u]
+        parts[a] = terms.body_weight * total / pixels.area[view, i]
+    return parts[:count].sum()

@@ -1,0 +1,157 @@
+"""The set of people that explains a frame best, by moves that only ever raise the score (METHODS 7).
+
+Adding, removing and exchanging one person at a time until no move helps. The score is a sum over groups whose evidence
+does not touch, so moves in one group never depend on another; the bound on sweeps is reached by none but crafted input.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stseg.accelerate import kernel
+from stseg.arrays import Flags, Floats, Ints
+from stseg.ghosts.evidence import BoxEvidence, PixelEvidence, Terms
+from stseg.ghosts.scoring import set_score
+
+SWEEPS = 8
+_GAINED = 1e-9
+_NEAR = 0.7
+_SLACK = 3.0
+
+
+@kernel
+def search(
+    members: Ints,
+    count: int,
+    boxes: BoxEvidence,
+    pixels: PixelEvidence,
+    own: Floats,
+    ground: Floats,
+    terms: Terms,
+    owner: Ints,
+    parts: Floats,
+) -> int:
+    """Improve the set in place, starting from its first `count` members; returns its new size.
+
+    Parameters
+    ----------
+    members : int64 (candidate + 1,)
+        Indices of candidates; the first `count` are the set.
+    own : float64 (candidate,)
+        What speaks for each candidate by itself, nats.
+    ground : float64 (candidate, 2)
+        Metres.
+    owner, parts
+        Scratch of `set_score`.
+    """
+    inside = np.zeros(len(own), np.bool_)
+    for a in range(count):
+        inside[members[a]] = True
+    for _ in range(SWEEPS):
+        score = set_score(members, count, boxes, pixels, own, ground, terms, owner, parts)
+        grown = _add(members, count, score, inside, boxes, pixels, own, ground, terms, owner, parts)
+        shrunk = _remove(members, grown, inside, boxes, pixels, own, ground, terms, owner, parts)
+        exchanged = _exchange(members, shrunk, inside, boxes, pixels, own, ground, terms, owner, parts)
+        if grown == count and shrunk == grown and not exchanged:
+            break
+        count = shrunk
+    return count
+
+
+@kernel
+def _add(
+    members: Ints,
+    count: int,
+    score: float,
+    inside: Flags,
+    boxes: BoxEvidence,
+    pixels: PixelEvidence,
+    own: Floats,
+    ground: Floats,
+    terms: Terms,
+    owner: Ints,
+    parts: Floats,
+) -> int:
+    """Add the best candidate while one helps; a candidate's gain seldom rises, so hopeless ones are tried once."""
+    gain = np.full(len(own), np.inf)
+    while count < len(own):
+        best, best_gain = -1, _GAINED
+        for i in range(len(own)):
+            if inside[i] or gain[i] < best_gain - _SLACK:
+                continue
+            members[count] = i
+            gain[i] = set_score(members, count + 1, boxes, pixels, own, ground, terms, owner, parts) - score
+            if gain[i] > best_gain:
+                best, best_gain = i, gain[i]
+        if best < 0:
+            break
+        members[count], inside[best] = best, True
+        count += 1
+        score += best_gain
+    return count
+
+
+@kernel
+def _remove(
+    members: Ints,
+    count: int,
+    inside: Flags,
+    boxes: BoxEvidence,
+    pixels: PixelEvidence,
+    own: Floats,
+    ground: Floats,
+    terms: Terms,
+    owner: Ints,
+    parts: Floats,
+) -> int:
+    """Remove each member without whom the score is higher."""
+    score = set_score(members, count, boxes, pixels, own, ground, terms, owner, parts)
+    a = 0
+    while a < count:
+        leaving = members[a]
+        members[a] = members[count - 1]
+        without = set_score(members, count - 1, boxes, pixels, own, ground, terms, owner, parts)
+        if without > score + _GAINED:
+            members[count - 1] = leaving
+            inside[leaving] = False
+            count -= 1
+            score = without
+        else:
+            members[count - 1] = members[a]
+            members[a] = leaving
+            a += 1
+    return count
+
+
+@kernel
+def _exchange(
+    members: Ints,
+    count: int,
+    inside: Flags,
+    boxes: BoxEvidence,
+    pixels: PixelEvidence,
+    own: Floats,
+    ground: Floats,
+    terms: Terms,
+    owner: Ints,
+    parts: Floats,
+) -> bool:
+    """Replace each member by the near candidate that raises the score most."""
+    changed = False
+    score = set_score(members, count, boxes, pixels, own, ground, terms, owner, parts)
+    for a in range(count):
+        old, best = members[a], members[a]
+        best_score = score + _GAINED
+        for i in range(len(own)):
+            apart = np.hypot(ground[i, 0] - ground[old, 0], ground[i, 1] - ground[old, 1])
+            if inside[i] or apart > _NEAR:
+                continue
+            members[a] = i
+            trial = set_score(members, count, boxes, pixels, own, ground, terms, owner, parts)
+            if trial > best_score:
+                best, best_score = i, trial
+        members[a] = best
+        if best != old:
+            inside[old], inside[best] = False, True
+            score, changed = best_score, True
+    return changed

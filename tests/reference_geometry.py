@@ -1,0 +1,31 @@
+"""Projection by other means: a 3x4 matrix, point by point, and OpenCV's own function."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from stseg.arrays import Floats
+
+
+def project_by_matrix(projection: Floats, points: Floats) -> Floats:
+    """Pixels (n, 2) of points (n, 3) under a 3x4 matrix."""
+    pixels = np.empty((len(points), 2))
+    for row, point in enumerate(points):
+        s, t, w = (sum(float(p) * float(c) for p, c in zip(line, (*point, 1.0), strict=True)) for line in projection)
+        pixels[row] = s / w, t / w
+    return pixels
+
+
+def project_by_opencv(
+    matrix: Floats, distortion: Floats, rotation_vector: Floats, translation: Floats, points: Floats
+) -> Floats:
+    """Pixels (n, 2) of points (n, 3) in the calibration's own world and unit."""
+    pixels, _ = cv2.projectPoints(np.ascontiguousarray(points, float), rotation_vector, translation, matrix, distortion)
+    return np.asarray(pixels, float).reshape(-1, 2)
+
+
+def matrix_of(matrix: Floats, rotation_vector: Floats, translation: Floats) -> Floats:
+    """K [R | t], float64 (3, 4)."""
+    rotation, _ = cv2.Rodrigues(np.asarray(rotation_vector, float))
+    return np.asarray(matrix @ np.column_stack([rotation, translation]), float)

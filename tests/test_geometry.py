@@ -1,0 +1,242 @@
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+from reference_geometry import project_by_matrix, project_by_opencv
+from strategies import BARREL, Pose, cameras, grids, numbers, poses, rigs
+
+from stseg.arrays import Floats
+from stseg.errors import CalibrationError
+from stseg.geometry import Camera, Grid, Lens, Rig
+from stseg.geometry.grid import inside_polygon
+from stseg.geometry.planes import homology, inverse_homology, plane_homography, view_to_view
+
+MATRIX = np.array([[492.3, 0.0, 341.1], [0.0, 494.7, 225.1], [0.0, 0.0, 1.0]])
+LENS = Lens(MATRIX, np.array(BARREL))
+LEVEL = np.array([[500.0, 320.0, 0.0, 0.0], [0.0, 240.0, -500.0, 1000.0], [0.0, 1.0, 0.0, 0.0]])
+"""A camera 2 m above the origin that looks along y, the horizon at v = 240."""
+# Within sight of every camera that looks at the origin: at least 1.5 m in front of it and below it.
+HEIGHTS = numbers(0.0, 1.2)
+GROUNDS = st.lists(st.tuples(numbers(-1.2, 1.2), numbers(-1.2, 1.2)), min_size=1, max_size=8).map(np.array)
+
+
+def homogeneous(points: Floats) -> Floats:
+    return np.concatenate([points, np.ones_like(points[..., :1])], -1)
+
+
+def pixels_under(matrix: Floats, points: Floats) -> Floats:
+    image = homogeneous(points) @ matrix.T
+    return np.asarray(image[:, :2] / image[:, 2:])
+
+
+def in_space(ground: Floats, height: float) -> Floats:
+    return np.column_stack([ground, np.full(len(ground), height)])
+
+
+def straight_down(height: float = 3.0, lens: Lens | None = None) -> Camera:
+    """A camera above the origin, image u along x, v along -y."""
+    rotation = np.diag([1.0, -1.0, -1.0])
+    projection = MATRIX @ np.column_stack([rotation, [0.0, 0.0, height]])
+    return Camera.from_projection("down", (644, 486), projection, lens)
+
+
+class TestPlanes:
+    @given(poses(), GROUNDS, HEIGHTS)
+    def test_project_as_the_matrix_does(self, pose: Pose, ground: Floats, height: float) -> None:
+        expected = project_by_matrix(pose.projection, in_space(ground, height))
+        camera = Camera.from_projection("cam", (640, 480), pose.projection)
+        np.testing.assert_allclose(pixels_under(camera.plane(height), ground), expected, rtol=1e-9, atol=1e-6)
+        pixel, seen = camera.project(ground, height)
+        assert seen.all()
+        np.testing.assert_allclose(pixel, expected, rtol=1e-9, atol=1e-6)
+
+    @given(cameras(lenses=False), HEIGHTS)
+    def test_both_forms_are_one(self, camera: Camera, height: float) -> None:
+        form = homology(camera.ground, camera.vertical, height) @ camera.ground
+        plane = plane_homography(camera.ground, camera.vertical, height)
+        np.testing.assert_allclose(form, plane, rtol=0, atol=1e-9 * np.abs(plane).max())
+
+    @given(cameras(lenses=False), GROUNDS, HEIGHTS)
+    def test_inverse_homology_lowers_what_the_homology_lifts(
+        self, camera: Camera, ground: Floats, height: float
+    ) -> None:
+        at_ground, _ = camera.project(ground, 0.0)
+        lifted, _ = camera.project(ground, height)
+        forth = homology(camera.ground, camera.vertical, height)
+        back = inverse_homology(camera.ground, camera.vertical, height)
+        np.testing.assert_allclose(pixels_under(forth, at_ground), lifted, rtol=1e-9, atol=1e-6)
+        np.testing.assert_allclose(pixels_under(back, lifted), at_ground, rtol=1e-9, atol=1e-6)
+        identity = back @ forth
+        np.testing.assert_allclose(identity, np.eye(3), rtol=0, atol=1e-9 * np.abs(back).max() * np.abs(forth).max())
+
+    @given(poses(), poses(), GROUNDS, HEIGHTS)
+    def test_one_view_to_another(self, start: Pose, end: Pose, ground: Floats, height: float) -> None:
+        here, there = (Camera.from_projection("cam", (640, 480), pose.projection) for pose in (start, end))
+        matrix = view_to_view(here.ground, here.vertical, there.ground, there.vertical, height)
+        points = in_space(ground, height)
+        seen = project_by_matrix(start.projection, points)
+        expected = project_by_matrix(end.projection, points)
+        np.testing.assert_allclose(pixels_under(matrix, seen), expected, rtol=1e-9, atol=1e-6)
+
+
+class TestCamera:
+    @given(cameras(), GROUNDS, HEIGHTS)
+    def test_back_projection_returns(self, camera: Camera, ground: Floats, height: float) -> None:
+        pixel, seen = camera.project(ground, height)
+        assert seen.all()
+        np.testing.assert_allclose(camera.back_project(pixel, height), ground, rtol=0, atol=1e-8)
+
+    @given(poses(), numbers(-9.0, 9.0).filter(lambda scale: abs(scale) > 1e-3), GROUNDS)
+    def test_scale_and_sign_of_the_homography_mean_nothing(self, pose: Pose, scale: float, ground: Floats) -> None:
+        plain = Camera.from_projection("cam", (640, 480), pose.projection)
+        scaled = Camera("cam", (640, 480), plain.ground * scale, plain.vertical * scale)
+        expected, seen = plain.project(ground, 1.0)
+        pixel, seen_too = scaled.project(ground, 1.0)
+        assert seen.all() and seen_too.all()
+        np.testing.assert_allclose(pixel, expected, rtol=1e-9, atol=1e-9)
+
+    @given(poses())
+    def test_centre(self, pose: Pose) -> None:
+        camera = Camera.from_projection("cam", (640, 480), pose.projection * -2.0)
+        np.testing.assert_allclose(camera.centre, -pose.rotation.T @ pose.translation, rtol=0, atol=1e-9)
+
+    @given(poses(), numbers(0.1, 50.0), numbers(-3.0, 3.0), numbers(-3.0, 3.0))
+    def test_points_behind_are_unseen(self, pose: Pose, depth: float, right: float, down: float) -> None:
+        point = pose.rotation.T @ (np.array([right, down, -depth]) - pose.translation)
+        for lens in (None, Lens(pose.matrix, np.array(BARREL))):
+            camera = Camera.from_projection("cam", (640, 480), pose.projection, lens)
+            pixel, seen = camera.project(point[:2], point[2])
+            assert not seen
+            assert not camera.inside(pixel)
+
+    def test_pixels_above_the_horizon_show_no_ground(self) -> None:
+        camera = Camera.from_projection("cam", (640, 480), LEVEL)
+        ground = camera.back_project(np.array([[320.0, 300.0], [320.0, 200.0]]))
+        assert np.isfinite(ground[0]).all()
+        assert np.isnan(ground[1]).all()
+
+    def test_heights_broadcast_with_points(self) -> None:
+        pixel, seen = straight_down().project(np.zeros((4, 1, 2)), np.array([0.0, 1.0]))
+        assert pixel.shape == (4, 2, 2)
+        assert seen.shape == (4, 2)
+
+    def test_image_spans_half_a_pixel_around_the_outermost_centres(self) -> None:
+        camera = straight_down()
+        corners = np.array([[-0.5, -0.5], [643.4, 485.4], [643.5, 0.0], [0.0, 485.5], [-0.6, 0.0]])
+        assert camera.inside(corners).tolist() == [True, True, False, False, False]
+
+    @pytest.mark.parametrize(
+        ("ground", "vertical", "key"),
+        [
+            (np.zeros((3, 3)), [0, 0, 1], "ground"),
+            (np.ones((3, 3)), [0, 0, 1], "ground"),
+            ([[1, 2, 3], [2, 4, 6], [0, 0, 1]], [0, 0, 1], "ground"),
+            (np.eye(3), [0, 0, 0], "vertical"),
+            (np.eye(3), [1, 2, 0], "vertical"),
+            (np.diag([1, 1, np.nan]), [0, 0, 1], "ground, vertical"),
+        ],
+    )
+    def test_refuses_what_is_no_view(self, ground: Floats, vertical: Floats, key: str) -> None:
+        with pytest.raises(CalibrationError, match="camera cam") as caught:
+            Camera("cam", (640, 480), np.array(ground, float), np.array(vertical, float))
+        assert caught.value.key == key
+
+    def test_units_do_not_make_a_homography_singular(self) -> None:
+        plain = straight_down()
+        tiny = Camera("cam", (640, 480), plain.ground @ np.diag([1e-6, 1e-6, 1.0]), plain.vertical * 1e-6)
+        pixel, _ = tiny.project(np.array([5e5, -5e5]), 0.0)
+        np.testing.assert_allclose(pixel, plain.project(np.array([0.5, -0.5]), 0.0)[0])
+
+
+class TestLens:
+    @given(poses(), GROUNDS, HEIGHTS, st.sampled_from((BARREL, BARREL[:2], (0.1, 0.05, 0.002, -0.003, 0.01))))
+    def test_distorts_as_opencv_does(
+        self, pose: Pose, ground: Floats, height: float, distortion: tuple[float, ...]
+    ) -> None:
+        lens = Lens(pose.matrix, np.array(distortion))
+        camera = Camera.from_projection("cam", (640, 480), pose.projection, lens)
+        vector, _ = cv2.Rodrigues(pose.rotation)
+        expected = project_by_opencv(
+            pose.matrix, lens.distortion, np.asarray(vector), pose.translation, in_space(ground, height)
+        )
+        np.testing.assert_allclose(camera.project(ground, height)[0], expected, rtol=0, atol=1e-6)
+
+    @given(numbers(0.0, 0.99), numbers(0.0, 6.3))
+    def test_undistorts_everything_before_the_fold(self, share: float, angle: float) -> None:
+        radius = share * LENS.fold
+        ideal = MATRIX[:2, 2] + radius * np.array([np.cos(angle), np.sin(angle)]) * np.diag(MATRIX)[:2]
+        pixel, unfolded = LENS.distort(ideal)
+        assert unfolded
+        np.testing.assert_allclose(LENS.undistort(pixel), ideal, rtol=0, atol=1e-6)
+
+    def test_fold_is_where_the_radius_turns_round(self) -> None:
+        k1, k2, _, _, k3 = BARREL
+        radius = np.linspace(0.0, 2.0, 200_001)
+        bent = radius * (1 + k1 * radius**2 + k2 * radius**4 + k3 * radius**6)
+        turn = radius[np.argmax(np.diff(bent) < 0)]
+        assert LENS.fold == pytest.approx(turn, abs=2e-5)
+        assert Lens(MATRIX, np.array([0.1, 0.2])).fold == np.inf
+        assert Lens(MATRIX, np.zeros(0)).fold == np.inf
+
+    def test_far_point_that_folds_back_into_the_image_is_unseen(self) -> None:
+        camera = straight_down(lens=LENS)
+        far = np.array([4.8, 0.0])
+        pixel, seen = camera.project(far, 0.0)
+        assert camera.inside(pixel), "the polynomial brings it back"
+        assert not seen
+        assert camera.project(np.array([1.0, 0.0]), 0.0)[1]
+
+    def test_corner_that_no_ray_reaches_shows_nothing(self) -> None:
+        corner, middle = LENS.undistort(np.array([[0.0, 0.0], [300.0, 200.0]]))
+        assert np.isnan(corner).all()
+        assert np.isfinite(middle).all()
+        assert np.isnan(straight_down(lens=LENS).back_project(np.array([0.0, 0.0]))).all()
+
+
+class TestGrid:
+    @given(grids())
+    def test_cells_and_ground_agree(self, grid: Grid) -> None:
+        planes, rows, columns = grid.shape
+        assert grid.ground.shape == (rows, columns, 2)
+        cell = grid.cell_of(grid.ground)
+        np.testing.assert_allclose(cell[..., 0], np.broadcast_to(np.arange(columns), (rows, columns)), atol=1e-9)
+        np.testing.assert_allclose(cell[..., 1], np.broadcast_to(np.arange(rows)[:, None], (rows, columns)), atol=1e-9)
+        assert len(grid.heights) == planes
+        assert grid.inside().shape == (rows, columns)
+
+    def test_first_centre_is_half_a_cell_inside_the_corner(self) -> None:
+        grid = Grid((-2.5, 2.5), (-4.5, 1.5), cell=0.1, top=1.8, planes=10)
+        assert grid.shape == (10, 60, 50)
+        np.testing.assert_allclose(grid.ground[0, 0], (-2.45, -4.45))
+        np.testing.assert_allclose(grid.cell_of(np.array([-2.5, -4.5])), (-0.5, -0.5))
+        np.testing.assert_allclose(grid.heights[[0, 1, -1]], (0.0, 0.2, 1.8))
+
+    @given(numbers(-1.0, 3.0), numbers(-1.0, 3.0))
+    @example(0.5, 1.5)
+    def test_polygon_may_be_hollow(self, x: float, y: float) -> None:
+        ell = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]])
+        expected = (0 < x < 2 and 0 < y < 1) or (0 < x < 1 and 0 < y < 2)
+        if all(min(abs(x - edge), abs(y - edge)) > 1e-9 for edge in (0, 1, 2)):
+            for polygon in (ell, ell[::-1], np.roll(ell, 2, axis=0)):
+                assert bool(inside_polygon(np.array([x, y]), polygon)) == expected
+
+
+class TestRig:
+    @given(rigs())
+    def test_that_watches_its_area(self, rig: Rig) -> None:
+        rig.require_sight()
+
+    def test_camera_that_looks_away_is_named(self) -> None:
+        away = Grid((50.0, 51.0), (0.0, 1.0), cell=0.5)
+        with pytest.raises(CalibrationError, match=r"camera down: ground: found a view that sees nothing"):
+            Rig("hall", 5.0, away, (straight_down(),)).require_sight()
+
+    def test_sight_of_an_upper_plane_is_enough(self) -> None:
+        camera = Camera.from_projection("cam", (640, 480), LEVEL)
+        near = Grid((-0.5, 0.5), (1.0, 2.0), cell=0.5, top=1.8, planes=4)
+        pixel, seen = camera.project(near.ground, 0.0)
+        assert seen.all() and not camera.inside(pixel).any(), "its feet are below the image"
+        Rig("hall", 5.0, near, (camera,)).require_sight()

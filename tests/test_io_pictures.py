@@ -1,0 +1,194 @@
+"""Image files: kinds, indexed PNG, broken files, order and gaps of folders."""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from stseg.arrays import Bytes
+from stseg.errors import SourceError
+from stseg.io.image_stream import image_paths
+from stseg.io.indexed_png import decode_indexed, stores_numbers
+from stseg.io.pictures import read_picture
+from stseg.io.recording import SourceKind
+
+GREY, INDEXED = 0, 3
+NONE, SUB, UP, AVERAGE, PAETH = range(5)
+
+
+def chunk(name: bytes, body: bytes) -> bytes:
+    return struct.pack(">I", len(body)) + name + body + struct.pack(">I", zlib.crc32(name + body))
+
+
+def paeth(left: int, up: int, corner: int) -> int:
+    guess = left + up - corner
+    return min((left, up, corner), key=lambda value: abs(guess - value))
+
+
+def filtered(kind: int, line: bytes, above: bytes) -> bytes:
+    """One scan line as a PNG stores it, the filters written out from the specification's table."""
+    left, corner = b"\0" + line[:-1], b"\0" + above[:-1]
+    guess: Callable[[int], int] = {
+        NONE: lambda i: 0,  # noqa: ARG005
+        SUB: lambda i: left[i],
+        UP: lambda i: above[i],
+        AVERAGE: lambda i: (left[i] + above[i]) // 2,
+        PAETH: lambda i: paeth(left[i], above[i], corner[i]),
+    }[kind]
+    return bytes([kind, *((line[i] - guess(i)) % 256 for i in range(len(line)))])
+
+
+def png_by_hand(numbers: Bytes, bits: int, colour: int, filters: tuple[int, ...] = (NONE,)) -> bytes:
+    """A PNG of numbers below 2^bits, with a palette that says nothing of them where it is indexed."""
+    ones = (numbers[..., None] >> np.arange(bits)[::-1]) & 1
+    lines = [np.packbits(row).tobytes() for row in ones.astype(np.uint8)]
+    above = [bytes(len(lines[0])), *lines[:-1]]
+    stored = b"".join(filtered(filters[i % len(filters)], lines[i], above[i]) for i in range(len(lines)))
+    header = struct.pack(">IIBBBBB", numbers.shape[1], numbers.shape[0], bits, colour, 0, 0, 0)
+    palette = chunk(b"PLTE", bytes(reversed(range(3 * 2**bits)) if bits < 8 else 768 * b"\x11"))
+    return b"".join(
+        [
+            b"\x89PNG\r\n\x1a\n",
+            chunk(b"IHDR", header),
+            palette + chunk(b"tRNS", b"\0") if colour == INDEXED else b"",
+            chunk(b"IDAT", zlib.compress(stored)),
+            chunk(b"IEND", b""),
+        ]
+    )
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    st.sampled_from([1, 2, 4, 8]),
+    st.integers(1, 9),
+    st.integers(1, 19),
+    st.integers(0, 2**32 - 1),
+    st.permutations(range(5)),
+)
+def test_indexed_png_gives_its_numbers(bits: int, height: int, width: int, seed: int, filters: list[int]) -> None:
+    numbers = np.random.default_rng(seed).integers(0, 2**bits, (height, width)).astype(np.uint8)
+    data = png_by_hand(numbers, bits, INDEXED, tuple(filters))
+    assert stores_numbers(data)
+    np.testing.assert_array_equal(decode_indexed(data), numbers)
+
+
+@pytest.mark.parametrize("bits", [1, 2, 4])
+def test_grey_png_of_few_bits_is_not_stretched(tmp_path: Path, bits: int) -> None:
+    numbers = (np.arange(12, dtype=np.uint8) % 2**bits).reshape(3, 4)
+    (tmp_path / "a.png").write_bytes(png_by_hand(numbers, bits, GREY))
+    np.testing.assert_array_equal(read_picture(tmp_path / "a.png", "instances", (4, 3), ""), numbers)
+
+
+def test_interlaced_indexed_png(tmp_path: Path) -> None:
+    """Of the seven passes of Adam7 a 2x2 image has the first, the sixth and the seventh."""
+    header = chunk(b"IHDR", struct.pack(">IIBBBBB", 2, 2, 8, INDEXED, 0, 0, 1))
+    passes = zlib.compress(bytes([0, 1, 0, 2, 0, 3, 4]))
+    data = b"\x89PNG\r\n\x1a\n" + header + chunk(b"PLTE", bytes(768)) + chunk(b"IDAT", passes) + chunk(b"IEND", b"")
+    (tmp_path / "a.png").write_bytes(data)
+    assert read_picture(tmp_path / "a.png", "instances", (2, 2), "").tolist() == [[1, 2], [3, 4]]
+
+
+@pytest.mark.parametrize(
+    "numbers", [np.array([[0, 1, 2], [200, 7, 255]], np.uint8), np.array([[0, 1, 2], [200, 7, 65535]], np.uint16)]
+)
+def test_instances_keep_their_numbers(tmp_path: Path, numbers: Bytes | NDArray[np.uint16]) -> None:
+    cv2.imwrite(str(tmp_path / "a.png"), numbers)
+    read = read_picture(tmp_path / "a.png", "instances", (3, 2), "")
+    assert read.dtype == np.uint16
+    np.testing.assert_array_equal(read, numbers)
+
+
+def test_masks_may_be_stored_in_three_channels_but_not_in_colours(tmp_path: Path) -> None:
+    mask = np.random.default_rng(0).integers(0, 256, (6, 8)).astype(np.uint8)
+    for name, picture in (("grey", mask), ("equal", np.dstack([mask] * 3)), ("alpha", np.dstack([mask] * 3 + [mask]))):
+        cv2.imwrite(str(tmp_path / f"{name}.png"), picture)
+        np.testing.assert_array_equal(read_picture(tmp_path / f"{name}.png", "masks", (8, 6), ""), mask)
+    cv2.imwrite(str(tmp_path / "green.png"), np.dstack([0 * mask, mask, 0 * mask]))
+    with pytest.raises(SourceError, match="a picture in colours"):
+        read_picture(tmp_path / "green.png", "masks", (8, 6), "camera a")
+
+
+@pytest.mark.parametrize("channels", [1, 3, 4])
+def test_images_are_blue_green_red(tmp_path: Path, channels: int) -> None:
+    picture = np.full((2, 3, channels), np.arange(1, channels + 1) * 50, np.uint8)
+    cv2.imwrite(str(tmp_path / "a.png"), picture)
+    expected = [50, 50, 50] if channels == 1 else [50, 100, 150]
+    read = read_picture(tmp_path / "a.png", "images", (3, 2), "")
+    assert read.shape == (2, 3, 3)
+    assert read[1, 2].tolist() == expected
+
+
+@pytest.mark.parametrize(
+    ("kind", "picture", "said"),
+    [
+        ("masks", np.zeros((2, 3), np.uint16), "found values of type uint16, expected 8 bits"),
+        ("instances", np.zeros((2, 3, 3), np.uint8), "found a picture in colours"),
+        ("images", np.zeros((2, 4), np.uint8), "found an image of 4x2, expected 3x2"),
+    ],
+)
+def test_pictures_of_another_kind_are_refused(tmp_path: Path, kind: SourceKind, picture: Bytes, said: str) -> None:
+    cv2.imwrite(str(tmp_path / "a.png"), picture)
+    with pytest.raises(SourceError, match=f"a.png: camera a: {said}"):
+        read_picture(tmp_path / "a.png", kind, (3, 2), "camera a")
+
+
+@pytest.mark.parametrize("kind", ["images", "instances"])
+def test_broken_files_are_refused(tmp_path: Path, kind: SourceKind) -> None:
+    whole = png_by_hand(np.zeros((20, 30), np.uint8), 8, INDEXED)
+    for data in (b"", b"no image", whole[:20], whole[:-30], whole[:24] + b"\x03" + whole[25:]):
+        (tmp_path / "a.png").write_bytes(data)
+        with pytest.raises(SourceError, match="a broken file"):
+            read_picture(tmp_path / "a.png", kind, (30, 20), "")
+
+
+def names(folder: Path, *files: str) -> None:
+    for file in files:
+        (folder / file).touch()
+
+
+def test_folders_are_read_in_the_order_of_their_number(tmp_path: Path) -> None:
+    names(tmp_path, "cam1_10.png", "cam1_8.png", "cam1_6.png", "readme.txt", "._cam1_6.png")
+    assert [path.name for path in image_paths(tmp_path, "")] == ["cam1_6.png", "cam1_8.png", "cam1_10.png"]
+
+
+def test_patterns_choose_files(tmp_path: Path) -> None:
+    folder = tmp_path / "scene [1]"
+    folder.mkdir()
+    names(folder, "view-f9-c0.png", "view-f10-c0.png", "view-f9-c1.png", "view-f10-c1.png")
+    found = image_paths(folder / "view-f*-c1.png", "")
+    assert [path.name for path in found] == ["view-f9-c1.png", "view-f10-c1.png"]
+    assert [path.name for path in image_paths(folder / "view-f9-c0.png", "")] == ["view-f9-c0.png"]
+
+
+@pytest.mark.parametrize(
+    ("files", "said"),
+    [
+        ((), "no images"),
+        (("a1.png", "a2.png", "a4.png"), "a gap after a2.png, expected running numbers in steps of 1"),
+        (("a1.png", "a01.png", "a2.png"), "a01.png and a1.png, expected each number once"),
+        (("a1.png", "a1.jpg"), "a1.jpg beside a1.png"),
+        (("a1.png", "b2.png"), "names that differ in one running number"),
+        (("a1_1.png", "a2_2.png"), "names that differ in one running number"),
+        (("a.png", "b.png"), "names that differ in one running number"),
+    ],
+)
+def test_folders_without_a_clear_order_are_refused(tmp_path: Path, files: tuple[str, ...], said: str) -> None:
+    names(tmp_path, *files)
+    with pytest.raises(SourceError, match=said):
+        image_paths(tmp_path, "camera a")
+
+
+def test_missing_folders_are_said(tmp_path: Path) -> None:
+    with pytest.raises(SourceError, match="no such file or folder"):
+        image_paths(tmp_path / "none", "camera a")
+    with pytest.raises(SourceError, match="no images"):
+        image_paths(tmp_path / "none_*.png", "camera a")

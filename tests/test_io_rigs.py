@@ -1,0 +1,245 @@
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from strategies import recordings
+
+from stseg.errors import CalibrationError, InputError, OutputError, RigError
+from stseg.io.recording import CameraSource, Recording, Source
+from stseg.io.rigs import parse_rig, read_rig, write_rig
+
+RIG = """\
+format = 1
+
+[scene]
+name = "room"
+frame_rate = 5.0
+x = [-2.5, 2.5]
+y = [-4.5, 1.5]
+polygon = [[-2.5, -4.5], [2.5, -4.5], [2.5, 1.5]]
+
+[grid]
+cell = 0.10
+top = 1.80
+planes = 10
+
+[[camera]]
+name = "cam1"
+size = [644, 486]
+ground = [[100, 0, 320], [0, -100, 240], [0, 0, 3]]
+vertical = [-320, -240, -1.0]
+lens = { matrix = [[490.0, 0, 320], [0, 490, 240], [0, 0, 1]], distortion = [-0.1, 0.01] }
+offset = -2
+source = { kind = "video", path = "cam1.avi" }
+background = { kind = "video", path = "empty.avi" }
+
+[[camera]]
+name = "cam2"
+size = [644, 486]
+projection = [[100, 0, -320, 320], [0, -100, -240, 240], [0, 0, -1, 3]]
+source = { kind = "boxes", path = "../boxes/cam2.txt", first_frame = 1, frames = 263 }
+on_missing = "blind"
+"""
+FILE = Path("shop/rig.toml")
+ONE, TWO = "camera[0] (cam1).", "camera[1] (cam2)."
+
+
+def plain(value: object) -> object:
+    """A recording as nested tuples, so that == compares the numbers in its arrays to the last bit."""
+    if dataclasses.is_dataclass(value):
+        return (type(value), *(plain(getattr(value, field.name)) for field in dataclasses.fields(value)))
+    if isinstance(value, np.ndarray):
+        return value.dtype, value.shape, value.tolist()
+    return tuple(map(plain, value)) if isinstance(value, tuple) else value
+
+
+def changed(old: str, new: str) -> str:
+    assert RIG.count(old) >= 1, f"{old!r} is not in the rig"
+    return RIG.replace(old, new, 1)
+
+
+def refusal(text: str, kind: type[InputError] = RigError) -> InputError:
+    with pytest.raises(kind) as caught:
+        parse_rig(text, FILE)
+    assert caught.value.place == str(FILE)
+    return caught.value
+
+
+class TestRead:
+    def test_everything_that_the_file_says(self) -> None:
+        recording = parse_rig(RIG, FILE)
+        rig, grid = recording.rig, recording.rig.grid
+        assert (rig.name, rig.frame_rate) == ("room", 5.0)
+        assert (grid.x, grid.y, grid.cell, grid.top, grid.planes) == ((-2.5, 2.5), (-4.5, 1.5), 0.1, 1.8, 10)
+        assert grid.polygon is not None and grid.polygon.tolist() == [[-2.5, -4.5], [2.5, -4.5], [2.5, 1.5]]
+        first, second = rig.cameras
+        assert (first.name, first.size) == ("cam1", (644, 486))
+        assert first.lens is not None and first.lens.distortion.tolist() == [-0.1, 0.01, 0, 0, 0]
+        assert second.lens is None
+        np.testing.assert_array_equal(first.projection, second.projection)
+        assert recording.sources == (
+            CameraSource(Source("video", Path("shop/cam1.avi")), Source("video", Path("shop/empty.avi")), -2, "error"),
+            CameraSource(Source("boxes", Path("shop/../boxes/cam2.txt"), 1, 263), None, 0, "blind"),
+        )
+
+    def test_windows_line_ends_and_byte_order_mark(self, tmp_path: Path) -> None:
+        file = tmp_path / "rig.toml"
+        file.write_bytes(b"\xef\xbb\xbf" + RIG.replace("\n", "\r\n").encode())
+        assert read_rig(file).rig.name == "room"
+
+    def test_missing_file(self, tmp_path: Path) -> None:
+        with pytest.raises(RigError, match=r"nowhere.toml: found No such file or directory, expected a rig file"):
+            read_rig(tmp_path / "nowhere.toml")
+
+    @pytest.mark.parametrize("content", [b"\xff\xfe", b"format = ", b"a = " + b"[" * 5000, b"a = " + b"9" * 5000])
+    def test_what_is_no_toml(self, tmp_path: Path, content: bytes) -> None:
+        file = tmp_path / "rig.toml"
+        file.write_bytes(content)
+        with pytest.raises(RigError, match=r"rig.toml: found .* expected TOML"):
+            read_rig(file)
+
+
+class TestRefuse:
+    @pytest.mark.parametrize(
+        ("old", "new", "key", "found", "expected"),
+        [
+            ("format = 1", "", "format", "nothing", "whole number"),
+            ("format = 1", "format = 2", "format", "2", "1, the format"),
+            ("format = 1", "format = 1\nscnee = 3", "scnee", "unknown key", "did you mean scene?"),
+            ('name = "room"', "name = 3", "scene.name", "3", "a text"),
+            ('name = "room"', 'name = ""', "scene.name", "''", "a text"),
+            ("frame_rate = 5.0", "", "scene.frame_rate", "nothing", "a number"),
+            ("frame_rate = 5.0", "frame_rate = 0", "scene.frame_rate", "0.0", "above 0"),
+            ("frame_rate = 5.0", "frame_rate = true", "scene.frame_rate", "True", "a number"),
+            ("frame_rate = 5.0", "fps = 5", "scene.fps", "unknown key", "frame_rate"),
+            ("x = [-2.5, 2.5]", "x = [2.5, -2.5]", "scene.x", "[2.5, -2.5]", "lower bound"),
+            ("x = [-2.5, 2.5]", "x = [1, 1]", "scene.x", "[1.0, 1.0]", "lower bound"),
+            ("x = [-2.5, 2.5]", "x = [1]", "scene.x", "[1]", "2 numbers"),
+            ("y = [-4.5, 1.5]", "y = [-inf, 1.5]", "scene.y", "-inf", "finite"),
+            ("polygon = [[-2.5, -4.5], ", "polygon = [", "scene.polygon", "2 corners", "at least 3"),
+            ("[2.5, 1.5]]", "[2.5, 1.5, 3]]", "scene.polygon", "[", "rows of 2 numbers"),
+            ("[[-2.5, -4.5], [2.5, -4.5], [2.5, 1.5]]", "[[9, 9], [9, 8], [8, 9]]", "scene.polygon", "no cell", "over"),
+            ("[grid]", "[gird]", "gird", "unknown key", "did you mean grid?"),
+            ("cell = 0.10", "cell = -0.1", "grid.cell", "-0.1", "above 0"),
+            ("cell = 0.10", "cell = nan", "grid.cell", "nan", "finite"),
+            ("cell = 0.10", "cell = 1e-6", "grid.cell", "1e-06, which makes 3.0e+14 cells", "fewer than 1e+08"),
+            ("top = 1.80", "top = 0", "grid.top", "0.0", "above 0"),
+            ("top = 1.80", f"top = 1{'0' * 400}", "grid.top", "1000", "a number"),
+            ("planes = 10", "planes = 0", "grid.planes", "0", "at least 1"),
+            ("planes = 10", "planes = 2.5", "grid.planes", "2.5", "whole number"),
+            ('name = "cam1"', "", "camera[0].name", "nothing", "a text"),
+            ('name = "cam1"', 'name = "cam2"', "camera[1].name", "the name of camera[0]", "of its own"),
+            ("size = [644, 486]", "size = [644, 0]", ONE + "size", "[644.0, 0.0]", "whole pixels"),
+            ("size = [644, 486]", "size = [644.5, 486]", ONE + "size", "644.5", "whole pixels"),
+            ("ground = [[100, 0", "ground = [[nan, 0", ONE + "ground", "nan", "3 rows of 3 numbers"),
+            ("[0, 0, 3]]", "[0, 0]]", ONE + "ground", "[[100", "3 rows of 3 numbers"),
+            ("ground = [[100, 0, 320], [0, -100, 240], [0, 0, 3]]\n", "", ONE + "ground", "noth", "projection"),
+            ("vertical =", "verticle =", ONE + "verticle", "unknown key", "did you mean vertical?"),
+            ("vertical = [-320, -240, -1.0]\n", "", ONE + "vertical", "nothing", "3 numbers"),
+            ("projection =", "vertical = [0, 0, 1]\nprojection =", TWO + "projection", "beside", "either"),
+            ("matrix = [[490.0", "matrix = [[-490.0", ONE + "lens.matrix", "-490.0", "fx, s, cx"),
+            ("distortion = [", "distortion = [1, 2, 3, 4, ", ONE + "lens.distortion", "6", "k1, k2, p1, p2, k3"),
+            ("offset = -2", 'offset = "-2"', ONE + "offset", "'-2'", "whole number"),
+            ('source = { kind = "video", path = "cam1.avi" }\n', "", ONE + "source", "nothing", "a table"),
+            ('path = "cam1.avi"', 'file = "cam1.avi"', ONE + "source.file", "unknown key", "path"),
+            ('kind = "video"', 'kind = "vidoe"', ONE + "source.kind", "'vidoe'", "did you mean video?"),
+            ('"cam1.avi"', '"cam1.avi", frames = 3', ONE + "source.frames", "unknown key", "kind, path"),
+            ("frames = 263", "frames = 0", TWO + "source.frames", "0", "at least 1"),
+            ('"blind"', '"blnd"', TWO + "on_missing", "'blnd'", "did you mean blind?"),
+            (
+                'background = { kind = "video"',
+                'background = { kind = "masks"',
+                ONE + "background.kind",
+                "masks",
+                "colour",
+            ),
+        ],
+    )
+    def test_names_key_found_and_expected(self, old: str, new: str, key: str, found: str, expected: str) -> None:
+        error = refusal(changed(old, new))
+        assert error.key == key
+        assert found in error.found
+        assert expected in error.expected
+
+    def test_no_cameras(self) -> None:
+        text = RIG[: RIG.index("[[camera]]")]
+        assert refusal(text).key == "camera"
+        assert refusal(f"camera = []\n{text}").expected == "at least one [[camera]]"
+
+    @pytest.mark.parametrize(
+        ("old", "new", "key"),
+        [
+            ("[0, 0, 3]]", "[0, 0, 0]]", ONE + "ground"),
+            ("vertical = [-320, -240, -1.0]", "vertical = [0, 0, 0]", ONE + "vertical"),
+            ("[0, 0, -1, 3]]", "[0, 0, -1, 0]]", TWO + "projection"),
+            ("[0, 0, -1, 3]]", "[0, 0, 0, 3]]", TWO + "projection"),
+            ("320], [0, -100", "9e9], [0, -100", ONE + "ground"),
+            ("-320, 320]", "-320, 9e9]", TWO + "projection"),
+        ],
+    )
+    def test_impossible_geometry_is_placed_in_the_file(self, old: str, new: str, key: str) -> None:
+        assert refusal(changed(old, new), CalibrationError).key == key
+
+    @given(st.data())
+    def test_no_slip_of_the_pen_raises_anything_else(self, data: st.DataObject) -> None:
+        start = data.draw(st.integers(0, len(RIG) - 1))
+        stop = data.draw(st.integers(start, min(start + 9, len(RIG))))
+        slip = data.draw(st.text("0123456789.-e[]{}\"'=,#\nnaif ", max_size=4))
+        try:
+            parse_rig(RIG[:start] + slip + RIG[stop:], FILE)
+        except InputError as error:
+            assert "\n" not in str(error)
+
+
+class TestWrite:
+    @settings(max_examples=50)
+    @given(st.data())
+    def test_reads_back_to_the_last_bit(self, tmp_path_factory: pytest.TempPathFactory, data: st.DataObject) -> None:
+        path = tmp_path_factory.mktemp("rig") / "rig.toml"
+        recording = data.draw(recordings(path))
+        write_rig(path, recording)
+        assert plain(read_rig(path)) == plain(recording)
+        assert [file.name for file in path.parent.iterdir()] == ["rig.toml"]
+
+    def test_what_is_read_is_written_the_same(self, tmp_path: Path) -> None:
+        path = tmp_path / "rig.toml"
+        path.write_text(RIG)
+        recording = read_rig(path)
+        write_rig(path, recording)
+        first = path.read_text()
+        write_rig(path, read_rig(path))
+        assert path.read_text() == first
+        assert 'path = "../boxes/cam2.txt"' in first
+
+    def test_paths_are_relative_to_the_file(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.chdir(tmp_path)
+        Path("rigs").mkdir()
+        recording = parse_rig(RIG, Path("rig.toml"))
+        write_rig("rigs/rig.toml", recording)
+        text = Path("rigs/rig.toml").read_text()
+        assert 'path = "../cam1.avi"' in text
+        assert 'path = "../../boxes/cam2.txt"' in text
+
+    def test_numpy_numbers_are_plain_in_the_file(self, tmp_path: Path) -> None:
+        recording = parse_rig(RIG, FILE)
+        grid = dataclasses.replace(recording.rig.grid, cell=np.float64(0.1), planes=int(np.int64(4)))
+        rig = dataclasses.replace(recording.rig, grid=grid, frame_rate=5)
+        write_rig(tmp_path / "rig.toml", Recording(FILE, rig, recording.sources))
+        assert read_rig(tmp_path / "rig.toml").rig.grid.cell == 0.1
+
+    def test_what_could_not_be_read_is_not_written(self, tmp_path: Path) -> None:
+        recording = parse_rig(RIG, FILE)
+        path = tmp_path / "rig.toml"
+        twins = dataclasses.replace(recording.rig, cameras=(recording.rig.cameras[0],) * 2)
+        with pytest.raises(RigError, match=r"rig.toml: camera\[1\].name: found 'cam1'"):
+            write_rig(path, Recording(path, twins, recording.sources))
+        assert not path.exists()
+
+    def test_place_that_cannot_be_written(self, tmp_path: Path) -> None:
+        with pytest.raises(OutputError, match=r"nowhere/rig.toml: found No such file"):
+            write_rig(tmp_path / "nowhere/rig.toml", parse_rig(RIG, FILE))
