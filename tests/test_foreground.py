@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from itertools import pairwise
+from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
+import reference_foreground as reference
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -19,8 +23,8 @@ from stseg.foreground.commonest import commonest_colours
 from stseg.foreground.light import channel_gains
 from stseg.foreground.mixture_kernels import evaluate, update
 from stseg.foreground.smoothing import pool_log_odds
-from tests import reference_foreground as reference
 
+DATA = Path(os.environ.get("STSEG_DATA", Path(__file__).parents[1] / "../shared/data"))
 FLOOR = (110, 140, 60)  # BGR
 SHIRT = (40, 60, 190)
 SIZE = (12, 12)
@@ -421,3 +425,29 @@ def test_an_image_without_instances_has_no_boxes() -> None:
     assert len(instance_boxes(np.zeros((4, 4), np.uint16))) == 0
     with pytest.raises(SourceError):
         instance_boxes(np.zeros((4, 4), np.uint8))
+
+
+# Real data
+
+
+def test_people_in_a_real_room_are_found() -> None:
+    empty = DATA / "uu4/cam1/background.avi"
+    if not empty.exists():
+        pytest.skip("the data set uu4 is not here: set STSEG_DATA to its parent folder")
+    model = Mixture((129, 98), 5.0)
+    for image in _frames(empty, 8):
+        model.learn(image)
+    overlap = union = 0
+    silhouettes = _frames(DATA / "uu4/cam1/foreground_cropped.avi", 4)
+    for image, silhouette in zip(_frames(DATA / "uu4_colour/cam1.avi", 4), silhouettes, strict=True):
+        found, true = model.likelihood(image) > 0.5, silhouette[:, :, 0] > 127
+        overlap, union = overlap + int((found & true).sum()), union + int((found | true).sum())
+    assert overlap / union > 0.85
+
+
+def _frames(path: Path, count: int) -> list[Bytes]:
+    """The first frames of a video, one pixel in five of each row and column: quick in plain Python too."""
+    video = cv2.VideoCapture(str(path))
+    frames = [np.ascontiguousarray(video.read()[1][::5, ::5], np.uint8) for _ in range(count)]
+    video.release()
+    return frames

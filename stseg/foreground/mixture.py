@@ -43,6 +43,8 @@ from stseg.foreground.light import channel_gains
 from stseg.foreground.mixture_kernels import evaluate, update
 from stseg.foreground.smoothing import pool_log_odds
 
+_TURNS = 4  # each frame teaches every fourth row at four times the rate: the rates are slow, and it costs a quarter
+
 
 @dataclass(frozen=True, slots=True)
 class MixtureConfig:
@@ -132,6 +134,7 @@ class Mixture:
         self._variance = np.full((height, width, self.config.modes), self.config.initial_sd**2, np.float32)
         self._weight = np.zeros((height, width, self.config.modes), np.float32)
         self._learned = 0
+        self._asked = 0
 
     @classmethod
     def from_state(
@@ -144,8 +147,8 @@ class Mixture:
         InputError
             Where an array is missing, or has another shape or dtype than `state` gives it.
         """
-        if missing := {"mean", "variance", "weight", "learned"} - set(state):
-            raise InputError("state of a mixture", "", f"no {', '.join(sorted(missing))}", "all four arrays")
+        if missing := {"mean", "variance", "weight", "learned", "asked"} - set(state):
+            raise InputError("state of a mixture", "", f"no {', '.join(sorted(missing))}", "all five arrays")
         height, width = state["weight"].shape[:2]
         model = cls((width, height), frame_rate, config)
         for key, own in model.state().items():
@@ -153,7 +156,7 @@ class Mixture:
                 found = f"{state[key].dtype} {state[key].shape}"
                 raise InputError("state of a mixture", key, found, f"{own.dtype} {own.shape}")
         model._mean, model._variance, model._weight = (state[key].copy() for key in ("mean", "variance", "weight"))
-        model._learned = int(state["learned"])
+        model._learned, model._asked = int(state["learned"]), int(state["asked"])
         return model
 
     def state(self) -> dict[str, AnyArray]:
@@ -163,13 +166,14 @@ class Mixture:
         -------
         dict
             mean float32 (v, u, K, 3) grey levels BGR, variance float32 (v, u, K) squared grey levels, weight float32
-            (v, u, K), learned int64 (): frames learned.
+            (v, u, K), learned and asked int64 (): frames so far of `learn` and of `likelihood`.
         """
         return {
             "mean": self._mean.copy(),
             "variance": self._variance.copy(),
             "weight": self._weight.copy(),
             "learned": np.array(self._learned, np.int64),
+            "asked": np.array(self._asked, np.int64),
         }
 
     def learn(self, image: Bytes) -> None:
@@ -177,7 +181,7 @@ class Mixture:
         self._check(image)
         certain = np.ones(image.shape[:2], np.float32)
         rate = 1.0 / (self._learned + 1)
-        self._update(image, self._gain(image), certain, rate, rate)
+        self._update(slice(None), image, self._gain(image), certain, rate, rate)
         self._learned += 1
 
     def learn_from(self, images: Iterable[Bytes]) -> None:
@@ -236,22 +240,23 @@ class Mixture:
             config.unexplained, config.shadow, config.darkest, config.mimicry, log_odds,
         )  # fmt: skip
         pool_log_odds(log_odds, config.radius, rows, likelihood)
-        step = 1.0 / self._frame_rate
+        step = _TURNS / self._frame_rate
         fast = 1.0 - math.exp(-step / config.memory)
         slow = 1.0 - (1.0 - config.share) ** (step / config.absorption)
-        self._update(image, gain, likelihood, fast, slow)
+        self._update(slice(self._asked % _TURNS, None, _TURNS), image, gain, likelihood, fast, slow)
+        self._asked += 1
         return likelihood
 
     def _gain(self, image: Bytes) -> Floats:
         """The frame's light relative to the model's."""
         return channel_gains(image, self._mean, self._weight) if self._learned else np.ones(3)
 
-    def _update(self, image: Bytes, gain: Floats, likelihood: Singles, fast: float, slow: float) -> None:
+    def _update(self, rows: slice, image: Bytes, gain: Floats, likelihood: Singles, fast: float, slow: float) -> None:
         config = self.config
         update(
-            image, gain.astype(np.float32), likelihood, np.float32(fast), np.float32(slow), np.float32(config.share),
-            np.float32(config.match), np.float32(config.minimum_sd), np.float32(config.initial_sd),
-            self._mean, self._variance, self._weight,
+            image[rows], gain.astype(np.float32), likelihood[rows], np.float32(fast), np.float32(slow),
+            np.float32(config.share), np.float32(config.match), np.float32(config.minimum_sd),
+            np.float32(config.initial_sd), self._mean[rows], self._variance[rows], self._weight[rows],
         )  # fmt: skip
 
     def _check(self, image: Bytes) -> None:

@@ -108,19 +108,21 @@ def update(
                     length = r0 * r0 + r1 * r1 + r2 * r2
                     if length <= distance * variance[v, u, k]:
                         nearest, distance, squared = k, length / variance[v, u, k], length
-            weakest = weight[v, u].argmin()
-            if nearest < 0 and (chance < _HALF or weight[v, u, weakest] >= share):
-                continue  # a shadow, noise among background, or no mode to spare for what is new
-            rate = slow
-            if nearest >= 0 and weight[v, u, nearest] >= share:
-                rate = slow * chance + fast * (_ONE - chance)
-            for k in range(modes):
-                weight[v, u, k] *= _ONE - rate
             if nearest < 0:
-                weight[v, u, weakest] = rate
+                weakest = weight[v, u].argmin()
+                if chance < _HALF or weight[v, u, weakest] >= share:
+                    continue  # a shadow, noise among background, or no mode to spare for what is new
+                for k in range(modes):
+                    weight[v, u, k] *= _ONE - slow
+                weight[v, u, weakest] = slow
                 variance[v, u, weakest] = initial_sd * initial_sd
                 mean[v, u, weakest, 0], mean[v, u, weakest, 1], mean[v, u, weakest, 2] = x0 / g0, x1 / g1, x2 / g2
                 continue
+            rate = slow
+            if weight[v, u, nearest] >= share:
+                rate = slow * chance + fast * (_ONE - chance)
+            for k in range(modes):
+                weight[v, u, k] *= _ONE - rate
             weight[v, u, nearest] += rate
             step = min(rate / weight[v, u, nearest], _ONE)
             mean[v, u, nearest, 0] += step * (x0 - min(g0 * mean[v, u, nearest, 0], _WHITE)) / g0

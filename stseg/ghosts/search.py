@@ -112,12 +112,10 @@ def _remove(
         members[a] = members[count - 1]
         without = set_score(members, count - 1, boxes, pixels, own, ground, terms, owner, parts)
         if without > score + _GAINED:
-            members[count - 1] = leaving
             inside[leaving] = False
             count -= 1
             score = without
         else:
-            members[count - 1] = members[a]
             members[a] = leaving
             a += 1
     return count

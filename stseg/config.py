@@ -1,0 +1,48 @@
+"""One frozen dataclass per stage. What each value means physically stands below it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class GhostConfig:
+    """The pass that decides which candidates are people (METHODS 7)."""
+
+    heights: tuple[float, ...] = (1.5, 1.6, 1.7, 1.8, 1.9)
+    """Heights that are tried, metres."""
+    height_mean: float = 1.70
+    """Mean height of people, metres (HW12)."""
+    height_spread: float = 0.12
+    """Standard deviation of their heights, metres."""
+    lattice: float = 0.20
+    """Spacing of the ground lattice that is searched for candidates, metres."""
+    rounds: int = 4
+    """How often the frame is searched again for people behind those already found."""
+    person: float = -3.0
+    """Log-odds of a person at a candidate's place before any view is asked, nats."""
+    apart: float = 0.30
+    """Distance below which two bodies would stand inside each other, metres."""
+    hit: float = 3.0
+    """Log-likelihood ratio of a perfectly fitting box, person against clutter, nats."""
+    box_miss: float = 0.20
+    """How often a detector misses a person it sees whole."""
+    hidden_below: float = 0.20
+    """Visible share of a body below which a detector finds hardly anybody."""
+    whole_above: float = 0.90
+    """Visible share from which on a body is as good as whole."""
+    least: float = 0.02
+    """Share of hidden people that are found all the same."""
+    body_weight: float = 2.0
+    """How many independent looks one view's pixels of one body are worth."""
+    pixel_miss: float = 0.15
+    """How often a body's pixel is missed by the foreground (m of METHODS 4)."""
+    pixel_clutter: float = 0.10
+    """How often a ray past all bodies meets foreground (b of METHODS 4)."""
+
+
+@dataclass(frozen=True)
+class Config:
+    """All stages."""
+
+    ghosts: GhostConfig = field(default_factory=GhostConfig)

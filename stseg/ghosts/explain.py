@@ -1,0 +1,258 @@
+"""The pass of one frame: candidates, and the set of them that best explains what all views show (METHODS 7).
+
+Candidates are sought on a ground lattice, in what nobody explains yet, so people behind others are found once those
+others stand. Tracks committed in earlier windows are candidates too. After each round the set is searched anew.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from stseg.arrays import Boxes, Flags, Floats, Ints, Singles
+from stseg.config import GhostConfig
+from stseg.geometry import Rig
+from stseg.ghosts.evidence import BoxEvidence, PixelEvidence, Terms
+from stseg.ghosts.pool import Pool, box_evidence, empty_pool, peaks, pixel_evidence
+from stseg.ghosts.refine import owned, refine
+from stseg.ghosts.scoring import box_score, pixel_score, set_score
+from stseg.ghosts.search import search
+from stseg.ghosts.views import BoxView, PixelView, Sight, View
+
+ViewEvidence = Boxes | Singles | None
+"""One view of one frame: boxes, a likelihood map float32 (v, u), or None where the view is blind."""
+
+
+@dataclass(frozen=True)
+class People:
+    """Places of bodies.
+
+    Attributes
+    ----------
+    ground : float64 (n, 2)
+        Metres.
+    height : float64 (n,)
+        Metres.
+    covariance : float64 (n, 2, 2)
+        Square metres.
+    evidence : float64 (n,)
+        What all views and the prior say, nats.
+    parts : float64 (view, n)
+        What each view says, nats.
+    """
+
+    ground: Floats
+    height: Floats
+    covariance: Floats
+    evidence: Floats
+    parts: Floats
+
+    def __len__(self) -> int:
+        return len(self.ground)
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """Who is there, who is not, and who explains what.
+
+    Attributes
+    ----------
+    people
+        The true candidates.
+    ghosts
+        Candidates that were weighed and found to be nobody.
+    owner : tuple of int16 arrays (v, u)
+        For each view the index of the person whose body is nearest at each raster pixel, -1 for nobody.
+    raster_step : tuple of int
+        Image pixels to a raster pixel of `owner`, for each view.
+    box_owner : tuple of int64 arrays (box,)
+        For each view with boxes the person whom each box shows, -1 for nobody; empty for other views.
+    """
+
+    people: People
+    ghosts: People
+    owner: tuple[Ints, ...]
+    raster_step: tuple[int, ...]
+    box_owner: tuple[Ints, ...]
+
+
+class FramePass:
+    """The pass for one rig: lattice and tables are made once, frames are explained one by one.
+
+    Parameters
+    ----------
+    rig
+        The cameras and the grid.
+    kinds
+        What each camera delivers: "boxes" or "pixels".
+    config
+        The pass's constants.
+    """
+
+    def __init__(self, rig: Rig, kinds: Sequence[str], config: GhostConfig) -> None:
+        self.config = config
+        grid = rig.grid
+        x = np.arange(grid.x[0] + config.lattice / 2, grid.x[1], config.lattice)
+        y = np.arange(grid.y[0] + config.lattice / 2, grid.y[1], config.lattice)
+        self.lattice_ground = np.stack(np.meshgrid(x, y), -1)
+        flat = self.lattice_ground.reshape(-1, 2)
+        self.views: list[View] = [
+            (BoxView if kind == "boxes" else PixelView)(camera, grid, flat, config)
+            for camera, kind in zip(rig.cameras, kinds, strict=True)
+        ]
+        self.terms = Terms(
+            config.person,
+            config.apart,
+            config.hit,
+            config.box_miss,
+            config.hidden_below,
+            config.whole_above,
+            config.least,
+            config.body_weight,
+        )
+        self.height_prior = self._height_prior(np.asarray(config.heights))
+
+    def explain(self, seen: Sequence[ViewEvidence], predicted: Floats) -> Explanation:
+        """Explain one frame.
+
+        Parameters
+        ----------
+        seen
+            What each view shows.
+        predicted : float64 (n, 3)
+            Ground position and height, metres, of tracks committed in earlier windows, carried to this frame.
+        """
+        sights = [None if s is None else view.observe(s) for view, s in zip(self.views, seen, strict=True)]
+        pool = Pool(predicted[:, :2], predicted[:, 2]) if len(predicted) else empty_pool()
+        members = np.zeros(0, np.int64)
+        frame = _Frame(self, sights, pool, members)
+        for _ in range(self.config.rounds):
+            fresh = self._fresh(frame)
+            moved = frame.refined()[0]
+            if not len(fresh) and not len(moved):
+                break
+            frame = _Frame(self, sights, frame.pool.and_(moved).and_(fresh), frame.members)
+        return frame.explanation()
+
+    def _fresh(self, frame: _Frame) -> Pool:
+        """Candidates in what nobody explains yet."""
+        score = np.repeat(self.height_prior[:, None], len(self.lattice_ground.reshape(-1, 2)), 1)
+        for view, sight, free in zip(self.views, frame.sights, frame.free(), strict=True):
+            if sight is not None:
+                score += view.lattice_score(sight, free)
+        return peaks(score.reshape(-1, *self.lattice_ground.shape[:2]), self.lattice_ground, self._heights)
+
+    @property
+    def _heights(self) -> Floats:
+        return np.asarray(self.config.heights)
+
+    def _height_prior(self, heights: Floats) -> Floats:
+        return -0.5 * ((heights - self.config.height_mean) / self.config.height_spread) ** 2
+
+
+class _Frame:
+    """One frame while it is being explained: its candidates, and the set that explains it best."""
+
+    def __init__(self, frame_pass: FramePass, sights: list[Sight | None], pool: Pool, members: Ints) -> None:
+        self.frame_pass, self.sights, self.pool = frame_pass, sights, pool
+        views = frame_pass.views
+        self.boxes: BoxEvidence = box_evidence(views, sights, pool)
+        self.pixels: PixelEvidence = pixel_evidence(views, sights, pool)
+        self.own = frame_pass._height_prior(pool.height)
+        most = max(self.pixels.raster[0].size if len(self.pixels.raster) else 0, self.boxes.match.shape[2], 1)
+        self.scratch = np.empty(most, np.int64)
+        self.parts = np.zeros((len(views), len(pool) + 1))
+        room = np.zeros(len(pool) + 1, np.int64)
+        room[: len(members)] = members
+        count = search(room, len(members), *self._arguments())
+        self.members = room[:count].copy()
+        self.box_owner, self.pixel_owner = self._owners()
+
+    def _arguments(self) -> tuple[BoxEvidence, PixelEvidence, Floats, Floats, Terms, Ints, Floats]:
+        pool, terms = self.pool, self.frame_pass.terms
+        return self.boxes, self.pixels, self.own, pool.ground, terms, self.scratch, self.parts
+
+    def score(self, members: Ints) -> float:
+        """Score of a set; `parts` then holds what each view says of each member."""
+        return set_score(members, len(members), *self._arguments())
+
+    def _owners(self) -> tuple[list[Ints], list[Ints]]:
+        """For each view whose boxes are whose, and whose pixels are whose; -1 for nobody."""
+        boxes, pixels = [], []
+        terms, count = self.frame_pass.terms, len(self.members)
+        box_view = pixel_view = 0
+        for view, sight in zip(self.frame_pass.views, self.sights, strict=True):
+            owner = np.full(len(sight.edges) if sight else 0, -1, np.int64)
+            raster = np.full(view.shape, -1, np.int64)
+            if isinstance(view, BoxView):
+                box_score(box_view, self.members, count, self.boxes, terms, self.scratch, self.parts[0])
+                owner[:] = self.scratch[: len(owner)]
+                box_view += 1
+            else:
+                pixel_score(pixel_view, self.members, count, self.pixels, terms, self.scratch, self.parts[0])
+                rows, columns = self.pixels.raster.shape[1:]
+                raster[:] = self.scratch[: rows * columns].reshape(rows, columns)[: view.shape[0], : view.shape[1]]
+                pixel_view += 1
+            boxes.append(owner)
+            pixels.append(raster)
+        return boxes, pixels
+
+    def free(self) -> list[Flags]:
+        """For each view the boxes, or the pixels, that nobody explains."""
+        return [
+            (pixels if isinstance(view, PixelView) else boxes) < 0
+            for view, boxes, pixels in zip(self.frame_pass.views, self.box_owner, self.pixel_owner, strict=True)
+        ]
+
+    def refined(self) -> tuple[Pool, Floats]:
+        """The set's people at the means of their posteriors, and the covariances."""
+        views = self.frame_pass.views
+        own = [
+            [owned(v, j, b, p) for v, b, p in zip(views, self.box_owner, self.pixel_owner, strict=True)]
+            for j in range(len(self.members))
+        ]
+        return refine(self.pool.at(self.members), views, self.sights, own, self.frame_pass.height_prior)
+
+    def explanation(self) -> Explanation:
+        """The result, once nothing changes any more."""
+        exact, covariance = self.refined()
+        total = self.score(self.members)
+        parts = self.parts[:, : len(self.members)].copy()
+        without = [self.score(np.delete(self.members, a)) for a in range(len(self.members))]
+        people = People(exact.ground, exact.height, covariance, total - np.array(without), parts)
+        views = self.frame_pass.views
+        painted = [p if isinstance(v, PixelView) else _painted(v, exact) for v, p in zip(views, self.pixel_owner, strict=True)]
+        owner = tuple(p.astype(np.int16) for p in painted)
+        return Explanation(people, self._ghosts(total), owner, tuple(v.step for v in views), tuple(self.box_owner))
+
+    def _ghosts(self, total: float) -> People:
+        """Candidates that were weighed and found to be nobody, those in the same place as a better one left out."""
+        weighed = []
+        for i in np.setdiff1d(np.arange(len(self.pool)), self.members):
+            gain = self.score(np.append(self.members, i)) - total
+            weighed.append((gain, i, self.parts[:, len(self.members)].copy()))
+        weighed.sort(key=lambda one: (-one[0], one[1]))
+        kept: list[tuple[float, int, Floats]] = []
+        standing = list(self.pool.ground[self.members])
+        for gain, i, parts in weighed:
+            place = self.pool.ground[i]
+            if all(np.hypot(*(place - other)) >= 2 * self.frame_pass.config.lattice for other in standing):
+                standing.append(place)
+                kept.append((gain, int(i), parts))
+        chosen = self.pool.at([i for _, i, _ in kept])
+        wide = np.tile(np.eye(2) * self.frame_pass.config.lattice**2 / 12, (len(kept), 1, 1))
+        parts = np.array([p for _, _, p in kept]).reshape(len(kept), -1).T
+        return People(chosen.ground, chosen.height, wide, np.array([g for g, _, _ in kept]), parts)
+
+
+def _painted(view: View, people: Pool) -> Ints:
+    """Whose body is nearest at each raster pixel of a view, int64 (v, u), -1 for nobody."""
+    first, spans, _ = view.outlines(people.ground, people.height)
+    owner = np.full(view.shape, -1, np.int64)
+    for j in np.argsort(-view.distance(people.ground), kind="stable"):
+        for k in range(spans.shape[1]):
+            if 0 <= first[j] and first[j] + k < view.shape[0]:
+                owner[first[j] + k, spans[j, k, 0] : spans[j, k, 1]] = j
+    return owner

@@ -1,0 +1,87 @@
+"""Where exactly a person stands: the posterior over a small patch of ground, from the evidence that is theirs alone."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from stseg.arrays import Flags, Floats, Ints
+from stseg.ghosts.boxes import fill_match
+from stseg.ghosts.pool import Pool
+from stseg.ghosts.views import BoxView, PixelView, Sight, View
+
+_REACH, _SPACING = 2, 0.08
+_WORST = -8.0
+"""A box never speaks more strongly against a place than this, nats: it may not be theirs after all."""
+
+
+@dataclass(frozen=True)
+class Own:
+    """What belongs to one person in one view: a box (its index, -1 for none), or the raster's pixels open to them."""
+
+    box: int
+    pixels: Flags
+
+
+def refine(
+    pool: Pool, views: Sequence[View], sights: Sequence[Sight | None], own: Sequence[Sequence[Own]], prior: Floats
+) -> tuple[Pool, Floats]:
+    """Move each person to the mean of their posterior.
+
+    Parameters
+    ----------
+    pool
+        The people.
+    own
+        For each person and view what is theirs.
+    prior : float64 (height,)
+        Log-prior of the heights tried, nats.
+
+    Returns
+    -------
+    Pool, float64 (n, 2, 2)
+        The people moved, and the covariance of each place, square metres.
+    """
+    axis = np.arange(-_REACH, _REACH + 1) * _SPACING
+    offset = np.stack(np.meshgrid(axis, axis), -1).reshape(-1, 2)
+    ground, height, covariance = pool.ground.copy(), pool.height.copy(), np.zeros((len(pool), 2, 2))
+    tried = np.asarray(views[0].config.heights)
+    for j in range(len(pool)):
+        patch = pool.ground[j] + offset
+        score = np.repeat(prior[:, None], len(patch), 1)
+        for view, sight, mine in zip(views, sights, own[j], strict=True):
+            if sight is not None:
+                score += _patch_score(view, sight, mine, patch, tried)
+        weight = np.exp(score - score.max())
+        height[j] = tried[weight.sum(1).argmax()]
+        place = weight.sum(0) / weight.sum()
+        ground[j] = place @ patch
+        spread = patch - ground[j]
+        covariance[j] = (spread * place[:, None]).T @ spread + np.eye(2) * _SPACING**2 / 12
+    return Pool(ground, height), covariance
+
+
+def _patch_score(view: View, sight: Sight, mine: Own, patch: Floats, tried: Floats) -> Floats:
+    """What one view says of a patch's pillars, nats, float64 (height, place)."""
+    score = np.zeros((len(tried), len(patch)))
+    if isinstance(view, BoxView) and mine.box >= 0:
+        edges, belief = sight.edges[mine.box : mine.box + 1], sight.belief[mine.box : mine.box + 1]
+        match = np.empty((score.size, 1))
+        bodies = view.table.boxes(patch, tried).reshape(-1, 4)
+        fill_match(bodies, edges, belief, *map(float, view.camera.size), match)
+        score = np.maximum(match, _WORST).reshape(score.shape)
+    if isinstance(view, PixelView):
+        everywhere = np.tile(patch, (len(tried), 1))
+        first, spans, area = view.outlines(everywhere, np.repeat(tried, len(patch)))
+        score = view.mean_inside(sight.raster, mine.pixels, first, spans, area).reshape(score.shape)
+    return score
+
+
+def owned(view: View, person: int, boxes: Ints, pixels: Ints) -> Own:
+    """What of a view belongs to a person: the box assigned, or the pixels of nobody else."""
+    if isinstance(view, PixelView):
+        return Own(-1, (pixels == person) | (pixels < 0))
+    theirs = np.flatnonzero(boxes == person)
+    return Own(int(theirs[0]) if len(theirs) else -1, np.zeros((0, 0), bool))

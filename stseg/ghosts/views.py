@@ -1,0 +1,166 @@
+"""One view as the pass sees it: where the lattice's pillars appear, and what a frame shows there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stseg.accelerate import kernel
+from stseg.arrays import Boxes, Flags, Floats, Ints, Singles
+from stseg.config import GhostConfig
+from stseg.geometry import Camera, Grid
+from stseg.geometry.bodies import BodyTable
+from stseg.ghosts.boxes import fill_best_match, fill_inside
+from stseg.ghosts.evidence import Spans
+from stseg.ghosts.outlines import outlines
+
+_BODY_ROWS = 30
+_LEAST_INSIDE = 0.02
+_OPTIMISM = 0.3
+"""Cost of a missing box while candidates are sought, nats: whoever hides them is not known yet."""
+
+
+@dataclass(frozen=True)
+class Sight:
+    """What one view shows in one frame: boxes clipped to the image, or a raster of log-odds; the other is empty.
+
+    Attributes
+    ----------
+    edges : float64 (box, 4)
+        left, top, right, bottom, pixels.
+    belief : float64 (box,)
+        Logarithm of the scores.
+    raster : float32 (v, u)
+        Log-odds of foreground, nats.
+    """
+
+    edges: Floats
+    belief: Floats
+    raster: Singles
+
+
+class View:
+    """Pillars of a ground lattice in one camera."""
+
+    def __init__(self, camera: Camera, grid: Grid, lattice_ground: Floats, config: GhostConfig) -> None:
+        self.camera = camera
+        self.config = config
+        self.table = BodyTable.of(camera, grid)
+        self.bodies = self.table.boxes(lattice_ground, np.asarray(config.heights))
+        self.step = _raster_step(self.bodies, camera.size)
+        width, height = camera.size
+        self.shape = (-(-height // self.step), -(-width // self.step))
+
+    def distance(self, ground: Floats) -> Floats:
+        """Distance of ground points (n, 2) from the camera along the ground, metres, float64 (n,)."""
+        return np.asarray(np.hypot(*(ground - self.camera.centre[:2]).T))
+
+    def outlines(self, ground: Floats, heights: Floats) -> tuple[Ints, Spans, Floats]:
+        """Outlines of pillars on this view's raster; see `ghosts.outlines`."""
+        return outlines(self.table, ground, heights, self.step, self.shape)
+
+    def chosen_boxes(self, ground: Floats, heights: Floats) -> Floats:
+        """Pillar boxes of candidates, one height each, float64 (n, 4)."""
+        tried = np.asarray(self.config.heights)
+        every = self.table.boxes(ground, tried)
+        return every[np.abs(heights[:, None] - tried).argmin(1), np.arange(len(ground))]
+
+
+class BoxView(View):
+    """A view that delivers boxes."""
+
+    def __init__(self, camera: Camera, grid: Grid, lattice_ground: Floats, config: GhostConfig) -> None:
+        super().__init__(camera, grid, lattice_ground, config)
+        inside = np.zeros(self.bodies.shape[:2])
+        for row, bodies in zip(inside, self.bodies, strict=True):
+            fill_inside(bodies, *map(float, camera.size), row)
+        share = (inside - config.hidden_below) / (config.whole_above - config.hidden_below)
+        self.found = np.where(inside > _LEAST_INSIDE, np.clip(share, config.least, 1.0), 0.0)
+
+    def observe(self, seen: Boxes | Singles | None) -> Sight:
+        """The frame's boxes."""
+        boxes = seen if isinstance(seen, Boxes) else Boxes(np.zeros((0, 4)), np.zeros(0))
+        width, height = self.camera.size
+        corner, extent = boxes.pixel[:, :2], boxes.pixel[:, 2:]
+        edges = np.concatenate([corner, corner + extent], 1).clip(0, [width - 1, height - 1] * 2)
+        return Sight(edges, np.log(boxes.score.clip(0.05, 1.0)), np.zeros((0, 0), np.float32))
+
+    def lattice_score(self, sight: Sight, free: Flags) -> Floats:
+        """What the free boxes say of each lattice pillar, nats, float64 (height, cell)."""
+        best = np.full(self.bodies.shape[:2], -np.inf)
+        fill_best_match(self.bodies, sight.edges[free], sight.belief[free], *map(float, self.camera.size), best)
+        with np.errstate(divide="ignore"):
+            hit = self.config.hit + 0.3 * np.log(self.found) + best
+        return np.where(self.found > 0, np.maximum(hit, -_OPTIMISM * self.found), 0.0)
+
+
+class PixelView(View):
+    """A view that delivers a likelihood map."""
+
+    def __init__(self, camera: Camera, grid: Grid, lattice_ground: Floats, config: GhostConfig) -> None:
+        super().__init__(camera, grid, lattice_ground, config)
+        self.lattice = [
+            self.outlines(lattice_ground, np.full(len(lattice_ground), height)) for height in config.heights
+        ]
+
+    def observe(self, seen: Boxes | Singles | None) -> Sight:
+        """The frame's log-odds on the raster; all zero where the view is blind."""
+        raster = np.zeros(self.shape, np.float32)
+        if isinstance(seen, np.ndarray):
+            mean = np.empty(self.shape, np.float32)
+            _fill_means(seen, self.step, mean)
+            miss, clutter = self.config.pixel_miss, self.config.pixel_clutter
+            body = (1 - miss) * mean + miss * (1 - mean)
+            empty = clutter * mean + (1 - clutter) * (1 - mean)
+            raster = np.log(body / empty).astype(np.float32)
+        return Sight(np.zeros((0, 4)), np.zeros(0), raster)
+
+    def lattice_score(self, sight: Sight, free: Flags) -> Floats:
+        """What the free pixels (v, u) say of each lattice pillar, nats, float64 (height, cell)."""
+        return np.stack([self.mean_inside(sight.raster, free, *outlines) for outlines in self.lattice])
+
+    def mean_inside(self, raster: Singles, free: Flags, first: Ints, spans: Spans, area: Floats) -> Floats:
+        """Weighted mean log-odds of the free pixels inside outlines, nats, float64 (n,)."""
+        sums = np.zeros((self.shape[0], self.shape[1] + 1))
+        np.cumsum(np.where(free, raster, 0.0), axis=1, out=sums[:, 1:])
+        means = np.zeros(len(first))
+        _fill_span_means(sums, first, spans, area, means)
+        return means * self.config.body_weight
+
+
+@kernel
+def _fill_span_means(sums: Floats, first: Ints, spans: Spans, area: Floats, means: Floats) -> None:
+    """Fill means (cell,) with each outline's sum over its area, from sums along rows (v, u + 1)."""
+    rows = sums.shape[0]
+    for i in range(len(first)):
+        means[i] = 0.0
+        if first[i] >= 0:
+            total = 0.0
+            for k in range(min(spans.shape[1], rows - first[i])):
+                total += sums[first[i] + k, spans[i, k, 1]] - sums[first[i] + k, spans[i, k, 0]]
+            means[i] = total / area[i]
+
+
+@kernel
+def _fill_means(likelihood: Singles, step: int, mean: Singles) -> None:
+    """Fill mean (v, u) with the means over squares of `step` pixels; those at the border may be smaller."""
+    height, width = likelihood.shape
+    for v in range(mean.shape[0]):
+        for u in range(mean.shape[1]):
+            total, count = 0.0, 0
+            for row in range(v * step, min((v + 1) * step, height)):
+                for column in range(u * step, min((u + 1) * step, width)):
+                    total += likelihood[row, column]
+                    count += 1
+            mean[v, u] = total / count
+
+
+def _raster_step(bodies: Floats, size: tuple[int, int]) -> int:
+    """Image pixels to a raster pixel, so that a body in the image is some thirty rows tall."""
+    middle = bodies[len(bodies) // 2]
+    width, height = size
+    within = (middle[:, 2] > 0) & (middle[:, 0] < width) & (middle[:, 3] > 0) & (middle[:, 1] < height)
+    if not within.any():
+        return max(1, height // 120)
+    return max(1, int(np.median(middle[within, 3] - middle[within, 1]) / _BODY_ROWS))

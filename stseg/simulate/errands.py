@@ -1,0 +1,169 @@
+"""Where people want to go: from place to place, to stand a while, to meet somebody, and out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from stseg.arrays import Floats
+
+MARGIN = 0.9
+"""How far outside the area people appear and disappear, metres."""
+_BORDER = 0.45  # metres that goals keep from the area's border
+_PATIENCE = 7.0  # seconds after which a place that could not be reached is given up
+_STAND, _MEET = 0.25, 0.15  # chances of standing a while, and of a meeting, on arrival
+_MEETING = 0.7  # metres between two who meet
+
+
+@dataclass(slots=True)
+class Errand:
+    """What one person is up to.
+
+    Attributes
+    ----------
+    goal : float64 (2,)
+        Where to, metres.
+    stay
+        Seconds until the person wants to leave.
+    enters, leaves
+        On the way in, or out.
+    pause
+        Seconds to stand at the goal.
+    waits
+        Whether the person stands there now.
+    spent
+        Seconds since the goal was set.
+    partner : float64 (2,) or None
+        Goal of the person to meet.
+    half : float64 (2,)
+        Half the area's sides, metres.
+    """
+
+    goal: Floats
+    stay: float
+    half: Floats
+    enters: bool = False
+    leaves: bool = False
+    pause: float = 0.0
+    waits: bool = False
+    spent: float = 0.0
+    partner: Floats | None = field(default=None)
+
+    @property
+    def stays_inside(self) -> bool:
+        """Whether the person is bound to the area."""
+        return not (self.enters or self.leaves)
+
+    @property
+    def is_free(self) -> bool:
+        """Whether the person may be called to a meeting."""
+        return self.stays_inside and not self.waits and self.partner is None
+
+    def counts(self, ground: Floats) -> bool:
+        """Whether the person is in the area or about to enter it."""
+        return self.enters or bool((np.abs(ground) <= self.half).all())
+
+    def is_over(self, ground: Floats) -> bool:
+        """Whether the person has left the scene."""
+        return self.leaves and bool((np.abs(ground) > self.half + MARGIN - 0.05).any())
+
+    def facing(self, ground: Floats) -> float | None:
+        """Direction that one who waits looks to, radians; None to look on."""
+        if self.partner is None:
+            return None
+        way = self.partner - ground
+        return float(np.arctan2(way[1], way[0]))
+
+    def send(self, goal: Floats, pause: float = 0.0, partner: Floats | None = None) -> None:
+        """Set the next goal."""
+        self.goal, self.pause, self.partner = goal, pause, partner
+        self.waits, self.spent = False, 0.0
+
+
+class Planner:
+    """Gives people their errands.
+
+    Parameters
+    ----------
+    area
+        Its sides, metres.
+    stay
+        Mean time that a person stays, seconds.
+    lots
+        Where chance comes from.
+    """
+
+    def __init__(self, area: tuple[float, float], stay: float, lots: np.random.Generator) -> None:
+        self._half, self._stay, self._lots = np.array(area) / 2, stay, lots
+
+    def errand(self, enters: bool) -> Errand:
+        """The first errand of somebody who is there from the start or enters."""
+        return Errand(self._goal(), self._stay * self._lots.uniform(0.4, 1.6), self._half, enters)
+
+    def place_inside(self, others: Floats) -> Floats:
+        """A place in the area where one does not stand on others' feet."""
+        return self._roomiest(np.stack([self._goal() for _ in range(12)]), others)
+
+    def door(self, others: Floats) -> Floats:
+        """A place outside the area where nobody is."""
+        return self._roomiest(np.stack([self._way_out() for _ in range(6)]), others)
+
+    def revise(self, people: list[tuple[Floats, Errand]], step: float) -> None:
+        """Let `step` seconds pass, and give new errands to those who have done theirs."""
+        for ground, errand in people:
+            errand.stay -= step
+            errand.spent += step
+            errand.enters = errand.enters and bool((np.abs(ground) > self._half - 0.2).any())
+            near = float(np.hypot(*(errand.goal - ground))) < 0.3
+            if errand.leaves:
+                # Who has been pushed past the way out gives no more than a few seconds to it.
+                if errand.spent > _PATIENCE:
+                    errand.send(self._way_out())
+            elif errand.waits or (near and errand.pause > 0):
+                errand.waits = True
+                errand.pause -= step
+                if errand.pause <= 0:
+                    self._next(errand, people)
+            elif near or errand.spent > _PATIENCE:
+                self._next(errand, people)
+
+    def _next(self, errand: Errand, people: list[tuple[Floats, Errand]]) -> None:
+        if errand.stay < 0 and not errand.enters:
+            errand.leaves = True
+            errand.send(self._way_out())
+            return
+        lot = self._lots.uniform()
+        free = [other for _, other in people if other.is_free and other is not errand]
+        if lot < _MEET and free and not errand.enters:
+            self._meet(errand, free[int(self._lots.integers(len(free)))])
+        elif lot < _MEET + _STAND:
+            errand.send(self._goal(), self._lots.uniform(1.5, 5.0))
+        else:
+            errand.send(self._goal())
+
+    def _meet(self, one: Errand, other: Errand) -> None:
+        place, angle = self._goal(), self._lots.uniform(0, np.pi)
+        apart = _MEETING / 2 * np.array([np.cos(angle), np.sin(angle)])
+        pause = self._lots.uniform(2.5, 6.0)
+        one.send(place + apart, pause, place - apart)
+        other.send(place - apart, pause, place + apart)
+
+    def _goal(self) -> Floats:
+        return self._lots.uniform(-1.0, 1.0, 2) * (self._half - _BORDER)
+
+    def _way_out(self) -> Floats:
+        """Somewhere beyond the middle of one of the sides: corners are where cameras stand."""
+        side, along = int(self._lots.integers(4)), self._lots.uniform(-0.6, 0.6)
+        axis, sign = side % 2, 1 - 2 * (side // 2)
+        place = np.empty(2)
+        place[axis] = sign * (self._half[axis] + MARGIN)
+        place[1 - axis] = along * self._half[1 - axis]
+        return place
+
+    @staticmethod
+    def _roomiest(places: Floats, others: Floats) -> Floats:
+        if not len(others):
+            return np.asarray(places[0])
+        room = np.linalg.norm(places[:, None] - others[None], axis=2).min(axis=1)
+        return np.asarray(places[int(np.argmax(room))])

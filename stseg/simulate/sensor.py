@@ -1,0 +1,36 @@
+"""From the light in front of a lens to the numbers of a sensor: softness, gain, noise."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from stseg.arrays import Bytes
+
+_SOFTNESS = 0.6
+"""Standard deviation of the lens's blur, pixels."""
+
+
+def expose(light: Bytes, gain: float, noise: float, lots: np.random.Generator) -> Bytes:
+    """The frame that a camera delivers.
+
+    Parameters
+    ----------
+    light : uint8 (v, u, 3)
+        The scene at normal light.
+    gain
+        Light relative to normal.
+    noise
+        Standard deviation of the sensor's noise, grey levels.
+    lots
+        Where chance comes from.
+
+    Returns
+    -------
+    uint8 (v, u, 3)
+    """
+    soft = cv2.GaussianBlur(light, (5, 5), _SOFTNESS)
+    frame = lots.standard_normal(light.shape, np.float32)
+    frame *= noise
+    frame += np.float32(gain) * soft + 0.5
+    return np.clip(frame, 0, 255, out=frame).astype(np.uint8)
