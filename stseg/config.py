@@ -42,7 +42,48 @@ class GhostConfig:
 
 
 @dataclass(frozen=True)
+class OccupancyConfig:
+    """Fusion of the views into the volume (METHODS 3, 4)."""
+
+    occupied: float = 0.02
+    """Share of the cells that a body fills where the pass of the frame found nobody (pi of METHODS 4)."""
+    reach: float = 0.40
+    """How far from a person's place their own cells reach, metres."""
+
+
+@dataclass(frozen=True)
+class SegmentationConfig:
+    """The cut of a window's volume (METHODS 4)."""
+
+    smoothness: float = 0.5
+    """lambda: what it costs that two neighbours at no distance differ, nats."""
+    spread: float = 0.20
+    """s: distance over which that falls to 0.6 of it, metres."""
+    step: float = 0.15
+    """How far apart the time neighbours of one body are once its motion is followed, metres."""
+
+
+@dataclass(frozen=True)
+class IdentityConfig:
+    """Windows, and tracks out of pieces (METHODS 5)."""
+
+    window: float = 1.0
+    """Length of a window, seconds; held between 8 and 30 frames."""
+    walking_speed: float = 2.0
+    """How fast people walk at most, metres per second."""
+    slack: float = 0.35
+    """How far a place may be off besides, metres."""
+    patience: float = 1.0
+    """How long somebody may be unseen and still be the same, seconds."""
+    shortest: float = 0.8
+    """Tracks shorter than this are nobody, seconds (HW12's temporal check)."""
+
+
+@dataclass(frozen=True)
 class Config:
     """All stages."""
 
+    occupancy: OccupancyConfig = field(default_factory=OccupancyConfig)
+    segmentation: SegmentationConfig = field(default_factory=SegmentationConfig)
+    identity: IdentityConfig = field(default_factory=IdentityConfig)
     ghosts: GhostConfig = field(default_factory=GhostConfig)

@@ -74,6 +74,23 @@ CANDIDATE = np.dtype(
 )
 """One row per candidate and frame, true or ghost. In the run file each row also has one column a view."""
 
+WINDOW = np.dtype(
+    [
+        ("index", "<i8"),
+        ("solve_first", "<i8"),  # frames that were solved together, half open
+        ("solve_stop", "<i8"),
+        ("commit_first", "<i8"),  # those of them whose labels were kept, half open
+        ("commit_stop", "<i8"),
+        ("energy", "<i8"),  # of the cut, in quanta
+        ("energy_quantum", "<f8"),  # nats
+        ("nodes_cut", "<i8"),  # nodes that were left to the minimum cut
+    ]
+)
+"""One row per window."""
+
+TIMING = np.dtype([("stage", "S24"), ("window", "<i8"), ("seconds", "<f8")])
+"""One row per stage and window; window -1 for work that belongs to none."""
+
 
 @dataclass(frozen=True)
 class Tracks:

@@ -47,8 +47,8 @@ _SIDES = ("left", "right")
 PARTS = (
     Part("head", ("chin", "crown"), 0.045, 0.055, 1.0),
     Part("neck", ("chest", "chin"), 0.032, 0.032, 1.6),
-    Part("chest", ("waist", "chest"), 0.122, 0.07, 1.15),
-    Part("hips", ("crotch", "waist"), 0.092, 0.066, 1.3),
+    Part("chest", ("navel", "chest"), 0.122, 0.07, 1.2),
+    Part("hips", ("crotch", "waist"), 0.092, 0.066, 1.35),
     *(Part(f"{side} upper arm", (f"{side} shoulder", f"{side} elbow"), 0.03, 0.032, 1.3) for side in _SIDES),
     *(Part(f"{side} forearm", (f"{side} elbow", f"{side} hand"), 0.022, 0.024, 1.1) for side in _SIDES),
     *(Part(f"{side} thigh", (f"{side} hip", f"{side} knee"), 0.05, 0.056, 1.25) for side in _SIDES),
@@ -76,11 +76,10 @@ class Bodies:
     form: Floats
     axes: Floats
 
-    @property
-    def corners(self) -> Floats:
-        """Corners of the boxes around the ellipsoids, float64 (n, part, 8, 3), metres."""
-        signs = np.stack(np.meshgrid(*[(-1.0, 1.0)] * 3, indexing="ij"), -1).reshape(8, 3)
-        return self.centre[:, :, None] + signs @ self.axes
+    def corners(self, scale: float) -> Floats:
+        """Corners of the boxes around the ellipsoids, scaled, float64 (n, part, 8, 3), metres."""
+        signs = np.stack(np.meshgrid(*[(-scale, scale)] * 3, indexing="ij"), -1).reshape(8, 3)
+        return np.asarray(self.centre[:, :, None] + signs @ self.axes)
 
 
 def pose(crowd: Crowd) -> Bodies:
@@ -139,7 +138,7 @@ def _skeleton(phase: Floats, swing: Floats) -> dict[str, Floats]:
     return {name: joint - drop for name, joint in joints.items()}
 
 
-_TRUNK = {"crotch": 0.46, "waist": 0.62, "chest": 0.83, "chin": 0.865, "crown": 1.0}
+_TRUNK = {"crotch": 0.46, "navel": 0.58, "waist": 0.62, "chest": 0.83, "chin": 0.865, "crown": 1.0}
 
 
 def _down(angle: Floats) -> Floats:

@@ -9,7 +9,7 @@ from stseg.geometry import Camera, Grid, Lens, Rig
 from stseg.simulate.chance import Topic, chance
 from stseg.simulate.scene import SceneSpec
 
-_AIM = 0.9
+_AIM = 0.6
 """Height of the point above the area's centre that the cameras look at, metres."""
 
 
@@ -78,7 +78,7 @@ def pixel_rays(camera: Camera) -> Singles:
     ideal: Floats = pixel if camera.lens is None else camera.lens.undistort(pixel)
     toward = np.linalg.inv(camera.projection[:, :3])
     rays = np.concatenate([ideal, np.ones_like(ideal[..., :1])], -1) @ toward.T
-    return np.nan_to_num(rays * _depth(camera)).astype(np.float32)
+    return np.asarray(np.nan_to_num(rays * _depth(camera)), np.float32)
 
 
 def _depth(camera: Camera) -> float:

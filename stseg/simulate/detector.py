@@ -8,7 +8,7 @@ from stseg.accelerate import kernel
 from stseg.arrays import Boxes, Floats, Ints
 from stseg.geometry import Camera
 
-_SMALLEST = 0.004  # of the image's area: who covers less is not found
+_SMALLEST = 0.0015  # of the image's area: who covers less is not found
 _BEST, _HALF, _SOFT = 0.97, 0.35, 0.09  # chance to find who is in full view; share in view at which half are found
 _GUESS = 0.6  # chance that of one half hidden the whole body is guessed, when enough of it shows
 _JITTER = 0.03  # of the box's width and height, standard deviation of each edge
@@ -74,7 +74,7 @@ def detect(camera: Camera, visible: Ints, silhouettes: Ints, half: Floats, lots:
 
 def _edges(spans: Ints) -> Floats:
     """left, top, right, bottom of spans of pixels (first column, last column, first row, last row)."""
-    return spans[:, [0, 2, 1, 3]] + np.array([-0.5, -0.5, 0.5, 0.5])
+    return np.asarray(spans[:, [0, 2, 1, 3]] + np.array([-0.5, -0.5, 0.5, 0.5]))
 
 
 def _shake(spans: Ints, lots: np.random.Generator) -> Floats:

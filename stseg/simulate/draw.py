@@ -1,4 +1,4 @@
-"""Bodies and shadows by casting rays: every pixel's ray against the ellipsoids whose boxes hold the pixel."""
+"""Bodies by casting rays: every pixel's ray against the ellipsoids whose boxes hold the pixel."""
 
 from __future__ import annotations
 
@@ -6,12 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stseg.accelerate import kernel
-from stseg.arrays import Bytes, Floats, Ints, Singles
+from stseg.arrays import Bytes, Flags, Floats, Ints, Singles
 from stseg.geometry import Camera
 
 AMBIENT = 0.55
 """Share of the light that comes from everywhere; the rest comes from the lamp."""
-_UMBRA, _PENUMBRA = 0.75, 1.3  # a lamp has a size: full shadow within, none beyond, in half axes from the centre
 _ROOM = 2.0  # pixels around boxes, and
 _BULGE = 0.05  # of their size: a lens bends the boxes' straight sides outwards
 
@@ -33,59 +32,14 @@ def pixel_boxes(camera: Camera, corners: Floats) -> Ints:
         image where a corner lies behind the camera or beyond the lens's fold.
     """
     pixel, ahead = camera.project(corners[..., :2], corners[..., 2])
-    whole = ~ahead.all(axis=-1)
-    pixel = np.where(whole[..., None, None], 0.0, pixel)
+    whole: Flags = ~np.all(ahead, axis=-1, keepdims=True)
+    pixel = np.where(whole[..., None], 0.0, pixel)
     low, high = pixel.min(axis=-2), pixel.max(axis=-2)
     room = _ROOM + _BULGE * (high - low)
     most = np.array(camera.size) - 1
-    first = np.where(whole[..., None], 0, np.clip(np.floor(low - room), 0, most + 1))
-    last = np.where(whole[..., None], most, np.clip(np.ceil(high + room), -1, most))
+    first = np.where(whole, 0, np.clip(np.floor(low - room), 0, most + 1))
+    last = np.where(whole, most, np.clip(np.ceil(high + room), -1, most))
     return np.stack([first[..., 0], last[..., 0], first[..., 1], last[..., 1]], -1).astype(np.int64)
-
-
-@kernel
-def darken(
-    ground: Singles,
-    boxes: Ints,
-    centre: Floats,
-    form: Floats,
-    lamp: Floats,
-    shade: Singles,
-) -> None:
-    """Raise `shade`, 0..1 of every pixel's ground point, to the shadow that falls there.
-
-    Parameters
-    ----------
-    ground : float32 (v, u, 2)
-        Ground points that the pixels show, metres; nan where they show none.
-    boxes : int64 (n, 4)
-        Where the ellipsoids' shadows may fall, see `pixel_boxes`.
-    centre, form
-        Of the ellipsoids, float64 (n, 3) and (n, 3, 3), see `stseg.simulate.body.Bodies`.
-    lamp : float64 (3,)
-        Direction towards the light.
-    shade : float32 (v, u)
-        Changed in place.
-    """
-    for k in range(len(centre)):
-        m = form[k]
-        lx = m[0, 0] * lamp[0] + m[0, 1] * lamp[1] + m[0, 2] * lamp[2]
-        ly = m[1, 0] * lamp[0] + m[1, 1] * lamp[1] + m[1, 2] * lamp[2]
-        lz = m[2, 0] * lamp[0] + m[2, 1] * lamp[1] + m[2, 2] * lamp[2]
-        length = lx * lx + ly * ly + lz * lz
-        z = -centre[k, 2]
-        for v in range(boxes[k, 2], boxes[k, 3] + 1):
-            for u in range(boxes[k, 0], boxes[k, 1] + 1):
-                x, y = ground[v, u, 0] - centre[k, 0], ground[v, u, 1] - centre[k, 1]
-                px = m[0, 0] * x + m[0, 1] * y + m[0, 2] * z
-                py = m[1, 0] * x + m[1, 1] * y + m[1, 2] * z
-                pz = m[2, 0] * x + m[2, 1] * y + m[2, 2] * z
-                along = px * lx + py * ly + pz * lz
-                # How near the light's ray passes by the centre, in half axes.
-                miss = np.sqrt(max(px * px + py * py + pz * pz - along * along / length, 0.0))
-                dark = (_PENUMBRA - miss) / (_PENUMBRA - _UMBRA)
-                if dark > shade[v, u]:
-                    shade[v, u] = min(dark, 1.0)
 
 
 @kernel

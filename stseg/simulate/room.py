@@ -69,7 +69,9 @@ def _ground(rays: Singles, eye: Floats, half: float) -> Singles:
 def _shoot(rays: Singles, eye: Floats, half: float, lattice: Floats) -> Floats:
     """Colours that rays meet, float64 (v, u, 3)."""
     with np.errstate(divide="ignore"):
-        to_walls = (np.where(rays[..., :2] < 0, -half, half) - eye[:2]) / np.where(rays[..., :2] == 0, 1e-9, rays[..., :2])
+        to_walls = (np.where(rays[..., :2] < 0, -half, half) - eye[:2]) / np.where(
+            rays[..., :2] == 0, 1e-9, rays[..., :2]
+        )
     side = np.argmin(np.abs(to_walls), axis=-1)
     hit = eye + np.abs(to_walls).min(axis=-1)[..., None] * rays
     along = np.where(side == 0, hit[..., 1], hit[..., 0]) + 3.7 * half * (1 + side + 2 * (hit.sum(axis=-1) > 0))

@@ -61,7 +61,7 @@ class SceneSpec:
     cameras: int = 4
     camera_distance: float = 6.5
     camera_height: float = 2.8
-    field_of_view: float = 75.0
+    field_of_view: float = 66.0
     size: tuple[int, int] = (480, 360)
     distortion: tuple[float, ...] = (-0.22, 0.05, 0.001, -0.001)
     noise: float = 3.0

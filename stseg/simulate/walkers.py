@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stseg.arrays import Floats, Ints, Rows
+from stseg.arrays import Flags, Floats, Ints, Rows
 from stseg.simulate.chance import Topic, chance
-from stseg.simulate.errands import MARGIN, Errand, Planner
+from stseg.simulate.errands import Errand, Planner
 from stseg.simulate.scene import SceneSpec
 
 TRUTH = np.dtype([("frame", "<i8"), ("id", "<i8"), ("x", "<f8"), ("y", "<f8"), ("height", "<f8")])
@@ -158,7 +158,7 @@ def _repulsion(ground: Floats, velocity: Floats) -> Floats:
     return np.asarray((strength[..., None] * (away + _SWERVE * right)).sum(axis=1))
 
 
-def _apart(ground: Floats, stays: Ints, half: Floats) -> Floats:
+def _apart(ground: Floats, stays: Flags, half: Floats) -> Floats:
     """Places moved as little as keeps bodies apart and those who stay inside the area."""
     ground = ground.copy()
     first, second = np.triu_indices(len(ground), 1)
@@ -196,6 +196,3 @@ def _crowd(frame: int, walkers: list[Walker]) -> Crowd:
     ids = np.array([walker.id for walker in walkers], np.int64)
     names = ("heading", "phase", "swing", "height", "build")
     return Crowd(frame, ids, ground, *(column(name) for name in names))
-
-
-__all__ = ["MARGIN", "TRUTH", "Crowd", "walk"]

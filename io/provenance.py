@@ -1,0 +1,126 @@
+"""What a run was made from: the resolved configuration, the rig, versions, and the files of every stream."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from stseg import __version__
+from stseg.arrays import Rows
+from stseg.errors import SourceError
+from stseg.io.image_stream import image_paths
+from stseg.io.recording import Recording, Source
+from stseg.io.rig_text import format_rig
+
+_PACKAGES = ("numpy", "scipy", "numba", "h5py", "opencv-python-headless", "PyMaxflow")
+_TEXT = h5py.string_dtype()
+_VERSION = np.dtype([("name", "S32"), ("version", "S32")])
+SOURCE = np.dtype(
+    [
+        ("camera", _TEXT),
+        ("role", "S16"),  # frames or background
+        ("kind", "S16"),
+        ("path", _TEXT),
+        ("files", "<i8"),  # 0 where nothing could be found
+        ("size", "<i8"),  # bytes of all of them
+        ("modified", "<f8"),  # the latest of them, seconds since 1970; NaN where there is none
+    ]
+)
+"""One row per stream."""
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """What a run was made from.
+
+    Attributes
+    ----------
+    created
+        When the run began, ISO 8601, UTC.
+    config
+        The resolved configuration, TOML.
+    rig
+        The rig file, TOML; it stood at `rig_path`.
+    versions
+        Of this package, Python and the libraries that compute.
+    sources : SOURCE (n,)
+    """
+
+    created: str
+    config: str
+    rig: str
+    rig_path: Path
+    versions: Mapping[str, str]
+    sources: Rows
+
+
+def gather_provenance(recording: Recording, config_text: str) -> Provenance:
+    """The provenance of a run that begins now."""
+    path = recording.path.absolute()
+    return Provenance(
+        datetime.now(UTC).isoformat(timespec="seconds"),
+        config_text,
+        format_rig(recording, recording.path),
+        path,
+        _versions(),
+        _sources(recording),
+    )
+
+
+def write_provenance(group: h5py.Group, provenance: Provenance) -> None:
+    """Fill the group /provenance."""
+    group.attrs["created"] = provenance.created
+    group.attrs["rig_path"] = str(provenance.rig_path)
+    group["config"] = provenance.config
+    group["rig"] = provenance.rig
+    versions = [(name.encode(), number.encode()) for name, number in provenance.versions.items()]
+    group["versions"] = np.array(versions, _VERSION)
+    group.create_dataset("sources", data=provenance.sources, dtype=SOURCE)
+
+
+def read_provenance(group: h5py.Group) -> Provenance:
+    """What `write_provenance` wrote."""
+    return Provenance(
+        group.attrs["created"],
+        group["config"].asstr()[()],
+        group["rig"].asstr()[()],
+        Path(group.attrs["rig_path"]),
+        {name.decode(): number.decode() for name, number in group["versions"][:].tolist()},
+        group["sources"][:],
+    )
+
+
+def _versions() -> dict[str, str]:
+    found = {"stseg": __version__, "python": platform.python_version(), "hdf5": h5py.version.hdf5_version}
+    for package in _PACKAGES:
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:  # another build of the same library, such as opencv-python
+            found[package] = "unknown"
+    return found
+
+
+def _sources(recording: Recording) -> Rows:
+    rows = []
+    for camera, streams in zip(recording.rig.cameras, recording.sources, strict=True):
+        rows.append((camera.name, b"frames", *_described(streams.source)))
+        if streams.background is not None:
+            rows.append((camera.name, b"background", *_described(streams.background)))
+    return np.array(rows, SOURCE)
+
+
+def _described(source: Source) -> tuple[bytes, str, int, int, float]:
+    """kind, path, files, size, modified. Whether a stream can be read is not for here to say."""
+    try:
+        states = [path.stat() for path in image_paths(source.path, "")]
+    except (OSError, SourceError):
+        states = []
+    modified = max((state.st_mtime for state in states), default=np.nan)
+    return source.kind.encode(), str(source.path), len(states), sum(state.st_size for state in states), modified

@@ -1,0 +1,259 @@
+"""Writing a run file, window by window; it takes its name only once it is whole."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import h5py
+import numpy as np
+
+from stseg.arrays import AnyArray, Bytes, Ints, Labels, Rows, Singles
+from stseg.io import layout
+from stseg.io.outputs import PartFile, require_new
+from stseg.io.provenance import gather_provenance, write_provenance
+from stseg.io.recording import Recording
+
+_HELD_ROWS = 4096  # of one table, before they are written
+_LARGEST = float(np.finfo(np.float16).max)
+
+
+class RunWriter:
+    """A run file in the making: `PATH.part` beside its place until `finish`.
+
+    Use it in a `with`: whatever is raised before `finish` leaves no part behind and an older file of that name as it
+    was.
+
+    Parameters
+    ----------
+    path
+        Where the run file is to stand.
+    recording
+        What is run.
+    views : uint8 (plane, y, x)
+        Number of views that see each cell.
+    config_text
+        The resolved configuration, TOML.
+    overwrite
+        Whether an older file of that name may be replaced, at the end.
+
+    Raises
+    ------
+    OutputError
+        Where the file exists and is not to be overwritten, or cannot be written; from every method.
+    """
+
+    def __init__(self, path: Path, recording: Recording, views: Bytes, config_text: str, *, overwrite: bool) -> None:
+        self._path = Path(path)
+        require_new(self._path, overwrite)
+        if views.shape != recording.rig.grid.shape:
+            raise ValueError(f"views {views.shape} on a grid {recording.rig.grid.shape}")
+        self._recording, self._views, self._config_text, self._overwrite = recording, views, config_text, overwrite
+        self._last_frame = -1
+        self._finished = False
+
+    def __enter__(self) -> Self:
+        self._disk = PartFile(self._path)
+        try:
+            self._create()
+        except BaseException:
+            self._drop()
+            raise
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if not self._finished:
+            self._drop()
+
+    def append_frames(self, frames: Ints, log_odds: Singles, label: Labels) -> None:
+        """Write the volume of the next frames.
+
+        Parameters
+        ----------
+        frames : int64 (time,)
+            Their numbers in the recording, rising.
+        log_odds : float32 (time, plane, y, x)
+            Nats, NaN where no view sees the cell; kept to half precision.
+        label : int32 (time, plane, y, x)
+            Track ids, 0 for background.
+        """
+        shape = (len(frames), *self._views.shape)
+        if log_odds.shape != shape or label.shape != shape:
+            raise ValueError(f"volumes {log_odds.shape} and {label.shape} for {shape}")
+        if len(frames) and (frames[0] <= self._last_frame or (np.diff(frames) <= 0).any()):
+            raise ValueError(f"frames {frames} after frame {self._last_frame}")
+        half = np.clip(log_odds, -_LARGEST, _LARGEST).astype(np.float16)
+        with self._checked():
+            self._extend("log_odds", half)
+            self._extend("label", label)
+            self._extend("frame", frames)
+            self._extend("time", frames / self._recording.rig.frame_rate)
+        self._last_frame = int(frames[-1]) if len(frames) else self._last_frame
+
+    def append(self, table: str, rows: Rows) -> None:
+        """Add rows to one of the tables of `stseg.io.layout`, whose dtype they have."""
+        with self._checked():
+            self._tables[table].append(rows)
+
+    def relabel(self, new_id_of: Mapping[int, int]) -> None:
+        """Give tracks of the volume other ids, or 0 to drop them; the tables are the caller's.
+
+        One frame is in memory at a time, and frames without any of these ids are not written again.
+
+        Parameters
+        ----------
+        new_id_of
+            New ids by old ones; ids that are not in it stay.
+        """
+        changed = {old: new for old, new in new_id_of.items() if old != new and old != 0}
+        if not changed:
+            return
+        new_id = np.arange(max(changed) + 1, dtype=np.int32)
+        new_id[list(changed)] = list(changed.values())
+        affected = new_id != np.arange(len(new_id))
+        with self._checked():
+            volume = self._occupancy["label"]
+            for index in range(len(volume)):
+                label = volume[index]
+                known = np.where(label < len(new_id), label, 0)
+                if affected[known].any():
+                    volume[index] = np.where(label < len(new_id), new_id[known], label)
+                self._disk.check()
+
+    def finish(self, tracks: Rows) -> None:
+        """Write the TRACK rows, then sync the file and give it its name."""
+        with self._checked():
+            self._tables["tracks"].append(tracks)
+            for table in self._tables.values():
+                table.flush()
+            self._file.close()
+        if not self._overwrite:
+            require_new(self._path, overwrite=False)
+        self._disk.publish()
+        self._disk.close()
+        self._finished = True
+
+    def _create(self) -> None:
+        rig = self._recording.rig
+        with self._checked():
+            self._file = h5py.File(self._disk, "w")
+            cameras = [camera.name for camera in rig.cameras]
+            area = layout.walkable_area(rig.grid)
+            self._file.attrs.update({**layout.ROOT_ATTRIBUTES, "cameras": cameras, "wkt_geometry": area})
+            entry = self._file.create_group("entry")
+            entry.attrs.update(layout.ENTRY_ATTRIBUTES)
+            entry["title"] = rig.name
+            self._occupancy = self._create_occupancy()
+            self._tables = {
+                name: _Table(_create_table(self._file, name, dtype))
+                for name, dtype in layout.table_types(len(cameras)).items()
+            }
+            self._file["trajectory"].attrs["fps"] = rig.frame_rate
+            self._file["ghosts"].attrs["views"] = cameras
+            provenance = gather_provenance(self._recording, self._config_text)
+            write_provenance(self._file.create_group(layout.PROVENANCE), provenance)
+
+    def _create_occupancy(self) -> h5py.Group:
+        grid = self._recording.rig.grid
+        group = self._file.create_group(layout.OCCUPANCY)
+        group.attrs.update(layout.OCCUPANCY_ATTRIBUTES)
+        group["title"] = f"{self._recording.rig.name}: occupancy"
+        lengths = dict(zip(layout.AXES, (0, *grid.shape), strict=True))
+        contents: dict[str, AnyArray] = {
+            "plane": grid.heights,
+            "y": grid.ground_y,
+            "x": grid.ground_x,
+            "views": self._views,
+        }
+        for field in layout.FIELDS:
+            _create_field(group, field, lengths)
+            if field.name in contents:
+                group[field.name][...] = contents[field.name]
+        return group
+
+    def _extend(self, name: str, values: AnyArray) -> None:
+        dataset = self._occupancy[name]
+        start = len(dataset)
+        dataset.resize(start + len(values), axis=0)
+        dataset[start:] = values
+
+    @contextmanager
+    def _checked(self) -> Iterator[None]:
+        """Raise OutputError where the disk has refused a write meanwhile."""
+        try:
+            yield
+        except (OSError, RuntimeError):  # what HDF5 makes of reading what was never written
+            self._disk.check()
+            raise
+        self._disk.check()
+
+    def _drop(self) -> None:
+        # What stopped the run may have struck inside HDF5, which then cannot close; that must not hide the cause.
+        with suppress(OSError, RuntimeError, AttributeError):
+            self._file.close()
+        self._disk.discard()
+        self._disk.close()
+
+
+class _Table:
+    """A table that grows; rows are held until there are enough for a chunk."""
+
+    def __init__(self, dataset: h5py.Dataset) -> None:
+        self._dataset = dataset
+        self._held: list[Rows] = []
+        self._count = 0
+
+    def append(self, rows: Rows) -> None:
+        if rows.dtype != self._dataset.dtype:
+            raise ValueError(f"rows {rows.dtype} for the table {self._dataset.name} of {self._dataset.dtype}")
+        self._held.append(rows.copy())
+        self._count += len(rows)
+        if self._count >= _HELD_ROWS:
+            self.flush()
+
+    def flush(self) -> None:
+        if self._count:
+            start = len(self._dataset)
+            self._dataset.resize(start + self._count, axis=0)
+            self._dataset[start:] = np.concatenate(self._held)
+        self._held, self._count = [], 0
+
+
+def _create_field(group: h5py.Group, field: layout.Field, lengths: Mapping[str, int]) -> None:
+    """An empty array with its attributes, tied to the scales along it, which exist by then."""
+    shape = tuple(lengths[axis] for axis in field.axes)
+    grows = field.axes[0] == "time"
+    chunks = (1, *shape[1:]) if grows and len(shape) > 1 else (1024,) if grows else None
+    storage = {
+        "chunks": chunks,
+        "maxshape": (None, *shape[1:]),
+        "compression": "gzip",
+        "compression_opts": 1,
+        "shuffle": True,
+    }
+    fill = np.nan if field is layout.LOG_ODDS else 0
+    dataset = group.create_dataset(field.name, shape, field.dtype, fillvalue=fill, **(storage if grows else {}))
+    dataset.attrs["long_name"] = field.long_name
+    if field.units:
+        dataset.attrs["units"] = field.units
+    if field in layout.SCALES:
+        dataset.make_scale(field.name)
+    for dimension, axis in enumerate(field.axes):
+        dataset.dims[dimension].label = axis
+        if field not in layout.SCALES:
+            dataset.dims[dimension].attach_scale(group[axis])
+    if field.axes == layout.AXES:
+        dataset.attrs["interpretation"] = "image"
+
+
+def _create_table(file: h5py.File, name: str, dtype: np.dtype[np.void]) -> h5py.Dataset:
+    table = file.create_dataset(
+        name, (0,), dtype, maxshape=(None,), chunks=(1024,), compression="gzip", compression_opts=1, shuffle=True
+    )
+    table.attrs["about"] = layout.ABOUT[name]
+    return table

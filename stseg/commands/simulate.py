@@ -1,0 +1,111 @@
+"""`stseg simulate`: make a scene with truth."""
+
+from __future__ import annotations
+
+import difflib
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+from rich.console import Console
+from rich.progress import Progress
+
+from stseg.errors import ConfigError
+from stseg.io.scenes import write_scene
+from stseg.simulate import NAMED, Film, SceneSpec
+
+
+def simulate(
+    folder: Path,
+    /,
+    *,
+    scene: str = "easy",
+    people: int | None = None,
+    cameras: int | None = None,
+    seconds: float | None = None,
+    frame_rate: float | None = None,
+    size: Annotated[str | None, Parameter(metavar="W,H")] = None,
+    noise: float | None = None,
+    shadows: float | None = None,
+    light_drift: float | None = None,
+    seed: int | None = None,
+    instances: Annotated[bool, Parameter(negative="")] = False,
+    overwrite: Annotated[bool, Parameter(negative="")] = False,
+) -> None:
+    """Film a simulated scene: videos of every camera, exact masks, a detector's boxes, rig files and truth.
+
+    Example: stseg simulate crowd/ --scene dense --cameras 4 --seconds 10
+
+    Then: stseg run crowd/rig.toml -o crowd.h5, and stseg evaluate crowd.h5 crowd/truth.csv
+
+    Parameters
+    ----------
+    folder
+        Where to write; it must be empty or not there yet.
+    scene
+        easy (5 people, 4 cameras), dense (14 people on 6 m x 6 m, 8 cameras), dense4 (the same crowd, 4 of those
+        cameras), demo (small images, 8 s) or tiny (a second of very small images). The other options change it.
+    people
+        How many the area holds.
+    cameras
+        Number of cameras around the area.
+    seconds
+        Length of the recording.
+    frame_rate
+        Frames per second.
+    size
+        Width and height of the images, pixels.
+    noise
+        Standard deviation of the sensors' noise, grey levels.
+    shadows
+        How much light the people's shadows take from the ground, 0..1.
+    light_drift
+        Relative amplitude of slow changes of the light, 0..1.
+    seed
+        Another one makes other people, other ways, other cameras.
+    instances
+        Write images of who is where, too.
+    overwrite
+        Write into a folder that is not empty.
+    """
+    changes = {
+        "people": people,
+        "cameras": cameras,
+        "seconds": seconds,
+        "frame_rate": frame_rate,
+        "size": None if size is None else _size(size),
+        "noise": noise,
+        "shadows": shadows,
+        "light_drift": light_drift,
+        "seed": seed,
+    }
+    given = {key: value for key, value in changes.items() if value is not None}
+    film = Film(replace(_named(scene), **given))  # type: ignore[arg-type]  # each value has its field's type
+    console = Console(stderr=True)
+    with Progress(console=console, disable=not console.is_terminal, transient=True) as bar:
+        task = bar.add_task("filming", total=film.frames)
+        write_scene(
+            folder,
+            film,
+            instances=instances,
+            overwrite=overwrite,
+            progress=lambda done, _: bar.update(task, completed=done),
+        )
+    print(f"{folder / 'rig.toml'}: {film.frames} frames of {len(film.rig.cameras)} cameras; truth in truth.csv")
+
+
+def _named(name: str) -> SceneSpec:
+    if name in NAMED:
+        return NAMED[name]
+    near = difflib.get_close_matches(name, NAMED, n=1)
+    suggestion = f"; did you mean {near[0]}?" if near else ""
+    raise ConfigError("command line", "--scene", repr(name), f"one of {', '.join(NAMED)}{suggestion}")
+
+
+def _size(text: str) -> tuple[int, int]:
+    try:
+        width, height = (int(part) for part in text.split(","))
+    except ValueError as error:
+        raise ConfigError("command line", "--size", repr(text), "width,height in whole pixels") from error
+    return width, height

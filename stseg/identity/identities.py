@@ -1,0 +1,164 @@
+"""Who is who over the whole recording: pieces of windows become tracks (METHODS 5).
+
+Each piece of a window takes the identity that the earlier window gave to the same cells on the frames that both solved:
+a one-to-one assignment by shared ground mass. A piece that no earlier track claims may be somebody who was unseen for a
+moment; else somebody new.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from stseg.arrays import Floats, Ints, Labels
+from stseg.config import IdentityConfig
+from stseg.identity.linking import assign
+from stseg.identity.pieces import Piece, gap_cost
+from stseg.identity.windows import Window
+from stseg.segmentation.blobs import Blobs
+
+
+@dataclass
+class Track:
+    """A track that may still go on: its identity and its latest piece."""
+
+    identity: int
+    tail: Piece
+
+
+@dataclass(frozen=True)
+class Decision:
+    """Identities of one window.
+
+    Attributes
+    ----------
+    identity : list of int64 (blob,)
+        For each frame of the window the track of each blob.
+    events
+        (frame, kind, id, other, reason) of the frames that the window commits.
+    """
+
+    identity: list[Ints]
+    events: list[tuple[int, str, int, int, str]]
+
+
+@dataclass
+class Identities:
+    """The state that is carried from window to window."""
+
+    frame_rate: float
+    config: IdentityConfig
+    alive: list[Track] = field(default_factory=list)
+    issued: int = 0
+    shared_cells: dict[int, Labels] = field(default_factory=dict)
+    touching: set[tuple[int, int]] = field(default_factory=set)
+
+    def decide(self, window: Window, blobs: Sequence[Blobs], pieces: Sequence[Piece]) -> Decision:
+        """Give every piece of a window its identity, and note what happened.
+
+        Parameters
+        ----------
+        blobs
+            Of each frame of the window's solve range.
+        pieces
+            Of the window, `identity.pieces.chain`.
+        """
+        names = self._names(window, blobs, pieces)
+        identity = [np.zeros(len(found.person), np.int64) for found in blobs]
+        for piece, name in zip(pieces, names, strict=True):
+            for frame, blob in zip(piece.frames, piece.blobs, strict=True):
+                identity[frame - window.solve_first][blob] = name
+        events = self._births_and_deaths(window, pieces, names)
+        events += self._meetings(window, blobs, identity)
+        self.shared_cells = {
+            window.solve_first + k: np.append(0, identity[k])[found.cells].astype(np.int32)
+            for k, found in enumerate(blobs)
+            if window.solve_first + k >= window.commit_stop - (window.solve_stop - window.commit_stop)
+        }
+        return Decision(identity, sorted(events))
+
+    def predict(self, frame: int) -> Floats:
+        """Where the living tracks would be at a frame at constant velocity, float64 (n, 2), metres."""
+        places = [t.tail.ground[-1] + (frame - t.tail.frames[-1]) * t.tail.velocity(True) for t in self.alive]
+        return np.array(places).reshape(-1, 2)
+
+    def _names(self, window: Window, blobs: Sequence[Blobs], pieces: Sequence[Piece]) -> list[int]:
+        names = [0] * len(pieces)
+        known = [track.identity for track in self.alive]
+        shared = np.zeros((len(known), len(pieces)))
+        for p, piece in enumerate(pieces):
+            for frame, blob in zip(piece.frames, piece.blobs, strict=True):
+                if frame in self.shared_cells:
+                    inside = blobs[frame - window.solve_first].cells == blob + 1
+                    owners, counts = np.unique(self.shared_cells[frame][inside], return_counts=True)
+                    for owner, count in zip(owners, counts, strict=True):
+                        if owner in known:
+                            shared[known.index(int(owner)), p] += count
+        for k, p in zip(*assign(np.where(shared > 0, -shared, np.inf), 0.0), strict=True):
+            names[p] = known[k]
+        self._reclaim(names, pieces)
+        for p in range(len(pieces)):
+            if not names[p]:
+                self.issued += 1
+                names[p] = self.issued
+        return names
+
+    def _reclaim(self, names: list[int], pieces: Sequence[Piece]) -> None:
+        """Give unnamed pieces to living tracks that nobody claims, where a walker would be."""
+        lost = [track for track in self.alive if track.identity not in names]
+        new = [p for p in range(len(pieces)) if not names[p]]
+        patience = max(round(self.config.patience * self.frame_rate), 1)
+        cost = [[gap_cost(t.tail, pieces[p], patience, self.frame_rate, self.config) for p in new] for t in lost]
+        rows, columns = assign(np.array(cost).reshape(len(lost), len(new)), np.finfo(float).max)
+        for row, column in zip(rows, columns, strict=True):
+            names[new[column]] = lost[row].identity
+
+    def _births_and_deaths(
+        self, window: Window, pieces: Sequence[Piece], names: Sequence[int]
+    ) -> list[tuple[int, str, int, int, str]]:
+        """Carry the living tracks on to the window's commit range, with events for those that begin or end."""
+        events: list[tuple[int, str, int, int, str]] = []
+        known = {track.identity: track for track in self.alive}
+        for piece, name in zip(pieces, names, strict=True):
+            kept = _within(piece, window.commit_first, window.commit_stop)
+            if not kept.frames:
+                continue
+            if name in known:
+                gap = kept.frames[0] - known[name].tail.frames[-1] - 1
+                if gap > 0:
+                    events.append((kept.frames[0], "hand-over", name, 0, f"found again after {gap} unseen frames"))
+                known[name].tail.extend(kept)
+            else:
+                known[name] = Track(name, kept)
+                events.append((kept.frames[0], "birth", name, 0, "nobody known was near"))
+        patience = max(round(self.config.patience * self.frame_rate), 1)
+        self.alive = []
+        for track in known.values():
+            if window.commit_stop - track.tail.frames[-1] > patience + 1:
+                events.append((track.tail.frames[-1], "death", track.identity, 0, f"unseen for over {patience} frames"))
+            else:
+                track.tail = _within(track.tail, track.tail.frames[-1] - 8, track.tail.frames[-1] + 1)
+                self.alive.append(track)
+        return events
+
+    def _meetings(
+        self, window: Window, blobs: Sequence[Blobs], identity: Sequence[Ints]
+    ) -> list[tuple[int, str, int, int, str]]:
+        """Merges and splits: tracks whose cells come to share one piece of ground, and cease to."""
+        events: list[tuple[int, str, int, int, str]] = []
+        for frame in range(window.commit_first, window.commit_stop):
+            k = frame - window.solve_first
+            pairs = {tuple(sorted((int(identity[k][a]), int(identity[k][b])))) for a, b in blobs[k].touches}
+            now = {(a, b) for a, b in pairs if a != b}
+            events += [(frame, "merge", a, b, "their cells touch") for a, b in sorted(now - self.touching)]
+            events += [(frame, "split", a, b, "their cells part") for a, b in sorted(self.touching - now)]
+            self.touching = now
+        return events
+
+
+def _within(piece: Piece, first: int, stop: int) -> Piece:
+    """The part of a piece in frames first .. stop - 1."""
+    kept = [k for k, frame in enumerate(piece.frames) if first <= frame < stop]
+    return Piece([piece.frames[k] for k in kept], [piece.blobs[k] for k in kept], [piece.ground[k] for k in kept])

@@ -1,0 +1,59 @@
+"""Windows of frames: what is solved together, and which of it is kept (METHODS 5)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from stseg.config import IdentityConfig
+
+SHORTEST, LONGEST = 8, 30
+
+
+@dataclass(frozen=True)
+class Window:
+    """Half-open ranges of frames.
+
+    Attributes
+    ----------
+    index
+        Counted from the recording's frame 0, whatever part is run.
+    solve_first, solve_stop
+        Frames that are cut together.
+    commit_first, commit_stop
+        Frames whose result is kept; the commit ranges of all windows partition the run.
+    """
+
+    index: int
+    solve_first: int
+    solve_stop: int
+    commit_first: int
+    commit_stop: int
+
+
+def window_length(frame_rate: float, config: IdentityConfig) -> tuple[int, int]:
+    """Frames of a window, and frames that it shares with the next."""
+    length = min(max(round(config.window * frame_rate), SHORTEST), LONGEST)
+    return length, max(2, length // 4)
+
+
+def windows(frame_rate: float, config: IdentityConfig, first: int, stop: int) -> Iterator[Window]:
+    """The windows that cover frames first .. stop - 1.
+
+    Half of the frames that two windows share is kept from each, so that every kept frame was solved with context on
+    both sides, except at the ends of the run.
+    """
+    length, shared = window_length(frame_rate, config)
+    stride = length - shared
+    index = max(0, (first - shared // 2) // stride)
+    while index * stride + shared // 2 < stop or index * stride <= first:
+        start, end = index * stride, index * stride + length
+        commit_first = first if index == 0 else max(first, start + shared // 2)
+        commit_stop = min(end - shared + shared // 2, stop)
+        if end >= stop:
+            commit_stop = stop
+        if commit_first < commit_stop:
+            yield Window(index, max(start, first), min(end, stop), commit_first, commit_stop)
+        if commit_stop >= stop:
+            return
+        index += 1

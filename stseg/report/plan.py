@@ -1,0 +1,234 @@
+"""The plan view: the ground from above with what the cameras see, where they stand, and where people went."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from stseg.arrays import AnyArray, Bytes, Floats, Rows
+from stseg.geometry import Camera, Grid, Rig
+from stseg.report.canvas import chip, chip_size, dashes, disc, fill, outline, stroke, text, text_size
+from stseg.report.colours import INK, PAPER, QUIET, Colour, mixed, track_colour
+from stseg.report.labels import place_labels
+from stseg.report.plan_map import PlanMap, rule, scale_bar, sheet
+
+_NEAR = 0.45  # cameras within this share of the ground's longer side are shown where they stand
+_DARKEST: Colour = (206, 199, 195)  # seen by no view
+_TRUTH: Colour = (84, 76, 70)
+_LABELLED = 40  # tracks, the longest ones
+
+
+def plan_view(
+    rig: Rig,
+    trajectory: Rows,
+    truth: Rows | None = None,
+    coverage: Bytes | None = None,
+    title: str = "",
+    width: int = 1400,
+    height: int = 1500,
+) -> Bytes:
+    """Draw the ground from above, y up.
+
+    Parameters
+    ----------
+    rig
+        Its rectangle, polygon and cameras.
+    trajectory : TRAJECTORY (n,)
+        Coloured lines: a dot where a track starts, an arrow head and its id where it ends, dashes where it has gaps.
+    truth : (m,) with frame, id, x, y
+        Thin dark dashed lines; None for none.
+    coverage : uint8 (y, x)
+        Number of views that see each ground cell: the more, the lighter. None for plain paper.
+    title
+        Stands above.
+    width, height
+        The largest size of the picture, pixels.
+
+    Returns
+    -------
+    uint8 (v, u, 3)
+        Blue, green, red.
+    """
+    plan = plan_map(rig, width, height)
+    canvas = sheet(plan, title or rig.name)
+    if coverage is not None:
+        _shade(canvas, plan, rig.grid, coverage)
+    rule(canvas, plan)
+    outline(canvas, plan.pixel(_border(rig.grid)), mixed(INK, PAPER, 0.35), 2)
+    for camera in rig.cameras:
+        _draw_camera(canvas, plan, camera)
+    _draw_tracks(canvas, plan, trajectory)
+    if truth is not None:
+        for _, path in _paths(truth):
+            dashes(canvas, plan.pixel(path), _TRUTH)
+    _label_tracks(canvas, plan, trajectory)
+    _legend(canvas, plan, None if coverage is None else int(coverage.max()), truth is not None)
+    return canvas
+
+
+def plan_map(rig: Rig, width: int = 1400, height: int = 1500) -> PlanMap:
+    """Where `plan_view` draws the ground."""
+    near = [_stand(camera, rig.grid) for camera in rig.cameras]
+    places = [place for place in near if place is not None]
+    return PlanMap.fit(rig.grid, np.array(places).reshape(-1, 2), width, height)
+
+
+def view_counts(rig: Rig) -> Bytes:
+    """How many cameras see each ground cell, uint8 (y, x)."""
+    ground = rig.grid.ground
+    counts = np.zeros(ground.shape[:2], np.uint8)
+    for camera in rig.cameras:
+        pixel, ahead = camera.project(ground, 0.0)
+        counts += ahead & camera.inside(pixel)
+    return counts
+
+
+def _stand(camera: Camera, grid: Grid) -> Floats | None:
+    """Where a camera stands on the ground, metres (x, y), None where that is far away."""
+    place = camera.centre[:2]
+    reach = _NEAR * max(grid.x[1] - grid.x[0], grid.y[1] - grid.y[0])
+    low, high = np.array([grid.x[0], grid.y[0]]), np.array([grid.x[1], grid.y[1]])
+    beyond = np.maximum(low - place, place - high).max()
+    return place if beyond <= reach else None
+
+
+def _border(grid: Grid) -> Floats:
+    if grid.polygon is not None:
+        return np.asarray(grid.polygon, float)
+    (x0, x1), (y0, y1) = grid.x, grid.y
+    return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
+
+
+def _shade(canvas: Bytes, plan: PlanMap, grid: Grid, coverage: Bytes) -> None:
+    """Paint the cells; the area outside the rectangle stays paper."""
+    most = max(int(coverage.max()), 1)
+    tones = np.array([_tone(count, most) for count in range(most + 1)], np.uint8)
+    picture = tones[coverage[::-1]]
+    low = np.rint(plan.pixel(np.array([grid.x[0], grid.y[1]]))).astype(int)
+    high = np.rint(plan.pixel(np.array([grid.x[1], grid.y[0]]))).astype(int)
+    size = (int(high[0] - low[0]), int(high[1] - low[1]))
+    canvas[low[1] : high[1], low[0] : high[0]] = cv2.resize(picture, size, interpolation=cv2.INTER_NEAREST)
+
+
+def _tone(count: int, most: int) -> Colour:
+    return mixed(_DARKEST, (252, 251, 250), count / most)
+
+
+def _draw_camera(canvas: Bytes, plan: PlanMap, camera: Camera) -> None:
+    """A wedge as wide as the view, pointing where it looks; at the edge of the plan where it stands beyond."""
+    stand = camera.centre[:2]
+    edge = np.clip(stand, [plan.x[0], plan.y[0]], [plan.x[1], plan.y[1]])
+    place, beyond = plan.pixel(edge), bool((edge != stand).any())
+    tone = QUIET if beyond else INK
+    sides = _looks(camera)
+    if sides is not None:
+        wedge = np.concatenate([place[None], place + 46 * sides])
+        fill(canvas, wedge, tone, 0.16)
+        outline(canvas, wedge, mixed(tone, PAPER, 0.35))
+    disc(canvas, place, 6, PAPER)
+    disc(canvas, place, 4.5, tone)
+    back = np.array([0.0, -1.0]) if sides is None else -sides[1]
+    (wide, tall), room = text_size(camera.name, 12), np.array(plan.size)
+    u, v = np.clip(place + back * (14 + wide / 2, 18), (wide / 2 + 4, tall), room - (wide / 2 + 4, tall)).tolist()
+    text(canvas, camera.name, (u, v), tone, 12, (0.5, 0.5))
+
+
+def _looks(camera: Camera) -> Floats | None:
+    """Directions on the canvas (v down) of the left, middle and right of the view; None where it looks down.
+
+    float64 (3, 2), unit length.
+    """
+    matrix = camera.projection[:, :3]
+    width, height = camera.size
+    pixel = np.array([[0.0, height / 2], [width / 2, height / 2], [width - 1.0, height / 2]])
+    ideal = pixel if camera.lens is None else camera.lens.undistort(pixel)
+    ray = np.linalg.solve(matrix, np.concatenate([ideal, np.ones((3, 1))], axis=1).T).T
+    length = np.hypot(ray[:, 0], ray[:, 1])
+    if not np.isfinite(ray).all() or (length < 0.2 * np.linalg.norm(ray, axis=1)).any():
+        return None
+    return np.asarray(ray[:, :2] / length[:, None] * (1, -1))
+
+
+def _paths(table: Rows) -> list[tuple[int, Floats]]:
+    """Each id with its places in order of time; a nan stands where frames are missing."""
+    paths = []
+    step = _frame_step(table["frame"])
+    order = np.lexsort((table["frame"], table["id"]))
+    table = table[order]
+    for own in np.split(table, np.flatnonzero(np.diff(table["id"])) + 1):
+        if len(own):
+            places = np.stack([own["x"], own["y"]], -1)
+            gaps = np.flatnonzero(np.diff(own["frame"]) > step) + 1
+            paths.append((int(own["id"][0]), np.insert(places, gaps, np.nan, axis=0)))
+    return paths
+
+
+def _frame_step(frames: AnyArray) -> int:
+    """Frames from one row of a table to the next where nothing is missing: truth may be sparse."""
+    known = np.unique(frames)
+    return int(np.diff(known).min()) if len(known) > 1 else 1
+
+
+def _draw_tracks(canvas: Bytes, plan: PlanMap, trajectory: Rows) -> None:
+    paths = _paths(trajectory)
+    few, some = len(paths) <= 12, len(paths) <= 60
+    width, opacity = (3 if few else 2 if some else 1), (1.0 if some else 0.7)
+    for identity, path in paths:
+        colour, pixel = track_colour(identity), plan.pixel(path)
+        known = pixel[np.isfinite(pixel[:, 0])]
+        if len(known) < len(pixel):
+            dashes(canvas, known, mixed(colour, PAPER, 0.4), 1, 3, 5)
+        stroke(canvas, pixel, colour, width, opacity)
+    size = 1.0 if few else 0.8 if some else 0.5
+    for identity, path in paths:
+        _draw_ends(canvas, plan.pixel(path[np.isfinite(path[:, 0])]), track_colour(identity), size)
+
+
+def _draw_ends(canvas: Bytes, pixel: Floats, colour: Colour, size: float) -> None:
+    """A dot at the start; at the end a head that points where the track was going."""
+    disc(canvas, pixel[0], 7.5 * size, PAPER)
+    disc(canvas, pixel[0], 6 * size, colour)
+    end = pixel[-1]
+    far = np.flatnonzero(np.hypot(*(pixel - end).T) > 12)
+    ahead = end - pixel[far[-1]] if len(far) else np.array([0.0, -1.0])
+    ahead = ahead / np.hypot(*ahead)
+    side = np.array([-ahead[1], ahead[0]])
+    head = end + size * np.array([13 * ahead, -6 * ahead + 8 * side, -2 * ahead, -6 * ahead - 8 * side])
+    outline(canvas, head, PAPER, 3)
+    fill(canvas, head, colour)
+
+
+def _label_tracks(canvas: Bytes, plan: PlanMap, trajectory: Rows) -> None:
+    """Ids beside the ends; of many tracks only the longest."""
+    paths = sorted(_paths(trajectory), key=lambda path: -len(path[1]))[:_LABELLED]
+    size = 12.0 if len(paths) <= 12 else 10.0
+    ends = np.array([plan.pixel(path[-1]) for _, path in paths]).reshape(-1, 2)
+    sizes = [chip_size(str(identity), size) for identity, _ in paths]
+    centres = place_labels(ends, sizes, (*plan.corner, *plan.far_corner), 16)
+    for (identity, _), (u, v) in zip(paths, centres.tolist(), strict=True):
+        chip(canvas, str(identity), (u, v), track_colour(identity), size)
+
+
+def _legend(canvas: Bytes, plan: PlanMap, most: int | None, has_truth: bool) -> None:
+    """Below the plan: what the tones and marks mean, and a scale bar."""
+    u, v = plan.corner[0], plan.size[1] - 34.0
+    if most is not None:
+        text(canvas, "views", (u, v), QUIET, 11, (0, 0.5))
+        u += text_size("views", 11)[0] + 10
+        for count in range(most + 1):
+            square = np.array([[u, v - 12], [u + 26, v - 12], [u + 26, v + 12], [u, v + 12]])
+            fill(canvas, square, _tone(count, max(most, 1)))
+            outline(canvas, square, mixed(QUIET, PAPER, 0.5))
+            text(canvas, str(count), (u + 13, v), INK, 10, (0.5, 0.5))
+            u += 26
+        u += 28
+    colour = track_colour(1)
+    line = np.array([[u, v], [u + 46, v]])
+    stroke(canvas, line, colour, 3)
+    _draw_ends(canvas, line, colour, 0.8)
+    text(canvas, "track", (u + 66, v), QUIET, 11, (0, 0.5))
+    u += 66 + text_size("track", 11)[0] + 28
+    if has_truth:
+        dashes(canvas, np.array([[u, v], [u + 46, v]]), _TRUTH)
+        text(canvas, "truth", (u + 56, v), QUIET, 11, (0, 0.5))
+    scale_bar(canvas, plan, (plan.far_corner[0], v))

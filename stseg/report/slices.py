@@ -1,0 +1,163 @@
+"""One frame of an occupancy volume: its planes side by side, and what stands highest over each ground cell."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from stseg.arrays import AnyArray, Bytes, Flags, Labels
+from stseg.geometry import Grid
+from stseg.report.canvas import blank, outline, text
+from stseg.report.colours import INK, PAPER, QUIET, RULE, track_colour
+
+_STOPS = np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
+# blue-ish below 0, nearly white at 0, orange above; blue, green, red
+_TONES = np.array([(176, 128, 84), (230, 204, 176), (249, 249, 249), (110, 184, 253), (34, 104, 222)], float)
+_UNSEEN = np.array([(236, 234, 232), (205, 201, 198)], np.uint8)  # hatching, light and dark
+_GAP, _HEAD, _MARGIN, _FOOT = 22, 24, 26, 56  # pixels
+
+
+def volume_picture(
+    log_odds: AnyArray, label: Labels, grid: Grid, title: str = "", width: int = 1400, limit: float | None = None
+) -> Bytes:
+    """All planes of one frame as a contact sheet, the ground first, y up.
+
+    Parameters
+    ----------
+    log_odds : float (plane, y, x)
+        Nats; nan where no view sees the cell.
+    label : int32 (plane, y, x)
+        Track ids, outlined in the tracks' colours; 0 is background.
+    grid
+        Heights of the planes and the shape of the ground.
+    title
+        Stands above.
+    width
+        About how wide the picture is, pixels.
+    limit
+        Log-odds at which colours end, nats; None for the 99th percentile of their sizes.
+
+    Returns
+    -------
+    uint8 (v, u, 3)
+        Blue, green, red.
+    """
+    panels = [_Panel(f"{z:.2f} m", log_odds[k], label[k]) for k, z in enumerate(grid.heights)]
+    return _contact_sheet(panels, title, width, _limit(log_odds) if limit is None else limit)
+
+
+def marginal_picture(
+    log_odds: AnyArray, label: Labels, grid: Grid, title: str = "", width: int = 700, limit: float | None = None
+) -> Bytes:
+    """The greatest log-odds over each ground cell, outlined by the id that is commonest above it; see `volume_picture`.
+
+    Returns
+    -------
+    uint8 (v, u, 3)
+    """
+    seen = np.isfinite(log_odds)
+    highest = np.where(seen, log_odds, -np.inf).max(axis=0)
+    highest = np.where(seen.any(axis=0), highest, np.nan)
+    panel = _Panel(f"greatest of {grid.planes} planes", highest, _commonest(label))
+    return _contact_sheet([panel], title, width, _limit(log_odds) if limit is None else limit)
+
+
+@dataclass(frozen=True)
+class _Panel:
+    caption: str
+    log_odds: AnyArray
+    label: Labels
+
+
+def colours_of(log_odds: AnyArray, limit: float) -> Bytes:
+    """The diverging colour map, uint8 (..., 3); what is nan becomes 0's colour."""
+    share = np.clip(np.nan_to_num(np.asarray(log_odds, float), posinf=limit, neginf=-limit) / limit, -1, 1)
+    return np.rint(np.stack([np.interp(share, _STOPS, tone) for tone in _TONES.T], -1)).astype(np.uint8)
+
+
+def _contact_sheet(panels: Sequence[_Panel], title: str, width: int, limit: float) -> Bytes:
+    rows, columns, scale = _arrange(len(panels), panels[0].label.shape, width)
+    tall, wide = (side * scale for side in panels[0].label.shape)
+    top = _MARGIN + (34 if title else 0)
+    canvas_width = max(2 * _MARGIN + columns * (wide + _GAP) - _GAP, 420)
+    canvas = blank(canvas_width, top + rows * (tall + _HEAD + _GAP) - _GAP + _FOOT + _MARGIN, PAPER)
+    text(canvas, title, (_MARGIN, _MARGIN), INK, 15, (0, 0), 2)
+    for k, panel in enumerate(panels):
+        u = _MARGIN + (k % columns) * (wide + _GAP)
+        v = top + (k // columns) * (tall + _HEAD + _GAP) + _HEAD
+        text(canvas, panel.caption, (u, v - 8), QUIET, 11)
+        canvas[v : v + tall, u : u + wide] = _panel_picture(panel, scale, limit)
+        corners = np.array([[u - 1, v - 1], [u + wide, v - 1], [u + wide, v + tall], [u - 1, v + tall]])
+        outline(canvas, corners, RULE)
+    _colour_bar(canvas, limit)
+    return canvas
+
+
+def _arrange(count: int, shape: tuple[int, ...], width: int) -> tuple[int, int, int]:
+    """Rows, columns and pixels a cell: as near as can be to a sheet that is four wide and three tall."""
+    tall, wide = shape
+    columns = min(count, max(1, round(float(np.sqrt(count * tall / wide * 4 / 3)))))
+    rows = -(-count // columns)
+    columns = -(-count // rows)
+    room = (width - 2 * _MARGIN - (columns - 1) * _GAP) / columns
+    return rows, columns, max(2, int(room / wide))
+
+
+def _panel_picture(panel: _Panel, scale: int, limit: float) -> Bytes:
+    """A plane, y up, `scale` pixels a cell."""
+    cell = np.repeat(np.repeat(panel.log_odds[::-1], scale, 0), scale, 1)
+    label = np.repeat(np.repeat(panel.label[::-1], scale, 0), scale, 1)
+    picture = colours_of(cell, limit)
+    v, u = np.indices(cell.shape, sparse=True)
+    unseen = np.isnan(cell)
+    picture[unseen] = _UNSEEN[((u + v) % 8 < 2).astype(int)][unseen]
+    wide = max(1, scale // 5)
+    rim = _rim(label, wide)
+    picture[_rim(label, wide + 1) & ~rim] = PAPER
+    for identity in np.unique(label[rim]).tolist():
+        picture[rim & (label == identity)] = track_colour(identity)
+    return picture
+
+
+def _rim(label: Labels, width: int) -> Flags:
+    """Pixels of a label within `width` of another one or of the edge, bool (v, u)."""
+    padded = np.pad(label, width, constant_values=0)
+    inner = np.ones(label.shape, bool)
+    tall, wide = label.shape
+    for down in range(2 * width + 1):
+        for right in range(2 * width + 1):
+            inner &= padded[down : down + tall, right : right + wide] == label
+    return np.asarray((label > 0) & ~inner)
+
+
+def _commonest(label: Labels) -> Labels:
+    """The id that most planes give to each ground cell, 0 where none does; of equals the least, int32 (y, x)."""
+    best, votes = np.zeros(label.shape[1:], np.int32), np.zeros(label.shape[1:], np.int64)
+    for identity in np.unique(label[label > 0]).tolist():
+        own = (label == identity).sum(axis=0)
+        best[own > votes] = identity
+        votes = np.maximum(votes, own)
+    return best
+
+
+def _limit(log_odds: AnyArray) -> float:
+    known = np.abs(np.asarray(log_odds, np.float32)[np.isfinite(log_odds)])
+    return max(float(np.percentile(known, 99)), 1e-3) if known.size else 1.0
+
+
+def _colour_bar(canvas: Bytes, limit: float) -> None:
+    """Below: which colour is which log-odds."""
+    length, tall = 220, 12
+    u, v = _MARGIN, canvas.shape[0] - _MARGIN - tall - 16
+    ramp = np.linspace(-limit, limit, length)
+    canvas[v : v + tall, u : u + length] = colours_of(ramp, limit)[None]
+    for share, value in ((0.0, -limit), (0.5, 0.0), (1.0, limit)):
+        text(canvas, f"{value:.2g}", (u + share * length, v + tall + 6), QUIET, 10, (share, 0))
+    text(canvas, "log-odds, nats", (u + length + 16, v + tall / 2), QUIET, 10, (0, 0.5))
+    hatch_u = u + length + 16 + 120
+    rows, columns = np.indices((tall, 2 * tall), sparse=True)
+    canvas[v : v + tall, hatch_u : hatch_u + 2 * tall] = _UNSEEN[((rows + columns) % 8 < 2).astype(int)]
+    text(canvas, "no view", (hatch_u + 2 * tall + 8, v + tall / 2), QUIET, 10, (0, 0.5))
+
