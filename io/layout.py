@@ -91,7 +91,7 @@ def ghost_type(views: int) -> np.dtype[np.void]:
     return np.dtype([*CANDIDATE.descr, ("parts", "<f4", (views,))])
 
 
-ROOT_ATTRIBUTES: Mapping[str, object] = {
+ROOT_ATTRIBUTES: Mapping[str, str | int] = {
     "format": FORMAT,
     "format_version": VERSION,
     "NX_class": "NXroot",

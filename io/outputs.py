@@ -9,7 +9,6 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
-from stseg.arrays import AnyArray
 from stseg.errors import OutputError
 
 try:
@@ -128,15 +127,19 @@ class PartFile(io.RawIOBase):
         if self._failure is not None:
             raise failure(self._path, self._failure) from self._failure
 
-    def publish(self) -> None:
-        """Sync, and give the file its name."""
+    def publish(self, overwrite: bool) -> None:
+        """Sync, and give the file its name; where that fails the part stays, for it is whole."""
+        kept = f"the whole result is kept in {part_of(self._path)}"
+        if self._path.exists() and not overwrite:
+            raise OutputError(self._path, "", "a file that has appeared meanwhile", f"none; {kept}")
         try:
             os.fsync(self._file.fileno())
             if os.name == "nt":  # cannot rename what is open; elsewhere the lock is held until the name is taken
                 self._file.close()
             publish(self._path)
         except OSError as error:
-            raise failure(self._path, error) from error
+            told = failure(self._path, error)
+            raise OutputError(told.place, "", told.found, f"{told.expected}; {kept}") from error
 
     def discard(self) -> None:
         """Delete the part."""
@@ -150,12 +153,12 @@ class PartFile(io.RawIOBase):
                 self._file.close()
         super().close()
 
-    def write(self, data: AnyArray) -> int:  # type: ignore[override]  # any buffer
+    def write(self, data: memoryview) -> int:  # type: ignore[override]  # what h5py gives
         """All of it, or a failure is kept."""
-        view = memoryview(data)
+        rest = memoryview(data)
         try:
-            while self._failure is None and len(view):
-                view = view[self._file.write(view) :]
+            while self._failure is None and rest.nbytes:
+                rest = rest[self._file.write(rest) :]
         except OSError as error:
             self._failure = error
         return memoryview(data).nbytes
@@ -169,9 +172,9 @@ class PartFile(io.RawIOBase):
             self._failure = error
         return size or 0
 
-    def readinto(self, buffer: AnyArray) -> int:  # type: ignore[override]  # any buffer
+    def readinto(self, buffer: memoryview) -> int:  # type: ignore[override]  # what h5py gives
         """As of any file."""
-        return self._file.readinto(buffer) or 0  # type: ignore[attr-defined, no-any-return]
+        return self._file.readinto(buffer) or 0
 
     def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
         """As of any file."""

@@ -12,6 +12,7 @@ import h5py
 import numpy as np
 
 from stseg.arrays import AnyArray, Bytes, Ints, Labels, Rows, Singles
+from stseg.geometry import Rig
 from stseg.io import layout
 from stseg.io.outputs import PartFile, require_new
 from stseg.io.provenance import gather_provenance, write_provenance
@@ -54,6 +55,7 @@ class RunWriter:
         self._recording, self._views, self._config_text, self._overwrite = recording, views, config_text, overwrite
         self._last_frame = -1
         self._finished = False
+        self._file: h5py.File | None = None
 
     def __enter__(self) -> Self:
         self._disk = PartFile(self._path)
@@ -131,50 +133,32 @@ class RunWriter:
             self._tables["tracks"].append(tracks)
             for table in self._tables.values():
                 table.flush()
-            self._file.close()
-        if not self._overwrite:
-            require_new(self._path, overwrite=False)
-        self._disk.publish()
-        self._disk.close()
-        self._finished = True
+            self._close()  # flushes
+        self._finished = True  # the part is whole: from here it is kept, whatever happens
+        try:
+            self._disk.publish(self._overwrite)
+        finally:
+            self._disk.close()
 
     def _create(self) -> None:
         rig = self._recording.rig
         with self._checked():
-            self._file = h5py.File(self._disk, "w")
+            self._file = file = h5py.File(self._disk, "w")
             cameras = [camera.name for camera in rig.cameras]
             area = layout.walkable_area(rig.grid)
-            self._file.attrs.update({**layout.ROOT_ATTRIBUTES, "cameras": cameras, "wkt_geometry": area})
-            entry = self._file.create_group("entry")
+            file.attrs.update({**layout.ROOT_ATTRIBUTES, "cameras": cameras, "wkt_geometry": area})
+            entry = file.create_group("entry")
             entry.attrs.update(layout.ENTRY_ATTRIBUTES)
             entry["title"] = rig.name
-            self._occupancy = self._create_occupancy()
+            self._occupancy = _create_occupancy(file, rig, self._views)
             self._tables = {
-                name: _Table(_create_table(self._file, name, dtype))
+                name: _Table(_create_table(file, name, dtype))
                 for name, dtype in layout.table_types(len(cameras)).items()
             }
-            self._file["trajectory"].attrs["fps"] = rig.frame_rate
-            self._file["ghosts"].attrs["views"] = cameras
+            file["trajectory"].attrs["fps"] = rig.frame_rate
+            file["ghosts"].attrs["views"] = cameras
             provenance = gather_provenance(self._recording, self._config_text)
-            write_provenance(self._file.create_group(layout.PROVENANCE), provenance)
-
-    def _create_occupancy(self) -> h5py.Group:
-        grid = self._recording.rig.grid
-        group = self._file.create_group(layout.OCCUPANCY)
-        group.attrs.update(layout.OCCUPANCY_ATTRIBUTES)
-        group["title"] = f"{self._recording.rig.name}: occupancy"
-        lengths = dict(zip(layout.AXES, (0, *grid.shape), strict=True))
-        contents: dict[str, AnyArray] = {
-            "plane": grid.heights,
-            "y": grid.ground_y,
-            "x": grid.ground_x,
-            "views": self._views,
-        }
-        for field in layout.FIELDS:
-            _create_field(group, field, lengths)
-            if field.name in contents:
-                group[field.name][...] = contents[field.name]
-        return group
+            write_provenance(file.create_group(layout.PROVENANCE), provenance)
 
     def _extend(self, name: str, values: AnyArray) -> None:
         dataset = self._occupancy[name]
@@ -192,10 +176,14 @@ class RunWriter:
             raise
         self._disk.check()
 
+    def _close(self) -> None:
+        if self._file is not None:
+            self._file.close()
+
     def _drop(self) -> None:
         # What stopped the run may have struck inside HDF5, which then cannot close; that must not hide the cause.
-        with suppress(OSError, RuntimeError, AttributeError):
-            self._file.close()
+        with suppress(OSError, RuntimeError):
+            self._close()
         self._disk.discard()
         self._disk.close()
 
@@ -222,6 +210,20 @@ class _Table:
             self._dataset.resize(start + self._count, axis=0)
             self._dataset[start:] = np.concatenate(self._held)
         self._held, self._count = [], 0
+
+
+def _create_occupancy(file: h5py.File, rig: Rig, views: Bytes) -> h5py.Group:
+    grid = rig.grid
+    group = file.create_group(layout.OCCUPANCY)
+    group.attrs.update(layout.OCCUPANCY_ATTRIBUTES)
+    group["title"] = f"{rig.name}: occupancy"
+    lengths = dict(zip(layout.AXES, (0, *grid.shape), strict=True))
+    contents: dict[str, AnyArray] = {"plane": grid.heights, "y": grid.ground_y, "x": grid.ground_x, "views": views}
+    for field in layout.FIELDS:
+        _create_field(group, field, lengths)
+        if field.name in contents:
+            group[field.name][...] = contents[field.name]
+    return group
 
 
 def _create_field(group: h5py.Group, field: layout.Field, lengths: Mapping[str, int]) -> None:

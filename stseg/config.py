@@ -73,6 +73,8 @@ class IdentityConfig:
     """How fast people walk at most, metres per second."""
     slack: float = 0.35
     """How far a place may be off besides, metres."""
+    place_noise: float = 0.12
+    """How far a frame's place is off besides its own covariance, metres (standard deviation)."""
     patience: float = 1.0
     """How long somebody may be unseen and still be the same, seconds."""
     shortest: float = 0.8

@@ -41,6 +41,8 @@ class People:
         What all views and the prior say, nats.
     parts : float64 (view, n)
         What each view says, nats.
+    visible : float64 (view, n)
+        How much of each body a view can see past nearer people, 0..1.
     """
 
     ground: Floats
@@ -48,6 +50,7 @@ class People:
     covariance: Floats
     evidence: Floats
     parts: Floats
+    visible: Floats
 
     def __len__(self) -> int:
         return len(self.ground)
@@ -199,6 +202,17 @@ class _Frame:
             pixels.append(raster)
         return boxes, pixels
 
+    def _visible(self) -> Floats:
+        """How much of each member each view can see past the others, float64 (view, member)."""
+        visible = np.ones((len(self.frame_pass.views), len(self.members)))
+        boxes = iter(range(len(self.boxes.match)))
+        for row, view in zip(visible, self.frame_pass.views, strict=True):
+            if isinstance(view, BoxView):
+                k = next(boxes)
+                cover = self.boxes.cover[k][np.ix_(self.members, self.members)]
+                row[:] = view.found_share(self.boxes.inside[k][self.members] * np.prod(1.0 - cover, axis=1))
+        return visible
+
     def free(self) -> list[Flags]:
         """For each view the boxes, or the pixels, that nobody explains."""
         return [
@@ -221,7 +235,8 @@ class _Frame:
         total = self.score(self.members)
         parts = self.parts[:, : len(self.members)].copy()
         without = [self.score(np.delete(self.members, a)) for a in range(len(self.members))]
-        people = People(exact.ground, exact.height, covariance, total - np.array(without), parts)
+        evidence = total - np.array(without)
+        people = People(exact.ground, exact.height, covariance, evidence, parts, self._visible())
         views = self.frame_pass.views
         painted = [p if isinstance(v, PixelView) else _painted(v, exact) for v, p in zip(views, self.pixel_owner, strict=True)]
         owner = tuple(p.astype(np.int16) for p in painted)
@@ -244,7 +259,7 @@ class _Frame:
         chosen = self.pool.at([i for _, i, _ in kept])
         wide = np.tile(np.eye(2) * self.frame_pass.config.lattice**2 / 12, (len(kept), 1, 1))
         parts = np.array([p for _, _, p in kept]).reshape(len(kept), -1).T
-        return People(chosen.ground, chosen.height, wide, np.array([g for g, _, _ in kept]), parts)
+        return People(chosen.ground, chosen.height, wide, np.array([g for g, _, _ in kept]), parts, np.ones_like(parts))
 
 
 def _painted(view: View, people: Pool) -> Ints:

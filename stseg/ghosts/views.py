@@ -75,8 +75,13 @@ class BoxView(View):
         inside = np.zeros(self.bodies.shape[:2])
         for row, bodies in zip(inside, self.bodies, strict=True):
             fill_inside(bodies, *map(float, camera.size), row)
-        share = (inside - config.hidden_below) / (config.whole_above - config.hidden_below)
-        self.found = np.where(inside > _LEAST_INSIDE, np.clip(share, config.least, 1.0), 0.0)
+        self.found = np.where(inside > _LEAST_INSIDE, self.found_share(inside), 0.0)
+
+    def found_share(self, visible: Floats) -> Floats:
+        """How often a body of which so much is visible is found, relative to a whole one."""
+        config = self.config
+        share = (visible - config.hidden_below) / (config.whole_above - config.hidden_below)
+        return np.asarray(share.clip(config.least, 1.0))
 
     def observe(self, seen: Boxes | Singles | None) -> Sight:
         """The frame's boxes."""

@@ -63,7 +63,7 @@ class Identities:
         blobs
             Of each frame of the window's solve range.
         pieces
-            Of the window, `identity.pieces.chain`.
+            Of the window, `identity.pieces.chain_pieces`.
         """
         names = self._names(window, blobs, pieces)
         identity = [np.zeros(len(found.person), np.int64) for found in blobs]
@@ -98,6 +98,7 @@ class Identities:
                             shared[known.index(int(owner)), p] += count
         for k, p in zip(*assign(np.where(shared > 0, -shared, np.inf), 0.0), strict=True):
             names[p] = known[k]
+        self._follow(names, pieces)
         self._reclaim(names, pieces)
         for p in range(len(pieces)):
             if not names[p]:
@@ -105,13 +106,20 @@ class Identities:
                 names[p] = self.issued
         return names
 
+    def _follow(self, names: list[int], pieces: Sequence[Piece]) -> None:
+        """Give unnamed pieces to living tracks that nobody claims and that are of the same chain."""
+        lost = {track.tail.chain: track.identity for track in self.alive if track.identity not in names}
+        for p, piece in enumerate(pieces):
+            if not names[p] and piece.chain in lost:
+                names[p] = lost.pop(piece.chain)
+
     def _reclaim(self, names: list[int], pieces: Sequence[Piece]) -> None:
         """Give unnamed pieces to living tracks that nobody claims, where a walker would be."""
         lost = [track for track in self.alive if track.identity not in names]
         new = [p for p in range(len(pieces)) if not names[p]]
         patience = max(round(self.config.patience * self.frame_rate), 1)
         cost = [[gap_cost(t.tail, pieces[p], patience, self.frame_rate, self.config) for p in new] for t in lost]
-        rows, columns = assign(np.array(cost).reshape(len(lost), len(new)), np.finfo(float).max)
+        rows, columns = assign(np.array(cost).reshape(len(lost), len(new)), 1.0)
         for row, column in zip(rows, columns, strict=True):
             names[new[column]] = lost[row].identity
 
@@ -161,4 +169,4 @@ class Identities:
 def _within(piece: Piece, first: int, stop: int) -> Piece:
     """The part of a piece in frames first .. stop - 1."""
     kept = [k for k, frame in enumerate(piece.frames) if first <= frame < stop]
-    return Piece([piece.frames[k] for k in kept], [piece.blobs[k] for k in kept], [piece.ground[k] for k in kept])
+    return Piece(piece.chain, [piece.frames[k] for k in kept], [piece.blobs[k] for k in kept], [piece.ground[k] for k in kept])

@@ -2,24 +2,29 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from stseg.arrays import Floats, Ints
 from stseg.config import IdentityConfig
 
-_STEADY = 0.8
-"""How much of the last step is expected again."""
+_TURN = 1.2
+"""How people change their velocity, metres per second per square root of a second (standard deviation)."""
+_STILL = 0.8
+"""Standard deviation of the velocity of somebody new, metres per second."""
+_GATE = 9.2
+"""Squared Mahalanobis distance beyond which nobody is linked: one true link in a hundred."""
 
 
-def assign(cost: Floats, most: Floats | float) -> tuple[Ints, Ints]:
-    """Pairs of least total cost, as many as have a cost of at most `most`; rows and columns, both int64."""
+def assign(cost: Floats, alone: float) -> tuple[Ints, Ints]:
+    """Pairs of least total cost where staying alone costs `alone` a pair; rows and columns, both int64."""
     if not cost.size:
         return np.zeros(0, np.int64), np.zeros(0, np.int64)
-    allowed = cost <= most
-    worst = float(cost[allowed].max(initial=0.0)) + 1.0
-    rows, columns = linear_sum_assignment(np.where(allowed, cost - worst * min(cost.shape), 0.0))
-    kept = allowed[rows, columns]
+    gain = np.minimum(cost - alone, 0.0)
+    rows, columns = linear_sum_assignment(gain)
+    kept = gain[rows, columns] < 0
     return rows[kept], columns[kept]
 
 
@@ -28,23 +33,87 @@ def distances(a: Floats, b: Floats) -> Floats:
     return np.asarray(np.hypot(*np.moveaxis(a[:, None] - b[None], -1, 0)))
 
 
+@dataclass(frozen=True)
+class Walker:
+    """Somebody whom the linker follows: chain number, last frame, and a constant-velocity estimate of (x, y, vx, vy)."""
+
+    chain: int
+    frame: int
+    state: Floats
+    covariance: Floats
+
+    def at(self, frame: int, frame_rate: float) -> Walker:
+        """Carried to a later frame, metres and seconds."""
+        dt = (frame - self.frame) / frame_rate
+        motion = np.eye(4)
+        motion[:2, 2:] = dt * np.eye(2)
+        noise = np.kron([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]], np.eye(2)) * _TURN**2
+        return Walker(self.chain, self.frame, motion @ self.state, motion @ self.covariance @ motion.T + noise)
+
+    def seen(self, frame: int, ground: Floats, noise: Floats) -> Walker:
+        """Corrected by a place with its covariance (Kalman's update)."""
+        gain = self.covariance[:, :2] @ np.linalg.inv(self.covariance[:2, :2] + noise)
+        state = self.state + gain @ (ground - self.state[:2])
+        return Walker(self.chain, frame, state, self.covariance - gain @ self.covariance[:2])
+
+
 class Linker:
-    """Links each frame's people to those of the frame before, following their motion."""
+    """Follows people from frame to frame, and over as many frames as patience allows.
+
+    Each frame's places are assigned one to one to the walkers, by Mahalanobis distance from where each was expected.
+    """
 
     def __init__(self, frame_rate: float, config: IdentityConfig) -> None:
-        self.reach = config.walking_speed / frame_rate + config.slack
-        self.ground = np.zeros((0, 2))
-        self.step = np.zeros((0, 2))
+        self.frame_rate = frame_rate
+        self.config = config
+        self.walkers: list[Walker] = []
+        self.issued = 0
 
-    def link(self, ground: Floats) -> Ints:
-        """For each person of the next frame (n, 2) the index in the frame before, int64 (n,); -1 for nobody."""
-        before = np.full(len(ground), -1, np.int64)
-        expected = self.ground + _STEADY * self.step
-        cost = distances(expected, ground)
-        cost[distances(self.ground, ground) > self.reach] = np.inf
-        rows, columns = assign(cost, self.reach)
-        before[columns] = rows
-        step = np.zeros((len(ground), 2))
-        step[columns] = ground[columns] - self.ground[rows]
-        self.ground, self.step = ground.copy(), step
-        return before
+    def link(self, frame: int, ground: Floats, covariance: Floats) -> Ints:
+        """The chain to which each person of a frame belongs.
+
+        Parameters
+        ----------
+        frame
+            Its number; frames come in order.
+        ground, covariance : float64 (n, 2), (n, 2, 2)
+            Metres, square metres.
+
+        Returns
+        -------
+        int64 (n,)
+            Chain numbers from 1; those not met before are new.
+        """
+        noise = covariance + np.eye(2) * self.config.place_noise**2
+        expected = [walker.at(frame, self.frame_rate) for walker in self.walkers]
+        cost = np.array([_surprise(w, ground, noise, self._reach(frame, w)) for w in expected])
+        rows, columns = assign(cost.reshape(len(expected), len(ground)), _GATE)
+        chains = np.zeros(len(ground), np.int64)
+        met = dict(zip(columns.tolist(), rows.tolist(), strict=True))
+        followed = []
+        for j in range(len(ground)):
+            if j in met:
+                walker = expected[met[j]].seen(frame, ground[j], noise[j])
+            else:
+                self.issued += 1
+                spread = np.diag([0.0, 0.0, _STILL**2, _STILL**2])
+                spread[:2, :2] = noise[j]
+                walker = Walker(self.issued, frame, np.append(ground[j], [0.0, 0.0]), spread)
+            chains[j] = walker.chain
+            followed.append(walker)
+        patience = round(self.config.patience * self.frame_rate) + 1
+        lost = [w for k, w in enumerate(self.walkers) if k not in met.values() and frame - w.frame < patience]
+        self.walkers = followed + lost
+        return chains
+
+    def _reach(self, frame: int, walker: Walker) -> float:
+        """How far a walker may be from where they were last seen, metres."""
+        return self.config.walking_speed * (frame - walker.frame) / self.frame_rate + self.config.slack
+
+
+def _surprise(walker: Walker, ground: Floats, noise: Floats, reach: float) -> Floats:
+    """Squared Mahalanobis distances of places (n, 2) from a walker's expected place, float64 (n,)."""
+    off = ground - walker.state[:2]
+    spread = walker.covariance[:2, :2] + noise
+    square = np.einsum("ni,nij,nj->n", off, np.linalg.inv(spread), off) if len(off) else np.zeros(0)
+    return np.where(np.hypot(off[:, 0], off[:, 1]) <= reach, square, np.inf)

@@ -19,6 +19,8 @@ class Piece:
 
     Attributes
     ----------
+    chain
+        The chain of the people whom the blobs hold, 0 where they hold nobody.
     frames
         Frames of the recording.
     blobs
@@ -27,6 +29,7 @@ class Piece:
         Metres.
     """
 
+    chain: int
     frames: list[int] = field(default_factory=list)
     blobs: list[int] = field(default_factory=list)
     ground: list[Floats] = field(default_factory=list)
@@ -39,6 +42,7 @@ class Piece:
 
     def extend(self, later: Piece) -> None:
         """Append what is the same body later."""
+        self.chain = later.chain or self.chain
         self.frames += later.frames
         self.blobs += later.blobs
         self.ground += later.ground
@@ -52,35 +56,48 @@ class Piece:
         return np.asarray((ground[-1] - ground[0]) / (frames[-1] - frames[0]))
 
 
-def chain(blobs: Sequence[Blobs], before: Sequence[Ints], first: int, frame_rate: float, config: IdentityConfig) -> list[Piece]:
+def chain_pieces(
+    blobs: Sequence[Blobs], chains: Sequence[Ints], first: int, frame_rate: float, config: IdentityConfig
+) -> list[Piece]:
     """The pieces of a window.
 
-    Blobs that hold linked people are one piece; then pieces that end are joined to pieces that begin soon after, where
-    a walker would be.
+    Blobs that hold people of one chain are one piece; then pieces that end are joined to pieces that begin soon after,
+    where a walker would be.
 
     Parameters
     ----------
     blobs
         Of each frame of the window.
-    before
-        For each frame and each of its people the index in the frame before, -1 for nobody.
+    chains
+        For each frame the chain of each of its people (`identity.linking`).
     first
         The window's first frame.
     """
-    pieces: list[Piece] = []
-    open_: dict[int, Piece] = {}
-    for offset, (found, links) in enumerate(zip(blobs, before, strict=True)):
-        held: dict[int, Piece] = {}
+    held: dict[int, Piece] = {}
+    alone: list[Piece] = []
+    for offset, (found, chain) in enumerate(zip(blobs, chains, strict=True)):
         for b, person in enumerate(found.person):
-            piece = open_.get(int(links[person])) if person >= 0 and links[person] >= 0 else None
-            if piece is None:
-                piece = Piece()
-                pieces.append(piece)
-            piece.add(first + offset, b, found.ground[b])
             if person >= 0:
-                held[int(person)] = piece
-        open_ = held
-    return join(pieces, frame_rate, config)
+                piece = held.setdefault(int(chain[person]), Piece(int(chain[person])))
+            else:
+                piece = Piece(0)
+                alone.append(piece)
+            piece.add(first + offset, b, found.ground[b])
+    pieces = join([*held.values(), *alone], frame_rate, config)
+    return [_supported(piece, blobs, first) for piece in pieces if _people(piece, blobs, first)]
+
+
+def _people(piece: Piece, blobs: Sequence[Blobs], first: int) -> list[int]:
+    """Places in the piece whose blob holds a person of the frame's pass."""
+    pairs = enumerate(zip(piece.frames, piece.blobs, strict=True))
+    return [k for k, (frame, blob) in pairs if blobs[frame - first].person[blob] >= 0]
+
+
+def _supported(piece: Piece, blobs: Sequence[Blobs], first: int) -> Piece:
+    """The piece from its first to its last frame with a person: the cut bridges what a frame's pass missed, no more."""
+    held = _people(piece, blobs, first)
+    kept = slice(held[0], held[-1] + 1)
+    return Piece(piece.chain, piece.frames[kept], piece.blobs[kept], piece.ground[kept])
 
 
 def join(pieces: list[Piece], frame_rate: float, config: IdentityConfig) -> list[Piece]:
@@ -88,7 +105,7 @@ def join(pieces: list[Piece], frame_rate: float, config: IdentityConfig) -> list
     patience = max(round(config.patience * frame_rate), 1)
     while True:
         cost = np.array([[gap_cost(a, b, patience, frame_rate, config) for b in pieces] for a in pieces])
-        rows, columns = assign(cost.reshape(len(pieces), len(pieces)), np.finfo(float).max)
+        rows, columns = assign(cost.reshape(len(pieces), len(pieces)), 1.0)
         if not len(rows):
             return pieces
         best = int(cost[rows, columns].argmin())
@@ -98,12 +115,15 @@ def join(pieces: list[Piece], frame_rate: float, config: IdentityConfig) -> list
 
 
 def gap_cost(ended: Piece, begun: Piece, patience: int, frame_rate: float, config: IdentityConfig) -> float:
-    """Metres between where the two would meet at constant velocity; infinite where a walker could not be both."""
+    """Cost of one body in both pieces, below 1 where a walker could be; infinite where none could.
+
+    The squared distance between where the two would meet at constant velocity, in units of what the places are
+    uncertain by and half of how far a walker comes meanwhile.
+    """
     gap = begun.frames[0] - ended.frames[-1]
-    if not 0 < gap <= patience + 1:
-        return np.inf
     apart = begun.ground[0] - ended.ground[-1]
-    if np.hypot(*apart) > config.walking_speed * gap / frame_rate + config.slack:
+    stride = config.walking_speed * gap / frame_rate
+    if not 0 < gap <= patience + 1 or np.hypot(*apart) > stride + config.slack:
         return np.inf
     miss = apart - 0.5 * gap * (ended.velocity(True) + begun.velocity(False))
-    return float(np.hypot(*miss)) + config.slack * (gap - 1) / patience
+    return float((np.hypot(*miss) / (config.slack + 0.5 * stride)) ** 2)

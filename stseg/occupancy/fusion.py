@@ -37,6 +37,7 @@ def fill_terms(
     owner_step: int,
     near: Ints,
     has_box: NDArray[np.bool_],
+    visible: Floats,
     distance: Singles,
     person_distance: Floats,
     rates: Rates,
@@ -61,6 +62,8 @@ def fill_terms(
         Person near each cell, -1 for nobody.
     has_box : bool (person,)
         Whether this view's instances show the person.
+    visible : float64 (person,)
+        How much of the person the view can see; a missing instance says that much less.
     distance : float32 (y, x), person_distance : float64 (person,)
         From the camera along the ground, metres.
     weighted, weights : float64 (plane, y, x), count : uint8 (plane, y, x)
@@ -84,7 +87,10 @@ def fill_terms(
                         seen = np.float32(0.0)
                 body = (1.0 - rates.miss) * seen + rates.miss * (1.0 - seen)
                 empty = rates.clutter * seen + (1.0 - rates.clutter) * (1.0 - seen)
-                weighted[z, y, x] += weight * np.log(body / empty)
+                term = np.log(body / empty)
+                if mine >= 0 and not from_map and not has_box[mine]:
+                    term *= visible[mine]
+                weighted[z, y, x] += weight * term
                 weights[z, y, x] += weight
                 count[z, y, x] += 1
 

@@ -62,7 +62,7 @@ class Occupancy:
             likelihood, per_plane = self._likelihood(i, view, explanation, near)
             fill_terms(
                 self.sampling.pixel[i], likelihood, per_plane, explanation.owner[i], explanation.raster_step[i], near,
-                has_box, self.sampling.distance[i], away, self.rates[i], share[i], weighted, weights, count,
+                has_box, explanation.people.visible[i], self.sampling.distance[i], away, self.rates[i], share[i], weighted, weights, count,
             )  # fmt: skip
         log_odds = np.empty(shape, np.float32)
         prior = float(np.log(self.config.occupied / (1 - self.config.occupied)))

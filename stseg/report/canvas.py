@@ -9,6 +9,7 @@ from collections.abc import Iterator
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from stseg.arrays import AnyArray, Bytes, Floats, Ints
 from stseg.report.colours import PAPER, Colour
@@ -122,9 +123,9 @@ def blend(part: Bytes, mask: Bytes, colour: Colour, opacity: float) -> None:
     part[:] = np.rint(part + (np.array(colour, np.float32) - part) * share).astype(np.uint8)
 
 
-def _fixed(points: AnyArray) -> Ints:
+def _fixed(points: AnyArray) -> NDArray[np.int32]:
     """OpenCV's fixed-point coordinates."""
-    return np.rint(np.asarray(points, float) * 2**_SHIFT).astype(np.int32)
+    return np.asarray(np.rint(np.asarray(points, float) * 2**_SHIFT), np.int32)
 
 
 def _runs(points: AnyArray) -> Iterator[Floats]:

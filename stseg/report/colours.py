@@ -1,8 +1,8 @@
 """Colours of the pictures: one for each track, the same everywhere, and the neutral tones around them.
 
-Hues step by the golden angle, so that any few ids in a row lie far apart; lightness changes in a cycle of three, so that
-neighbours on the hue circle still differ. Lightness and chroma are those of OKLCH (B. Ottosson, "A perceptual color
-space for image processing", 2020): no track shouts louder than another, on white or on dark ground.
+Hues step by the golden angle, so that any few ids in a row lie far apart; lightness changes in a cycle of three, so
+that neighbours on the hue circle still differ. Lightness and chroma are those of OKLCH (B. Ottosson, "A perceptual
+color space for image processing", 2020): no track shouts louder than another, on white or on dark ground.
 """
 
 from __future__ import annotations

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import cv2
 import numpy as np
@@ -36,7 +37,7 @@ def overlay(
     camera
         The view.
     grid
-        Its rectangle is ruled in metres where there is no image.
+        Its rectangle is ruled in metres where there is no colour frame.
     image : uint8 (v, u, 3) or (v, u) or None
         A colour frame, a mask (shown in greys), or nothing: a dark canvas with the ground's grid.
     trajectory : TRAJECTORY (n,)
@@ -55,7 +56,7 @@ def overlay(
     """
     view = View(camera, width)
     canvas = view.canvas(image)
-    if image is None:
+    if image is None or image.ndim == 2:
         _rule(canvas, view, grid)
     own = trajectory[trajectory["frame"] == frame]
     recent = trajectory[(trajectory["frame"] <= frame) & (trajectory["frame"] >= frame - trail)]
@@ -91,8 +92,8 @@ class View:
         shown = cv2.resize(image, self.size, interpolation=cv2.INTER_AREA if self.scale < 1 else cv2.INTER_LINEAR)
         if image.ndim == 2:
             tones = np.linspace(NIGHT, mixed(NIGHT, PAPER, 0.5), 256)
-            return np.rint(tones).astype(np.uint8)[shown]
-        return np.rint(shown * 0.85).astype(np.uint8)
+            return np.asarray(np.rint(tones)[shown], np.uint8)
+        return np.asarray(np.rint(shown * 0.85), np.uint8)
 
     def pixel(self, ground: AnyArray, height: AnyArray | float) -> Floats:
         """Where the picture shows points, float64 (..., 2); nan behind the camera and far off the picture."""
@@ -117,7 +118,7 @@ def pillar_outline(view: View, ground: Floats, height: float) -> list[Floats]:
     wide, tall = (np.ceil(np.ptp(pixel.reshape(-1, 2), axis=0)).astype(int) + 5).tolist()
     mask = np.zeros((tall * _FINE, wide * _FINE), np.uint8)
     fine = np.rint((pixel - low) * _FINE).astype(np.int32)
-    for below, above in zip(fine[:-1], fine[1:], strict=True):
+    for below, above in pairwise(fine):
         cv2.fillConvexPoly(mask, cv2.convexHull(np.concatenate([below, above])), 255)
     found, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     return [cv2.approxPolyDP(contour, 1.2, True)[:, 0] / _FINE + low for contour in found]
@@ -178,4 +179,3 @@ def _rule(canvas: Bytes, view: View, grid: Grid) -> None:
 def _ground_line(canvas: Bytes, view: View, x: Floats, y: Floats, is_border: bool) -> None:
     colour: Colour = mixed(_LINE, PAPER, 0.3) if is_border else _LINE
     stroke(canvas, view.pixel(np.stack([x, y], -1), 0.0), colour, 2 if is_border else 1)
-

@@ -73,16 +73,6 @@ def plan_map(rig: Rig, width: int = 1400, height: int = 1500) -> PlanMap:
     return PlanMap.fit(rig.grid, np.array(places).reshape(-1, 2), width, height)
 
 
-def view_counts(rig: Rig) -> Bytes:
-    """How many cameras see each ground cell, uint8 (y, x)."""
-    ground = rig.grid.ground
-    counts = np.zeros(ground.shape[:2], np.uint8)
-    for camera in rig.cameras:
-        pixel, ahead = camera.project(ground, 0.0)
-        counts += ahead & camera.inside(pixel)
-    return counts
-
-
 def _stand(camera: Camera, grid: Grid) -> Floats | None:
     """Where a camera stands on the ground, metres (x, y), None where that is far away."""
     place = camera.centre[:2]

@@ -74,7 +74,7 @@ class _Panel:
 def colours_of(log_odds: AnyArray, limit: float) -> Bytes:
     """The diverging colour map, uint8 (..., 3); what is nan becomes 0's colour."""
     share = np.clip(np.nan_to_num(np.asarray(log_odds, float), posinf=limit, neginf=-limit) / limit, -1, 1)
-    return np.rint(np.stack([np.interp(share, _STOPS, tone) for tone in _TONES.T], -1)).astype(np.uint8)
+    return np.asarray(np.rint(np.stack([np.interp(share, _STOPS, tone) for tone in _TONES.T], -1)), np.uint8)
 
 
 def _contact_sheet(panels: Sequence[_Panel], title: str, width: int, limit: float) -> Bytes:
@@ -102,7 +102,7 @@ def _arrange(count: int, shape: tuple[int, ...], width: int) -> tuple[int, int, 
     rows = -(-count // columns)
     columns = -(-count // rows)
     room = (width - 2 * _MARGIN - (columns - 1) * _GAP) / columns
-    return rows, columns, max(2, int(room / wide))
+    return rows, columns, max(1, int(room / wide))
 
 
 def _panel_picture(panel: _Panel, scale: int, limit: float) -> Bytes:
@@ -110,7 +110,7 @@ def _panel_picture(panel: _Panel, scale: int, limit: float) -> Bytes:
     cell = np.repeat(np.repeat(panel.log_odds[::-1], scale, 0), scale, 1)
     label = np.repeat(np.repeat(panel.label[::-1], scale, 0), scale, 1)
     picture = colours_of(cell, limit)
-    v, u = np.indices(cell.shape, sparse=True)
+    v, u = np.ogrid[: cell.shape[0], : cell.shape[1]]
     unseen = np.isnan(cell)
     picture[unseen] = _UNSEEN[((u + v) % 8 < 2).astype(int)][unseen]
     wide = max(1, scale // 5)
@@ -121,7 +121,7 @@ def _panel_picture(panel: _Panel, scale: int, limit: float) -> Bytes:
     return picture
 
 
-def _rim(label: Labels, width: int) -> Flags:
+def _rim(label: AnyArray, width: int) -> Flags:
     """Pixels of a label within `width` of another one or of the edge, bool (v, u)."""
     padded = np.pad(label, width, constant_values=0)
     inner = np.ones(label.shape, bool)
@@ -157,7 +157,6 @@ def _colour_bar(canvas: Bytes, limit: float) -> None:
         text(canvas, f"{value:.2g}", (u + share * length, v + tall + 6), QUIET, 10, (share, 0))
     text(canvas, "log-odds, nats", (u + length + 16, v + tall / 2), QUIET, 10, (0, 0.5))
     hatch_u = u + length + 16 + 120
-    rows, columns = np.indices((tall, 2 * tall), sparse=True)
+    rows, columns = np.ogrid[:tall, : 2 * tall]
     canvas[v : v + tall, hatch_u : hatch_u + 2 * tall] = _UNSEEN[((rows + columns) % 8 < 2).astype(int)]
     text(canvas, "no view", (hatch_u + 2 * tall + 8, v + tall / 2), QUIET, 10, (0, 0.5))
-

@@ -1,12 +1,13 @@
-"""The space-time picture: the ground below, time upwards, every track a thread (KS09 section 5, its space-time tracks)."""
+"""The space-time picture: the ground below, time upwards, every track a thread (KS09 section 5)."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from stseg.arrays import AnyArray, Bytes, Floats, Rows
+from stseg.arrays import Bytes, Floats, Rows
 from stseg.geometry import Grid
 from stseg.report.canvas import blank, chip, chip_size, disc, fill, outline, stroke, text
 from stseg.report.colours import INK, PAPER, QUIET, RULE, mixed, track_colour
@@ -99,11 +100,11 @@ class Block:
         origin = np.array([size[0] / 2, size[1] / 2 + 18]) - middle
         return cls(grid.x, grid.y, (first, last), scale * matrix, origin)
 
-    def pixel(self, places: AnyArray) -> Floats:
+    def pixel(self, places: ArrayLike) -> Floats:
         """Pixels of x, y (metres), frame: float64 (..., 2)."""
         return np.asarray(np.asarray(places, float) @ self.matrix[:2].T + self.origin)
 
-    def distance(self, places: AnyArray) -> Floats:
+    def distance(self, places: ArrayLike) -> Floats:
         """Distance from the eye, up to a constant, float64 (...)."""
         return np.asarray(np.asarray(places, float) @ self.matrix[2])
 

@@ -8,15 +8,17 @@ from stseg.arrays import Floats, Ints
 from stseg.geometry import Grid
 
 
-def motion_field(ground_now: Floats, ground_next: Floats, before: Ints, reach: float, grid: Grid) -> Ints:
+def motion_field(
+    ground_now: Floats, ground_next: Floats, chain_now: Ints, chain_next: Ints, reach: float, grid: Grid
+) -> Ints:
     """Motion of each cell until the next frame, in cells.
 
     Parameters
     ----------
     ground_now, ground_next : float64 (n, 2), (m, 2)
         People of the two frames, metres.
-    before : int64 (m,)
-        For each person of the next frame the index in this one, -1 for nobody.
+    chain_now, chain_next : int64 (n,), (m,)
+        Who they are: equal numbers are the same body.
     reach
         How far from a person's place their cells reach, metres.
 
@@ -26,11 +28,11 @@ def motion_field(ground_now: Floats, ground_next: Floats, before: Ints, reach: f
         (dy, dx); zero where nobody is near, or whoever is was not found again.
     """
     motion = np.zeros((*grid.shape[1:], 2), np.int64)
-    followed = np.flatnonzero(before >= 0)
-    if not len(followed):
+    _, now, then = np.intersect1d(chain_now, chain_next, return_indices=True)
+    if not len(now):
         return motion
-    start = ground_now[before[followed]]
-    moved = np.rint((ground_next[followed] - start) / grid.cell).astype(np.int64)
+    start = ground_now[now]
+    moved = np.rint((ground_next[then] - start) / grid.cell).astype(np.int64)
     away = np.hypot(*np.moveaxis(grid.ground[:, :, None] - start, -1, 0))
     near = away.min(2) <= reach
     motion[near] = moved[away.argmin(2)[near]][:, ::-1]

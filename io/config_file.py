@@ -1,0 +1,79 @@
+"""The configuration: TOML with a table a stage, and assignments from the command line, which come after it."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from stseg.config import Config
+from stseg.errors import ConfigError
+from stseg.settings import Given, as_toml, build
+
+_OPTION = "--set"
+
+
+def read_config(path: Path | None, assignments: Sequence[str] = ()) -> Config:
+    """The configuration that a file and assignments make; defaults for all they do not say.
+
+    Parameters
+    ----------
+    path
+        TOML, one table a stage; None for none.
+    assignments
+        `stage.key=value` each, the value as in TOML; a text needs no quotes. The last word on a key counts.
+
+    Raises
+    ------
+    ConfigError
+        Where the file cannot be read, a key is unknown, or a value of the wrong type or out of its range; it names the
+        file or --set, and the key.
+    """
+    given: dict[str, Any] = {} if path is None else _wrapped(_read_toml(Path(path)), str(path))
+    for assignment in assignments:
+        _assign(given, assignment)
+    return build(Config, given, _OPTION if path is None else str(path))
+
+
+def format_config(config: Config) -> str:
+    """The whole configuration as TOML; `read_config` of it gives back the same."""
+    return as_toml(config)
+
+
+def _read_toml(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+    except OSError as error:
+        raise ConfigError(path, "", error.strerror or error, "a configuration file") from error
+    except (ValueError, RecursionError) as error:
+        raise ConfigError(path, "", f"what is not TOML ({error})", "TOML") from error
+
+
+def _wrapped(table: Mapping[str, Any], place: str) -> dict[str, Any]:
+    return {
+        name: _wrapped(value, place) if isinstance(value, dict) else Given(value, place)
+        for name, value in table.items()
+    }
+
+
+def _assign(given: dict[str, Any], assignment: str) -> None:
+    key, equals, text = assignment.partition("=")
+    *tables, name = key.strip().split(".")
+    if not equals or not tables or not all((*tables, name)):
+        raise ConfigError(_OPTION, "", repr(assignment), "stage.key=value")
+    table = given
+    for part in tables:
+        if isinstance(table.setdefault(part, {}), Given):  # the file has a value where a table belongs
+            table[part] = {}
+        table = table[part]
+    table[name] = Given(_value(text.strip()), _OPTION)
+
+
+def _value(text: str) -> Any:
+    """A TOML value; what is none stands for itself."""
+    try:
+        table = tomllib.loads(f"value = {text}")
+    except (ValueError, RecursionError):
+        return text
+    return table["value"] if len(table) == 1 else text

@@ -1,0 +1,230 @@
+"""Reading a run file: its layout is checked on opening, its tables are read when they are asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TypeVar
+
+import h5py
+import numpy as np
+
+from stseg.arrays import Bytes, Floats, Ints, Labels, Rows, Singles
+from stseg.errors import FormatError
+from stseg.io import layout
+from stseg.io.provenance import Provenance, read_provenance
+from stseg.io.recording import Recording
+from stseg.io.rigs import parse_rig
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Run:
+    """What is in a run file.
+
+    Attributes
+    ----------
+    path
+    scene
+        The scene's name.
+    frame_rate
+        Frames per second.
+    cameras
+        Their names; tables count them from 0.
+    frames : int64 (time,)
+        Numbers of the frames in the recording.
+    heights, ground_y, ground_x : float64 (plane,), (y,), (x,)
+        Centres of the cells, metres.
+    views : uint8 (plane, y, x)
+        Number of views that see each cell.
+    """
+
+    path: Path
+    scene: str
+    frame_rate: float
+    cameras: tuple[str, ...]
+    frames: Ints
+    heights: Floats
+    ground_y: Floats
+    ground_x: Floats
+    views: Bytes
+
+    @cached_property
+    def trajectory(self) -> Rows:
+        """TRAJECTORY (n,)."""
+        return self._table("trajectory")
+
+    @cached_property
+    def tracks(self) -> Rows:
+        """TRACK (n,)."""
+        return self._table("tracks")
+
+    @cached_property
+    def boxes(self) -> Rows:
+        """BOX (n,)."""
+        return self._table("boxes")
+
+    @cached_property
+    def events(self) -> Rows:
+        """EVENT (n,)."""
+        return self._table("events")
+
+    @cached_property
+    def ghosts(self) -> Rows:
+        """CANDIDATE (n,) with `parts`, float32 (views,)."""
+        return self._table("ghosts")
+
+    @cached_property
+    def windows(self) -> Rows:
+        """WINDOW (n,)."""
+        return self._table("windows")
+
+    @cached_property
+    def timings(self) -> Rows:
+        """TIMING (n,)."""
+        return self._table("timings")
+
+    @cached_property
+    def provenance(self) -> Provenance:
+        """What the run was made from."""
+        return _read(self.path, layout.PROVENANCE, lambda file: read_provenance(file[layout.PROVENANCE]))
+
+    @cached_property
+    def recording(self) -> Recording:
+        """The rig, with its grid, and the streams, as they were when the run began."""
+        return parse_rig(self.provenance.rig, self.provenance.rig_path)
+
+    def read_frame(self, frame: int) -> tuple[Singles, Labels]:
+        """Volume of one frame.
+
+        Parameters
+        ----------
+        frame
+            Its number in the recording; one of `frames`.
+
+        Returns
+        -------
+        log_odds : float32 (plane, y, x)
+            Nats, NaN where no view sees the cell.
+        label : int32 (plane, y, x)
+            Track ids, 0 for background.
+        """
+        index = int(np.searchsorted(self.frames, frame))
+        if index == len(self.frames) or self.frames[index] != frame:
+            raise ValueError(f"frame {frame} is not in {self.path}")
+        return _read(self.path, layout.OCCUPANCY, lambda file: _volume(file[layout.OCCUPANCY], index))
+
+    def _table(self, name: str) -> Rows:
+        return _read(self.path, f"/{name}", lambda file: np.asarray(file[name][:]))
+
+
+def read_run(path: Path) -> Run:
+    """Open a run file.
+
+    Raises
+    ------
+    FormatError
+        Where it is no run file, of another version, or lacks what `stseg.io.layout` promises; it names the object.
+    """
+    return _read(Path(path), "", lambda file: _checked_run(Path(path), file))
+
+
+def read_trajectory(path: Path) -> Rows:
+    """The TRAJECTORY table of a run file; raises as `read_run` does."""
+    return read_run(path).trajectory
+
+
+def _read(path: Path, place: str, take: Callable[[h5py.File], T]) -> T:
+    with _told_as_format_error(path, place), h5py.File(path, "r") as file:
+        return take(file)
+
+
+@contextmanager
+def _told_as_format_error(path: Path, place: str) -> Iterator[None]:
+    try:
+        yield
+    except FileNotFoundError as error:
+        raise FormatError(path, "", "no such file", "a run file") from error
+    except BlockingIOError as error:
+        raise FormatError(path, "", "a file that is still being written", "a finished run file") from error
+    except (OSError, RuntimeError) as error:
+        if path.is_file() and not h5py.is_hdf5(path):
+            raise FormatError(path, "", "something that is not HDF5", "a run file") from error
+        raise FormatError(path, place, f"something that cannot be read ({error})", "a whole run file") from error
+
+
+def _volume(group: h5py.Group, index: int) -> tuple[Singles, Labels]:
+    return group["log_odds"][index].astype(np.float32), group["label"][index]
+
+
+def _checked_run(path: Path, file: h5py.File) -> Run:
+    checks = _Checks(path, file)
+    for name in ("format", "format_version"):
+        checks.require_value("/", name, layout.ROOT_ATTRIBUTES[name])
+    cameras = tuple(str(name) for name in checks.attribute("/", "cameras", "names of cameras"))
+    lengths: dict[str, int] = {}
+    for field in layout.FIELDS:
+        checks.require_field(field, lengths)
+    for name, dtype in layout.table_types(len(cameras)).items():
+        checks.require_dataset(f"/{name}", dtype, 1)
+    checks.require_provenance()
+    frame_rate = checks.attribute("/trajectory", "fps", "frames per second")
+    entry, group = checks.require("/entry/title"), file[layout.OCCUPANCY]
+    return Run(
+        path,
+        entry.asstr()[()],
+        float(frame_rate),
+        cameras,
+        *(group[name][:] for name in ("frame", "plane", "y", "x", "views")),
+    )
+
+
+@dataclass(frozen=True)
+class _Checks:
+    """The layout, object by object; each raises a FormatError that names the object."""
+
+    path: Path
+    file: h5py.File
+
+    def require(self, name: str) -> h5py.Dataset:
+        found = self.file.get(name)
+        if not isinstance(found, h5py.Dataset):
+            raise FormatError(self.path, name, "nothing" if found is None else "no array", "an array")
+        return found
+
+    def attribute(self, name: str, key: str, expected: str) -> h5py.AttributeManager:
+        attributes = self.file[name].attrs
+        if key not in attributes:
+            raise FormatError(self.path, f"{name}@{key}", "nothing", expected)
+        return attributes[key]
+
+    def require_value(self, name: str, key: str, expected: str | int) -> None:
+        found = self.attribute(name, key, repr(expected))
+        if np.shape(found) or found != expected:
+            raise FormatError(self.path, f"{name}@{key}", repr(found), repr(expected))
+
+    def require_dataset(self, name: str, dtype: np.dtype[np.generic], dimensions: int) -> h5py.Dataset:
+        dataset = self.require(name)
+        if dataset.dtype != dtype:
+            raise FormatError(self.path, name, f"the type {dataset.dtype}", str(dtype))
+        if dataset.ndim != dimensions:
+            raise FormatError(self.path, name, f"{dataset.ndim} dimensions", str(dimensions))
+        return dataset
+
+    def require_field(self, field: layout.Field, lengths: dict[str, int]) -> None:
+        """Scales come first and say how long the axes are."""
+        name = f"{layout.OCCUPANCY}/{field.name}"
+        dataset = self.require_dataset(name, field.dtype, len(field.axes))
+        expected = tuple(lengths.setdefault(axis, len(dataset)) for axis in field.axes)
+        if dataset.shape != expected:
+            raise FormatError(self.path, name, f"the shape {dataset.shape}", f"{expected}, as its axes say")
+
+    def require_provenance(self) -> None:
+        for name in ("config", "rig", "versions", "sources"):
+            self.require(f"{layout.PROVENANCE}/{name}")
+        for key in ("created", "rig_path"):
+            self.attribute(layout.PROVENANCE, key, "a text")

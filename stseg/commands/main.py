@@ -1,0 +1,67 @@
+"""The command `stseg`: one sub-command a file, imported once it is asked for."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from difflib import get_close_matches
+
+from cyclopts import App, CycloptsError
+
+from stseg import __version__
+from stseg.errors import ConfigError, StsegError
+
+COMMANDS = {
+    "demo": ("stseg.commands.demo:demo", "Render a small scene, track it, score it, write the report."),
+    "run": ("stseg.commands.run:run", "Track the people of a recording."),
+    "inspect": ("stseg.commands.inspect:inspect", "Say what is in a run file."),
+    "export": ("stseg.commands.export:export", "Write the tracks of a run file in another format."),
+    "evaluate": ("stseg.commands.evaluate:evaluate", "Score tracks on the ground against the truth."),
+    "report": ("stseg.commands.report:report", "Write pictures of a run file as one HTML page."),
+    "calibrate": ("stseg.commands.calibrate:app", "Make a rig file."),
+    "simulate": ("stseg.commands.simulate:simulate", "Make a scene with truth."),
+}
+"""Where each command is, and the line that `stseg --help` says of it."""
+
+_USER_ERROR = 2
+_INTERRUPTED = 130
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a command line and return its exit status; what the user can mend is one line on standard error."""
+    tokens = list(sys.argv[1:] if arguments is None else arguments)
+    try:
+        _require_command(tokens)
+        _app(tokens)(tokens, exit_on_error=False, print_error=False, result_action="return_value")
+        sys.stdout.flush()
+    except (StsegError, CycloptsError) as error:
+        print(f"stseg: error: {' '.join(str(error).split())}", file=sys.stderr)
+        return _USER_ERROR
+    except KeyboardInterrupt:
+        print("stseg: interrupted", file=sys.stderr)
+        return _INTERRUPTED
+    except BrokenPipeError:  # the reader of our output, such as head, has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return 0
+
+
+def _app(tokens: Sequence[str]) -> App:
+    """The command that is asked for speaks for itself; the others have a line in the list and are not imported."""
+    app = App(
+        name="stseg",
+        help="Tracks of people on the ground from several fixed, overlapping cameras.",
+        version=__version__,
+        suppress_keyboard_interrupt=False,
+    )
+    for name, (path, summary) in COMMANDS.items():
+        app.command(path, name=name, help=None if name in tokens[:1] else summary)
+    return app
+
+
+def _require_command(tokens: Sequence[str]) -> None:
+    """Refuse an unknown command here: to suggest another, cyclopts would import them all."""
+    if tokens and not tokens[0].startswith("-") and tokens[0] not in COMMANDS:
+        close = get_close_matches(tokens[0], COMMANDS, 1)
+        hint = f"; did you mean {close[0]}?" if close else ""
+        raise ConfigError("command line", "", repr(tokens[0]), f"one of {', '.join(COMMANDS)}{hint}")

@@ -1,0 +1,137 @@
+"""Charts over time as inline SVG: how many people, and from when to when each track was there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stseg.arrays import Floats, Ints, Rows
+from stseg.report.colours import hex_colour, track_colour
+
+_WIDTH, _LEFT, _RIGHT = 1000, 44, 16  # pixels
+_COLUMNS = 900  # steps of a chart, however long the recording
+_LANE, _MOST_LANES = 15, 60
+
+
+@dataclass(frozen=True)
+class Span:
+    """The frames that a chart shows, half open, and the recording's frames per second."""
+
+    first: int
+    stop: int
+    frame_rate: float
+
+    def place(self, frame: float) -> float:
+        """Pixels from the left."""
+        return _LEFT + (frame - self.first) / (self.stop - self.first) * (_WIDTH - _LEFT - _RIGHT)
+
+
+def people_chart(span: Span, trajectory: Rows, truth: Rows | None) -> str:
+    """Number of people in each frame, and in the truth's frames; the mean where a pixel holds several frames."""
+    height, bottom = 190, 158
+    found = _counts(span, trajectory["frame"])
+    true = None if truth is None else _true_counts(span, truth["frame"])
+    most = max(1, int(found.max()), 0 if true is None else int(true.max()))
+    rise = (bottom - 14) / most
+    lines = [_open(height), *_clock(span, bottom, 14)]
+    for count in range(0, most + 1, max(1, -(-most // 5))):
+        v = bottom - count * rise
+        lines.append(f'<line class="rule" x1="{_LEFT}" x2="{_WIDTH - _RIGHT}" y1="{v:.1f}" y2="{v:.1f}"/>')
+        lines.append(f'<text x="{_LEFT - 8}" y="{v + 4:.1f}" text-anchor="end">{count}</text>')
+    steps = _steps(span, found, bottom, rise)
+    lines.append(f'<path class="area" d="M{_LEFT},{bottom} {steps} V{bottom} Z"/>')
+    lines.append(f'<path class="line" d="M{_LEFT},{bottom} {steps}"/>')
+    if true is not None:
+        lines.append(f'<path class="truth" d="M{_LEFT},{bottom} {_steps(span, true, bottom, rise)}"/>')
+    return "\n".join([*lines, "</svg>"])
+
+
+def lives_chart(span: Span, tracks: Rows) -> str:
+    """A bar from each track's first frame to its last, packed into lanes; beyond the last lane they are left out."""
+    lanes = _lanes(tracks, max(1, (span.stop - span.first) // 150))
+    count = min(max(lanes, default=0) + 1, _MOST_LANES)
+    bottom = 8 + count * _LANE + 4
+    lines = [_open(bottom + 32), *_clock(span, bottom, 4)]
+    for row, lane in zip(tracks, lanes, strict=True):
+        if lane < _MOST_LANES:
+            u, end = span.place(int(row["first"])), span.place(int(row["last"]) + 1)
+            v, colour = 8 + lane * _LANE, hex_colour(track_colour(int(row["id"])))
+            words = f"track {row['id']}: frames {row['first']} to {row['last']}"
+            lines.append(
+                f'<rect x="{u:.1f}" y="{v}" width="{max(end - u, 1.5):.1f}" height="{_LANE - 4}" rx="3" '
+                f'fill="{colour}"><title>{words}</title></rect>'
+            )
+            if end - u > 8 * len(str(row["id"])) + 8:
+                lines.append(f'<text class="on" x="{u + 5:.1f}" y="{v + _LANE - 6}">{row["id"]}</text>')
+    return "\n".join([*lines, "</svg>"])
+
+
+def _open(height: float) -> str:
+    return f'<svg class="chart" viewBox="0 0 {_WIDTH} {height}" role="img">'
+
+
+def _clock(span: Span, bottom: float, top: float) -> list[str]:
+    """Marks of a round number of seconds, with faint upright lines."""
+    seconds = (span.stop - span.first) / span.frame_rate
+    step = _round_time(seconds / 8)
+    lines = []
+    start = span.first / span.frame_rate
+    for second in np.arange(np.ceil(start / step) * step, start + seconds + 1e-9, step):
+        u = span.place(second * span.frame_rate)
+        lines.append(f'<line class="rule" x1="{u:.1f}" x2="{u:.1f}" y1="{top}" y2="{bottom}"/>')
+        lines.append(f'<text x="{u:.1f}" y="{bottom + 18}" text-anchor="middle">{clock_time(float(second))}</text>')
+    return lines
+
+
+def clock_time(second: float) -> str:
+    """Time since the recording's first frame: 12 s, 3:05 or 2:03:05."""
+    if second < 60:
+        return f"{second:.3g} s"
+    whole = round(second)
+    hours, minutes, seconds = whole // 3600, whole // 60 % 60, whole % 60
+    return f"{hours}:{minutes:02d}:{seconds:02d}" if hours else f"{minutes}:{seconds:02d}"
+
+
+def _round_time(seconds: float) -> float:
+    steps = (0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 14400, 28800, 86400)
+    return min((float(step) for step in steps if step >= seconds), default=86400.0 * float(np.ceil(seconds / 86400)))
+
+
+def _counts(span: Span, frames: Ints) -> Floats:
+    """People in each frame, float64 (frame,)."""
+    own = frames[(frames >= span.first) & (frames < span.stop)] - span.first
+    return np.bincount(own, minlength=span.stop - span.first).astype(float)
+
+
+def _true_counts(span: Span, frames: Ints) -> Floats:
+    """The same of truth, which may be sparse: a frame that it does not know has the people of the last one it knows."""
+    counts = _counts(span, frames)
+    known = np.flatnonzero(counts)
+    return (
+        counts
+        if not len(known)
+        else counts[known[np.maximum(np.searchsorted(known, np.arange(len(counts)), "right") - 1, 0)]]
+    )
+
+
+def _steps(span: Span, counts: Floats, bottom: float, rise: float) -> str:
+    """A path of steps."""
+    bounds = np.unique(np.linspace(0, len(counts), min(len(counts), _COLUMNS) + 1).astype(int))
+    words = []
+    for start, stop in zip(bounds[:-1].tolist(), bounds[1:].tolist(), strict=True):
+        v, end = bottom - counts[start:stop].mean() * rise, span.place(span.first + stop)
+        words.append(f"V{v:.1f} H{end:.1f}")
+    return " ".join(words)
+
+
+def _lanes(tracks: Rows, apart: int) -> list[int]:
+    """The first lane that is free at each track's first frame, `tracks` being in any order."""
+    ends: list[int] = []
+    lanes = [0] * len(tracks)
+    for k in np.lexsort((tracks["id"], tracks["first"])).tolist():
+        first, last = int(tracks["first"][k]), int(tracks["last"][k])
+        lane = next((lane for lane, end in enumerate(ends) if end + apart < first), len(ends))
+        ends[lane : lane + 1] = [last]
+        lanes[k] = lane
+    return lanes

@@ -1,0 +1,41 @@
+"""The report page's style sheet."""
+
+STYLE = """
+:root { --ink: #2a2e34; --quiet: #7c828a; --rule: #e4e6ea; --soft: #f6f7f9; --accent: #0b70d8 }
+* { box-sizing: border-box }
+body { margin: 0; font: 15px/1.5 system-ui, -apple-system, "Segoe UI", Roboto, "Helvetica Neue", sans-serif;
+  color: var(--ink); background: var(--soft) }
+header, main { max-width: 1240px; margin: 0 auto; padding: 0 24px }
+header { padding-top: 40px }
+h1 { font-size: 30px; letter-spacing: -0.02em; margin: 0 0 20px }
+h2 { font-size: 19px; letter-spacing: -0.01em; margin: 0 0 16px }
+dl { display: grid; grid-template-columns: repeat(auto-fit, minmax(130px, 1fr)); gap: 1px; margin: 0;
+  background: var(--rule); border: 1px solid var(--rule); border-radius: 12px; overflow: hidden }
+dl div { background: #fff; padding: 12px 16px }
+dt { color: var(--quiet); font-size: 13px }
+dd { margin: 0; font-size: 20px; font-weight: 600; font-variant-numeric: tabular-nums }
+section { background: #fff; border: 1px solid var(--rule); border-radius: 12px; padding: 24px; margin: 24px 0 }
+figure { margin: 0 }
+figcaption { color: var(--quiet); font-size: 13px; margin-top: 6px }
+img { max-width: 100%; height: auto; display: block; border-radius: 6px }
+.pair { display: grid; grid-template-columns: repeat(auto-fit, minmax(440px, 1fr)); gap: 20px; align-items: start }
+.wide { display: grid; gap: 28px }
+.chart { width: 100%; height: auto; display: block; margin-top: 8px }
+.chart text { font-size: 12px; fill: var(--quiet); font-variant-numeric: tabular-nums }
+.chart .on { fill: #fff; font-size: 10px; font-weight: 600 }
+.chart .rule { stroke: var(--rule) }
+.chart .area { fill: var(--accent); opacity: 0.12 }
+.chart .line { fill: none; stroke: var(--accent); stroke-width: 1.8 }
+.chart .truth { fill: none; stroke: #464c54; stroke-width: 1.2; stroke-dasharray: 5 4 }
+.note { color: var(--quiet); margin: 0 0 12px }
+.note b { color: var(--ink) }
+.warn { color: #a34a00 }
+.scroll { max-height: 420px; overflow: auto; margin-top: 16px; border: 1px solid var(--rule); border-radius: 8px }
+table { border-collapse: collapse; width: 100%; font-variant-numeric: tabular-nums }
+th, td { text-align: left; padding: 6px 14px; border-bottom: 1px solid var(--rule); white-space: nowrap }
+th { position: sticky; top: 0; background: var(--soft); color: var(--quiet); font-weight: 500; font-size: 13px }
+td i { display: inline-block; width: 12px; height: 12px; border-radius: 4px; margin-right: 8px; vertical-align: -1px }
+td small { color: var(--quiet); margin-left: 6px }
+td:last-child { white-space: normal }
+@media print { section { break-inside: avoid } .scroll { max-height: none } }
+"""

@@ -1,0 +1,78 @@
+"""Small run files for tests: two cameras above a few cells, frames 10 to 15, two people."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from stseg.arrays import Labels, Rows, Singles
+from stseg.geometry import Camera, Grid, Rig
+from stseg.io.layout import ghost_type
+from stseg.io.recording import CameraSource, Recording, Source
+from stseg.io.runs import RunWriter
+from stseg.tracks import BOX, EVENT, TIMING, TRAJECTORY, WINDOW, Tracks
+
+FRAMES = np.arange(10, 16)
+CONFIG = "[ghosts]\nperson = -3.0\n"
+_ABOVE = np.array([[10.0, 0.0, -8.0, 34.0], [0.0, -10.0, -6.0, 34.0], [0.0, 0.0, -1.0, 5.0]])
+
+
+def small_recording(folder: Path) -> Recording:
+    """Two cameras 5 m above 0.6 m x 0.4 m of ground; the first one's stream exists."""
+    cameras = tuple(Camera.from_projection(name, (16, 12), _ABOVE) for name in ("left", "right"))
+    (folder / "left.avi").write_bytes(b"12345")
+    sources = tuple(CameraSource(Source("video", folder / f"{camera.name}.avi")) for camera in cameras)
+    return Recording(folder / "rig.toml", Rig("hall", 5.0, Grid((0, 0.6), (0, 0.4), 0.1, 1.8, 3), cameras), sources)
+
+
+def small_volume(frames: int = len(FRAMES)) -> tuple[Singles, Labels]:
+    """Log-odds with an unseen cell, and labels of tracks 1 and 2; (frames, 3, 4, 6)."""
+    log_odds = np.random.default_rng(0).normal(0, 3, (frames, 3, 4, 6)).astype(np.float32)
+    log_odds[:, 0, 0, 0] = np.nan
+    label = np.zeros(log_odds.shape, np.int32)
+    label[:, :, 1, 1] = 1
+    label[3:, :, 2, 4] = 2
+    return log_odds, label
+
+
+def small_trajectory() -> Rows:
+    """Track 1 in every frame, track 2 in the last three."""
+    rows = [(frame, 1) for frame in FRAMES] + [(frame, 2) for frame in FRAMES[3:]]
+    table = np.zeros(len(rows), TRAJECTORY)
+    table["frame"], table["id"] = np.array(sorted(rows)).T
+    table["x"], table["y"] = 0.15 * table["id"], 0.2
+    table["height"], table["score"], table["views"] = 1.7, 4.0, 2
+    return table
+
+
+def small_ghosts() -> Rows:
+    """Three candidates, one of them a ghost, of which the right view says nothing."""
+    table = np.zeros(3, ghost_type(2))
+    table["frame"], table["status"], table["origin"] = (10, 10, 11), (1, 0, 1), b"volume"
+    table["parts"][:, 0] = (2.0, -1.0, 2.0)
+    return table
+
+
+def fill(writer: RunWriter) -> None:
+    """Everything but the end, in two windows of three frames."""
+    log_odds, label = small_volume()
+    for index, part in enumerate((slice(0, 3), slice(3, 6))):
+        writer.append_frames(FRAMES[part], log_odds[part], label[part])
+        bounds = (index, FRAMES[part][0], FRAMES[part][-1] + 1) + (FRAMES[part][0], FRAMES[part][-1] + 1)
+        writer.append("windows", np.array([(*bounds, 12345, 1e-6, 7)], WINDOW))
+        writer.append("timings", np.array([(b"cut", index, 1.5), (b"volume", index, 0.5)], TIMING))
+    writer.append("trajectory", small_trajectory())
+    writer.append("boxes", np.array([(10, 1, 0, 1.0, 2.0, 3.0, 4.0)], BOX))
+    writer.append("events", np.array([(10, b"birth", 1, 0, b"start"), (13, b"birth", 2, 0, b"entered")], EVENT))
+    writer.append("ghosts", small_ghosts())
+
+
+def write_small_run(path: Path, overwrite: bool = False) -> Path:
+    """A whole run file."""
+    recording = small_recording(path.parent)
+    views = np.full(recording.rig.grid.shape, 2, np.uint8)
+    with RunWriter(path, recording, views, CONFIG, overwrite=overwrite) as writer:
+        fill(writer)
+        writer.finish(Tracks(small_trajectory()).summary())
+    return path

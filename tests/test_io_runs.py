@@ -1,0 +1,448 @@
+"""Run files: what stands in them, that they appear whole or not at all, and what is said of broken ones."""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from runs import (
+    CONFIG,
+    FRAMES,
+    fill,
+    small_ghosts,
+    small_recording,
+    small_trajectory,
+    small_volume,
+    write_small_run,
+)
+
+from stseg.arrays import Bytes, Labels
+from stseg.errors import FormatError, OutputError
+from stseg.geometry import Grid
+from stseg.io import layout, outputs
+from stseg.io.outputs import PartFile, part_of, replacing
+from stseg.io.rig_text import format_rig
+from stseg.io.runs import RunWriter, read_run, read_trajectory
+from stseg.tracks import TRAJECTORY, Tracks
+
+VIEWS: Bytes = np.full((3, 4, 6), 2, np.uint8)
+
+
+@pytest.fixture
+def run_path(tmp_path: Path) -> Path:
+    return write_small_run(tmp_path / "night.h5")
+
+
+def writer_at(path: Path, overwrite: bool = False) -> RunWriter:
+    return RunWriter(path, small_recording(path.parent), VIEWS, CONFIG, overwrite=overwrite)
+
+
+def edited(path: Path, edit: Callable[[h5py.File], object]) -> Path:
+    with h5py.File(path, "r+") as file:
+        edit(file)
+    return path
+
+
+# What stands in the file
+
+
+def test_every_table_and_frame_reads_back(run_path: Path) -> None:
+    run, (log_odds, label) = read_run(run_path), small_volume()
+    assert (run.scene, run.frame_rate, run.cameras) == ("hall", 5.0, ("left", "right"))
+    np.testing.assert_array_equal(run.frames, FRAMES)
+    np.testing.assert_array_equal(run.trajectory, small_trajectory())
+    np.testing.assert_array_equal(run.tracks, Tracks(small_trajectory()).summary())
+    np.testing.assert_array_equal(run.ghosts, small_ghosts())
+    np.testing.assert_array_equal(run.views, VIEWS)
+    assert [len(table) for table in (run.boxes, run.events, run.windows, run.timings)] == [1, 2, 2, 4]
+    assert run.windows["energy"].tolist() == [12345, 12345]
+    for index, frame in enumerate(FRAMES):
+        read_log_odds, read_label = run.read_frame(frame)
+        np.testing.assert_allclose(read_log_odds, log_odds[index], rtol=1e-3)
+        assert read_log_odds.dtype == np.float32
+        np.testing.assert_array_equal(read_label, label[index])
+    np.testing.assert_array_equal(read_trajectory(run_path), small_trajectory())
+
+
+def test_the_provenance_gives_back_the_rig_and_names_the_streams(run_path: Path) -> None:
+    run = read_run(run_path)
+    recording = small_recording(run_path.parent)
+    assert format_rig(run.recording, recording.path) == format_rig(recording, recording.path)
+    assert run.recording.sources == recording.sources
+    assert run.provenance.config == CONFIG
+    assert {"stseg", "python", "numpy", "h5py", "hdf5", "numba"} <= set(run.provenance.versions)
+    left, right = run.provenance.sources
+    assert (left["camera"].decode(), left["files"], left["size"]) == ("left", 1, 5)
+    assert left["modified"] == (run_path.parent / "left.avi").stat().st_mtime
+    assert (right["files"], right["size"]) == (0, 0)
+    assert np.isnan(right["modified"])
+
+
+def test_viewers_find_their_attributes(run_path: Path) -> None:
+    with h5py.File(run_path) as file:
+        assert (file.attrs["NX_class"], file.attrs["format"], file.attrs["default"]) == (
+            "NXroot",
+            "stseg-run",
+            "entry",
+        )
+        group = file[file.attrs["default"]][file["entry"].attrs["default"]]
+        assert group.attrs["NX_class"] == "NXdata"
+        assert list(group.attrs["axes"]) == ["time", "plane", "y", "x"]
+        signals = [group.attrs["signal"], *group.attrs["auxiliary_signals"]]
+        assert signals == ["log_odds", "label"]
+        for signal in signals:
+            dataset = group[signal]
+            assert (dataset.chunks, dataset.compression, dataset.shuffle) == ((1, 3, 4, 6), "gzip", True)
+            assert (dataset.compression_opts, dataset.maxshape[0]) == (1, None)
+            assert [dimension[0].name.rsplit("/")[-1] for dimension in dataset.dims] == list(group.attrs["axes"])
+        assert group["log_odds"].dtype == np.float16
+        assert [group[name].attrs["units"] for name in group.attrs["axes"]] == ["s", "m", "m", "m"]
+        np.testing.assert_allclose(group["time"][:], FRAMES / 5)
+        np.testing.assert_allclose(group["x"][:], [0.05, 0.15, 0.25, 0.35, 0.45, 0.55])
+        np.testing.assert_allclose(group["plane"][:], [0, 0.9, 1.8])
+        assert [dimension[0].name.rsplit("/")[-1] for dimension in group["views"].dims] == ["plane", "y", "x"]
+
+
+def test_pedpy_finds_frame_rate_and_area(run_path: Path) -> None:
+    with h5py.File(run_path) as file:
+        assert file["trajectory"].attrs["fps"] == 5.0
+        assert {"id", "frame", "x", "y"} <= set(file["trajectory"].dtype.names)
+        assert file.attrs["wkt_geometry"] == "POLYGON ((0.0 0.0, 0.6 0.0, 0.6 0.4, 0.0 0.4, 0.0 0.0))"
+    triangle = Grid((0, 1), (0, 1), polygon=np.array([[0, 0], [1, 0], [0, 1.0]]))
+    assert layout.walkable_area(triangle) == "POLYGON ((0.0 0.0, 1.0 0.0, 0.0 1.0, 0.0 0.0))"
+
+
+def test_equal_runs_differ_only_in_timings_and_provenance(tmp_path: Path) -> None:
+    def contents(path: Path) -> dict[str, tuple[bytes, str]]:
+        found = {}
+
+        def take(name: str, item: h5py.Dataset | h5py.Group) -> None:
+            if not name.startswith(("provenance", "timings")):
+                attributes = {key: str(value) for key, value in item.attrs.items() if not isinstance(value, bytes)}
+                value = np.asarray(item[()]) if isinstance(item, h5py.Dataset) else np.zeros(0)
+                plain = value.tobytes() if value.dtype != object else str(value).encode()
+                found[name] = (plain, "" if "REFERENCE_LIST" in attributes else str(sorted(attributes.items())))
+
+        with h5py.File(path) as file:
+            file.visititems(take)
+        return found
+
+    first = contents(write_small_run(tmp_path / "first.h5"))
+    assert len(first) > 12
+    assert contents(write_small_run(tmp_path / "second.h5")) == first
+
+
+def test_a_run_of_no_frames_is_a_run(tmp_path: Path) -> None:
+    with writer_at(tmp_path / "none.h5") as writer:
+        writer.finish(Tracks(np.zeros(0, TRAJECTORY)).summary())
+    run = read_run(tmp_path / "none.h5")
+    assert len(run.frames) == len(run.trajectory) == len(run.tracks) == 0
+    with pytest.raises(ValueError, match="frame 3"):
+        run.read_frame(3)
+
+
+def test_log_odds_beyond_half_precision_stay_finite(tmp_path: Path) -> None:
+    log_odds, label = small_volume(1)
+    log_odds[0, 0, 0, 1:3] = np.inf, -1e6
+    with writer_at(tmp_path / "far.h5") as writer:
+        writer.append_frames(FRAMES[:1], log_odds, label)
+        writer.finish(Tracks(np.zeros(0, TRAJECTORY)).summary())
+    np.testing.assert_array_equal(read_run(tmp_path / "far.h5").read_frame(10)[0][0, 0, :3], [np.nan, 65504, -65504])
+
+
+def test_many_small_appends_make_one_table(tmp_path: Path) -> None:
+    rows = np.zeros(10_000, TRAJECTORY)
+    rows["frame"] = np.arange(len(rows))
+    with writer_at(tmp_path / "long.h5") as writer:
+        for start in range(0, len(rows), 7):
+            part = rows[start : start + 7].copy()
+            writer.append("trajectory", part)
+            part["frame"] = -1  # the caller may use the array again
+        writer.finish(Tracks(rows[:0]).summary())
+    np.testing.assert_array_equal(read_trajectory(tmp_path / "long.h5"), rows)
+
+
+def test_slips_of_the_caller_are_refused(tmp_path: Path) -> None:
+    log_odds, label = small_volume(2)
+    with writer_at(tmp_path / "slip.h5") as writer:
+        writer.append_frames(np.array([4, 6]), log_odds, label)
+        with pytest.raises(ValueError, match="after frame 6"):
+            writer.append_frames(np.array([6, 7]), log_odds, label)
+        with pytest.raises(ValueError, match="volumes"):
+            writer.append_frames(np.array([8]), log_odds, label)
+        with pytest.raises(ValueError, match="rows"):
+            writer.append("ghosts", np.zeros(1, layout.ghost_type(3)))
+    with pytest.raises(ValueError, match="views"):
+        RunWriter(tmp_path / "slip.h5", small_recording(tmp_path), VIEWS[:2], CONFIG, overwrite=False)
+
+
+# Other ids
+
+
+@settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    st.lists(st.integers(0, 6), min_size=4, max_size=4),
+    st.dictionaries(st.integers(0, 9), st.integers(0, 9), max_size=5),
+)
+def test_relabelling_maps_every_cell_once(tmp_path: Path, ids: list[int], new_id_of: dict[int, int]) -> None:
+    log_odds, label = small_volume(4)
+    label[:, 0, 0, 0] = ids
+    plain = label.copy()
+    for cell in np.ndindex(label.shape):
+        plain[cell] = new_id_of.get(int(label[cell]), label[cell]) if label[cell] else 0
+    with writer_at(tmp_path / "relabel.h5", overwrite=True) as writer:
+        writer.append_frames(FRAMES[:4], log_odds, label)
+        writer.relabel(new_id_of)
+        writer.finish(Tracks(np.zeros(0, TRAJECTORY)).summary())
+    run = read_run(tmp_path / "relabel.h5")
+    read: Labels = np.stack([run.read_frame(frame)[1] for frame in FRAMES[:4]])
+    np.testing.assert_array_equal(read, plain)
+
+
+def test_frames_without_the_ids_are_not_written_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    written = []
+    set_item = h5py.Dataset.__setitem__
+
+    def noting(dataset: h5py.Dataset, place: object, values: object) -> None:
+        written.append(place)
+        set_item(dataset, place, values)
+
+    with writer_at(tmp_path / "relabel.h5") as writer:
+        fill(writer)
+        with monkeypatch.context() as patch:
+            patch.setattr(h5py.Dataset, "__setitem__", noting)
+            writer.relabel({2: 1, 7: 8, 1: 1})
+    assert written == [3, 4, 5]  # track 2 enters in the fourth frame
+
+
+# Whole or not at all
+
+
+def test_an_existing_file_is_refused_before_any_work(run_path: Path) -> None:
+    before = run_path.read_bytes()
+    with pytest.raises(OutputError, match="exists"):
+        writer_at(run_path)
+    assert run_path.read_bytes() == before
+    assert not part_of(run_path).exists()
+
+
+def test_overwriting_replaces_only_at_the_end(run_path: Path) -> None:
+    before = run_path.read_bytes()
+    with writer_at(run_path, overwrite=True) as writer:
+        fill(writer)
+        assert run_path.read_bytes() == before
+        assert part_of(run_path).exists()
+        writer.finish(Tracks(small_trajectory()[:0]).summary())
+    assert len(read_run(run_path).tracks) == 0
+    assert not part_of(run_path).exists()
+
+
+@pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt])
+def test_an_exception_leaves_the_old_file_and_no_part(run_path: Path, error: type[BaseException]) -> None:
+    before = run_path.read_bytes()
+    with pytest.raises(error), writer_at(run_path, overwrite=True) as writer:
+        fill(writer)
+        raise error
+    assert run_path.read_bytes() == before
+    assert not part_of(run_path).exists()
+
+
+def test_an_interrupt_inside_a_write_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "night.h5"
+
+    def interrupted(*_: object) -> int:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt), writer_at(path) as writer:
+        fill(writer)
+        monkeypatch.setattr(PartFile, "write", interrupted)
+        writer.finish(Tracks(small_trajectory()).summary())
+    assert [file.name for file in tmp_path.iterdir()] == ["left.avi"]
+
+
+def test_the_part_of_a_killed_run_is_written_over(tmp_path: Path) -> None:
+    part_of(tmp_path / "night.h5").write_bytes(b"half of something" * 10_000)
+    assert len(read_run(write_small_run(tmp_path / "night.h5")).frames) == 6
+
+
+@pytest.mark.skipif(os.name == "nt", reason="needs the locks of POSIX systems")
+def test_two_runs_into_one_file_are_refused(tmp_path: Path) -> None:
+    with writer_at(tmp_path / "night.h5") as writer:
+        fill(writer)
+        with pytest.raises(OutputError, match="another run"), writer_at(tmp_path / "night.h5"):
+            pass
+        writer.finish(Tracks(small_trajectory()).summary())
+    assert len(read_run(tmp_path / "night.h5").frames) == 6
+
+
+def test_a_file_that_appears_meanwhile_is_not_destroyed(tmp_path: Path) -> None:
+    path = tmp_path / "night.h5"
+    with pytest.raises(OutputError, match=r"kept in .*night\.h5\.part"), writer_at(path) as writer:
+        fill(writer)
+        path.write_text("precious")
+        writer.finish(Tracks(small_trajectory()).summary())
+    assert path.read_text() == "precious"
+    assert len(read_run(part_of(path)).frames) == 6
+
+
+@pytest.mark.parametrize(
+    ("name", "found"), [("nowhere/night.h5", "no such folder"), (".", "a folder"), ("left.avi/night.h5", "no such")]
+)
+def test_impossible_places_are_refused_before_any_work(tmp_path: Path, name: str, found: str) -> None:
+    small_recording(tmp_path)
+    with pytest.raises(OutputError, match=found):
+        RunWriter(tmp_path / name, small_recording(tmp_path), VIEWS, CONFIG, overwrite=True)
+
+
+def test_a_folder_that_cannot_be_written_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refusing(*_: object) -> int:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(outputs.os, "open", refusing)
+    with pytest.raises(OutputError, match="Permission denied"), writer_at(tmp_path / "night.h5"):
+        pass
+
+
+class FullDisk:
+    """A file that takes so many bytes and no more, as a disk does that runs full."""
+
+    def __init__(self, file: object, room: int) -> None:
+        self._file, self.room = file, room
+
+    def __getattr__(self, name: str) -> object:
+        return getattr(self._file, name)
+
+    def write(self, data: memoryview) -> int:
+        if self.room < data.nbytes:
+            raise OSError(28, "No space left on device")
+        self.room -= data.nbytes
+        written: int = self._file.write(data)  # type: ignore[attr-defined]
+        return written
+
+
+@pytest.mark.parametrize("room", [0, 100, 3000, 8000, 12000, 16000, 20000])
+def test_a_full_disk_is_told_and_leaves_the_old_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, room: int
+) -> None:
+    path = tmp_path / "night.h5"
+    path.write_text("old")
+    fdopen = os.fdopen
+    monkeypatch.setattr(outputs.os, "fdopen", lambda *given, **how: FullDisk(fdopen(*given, **how), room))
+    monkeypatch.setattr(outputs, "_lock", lambda _: None)
+    with pytest.raises(OutputError, match="No space left on device"), writer_at(path, overwrite=True) as writer:
+        fill(writer)
+        writer.finish(Tracks(small_trajectory()).summary())
+    assert path.read_text() == "old"
+    assert not part_of(path).exists()
+
+
+def test_text_outputs_replace_only_when_whole(tmp_path: Path) -> None:
+    path = tmp_path / "tracks.csv"
+    path.write_text("old")
+    with pytest.raises(RuntimeError), replacing(path, overwrite=True) as part:
+        part.write_text("new")
+        raise RuntimeError
+    assert path.read_text() == "old"
+    with pytest.raises(OutputError, match=r"tracks\.csv: found gone"), replacing(path, overwrite=True) as part:
+        raise OutputError(part, "", "gone", "a place")
+    with replacing(path, overwrite=True) as part:
+        part.write_text("new")
+    assert [file.read_text() for file in tmp_path.iterdir()] == ["new"]
+
+
+# Broken files
+
+
+def test_what_is_no_run_file_is_told_by_name(tmp_path: Path) -> None:
+    with pytest.raises(FormatError, match="no such file"):
+        read_run(tmp_path / "none.h5")
+    (tmp_path / "text.h5").write_text("frame,id,x,y\n")
+    with pytest.raises(FormatError, match="not HDF5"):
+        read_run(tmp_path / "text.h5")
+    with h5py.File(tmp_path / "other.h5", "w") as file:
+        file["x"] = 1
+    with pytest.raises(FormatError, match="/@format: found nothing"):
+        read_run(tmp_path / "other.h5")
+    with pytest.raises(FormatError):
+        read_run(tmp_path)
+
+
+def test_a_cut_off_file_is_told(run_path: Path) -> None:
+    run_path.write_bytes(run_path.read_bytes()[:-3000])
+    with pytest.raises(FormatError, match="whole run file"):
+        read_run(run_path)
+
+
+def delete(name: str) -> Callable[[h5py.File], object]:
+    return lambda file: file.__delitem__(name)
+
+
+def replace(name: str, values: object) -> Callable[[h5py.File], object]:
+    def edit(file: h5py.File) -> None:
+        del file[name]
+        file[name] = values
+
+    return edit
+
+
+@pytest.mark.parametrize(
+    ("edit", "named"),
+    [
+        (lambda file: file.attrs.__setitem__("format_version", 2), "/@format_version: found"),
+        (lambda file: file.attrs.__setitem__("format", "geff"), "/@format: found 'geff'"),
+        (lambda file: file.attrs.__delitem__("cameras"), "/@cameras: found nothing"),
+        (lambda file: file["trajectory"].attrs.__delitem__("fps"), "/trajectory@fps: found nothing"),
+        (delete("events"), "/events: found nothing"),
+        (delete("entry/occupancy/label"), "/entry/occupancy/label: found nothing"),
+        (delete("provenance"), "/provenance/config: found nothing"),
+        (delete("entry/title"), "/entry/title: found nothing"),
+        (replace("windows", np.zeros((2, 2))), "/windows: found the type float64"),
+        (replace("tracks", np.zeros((2, 2), TRAJECTORY)), "/tracks: found the type"),
+        (replace("entry/occupancy/views", np.zeros((3, 4, 5), "u1")), "/entry/occupancy/views: found the shape"),
+        (replace("entry/occupancy/log_odds", np.zeros((6, 3), "f2")), "/entry/occupancy/log_odds: found 2 dim"),
+        (lambda file: file.create_group("x") and file.move("x", "/boxes/x"), "/boxes: found no array"),
+    ],
+)
+def test_what_is_missing_or_wrong_is_named(run_path: Path, edit: Callable[[h5py.File], object], named: str) -> None:
+    if named.startswith("/boxes"):
+        edited(run_path, delete("boxes"))
+        edited(run_path, lambda file: file.create_group("boxes"))
+    else:
+        edited(run_path, edit)
+    with pytest.raises(FormatError) as caught:
+        read_run(run_path)
+    assert f"{run_path}: {named}" in str(caught.value)
+
+
+def test_a_broken_chunk_is_told_when_it_is_read(run_path: Path) -> None:
+    with h5py.File(run_path) as file:
+        chunk = file["trajectory"].id.get_chunk_info(0)
+    data = bytearray(run_path.read_bytes())
+    data[chunk.byte_offset : chunk.byte_offset + chunk.size] = bytes(chunk.size)
+    run_path.write_bytes(data)
+    run = read_run(run_path)
+    with pytest.raises(FormatError, match="/trajectory"):
+        _ = run.trajectory
+
+
+def test_a_run_can_be_read_from_several_threads(run_path: Path) -> None:
+    run, failures = read_run(run_path), []
+
+    def read() -> None:
+        for frame in FRAMES:
+            if not (run.read_frame(frame)[1] == 1).any():
+                failures.append(frame)
+
+    threads = [threading.Thread(target=read) for _ in range(3)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not failures
