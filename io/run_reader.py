@@ -151,7 +151,7 @@ def _told_as_format_error(path: Path, place: str) -> Iterator[None]:
         raise FormatError(path, "", "no such file", "a run file") from error
     except BlockingIOError as error:
         raise FormatError(path, "", "a file that is still being written", "a finished run file") from error
-    except (OSError, RuntimeError) as error:
+    except (OSError, RuntimeError, KeyError, TypeError, ValueError) as error:  # all that h5py makes of broken files
         if path.is_file() and not h5py.is_hdf5(path):
             raise FormatError(path, "", "something that is not HDF5", "a run file") from error
         raise FormatError(path, place, f"something that cannot be read ({error})", "a whole run file") from error

@@ -14,7 +14,8 @@ import numpy as np
 from stseg.arrays import AnyArray, Bytes, Ints, Labels, Rows, Singles
 from stseg.geometry import Rig
 from stseg.io import layout
-from stseg.io.outputs import PartFile, require_new
+from stseg.io.outputs import require_new
+from stseg.io.part_file import PartFile
 from stseg.io.provenance import gather_provenance, write_provenance
 from stseg.io.recording import Recording
 
@@ -118,14 +119,13 @@ class RunWriter:
         new_id = np.arange(max(changed) + 1, dtype=np.int32)
         new_id[list(changed)] = list(changed.values())
         affected = new_id != np.arange(len(new_id))
-        with self._checked():
-            volume = self._occupancy["label"]
-            for index in range(len(volume)):
+        volume = self._occupancy["label"]
+        for index in range(len(volume)):
+            with self._checked():
                 label = volume[index]
                 known = np.where(label < len(new_id), label, 0)
                 if affected[known].any():
                     volume[index] = np.where(label < len(new_id), new_id[known], label)
-                self._disk.check()
 
     def finish(self, tracks: Rows) -> None:
         """Write the TRACK rows, then sync the file and give it its name."""
@@ -181,8 +181,7 @@ class RunWriter:
             self._file.close()
 
     def _drop(self) -> None:
-        # What stopped the run may have struck inside HDF5, which then cannot close; that must not hide the cause.
-        with suppress(OSError, RuntimeError):
+        with suppress(OSError, RuntimeError):  # must not hide what stopped the run
             self._close()
         self._disk.discard()
         self._disk.close()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from stseg.foreground.mixture import MixtureConfig
 
 @dataclass(frozen=True)
 class GhostConfig:
@@ -55,7 +56,7 @@ class OccupancyConfig:
 class SegmentationConfig:
     """The cut of a window's volume (METHODS 4)."""
 
-    smoothness: float = 0.5
+    smoothness: float = 0.2
     """lambda: what it costs that two neighbours at no distance differ, nats."""
     spread: float = 0.20
     """s: distance over which that falls to 0.6 of it, metres."""
@@ -85,6 +86,7 @@ class IdentityConfig:
 class Config:
     """All stages."""
 
+    foreground: MixtureConfig = field(default_factory=MixtureConfig)
     occupancy: OccupancyConfig = field(default_factory=OccupancyConfig)
     segmentation: SegmentationConfig = field(default_factory=SegmentationConfig)
     identity: IdentityConfig = field(default_factory=IdentityConfig)

@@ -24,6 +24,7 @@ COMMANDS = {
 }
 """Where each command is, and the line that `stseg --help` says of it."""
 
+_FLAGS = ("--help", "-h", "--version")
 _USER_ERROR = 2
 _INTERRUPTED = 130
 
@@ -60,8 +61,8 @@ def _app(tokens: Sequence[str]) -> App:
 
 
 def _require_command(tokens: Sequence[str]) -> None:
-    """Refuse an unknown command here: to suggest another, cyclopts would import them all."""
-    if tokens and not tokens[0].startswith("-") and tokens[0] not in COMMANDS:
+    """Refuse what is no command here: to suggest one, cyclopts would import them all."""
+    if tokens and tokens[0] not in (*COMMANDS, *_FLAGS):
         close = get_close_matches(tokens[0], COMMANDS, 1)
         hint = f"; did you mean {close[0]}?" if close else ""
         raise ConfigError("command line", "", repr(tokens[0]), f"one of {', '.join(COMMANDS)}{hint}")

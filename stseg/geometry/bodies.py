@@ -73,6 +73,16 @@ class BodyTable:
         _fill_boxes(self.pixel, lattice, np.asarray(heights, float), LEVELS[1], self.step, PROFILE, filled)
         return filled
 
+    def boxes_of(self, ground: Floats, heights: Floats) -> Floats:
+        """Boxes of pillars with a height each, ground (n, 2) and heights (n,) in metres; float64 (n, 4), pixels."""
+        filled = np.full((1, len(ground), 4), np.nan)
+        lattice = (np.asarray(ground, float) - self.origin) / self.step
+        for i in range(len(ground)):
+            _fill_boxes(
+                self.pixel, lattice[i : i + 1], heights[i : i + 1], LEVELS[1], self.step, PROFILE, filled[:, i : i + 1]
+            )
+        return np.asarray(filled[0])
+
     def discs(self, ground: Floats, height: float) -> Floats:
         """The discs of one pillar: centre u, v and the Jacobian times radius (2x2), float64 (disc, 6)."""
         filled = np.full((len(PROFILE), 6), np.nan)

@@ -65,7 +65,7 @@ def report_page(contents: Contents) -> str:
         _section("People over time", _chart(people_chart(span, contents.trajectory, contents.truth), counted)),
         _section("Tracks", _chart(lives_chart(span, tracks), "from first frame to last") + _track_table(span, tracks)),
         _section("Events", _event_summary(contents) + _event_table(span, contents.events)),
-        _section("Occupancy", _figures(contents.slices, "wide")),
+        _section("Occupancy", _figures(contents.slices, "sheets")),
         _section("Cameras", _privacy(contents) + _figures(contents.cameras, "pair")) if contents.cameras else "",
     ]
     facts = "".join(f"<div><dt>{escape(name)}</dt><dd>{escape(value)}</dd></div>" for name, value in contents.facts)
@@ -76,7 +76,7 @@ def report_page(contents: Contents) -> str:
 
 def png_bytes(picture: Bytes) -> bytes:
     """A picture as a PNG file's bytes."""
-    _, data = cv2.imencode(".png", picture, [cv2.IMWRITE_PNG_COMPRESSION, 9])
+    _, data = cv2.imencode(".png", picture, [cv2.IMWRITE_PNG_COMPRESSION, 7])
     return bytes(np.asarray(data, np.uint8))
 
 
@@ -147,11 +147,11 @@ def _track_table(span: Span, tracks: Rows) -> str:
 def _event_summary(contents: Contents) -> str:
     """How often each kind of event occurred, and how many candidates were ghosts."""
     kinds, counts = np.unique(contents.events["kind"], return_counts=True)
-    words = [f"<b>{count}</b> {escape(kind.decode())}" for kind, count in zip(kinds, counts.tolist(), strict=True)]
+    words = [f"{escape(kind.decode())} <b>{count}</b>" for kind, count in zip(kinds, counts.tolist(), strict=True)]
     if len(contents.candidates):
         ghosts = int((contents.candidates["status"] == 0).sum())
-        words.append(f"<b>{ghosts}</b> ghosts removed of {len(contents.candidates)} candidates")
-    return f'<p class="note">{", ".join(words) or "none"}</p>'
+        words.append(f"ghosts removed <b>{ghosts}</b> of {len(contents.candidates)} candidates")
+    return f'<p class="note">{" &middot; ".join(words) or "none"}</p>'
 
 
 def _event_table(span: Span, events: Rows) -> str:
@@ -165,7 +165,7 @@ def _event_table(span: Span, events: Rows) -> str:
             _swatch(int(row["other"])) if row["other"] else "",
             escape(row["reason"].decode(errors="replace")),
         )
-        for row in events[:_MOST_ROWS]
+        for row in events[np.argsort(events["frame"], kind="stable")][:_MOST_ROWS]
     ]
     return _table(("frame", "event", "track", "other", "reason"), rows, len(events))
 

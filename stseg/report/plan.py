@@ -118,9 +118,9 @@ def _draw_camera(canvas: Bytes, plan: PlanMap, camera: Camera) -> None:
     disc(canvas, place, 6, PAPER)
     disc(canvas, place, 4.5, tone)
     back = np.array([0.0, -1.0]) if sides is None else -sides[1]
-    (wide, tall), room = text_size(camera.name, 12), np.array(plan.size)
-    u, v = np.clip(place + back * (14 + wide / 2, 18), (wide / 2 + 4, tall), room - (wide / 2 + 4, tall)).tolist()
-    text(canvas, camera.name, (u, v), tone, 12, (0.5, 0.5))
+    (wide, tall), room = text_size(camera.name, 15), np.array(plan.size)
+    u, v = np.clip(place + back * (14 + wide / 2, 22), (wide / 2 + 4, tall), room - (wide / 2 + 4, tall)).tolist()
+    text(canvas, camera.name, (u, v), tone, 15, (0.5, 0.5))
 
 
 def _looks(camera: Camera) -> Floats | None:
@@ -191,7 +191,7 @@ def _draw_ends(canvas: Bytes, pixel: Floats, colour: Colour, size: float) -> Non
 def _label_tracks(canvas: Bytes, plan: PlanMap, trajectory: Rows) -> None:
     """Ids beside the ends; of many tracks only the longest."""
     paths = sorted(_paths(trajectory), key=lambda path: -len(path[1]))[:_LABELLED]
-    size = 12.0 if len(paths) <= 12 else 10.0
+    size = 14.0 if len(paths) <= 12 else 11.0
     ends = np.array([plan.pixel(path[-1]) for _, path in paths]).reshape(-1, 2)
     sizes = [chip_size(str(identity), size) for identity, _ in paths]
     centres = place_labels(ends, sizes, (*plan.corner, *plan.far_corner), 16)
@@ -201,24 +201,24 @@ def _label_tracks(canvas: Bytes, plan: PlanMap, trajectory: Rows) -> None:
 
 def _legend(canvas: Bytes, plan: PlanMap, most: int | None, has_truth: bool) -> None:
     """Below the plan: what the tones and marks mean, and a scale bar."""
-    u, v = plan.corner[0], plan.size[1] - 34.0
+    u, v = plan.corner[0], plan.size[1] - 38.0
     if most is not None:
-        text(canvas, "views", (u, v), QUIET, 11, (0, 0.5))
-        u += text_size("views", 11)[0] + 10
+        text(canvas, "views", (u, v), QUIET, 15, (0, 0.5))
+        u += text_size("views", 15)[0] + 10
         for count in range(most + 1):
-            square = np.array([[u, v - 12], [u + 26, v - 12], [u + 26, v + 12], [u, v + 12]])
+            square = np.array([[u, v - 14], [u + 30, v - 14], [u + 30, v + 14], [u, v + 14]])
             fill(canvas, square, _tone(count, max(most, 1)))
             outline(canvas, square, mixed(QUIET, PAPER, 0.5))
-            text(canvas, str(count), (u + 13, v), INK, 10, (0.5, 0.5))
-            u += 26
+            text(canvas, str(count), (u + 15, v), INK, 14, (0.5, 0.5))
+            u += 30
         u += 28
     colour = track_colour(1)
     line = np.array([[u, v], [u + 46, v]])
     stroke(canvas, line, colour, 3)
     _draw_ends(canvas, line, colour, 0.8)
-    text(canvas, "track", (u + 66, v), QUIET, 11, (0, 0.5))
-    u += 66 + text_size("track", 11)[0] + 28
+    text(canvas, "track", (u + 66, v), QUIET, 15, (0, 0.5))
+    u += 66 + text_size("track", 15)[0] + 28
     if has_truth:
         dashes(canvas, np.array([[u, v], [u + 46, v]]), _TRUTH)
-        text(canvas, "truth", (u + 56, v), QUIET, 11, (0, 0.5))
+        text(canvas, "truth", (u + 56, v), QUIET, 15, (0, 0.5))
     scale_bar(canvas, plan, (plan.far_corner[0], v))

@@ -11,8 +11,8 @@ from stseg.geometry import Grid
 from stseg.report.canvas import blank, outline, stroke, text, text_size
 from stseg.report.colours import INK, PAPER, QUIET, RULE, Colour
 
-_LEFT, _RIGHT, _TOP, _BOTTOM = 72, 40, 92, 118  # room around the ground for title, labels and legend, pixels
-_NARROWEST = 840  # pixels, for the legend
+_LEFT, _RIGHT, _TOP, _BOTTOM = 76, 44, 104, 132  # room around the ground for title, labels and legend, pixels
+_NARROWEST = 900  # pixels, for the legend
 _STEPS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)
 
 
@@ -66,39 +66,39 @@ class PlanMap:
 def sheet(plan: PlanMap, title: str) -> Bytes:
     """An empty plan: white paper and a title."""
     canvas = blank(*plan.size, PAPER)
-    text(canvas, title, (plan.corner[0], 24), INK, 17, (0, 0), 2)
+    text(canvas, title, (plan.corner[0], 24), INK, 20, (0, 0), 2)
     return canvas
 
 
 def rule(canvas: Bytes, plan: PlanMap) -> None:
     """Grid lines every metre (wider apart where they would crowd), with labels in metres."""
     step = step_for(plan.scale, 12, 1.0)
-    every = step_for(plan.scale, 46, step)
+    every = step_for(plan.scale, 56, step)
     (left, top), (right, bottom) = plan.corner, plan.far_corner
     for metres in _multiples(plan.x, step):
         u = plan.pixel(np.array([metres, 0.0]))[0]
         stroke(canvas, np.array([[u, top], [u, bottom]]), RULE)
         if _is_multiple(metres, every):
-            text(canvas, f"{metres:g}", (u, bottom + 12), QUIET, 11, (0.5, 0))
+            text(canvas, f"{metres:g}", (u, bottom + 14), QUIET, 15, (0.5, 0))
     for metres in _multiples(plan.y, step):
         v = plan.pixel(np.array([0.0, metres]))[1]
         stroke(canvas, np.array([[left, v], [right, v]]), RULE)
         if _is_multiple(metres, every):
-            text(canvas, f"{metres:g}", (left - 12, v), QUIET, 11, (1, 0.5))
+            text(canvas, f"{metres:g}", (left - 14, v), QUIET, 15, (1, 0.5))
     outline(canvas, np.array([[left, top], [right, top], [right, bottom], [left, bottom]]), RULE)
-    text(canvas, "x, metres", (right, bottom + 34), QUIET, 11, (1, 0))
-    text(canvas, "y, metres", (left, top - 12), QUIET, 11, (0, 1))
+    text(canvas, "x, metres", (right, bottom + 42), QUIET, 15, (1, 0))
+    text(canvas, "y, metres", (left, top - 16), QUIET, 15, (0, 1))
 
 
 def scale_bar(canvas: Bytes, plan: PlanMap, place: tuple[float, float], colour: Colour = INK) -> None:
     """A bar of a round number of metres whose right end stands at `place`."""
-    metres = max((step for step in _STEPS if step * plan.scale <= 170), default=_STEPS[0])
+    metres = max((step for step in _STEPS if step * plan.scale <= 180), default=_STEPS[0])
     (u, v), length = place, metres * plan.scale
     words = f"{metres:g} m"
     stroke(canvas, np.array([[u - length, v], [u, v]]), colour, 3)
     for end in (u - length, u):
         stroke(canvas, np.array([[end, v - 6], [end, v + 6]]), colour, 2)
-    text(canvas, words, (u - length - 12 - text_size(words, 12)[0], v), colour, 12, (0, 0.5))
+    text(canvas, words, (u - length - 12 - text_size(words, 16)[0], v), colour, 16, (0, 0.5))
 
 
 def step_for(scale: float, apart: float, least: float) -> float:

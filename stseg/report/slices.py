@@ -16,7 +16,8 @@ _STOPS = np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
 # blue-ish below 0, nearly white at 0, orange above; blue, green, red
 _TONES = np.array([(176, 128, 84), (230, 204, 176), (249, 249, 249), (110, 184, 253), (34, 104, 222)], float)
 _UNSEEN = np.array([(236, 234, 232), (205, 201, 198)], np.uint8)  # hatching, light and dark
-_GAP, _HEAD, _MARGIN, _FOOT = 22, 24, 26, 56  # pixels
+_GAP, _HEAD, _MARGIN, _FOOT = 22, 30, 26, 64  # pixels
+_SHEET_SHAPE = 1.6  # width over height
 
 
 def volume_picture(
@@ -80,14 +81,14 @@ def colours_of(log_odds: AnyArray, limit: float) -> Bytes:
 def _contact_sheet(panels: Sequence[_Panel], title: str, width: int, limit: float) -> Bytes:
     rows, columns, scale = _arrange(len(panels), panels[0].label.shape, width)
     tall, wide = (side * scale for side in panels[0].label.shape)
-    top = _MARGIN + (34 if title else 0)
-    canvas_width = max(2 * _MARGIN + columns * (wide + _GAP) - _GAP, 420)
+    top = _MARGIN + (38 if title else 0)
+    canvas_width = max(2 * _MARGIN + columns * (wide + _GAP) - _GAP, 560)
     canvas = blank(canvas_width, top + rows * (tall + _HEAD + _GAP) - _GAP + _FOOT + _MARGIN, PAPER)
-    text(canvas, title, (_MARGIN, _MARGIN), INK, 15, (0, 0), 2)
+    text(canvas, title, (_MARGIN, _MARGIN), INK, 18, (0, 0), 2)
     for k, panel in enumerate(panels):
         u = _MARGIN + (k % columns) * (wide + _GAP)
         v = top + (k // columns) * (tall + _HEAD + _GAP) + _HEAD
-        text(canvas, panel.caption, (u, v - 8), QUIET, 11)
+        text(canvas, panel.caption, (u, v - 9), QUIET, 15)
         canvas[v : v + tall, u : u + wide] = _panel_picture(panel, scale, limit)
         corners = np.array([[u - 1, v - 1], [u + wide, v - 1], [u + wide, v + tall], [u - 1, v + tall]])
         outline(canvas, corners, RULE)
@@ -96,11 +97,16 @@ def _contact_sheet(panels: Sequence[_Panel], title: str, width: int, limit: floa
 
 
 def _arrange(count: int, shape: tuple[int, ...], width: int) -> tuple[int, int, int]:
-    """Rows, columns and pixels a cell: as near as can be to a sheet that is four wide and three tall."""
+    """Rows, columns and pixels a cell: few empty places, and a sheet of about `_SHEET_SHAPE`."""
     tall, wide = shape
-    columns = min(count, max(1, round(float(np.sqrt(count * tall / wide * 4 / 3)))))
+
+    def waste(columns: int) -> float:
+        rows = -(-count // columns)
+        odd_shape = abs(np.log(columns * wide / (rows * tall) / _SHEET_SHAPE))
+        return 1 - count / (rows * columns) + 0.5 * float(odd_shape)
+
+    columns = min(range(1, count + 1), key=waste)
     rows = -(-count // columns)
-    columns = -(-count // rows)
     room = (width - 2 * _MARGIN - (columns - 1) * _GAP) / columns
     return rows, columns, max(1, int(room / wide))
 
@@ -149,14 +155,14 @@ def _limit(log_odds: AnyArray) -> float:
 
 def _colour_bar(canvas: Bytes, limit: float) -> None:
     """Below: which colour is which log-odds."""
-    length, tall = 220, 12
-    u, v = _MARGIN, canvas.shape[0] - _MARGIN - tall - 16
+    length, tall = 220, 14
+    u, v = _MARGIN, canvas.shape[0] - _MARGIN - tall - 18
     ramp = np.linspace(-limit, limit, length)
     canvas[v : v + tall, u : u + length] = colours_of(ramp, limit)[None]
     for share, value in ((0.0, -limit), (0.5, 0.0), (1.0, limit)):
-        text(canvas, f"{value:.2g}", (u + share * length, v + tall + 6), QUIET, 10, (share, 0))
-    text(canvas, "log-odds, nats", (u + length + 16, v + tall / 2), QUIET, 10, (0, 0.5))
-    hatch_u = u + length + 16 + 120
+        text(canvas, f"{value:.2g}", (u + share * length, v + tall + 7), QUIET, 13, (share, 0))
+    text(canvas, "log-odds, nats", (u + length + 16, v + tall / 2), QUIET, 13, (0, 0.5))
+    hatch_u = u + length + 16 + 150
     rows, columns = np.ogrid[:tall, : 2 * tall]
     canvas[v : v + tall, hatch_u : hatch_u + 2 * tall] = _UNSEEN[((rows + columns) % 8 < 2).astype(int)]
-    text(canvas, "no view", (hatch_u + 2 * tall + 8, v + tall / 2), QUIET, 10, (0, 0.5))
+    text(canvas, "no view", (hatch_u + 2 * tall + 8, v + tall / 2), QUIET, 13, (0, 0.5))

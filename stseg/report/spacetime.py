@@ -15,12 +15,12 @@ from stseg.report.labels import place_labels
 from stseg.report.plan_map import step_for
 
 _AZIMUTH, _ELEVATION = np.radians(-32.0), np.radians(32.0)
-_MARGIN, _PIECE, _MOST_PIECES = 96, 6, 6000
+_MARGIN, _PIECE, _MOST_PIECES = 88, 6, 6000
 _LABELLED = 40
 
 
 def spacetime_picture(
-    grid: Grid, trajectory: Rows, frame_rate: float, title: str = "", width: int = 1400, height: int = 1200
+    grid: Grid, trajectory: Rows, frame_rate: float, title: str = "", width: int = 1200, height: int = 1400
 ) -> Bytes:
     """Draw tracks as threads that rise with time; near ones pass in front of far ones.
 
@@ -42,7 +42,7 @@ def spacetime_picture(
         Blue, green, red.
     """
     canvas = blank(width, height, PAPER)
-    text(canvas, title, (48, 36), INK, 17, (0, 0), 2)
+    text(canvas, title, (40, 30), INK, 20, (0, 0), 2)
     frames = trajectory["frame"]
     first, last = (int(frames.min()), int(frames.max())) if len(frames) else (0, 1)
     block = Block.fit(grid, first, max(last, first + 1), (width, height))
@@ -145,15 +145,15 @@ def _draw_floor(canvas: Bytes, block: Block) -> None:
     for y in np.arange(np.ceil(y0 / step) * step, y1 + 1e-9, step):
         stroke(canvas, block.pixel([[x0, y, first], [x1, y, first]]), RULE)
     outline(canvas, floor, mixed(INK, PAPER, 0.35), 2)
-    every = step_for(block.scale, 60, step)
+    every = step_for(block.scale, 70, step)
     away = block.pixel([0, -1, 0]) - block.pixel([0, 0, 0])
     for x in np.arange(np.ceil(x0 / every) * every, x1 + 1e-9, every):
-        u, v = (block.pixel([x, y0, first]) + away / np.hypot(*away) * 22).tolist()
-        text(canvas, f"{x + 0.0:g}", (u, v), QUIET, 11, (0.5, 0.5))
+        u, v = (block.pixel([x, y0, first]) + away / np.hypot(*away) * 26).tolist()
+        text(canvas, f"{x + 0.0:g}", (u, v), QUIET, 15, (0.5, 0.5))
     away = block.pixel([1, 0, 0]) - block.pixel([0, 0, 0])
     for y in np.arange(np.ceil(y0 / every) * every, y1 + 1e-9, every):
-        u, v = (block.pixel([x1, y, first]) + away / np.hypot(*away) * 22).tolist()
-        text(canvas, f"{y + 0.0:g}", (u, v), QUIET, 11, (0.5, 0.5))
+        u, v = (block.pixel([x1, y, first]) + away / np.hypot(*away) * 26).tolist()
+        text(canvas, f"{y + 0.0:g}", (u, v), QUIET, 15, (0.5, 0.5))
 
 
 def _draw_clock(canvas: Bytes, block: Block, frame_rate: float) -> None:
@@ -169,7 +169,7 @@ def _draw_clock(canvas: Bytes, block: Block, frame_rate: float) -> None:
         outline(canvas, block.pixel(np.column_stack([corners, np.full(4, frame)])), mixed(RULE, PAPER, 0.4))
         u, v = block.pixel([*left, frame]).tolist()
         stroke(canvas, np.array([[u - 6, v], [u, v]]), INK)
-        text(canvas, f"{second + 0.0:g} s", (u - 12, v), QUIET, 11, (1, 0.5))
+        text(canvas, f"{second + 0.0:g} s", (u - 12, v), QUIET, 15, (1, 0.5))
 
 
 def _nice(value: float) -> float:
@@ -198,7 +198,7 @@ def _label(canvas: Bytes, block: Block, threads: list[_Thread]) -> None:
     """Ids at the upper ends; of many threads only the longest."""
     longest = sorted(threads, key=lambda thread: -len(thread.places))[:_LABELLED]
     ends = np.array([block.pixel(thread.places[-1]) for thread in longest]).reshape(-1, 2)
-    sizes = [chip_size(str(thread.identity), 11) for thread in longest]
+    sizes = [chip_size(str(thread.identity), 14) for thread in longest]
     tall, wide = canvas.shape[:2]
     for thread, centre in zip(longest, place_labels(ends, sizes, (4, 4, wide - 4, tall - 4)).tolist(), strict=True):
-        chip(canvas, str(thread.identity), (centre[0], centre[1]), track_colour(thread.identity), 11)
+        chip(canvas, str(thread.identity), (centre[0], centre[1]), track_colour(thread.identity), 14)

@@ -9,17 +9,17 @@ header, main { max-width: 1240px; margin: 0 auto; padding: 0 24px }
 header { padding-top: 40px }
 h1 { font-size: 30px; letter-spacing: -0.02em; margin: 0 0 20px }
 h2 { font-size: 19px; letter-spacing: -0.01em; margin: 0 0 16px }
-dl { display: grid; grid-template-columns: repeat(auto-fit, minmax(130px, 1fr)); gap: 1px; margin: 0;
-  background: var(--rule); border: 1px solid var(--rule); border-radius: 12px; overflow: hidden }
-dl div { background: #fff; padding: 12px 16px }
+dl { display: flex; flex-wrap: wrap; gap: 10px; margin: 0 }
+dl div { background: #fff; padding: 10px 18px; border: 1px solid var(--rule); border-radius: 12px }
 dt { color: var(--quiet); font-size: 13px }
-dd { margin: 0; font-size: 20px; font-weight: 600; font-variant-numeric: tabular-nums }
+dd { margin: 0; font-size: 18px; white-space: nowrap; font-weight: 600; font-variant-numeric: tabular-nums }
 section { background: #fff; border: 1px solid var(--rule); border-radius: 12px; padding: 24px; margin: 24px 0 }
 figure { margin: 0 }
 figcaption { color: var(--quiet); font-size: 13px; margin-top: 6px }
 img { max-width: 100%; height: auto; display: block; border-radius: 6px }
 .pair { display: grid; grid-template-columns: repeat(auto-fit, minmax(440px, 1fr)); gap: 20px; align-items: start }
-.wide { display: grid; gap: 28px }
+.sheets { display: grid; grid-template-columns: 2fr 1fr; gap: 32px 20px; align-items: start }
+@media (max-width: 900px) { .sheets { grid-template-columns: 1fr } .pair { grid-template-columns: 1fr } }
 .chart { width: 100%; height: auto; display: block; margin-top: 8px }
 .chart text { font-size: 12px; fill: var(--quiet); font-variant-numeric: tabular-nums }
 .chart .on { fill: #fff; font-size: 10px; font-weight: 600 }

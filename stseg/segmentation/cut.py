@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import maxflow
 import numpy as np
 
@@ -10,14 +12,24 @@ from stseg.segmentation.energy import Energy
 from stseg.segmentation.reduction import reduce
 
 
-def minimum_cut(energy: Energy) -> Flags:
-    """The labelling of least energy; of several, the one with the smallest object set.
+@dataclass(frozen=True)
+class Cut:
+    """A minimum cut.
 
-    Returns
-    -------
-    bool (time, plane, y, x)
+    Attributes
+    ----------
+    occupied : bool (time, plane, y, x)
         True where a cell is occupied.
+    nodes
+        Number of cells that the reduction left to the solver.
     """
+
+    occupied: Flags
+    nodes: int
+
+
+def minimum_cut(energy: Energy) -> Cut:
+    """The labelling of least energy; of several, the one with the smallest object set."""
     left = reduce(energy)
     occupied = left.occupied.copy()
     cells = np.flatnonzero(left.open)
@@ -34,4 +46,4 @@ def minimum_cut(energy: Energy) -> Flags:
         # The solver counts a node that neither terminal reaches to the source. With the background there, the cells
         # that remain are those from which the sink can be reached: the smallest object set.
         occupied[cells] = graph.get_grid_segments(nodes)
-    return occupied.reshape(energy.unary.shape)
+    return Cut(occupied.reshape(energy.unary.shape), len(cells))

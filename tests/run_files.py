@@ -21,7 +21,8 @@ _ABOVE = np.array([[10.0, 0.0, -8.0, 34.0], [0.0, -10.0, -6.0, 34.0], [0.0, 0.0,
 def small_recording(folder: Path) -> Recording:
     """Two cameras 5 m above 0.6 m x 0.4 m of ground; the first one's stream exists."""
     cameras = tuple(Camera.from_projection(name, (16, 12), _ABOVE) for name in ("left", "right"))
-    (folder / "left.avi").write_bytes(b"12345")
+    if not (folder / "left.avi").exists():
+        (folder / "left.avi").write_bytes(b"12345")
     sources = tuple(CameraSource(Source("video", folder / f"{camera.name}.avi")) for camera in cameras)
     return Recording(folder / "rig.toml", Rig("hall", 5.0, Grid((0, 0.6), (0, 0.4), 0.1, 1.8, 3), cameras), sources)
 
@@ -59,7 +60,7 @@ def fill(writer: RunWriter) -> None:
     log_odds, label = small_volume()
     for index, part in enumerate((slice(0, 3), slice(3, 6))):
         writer.append_frames(FRAMES[part], log_odds[part], label[part])
-        bounds = (index, FRAMES[part][0], FRAMES[part][-1] + 1) + (FRAMES[part][0], FRAMES[part][-1] + 1)
+        bounds = (index, FRAMES[part][0], FRAMES[part][-1] + 1, FRAMES[part][0], FRAMES[part][-1] + 1)
         writer.append("windows", np.array([(*bounds, 12345, 1e-6, 7)], WINDOW))
         writer.append("timings", np.array([(b"cut", index, 1.5), (b"volume", index, 0.5)], TIMING))
     writer.append("trajectory", small_trajectory())

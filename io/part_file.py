@@ -1,0 +1,170 @@
+"""The part of an output that HDF5 writes: a file object that shows HDF5 neither failures nor interrupts."""
+
+from __future__ import annotations
+
+import io
+import os
+import signal
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from types import FrameType
+from typing import BinaryIO
+
+from stseg.errors import OutputError
+from stseg.io.outputs import failure, part_of, publish
+
+try:
+    from fcntl import LOCK_EX, LOCK_NB, flock
+except ImportError:  # Windows has no such locks: two runs into one file go unnoticed there
+
+    def _lock(file: BinaryIO) -> None:
+        pass
+else:
+
+    def _lock(file: BinaryIO) -> None:
+        try:
+            flock(file, LOCK_EX | LOCK_NB)
+        except BlockingIOError:
+            raise
+        except OSError:
+            pass  # a file system without locks
+
+
+class PartFile(io.RawIOBase):
+    """`NAME.part` as a file object that never raises while HDF5 calls it.
+
+    HDF5 cannot close a file once a write has failed, and crashes on trying. So the first failure is kept and later
+    writes are dropped; an interrupt (Ctrl-C) that strikes during a call is kept as well. The writer asks `check` after
+    each step.
+
+    Parameters
+    ----------
+    path
+        The output whose part this is. An old part is overwritten, unless another process holds it open.
+
+    Raises
+    ------
+    OutputError
+        Where the part cannot be made.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._failure: OSError | None = None
+        self._interrupted = False
+        try:
+            self._file = os.fdopen(os.open(part_of(path), os.O_RDWR | os.O_CREAT, 0o666), "r+b", buffering=0)
+        except OSError as error:
+            raise failure(path, error) from error
+        try:
+            _lock(self._file)
+            self._file.truncate(0)
+        except OSError as error:
+            self._file.close()
+            raise failure(path, error) from error
+        self._on_interrupt = self._shield()
+
+    def check(self) -> None:
+        """Raise what was kept: OutputError where a write has failed, or the interrupt."""
+        if self._failure is not None:
+            raise failure(self._path, self._failure) from self._failure
+        if self._interrupted and self._on_interrupt is not None:
+            self._interrupted = False
+            self._on_interrupt(signal.SIGINT, None)
+
+    def publish(self, overwrite: bool) -> None:
+        """Sync, and give the file its name; where that fails the part stays, for it is whole."""
+        kept = f"the whole result is kept in {part_of(self._path)}"
+        if self._path.exists() and not overwrite:
+            raise OutputError(self._path, "", "a file that has appeared meanwhile", f"none; {kept}")
+        try:
+            os.fsync(self._file.fileno())
+            if os.name == "nt":  # cannot rename what is open; elsewhere the lock is held until the name is taken
+                self._file.close()
+            publish(self._path)
+        except OSError as error:
+            told = failure(self._path, error)
+            raise OutputError(told.place, "", told.found, f"{told.expected}; {kept}") from error
+
+    def discard(self) -> None:
+        """Delete the part."""
+        with suppress(OSError):
+            part_of(self._path).unlink(missing_ok=True)
+
+    def close(self) -> None:
+        """Let go of the file and its lock; HDF5 has closed it by then."""
+        if self.closed:
+            return
+        with suppress(OSError):
+            self._file.close()
+        super().close()
+        if self._on_interrupt is not None:
+            signal.signal(signal.SIGINT, self._on_interrupt)
+
+    def write(self, data: memoryview) -> int:  # type: ignore[override]  # what h5py gives
+        """All of it, or the failure is kept."""
+        rest = memoryview(data)
+        try:
+            while self._failure is None and rest.nbytes:
+                rest = rest[self._file.write(rest) :]
+        except OSError as error:
+            self._failure = error
+        return memoryview(data).nbytes
+
+    def truncate(self, size: int | None = None) -> int:
+        """Set the length, or the failure is kept."""
+        try:
+            if self._failure is None:
+                self._file.truncate(size)
+        except OSError as error:
+            self._failure = error
+        return size or 0
+
+    def readinto(self, buffer: memoryview) -> int:  # type: ignore[override]  # what h5py gives
+        """As of any file."""
+        return self._file.readinto(buffer) or 0
+
+    def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
+        """As of any file."""
+        return self._file.seek(offset, whence)
+
+    def tell(self) -> int:
+        """As of any file."""
+        return self._file.tell()
+
+    def flush(self) -> None:
+        """Nothing is buffered here."""
+
+    def _shield(self) -> Callable[[int, FrameType | None], object] | None:
+        """Keep interrupts out of the calls of HDF5; what handled them before, None where they cannot strike."""
+        before = signal.getsignal(signal.SIGINT)
+        if threading.current_thread() is not threading.main_thread() or not callable(before):
+            return None
+
+        def handle(number: int, frame: FrameType | None) -> None:
+            if _is_called_by_hdf5(frame):
+                self._interrupted = True
+            else:
+                before(number, frame)
+
+        signal.signal(signal.SIGINT, handle)
+        return before
+
+
+_CALLS = {
+    call.__code__
+    for call in (
+        *(PartFile.write, PartFile.truncate, PartFile.readinto),
+        *(PartFile.seek, PartFile.tell, PartFile.flush),
+    )
+}
+
+
+def _is_called_by_hdf5(frame: FrameType | None) -> bool:
+    while frame is not None:
+        if frame.f_code in _CALLS:
+            return True
+        frame = frame.f_back
+    return False

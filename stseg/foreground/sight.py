@@ -1,0 +1,38 @@
+"""From what a camera delivers to what the fusion asks for: a likelihood map, or boxes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stseg.arrays import Boxes, Observation, Singles
+from stseg.foreground.instances import instance_boxes
+from stseg.foreground.masks import mask_likelihood
+from stseg.foreground.mixture import Mixture
+
+Evidence = Boxes | Singles | None
+"""One view of one frame: boxes, a likelihood map float32 (v, u), or None where the view is blind."""
+
+
+class Sight:
+    """One camera's way from observation to evidence.
+
+    Parameters
+    ----------
+    background
+        The model of the empty scene of a colour camera; None for all others.
+    """
+
+    def __init__(self, background: Mixture | None = None) -> None:
+        self.background = background
+
+    def evidence(self, seen: Observation) -> Evidence:
+        """What the frame shows; colour frames also teach the background model."""
+        if seen is None or isinstance(seen, Boxes):
+            return seen
+        if seen.dtype == np.uint16:
+            return instance_boxes(np.asarray(seen, np.uint16))
+        if seen.ndim == 2:
+            return mask_likelihood(np.asarray(seen, np.uint8))
+        if self.background is None:
+            raise ValueError("a colour frame needs a background model")
+        return self.background.likelihood(np.asarray(seen, np.uint8))

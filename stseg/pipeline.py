@@ -1,0 +1,165 @@
+"""The whole way, top to bottom: moments of a recording become tracks and a volume.
+
+    observation -> evidence -> explanation -> volume -> window -> cut -> pieces -> tracks
+    (foreground)   (ghosts)    (occupancy)   (trackers: segmentation, identity)
+
+Files, windows of progress bars and printing are the callers': they hand in moments and take what is committed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from time import perf_counter
+from typing import Protocol
+
+import numpy as np
+
+from stseg.arrays import Floats, Observation, Rows
+from stseg.config import Config
+from stseg.foreground.sight import Sight
+from stseg.geometry import Rig
+from stseg.ghosts.explain import Explanation, FramePass, People
+from stseg.identity.smoothing import drop_short, fill_gaps
+from stseg.occupancy.volume import Occupancy
+from stseg.identity.views import box_rows
+from stseg.trackers import Commit, Scene, make_tracker
+from stseg.tracks import CANDIDATE, TIMING, Tracks
+
+
+class Moment(Protocol):
+    """What all cameras saw at one time: `stseg.io.frames.Moment`."""
+
+    @property
+    def frame(self) -> int: ...
+    @property
+    def views(self) -> Sequence[Observation]: ...
+
+
+@dataclass
+class Stopwatch:
+    """Seconds of each stage since the last time they were taken."""
+
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    @contextmanager
+    def time(self, stage: str) -> Iterator[None]:
+        """Add what the body takes to a stage."""
+        start = perf_counter()
+        try:
+            yield
+        finally:
+            self.seconds[stage] = self.seconds.get(stage, 0.0) + perf_counter() - start
+
+    def take(self, window: int) -> Rows:
+        """TIMING rows of what was timed since, and start anew."""
+        rows = np.array([(stage.encode(), window, s) for stage, s in self.seconds.items()], TIMING)
+        self.seconds = {}
+        return rows
+
+
+@dataclass(frozen=True)
+class Step:
+    """What is decided about some frames: the tracker's commit, the weighed candidates, the time it took.
+
+    Attributes
+    ----------
+    commit
+        Volume, labels, trajectory, events, windows.
+    candidates : CANDIDATE (n,), parts : float32 (n, view)
+        Every candidate of the frames, true or ghost, and what each view says of it, nats.
+    timings : TIMING (k,)
+    """
+
+    commit: Commit
+    candidates: Rows
+    parts: Floats
+    timings: Rows
+
+
+class Pipeline:
+    """The stages of one rig.
+
+    Parameters
+    ----------
+    rig
+        The cameras and the grid.
+    sights
+        Each camera's way from observation to evidence.
+    kinds
+        What that evidence is: "boxes" or "pixels".
+    config
+        The constants of all stages.
+    tracker
+        Its name, one of `stseg.trackers.TRACKERS`.
+    """
+
+    def __init__(self, rig: Rig, sights: Sequence[Sight], kinds: Sequence[str], config: Config, tracker: str) -> None:
+        self.rig, self.sights, self.config, self.tracker_name = rig, sights, config, tracker
+        self.frame_pass = FramePass(rig, kinds, config.ghosts)
+        self.occupancy = Occupancy(rig, kinds, config.occupancy, config.ghosts)
+
+    def steps(self, moments: Iterable[Moment], first: int, advance: Callable[[int], None]) -> Iterator[Step]:
+        """Run over moments, from frame `first` on; yields what is decided as soon as it is.
+
+        `advance` is told each frame that was fused.
+        """
+        tracker = make_tracker(self.tracker_name, self.rig, self.config, first)
+        watch = Stopwatch()
+        explained: dict[int, Explanation] = {}
+        moments = iter(moments)
+        while True:
+            with watch.time("read"):
+                moment = next(moments, None)
+            if moment is None:
+                break
+            scene, explained[moment.frame] = self._scene(moment, tracker.predict(moment.frame), watch)
+            with watch.time("track"):
+                commits = tracker.add(scene)
+            yield from (_step(commit, explained, watch) for commit in commits)
+            advance(moment.frame)
+        with watch.time("track"):
+            commits = tracker.finish()
+        yield from (_step(commit, explained, watch) for commit in commits)
+
+    def _scene(self, moment: Moment, predicted: Floats, watch: Stopwatch) -> tuple[Scene, Explanation]:
+        with watch.time("foreground"):
+            seen = [sight.evidence(view) for sight, view in zip(self.sights, moment.views, strict=True)]
+        with watch.time("ghosts"):
+            standing = np.column_stack([predicted, np.full(len(predicted), self.config.ghosts.height_mean)])
+            explanation = self.frame_pass.explain(seen, standing)
+        with watch.time("occupancy"):
+            log_odds = self.occupancy.fuse(seen, explanation)
+        return Scene(moment.frame, explanation.people, log_odds), explanation
+
+    def finished(self, trajectory: Rows) -> Tracks:
+        """The tracks of the whole run from all committed rows: short ones dropped, gaps filled, boxes drawn."""
+        kept, events = drop_short(trajectory, self.rig.frame_rate, self.config.identity)
+        whole = fill_gaps(kept)
+        tables = [view.table for view in self.frame_pass.views]
+        return Tracks(whole, box_rows(tables, whole), events)
+
+
+def _step(commit: Commit, explained: dict[int, Explanation], watch: Stopwatch) -> Step:
+    rows, parts = [], []
+    for scene in commit.scenes:
+        explanation = explained.pop(scene.frame)
+        for status, weighed in ((1, explanation.people), (0, explanation.ghosts)):
+            rows.append(_candidate_rows(scene.frame, status, weighed))
+            parts.append(weighed.parts.T)
+    window = int(commit.windows["index"][0]) if len(commit.windows) else commit.scenes[0].frame
+    return Step(commit, np.concatenate(rows), np.concatenate(parts).astype(np.float32), watch.take(window))
+
+
+def _candidate_rows(frame: int, status: int, people: People) -> Rows:
+    rows = np.zeros(len(people), CANDIDATE)
+    rows["frame"], rows["status"], rows["height"], rows["evidence"] = frame, status, people.height, people.evidence
+    rows["x"], rows["y"] = people.ground[:, 0], people.ground[:, 1]
+    rows["xx"], rows["xy"], rows["yy"] = (
+        people.covariance[:, 0, 0],
+        people.covariance[:, 0, 1],
+        people.covariance[:, 1, 1],
+    )
+    rows["origin"] = b"lattice"
+    return rows

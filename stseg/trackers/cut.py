@@ -1,0 +1,143 @@
+"""Graph cuts of space-time windows, identities over their overlaps (KS09 section 5; METHODS 4, 5)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stseg.arrays import Floats, Ints, Labels, Rows
+from stseg.config import Config
+from stseg.geometry import Rig
+from stseg.identity.identities import Decision, Identities
+from stseg.identity.linking import Linker
+from stseg.identity.pieces import chain_pieces
+from stseg.identity.windows import Window, windows
+from stseg.occupancy.sampling import Sampling
+from stseg.segmentation.blobs import Blobs, find_blobs
+from stseg.segmentation.cut import minimum_cut
+from stseg.segmentation.energy import QUANTUM, Energy, build_energy
+from stseg.segmentation.motion import motion_field
+from stseg.tracks import WINDOW
+from stseg.trackers.protocol import Commit, Scene
+from stseg.trackers.rows import event_rows, trajectory_rows, views_at
+
+_ENDLESS = 1 << 62
+"""A stop that is not known yet."""
+
+
+@dataclass(frozen=True)
+class _Linked:
+    """A frame and the chains of its people."""
+
+    scene: Scene
+    chains: Ints
+
+
+class CutTracker:
+    """Follows people by the minimum cut of one window after the other.
+
+    Parameters
+    ----------
+    rig, config
+        The scene, and the constants of all stages.
+    first
+        The run's first frame.
+    """
+
+    def __init__(self, rig: Rig, config: Config, first: int) -> None:
+        self.rig, self.config = rig, config
+        self.views = Sampling.of(rig).views()
+        self.linker = Linker(rig.frame_rate, config.identity)
+        self.identities = Identities(rig.frame_rate, config.identity)
+        self.held: list[_Linked] = []
+        self.first = self.committed = first
+        self.coming = windows(rig.frame_rate, config.identity, first, _ENDLESS)
+        self.window = next(self.coming)
+
+    def predict(self, frame: int) -> Floats:
+        """Ground positions of people committed so far, carried to a frame, float64 (n, 2), metres."""
+        return self.identities.predict(frame)
+
+    def add(self, scene: Scene) -> list[Commit]:
+        """The next frame; the window before it, if it is complete.
+
+        A window waits for the frame after its last: only then is it known not to be the run's last one, which commits
+        to its end.
+        """
+        done = []
+        if scene.frame >= self.window.solve_stop:
+            done.append(self._solve(self.window))
+            self.window = next(self.coming)
+            self.held = [linked for linked in self.held if linked.scene.frame >= self.window.solve_first]
+        chains = self.linker.link(scene.frame, scene.people.ground, scene.people.covariance)
+        self.held.append(_Linked(scene, chains))
+        return done
+
+    def finish(self) -> list[Commit]:
+        """Solve what is still open, in the windows of a run that ends here."""
+        if not self.held:
+            return []
+        stop = self.held[-1].scene.frame + 1
+        remaining = windows(self.rig.frame_rate, self.config.identity, self.first, stop)
+        return [self._solve(window) for window in remaining if window.commit_stop > self.committed]
+
+    def _solve(self, window: Window) -> Commit:
+        held = [linked for linked in self.held if window.solve_first <= linked.scene.frame < window.solve_stop]
+        energy = self._energy(held)
+        cut = minimum_cut(energy)
+        occupied = cut.occupied
+        blobs = [
+            find_blobs(cells, linked.scene.log_odds, linked.scene.people.ground, self.config.occupancy.reach, self.rig.grid)
+            for cells, linked in zip(occupied, held, strict=True)
+        ]
+        pieces = chain_pieces(
+            blobs, [linked.chains for linked in held], window.solve_first, self.rig.frame_rate, self.config.identity
+        )
+        decision = self.identities.decide(window, blobs, pieces)
+        row = np.array([(*_ranges(window), energy.of(occupied), QUANTUM, cut.nodes)], WINDOW)
+        self.committed = window.commit_stop
+        return self._commit(window, held, occupied, blobs, decision, row)
+
+    def _energy(self, held: list[_Linked]) -> Energy:
+        log_odds = np.stack([linked.scene.log_odds for linked in held])
+        reach, grid = self.config.occupancy.reach, self.rig.grid
+        motion = [
+            motion_field(now.scene.people.ground, then.scene.people.ground, now.chains, then.chains, reach, grid)
+            for now, then in zip(held[:-1], held[1:], strict=True)
+        ]
+        steps = np.array(motion, np.int64).reshape(-1, *grid.shape[1:], 2)
+        return build_energy(log_odds, steps, grid, self.config.segmentation)
+
+    def _commit(
+        self, window: Window, held: list[_Linked], occupied: Labels, blobs: list[Blobs], decision: Decision, row: Rows
+    ) -> Commit:
+        kept = range(window.commit_first - held[0].scene.frame, window.commit_stop - held[0].scene.frame)
+        label = np.zeros((len(kept), *self.rig.grid.shape), np.int32)
+        rows = []
+        for k, cells in zip(kept, label, strict=True):
+            identity = np.append(0, decision.identity[k])
+            cells[:] = np.where(occupied[k], identity[blobs[k].cells], 0)
+            rows.append(self._rows(held[k].scene, blobs[k], decision.identity[k]))
+        scenes = [held[k].scene for k in kept]
+        return Commit(scenes, label, np.concatenate(rows), event_rows(decision.events), row)
+
+    def _rows(self, scene: Scene, blobs: Blobs, identity: Ints) -> Rows:
+        """Where a blob holds a person of the pass, the pass knows best where; else the blob's mass tells."""
+        named = np.flatnonzero(identity)
+        person = blobs.person[named]
+        held, who = person >= 0, person.clip(0)
+        people = scene.people if len(scene.people) else None
+        ground, covariance = blobs.ground[named].copy(), blobs.covariance[named].copy()
+        height, score = blobs.height[named].copy(), blobs.mass[named].copy()
+        if people is not None:
+            ground[held], covariance[held] = people.ground[who[held]], people.covariance[who[held]]
+            height[held], score[held] = people.height[who[held]], people.evidence[who[held]]
+        views = views_at(self.views, ground, self.rig.grid)
+        return trajectory_rows(
+            scene.frame, identity[named], ground, covariance, height, blobs.extent[named], score, views
+        )
+
+
+def _ranges(window: Window) -> tuple[int, int, int, int, int]:
+    return window.index, window.solve_first, window.solve_stop, window.commit_first, window.commit_stop

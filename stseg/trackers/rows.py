@@ -1,0 +1,50 @@
+"""Rows of the trajectory table for one frame."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stseg.arrays import Bytes, Floats, Ints, Rows
+from stseg.geometry import Grid
+from stseg.tracks import EVENT, TRAJECTORY
+
+Event = tuple[int, str, int, int, str]
+"""frame, kind, id, other id, reason."""
+
+
+def trajectory_rows(
+    frame: int, ids: Ints, ground: Floats, covariance: Floats, height: Floats, extent: Floats, score: Floats,
+    views: Ints,
+) -> Rows:  # fmt: skip
+    """TRAJECTORY rows of one frame, sorted by id.
+
+    Parameters
+    ----------
+    ids : int64 (n,)
+        Tracks.
+    ground, covariance : float64 (n, 2), (n, 2, 2)
+        Metres, square metres.
+    height, extent, score : float64 (n,)
+        Metres, square metres, nats.
+    views : int64 (n,)
+        Number of views that see the place.
+    """
+    rows = np.zeros(len(ids), TRAJECTORY)
+    rows["frame"], rows["id"] = frame, ids
+    rows["x"], rows["y"] = ground[:, 0], ground[:, 1]
+    rows["xx"], rows["xy"], rows["yy"] = covariance[:, 0, 0], covariance[:, 0, 1], covariance[:, 1, 1]
+    rows["height"], rows["extent"], rows["score"], rows["views"] = height, extent, score, views
+    return rows[np.argsort(ids, kind="stable")]
+
+
+def views_at(views: Bytes, ground: Floats, grid: Grid) -> Ints:
+    """Number of views that see some plane above each place (n, 2), from the grid's views (plane, y, x); int64 (n,)."""
+    cell = np.rint(grid.cell_of(ground)).astype(int)
+    most = views.max(0)
+    column, row = cell[:, 0].clip(0, most.shape[1] - 1), cell[:, 1].clip(0, most.shape[0] - 1)
+    return most[row, column].astype(np.int64)
+
+
+def event_rows(events: list[Event]) -> Rows:
+    """EVENT rows."""
+    return np.array([(f, kind.encode(), i, other, reason.encode()) for f, kind, i, other, reason in events], EVENT)

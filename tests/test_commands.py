@@ -1,0 +1,204 @@
+"""The command line: exit statuses, one line for what the user can mend, what `inspect` and `export` give."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from run_files import CONFIG, small_recording, small_trajectory, write_small_run
+
+import stseg
+from stseg.commands.inspect import look_over
+from stseg.commands.main import COMMANDS, main
+from stseg.io.runs import RunWriter, read_run
+from stseg.io.tracks import read_tracks_csv
+from stseg.tracks import TRAJECTORY, Tracks
+
+
+@pytest.fixture
+def run_path(tmp_path: Path) -> Path:
+    return write_small_run(tmp_path / "night.h5")
+
+
+def stseg_process(*arguments: str) -> subprocess.CompletedProcess[str]:
+    program = "import sys; from stseg.commands.main import main; sys.exit(main())"
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    return subprocess.run(
+        [sys.executable, "-c", program, *arguments], capture_output=True, text=True, env=environment, check=False
+    )
+
+
+def silent_run(path: Path) -> Path:
+    """A run that found nobody and whose cells no view sees."""
+    recording = small_recording(path.parent)
+    with RunWriter(path, recording, np.zeros((3, 4, 6), np.uint8), CONFIG, overwrite=False) as writer:
+        volume = np.full((1, 3, 4, 6), np.nan, np.float32)
+        writer.append_frames(np.array([0]), volume, np.zeros(volume.shape, np.int32))
+        writer.finish(Tracks(np.zeros(0, TRAJECTORY)).summary())
+    return path
+
+
+# The command line
+
+
+def test_help_names_every_command_and_imports_none() -> None:
+    program = (
+        "import sys; from stseg.commands.main import main; main(['--help']);"
+        "print(*(name for name in ('numba', 'cv2', 'h5py', 'scipy') if name in sys.modules), file=sys.stderr)"
+    )
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    process = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, env=environment, check=True
+    )
+    assert process.stderr.strip() == ""
+    for command in COMMANDS:
+        assert f" {command} " in process.stdout
+
+
+def test_exit_statuses_of_the_program(run_path: Path, tmp_path: Path) -> None:
+    good = stseg_process("inspect", str(run_path))
+    assert (good.returncode, good.stderr) == (0, "")
+    bad = stseg_process("inspect", str(tmp_path / "none.h5"))
+    assert (bad.returncode, bad.stdout) == (2, "")
+    assert bad.stderr == f"stseg: error: {tmp_path / 'none.h5'}: found no such file, expected a run file\n"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["inspekt", "x.h5"], "command line: found 'inspekt', expected one of demo, run, inspect"),
+        (["inspect"], "RUN"),
+        (["inspect", "x.h5", "--jsn"], "--jsn"),
+        (["export", "x.h5", "--to", "docx", "-o", "x.docx"], "--to: found 'docx', expected one of csv, mot, pedpy"),
+        (["--colour"], "--colour"),
+    ],
+)
+def test_slips_on_the_command_line_are_one_line(
+    arguments: list[str], told: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(arguments) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("stseg: error: ")
+    assert said.count("\n") == 1
+    assert told in said
+
+
+def test_a_misspelt_command_gets_a_suggestion(capsys: pytest.CaptureFixture[str]) -> None:
+    main(["inspekt"])
+    assert "did you mean inspect?" in capsys.readouterr().err
+
+
+def test_an_interrupt_is_one_line(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    def interrupted(_: Path) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("stseg.commands.inspect.read_run", interrupted)
+    assert main(["inspect", "x.h5"]) == 130
+    assert capsys.readouterr().err == "stseg: interrupted\n"
+
+
+def test_version_and_help_of_a_command(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out == f"{stseg.__version__}\n"
+    assert main(["export", "--help"]) == 0
+    assert "MOTChallenge" in capsys.readouterr().out  # the long text, not the line of the list
+
+
+@pytest.mark.skipif(os.name == "nt", reason="needs a shell's pipe")
+def test_a_reader_that_has_seen_enough_is_no_error(run_path: Path) -> None:
+    program = "import sys; from stseg.commands.main import main; sys.exit(main())"
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    command = [sys.executable, "-c", program, "inspect", "--json", str(run_path)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=environment) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        process.stdout.close()
+        assert process.stderr.read() == b""
+    assert process.returncode == 0
+
+
+# inspect
+
+
+def test_inspect_sums_up_a_run(run_path: Path) -> None:
+    overview = look_over(read_run(run_path))
+    assert (overview.frames, overview.first_frame, overview.last_frame, overview.seconds) == (6, 10, 15, 1.2)
+    assert (overview.people_mean, overview.people_most) == (1.5, 2)
+    assert [track["id"] for track in overview.tracks] == [1, 2]
+    assert overview.events == {"birth": 2}
+    assert (overview.candidates_per_frame, overview.ghosts_per_frame) == (3 / 6, 1 / 6)
+    assert overview.seconds_by_stage == {"cut": 3.0, "volume": 1.0}
+    assert list(overview.seconds_by_stage) == ["cut", "volume"]
+    assert (overview.windows, overview.frames_per_window) == (2, 3.0)
+    assert overview.bytes == run_path.stat().st_size
+    assert overview.warnings == ["view right says nothing of any candidate: is it blind, or its calibration wrong?"]
+
+
+def test_inspect_on_a_screen(run_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["inspect", str(run_path)]) == 0
+    screen = capsys.readouterr().out
+    for said in ("hall", "10 to 15", "2 birth", "cut 3.0 s (75 %)", "warning: view right", "x 0 to 0.6 m"):
+        assert said in screen
+
+
+def test_inspect_as_json(run_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["inspect", str(run_path), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["cameras"] == ["left", "right"]
+    assert found["tracks"][0]["frames"] == 6
+
+
+def test_inspect_warns_of_an_empty_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    overview = look_over(read_run(silent_run(tmp_path / "silent.h5")))
+    assert overview.warnings == ["nobody was found", "no view sees any cell"]
+    assert main(["inspect", str(tmp_path / "silent.h5")]) == 0
+    assert "warning: nobody was found" in capsys.readouterr().out
+
+
+# export
+
+
+def test_export_to_csv_reads_back(run_path: Path, tmp_path: Path) -> None:
+    assert main(["export", str(run_path), "--to", "csv", "-o", str(tmp_path / "tracks.csv")]) == 0
+    table = read_tracks_csv(tmp_path / "tracks.csv")
+    for name in ("frame", "id"):
+        np.testing.assert_array_equal(table[name], small_trajectory()[name])
+    np.testing.assert_allclose(table["x"], small_trajectory()["x"], atol=1e-4)
+
+
+def test_export_to_pedpy_and_mot(run_path: Path, tmp_path: Path) -> None:
+    assert main(["export", str(run_path), "--to", "pedpy", "-o", str(tmp_path / "tracks.txt")]) == 0
+    lines = (tmp_path / "tracks.txt").read_text().splitlines()
+    assert lines[:3] == ["# framerate: 5.00", "# id frame x/m y/m z/m", "1 10 0.1500 0.2000 0.0000"]
+    assert len(lines) == 2 + len(small_trajectory())
+    assert main(["export", str(run_path), "--to", "mot", "-o", str(tmp_path / "mot.txt")]) == 0
+    lines = (tmp_path / "mot.txt").read_text().splitlines()
+    assert lines[0] == "11,1,-1,-1,-1,-1,1,0.1500,0.2000,0.0000"
+    assert len(lines) == len(small_trajectory())
+
+
+def test_export_destroys_nothing(run_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    target = tmp_path / "tracks.csv"
+    target.write_text("precious")
+    command = ["export", str(run_path), "--to", "csv", "-o", str(target)]
+    assert main(command) == 2
+    assert "exists" in capsys.readouterr().err
+    assert target.read_text() == "precious"
+    assert main([*command, "--overwrite"]) == 0
+    assert target.read_text().startswith("frame,id,x,y")
+    assert main(["export", str(run_path), "--to", "csv", "-o", str(run_path), "--overwrite"]) == 2
+    assert "the run file itself" in capsys.readouterr().err
+    assert len(read_run(run_path).frames) == 6
+
+
+def test_evaluate_takes_a_run_file(run_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    truth = tmp_path / "truth.csv"
+    assert main(["export", str(run_path), "--to", "csv", "-o", str(truth)]) == 0
+    capsys.readouterr()
+    assert main(["evaluate", str(run_path), str(truth), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["MODA"] == 100

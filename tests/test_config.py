@@ -1,0 +1,162 @@
+"""The configuration: what is read comes back from its own text, what is wrong is named."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
+from typing import Any, Literal
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from stseg.config import Config
+from stseg.errors import ConfigError
+from stseg.io.config_file import format_config, read_config
+from stseg.settings import Given, as_toml, build, require
+
+TOML = """
+[ghosts]
+person = -2    # a whole number is a number
+heights = [1.5, 1.75]
+rounds = 3
+"""
+
+
+@dataclass(frozen=True)
+class Inner:
+    share: float = 0.5
+    pair: tuple[float, float] = (0.0, 1.0)
+    names: tuple[str, ...] = ()
+    limit: int | None = None
+
+    def __post_init__(self) -> None:
+        require(0 <= self.share <= 1, self, "share", "a share from 0 to 1")
+
+
+@dataclass(frozen=True)
+class Outer:
+    kind: Literal["masks", "boxes"] = "masks"
+    quick: bool = False
+    count: int = 3
+    inner: Inner = field(default_factory=Inner)
+
+
+def read(path: Path, text: str, *assignments: str) -> Config:
+    path.write_text(text)
+    return read_config(path, assignments)
+
+
+def wrapped(table: dict[str, Any]) -> dict[str, Any]:
+    return {
+        name: wrapped(value) if isinstance(value, dict) else Given(value, "file.toml") for name, value in table.items()
+    }
+
+
+def test_nothing_given_is_the_default() -> None:
+    assert read_config(None) == Config()
+
+
+def test_a_file_and_assignments_say_what_differs(tmp_path: Path) -> None:
+    config = read(tmp_path / "c.toml", TOML, "ghosts.person=-1.5", "ghosts.rounds = 5", "ghosts.rounds=6")
+    expected = replace(Config().ghosts, person=-1.5, heights=(1.5, 1.75), rounds=6)
+    assert config == replace(Config(), ghosts=expected)
+    assert isinstance(read(tmp_path / "c.toml", TOML).ghosts.person, float)
+
+
+def test_the_resolved_text_reads_back_equal(tmp_path: Path) -> None:
+    config = read_config(None, ["ghosts.person=-1e-3", "ghosts.heights=[1, 1.25]"])
+    text = format_config(config)
+    assert read(tmp_path / "c.toml", text) == config
+    table = tomllib.loads(text)
+    assert list(table) == [stage.name for stage in fields(Config)]
+    for stage in fields(Config):
+        assert list(table[stage.name]) == [key.name for key in fields(getattr(config, stage.name))]
+
+
+finite = st.floats(allow_nan=False, allow_infinity=False)
+
+
+@given(
+    st.builds(
+        Outer,
+        st.sampled_from(("masks", "boxes")),
+        st.booleans(),
+        st.integers(-(2**63), 2**63 - 1),
+        st.builds(
+            Inner,
+            st.floats(0, 1),
+            st.tuples(finite, finite),
+            st.lists(st.text(st.characters(exclude_categories=["Cs"]))).map(tuple),
+            st.none() | st.integers(0, 9),
+        ),
+    )
+)
+def test_any_settings_read_back_equal_from_their_text(settings: Outer) -> None:
+    assert build(Outer, wrapped(tomllib.loads(as_toml(settings))), "file.toml") == settings
+
+
+@pytest.mark.parametrize(
+    ("table", "told"),
+    [
+        ({"kind": "maps"}, "kind: found 'maps', expected one of masks, boxes"),
+        ({"quick": 1}, "quick: found 1, expected true or false"),
+        ({"count": True}, "count: found True, expected a whole number"),
+        ({"count": 3.0}, "count: found 3.0, expected a whole number"),
+        ({"inner": {"share": "much"}}, "inner.share: found 'much', expected a finite number"),
+        ({"inner": {"share": 10**400}}, "expected a finite number"),
+        ({"inner": {"share": True}}, "inner.share: found True, expected a finite number"),
+        ({"inner": {"share": 1.5}}, "inner.share: found 1.5, expected a share from 0 to 1"),
+        ({"inner": {"pair": [1]}}, "inner.pair: found [1], expected a list of 2, each a finite number"),
+        ({"inner": {"names": ["a", 2]}}, "inner.names: found ['a', 2], expected a list, each a text"),
+        ({"inner": {"limit": "x"}}, "inner.limit: found 'x', expected a whole number"),
+        ({"inner": 3}, "inner: found 3, expected a table"),
+        ({"count": {"a": 3}}, "count: found a table, expected a whole number"),
+        ({"cuont": 3}, "cuont: found an unknown key, expected one of kind, quick, count, inner; did you mean count?"),
+        ({"inner": {"zzz": 3}}, "inner.zzz: found an unknown key, expected one of share, pair, names, limit"),
+    ],
+)
+def test_wrong_values_are_named_with_what_was_expected(table: dict[str, Any], told: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        build(Outer, wrapped(table), "file.toml")
+    assert str(caught.value).startswith("file.toml: ")
+    assert str(caught.value).endswith(told)
+
+
+@pytest.mark.parametrize(
+    ("assignment", "told"),
+    [
+        ("ghosts.persn=1", "--set: ghosts.persn: found an unknown key"),
+        ("ghost.person=1", "did you mean ghosts?"),
+        ("ghosts.person", "--set: found 'ghosts.person', expected stage.key=value"),
+        ("person=1", "expected stage.key=value"),
+        ("ghosts.=1", "expected stage.key=value"),
+        ("ghosts.person=high", "--set: ghosts.person: found 'high', expected a finite number"),
+        ("ghosts.person=1\nx=2", "--set: ghosts.person: found '1\\nx=2', expected a finite number"),
+        ("ghosts.person.x=1", "--set: ghosts.person: found a table"),
+        ("ghosts.person=nan", "--set: ghosts.person: found nan"),
+    ],
+)
+def test_wrong_assignments_name_the_option(tmp_path: Path, assignment: str, told: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        read(tmp_path / "c.toml", TOML, assignment)
+    assert told in str(caught.value)
+
+
+def test_a_fault_is_laid_where_the_value_was_given(tmp_path: Path) -> None:
+    path = tmp_path / "c.toml"
+    with pytest.raises(ConfigError, match=r"c\.toml: ghosts\.rounds: found 'x'"):
+        read(path, "[ghosts]\nrounds = 'x'", "ghosts.person=1")
+    with pytest.raises(ConfigError, match=r"c\.toml: found what is not TOML"):
+        read(path, "[ghosts\n")
+    with pytest.raises(ConfigError, match=r"c\.toml: found what is not TOML"):
+        path.write_bytes(b"# \xff")
+        read_config(path)
+    with pytest.raises(ConfigError, match=r"none\.toml: found No such file"):
+        read_config(tmp_path / "none.toml")
+
+
+def test_a_text_needs_no_quotes_in_an_assignment() -> None:
+    given_kind = build(Outer, {"kind": Given("boxes", "--set")}, "--set")
+    assert given_kind.kind == "boxes"
