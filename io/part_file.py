@@ -6,8 +6,8 @@ import io
 import os
 import signal
 import threading
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
 from typing import BinaryIO
@@ -36,8 +36,8 @@ class PartFile(io.RawIOBase):
     """`NAME.part` as a file object that never raises while HDF5 calls it.
 
     HDF5 cannot close a file once a write has failed, and crashes on trying. So the first failure is kept and later
-    writes are dropped; an interrupt (Ctrl-C) that strikes during a call is kept as well. The writer asks `check` after
-    each step.
+    writes are dropped, and an interrupt (Ctrl-C) is kept as well, to be raised at the end of the step. All that HDF5
+    does, the closing of its datasets too, belongs into a `step`.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ class PartFile(io.RawIOBase):
     def __init__(self, path: Path) -> None:
         self._path = path
         self._failure: OSError | None = None
-        self._interrupted = False
+        self._in_step = self._interrupted = False
         try:
             self._file = os.fdopen(os.open(part_of(path), os.O_RDWR | os.O_CREAT, 0o666), "r+b", buffering=0)
         except OSError as error:
@@ -66,10 +66,18 @@ class PartFile(io.RawIOBase):
             raise failure(path, error) from error
         self._on_interrupt = self._shield()
 
-    def check(self) -> None:
-        """Raise what was kept: OutputError where a write has failed, or the interrupt."""
-        if self._failure is not None:
-            raise failure(self._path, self._failure) from self._failure
+    @contextmanager
+    def step(self) -> Iterator[None]:
+        """Raise at the end what was kept: OutputError where a write has failed, or the interrupt."""
+        self._in_step = True
+        try:
+            yield
+        except (OSError, RuntimeError):  # what HDF5 makes of reading what was never written
+            self._raise_failure()
+            raise
+        finally:
+            self._in_step = False
+        self._raise_failure()
         if self._interrupted and self._on_interrupt is not None:
             self._interrupted = False
             self._on_interrupt(signal.SIGINT, None)
@@ -88,10 +96,14 @@ class PartFile(io.RawIOBase):
             told = failure(self._path, error)
             raise OutputError(told.place, "", told.found, f"{told.expected}; {kept}") from error
 
-    def discard(self) -> None:
-        """Delete the part."""
+    def discard(self, close_hdf5: Callable[[], object]) -> None:
+        """Delete the part; nothing that happens on the way may hide what stopped the run."""
+        self._in_step = True
+        with suppress(OSError, RuntimeError):
+            close_hdf5()
         with suppress(OSError):
             part_of(self._path).unlink(missing_ok=True)
+        self.close()
 
     def close(self) -> None:
         """Let go of the file and its lock; HDF5 has closed it by then."""
@@ -137,34 +149,21 @@ class PartFile(io.RawIOBase):
     def flush(self) -> None:
         """Nothing is buffered here."""
 
+    def _raise_failure(self) -> None:
+        if self._failure is not None:
+            raise failure(self._path, self._failure) from self._failure
+
     def _shield(self) -> Callable[[int, FrameType | None], object] | None:
-        """Keep interrupts out of the calls of HDF5; what handled them before, None where they cannot strike."""
+        """Keep interrupts out of the steps; what handled them before, None where they cannot strike."""
         before = signal.getsignal(signal.SIGINT)
         if threading.current_thread() is not threading.main_thread() or not callable(before):
             return None
 
         def handle(number: int, frame: FrameType | None) -> None:
-            if _is_called_by_hdf5(frame):
+            if self._in_step:
                 self._interrupted = True
             else:
                 before(number, frame)
 
         signal.signal(signal.SIGINT, handle)
         return before
-
-
-_CALLS = {
-    call.__code__
-    for call in (
-        *(PartFile.write, PartFile.truncate, PartFile.readinto),
-        *(PartFile.seek, PartFile.tell, PartFile.flush),
-    )
-}
-
-
-def _is_called_by_hdf5(frame: FrameType | None) -> bool:
-    while frame is not None:
-        if frame.f_code in _CALLS:
-            return True
-        frame = frame.f_back
-    return False

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -11,7 +10,7 @@ from typing import Self
 import h5py
 import numpy as np
 
-from stseg.arrays import AnyArray, Bytes, Ints, Labels, Rows, Singles
+from stseg.arrays import AnyArray, Bytes, Flags, Ints, Labels, Rows, Singles
 from stseg.geometry import Rig
 from stseg.io import layout
 from stseg.io.outputs import require_new
@@ -54,16 +53,17 @@ class RunWriter:
         if views.shape != recording.rig.grid.shape:
             raise ValueError(f"views {views.shape} on a grid {recording.rig.grid.shape}")
         self._recording, self._views, self._config_text, self._overwrite = recording, views, config_text, overwrite
-        self._last_frame = -1
+        self._frames, self._last_frame = 0, -1
         self._finished = False
         self._file: h5py.File | None = None
 
     def __enter__(self) -> Self:
         self._disk = PartFile(self._path)
         try:
-            self._create()
+            with self._disk.step():
+                self._create()
         except BaseException:
-            self._drop()
+            self._disk.discard(self._close)
             raise
         return self
 
@@ -71,7 +71,7 @@ class RunWriter:
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
         if not self._finished:
-            self._drop()
+            self._disk.discard(self._close)
 
     def append_frames(self, frames: Ints, log_odds: Singles, label: Labels) -> None:
         """Write the volume of the next frames.
@@ -91,16 +91,17 @@ class RunWriter:
         if len(frames) and (frames[0] <= self._last_frame or (np.diff(frames) <= 0).any()):
             raise ValueError(f"frames {frames} after frame {self._last_frame}")
         half = np.clip(log_odds, -_LARGEST, _LARGEST).astype(np.float16)
-        with self._checked():
+        with self._disk.step():
             self._extend("log_odds", half)
             self._extend("label", label)
             self._extend("frame", frames)
             self._extend("time", frames / self._recording.rig.frame_rate)
+        self._frames += len(frames)
         self._last_frame = int(frames[-1]) if len(frames) else self._last_frame
 
     def append(self, table: str, rows: Rows) -> None:
         """Add rows to one of the tables of `stseg.io.layout`, whose dtype they have."""
-        with self._checked():
+        with self._disk.step():
             self._tables[table].append(rows)
 
     def relabel(self, new_id_of: Mapping[int, int]) -> None:
@@ -119,17 +120,13 @@ class RunWriter:
         new_id = np.arange(max(changed) + 1, dtype=np.int32)
         new_id[list(changed)] = list(changed.values())
         affected = new_id != np.arange(len(new_id))
-        volume = self._occupancy["label"]
-        for index in range(len(volume)):
-            with self._checked():
-                label = volume[index]
-                known = np.where(label < len(new_id), label, 0)
-                if affected[known].any():
-                    volume[index] = np.where(label < len(new_id), new_id[known], label)
+        for index in range(self._frames):
+            with self._disk.step():
+                self._relabel_frame(index, new_id, affected)
 
     def finish(self, tracks: Rows) -> None:
         """Write the TRACK rows, then sync the file and give it its name."""
-        with self._checked():
+        with self._disk.step():
             self._tables["tracks"].append(tracks)
             for table in self._tables.values():
                 table.flush()
@@ -142,23 +139,21 @@ class RunWriter:
 
     def _create(self) -> None:
         rig = self._recording.rig
-        with self._checked():
-            self._file = file = h5py.File(self._disk, "w")
-            cameras = [camera.name for camera in rig.cameras]
-            area = layout.walkable_area(rig.grid)
-            file.attrs.update({**layout.ROOT_ATTRIBUTES, "cameras": cameras, "wkt_geometry": area})
-            entry = file.create_group("entry")
-            entry.attrs.update(layout.ENTRY_ATTRIBUTES)
-            entry["title"] = rig.name
-            self._occupancy = _create_occupancy(file, rig, self._views)
-            self._tables = {
-                name: _Table(_create_table(file, name, dtype))
-                for name, dtype in layout.table_types(len(cameras)).items()
-            }
-            file["trajectory"].attrs["fps"] = rig.frame_rate
-            file["ghosts"].attrs["views"] = cameras
-            provenance = gather_provenance(self._recording, self._config_text)
-            write_provenance(file.create_group(layout.PROVENANCE), provenance)
+        self._file = file = h5py.File(self._disk, "w")
+        cameras = [camera.name for camera in rig.cameras]
+        area = layout.walkable_area(rig.grid)
+        file.attrs.update({**layout.ROOT_ATTRIBUTES, "cameras": cameras, "wkt_geometry": area})
+        entry = file.create_group("entry")
+        entry.attrs.update(layout.ENTRY_ATTRIBUTES)
+        entry["title"] = rig.name
+        self._occupancy = _create_occupancy(file, rig, self._views)
+        self._tables = {
+            name: _Table(_create_table(file, name, dtype)) for name, dtype in layout.table_types(len(cameras)).items()
+        }
+        file["trajectory"].attrs["fps"] = rig.frame_rate
+        file["ghosts"].attrs["views"] = cameras
+        provenance = gather_provenance(self._recording, self._config_text)
+        write_provenance(file.create_group(layout.PROVENANCE), provenance)
 
     def _extend(self, name: str, values: AnyArray) -> None:
         dataset = self._occupancy[name]
@@ -166,25 +161,16 @@ class RunWriter:
         dataset.resize(start + len(values), axis=0)
         dataset[start:] = values
 
-    @contextmanager
-    def _checked(self) -> Iterator[None]:
-        """Raise OutputError where the disk has refused a write meanwhile."""
-        try:
-            yield
-        except (OSError, RuntimeError):  # what HDF5 makes of reading what was never written
-            self._disk.check()
-            raise
-        self._disk.check()
+    def _relabel_frame(self, index: int, new_id: Labels, affected: Flags) -> None:
+        volume = self._occupancy["label"]
+        label = volume[index]
+        known = np.where(label < len(new_id), label, 0)
+        if affected[known].any():
+            volume[index] = np.where(label < len(new_id), new_id[known], label)
 
     def _close(self) -> None:
         if self._file is not None:
             self._file.close()
-
-    def _drop(self) -> None:
-        with suppress(OSError, RuntimeError):  # must not hide what stopped the run
-            self._close()
-        self._disk.discard()
-        self._disk.close()
 
 
 class _Table:

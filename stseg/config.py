@@ -4,7 +4,52 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from stseg.foreground.mixture import MixtureConfig
+from stseg.errors import ConfigError
+
+
+@dataclass(frozen=True, slots=True)
+class MixtureConfig:
+    """The background of one view, a mixture of Gaussians per pixel (METHODS 2); symbols as in `foreground.mixture`."""
+
+    modes: int = 3
+    """K, modes per pixel, 1 or more; with 1 nothing that moved in is ever absorbed."""
+    memory: float = 60.0
+    """How long background takes to follow a slow change, seconds."""
+    absorption: float = 600.0
+    """How long a thing that moved in must stay still to become background, seconds."""
+    share: float = 0.1
+    """Weight from which a mode is background: the share of time that the scene shows it, 0..1."""
+    foreground: float = 0.1
+    """f: prior probability of a person at a pixel, 0..1."""
+    unexplained: float = 1e-3
+    """e: share of background colours that no mode explains, 0..1; keeps the likelihood below 1."""
+    shadow: float = 0.1
+    """s: prior probability that background lies in shadow, 0..1."""
+    darkest: float = 0.5
+    """Brightness, relative to full light, of the deepest shadow that counts as one, 0..1."""
+    mimicry: float = 0.1
+    """m: share of people's colours that look like the background in shadow, 0..1."""
+    match: float = 5.0
+    """Standard deviations within which a colour belongs to a mode."""
+    minimum_sd: float = 4.0
+    """Least standard deviation of a mode, grey levels: noise of sensor and compression."""
+    initial_sd: float = 12.0
+    """Standard deviation of a new mode, grey levels."""
+    radius: int = 1
+    """Neighbourhood over which log-odds are averaged, pixels; 0 for none."""
+
+    def __post_init__(self) -> None:
+        if self.modes < 1:
+            raise ConfigError("mixture", "modes", self.modes, "1 or more")
+        if self.radius < 0:
+            raise ConfigError("mixture", "radius", self.radius, "0 or more pixels")
+        for key in ("memory", "absorption", "match", "minimum_sd", "initial_sd"):
+            if not getattr(self, key) > 0:
+                raise ConfigError("mixture", key, getattr(self, key), "a number above 0")
+        for key in ("share", "foreground", "unexplained", "shadow", "darkest", "mimicry"):
+            if not 0 < getattr(self, key) < 1:
+                raise ConfigError("mixture", key, getattr(self, key), "a number between 0 and 1")
+
 
 @dataclass(frozen=True)
 class GhostConfig:
@@ -74,7 +119,7 @@ class IdentityConfig:
     """How fast people walk at most, metres per second."""
     slack: float = 0.35
     """How far a place may be off besides, metres."""
-    place_noise: float = 0.12
+    place_noise: float = 0.20
     """How far a frame's place is off besides its own covariance, metres (standard deviation)."""
     patience: float = 1.0
     """How long somebody may be unseen and still be the same, seconds."""

@@ -22,8 +22,8 @@ from stseg.foreground.sight import Sight
 from stseg.geometry import Rig
 from stseg.ghosts.explain import Explanation, FramePass, People
 from stseg.identity.smoothing import drop_short, fill_gaps
-from stseg.occupancy.volume import Occupancy
 from stseg.identity.views import box_rows
+from stseg.occupancy.volume import Occupancy
 from stseg.trackers import Commit, Scene, make_tracker
 from stseg.tracks import CANDIDATE, TIMING, Tracks
 

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from difflib import get_close_matches
 from types import NoneType, UnionType
-from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import Any, Literal, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
 from stseg.errors import ConfigError
 
@@ -29,7 +29,7 @@ class Given:
     place: str
 
 
-Given_Tree = Mapping[str, "Given | Given_Tree"]
+GivenTree = Mapping[str, "Given | GivenTree"]
 
 
 def require(holds: bool, settings: object, name: str, expected: str) -> None:
@@ -44,7 +44,7 @@ def require(holds: bool, settings: object, name: str, expected: str) -> None:
         raise ConfigError("configuration", name, repr(getattr(settings, name)), expected)
 
 
-def build(kind: type[T], given: Given_Tree, place: str, table: str = "") -> T:
+def build(kind: type[T], given: GivenTree, place: str, table: str = "") -> T:
     """Settings of this kind: what is given, and defaults for the rest.
 
     Parameters
@@ -91,22 +91,17 @@ def as_toml(settings: Any, table: str = "") -> str:
     return "\n".join(own + tables)
 
 
-def _built(hint: Any, entry: Given | Given_Tree, place: str, key: str) -> Any:
+def _built(hint: Any, entry: Given | GivenTree, place: str, key: str) -> Any:
     if is_dataclass(hint):
         if isinstance(entry, Given):
             raise ConfigError(entry.place, key, repr(entry.value), "a table")
-        return build(_class(hint), entry, place, key)
+        return build(cast(type[Any], hint), entry, place, key)
     if not isinstance(entry, Given):
         raise ConfigError(_place(entry, place), key, "a table", _in_words(hint))
     value = _converted(hint, entry.value)
     if value is None:
         raise ConfigError(entry.place, key, repr(entry.value), _in_words(hint))
     return value
-
-
-def _class(hint: Any) -> type[Any]:
-    assert isinstance(hint, type)
-    return hint
 
 
 def _converted(hint: Any, value: object) -> Any:
@@ -158,7 +153,7 @@ def _one_of(name: str, names: Mapping[str, Any]) -> str:
     return f"one of {', '.join(names)}" + (f"; did you mean {close[0]}?" if close else "")
 
 
-def _place(entry: Given | Given_Tree | None, place: str) -> str:
+def _place(entry: Given | GivenTree | None, place: str) -> str:
     """Where something was given; of a table, where its first value was."""
     while isinstance(entry, Mapping):
         entry = next(iter(entry.values()), None)

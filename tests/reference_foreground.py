@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stseg.arrays import Boxes, Bytes, Floats, Singles
-from stseg.foreground.mixture import MixtureConfig
+from stseg.config import MixtureConfig
 
 UNIFORM = 256.0**-3
 

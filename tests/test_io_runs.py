@@ -270,7 +270,7 @@ def test_an_exception_leaves_the_old_file_and_no_part(run_path: Path, error: typ
     assert not part_of(run_path).exists()
 
 
-@pytest.mark.parametrize("moment", [0, 3, 10, 30, 60, 80])
+@pytest.mark.parametrize("moment", [0, 1, 3, 10, 30, 50, 70, 90, 100, 110])
 def test_an_interrupt_inside_a_write_leaves_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, moment: int
 ) -> None:

@@ -32,11 +32,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
 from stseg.arrays import AnyArray, Bytes, Floats, Singles
+from stseg.config import MixtureConfig
 from stseg.errors import ConfigError, InputError, SourceError
 from stseg.foreground.commonest import commonest_colours
 from stseg.foreground.light import channel_gains
@@ -44,67 +44,6 @@ from stseg.foreground.mixture_kernels import evaluate, update
 from stseg.foreground.smoothing import pool_log_odds
 
 _TURNS = 4  # each frame teaches every fourth row at four times the rate: the rates are slow, and it costs a quarter
-
-
-@dataclass(frozen=True, slots=True)
-class MixtureConfig:
-    """Parameters of `Mixture`.
-
-    Attributes
-    ----------
-    modes
-        K, modes per pixel, 1 or more; with 1 nothing that moved in is ever absorbed.
-    memory
-        Seconds in which background follows a slow change; above 0.
-    absorption
-        Seconds that a thing which moved in must stay still to become background; above 0.
-    share
-        Weight from which a mode is background, 0..1: the share of time that the scene shows it.
-    foreground
-        f, the prior probability of a person at a pixel, 0..1.
-    unexplained
-        e, the share of background colours that no mode explains, 0..1; keeps L below 1.
-    shadow
-        s, the prior probability that background lies in shadow, 0..1.
-    darkest
-        The brightness, relative to full light, of the deepest shadow that counts as one, 0..1.
-    mimicry
-        m, the share of people's colours that look like the background in shadow, 0..1.
-    match
-        Standard deviations within which a colour belongs to a mode.
-    minimum_sd
-        Least standard deviation of a mode, grey levels: noise of sensor and compression.
-    initial_sd
-        Standard deviation of a new mode, grey levels.
-    radius
-        Neighbourhood over which log-odds are averaged, pixels; 0 for none.
-    """
-
-    modes: int = 3
-    memory: float = 60.0
-    absorption: float = 600.0
-    share: float = 0.1
-    foreground: float = 0.1
-    unexplained: float = 1e-3
-    shadow: float = 0.1
-    darkest: float = 0.5
-    mimicry: float = 0.1
-    match: float = 5.0
-    minimum_sd: float = 4.0
-    initial_sd: float = 12.0
-    radius: int = 1
-
-    def __post_init__(self) -> None:
-        if self.modes < 1:
-            raise ConfigError("mixture", "modes", self.modes, "1 or more")
-        if self.radius < 0:
-            raise ConfigError("mixture", "radius", self.radius, "0 or more pixels")
-        for key in ("memory", "absorption", "match", "minimum_sd", "initial_sd"):
-            if not getattr(self, key) > 0:
-                raise ConfigError("mixture", key, getattr(self, key), "a number above 0")
-        for key in ("share", "foreground", "unexplained", "shadow", "darkest", "mimicry"):
-            if not 0 < getattr(self, key) < 1:
-                raise ConfigError("mixture", key, getattr(self, key), "a number between 0 and 1")
 
 
 class Mixture:

@@ -37,7 +37,7 @@ def half_square(body: Floats, box: Floats, width: float, height: float) -> float
     feet = (bottom - box[3]) / (FEET * tall + PIXELS)
     if feet > 0:
         feet /= EARLY_FEET
-    return 0.5 * (middle * middle + wide * wide + head * head + feet * feet)
+    return float(0.5 * (middle * middle + wide * wide + head * head + feet * feet))
 
 
 @kernel

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from stseg.arrays import Boxes, Flags, Floats, Ints, Singles
 from stseg.config import GhostConfig
@@ -76,7 +77,7 @@ class Explanation:
 
     people: People
     ghosts: People
-    owner: tuple[Ints, ...]
+    owner: tuple[NDArray[np.int16], ...]
     raster_step: tuple[int, ...]
     box_owner: tuple[Ints, ...]
 
@@ -101,8 +102,8 @@ class FramePass:
         y = np.arange(grid.y[0] + config.lattice / 2, grid.y[1], config.lattice)
         self.lattice_ground = np.stack(np.meshgrid(x, y), -1)
         flat = self.lattice_ground.reshape(-1, 2)
-        self.views: list[View] = [
-            (BoxView if kind == "boxes" else PixelView)(camera, grid, flat, config)
+        self.views: list[BoxView | PixelView] = [
+            BoxView(camera, grid, flat, config) if kind == "boxes" else PixelView(camera, grid, flat, config)
             for camera, kind in zip(rig.cameras, kinds, strict=True)
         ]
         self.terms = Terms(
@@ -167,6 +168,9 @@ class _Frame:
         most = max(self.pixels.raster[0].size if len(self.pixels.raster) else 0, self.boxes.match.shape[2], 1)
         self.scratch = np.empty(most, np.int64)
         self.parts = np.zeros((len(views), len(pool) + 1))
+        # The scores' parts have the views with boxes first; `row` finds those of each view of the rig.
+        pixels_last = np.argsort([isinstance(view, PixelView) for view in views], kind="stable")
+        self.row = np.argsort(pixels_last)
         room = np.zeros(len(pool) + 1, np.int64)
         room[: len(members)] = members
         count = search(room, len(members), *self._arguments())
@@ -233,12 +237,14 @@ class _Frame:
         """The result, once nothing changes any more."""
         exact, covariance = self.refined()
         total = self.score(self.members)
-        parts = self.parts[:, : len(self.members)].copy()
+        parts = self.parts[self.row, : len(self.members)]
         without = [self.score(np.delete(self.members, a)) for a in range(len(self.members))]
         evidence = total - np.array(without)
         people = People(exact.ground, exact.height, covariance, evidence, parts, self._visible())
         views = self.frame_pass.views
-        painted = [p if isinstance(v, PixelView) else _painted(v, exact) for v, p in zip(views, self.pixel_owner, strict=True)]
+        painted = [
+            p if isinstance(v, PixelView) else _painted(v, exact) for v, p in zip(views, self.pixel_owner, strict=True)
+        ]
         owner = tuple(p.astype(np.int16) for p in painted)
         return Explanation(people, self._ghosts(total), owner, tuple(v.step for v in views), tuple(self.box_owner))
 
@@ -247,7 +253,7 @@ class _Frame:
         weighed = []
         for i in np.setdiff1d(np.arange(len(self.pool)), self.members):
             gain = self.score(np.append(self.members, i)) - total
-            weighed.append((gain, i, self.parts[:, len(self.members)].copy()))
+            weighed.append((gain, i, self.parts[self.row, len(self.members)]))
         weighed.sort(key=lambda one: (-one[0], one[1]))
         kept: list[tuple[float, int, Floats]] = []
         standing = list(self.pool.ground[self.members])
@@ -258,7 +264,7 @@ class _Frame:
                 kept.append((gain, int(i), parts))
         chosen = self.pool.at([i for _, i, _ in kept])
         wide = np.tile(np.eye(2) * self.frame_pass.config.lattice**2 / 12, (len(kept), 1, 1))
-        parts = np.array([p for _, _, p in kept]).reshape(len(kept), -1).T
+        parts = np.array([p for _, _, p in kept]).reshape(len(kept), len(self.frame_pass.views)).T
         return People(chosen.ground, chosen.height, wide, np.array([g for g, _, _ in kept]), parts, np.ones_like(parts))
 
 
@@ -268,6 +274,6 @@ def _painted(view: View, people: Pool) -> Ints:
     owner = np.full(view.shape, -1, np.int64)
     for j in np.argsort(-view.distance(people.ground), kind="stable"):
         for k in range(spans.shape[1]):
-            if 0 <= first[j] and first[j] + k < view.shape[0]:
+            if first[j] >= 0 and first[j] + k < view.shape[0]:
                 owner[first[j] + k, spans[j, k, 0] : spans[j, k, 1]] = j
     return owner

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from stseg.accelerate import kernel
-from stseg.arrays import Floats, Ints
+from stseg.arrays import Floats, Ints, Singles
 from stseg.geometry.bodies import LEVELS, PROFILE, BodyTable, fill_discs
 from stseg.ghosts.evidence import Spans
 
@@ -52,7 +52,7 @@ def outlines(
 
 @kernel
 def _fill_outlines(
-    pixel: Floats,
+    pixel: Singles,
     lattice: Floats,
     heights: Floats,
     level_step: float,
@@ -86,7 +86,7 @@ def _between(discs: Floats, k: int, which: int) -> float:
     """Component `which` of the k-th drawn disc, interpolated along the profile."""
     lower = min(k // _BETWEEN, len(discs) - 2)
     share = (k - lower * _BETWEEN) / _BETWEEN
-    return discs[lower, which] * (1.0 - share) + discs[lower + 1, which] * share
+    return float(discs[lower, which] * (1.0 - share) + discs[lower + 1, which] * share)
 
 
 @kernel

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import maximum_filter
 
-from stseg.arrays import Floats
+from stseg.arrays import Floats, Ints
 from stseg.ghosts.boxes import fill_cover, fill_inside, fill_match
 from stseg.ghosts.evidence import BoxEvidence, PixelEvidence
 from stseg.ghosts.views import BoxView, PixelView, Sight, View
@@ -33,7 +33,7 @@ class Pool:
         """This pool's candidates, then the other's."""
         return Pool(np.concatenate([self.ground, other.ground]), np.concatenate([self.height, other.height]))
 
-    def at(self, chosen: Sequence[int] | Floats) -> Pool:
+    def at(self, chosen: Sequence[int] | Ints) -> Pool:
         """The chosen candidates, in that order."""
         index = np.asarray(chosen, int)
         return Pool(self.ground[index], self.height[index])

@@ -67,10 +67,11 @@ def _patch_score(view: View, sight: Sight, mine: Own, patch: Floats, tried: Floa
     """What one view says of a patch's pillars, nats, float64 (height, place)."""
     score = np.zeros((len(tried), len(patch)))
     if isinstance(view, BoxView) and mine.box >= 0:
+        width, height = map(float, view.camera.size)
         edges, belief = sight.edges[mine.box : mine.box + 1], sight.belief[mine.box : mine.box + 1]
         match = np.empty((score.size, 1))
         bodies = view.table.boxes(patch, tried).reshape(-1, 4)
-        fill_match(bodies, edges, belief, *map(float, view.camera.size), match)
+        fill_match(bodies, edges, belief, width, height, match)
         score = np.maximum(match, _WORST).reshape(score.shape)
     if isinstance(view, PixelView):
         everywhere = np.tile(patch, (len(tried), 1))

@@ -91,7 +91,7 @@ def box_score(
             break
         served[best_a], taken_by[best_b] = True, best_a
         parts[best_a] += best
-    return parts[:count].sum()
+    return float(parts[:count].sum())
 
 
 @kernel
@@ -117,4 +117,4 @@ def pixel_score(
                     owner[line + u] = a
                     total += raster[first + k, u]
         parts[a] = terms.body_weight * total / pixels.area[view, i]
-    return parts[:count].sum()
+    return float(parts[:count].sum())

@@ -63,8 +63,8 @@ class View:
     def chosen_boxes(self, ground: Floats, heights: Floats) -> Floats:
         """Pillar boxes of candidates, one height each, float64 (n, 4)."""
         tried = np.asarray(self.config.heights)
-        every = self.table.boxes(ground, tried)
-        return every[np.abs(heights[:, None] - tried).argmin(1), np.arange(len(ground))]
+        every: Floats = self.table.boxes(ground, tried)
+        return np.asarray(every[np.abs(heights[:, None] - tried).argmin(1), np.arange(len(ground))])
 
 
 class BoxView(View):
@@ -72,9 +72,10 @@ class BoxView(View):
 
     def __init__(self, camera: Camera, grid: Grid, lattice_ground: Floats, config: GhostConfig) -> None:
         super().__init__(camera, grid, lattice_ground, config)
+        width, height = map(float, camera.size)
         inside = np.zeros(self.bodies.shape[:2])
         for row, bodies in zip(inside, self.bodies, strict=True):
-            fill_inside(bodies, *map(float, camera.size), row)
+            fill_inside(bodies, width, height, row)
         self.found = np.where(inside > _LEAST_INSIDE, self.found_share(inside), 0.0)
 
     def found_share(self, visible: Floats) -> Floats:
@@ -93,8 +94,9 @@ class BoxView(View):
 
     def lattice_score(self, sight: Sight, free: Flags) -> Floats:
         """What the free boxes say of each lattice pillar, nats, float64 (height, cell)."""
+        width, height = map(float, self.camera.size)
         best = np.full(self.bodies.shape[:2], -np.inf)
-        fill_best_match(self.bodies, sight.edges[free], sight.belief[free], *map(float, self.camera.size), best)
+        fill_best_match(self.bodies, sight.edges[free], sight.belief[free], width, height, best)
         with np.errstate(divide="ignore"):
             hit = self.config.hit + 0.3 * np.log(self.found) + best
         return np.where(self.found > 0, np.maximum(hit, -_OPTIMISM * self.found), 0.0)

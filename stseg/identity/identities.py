@@ -15,7 +15,7 @@ import numpy as np
 from stseg.arrays import Floats, Ints, Labels
 from stseg.config import IdentityConfig
 from stseg.identity.linking import assign
-from stseg.identity.pieces import Piece, gap_cost
+from stseg.identity.pieces import Piece
 from stseg.identity.windows import Window
 from stseg.segmentation.blobs import Blobs
 
@@ -99,7 +99,6 @@ class Identities:
         for k, p in zip(*assign(np.where(shared > 0, -shared, np.inf), 0.0), strict=True):
             names[p] = known[k]
         self._follow(names, pieces)
-        self._reclaim(names, pieces)
         for p in range(len(pieces)):
             if not names[p]:
                 self.issued += 1
@@ -112,16 +111,6 @@ class Identities:
         for p, piece in enumerate(pieces):
             if not names[p] and piece.chain in lost:
                 names[p] = lost.pop(piece.chain)
-
-    def _reclaim(self, names: list[int], pieces: Sequence[Piece]) -> None:
-        """Give unnamed pieces to living tracks that nobody claims, where a walker would be."""
-        lost = [track for track in self.alive if track.identity not in names]
-        new = [p for p in range(len(pieces)) if not names[p]]
-        patience = max(round(self.config.patience * self.frame_rate), 1)
-        cost = [[gap_cost(t.tail, pieces[p], patience, self.frame_rate, self.config) for p in new] for t in lost]
-        rows, columns = assign(np.array(cost).reshape(len(lost), len(new)), 1.0)
-        for row, column in zip(rows, columns, strict=True):
-            names[new[column]] = lost[row].identity
 
     def _births_and_deaths(
         self, window: Window, pieces: Sequence[Piece], names: Sequence[int]
@@ -169,4 +158,6 @@ class Identities:
 def _within(piece: Piece, first: int, stop: int) -> Piece:
     """The part of a piece in frames first .. stop - 1."""
     kept = [k for k, frame in enumerate(piece.frames) if first <= frame < stop]
-    return Piece(piece.chain, [piece.frames[k] for k in kept], [piece.blobs[k] for k in kept], [piece.ground[k] for k in kept])
+    return Piece(
+        piece.chain, [piece.frames[k] for k in kept], [piece.blobs[k] for k in kept], [piece.ground[k] for k in kept]
+    )

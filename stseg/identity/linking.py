@@ -10,12 +10,18 @@ from scipy.optimize import linear_sum_assignment
 from stseg.arrays import Floats, Ints
 from stseg.config import IdentityConfig
 
-_TURN = 1.2
+_TURN = 0.8
 """How people change their velocity, metres per second per square root of a second (standard deviation)."""
 _STILL = 0.8
 """Standard deviation of the velocity of somebody new, metres per second."""
 _GATE = 9.2
 """Squared Mahalanobis distance beyond which nobody is linked: one true link in a hundred."""
+_STRANGER = 13.8
+"""Minus twice the log-probability that somebody leaves and another comes instead: one in a thousand."""
+_GAPS, _LINKS = 2.0, 20.0
+"""How often people are lost from sight before anything is known, as so many of so many links."""
+_STILL_HIDDEN = 0.6
+"""Who is out of sight stays so for another frame this often."""
 
 
 def assign(cost: Floats, alone: float) -> tuple[Ints, Ints]:
@@ -35,7 +41,7 @@ def distances(a: Floats, b: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Walker:
-    """Somebody whom the linker follows: chain number, last frame, and a constant-velocity estimate of (x, y, vx, vy)."""
+    """Somebody whom the linker follows: chain, last frame, and a constant-velocity estimate of (x, y, vx, vy)."""
 
     chain: int
     frame: int
@@ -60,7 +66,8 @@ class Walker:
 class Linker:
     """Follows people from frame to frame, and over as many frames as patience allows.
 
-    Each frame's places are assigned one to one to the walkers, by Mahalanobis distance from where each was expected.
+    Each frame's places are assigned one to one to the walkers, by Mahalanobis distance from where each was expected
+    and by how likely it is that the walker was missed meanwhile: how often people are missed is learned on the way.
     """
 
     def __init__(self, frame_rate: float, config: IdentityConfig) -> None:
@@ -68,6 +75,7 @@ class Linker:
         self.config = config
         self.walkers: list[Walker] = []
         self.issued = 0
+        self.gaps, self.links = _GAPS, _LINKS
 
     def link(self, frame: int, ground: Floats, covariance: Floats) -> Ints:
         """The chain to which each person of a frame belongs.
@@ -86,8 +94,12 @@ class Linker:
         """
         noise = covariance + np.eye(2) * self.config.place_noise**2
         expected = [walker.at(frame, self.frame_rate) for walker in self.walkers]
+        unseen = np.array([self._unseen(frame - walker.frame - 1) for walker in expected])
         cost = np.array([_surprise(w, ground, noise, self._reach(frame, w)) for w in expected])
-        rows, columns = assign(cost.reshape(len(expected), len(ground)), _GATE)
+        cost = cost.reshape(len(expected), len(ground)) + unseen[:, None]
+        rows, columns = assign(cost, _STRANGER)
+        self.links += len(rows)
+        self.gaps += sum(frame - expected[row].frame > 1 for row in rows)
         chains = np.zeros(len(ground), np.int64)
         met = dict(zip(columns.tolist(), rows.tolist(), strict=True))
         followed = []
@@ -106,6 +118,12 @@ class Linker:
         self.walkers = followed + lost
         return chains
 
+    def _unseen(self, frames: int) -> float:
+        """Minus twice the log-probability of being out of sight for so many frames, in this recording."""
+        if frames == 0:
+            return 0.0
+        return float(-2.0 * (np.log(self.gaps / self.links) + (frames - 1) * np.log(_STILL_HIDDEN)))
+
     def _reach(self, frame: int, walker: Walker) -> float:
         """How far a walker may be from where they were last seen, metres."""
         return self.config.walking_speed * (frame - walker.frame) / self.frame_rate + self.config.slack
@@ -116,4 +134,4 @@ def _surprise(walker: Walker, ground: Floats, noise: Floats, reach: float) -> Fl
     off = ground - walker.state[:2]
     spread = walker.covariance[:2, :2] + noise
     square = np.einsum("ni,nij,nj->n", off, np.linalg.inv(spread), off) if len(off) else np.zeros(0)
-    return np.where(np.hypot(off[:, 0], off[:, 1]) <= reach, square, np.inf)
+    return np.where((np.hypot(off[:, 0], off[:, 1]) <= reach) & (square <= _GATE), square, np.inf)

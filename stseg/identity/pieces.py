@@ -61,8 +61,8 @@ def chain_pieces(
 ) -> list[Piece]:
     """The pieces of a window.
 
-    Blobs that hold people of one chain are one piece; then pieces that end are joined to pieces that begin soon after,
-    where a walker would be.
+    Blobs that hold people of one chain are one piece. Blobs that hold nobody are joined to the pieces that end before
+    or begin after them, where a walker would be: so the cut bridges frames in which the pass missed somebody.
 
     Parameters
     ----------
@@ -123,7 +123,8 @@ def gap_cost(ended: Piece, begun: Piece, patience: int, frame_rate: float, confi
     gap = begun.frames[0] - ended.frames[-1]
     apart = begun.ground[0] - ended.ground[-1]
     stride = config.walking_speed * gap / frame_rate
-    if not 0 < gap <= patience + 1 or np.hypot(*apart) > stride + config.slack:
+    linked_apart = ended.chain and begun.chain and ended.chain != begun.chain
+    if linked_apart or not 0 < gap <= patience + 1 or np.hypot(*apart) > stride + config.slack:
         return np.inf
     miss = apart - 0.5 * gap * (ended.velocity(True) + begun.velocity(False))
     return float((np.hypot(*miss) / (config.slack + 0.5 * stride)) ** 2)

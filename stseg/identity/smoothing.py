@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from stseg.arrays import Rows
@@ -37,7 +39,7 @@ def fill_gaps(trajectory: Rows) -> Rows:
     for identity in np.unique(trajectory["id"]):
         own = trajectory[trajectory["id"] == identity]
         own = own[np.argsort(own["frame"], kind="stable")]
-        for before, after in zip(own[:-1], own[1:], strict=True):
+        for before, after in pairwise(own):
             rows.append(_between(before, after))
     every = np.concatenate(rows)
     return every[np.lexsort((every["id"], every["frame"]))]
@@ -47,7 +49,7 @@ _DRIFT = 0.1
 """Standard deviation that a place gains a frame away from the last that was seen, metres."""
 
 
-def _between(before: Rows, after: Rows) -> Rows:
+def _between(before: np.void, after: np.void) -> Rows:
     frames = np.arange(before["frame"] + 1, after["frame"])
     filled = np.zeros(len(frames), TRAJECTORY)
     share = (frames - before["frame"]) / (after["frame"] - before["frame"])

@@ -62,7 +62,8 @@ class Occupancy:
             likelihood, per_plane = self._likelihood(i, view, explanation, near)
             fill_terms(
                 self.sampling.pixel[i], likelihood, per_plane, explanation.owner[i], explanation.raster_step[i], near,
-                has_box, explanation.people.visible[i], self.sampling.distance[i], away, self.rates[i], share[i], weighted, weights, count,
+                has_box, explanation.people.visible[i], self.sampling.distance[i], away, self.rates[i], share[i],
+                weighted, weights, count,
             )  # fmt: skip
         log_odds = np.empty(shape, np.float32)
         prior = float(np.log(self.config.occupied / (1 - self.config.occupied)))
@@ -77,7 +78,9 @@ class Occupancy:
         away = np.hypot(*np.moveaxis(ground[:, :, None] - people_ground, -1, 0))
         return np.where(away.min(2) <= self.config.reach, away.argmin(2), -1)
 
-    def _likelihood(self, i: int, view: Boxes | Singles, explanation: Explanation, near: Ints) -> tuple[Singles, Singles]:
+    def _likelihood(
+        self, i: int, view: Boxes | Singles, explanation: Explanation, near: Ints
+    ) -> tuple[Singles, Singles]:
         """The view's map, or its likelihood per plane; the other is empty."""
         if not isinstance(view, Boxes):
             return view, _NO_PLANES

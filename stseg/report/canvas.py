@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from stseg.arrays import AnyArray, Bytes, Floats, Ints
+from stseg.arrays import AnyArray, Bytes, Flags, Floats, Ints
 from stseg.report.colours import PAPER, Colour
 
 _SHIFT = 4  # fractional bits of OpenCV's coordinates
@@ -38,6 +38,22 @@ def dashes(canvas: Bytes, points: AnyArray, colour: Colour, width: int = 1, on: 
     for run in _runs(points):
         for piece in _dashed(run, on, off):
             cv2.polylines(canvas, [_fixed(piece)], False, colour, width, cv2.LINE_AA, _SHIFT)
+
+
+def fading_stroke(canvas: Bytes, points: AnyArray, colour: Colour, width: int, opacities: AnyArray) -> None:
+    """An open polyline whose pieces have opacities of their own, 0..1, one fewer than points."""
+    points = np.asarray(points, float)
+    known: Flags = np.asarray(np.isfinite(points).all(axis=1))
+    if not known.any():
+        return
+    part, origin = _part(canvas, points[known], width + 1)
+    if not part.size:
+        return
+    mask = np.zeros(part.shape[:2], np.uint8)
+    for k in np.flatnonzero(known[1:] & known[:-1]):
+        piece = _fixed(points[k : k + 2] - origin)
+        cv2.polylines(mask, [piece], False, round(255 * float(opacities[k])), width, cv2.LINE_AA, _SHIFT)
+    blend(part, mask, colour, 1.0)
 
 
 def outline(canvas: Bytes, points: AnyArray, colour: Colour, width: int = 1) -> None:

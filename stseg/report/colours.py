@@ -24,7 +24,7 @@ NIGHT: Colour = (42, 35, 31)
 
 _GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5.0))
 _HUE_OF_ZERO = np.radians(117.5)  # makes id 1 blue
-_LIGHTNESS = (0.64, 0.57, 0.60)
+_LIGHTNESS = (0.70, 0.55, 0.60)
 _CHROMA = 0.19
 _LMS_OF_OKLAB = np.array(
     [

@@ -11,7 +11,7 @@ import numpy as np
 from stseg.arrays import AnyArray, Bytes, Floats, Rows
 from stseg.geometry import Camera, Grid
 from stseg.geometry.bodies import PROFILE
-from stseg.report.canvas import blank, chip, chip_size, disc, fill, outline, stroke, text
+from stseg.report.canvas import blank, chip, chip_size, disc, fading_stroke, fill, outline, stroke, text
 from stseg.report.colours import NIGHT, PAPER, Colour, mixed, track_colour
 from stseg.report.labels import place_labels
 
@@ -140,9 +140,8 @@ def _draw_trail(canvas: Bytes, view: View, rows: Rows, frame: int, trail: int) -
     rows = rows[np.argsort(rows["frame"], kind="stable")]
     pixel = view.pixel(np.stack([rows["x"], rows["y"]], -1), 0.0)
     colour = track_colour(int(rows["id"][0]))
-    for k in range(len(rows) - 1):
-        age = (frame - int(rows["frame"][k])) / max(trail, 1)
-        stroke(canvas, pixel[k : k + 2], colour, 3, 1 - 0.85 * min(age, 1.0))
+    age = (frame - rows["frame"][:-1]) / max(trail, 1)
+    fading_stroke(canvas, pixel, colour, 3, 1 - 0.85 * age)
 
 
 def _label(canvas: Bytes, view: View, own: Rows) -> None:

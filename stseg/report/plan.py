@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import cv2
 import numpy as np
 
@@ -15,7 +17,7 @@ from stseg.report.plan_map import PlanMap, rule, scale_bar, sheet
 _NEAR = 0.45  # cameras within this share of the ground's longer side are shown where they stand
 _DARKEST: Colour = (206, 199, 195)  # seen by no view
 _TRUTH: Colour = (84, 76, 70)
-_LABELLED = 40  # tracks, the longest ones
+_LABELLED = 24  # tracks, the longest ones
 
 
 def plan_view(
@@ -55,8 +57,7 @@ def plan_view(
         _shade(canvas, plan, rig.grid, coverage)
     rule(canvas, plan)
     outline(canvas, plan.pixel(_border(rig.grid)), mixed(INK, PAPER, 0.35), 2)
-    for camera in rig.cameras:
-        _draw_camera(canvas, plan, camera)
+    _draw_cameras(canvas, plan, rig.cameras)
     _draw_tracks(canvas, plan, trajectory)
     if truth is not None:
         for _, path in _paths(truth):
@@ -104,8 +105,23 @@ def _tone(count: int, most: int) -> Colour:
     return mixed(_DARKEST, (252, 251, 250), count / most)
 
 
-def _draw_camera(canvas: Bytes, plan: PlanMap, camera: Camera) -> None:
-    """A wedge as wide as the view, pointing where it looks; at the edge of the plan where it stands beyond."""
+def _draw_cameras(canvas: Bytes, plan: PlanMap, cameras: Sequence[Camera]) -> None:
+    """Every camera, and its name behind it, below the names that are there already."""
+    named: list[tuple[float, float, int]] = []
+    for camera in cameras:
+        tone, (u, v) = _draw_camera(canvas, plan, camera)
+        width = text_size(camera.name, 15)[0]
+        while any(abs(u - other) < (width + wide) / 2 and abs(v - below) < 20 for other, below, wide in named):
+            v += 20
+        named.append((u, v, width))
+        text(canvas, camera.name, (u, v), tone, 15, (0.5, 0.5))
+
+
+def _draw_camera(canvas: Bytes, plan: PlanMap, camera: Camera) -> tuple[Colour, tuple[float, float]]:
+    """A wedge as wide as the view, pointing where it looks; at the edge of the plan where it stands beyond.
+
+    Returns its colour and where the middle of its name may stand.
+    """
     stand = camera.centre[:2]
     edge = np.clip(stand, [plan.x[0], plan.y[0]], [plan.x[1], plan.y[1]])
     place, beyond = plan.pixel(edge), bool((edge != stand).any())
@@ -120,7 +136,7 @@ def _draw_camera(canvas: Bytes, plan: PlanMap, camera: Camera) -> None:
     back = np.array([0.0, -1.0]) if sides is None else -sides[1]
     (wide, tall), room = text_size(camera.name, 15), np.array(plan.size)
     u, v = np.clip(place + back * (14 + wide / 2, 22), (wide / 2 + 4, tall), room - (wide / 2 + 4, tall)).tolist()
-    text(canvas, camera.name, (u, v), tone, 15, (0.5, 0.5))
+    return tone, (u, v)
 
 
 def _looks(camera: Camera) -> Floats | None:
@@ -201,17 +217,9 @@ def _label_tracks(canvas: Bytes, plan: PlanMap, trajectory: Rows) -> None:
 
 def _legend(canvas: Bytes, plan: PlanMap, most: int | None, has_truth: bool) -> None:
     """Below the plan: what the tones and marks mean, and a scale bar."""
-    u, v = plan.corner[0], plan.size[1] - 38.0
+    u, v = 76.0, plan.size[1] - 38.0
     if most is not None:
-        text(canvas, "views", (u, v), QUIET, 15, (0, 0.5))
-        u += text_size("views", 15)[0] + 10
-        for count in range(most + 1):
-            square = np.array([[u, v - 14], [u + 30, v - 14], [u + 30, v + 14], [u, v + 14]])
-            fill(canvas, square, _tone(count, max(most, 1)))
-            outline(canvas, square, mixed(QUIET, PAPER, 0.5))
-            text(canvas, str(count), (u + 15, v), INK, 14, (0.5, 0.5))
-            u += 30
-        u += 28
+        u = _legend_of_tones(canvas, (u, v), most) + 28
     colour = track_colour(1)
     line = np.array([[u, v], [u + 46, v]])
     stroke(canvas, line, colour, 3)
@@ -221,4 +229,20 @@ def _legend(canvas: Bytes, plan: PlanMap, most: int | None, has_truth: bool) -> 
     if has_truth:
         dashes(canvas, np.array([[u, v], [u + 46, v]]), _TRUTH)
         text(canvas, "truth", (u + 56, v), QUIET, 15, (0, 0.5))
-    scale_bar(canvas, plan, (plan.far_corner[0], v))
+    scale_bar(canvas, plan, (plan.size[0] - 44.0, v))
+
+
+def _legend_of_tones(canvas: Bytes, place: tuple[float, float], most: int) -> float:
+    """A square for each number of views from `place` on; returns where they end."""
+    u, v = place
+    text(canvas, "views", (u, v), QUIET, 15, (0, 0.5))
+    u += text_size("views", 15)[0] + 10
+    wide = min(30.0, 270.0 / (most + 1))
+    for count in range(most + 1):
+        square = np.array([[u, v - 14], [u + wide, v - 14], [u + wide, v + 14], [u, v + 14]])
+        fill(canvas, square, _tone(count, max(most, 1)))
+        outline(canvas, square, mixed(QUIET, PAPER, 0.5))
+        if wide > 20 or count in (0, most):
+            text(canvas, str(count), (u + wide / 2, v), INK, 14, (0.5, 0.5))
+        u += wide
+    return u

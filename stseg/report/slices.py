@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import maximum_filter, minimum_filter
 
 from stseg.arrays import AnyArray, Bytes, Flags, Labels
 from stseg.geometry import Grid
@@ -18,6 +19,7 @@ _TONES = np.array([(176, 128, 84), (230, 204, 176), (249, 249, 249), (110, 184, 
 _UNSEEN = np.array([(236, 234, 232), (205, 201, 198)], np.uint8)  # hatching, light and dark
 _GAP, _HEAD, _MARGIN, _FOOT = 22, 30, 26, 64  # pixels
 _SHEET_SHAPE = 1.6  # width over height
+_RIM = 5  # greatest width of an outline, pixels
 
 
 def volume_picture(
@@ -89,9 +91,9 @@ def _contact_sheet(panels: Sequence[_Panel], title: str, width: int, limit: floa
         u = _MARGIN + (k % columns) * (wide + _GAP)
         v = top + (k // columns) * (tall + _HEAD + _GAP) + _HEAD
         text(canvas, panel.caption, (u, v - 9), QUIET, 15)
-        canvas[v : v + tall, u : u + wide] = _panel_picture(panel, scale, limit)
         corners = np.array([[u - 1, v - 1], [u + wide, v - 1], [u + wide, v + tall], [u - 1, v + tall]])
         outline(canvas, corners, RULE)
+        canvas[v : v + tall, u : u + wide] = _panel_picture(panel, scale, limit)
     _colour_bar(canvas, limit)
     return canvas
 
@@ -119,7 +121,7 @@ def _panel_picture(panel: _Panel, scale: int, limit: float) -> Bytes:
     v, u = np.ogrid[: cell.shape[0], : cell.shape[1]]
     unseen = np.isnan(cell)
     picture[unseen] = _UNSEEN[((u + v) % 8 < 2).astype(int)][unseen]
-    wide = max(1, scale // 5)
+    wide = min(max(1, scale // 5), _RIM)
     rim = _rim(label, wide)
     picture[_rim(label, wide + 1) & ~rim] = PAPER
     for identity in np.unique(label[rim]).tolist():
@@ -129,13 +131,9 @@ def _panel_picture(panel: _Panel, scale: int, limit: float) -> Bytes:
 
 def _rim(label: AnyArray, width: int) -> Flags:
     """Pixels of a label within `width` of another one or of the edge, bool (v, u)."""
-    padded = np.pad(label, width, constant_values=0)
-    inner = np.ones(label.shape, bool)
-    tall, wide = label.shape
-    for down in range(2 * width + 1):
-        for right in range(2 * width + 1):
-            inner &= padded[down : down + tall, right : right + wide] == label
-    return np.asarray((label > 0) & ~inner)
+    least = minimum_filter(label, 2 * width + 1, mode="constant")
+    greatest = maximum_filter(label, 2 * width + 1, mode="constant")
+    return np.asarray((label > 0) & (least != greatest))
 
 
 def _commonest(label: Labels) -> Labels:

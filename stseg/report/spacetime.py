@@ -16,7 +16,7 @@ from stseg.report.plan_map import step_for
 
 _AZIMUTH, _ELEVATION = np.radians(-32.0), np.radians(32.0)
 _MARGIN, _PIECE, _MOST_PIECES = 88, 6, 6000
-_LABELLED = 40
+_LABELLED = 24
 
 
 def spacetime_picture(
@@ -48,7 +48,7 @@ def spacetime_picture(
     block = Block.fit(grid, first, max(last, first + 1), (width, height))
     _draw_floor(canvas, block)
     _draw_clock(canvas, block, frame_rate)
-    threads = _threads(trajectory, 3 if len(np.unique(trajectory["id"])) <= 12 else 2)
+    threads = _threads(trajectory)
     for thread in threads:
         floor = np.column_stack([thread.places[:, :2], np.full(len(thread.places), first)])
         stroke(canvas, block.pixel(floor), mixed(QUIET, PAPER, 0.45), 1)
@@ -122,7 +122,9 @@ class _Thread:
     width: int
 
 
-def _threads(trajectory: Rows, width: int) -> list[_Thread]:
+def _threads(trajectory: Rows) -> list[_Thread]:
+    count = len(np.unique(trajectory["id"]))
+    width = 3 if count <= 12 else 2 if count <= 60 else 1
     table = trajectory[np.lexsort((trajectory["frame"], trajectory["id"]))]
     # A picture has no room for more points than that, however long the recording.
     stride = max(1, len(table) // (_PIECE * _MOST_PIECES))

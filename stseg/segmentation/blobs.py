@@ -69,7 +69,7 @@ def find_blobs(occupied: Flags, log_odds: Singles, people_ground: Floats, reach:
     person: list[int] = []
     piece_of: list[int] = []
     ground = grid.ground
-    home = _homes(pieces, people_ground, reach, grid)
+    home = _homes(np.asarray(pieces, np.int32), people_ground, reach, grid)
     for piece in range(1, number + 1):
         inside = pieces == piece
         standing = np.flatnonzero(home == piece)
@@ -99,9 +99,7 @@ def _homes(pieces: Labels, people_ground: Floats, reach: float, grid: Grid) -> I
     return home
 
 
-def _measure(
-    cells: Labels, person: Ints, piece_of: Ints, occupied: Flags, log_odds: Singles, grid: Grid
-) -> Blobs:
+def _measure(cells: Labels, person: Ints, piece_of: Ints, occupied: Flags, log_odds: Singles, grid: Grid) -> Blobs:
     n = len(person)
     strength = np.where(occupied, np.nan_to_num(log_odds), 0.0)
     weight = strength.clip(0).sum(0) + 1e-6

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stseg.arrays import Ints, Labels, Singles
+from stseg.arrays import Flags, Ints, Labels, Singles
 from stseg.config import SegmentationConfig
 from stseg.geometry import Grid
 
@@ -44,7 +44,7 @@ class Energy:
     ahead: int
     motion: Ints
 
-    def of(self, labels: Labels) -> int:
+    def of(self, labels: Labels | Flags) -> int:
         """Energy of a labelling, relative to everything background; labels bool or 0 / 1 (time, plane, y, x)."""
         occupied = labels != 0
         total = -int(self.unary[occupied].sum())
@@ -73,14 +73,12 @@ def build_energy(log_odds: Singles, motion: Ints, grid: Grid, config: Segmentati
     bounded = np.nan_to_num(log_odds.astype(float), nan=0.0).clip(-_STRONGEST, _STRONGEST)
     unary = np.rint(bounded / QUANTUM).astype(np.int64)
     rise = grid.top / max(grid.planes - 1, 1)
-    return Energy(
-        unary, capacity(grid.cell), capacity(grid.cell), capacity(rise), capacity(config.step), motion
-    )
+    return Energy(unary, capacity(grid.cell), capacity(grid.cell), capacity(rise), capacity(config.step), motion)
 
 
 def time_edges(energy: Energy) -> tuple[Ints, Ints]:
     """Flat indices of the two cells of each edge in time; motion that leaves the grid has no edge."""
-    frames, planes, rows, columns = energy.unary.shape
+    planes, rows, columns = energy.unary.shape[1:]
     y, x = np.arange(rows)[:, None], np.arange(columns)
     to_y, to_x = y + energy.motion[..., 0], x + energy.motion[..., 1]
     kept = (to_y >= 0) & (to_y < rows) & (to_x >= 0) & (to_x < columns)

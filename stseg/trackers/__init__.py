@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from stseg.config import Config
 from stseg.errors import ConfigError
 from stseg.geometry import Rig
@@ -9,7 +11,7 @@ from stseg.trackers.cut import CutTracker
 from stseg.trackers.frames import FrameTracker
 from stseg.trackers.protocol import Commit, Scene, Tracker
 
-TRACKERS = {"cut": CutTracker, "frames": FrameTracker}
+TRACKERS: dict[str, Callable[[Rig, Config, int], Tracker]] = {"cut": CutTracker, "frames": FrameTracker}
 """cut: graph cuts of windows of the volume (the default). frames: each frame by itself, linked by motion alone."""
 
 

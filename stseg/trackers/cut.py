@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
-from stseg.arrays import Floats, Ints, Labels, Rows
+from stseg.arrays import Flags, Floats, Ints, Rows
 from stseg.config import Config
 from stseg.geometry import Rig
 from stseg.identity.identities import Decision, Identities
@@ -18,9 +19,9 @@ from stseg.segmentation.blobs import Blobs, find_blobs
 from stseg.segmentation.cut import minimum_cut
 from stseg.segmentation.energy import QUANTUM, Energy, build_energy
 from stseg.segmentation.motion import motion_field
-from stseg.tracks import WINDOW
 from stseg.trackers.protocol import Commit, Scene
 from stseg.trackers.rows import event_rows, trajectory_rows, views_at
+from stseg.tracks import WINDOW
 
 _ENDLESS = 1 << 62
 """A stop that is not known yet."""
@@ -88,7 +89,9 @@ class CutTracker:
         cut = minimum_cut(energy)
         occupied = cut.occupied
         blobs = [
-            find_blobs(cells, linked.scene.log_odds, linked.scene.people.ground, self.config.occupancy.reach, self.rig.grid)
+            find_blobs(
+                cells, linked.scene.log_odds, linked.scene.people.ground, self.config.occupancy.reach, self.rig.grid
+            )
             for cells, linked in zip(occupied, held, strict=True)
         ]
         pieces = chain_pieces(
@@ -104,13 +107,13 @@ class CutTracker:
         reach, grid = self.config.occupancy.reach, self.rig.grid
         motion = [
             motion_field(now.scene.people.ground, then.scene.people.ground, now.chains, then.chains, reach, grid)
-            for now, then in zip(held[:-1], held[1:], strict=True)
+            for now, then in pairwise(held)
         ]
         steps = np.array(motion, np.int64).reshape(-1, *grid.shape[1:], 2)
         return build_energy(log_odds, steps, grid, self.config.segmentation)
 
     def _commit(
-        self, window: Window, held: list[_Linked], occupied: Labels, blobs: list[Blobs], decision: Decision, row: Rows
+        self, window: Window, held: list[_Linked], occupied: Flags, blobs: list[Blobs], decision: Decision, row: Rows
     ) -> Commit:
         kept = range(window.commit_first - held[0].scene.frame, window.commit_stop - held[0].scene.frame)
         label = np.zeros((len(kept), *self.rig.grid.shape), np.int32)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from stseg.arrays import Floats, Labels
+from stseg.arrays import Floats, Ints, Labels
 from stseg.config import Config
 from stseg.geometry import Rig
 from stseg.identity.linking import Linker
@@ -53,11 +53,11 @@ class FrameTracker:
         """Nothing is open."""
         return []
 
-    def _label(self, scene: Scene, ids: Floats) -> tuple[Labels, Floats]:
+    def _label(self, scene: Scene, ids: Ints) -> tuple[Labels, Floats]:
         """Occupied cells within each person's reach, int32 (plane, y, x), and their ground area, float64 (n,)."""
         grid = self.rig.grid
         near = near_person(grid.ground, scene.people.ground, self.config.occupancy.reach)
         occupied = (scene.log_odds > 0) & (near >= 0)
         label = np.where(occupied, np.append(ids, 0)[near], 0).astype(np.int32)
         cells = np.bincount(near[occupied.any(0)], minlength=len(ids))[: len(ids)]
-        return label, cells * grid.cell**2
+        return label, np.asarray(cells * grid.cell**2, float)

@@ -42,7 +42,7 @@ def views_at(views: Bytes, ground: Floats, grid: Grid) -> Ints:
     cell = np.rint(grid.cell_of(ground)).astype(int)
     most = views.max(0)
     column, row = cell[:, 0].clip(0, most.shape[1] - 1), cell[:, 1].clip(0, most.shape[0] - 1)
-    return most[row, column].astype(np.int64)
+    return np.asarray(most[row, column], np.int64)
 
 
 def event_rows(events: list[Event]) -> Rows:

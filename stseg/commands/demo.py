@@ -1,0 +1,75 @@
+"""`stseg demo`: the whole way on a small simulated scene."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from stseg.commands.evaluate import evaluate
+from stseg.commands.report import report, write_pictures
+from stseg.commands.run import run
+from stseg.commands.simulate import simulate
+from stseg.errors import OutputError
+from stseg.io.rigs import read_rig
+from stseg.io.runs import read_run
+from stseg.io.tracks import read_tracks_csv
+
+
+def demo(
+    folder: Path = Path("stseg-demo"),
+    /,
+    *,
+    overwrite: Annotated[bool, Parameter(negative="")] = False,
+) -> None:
+    """Film a small simulated scene, track its people from the colour videos, score the tracks, write the report.
+
+    Example: stseg demo
+
+    The scene is a room that four cameras watch through lenses. Its truth is exact, and the tracker is not shown it. The
+    first run on a machine takes longer: the kernels are compiled, and kept.
+
+    Parameters
+    ----------
+    folder
+        Where to write; it must be empty or not there yet.
+    overwrite
+        Write into a folder that is not empty.
+    """
+    _require_empty(folder, overwrite)
+    scene, run_file, page = folder / "scene", folder / "run.h5", folder / "report.html"
+    simulate(scene, scene="demo", overwrite=overwrite)
+    run(scene / "rig.toml", output=run_file, overwrite=overwrite)
+    evaluate(run_file, scene / "truth.csv")
+    report(run_file, output=page, truth=scene / "truth.csv", camera_images=True, overwrite=overwrite)
+    _draw(run_file, scene, folder / "pictures")
+    print(_what_to_open(folder))
+
+
+def _require_empty(folder: Path, overwrite: bool) -> None:
+    """Refuse a folder that holds something before any work is done."""
+    try:
+        if folder.exists() and any(folder.iterdir()) and not overwrite:
+            raise OutputError(folder, "", "files in it", "an empty folder, a new name, or --overwrite")
+    except OSError as error:
+        raise OutputError(folder, "", error.strerror or error, "a folder that can be written to") from error
+
+
+def _draw(run_file: Path, scene: Path, folder: Path) -> None:
+    """The pictures of the frame in the middle. People are simulated, so the cameras' images may be shown."""
+    run, truth = read_run(run_file), read_tracks_csv(scene / "truth.csv")
+    middle = int(run.frames[len(run.frames) // 2])
+    write_pictures(folder, read_rig(scene / "rig.toml"), run, truth, middle, camera_images=True)
+
+
+def _what_to_open(folder: Path) -> str:
+    contents = {
+        "report.html": "everything on one page, in a browser",
+        "pictures/plan.png": "the tracks from above; the truth is dashed",
+        "pictures/overlay_cam1.png": "one camera with its tracks; also cam2 to cam4",
+        "pictures/slices.png": "the occupancy volume, plane by plane",
+        "run.h5": "volume, tracks, events, reasons, in an HDF5 viewer",
+        "scene/rig.toml": "the rig file: begin your own from it",
+    }
+    return "\n".join(["Open", *(f"  {folder / name!s:<36}  {what}" for name, what in contents.items())])

@@ -1,0 +1,250 @@
+"""The core stages by their definitions, one element at a time: slow, plain, without the fast code's ideas."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from itertools import combinations, permutations
+
+import numpy as np
+
+from stseg.arrays import Boxes, Flags, Floats, Ints, Singles
+from stseg.ghosts import boxes as tolerance
+from stseg.ghosts.evidence import BoxEvidence, PixelEvidence, Terms
+from stseg.ghosts.explain import Explanation
+from stseg.occupancy.fusion import SHOULDER, Rates
+from stseg.segmentation.energy import Energy
+
+Edge = tuple[int, int, int]
+"""Two cells of a flattened volume, and the capacity between them."""
+
+
+# Boxes and pillars
+
+
+def half_square(body: Floats, box: Floats, width: float, height: float) -> float:
+    """Half the squared distance of a box from a pillar's box in units of its tolerances; infinite far to the side."""
+    left, right = np.clip(body[[0, 2]], 0, width - 1)
+    top, bottom = np.clip(body[[1, 3]], 0, height - 1)
+    if left >= right or top >= bottom:
+        return math.inf
+    tall = max(float(body[3] - body[1]), 8.0)
+    sd = {name: getattr(tolerance, name) * tall + tolerance.PIXELS for name in ("SIDE", "WIDTH", "HEAD", "FEET")}
+    middle = ((left + right) / 2 - (box[0] + box[2]) / 2) / sd["SIDE"]
+    width_off = ((right - left) - (box[2] - box[0])) / sd["WIDTH"]
+    feet = (bottom - box[3]) / sd["FEET"]
+    feet = feet / tolerance.EARLY_FEET if box[3] < bottom else feet
+    if abs(middle) > 4.5:
+        return math.inf
+    return float(middle**2 + width_off**2 + ((top - box[1]) / sd["HEAD"]) ** 2 + feet**2) / 2
+
+
+def overlap(a: Floats, b: Floats) -> float:
+    """Area that two boxes (left, top, right, bottom) share."""
+    shared = np.minimum(a[2:], b[2:]) - np.maximum(a[:2], b[:2])
+    return float(shared.clip(0).prod())
+
+
+def inside(body: Floats, width: float, height: float) -> float:
+    """Share of a pillar's box that lies in the image."""
+    return 0.0 if np.isnan(body).any() else overlap(body, np.array([0, 0, width, height])) / overlap(body, body)
+
+
+def cover(bodies: Floats, distance: Floats, width: float, height: float, i: int, k: int) -> float:
+    """Share of i's box in the image that lies behind the inner four fifths of the width of k's box."""
+    if np.isnan(bodies[[i, k]]).any() or not distance[k] < distance[i] - 0.1:
+        return 0.0
+    image = np.array([0, 0, width, height])
+    seen = np.concatenate([np.maximum(bodies[i, :2], image[:2]), np.minimum(bodies[i, 2:], image[2:])])
+    if not (seen[2:] > seen[:2]).all():
+        return 0.0
+    trunk = bodies[k] + 0.1 * (bodies[k, 2] - bodies[k, 0]) * np.array([1, 0, -1, 0])
+    return min(overlap(seen, trunk) / overlap(seen, seen), 1.0)
+
+
+# The score of a set
+
+
+def set_score(
+    members: Sequence[int], boxes: BoxEvidence, pixels: PixelEvidence, own: Floats, ground: Floats, terms: Terms
+) -> float:
+    """What a set of people says of a frame: each box serves one of them, each pixel belongs to the nearest body."""
+    total = sum(terms.person + own[j] for j in members)
+    for i, j in combinations(members, 2):
+        apart = math.dist(ground[i], ground[j])
+        if apart < terms.apart:
+            total -= 2 + 20 * (1 - apart / terms.apart)
+    total += sum(_boxes_of_view(view, members, boxes, terms) for view in range(len(boxes.boxes)))
+    total += sum(_pixels_of_view(view, members, pixels, terms) for view in range(len(pixels.raster)))
+    return float(total)
+
+
+def _boxes_of_view(view: int, members: Sequence[int], boxes: BoxEvidence, terms: Terms) -> float:
+    total = 0.0
+    gains: list[tuple[float, int, int]] = []
+    for j in members:
+        visible = boxes.inside[view, j] * math.prod(1 - boxes.cover[view, j, k] for k in members)
+        share = (visible - terms.hidden_below) / (terms.whole_above - terms.hidden_below)
+        found = min(max(share, terms.least), 1.0)
+        missing = math.log(1 - (1 - terms.box_miss) * found)
+        total += missing
+        worth = terms.hit + 0.3 * math.log(found) - missing
+        gains += [(worth + boxes.match[view, j, b], j, b) for b in range(boxes.boxes[view])]
+    served: set[int] = set()
+    taken: set[int] = set()
+    for gain, j, b in sorted(gains, reverse=True):
+        if gain > 0 and j not in served and b not in taken:
+            served.add(j)
+            taken.add(b)
+            total += gain
+    return total
+
+
+def covered(pixels: PixelEvidence, view: int, j: int) -> Flags:
+    """The raster pixels inside a candidate's outline, bool (v, u)."""
+    shown = np.zeros(pixels.raster.shape[1:], bool)
+    for k, (start, stop) in enumerate(pixels.spans[view, j]):
+        row = pixels.first[view, j] + k
+        if pixels.first[view, j] >= 0 and row < len(shown):
+            shown[row, start:stop] = True
+    return shown
+
+
+def _pixels_of_view(view: int, members: Sequence[int], pixels: PixelEvidence, terms: Terms) -> float:
+    total = 0.0
+    bodies = {j: covered(pixels, view, j) for j in members}
+    for v, u in np.ndindex(*pixels.raster.shape[1:]):
+        there = [j for j in members if bodies[j][v, u]]
+        if there:
+            nearest = min(there, key=lambda j: pixels.order[view, j])
+            total += terms.body_weight * float(pixels.raster[view, v, u]) / pixels.area[view, nearest]
+    return total
+
+
+def subsets(number: int) -> Iterator[tuple[int, ...]]:
+    """All sets of candidates."""
+    for size in range(number + 1):
+        yield from combinations(range(number), size)
+
+
+# Occupancy
+
+
+def clutter(likelihood: Singles, side: int) -> float:
+    """Root mean square of the standard deviations of square cells, those cut by the border included."""
+    height, width = likelihood.shape
+    cells = [
+        likelihood[v : v + side, u : u + side].astype(float)
+        for v in range(0, height, side)
+        for u in range(0, width, side)
+    ]
+    return math.sqrt(sum(float(np.var(cell)) for cell in cells) / len(cells))
+
+
+def log_odds_of_cell(
+    likelihood: Sequence[float], weight: Sequence[float], rates: Sequence[Rates], prior: float
+) -> float:
+    """u of a cell that these views see (METHODS 4)."""
+    mean = 0.0
+    for seen, share, rate in zip(likelihood, weight, rates, strict=True):
+        body = (1 - rate.miss) * seen + rate.miss * (1 - seen)
+        empty = rate.clutter * seen + (1 - rate.clutter) * (1 - seen)
+        mean += share / sum(weight) * math.log(body / empty)
+    return len(likelihood) * mean + math.log(prior / (1 - prior))
+
+
+def plane_likelihood(
+    bodies: Floats, heights: Floats, plane: float, expected: float, spread: float, boxes: Boxes, free: Sequence[int],
+    size: tuple[int, int],
+) -> float:  # fmt: skip
+    """L(X, Z) of one cell: the best of these boxes and of the pillars (height, 4) that reach up to the plane."""
+    best = 0.0
+    for body, height in zip(bodies, heights, strict=True):
+        for b in free:
+            left, top, wide, tall = boxes.pixel[b]
+            edges = np.clip([left, top, left + wide, top + tall], 0, [size[0] - 1, size[1] - 1] * 2)
+            if height >= plane and not np.isnan(body).any():
+                prior = math.exp(-0.5 * ((height - expected) / spread) ** 2)
+                fit = math.exp(-half_square(body, edges, *map(float, size)))
+                best = max(best, prior * fit * float(np.clip(boxes.score[b], 0.05, 1)))
+    return best
+
+
+def map_views_of_cell(
+    explanation: Explanation, pixels: Ints, away: Floats, people_away: Floats, near: int, maps: Sequence[Singles | None]
+) -> tuple[list[int], list[float]]:
+    """Which views with a map see a cell past nearer people, and the likelihood that each leaves it.
+
+    Parameters
+    ----------
+    pixels : int64 (view, 2)
+        Column and row of the cell, -1 where it is not in the image.
+    away : float64 (view,), people_away : float64 (view, person)
+        Distances along the ground from each camera, metres.
+    near
+        The person near the cell, -1 for nobody.
+    """
+    views, seen = [], []
+    for i, shown in enumerate(maps):
+        u, v = pixels[i]
+        if shown is None or u < 0:
+            continue
+        step = explanation.raster_step[i]
+        owner = int(explanation.owner[i][v // step, u // step])
+        elsewhere = owner >= 0 and owner != near
+        if elsewhere and people_away[i, owner] < away[i] - SHOULDER:
+            continue
+        views.append(i)
+        seen.append(0.0 if elsewhere else float(shown[v, u]))
+    return views, seen
+
+
+# The cut
+
+
+def neighbours(energy: Energy) -> list[Edge]:
+    """All edges of a window, cell by cell."""
+    frames, planes, rows, columns = energy.unary.shape
+    index = np.arange(energy.unary.size).reshape(energy.unary.shape)
+    found: list[Edge] = []
+    for t, z, y, x in np.ndindex(*energy.unary.shape):
+        here = int(index[t, z, y, x])
+        if z + 1 < planes:
+            found.append((here, int(index[t, z + 1, y, x]), energy.up))
+        if y + 1 < rows:
+            found.append((here, int(index[t, z, y + 1, x]), energy.across))
+        if x + 1 < columns:
+            found.append((here, int(index[t, z, y, x + 1]), energy.along))
+        if t + 1 < frames:
+            to_y, to_x = y + int(energy.motion[t, y, x, 0]), x + int(energy.motion[t, y, x, 1])
+            if 0 <= to_y < rows and 0 <= to_x < columns:
+                found.append((here, int(index[t + 1, z, to_y, to_x]), energy.ahead))
+    return found
+
+
+def energy_of(energy: Energy, labels: Flags) -> int:
+    """E of a labelling, relative to everything background, in quanta."""
+    flat, unary = labels.ravel().tolist(), energy.unary.ravel().tolist()
+    gained = sum(u for u, occupied in zip(unary, flat, strict=True) if occupied)
+    return sum(b for p, q, b in neighbours(energy) if flat[p] != flat[q]) - gained
+
+
+def least_energy(energy: Energy) -> tuple[int, Flags]:
+    """The least energy of all labellings, and the cells that are occupied in every minimum: the smallest object set."""
+    size = energy.unary.size
+    labels = ((np.arange(2**size)[:, None] >> np.arange(size)) & 1).astype(bool)
+    total = -(labels @ energy.unary.ravel())
+    for p, q, b in neighbours(energy):
+        total += b * (labels[:, p] != labels[:, q])
+    return int(total.min()), labels[total == total.min()].all(0).reshape(energy.unary.shape)
+
+
+# Assignments
+
+
+def least_assignment(cost: Floats, alone: float) -> float:
+    """Least total of a one-to-one assignment in which a pair that stays apart costs `alone`; by trying all."""
+    rows, columns = cost.shape
+    wide = np.minimum(cost, alone)
+    wide = np.pad(wide, ((0, max(columns - rows, 0)), (0, max(rows - columns, 0))), constant_values=alone)
+    return min(float(sum(wide[i, j] for i, j in enumerate(order))) for order in permutations(range(len(wide))))

@@ -1,0 +1,181 @@
+"""Named micro-scenes: four cameras around four by four metres, people at given places, what each camera shows of them.
+
+Everything is drawn from projections of points in space, with nothing of the tables that the stages use. People are
+rows of x, y and height in metres, float64 (n, 3).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import cv2
+import numpy as np
+
+from stseg.arrays import Boxes, Bytes, Floats, Observation, Rows, Singles
+from stseg.config import Config, GhostConfig
+from stseg.geometry import Camera, Grid, Lens, Rig
+from stseg.geometry.bodies import PROFILE
+from stseg.tracks import TRAJECTORY
+
+SIZE = (128, 96)
+FOCAL = 75.0
+AREA = (-2.0, 2.0)
+FRAME_RATE = 8.0
+FEW_HEIGHTS = GhostConfig(heights=(1.6, 1.7, 1.8), lattice=0.25)
+"""The pass with few heights and a coarse lattice: as good on these scenes, and quick without a compiler."""
+CONFIG = Config(ghosts=FEW_HEIGHTS)
+_FINE = 4
+_BITS = 6
+
+
+@dataclass(frozen=True)
+class Moment:
+    """What all cameras saw at one time."""
+
+    frame: int
+    views: tuple[Observation, ...]
+
+
+def looking(
+    name: str,
+    centre: Sequence[float],
+    target: Sequence[float] = (0.0, 0.0, 0.9),
+    size: tuple[int, int] = SIZE,
+    focal: float = FOCAL,
+    distortion: Sequence[float] | None = None,
+) -> Camera:
+    """A camera at a place, metres, that looks at another."""
+    place = np.asarray(centre, float)
+    forward = np.asarray(target, float) - place
+    forward /= np.linalg.norm(forward)
+    right = np.cross(forward, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    rotation = np.stack([right, np.cross(forward, right), forward])
+    matrix = np.array([[focal, 0.0, (size[0] - 1) / 2], [0.0, focal, (size[1] - 1) / 2], [0.0, 0.0, 1.0]])
+    projection = matrix @ np.column_stack([rotation, -rotation @ place])
+    lens = None if distortion is None else Lens(matrix, np.asarray(distortion, float))
+    return Camera.from_projection(name, size, projection, lens)
+
+
+def corner_cameras() -> tuple[Camera, ...]:
+    """One camera above each corner of the room."""
+    corners = ((-3.5, -3.5), (3.5, -3.4), (3.4, 3.5), (-3.4, 3.4))
+    return tuple(looking(f"corner{k}", (*corner, 2.6)) for k, corner in enumerate(corners))
+
+
+def rig_of(cameras: Sequence[Camera], cell: float = 0.25, planes: int = 4) -> Rig:
+    """The room under these cameras."""
+    return Rig("room", FRAME_RATE, Grid(AREA, AREA, cell, 1.8, planes), tuple(cameras))
+
+
+def room() -> Rig:
+    """The room under its four corner cameras."""
+    return rig_of(corner_cameras())
+
+
+def people(*places: Sequence[float]) -> Floats:
+    """People at x, y (metres) and, where it is given, of a height; 1.7 m otherwise."""
+    return np.array([(*place, 1.7)[:3] if len(place) == 2 else place for place in places], float).reshape(-1, 3)
+
+
+def ring(person: Floats, share: float, radius: float, points: int = 32) -> Floats:
+    """Points of one disc of a body, at a share of its height, float64 (points, 3), metres."""
+    angle = np.linspace(0, 2 * np.pi, points, endpoint=False)
+    x, y, height = person
+    return np.column_stack([x + radius * np.cos(angle), y + radius * np.sin(angle), np.full(points, share * height)])
+
+
+def body_points(person: Floats, levels: int = 60) -> Floats:
+    """Points of the whole body of revolution, float64 (n, 3), metres."""
+    shares = np.union1d(np.linspace(0, 1, levels), PROFILE[:, 0])
+    return np.concatenate([ring(person, s, float(np.interp(s, PROFILE[:, 0], PROFILE[:, 1]))) for s in shares])
+
+
+def body_box(camera: Camera, person: Floats) -> Floats:
+    """Left, top, right, bottom of a body's pixels, not clipped to the image; nan where a point of it is unseen."""
+    points = body_points(person)
+    pixel, ahead = camera.project(points[:, :2], points[:, 2])
+    return np.concatenate([pixel.min(0), pixel.max(0)]) if ahead.all() else np.full(4, np.nan)
+
+
+def box(camera: Camera, person: Floats) -> Boxes:
+    """A perfect detector's box of one person, clipped to the image; none where the person is outside it."""
+    width, height = camera.size
+    edges = body_box(camera, person).clip(0, [width - 1, height - 1] * 2)
+    if not (edges[2] > edges[0] and edges[3] > edges[1]):
+        return no_boxes()
+    return Boxes(np.concatenate([edges[:2], edges[2:] - edges[:2]])[None], np.ones(1))
+
+
+def no_boxes() -> Boxes:
+    """A frame in which a detector found nobody."""
+    return Boxes(np.zeros((0, 4)), np.zeros(0))
+
+
+def together(found: Sequence[Boxes]) -> Boxes:
+    """All boxes of one view."""
+    return Boxes(
+        np.concatenate([np.zeros((0, 4)), *(b.pixel for b in found)]), np.concatenate([[], *(b.score for b in found)])
+    )
+
+
+def boxes(camera: Camera, standing: Floats) -> Boxes:
+    """A perfect detector's boxes of everybody, hidden or not."""
+    return together([box(camera, person) for person in standing])
+
+
+def mask(camera: Camera, standing: Floats) -> Bytes:
+    """The exact silhouette of everybody, uint8 (v, u); pixels at its edge are as bright as they are covered."""
+    width, height = camera.size
+    fine = np.zeros((height * _FINE, width * _FINE), np.uint8)
+    for person in standing:
+        for lower, upper in pairwise(PROFILE):
+            points = np.concatenate([ring(person, *lower), ring(person, *upper)])
+            pixel, ahead = camera.project(points[:, :2], points[:, 2])
+            if ahead.all():
+                corners = np.rint(((pixel + 0.5) * _FINE - 0.5) * 2**_BITS).astype(np.int32)
+                cv2.fillConvexPoly(fine, cv2.convexHull(corners), (255,), shift=_BITS)
+    cells = fine.reshape(height, _FINE, width, _FINE).astype(float)
+    return np.asarray(np.rint(cells.mean((1, 3))), np.uint8)
+
+
+def likelihoods(cameras: Sequence[Camera], standing: Floats) -> list[Singles]:
+    """The masks of all cameras as likelihood maps, float32 (v, u)."""
+    return [(mask(camera, standing) / np.float32(255)).astype(np.float32) for camera in cameras]
+
+
+def walkers(frames: int) -> Rows:
+    """Three people who walk through the room for so many frames; TRAJECTORY rows with frame, id, x, y, height.
+
+    The first two pass each other 0.9 m apart, the third walks a half circle.
+    """
+    rows = np.zeros((frames, 3), TRAJECTORY)
+    share = np.arange(frames) / 40
+    turn = np.pi * share
+    rows["frame"], rows["id"] = np.arange(frames)[:, None], [11, 12, 13]
+    rows["x"] = np.column_stack([-1.4 + 2.8 * share, 1.4 - 2.8 * share, 1.3 * np.cos(turn) + 0.1])
+    rows["y"] = np.column_stack([np.full(frames, -1.3), np.full(frames, -0.4), 0.4 + 1.1 * np.sin(turn)])
+    rows["height"] = [1.7, 1.8, 1.6]
+    return rows.ravel()
+
+
+def standing_at(truth: Rows, frame: int) -> Floats:
+    """People of one frame of a trajectory."""
+    own = truth[truth["frame"] == frame]
+    return np.column_stack([own["x"], own["y"], own["height"].astype(float)])
+
+
+def mask_moments(rig: Rig, truth: Rows, first: int, stop: int) -> Iterator[Moment]:
+    """Frames first .. stop - 1 as masks of all cameras."""
+    for frame in range(first, stop):
+        standing = standing_at(truth, frame)
+        yield Moment(frame, tuple(mask(camera, standing) for camera in rig.cameras))
+
+
+def box_moments(rig: Rig, truth: Rows, first: int, stop: int) -> Iterator[Moment]:
+    """Frames first .. stop - 1 as boxes of all cameras."""
+    for frame in range(first, stop):
+        standing = standing_at(truth, frame)
+        yield Moment(frame, tuple(boxes(camera, standing) for camera in rig.cameras))

@@ -1,0 +1,427 @@
+"""The pass of a frame: its kernels by definition, its search by trying all, and what it makes of named scenes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+import pytest
+import reference_core as reference
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scenes import (
+    FEW_HEIGHTS,
+    body_points,
+    boxes,
+    corner_cameras,
+    likelihoods,
+    looking,
+    no_boxes,
+    people,
+    rig_of,
+    room,
+    together,
+)
+from strategies import numbers
+
+from stseg.arrays import Floats, Ints
+from stseg.geometry import Camera, Rig
+from stseg.geometry.bodies import BodyTable
+from stseg.ghosts.boxes import fill_best_match, fill_cover, fill_inside, fill_match, half_square
+from stseg.ghosts.evidence import BoxEvidence, PixelEvidence, Terms
+from stseg.ghosts.explain import Explanation, FramePass, ViewEvidence
+from stseg.ghosts.outlines import outlines
+from stseg.ghosts.scoring import set_score
+from stseg.ghosts.search import search
+
+WIDTH, HEIGHT = 128.0, 96.0
+KINDS = ("pixels", "boxes")
+NOBODY = np.zeros((0, 3))
+TERMS = Terms(-3.0, 0.3, 3.0, 0.2, 0.2, 0.9, 0.02, 2.0)
+EDGES = st.tuples(numbers(-60, 150), numbers(-80, 100), numbers(1, 60), numbers(2, 150)).map(
+    lambda b: np.array([b[0], b[1], b[0] + b[2], b[1] + b[3]])
+)
+
+
+# Boxes and pillars
+
+
+@settings(deadline=None)
+@given(EDGES, EDGES)
+def test_half_square_by_definition(body: Floats, box: Floats) -> None:
+    expected = reference.half_square(body, box, WIDTH, HEIGHT)
+    assert half_square(body, box, WIDTH, HEIGHT) == pytest.approx(expected, rel=1e-9)
+
+
+def test_a_box_that_fits_costs_nothing_and_early_feet_little() -> None:
+    body = np.array([50.0, 20.0, 62.0, 70.0])
+    assert half_square(body, body, WIDTH, HEIGHT) == 0.0
+    early, late = body + np.array([[0, 0, 0, -8], [0, 0, 0, 8]])
+    assert half_square(body, late, WIDTH, HEIGHT) == pytest.approx(16 * half_square(body, early, WIDTH, HEIGHT))
+
+
+@settings(deadline=None)
+@given(st.lists(EDGES, min_size=1, max_size=4).map(np.array), st.lists(EDGES, max_size=3), st.integers(0, 99))
+def test_matches_by_definition(bodies: Floats, found: list[Floats], seed: int) -> None:
+    bodies[seed % len(bodies)] = np.nan if seed % 3 == 0 else bodies[0]
+    edges = np.array(found).reshape(-1, 4)
+    belief = np.log(np.random.default_rng(seed).uniform(0.1, 1, len(edges)))
+    match, best = np.empty((len(bodies), len(edges))), np.empty((1, len(bodies)))
+    fill_match(bodies, edges, belief, WIDTH, HEIGHT, match)
+    fill_best_match(bodies[None], edges, belief, WIDTH, HEIGHT, best)
+    for i, body in enumerate(bodies):
+        costs = [np.inf if np.isnan(body).any() else reference.half_square(body, e, WIDTH, HEIGHT) for e in edges]
+        np.testing.assert_allclose(match[i], belief - np.array(costs).reshape(-1), rtol=1e-9)
+    np.testing.assert_array_equal(best[0], match.max(1, initial=-np.inf))
+
+
+@settings(deadline=None)
+@given(st.lists(EDGES, min_size=1, max_size=4).map(np.array), st.integers(0, 99))
+def test_inside_and_cover_by_definition(bodies: Floats, seed: int) -> None:
+    bodies[seed % len(bodies)] = np.nan if seed % 3 == 0 else bodies[0]
+    distance = np.random.default_rng(seed).uniform(2, 3, len(bodies))
+    inside, cover = np.empty(len(bodies)), np.empty((len(bodies),) * 2)
+    fill_inside(bodies, WIDTH, HEIGHT, inside)
+    fill_cover(bodies, distance, WIDTH, HEIGHT, cover)
+    everyone = range(len(bodies))
+    np.testing.assert_allclose(inside, [reference.inside(b, WIDTH, HEIGHT) for b in bodies], atol=1e-12)
+    hidden = [[reference.cover(bodies, distance, WIDTH, HEIGHT, i, k) for k in everyone] for i in everyone]
+    np.testing.assert_allclose(cover, hidden, atol=1e-12)
+
+
+@pytest.mark.parametrize("step", [1, 3])
+def test_an_outline_is_the_silhouette(step: int) -> None:
+    camera = corner_cameras()[0]
+    standing = people((0.3, -0.4), (1.2, 1.1, 1.6))
+    rows, columns = -(-96 // step), -(-128 // step)
+    table = BodyTable.of(camera, room().grid)
+    first, spans, area = outlines(table, standing[:, :2], standing[:, 2], step, (rows, columns))
+    for j, shown in enumerate(likelihoods([camera], standing[k : k + 1])[0] for k in range(2)):
+        fine = np.pad(shown, ((0, rows * step - 96), (0, columns * step - 128)))
+        silhouette = fine.reshape(rows, step, columns, step).mean((1, 3))
+        filled = np.zeros((rows, columns))
+        for k, (start, stop) in enumerate(spans[j]):
+            filled[first[j] + k, start:stop] = 1
+        edge = (silhouette > 0.0) & (silhouette < 1.0)
+        assert (filled == (silhouette > 0.5))[~edge].all()
+        assert area[j] == pytest.approx(silhouette.sum(), rel=0.15)
+
+
+def test_outlines_outside_the_image() -> None:
+    ahead = looking("ahead", (0.0, 0.0, 1.5), target=(2.0, 0.0, 1.0))
+    table = BodyTable.of(ahead, room().grid)
+    places = np.array([[-1.5, 0.0], [0.3, 1.9]])
+    first, _, _ = outlines(table, places, np.array([1.7, 1.7]), 1, (96, 128))
+    np.testing.assert_array_equal(first, [-1, -1])
+
+
+# The score of a set
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A crafted frame: the evidence of some candidates."""
+
+    boxes: BoxEvidence
+    pixels: PixelEvidence
+    own: Floats
+    ground: Floats
+
+    def score(self, members: Sequence[int] | Ints) -> float:
+        """The fast score of a set."""
+        chosen = np.array(members, np.int64)
+        views = len(self.boxes.boxes) + len(self.pixels.raster)
+        scratch = np.empty(max(self.pixels.raster[0].size, self.boxes.match.shape[2]), np.int64)
+        parts = np.zeros((views, len(self.own) + 1))
+        own, ground = self.own, self.ground
+        return set_score(chosen, len(chosen), self.boxes, self.pixels, own, ground, TERMS, scratch, parts)
+
+    def found(self, start: Sequence[int] = ()) -> list[int]:
+        """The set that the search ends with."""
+        room = np.zeros(len(self.own) + 1, np.int64)
+        room[: len(start)] = start
+        views = len(self.boxes.boxes) + len(self.pixels.raster)
+        scratch = np.empty(max(self.pixels.raster[0].size, self.boxes.match.shape[2]), np.int64)
+        parts = np.zeros((views, len(self.own) + 1))
+        own, ground = self.own, self.ground
+        count = search(room, len(start), self.boxes, self.pixels, own, ground, TERMS, scratch, parts)
+        return sorted(room[:count].tolist())
+
+
+def problem(seed: int, candidates: int) -> Problem:
+    """Two views with boxes, two with pixels; candidates that share boxes, hide each other and crowd."""
+    rng = np.random.default_rng(seed)
+    views, most, rows, columns = 2, 4, 8, 10
+    match = -rng.exponential(2.0, (views, candidates, most))
+    match[rng.random(match.shape) < 0.5] = -np.inf
+    cover = rng.uniform(0, 1, (views, candidates, candidates)) * (rng.random((views, candidates, candidates)) < 0.3)
+    cover[:, np.arange(candidates), np.arange(candidates)] = 0
+    evidence = BoxEvidence(match, np.array([most, 2]), cover, rng.uniform(0.3, 1, (views, candidates)))
+    start = rng.integers(0, columns - 2, (views, candidates, 4))
+    stop = np.minimum(start + rng.integers(0, 6, start.shape), columns)
+    first = rng.integers(-1, rows - 1, (views, candidates))
+    area = (stop - start).sum(-1) + rng.integers(1, 5, (views, candidates)).astype(float)
+    pixels = PixelEvidence(
+        rng.normal(0.3, 1.5, (views, rows, columns)).astype(np.float32),
+        first,
+        np.stack([start, stop], -1).astype(np.int16),
+        area,
+        rng.uniform(1, 5, (views, candidates)),
+    )
+    return Problem(evidence, pixels, rng.normal(0, 0.5, candidates), rng.uniform(0, 1.2, (candidates, 2)))
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_score_by_definition(seed: int) -> None:
+    frame = problem(seed, 6)
+    rng = np.random.default_rng(seed)
+    for _ in range(3):
+        members = rng.permutation(6)[: rng.integers(0, 7)].tolist()
+        expected = reference.set_score(members, frame.boxes, frame.pixels, frame.own, frame.ground, TERMS)
+        assert frame.score(members) == pytest.approx(expected, abs=1e-5)
+
+
+def test_a_box_speaks_for_one_person() -> None:
+    one = problem(0, 2)
+    boxes_only = BoxEvidence(np.zeros((1, 2, 1)), np.array([1]), np.zeros((1, 2, 2)), np.ones((1, 2)))
+    blank = one.pixels._replace(raster=np.zeros_like(one.pixels.raster))
+    frame = Problem(boxes_only, blank, np.zeros(2), np.array([[0.0, 0.0], [2.0, 0.0]]))
+    assert frame.score([0]) - frame.score([]) == pytest.approx(TERMS.person + TERMS.hit)
+    assert frame.score([0, 1]) - frame.score([0]) == pytest.approx(TERMS.person + np.log(TERMS.box_miss))
+
+
+def test_a_pixel_belongs_to_the_nearest_body() -> None:
+    spans = np.array([[[[0, 4]], [[2, 6]]]], np.int16)
+    raster = np.array([[[1, 1, 1, 1, -5, -5]]], np.float32)
+    pixels = PixelEvidence(raster, np.zeros((1, 2), np.int64), spans, np.full((1, 2), 4.0), np.array([[3.0, 2.0]]))
+    none = BoxEvidence(np.zeros((0, 2, 0)), np.zeros(0, np.int64), np.zeros((0, 2, 2)), np.zeros((0, 2)))
+    frame = Problem(none, pixels, np.zeros(2), np.array([[0.0, 0.0], [2.0, 0.0]]))
+    near = TERMS.person + TERMS.body_weight * (1 + 1 - 5 - 5) / 4
+    assert frame.score([1]) == pytest.approx(near)
+    assert frame.score([0, 1]) == pytest.approx(near + TERMS.person + TERMS.body_weight * (1 + 1) / 4)
+
+
+# The search
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_no_single_move_helps(seed: int) -> None:
+    frame = problem(seed, 7)
+    start = [] if seed % 2 else [0, 3]
+    members = frame.found(start)
+    assert len(set(members)) == len(members)
+    score = frame.score(members) + 1e-6
+    assert score >= frame.score(start)
+    others = [i for i in range(7) if i not in members]
+    for leaving in members:
+        without = [i for i in members if i != leaving]
+        assert score >= frame.score(without)
+        near = [i for i in others if np.hypot(*(frame.ground[i] - frame.ground[leaving])) <= 0.7]
+        assert all(score >= frame.score([*without, i]) for i in near)
+    assert all(score >= frame.score([*members, i]) for i in others)
+
+
+def test_the_best_of_all_sets_is_nearly_always_found() -> None:
+    frames = [problem(seed, 7) for seed in range(30)]
+    missed = [
+        seed
+        for seed, frame in enumerate(frames)
+        if frame.score(frame.found()) < max(frame.score(s) for s in reference.subsets(7)) - 1e-6
+    ]
+    assert len(missed) <= 3, missed
+
+
+# The pass on named scenes
+
+
+@cache
+def pass_of(kind: str) -> FramePass:
+    return FramePass(room(), [kind] * 4, FEW_HEIGHTS)
+
+
+def show(kind: str, cameras: Sequence[Camera], standing: Floats) -> list[ViewEvidence]:
+    """What the cameras deliver: exact masks, or a box of everybody."""
+    if kind == "pixels":
+        return list(likelihoods(cameras, standing))
+    return [boxes(camera, standing) for camera in cameras]
+
+
+def assert_found(explanation: Explanation, standing: Floats, within: float = 0.12) -> Ints:
+    """Assert that these people and nobody else were found; for each the index of whom was found there."""
+    found = explanation.people
+    assert len(found) == len(standing), found.ground
+    away = np.hypot(*np.moveaxis(standing[:, None, :2] - found.ground, -1, 0))
+    who = np.asarray(away.argmin(1), np.int64)
+    assert len(set(who.tolist())) == len(standing)
+    assert away.min(1).max() < within, (found.ground, standing)
+    return who
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_two_people_apart(kind: str) -> None:
+    standing = people((-0.83, 0.31), (0.9, -0.62, 1.8))
+    explanation = pass_of(kind).explain(show(kind, room().cameras, standing), NOBODY)
+    who = assert_found(explanation, standing)
+    found = explanation.people
+    np.testing.assert_allclose(found.height[who], standing[:, 2], atol=0.11)
+    assert (found.evidence > 5).all()
+    assert (found.parts > 0.5).all()
+    assert found.parts.shape == found.visible.shape == (4, 2)
+    spread = np.linalg.eigvalsh(found.covariance)
+    assert ((spread > 0) & (spread < 0.15**2)).all()
+    assert (explanation.ghosts.evidence < 0).all()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_who_explains_what(kind: str) -> None:
+    rig = room()
+    standing = people((-0.7, -0.7), (0.8, 0.8))
+    explanation = pass_of(kind).explain(show(kind, rig.cameras, standing), NOBODY)
+    near, far = assert_found(explanation, standing)
+    points = body_points(np.array([-0.7, -0.7, 1.5]))
+    pixel, _ = rig.cameras[0].project(points[::20, :2], points[::20, 2])
+    u, v = np.rint(pixel / explanation.raster_step[0]).astype(int).T
+    owner = explanation.owner[0][v, u]
+    assert (owner == near).mean() > 0.8
+    assert not (owner == far).any()
+    assert set(np.unique(explanation.owner[2]).tolist()) == {-1, 0, 1}
+    for owners in explanation.box_owner:
+        assert sorted(owners.tolist()) == ([near, far] if near < far else [far, near]) * (kind == "boxes")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_one_behind_the_other_in_a_view(kind: str) -> None:
+    rig = room()
+    standing = people((-0.5, -0.5, 1.8), (0.1, 0.1, 1.6))
+    seen = show(kind, rig.cameras, standing)
+    if kind == "boxes":
+        seen[0] = boxes(rig.cameras[0], standing[:1])
+    explanation = pass_of(kind).explain(seen, NOBODY)
+    near, far = assert_found(explanation, standing)
+    if kind == "boxes":
+        assert explanation.box_owner[0].tolist() == [near]
+        assert explanation.people.visible[0, far] < 0.3 < 0.9 < explanation.people.visible[0, near]
+        assert explanation.people.parts[0, far] > -1.0  # a box that nobody expects is not missed
+
+
+def crossing(kind: str) -> tuple[Rig, FramePass]:
+    """Two cameras whose lines of sight to two people cross in four places."""
+    west, south = looking("west", (-4.0, 0.0, 2.2)), looking("south", (0.0, -4.0, 2.2))
+    rig = rig_of([west, south])
+    return rig, FramePass(rig, [kind] * 2, FEW_HEIGHTS)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_crossing_lines_of_sight_are_ghosts(kind: str) -> None:
+    """HW12 figure 4."""
+    rig, frame_pass = crossing(kind)
+    standing = people((-1.0, -1.0), (1.0, 1.0))
+    explanation = frame_pass.explain(show(kind, rig.cameras, standing), NOBODY)
+    assert_found(explanation, standing, within=0.2)
+    crossings = np.array([[0.5, -1.5], [-1.5, 0.5]])
+    ghosts = explanation.ghosts
+    assert len(ghosts) >= 1
+    assert (ghosts.evidence < 0).all()
+    away = np.hypot(*np.moveaxis(crossings[:, None] - ghosts.ground, -1, 0)).min(1)
+    assert (away < 0.6).all(), ghosts.ground
+    assert ghosts.parts.shape == (2, len(ghosts))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_somebody_hidden_from_all_but_two_views_stays(kind: str) -> None:
+    rig = room()
+    hidden = people((0.0, 1.0, 1.6))
+    nearer = people((-0.92, -0.18, 1.8), (0.93, -0.17, 1.8))  # on the lines to the first two cameras
+    everybody = np.concatenate([hidden, nearer])
+    seen = show(kind, rig.cameras, everybody)
+    if kind == "boxes":
+        seen[:2] = [boxes(camera, nearer) for camera in rig.cameras[:2]]
+    explanation = pass_of(kind).explain(seen, NOBODY)
+    assert_found(explanation, everybody, within=0.2)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_an_empty_frame_holds_nobody(kind: str) -> None:
+    seen = show(kind, room().cameras, NOBODY)
+    explanation = pass_of(kind).explain(seen, NOBODY)
+    assert len(explanation.people) == 0
+    assert len(explanation.ghosts) == 0
+    assert all((owner == -1).all() for owner in explanation.owner)
+    # Whoever was there a moment ago is not there now.
+    explanation = pass_of(kind).explain(seen, people((0.2, 0.4)))
+    assert len(explanation.people) == 0
+    assert len(explanation.ghosts) == 1
+    assert explanation.ghosts.evidence[0] < 0
+    assert explanation.people.parts.shape == (4, 0)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_track_proposes_and_the_frame_decides(kind: str) -> None:
+    standing = people((0.2, 0.4))
+    seen = show(kind, room().cameras, standing)
+    explanation = pass_of(kind).explain(seen, people((0.25, 0.35), (-1.2, 1.1)))
+    assert_found(explanation, standing)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_blind_view_says_nothing(kind: str) -> None:
+    standing = people((-0.83, 0.31), (0.9, -0.62))
+    cameras = corner_cameras()
+    seen = show(kind, cameras, standing)
+    three = FramePass(rig_of(cameras[:3]), [kind] * 3, FEW_HEIGHTS).explain(seen[:3], NOBODY)
+    four = pass_of(kind).explain([*seen[:3], None], NOBODY)
+    np.testing.assert_allclose(four.people.ground, three.people.ground, atol=1e-9)
+    np.testing.assert_array_equal(four.people.height, three.people.height)
+    np.testing.assert_allclose(four.people.parts[:3], three.people.parts, atol=1e-9)
+    np.testing.assert_allclose(four.people.parts[3], 0.0, atol=0.02)
+    np.testing.assert_allclose(four.people.evidence, three.people.evidence, atol=0.02)
+    if kind == "boxes":
+        assert len(four.box_owner[3]) == 0
+
+
+def test_all_blind() -> None:
+    for kind in KINDS:
+        assert len(pass_of(kind).explain([None] * 4, NOBODY).people) == 0
+
+
+def test_parts_stand_in_the_order_of_the_rig() -> None:
+    """A rig that mixes both kinds: what a view says stands in that view's row."""
+    cameras = corner_cameras()
+    kinds = ["pixels", "boxes", "pixels", "boxes"]
+    standing = people((0.4, 0.3))
+    seen: list[ViewEvidence] = [show(kind, [c], standing)[0] for kind, c in zip(kinds, cameras, strict=True)]
+    frame_pass = FramePass(rig_of(cameras), kinds, FEW_HEIGHTS)
+    for silent, kind in enumerate(kinds):
+        partly = [*seen]
+        partly[silent] = show(kind, cameras[silent : silent + 1], NOBODY)[0]
+        parts = frame_pass.explain(partly, NOBODY).people.parts[:, 0]
+        assert [bool(p < 0) for p in parts] == [k == silent for k in range(4)], (silent, parts)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_same_frame_twice(kind: str) -> None:
+    rig = room()
+    first, second = people((-0.83, 0.31), (0.9, -0.62), (0.5, 0.1)), people((0.1, 0.1))
+    fresh = FramePass(rig, [kind] * 4, FEW_HEIGHTS).explain(show(kind, rig.cameras, first), NOBODY)
+    used = pass_of(kind)
+    used.explain(show(kind, rig.cameras, second), NOBODY)
+    again = used.explain(show(kind, rig.cameras, first), NOBODY)
+    for name in ("ground", "height", "covariance", "evidence", "parts", "visible"):
+        np.testing.assert_array_equal(getattr(fresh.people, name), getattr(again.people, name))
+        np.testing.assert_array_equal(getattr(fresh.ghosts, name), getattr(again.ghosts, name))
+
+
+def test_boxes_of_things_are_nobody() -> None:
+    """A box in one view that no other view bears out."""
+    rig = room()
+    standing = people((-0.83, 0.31))
+    thing = boxes(rig.cameras[1], people((1.0, 0.9)))
+    seen: list[ViewEvidence] = list(show("boxes", rig.cameras, standing))
+    seen[1] = together([boxes(rig.cameras[1], standing), thing])
+    explanation = pass_of("boxes").explain(seen, NOBODY)
+    assert_found(explanation, standing)
+    assert explanation.box_owner[1].tolist() == [0, -1]
+    seen[1] = no_boxes()
+    assert_found(pass_of("boxes").explain(seen, NOBODY), standing)

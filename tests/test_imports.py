@@ -1,0 +1,173 @@
+"""Who may import whom, read from the sources."""
+
+from __future__ import annotations
+
+import ast
+import sys
+import tomllib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+
+FOUNDATION = ("errors", "arrays", "accelerate", "settings", "config", "tracks", "geometry")
+"""Records and geometry. Each may import those before it, and everything below may import all of them."""
+
+STAGES = ("foreground", "ghosts", "occupancy", "segmentation", "identity", "trackers")
+"""In the order in which a frame passes through them. The pass that finds people stands before the volume, since the
+volume is shaped by what it explains (METHODS 7)."""
+
+CROSSINGS = {
+    ("occupancy", "foreground"): "boxes as a soft map, whose clutter is weighed",
+    ("occupancy", "ghosts"): "the explanation of the frame, and how well a box fits a body",
+    ("identity", "segmentation"): "blobs are what identities are given to",
+    ("trackers", "ghosts"): "the people of a frame are part of what is tracked",
+    ("trackers", "occupancy"): "how many views see a place",
+    ("trackers", "segmentation"): "a tracker cuts",
+    ("trackers", "identity"): "and names",
+}
+"""What one stage takes from another, and why. Every other pair is strangers."""
+
+BESIDE = {
+    "evaluation": {"errors", "arrays"},
+    "io": {"errors", "arrays", "settings", "config", "tracks", "geometry", "__init__"},
+    "report": {"errors", "arrays", "tracks", "geometry"},
+    "simulate": {"errors", "arrays", "accelerate", "geometry"},
+}
+"""What stands beside the way from pixels to tracks."""
+
+AT_HOME = {
+    "h5py": ("stseg.io",),
+    "cv2": ("stseg.io", "stseg.report", "stseg.simulate", "stseg.calibrate"),
+    "maxflow": ("stseg.segmentation.cut",),
+    "numba": ("stseg.accelerate",),
+    "cyclopts": ("stseg.commands",),
+    "rich": ("stseg.commands",),
+    "tomllib": ("stseg.io",),
+    "pathlib": ("stseg.io", "stseg.commands"),
+}
+"""Libraries, and the only modules that know them."""
+
+NEEDED = ("numpy", "scipy")
+"""Libraries that every module may use."""
+
+
+@dataclass(frozen=True)
+class Module:
+    """A source file of the package."""
+
+    name: str
+    tree: ast.Module
+
+    @property
+    def part(self) -> str:
+        """The part of the package that it belongs to: `stseg.io.rigs` is of `io`."""
+        return f"{self.name}.__init__".split(".")[1]
+
+    def imports(self) -> Iterator[str]:
+        """Full names of what it imports; of `from a import b`, both a and a.b."""
+        for node in ast.walk(self.tree):
+            if isinstance(node, ast.Import):
+                yield from (alias.name for alias in node.names)
+            elif isinstance(node, ast.ImportFrom):
+                assert node.level == 0, f"{self.name} line {node.lineno}: a relative import"
+                yield node.module or ""
+                yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def modules() -> list[Module]:
+    # The link stseg/io is not followed by glob on every Python, so the folder behind it is read by itself.
+    found = {path: ("stseg", *path.relative_to(ROOT / "stseg").parts) for path in (ROOT / "stseg").rglob("*.py")}
+    found = {path: parts for path, parts in found.items() if parts[1] != "io"}
+    found |= {path: ("stseg", "io", *path.relative_to(ROOT / "io").parts) for path in (ROOT / "io").rglob("*.py")}
+    return [
+        Module(".".join(parts).removesuffix(".py").removesuffix(".__init__"), ast.parse(path.read_text("utf-8")))
+        for path, parts in sorted(found.items())
+    ]
+
+
+MODULES = modules()
+
+
+def parts_imported(module: Module) -> set[str]:
+    """Parts of the package that a module imports, its own left out; `stseg` itself is `__init__`."""
+    parts = {*FOUNDATION, *STAGES, *BESIDE, "pipeline", "commands"}
+    taken = {name.split(".")[1] for name in module.imports() if name.startswith("stseg.")}
+    if any(name == "stseg.__version__" for name in module.imports()):
+        taken = (taken - {"__version__"}) | {"__init__"}
+    assert taken <= parts | {"__init__"}, f"{module.name} imports {taken - parts}, of which no rule is known"
+    return taken - {module.part}
+
+
+def allowed(part: str) -> set[str]:
+    """What the modules of a part may import."""
+    if part == "__init__":
+        return set()
+    if part in FOUNDATION:
+        return set(FOUNDATION[: FOUNDATION.index(part)])
+    if part in STAGES:
+        return {*FOUNDATION, *(taken for taker, taken in CROSSINGS if taker == part)}
+    if part == "pipeline":
+        return {*FOUNDATION, *STAGES}
+    if part == "commands":
+        return {*FOUNDATION, *STAGES, *BESIDE, "pipeline", "__init__"}
+    return BESIDE[part]
+
+
+@pytest.mark.parametrize("module", MODULES, ids=lambda module: module.name)
+def test_a_module_imports_what_stands_below_it(module: Module) -> None:
+    assert parts_imported(module) <= allowed(module.part)
+
+
+def test_stages_look_back_only_and_no_leave_is_out_of_use() -> None:
+    for taker, taken in CROSSINGS:
+        assert STAGES.index(taken) < STAGES.index(taker)
+    used = {(module.part, taken) for module in MODULES for taken in parts_imported(module)}
+    assert set(CROSSINGS) <= used
+
+
+@pytest.mark.parametrize("library", AT_HOME)
+def test_a_library_is_known_where_it_belongs(library: str) -> None:
+    at_home = [module for module in MODULES if library in {name.split(".")[0] for name in module.imports()}]
+    for module in at_home:
+        assert module.name.startswith(AT_HOME[library]), f"{module.name} imports {library}"
+    assert at_home, f"nothing imports {library}"
+
+
+def test_one_module_knows_the_solver() -> None:
+    assert sum("maxflow" in set(module.imports()) for module in MODULES) == 1
+
+
+def test_every_other_library_is_numpy_scipy_or_of_python_itself() -> None:
+    known = {*AT_HOME, *NEEDED, *sys.stdlib_module_names, "stseg"}
+    for module in MODULES:
+        assert {name.split(".")[0] for name in module.imports()} <= known, module.name
+
+
+@pytest.mark.parametrize("module", MODULES, ids=lambda module: module.name)
+def test_only_commands_print(module: Module) -> None:
+    called = [node.func for node in ast.walk(module.tree) if isinstance(node, ast.Call)]
+    prints = [name for name in called if isinstance(name, ast.Name) and name.id == "print"]
+    assert module.part == "commands" or not prints
+
+
+def test_no_drawer_for_odds_and_ends() -> None:
+    for module in MODULES:
+        assert not {"utils", "util", "helpers", "misc", "common"} & set(module.name.split("."))
+
+
+def test_io_is_a_linked_folder_without_init() -> None:
+    # With an __init__.py, io would hide Python's own io from type checkers and, without frozen modules, from Python.
+    assert not (ROOT / "io" / "__init__.py").exists()
+    assert (ROOT / "stseg" / "io" / "layout.py").samefile(ROOT / "io" / "layout.py")
+
+
+def test_pyproject_lists_every_package() -> None:
+    listed = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["setuptools"]["packages"]
+    folders = {path.parent for path in (ROOT / "stseg").rglob("*.py")} | {
+        ROOT / "stseg" / path.parent.relative_to(ROOT) for path in (ROOT / "io").rglob("*.py")
+    }
+    assert sorted(listed) == sorted(".".join(folder.relative_to(ROOT).parts) for folder in folders)

@@ -1,0 +1,202 @@
+"""The sets that docs/results.md is measured on: what each is made from, and how it is scored.
+
+Commands are written as one types them; $DATA is the folder of data sets, $WORK the folder for what is made.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+__all__ = ["SETS", "ResultSet"]
+
+
+@dataclass(frozen=True)
+class ResultSet:
+    """One set of the table.
+
+    Attributes
+    ----------
+    name
+    foreground
+        What the run starts from.
+    views
+        Number of cameras.
+    frames
+        A:B, half open: what is run and scored.
+    rig
+        The rig file.
+    prepare
+        Commands that make it, and what else is needed.
+    film
+        The command that renders a simulated scene; run only where `rig` is not there yet.
+    truth
+        CSV file, or None where there is none.
+    scoring
+        Options of `stseg evaluate` beside the frames.
+    area, remark
+        In words.
+    peer_frames
+        The part of the frames that peers were measured on, where it is not all of them.
+    """
+
+    name: str
+    foreground: str
+    views: int
+    frames: str
+    rig: str
+    prepare: tuple[str, ...] = ()
+    film: str | None = None
+    truth: str | None = None
+    scoring: str = ""
+    area: str = "all the ground"
+    remark: str = ""
+    peer_frames: str | None = None
+
+    def run_file(self, tracker: str) -> str:
+        """Where a run goes."""
+        return f"$WORK/{self.name}_{tracker}.h5"
+
+    def run_command(self, tracker: str) -> str:
+        """The run that the row was measured on."""
+        return f"stseg run {self.rig} -o {self.run_file(tracker)} --frames {self.frames} --tracker {tracker}"
+
+    def score_command(self, tracker: str, frames: str | None = None) -> str:
+        """How it was scored."""
+        options = f" {self.scoring}" if self.scoring else ""
+        return f"stseg evaluate {self.run_file(tracker)} {self.truth} --frames {frames or self.frames}{options}"
+
+
+_ROOM = "--size 644,486 --unit mm --up=-z --area=-2.5,-4.5,2.5,1.5"
+_CMC = "--names Cam1,Cam2,Cam3,Cam4 --size 1920,1024 --unit m --area=0,-0.4,7.67,3.6 --frame-rate 4"
+_CMC_AREA = "--area=1.9,-0.3,6.2,3.5"
+_WILDTRACK_VIEWS = ("CVLab1", "CVLab2", "CVLab3", "CVLab4", "IDIAP1", "IDIAP2", "IDIAP3")
+_WILDTRACK_FILES = " ".join(
+    f"$DATA/wildtrack/calibrations/intrinsic_zero/intr_{view}.xml"
+    f"+$DATA/wildtrack/calibrations/extrinsic/extr_{view}.xml"
+    for view in _WILDTRACK_VIEWS
+)
+_WILDTRACK = (
+    f"stseg calibrate import opencv {_WILDTRACK_FILES} -o $WORK/{{}}.toml --names {','.join(_WILDTRACK_VIEWS)} "
+    "--size 1920,1080 --unit cm --area=-3,-9,9,27 --frame-rate 2 --cell 0.20 --source-kind boxes "
+    "--source-pattern '{}/{{name}}.csv' --overwrite"
+)
+
+
+def _cmc(number: int, people: str) -> ResultSet:
+    name = f"cmc{number}"
+    return ResultSet(
+        name,
+        "a detector's boxes, without scores",
+        4,
+        "0:261",
+        f"$WORK/{name}.toml",
+        (
+            f"stseg calibrate import matrix $DATA/cmc/cam?_cam_mat.mat -o $WORK/{name}.toml {_CMC} --source-kind boxes "
+            f"--source-pattern '$DATA/cmc/DET_CMC{number}_{{name}}.txt' --first-frame 1 --overwrite",
+            f"python tools/result_inputs.py cmc-truth $DATA/cmc/GT_CMC{number}_WORLD_CENTROID.txt $WORK/{name}.csv",
+        ),
+        truth=f"$WORK/{name}.csv",
+        scoring=_CMC_AREA,
+        area="x 1.9 .. 6.2, y -0.3 .. 3.5 m",
+        remark=people,
+    )
+
+
+def _wildtrack(name: str, foreground: str, folder: str, *inputs: str) -> ResultSet:
+    truth = "python tools/result_inputs.py wildtrack-truth $DATA/wildtrack/annotations_positions $WORK/wildtrack.csv"
+    return ResultSet(
+        name,
+        foreground,
+        7,
+        "0:200",
+        f"$WORK/{name}.toml",
+        (*inputs, _WILDTRACK.format(name, folder), truth),
+        truth="$WORK/wildtrack.csv",
+        area="x -3 .. 9, y -9 .. 27 m",
+        remark="24 people a frame",
+        peer_frames="0:40",
+    )
+
+
+def _simulated(name: str, scene: str, rig: str, foreground: str, views: int, people: str) -> ResultSet:
+    return ResultSet(
+        name,
+        foreground,
+        views,
+        "0:250",
+        f"$WORK/{scene}/{rig}",
+        film=f"stseg simulate $WORK/{scene} --scene {scene}",
+        truth=f"$WORK/{scene}/truth.csv",
+        area="6 m x 6 m",
+        remark=people,
+    )
+
+
+_ALL = (
+    ResultSet(
+        "uu4",
+        "given silhouettes (video of masks)",
+        4,
+        "0:136",
+        "$WORK/uu4.toml",
+        (
+            f"stseg calibrate import opencv $DATA/uu4/cam?/config.xml -o $WORK/uu4.toml {_ROOM} --frame-rate 5 "
+            "--source-pattern '$DATA/uu4/{name}/foreground_cropped.avi' --source-kind masks --overwrite",
+        ),
+        truth="$DATA/uu4/reference_tracks.csv",
+        scoring="--ignore-flagged",
+        remark="4 people, flagged rows not judged",
+    ),
+    ResultSet(
+        "uu4_colour",
+        "Gaussian mixtures on colour video, learned from the empty room",
+        4,
+        "0:136",
+        "$WORK/uu4_colour.toml",
+        (
+            f"stseg calibrate import opencv $DATA/uu4/cam?/config.xml -o $WORK/uu4_colour.toml {_ROOM} --frame-rate 5 "
+            "--source-pattern '$DATA/uu4_colour/{name}.avi' --background '$DATA/uu4/{name}/background.avi' --overwrite",
+        ),
+        truth="$DATA/uu4/reference_tracks.csv",
+        scoring="--ignore-flagged",
+        remark="4 people, flagged rows not judged",
+    ),
+    _cmc(1, "3 people"),
+    _cmc(2, "up to 10 people"),
+    _wildtrack("wildtrack", "detector-like boxes with scores", "$DATA/wildtrack/detector"),
+    _wildtrack(
+        "wildtrack_annotated",
+        "annotated boxes: a check of geometry alone",
+        "$WORK/wildtrack_annotated",
+        "python tools/result_inputs.py wildtrack-boxes $DATA/wildtrack/annotations_positions $WORK/wildtrack_annotated",
+    ),
+    ResultSet(
+        "pom",
+        "given ragged masks, 160x120",
+        2,
+        "0:30",
+        "$WORK/pom.toml",
+        ("python tools/pom_rig.py $DATA/pom $WORK/pom.toml",),
+        remark="no truth: counts alone",
+    ),
+    ResultSet(
+        "uu1",
+        "Gaussian mixtures on colour video, learned from the empty room",
+        4,
+        "0:426",
+        "$WORK/uu1.toml",
+        (
+            f"stseg calibrate import opencv $DATA/uu1/cam?/config.xml -o $WORK/uu1.toml {_ROOM} --frame-rate 50 "
+            "--source-pattern '$DATA/uu1/{name}/video.avi' --background '$DATA/uu1/{name}/background.avi' --overwrite",
+        ),
+        remark="1 person, no truth: counts alone",
+    ),
+    _simulated("easy", "easy", "rig.toml", "Gaussian mixtures on rendered video", 4, "5 people"),
+    _simulated("dense", "dense", "rig.toml", "Gaussian mixtures on rendered video", 8, "14 people"),
+    _simulated("dense_masks", "dense", "rig_masks.toml", "exact silhouettes of the rendered crowd", 8, "14 people"),
+    _simulated("dense_boxes", "dense", "rig_boxes.toml", "a simulated detector's boxes", 8, "14 people"),
+    _simulated("dense4", "dense4", "rig.toml", "Gaussian mixtures on rendered video", 4, "14 people"),
+)
+
+SETS = {one.name: one for one in _ALL}
+"""In the order of the table."""

@@ -1,0 +1,171 @@
+"""Measure stseg on every set at hand and write docs/results.md.
+
+    python tools/results.py [--data ../shared/data] [--sets uu4,cmc1,...] [--tracker cut|frames|both] [--work FOLDER]
+
+Makes rig files, runs, scores and draws, all through the command line of `stseg`. Figures go to docs/results.json, each
+row replacing the same row of an earlier run, and from there into the marked parts of docs/results.md. `--sets none`
+writes the page anew from the figures that there are.
+
+Pictures are written under WORK/pictures and hold images of people; run files and rendered scenes stay in WORK.
+Rendered scenes are used again: remove WORK after a change to the simulator.
+"""
+
+from __future__ import annotations
+
+import argparse
+import datetime
+import json
+import shlex
+import subprocess
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from result_page import rewrite
+from result_pictures import draw, worst_frames
+from result_sets import SETS, ResultSet
+
+from stseg import __version__
+from stseg.io.runs import read_run
+from stseg.io.tracks import read_tracks_csv
+
+ROOT = Path(__file__).parents[1]
+TRACKERS = ("cut", "frames")
+_PROGRAMS = {
+    "stseg": [sys.executable, "-c", "import sys; from stseg.commands.main import main; sys.exit(main())"],
+    "python": [sys.executable],
+}
+_WARM_UP = 16  # frames
+
+
+@dataclass(frozen=True)
+class Bench:
+    """Where data lie and where results go; runs commands written with $DATA and $WORK."""
+
+    data: Path
+    work: Path
+
+    def path(self, text: str) -> Path:
+        """A path written with $DATA or $WORK."""
+        return Path(self._filled(text))
+
+    def do(self, command: str) -> str:
+        """Run a command and return what it printed; stop where it fails."""
+        print(f"$ {command}", flush=True)
+        program, *arguments = shlex.split(command)
+        words = [*_PROGRAMS[program], *(word for argument in arguments for word in self._words(argument))]
+        process = subprocess.run(words, stdout=subprocess.PIPE, text=True, cwd=ROOT, check=False)
+        if process.returncode:
+            sys.exit(f"results.py: exit status {process.returncode} of: {command}")
+        return process.stdout
+
+    def _filled(self, text: str) -> str:
+        return text.replace("$DATA", str(self.data)).replace("$WORK", str(self.work))
+
+    def _words(self, argument: str) -> list[str]:
+        """What a shell would make of an argument."""
+        filled = self._filled(argument)
+        if "?" not in argument:
+            return [filled]
+        return sorted(str(path) for path in Path("/").glob(filled.lstrip("/"))) or [filled]
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Measure the sets that are asked for, then write the page."""
+    options = _options(arguments)
+    bench = Bench(options.data.resolve(), options.work.resolve())
+    figures_path = ROOT / "docs" / "results.json"
+    for name in options.sets:
+        _prepare(SETS[name], bench, options.tracker[0])
+        for tracker in options.tracker:
+            row = measure(SETS[name], bench, tracker)
+            figures = json.loads(figures_path.read_text(encoding="utf-8")) if figures_path.exists() else {}
+            figures[f"{name} {tracker}"] = row
+            figures_path.write_text(json.dumps(dict(sorted(figures.items())), indent=1) + "\n", encoding="utf-8")
+    figures = json.loads(figures_path.read_text(encoding="utf-8"))
+    page = ROOT / "docs" / "results.md"
+    page.write_text(rewrite(page.read_text(encoding="utf-8"), figures), encoding="utf-8")
+    print(f"wrote {page.relative_to(ROOT)}")
+
+
+def measure(one: ResultSet, bench: Bench, tracker: str) -> dict[str, Any]:
+    """Run, score and draw one row; what docs/results.json holds of it."""
+    command = one.run_command(tracker)
+    bench.do(f"{command} --overwrite")
+    run = read_run(bench.path(one.run_file(tracker)))
+    row: dict[str, Any] = {
+        "set": one.name,
+        "tracker": tracker,
+        "version": __version__,
+        "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
+        "frames_per_second": round(len(run.frames) / float(run.timings["seconds"].sum()), 2),
+        "tracks": len(run.tracks),
+        "people_a_frame": round(len(run.trajectory) / len(run.frames), 2),
+        "run": command,
+    }
+    worst: list[int] = []
+    if one.truth is not None:
+        row["evaluate"] = one.score_command(tracker)
+        row["scores"] = json.loads(bench.do(f"{row['evaluate']} --json"))
+        if one.peer_frames is not None:
+            row["peer_scores"] = json.loads(bench.do(f"{one.score_command(tracker, one.peer_frames)} --json"))
+        worst = worst_frames(run, read_tracks_csv(bench.path(one.truth)), row["scores"], "--ignore" in one.scoring)
+        row["worst_frames"] = worst
+    _draw(one, bench, tracker, worst)
+    return row
+
+
+def _prepare(one: ResultSet, bench: Bench, tracker: str) -> None:
+    """Rig and truth; and a short run, so that no row's time holds the compiling of kernels."""
+    bench.work.mkdir(parents=True, exist_ok=True)
+    if one.film is not None and not bench.path(one.rig).exists():
+        bench.do(f"{one.film} --overwrite")
+    for command in one.prepare:
+        bench.do(command)
+    first = int(one.frames.partition(":")[0])
+    part = f"--frames {first}:{first + _WARM_UP}"
+    bench.do(f"stseg run {one.rig} -o $WORK/warm_up.h5 {part} --tracker {tracker} --overwrite")
+
+
+def _draw(one: ResultSet, bench: Bench, tracker: str, frames: Sequence[int]) -> None:
+    """The report with its pictures, and the ground at each of the worst frames."""
+    folder = f"$WORK/pictures/{one.name}_{tracker}"
+    bench.path(folder).mkdir(parents=True, exist_ok=True)
+    truth = "" if one.truth is None else f" --truth {one.truth}"
+    shown = "".join(f" --frame {frame}" for frame in frames)
+    bench.do(
+        f"stseg report {one.run_file(tracker)} -o {folder}/report.html --pictures {folder}{truth}{shown} "
+        "--camera-images --overwrite"
+    )
+    if one.truth is not None:
+        run, true = read_run(bench.path(one.run_file(tracker))), read_tracks_csv(bench.path(one.truth))
+        draw(run, true, frames, bench.path(folder))
+
+
+def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--data", type=Path, default=ROOT / "../shared/data")
+    parser.add_argument("--work", type=Path, default=ROOT / "build/results")
+    parser.add_argument("--sets", type=_names, default=list(SETS), help="names of sets; none for the page alone")
+    parser.add_argument("--tracker", type=_trackers, default=list(TRACKERS), help="cut, frames or both")
+    return parser.parse_args(arguments)
+
+
+def _names(text: str) -> list[str]:
+    names = [] if text == "none" else text.split(",")
+    unknown = [name for name in names if name not in SETS]
+    if unknown:
+        raise argparse.ArgumentTypeError(f"{', '.join(unknown)}: expected names among {', '.join(SETS)}, or none")
+    return names
+
+
+def _trackers(text: str) -> list[str]:
+    if text not in ("both", *TRACKERS):
+        raise argparse.ArgumentTypeError(f"{text}: expected cut, frames or both")
+    return list(TRACKERS) if text == "both" else [text]
+
+
+if __name__ == "__main__":
+    main()
