@@ -121,6 +121,8 @@ class IdentityConfig:
     """How far a place may be off besides, metres."""
     place_noise: float = 0.20
     """How far a frame's place is off besides its own covariance, metres (standard deviation)."""
+    foresight: float = 0.6
+    """How far ahead committed tracks propose candidates, seconds; beyond that a walker may be anywhere."""
     patience: float = 1.0
     """How long somebody may be unseen and still be the same, seconds."""
     shortest: float = 0.8

@@ -80,8 +80,10 @@ class Identities:
         return Decision(identity, sorted(events))
 
     def predict(self, frame: int) -> Floats:
-        """Where the living tracks would be at a frame at constant velocity, float64 (n, 2), metres."""
-        places = [t.tail.ground[-1] + (frame - t.tail.frames[-1]) * t.tail.velocity(True) for t in self.alive]
+        """Where living tracks seen not long before a frame would be then at constant velocity, float64 (n, 2), metres."""
+        ahead = self.config.foresight * self.frame_rate
+        recent = [track.tail for track in self.alive if frame - track.tail.frames[-1] <= ahead]
+        places = [tail.ground[-1] + (frame - tail.frames[-1]) * tail.velocity(True) for tail in recent]
         return np.array(places).reshape(-1, 2)
 
     def _names(self, window: Window, blobs: Sequence[Blobs], pieces: Sequence[Piece]) -> list[int]:

@@ -1,0 +1,299 @@
+"""The volume of a frame: clutter, sampling, likelihood per plane and fusion by definition, and what they mean."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import reference_core as reference
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scenes import FEW_HEIGHTS, boxes, corner_cameras, likelihoods, looking, no_boxes, people, rig_of, room
+from strategies import numbers, rigs
+
+from stseg.arrays import Boxes, Floats, Ints, Singles
+from stseg.config import OccupancyConfig
+from stseg.geometry import Grid, Rig
+from stseg.geometry.bodies import BodyTable
+from stseg.ghosts.explain import Explanation, FramePass, People, ViewEvidence
+from stseg.occupancy.clutter import clutter, clutter_weights
+from stseg.occupancy.fusion import Rates
+from stseg.occupancy.instances import fill_likelihood
+from stseg.occupancy.sampling import UNSEEN, Sampling
+from stseg.occupancy.volume import Occupancy
+
+COARSE = rig_of(corner_cameras(), cell=0.5, planes=3)
+PIXELS, BOXES = ["pixels"] * 4, ["boxes"] * 4
+CONFIG = OccupancyConfig()
+PRIOR = float(np.log(CONFIG.occupied / (1 - CONFIG.occupied)))
+RATES = Rates(FEW_HEIGHTS.pixel_miss, FEW_HEIGHTS.pixel_clutter)
+
+
+def crowd(standing: Floats, views: int = 4) -> People:
+    """People as the pass reports them, wholly visible."""
+    n = len(standing)
+    ones = np.ones((views, n))
+    return People(standing[:, :2], standing[:, 2], np.tile(np.eye(2) * 0.01, (n, 1, 1)), np.full(n, 5.0), ones, ones)
+
+
+def explained(rig: Rig, standing: Floats, owner: Sequence[Ints] | None = None, step: int = 1) -> Explanation:
+    """An explanation in which these pixels are whose; nobody's where it is not said."""
+    views, nobody = len(rig.cameras), crowd(people(), len(rig.cameras))
+    width, height = rig.cameras[0].size
+    blank = np.full((-(-height // step), -(-width // step)), -1, np.int16)
+    owners = [blank] * views if owner is None else [np.asarray(o, np.int16) for o in owner]
+    free = tuple(np.zeros(0, np.int64) for _ in range(views))
+    return Explanation(crowd(standing, views), nobody, tuple(owners), (step,) * views, free)
+
+
+def flat(value: float) -> Singles:
+    """A map of one likelihood."""
+    return np.full((96, 128), value, np.float32)
+
+
+def noise(seed: int) -> list[Singles]:
+    """A random map for each view, with edges of different strength."""
+    rng = np.random.default_rng(seed)
+    return [(rng.random((96, 128)) ** (k + 1)).astype(np.float32) for k in range(4)]
+
+
+# Clutter
+
+
+@settings(deadline=None)
+@given(st.integers(1, 20), st.integers(1, 20), st.integers(1, 25), st.integers(0, 99))
+def test_clutter_by_definition(height: int, width: int, side: int, seed: int) -> None:
+    likelihood = np.random.default_rng(seed).random((height, width)).astype(np.float32)
+    assert clutter(likelihood, side) == pytest.approx(reference.clutter(likelihood, side), abs=1e-7)
+
+
+def test_clutter_measures_unrest_within_cells() -> None:
+    assert clutter(flat(0.7), 24) == pytest.approx(0.0, abs=1e-7)
+    chequered = flat(0.0)
+    chequered[::2, ::2] = chequered[1::2, 1::2] = 1.0
+    assert clutter(chequered, 24) == pytest.approx(0.5)
+    halves = flat(0.0)
+    halves[:, 64:] = 1.0
+    assert clutter(halves, 32) == pytest.approx(0.0, abs=1e-7)  # the edge runs between the cells
+    assert clutter(halves, 48) > 0.2
+
+
+@given(st.lists(st.none() | numbers(0, 0.5), min_size=1, max_size=6))
+def test_weights_fall_with_clutter_down_to_the_median(clutters: list[float | None]) -> None:
+    given_clutter = np.array([np.nan if c is None else c for c in clutters])
+    weights = clutter_weights(given_clutter)
+    awake = ~np.isnan(given_clutter)
+    assert (weights[~awake] == 0).all()
+    if awake.any():
+        assert weights[awake].mean() == pytest.approx(1.0)
+        floor = max(float(np.median(given_clutter[awake])), 1e-6)
+        share = weights[awake] * np.maximum(given_clutter[awake], floor)
+        np.testing.assert_allclose(share, share[0])
+
+
+def test_a_view_that_sees_nothing_does_not_silence_the_others() -> None:
+    weights = clutter_weights(np.array([0.0, 0.1, 0.1, 0.1]))
+    np.testing.assert_allclose(weights, 1.0)
+    assert clutter_weights(np.array([np.nan, np.nan])).tolist() == [0.0, 0.0]
+
+
+# Sampling
+
+
+@settings(max_examples=15, deadline=None)
+@given(rigs(most=2))
+def test_cells_are_looked_up_where_they_project(rig: Rig) -> None:
+    sampling = Sampling.of(rig)
+    counts = rig.grid.inside()
+    assert sampling.pixel.shape == (len(rig.cameras), *rig.grid.shape, 2)
+    rng = np.random.default_rng(0)
+    for i, camera in enumerate(rig.cameras):
+        for _ in range(40):
+            z, y, x = (int(rng.integers(0, n)) for n in rig.grid.shape)
+            place, ahead = camera.project(rig.grid.ground[y, x], rig.grid.heights[z])
+            u, v = sampling.pixel[i, z, y, x]
+            if ahead and counts[y, x] and camera.inside(place):
+                np.testing.assert_allclose((u, v), place, atol=0.5 + 1e-9)
+                assert 0 <= u < camera.size[0]
+                assert 0 <= v < camera.size[1]
+            else:
+                assert u == v == UNSEEN
+            away = np.hypot(*(rig.grid.ground[y, x] - camera.centre[:2]))
+            assert sampling.distance[i, y, x] == pytest.approx(away, rel=1e-6)
+    np.testing.assert_array_equal(sampling.views(), (sampling.pixel[..., 0] >= 0).sum(0))
+
+
+def test_cells_outside_the_polygon_are_not_seen() -> None:
+    triangle = np.array([[-2.0, -2.0], [2.0, -2.0], [-2.0, 2.0]])
+    rig = replace(COARSE, grid=replace(COARSE.grid, polygon=triangle))
+    views = Sampling.of(rig).views()
+    assert (views[:, ~rig.grid.inside()] == 0).all()
+    assert (views[0][rig.grid.inside()] == 4).all()
+
+
+# Likelihood per plane
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.integers(0, 999))
+def test_likelihood_per_plane_by_definition(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    camera = corner_cameras()[seed % 4]
+    grid = Grid((-2, 2), (-2, 2), cell=1.0, top=1.8, planes=4)
+    standing = people(*rng.uniform((-1.8, -1.8, 1.5), (1.8, 1.8, 1.9), (3, 3)))
+    found = boxes(camera, standing)
+    shaken = Boxes(found.pixel + rng.normal(0, 2, found.pixel.shape), rng.uniform(0.2, 1, len(found)))
+    tried = np.array([1.5, 1.65, 1.8])
+    bodies = BodyTable.of(camera, grid).boxes(grid.ground.reshape(-1, 2), tried).reshape(3, 4, 4, 4)
+    box_owner = rng.integers(-1, 2, len(found))
+    near = rng.integers(-1, 2, (4, 4))
+    edges = np.concatenate([shaken.pixel[:, :2], shaken.pixel[:, :2] + shaken.pixel[:, 2:]], 1)
+    edges = edges.clip(0, [camera.size[0] - 1, camera.size[1] - 1] * 2)
+    likelihood = np.full(grid.shape, np.nan, np.float32)
+    fill_likelihood(
+        bodies.astype(np.float32), tried, 0.1, 1.7, np.array([1.6, 1.8]), grid.heights, edges, np.log(shaken.score),
+        box_owner, near, *map(float, camera.size), likelihood,
+    )  # fmt: skip
+    for y, x in np.ndindex(4, 4):
+        free = [b for b in range(len(found)) if box_owner[b] in (-1, near[y, x])]
+        expected = 1.7 if near[y, x] < 0 else (1.6, 1.8)[near[y, x]]
+        for z, plane in enumerate(grid.heights):
+            best = reference.plane_likelihood(
+                bodies[:, y, x].astype(np.float32), tried, plane, expected, 0.1, shaken, free, camera.size
+            )
+            assert likelihood[z, y, x] == pytest.approx(best, rel=1e-4, abs=1e-6)
+
+
+# Fusion
+
+
+def volume_by_definition(rig: Rig, maps: Sequence[Singles | None], explanation: Explanation) -> Floats:
+    """The frame's log-odds, cell by cell."""
+    sides = [max(min(camera.size) // 4, 8) for camera in rig.cameras]
+    unrest = [np.nan if m is None else reference.clutter(m, side) for m, side in zip(maps, sides, strict=True)]
+    weights = clutter_weights(np.array(unrest))
+    sampling, found = Sampling.of(rig), explanation.people
+    centres = np.array([camera.centre[:2] for camera in rig.cameras])
+    people_away = np.hypot(*np.moveaxis(found.ground[None] - centres[:, None], -1, 0))
+    volume = np.full(rig.grid.shape, np.nan)
+    for z, y, x in np.ndindex(*rig.grid.shape):
+        pixels = np.asarray(sampling.pixel[:, z, y, x], np.int64)
+        if (pixels[:, 0] < 0).all():
+            continue
+        reached = np.hypot(*(found.ground - rig.grid.ground[y, x]).T)
+        near = int(reached.argmin()) if len(found) and reached.min() <= CONFIG.reach else -1
+        away = np.hypot(*(rig.grid.ground[y, x] - centres).T)
+        views, seen = reference.map_views_of_cell(explanation, pixels, away, people_away, near, maps)
+        prior = CONFIG.occupied if near < 0 else 0.5
+        volume[z, y, x] = np.log(prior / (1 - prior))
+        if views:
+            volume[z, y, x] = reference.log_odds_of_cell(seen, weights[views].tolist(), [RATES] * len(views), prior)
+    return volume
+
+
+@pytest.mark.parametrize("blind", [None, 2])
+@pytest.mark.parametrize("step", [1, 3])
+def test_fusion_by_definition(blind: int | None, step: int) -> None:
+    standing = people((-0.8, 0.3), (1.0, -0.6))
+    rng = np.random.default_rng(step)
+    shape = (-(-96 // step), -(-128 // step))
+    owner = [np.where(rng.random(shape) < 0.6, -1, rng.integers(0, 2, shape)) for _ in range(4)]
+    explanation = explained(COARSE, standing, owner, step)
+    maps: list[Singles | None] = [*noise(step)]
+    if blind is not None:
+        maps[blind] = None
+    fused = Occupancy(COARSE, PIXELS, CONFIG, FEW_HEIGHTS).fuse(maps, explanation)
+    assert fused.dtype == np.float32
+    np.testing.assert_allclose(fused, volume_by_definition(COARSE, maps, explanation), rtol=1e-5, atol=1e-5)
+
+
+@pytest.mark.parametrize("value", [0.0, 0.3, 1.0])
+def test_more_views_are_sharper_evidence(value: float) -> None:
+    """With equal weights u is the plain sum of the views' log-odds and the prior."""
+    rig = rig_of([looking(f"cam{k}", (x, y, 2.6), focal=200.0) for k, (x, y) in enumerate([(-3, -3), (3, -3), (3, 3)])])
+    fused = Occupancy(rig, PIXELS[:3], CONFIG, FEW_HEIGHTS).fuse([flat(value)] * 3, explained(rig, people()))
+    miss, false = RATES
+    one = np.log(((1 - miss) * value + miss * (1 - value)) / (false * value + (1 - false) * (1 - value)))
+    views = Sampling.of(rig).views()
+    assert set(np.unique(views).tolist()) >= {0, 1, 2, 3}
+    np.testing.assert_allclose(fused[views > 0], views[views > 0] * one + PRIOR, rtol=1e-5)
+    assert np.isnan(fused[views == 0]).all()
+
+
+def test_all_blind_leaves_the_prior() -> None:
+    occupancy = Occupancy(COARSE, PIXELS, CONFIG, FEW_HEIGHTS)
+    fused = occupancy.fuse([None] * 4, explained(COARSE, people()))
+    np.testing.assert_allclose(fused[occupancy.views > 0], PRIOR, rtol=1e-6)
+    assert np.isnan(fused[occupancy.views == 0]).all()
+
+
+def line_of_sight() -> tuple[Rig, Explanation]:
+    """One camera; a person in the middle of the room explains all that it sees."""
+    rig = rig_of([looking("west", (-4.0, 0.0, 2.4))])
+    everything = np.zeros((96, 128), np.int64)
+    return rig, explained(rig, people((0.0, 0.0)), [everything])
+
+
+def test_explained_evidence_does_not_speak_elsewhere() -> None:
+    rig, explanation = line_of_sight()
+    occupancy = Occupancy(rig, PIXELS[:1], CONFIG, FEW_HEIGHTS)
+    fused = occupancy.fuse([flat(1.0)], explanation)
+    nobodys = occupancy.fuse([flat(0.0)], explained(rig, people()))
+    seen = occupancy.views[0] > 0
+    away = np.hypot(*np.moveaxis(rig.grid.ground, -1, 0))
+    in_front = seen & (rig.grid.ground[..., 0] < -0.5)
+    np.testing.assert_allclose(fused[0][in_front], nobodys[0][in_front], rtol=1e-6)
+    assert (fused[0][in_front] < PRIOR).all()
+    assert (fused[0][seen & (away < 0.3)] > 1.0).all()
+
+
+def test_a_hidden_view_does_not_count() -> None:
+    rig, explanation = line_of_sight()
+    occupancy = Occupancy(rig, PIXELS[:1], CONFIG, FEW_HEIGHTS)
+    behind = (occupancy.views[0] > 0) & (rig.grid.ground[..., 0] > 0.6)
+    assert behind.any()
+    for value in (0.0, 1.0):
+        fused = occupancy.fuse([flat(value)], explanation)
+        np.testing.assert_allclose(fused[0][behind], PRIOR, rtol=1e-6)
+
+
+def test_a_missing_box_says_less_of_somebody_hidden() -> None:
+    rig = rig_of(corner_cameras()[:1])
+    occupancy = Occupancy(rig, BOXES[:1], CONFIG, FEW_HEIGHTS)
+    explanation = explained(rig, people((0.0, 0.0)))
+    half = replace(explanation.people, visible=np.array([[0.5]]))
+    whole_says = occupancy.fuse([no_boxes()], explanation)
+    half_says = occupancy.fuse([no_boxes()], replace(explanation, people=half))
+    near = np.hypot(*np.moveaxis(rig.grid.ground, -1, 0)) <= CONFIG.reach
+    assert (whole_says[0][near] < -1).all()
+    np.testing.assert_allclose(half_says[0][near], whole_says[0][near] / 2, rtol=1e-5)
+    np.testing.assert_array_equal(half_says[0][~near], whole_says[0][~near])
+
+
+@pytest.mark.parametrize("kind", ["pixels", "boxes"])
+def test_a_person_is_a_column_of_occupied_cells(kind: str) -> None:
+    rig = room()
+    standing = people((-0.8, 0.3), (0.9, -0.6))
+    seen: list[ViewEvidence] = list(likelihoods(rig.cameras, standing))
+    if kind == "boxes":
+        seen = [boxes(camera, standing) for camera in rig.cameras]
+    explanation = FramePass(rig, [kind] * 4, FEW_HEIGHTS).explain(seen, np.zeros((0, 3)))
+    fused = Occupancy(rig, [kind] * 4, CONFIG, FEW_HEIGHTS).fuse(seen, explanation)
+    away = np.hypot(*np.moveaxis(rig.grid.ground[:, :, None] - standing[:, :2], -1, 0)).min(2)
+    assert fused.shape == rig.grid.shape
+    assert (fused[:3, away < 0.15] > 0).all()  # the uppermost plane is above them
+    assert (fused[:, away > 0.6] < 0).all()
+    # A volume from nobody's evidence holds nobody.
+    empty: list[ViewEvidence] = [flat(0.0)] * 4 if kind == "pixels" else [no_boxes()] * 4
+    nobody = FramePass(rig, [kind] * 4, FEW_HEIGHTS).explain(empty, np.zeros((0, 3)))
+    assert (Occupancy(rig, [kind] * 4, CONFIG, FEW_HEIGHTS).fuse(empty, nobody) < PRIOR).all()
+
+
+def test_the_same_frame_twice() -> None:
+    occupancy = Occupancy(COARSE, PIXELS, CONFIG, FEW_HEIGHTS)
+    explanation = explained(COARSE, people((0.2, 0.3)))
+    first = occupancy.fuse(noise(1), explanation)
+    occupancy.fuse(noise(2), explanation)
+    np.testing.assert_array_equal(first, occupancy.fuse(noise(1), explanation))

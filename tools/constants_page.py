@@ -1,0 +1,59 @@
+"""Write the tables of constants in docs/how-it-works.md anew, from stseg/config.py.
+
+    python tools/constants_page.py
+
+The meaning of a constant is the text that stands below it in the source.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+PAGE = ROOT / "docs" / "how-it-works.md"
+_MARKED = re.compile(r"<!-- constants: (\w+) -->\n.*?<!-- end -->", re.DOTALL)
+
+
+def stages(source: str) -> dict[str, list[tuple[str, str, str]]]:
+    """Name, default and meaning of the constants of each stage."""
+    classes = {node.name: node for node in ast.parse(source).body if isinstance(node, ast.ClassDef)}
+    return {
+        field.target.id: _constants(classes[ast.unparse(field.annotation)])
+        for field in classes["Config"].body
+        if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name)
+    }
+
+
+def rewrite(page: str, source: str) -> str:
+    """The page with its marked tables made anew; the text around them stays."""
+    known = stages(source)
+
+    def table(found: re.Match[str]) -> str:
+        rows = [f"| `{found[1]}.{name}` | {default} | {meaning} |" for name, default, meaning in known[found[1]]]
+        head = ["| constant | default | meaning |", "| --- | --- | --- |"]
+        return "\n".join([f"<!-- constants: {found[1]} -->", *head, *rows, "<!-- end -->"])
+
+    return _MARKED.sub(table, page)
+
+
+def _constants(stage: ast.ClassDef) -> list[tuple[str, str, str]]:
+    found = []
+    for field, below in zip(stage.body, [*stage.body[1:], None], strict=True):
+        if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name):
+            if not (isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant)):
+                raise SystemExit(f"config.py line {field.lineno}: {field.target.id} has no meaning below it")
+            default = ast.unparse(field.value) if field.value else ""
+            found.append((field.target.id, default.strip("()"), " ".join(str(below.value.value).split())))
+    return found
+
+
+def main() -> None:
+    """Rewrite the page."""
+    source = (ROOT / "stseg" / "config.py").read_text(encoding="utf-8")
+    PAGE.write_text(rewrite(PAGE.read_text(encoding="utf-8"), source), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
