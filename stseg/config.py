@@ -81,9 +81,9 @@ class GhostConfig:
     """Share of hidden people that are found all the same."""
     body_weight: float = 2.0
     """How many independent looks one view's pixels of one body are worth."""
-    pixel_miss: float = 0.15
+    pixel_miss: float = 0.20
     """How often a body's pixel is missed by the foreground (m of METHODS 4)."""
-    pixel_clutter: float = 0.10
+    pixel_clutter: float = 0.03
     """How often a ray past all bodies meets foreground (b of METHODS 4)."""
 
 

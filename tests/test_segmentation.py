@@ -238,7 +238,7 @@ def test_the_centroid_follows_the_mass() -> None:
     place = (0.85, 0.75)
     heavier = np.where(GRID.ground[..., 0] > 0.85, 6.0, 1.0)
     found = blobs_of(disc(place), place, strength=heavier)
-    assert found.ground[0, 0] > 0.9
+    assert found.ground[0, 0] > 0.88
     assert found.ground[0, 1] == pytest.approx(0.75)
 
 
@@ -266,7 +266,8 @@ def test_people_without_cells_are_no_blobs() -> None:
     found = blobs_of(disc((0.45, 0.75)), (0.45, 0.75), (1.8, 0.2))
     assert found.person.tolist() == [0]
     empty = blobs_of(np.zeros(GRID.shape, bool), (0.45, 0.75))
-    assert (len(empty.person), len(empty.ground), empty.cells.any()) == (0, 0, False)
+    assert len(empty.person) == len(empty.ground) == 0
+    assert not empty.cells.any()
     assert empty.touches.shape == (0, 2)
 
 

@@ -67,6 +67,7 @@ class ResultSet:
 
 
 _ROOM = "--size 644,486 --unit mm --up=-z --area=-2.5,-4.5,2.5,1.5"
+_ROOM_1 = "--size 644,486 --unit mm --up=-z --area=-2.5,-3,2.5,2"
 _CMC = "--names Cam1,Cam2,Cam3,Cam4 --size 1920,1024 --unit m --area=0,-0.4,7.67,3.6 --frame-rate 4"
 _CMC_AREA = "--area=1.9,-0.3,6.2,3.5"
 _WILDTRACK_VIEWS = ("CVLab1", "CVLab2", "CVLab3", "CVLab4", "IDIAP1", "IDIAP2", "IDIAP3")
@@ -186,7 +187,7 @@ _ALL = (
         "0:426",
         "$WORK/uu1.toml",
         (
-            f"stseg calibrate import opencv $DATA/uu1/cam?/config.xml -o $WORK/uu1.toml {_ROOM} --frame-rate 50 "
+            f"stseg calibrate import opencv $DATA/uu1/cam?/config.xml -o $WORK/uu1.toml {_ROOM_1} --frame-rate 50 "
             "--source-pattern '$DATA/uu1/{name}/video.avi' --background '$DATA/uu1/{name}/background.avi' --overwrite",
         ),
         remark="1 person, no truth: counts alone",

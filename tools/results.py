@@ -76,18 +76,21 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Measure the sets that are asked for, then write the page."""
     options = _options(arguments)
     bench = Bench(options.data.resolve(), options.work.resolve())
-    figures_path = ROOT / "docs" / "results.json"
     for name in options.sets:
         _prepare(SETS[name], bench, options.tracker[0])
         for tracker in options.tracker:
-            row = measure(SETS[name], bench, tracker)
-            figures = json.loads(figures_path.read_text(encoding="utf-8")) if figures_path.exists() else {}
-            figures[f"{name} {tracker}"] = row
-            figures_path.write_text(json.dumps(dict(sorted(figures.items())), indent=1) + "\n", encoding="utf-8")
-    figures = json.loads(figures_path.read_text(encoding="utf-8"))
-    page = ROOT / "docs" / "results.md"
-    page.write_text(rewrite(page.read_text(encoding="utf-8"), figures), encoding="utf-8")
-    print(f"wrote {page.relative_to(ROOT)}")
+            publish({f"{name} {tracker}": measure(SETS[name], bench, tracker)})
+    publish({})
+
+
+def publish(rows: dict[str, dict[str, Any]]) -> None:
+    """Put rows among the figures, and write the page anew from all of them."""
+    store, page = ROOT / "docs" / "results.json", ROOT / "docs" / "results.md"
+    figures = json.loads(store.read_text(encoding="utf-8")) | rows
+    text = rewrite(page.read_text(encoding="utf-8"), figures)
+    store.write_text(json.dumps(dict(sorted(figures.items())), indent=1) + "\n", encoding="utf-8")
+    page.write_text(text, encoding="utf-8")
+    print(f"wrote {page.relative_to(ROOT)}: {', '.join(rows) or 'no new row'}")
 
 
 def measure(one: ResultSet, bench: Bench, tracker: str) -> dict[str, Any]:

@@ -57,8 +57,12 @@ class View:
         return np.asarray(np.hypot(*(ground - self.camera.centre[:2]).T))
 
     def outlines(self, ground: Floats, heights: Floats) -> tuple[Ints, Spans, Floats]:
-        """Outlines of pillars on this view's raster; see `ghosts.outlines`."""
-        return outlines(self.table, ground, heights, self.step, self.shape)
+        """Outlines of pillars on this view's raster; see `ghosts.outlines`.
+
+        Areas are those of people of mean height there: a pillar that covers more of somebody must not count as less.
+        """
+        first, spans, area = outlines(self.table, ground, heights, self.step, self.shape)
+        return first, spans, area * (self.config.height_mean / heights)
 
     def chosen_boxes(self, ground: Floats, heights: Floats) -> Floats:
         """Pillar boxes of candidates, one height each, float64 (n, 4)."""

@@ -80,7 +80,7 @@ class Identities:
         return Decision(identity, sorted(events))
 
     def predict(self, frame: int) -> Floats:
-        """Where living tracks seen not long before a frame would be then at constant velocity, float64 (n, 2), metres."""
+        """Where tracks seen not long before a frame would be then at constant velocity, float64 (n, 2), metres."""
         ahead = self.config.foresight * self.frame_rate
         recent = [track.tail for track in self.alive if frame - track.tail.frames[-1] <= ahead]
         places = [tail.ground[-1] + (frame - tail.frames[-1]) * tail.velocity(True) for tail in recent]

@@ -1,0 +1,212 @@
+"""The whole way on a micro recording: three walkers, four cameras, masks and boxes without any noise."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from functools import cache
+
+import numba
+import numpy as np
+import pytest
+from scenes import CONFIG, Moment, box_moments, mask_moments, room, walkers
+
+from stseg.arrays import Floats, Rows
+from stseg.evaluation import evaluate
+from stseg.foreground.sight import Sight
+from stseg.geometry import Rig
+from stseg.pipeline import Pipeline, Step
+from stseg.tracks import CANDIDATE, TIMING, Tracks
+
+FRAMES = 14 if numba.config.DISABLE_JIT else 40
+"""The interpreter takes a hundred times as long."""
+SHORT = min(FRAMES, 17)
+RIG = room()
+TRUTH = walkers(40)
+MOMENTS: dict[str, Callable[[Rig, Rows, int, int], Iterator[Moment]]] = {"pixels": mask_moments, "boxes": box_moments}
+
+
+@cache
+def recording(kind: str, stop: int) -> tuple[Moment, ...]:
+    return tuple(MOMENTS[kind](RIG, TRUTH, 0, stop))
+
+
+@dataclass(frozen=True)
+class Run:
+    """Everything that a run gave."""
+
+    steps: list[Step]
+    tracks: Tracks
+    advanced: list[int]
+
+    @property
+    def trajectory(self) -> Rows:
+        """All committed rows, before the last look."""
+        return np.concatenate([step.commit.trajectory for step in self.steps])
+
+    @property
+    def label(self) -> Floats:
+        """All labels, int32 (time, plane, y, x)."""
+        return np.concatenate([step.commit.label for step in self.steps])
+
+
+def run(kind: str, moments: Iterable[Moment], tracker: str = "cut", first: int = 0) -> Run:
+    pipeline = Pipeline(RIG, [Sight() for _ in RIG.cameras], [kind] * len(RIG.cameras), CONFIG, tracker)
+    advanced: list[int] = []
+    steps = list(pipeline.steps(moments, first, advanced.append))
+    trajectory = np.concatenate([step.commit.trajectory for step in steps])
+    return Run(steps, pipeline.finished(trajectory), advanced)
+
+
+@cache
+def whole(kind: str, tracker: str) -> Run:
+    stop = FRAMES if kind == "boxes" else SHORT
+    return run(kind, recording(kind, stop), tracker)
+
+
+def assert_equal(one: Run, other: Run) -> None:
+    """Everything but the time it took, bit for bit."""
+    np.testing.assert_array_equal(one.label, other.label)
+    np.testing.assert_array_equal(one.trajectory, other.trajectory)
+    np.testing.assert_array_equal(one.tracks.trajectory, other.tracks.trajectory)
+    np.testing.assert_array_equal(one.tracks.boxes, other.tracks.boxes)
+    for a, b in zip(one.steps, other.steps, strict=True):
+        np.testing.assert_array_equal(a.candidates, b.candidates)
+        np.testing.assert_array_equal(a.parts, b.parts)
+        np.testing.assert_array_equal(a.commit.events, b.commit.events)
+        np.testing.assert_array_equal(a.commit.windows, b.commit.windows)
+        for x, y in zip(a.commit.scenes, b.commit.scenes, strict=True):
+            np.testing.assert_array_equal(x.log_odds, y.log_odds)
+
+
+@pytest.mark.parametrize("tracker", ["cut", "frames"])
+@pytest.mark.parametrize("kind", ["pixels", "boxes"])
+def test_three_walkers_are_three_tracks(kind: str, tracker: str) -> None:
+    done = whole(kind, tracker)
+    frames = len(done.advanced)
+    truth = TRUTH[TRUTH["frame"] < frames]
+    scores = evaluate(truth, done.tracks.trajectory)
+    assert (scores.tracks, scores.switches, scores.false_alarms, scores.misses) == (3, 0, 0, 0)
+    assert scores.location_mean is not None
+    assert scores.location_mean < (0.05 if kind == "pixels" else 0.1)
+    summary = done.tracks.summary()
+    assert (summary["frames"] == frames).all()
+    assert sorted(np.round(summary["height"], 1)) == pytest.approx([1.6, 1.7, 1.8], abs=0.11)
+    # Labels stand where the walkers are.
+    for t, label in enumerate(done.label):
+        places = truth[truth["frame"] == t]
+        occupied = RIG.grid.ground[(label > 0).any(0)]
+        away = np.hypot(occupied[:, 0, None] - places["x"], occupied[:, 1, None] - places["y"])
+        assert away.min(1).max() < 0.6
+        assert (away.min(0) < 0.3).all()
+
+
+def test_boxes_of_the_tracks_are_those_of_the_people() -> None:
+    done = whole("boxes", "cut")
+    drawn = done.tracks.boxes
+    assert np.unique(drawn["view"]).tolist() == [0, 1, 2, 3]
+    for moment in recording("boxes", SHORT)[::4]:
+        for view, seen in enumerate(moment.views):
+            own = drawn[(drawn["frame"] == moment.frame) & (drawn["view"] == view)]
+            given = np.column_stack([own["left"], own["top"], own["width"], own["height"]]).astype(float)
+            expected = seen.pixel  # type: ignore[union-attr]
+            off = np.abs(given[:, None] - expected).max(2)
+            assert off.min(1).max() < 5
+
+
+def test_candidates_are_told_for_every_frame() -> None:
+    done = whole("boxes", "cut")
+    for step in done.steps:
+        assert step.candidates.dtype == CANDIDATE
+        assert step.parts.shape == (len(step.candidates), 4)
+        assert step.timings.dtype == TIMING
+        assert {b"foreground", b"ghosts", b"occupancy", b"track"} <= {*step.timings["stage"].tolist(), b"track"}
+        for scene in step.commit.scenes:
+            own = step.candidates[step.candidates["frame"] == scene.frame]
+            true = own[own["status"] == 1]
+            np.testing.assert_array_equal(np.column_stack([true["x"], true["y"]]), scene.people.ground)
+            assert (own["evidence"][own["status"] == 0] < 0).all()
+            assert (true["evidence"] > 0).all()
+    told = np.concatenate([step.candidates for step in done.steps])
+    assert np.unique(told["frame"]).tolist() == list(range(FRAMES))
+
+
+def test_every_frame_is_committed_once() -> None:
+    done = whole("boxes", "cut")
+    assert done.advanced == list(range(FRAMES))
+    assert [s.frame for step in done.steps for s in step.commit.scenes] == list(range(FRAMES))
+
+
+@pytest.mark.parametrize("tracker", ["cut", "frames"])
+def test_the_same_recording_twice(tracker: str) -> None:
+    assert_equal(run("boxes", recording("boxes", FRAMES), tracker), whole("boxes", tracker))
+
+
+def test_masks_twice() -> None:
+    assert_equal(run("pixels", recording("pixels", SHORT)), whole("pixels", "cut"))
+
+
+def test_moments_may_come_in_chunks() -> None:
+    """A generator that reads ahead, a list, one by one: the result is the same."""
+
+    def chunks(size: int) -> Iterator[Moment]:
+        read = recording("boxes", FRAMES)
+        for start in range(0, FRAMES, size):
+            yield from list(read[start : start + size])
+
+    for size in (1, 6):
+        assert_equal(run("boxes", chunks(size)), whole("boxes", "cut"))
+
+
+@pytest.mark.parametrize("first", [3, 8])
+def test_a_part_keeps_its_frame_numbers(first: int) -> None:
+    stop = SHORT - 2
+    part = run("boxes", recording("boxes", FRAMES)[first:stop], first=first)
+    assert part.advanced == list(range(first, stop))
+    assert [s.frame for step in part.steps for s in step.commit.scenes] == part.advanced
+    rows = part.trajectory
+    assert np.unique(rows["frame"]).tolist() == part.advanced
+    truth = TRUTH[(TRUTH["frame"] >= first) & (TRUTH["frame"] < stop)]
+    scores = evaluate(truth, rows)
+    assert (scores.tracks, scores.switches, scores.false_alarms, scores.misses) == (3, 0, 0, 0)
+    # What the pass of a frame sees alone does not depend on where the run began.
+    alone = whole("boxes", "frames").steps
+    again = run("boxes", recording("boxes", FRAMES)[first:stop], "frames", first)
+    for step in again.steps:
+        np.testing.assert_array_equal(step.candidates, alone[step.commit.scenes[0].frame].candidates)
+
+
+@pytest.mark.parametrize("frames", [1, 7, 8, 9])
+def test_short_recordings(frames: int) -> None:
+    done = run("boxes", recording("boxes", FRAMES)[:frames])
+    assert [s.frame for step in done.steps for s in step.commit.scenes] == list(range(frames))
+    assert len(done.trajectory) == 3 * frames
+    shortest = round(CONFIG.identity.shortest * RIG.frame_rate)
+    assert len(done.tracks.trajectory) == (3 * frames if frames >= shortest else 0)
+    assert len(done.tracks.events) == (0 if frames >= shortest else 3)
+
+
+def test_no_moments_no_steps() -> None:
+    pipeline = Pipeline(RIG, [Sight() for _ in RIG.cameras], ["boxes"] * 4, CONFIG, "cut")
+    assert list(pipeline.steps([], 0, lambda _: None)) == []
+
+
+def test_an_empty_room() -> None:
+    nobody = TRUTH[:0]
+    for kind in ("pixels", "boxes"):
+        done = run(kind, list(MOMENTS[kind](RIG, nobody, 0, 10)))
+        assert done.advanced == list(range(10))
+        assert len(done.tracks.trajectory) == len(done.tracks.boxes) == len(done.tracks.events) == 0
+        assert not done.label.any()
+
+
+def test_a_camera_that_goes_blind() -> None:
+    """One of four cameras stops in the middle: nobody is lost."""
+    half = SHORT // 2
+    moments = [
+        moment if moment.frame < half else Moment(moment.frame, (*moment.views[:3], None))
+        for moment in recording("boxes", SHORT)
+    ]
+    done = run("boxes", moments)
+    scores = evaluate(TRUTH[TRUTH["frame"] < SHORT], done.tracks.trajectory)
+    assert (scores.tracks, scores.switches, scores.false_alarms, scores.misses) == (3, 0, 0, 0)
