@@ -1,7 +1,8 @@
 """The pass of one frame: candidates, and the set of them that best explains what all views show (METHODS 7).
 
 Candidates are sought on a ground lattice, in what nobody explains yet, so people behind others are found once those
-others stand. Tracks committed in earlier windows are candidates too. After each round the set is searched anew.
+others stand. Tracks committed in earlier windows are candidates too. After each round the set is searched anew, until a
+round changes nobody.
 """
 
 from __future__ import annotations
@@ -137,7 +138,10 @@ class FramePass:
             moved = frame.refined()[0]
             if not len(fresh) and not len(moved):
                 break
+            known = len(frame.pool)
             frame = _Frame(self, sights, frame.pool.and_(moved).and_(fresh), frame.members)
+            if (frame.members < known).all():
+                break
         return frame.explanation()
 
     def _fresh(self, frame: _Frame) -> Pool:

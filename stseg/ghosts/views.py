@@ -129,12 +129,19 @@ class PixelView(View):
 
     def lattice_score(self, sight: Sight, free: Flags) -> Floats:
         """What the free pixels (v, u) say of each lattice pillar, nats, float64 (height, cell)."""
-        return np.stack([self.mean_inside(sight.raster, free, *outlines) for outlines in self.lattice])
+        sums = self._row_sums(sight.raster, free)
+        return np.stack([self._means(sums, *outlines) for outlines in self.lattice])
 
     def mean_inside(self, raster: Singles, free: Flags, first: Ints, spans: Spans, area: Floats) -> Floats:
         """Weighted mean log-odds of the free pixels inside outlines, nats, float64 (n,)."""
+        return self._means(self._row_sums(raster, free), first, spans, area)
+
+    def _row_sums(self, raster: Singles, free: Flags) -> Floats:
         sums = np.zeros((self.shape[0], self.shape[1] + 1))
-        np.cumsum(np.where(free, raster, 0.0), axis=1, out=sums[:, 1:])
+        np.cumsum(np.where(free, raster, np.float32(0.0)), axis=1, dtype=np.float64, out=sums[:, 1:])
+        return sums
+
+    def _means(self, sums: Floats, first: Ints, spans: Spans, area: Floats) -> Floats:
         means = np.zeros(len(first))
         _fill_span_means(sums, first, spans, area, means)
         return means * self.config.body_weight
