@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from stseg.errors import ConfigError
+from stseg.settings import require
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,7 +20,7 @@ class MixtureConfig:
     """How long a thing that moved in must stay still to become background, seconds."""
     share: float = 0.1
     """Weight from which a mode is background: the share of time that the scene shows it, 0..1."""
-    foreground: float = 0.1
+    foreground: float = 0.5
     """f: prior probability of a person at a pixel, 0..1."""
     unexplained: float = 1e-3
     """e: share of background colours that no mode explains, 0..1; keeps the likelihood below 1."""
@@ -83,8 +84,22 @@ class GhostConfig:
     """How many independent looks one view's pixels of one body are worth."""
     pixel_miss: float = 0.20
     """How often a body's pixel is missed by the foreground (m of METHODS 4)."""
-    pixel_clutter: float = 0.03
+    pixel_clutter: float = 0.07
     """How often a ray past all bodies meets foreground (b of METHODS 4)."""
+
+    def __post_init__(self) -> None:
+        heights = self.heights
+        require(len(heights) > 0 and min(heights) > 0, self, "heights", "one or more heights above 0 m")
+        require(list(heights) == sorted(heights) and max(heights) <= 2.2, self, "heights", "rising, at most 2.2 m")
+        for name in ("height_mean", "height_spread", "lattice", "apart", "body_weight"):
+            require(getattr(self, name) > 0, self, name, "a number above 0")
+        require(self.rounds >= 1, self, "rounds", "1 or more")
+        for name in ("box_miss", "least", "pixel_miss", "pixel_clutter"):
+            require(0 < getattr(self, name) < 1, self, name, "a number between 0 and 1")
+        require(self.hit > 0, self, "hit", "a number above 0")
+        require(
+            0 <= self.hidden_below < self.whole_above <= 1, self, "hidden_below", "0 to below whole_above, at most 1"
+        )
 
 
 @dataclass(frozen=True)
@@ -95,6 +110,10 @@ class OccupancyConfig:
     """Share of the cells that a body fills where the pass of the frame found nobody (pi of METHODS 4)."""
     reach: float = 0.40
     """How far from a person's place their own cells reach, metres."""
+
+    def __post_init__(self) -> None:
+        require(0 < self.occupied < 1, self, "occupied", "a number between 0 and 1")
+        require(self.reach > 0, self, "reach", "a number above 0")
 
 
 @dataclass(frozen=True)
@@ -107,6 +126,11 @@ class SegmentationConfig:
     """s: distance over which that falls to 0.6 of it, metres."""
     step: float = 0.15
     """How far apart the time neighbours of one body are once its motion is followed, metres."""
+
+    def __post_init__(self) -> None:
+        require(self.smoothness >= 0, self, "smoothness", "0 or more nats")
+        require(self.spread > 0, self, "spread", "a number above 0")
+        require(self.step >= 0, self, "step", "0 or more metres")
 
 
 @dataclass(frozen=True)
@@ -127,6 +151,12 @@ class IdentityConfig:
     """How long somebody may be unseen and still be the same, seconds."""
     shortest: float = 0.8
     """Tracks shorter than this are nobody, seconds (HW12's temporal check)."""
+
+    def __post_init__(self) -> None:
+        for name in ("window", "walking_speed", "place_noise"):
+            require(getattr(self, name) > 0, self, name, "a number above 0")
+        for name in ("slack", "foresight", "patience", "shortest"):
+            require(getattr(self, name) >= 0, self, name, "0 or more")
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from stseg.io.runs import read_run
 from stseg.io.tracks import read_tracks_csv
 
 ROOT = Path(__file__).parents[1]
-LEAST_MODA = 30.0
+LEAST_MODA = 80.0
 """Percent at half a metre; a floor below what was measured, so that the demo shows people who are tracked."""
 
 

@@ -322,7 +322,8 @@ def test_crossing_lines_of_sight_are_ghosts(kind: str) -> None:
     assert_found(explanation, standing, within=0.2)
     crossings = np.array([[0.5, -1.5], [-1.5, 0.5]])
     ghosts = explanation.ghosts
-    assert len(ghosts) >= 1
+    if kind == "pixels":  # a box knows how far away its person is, so its lines of sight cross nowhere else
+        assert len(ghosts) >= 1
     assert (ghosts.evidence < 0).all()
     away = np.hypot(*np.moveaxis(crossings[:, None] - ghosts.ground, -1, 0)).min(1)
     assert (away < 0.6).all(), ghosts.ground
@@ -386,7 +387,6 @@ def test_all_blind() -> None:
         assert len(pass_of(kind).explain([None] * 4, NOBODY).people) == 0
 
 
-@pytest.mark.xfail(reason="places that nothing speaks for are weighed where at most three views with boxes see them")
 def test_nobody_is_sought_where_nothing_speaks_for_it() -> None:
     for kind in KINDS:
         assert len(pass_of(kind).explain([None] * 4, NOBODY).ghosts) == 0

@@ -20,6 +20,7 @@ from stseg.foreground.sight import Sight
 from stseg.io.config_file import format_config, read_config
 from stseg.io.frames import count_frames, open_frames, read_background
 from stseg.io.layout import ghost_type
+from stseg.io.outputs import require_new
 from stseg.io.recording import Recording
 from stseg.io.rigs import read_rig
 from stseg.io.runs import RunWriter
@@ -64,6 +65,7 @@ def run(
     overwrite
         Replace an older run file of that name, once this one is whole.
     """
+    require_new(output, overwrite)
     resolved = read_config(config, set_)
     recording = read_rig(rig)
     first, stop = _frames(frames, recording)

@@ -15,7 +15,7 @@ from stseg.ghosts.views import BoxView, PixelView, Sight, View
 
 MOST = 250
 """Candidates that one round adds at most."""
-_WORTH = -1.0
+_WORTH = 0.0
 """Score above which a peak of the lattice is a candidate, nats."""
 
 

@@ -83,7 +83,7 @@ class Identities:
         """Where tracks seen not long before a frame would be then at constant velocity, float64 (n, 2), metres."""
         ahead = self.config.foresight * self.frame_rate
         recent = [track.tail for track in self.alive if frame - track.tail.frames[-1] <= ahead]
-        places = [tail.ground[-1] + (frame - tail.frames[-1]) * tail.velocity(True) for tail in recent]
+        places = [tail.ground[-1] + (frame - tail.frames[-1]) * tail.velocity() for tail in recent]
         return np.array(places).reshape(-1, 2)
 
     def _names(self, window: Window, blobs: Sequence[Blobs], pieces: Sequence[Piece]) -> list[int]:

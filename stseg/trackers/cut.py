@@ -94,9 +94,7 @@ class CutTracker:
             )
             for cells, linked in zip(occupied, held, strict=True)
         ]
-        pieces = chain_pieces(
-            blobs, [linked.chains for linked in held], window.solve_first, self.rig.frame_rate, self.config.identity
-        )
+        pieces = chain_pieces(blobs, [linked.chains for linked in held], window.solve_first, self.config.identity)
         decision = self.identities.decide(window, blobs, pieces)
         row = np.array([(*_ranges(window), energy.of(occupied), QUANTUM, cut.nodes)], WINDOW)
         self.committed = window.commit_stop
