@@ -122,7 +122,7 @@ class Run:
         return _read(self.path, f"/{name}", lambda file: np.asarray(file[name][:]))
 
 
-def read_run(path: Path) -> Run:
+def read_run(path: Path | str) -> Run:
     """Open a run file.
 
     Raises

@@ -142,7 +142,13 @@ class FramePass:
             frame = _Frame(self, sights, frame.pool.and_(moved).and_(fresh), frame.members)
             if (frame.members < known).all():
                 break
-        return frame.explanation()
+        return self._settled(frame).explanation()
+
+    def _settled(self, frame: _Frame) -> _Frame:
+        """The frame searched once more from where its people exactly stand, which may show two of them to be one."""
+        exact = frame.refined()[0]
+        known = len(frame.pool)
+        return _Frame(self, frame.sights, frame.pool.and_(exact), np.arange(known, known + len(exact)))
 
     def _fresh(self, frame: _Frame) -> Pool:
         """Candidates in what nobody explains yet."""
