@@ -13,12 +13,10 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from stseg.arrays import Bytes, Rows
-from stseg.config import Config
+from stseg.commands.sights import make_sights
 from stseg.errors import ConfigError
-from stseg.foreground import Mixture
-from stseg.foreground.sight import Sight
 from stseg.io.config_file import format_config, read_config
-from stseg.io.frames import count_frames, open_frames, read_background
+from stseg.io.frames import count_frames, open_frames
 from stseg.io.layout import ghost_type
 from stseg.io.outputs import require_new
 from stseg.io.recording import Recording
@@ -26,9 +24,6 @@ from stseg.io.rigs import read_rig
 from stseg.io.runs import RunWriter
 from stseg.pipeline import Pipeline, Step
 from stseg.tracks import EVENT, TRAJECTORY, Tracks
-
-_SAMPLES = 40
-"""Frames that a background is learned from where no empty scene is given."""
 
 
 def run(
@@ -69,7 +64,7 @@ def run(
     resolved = read_config(config, set_)
     recording = read_rig(rig)
     first, stop = _frames(frames, recording)
-    sights = [_sight(recording, k, resolved, first, stop) for k in range(len(recording.sources))]
+    sights = make_sights(recording, resolved, first, stop)
     kinds = ["boxes" if s.source.kind in ("boxes", "instances") else "pixels" for s in recording.sources]
     pipeline = Pipeline(recording.rig, sights, kinds, resolved, tracker)
     views: Bytes = pipeline.occupancy.views
@@ -111,30 +106,6 @@ def _write(step: Step, writer: RunWriter, views: int) -> None:
     writer.append("ghosts", ghosts)
     writer.append("windows", commit.windows)
     writer.append("timings", step.timings)
-
-
-def _sight(recording: Recording, camera: int, config: Config, first: int, stop: int) -> Sight:
-    """A camera's foreground; a colour camera learns its background, from empty frames where there are some."""
-    source = recording.sources[camera]
-    if source.source.kind not in ("video", "images"):
-        return Sight()
-    model = Mixture(recording.rig.cameras[camera].size, recording.rig.frame_rate, config.foreground)
-    if source.background is not None:
-        for image in read_background(recording, camera):
-            model.learn(np.asarray(image, np.uint8))
-    else:
-        model.learn_from(_spread(recording, camera, first, stop))
-    return Sight(model)
-
-
-def _spread(recording: Recording, camera: int, first: int, stop: int) -> Iterator[Bytes]:
-    """Frames of one camera spread over the first five minutes, to learn the background from."""
-    last = min(stop, first + round(300 * recording.rig.frame_rate))
-    every = max(1, (last - first) // _SAMPLES)
-    with open_frames(recording, first, last) as moments:
-        for moment in moments:
-            if (moment.frame - first) % every == 0 and moment.views[camera] is not None:
-                yield np.asarray(moment.views[camera], np.uint8)
 
 
 def _frames(text: str | None, recording: Recording) -> tuple[int, int]:

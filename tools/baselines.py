@@ -1,0 +1,124 @@
+"""How the plain methods do on a recording: what a scene's difficulty is judged by (METHODS 12).
+
+    python tools/baselines.py RIG TRUTH.csv [--frames 0:100] [--level -1.0]
+
+plain KS09: the mean over the views that see a cell of log L, on all planes, summed over planes, thresholded at `level`
+nats a plane, components on the ground. plain 4-D cut: a minimum cut of windows of 15 frames of the same volume less the
+level, components in space and time cut frame by frame. Neither knows who explains what, so both are expected to fail in
+a crowd.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from scipy.ndimage import label
+
+from stseg.arrays import Boxes, Flags, Floats, Rows, Singles
+from stseg.commands.sights import make_sights
+from stseg.config import Config, SegmentationConfig
+from stseg.evaluation import evaluate
+from stseg.foreground import box_likelihood
+from stseg.geometry import Grid, Rig
+from stseg.io.frames import open_frames
+from stseg.io.rigs import read_rig
+from stseg.io.tracks import POSITION, read_tracks_csv
+from stseg.occupancy.sampling import UNSEEN, Sampling
+from stseg.segmentation.cut import minimum_cut
+from stseg.segmentation.energy import build_energy
+
+LEAST = 0.05
+"""L_min: how often a detector misses."""
+WINDOW = 15
+SMALLEST = 0.05
+"""Square metres of ground below which a component is nobody."""
+
+
+def mean_log(maps: list[Singles], sampling: Sampling) -> Singles:
+    """Mean log-likelihood of the views that see each cell, float32 (plane, y, x); nan where none does."""
+    total, seen = np.zeros(sampling.pixel.shape[1:4]), np.zeros(sampling.pixel.shape[1:4])
+    for likelihood, pixel in zip(maps, sampling.pixel, strict=True):
+        inside = pixel[..., 0] != UNSEEN
+        u, v = pixel[inside].T
+        total[inside] += np.log(np.maximum(likelihood[v, u], LEAST))
+        seen[inside] += 1
+    with np.errstate(invalid="ignore"):
+        return (total / np.where(seen > 0, seen, np.nan)).astype(np.float32)
+
+
+def volumes(rig_path: Path, first: int, stop: int) -> Iterator[Singles]:
+    """The plain volume of each frame."""
+    recording = read_rig(rig_path)
+    sights = make_sights(recording, Config(), first, stop)
+    sampling = Sampling.of(recording.rig)
+    with open_frames(recording, first, stop) as moments:
+        for moment in moments:
+            maps = []
+            for sight, view, camera in zip(sights, moment.views, recording.rig.cameras, strict=True):
+                seen = sight.evidence(view)
+                if seen is not None:
+                    maps.append(box_likelihood(seen, camera.size) if isinstance(seen, Boxes) else seen)
+            yield mean_log(maps, sampling)
+
+
+def places(occupied: Flags, grid: Grid) -> Floats:
+    """Centroids of the components on the ground (y, x), metres, float64 (n, 2)."""
+    pieces, number = label(occupied, np.ones((3, 3)))
+    centroids = [
+        grid.ground[pieces == k].mean(0) for k in range(1, number + 1) if (pieces == k).sum() * grid.cell**2 > SMALLEST
+    ]
+    return np.array(centroids).reshape(-1, 2)
+
+
+def rows(found: list[Floats], first: int) -> Rows:
+    """Detections without identities: every one is a track of its own."""
+    table = np.zeros(sum(map(len, found)), POSITION)
+    table["frame"] = np.repeat(np.arange(first, first + len(found)), [len(f) for f in found])
+    table["id"] = np.arange(len(table)) + 1
+    ground = np.concatenate([*found, np.zeros((0, 2))])
+    table["x"], table["y"] = ground.T
+    return table
+
+
+def plain_fusion(volume: list[Singles], level: float, grid: Grid) -> list[Floats]:
+    """Plain KS09."""
+    return [places(np.nan_to_num(frame - level, nan=-1.0).mean(0) > 0, grid) for frame in volume]
+
+
+def plain_cut(volume: list[Singles], level: float, rig: Rig) -> list[Floats]:
+    """The plain 4-D cut."""
+    found = []
+    for start in range(0, len(volume), WINDOW):
+        window = np.nan_to_num(np.stack(volume[start : start + WINDOW]) - level, nan=-1.0).astype(np.float32)
+        still = np.zeros((len(window) - 1, *rig.grid.shape[1:], 2), np.int64)
+        energy = build_energy(window, still, rig.grid, SegmentationConfig())
+        found += [places(cells.any(0), rig.grid) for cells in minimum_cut(energy).occupied]
+    return found
+
+
+def main() -> None:
+    """Run both and print their scores."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("rig", type=Path)
+    parser.add_argument("truth", type=Path)
+    parser.add_argument("--frames", default="0:100")
+    parser.add_argument("--level", type=float, default=-1.0)
+    asked = parser.parse_args()
+    first, stop = map(int, asked.frames.split(":"))
+    rig = read_rig(asked.rig).rig
+    truth = read_tracks_csv(asked.truth)
+    truth = truth[(truth["frame"] >= first) & (truth["frame"] < stop)]
+    volume = list(volumes(asked.rig, first, stop))
+    for name, found in (
+        ("plain KS09", plain_fusion(volume, asked.level, rig.grid)),
+        ("plain 4-D cut", plain_cut(volume, asked.level, rig)),
+    ):
+        scores = evaluate(truth, rows(found, first), ignore_flagged=True).as_dict()
+        print(name, {key: scores[key] for key in ("MODA", "precision", "recall")})
+
+
+if __name__ == "__main__":
+    main()
