@@ -20,8 +20,8 @@ class MixtureConfig:
     """How long a thing that moved in must stay still to become background, seconds."""
     share: float = 0.1
     """Weight from which a mode is background: the share of time that the scene shows it, 0..1."""
-    foreground: float = 0.5
-    """f: prior probability of a person at a pixel, 0..1."""
+    foreground: float = 0.1
+    """f: prior probability of a person at a pixel, 0..1; it guides learning and is taken out of the evidence."""
     unexplained: float = 1e-3
     """e: share of background colours that no mode explains, 0..1; keeps the likelihood below 1."""
     shadow: float = 0.1

@@ -35,4 +35,25 @@ class Sight:
             return mask_likelihood(np.asarray(seen, np.uint8))
         if self.background is None:
             raise ValueError("a colour frame needs a background model")
-        return self.background.likelihood(np.asarray(seen, np.uint8))
+        posterior = self.background.likelihood(np.asarray(seen, np.uint8))
+        return without_prior(posterior, self.background.config.foreground)
+
+
+def without_prior(posterior: Singles, prior: float) -> Singles:
+    """What a posterior would be with a prior of one half: the evidence alone.
+
+    The fusion has a prior of its own, that of a cell being occupied; one for the pixel besides would count it twice.
+
+    Parameters
+    ----------
+    posterior : float32 (v, u)
+        Probability of foreground, 0..1.
+    prior
+        The prior in it, 0..1.
+
+    Returns
+    -------
+    float32 (v, u)
+    """
+    body, empty = posterior * np.float32(1 - prior), (1 - posterior) * np.float32(prior)
+    return np.asarray(body / (body + empty), np.float32)
