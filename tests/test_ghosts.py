@@ -30,7 +30,7 @@ from stseg.arrays import Floats, Ints
 from stseg.geometry import Camera, Rig
 from stseg.geometry.bodies import BodyTable
 from stseg.ghosts.boxes import fill_best_match, fill_cover, fill_inside, fill_match, half_square
-from stseg.ghosts.evidence import BoxEvidence, PixelEvidence, Terms
+from stseg.ghosts.evidence import BoxEvidence, Case, PixelEvidence, Terms
 from stseg.ghosts.explain import Explanation, FramePass, ViewEvidence
 from stseg.ghosts.outlines import outlines
 from stseg.ghosts.scoring import set_score
@@ -129,24 +129,23 @@ class Problem:
     own: Floats
     ground: Floats
 
+    def case(self) -> Case:
+        """The frame as the kernels take it."""
+        views = len(self.boxes.boxes) + len(self.pixels.raster)
+        owner = np.empty(max(self.pixels.raster[0].size, self.boxes.match.shape[2]), np.int64)
+        parts = np.zeros((views, len(self.own) + 1))
+        return Case(self.boxes, self.pixels, self.own, self.ground, TERMS, owner, parts)
+
     def score(self, members: Sequence[int] | Ints) -> float:
         """The fast score of a set."""
         chosen = np.array(members, np.int64)
-        views = len(self.boxes.boxes) + len(self.pixels.raster)
-        scratch = np.empty(max(self.pixels.raster[0].size, self.boxes.match.shape[2]), np.int64)
-        parts = np.zeros((views, len(self.own) + 1))
-        own, ground = self.own, self.ground
-        return set_score(chosen, len(chosen), self.boxes, self.pixels, own, ground, TERMS, scratch, parts)
+        return set_score(chosen, len(chosen), self.case())
 
     def found(self, start: Sequence[int] = ()) -> list[int]:
         """The set that the search ends with."""
         room = np.zeros(len(self.own) + 1, np.int64)
         room[: len(start)] = start
-        views = len(self.boxes.boxes) + len(self.pixels.raster)
-        scratch = np.empty(max(self.pixels.raster[0].size, self.boxes.match.shape[2]), np.int64)
-        parts = np.zeros((views, len(self.own) + 1))
-        own, ground = self.own, self.ground
-        count = search(room, len(start), self.boxes, self.pixels, own, ground, TERMS, scratch, parts)
+        count = search(room, len(start), self.case())
         return sorted(room[:count].tolist())
 
 

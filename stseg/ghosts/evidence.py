@@ -72,3 +72,31 @@ class PixelEvidence(NamedTuple):
     spans: Spans
     area: Floats
     order: Floats
+
+
+class Case(NamedTuple):
+    """A frame's candidates and all that is known of them.
+
+    Attributes
+    ----------
+    boxes, pixels
+        What the views say.
+    own : float64 (candidate,)
+        What speaks for each candidate by itself, nats.
+    ground : float64 (candidate, 2)
+        Metres.
+    terms
+        The pass's constants.
+    owner : int64 (at least boxes, at least v * u)
+        Scratch: after a view was scored, the place in the set of whoever owns each box or pixel, -1 for nobody.
+    parts : float64 (view, candidate + 1)
+        Scratch: after a set was scored, what each view says of each of its members, nats; views with boxes first.
+    """
+
+    boxes: BoxEvidence
+    pixels: PixelEvidence
+    own: Floats
+    ground: Floats
+    terms: Terms
+    owner: Ints
+    parts: Floats

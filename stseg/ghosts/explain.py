@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from stseg.arrays import Boxes, Flags, Floats, Ints, Singles
 from stseg.config import GhostConfig
 from stseg.geometry import Rig
-from stseg.ghosts.evidence import BoxEvidence, PixelEvidence, Terms
+from stseg.ghosts.evidence import Case, Terms
 from stseg.ghosts.pool import Pool, box_evidence, empty_pool, peaks, pixel_evidence
 from stseg.ghosts.refine import owned, refine
 from stseg.ghosts.scoring import box_score, pixel_score, set_score
@@ -172,45 +172,40 @@ class _Frame:
     def __init__(self, frame_pass: FramePass, sights: list[Sight | None], pool: Pool, members: Ints) -> None:
         self.frame_pass, self.sights, self.pool = frame_pass, sights, pool
         views = frame_pass.views
-        self.boxes: BoxEvidence = box_evidence(views, sights, pool)
-        self.pixels: PixelEvidence = pixel_evidence(views, sights, pool)
-        self.own = frame_pass._height_prior(pool.height)
-        most = max(self.pixels.raster[0].size if len(self.pixels.raster) else 0, self.boxes.match.shape[2], 1)
-        self.scratch = np.empty(most, np.int64)
-        self.parts = np.zeros((len(views), len(pool) + 1))
+        boxes, pixels = box_evidence(views, sights, pool), pixel_evidence(views, sights, pool)
+        owner = np.empty(max(pixels.raster[:1].size, boxes.match.shape[2], 1), np.int64)
+        parts = np.zeros((len(views), len(pool) + 1))
+        own = frame_pass._height_prior(pool.height)
+        self.case = Case(boxes, pixels, own, pool.ground, frame_pass.terms, owner, parts)
         # The scores' parts have the views with boxes first; `row` finds those of each view of the rig.
         pixels_last = np.argsort([isinstance(view, PixelView) for view in views], kind="stable")
         self.row = np.argsort(pixels_last)
         room = np.zeros(len(pool) + 1, np.int64)
         room[: len(members)] = members
-        count = search(room, len(members), *self._arguments())
+        count = search(room, len(members), self.case)
         self.members = room[:count].copy()
         self.box_owner, self.pixel_owner = self._owners()
 
-    def _arguments(self) -> tuple[BoxEvidence, PixelEvidence, Floats, Floats, Terms, Ints, Floats]:
-        pool, terms = self.pool, self.frame_pass.terms
-        return self.boxes, self.pixels, self.own, pool.ground, terms, self.scratch, self.parts
-
     def score(self, members: Ints) -> float:
-        """Score of a set; `parts` then holds what each view says of each member."""
-        return set_score(members, len(members), *self._arguments())
+        """Score of a set; the case's `parts` then holds what each view says of each member."""
+        return set_score(members, len(members), self.case)
 
     def _owners(self) -> tuple[list[Ints], list[Ints]]:
         """For each view whose boxes are whose, and whose pixels are whose; -1 for nobody."""
         boxes, pixels = [], []
-        terms, count = self.frame_pass.terms, len(self.members)
+        case, count = self.case, len(self.members)
         box_view = pixel_view = 0
         for view, sight in zip(self.frame_pass.views, self.sights, strict=True):
             owner = np.full(len(sight.edges) if sight else 0, -1, np.int64)
             raster = np.full(view.shape, -1, np.int64)
             if isinstance(view, BoxView):
-                box_score(box_view, self.members, count, self.boxes, terms, self.scratch, self.parts[0])
-                owner[:] = self.scratch[: len(owner)]
+                box_score(box_view, self.members, count, case.boxes, case.terms, case.owner, case.parts[0])
+                owner[:] = case.owner[: len(owner)]
                 box_view += 1
             else:
-                pixel_score(pixel_view, self.members, count, self.pixels, terms, self.scratch, self.parts[0])
-                rows, columns = self.pixels.raster.shape[1:]
-                raster[:] = self.scratch[: rows * columns].reshape(rows, columns)[: view.shape[0], : view.shape[1]]
+                pixel_score(pixel_view, self.members, count, case.pixels, case.terms, case.owner, case.parts[0])
+                rows, columns = case.pixels.raster.shape[1:]
+                raster[:] = case.owner[: rows * columns].reshape(rows, columns)[: view.shape[0], : view.shape[1]]
                 pixel_view += 1
             boxes.append(owner)
             pixels.append(raster)
@@ -219,12 +214,12 @@ class _Frame:
     def _visible(self) -> Floats:
         """How much of each member each view can see past the others, float64 (view, member)."""
         visible = np.ones((len(self.frame_pass.views), len(self.members)))
-        boxes = iter(range(len(self.boxes.match)))
+        boxes = iter(range(len(self.case.boxes.match)))
         for row, view in zip(visible, self.frame_pass.views, strict=True):
             if isinstance(view, BoxView):
                 k = next(boxes)
-                cover = self.boxes.cover[k][np.ix_(self.members, self.members)]
-                row[:] = view.found_share(self.boxes.inside[k][self.members] * np.prod(1.0 - cover, axis=1))
+                cover = self.case.boxes.cover[k][np.ix_(self.members, self.members)]
+                row[:] = view.found_share(self.case.boxes.inside[k][self.members] * np.prod(1.0 - cover, axis=1))
         return visible
 
     def free(self) -> list[Flags]:
@@ -247,7 +242,7 @@ class _Frame:
         """The result, once nothing changes any more."""
         exact, covariance = self.refined()
         total = self.score(self.members)
-        parts = self.parts[self.row, : len(self.members)]
+        parts = self.case.parts[self.row, : len(self.members)]
         without = [self.score(np.delete(self.members, a)) for a in range(len(self.members))]
         evidence = total - np.array(without)
         people = People(exact.ground, exact.height, covariance, evidence, parts, self._visible())
@@ -263,7 +258,7 @@ class _Frame:
         weighed = []
         for i in np.setdiff1d(np.arange(len(self.pool)), self.members):
             gain = self.score(np.append(self.members, i)) - total
-            weighed.append((gain, i, self.parts[self.row, len(self.members)]))
+            weighed.append((gain, i, self.case.parts[self.row, len(self.members)]))
         weighed.sort(key=lambda one: (-one[0], one[1]))
         kept: list[tuple[float, int, Floats]] = []
         standing = list(self.pool.ground[self.members])

@@ -13,35 +13,23 @@ import numpy as np
 
 from stseg.accelerate import kernel
 from stseg.arrays import Floats, Ints
-from stseg.ghosts.evidence import BoxEvidence, PixelEvidence, Terms
+from stseg.ghosts.evidence import BoxEvidence, Case, PixelEvidence, Terms
 
 _CROWDED = 20.0
 
 
 @kernel
-def set_score(
-    members: Ints,
-    count: int,
-    boxes: BoxEvidence,
-    pixels: PixelEvidence,
-    own: Floats,
-    ground: Floats,
-    terms: Terms,
-    owner: Ints,
-    parts: Floats,
-) -> float:
-    """Score of the first `count` members; fills parts (view, member), boxes' views first, then pixels'.
-
-    `owner` is scratch: int64 at least (boxes,) and (v * u,).
-    """
-    total = -crowding(members, count, ground, terms.apart)
+def set_score(members: Ints, count: int, case: Case) -> float:
+    """Score of the first `count` members, nats; fills `case.parts` (view, member), boxes' views first, then pixels'."""
+    total = -crowding(members, count, case.ground, case.terms.apart)
     for a in range(count):
-        total += terms.person + own[members[a]]
-    box_views = boxes.match.shape[0]
+        total += case.terms.person + case.own[members[a]]
+    box_views = case.boxes.match.shape[0]
     for view in range(box_views):
-        total += box_score(view, members, count, boxes, terms, owner, parts[view])
-    for view in range(pixels.raster.shape[0]):
-        total += pixel_score(view, members, count, pixels, terms, owner, parts[box_views + view])
+        total += box_score(view, members, count, case.boxes, case.terms, case.owner, case.parts[view])
+    for view in range(case.pixels.raster.shape[0]):
+        parts = case.parts[box_views + view]
+        total += pixel_score(view, members, count, case.pixels, case.terms, case.owner, parts)
     return total
 
 

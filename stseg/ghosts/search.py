@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from stseg.accelerate import kernel
-from stseg.arrays import Flags, Floats, Ints
-from stseg.ghosts.evidence import BoxEvidence, PixelEvidence, Terms
+from stseg.arrays import Flags, Ints
+from stseg.ghosts.evidence import Case
 from stseg.ghosts.scoring import set_score
 
 SWEEPS = 8
@@ -23,13 +23,7 @@ _SLACK = 3.0
 def search(
     members: Ints,
     count: int,
-    boxes: BoxEvidence,
-    pixels: PixelEvidence,
-    own: Floats,
-    ground: Floats,
-    terms: Terms,
-    owner: Ints,
-    parts: Floats,
+    case: Case,
 ) -> int:
     """Improve the set in place, starting from its first `count` members; returns its new size.
 
@@ -37,21 +31,15 @@ def search(
     ----------
     members : int64 (candidate + 1,)
         Indices of candidates; the first `count` are the set.
-    own : float64 (candidate,)
-        What speaks for each candidate by itself, nats.
-    ground : float64 (candidate, 2)
-        Metres.
-    owner, parts
-        Scratch of `set_score`.
     """
-    inside = np.zeros(len(own), np.bool_)
+    inside = np.zeros(len(case.own), np.bool_)
     for a in range(count):
         inside[members[a]] = True
     for _ in range(SWEEPS):
-        score = set_score(members, count, boxes, pixels, own, ground, terms, owner, parts)
-        grown = _add(members, count, score, inside, boxes, pixels, own, ground, terms, owner, parts)
-        shrunk = _remove(members, grown, inside, boxes, pixels, own, ground, terms, owner, parts)
-        exchanged = _exchange(members, shrunk, inside, boxes, pixels, own, ground, terms, owner, parts)
+        score = set_score(members, count, case)
+        grown = _add(members, count, score, inside, case)
+        shrunk = _remove(members, grown, inside, case)
+        exchanged = _exchange(members, shrunk, inside, case)
         if grown == count and shrunk == grown and not exchanged:
             break
         count = shrunk
@@ -64,23 +52,17 @@ def _add(
     count: int,
     score: float,
     inside: Flags,
-    boxes: BoxEvidence,
-    pixels: PixelEvidence,
-    own: Floats,
-    ground: Floats,
-    terms: Terms,
-    owner: Ints,
-    parts: Floats,
+    case: Case,
 ) -> int:
     """Add the best candidate while one helps; a candidate's gain seldom rises, so hopeless ones are tried once."""
-    gain = np.full(len(own), np.inf)
-    while count < len(own):
+    gain = np.full(len(case.own), np.inf)
+    while count < len(case.own):
         best, best_gain = -1, _GAINED
-        for i in range(len(own)):
+        for i in range(len(case.own)):
             if inside[i] or gain[i] < best_gain - _SLACK:
                 continue
             members[count] = i
-            gain[i] = set_score(members, count + 1, boxes, pixels, own, ground, terms, owner, parts) - score
+            gain[i] = set_score(members, count + 1, case) - score
             if gain[i] > best_gain:
                 best, best_gain = i, gain[i]
         if best < 0:
@@ -96,21 +78,15 @@ def _remove(
     members: Ints,
     count: int,
     inside: Flags,
-    boxes: BoxEvidence,
-    pixels: PixelEvidence,
-    own: Floats,
-    ground: Floats,
-    terms: Terms,
-    owner: Ints,
-    parts: Floats,
+    case: Case,
 ) -> int:
     """Remove each member without whom the score is higher."""
-    score = set_score(members, count, boxes, pixels, own, ground, terms, owner, parts)
+    score = set_score(members, count, case)
     a = 0
     while a < count:
         leaving = members[a]
         members[a] = members[count - 1]
-        without = set_score(members, count - 1, boxes, pixels, own, ground, terms, owner, parts)
+        without = set_score(members, count - 1, case)
         if without > score + _GAINED:
             inside[leaving] = False
             count -= 1
@@ -126,26 +102,20 @@ def _exchange(
     members: Ints,
     count: int,
     inside: Flags,
-    boxes: BoxEvidence,
-    pixels: PixelEvidence,
-    own: Floats,
-    ground: Floats,
-    terms: Terms,
-    owner: Ints,
-    parts: Floats,
+    case: Case,
 ) -> bool:
     """Replace each member by the near candidate that raises the score most."""
     changed = False
-    score = set_score(members, count, boxes, pixels, own, ground, terms, owner, parts)
+    score = set_score(members, count, case)
     for a in range(count):
         old, best = members[a], members[a]
         best_score = score + _GAINED
-        for i in range(len(own)):
-            apart = np.hypot(ground[i, 0] - ground[old, 0], ground[i, 1] - ground[old, 1])
+        for i in range(len(case.own)):
+            apart = np.hypot(case.ground[i, 0] - case.ground[old, 0], case.ground[i, 1] - case.ground[old, 1])
             if inside[i] or apart > _NEAR:
                 continue
             members[a] = i
-            trial = set_score(members, count, boxes, pixels, own, ground, terms, owner, parts)
+            trial = set_score(members, count, case)
             if trial > best_score:
                 best, best_score = i, trial
         members[a] = best
