@@ -88,7 +88,7 @@ def _boxes_of_view(view: int, members: Sequence[int], boxes: BoxEvidence, terms:
         found = min(max(share, terms.least), 1.0)
         missing = math.log(1 - (1 - terms.box_miss) * found)
         total += missing
-        worth = terms.hit + 0.3 * math.log(found) - missing
+        worth = terms.hit - missing
         gains += [(worth + boxes.match[view, j, b], j, b) for b in range(boxes.boxes[view])]
     served: set[int] = set()
     taken: set[int] = set()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import gc
 import os
 import signal
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import BinaryIO
 
@@ -270,6 +270,15 @@ def test_an_exception_leaves_the_old_file_and_no_part(run_path: Path, error: typ
     assert not part_of(run_path).exists()
 
 
+@pytest.fixture
+def interruptible() -> Iterator[None]:
+    """Interrupts as at a terminal: a process in the background of a shell may have been told to ignore them."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("interruptible")
 @pytest.mark.parametrize("moment", [0, 1, 3, 10, 30, 50, 70, 90, 100, 110])
 def test_an_interrupt_inside_a_write_leaves_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, moment: int

@@ -2,7 +2,7 @@
 
     score(S) = sum_j [person + height_j] + sum_views sum_j part_j(S) - crowding(S)
 
-In a view with boxes, part_j is the best box that nobody else in S takes, or the cost of a missing one; both weigh less
+In a view with boxes, part_j is the best box that nobody else in S takes, or the cost of a missing one, which is less
 the more of j is hidden by nearer members. In a view with pixels, part_j is the mean log-odds over j's outline of the
 pixels that no nearer member covers (HW12's detection energy, eqs 13 to 15, in soft form, for the labels of eq. 24).
 """
@@ -65,7 +65,7 @@ def box_score(
         found = min(max(share, terms.least), 1.0)
         parts[a] = np.log(1.0 - (1.0 - terms.box_miss) * found)
         for b in range(number):
-            gain[a, b] = terms.hit + 0.3 * np.log(found) + boxes.match[view, i, b] - parts[a]
+            gain[a, b] = terms.hit + boxes.match[view, i, b] - parts[a]
     taken_by[:number] = -1
     served = np.zeros(count, np.bool_)
     while True:

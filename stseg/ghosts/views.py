@@ -101,9 +101,7 @@ class BoxView(View):
         width, height = map(float, self.camera.size)
         best = np.full(self.bodies.shape[:2], -np.inf)
         fill_best_match(self.bodies, sight.edges[free], sight.belief[free], width, height, best)
-        with np.errstate(divide="ignore"):
-            hit = self.config.hit + 0.3 * np.log(self.found) + best
-        return np.where(self.found > 0, np.maximum(hit, -_OPTIMISM * self.found), 0.0)
+        return np.where(self.found > 0, np.maximum(self.config.hit + best, -_OPTIMISM * self.found), 0.0)
 
 
 class PixelView(View):
