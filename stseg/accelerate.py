@@ -3,8 +3,8 @@
 A kernel keeps its signature for type checkers, fills arrays that it is given, and is cached on disk. Kernels never use
 fast-math: the same input gives the same bits. With `NUMBA_DISABLE_JIT=1` every kernel is plain Python.
 
-The cache on disk knows a kernel by its own file alone: after an edit to a kernel that kernels of other files call, delete
-theirs (`find . -name '*.nb[ci]' -delete`).
+The cache on disk knows a kernel by its own file alone: after an edit to a kernel that kernels of other files call,
+delete theirs (`find . -name '*.nb[ci]' -delete`).
 """
 
 from __future__ import annotations

@@ -207,13 +207,13 @@ def test_a_pixel_belongs_to_the_nearest_body() -> None:
 
 @pytest.mark.parametrize("seed", range(40))
 def test_no_single_move_helps(seed: int) -> None:
-    frame = problem(seed, 7)
+    frame = problem(seed, 10)
     start = [] if seed % 2 else [0, 3]
     members = frame.found(start)
     assert len(set(members)) == len(members)
     score = frame.score(members) + 1e-6
     assert score >= frame.score(start)
-    others = [i for i in range(7) if i not in members]
+    others = [i for i in range(10) if i not in members]
     for leaving in members:
         without = [i for i in members if i != leaving]
         assert score >= frame.score(without)
@@ -222,14 +222,19 @@ def test_no_single_move_helps(seed: int) -> None:
     assert all(score >= frame.score([*members, i]) for i in others)
 
 
-def test_the_best_of_all_sets_is_nearly_always_found() -> None:
-    frames = [problem(seed, 7) for seed in range(30)]
-    missed = [
-        seed
-        for seed, frame in enumerate(frames)
-        if frame.score(frame.found()) < max(frame.score(s) for s in reference.subsets(7)) - 1e-6
-    ]
-    assert len(missed) <= 3, missed
+@pytest.mark.parametrize("seed", range(20))
+def test_of_few_candidates_the_best_of_all_sets_is_found(seed: int) -> None:
+    frame = problem(seed, 7)
+    best = max(frame.score(chosen) for chosen in reference.subsets(7))
+    assert frame.score(frame.found()) == pytest.approx(best, abs=1e-6)
+
+
+def test_of_more_candidates_the_best_set_is_mostly_found() -> None:
+    """Single moves cannot trade one person for two; on these crafted frames six of forty end below the best."""
+    frames = [problem(seed, 10) for seed in range(40)]
+    below = [max(f.score(s) for s in reference.subsets(10)) - f.score(f.found()) for f in frames]
+    assert sum(short > 1e-6 for short in below) <= 6, below
+    assert max(below) < 2.2
 
 
 # The pass on named scenes

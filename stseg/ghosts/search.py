@@ -1,7 +1,8 @@
 """The set of people that explains a frame best, by moves that only ever raise the score (METHODS 7).
 
-Adding, removing and exchanging one person at a time until no move helps. The score is a sum over groups whose evidence
-does not touch, so moves in one group never depend on another; the bound on sweeps is reached by none but crafted input.
+Few candidates are enumerated: the best of all sets. Beyond that, one person at a time is added, removed or exchanged
+until no move helps. The score is a sum over groups whose evidence does not touch, so moves in one group never depend on
+another; the bound on sweeps is reached by none but crafted input.
 """
 
 from __future__ import annotations
@@ -13,6 +14,8 @@ from stseg.arrays import Flags, Ints
 from stseg.ghosts.evidence import Case
 from stseg.ghosts.scoring import set_score
 
+ENUMERATED = 8
+"""Up to so many candidates all sets are tried."""
 SWEEPS = 8
 _GAINED = 1e-9
 _NEAR = 0.7
@@ -32,6 +35,8 @@ def search(
     members : int64 (candidate + 1,)
         Indices of candidates; the first `count` are the set.
     """
+    if len(case.own) <= ENUMERATED:
+        return _enumerate(members, case)
     inside = np.zeros(len(case.own), np.bool_)
     for a in range(count):
         inside[members[a]] = True
@@ -43,6 +48,29 @@ def search(
         if grown == count and shrunk == grown and not exchanged:
             break
         count = shrunk
+    return count
+
+
+@kernel
+def _enumerate(members: Ints, case: Case) -> int:
+    """The best of all sets; of several, the one that leaves out the later candidates. Bits of a number name a set."""
+    candidates = len(case.own)
+    best, best_score = 0, -np.inf
+    for chosen in range(1 << candidates):
+        score = set_score(members, _spell(chosen, candidates, members), case)
+        if score > best_score + _GAINED:
+            best, best_score = chosen, score
+    return _spell(best, candidates, members)
+
+
+@kernel
+def _spell(chosen: int, candidates: int, members: Ints) -> int:
+    """Fill members with the set that the bits name; returns its size."""
+    count = 0
+    for i in range(candidates):
+        if chosen >> i & 1:
+            members[count] = i
+            count += 1
     return count
 
 
