@@ -79,12 +79,12 @@ def rule(canvas: Bytes, plan: PlanMap) -> None:
         u = plan.pixel(np.array([metres, 0.0]))[0]
         stroke(canvas, np.array([[u, top], [u, bottom]]), RULE)
         if _is_multiple(metres, every):
-            text(canvas, f"{metres:g}", (u, bottom + 14), QUIET, 15, (0.5, 0))
+            text(canvas, f"{metres + 0.0:g}", (u, bottom + 14), QUIET, 15, (0.5, 0))
     for metres in _multiples(plan.y, step):
         v = plan.pixel(np.array([0.0, metres]))[1]
         stroke(canvas, np.array([[left, v], [right, v]]), RULE)
         if _is_multiple(metres, every):
-            text(canvas, f"{metres:g}", (left - 14, v), QUIET, 15, (1, 0.5))
+            text(canvas, f"{metres + 0.0:g}", (left - 14, v), QUIET, 15, (1, 0.5))
     outline(canvas, np.array([[left, top], [right, top], [right, bottom], [left, bottom]]), RULE)
     text(canvas, "x, metres", (right, bottom + 42), QUIET, 15, (1, 0))
     text(canvas, "y, metres", (left, top - 16), QUIET, 15, (0, 1))
