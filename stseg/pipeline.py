@@ -161,5 +161,4 @@ def _candidate_rows(frame: int, status: int, people: People) -> Rows:
         people.covariance[:, 0, 1],
         people.covariance[:, 1, 1],
     )
-    rows["origin"] = b"lattice"
     return rows

@@ -69,7 +69,6 @@ CANDIDATE = np.dtype(
         ("height", "<f4"),
         ("status", "u1"),  # 1 true, 0 ghost
         ("evidence", "<f4"),  # what all views and the prior say, nats; below 0 speaks for a ghost
-        ("origin", "S8"),  # where the candidate came from: volume or track
     ]
 )
 """One row per candidate and frame, true or ghost. In the run file each row also has one column a view."""

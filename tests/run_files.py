@@ -50,7 +50,7 @@ def small_trajectory() -> Rows:
 def small_ghosts() -> Rows:
     """Three candidates, one of them a ghost, of which the right view says nothing."""
     table = np.zeros(3, ghost_type(2))
-    table["frame"], table["status"], table["origin"] = (10, 10, 11), (1, 0, 1), b"volume"
+    table["frame"], table["status"] = (10, 10, 11), (1, 0, 1)
     table["parts"][:, 0] = (2.0, -1.0, 2.0)
     return table
 

@@ -11,11 +11,11 @@ from scenes import CONFIG, FRAME_RATE, room
 
 from stseg.arrays import Floats, Rows
 from stseg.errors import ConfigError
+from stseg.geometry.near import near_person
 from stseg.ghosts.explain import People
 from stseg.identity.windows import window_length, windows
 from stseg.segmentation.energy import QUANTUM
 from stseg.trackers import TRACKERS, Commit, Scene, make_tracker
-from stseg.trackers.protocol import near_person
 from stseg.trackers.rows import event_rows, trajectory_rows, views_at
 from stseg.tracks import WINDOW
 

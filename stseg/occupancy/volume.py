@@ -6,11 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from stseg.arrays import Boxes, Bytes, Floats, Ints, Singles
+from stseg.arrays import Boxes, Bytes, Ints, Singles
 from stseg.config import GhostConfig, OccupancyConfig
 from stseg.foreground import box_likelihood
 from stseg.geometry import Rig
 from stseg.geometry.bodies import BodyTable
+from stseg.geometry.near import near_person
 from stseg.ghosts.explain import Explanation, ViewEvidence
 from stseg.occupancy.clutter import clutter, clutter_weights
 from stseg.occupancy.fusion import Rates, fill_log_odds, fill_terms
@@ -50,7 +51,7 @@ class Occupancy:
         """The frame's log-odds, float32 (plane, y, x), nats; nan where no view sees the cell."""
         shape = self.rig.grid.shape
         weighted, weights, count = np.zeros(shape), np.zeros(shape), np.zeros(shape, np.uint8)
-        near = self._near(explanation.people.ground)
+        near = near_person(self.rig.grid.ground, explanation.people.ground, self.config.reach)
         share = clutter_weights(np.array([self._clutter(i, view) for i, view in enumerate(seen)]))
         for i, (camera, view) in enumerate(zip(self.rig.cameras, seen, strict=True)):
             if view is None:
@@ -69,14 +70,6 @@ class Occupancy:
         prior = float(np.log(self.config.occupied / (1 - self.config.occupied)))
         fill_log_odds(weighted, weights, count, self.views, near, prior, log_odds)
         return log_odds
-
-    def _near(self, people_ground: Floats) -> Ints:
-        """The person within reach of each cell, the nearest of several, int64 (y, x); -1 for nobody."""
-        ground = self.rig.grid.ground
-        if not len(people_ground):
-            return np.full(ground.shape[:2], -1, np.int64)
-        away = np.hypot(*np.moveaxis(ground[:, :, None] - people_ground, -1, 0))
-        return np.where(away.min(2) <= self.config.reach, away.argmin(2), -1)
 
     def _likelihood(
         self, i: int, view: Boxes | Singles, explanation: Explanation, near: Ints

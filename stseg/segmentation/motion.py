@@ -6,6 +6,7 @@ import numpy as np
 
 from stseg.arrays import Floats, Ints
 from stseg.geometry import Grid
+from stseg.geometry.near import near_person
 
 
 def motion_field(
@@ -33,7 +34,6 @@ def motion_field(
         return motion
     start = ground_now[now]
     moved = np.rint((ground_next[then] - start) / grid.cell).astype(np.int64)
-    away = np.hypot(*np.moveaxis(grid.ground[:, :, None] - start, -1, 0))
-    near = away.min(2) <= reach
-    motion[near] = moved[away.argmin(2)[near]][:, ::-1]
+    near = near_person(grid.ground, start, reach)
+    motion[near >= 0] = moved[near[near >= 0]][:, ::-1]
     return motion

@@ -7,9 +7,10 @@ import numpy as np
 from stseg.arrays import Floats, Ints, Labels
 from stseg.config import Config
 from stseg.geometry import Rig
+from stseg.geometry.near import near_person
 from stseg.identity.linking import Linker
 from stseg.occupancy.sampling import Sampling
-from stseg.trackers.protocol import Commit, Scene, near_person
+from stseg.trackers.protocol import Commit, Scene
 from stseg.trackers.rows import event_rows, trajectory_rows, views_at
 from stseg.tracks import WINDOW
 

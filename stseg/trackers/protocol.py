@@ -5,9 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
-import numpy as np
-
-from stseg.arrays import Floats, Ints, Labels, Rows, Singles
+from stseg.arrays import Floats, Labels, Rows, Singles
 from stseg.ghosts.explain import People
 
 
@@ -62,23 +60,3 @@ class Tracker(Protocol):
 
     def predict(self, frame: int) -> Floats:
         """Ground positions of people committed so far, carried to a frame, float64 (n, 2), metres."""
-
-
-def near_person(ground: Floats, people_ground: Floats, reach: float) -> Ints:
-    """The person within reach of each place, the nearest of several, -1 for nobody.
-
-    Parameters
-    ----------
-    ground : float64 (..., 2)
-        Places, metres.
-    people_ground : float64 (n, 2)
-        People, metres.
-
-    Returns
-    -------
-    int64 (...)
-    """
-    if not len(people_ground):
-        return np.full(ground.shape[:-1], -1, np.int64)
-    away = np.hypot(*np.moveaxis(ground[..., None, :] - people_ground, -1, 0))
-    return np.where(away.min(-1) <= reach, away.argmin(-1), -1)

@@ -1,0 +1,27 @@
+"""Which of several bodies a place on the ground belongs to."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stseg.arrays import Floats, Ints
+
+
+def near_person(ground: Floats, people_ground: Floats, reach: float) -> Ints:
+    """The person within reach of each place, the nearest of several, -1 for nobody.
+
+    Parameters
+    ----------
+    ground : float64 (..., 2)
+        Places, metres.
+    people_ground : float64 (n, 2)
+        People, metres.
+
+    Returns
+    -------
+    int64 (...)
+    """
+    if not len(people_ground):
+        return np.full(ground.shape[:-1], -1, np.int64)
+    away = np.hypot(*np.moveaxis(ground[..., None, :] - people_ground, -1, 0))
+    return np.where(away.min(-1) <= reach, away.argmin(-1), -1)
