@@ -126,9 +126,12 @@ class SegmentationConfig:
     """s: distance over which that falls to 0.6 of it, metres."""
     step: float = 0.15
     """How far apart the time neighbours of one body are once its motion is followed, metres."""
+    neighbours: int = 8
+    """How many neighbours a cell has: 8, one step along x, y, the planes or time, or 80, the diagonals too."""
 
     def __post_init__(self) -> None:
-        require(self.smoothness >= 0, self, "smoothness", "0 or more nats")
+        require(0 <= self.smoothness <= 16, self, "smoothness", "0 to 16 nats")
+        require(self.neighbours in (8, 80), self, "neighbours", "8 or 80")
         require(self.spread > 0, self, "spread", "a number above 0")
         require(self.step >= 0, self, "step", "0 or more metres")
 

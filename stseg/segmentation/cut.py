@@ -1,15 +1,28 @@
-"""The exact two-label minimum cut of a window. The one module that knows the solver."""
+"""The exact two-label minimum cut of a window."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
-import maxflow
 import numpy as np
 
 from stseg.arrays import Flags
+from stseg.segmentation.arcs import in_place, in_rows
 from stseg.segmentation.energy import Energy
-from stseg.segmentation.reduction import reduce
+from stseg.segmentation.graph import Graph
+from stseg.segmentation.halves import Bridges, solve, solve_halves
+from stseg.segmentation.lattice import cells
+from stseg.segmentation.reduction import OCCUPIED, Reduced, reduce
+
+DENSE = 0.15
+"""Share of the cells left by the reduction from which their arcs stay in place."""
+_WORTH_TWO = 20_000
+"""Open nodes from which a second thread gains more than it costs."""
+_STRONGEST = 16383
+"""Capacity of which twice fits into 16 bits."""
+
+Storage = Callable[[Reduced, int], tuple[Graph, Bridges]]
 
 
 @dataclass(frozen=True)
@@ -28,22 +41,34 @@ class Cut:
     nodes: int
 
 
-def minimum_cut(energy: Energy) -> Cut:
-    """The labelling of least energy; of several, the one with the smallest object set."""
-    left = reduce(energy)
-    occupied = left.occupied.copy()
-    cells = np.flatnonzero(left.open)
-    if len(cells):
-        node_of = np.full(len(left.open), -1, np.int64)
-        node_of[cells] = np.arange(len(cells))
-        graph = maxflow.GraphInt(len(cells), len(left.start))
-        nodes = graph.add_nodes(len(cells))
-        unary = left.unary[cells]
-        graph.add_grid_tedges(nodes, (-unary).clip(0), unary.clip(0))
-        if len(left.start):
-            graph.add_edges(node_of[left.start], node_of[left.end], left.capacity, left.capacity)
-        graph.maxflow()
-        # The solver counts a node that neither terminal reaches to the source. With the background there, the cells
-        # that remain are those from which the sink can be reached: the smallest object set.
-        occupied[cells] = graph.get_grid_segments(nodes)
-    return Cut(occupied.reshape(energy.unary.shape), len(cells))
+def minimum_cut(energy: Energy, threads: int = 2, storage: Storage | None = None) -> Cut:
+    """The labelling of least energy; of several, the one with the smallest object set.
+
+    Parameters
+    ----------
+    energy
+        With capacities of at most 16383 quanta each, and at most 2**30 together.
+    threads
+        1 or 2; the labels are the same.
+    storage
+        How the arcs of what is left are stored; by its share if not given. The labels are the same.
+
+    Raises
+    ------
+    OverflowError
+        If a capacity is larger.
+    """
+    if energy.capacity.max(initial=0) > _STRONGEST:
+        raise OverflowError(f"a capacity of {energy.capacity.max()} quanta, more than {_STRONGEST}")
+    reduced = reduce(energy)
+    nodes = len(reduced.left)
+    if nodes:
+        arrange = storage or (in_place if nodes > DENSE * energy.unary.size else in_rows)
+        middle = int(reduced.left[nodes // 2]) // reduced.lattice.frame * reduced.lattice.frame
+        if threads == 1 or nodes < _WORTH_TWO:
+            graph, _ = arrange(reduced, 0)
+            reached = solve(graph)
+        else:
+            reached = solve_halves(*arrange(reduced, middle))
+        reduced.state[reduced.left[reached if len(reached) == nodes else reached[reduced.left]]] = OCCUPIED
+    return Cut(np.asarray(cells(reduced.state, energy.unary.shape) == OCCUPIED), nodes)

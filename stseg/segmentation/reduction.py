@@ -1,7 +1,12 @@
-"""Cells whose label is certain before any cut: exact persistency.
+"""Cells whose label is certain before any cut.
 
-A cell whose unary outweighs all its capacities together takes the side of its unary in some minimum whatever the others
-do. It leaves the graph; its edges become terminal capacities of the neighbours that stay, which may decide those too.
+First by sets. Let every cell of a set S have u <= 0 and lose at least as much, -u, as all its capacities to cells
+outside S together. Then nothing is won by calling any part of S occupied, so all of S is background in the minimum with
+the smallest object set. The greatest such set is what remains of all cells with u <= 0 once those that do not hold are
+taken out one after the other. Its mirror image, the greatest set of cells with more than they could pay, is occupied.
+
+Then one by one (persistency): with the capacities to decided neighbours counted in, a cell that outweighs its
+capacities to those undecided is decided itself, which may decide its neighbours.
 """
 
 from __future__ import annotations
@@ -10,10 +15,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stseg.arrays import Flags, Ints
-from stseg.segmentation.energy import Energy, time_edges
+from stseg.accelerate import kernel
+from stseg.arrays import Bytes, Labels
+from stseg.segmentation.energy import Energy
+from stseg.segmentation.lattice import Lattice, lay_out, neighbour, spread
 
-_ROUNDS = 3
+GUARD, OPEN, OCCUPIED, EMPTY = 0, 1, 2, 3
+"""What is known of a node."""
 
 
 @dataclass(frozen=True)
@@ -22,57 +30,125 @@ class Reduced:
 
     Attributes
     ----------
-    occupied : bool (n,)
-        Label of each cell of the flattened volume; means nothing where `open` is true.
-    open : bool (n,)
-        Cells that are still to be decided.
-    unary : int64 (n,)
-        Quanta, with the capacities to decided neighbours added.
-    start, end, capacity : int64 (edge,)
-        Edges between open cells.
+    lattice
+        How nodes are numbered.
+    capacity : int32 (degree,)
+        What the arcs of a node carry.
+    state : uint8 (node,)
+        What is known of each node.
+    left : int32 (k,)
+        Nodes that are still to be decided, in rising order.
+    excess : int32 (k,)
+        Their unary with the capacities to decided neighbours added, quanta.
     """
 
-    occupied: Flags
-    open: Flags
-    unary: Ints
-    start: Ints
-    end: Ints
-    capacity: Ints
-
-
-def edges(energy: Energy) -> tuple[Ints, Ints, Ints]:
-    """All edges of the window as flat indices of their cells, and their capacities in quanta."""
-    index = np.arange(energy.unary.size).reshape(energy.unary.shape)
-    pairs = [
-        (index[:, :-1].ravel(), index[:, 1:].ravel(), energy.up),
-        (index[:, :, :-1].ravel(), index[:, :, 1:].ravel(), energy.across),
-        (index[..., :-1].ravel(), index[..., 1:].ravel(), energy.along),
-        (*time_edges(energy), energy.ahead),
-    ]
-    start, end = np.concatenate([p[0] for p in pairs]), np.concatenate([p[1] for p in pairs])
-    capacity = np.concatenate([np.full(len(p[0]), p[2], np.int64) for p in pairs])
-    return start, end, capacity
+    lattice: Lattice
+    capacity: Labels
+    state: Bytes
+    left: Labels
+    excess: Labels
 
 
 def reduce(energy: Energy) -> Reduced:
     """Decide what can be decided without a cut."""
-    start, end, capacity = edges(energy)
-    unary = energy.unary.ravel().copy()
-    size = len(unary)
-    open_, occupied = np.ones(size, bool), np.zeros(size, bool)
-    for _ in range(_ROUNDS):
-        around = np.bincount(start, capacity, size) + np.bincount(end, capacity, size)
-        # Of several minima the smallest object set is wanted, so a tie decides for the background only.
-        sure = open_ & ((unary <= -around) | (unary > around))
-        if not sure.any():
-            break
-        occupied[sure] = unary[sure] > 0
-        open_[sure] = False
-        leaving = sure[start] != sure[end]
-        inner = np.where(sure[start], end, start)[leaving]
-        outer = np.where(sure[start], start, end)[leaving]
-        signed = np.where(occupied[outer], capacity[leaving], -capacity[leaving])
-        unary += np.bincount(inner, signed, size).astype(np.int64)
-        kept = ~(sure[start] | sure[end])
-        start, end, capacity = start[kept], end[kept], capacity[kept]
-    return Reduced(occupied, open_, unary, start, end, capacity)
+    lattice, capacity = lay_out(energy), np.repeat(energy.capacity, 2)
+    unary = spread(energy.unary)
+    state = spread(np.where(energy.unary > 0, np.uint8(OCCUPIED), np.uint8(EMPTY)))
+    stack, doubt = (np.empty(len(state), np.int32) for _ in range(2))
+    # Of several minima the smallest object set is wanted, so a tie holds for the background only.
+    margin = np.where(unary > 0, unary - 1, -unary)
+    _decide_sets(margin, state, lattice, capacity, stack)
+    left = np.flatnonzero(state == OPEN).astype(np.int32)
+    _decide_single(left, unary, doubt, state, lattice, capacity, stack)
+    left = left[state[left] == OPEN]
+    return Reduced(lattice, capacity, state, left, unary[left])
+
+
+@kernel
+def _decide_sets(margin: Labels, state: Bytes, lattice: Lattice, capacity: Labels, stack: Labels) -> None:
+    """From all nodes as their signs have them, open those that do not hold.
+
+    `margin` is what a node has left when it has paid its capacities to those that are not of its set.
+    """
+    for node in range(len(state)):
+        if state[node] == OCCUPIED:
+            for slot in range(len(capacity)):
+                to = neighbour(node, slot, lattice)
+                if state[to] == OPEN or state[to] == EMPTY:
+                    margin[node] -= capacity[slot]
+                    margin[to] -= capacity[slot]
+                    if state[to] == EMPTY and margin[to] < 0:
+                        _open(to, margin, state, lattice, capacity, stack)
+    for node in range(len(state)):
+        if state[node] == OCCUPIED and margin[node] < 0:
+            _open(node, margin, state, lattice, capacity, stack)
+
+
+@kernel
+def _open(node: int, margin: Labels, state: Bytes, lattice: Lattice, capacity: Labels, stack: Labels) -> None:
+    """Take a node out of its set, and all that no longer hold without it."""
+    side = state[node]
+    state[node] = OPEN
+    stack[0] = node
+    top = 1
+    while top > 0:
+        top -= 1
+        taken = stack[top]
+        for slot in range(len(capacity)):
+            to = neighbour(taken, slot, lattice)
+            if state[to] == side:
+                margin[to] -= capacity[slot]
+                if margin[to] < 0:
+                    state[to] = OPEN
+                    stack[top] = to
+                    top += 1
+
+
+@kernel
+def _decide_single(
+    left: Labels, gain: Labels, doubt: Labels, state: Bytes, lattice: Lattice, capacity: Labels, stack: Labels
+) -> None:
+    """Decide open nodes that outweigh what is open around them, and so on from each of them.
+
+    `gain` becomes a node's unary with its capacities to decided nodes, `doubt` is the sum of those to open ones.
+    """
+    for node in left:
+        _look_around(node, gain, doubt, state, lattice, capacity)
+    for first in left:
+        if state[first] != OPEN or not _outweighs(first, gain, doubt):
+            continue
+        state[first] = OCCUPIED if gain[first] > 0 else EMPTY
+        stack[0] = first
+        top = 1
+        while top > 0:
+            top -= 1
+            node = stack[top]
+            for slot in range(len(capacity)):
+                to = neighbour(node, slot, lattice)
+                if state[to] == OPEN:
+                    doubt[to] -= capacity[slot]
+                    gain[to] += capacity[slot] if state[node] == OCCUPIED else -capacity[slot]
+                    if _outweighs(to, gain, doubt):
+                        state[to] = OCCUPIED if gain[to] > 0 else EMPTY
+                        stack[top] = to
+                        top += 1
+
+
+@kernel
+def _outweighs(node: int, gain: Labels, doubt: Labels) -> bool:
+    return bool(gain[node] > doubt[node] or -gain[node] >= doubt[node])
+
+
+@kernel
+def _look_around(
+    node: int, gain: Labels, doubt: Labels, state: Bytes, lattice: Lattice, capacity: Labels
+) -> None:  # fmt: skip
+    doubt[node] = 0
+    for slot in range(len(capacity)):
+        there = state[neighbour(node, slot, lattice)]
+        if there == OPEN:
+            doubt[node] += capacity[slot]
+        elif there == OCCUPIED:
+            gain[node] += capacity[slot]
+        elif there == EMPTY:
+            gain[node] -= capacity[slot]

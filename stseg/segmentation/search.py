@@ -15,8 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stseg.accelerate import kernel
-from stseg.arrays import Bytes, Flags, Ints, Labels
+from stseg.accelerate import kernel, part
+from stseg.arrays import Bytes, Ints, Labels
 from stseg.segmentation.graph import Graph, first_arc, head_of, sister_of
 
 NO_ARC, TERMINAL, ORPHAN = -1, -2, -3
@@ -105,26 +105,28 @@ def push_near(graph: Graph, begin: int, end: int) -> None:
 
 @kernel
 def plant(graph: Graph, trees: Trees, queue: Queue, begin: int, end: int) -> None:
-    """Each node with excess is a root; those of the source that touch anything else wait to grow.
+    """Each node with excess is a root; those that can take in a free node wait to grow.
 
-    The sink's tree need not grow of itself: what the source's does not reach belongs to nobody.
+    Once `push_near` has gone over them, no arc from a root of the source to one of the sink can carry more.
     """
     for node in range(begin, end):
         trees.way[node] = TERMINAL if graph.excess[node] != 0 else NO_ARC
         trees.side[node] = SINK if graph.excess[node] < 0 else SOURCE
         trees.distance[node] = 1
+        trees.waits[node] = 0
     for node in range(begin, end):
-        if graph.excess[node] > 0:
-            first = first_arc(node, graph.first, graph.degree)
-            for arc in range(first, first_arc(node + 1, graph.first, graph.degree)):
-                if graph.residual[arc] > 0:
-                    to = head_of(arc, node, graph.head, graph.degree, graph.lattice)
-                    if graph.excess[to] <= 0:
-                        wait(trees, queue, node)
-                        break
+        if graph.excess[node] == 0:
+            continue
+        for arc in range(first_arc(node, graph.first, graph.degree), first_arc(node + 1, graph.first, graph.degree)):
+            to = head_of(arc, node, graph.head, graph.degree, graph.lattice)
+            if graph.excess[to] == 0:
+                back = sister_of(arc, node, to, graph.sister, graph.degree)
+                if graph.residual[arc if graph.excess[node] > 0 else back] > 0:
+                    wait(trees, queue, node)
+                    break
 
 
-@kernel
+@part
 def wait(trees: Trees, queue: Queue, node: int) -> None:
     """Put a node at the end of those that wait to grow, unless it is there."""
     if trees.waits[node] == 0:
@@ -140,21 +142,21 @@ def wait(trees: Trees, queue: Queue, node: int) -> None:
 @kernel
 def search(graph: Graph, trees: Trees, queue: Queue) -> None:
     """Grow, push and adopt until nothing waits any more."""
-    while queue.ends[0] != queue.ends[1]:
-        node = queue.waiting[queue.ends[0]]
-        while trees.way[node] != NO_ARC:
+    waiting, ends, way, waits = queue.waiting, queue.ends, trees.way, trees.waits
+    while ends[0] != ends[1]:
+        node = int(waiting[ends[0]])
+        while way[node] != NO_ARC:
             tail, arc = _grow(graph, trees, queue, node)
-            queue.ends[4] += 1
+            ends[4] += 1
             if arc < 0:
                 break
             _push(graph, trees, queue, tail, arc)
             _adopt(graph, trees, queue)
-        trees.waits[node] = 0
-        first = queue.ends[0] + 1
-        queue.ends[0] = first if first < len(queue.waiting) else 0
+        waits[node] = 0
+        ends[0] = ends[0] + 1 if ends[0] + 1 < len(waiting) else 0
 
 
-@kernel
+@part
 def _grow(graph: Graph, trees: Trees, queue: Queue, node: int) -> tuple[int, int]:
     """Take in free neighbours of a node; where it touches the other tree, the node and arc from source to sink."""
     residual, way, side, stamp, distance = graph.residual, trees.way, trees.side, trees.stamp, trees.distance
@@ -176,48 +178,51 @@ def _grow(graph: Graph, trees: Trees, queue: Queue, node: int) -> tuple[int, int
     return -1, -1
 
 
-@kernel
+@part
 def _push(graph: Graph, trees: Trees, queue: Queue, tail: int, bridge: int) -> None:
     """Push what the path through an arc between the trees can carry; nodes behind what it saturates are orphans."""
-    residual, excess, way = graph.residual, graph.excess, trees.way
     to = head_of(bridge, tail, graph.head, graph.degree, graph.lattice)
-    back = sister_of(bridge, tail, to, graph.sister, graph.degree)
-    amount = min(_room(graph, trees, tail), _room(graph, trees, to), np.int64(residual[bridge]))
-    residual[bridge] -= amount
-    residual[back] += amount
-    for node in (tail, to):
-        sign = 1 if node == tail else -1
-        while True:
-            arc = way[node]
-            if arc < 0:
-                break
-            parent = head_of(arc, node, graph.head, graph.degree, graph.lattice)
-            other = sister_of(arc, node, parent, graph.sister, graph.degree)
-            residual[arc] += sign * amount
-            residual[other] -= sign * amount
-            if residual[other if sign > 0 else arc] == 0:
-                _cut_off(trees, queue, node)
-            node = parent
-        excess[node] -= sign * amount
-        if excess[node] == 0:
+    amount = min(_room(graph, trees, tail), _room(graph, trees, to), int(graph.residual[bridge]))
+    graph.residual[bridge] -= amount
+    graph.residual[sister_of(bridge, tail, to, graph.sister, graph.degree)] += amount
+    _carry(graph, trees, queue, tail, amount)
+    _carry(graph, trees, queue, to, -amount)
+
+
+@part
+def _carry(graph: Graph, trees: Trees, queue: Queue, node: int, amount: int) -> None:
+    """Book flow on the way between a node and its terminal: from the source, or, below 0, to the sink."""
+    residual, excess, way = graph.residual, graph.excess, trees.way
+    head, sister, lattice, degree = graph.head, graph.sister, graph.lattice, graph.degree
+    while way[node] >= 0:
+        arc = int(way[node])
+        parent = head_of(arc, node, head, degree, lattice)
+        back = sister_of(arc, node, parent, sister, degree)
+        residual[arc] += amount
+        residual[back] -= amount
+        if residual[back if amount > 0 else arc] == 0:
             _cut_off(trees, queue, node)
+        node = parent
+    excess[node] -= amount
+    if excess[node] == 0:
+        _cut_off(trees, queue, node)
 
 
-@kernel
+@part
 def _room(graph: Graph, trees: Trees, node: int) -> int:
     """What the way from a node to its terminal can carry."""
-    least = np.int64(_FAR)
+    least = int(_FAR)
     from_source = trees.side[node] == SOURCE
     arc = trees.way[node]
     while arc >= 0:
         parent = head_of(arc, node, graph.head, graph.degree, graph.lattice)
         carries = sister_of(arc, node, parent, graph.sister, graph.degree) if from_source else arc
-        least = min(least, np.int64(graph.residual[carries]))
+        least = min(least, int(graph.residual[carries]))
         node, arc = parent, trees.way[parent]
-    return min(least, np.int64(abs(graph.excess[node])))
+    return min(least, int(abs(graph.excess[node])))
 
 
-@kernel
+@part
 def _cut_off(trees: Trees, queue: Queue, node: int) -> None:
     """A node whose way is saturated: the next to be adopted."""
     trees.way[node] = ORPHAN
@@ -226,12 +231,12 @@ def _cut_off(trees: Trees, queue: Queue, node: int) -> None:
     queue.ends[2] = first
 
 
-@kernel
+@part
 def _adopt(graph: Graph, trees: Trees, queue: Queue) -> None:
     """Find each orphan the parent nearest to the terminal, or let it go free and its children be orphans."""
     time = queue.ends[4]
     while queue.ends[2] != queue.ends[3]:
-        node = queue.orphans[queue.ends[2]]
+        node = int(queue.orphans[queue.ends[2]])
         queue.ends[2] = queue.ends[2] + 1 if queue.ends[2] + 1 < len(queue.orphans) else 0
         arc, away = _nearest_parent(graph, trees, node, time)
         trees.way[node] = arc
@@ -241,7 +246,7 @@ def _adopt(graph: Graph, trees: Trees, queue: Queue) -> None:
             _let_go(graph, trees, queue, node)
 
 
-@kernel
+@part
 def _nearest_parent(graph: Graph, trees: Trees, node: int, time: int) -> tuple[int, int]:
     """Of the arcs to neighbours whose way does lead to the terminal, the one with the fewest arcs behind it."""
     residual, way, side, stamp, distance = graph.residual, trees.way, trees.side, trees.stamp, trees.distance
@@ -274,7 +279,7 @@ def _nearest_parent(graph: Graph, trees: Trees, node: int, time: int) -> tuple[i
     return best, least
 
 
-@kernel
+@part
 def _let_go(graph: Graph, trees: Trees, queue: Queue, node: int) -> None:
     """A node that nobody adopts is free: neighbours that could take it in wait, its children are orphans."""
     mine = trees.side[node]
