@@ -10,9 +10,11 @@ delete theirs (`find . -name '*.nb[ci]' -delete`).
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import ParamSpec, TypeVar, cast
+from typing import Any, ParamSpec, TypeVar, cast
 
 import numba
+
+_UNCOUNTED: dict[str, Any] = {"_nrt": False}
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -24,8 +26,11 @@ def kernel(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def part(function: Callable[P, R]) -> Callable[P, R]:
-    """A part of kernels, copied into each that calls it: nothing is spent on handing over its arguments."""
-    return cast("Callable[P, R]", numba.njit(cache=True, nogil=True, forceinline=True)(function))
+    """A kernel for the innermost loops, copied into each kernel that calls it; it may hold no new array.
+
+    Nothing is spent on handing over its arguments, nor on counting who refers to them.
+    """
+    return cast("Callable[P, R]", numba.njit(cache=True, nogil=True, forceinline=True, **_UNCOUNTED)(function))
 
 
 def python_form(compiled: Callable[P, R]) -> Callable[P, R]:

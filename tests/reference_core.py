@@ -8,7 +8,7 @@ from itertools import combinations, permutations
 
 import numpy as np
 
-from stseg.arrays import Boxes, Flags, Floats, Ints, Singles
+from stseg.arrays import Boxes, Flags, Floats, Ints, Labels, Singles
 from stseg.ghosts import boxes as tolerance
 from stseg.ghosts.evidence import BoxEvidence, PixelEvidence, Terms
 from stseg.ghosts.explain import Explanation
@@ -208,18 +208,28 @@ def neighbours(energy: Energy) -> list[Edge]:
     index = np.arange(energy.unary.size).reshape(energy.unary.shape)
     found: list[Edge] = []
     for t, z, y, x in np.ndindex(*energy.unary.shape):
-        here = int(index[t, z, y, x])
-        if z + 1 < planes:
-            found.append((here, int(index[t, z + 1, y, x]), energy.up))
-        if y + 1 < rows:
-            found.append((here, int(index[t, z, y + 1, x]), energy.across))
-        if x + 1 < columns:
-            found.append((here, int(index[t, z, y, x + 1]), energy.along))
-        if t + 1 < frames:
-            to_y, to_x = y + int(energy.motion[t, y, x, 0]), x + int(energy.motion[t, y, x, 1])
-            if 0 <= to_y < rows and 0 <= to_x < columns:
-                found.append((here, int(index[t + 1, z, to_y, to_x]), energy.ahead))
+        for (later, dz, dy, dx), capacity in zip(energy.offsets.tolist(), energy.capacity.tolist(), strict=True):
+            foot = y * columns + x
+            if later:
+                foot = int(energy.ahead[t, y, x]) if t + 1 < frames else -1
+            to_z, to_y, to_x = z + dz, foot // columns + dy, foot % columns + dx
+            if foot >= 0 and 0 <= to_z < planes and 0 <= to_y < rows and 0 <= to_x < columns:
+                found.append((int(index[t, z, y, x]), int(index[t + later, to_z, to_y, to_x]), capacity))
     return found
+
+
+def lead_ahead(motion: Ints) -> Labels:
+    """Where each ground cell leads: movers first, cell by cell, then those that stand still and are in no one's way."""
+    ahead = np.full(motion.shape[:3], -1, np.int32)
+    for t, field in enumerate(motion):
+        for moving in (True, False):
+            for y, x in np.ndindex(*field.shape[:2]):
+                to_y, to_x = y + int(field[y, x, 0]), x + int(field[y, x, 1])
+                inside = 0 <= to_y < field.shape[0] and 0 <= to_x < field.shape[1]
+                to = to_y * field.shape[1] + to_x
+                if inside and bool(field[y, x].any()) == moving and to not in ahead[t]:
+                    ahead[t, y, x] = to
+    return ahead
 
 
 def energy_of(energy: Energy, labels: Flags) -> int:

@@ -42,7 +42,6 @@ BESIDE = {
 AT_HOME = {
     "h5py": ("stseg.io",),
     "cv2": ("stseg.io", "stseg.report", "stseg.simulate", "stseg.calibrate"),
-    "maxflow": ("stseg.segmentation.cut",),
     "numba": ("stseg.accelerate",),
     "cyclopts": ("stseg.commands",),
     "rich": ("stseg.commands",),
@@ -135,10 +134,6 @@ def test_a_library_is_known_where_it_belongs(library: str) -> None:
     for module in at_home:
         assert module.name.startswith(AT_HOME[library]), f"{module.name} imports {library}"
     assert at_home, f"nothing imports {library}"
-
-
-def test_one_module_knows_the_solver() -> None:
-    assert sum("maxflow" in set(module.imports()) for module in MODULES) == 1
 
 
 def test_every_other_library_is_numpy_scipy_or_of_python_itself() -> None:

@@ -1,183 +1,19 @@
-"""The cut: its energy by definition, its minimum by trying all and by other solvers, and the blobs that it leaves."""
+"""Where cells move, and the blobs that the cut leaves."""
 
 from __future__ import annotations
 
-from dataclasses import replace
-
-import maxflow
 import numpy as np
 import pytest
-import reference_core as reference
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import maximum_flow
 from strategies import numbers
 
 from stseg.arrays import Flags, Floats
-from stseg.config import SegmentationConfig
 from stseg.geometry import Grid
 from stseg.segmentation.blobs import Blobs, find_blobs
-from stseg.segmentation.cut import minimum_cut
-from stseg.segmentation.energy import QUANTUM, Energy, build_energy
 from stseg.segmentation.motion import motion_field
-from stseg.segmentation.reduction import reduce
 
 GRID = Grid((0.0, 2.0), (0.0, 1.5), cell=0.1, top=1.8, planes=4)
-TINY = [(1, 1, 3, 4), (2, 1, 2, 3), (2, 2, 1, 3), (3, 1, 2, 2), (2, 2, 3, 1), (1, 3, 2, 2), (4, 1, 1, 3), (12, 1, 1, 1)]
-"""Volumes of at most twelve cells, with and without each of the axes."""
-
-
-def window(seed: int, shape: tuple[int, ...], unary: int, capacity: int, drift: int = 1) -> Energy:
-    """A random window in small whole numbers, so that minima tie; motion may leave the grid."""
-    rng = np.random.default_rng(seed)
-    frames, _, rows, columns = shape
-    across, along, up, ahead = (int(c) for c in rng.integers(0, capacity + 1, 4))
-    motion = rng.integers(-drift, drift + 1, (frames - 1, rows, columns, 2))
-    return Energy(rng.integers(-unary, unary + 1, shape), across, along, up, ahead, motion)
-
-
-def smooth_window(seed: int, shape: tuple[int, ...]) -> Energy:
-    """A random window as occupied volumes are: blobs, weak borders, cells that no view sees, motion of many cells."""
-    rng = np.random.default_rng(seed)
-    frames, planes, rows, columns = shape
-    log_odds = rng.normal(-0.3, 1.0, shape).astype(np.float32)
-    for _ in range(3):
-        y, x = rng.uniform(0, rows), rng.uniform(0, columns)
-        away = np.hypot(np.arange(rows)[:, None] - y, np.arange(columns) - x)
-        log_odds += (2.5 * np.exp(-((away / 2) ** 2))).astype(np.float32)
-    log_odds[rng.random(shape) < 0.05] = np.nan
-    motion = rng.integers(-2, 3, (frames - 1, rows, columns, 2))
-    grid = Grid((0.0, columns * 0.1), (0.0, rows * 0.1), 0.1, 1.8, planes)
-    return build_energy(log_odds, motion, grid, SegmentationConfig(smoothness=0.8))
-
-
-# The energy
-
-
-@settings(deadline=None, max_examples=60)
-@given(st.integers(0, 999), st.sampled_from(TINY))
-def test_energy_by_definition(seed: int, shape: tuple[int, ...]) -> None:
-    energy = window(seed, shape, 9, 5)
-    labels = np.random.default_rng(seed).random(shape) < 0.5
-    assert energy.of(labels) == reference.energy_of(energy, labels)
-    assert energy.of(labels.astype(np.int32)) == energy.of(labels)
-    assert energy.of(np.zeros(shape, bool)) == 0
-    assert energy.of(np.ones(shape, bool)) == -energy.unary.sum()
-
-
-def test_energy_of_log_odds() -> None:
-    """Capacities by METHODS 4 in quanta; what no view sees costs and earns nothing."""
-    log_odds = np.array([1.5, np.nan, -1e9, 1e9], np.float32).reshape(1, 1, 1, 4)
-    config = SegmentationConfig(smoothness=0.5, spread=0.2, step=0.3)
-    grid = Grid((0, 0.4), (0, 0.1), cell=0.1, top=0.6, planes=3)
-    energy = build_energy(log_odds, np.zeros((0, 1, 4, 2), np.int64), grid, config)
-    assert energy.unary.ravel().tolist()[:2] == [1500, 0]
-    assert energy.unary.min() == -energy.unary.max() < -10_000
-    expected = [0.5 * np.exp(-0.5 * (d / 0.2) ** 2) / QUANTUM for d in (0.1, 0.1, 0.3, 0.3)]
-    np.testing.assert_allclose((energy.along, energy.across, energy.up, energy.ahead), expected, atol=0.5)
-
-
-# The minimum
-
-
-@pytest.mark.parametrize("shape", TINY)
-def test_the_cut_is_the_smallest_of_the_minima(shape: tuple[int, ...]) -> None:
-    for seed in range(60):
-        energy = window(seed, shape, unary=3, capacity=2)
-        least, smallest = reference.least_energy(energy)
-        occupied = minimum_cut(energy).occupied
-        assert energy.of(occupied) == least, seed
-        np.testing.assert_array_equal(occupied, smallest, err_msg=f"seed {seed}")
-
-
-def by_plain_graph(energy: Energy) -> Flags:
-    """The cut of the whole grid, nothing decided beforehand; ties to the background."""
-    graph = maxflow.GraphInt(energy.unary.size, 8 * energy.unary.size)
-    graph.add_nodes(energy.unary.size)
-    for p, u in enumerate(energy.unary.ravel().tolist()):
-        graph.add_tedge(p, max(-u, 0), max(u, 0))
-    for p, q, b in reference.neighbours(energy):
-        graph.add_edge(p, q, b, b)
-    graph.maxflow()
-    segments = [graph.get_segment(p) for p in range(energy.unary.size)]
-    return np.array(segments, bool).reshape(energy.unary.shape)
-
-
-def flow_value(energy: Energy) -> int:
-    """The maximum flow from background to object by scipy, quanta."""
-    size, unary = energy.unary.size, energy.unary.ravel()
-    edges = [(p, q, b) for p, q, b in reference.neighbours(energy) if b]
-    pairs = [*edges, *((q, p, b) for p, q, b in edges)]
-    pairs += [(size, int(p), int(-unary[p])) for p in np.flatnonzero(unary < 0)]
-    pairs += [(int(p), size + 1, int(unary[p])) for p in np.flatnonzero(unary > 0)]
-    start, end, capacity = np.array(pairs).T
-    graph = csr_array((capacity.astype(np.int32), (start, end)), shape=(size + 2, size + 2))
-    return int(maximum_flow(graph, size, size + 1).flow_value)
-
-
-@pytest.mark.parametrize("shape", [(3, 2, 8, 9), (5, 3, 6, 7), (1, 4, 10, 10), (8, 1, 9, 8)])
-@pytest.mark.parametrize("kind", ["whole numbers", "volume"])
-def test_the_cut_is_that_of_other_solvers(shape: tuple[int, ...], kind: str) -> None:
-    for seed in range(3):
-        energy = smooth_window(seed, shape) if kind == "volume" else window(seed, shape, 6, 2, drift=2)
-        cut = minimum_cut(energy)
-        np.testing.assert_array_equal(cut.occupied, by_plain_graph(energy))
-        # Least energy, relative to all background, is the least cut less what all background loses.
-        assert energy.of(cut.occupied) == flow_value(energy) - int(energy.unary.clip(0).sum())
-        assert cut.nodes <= energy.unary.size
-
-
-@settings(deadline=None, max_examples=40)
-@given(st.integers(0, 999), st.integers(1, 60))
-def test_what_is_decided_beforehand_is_right(seed: int, strength: int) -> None:
-    energy = window(seed, (3, 2, 5, 6), unary=strength, capacity=4)
-    left = reduce(energy)
-    sure = ~left.open
-    np.testing.assert_array_equal(left.occupied[sure], by_plain_graph(energy).ravel()[sure])
-    assert left.open[left.start].all()
-    assert left.open[left.end].all()
-
-
-def test_strong_evidence_leaves_nothing_to_cut() -> None:
-    energy = window(1, (3, 2, 5, 6), unary=1, capacity=1)
-    strong = replace(energy, unary=np.where(energy.unary > 0, 100, -100))
-    cut = minimum_cut(strong)
-    assert cut.nodes == 0
-    np.testing.assert_array_equal(cut.occupied, strong.unary > 0)
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_no_other_labelling_has_less_energy(seed: int) -> None:
-    energy = smooth_window(seed, (4, 3, 8, 8))
-    occupied = minimum_cut(energy).occupied
-    least = energy.of(occupied)
-    rng = np.random.default_rng(seed)
-    for share in (0.02, 0.2, 0.5):
-        for _ in range(20):
-            assert energy.of(rng.random(occupied.shape) < share) >= least
-            assert energy.of(occupied ^ (rng.random(occupied.shape) < share)) >= least
-    for _ in range(50):
-        other = occupied.copy()
-        other.flat[rng.integers(other.size)] ^= True
-        assert energy.of(other) >= least
-    assert least <= energy.of(energy.unary > 0)
-
-
-def test_smoothness_bridges_a_gap_along_the_motion() -> None:
-    """A walker of two cells a frame, missed in one frame: the edges in time follow, straight ones would not."""
-    log_odds = np.full((5, 1, 1, 12), -2.0, np.float32)
-    for t in range(5):
-        log_odds[t, 0, 0, 2 * t : 2 * t + 2] = 2.0 if t != 2 else -0.2
-    grid = Grid((0.0, 1.2), (0.0, 0.1), 0.1, 1.8, 1)
-    moving = np.zeros((4, 1, 12, 2), np.int64)
-    moving[..., 1] = 2
-    config = SegmentationConfig(smoothness=0.5)
-    followed = minimum_cut(build_energy(log_odds, moving, grid, config)).occupied
-    straight = minimum_cut(build_energy(log_odds, np.zeros_like(moving), grid, config)).occupied
-    assert followed[2, 0, 0].nonzero()[0].tolist() == [4, 5]
-    assert not straight[2].any()
-
 
 # Motion
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from stseg.accelerate import kernel
+from stseg.accelerate import part
 from stseg.arrays import AnyArray, Bytes, Ints, Labels
 from stseg.segmentation.graph import Graph
 from stseg.segmentation.halves import Bridges
@@ -57,7 +57,7 @@ def _built(bridges: Bridges, number: int) -> Bridges:
     return Bridges(bridges.middle, bridges.tail[:number], bridges.arc[:number], bridges.capacity[:number])
 
 
-@kernel
+@part
 def _write_rows(
     left: Labels,
     state: Bytes,
@@ -86,7 +86,7 @@ def _write_rows(
                     built[0] += 1
 
 
-@kernel
+@part
 def _write_place(
     left: Labels,
     state: Bytes,

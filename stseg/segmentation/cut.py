@@ -15,9 +15,9 @@ from stseg.segmentation.halves import Bridges, solve, solve_halves
 from stseg.segmentation.lattice import cells
 from stseg.segmentation.reduction import OCCUPIED, Reduced, reduce
 
-DENSE = 0.15
-"""Share of the cells left by the reduction from which their arcs stay in place."""
-_WORTH_TWO = 20_000
+DENSE = 0.5
+"""Share of the cells left by the reduction from which their arcs stay in place: rows would take twice the memory."""
+WORTH_TWO = 20_000
 """Open nodes from which a second thread gains more than it costs."""
 _STRONGEST = 16383
 """Capacity of which twice fits into 16 bits."""
@@ -65,7 +65,7 @@ def minimum_cut(energy: Energy, threads: int = 2, storage: Storage | None = None
     if nodes:
         arrange = storage or (in_place if nodes > DENSE * energy.unary.size else in_rows)
         middle = int(reduced.left[nodes // 2]) // reduced.lattice.frame * reduced.lattice.frame
-        if threads == 1 or nodes < _WORTH_TWO:
+        if threads == 1 or nodes < WORTH_TWO:
             graph, _ = arrange(reduced, 0)
             reached = solve(graph)
         else:

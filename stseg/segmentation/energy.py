@@ -66,7 +66,7 @@ class Energy:
                 below, above = volume[:-1, start[0]], volume[1:, end[0]]
                 to = _beside(self.ahead, y, x)
                 frames, rows, columns = np.nonzero(to >= 0)
-                flat = above.reshape(*above.shape[:2], -1)
+                flat = above.reshape(*above.shape[:2], to.shape[1] * to.shape[2])
                 yield below[frames, :, rows, columns], flat[frames, :, to[frames, rows, columns]]
 
     def edges(self) -> tuple[Ints, Ints, Ints]:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from stseg.accelerate import kernel
+from stseg.accelerate import part
 from stseg.arrays import AnyArray, Labels
 from stseg.segmentation.lattice import Lattice, neighbour
 
@@ -40,7 +40,7 @@ class Graph(NamedTuple):
     lattice: Lattice | None
 
 
-@kernel
+@part
 def first_arc(node: int, first: Labels | None, degree: int) -> int:
     """The first arc of a node; that of the next node is past its last."""
     if first is None:
@@ -48,7 +48,7 @@ def first_arc(node: int, first: Labels | None, degree: int) -> int:
     return int(first[node])
 
 
-@kernel
+@part
 def head_of(arc: int, node: int, head: Labels | None, degree: int, lattice: Lattice | None) -> int:
     """The node that a node's arc leads to."""
     if lattice is not None:
@@ -57,7 +57,7 @@ def head_of(arc: int, node: int, head: Labels | None, degree: int, lattice: Latt
     return int(head[arc])
 
 
-@kernel
+@part
 def sister_of(arc: int, node: int, to: int, sister: Labels | None, degree: int) -> int:
     """The arc that leads back."""
     if sister is None:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stseg.accelerate import kernel
+from stseg.accelerate import part
 from stseg.arrays import Flags, Labels
 from stseg.segmentation.graph import Graph
 from stseg.segmentation.search import NO_ARC, SOURCE, Queue, Trees, new_queue, new_trees, plant, push_near, search, wait
@@ -57,14 +57,14 @@ def _reached(trees: Trees) -> Flags:
     return np.asarray((trees.side == SOURCE) & (trees.way != NO_ARC))
 
 
-@kernel
+@part
 def _solve_range(graph: Graph, trees: Trees, queue: Queue, begin: int, end: int) -> None:
     push_near(graph, begin, end)
     plant(graph, trees, queue, begin, end)
     search(graph, trees, queue)
 
 
-@kernel
+@part
 def _open(graph: Graph, trees: Trees, queue: Queue, tails: Labels, arcs: Labels, capacities: Labels) -> None:
     """Let the bridges carry; where the source's tree stands at one, it may grow again."""
     for tail, arc, capacity in zip(tails, arcs, capacities):  # noqa: B905 - numba knows no strict

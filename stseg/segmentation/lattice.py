@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stseg.accelerate import kernel
+from stseg.accelerate import part
 from stseg.arrays import AnyArray, Labels
 from stseg.segmentation.energy import Energy
 
@@ -71,7 +71,7 @@ def cells(nodes: AnyArray, shape: tuple[int, ...]) -> AnyArray:
     return nodes[: np.prod(guarded)].reshape(guarded)[:, 1:, 1:, 1:]
 
 
-@kernel
+@part
 def neighbour(node: int, slot: int, lattice: Lattice) -> int:
     """The node that an arc leads to; 0, a guard, for an arc in time that leads nowhere."""
     to = node + int(lattice.steps[slot])

@@ -15,13 +15,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stseg.accelerate import kernel
+from stseg.accelerate import part
 from stseg.arrays import Bytes, Labels
 from stseg.segmentation.energy import Energy
 from stseg.segmentation.lattice import Lattice, lay_out, neighbour, spread
 
 GUARD, OPEN, OCCUPIED, EMPTY = 0, 1, 2, 3
 """What is known of a node."""
+HOPELESS = 0.9
+"""Share of cells weaker than their capacities together from which too few are decided to be worth looking for."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +55,11 @@ def reduce(energy: Energy) -> Reduced:
     """Decide what can be decided without a cut."""
     lattice, capacity = lay_out(energy), np.repeat(energy.capacity, 2)
     unary = spread(energy.unary)
+    weak = np.count_nonzero((energy.unary <= 0) & (energy.unary > -capacity.sum()))
+    if weak > HOPELESS * energy.unary.size:
+        state = spread(np.full(energy.unary.shape, OPEN, np.uint8))
+        left = np.flatnonzero(state).astype(np.int32)
+        return Reduced(lattice, capacity, state, left, unary[left])
     state = spread(np.where(energy.unary > 0, np.uint8(OCCUPIED), np.uint8(EMPTY)))
     stack, doubt = (np.empty(len(state), np.int32) for _ in range(2))
     # Of several minima the smallest object set is wanted, so a tie holds for the background only.
@@ -64,7 +71,7 @@ def reduce(energy: Energy) -> Reduced:
     return Reduced(lattice, capacity, state, left, unary[left])
 
 
-@kernel
+@part
 def _decide_sets(margin: Labels, state: Bytes, lattice: Lattice, capacity: Labels, stack: Labels) -> None:
     """From all nodes as their signs have them, open those that do not hold.
 
@@ -84,7 +91,7 @@ def _decide_sets(margin: Labels, state: Bytes, lattice: Lattice, capacity: Label
             _open(node, margin, state, lattice, capacity, stack)
 
 
-@kernel
+@part
 def _open(node: int, margin: Labels, state: Bytes, lattice: Lattice, capacity: Labels, stack: Labels) -> None:
     """Take a node out of its set, and all that no longer hold without it."""
     side = state[node]
@@ -104,7 +111,7 @@ def _open(node: int, margin: Labels, state: Bytes, lattice: Lattice, capacity: L
                     top += 1
 
 
-@kernel
+@part
 def _decide_single(
     left: Labels, gain: Labels, doubt: Labels, state: Bytes, lattice: Lattice, capacity: Labels, stack: Labels
 ) -> None:
@@ -134,12 +141,12 @@ def _decide_single(
                         top += 1
 
 
-@kernel
+@part
 def _outweighs(node: int, gain: Labels, doubt: Labels) -> bool:
     return bool(gain[node] > doubt[node] or -gain[node] >= doubt[node])
 
 
-@kernel
+@part
 def _look_around(
     node: int, gain: Labels, doubt: Labels, state: Bytes, lattice: Lattice, capacity: Labels
 ) -> None:  # fmt: skip

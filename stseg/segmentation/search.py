@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stseg.accelerate import kernel, part
+from stseg.accelerate import part
 from stseg.arrays import Bytes, Ints, Labels
 from stseg.segmentation.graph import Graph, first_arc, head_of, sister_of
 
@@ -76,7 +76,7 @@ def new_queue(nodes: int) -> Queue:
 # Before the search
 
 
-@kernel
+@part
 def push_near(graph: Graph, begin: int, end: int) -> None:
     """Push what goes over one arc: from each node that takes from the source to neighbours that give to the sink.
 
@@ -103,7 +103,7 @@ def push_near(graph: Graph, begin: int, end: int) -> None:
         excess[node] = left
 
 
-@kernel
+@part
 def plant(graph: Graph, trees: Trees, queue: Queue, begin: int, end: int) -> None:
     """Each node with excess is a root; those that can take in a free node wait to grow.
 
@@ -139,7 +139,7 @@ def wait(trees: Trees, queue: Queue, node: int) -> None:
 # The search
 
 
-@kernel
+@part
 def search(graph: Graph, trees: Trees, queue: Queue) -> None:
     """Grow, push and adopt until nothing waits any more."""
     waiting, ends, way, waits = queue.waiting, queue.ends, trees.way, trees.waits

@@ -1,0 +1,187 @@
+"""Measure the cut against PyMaxflow on the same windows, in the same run, at the same energy.
+
+    python tools/bench_cut.py [--sections synthetic,wide,real,memory] [--seeds 6] [--data ../shared/data]
+
+PyMaxflow builds its graph, solves and reads the labels; stseg does the same from the same energy. Each is the better
+of two calls. Seconds are those of the processor, which other programs on the machine hardly change; with two threads
+they are those of the clock, for both.
+"""
+
+from __future__ import annotations
+
+import argparse
+import pickle
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TypeVar
+
+import maxflow
+import numpy as np
+from bench_windows import real, synthetic
+
+from stseg.arrays import Flags
+from stseg.segmentation.arcs import in_place, in_rows
+from stseg.segmentation.cut import minimum_cut
+from stseg.segmentation.energy import Energy
+
+T = TypeVar("T")
+_REAL = {"uu4": "0:40", "cmc1": "0:40", "cmc2": "0:40", "wildtrack": "0:20"}
+_LEVELS, _TOTALS = (-1.0, -1.5), (1.0, 3.0, 6.0)  # nats
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line of a table: a name, and figures by column."""
+
+    name: str
+    figures: dict[str, float]
+
+
+def print_table(title: str, rows: Iterable[Row]) -> list[Row]:
+    """Print rows as they come, then the median and the least of each column."""
+    print(f"\n## {title}\n")
+    done: list[Row] = []
+    for row in rows:
+        if not done:
+            print("| window | " + " | ".join(row.figures) + " |")
+            print("|---" * (len(row.figures) + 1) + "|")
+        done.append(row)
+        _print_row(row)
+    for name, of in (("median", np.median), ("least", np.min)):
+        if done:
+            _print_row(Row(name, {key: float(of([row.figures[key] for row in done])) for key in done[0].figures}))
+    return done
+
+
+def _print_row(row: Row) -> None:
+    print(f"| {row.name} | " + " | ".join(f"{figure:.4g}" for figure in row.figures.values()) + " |", flush=True)
+
+
+def by_pymaxflow(energy: Energy) -> Flags:
+    """The cut of the whole grid by PyMaxflow; ties to the background."""
+    size = energy.unary.size
+    graph = maxflow.GraphInt(size, size * len(energy.offsets))
+    nodes = graph.add_grid_nodes(energy.unary.shape)
+    for offset, capacity, (start, end) in zip(energy.offsets, energy.capacity, energy.ends(nodes), strict=True):
+        # Edges of a kind that the grid functions know are added by them: they are the faster way.
+        if offset[0] == 0 or not _moves(energy):
+            structure = np.zeros((3, 3, 3, 3))
+            structure[tuple(offset + 1)] = 1
+            graph.add_grid_edges(nodes, int(capacity), structure, symmetric=True)
+        else:
+            graph.add_edges(start.ravel(), end.ravel(), *np.full((2, start.size), capacity, np.int64))
+    graph.add_grid_tedges(nodes, (-energy.unary).clip(0), energy.unary.clip(0))
+    graph.maxflow()
+    return np.asarray(graph.get_grid_segments(nodes))
+
+
+def _moves(energy: Energy) -> bool:
+    still = np.arange(energy.ahead[:1].size).reshape(energy.ahead.shape[1:])
+    return bool((energy.ahead != still).any())
+
+
+def compare(name: str, energy: Energy) -> Row:
+    """Ratios on one window."""
+    labels, peer, peer_clock = _timed(by_pymaxflow, energy)
+    cut, ours, _ = _timed(lambda window: minimum_cut(window, threads=1), energy)
+    both, _, ours_clock = _timed(minimum_cut, energy)
+    for found in (cut, both):
+        if energy.of(found.occupied) != energy.of(labels):
+            sys.exit(f"bench_cut.py: {name}: energy {energy.of(found.occupied)}, PyMaxflow's {energy.of(labels)}")
+    share = 100 * cut.nodes / energy.unary.size
+    figures = {"PyMaxflow ms": 1e3 * peer, "stseg ms": 1e3 * ours, "ratio": peer / ours}
+    return Row(name, {**figures, "ratio, 2 threads": peer_clock / ours_clock, "left %": share})
+
+
+def _timed(solve: Callable[[Energy], T], energy: Energy) -> tuple[T, float, float]:
+    """What is found, and the better of two calls in seconds of the processor and of the clock."""
+    seconds = []
+    for _ in range(2):
+        start = time.process_time(), time.perf_counter()
+        found = solve(energy)
+        seconds.append((time.process_time() - start[0], time.perf_counter() - start[1]))
+    return found, *np.min(seconds, axis=0).tolist()
+
+
+def synthetic_rows(seeds: int, neighbours: int = 8) -> Iterable[Row]:
+    """Synthetic windows over the levels and strengths of smoothness of the study."""
+    for k in range(seeds):
+        level, total = _LEVELS[k % 2], _TOTALS[k // 2 % 3]
+        energy = synthetic(100 + k, level, total, neighbours)
+        yield compare(f"seed {100 + k}, level {level}, total {total}", energy)
+
+
+def real_rows(data: Path) -> Iterable[Row]:
+    """Windows of real recordings at the default energy."""
+    for name, frames in _REAL.items():
+        if not (data / name.rstrip("12" if name.startswith("cmc") else "")).exists():
+            print(f"{name}: not at hand")
+            continue
+        for k, energy in enumerate(real(name, frames, data)):
+            yield compare(f"{name} {k}", energy)
+
+
+_PEAK = """
+import pickle, resource, sys
+sys.path.insert(0, {tools!r})
+import bench_cut
+energies = pickle.load(open({file!r}, "rb"))
+bench_cut.SOLVERS[{solver!r}](energies[0])  # a small one: what is loaded and compiled is no one's
+before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+bench_cut.SOLVERS[{solver!r}](energies[1])
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)
+"""
+
+SOLVERS: dict[str, Callable[[Energy], object]] = {
+    "PyMaxflow MiB": by_pymaxflow,
+    "stseg MiB": minimum_cut,
+    "in rows MiB": lambda energy: minimum_cut(energy, storage=in_rows),
+    "in place MiB": lambda energy: minimum_cut(energy, storage=in_place),
+}
+
+
+def memory_rows(seeds: int) -> Iterable[Row]:
+    """What each solver adds to the peak of its own process."""
+    for k in range(seeds):
+        level, total = _LEVELS[k % 2], _TOTALS[k // 2 % 3]
+        windows = [synthetic(100 + k, level, total, shape=shape) for shape in ((3, 3, 20, 20), (15, 10, 100, 100))]
+        with TemporaryDirectory() as folder:
+            file = Path(folder, "windows")
+            file.write_bytes(pickle.dumps(windows))
+            figures = {solver: _peak(solver, file) for solver in SOLVERS}
+        figures["share"] = figures["stseg MiB"] / figures["PyMaxflow MiB"]
+        yield Row(f"seed {100 + k}, level {level}, total {total}", figures)
+
+
+def _peak(solver: str, file: Path) -> float:
+    program = _PEAK.format(tools=str(Path(__file__).parent), file=str(file), solver=solver)
+    done = subprocess.run([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True, check=True)
+    return int(done.stdout.split()[-1]) / 1024
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Print the sections that are asked for."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--sections", default="synthetic,wide,real,memory")
+    parser.add_argument("--seeds", type=int, default=6)
+    parser.add_argument("--data", type=Path, default=Path("../shared/data"))
+    asked = parser.parse_args(arguments)
+    sections: dict[str, tuple[str, Callable[[], Iterable[Row]]]] = {
+        "synthetic": ("8 neighbours, synthetic", lambda: synthetic_rows(asked.seeds)),
+        "wide": ("80 neighbours, synthetic", lambda: synthetic_rows(2, 80)),
+        "real": ("8 neighbours, real recordings, default energy", lambda: real_rows(asked.data)),
+        "memory": ("Memory added to the peak", lambda: memory_rows(min(asked.seeds, 2))),
+    }
+    compare("warm up", synthetic(0, -1.0, 3.0, shape=(3, 3, 20, 20)))
+    for name in asked.sections.split(","):
+        title, rows = sections[name]
+        print_table(title, rows())
+
+
+if __name__ == "__main__":
+    main()
