@@ -60,7 +60,7 @@ def _walk(rng: np.random.Generator, people: int, shape: tuple[int, ...]) -> Floa
     far = np.array(shape[:1:-1]) * _CELL - 0.3
     start, heading = rng.uniform(0.5, far - 0.2, (people, 2)), rng.uniform(0, 2 * np.pi, people)
     step = rng.uniform(0.5, 1.5, people)[:, None] * _FRAME * np.stack([np.cos(heading), np.sin(heading)], 1)
-    return np.clip(start + np.arange(shape[0])[:, None, None] * step, 0.3, far)
+    return np.asarray(np.clip(start + np.arange(shape[0])[:, None, None] * step, 0.3, far))
 
 
 def _silhouettes(
