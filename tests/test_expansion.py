@@ -1,0 +1,147 @@
+"""Expansion: each move is the best there is, the end is that of other solvers, pruned or not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import reference_expansion as reference
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from maxflow.fastmin import aexpansion_grid
+
+from stseg.arrays import Ints
+from stseg.segmentation.compact import least_cut
+from stseg.segmentation.expansion import LabelEnergy, Moves, expand
+
+
+def lattice(shape: tuple[int, ...]) -> tuple[Ints, Ints]:
+    """Pairs of direct neighbours of a grid."""
+    index = np.arange(np.prod(shape)).reshape(shape)
+    sides = [(index.take(range(n - 1), a), index.take(range(1, n), a)) for a, n in enumerate(shape)]
+    start, end = (np.concatenate([side[k].ravel() for side in sides]) for k in (0, 1))
+    return start, end
+
+
+def chance(seed: int, shape: tuple[int, ...], labels: int, weight: int, admissible: float = 0.7) -> LabelEnergy:
+    """A random energy in small whole numbers, so that minima tie; weights of its own for each edge."""
+    rng = np.random.default_rng(seed)
+    start, end = lattice(shape)
+    may = rng.random((int(np.prod(shape)), labels)) < admissible
+    first = np.append(0, np.cumsum(may.sum(1)))
+    strength = int(rng.integers(2, 12))
+    cost = rng.integers(-strength, strength // 2 + 1, int(may.sum()))
+    return LabelEnergy(first, np.nonzero(may)[1] + 1, cost, start, end, rng.integers(0, weight + 1, len(start)))
+
+
+def some_start(energy: LabelEnergy, seed: int) -> Ints:
+    """Any admissible labelling."""
+    rng = np.random.default_rng(seed)
+    return np.array([rng.choice(sorted(own)) for own in reference.costs(energy)])
+
+
+TINY = [(2, 4), (2, 2, 2), (8,), (1, 7)]
+
+
+@settings(deadline=None, max_examples=40)
+@given(st.integers(0, 999), st.sampled_from(TINY))
+def test_energy_by_definition(seed: int, shape: tuple[int, ...]) -> None:
+    energy = chance(seed, shape, 3, 5)
+    for labels in (some_start(energy, seed), energy.best()):
+        assert energy.of(labels) == reference.energy_of(energy, labels)
+    assert energy.of(np.zeros(energy.cells, np.int64)) == 0
+
+
+def test_a_label_that_a_cell_may_not_have_is_refused() -> None:
+    energy = LabelEnergy(*(np.array(a) for a in ([0, 1, 1], [2], [-5], [0], [1], [1])))
+    assert energy.of(np.array([2, 0])) == -4
+    for labels in ([1, 0], [2, 2]):
+        with pytest.raises(ValueError, match="may not have"):
+            expand(energy, np.array(labels))
+
+
+@settings(deadline=None, max_examples=40)
+@given(st.integers(0, 999), st.sampled_from(TINY), st.integers(0, 6))
+def test_each_move_is_the_best_and_smallest_of_all(seed: int, shape: tuple[int, ...], weight: int) -> None:
+    energy = chance(seed, shape, 3, weight)
+    moves = Moves(energy, some_start(energy, seed))
+    for alpha in (1, 2, 0, 3, 1, 2, 3, 0):
+        if alpha not in moves.alphabet:
+            continue
+        all_ = list(reference.expansions(energy, moves.labels.copy(), alpha))
+        best = min(all_, key=lambda labels: reference.energy_of(energy, labels))  # the first of several: the smallest
+        before, start = energy.of(moves.labels), moves.labels.copy()
+        changed = moves.move(alpha)
+        np.testing.assert_array_equal(moves.labels, best)
+        assert changed == (moves.labels != start).sum()
+        assert energy.of(moves.labels) < before if changed else energy.of(moves.labels) == before
+
+
+@settings(deadline=None, max_examples=30)
+@given(st.integers(0, 999), st.sampled_from(TINY))
+def test_no_expansion_betters_the_end(seed: int, shape: tuple[int, ...]) -> None:
+    energy = chance(seed, shape, 3, 4)
+    start = some_start(energy, seed)
+    labels = expand(energy, start)
+    least = reference.energy_of(energy, labels)
+    assert least <= reference.energy_of(energy, start)
+    for alpha in range(4):
+        assert all(reference.energy_of(energy, other) >= least for other in reference.expansions(energy, labels, alpha))
+
+
+@pytest.mark.parametrize("shape", [(4, 5, 3), (3, 2, 4, 3)])
+@pytest.mark.parametrize("weight", [0, 2, 6])
+def test_the_end_is_that_of_cuts_of_all_cells(shape: tuple[int, ...], weight: int) -> None:
+    """Cells dropped from a move change nothing: not the energy, not a label."""
+    for seed in range(6):
+        energy = chance(seed, shape, 4, weight)
+        for start in (energy.best(), some_start(energy, seed), np.zeros(energy.cells, np.int64)):
+            labels = expand(energy, start)
+            np.testing.assert_array_equal(labels, reference.plain_expand(energy, start))
+            np.testing.assert_array_equal(labels, expand(energy, start))
+
+
+@pytest.mark.parametrize("admissible", [0.6, 1.0])
+def test_with_one_weight_the_end_is_that_of_aexpansion_grid(admissible: float) -> None:
+    shape, labels = (3, 2, 4, 5), 4
+    for seed in range(25):
+        drawn = chance(seed, shape, labels, 1, admissible)
+        weight = seed % 7
+        energy = LabelEnergy(
+            drawn.first, drawn.label, drawn.cost, drawn.start, drawn.end, np.full(len(drawn.start), weight)
+        )
+        table = np.full((energy.cells, labels + 1), 1e6)
+        for p, own in enumerate(reference.costs(energy)):
+            table[p, list(own)] = list(own.values())
+        start = table.argmin(1)
+        np.testing.assert_array_equal(start, energy.best())
+        differ = weight * (1.0 - np.eye(labels + 1))
+        theirs = aexpansion_grid(table.reshape(*shape, -1), differ, labels=start.reshape(shape).copy()).ravel()
+        ours = expand(energy, start)
+        assert energy.of(ours) == energy.of(theirs)
+        np.testing.assert_array_equal(ours, theirs)
+
+
+def test_with_one_label_it_is_the_two_label_cut() -> None:
+    for seed in range(10):
+        energy = chance(seed, (4, 6), 1, 3, admissible=1.0)
+        cut = least_cut(-energy.cost, energy.start, energy.end, energy.weight, energy.weight)
+        np.testing.assert_array_equal(expand(energy, np.zeros(energy.cells, np.int64)), cut)
+
+
+def test_what_the_cut_of_the_best_costs_leaves_out_no_move_takes() -> None:
+    """The cells that a window's two-label cut calls background stay so: they need not be moved."""
+    for seed in range(10):
+        energy = chance(seed, (5, 7), 3, 3, admissible=0.8)
+        best = np.array([max(0, *(-cost for cost in own.values())) for own in reference.costs(energy)])
+        only = np.array([min([own[k] for k in own if k] or [9]) for own in reference.costs(energy)])
+        unary = np.where(best > 0, best, -only)
+        inside = least_cut(unary, energy.start, energy.end, energy.weight, energy.weight)
+        labels = expand(energy, np.where(inside, energy.best(), 0))
+        assert not labels[~inside].any()
+
+
+def test_nothing_to_label() -> None:
+    empty = np.zeros(0, np.int64)
+    assert len(expand(LabelEnergy(np.zeros(1, np.int64), empty, empty, empty, empty, empty), empty)) == 0
+    alone = LabelEnergy(np.zeros(4, np.int64), empty, empty, empty, empty, empty)
+    assert expand(alone, np.zeros(3, np.int64)).tolist() == [0, 0, 0]
