@@ -17,6 +17,7 @@ from stseg.arrays import Flags, Rows
 from stseg.config import IdentityConfig
 from stseg.geometry import Grid
 from stseg.geometry.bodies import BodyTable
+from stseg.geometry.near import near_person
 from stseg.identity.identities import Decision, Identities
 from stseg.identity.linking import Linker, assign, distances
 from stseg.identity.pieces import Piece, chain_pieces
@@ -24,6 +25,7 @@ from stseg.identity.smoothing import drop_short, fill_gaps
 from stseg.identity.views import box_rows
 from stseg.identity.windows import LONGEST, SHORTEST, Window, window_length, windows
 from stseg.segmentation.blobs import Blobs, find_blobs
+from stseg.segmentation.division import STRANGER
 from stseg.tracks import TRAJECTORY
 
 RATE = 8.0
@@ -174,22 +176,25 @@ def column(places: Sequence[tuple[float, float]]) -> Flags:
     return occupied
 
 
-def blobs_in(paths: Sequence[Path], frame: int, unheld: Sequence[Path] = ()) -> Blobs:
+def blobs_in(
+    paths: Sequence[Path], frame: int, unheld: Sequence[Path] = (), chain: Sequence[int] | None = None
+) -> Blobs:
     """Blobs of one frame: people of `paths`, and cells along `unheld` where the frame's pass saw nobody."""
-    held = [path[frame] for path in paths if frame in path]
-    occupied = column([*held, *(path[frame] for path in unheld if frame in path)])
+    names = np.array(chain or range(1, len(paths) + 1))[[frame in path for path in paths]]
+    held = np.array([path[frame] for path in paths if frame in path]).reshape(-1, 2)
+    occupied = column([*map(tuple, held), *(path[frame] for path in unheld if frame in path)])
+    owner = np.append(names, STRANGER)[near_person(GRID.ground, held, 0.4)]
+    label = np.where(occupied, owner, 0).astype(np.int32)
     log_odds = np.where(occupied, 2.0, -2.0).astype(np.float32)
-    return find_blobs(occupied, log_odds, np.array(held).reshape(-1, 2), 0.4, GRID)
+    return find_blobs(label, log_odds, held, names, 0.4, GRID)
 
 
 def pieces_of(
     paths: Sequence[Path], frames: range, unheld: Sequence[Path] = (), chain: Sequence[int] | None = None
 ) -> tuple[list[Blobs], list[Piece]]:
     """Blobs and pieces of some frames; each path is a chain of its own unless `chain` says otherwise."""
-    blobs = [blobs_in(paths, frame, unheld) for frame in frames]
-    names = chain or range(1, len(paths) + 1)
-    chains = [np.array([names[k] for k, p in enumerate(paths) if f in p], np.int64) for f in frames]
-    return blobs, chain_pieces(blobs, chains, frames[0], CONFIG)
+    blobs = [blobs_in(paths, frame, unheld, chain) for frame in frames]
+    return blobs, chain_pieces(blobs, frames[0], CONFIG)
 
 
 FRAMES = range(40, 52)
@@ -211,6 +216,19 @@ def test_the_cut_bridges_what_a_frames_pass_missed() -> None:
     seen = {f: p for f, p in path.items() if f not in (44, 45)}
     _, pieces = pieces_of([seen], FRAMES, unheld=[{f: path[f] for f in (44, 45)}])
     assert [piece.frames for piece in pieces] == [list(FRAMES)]
+
+
+def test_a_gap_is_bridged_by_cells_of_the_track_itself() -> None:
+    """Cells that the cut gave to another track are not taken."""
+    path = walk((-2, 0), (0.4, 0), FRAMES)
+    seen = {f: p for f, p in path.items() if f != 45}
+    blobs = [blobs_in([seen], f) for f in FRAMES]
+    for whose, bridged in ((1, True), (STRANGER, True), (2, False)):
+        label = np.where(column([path[45]]), whose, 0).astype(np.int32)
+        nobody = np.zeros((0, 2)), np.zeros(0, np.int64)
+        blobs[5] = find_blobs(label, np.ones(GRID.shape, np.float32), *nobody, 0.4, GRID)
+        (one,) = chain_pieces(blobs, FRAMES[0], CONFIG)
+        assert (45 in one.frames) == bridged
 
 
 def test_no_piece_begins_or_ends_where_nobody_was_seen() -> None:

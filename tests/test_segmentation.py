@@ -10,7 +10,9 @@ from strategies import numbers
 
 from stseg.arrays import Flags, Floats
 from stseg.geometry import Grid
+from stseg.geometry.near import near_person
 from stseg.segmentation.blobs import Blobs, find_blobs
+from stseg.segmentation.division import STRANGER
 from stseg.segmentation.motion import motion_field
 
 GRID = Grid((0.0, 2.0), (0.0, 1.5), cell=0.1, top=1.8, planes=4)
@@ -52,14 +54,19 @@ def disc(*places: tuple[float, float], radius: float = 0.22, tall: int = 3) -> F
 
 
 def blobs_of(occupied: Flags, *standing: tuple[float, float], strength: Floats | float = 2.0) -> Blobs:
+    """Blobs of people with tracks 11, 12, ..., the cells within 0.4 m of one given to the nearest of them."""
+    ground = np.array(standing).reshape(-1, 2)
     log_odds = np.where(occupied, strength, -3.0).astype(np.float32)
-    return find_blobs(occupied, log_odds, np.array(standing).reshape(-1, 2), 0.4, GRID)
+    label = np.where(
+        occupied, np.append(np.arange(len(ground)) + 11, STRANGER)[near_person(GRID.ground, ground, 0.4)], 0
+    )
+    return find_blobs(label.astype(np.int32), log_odds, ground, np.arange(len(ground)) + 11, 0.4, GRID)
 
 
 def test_a_person_is_a_blob() -> None:
     place = (0.85, 0.75)
     found = blobs_of(disc(place, tall=2), place)
-    assert found.person.tolist() == [0]
+    assert (found.person.tolist(), found.track.tolist()) == ([0], [11])
     np.testing.assert_allclose(found.ground[0], place, atol=1e-9)  # a symmetric mass has its centroid in the middle
     assert found.extent[0] == pytest.approx((found.cells == 1).sum() * 0.01)
     assert found.height[0] == pytest.approx(1.2)
@@ -78,7 +85,7 @@ def test_the_centroid_follows_the_mass() -> None:
     assert found.ground[0, 1] == pytest.approx(0.75)
 
 
-def test_touching_people_are_divided() -> None:
+def test_touching_people_are_two_blobs() -> None:
     left, right = (0.65, 0.75), (1.05, 0.75)
     found = blobs_of(disc(left, right), right, left)
     assert sorted(found.person.tolist()) == [0, 1]
@@ -92,7 +99,7 @@ def test_touching_people_are_divided() -> None:
 
 def test_a_piece_without_a_person_is_kept() -> None:
     found = blobs_of(disc((0.45, 0.75), (1.55, 0.75)), (0.45, 0.75))
-    assert sorted(found.person.tolist()) == [-1, 0]
+    assert (found.person.tolist(), found.track.tolist()) == ([0, -1], [11, STRANGER])
     assert len(found.touches) == 0
     unknown = found.person.tolist().index(-1)
     np.testing.assert_allclose(found.ground[unknown], (1.55, 0.75), atol=1e-9)
@@ -107,19 +114,54 @@ def test_people_without_cells_are_no_blobs() -> None:
     assert empty.touches.shape == (0, 2)
 
 
+def test_a_track_is_one_blob_strangers_are_many() -> None:
+    label = np.zeros(GRID.shape, np.int32)
+    label[1, 3, 3], label[1, 3, 8] = 4, 4
+    label[1, 9, 3], label[1, 9, 8] = STRANGER, STRANGER
+    found = find_blobs(label, np.ones(GRID.shape, np.float32), np.zeros((0, 2)), np.zeros(0, np.int64), 0.4, GRID)
+    assert found.track.tolist() == [4, STRANGER, STRANGER]
+    assert found.person.tolist() == [-1, -1, -1]
+    np.testing.assert_allclose(found.ground[0], (GRID.ground[3, 3] + GRID.ground[3, 8]) / 2)
+
+
+def test_a_column_goes_to_who_has_most_mass_there() -> None:
+    label = np.zeros(GRID.shape, np.int32)
+    label[:3, 5, 5], label[3, 5, 5] = 2, 1
+    for strength, whose in ((1.0, 2), (9.0, 1)):
+        log_odds = np.ones(GRID.shape, np.float32)
+        log_odds[3] = strength
+        found = find_blobs(label, log_odds, GRID.ground[5, 5][None], np.array([1]), 0.4, GRID)
+        assert found.track.tolist() == [whose]
+        assert found.person.tolist() == [0 if whose == 1 else -1]
+        assert found.mass[0] == pytest.approx(strength if whose == 1 else 1.0)
+        assert found.height[0] == pytest.approx(1.8 if whose == 1 else 1.2)
+
+
+def test_a_blob_holds_who_stands_in_it() -> None:
+    label = disc((0.45, 0.75)).astype(np.int32) * 3
+    for x, held in ((0.45, 0), (0.85, 0), (0.95, -1)):  # its outermost cell is at 0.65
+        found = find_blobs(label, label.astype(np.float32), np.array([[x, 0.75]]), np.array([3]), 0.4, GRID)
+        assert found.person.tolist() == [held]
+
+
 @settings(deadline=None, max_examples=40)
 @given(st.lists(st.tuples(numbers(0, 2), numbers(0, 1.5)), max_size=4), st.integers(0, 999))
 def test_blobs_partition_what_is_occupied(standing: list[tuple[float, float]], seed: int) -> None:
     rng = np.random.default_rng(seed)
-    occupied = rng.random(GRID.shape) < 0.08
+    tracks = rng.permutation(5)[: len(standing)] + 1
+    label = np.where(rng.random(GRID.shape) < 0.08, rng.choice([STRANGER, 1, 2, 3], GRID.shape), 0).astype(np.int32)
     log_odds = rng.normal(0, 2, GRID.shape).astype(np.float32)
     log_odds[rng.random(GRID.shape) < 0.1] = np.nan
-    found = find_blobs(occupied, log_odds, np.array(standing).reshape(-1, 2), 0.4, GRID)
-    number = len(found.person)
-    np.testing.assert_array_equal(found.cells > 0, occupied.any(0))
+    found = find_blobs(label, log_odds, np.array(standing).reshape(-1, 2), tracks, 0.4, GRID)
+    number = len(found.track)
+    np.testing.assert_array_equal(found.cells > 0, (label != 0).any(0))
     assert np.unique(found.cells[found.cells > 0]).tolist() == list(range(1, number + 1))
-    held = found.person[found.person >= 0]
-    assert len(np.unique(held)) == len(held)
+    for blob in range(number):
+        assert (label[:, found.cells == blob + 1] == found.track[blob]).any(0).all()
+    known = found.track[found.track != STRANGER]
+    assert len(np.unique(known)) == len(known)
+    held = found.person >= 0
+    np.testing.assert_array_equal(found.track[held], tracks[found.person[held]])
     assert np.isfinite(found.ground).all()
     assert (np.linalg.eigvalsh(found.covariance) > 0).all()
-    assert found.extent.sum() == pytest.approx(occupied.any(0).sum() * 0.01)
+    assert found.extent.sum() == pytest.approx((label != 0).any(0).sum() * 0.01)

@@ -8,10 +8,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from stseg.arrays import Floats, Ints
+from stseg.arrays import Floats
 from stseg.config import IdentityConfig
 from stseg.identity.linking import assign, distances
 from stseg.segmentation.blobs import Blobs
+from stseg.segmentation.division import STRANGER
 
 
 @dataclass
@@ -70,27 +71,25 @@ class Piece:
         return np.asarray((ground[-1] - ground[0]) / (frames[-1] - frames[0]))
 
 
-def chain_pieces(blobs: Sequence[Blobs], chains: Sequence[Ints], first: int, config: IdentityConfig) -> list[Piece]:
+def chain_pieces(blobs: Sequence[Blobs], first: int, config: IdentityConfig) -> list[Piece]:
     """The pieces of a window.
 
-    Blobs that hold people of one chain are one piece. A blob that holds nobody belongs to the piece in whose gap it
-    lies, where the walker would be: so the cut bridges frames in which the pass missed somebody, and no more.
+    Blobs that hold people of one chain are one piece. A blob that holds nobody, but is of that chain or of no known
+    one, belongs to the piece in whose gap it lies, where the walker would be: so the cut bridges frames in which the
+    pass missed somebody, and no more.
 
     Parameters
     ----------
     blobs
-        Of each frame of the window.
-    chains
-        For each frame the chain of each of its people (`identity.linking`).
+        Of each frame of the window; their tracks are chains (`identity.linking`).
     first
         The window's first frame.
     """
     pieces: dict[int, Piece] = {}
-    for offset, (found, chain) in enumerate(zip(blobs, chains, strict=True)):
-        for b, person in enumerate(found.person):
-            if person >= 0:
-                piece = pieces.setdefault(int(chain[person]), Piece(int(chain[person])))
-                piece.add(first + offset, b, found.ground[b])
+    for offset, found in enumerate(blobs):
+        for b in np.flatnonzero(found.person >= 0).tolist():
+            chain = int(found.track[b])
+            pieces.setdefault(chain, Piece(chain)).add(first + offset, b, found.ground[b])
     for offset, found in enumerate(blobs):
         _bridge(list(pieces.values()), first + offset, found, config)
     return list(pieces.values())
@@ -103,6 +102,9 @@ def _bridge(pieces: Sequence[Piece], frame: int, found: Blobs, config: IdentityC
     if not open_ or not len(nobody):
         return
     expected = np.array([piece.between(frame) for piece in open_])
-    for row, column in zip(*assign(distances(expected, found.ground[nobody]), config.slack), strict=True):
+    away = distances(expected, found.ground[nobody])
+    chain = np.array([piece.chain for piece in open_])
+    others = (found.track[nobody] != STRANGER) & (found.track[nobody] != chain[:, None])
+    for row, column in zip(*assign(np.where(others, np.inf, away), config.slack), strict=True):
         blob = int(nobody[column])
         open_[row].insert(frame, blob, found.ground[blob])

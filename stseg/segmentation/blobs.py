@@ -1,4 +1,4 @@
-"""What the cut calls occupied, frame by frame: one blob a person, touching people divided between them."""
+"""Whose the occupied cells are, frame by frame: one blob a track, measured."""
 
 from __future__ import annotations
 
@@ -7,10 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import label as connected
 
-from stseg.arrays import Flags, Floats, Ints, Labels, Singles
+from stseg.arrays import Floats, Ints, Labels, Singles
 from stseg.geometry import Grid
+from stseg.segmentation.division import STRANGER
 
 _EIGHT = np.ones((3, 3), int)
+_FAINT = 1e-6
+"""Mass of a cell without evidence, nats."""
 
 
 @dataclass(frozen=True)
@@ -21,6 +24,8 @@ class Blobs:
     ----------
     cells : int32 (y, x)
         Blob of each ground cell, counted from 1; 0 for none.
+    track : int64 (n,)
+        Whose each blob is; STRANGER where no track claims it.
     person : int64 (n,)
         The person of the frame's pass whom each blob holds, -1 for nobody.
     ground : float64 (n, 2)
@@ -38,6 +43,7 @@ class Blobs:
     """
 
     cells: Labels
+    track: Ints
     person: Ints
     ground: Floats
     covariance: Floats
@@ -47,68 +53,65 @@ class Blobs:
     touches: Ints
 
 
-def find_blobs(occupied: Flags, log_odds: Singles, people_ground: Floats, reach: float, grid: Grid) -> Blobs:
-    """Blobs of one frame of the cut.
+def find_blobs(
+    label: Labels, log_odds: Singles, people_ground: Floats, people_track: Ints, reach: float, grid: Grid
+) -> Blobs:
+    """Blobs of one frame.
 
-    Each connected piece of ground goes to the people who stand in it, cell by cell to the nearest; a piece in which
-    nobody stands is a blob of its own: the cut may see what a single frame's pass did not.
+    The cells of one track are one blob; those of strangers one for each connected piece of ground. A ground cell above
+    which several have cells goes to the one with the most mass there.
 
     Parameters
     ----------
-    occupied : bool (plane, y, x)
-        The cut's label.
+    label : int32 (plane, y, x)
+        Whose each cell is: a track, STRANGER, or 0 for background.
     log_odds : float32 (plane, y, x)
         u, nats.
-    people_ground : float64 (n, 2)
-        People of the frame's pass, metres.
+    people_ground, people_track : float64 (n, 2), int64 (n,)
+        People of the frame's pass, metres, and their tracks.
     reach
-        How far from a person's place their cells reach, metres.
+        How far from a person's place their cells reach, metres. A blob holds the person of its track who stands in it:
+        who has a cell of it within half a reach.
     """
-    pieces, number = connected(occupied.any(0), _EIGHT)
-    cells = np.zeros(pieces.shape, np.int32)
-    person: list[int] = []
-    piece_of: list[int] = []
+    owner = _owner(label, log_odds)
+    strange, number = connected(owner == STRANGER, _EIGHT)
+    known = np.unique(owner[owner > 0])
+    cells = np.where(owner > 0, 1 + np.searchsorted(known, owner), 0).astype(np.int32)
+    cells[strange > 0] = len(known) + strange[strange > 0]
+    track = np.concatenate([known, np.full(number, STRANGER)]).astype(np.int64)
+    person = np.full(len(track), -1, np.int64)
     ground = grid.ground
-    home = _homes(np.asarray(pieces, np.int32), people_ground, reach, grid)
-    for piece in range(1, number + 1):
-        inside = pieces == piece
-        standing = np.flatnonzero(home == piece)
-        if len(standing) == 0:
-            person.append(-1)
-            cells[inside] = len(person)
-            piece_of.append(piece)
-            continue
-        nearest = np.hypot(*np.moveaxis(ground[inside][:, None] - people_ground[standing], -1, 0)).argmin(1)
-        taken = np.unique(nearest)
-        cells[inside] = len(person) + 1 + np.searchsorted(taken, nearest)
-        person.extend(standing[taken])
-        piece_of.extend([piece] * len(taken))
-    return _measure(cells, np.array(person, np.int64), np.array(piece_of), occupied, log_odds, grid)
+    for j, (place, name) in enumerate(zip(people_ground, people_track, strict=True)):
+        away = np.hypot(*(ground[owner == name] - place).T)
+        if away.min(initial=np.inf) <= reach / 2:
+            person[known.searchsorted(name)] = j
+    return _measure(cells, track, person, label, log_odds, grid)
 
 
-def _homes(pieces: Labels, people_ground: Floats, reach: float, grid: Grid) -> Ints:
-    """The piece in which each person stands: the one with the nearest cell within half a reach; 0 for none."""
-    home = np.zeros(len(people_ground), np.int64)
-    rows, columns = np.nonzero(pieces)
-    if len(rows):
-        places = grid.ground[rows, columns]
-        for j, place in enumerate(people_ground):
-            away = np.hypot(*(places - place).T)
-            if away.min() <= reach / 2:
-                home[j] = pieces[rows[away.argmin()], columns[away.argmin()]]
-    return home
+def _owner(label: Labels, log_odds: Singles) -> Labels:
+    """The label that has the most mass above each ground cell, int32 (y, x); 0 where none has any."""
+    names = np.unique(label[label != 0])
+    owner, most = np.zeros(label.shape[1:], np.int32), np.zeros(label.shape[1:])
+    strength = np.nan_to_num(log_odds).clip(0) + _FAINT
+    for name in names:
+        mass = np.where(label == name, strength, 0.0).sum(0)
+        owner[mass > most] = name
+        np.maximum(most, mass, out=most)
+    return owner
 
 
-def _measure(cells: Labels, person: Ints, piece_of: Ints, occupied: Flags, log_odds: Singles, grid: Grid) -> Blobs:
-    n = len(person)
+def _measure(cells: Labels, track: Ints, person: Ints, label: Labels, log_odds: Singles, grid: Grid) -> Blobs:
+    n, everywhere = len(track), grid.ground
+    occupied = label == np.append(0, track)[cells]
+    occupied &= label != 0
     strength = np.where(occupied, np.nan_to_num(log_odds), 0.0)
-    weight = strength.clip(0).sum(0) + 1e-6
+    weight = strength.clip(0).sum(0) + _FAINT
     ground, covariance = np.zeros((n, 2)), np.zeros((n, 2, 2))
     extent, height, mass = np.zeros(n), np.zeros(n), np.zeros(n)
     for b in range(n):
         inside = cells == b + 1
         share = weight[inside] / weight[inside].sum()
-        places = grid.ground[inside]
+        places = everywhere[inside]
         ground[b] = share @ places
         spread = places - ground[b]
         covariance[b] = (spread * share[:, None]).T @ spread / max(inside.sum(), 1) + np.eye(2) * grid.cell**2 / 12
@@ -116,6 +119,12 @@ def _measure(cells: Labels, person: Ints, piece_of: Ints, occupied: Flags, log_o
         planes = occupied[:, inside].any(1)
         height[b] = grid.heights[np.flatnonzero(planes)[-1]]
         mass[b] = strength[:, inside].sum() / max(occupied[:, inside].sum(), 1)
-    pairs = [(a, b) for a in range(n) for b in range(a + 1, n) if piece_of[a] == piece_of[b]]
-    touches = np.array(pairs, np.int64).reshape(-1, 2)
-    return Blobs(cells, person, ground, covariance, extent, height, mass, touches)
+    return Blobs(cells, track, person, ground, covariance, extent, height, mass, _touches(cells))
+
+
+def _touches(cells: Labels) -> Ints:
+    """Pairs of blobs, counted from 0, that share one connected piece of ground, int64 (k, 2)."""
+    piece = connected(cells > 0, _EIGHT)[0]
+    members = np.unique(np.stack([piece[cells > 0], cells[cells > 0] - 1]), axis=1).T
+    pairs = {(int(a), int(b)) for i, a in members for j, b in members if i == j and a < b}
+    return np.array(sorted(pairs), np.int64).reshape(-1, 2)

@@ -7,17 +7,20 @@ from itertools import pairwise
 
 import numpy as np
 
-from stseg.arrays import Flags, Floats, Ints, Rows
+from stseg.arrays import Flags, Floats, Ints, Labels, Rows
 from stseg.config import Config
 from stseg.geometry import Rig
 from stseg.identity.identities import Decision, Identities
 from stseg.identity.linking import Linker
 from stseg.identity.pieces import chain_pieces
+from stseg.identity.places import Sightings, earlier_sightings, expected_places, together
 from stseg.identity.windows import Window, windows
 from stseg.occupancy.sampling import Sampling
 from stseg.segmentation.blobs import Blobs, find_blobs
 from stseg.segmentation.cut import minimum_cut
+from stseg.segmentation.division import Division, Found, divide
 from stseg.segmentation.energy import QUANTUM, Energy, build_energy
+from stseg.segmentation.labels import Pillar
 from stseg.segmentation.motion import motion_field
 from stseg.trackers.protocol import Commit, Scene
 from stseg.trackers.rows import event_rows, trajectory_rows, views_at
@@ -33,6 +36,11 @@ class _Linked:
 
     scene: Scene
     chains: Ints
+
+    def sightings(self) -> Sightings:
+        """Who was seen where."""
+        people, frame = self.scene.people, np.full(len(self.chains), self.scene.frame)
+        return Sightings(frame, self.chains, people.ground, people.covariance, people.height)
 
 
 class CutTracker:
@@ -51,6 +59,8 @@ class CutTracker:
         self.views = Sampling.of(rig).views()
         self.linker = Linker(rig.frame_rate, config.identity)
         self.identities = Identities(rig.frame_rate, config.identity)
+        spread, stranger = config.ghosts.height_spread, config.occupancy.occupied
+        self.pillar = Pillar(config.occupancy.reach, spread, stranger)
         self.held: list[_Linked] = []
         self.first = self.committed = first
         self.coming = windows(rig.frame_rate, config.identity, first, _ENDLESS)
@@ -87,18 +97,17 @@ class CutTracker:
         held = [linked for linked in self.held if window.solve_first <= linked.scene.frame < window.solve_stop]
         energy = self._energy(held)
         cut = minimum_cut(energy)
-        occupied = cut.occupied
+        label = self._divide(window, held, energy, cut.occupied).label
+        reach, grid = self.config.occupancy.reach, self.rig.grid
         blobs = [
-            find_blobs(
-                cells, linked.scene.log_odds, linked.scene.people.ground, self.config.occupancy.reach, self.rig.grid
-            )
-            for cells, linked in zip(occupied, held, strict=True)
+            find_blobs(cells, linked.scene.log_odds, linked.scene.people.ground, linked.chains, reach, grid)
+            for cells, linked in zip(label, held, strict=True)
         ]
-        pieces = chain_pieces(blobs, [linked.chains for linked in held], window.solve_first, self.config.identity)
+        pieces = chain_pieces(blobs, window.solve_first, self.config.identity)
         decision = self.identities.decide(window, blobs, pieces)
-        row = np.array([(*_ranges(window), energy.of(occupied), QUANTUM, cut.nodes)], WINDOW)
+        row = np.array([(*_ranges(window), energy.of(cut.occupied), QUANTUM, cut.nodes)], WINDOW)
         self.committed = window.commit_stop
-        return self._commit(window, held, occupied, blobs, decision, row)
+        return self._commit(window, held, label, blobs, decision, row)
 
     def _energy(self, held: list[_Linked]) -> Energy:
         log_odds = np.stack([linked.scene.log_odds for linked in held])
@@ -110,18 +119,30 @@ class CutTracker:
         steps = np.array(motion, np.int64).reshape(-1, *grid.shape[1:], 2)
         return build_energy(log_odds, steps, grid, self.config.segmentation)
 
+    def _divide(self, window: Window, held: list[_Linked], energy: Energy, occupied: Flags) -> Division:
+        """Whose the occupied cells are: chains of this window and of tracks that live."""
+        tails = [track.tail for track in self.identities.alive]
+        mean_height = self.config.ghosts.height_mean
+        seen = [earlier_sightings(tails, window.solve_first, mean_height, self.config.identity)]
+        seen += [linked.sightings() for linked in held]
+        places = expected_places(
+            together(seen), window.solve_first, window.solve_stop, self.rig.frame_rate, self.config.identity
+        )
+        found = Found([linked.scene.people.ground for linked in held], [linked.chains for linked in held])
+        return divide(energy, occupied, found, places, self.pillar, self.rig.grid)
+
     def _commit(
-        self, window: Window, held: list[_Linked], occupied: Flags, blobs: list[Blobs], decision: Decision, row: Rows
+        self, window: Window, held: list[_Linked], label: Labels, blobs: list[Blobs], decision: Decision, row: Rows
     ) -> Commit:
         kept = range(window.commit_first - held[0].scene.frame, window.commit_stop - held[0].scene.frame)
-        label = np.zeros((len(kept), *self.rig.grid.shape), np.int32)
+        named = np.zeros((len(kept), *self.rig.grid.shape), np.int32)
         rows = []
-        for k, cells in zip(kept, label, strict=True):
+        for k, cells in zip(kept, named, strict=True):
             identity = np.append(0, decision.identity[k])
-            cells[:] = np.where(occupied[k], identity[blobs[k].cells], 0)
+            cells[:] = np.where(label[k] != 0, identity[blobs[k].cells], 0)
             rows.append(self._rows(held[k].scene, blobs[k], decision.identity[k]))
         scenes = [held[k].scene for k in kept]
-        return Commit(scenes, label, np.concatenate(rows), event_rows(decision.events), row)
+        return Commit(scenes, named, np.concatenate(rows), event_rows(decision.events), row)
 
     def _rows(self, scene: Scene, blobs: Blobs, identity: Ints) -> Rows:
         """Where a blob holds a person of the pass, the pass knows best where; else the blob's mass tells."""
