@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import reference_core
 import reference_expansion as reference
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -19,9 +18,10 @@ from stseg.identity.pieces import Piece
 from stseg.identity.places import Sightings, earlier_sightings, expected_places, together
 from stseg.segmentation.cut import minimum_cut
 from stseg.segmentation.division import STRANGER, Division, Found, divide
-from stseg.segmentation.energy import QUANTUM, Energy, build_energy
+from stseg.segmentation.energy import QUANTUM, Energy, build_energy, neighbourhood
 from stseg.segmentation.expansion import LabelEnergy, expand
 from stseg.segmentation.labels import Pillar, Places, label_energy, shares
+from stseg.segmentation.motion import follow
 from stseg.segmentation.part import Part, part_of
 
 GRID = Grid((0.0, 2.4), (0.0, 1.4), cell=0.1, top=1.8, planes=4)
@@ -35,9 +35,10 @@ CONFIG = IdentityConfig()
 def random_window(seed: int, shape: tuple[int, ...]) -> Energy:
     rng = np.random.default_rng(seed)
     frames, _, rows, columns = shape
-    across, along, up, ahead = (int(c) for c in rng.integers(1, 9, 4))
     motion = rng.integers(-2, 3, (frames - 1, rows, columns, 2))
-    return Energy(rng.integers(-20, 21, shape), across, along, up, ahead, motion)
+    offsets = neighbourhood(8 if seed % 2 else 80)
+    capacity = rng.integers(1, 9, len(offsets)).astype(np.int32)
+    return Energy(rng.integers(-20, 21, shape).astype(np.int32), offsets, capacity, follow(motion))
 
 
 @settings(deadline=None, max_examples=25)
@@ -48,7 +49,7 @@ def test_a_part_has_the_edges_of_its_window(seed: int, shape: tuple[int, ...]) -
     part = part_of(energy, inside)
     assert part.cell.tolist() == np.flatnonzero(inside).tolist()
     within = inside.ravel()
-    every = reference_core.neighbours(energy)
+    every = list(zip(*(side.tolist() for side in energy.edges()), strict=True))
     told = sorted(zip(part.cell[part.start], part.cell[part.end], part.weight, strict=True))
     assert told == sorted((p, q, w) for p, q, w in every if within[p] and within[q])
     border = np.zeros(within.size, np.int64)

@@ -20,8 +20,9 @@ import numpy as np
 from stseg.accelerate import kernel
 from stseg.arrays import Floats, Ints, Labels, Singles
 from stseg.segmentation.cut import minimum_cut
-from stseg.segmentation.energy import Energy
+from stseg.segmentation.energy import Energy, neighbourhood
 from stseg.segmentation.expansion import LabelEnergy, expand
+from stseg.segmentation.motion import follow
 from stseg.segmentation.part import part_of
 
 SHAPE = (15, 10, 100, 100)
@@ -93,9 +94,10 @@ def solve(cost: Labels) -> Ints:
     The two-label cut of each cell's best cost leaves the cells that a label can win. Of their labels, one that costs
     more than the background and all the cell's edges together cannot win either.
     """
-    best = np.empty(SHAPE, np.int64)
+    best = np.empty(SHAPE, np.int32)
     _fill_best(cost, best)
-    window = Energy(best, WEIGHT, WEIGHT, WEIGHT, WEIGHT, np.zeros((SHAPE[0] - 1, *SHAPE[2:], 2), np.int64))
+    still = follow(np.zeros((SHAPE[0] - 1, *SHAPE[2:], 2), np.int64))
+    window = Energy(best, neighbourhood(8), np.full(4, WEIGHT, np.int32), still)
     part = part_of(window, minimum_cut(window).occupied)
     own = cost.reshape(-1, cost.shape[-1])[part.cell].astype(np.int64)
     more = own[:, 1:] - own[:, :1]
@@ -111,7 +113,7 @@ def solve(cost: Labels) -> Ints:
 
 
 @kernel
-def _fill_best(cost: Labels, best: Ints) -> None:
+def _fill_best(cost: Labels, best: Labels) -> None:
     """Fill what each cell's cheapest label gains over the background."""
     for t in range(cost.shape[0]):
         for z in range(cost.shape[1]):

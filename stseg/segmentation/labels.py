@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stseg.accelerate import kernel
-from stseg.arrays import Flags, Floats, Ints
+from stseg.arrays import Flags, Floats, Ints, Labels
 from stseg.segmentation.energy import QUANTUM
 from stseg.segmentation.expansion import LabelEnergy
 from stseg.segmentation.part import Part
@@ -104,12 +104,12 @@ def shares(
     return np.asarray(share / share.sum(1, keepdims=True))
 
 
-def label_energy(unary: Ints, share: Floats, part: Part) -> LabelEnergy:
+def label_energy(unary: Ints | Labels, share: Floats, part: Part) -> LabelEnergy:
     """The energy of dividing a part of a window.
 
     Parameters
     ----------
-    unary : int64 (n,)
+    unary : int32 or int64 (n,)
         u of the part's cells, quanta.
     share : float64 (n, k + 1)
         As `shares` returns; label j + 1 has column j. Labels without a share are not admissible.

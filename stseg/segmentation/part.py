@@ -9,8 +9,11 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 from stseg.accelerate import kernel
-from stseg.arrays import Flags, Ints
+from stseg.arrays import Flags, Ints, Labels
 from stseg.segmentation.energy import Energy
+from stseg.segmentation.lattice import Lattice, lay_out, neighbour, spread
+
+_OUTSIDE, _FIRST = 1, 2
 
 
 @dataclass(frozen=True)
@@ -52,55 +55,36 @@ class Part:
 def part_of(energy: Energy, inside: Flags) -> Part:
     """The part of a window that is inside, bool (time, plane, y, x)."""
     cell = np.flatnonzero(inside)
-    node = np.full(inside.shape, -1, np.int64)
-    node.flat[cell] = np.arange(len(cell))
-    # Every cell has one neighbour ahead in each of the four directions, so this is room for all edges.
-    start, end, weight = (np.empty(4 * len(cell), np.int64) for _ in range(3))
+    index = np.full(inside.shape, _OUTSIDE, np.int32)
+    index.flat[cell] = np.arange(_FIRST, _FIRST + len(cell))
+    known = spread(index)
+    start, end, weight = (np.empty(len(energy.offsets) * len(cell), np.int64) for _ in range(3))
     border = np.zeros(len(cell), np.int64)
-    capacity = np.array([energy.ahead, energy.up, energy.across, energy.along])
-    edges = _fill_part(node, energy.motion, capacity, start, end, weight, border)
+    nodes = np.flatnonzero(known >= _FIRST)  # numbered in the order of the cells
+    edges = _fill_part(nodes, known, lay_out(energy), energy.capacity, start, end, weight, border)
     return Part(cell, start[:edges], end[:edges], weight[:edges], border)
 
 
 @kernel
-def _fill_part(node: Ints, motion: Ints, capacity: Ints, start: Ints, end: Ints, weight: Ints, border: Ints) -> int:
+def _fill_part(
+    nodes: Ints, known: Labels, lattice: Lattice, capacity: Labels, start: Ints, end: Ints, weight: Ints, border: Ints
+) -> int:
     """Fill the edges of a part and its border; the number of edges.
 
     Parameters
     ----------
-    node : int64 (time, plane, y, x)
-        Index of each cell in the part, -1 outside it.
-    motion : int64 (time - 1, y, x, 2)
-        Cells (dy, dx) moved until the next frame.
-    capacity : int64 (4,)
-        To the neighbour in time, between planes, in y, in x; quanta.
+    nodes : int64 (n,)
+        The part's cells in the lattice, rising.
+    known : int32 (node,)
+        0 for guards, _OUTSIDE for cells that are not of the part, _FIRST plus the index of those that are.
     """
-    frames, planes, rows, columns = node.shape
     edges = 0
-    for t in range(frames):
-        for z in range(planes):
-            for y in range(rows):
-                for x in range(columns):
-                    for way in range(4):
-                        s, h, v, u = t, z, y, x
-                        if way == 0:
-                            s += 1
-                        elif way == 1:
-                            h += 1
-                        elif way == 2:
-                            v += 1
-                        else:
-                            u += 1
-                        if way == 0 and s < frames:
-                            v, u = y + motion[t, y, x, 0], x + motion[t, y, x, 1]
-                        if s == frames or h == planes or v < 0 or v >= rows or u < 0 or u >= columns:
-                            continue
-                        p, q = node[t, z, y, x], node[s, h, v, u]
-                        if p >= 0 and q >= 0:
-                            start[edges], end[edges], weight[edges] = p, q, capacity[way]
-                            edges += 1
-                        elif p >= 0:
-                            border[p] += capacity[way]
-                        elif q >= 0:
-                            border[q] += capacity[way]
+    for p in range(len(nodes)):
+        for slot in range(2 * len(capacity)):
+            q = known[neighbour(nodes[p], slot, lattice)]
+            if q == _OUTSIDE:
+                border[p] += capacity[slot // 2]
+            elif q >= _FIRST and slot % 2 == 0:
+                start[edges], end[edges], weight[edges] = p, q - _FIRST, capacity[slot // 2]
+                edges += 1
     return edges
