@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -128,6 +129,25 @@ def test_what_is_committed_early_does_not_change() -> None:
         np.testing.assert_array_equal(one.label, other.label)
         np.testing.assert_array_equal(one.windows, other.windows)
         np.testing.assert_array_equal(one.events, other.events)
+
+
+def test_who_touches_is_cut_apart() -> None:
+    """Two walk side by side, in one piece of occupied cells; one of them is missed for three frames."""
+    follow = make_tracker("cut", RIG, CONFIG, 0)
+    commits: list[Commit] = []
+    for frame in range(12):
+        x = -1.0 + 0.1 * frame
+        both = scene(frame, (x, -0.25), (x, 0.3))
+        seen = both if frame not in (4, 5, 6) else scene(frame, (x, -0.25))
+        commits += follow.add(replace(seen, log_odds=both.log_odds))
+    commits += follow.finish()
+    rows, labels = rows_of(commits), np.concatenate([commit.label for commit in commits])
+    assert np.unique(rows["id"]).tolist() == [1, 2]
+    assert len(rows) == 24
+    for row in rows:
+        assert abs(row["y"] - (-0.25 if row["id"] == 1 else 0.3)) < 0.15
+        own = RIG.grid.ground[(labels[row["frame"]] == row["id"]).any(0)]
+        assert (own[:, 1] < 0.1).all() if row["id"] == 1 else (own[:, 1] > -0.1).all()
 
 
 @pytest.mark.parametrize("tracker", sorted(TRACKERS))

@@ -16,6 +16,7 @@ from time import perf_counter
 
 import maxflow
 import numpy as np
+from bench_cut import Row, print_table
 
 from stseg.accelerate import kernel
 from stseg.arrays import Floats, Ints, Labels, Singles
@@ -42,24 +43,7 @@ class Crowd:
     height: Floats
 
 
-@dataclass(frozen=True)
-class Row:
-    """One line of the table."""
-
-    labels: int
-    seed: int
-    occupied: float
-    ours: float
-    theirs: float
-    energy: int
-
-    @property
-    def ratio(self) -> float:
-        """How many times as fast."""
-        return self.theirs / self.ours
-
-
-def measure(labels: int, seed: int) -> Row:
+def compare(labels: int, seed: int) -> Row:
     """Both on one window, in the same process; ours is the median of three, theirs one call."""
     unary, cost = problem(labels, seed)
     solve(cost)  # compiles
@@ -74,18 +58,16 @@ def measure(labels: int, seed: int) -> Row:
     taken = perf_counter() - begin
     energy = energy_of(cost, ours)
     if energy != energy_of(cost, theirs):
-        raise AssertionError(f"{labels} labels, seed {seed}: {energy} is not {energy_of(cost, theirs)}")
-    return Row(labels, seed, float((unary > 0).mean()), float(np.median(times)), taken, energy)
+        sys.exit(f"bench_expansion.py: seed {seed}: energy {energy}, aexpansion_grid's {energy_of(cost, theirs)}")
+    figures = {"u > 0, %": 100 * float((unary > 0).mean()), "aexpansion_grid s": taken}
+    figures |= {"stseg s": float(np.median(times)), "ratio": taken / float(np.median(times))}
+    return Row(f"{labels} labels, seed {seed}", figures)
 
 
-def table(rows: Iterable[Row]) -> str:
-    """The rows in Markdown."""
-    head = "| labels, seed | u > 0 | aexpansion_grid | expansion | ratio |\n|---|---|---|---|---|\n"
-    lines = (
-        f"| {r.labels}, {r.seed} | {100 * r.occupied:.1f} % | {r.theirs:.1f} s | {r.ours:.2f} s | {r.ratio:.0f} x |"
-        for r in rows
-    )
-    return head + "\n".join(lines)
+def expansion_rows(cases: Iterable[tuple[int, int]] = CASES) -> Iterable[Row]:
+    """Windows of many labels."""
+    for labels, seed in cases:
+        yield compare(labels, seed)
 
 
 def solve(cost: Labels) -> Ints:
@@ -226,8 +208,8 @@ def _fill_volume(
 
 def main(arguments: Sequence[str]) -> None:
     """Print the table."""
-    cases = [(int(a.partition(",")[0]), int(a.partition(",")[2])) for a in arguments] or CASES
-    print(table([measure(*case) for case in cases]))
+    cases = [(int(case.partition(",")[0]), int(case.partition(",")[2])) for case in arguments]
+    print_table("Expansion over many labels, synthetic", expansion_rows(cases or CASES))
 
 
 if __name__ == "__main__":
