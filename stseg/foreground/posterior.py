@@ -74,11 +74,35 @@ def surely_background(
         `doubt_of` the priors.
     """
     inner = d0 * m0 + d1 * m1 + d2 * m2
-    squared = inner * inner / (m0 * m0 + m1 * m1 + m2 * m2 + _TINY)
-    along = squared / along_variance
-    across = (d0 * d0 + d1 * d1 + d2 * d2 - squared) / across_variance
+    along = inner * inner / (m0 * m0 + m1 * m1 + m2 * m2 + _TINY)
+    across = d0 * d0 + d1 * d1 + d2 * d2 - along
     area, span = _TWO_PI * across_variance, np.sqrt(_TWO_PI * along_variance)
     line = span + reach * _SHORTEST * (m0 + m1 + m2)
+    return outshines(across / across_variance, along / along_variance, area, span, line, weight, doubt, mimicry)
+
+
+@kernel
+def outshines(
+    across: np.float32,
+    along: np.float32,
+    area: np.float32,
+    span: np.float32,
+    line: np.float32,
+    weight: np.float32,
+    doubt: np.float32,
+    mimicry: np.float32,
+) -> bool:
+    """Whether the one background there is exceeds people `doubt` times: never true where it does not.
+
+    Parameters
+    ----------
+    across, along
+        Squared Mahalanobis distances from the lit background, across the ray of its chromaticity and along it.
+    area
+        Over which its density is spread across the ray, squared grey levels.
+    span, line
+        The lengths over which it is spread along the ray where lit, and where dimmed, grey levels.
+    """
     near, level = max(_ONE - _SIXTEENTH * (across + along), _ZERO), max(_ONE - _SIXTEENTH * along, _ZERO)
     near, level = near * near, level * level
     near, level = near * near, level * level

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from stseg.arrays import Boxes, Observation, Singles
+from stseg.foreground.background import Background
 from stseg.foreground.instances import instance_boxes
 from stseg.foreground.masks import mask_likelihood
-from stseg.foreground.mixture import Mixture
 
 Evidence = Boxes | Singles | None
 """One view of one frame: boxes, a likelihood map float32 (v, u), or None where the view is blind."""
@@ -22,7 +22,7 @@ class Sight:
         The model of the empty scene of a colour camera; None for all others.
     """
 
-    def __init__(self, background: Mixture | None = None) -> None:
+    def __init__(self, background: Background | None = None) -> None:
         self.background = background
 
     def evidence(self, seen: Observation) -> Evidence:
@@ -36,7 +36,7 @@ class Sight:
         if self.background is None:
             raise ValueError("a colour frame needs a background model")
         posterior = self.background.likelihood(np.asarray(seen, np.uint8))
-        return without_prior(posterior, self.background.config.foreground)
+        return without_prior(posterior, self.background.prior)
 
 
 def without_prior(posterior: Singles, prior: float) -> Singles:
