@@ -78,13 +78,13 @@ class CodebookConfig(BackgroundConfig):
 
     codewords: int = 4
     """K, codewords per pixel, 1 or more; with 1 nothing that moved in is ever absorbed."""
-    noise: float = 4.0
+    noise: float = 3.0
     """sigma: standard deviation of a channel around its codeword, grey levels."""
     highlight: float = 0.02
     """h: prior probability that background is lit brighter than it was ever learned, 0..1."""
     brightest: float = 1.3
     """Brightness, relative to the brightest learned, of the strongest highlight that counts as one, above 1."""
-    recurrence: float = 0.15
+    recurrence: float = 0.1
     """Share of the frames learned among people for which background stays away at a stretch at most, 0..1."""
     absence: float = 10.0
     """How long a thing that moved in may be out of sight at a stretch before it is forgotten, seconds."""

@@ -54,12 +54,15 @@ class Chromatic(PixelModel):
 
     def _start(self, frames: NDArray[np.uint8]) -> None:
         config = self.config
-        mean, variance = commonest_colours(frames, config.match * config.minimum_sd)
-        self._arrays["weight"][:] = 0
-        self._arrays["weight"][:, :, 0] = 1
-        self._arrays["mean"][:, :, 0] = mean
-        least = config.chromatic_sd**2, config.minimum_sd**2
-        self._arrays["variance"][:, :, 0] = np.maximum(variance[:, :, None], np.array(least, np.float32))
+        colour, spread = commonest_colours(frames, config.match * config.minimum_sd)
+        mean, variance, weight = self._arrays.values()
+        weight[:], weight[:, :, 0] = 0, 1
+        mean[:, :, 0] = colour
+        variance[:, :, 0] = np.maximum(spread, config.minimum_sd**2)[:, :, None]
+        certain, rate = np.ones(weight.shape[:2], np.float32), 1.0 / len(frames)
+        for frame in frames:  # the two variances part; what else the frames teach is forgotten
+            self._update(slice(None), frame, np.ones(3), certain, rate, rate)
+        weight[:], weight[:, :, 0] = 0, 1
 
     def _teach(self, image: Bytes, gain: Floats) -> None:
         rate = 1.0 / (self._learned + 1)
