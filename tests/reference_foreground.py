@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stseg.arrays import Boxes, Bytes, Floats, Singles
-from stseg.config import MixtureConfig
+from stseg.config import BackgroundConfig, ChromaticConfig, CodebookConfig, MixtureConfig
 
 UNIFORM = 256.0**-3
 
@@ -34,12 +35,16 @@ def log_odds(
             mu = np.minimum(gain * mean[v, u, k].astype(float), 255.0)
             n, d = mode_densities(image[v, u].astype(float), mu, float(variance[v, u, k]), config.darkest)
             lit, dimmed = lit + float(weight[v, u, k]) * n, dimmed + float(weight[v, u, k]) * d
-        explained = (1 - config.shadow) * lit + config.shadow * dimmed
-        scene = (1 - config.unexplained) * explained + config.unexplained * UNIFORM
-        person = (1 - config.mimicry) * UNIFORM + config.mimicry * dimmed
-        odds = config.foreground * person / ((1 - config.foreground) * scene)
-        out[v, u] = np.clip(math.log(odds), -5, 5)
+        out[v, u] = posterior((1 - config.shadow) * lit + config.shadow * dimmed, dimmed, config)
     return out
+
+
+def posterior(explained: float, dimmed: float, config: BackgroundConfig) -> float:
+    """Log-odds of a person, within 5 nats."""
+    scene = (1 - config.unexplained) * explained + config.unexplained * UNIFORM
+    person = (1 - config.mimicry) * UNIFORM + config.mimicry * dimmed
+    odds = config.foreground * person / ((1 - config.foreground) * scene)
+    return float(np.clip(math.log(odds), -5, 5))
 
 
 def updated(
@@ -71,6 +76,197 @@ def updated(
             w *= 1 - slow
             w[k], variance[v, u, k], mean[v, u, k] = slow, config.initial_sd**2, x / gain
     return mean, variance, weight
+
+
+def polar(x: Floats, mu: Floats) -> tuple[float, float, float]:
+    """Brightness relative to mu, distance from the ray of mu, and the length of mu."""
+    ratio = float(x @ mu / (mu @ mu))
+    return ratio, float(np.linalg.norm(x - ratio * mu)), float(np.linalg.norm(mu))
+
+
+def gaussian(distance: float, var: float) -> float:
+    """A Gaussian that is 1 in its middle."""
+    return math.exp(-(distance**2) / (2 * var))
+
+
+def chromatic_densities(x: Floats, mu: Floats, across: float, along: float, darkest: float) -> tuple[float, float]:
+    """N and D of `stseg.foreground.chromatic`."""
+    ratio, off, length = polar(x, mu)
+    disc = gaussian(off, across) / (2 * math.pi * across)
+    lit = disc * gaussian((ratio - 1) * length, along) / math.sqrt(2 * math.pi * along)
+    t = max((min(ratio, 1) - darkest) / (1 - darkest), 0)
+    line = (1 - darkest) * length + math.sqrt(2 * math.pi * along)
+    return lit, disc * 2 * t * gaussian(max(ratio - 1, 0) * length, along) / line
+
+
+def chromatic_log_odds(
+    image: Bytes, gain: Floats, mean: Singles, variance: Singles, weight: Singles, config: ChromaticConfig
+) -> Floats:
+    """Log-odds of foreground (v, u), within 5 nats."""
+    out = np.empty(image.shape[:2])
+    for v, u in np.ndindex(*out.shape):
+        lit, dimmed = 0.0, 0.0
+        for k in np.flatnonzero(weight[v, u] >= config.share):
+            mu = np.minimum(gain * mean[v, u, k].astype(float), 255.0)
+            across, along = variance[v, u, k].astype(float)
+            n, d = chromatic_densities(image[v, u].astype(float), mu, across, along, config.darkest)
+            lit, dimmed = lit + float(weight[v, u, k]) * n, dimmed + float(weight[v, u, k]) * d
+        out[v, u] = posterior((1 - config.shadow) * lit + config.shadow * dimmed, dimmed, config)
+    return out
+
+
+def chromatic_updated(
+    image: Bytes,
+    gain: Floats,
+    likelihood: Singles,
+    fast: float,
+    slow: float,
+    state: tuple[Singles, Singles, Singles],
+    config: ChromaticConfig,
+) -> tuple[Floats, Floats, Floats]:
+    """Mean, variance and weight after a frame."""
+    mean, variance, weight = (part.astype(float) for part in state)
+    least = np.array([config.chromatic_sd**2, config.minimum_sd**2])
+    for v, u in np.ndindex(*image.shape[:2]):
+        x, w = image[v, u].astype(float), weight[v, u]
+        squares = np.empty((len(w), 2))
+        for k, mu in enumerate(np.minimum(gain * mean[v, u], 255.0)):
+            ratio, off, length = polar(x, mu)
+            squares[k] = off**2, ((ratio - 1) * length) ** 2
+        mahalanobis = np.where(w > 0, (squares / variance[v, u]).sum(-1), np.inf)
+        k = int(mahalanobis.argmin())
+        if mahalanobis[k] <= config.match**2:
+            rate = slow if w[k] < config.share else slow * likelihood[v, u] + fast * (1 - likelihood[v, u])
+            w *= 1 - rate
+            w[k] += rate
+            step = min(rate / w[k], 1)
+            mean[v, u, k] += step * (x - np.minimum(gain * mean[v, u, k], 255.0)) / gain
+            variance[v, u, k] += step * (squares[k] / (2, 1) - variance[v, u, k])
+            variance[v, u, k] = np.maximum(variance[v, u, k], least)
+        elif likelihood[v, u] >= 0.5 and w.min() < config.share:
+            k = int(w.argmin())
+            w *= 1 - slow
+            w[k], variance[v, u, k], mean[v, u, k] = slow, config.initial_sd**2, x / gain
+    return mean, variance, weight
+
+
+def codeword_densities(
+    x: Floats, mu: Floats, low: float, high: float, config: CodebookConfig
+) -> tuple[float, float, float]:
+    """Densities of a codeword as it was seen, in shadow and in highlight, of `stseg.foreground.codebook`."""
+    ratio, off, length = polar(x, mu)
+    var, span = config.noise**2, math.sqrt(2 * math.pi) * config.noise
+    disc = gaussian(off, var) / (2 * math.pi * var)
+    lit = gaussian(max(low - ratio, ratio - high, 0) * length, var) / ((high - low) * length + span)
+    t = float(np.clip((ratio / low - config.darkest) / (1 - config.darkest), 0, 1))
+    shadow = 2 * t * gaussian(max(ratio - low, 0) * length, var) / ((1 - config.darkest) * low * length + span)
+    t = float(np.clip((config.brightest - ratio / high) / (config.brightest - 1), 0, 1))
+    bright = 2 * t * gaussian(max(high - ratio, 0) * length, var) / ((config.brightest - 1) * high * length + span)
+    return disc * lit, disc * shadow, disc * bright
+
+
+def codebook_log_odds(
+    image: Bytes, gain: Floats, mean: Singles, bounds: Singles, weight: Singles, config: CodebookConfig
+) -> Floats:
+    """Log-odds of foreground (v, u), within 5 nats."""
+    out = np.empty(image.shape[:2])
+    for v, u in np.ndindex(*out.shape):
+        parts = np.zeros(3)
+        for k in np.flatnonzero(weight[v, u] > 0):
+            mu = np.minimum(gain * mean[v, u, k].astype(float), 255.0)
+            low, high = bounds[v, u, k].astype(float)
+            own = codeword_densities(image[v, u].astype(float), mu, low, high, config)
+            parts += weight[v, u, k] / weight[v, u].sum() * np.array(own)
+        priors = np.array([1 - config.shadow - config.highlight, config.shadow, config.highlight])
+        out[v, u] = posterior(float(parts @ priors), float(parts[1]), config)
+    return out
+
+
+@dataclass
+class Codeword:
+    """Kim et al. (2005): v and its six-tuple, the brightness as grey levels along v."""
+
+    colour: Floats
+    low: float
+    high: float
+    frequency: float
+    weight: float
+    longest: int
+    first: int
+    last: int
+
+    def beyond(self, x: Floats, gain: Floats) -> tuple[float, float]:
+        """Squared distance from the codeword's tube in the light of `gain`, and relative brightness."""
+        ratio, off, length = polar(x, np.minimum(gain * self.colour, 255.0))
+        own = float(np.linalg.norm(self.colour))
+        return off**2 + (max(self.low / own - ratio, ratio - self.high / own, 0) * length) ** 2, ratio * own
+
+    def move(self, x: Floats, gain: Floats, step: float) -> None:
+        """Towards a colour."""
+        self.colour = self.colour + step * (x - np.minimum(gain * self.colour, 255.0)) / gain
+
+
+Book = list[Codeword | None]
+
+
+def nearest_codeword(book: Book, x: Floats, gain: Floats, reach: float) -> Codeword | None:
+    """The codeword whose tube is nearest, within reach."""
+    words = [word for word in book if word is not None and word.beyond(x, gain)[0] <= reach**2]
+    return min(words, key=lambda word: word.beyond(x, gain)[0], default=None)
+
+
+def new_codeword(x: Floats, gain: Floats, now: int, weight: float) -> Codeword:
+    """Of a colour that nothing explains."""
+    colour = x / gain
+    length = float(np.linalg.norm(colour))
+    return Codeword(colour, length, length, 1, weight, 0, now, now)
+
+
+def teach(book: Book, x: Floats, gain: Floats, now: int, reach: float) -> None:
+    """A pixel of an empty frame."""
+    word = nearest_codeword(book, x, gain, reach)
+    if word is not None:
+        brightness = word.beyond(x, gain)[1]
+        word.longest = max(word.longest, now - word.last - 1)
+        word.last, word.frequency = now, word.frequency + 1
+        word.weight = word.frequency
+        word.low, word.high = min(word.low, brightness), max(word.high, brightness)
+        word.move(x, gain, 1 / word.frequency)
+    elif None in book:
+        book[book.index(None)] = new_codeword(x, gain, now, 1)
+    elif len(book) > 1:
+        rarest = min(range(1, len(book)), key=lambda k: book[k].frequency)  # type: ignore[union-attr]  # all are there
+        book[rarest] = new_codeword(x, gain, now, 1)
+
+
+def follow(
+    book: Book, x: Floats, gain: Floats, likelihood: float, now: int, reach: float, rate: float, turns: tuple[int, int]
+) -> None:
+    """A pixel of a frame that may show people; `turns` are those of absorption and of absence."""
+    absorption, absence = turns
+    for k, word in enumerate(book):
+        if word is not None and word.first > 0 and now - word.last > (absorption if word.weight else absence):
+            book[k] = None
+    word = nearest_codeword(book, x, gain, reach)
+    if word is None:
+        places = [k for k, word in enumerate(book) if word is None or not word.weight]
+        if likelihood >= 0.5 and places:
+            place = min(places, key=lambda k: -1 if book[k] is None else book[k].last)  # type: ignore[union-attr]
+            book[place] = new_codeword(x, gain, now, 0)
+        return
+    word.last, word.frequency = now, word.frequency + 1
+    if word.weight:
+        step = max(rate, 1 / word.weight) * (1 - likelihood)
+        word.weight += (1 - likelihood) if word.weight < 1 / rate else 0
+    else:
+        step = max(rate, 1 / word.frequency)
+        age = now - word.first
+        if age >= absorption and 2 * word.frequency >= age:
+            word.weight = min(word.frequency, 1 / rate)
+    brightness = word.beyond(x, gain)[1]
+    word.low += (min(20 * step, 1) if brightness < word.low else step) * (brightness - word.low)
+    word.high += (min(20 * step, 1) if brightness > word.high else step) * (brightness - word.high)
+    word.move(x, gain, step)
 
 
 def pooled(values: Floats, radius: int) -> Floats:

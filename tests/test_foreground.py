@@ -127,44 +127,6 @@ def test_learning_gives_every_empty_frame_the_same_weight() -> None:
     assert (state["variance"][:, :, 0] >= MixtureConfig().minimum_sd ** 2).all()
 
 
-def test_flicker_shown_while_learning_is_background() -> None:
-    model = Mixture(SIZE, 10.0)
-    for k in range(20):
-        model.learn(room() if k % 2 else room((200, 200, 200)))
-    assert model.likelihood(room()).max() < 0.05
-    assert model.likelihood(room((200, 200, 200))).max() < 0.05
-
-
-def test_the_start_among_people_finds_what_is_behind_them() -> None:
-    rng = np.random.default_rng(3)
-    frames = []
-    for k in range(20):  # 12 of 20 frames are covered, by people of many colours
-        colour = tuple(int(c) for c in rng.integers(0, 256, 3))
-        frames.append(noisy(room() if k % 5 < 2 else room((colour[0], colour[1], colour[2])), rng))
-    model = Mixture(SIZE, 10.0)
-    model.learn_from(frames)
-    likelihood = model.likelihood(with_person(room()))
-    assert likelihood[0, 0] < 0.05
-    assert likelihood[6, 6] > 0.95
-
-
-def test_a_person_who_stands_for_a_minute_does_not_fade() -> None:
-    model = taught()
-    rng = np.random.default_rng(4)
-    for _ in range(600):
-        likelihood = model.likelihood(noisy(with_person(room()), rng))
-    assert likelihood[6, 6] > 0.98
-    assert model.likelihood(room())[6, 6] < 0.02  # and leaves no hole behind
-
-
-def test_what_stays_becomes_background_after_the_absorption_and_its_leaving_is_no_ghost() -> None:
-    model = taught(MixtureConfig(absorption=10.0, radius=0), frame_rate=5.0)
-    answers = [float(model.likelihood(with_person(room()))[6, 6]) for _ in range(60)]
-    assert min(answers[:49]) > 0.9
-    assert max(answers[53:]) < 0.1
-    assert model.likelihood(room())[6, 6] < 0.1
-
-
 def test_a_shadow_teaches_nothing() -> None:
     model = taught()
     before = model.state()
@@ -202,30 +164,6 @@ def test_the_gain_holds_where_people_cover_more_than_half() -> None:
     np.testing.assert_allclose(gains, 1.3, rtol=0.01)
     dark = channel_gains(np.zeros_like(image), background, np.ones((40, 40, 1), np.float32))
     np.testing.assert_array_equal(dark, 1)
-
-
-def test_a_stopped_run_goes_on_bit_for_bit() -> None:
-    rng = np.random.default_rng(7)
-    frames = [noisy(with_person(room()) if k % 3 else room(), rng, 4.0) for k in range(12)]
-    whole, first = taught(), taught()
-    expected = [whole.likelihood(frame) for frame in frames]
-    for frame in frames[:5]:
-        first.likelihood(frame)
-    second = Mixture.from_state(first.state(), 10.0)
-    for frame, one in zip(frames[5:], expected[5:], strict=True):
-        np.testing.assert_array_equal(second.likelihood(frame), one)
-    for key, value in whole.state().items():
-        np.testing.assert_array_equal(second.state()[key], value)
-
-
-def test_the_state_is_a_copy() -> None:
-    model = taught()
-    state = model.state()
-    state["mean"][:] = 0
-    assert model.likelihood(room()).max() < 0.02
-    again = Mixture.from_state(model.state(), 10.0)
-    again.likelihood(with_person(room()))
-    assert model.likelihood(room()).max() < 0.02
 
 
 # Kernels against their plain definitions
@@ -300,13 +238,6 @@ def test_the_commonest_colour_is_the_one_with_most_companions(seed: int, count: 
 # What is refused
 
 
-def test_a_model_that_has_learned_nothing_says_so() -> None:
-    with pytest.raises(SourceError, match="learned nothing"):
-        Mixture(SIZE, 10.0).likelihood(room())
-    with pytest.raises(SourceError, match="no frames"):
-        Mixture(SIZE, 10.0).learn_from([])
-
-
 def test_images_of_another_size_or_kind_are_refused() -> None:
     model = taught()
     for image in (room(size=(11, 12)), room()[:, :, 0], room().astype(np.float32)):
@@ -320,14 +251,6 @@ def test_images_of_another_size_or_kind_are_refused() -> None:
 def test_parameters_out_of_range_are_named(key: str, value: float) -> None:
     with pytest.raises(StsegError, match=key):
         MixtureConfig(**{key: value})  # type: ignore[arg-type]
-
-
-def test_a_foreign_state_is_refused() -> None:
-    state = taught().state()
-    with pytest.raises(InputError, match="no variance"):
-        Mixture.from_state({k: v for k, v in state.items() if k != "variance"}, 10.0)
-    with pytest.raises(InputError, match="mean"):
-        Mixture.from_state(state, 10.0, MixtureConfig(modes=5))
 
 
 # Masks, boxes, instances

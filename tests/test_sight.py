@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from stseg.arrays import Boxes
 from stseg.foreground import Mixture
+from stseg.foreground.light_change import LightWatch
 from stseg.foreground.sight import Sight, without_prior
 
 
@@ -45,7 +46,7 @@ def test_colour_is_judged_by_the_background_with_the_prior_taken_out() -> None:
     frame = empty.copy()
     frame[4:8, 5:10] = (126, 114, 130)
     posterior = models[0].likelihood(frame)
-    seen = Sight(models[1]).evidence(frame)
+    seen = Sight(LightWatch(models[1], 10.0)).evidence(frame)
     assert isinstance(seen, np.ndarray)
     np.testing.assert_array_equal(seen, without_prior(posterior, models[1].config.foreground))
     assert (seen >= posterior).all()

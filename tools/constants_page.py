@@ -20,7 +20,7 @@ def stages(source: str) -> dict[str, list[tuple[str, str, str]]]:
     """Name, default and meaning of the constants of each stage."""
     classes = {node.name: node for node in ast.parse(source).body if isinstance(node, ast.ClassDef)}
     return {
-        field.target.id: _constants(classes[ast.unparse(field.annotation)])
+        field.target.id: _constants(classes[ast.unparse(field.annotation)], classes)
         for field in classes["Config"].body
         if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name)
     }
@@ -38,14 +38,21 @@ def rewrite(page: str, source: str) -> str:
     return _MARKED.sub(table, page)
 
 
-def _constants(stage: ast.ClassDef) -> list[tuple[str, str, str]]:
-    found = []
+def _constants(stage: ast.ClassDef, classes: dict[str, ast.ClassDef]) -> list[tuple[str, str, str]]:
+    """Those it inherits, its own, and of tables in it those that differ from constants of the same name before."""
+    found = [row for base in stage.bases for row in _constants(classes[ast.unparse(base)], classes)]
     for field, below in zip(stage.body, [*stage.body[1:], None], strict=True):
-        if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name):
-            if not (isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant)):
-                raise SystemExit(f"config.py line {field.lineno}: {field.target.id} has no meaning below it")
-            default = ast.unparse(field.value) if field.value else ""
-            found.append((field.target.id, default.strip("()"), " ".join(str(below.value.value).split())))
+        if not (isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name)):
+            continue
+        name, kind = field.target.id, ast.unparse(field.annotation)
+        if kind in classes:
+            inner = [row for row in _constants(classes[kind], classes) if row not in found]
+            found = [*found, *((f"{name}.{key}", default, meaning) for key, default, meaning in inner)]
+            continue
+        if not (isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant)):
+            raise SystemExit(f"config.py line {field.lineno}: {name} has no meaning below it")
+        default = ast.unparse(field.value).strip("()") if field.value else ""
+        found.append((name, default, " ".join(str(below.value.value).split())))
     return found
 
 

@@ -9,7 +9,8 @@ import numpy as np
 
 from stseg.arrays import Bytes
 from stseg.config import Config
-from stseg.foreground import Mixture
+from stseg.foreground import make_background
+from stseg.foreground.light_change import LightWatch
 from stseg.foreground.sight import Sight
 from stseg.io.frames import open_frames, read_background
 from stseg.io.recording import Recording
@@ -32,13 +33,13 @@ def _sight(recording: Recording, camera: int, config: Config, first: int, stop: 
     source = recording.sources[camera]
     if source.source.kind not in ("video", "images"):
         return Sight()
-    model = Mixture(recording.rig.cameras[camera].size, recording.rig.frame_rate, config.foreground)
+    model = make_background(recording.rig.cameras[camera].size, recording.rig.frame_rate, config.foreground)
     if source.background is not None:
         for image in read_background(recording, camera):
             model.learn(np.asarray(image, np.uint8))
     else:
         model.learn_from(_spread(recording, camera, first, stop))
-    return Sight(model)
+    return Sight(LightWatch(model, recording.rig.frame_rate, config.light))
 
 
 def _spread(recording: Recording, camera: int, first: int, stop: int) -> Iterator[Bytes]:

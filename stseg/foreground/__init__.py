@@ -1,9 +1,28 @@
 """Pixels to likelihood maps: what one view says of each pixel, never thresholded (METHODS 2)."""
 
-from stseg.config import MixtureConfig
+from stseg.config import ChromaticConfig, CodebookConfig, MixtureConfig
+from stseg.foreground.background import Background
 from stseg.foreground.boxes import box_likelihood
+from stseg.foreground.choice import make_background
+from stseg.foreground.chromatic import Chromatic
+from stseg.foreground.codebook import Codebook
 from stseg.foreground.instances import instance_boxes
+from stseg.foreground.light_change import LightChange, LightWatch
 from stseg.foreground.masks import mask_likelihood
 from stseg.foreground.mixture import Mixture
 
-__all__ = ["Mixture", "MixtureConfig", "box_likelihood", "instance_boxes", "mask_likelihood"]
+__all__ = [
+    "Background",
+    "Chromatic",
+    "ChromaticConfig",
+    "Codebook",
+    "CodebookConfig",
+    "LightChange",
+    "LightWatch",
+    "Mixture",
+    "MixtureConfig",
+    "box_likelihood",
+    "instance_boxes",
+    "make_background",
+    "mask_likelihood",
+]

@@ -31,174 +31,68 @@ Light that changes over the whole view, slowly or at once, is a gain of each cha
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
-from stseg.arrays import AnyArray, Bytes, Floats, Singles
+from stseg.arrays import Bytes, Floats, Singles
 from stseg.config import MixtureConfig
-from stseg.errors import ConfigError, InputError, SourceError
+from stseg.foreground.background import PixelModel
 from stseg.foreground.commonest import commonest_colours
-from stseg.foreground.light import channel_gains
 from stseg.foreground.mixture_kernels import evaluate, update
-from stseg.foreground.smoothing import pool_log_odds
-
-_TURNS = 4  # each frame teaches every fourth row at four times the rate: the rates are slow, and it costs a quarter
 
 
-class Mixture:
+class Mixture(PixelModel):
     """The background of one view, and the likelihood that its pixels show people.
 
-    Parameters
-    ----------
-    size
-        Width and height of the images, pixels.
-    frame_rate
-        Frames per second at which `likelihood` is asked.
-    config
-        What it assumes of scene and camera.
-
-    Notes
-    -----
-    First it learns: `learn` each frame of the empty scene, or `learn_from` frames of the recording itself.
+    State: mean float32 (v, u, K, 3) grey levels BGR, variance float32 (v, u, K) squared grey levels, weight float32
+    (v, u, K).
     """
 
+    name: ClassVar[str] = "mixture"
+
     def __init__(self, size: tuple[int, int], frame_rate: float, config: MixtureConfig | None = None) -> None:
-        if not frame_rate > 0:
-            raise ConfigError("mixture", "frame_rate", frame_rate, "frames per second, above 0")
         self.config = MixtureConfig() if config is None else config
-        width, height = size
-        self._frame_rate = frame_rate
-        self._mean = np.zeros((height, width, self.config.modes, 3), np.float32)
-        self._variance = np.full((height, width, self.config.modes), self.config.initial_sd**2, np.float32)
-        self._weight = np.zeros((height, width, self.config.modes), np.float32)
-        self._learned = 0
-        self._asked = 0
-
-    @classmethod
-    def from_state(
-        cls, state: Mapping[str, AnyArray], frame_rate: float, config: MixtureConfig | None = None
-    ) -> Mixture:
-        """A model that goes on from `state` bit for bit.
-
-        Raises
-        ------
-        InputError
-            Where an array is missing, or has another shape or dtype than `state` gives it.
-        """
-        if missing := {"mean", "variance", "weight", "learned", "asked"} - set(state):
-            raise InputError("state of a mixture", "", f"no {', '.join(sorted(missing))}", "all five arrays")
-        height, width = state["weight"].shape[:2]
-        model = cls((width, height), frame_rate, config)
-        for key, own in model.state().items():
-            if state[key].shape != own.shape or state[key].dtype != own.dtype:
-                found = f"{state[key].dtype} {state[key].shape}"
-                raise InputError("state of a mixture", key, found, f"{own.dtype} {own.shape}")
-        model._mean, model._variance, model._weight = (state[key].copy() for key in ("mean", "variance", "weight"))
-        model._learned, model._asked = int(state["learned"]), int(state["asked"])
-        return model
-
-    def state(self) -> dict[str, AnyArray]:
-        """Copies of all that it has learned.
-
-        Returns
-        -------
-        dict
-            mean float32 (v, u, K, 3) grey levels BGR, variance float32 (v, u, K) squared grey levels, weight float32
-            (v, u, K), learned and asked int64 (): frames so far of `learn` and of `likelihood`.
-        """
-        return {
-            "mean": self._mean.copy(),
-            "variance": self._variance.copy(),
-            "weight": self._weight.copy(),
-            "learned": np.array(self._learned, np.int64),
-            "asked": np.array(self._asked, np.int64),
+        shape = (size[1], size[0], self.config.modes)
+        arrays = {
+            "mean": np.zeros((*shape, 3), np.float32),
+            "variance": np.full(shape, self.config.initial_sd**2, np.float32),
+            "weight": np.zeros(shape, np.float32),
         }
+        super().__init__(size, frame_rate, self.config, arrays)
 
-    def learn(self, image: Bytes) -> None:
-        """Learn a frame of the empty scene, uint8 (v, u, 3) BGR; all frames learned count the same."""
-        self._check(image)
-        certain = np.ones(image.shape[:2], np.float32)
+    def _start(self, frames: NDArray[np.uint8]) -> None:
+        config = self.config
+        mean, variance = commonest_colours(frames, config.match * config.minimum_sd)
+        self._arrays["weight"][:] = 0
+        self._arrays["weight"][:, :, 0] = 1
+        self._arrays["mean"][:, :, 0] = mean
+        self._arrays["variance"][:, :, 0] = np.maximum(variance, config.minimum_sd**2)
+
+    def _teach(self, image: Bytes, gain: Floats) -> None:
         rate = 1.0 / (self._learned + 1)
-        self._update(slice(None), image, self._gain(image), certain, rate, rate)
-        self._learned += 1
+        self._update(slice(None), image, gain, np.ones(image.shape[:2], np.float32), rate, rate)
 
-    def learn_from(self, images: Iterable[Bytes]) -> None:
-        """Start anew from frames in which people walk: each pixel's commonest colour.
-
-        Parameters
-        ----------
-        images : uint8 (v, u, 3) BGR each
-            Two to five dozen, spread over a minute or more: a pixel is right where no person's colour covers it as
-            often as the background shows. They are held in memory together.
-
-        Raises
-        ------
-        SourceError
-            Where there are none.
-        """
-        frames = list(images)
-        if not frames:
-            raise SourceError("mixture", "", "no frames", "one or more to learn from")
-        for frame in frames:
-            self._check(frame)
+    def _evaluate(self, image: Bytes, gain: Floats, log_odds: Singles) -> None:
         config = self.config
-        mean, variance = commonest_colours(np.stack(frames), config.match * config.minimum_sd)
-        self._weight[:] = 0
-        self._weight[:, :, 0] = 1
-        self._mean[:, :, 0] = mean
-        self._variance[:, :, 0] = np.maximum(variance, config.minimum_sd**2)
-        self._learned = len(frames)
+        priors = config.share, config.foreground, config.unexplained, config.shadow, config.darkest, config.mimicry
+        mean, variance, weight = self._arrays.values()
+        evaluate(image, gain, mean, variance, weight, *priors, log_odds)
 
-    def likelihood(self, image: Bytes) -> Singles:
-        """The probability that each pixel shows a person; then learns the frame.
-
-        Parameters
-        ----------
-        image : uint8 (v, u, 3) BGR
-            The next frame.
-
-        Returns
-        -------
-        float32 (v, u)
-            L in (0, 1), as the module defines it, log-odds averaged over `radius`.
-
-        Raises
-        ------
-        SourceError
-            Where the image is not of the model's size, or nothing has been learned yet.
-        """
-        self._check(image)
-        if self._learned == 0:
-            raise SourceError("mixture", "", "a model that has learned nothing", "frames to learn from first")
-        config = self.config
-        gain = self._gain(image)
-        log_odds, rows, likelihood = (np.empty(image.shape[:2], np.float32) for _ in range(3))
-        evaluate(
-            image, gain, self._mean, self._variance, self._weight, config.share, config.foreground,
-            config.unexplained, config.shadow, config.darkest, config.mimicry, log_odds,
-        )  # fmt: skip
-        pool_log_odds(log_odds, config.radius, rows, likelihood)
-        step = _TURNS / self._frame_rate
-        fast = 1.0 - math.exp(-step / config.memory)
-        slow = 1.0 - (1.0 - config.share) ** (step / config.absorption)
-        self._update(slice(self._asked % _TURNS, None, _TURNS), image, gain, likelihood, fast, slow)
-        self._asked += 1
-        return likelihood
-
-    def _gain(self, image: Bytes) -> Floats:
-        """The frame's light relative to the model's."""
-        return channel_gains(image, self._mean, self._weight) if self._learned else np.ones(3)
+    def _follow(self, rows: slice, image: Bytes, gain: Floats, likelihood: Singles) -> None:
+        self._update(rows, image, gain, likelihood, *learning_rates(self._turn, self.config))
 
     def _update(self, rows: slice, image: Bytes, gain: Floats, likelihood: Singles, fast: float, slow: float) -> None:
         config = self.config
         update(
             image[rows], gain.astype(np.float32), likelihood[rows], np.float32(fast), np.float32(slow),
             np.float32(config.share), np.float32(config.match), np.float32(config.minimum_sd),
-            np.float32(config.initial_sd), self._mean[rows], self._variance[rows], self._weight[rows],
+            np.float32(config.initial_sd), *(array[rows] for array in self._arrays.values()),
         )  # fmt: skip
 
-    def _check(self, image: Bytes) -> None:
-        shape = (*self._weight.shape[:2], 3)
-        if image.shape != shape or image.dtype != np.uint8:
-            raise SourceError("mixture", "image", f"{image.dtype} {image.shape}", f"uint8 {shape}")
+
+def learning_rates(seconds: float, config: MixtureConfig) -> tuple[float, float]:
+    """How much of a mode changes in so many seconds: of background, and of what has moved in."""
+    fast = 1.0 - math.exp(-seconds / config.memory)
+    return fast, 1.0 - (1.0 - config.share) ** (seconds / config.absorption)

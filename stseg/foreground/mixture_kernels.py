@@ -8,10 +8,8 @@ import numpy as np
 
 from stseg.accelerate import kernel
 from stseg.arrays import Bytes, Floats, Singles
+from stseg.foreground.posterior import CERTAIN, FAR, bounded_log_odds, doubt_of, surely_background
 
-_UNIFORM = 1.0 / 256.0**3  # density of a colour of which nothing is known, per cubed grey level
-_CERTAIN = 5.0  # nats; beyond it one pixel would outvote all its neighbours
-_FAR = 50.0  # half a squared Mahalanobis distance; beyond it the density is below every constant here
 _WHITE, _ONE, _HALF, _THIRD = np.float32(255), np.float32(1), np.float32(0.5), np.float32(1 / 3)
 
 
@@ -31,8 +29,8 @@ def evaluate(
     log_odds: Singles,
 ) -> None:
     """Fill `log_odds` (v, u) with the log-odds of foreground; the densities are those in `stseg.foreground.mixture`."""
-    known = 1.0 - unexplained
-    doubt = foreground * math.exp(_CERTAIN) / ((1.0 - foreground) * known * (1.0 - shadow))
+    sure, reach, mimics = np.float32(1.0 - share), np.float32(1.0 - darkest), np.float32(mimicry)
+    doubt = np.float32(doubt_of(foreground, unexplained, shadow))
     g0, g1, g2 = gain[0], gain[1], gain[2]
     for v in range(image.shape[0]):
         for u in range(image.shape[1]):
@@ -46,31 +44,29 @@ def evaluate(
                 m0 = min(g0 * mean[v, u, k, 0], 255.0)
                 m1 = min(g1 * mean[v, u, k, 1], 255.0)
                 m2 = min(g2 * mean[v, u, k, 2], 255.0)
+                if weight[v, u, k] > sure and surely_background(
+                    np.float32(x0 - m0), np.float32(x1 - m1), np.float32(x2 - m2), np.float32(m0), np.float32(m1),
+                    np.float32(m2), variance[v, u, k], variance[v, u, k], weight[v, u, k], reach, doubt, mimics,
+                ):  # fmt: skip
+                    certain = True
+                    break
                 brightness = m0 * m0 + m1 * m1 + m2 * m2 + 1e-9
                 area = 2.0 * math.pi * variance[v, u, k]
                 span = math.sqrt(area)
                 line = span + (1.0 - darkest) * math.sqrt(brightness)
                 decay = math.pi / area
                 from_mean = decay * ((x0 - m0) ** 2 + (x1 - m1) ** 2 + (x2 - m2) ** 2)
-                # exp(-z) >= 1 - z, so most background is known for certain before any exponential
-                most = _UNIFORM * area * span * line + 2.0 * mimicry * w * span
-                if w > 1.0 - share and doubt * most <= w * (1.0 - from_mean) * line:
-                    certain = True
-                    break
                 ratio = min(max((x0 * m0 + x1 * m1 + x2 * m2) / brightness, darkest), 1.0)
                 from_ray = decay * ((x0 - ratio * m0) ** 2 + (x1 - ratio * m1) ** 2 + (x2 - ratio * m2) ** 2)
-                if from_ray > _FAR:
+                if from_ray > FAR:
                     continue
                 slope = 2.0 * (ratio - darkest) / (1.0 - darkest)
                 lit += w * math.exp(-from_mean) / (area * span)
                 dimmed += w * slope * math.exp(-from_ray) / (area * line)
             if certain:
-                log_odds[v, u] = -_CERTAIN
+                log_odds[v, u] = -CERTAIN
                 continue
-            person = (1.0 - mimicry) * _UNIFORM + mimicry * dimmed
-            scene = known * ((1.0 - shadow) * lit + shadow * dimmed) + unexplained * _UNIFORM
-            odds = math.log(foreground * person / ((1.0 - foreground) * scene))
-            log_odds[v, u] = min(max(odds, -_CERTAIN), _CERTAIN)
+            log_odds[v, u] = bounded_log_odds(lit, dimmed, foreground, unexplained, shadow, mimicry)
 
 
 @kernel

@@ -1,0 +1,278 @@
+"""The passes of the codebook over a frame: what shows foreground, what the empty scene teaches, what the rest does."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stseg.accelerate import kernel
+from stseg.arrays import Bytes, Floats, Singles
+from stseg.foreground.posterior import CERTAIN, FAR, bounded_log_odds, doubt_of, outshines
+
+_WHITE, _ZERO, _ONE, _HALF = np.float32(255), np.float32(0), np.float32(1), np.float32(0.5)
+_TINY, _TWO_PI = np.float32(1e-6), np.float32(2 * math.pi)
+_OUTWARDS = np.float32(20)  # times faster than inwards do the bounds move
+
+
+@kernel
+def evaluate(
+    image: Bytes,
+    gain: Floats,
+    mean: Singles,
+    bounds: Singles,
+    weight: Singles,
+    foreground: float,
+    unexplained: float,
+    shadow: float,
+    highlight: float,
+    darkest: float,
+    brightest: float,
+    mimicry: float,
+    noise: float,
+    log_odds: Singles,
+) -> None:
+    """Fill `log_odds` (v, u) with the log-odds of foreground; densities as in `stseg.foreground.codebook`."""
+    seen = (1.0 - shadow - highlight) / (1.0 - shadow)
+    doubt, mimics = np.float32(doubt_of(foreground, unexplained, shadow) / seen), np.float32(mimicry)
+    variance, area, span = noise * noise, 2.0 * math.pi * noise * noise, math.sqrt(2.0 * math.pi) * noise
+    inverse, wide, long = np.float32(1.0 / variance), np.float32(area), np.float32(span)
+    reach = np.float32(1.0 - darkest)
+    g0, g1, g2 = np.float32(gain[0]), np.float32(gain[1]), np.float32(gain[2])
+    for v in range(image.shape[0]):
+        for u in range(image.shape[1]):
+            x0, x1, x2 = np.float32(image[v, u, 0]), np.float32(image[v, u, 1]), np.float32(image[v, u, 2])
+            total = _ZERO
+            for k in range(weight.shape[2]):
+                total += weight[v, u, k]
+            lit, dimmed = 0.0, 0.0
+            certain = False
+            for k in range(weight.shape[2]):
+                if weight[v, u, k] == _ZERO:
+                    continue
+                m0 = min(g0 * mean[v, u, k, 0], _WHITE)
+                m1 = min(g1 * mean[v, u, k, 1], _WHITE)
+                m2 = min(g2 * mean[v, u, k, 2], _WHITE)
+                ratio, off, length = from_ray(x0, x1, x2, m0, m1, m2)
+                low, high = bounds[v, u, k, 0], bounds[v, u, k, 1]
+                beyond = max(low - ratio, ratio - high, _ZERO) * length
+                if weight[v, u, k] == total and outshines(
+                    off * inverse, beyond * beyond * inverse, wide, long + (high - low) * length,
+                    long + reach * low * length, _ONE, doubt, mimics,
+                ):  # fmt: skip
+                    certain = True
+                    break
+                across = off / (2.0 * variance)
+                if across > FAR:
+                    continue
+                density = weight[v, u, k] / total * math.exp(-across) / area
+                lit += seen * density * math.exp(-(beyond * beyond) / (2.0 * variance)) / (span + (high - low) * length)
+                below = (ratio / max(low, _TINY) - darkest) / (1.0 - darkest)
+                if below > 0.0:
+                    over = max(ratio - low, _ZERO) * length
+                    decay = math.exp(-(over * over) / (2.0 * variance))
+                    dimmed += density * 2.0 * min(below, 1.0) * decay / (span + (1.0 - darkest) * low * length)
+                above = (brightest - ratio / max(high, _TINY)) / (brightest - 1.0)
+                if above > 0.0:
+                    under = max(high - ratio, _ZERO) * length
+                    decay = highlight / (1.0 - shadow) * math.exp(-(under * under) / (2.0 * variance))
+                    lit += density * 2.0 * min(above, 1.0) * decay / (span + (brightest - 1.0) * high * length)
+            if certain:
+                log_odds[v, u] = -CERTAIN
+                continue
+            log_odds[v, u] = bounded_log_odds(lit, dimmed, foreground, unexplained, shadow, mimicry)
+
+
+@kernel
+def teach(
+    image: Bytes,
+    gain: Singles,
+    now: int,
+    reach: np.float32,
+    longest: NDArray[np.int32],
+    mean: Singles,
+    bounds: Singles,
+    frequency: Singles,
+    weight: Singles,
+    access: NDArray[np.int32],
+) -> None:
+    """Teach the codewords a frame of the empty scene, in place: what it shows is background.
+
+    With `now` counted from 1, `longest` (v, u, K) comes to hold the longest negative runs. The first codeword of a
+    pixel stays; where all places are taken what is new replaces the least frequent of the others.
+    """
+    for v in range(image.shape[0]):
+        for u in range(image.shape[1]):
+            x0, x1, x2 = np.float32(image[v, u, 0]), np.float32(image[v, u, 1]), np.float32(image[v, u, 2])
+            nearest, distance, nearest_ratio = -1, reach * reach, _ZERO
+            rarest = min(1, weight.shape[2] - 1)
+            for k in range(weight.shape[2]):
+                if frequency[v, u, k] < frequency[v, u, rarest] and k > 0:
+                    rarest = k
+                if frequency[v, u, k] == _ZERO:
+                    continue
+                m0 = min(gain[0] * mean[v, u, k, 0], _WHITE)
+                m1 = min(gain[1] * mean[v, u, k, 1], _WHITE)
+                m2 = min(gain[2] * mean[v, u, k, 2], _WHITE)
+                ratio, off, length = from_ray(x0, x1, x2, m0, m1, m2)
+                beyond = max(bounds[v, u, k, 0] - ratio, ratio - bounds[v, u, k, 1], _ZERO) * length
+                if off + beyond * beyond <= distance:
+                    nearest, distance, nearest_ratio = k, off + beyond * beyond, ratio
+            if nearest < 0:
+                if frequency[v, u, 0] == _ZERO:
+                    rarest = 0
+                elif rarest == 0:
+                    continue
+                _begin(v, u, rarest, now, x0 / gain[0], x1 / gain[1], x2 / gain[2], mean, bounds, frequency, access)
+                weight[v, u, rarest] = _ONE
+                longest[v, u, rarest] = 0
+                continue
+            longest[v, u, nearest] = max(longest[v, u, nearest], now - access[v, u, nearest, 1] - 1)
+            access[v, u, nearest, 1] = now
+            frequency[v, u, nearest] += _ONE
+            weight[v, u, nearest] = frequency[v, u, nearest]
+            bounds[v, u, nearest, 0] = min(bounds[v, u, nearest, 0], nearest_ratio)
+            bounds[v, u, nearest, 1] = max(bounds[v, u, nearest, 1], nearest_ratio)
+            _move(v, u, nearest, _ONE / frequency[v, u, nearest], x0, x1, x2, gain, mean, bounds)
+
+
+@kernel
+def settle(
+    frames: int,
+    allowed: int,
+    longest: NDArray[np.int32],
+    frequency: Singles,
+    weight: Singles,
+    access: NDArray[np.int32],
+) -> None:
+    """After so many frames among people, keep the first codewords, and those whose longest negative run is allowed.
+
+    A run goes on from the last frame to the first (Kim et al. 2005, section 2.1).
+    """
+    for v in range(weight.shape[0]):
+        for u in range(weight.shape[1]):
+            for k in range(weight.shape[2]):
+                around = frames - access[v, u, k, 1] + access[v, u, k, 0] - 1
+                if k > 0 and max(longest[v, u, k], around) > allowed:
+                    frequency[v, u, k] = weight[v, u, k] = _ZERO
+                access[v, u, k, 0] = access[v, u, k, 1] = 0
+
+
+@kernel
+def follow(
+    image: Bytes,
+    gain: Singles,
+    likelihood: Singles,
+    now: int,
+    reach: np.float32,
+    rate: np.float32,
+    absorption: int,
+    absence: int,
+    mean: Singles,
+    bounds: Singles,
+    frequency: Singles,
+    weight: Singles,
+    access: NDArray[np.int32],
+) -> None:
+    """Teach the codewords a frame that may show people, in place; `now`, `absorption` and `absence` in turns."""
+    for v in range(image.shape[0]):
+        for u in range(image.shape[1]):
+            x0, x1, x2 = np.float32(image[v, u, 0]), np.float32(image[v, u, 1]), np.float32(image[v, u, 2])
+            chance = likelihood[v, u]
+            nearest, distance, nearest_ratio = -1, reach * reach, _ZERO
+            place, oldest = -1, now
+            for k in range(weight.shape[2]):
+                away = now - access[v, u, k, 1]
+                moved_in = access[v, u, k, 0] > 0
+                if moved_in and away > (absence if weight[v, u, k] == _ZERO else absorption):
+                    frequency[v, u, k] = weight[v, u, k] = _ZERO
+                if weight[v, u, k] == _ZERO:
+                    last = access[v, u, k, 1] if frequency[v, u, k] > _ZERO else -1
+                    if last < oldest:
+                        place, oldest = k, last
+                if frequency[v, u, k] == _ZERO:
+                    continue
+                m0 = min(gain[0] * mean[v, u, k, 0], _WHITE)
+                m1 = min(gain[1] * mean[v, u, k, 1], _WHITE)
+                m2 = min(gain[2] * mean[v, u, k, 2], _WHITE)
+                ratio, off, length = from_ray(x0, x1, x2, m0, m1, m2)
+                beyond = max(bounds[v, u, k, 0] - ratio, ratio - bounds[v, u, k, 1], _ZERO) * length
+                if off + beyond * beyond <= distance:
+                    nearest, distance, nearest_ratio = k, off + beyond * beyond, ratio
+            if nearest < 0:
+                if chance >= _HALF and place >= 0:  # else a shadow, noise among background, or no place to spare
+                    _begin(v, u, place, now, x0 / gain[0], x1 / gain[1], x2 / gain[2], mean, bounds, frequency, access)
+                continue
+            access[v, u, nearest, 1] = now
+            frequency[v, u, nearest] += _ONE
+            if weight[v, u, nearest] > _ZERO:
+                step = max(rate, _ONE / weight[v, u, nearest]) * (_ONE - chance)
+                if weight[v, u, nearest] * rate < _ONE:
+                    weight[v, u, nearest] += _ONE - chance
+            else:
+                step = max(rate, _ONE / frequency[v, u, nearest])
+                age = now - access[v, u, nearest, 0]
+                if age >= absorption and frequency[v, u, nearest] >= _HALF * age:
+                    weight[v, u, nearest] = min(frequency[v, u, nearest], _ONE / rate)
+            low, high = bounds[v, u, nearest, 0], bounds[v, u, nearest, 1]
+            fast = min(_OUTWARDS * step, _ONE)
+            bounds[v, u, nearest, 0] += (fast if nearest_ratio < low else step) * (nearest_ratio - low)
+            bounds[v, u, nearest, 1] += (fast if nearest_ratio > high else step) * (nearest_ratio - high)
+            _move(v, u, nearest, step, x0, x1, x2, gain, mean, bounds)
+
+
+@kernel
+def from_ray(
+    x0: np.float32, x1: np.float32, x2: np.float32, m0: np.float32, m1: np.float32, m2: np.float32
+) -> tuple[np.float32, np.float32, np.float32]:
+    """Brightness of a colour relative to another, its squared distance from the other's ray, the other's length."""
+    squared = m0 * m0 + m1 * m1 + m2 * m2 + _TINY
+    ratio = (x0 * m0 + x1 * m1 + x2 * m2) / squared
+    d0, d1, d2 = x0 - ratio * m0, x1 - ratio * m1, x2 - ratio * m2
+    return ratio, d0 * d0 + d1 * d1 + d2 * d2, np.sqrt(squared)
+
+
+@kernel
+def _begin(
+    v: int,
+    u: int,
+    k: int,
+    now: int,
+    x0: np.float32,
+    x1: np.float32,
+    x2: np.float32,
+    mean: Singles,
+    bounds: Singles,
+    frequency: Singles,
+    access: NDArray[np.int32],
+) -> None:
+    """A new codeword of this colour, in the light that the model was learned in."""
+    mean[v, u, k, 0], mean[v, u, k, 1], mean[v, u, k, 2] = x0, x1, x2
+    bounds[v, u, k, 0] = bounds[v, u, k, 1] = frequency[v, u, k] = _ONE
+    access[v, u, k, 0] = access[v, u, k, 1] = now
+
+
+@kernel
+def _move(
+    v: int,
+    u: int,
+    k: int,
+    step: np.float32,
+    x0: np.float32,
+    x1: np.float32,
+    x2: np.float32,
+    gain: Singles,
+    mean: Singles,
+    bounds: Singles,
+) -> None:
+    """Move a codeword towards a colour; its bounds stay where they are in grey levels."""
+    before, after = _TINY, _TINY
+    for c in range(3):
+        x = x0 if c == 0 else (x1 if c == 1 else x2)
+        before += mean[v, u, k, c] * mean[v, u, k, c]
+        mean[v, u, k, c] += step * (x - min(gain[c] * mean[v, u, k, c], _WHITE)) / gain[c]
+        after += mean[v, u, k, c] * mean[v, u, k, c]
+    scale = np.sqrt(before / after)
+    bounds[v, u, k, 0] *= scale
+    bounds[v, u, k, 1] *= scale
