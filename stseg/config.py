@@ -62,10 +62,12 @@ class MixtureConfig(BackgroundConfig):
 
 @dataclass(frozen=True)
 class ChromaticConfig(MixtureConfig):
-    """The same in the chromatic plane and across it; `minimum_sd` is that of the brightness."""
+    """The same, judged across the ray of a colour's chromaticity and along it."""
 
-    chromatic_sd: float = 2.5
-    """Least standard deviation of a mode within the chromatic plane, grey levels."""
+    minimum_sd: float = 3.0
+    """Least standard deviation of a mode's brightness, grey levels: noise of sensor and compression."""
+    chromatic_sd: float = 2.0
+    """Least standard deviation of a mode's colour across its ray, grey levels."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -76,9 +78,9 @@ class ChromaticConfig(MixtureConfig):
 class CodebookConfig(BackgroundConfig):
     """A codebook per pixel (Kim et al. 2005); symbols as in `foreground.codebook`."""
 
-    codewords: int = 4
+    codewords: int = 3
     """K, codewords per pixel, 1 or more; with 1 nothing that moved in is ever absorbed."""
-    noise: float = 3.0
+    noise: float = 2.5
     """sigma: standard deviation of a channel around its codeword, grey levels."""
     highlight: float = 0.02
     """h: prior probability that background is lit brighter than it was ever learned, 0..1."""

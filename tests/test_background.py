@@ -164,6 +164,20 @@ def test_people_take_no_place_from_the_background(kind: type[PixelModel]) -> Non
 
 
 @every_model
+@pytest.mark.parametrize("level", [0, 255])
+def test_black_and_white_scenes_are_scenes_too(kind: type[PixelModel], level: int) -> None:
+    scenes = [room((level, level, level)) for _ in range(20)]
+    learned, started = new(kind), new(kind)
+    for scene in scenes:
+        learned.learn(scene)
+    started.learn_from(scenes)
+    for model in (learned, started):
+        for _ in range(8):
+            assert model.likelihood(scenes[0]).max() < 0.02
+        assert model.likelihood(with_person(scenes[0]))[MIDDLE] > 0.95
+
+
+@every_model
 def test_a_stopped_run_goes_on_bit_for_bit(kind: type[PixelModel]) -> None:
     rng = np.random.default_rng(7)
     frames = [noisy(with_person(room()) if k % 3 else room(), rng, 4.0) for k in range(24)]

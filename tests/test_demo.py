@@ -76,3 +76,11 @@ def test_the_python_example_of_the_readme_runs(demo: Demo, monkeypatch: pytest.M
     names: dict[str, object] = {}
     exec(example[0], names)
     assert len(names["tracks"]) == len(read_run(demo.folder / "run.h5").trajectory)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("model", ["chromatic", "codebook"])
+def test_every_background_model_can_be_asked_for(demo: Demo, tmp_path: Path, model: str) -> None:
+    rig, output = demo.folder / "scene" / "rig.toml", tmp_path / "run.h5"
+    chosen = f"foreground.model={model}"
+    assert main(["run", str(rig), "-o", str(output), "--frames", "0:12", "--set", chosen]) == 0
+    assert len(read_run(output).trajectory) > 0

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from stseg.arrays import Boxes
-from stseg.foreground import Mixture
+from stseg.config import ForegroundConfig
+from stseg.foreground import make_background
 from stseg.foreground.light_change import LightWatch
 from stseg.foreground.sight import Sight, without_prior
 
@@ -37,18 +40,19 @@ def test_each_kind_of_observation_has_its_evidence() -> None:
     assert len(found) == 1
 
 
-def test_colour_is_judged_by_the_background_with_the_prior_taken_out() -> None:
+@pytest.mark.parametrize("model", ["auto", "mixture", "chromatic", "codebook"])
+def test_colour_is_judged_by_the_background_with_the_prior_taken_out(model: Any) -> None:
     empty = np.full((12, 16, 3), 120, np.uint8)
-    models = [Mixture((16, 12), 10.0) for _ in range(2)]
-    for model in models:
+    models = [make_background((16, 12), 10.0, ForegroundConfig(model=model)) for _ in range(2)]
+    for background in models:
         for _ in range(20):
-            model.learn(empty)
+            background.learn(empty)
     frame = empty.copy()
-    frame[4:8, 5:10] = (126, 114, 130)
+    frame[4:8, 5:10] = (124, 116, 126)
     posterior = models[0].likelihood(frame)
     seen = Sight(LightWatch(models[1], 10.0)).evidence(frame)
     assert isinstance(seen, np.ndarray)
-    np.testing.assert_array_equal(seen, without_prior(posterior, models[1].config.foreground))
+    np.testing.assert_array_equal(seen, without_prior(posterior, models[1].prior))
     assert (seen >= posterior).all()
     assert seen[6, 7] > posterior[6, 7]
 

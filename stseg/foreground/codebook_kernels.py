@@ -12,7 +12,7 @@ from stseg.arrays import Bytes, Floats, Singles
 from stseg.foreground.posterior import CERTAIN, FAR, bounded_log_odds, doubt_of, outshines
 
 _WHITE, _ZERO, _ONE, _HALF = np.float32(255), np.float32(0), np.float32(1), np.float32(0.5)
-_TINY, _TWO_PI = np.float32(1e-6), np.float32(2 * math.pi)
+_TWO, _TINY, _FAR = np.float32(2), np.float32(1e-6), np.float32(FAR)
 _OUTWARDS = np.float32(20)  # times faster than inwards do the bounds move
 
 
@@ -34,11 +34,12 @@ def evaluate(
     log_odds: Singles,
 ) -> None:
     """Fill `log_odds` (v, u) with the log-odds of foreground; densities as in `stseg.foreground.codebook`."""
-    seen = (1.0 - shadow - highlight) / (1.0 - shadow)
-    doubt, mimics = np.float32(doubt_of(foreground, unexplained, shadow) / seen), np.float32(mimicry)
-    variance, area, span = noise * noise, 2.0 * math.pi * noise * noise, math.sqrt(2.0 * math.pi) * noise
-    inverse, wide, long = np.float32(1.0 / variance), np.float32(area), np.float32(span)
-    reach = np.float32(1.0 - darkest)
+    lit_share = np.float32((1.0 - shadow - highlight) / (1.0 - shadow))
+    high_share = np.float32(highlight / (1.0 - shadow))
+    doubt, mimics = np.float32(doubt_of(foreground, unexplained, shadow)) / lit_share, np.float32(mimicry)
+    half, area = np.float32(0.5 / noise**2), np.float32(2.0 * math.pi * noise**2)
+    span, deep, bright = np.float32(math.sqrt(2.0 * math.pi) * noise), np.float32(darkest), np.float32(brightest)
+    unknown = bounded_log_odds(0.0, 0.0, foreground, unexplained, shadow, mimicry)
     g0, g1, g2 = np.float32(gain[0]), np.float32(gain[1]), np.float32(gain[2])
     for v in range(image.shape[0]):
         for u in range(image.shape[1]):
@@ -46,7 +47,7 @@ def evaluate(
             total = _ZERO
             for k in range(weight.shape[2]):
                 total += weight[v, u, k]
-            lit, dimmed = 0.0, 0.0
+            lit, dimmed = _ZERO, _ZERO
             certain = False
             for k in range(weight.shape[2]):
                 if weight[v, u, k] == _ZERO:
@@ -55,33 +56,35 @@ def evaluate(
                 m1 = min(g1 * mean[v, u, k, 1], _WHITE)
                 m2 = min(g2 * mean[v, u, k, 2], _WHITE)
                 ratio, off, length = from_ray(x0, x1, x2, m0, m1, m2)
-                low, high = bounds[v, u, k, 0], bounds[v, u, k, 1]
+                low, high = max(bounds[v, u, k, 0], _TINY), max(bounds[v, u, k, 1], _TINY)
+                under, over = max(high - ratio, _ZERO) * length, max(ratio - low, _ZERO) * length
                 beyond = max(low - ratio, ratio - high, _ZERO) * length
+                flat, line = span + (high - low) * length, span + (_ONE - deep) * low * length
                 if weight[v, u, k] == total and outshines(
-                    off * inverse, beyond * beyond * inverse, wide, long + (high - low) * length,
-                    long + reach * low * length, _ONE, doubt, mimics,
+                    _TWO * half * off, _TWO * half * beyond * beyond, area, flat, line, _ONE, doubt,
+                    mimics / (_ONE + half * over * over),  # exp(-z) <= 1 / (1 + z)
                 ):  # fmt: skip
                     certain = True
                     break
-                across = off / (2.0 * variance)
-                if across > FAR:
+                across = half * off
+                if across > _FAR:
                     continue
-                density = weight[v, u, k] / total * math.exp(-across) / area
-                lit += seen * density * math.exp(-(beyond * beyond) / (2.0 * variance)) / (span + (high - low) * length)
-                below = (ratio / max(low, _TINY) - darkest) / (1.0 - darkest)
-                if below > 0.0:
-                    over = max(ratio - low, _ZERO) * length
-                    decay = math.exp(-(over * over) / (2.0 * variance))
-                    dimmed += density * 2.0 * min(below, 1.0) * decay / (span + (1.0 - darkest) * low * length)
-                above = (brightest - ratio / max(high, _TINY)) / (brightest - 1.0)
-                if above > 0.0:
-                    under = max(high - ratio, _ZERO) * length
-                    decay = highlight / (1.0 - shadow) * math.exp(-(under * under) / (2.0 * variance))
-                    lit += density * 2.0 * min(above, 1.0) * decay / (span + (brightest - 1.0) * high * length)
+                density = weight[v, u, k] / (total * area)
+                lit += lit_share * density * math.exp(-across - half * beyond * beyond) / flat
+                slope = _TWO * min((ratio - deep * low) / ((_ONE - deep) * low), _ONE)
+                if slope > _ZERO:
+                    dimmed += density * slope * math.exp(-across - half * over * over) / line
+                slope = _TWO * min((bright * high - ratio) / ((bright - _ONE) * high), _ONE)
+                if slope > _ZERO:
+                    decay = math.exp(-across - half * under * under)
+                    lit += high_share * density * slope * decay / (span + (bright - _ONE) * high * length)
             if certain:
                 log_odds[v, u] = -CERTAIN
                 continue
-            log_odds[v, u] = bounded_log_odds(lit, dimmed, foreground, unexplained, shadow, mimicry)
+            if lit + dimmed == _ZERO:
+                log_odds[v, u] = unknown
+                continue
+            log_odds[v, u] = bounded_log_odds(float(lit), float(dimmed), foreground, unexplained, shadow, mimicry)
 
 
 @kernel
