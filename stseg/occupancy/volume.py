@@ -63,12 +63,12 @@ class Occupancy:
             if view is None:
                 continue
             owners = self._owners(i, explanation)
-            share = self._share(i, owners, near)
+            share, shared = self._share(i, owners, near)
             if isinstance(view, Boxes):
                 levels = self._levels_of_boxes(i, view, explanation, near)
                 faith = _faith(near, owners.own, explanation.people.visible[i], share.shape)
             else:
-                levels = self._levels_of_map(i, view, owners, near, share)
+                levels = self._levels_of_map(i, view, owners, near, share, shared)
                 faith = np.ones_like(share)
             tally.add(levels, self.terms[i], weight, share, faith)
         return tally.total(self.views, near, self.prior)
@@ -77,19 +77,27 @@ class Occupancy:
         people, served = explanation.people, explanation.box_owner[i]
         own = np.zeros(len(people) + 1, bool)
         own[served[served >= 0]] = True
-        away = np.hypot(*(people.ground - self.rig.cameras[i].centre[:2]).T)
-        return Owners(explanation.owner[i], explanation.raster_step[i], away, own)
+        camera, step = self.rig.cameras[i], explanation.raster_step[i]
+        width, height = camera.size
+        away = np.hypot(*(people.ground - camera.centre[:2]).T)
+        return Owners(explanation.owner[i], step, np.arange(height) // step, np.arange(width) // step, away, own)
 
-    def _share(self, i: int, owners: Owners, near: Ints) -> Singles:
-        share = np.empty(self.rig.grid.shape, np.float32)
-        fill_share(self.sampling.footprint[i], *owners, near, self.sampling.distance[i], share)
-        return share
+    def _share(self, i: int, owners: Owners, near: Ints) -> tuple[Singles, Flags]:
+        """How much of each cell the view sees past nearer people, and whether its footprint shows anybody else."""
+        share, shared = np.empty(self.rig.grid.shape, np.float32), np.empty(self.rig.grid.shape, bool)
+        fill_share(self.sampling.footprint[i], *owners, near, self.sampling.distance[i], share, shared)
+        return share, shared
 
-    def _levels_of_map(self, i: int, view: Singles, owners: Owners, near: Ints, share: Singles) -> Levels:
+    def _levels_of_map(
+        self, i: int, view: Singles, owners: Owners, near: Ints, share: Singles, shared: Flags
+    ) -> Levels:
         """Mean likelihood that the explanation leaves each cell."""
         table = self.means.sum_table(i, view)
         levels = self.means.levels_from(i, table)
-        leave_unexplained(self.sampling.footprint[i], *table, owners.raster, owners.step, near, share, levels)
+        leave_unexplained(
+            self.sampling.footprint[i], table.sums, table.left, table.top, owners.raster, owners.step, owners.row,
+            owners.column, near, share, shared, levels,
+        )  # fmt: skip
         return levels
 
     def _levels_of_boxes(self, i: int, view: Boxes, explanation: Explanation, near: Ints) -> Levels:
