@@ -188,6 +188,8 @@ class OccupancyConfig:
     """Share of the cells that a body fills where the pass of the frame found nobody (pi of METHODS 4)."""
     reach: float = 0.40
     """How far from a person's place their own cells reach, metres."""
+    sampling: Literal["footprint", "point"] = "footprint"
+    """What of a view's map a cell sees: the mean over the pixels that it covers, or the pixel at its centre."""
 
     def __post_init__(self) -> None:
         require(0 < self.occupied < 1, self, "occupied", "a number between 0 and 1")

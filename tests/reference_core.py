@@ -12,7 +12,8 @@ from stseg.arrays import Boxes, Flags, Floats, Ints, Labels, Singles
 from stseg.ghosts import boxes as tolerance
 from stseg.ghosts.evidence import BoxEvidence, PixelEvidence, Terms
 from stseg.ghosts.explain import Explanation
-from stseg.occupancy.fusion import SHOULDER, Rates
+from stseg.occupancy.explained import SHOULDER
+from stseg.occupancy.fusion import Rates
 from stseg.segmentation.energy import Energy
 
 Edge = tuple[int, int, int]
@@ -141,16 +142,25 @@ def clutter(likelihood: Singles, side: int) -> float:
     return math.sqrt(sum(float(np.var(cell)) for cell in cells) / len(cells))
 
 
-def log_odds_of_cell(
-    likelihood: Sequence[float], weight: Sequence[float], rates: Sequence[Rates], prior: float
-) -> float:
-    """u of a cell that these views see (METHODS 4)."""
-    mean = 0.0
-    for seen, share, rate in zip(likelihood, weight, rates, strict=True):
-        body = (1 - rate.miss) * seen + rate.miss * (1 - seen)
-        empty = rate.clutter * seen + (1 - rate.clutter) * (1 - seen)
-        mean += share / sum(weight) * math.log(body / empty)
-    return len(likelihood) * mean + math.log(prior / (1 - prior))
+def fused(terms: Sequence[float], weights: Sequence[float], shares: Sequence[float]) -> float:
+    """n_vis sum_i w_i term_i over the views that see a cell (KS09 eq. 7), each as far as it sees it."""
+    parts = [weight * share for weight, share in zip(weights, shares, strict=True)]
+    return sum(shares) * sum(part * term for part, term in zip(parts, terms, strict=True)) / sum(parts)
+
+
+def log_odds_term(likelihood: float, rates: Rates) -> float:
+    """What one view says of a cell (METHODS 4)."""
+    body = (1 - rates.miss) * likelihood + rates.miss * (1 - likelihood)
+    empty = rates.clutter * likelihood + (1 - rates.clutter) * (1 - likelihood)
+    return math.log(body / empty)
+
+
+def pixels_of(footprint: Sequence[int]) -> Iterator[tuple[int, int]]:
+    """Rows and columns of a footprint: left, top, width, height."""
+    left, top, width, height = map(int, footprint)
+    for v in range(top, top + height):
+        for u in range(left, left + width):
+            yield v, u
 
 
 def plane_likelihood(
@@ -170,33 +180,29 @@ def plane_likelihood(
     return best
 
 
-def map_views_of_cell(
-    explanation: Explanation, pixels: Ints, away: Floats, people_away: Floats, near: int, maps: Sequence[Singles | None]
-) -> tuple[list[int], list[float]]:
-    """Which views with a map see a cell past nearer people, and the likelihood that each leaves it.
+def left_to_cell(
+    likelihood: Singles, footprint: Sequence[int], explanation: Explanation, view: int, near: int, away: float,
+    people_away: Floats,
+) -> tuple[float, float]:  # fmt: skip
+    """How much of a cell's footprint a view sees past nearer people, and the mean likelihood that is the cell's there.
 
     Parameters
     ----------
-    pixels : int64 (view, 2)
-        Column and row of the cell, -1 where it is not in the image.
-    away : float64 (view,), people_away : float64 (view, person)
-        Distances along the ground from each camera, metres.
     near
         The person near the cell, -1 for nobody.
+    away, people_away
+        Distances of the cell and of all people from the camera along the ground, metres.
     """
-    views, seen = [], []
-    for i, shown in enumerate(maps):
-        u, v = pixels[i]
-        if shown is None or u < 0:
-            continue
-        step = explanation.raster_step[i]
-        owner = int(explanation.owner[i][v // step, u // step])
+    step = explanation.raster_step[view]
+    visible, total, pixels = 0, 0.0, list(pixels_of(footprint))
+    for v, u in pixels:
+        owner = int(explanation.owner[view][v // step, u // step])
         elsewhere = owner >= 0 and owner != near
-        if elsewhere and people_away[i, owner] < away[i] - SHOULDER:
+        if elsewhere and people_away[owner] < away - SHOULDER:
             continue
-        views.append(i)
-        seen.append(0.0 if elsewhere else float(shown[v, u]))
-    return views, seen
+        visible += 1
+        total += 0.0 if elsewhere else float(likelihood[v, u])
+    return visible / len(pixels), total / max(visible, 1)
 
 
 # The cut

@@ -21,7 +21,8 @@ from stseg.ghosts.explain import Explanation, FramePass, People, ViewEvidence
 from stseg.occupancy.clutter import clutter, clutter_weights
 from stseg.occupancy.fusion import Rates
 from stseg.occupancy.instances import fill_likelihood
-from stseg.occupancy.sampling import UNSEEN, Sampling
+from stseg.occupancy.sampling import Sampling, SamplingKind
+from stseg.occupancy.tables import TOP
 from stseg.occupancy.volume import Occupancy
 
 COARSE = rig_of(corner_cameras(), cell=0.5, planes=3)
@@ -102,33 +103,57 @@ def test_a_view_that_sees_nothing_does_not_silence_the_others() -> None:
 # Sampling
 
 
+KINDS: list[SamplingKind] = ["point", "footprint"]
+
+
 @settings(max_examples=15, deadline=None)
-@given(rigs(most=2))
-def test_cells_are_looked_up_where_they_project(rig: Rig) -> None:
-    sampling = Sampling.of(rig)
+@given(rigs(most=2), st.sampled_from(KINDS))
+def test_cells_are_looked_up_where_they_project(rig: Rig, kind: SamplingKind) -> None:
+    sampling = Sampling.of(rig, kind)
     counts = rig.grid.inside()
-    assert sampling.pixel.shape == (len(rig.cameras), *rig.grid.shape, 2)
+    assert sampling.footprint.shape == (len(rig.cameras), *rig.grid.shape, 4)
     rng = np.random.default_rng(0)
     for i, camera in enumerate(rig.cameras):
         for _ in range(40):
             z, y, x = (int(rng.integers(0, n)) for n in rig.grid.shape)
             place, ahead = camera.project(rig.grid.ground[y, x], rig.grid.heights[z])
-            u, v = sampling.pixel[i, z, y, x]
+            box = sampling.footprint[i, z, y, x].astype(int)
             if ahead and counts[y, x] and camera.inside(place):
-                np.testing.assert_allclose((u, v), place, atol=0.5 + 1e-9)
-                assert 0 <= u < camera.size[0]
-                assert 0 <= v < camera.size[1]
+                first, stop = box[:2], box[:2] + box[2:]
+                assert (box[2:] == 1).all() or kind == "footprint"
+                assert (box[2:] >= 1).all()
+                assert (first >= 0).all()
+                assert (stop <= camera.size).all()
+                clipped = (first == 0) | (stop == camera.size)
+                off = np.abs((first + stop - 1) / 2 - place)
+                assert (off[~clipped] <= 0.5 + 1e-9).all()
+                assert (off[box[2:] == 1] <= 0.5 + 1e-9).all() or clipped.any()
             else:
-                assert u == v == UNSEEN
+                assert (box == 0).all()
             away = np.hypot(*(rig.grid.ground[y, x] - camera.centre[:2]))
             assert sampling.distance[i, y, x] == pytest.approx(away, rel=1e-6)
-    np.testing.assert_array_equal(sampling.views(), (sampling.pixel[..., 0] >= 0).sum(0))
+    np.testing.assert_array_equal(sampling.views(), (sampling.footprint[..., 2] > 0).sum(0))
+
+
+@pytest.mark.parametrize("distortion", [None, (-0.2, 0.03)])
+def test_a_footprint_has_the_spread_of_the_cells_image(distortion: Sequence[float] | None) -> None:
+    camera = looking("near", (-1.5, -1.2, 2.2), size=(640, 480), focal=420.0, distortion=distortion)
+    rig = rig_of([camera], cell=0.1, planes=2)
+    footprint = Sampling.of(rig, "footprint").footprint[0, 1]
+    within = (np.stack(np.meshgrid(*[np.arange(10)] * 2), -1).reshape(-1, 2) - 4.5) / 10 * rig.grid.cell
+    image, _ = camera.project(rig.grid.ground[:, :, None] + within, rig.grid.heights[1])
+    sides = image.std(2) * np.sqrt(12 / 0.99)  # of a box of the same variances; the lattice's is 0.99 of the cell's
+    left_top, right_bottom = footprint[..., :2], footprint[..., :2] + footprint[..., 2:]
+    whole = (left_top > 0).all(-1) & (right_bottom < camera.size).all(-1)
+    assert whole.sum() > 500
+    assert footprint[whole][:, 2:].max() > 20
+    np.testing.assert_allclose(footprint[whole][:, 2:], sides[whole], atol=0.51, rtol=0.02)
 
 
 def test_cells_outside_the_polygon_are_not_seen() -> None:
     triangle = np.array([[-2.0, -2.0], [2.0, -2.0], [-2.0, 2.0]])
     rig = replace(COARSE, grid=replace(COARSE.grid, polygon=triangle))
-    views = Sampling.of(rig).views()
+    views = Sampling.of(rig, "footprint").views()
     assert (views[:, ~rig.grid.inside()] == 0).all()
     assert (views[0][rig.grid.inside()] == 4).all()
 
@@ -169,33 +194,52 @@ def test_likelihood_per_plane_by_definition(seed: int) -> None:
 # Fusion
 
 
-def volume_by_definition(rig: Rig, maps: Sequence[Singles | None], explanation: Explanation) -> Floats:
+LEVEL = 0.01
+"""Nats: what rounding likelihoods to levels may do to the log-odds of four views."""
+
+
+def rounded(likelihood: Singles) -> Singles:
+    """A map in whole levels."""
+    return np.asarray(np.rint(likelihood * TOP) / TOP, np.float32)
+
+
+def volume_by_definition(
+    rig: Rig, maps: Sequence[Singles | None], explanation: Explanation, kind: SamplingKind
+) -> Floats:
     """The frame's log-odds, cell by cell."""
     sides = [max(min(camera.size) // 4, 8) for camera in rig.cameras]
     unrest = [np.nan if m is None else reference.clutter(m, side) for m, side in zip(maps, sides, strict=True)]
     weights = clutter_weights(np.array(unrest))
-    sampling, found = Sampling.of(rig), explanation.people
-    centres = np.array([camera.centre[:2] for camera in rig.cameras])
-    people_away = np.hypot(*np.moveaxis(found.ground[None] - centres[:, None], -1, 0))
+    sampling, people_at = Sampling.of(rig, kind), explanation.people.ground
+    centres = [camera.centre[:2] for camera in rig.cameras]
     volume = np.full(rig.grid.shape, np.nan)
     for z, y, x in np.ndindex(*rig.grid.shape):
-        pixels = np.asarray(sampling.pixel[:, z, y, x], np.int64)
-        if (pixels[:, 0] < 0).all():
+        footprints, place = sampling.footprint[:, z, y, x], rig.grid.ground[y, x]
+        if (footprints[:, 2] == 0).all():
             continue
-        reached = np.hypot(*(found.ground - rig.grid.ground[y, x]).T)
-        near = int(reached.argmin()) if len(found) and reached.min() <= CONFIG.reach else -1
-        away = np.hypot(*(rig.grid.ground[y, x] - centres).T)
-        views, seen = reference.map_views_of_cell(explanation, pixels, away, people_away, near, maps)
-        prior = CONFIG.occupied if near < 0 else 0.5
-        volume[z, y, x] = np.log(prior / (1 - prior))
-        if views:
-            volume[z, y, x] = reference.log_odds_of_cell(seen, weights[views].tolist(), [RATES] * len(views), prior)
+        reached = np.hypot(*(people_at - place).T)
+        near = int(reached.argmin()) if len(people_at) and reached.min() <= CONFIG.reach else -1
+        terms, shares, speaking = [], [], []
+        for i, (centre, shown) in enumerate(zip(centres, maps, strict=True)):
+            if shown is None or footprints[i, 2] == 0:
+                continue
+            away, people_away = float(np.hypot(*(place - centre))), np.hypot(*(people_at - centre).T)
+            box = footprints[i].tolist()
+            share, mean = reference.left_to_cell(rounded(shown), box, explanation, i, near, away, people_away)
+            if share > 0:
+                terms.append(reference.log_odds_term(mean, RATES))
+                shares.append(share)
+                speaking.append(weights[i])
+        volume[z, y, x] = PRIOR if near < 0 else 0.0
+        if terms:
+            volume[z, y, x] += reference.fused(terms, speaking, shares)
     return volume
 
 
+@pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("blind", [None, 2])
 @pytest.mark.parametrize("step", [1, 3])
-def test_fusion_by_definition(blind: int | None, step: int) -> None:
+def test_fusion_by_definition(kind: SamplingKind, blind: int | None, step: int) -> None:
     standing = people((-0.8, 0.3), (1.0, -0.6))
     rng = np.random.default_rng(step)
     shape = (-(-96 // step), -(-128 // step))
@@ -204,9 +248,9 @@ def test_fusion_by_definition(blind: int | None, step: int) -> None:
     maps: list[Singles | None] = [*noise(step)]
     if blind is not None:
         maps[blind] = None
-    fused = Occupancy(COARSE, PIXELS, CONFIG, FEW_HEIGHTS).fuse(maps, explanation)
+    fused = Occupancy(COARSE, PIXELS, replace(CONFIG, sampling=kind), FEW_HEIGHTS).fuse(maps, explanation)
     assert fused.dtype == np.float32
-    np.testing.assert_allclose(fused, volume_by_definition(COARSE, maps, explanation), rtol=1e-5, atol=1e-5)
+    np.testing.assert_allclose(fused, volume_by_definition(COARSE, maps, explanation, kind), atol=LEVEL)
 
 
 @pytest.mark.parametrize("value", [0.0, 0.3, 1.0])
@@ -216,9 +260,9 @@ def test_more_views_are_sharper_evidence(value: float) -> None:
     fused = Occupancy(rig, PIXELS[:3], CONFIG, FEW_HEIGHTS).fuse([flat(value)] * 3, explained(rig, people()))
     miss, false = RATES
     one = np.log(((1 - miss) * value + miss * (1 - value)) / (false * value + (1 - false) * (1 - value)))
-    views = Sampling.of(rig).views()
+    views = Sampling.of(rig, "point").views()
     assert set(np.unique(views).tolist()) >= {0, 1, 2, 3}
-    np.testing.assert_allclose(fused[views > 0], views[views > 0] * one + PRIOR, rtol=1e-5)
+    np.testing.assert_allclose(fused[views > 0], views[views > 0] * one + PRIOR, atol=LEVEL)
     assert np.isnan(fused[views == 0]).all()
 
 

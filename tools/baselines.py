@@ -1,6 +1,6 @@
 """How the plain methods do on a recording: what a scene's difficulty is judged by (METHODS 12).
 
-    python tools/baselines.py RIG TRUTH.csv [--frames 0:100] [--level -1.0]
+    python tools/baselines.py RIG TRUTH.csv [--frames 0:100] [--level -1.0] [--sampling point]
 
 plain KS09: the mean over the views that see a cell of log L, on all planes, summed over planes, thresholded at `level`
 nats a plane, components on the ground. plain 4-D cut: a minimum cut of windows of 15 frames of the same volume less the
@@ -11,7 +11,7 @@ a crowd.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -26,7 +26,8 @@ from stseg.geometry import Grid, Rig
 from stseg.io.frames import open_frames
 from stseg.io.rigs import read_rig
 from stseg.io.tracks import POSITION, read_tracks_csv
-from stseg.occupancy.sampling import UNSEEN, Sampling
+from stseg.occupancy.localise import Localiser
+from stseg.occupancy.sampling import SamplingKind
 from stseg.segmentation.cut import minimum_cut
 from stseg.segmentation.energy import build_energy
 
@@ -37,31 +38,25 @@ SMALLEST = 0.05
 """Square metres of ground below which a component is nobody."""
 
 
-def mean_log(maps: list[Singles], sampling: Sampling) -> Singles:
+def mean_log(maps: Sequence[Singles | None], localiser: Localiser) -> Singles:
     """Mean log-likelihood of the views that see each cell, float32 (plane, y, x); nan where none does."""
-    total, seen = np.zeros(sampling.pixel.shape[1:4]), np.zeros(sampling.pixel.shape[1:4])
-    for likelihood, pixel in zip(maps, sampling.pixel, strict=True):
-        inside = pixel[..., 0] != UNSEEN
-        u, v = pixel[inside].T
-        total[inside] += np.log(np.maximum(likelihood[v, u], LEAST))
-        seen[inside] += 1
-    with np.errstate(invalid="ignore"):
-        return (total / np.where(seen > 0, seen, np.nan)).astype(np.float32)
+    synergy = localiser.synergy(maps, np.ones(len(maps)), LEAST)
+    mean = synergy / np.maximum(localiser.views(maps), 1)
+    return np.asarray(mean, np.float32)
 
 
-def volumes(rig_path: Path, first: int, stop: int) -> Iterator[Singles]:
+def volumes(rig_path: Path, first: int, stop: int, sampling: SamplingKind) -> Iterator[Singles]:
     """The plain volume of each frame."""
     recording = read_rig(rig_path)
     sights = make_sights(recording, Config(), first, stop)
-    sampling = Sampling.of(recording.rig)
+    localiser = Localiser(recording.rig, sampling)
     with open_frames(recording, first, stop) as moments:
         for moment in moments:
-            maps = []
+            maps: list[Singles | None] = []
             for sight, view, camera in zip(sights, moment.views, recording.rig.cameras, strict=True):
                 seen = sight.evidence(view)
-                if seen is not None:
-                    maps.append(box_likelihood(seen, camera.size) if isinstance(seen, Boxes) else seen)
-            yield mean_log(maps, sampling)
+                maps.append(box_likelihood(seen, camera.size) if isinstance(seen, Boxes) else seen)
+            yield mean_log(maps, localiser)
 
 
 def places(occupied: Flags, grid: Grid) -> Floats:
@@ -106,18 +101,19 @@ def main() -> None:
     parser.add_argument("truth", type=Path)
     parser.add_argument("--frames", default="0:100")
     parser.add_argument("--level", type=float, default=-1.0)
+    parser.add_argument("--sampling", choices=("footprint", "point"), default="footprint")
     asked = parser.parse_args()
     first, stop = map(int, asked.frames.split(":"))
     rig = read_rig(asked.rig).rig
     truth = read_tracks_csv(asked.truth)
     truth = truth[(truth["frame"] >= first) & (truth["frame"] < stop)]
-    volume = list(volumes(asked.rig, first, stop))
+    volume = list(volumes(asked.rig, first, stop, asked.sampling))
     for name, found in (
         ("plain KS09", plain_fusion(volume, asked.level, rig.grid)),
         ("plain 4-D cut", plain_cut(volume, asked.level, rig)),
     ):
         scores = evaluate(truth, rows(found, first), ignore_flagged=True).as_dict()
-        print(name, {key: scores[key] for key in ("MODA", "precision", "recall")})
+        print(name, {key: scores[key] for key in ("MODA", "precision", "recall", "location_error_m")})
 
 
 if __name__ == "__main__":

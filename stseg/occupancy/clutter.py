@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from stseg.accelerate import kernel
 from stseg.arrays import Floats, Singles
 
 
@@ -20,16 +21,34 @@ def clutter(likelihood: Singles, side: int) -> float:
         Side of a cell, pixels; about twice the largest target's height, at most a quarter of the image.
     """
     height, width = likelihood.shape
-    rows, columns = np.arange(0, height, side), np.arange(0, width, side)
+    cells = np.empty((-(-height // side), -(-width // side)))
+    _fill_variances(likelihood, side, cells)
+    return float(np.sqrt(cells.mean()))
 
-    def cell_means(values: Floats) -> Floats:
-        sums = np.add.reduceat(np.add.reduceat(values, rows, 0), columns, 1)
-        counts = np.outer(np.diff(np.append(rows, height)), np.diff(np.append(columns, width)))
-        return np.asarray(sums / counts)
 
-    values = likelihood.astype(float)
-    variance = cell_means(values**2) - cell_means(values) ** 2
-    return float(np.sqrt(variance.clip(0).mean()))
+def clutter_side(size: tuple[int, int], least: int = 8) -> int:
+    """Side of a cell for images of a size, pixels: a quarter, since near people are taller than half of that."""
+    return max(min(size) // 4, least)
+
+
+@kernel
+def _fill_variances(likelihood: Singles, side: int, variance: Floats) -> None:
+    """Fill variance (cell row, cell column); sums are kept column by column, so that a row is added at once."""
+    height, width = likelihood.shape
+    sums, squares = np.empty(width), np.empty(width)
+    for j in range(variance.shape[0]):
+        sums[:], squares[:] = 0.0, 0.0
+        bottom = min((j + 1) * side, height)
+        for v in range(j * side, bottom):
+            for u in range(width):
+                value = np.float64(likelihood[v, u])
+                sums[u] += value
+                squares[u] += value * value
+        for i in range(variance.shape[1]):
+            right = min((i + 1) * side, width)
+            count = (right - i * side) * (bottom - j * side)
+            mean = sums[i * side : right].sum() / count
+            variance[j, i] = max(squares[i * side : right].sum() / count - mean * mean, 0.0)
 
 
 def clutter_weights(clutters: Floats) -> Floats:

@@ -6,21 +6,22 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from stseg.arrays import Boxes, Bytes, Ints, Singles
+from stseg.arrays import Boxes, Bytes, Flags, Floats, Ints, Singles
 from stseg.config import GhostConfig, OccupancyConfig
 from stseg.foreground import box_likelihood
 from stseg.geometry import Rig
 from stseg.geometry.bodies import BodyTable
 from stseg.geometry.near import near_person
 from stseg.ghosts.explain import Explanation, ViewEvidence
-from stseg.occupancy.clutter import clutter, clutter_weights
-from stseg.occupancy.fusion import Rates, fill_log_odds, fill_terms
+from stseg.occupancy.clutter import clutter, clutter_side, clutter_weights
+from stseg.occupancy.explained import Owners, fill_share, leave_unexplained
+from stseg.occupancy.fusion import Rates, Tally, log_odds_terms
 from stseg.occupancy.instances import fill_likelihood
+from stseg.occupancy.means import CellMeans
 from stseg.occupancy.sampling import Sampling
+from stseg.occupancy.tables import TOP, UNSEEN, Levels
 
 _MAP_STEP = 8
-_NO_MAP = np.zeros((0, 0), np.float32)
-_NO_PLANES = np.zeros((0, 0, 0), np.float32)
 
 
 class Occupancy:
@@ -28,8 +29,9 @@ class Occupancy:
 
     def __init__(self, rig: Rig, kinds: Sequence[str], config: OccupancyConfig, ghosts: GhostConfig) -> None:
         self.rig, self.config = rig, config
-        self.sampling = Sampling.of(rig)
+        self.sampling = Sampling.of(rig, config.sampling)
         self.views: Bytes = self.sampling.views()
+        self.means = CellMeans(self.sampling)
         self.heights = np.asarray(ghosts.heights)
         self.height_mean, self.height_spread = ghosts.height_mean, ghosts.height_spread
         flat = rig.grid.ground.reshape(-1, 2)
@@ -45,38 +47,61 @@ class Occupancy:
             Rates(ghosts.box_miss, box_clutter) if kind == "boxes" else Rates(ghosts.pixel_miss, ghosts.pixel_clutter)
             for kind in kinds
         ]
-        self.clutter_side = [_clutter_side(camera.size) for camera in rig.cameras]
+        self.terms = [log_odds_terms(rates) for rates in self.rates]
+        self.prior = float(np.log(config.occupied / (1 - config.occupied)))
 
     def fuse(self, seen: Sequence[ViewEvidence], explanation: Explanation) -> Singles:
-        """The frame's log-odds, float32 (plane, y, x), nats; nan where no view sees the cell."""
-        shape = self.rig.grid.shape
-        weighted, weights, count = np.zeros(shape), np.zeros(shape), np.zeros(shape, np.uint8)
+        """The frame's log-odds, float32 (plane, y, x), nats; nan where no view sees the cell.
+
+        pi is one half within reach of a person whom the pass of the frame found, where only the cells are left to
+        decide, and `occupied` elsewhere.
+        """
         near = near_person(self.rig.grid.ground, explanation.people.ground, self.config.reach)
-        share = clutter_weights(np.array([self._clutter(i, view) for i, view in enumerate(seen)]))
-        for i, (camera, view) in enumerate(zip(self.rig.cameras, seen, strict=True)):
+        weights = clutter_weights(np.array([self._clutter(i, view) for i, view in enumerate(seen)]))
+        tally = Tally(self.rig.grid.shape)
+        for i, (view, weight) in enumerate(zip(seen, weights, strict=True)):
             if view is None:
                 continue
-            people = len(explanation.people)
-            has_box = np.zeros(people + 1, bool)
-            has_box[explanation.box_owner[i][explanation.box_owner[i] >= 0]] = True
-            away = np.hypot(*(explanation.people.ground - camera.centre[:2]).T)
-            likelihood, per_plane = self._likelihood(i, view, explanation, near)
-            fill_terms(
-                self.sampling.pixel[i], likelihood, per_plane, explanation.owner[i], explanation.raster_step[i], near,
-                has_box, explanation.people.visible[i], self.sampling.distance[i], away, self.rates[i], share[i],
-                weighted, weights, count,
-            )  # fmt: skip
-        log_odds = np.empty(shape, np.float32)
-        prior = float(np.log(self.config.occupied / (1 - self.config.occupied)))
-        fill_log_odds(weighted, weights, count, self.views, near, prior, log_odds)
-        return log_odds
+            owners = self._owners(i, explanation)
+            share, shared = self._share(i, owners, near)
+            if isinstance(view, Boxes):
+                levels = self._levels_of_boxes(i, view, explanation, near)
+                faith = _faith(near, owners.own, explanation.people.visible[i], share.shape)
+            else:
+                levels = self._levels_of_map(i, view, owners, near, share, shared)
+                faith = np.ones_like(share)
+            tally.add(levels, self.terms[i], weight, share, faith)
+        return tally.total(self.views, near, self.prior)
 
-    def _likelihood(
-        self, i: int, view: Boxes | Singles, explanation: Explanation, near: Ints
-    ) -> tuple[Singles, Singles]:
-        """The view's map, or its likelihood per plane; the other is empty."""
-        if not isinstance(view, Boxes):
-            return view, _NO_PLANES
+    def _owners(self, i: int, explanation: Explanation) -> Owners:
+        people, served = explanation.people, explanation.box_owner[i]
+        own = np.zeros(len(people) + 1, bool)
+        own[served[served >= 0]] = True
+        camera, step = self.rig.cameras[i], explanation.raster_step[i]
+        width, height = camera.size
+        away = np.hypot(*(people.ground - camera.centre[:2]).T)
+        return Owners(explanation.owner[i], step, np.arange(height) // step, np.arange(width) // step, away, own)
+
+    def _share(self, i: int, owners: Owners, near: Ints) -> tuple[Singles, Flags]:
+        """How much of each cell the view sees past nearer people, and whether its footprint shows anybody else."""
+        share, shared = np.empty(self.rig.grid.shape, np.float32), np.empty(self.rig.grid.shape, bool)
+        fill_share(self.sampling.footprint[i], *owners, near, self.sampling.distance[i], share, shared)
+        return share, shared
+
+    def _levels_of_map(
+        self, i: int, view: Singles, owners: Owners, near: Ints, share: Singles, shared: Flags
+    ) -> Levels:
+        """Mean likelihood that the explanation leaves each cell."""
+        table = self.means.sum_table(i, view)
+        levels = self.means.levels_from(i, table)
+        leave_unexplained(
+            self.sampling.footprint[i], table.sums, table.left, table.top, owners.raster, owners.step, owners.row,
+            owners.column, near, share, shared, levels,
+        )  # fmt: skip
+        return levels
+
+    def _levels_of_boxes(self, i: int, view: Boxes, explanation: Explanation, near: Ints) -> Levels:
+        """Likelihood per plane of each cell."""
         per_plane = np.zeros(self.rig.grid.shape, np.float32)
         edges = np.concatenate([view.pixel[:, :2], view.pixel[:, :2] + view.pixel[:, 2:]], 1)
         width, height = map(float, self.rig.cameras[i].size)
@@ -86,16 +111,21 @@ class Occupancy:
             self.bodies[i], self.heights, self.height_spread, self.height_mean, explanation.people.height,
             self.rig.grid.heights, edges, belief, explanation.box_owner[i], near, width, height, per_plane,
         )  # fmt: skip
-        return _NO_MAP, per_plane
+        levels = np.rint(per_plane * TOP).astype(np.int16)
+        levels[self.sampling.footprint[i, ..., 2] == 0] = UNSEEN
+        return levels
 
     def _clutter(self, i: int, view: ViewEvidence) -> float:
+        size = self.rig.cameras[i].size
+        side = clutter_side(size, _MAP_STEP)
         if view is None:
             return float("nan")
         if isinstance(view, Boxes):
-            return clutter(box_likelihood(view, self.rig.cameras[i].size, _MAP_STEP), self.clutter_side[i] // _MAP_STEP)
-        return clutter(view, self.clutter_side[i])
+            return clutter(box_likelihood(view, size, _MAP_STEP), side // _MAP_STEP)
+        return clutter(view, side)
 
 
-def _clutter_side(size: tuple[int, int]) -> int:
-    """A quarter of the image: near people are taller than half of that, the cell that KS09 asks for."""
-    return max(min(size) // 4, _MAP_STEP)
+def _faith(near: Ints, own: Flags, visible: Floats, shape: tuple[int, ...]) -> Singles:
+    """How much a missing box says: as much as the view can see of the person near the cell, float32 (plane, y, x)."""
+    missing = np.where(own, 1.0, np.append(visible, 1.0))
+    return np.ascontiguousarray(np.broadcast_to(missing[near], shape), np.float32)

@@ -56,7 +56,7 @@ class CutTracker:
 
     def __init__(self, rig: Rig, config: Config, first: int) -> None:
         self.rig, self.config = rig, config
-        self.views = Sampling.of(rig).views()
+        self.views = Sampling.of(rig, "point").views()
         self.linker = Linker(rig.frame_rate, config.identity)
         self.identities = Identities(rig.frame_rate, config.identity)
         spread, stranger = config.ghosts.height_spread, config.occupancy.occupied

@@ -29,7 +29,7 @@ class FrameTracker:
     def __init__(self, rig: Rig, config: Config, first: int) -> None:
         del first
         self.rig, self.config = rig, config
-        self.views = Sampling.of(rig).views()
+        self.views = Sampling.of(rig, "point").views()
         self.linker = Linker(rig.frame_rate, config.identity)
 
     def predict(self, frame: int) -> Floats:
