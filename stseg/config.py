@@ -144,11 +144,15 @@ class GhostConfig:
     """Spacing of the ground lattice that is searched for candidates, metres."""
     rounds: int = 4
     """How often the frame is searched again for people behind those already found."""
-    person: float = -3.0
+    person: float = -4.0
     """Log-odds of a person at a candidate's place before any view is asked, nats."""
+    newcomer: float = 5.0
+    """What it costs that somebody stands where nobody was expected, away from the border, nats."""
+    border: float = 1.0
+    """Distance from the border of area and views over which that cost rises from nothing, metres."""
     apart: float = 0.30
     """Distance below which two bodies would stand inside each other, metres."""
-    hit: float = 3.0
+    hit: float = 4.5
     """Log-likelihood ratio of a perfectly fitting box, person against clutter, nats."""
     box_miss: float = 0.20
     """How often a detector misses a person it sees whole."""
@@ -175,6 +179,8 @@ class GhostConfig:
         for name in ("box_miss", "least", "pixel_miss", "pixel_clutter"):
             require(0 < getattr(self, name) < 1, self, name, "a number between 0 and 1")
         require(self.hit > 0, self, "hit", "a number above 0")
+        require(self.newcomer >= 0, self, "newcomer", "0 or more nats")
+        require(self.border > 0, self, "border", "a number above 0")
         require(
             0 <= self.hidden_below < self.whole_above <= 1, self, "hidden_below", "0 to below whole_above, at most 1"
         )
@@ -226,17 +232,19 @@ class IdentityConfig:
     """How fast people walk at most, metres per second."""
     slack: float = 0.35
     """How far a place may be off besides, metres."""
-    place_noise: float = 0.20
+    place_noise: float = 0.15
     """How far a frame's place is off besides its own covariance, metres (standard deviation)."""
+    height_noise: float = 0.035
+    """How far a frame's height of a person is off, metres (standard deviation)."""
     foresight: float = 0.6
     """How far ahead committed tracks propose candidates, seconds; beyond that a walker may be anywhere."""
-    patience: float = 1.0
+    patience: float = 2.0
     """How long somebody may be unseen and still be the same, seconds."""
     shortest: float = 0.8
     """Tracks shorter than this are nobody, seconds (HW12's temporal check)."""
 
     def __post_init__(self) -> None:
-        for name in ("window", "walking_speed", "place_noise"):
+        for name in ("window", "walking_speed", "place_noise", "height_noise"):
             require(getattr(self, name) > 0, self, name, "a number above 0")
         for name in ("slack", "foresight", "patience", "shortest"):
             require(getattr(self, name) >= 0, self, name, "0 or more")

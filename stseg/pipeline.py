@@ -20,6 +20,7 @@ from stseg.arrays import Floats, Observation, Rows
 from stseg.config import Config
 from stseg.foreground.sight import Sight
 from stseg.geometry import Rig
+from stseg.ghosts.expected import Expected
 from stseg.ghosts.explain import Explanation, FramePass, People
 from stseg.identity.smoothing import drop_short, fill_gaps
 from stseg.identity.views import box_rows
@@ -114,7 +115,7 @@ class Pipeline:
                 moment = next(moments, None)
             if moment is None:
                 break
-            scene, explained[moment.frame] = self._scene(moment, tracker.predict(moment.frame), watch)
+            scene, explained[moment.frame] = self._scene(moment, tracker.expected(moment.frame), watch)
             with watch.time("track"):
                 commits = tracker.add(scene)
             yield from (_step(commit, explained, watch) for commit in commits)
@@ -123,12 +124,11 @@ class Pipeline:
             commits = tracker.finish()
         yield from (_step(commit, explained, watch) for commit in commits)
 
-    def _scene(self, moment: Moment, predicted: Floats, watch: Stopwatch) -> tuple[Scene, Explanation]:
+    def _scene(self, moment: Moment, expected: Expected | None, watch: Stopwatch) -> tuple[Scene, Explanation]:
         with watch.time("foreground"):
             seen = [sight.evidence(view) for sight, view in zip(self.sights, moment.views, strict=True)]
         with watch.time("ghosts"):
-            standing = np.column_stack([predicted, np.full(len(predicted), self.config.ghosts.height_mean)])
-            explanation = self.frame_pass.explain(seen, standing)
+            explanation = self.frame_pass.explain(seen, expected)
         with watch.time("occupancy"):
             log_odds = self.occupancy.fuse(seen, explanation)
         return Scene(moment.frame, explanation.people, log_odds), explanation

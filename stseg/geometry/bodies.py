@@ -68,20 +68,14 @@ class BodyTable:
         float64 (h, n, 4)
             left, top, right, bottom in pixels, not clipped to the image; nan where the view cannot see the place.
         """
-        filled = np.full((len(heights), len(ground), 4), np.nan)
-        lattice = (np.asarray(ground, float) - self.origin) / self.step
-        _fill_boxes(self.pixel, lattice, np.asarray(heights, float), LEVELS[1], self.step, PROFILE, filled)
-        return filled
+        return np.stack([self.boxes_of(ground, np.full(len(ground), height)) for height in heights])
 
     def boxes_of(self, ground: Floats, heights: Floats) -> Floats:
         """Boxes of pillars with a height each, ground (n, 2) and heights (n,) in metres; float64 (n, 4), pixels."""
-        filled = np.full((1, len(ground), 4), np.nan)
+        filled = np.full((len(ground), 4), np.nan)
         lattice = (np.asarray(ground, float) - self.origin) / self.step
-        for i in range(len(ground)):
-            _fill_boxes(
-                self.pixel, lattice[i : i + 1], heights[i : i + 1], LEVELS[1], self.step, PROFILE, filled[:, i : i + 1]
-            )
-        return np.asarray(filled[0])
+        _fill_boxes(self.pixel, lattice, np.asarray(heights, float), LEVELS[1], self.step, PROFILE, filled)
+        return filled
 
     def discs(self, ground: Floats, height: float) -> Floats:
         """The discs of one pillar: centre u, v and the Jacobian times radius (2x2), float64 (disc, 6)."""
@@ -133,16 +127,15 @@ def _fill_boxes(
     filled: Floats,
 ) -> None:
     discs = np.empty((len(profile), 6))
-    for j in range(len(heights)):
-        for i in range(len(lattice)):
-            fill_discs(pixel, lattice[i, 0], lattice[i, 1], heights[j], level_step, step, profile, discs)
-            left, top, right, bottom = np.inf, np.inf, -np.inf, -np.inf
-            seen = True
-            for k in range(len(profile)):
-                wide = np.hypot(discs[k, 2], discs[k, 3])
-                tall = np.hypot(discs[k, 4], discs[k, 5])
-                seen = seen and not np.isnan(wide + tall)
-                left, right = min(left, discs[k, 0] - wide), max(right, discs[k, 0] + wide)
-                top, bottom = min(top, discs[k, 1] - tall), max(bottom, discs[k, 1] + tall)
-            if seen:
-                filled[j, i, 0], filled[j, i, 1], filled[j, i, 2], filled[j, i, 3] = left, top, right, bottom
+    for i in range(len(lattice)):
+        fill_discs(pixel, lattice[i, 0], lattice[i, 1], heights[i], level_step, step, profile, discs)
+        left, top, right, bottom = np.inf, np.inf, -np.inf, -np.inf
+        seen = True
+        for k in range(len(profile)):
+            wide = np.hypot(discs[k, 2], discs[k, 3])
+            tall = np.hypot(discs[k, 4], discs[k, 5])
+            seen = seen and not np.isnan(wide + tall)
+            left, right = min(left, discs[k, 0] - wide), max(right, discs[k, 0] + wide)
+            top, bottom = min(top, discs[k, 1] - tall), max(bottom, discs[k, 1] + tall)
+        if seen:
+            filled[i, 0], filled[i, 1], filled[i, 2], filled[i, 3] = left, top, right, bottom

@@ -12,7 +12,7 @@ import numpy as np
 from stseg.accelerate import kernel
 from stseg.arrays import Floats
 
-SIDE, WIDTH, HEAD, FEET = 0.11, 0.25, 0.07, 0.09
+SIDE, WIDTH, HEAD, FEET = 0.06, 0.15, 0.045, 0.06
 """Standard deviations as shares of the body's height: middle, width, upper edge, lower edge."""
 EARLY_FEET = 4.0
 """How many times looser the lower edge is where the box ends above the feet."""

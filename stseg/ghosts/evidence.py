@@ -83,12 +83,17 @@ class Case(NamedTuple):
         What the views say.
     own : float64 (candidate,)
         What speaks for each candidate by itself, nats.
+    newcomer : float64 (candidate,)
+        What it costs that nobody was expected there, nats.
+    known : float64 (candidate, walker)
+        What speaks for each candidate by being each walker, beyond a newcomer who costs nothing, nats.
     ground : float64 (candidate, 2)
         Metres.
     terms
         The pass's constants.
-    owner : int64 (at least boxes, at least v * u)
-        Scratch: after a view was scored, the place in the set of whoever owns each box or pixel, -1 for nobody.
+    owner : int64 (at least boxes, at least v * u, at least walkers)
+        Scratch: after a view was scored, the place in the set of whoever owns each box or pixel, -1 for nobody; after
+        the walkers were, of whoever is each walker.
     parts : float64 (view, candidate + 1)
         Scratch: after a set was scored, what each view says of each of its members, nats; views with boxes first.
     """
@@ -96,6 +101,8 @@ class Case(NamedTuple):
     boxes: BoxEvidence
     pixels: PixelEvidence
     own: Floats
+    newcomer: Floats
+    known: Floats
     ground: Floats
     terms: Terms
     owner: Ints

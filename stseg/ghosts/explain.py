@@ -1,8 +1,8 @@
 """The pass of one frame: candidates, and the set of them that best explains what all views show (METHODS 7).
 
 Candidates are sought on a ground lattice, in what nobody explains yet, so people behind others are found once those
-others stand. Tracks committed in earlier windows are candidates too. After each round the set is searched anew, until a
-round changes nobody.
+others stand. Whom the frames before led to expect are candidates too, and a newcomer away from the border costs. After
+each round the set is searched anew, until a round changes nobody.
 """
 
 from __future__ import annotations
@@ -16,10 +16,12 @@ from numpy.typing import NDArray
 from stseg.arrays import Boxes, Flags, Floats, Ints, Singles
 from stseg.config import GhostConfig
 from stseg.geometry import Rig
+from stseg.ghosts.border import Border
 from stseg.ghosts.evidence import Case, Terms
-from stseg.ghosts.pool import Pool, box_evidence, empty_pool, peaks, pixel_evidence
+from stseg.ghosts.expected import Expected, nobody
+from stseg.ghosts.pool import Pool, box_evidence, peaks, pixel_evidence
 from stseg.ghosts.refine import owned, refine
-from stseg.ghosts.scoring import box_score, pixel_score, set_score
+from stseg.ghosts.scoring import box_score, pixel_score, set_score, walker_score
 from stseg.ghosts.search import search
 from stseg.ghosts.views import BoxView, PixelView, Sight, View
 
@@ -45,6 +47,10 @@ class People:
         What each view says, nats.
     visible : float64 (view, n)
         How much of each body a view can see past nearer people, 0..1.
+    prior : float64 (n,)
+        What of the evidence spoke before any view was asked, nats.
+    walker : int64 (n,)
+        Whom of those expected each is, -1 for newcomers.
     """
 
     ground: Floats
@@ -53,6 +59,8 @@ class People:
     evidence: Floats
     parts: Floats
     visible: Floats
+    prior: Floats
+    walker: Ints
 
     def __len__(self) -> int:
         return len(self.ground)
@@ -118,28 +126,30 @@ class FramePass:
             config.body_weight,
         )
         self.height_prior = self._height_prior(np.asarray(config.heights))
+        self.border = Border.of(rig)
 
-    def explain(self, seen: Sequence[ViewEvidence], predicted: Floats) -> Explanation:
+    def explain(self, seen: Sequence[ViewEvidence], expected: Expected | None) -> Explanation:
         """Explain one frame.
 
         Parameters
         ----------
         seen
             What each view shows.
-        predicted : float64 (n, 3)
-            Ground position and height, metres, of tracks committed in earlier windows, carried to this frame.
+        expected
+            Whom the frames before lead to expect; None in a first frame, in which nobody is a newcomer.
         """
         sights = [None if s is None else view.observe(s) for view, s in zip(self.views, seen, strict=True)]
-        pool = Pool(predicted[:, :2], predicted[:, 2]) if len(predicted) else empty_pool()
-        members = np.zeros(0, np.int64)
-        frame = _Frame(self, sights, pool, members)
+        prior = _Prior(
+            expected or nobody(), self.config, self.border, 0.0 if expected is None else self.config.newcomer
+        )
+        frame = _Frame(self, sights, prior, prior.pool(), np.arange(len(prior.expected)))
         for _ in range(self.config.rounds):
             fresh = self._fresh(frame)
             moved = frame.refined()[0]
             if not len(fresh) and not len(moved):
                 break
             known = len(frame.pool)
-            frame = _Frame(self, sights, frame.pool.and_(moved).and_(fresh), frame.members)
+            frame = _Frame(self, sights, prior, frame.pool.and_(moved).and_(fresh), frame.members)
             if (frame.members < known).all():
                 break
         return self._settled(frame).explanation()
@@ -148,7 +158,7 @@ class FramePass:
         """The frame searched once more from where its people exactly stand, which may show two of them to be one."""
         exact = frame.refined()[0]
         known = len(frame.pool)
-        return _Frame(self, frame.sights, frame.pool.and_(exact), np.arange(known, known + len(exact)))
+        return _Frame(self, frame.sights, frame.prior, frame.pool.and_(exact), np.arange(known, known + len(exact)))
 
     def _fresh(self, frame: _Frame) -> Pool:
         """Candidates in what nobody explains yet."""
@@ -166,17 +176,43 @@ class FramePass:
         return -0.5 * ((heights - self.config.height_mean) / self.config.height_spread) ** 2
 
 
+@dataclass(frozen=True)
+class _Prior:
+    """What is known of a frame before any view is asked: whom to expect, and what a newcomer costs inside."""
+
+    expected: Expected
+    config: GhostConfig
+    border: Border
+    cost: float
+
+    def pool(self) -> Pool:
+        """Those expected, as candidates."""
+        heights = self.config.heights
+        return Pool(self.expected.ground, self.expected.height.clip(min(heights), max(heights)))
+
+    def newcomer(self, pool: Pool) -> Floats:
+        """What each candidate costs as a newcomer, nats, float64 (n,)."""
+        return self.cost * np.minimum(self.border.away(pool.ground) / self.config.border, 1.0)
+
+    def known(self, pool: Pool) -> Floats:
+        """What speaks for each candidate by being each walker, nats, float64 (n, walker)."""
+        return self.expected.known(pool.ground, pool.height, self.config)
+
+
 class _Frame:
     """One frame while it is being explained: its candidates, and the set that explains it best."""
 
-    def __init__(self, frame_pass: FramePass, sights: list[Sight | None], pool: Pool, members: Ints) -> None:
-        self.frame_pass, self.sights, self.pool = frame_pass, sights, pool
+    def __init__(
+        self, frame_pass: FramePass, sights: list[Sight | None], prior: _Prior, pool: Pool, members: Ints
+    ) -> None:
+        self.frame_pass, self.sights, self.prior, self.pool = frame_pass, sights, prior, pool
         views = frame_pass.views
         boxes, pixels = box_evidence(views, sights, pool), pixel_evidence(views, sights, pool)
-        owner = np.empty(max(pixels.raster[:1].size, boxes.match.shape[2], 1), np.int64)
+        owner = np.empty(max(pixels.raster[:1].size, boxes.match.shape[2], len(prior.expected), 1), np.int64)
         parts = np.zeros((len(views), len(pool) + 1))
         own = frame_pass._height_prior(pool.height)
-        self.case = Case(boxes, pixels, own, pool.ground, frame_pass.terms, owner, parts)
+        newcomer, known = prior.newcomer(pool), prior.known(pool)
+        self.case = Case(boxes, pixels, own, newcomer, known, pool.ground, frame_pass.terms, owner, parts)
         # The scores' parts have the views with boxes first; `row` finds those of each view of the rig.
         pixels_last = np.argsort([isinstance(view, PixelView) for view in views], kind="stable")
         self.row = np.argsort(pixels_last)
@@ -185,6 +221,7 @@ class _Frame:
         count = search(room, len(members), self.case)
         self.members = room[:count].copy()
         self.box_owner, self.pixel_owner = self._owners()
+        self.walker = self._walkers()
 
     def score(self, members: Ints) -> float:
         """Score of a set; the case's `parts` then holds what each view says of each member."""
@@ -211,6 +248,26 @@ class _Frame:
             pixels.append(raster)
         return boxes, pixels
 
+    def _walkers(self) -> Ints:
+        """Which walker each member is, int64 (member,), -1 for newcomers."""
+        case, walker = self.case, np.full(len(self.members), -1, np.int64)
+        walker_score(self.members, len(self.members), case.known, case.newcomer, case.owner)
+        for k, place in enumerate(case.owner[: case.known.shape[1]]):
+            if place >= 0:
+                walker[place] = k
+        return walker
+
+    def _own_prior(self, candidates: Ints, walker: Ints) -> Floats:
+        """What speaks for candidates before any view is asked, nats, float64 (n,)."""
+        case = self.case
+        alone = case.terms.person + case.own[candidates]
+        return np.array(
+            [
+                p + (case.known[i, k] if k >= 0 else -case.newcomer[i])
+                for p, i, k in zip(alone, candidates, walker, strict=True)
+            ]
+        )
+
     def _visible(self) -> Floats:
         """How much of each member each view can see past the others, float64 (view, member)."""
         visible = np.ones((len(self.frame_pass.views), len(self.members)))
@@ -236,7 +293,8 @@ class _Frame:
             [owned(v, j, b, p) for v, b, p in zip(views, self.box_owner, self.pixel_owner, strict=True)]
             for j in range(len(self.members))
         ]
-        return refine(self.pool.at(self.members), views, self.sights, own, self.frame_pass.height_prior)
+        people, expected = self.pool.at(self.members), self.prior.expected
+        return refine(people, views, self.sights, own, self.frame_pass.height_prior, expected, self.walker)
 
     def explanation(self) -> Explanation:
         """The result, once nothing changes any more."""
@@ -245,7 +303,10 @@ class _Frame:
         parts = self.case.parts[self.row, : len(self.members)]
         without = [self.score(np.delete(self.members, a)) for a in range(len(self.members))]
         evidence = total - np.array(without)
-        people = People(exact.ground, exact.height, covariance, evidence, parts, self._visible())
+        people = People(
+            exact.ground, exact.height, covariance, evidence, parts, self._visible(),
+            self._own_prior(self.members, self.walker), self.walker,
+        )  # fmt: skip
         views = self.frame_pass.views
         painted = [
             p if isinstance(v, PixelView) else _painted(v, exact) for v, p in zip(views, self.pixel_owner, strict=True)
@@ -270,7 +331,10 @@ class _Frame:
         chosen = self.pool.at([i for _, i, _ in kept])
         wide = np.tile(np.eye(2) * self.frame_pass.config.lattice**2 / 12, (len(kept), 1, 1))
         parts = np.array([p for _, _, p in kept]).reshape(len(kept), len(self.frame_pass.views)).T
-        return People(chosen.ground, chosen.height, wide, np.array([g for g, _, _ in kept]), parts, np.ones_like(parts))
+        strangers = np.full(len(kept), -1, np.int64)
+        prior = self._own_prior(np.array([i for _, i, _ in kept], np.int64), strangers)
+        evidence = np.array([gain for gain, _, _ in kept])
+        return People(chosen.ground, chosen.height, wide, evidence, parts, np.ones_like(parts), prior, strangers)
 
 
 def _painted(view: View, people: Pool) -> Ints:

@@ -39,11 +39,6 @@ class Pool:
         return Pool(self.ground[index], self.height[index])
 
 
-def empty_pool() -> Pool:
-    """A pool of nobody."""
-    return Pool(np.zeros((0, 2)), np.zeros(0))
-
-
 def peaks(score: Floats, lattice_ground: Floats, heights: Floats) -> Pool:
     """Local maxima of a lattice score (height, y, x) over the ground (y, x, 2), best first."""
     best, tallest = score.max(0), score.argmax(0)
@@ -67,7 +62,7 @@ def box_evidence(views: Sequence[View], sights: Sequence[Sight | None], pool: Po
     for k, (view, sight) in enumerate(chosen):
         if sight is not None:
             width, height = map(float, view.camera.size)
-            bodies = view.chosen_boxes(pool.ground, pool.height)
+            bodies = view.table.boxes_of(pool.ground, pool.height)
             match = evidence.match[k, :, : len(sight.edges)]
             fill_match(bodies, sight.edges, sight.belief, width, height, match)
             fill_inside(bodies, width, height, evidence.inside[k])

@@ -1,4 +1,7 @@
-"""Where exactly a person stands: the posterior over a small patch of ground, from the evidence that is theirs alone."""
+"""Where exactly a person stands: the posterior over a small patch of ground.
+
+Its prior is where they were expected, if they were; its evidence is what is theirs alone.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +12,7 @@ import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints
 from stseg.ghosts.boxes import fill_match
+from stseg.ghosts.expected import Expected
 from stseg.ghosts.pool import Pool
 from stseg.ghosts.views import BoxView, PixelView, Sight, View
 
@@ -26,7 +30,13 @@ class Own:
 
 
 def refine(
-    pool: Pool, views: Sequence[View], sights: Sequence[Sight | None], own: Sequence[Sequence[Own]], prior: Floats
+    pool: Pool,
+    views: Sequence[View],
+    sights: Sequence[Sight | None],
+    own: Sequence[Sequence[Own]],
+    height_prior: Floats,
+    expected: Expected,
+    walker: Ints,
 ) -> tuple[Pool, Floats]:
     """Move each person to the mean of their posterior.
 
@@ -36,8 +46,10 @@ def refine(
         The people.
     own
         For each person and view what is theirs.
-    prior : float64 (height,)
+    height_prior : float64 (height,)
         Log-prior of the heights tried, nats.
+    expected, walker : int64 (n,)
+        Whom the frames before led to expect, and who of them each person is, -1 for newcomers.
 
     Returns
     -------
@@ -50,12 +62,14 @@ def refine(
     tried = np.asarray(views[0].config.heights)
     for j in range(len(pool)):
         patch = pool.ground[j] + offset
-        score = np.repeat(prior[:, None], len(patch), 1)
+        score = np.repeat(height_prior[:, None], len(patch), 1)
         for view, sight, mine in zip(views, sights, own[j], strict=True):
             if sight is not None:
                 score += _patch_score(view, sight, mine, patch, tried)
+        if walker[j] >= 0:
+            score += expected.place(int(walker[j]), patch)
         weight = np.exp(score - score.max())
-        height[j] = tried[weight.sum(1).argmax()]
+        height[j] = weight.sum(1) @ tried / weight.sum()
         place = weight.sum(0) / weight.sum()
         ground[j] = place @ patch
         spread = patch - ground[j]

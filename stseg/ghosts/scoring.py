@@ -1,7 +1,9 @@
 """How well a set of people explains a frame: log-odds against nobody at all, each piece of evidence used once.
 
-    score(S) = sum_j [person + height_j] + sum_views sum_j part_j(S) - crowding(S)
+    score(S) = sum_j [person + height_j - newcomer_j] + walkers(S) + sum_views sum_j part_j(S) - crowding(S)
 
+Members whom the frames before led to expect are no newcomers: walkers(S) = sum of newcomer_j + known_jk over the pairs
+of member j and walker k, one to one.
 In a view with boxes, part_j is the best box that nobody else in S takes, or the cost of a missing one, which is less
 the more of j is hidden by nearer members. In a view with pixels, part_j is the mean log-odds over j's outline of the
 pixels that no nearer member covers (HW12's detection energy, eqs 13 to 15, in soft form, for the labels of eq. 24).
@@ -23,13 +25,39 @@ def set_score(members: Ints, count: int, case: Case) -> float:
     """Score of the first `count` members, nats; fills `case.parts` (view, member), boxes' views first, then pixels'."""
     total = -crowding(members, count, case.ground, case.terms.apart)
     for a in range(count):
-        total += case.terms.person + case.own[members[a]]
+        total += case.terms.person + case.own[members[a]] - case.newcomer[members[a]]
+    total += walker_score(members, count, case.known, case.newcomer, case.owner)
     box_views = case.boxes.match.shape[0]
     for view in range(box_views):
         total += box_score(view, members, count, case.boxes, case.terms, case.owner, case.parts[view])
     for view in range(case.pixels.raster.shape[0]):
         parts = case.parts[box_views + view]
         total += pixel_score(view, members, count, case.pixels, case.terms, case.owner, parts)
+    return total
+
+
+@kernel
+def walker_score(members: Ints, count: int, known: Floats, newcomer: Floats, taken_by: Ints) -> float:
+    """Walkers go to members in falling order of what they gain; fills taken_by (walker,) with the place in `members`.
+
+    -1 is for a walker who is nobody of the set.
+    """
+    walkers = known.shape[1]
+    taken_by[:walkers] = -1
+    served = np.zeros(count, np.bool_)
+    total = 0.0
+    while True:
+        best, best_a, best_k = 0.0, -1, -1
+        for a in range(count):
+            if not served[a]:
+                for k in range(walkers):
+                    gain = newcomer[members[a]] + known[members[a], k]
+                    if gain > best and taken_by[k] < 0:
+                        best, best_a, best_k = gain, a, k
+        if best_a < 0:
+            break
+        served[best_a], taken_by[best_k] = True, best_a
+        total += best
     return total
 
 

@@ -64,12 +64,6 @@ class View:
         first, spans, area = outlines(self.table, ground, heights, self.step, self.shape)
         return first, spans, area * (self.config.height_mean / heights)
 
-    def chosen_boxes(self, ground: Floats, heights: Floats) -> Floats:
-        """Pillar boxes of candidates, one height each, float64 (n, 4)."""
-        tried = np.asarray(self.config.heights)
-        every: Floats = self.table.boxes(ground, tried)
-        return np.asarray(every[np.abs(heights[:, None] - tried).argmin(1), np.arange(len(ground))])
-
 
 class BoxView(View):
     """A view that delivers boxes."""

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from stseg.arrays import Floats, Ints, Labels
+from stseg.arrays import Ints, Labels
 from stseg.config import IdentityConfig
 from stseg.identity.linking import assign
 from stseg.identity.pieces import Piece
@@ -78,13 +78,6 @@ class Identities:
             if window.solve_first + k >= window.commit_stop - (window.solve_stop - window.commit_stop)
         }
         return Decision(identity, sorted(events))
-
-    def predict(self, frame: int) -> Floats:
-        """Where tracks seen not long before a frame would be then at constant velocity, float64 (n, 2), metres."""
-        ahead = self.config.foresight * self.frame_rate
-        recent = [track.tail for track in self.alive if frame - track.tail.frames[-1] <= ahead]
-        places = [tail.ground[-1] + (frame - tail.frames[-1]) * tail.velocity() for tail in recent]
-        return np.array(places).reshape(-1, 2)
 
     def _names(self, window: Window, blobs: Sequence[Blobs], pieces: Sequence[Piece]) -> list[int]:
         names = [0] * len(pieces)

@@ -7,13 +7,14 @@ from itertools import pairwise
 
 import numpy as np
 
-from stseg.arrays import Flags, Floats, Ints, Labels, Rows
+from stseg.arrays import Flags, Ints, Labels, Rows
 from stseg.config import Config
 from stseg.geometry import Rig
+from stseg.ghosts.expected import Expected
 from stseg.identity.identities import Decision, Identities
-from stseg.identity.linking import Linker
 from stseg.identity.pieces import chain_pieces
 from stseg.identity.places import Sightings, earlier_sightings, expected_places, together
+from stseg.identity.walkers import Walkers
 from stseg.identity.windows import Window, windows
 from stseg.occupancy.sampling import Sampling
 from stseg.segmentation.blobs import Blobs, find_blobs
@@ -57,7 +58,7 @@ class CutTracker:
     def __init__(self, rig: Rig, config: Config, first: int) -> None:
         self.rig, self.config = rig, config
         self.views = Sampling.of(rig, "point").views()
-        self.linker = Linker(rig.frame_rate, config.identity)
+        self.walkers = Walkers(rig.frame_rate, config.ghosts, config.identity)
         self.identities = Identities(rig.frame_rate, config.identity)
         spread, stranger = config.ghosts.height_spread, config.occupancy.occupied
         self.pillar = Pillar(config.occupancy.reach, spread, stranger)
@@ -66,9 +67,9 @@ class CutTracker:
         self.coming = windows(rig.frame_rate, config.identity, first, _ENDLESS)
         self.window = next(self.coming)
 
-    def predict(self, frame: int) -> Floats:
-        """Ground positions of people committed so far, carried to a frame, float64 (n, 2), metres."""
-        return self.identities.predict(frame)
+    def expected(self, frame: int) -> Expected | None:
+        """Whom the frames before lead to expect."""
+        return self.walkers.expected(frame)
 
     def add(self, scene: Scene) -> list[Commit]:
         """The next frame; the window before it, if it is complete.
@@ -81,7 +82,7 @@ class CutTracker:
             done.append(self._solve(self.window))
             self.window = next(self.coming)
             self.held = [linked for linked in self.held if linked.scene.frame >= self.window.solve_first]
-        chains = self.linker.link(scene.frame, scene.people.ground, scene.people.covariance)
+        chains = self.walkers.follow(scene.frame, scene.people)
         self.held.append(_Linked(scene, chains))
         return done
 

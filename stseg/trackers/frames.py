@@ -1,4 +1,4 @@
-"""Each frame by itself: whom the pass of the frame found, linked by motion alone. What the cut is measured against."""
+"""Frame by frame, without a cut: whom the pass of each frame found. What the cut is measured against."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from stseg.arrays import Floats, Ints, Labels
 from stseg.config import Config
 from stseg.geometry import Rig
 from stseg.geometry.near import near_person
-from stseg.identity.linking import Linker
+from stseg.ghosts.expected import Expected
+from stseg.identity.walkers import Walkers
 from stseg.occupancy.sampling import Sampling
 from stseg.trackers.protocol import Commit, Scene
 from stseg.trackers.rows import event_rows, trajectory_rows, views_at
@@ -30,18 +31,17 @@ class FrameTracker:
         del first
         self.rig, self.config = rig, config
         self.views = Sampling.of(rig, "point").views()
-        self.linker = Linker(rig.frame_rate, config.identity)
+        self.walkers = Walkers(rig.frame_rate, config.ghosts, config.identity)
 
-    def predict(self, frame: int) -> Floats:
-        """Nobody: every frame stands for itself."""
-        del frame
-        return np.zeros((0, 2))
+    def expected(self, frame: int) -> Expected | None:
+        """Whom the frames before lead to expect."""
+        return self.walkers.expected(frame)
 
     def add(self, scene: Scene) -> list[Commit]:
         """The next frame, decided."""
         people = scene.people
-        known = self.linker.issued
-        ids = self.linker.link(scene.frame, people.ground, people.covariance)
+        known = self.walkers.issued
+        ids = self.walkers.follow(scene.frame, people)
         label, extent = self._label(scene, ids)
         births = [(scene.frame, "birth", int(i), 0, "nobody known was near") for i in np.sort(ids[ids > known])]
         rows = trajectory_rows(

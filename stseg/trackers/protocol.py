@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
-from stseg.arrays import Floats, Labels, Rows, Singles
+from stseg.arrays import Labels, Rows, Singles
+from stseg.ghosts.expected import Expected
 from stseg.ghosts.explain import People
 
 
@@ -58,5 +59,5 @@ class Tracker(Protocol):
     def finish(self) -> list[Commit]:
         """No more frames; what was still open."""
 
-    def predict(self, frame: int) -> Floats:
-        """Ground positions of people committed so far, carried to a frame, float64 (n, 2), metres."""
+    def expected(self, frame: int) -> Expected | None:
+        """Whom the frames before lead to expect in a frame; None in the first."""

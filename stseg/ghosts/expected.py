@@ -1,0 +1,73 @@
+"""Whom a frame expects, from the frames before: the prior of HW12 eq. 21 person by person (METHODS 7).
+
+A walker k of earlier frames is there with log-odds o_k, at N(x_k, C_k), as tall as N(h_k, v_k). A newcomer is there
+with log-odds `person` at any place of the resolution s, as tall as anybody. So what speaks for candidate j by being
+walker k, beyond what speaks for a newcomer, is
+
+    known_jk = o_k - person + log(s^2 / sqrt|C_k|) - d_jk^2 / 2 + log N(h_j; h_k, v_k) - log N(h_j; mean, spread^2)
+
+with d_jk the Mahalanobis distance of the places. Each walker speaks for one candidate at most.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stseg.arrays import Floats
+from stseg.config import GhostConfig
+
+_RESOLUTION = 0.1
+"""s: how finely one frame tells places apart, metres (standard deviation)."""
+_OUT_OF_SHAPE = -4.0
+"""A wrong height speaks no more strongly than this against a walker, nats: people stoop and sit."""
+
+
+@dataclass(frozen=True)
+class Expected:
+    """Walkers of earlier frames, carried to the frame.
+
+    Attributes
+    ----------
+    ground : float64 (n, 2), covariance : float64 (n, 2, 2)
+        Metres, square metres; how far the frame's own place may be off is in it.
+    height, height_variance : float64 (n,)
+        Metres, square metres.
+    odds : float64 (n,)
+        Log-odds that the walker is still there, nats.
+    """
+
+    ground: Floats
+    covariance: Floats
+    height: Floats
+    height_variance: Floats
+    odds: Floats
+
+    def __len__(self) -> int:
+        return len(self.ground)
+
+    def known(self, ground: Floats, height: Floats, config: GhostConfig) -> Floats:
+        """What speaks for candidates (n, 2), (n,) by being walkers, nats, float64 (n, walker)."""
+        if not len(self):
+            return np.zeros((len(ground), 0))
+        sharp = np.log(_RESOLUTION**2 / np.sqrt(np.linalg.det(self.covariance)))
+        off = height[:, None] - self.height
+        tall = -0.5 * off**2 / self.height_variance + np.log(config.height_spread / np.sqrt(self.height_variance))
+        anybody = -0.5 * ((height - config.height_mean) / config.height_spread) ** 2
+        shape = np.maximum(tall - anybody[:, None], _OUT_OF_SHAPE)
+        return np.asarray(self.odds - config.person + sharp - 0.5 * self._squares(ground) + shape)
+
+    def place(self, walker: int, ground: Floats) -> Floats:
+        """Log-density of a walker's place at points (n, 2), up to a constant, nats, float64 (n,)."""
+        return np.asarray(-0.5 * self._squares(ground)[:, walker])
+
+    def _squares(self, ground: Floats) -> Floats:
+        """Squared Mahalanobis distances, float64 (n, walker)."""
+        off = ground[:, None] - self.ground
+        return np.asarray(np.einsum("nki,kij,nkj->nk", off, np.linalg.inv(self.covariance), off))
+
+
+def nobody() -> Expected:
+    """Nobody was there before."""
+    return Expected(np.zeros((0, 2)), np.zeros((0, 2, 2)), np.zeros(0), np.zeros(0), np.zeros(0))

@@ -1,0 +1,162 @@
+"""Who is followed from frame to frame: a constant-velocity filter for each (HW12's Kalman filter; METHODS 7, 8).
+
+What a frame expects of them is a prior of its pass, which says who of the people that it found is whom: so who is who
+and who is there are decided together, and each piece of evidence is used once. A walker's height is a property of the
+person: it is what tells two people apart who have just crossed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from stseg.arrays import Floats, Ints
+from stseg.config import GhostConfig, IdentityConfig
+from stseg.ghosts.expected import Expected
+from stseg.ghosts.explain import People
+
+_TURN = 0.8
+"""How people change their velocity, metres per second per square root of a second (standard deviation)."""
+_STILL = 0.8
+"""Standard deviation of the velocity of somebody new, metres per second."""
+_GROWTH = 0.002
+"""How a person's height changes, metres per square root of a second (standard deviation): shoes, stoop, lens."""
+_STAYING = 1.0
+"""Log-odds at most that somebody seen in one frame is found in the next, nats."""
+_FORGETTING = 4.0
+"""How fast those fall while a walker is out of sight, nats per second."""
+
+
+@dataclass(frozen=True)
+class Walker:
+    """Somebody who is followed.
+
+    Attributes
+    ----------
+    chain
+        Number, from 1.
+    seen
+        The last frame that showed them.
+    state, covariance : float64 (4,), (4, 4)
+        x, y, vx, vy in metres and metres per second, at that frame.
+    height, height_variance
+        Metres, square metres.
+    odds
+        Log-odds that they are there, nats.
+    """
+
+    chain: int
+    seen: int
+    state: Floats
+    covariance: Floats
+    height: float
+    height_variance: float
+    odds: float
+
+    def carried(self, seconds: float) -> Walker:
+        """Some time after they were last seen."""
+        motion = np.eye(4)
+        motion[:2, 2:] = seconds * np.eye(2)
+        turn = np.array([[seconds**3 / 3, seconds**2 / 2], [seconds**2 / 2, seconds]]) * _TURN**2
+        return replace(
+            self,
+            state=motion @ self.state,
+            covariance=motion @ self.covariance @ motion.T + np.kron(turn, np.eye(2)),
+            height_variance=self.height_variance + _GROWTH**2 * seconds,
+        )
+
+    def found(self, frame: int, ground: Floats, covariance: Floats, height: float, noise: float, odds: float) -> Walker:
+        """Corrected by the posterior of their place, in which the expected place is the prior.
+
+        The velocity follows by what the place and it have in common. The height is a measurement with a standard
+        deviation of `noise`, metres.
+        """
+        gain = self.covariance[:, :2] @ np.linalg.inv(self.covariance[:2, :2])
+        surplus = self.covariance[:2, :2] - covariance
+        share = self.height_variance / (self.height_variance + noise**2)
+        return Walker(
+            self.chain,
+            frame,
+            self.state + gain @ (ground - self.state[:2]),
+            self.covariance - gain @ surplus @ gain.T,
+            self.height + share * (height - self.height),
+            self.height_variance * (1 - share),
+            odds,
+        )
+
+
+class Walkers:
+    """All who are followed, from frame to frame, and over as many frames as patience allows.
+
+    Parameters
+    ----------
+    frame_rate
+        Frames per second.
+    ghosts, config
+        What people are like, and how they walk.
+    """
+
+    def __init__(self, frame_rate: float, ghosts: GhostConfig, config: IdentityConfig) -> None:
+        self.frame_rate = frame_rate
+        self.ghosts, self.config = ghosts, config
+        self.walkers: list[Walker] = []
+        self.issued = 0
+        self.begun = False
+
+    def expected(self, frame: int) -> Expected | None:
+        """Whom to expect in a frame later than those seen; None before the first."""
+        if not self.begun:
+            return None
+        carried = [self._carried(walker, frame) for walker in self.walkers]
+        return Expected(
+            np.array([w.state[:2] for w in carried]).reshape(-1, 2),
+            np.array([w.covariance[:2, :2] for w in carried]).reshape(-1, 2, 2) + self._place_noise,
+            np.array([w.height for w in carried]),
+            np.array([w.height_variance for w in carried]) + self.config.height_noise**2,
+            np.array([w.odds for w in carried]),
+        )
+
+    def follow(self, frame: int, people: People) -> Ints:
+        """The chain of each person of a frame that was explained with what `expected` said.
+
+        Returns
+        -------
+        int64 (n,)
+            Chain numbers from 1; those not met before are new.
+        """
+        self.begun = True
+        chains, followed = np.zeros(len(people), np.int64), []
+        for j in range(len(people)):
+            known = int(people.walker[j])
+            before = self._carried(self.walkers[known], frame) if known >= 0 else self._newcomer(frame, people, j)
+            odds = (before.odds if known >= 0 else self.ghosts.person) + people.evidence[j] - people.prior[j]
+            followed.append(
+                before.found(
+                    frame, people.ground[j], people.covariance[j], float(people.height[j]), self.config.height_noise,
+                    min(float(odds), _STAYING),
+                )
+            )  # fmt: skip
+            chains[j] = before.chain
+        patience = round(self.config.patience * self.frame_rate)
+        hidden = np.setdiff1d(np.arange(len(self.walkers)), people.walker)
+        self.walkers = followed + [self.walkers[k] for k in hidden if frame - self.walkers[k].seen <= patience]
+        return chains
+
+    @property
+    def _place_noise(self) -> Floats:
+        return np.eye(2) * self.config.place_noise**2
+
+    def _carried(self, walker: Walker, frame: int) -> Walker:
+        seconds = (frame - walker.seen) / self.frame_rate
+        hidden = seconds - 1 / self.frame_rate
+        return replace(walker.carried(seconds), odds=walker.odds - _FORGETTING * hidden)
+
+    def _newcomer(self, frame: int, people: People, j: int) -> Walker:
+        """Somebody new: anywhere near the place, as tall as anybody, of any velocity."""
+        self.issued += 1
+        spread = np.diag([0.0, 0.0, _STILL**2, _STILL**2])
+        spread[:2, :2] = people.covariance[j] + self._place_noise
+        state = np.append(people.ground[j], [0.0, 0.0])
+        mean, variance = self.ghosts.height_mean, self.ghosts.height_spread**2
+        return Walker(self.issued, frame, state, spread, mean, variance, 0.0)
