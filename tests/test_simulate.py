@@ -23,7 +23,7 @@ from stseg.io.frames import open_frames, read_background
 from stseg.io.rigs import read_rig
 from stseg.io.scenes import write_scene
 from stseg.io.tracks import read_tracks_csv
-from stseg.simulate import NAMED, Film, SceneSpec
+from stseg.simulate import NAMED, Film, Lamp, SceneSpec
 from stseg.simulate import draw as draw_module
 from stseg.simulate.body import PARTS, pose
 from stseg.simulate.cameras import build_rig, pixel_rays
@@ -297,6 +297,42 @@ def test_noise_and_light_are_as_large_as_asked_for() -> None:
     means = np.array([[view.image.mean() for view in moment.views] for moment in drifting.moments()])
     swing = (means.max(axis=0) - means.min(axis=0)) / means.mean(axis=0) / 2
     np.testing.assert_allclose(swing, 0.2, atol=0.02)
+
+
+def test_lamps_are_switched_and_light_what_is_near() -> None:
+    lamp = Lamp(1.5, on=0.3, off=0.6, place=(0.0, 0.0, 1.0), reach=1.0)
+    film = Film(replace(SHARP, people=0, lamps=(lamp,)))
+    images = [moment.views[0].image.astype(float) for moment in film.moments()]
+    viewer = film.viewers[0]
+    far = np.hypot(*np.nan_to_num(viewer.room.ground, nan=99.0).transpose(2, 0, 1))
+    for frame in (0, 2, 6, 9):
+        np.testing.assert_array_equal(images[frame], images[0])
+    gain = images[3] / np.maximum(images[0], 1)
+    assert np.median(gain[far < 0.5]) == pytest.approx(1.72, abs=0.05)  # half of 1.5 a metre below it
+    assert gain[far < 0.5].min() > 1.5 > 1.15 > np.median(gain[(far > 2.5) & (far < 99)])
+
+
+def test_a_cloud_comes_slowly_and_is_everywhere() -> None:
+    film = Film(replace(SHARP, people=0, lamps=(Lamp(-0.5, on=0.2, rise=0.4),)))
+    means = np.array([moment.views[1].image.mean() for moment in film.moments()])
+    np.testing.assert_allclose(means[[0, 2, 4, 6, 9]] / means[0], [1, 1, 0.75, 0.5, 0.5], atol=0.02)
+
+
+def test_people_stand_in_the_light_of_lamps() -> None:
+    spec = replace(SHARP, seconds=0.1, size=(160, 120))
+    lit = replace(spec, lamps=(Lamp(0.4, on=0.0, place=(0.0, 0.0, 2.0), reach=2.0),))
+    dark, bright = (next(Film(one).moments()).views[0] for one in (spec, lit))
+    person = np.asarray(dark.instances > 0)
+    assert person.any()
+    np.testing.assert_array_equal(dark.instances, bright.instances)
+    gain = bright.image[person].astype(float).sum() / dark.image[person].sum()
+    assert 1.1 < gain < 1.4
+
+
+@pytest.mark.parametrize(("key", "value"), [("brightness", -1.0), ("off", -2.0), ("rise", -1.0), ("reach", 0.0)])
+def test_lamps_that_cannot_be_are_refused(key: str, value: float) -> None:
+    with pytest.raises(ConfigError, match=key):
+        Lamp(**{"brightness": 1.0, "on": 0.0, key: value})
 
 
 # The detector

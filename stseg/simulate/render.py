@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from stseg.arrays import Boxes, Bytes, Floats, Ints
+from stseg.arrays import Boxes, Bytes, Floats, Ints, Singles
 from stseg.geometry import Camera
 from stseg.simulate.body import Bodies
 from stseg.simulate.cameras import frame_seed, light_phase, pixel_rays
@@ -15,6 +15,7 @@ from stseg.simulate.chance import Topic, chance
 from stseg.simulate.clothes import wardrobe
 from stseg.simulate.detector import detect, visible_boxes
 from stseg.simulate.draw import draw_bodies, pixel_boxes
+from stseg.simulate.lamps import lit
 from stseg.simulate.room import look
 from stseg.simulate.scene import SceneSpec
 from stseg.simulate.sensor import expose
@@ -56,11 +57,14 @@ class Drawing:
         As in `View`.
     silhouettes : int64 (n, 5)
         See `stseg.simulate.draw.draw_bodies`.
+    depth : float32 (v, u)
+        Of what is seen, in lengths of the pixels' rays, metres.
     """
 
     light: Bytes
     instances: NDArray[np.uint16]
     silhouettes: Ints
+    depth: Singles
 
 
 class Viewer:
@@ -84,7 +88,7 @@ class Viewer:
 
     def empty(self, frame: int) -> Bytes:
         """The camera's frame of the empty room, uint8 (v, u, 3)."""
-        return self._expose(self.room.image, frame)
+        return self._expose(self.room.image, self.room.depth, frame)
 
     def view(self, crowd: Crowd, bodies: Bodies) -> View:
         """The camera's frame of a crowd whose `bodies` are those of `stseg.simulate.body.pose`."""
@@ -95,12 +99,13 @@ class Viewer:
         visible_boxes(drawing.instances, row_of, visible)
         lots = chance(self._spec.seed, Topic.DETECTOR, *frame_seed(self._turn, crowd.frame))
         boxes = detect(self.camera, visible, drawing.silhouettes, np.array(self._spec.area) / 2, lots)
-        return View(self._expose(drawing.light, crowd.frame), drawing.instances, boxes)
+        image = self._expose(drawing.light, drawing.depth, crowd.frame)
+        return View(image, drawing.instances, boxes)
 
     def draw(self, crowd: Crowd, bodies: Bodies) -> Drawing:
         """The crowd in the room."""
         image = self._with_shadows(bodies)
-        depth = np.full(image.shape[:2], np.inf, np.float32)
+        depth = self.room.depth.copy()
         instances = np.zeros(image.shape[:2], np.uint16)
         silhouettes = np.empty((len(crowd.id), 5), np.int64)
         paint = np.array([wardrobe(self._spec.seed, int(person)) for person in crowd.id])
@@ -119,7 +124,7 @@ class Viewer:
                 instances,
                 silhouettes,
             )
-        return Drawing(image, instances, silhouettes)
+        return Drawing(image, instances, silhouettes, depth)
 
     def _with_shadows(self, bodies: Bodies) -> Bytes:
         """The room with the people's shadows and without the people."""
@@ -133,6 +138,10 @@ class Viewer:
         image[dark] = np.rint(image[dark] * (1 - self._spec.shadows * shade[dark])[:, None])
         return image
 
-    def _expose(self, light: Bytes, frame: int) -> Bytes:
+    def _expose(self, light: Bytes, depth: Singles, frame: int) -> Bytes:
         lots = chance(self._spec.seed, Topic.SENSOR, *frame_seed(self._turn, frame))
-        return expose(light, self._spec.gain(frame, self._phase), self._spec.noise, lots)
+        gain: Singles | float = self._spec.gain(frame, self._phase)
+        if self._spec.lamps:
+            points = self._eye + depth[..., None] * self._rays
+            gain = np.float32(gain) * lit(self._spec.lamps, frame / self._spec.frame_rate, points)
+        return expose(light, gain, self._spec.noise, lots)

@@ -29,10 +29,13 @@ class Room:
         Blue, green, red.
     ground : float32 (v, u, 2)
         Ground points that the pixels show, metres; nan on the walls.
+    depth : float32 (v, u)
+        Of what they show, in lengths of their rays, metres.
     """
 
     image: Bytes
     ground: Singles
+    depth: Singles
 
 
 def look(spec: SceneSpec, rays: Singles, eye: Floats) -> Room:
@@ -54,7 +57,10 @@ def look(spec: SceneSpec, rays: Singles, eye: Floats) -> Room:
     # Four rays a pixel, so that the joints between tiles do not flicker where they are narrow.
     shots = [_shoot(rays + 0.25 * (i * across + j * down), eye, half, lattice) for i in (-1, 1) for j in (-1, 1)]
     image = np.where(seen[..., None], np.mean(shots, axis=0), 0.0)
-    return Room(np.clip(np.rint(image), 0, 255).astype(np.uint8), _ground(rays, eye, half))
+    ground = _ground(rays, eye, half)
+    down = np.where(rays[..., 2] < 0, rays[..., 2], -1.0)
+    depth = np.where(np.isfinite(ground[..., 0]), -eye[2] / down, np.abs(_to_walls(rays, eye, half)).min(axis=-1))
+    return Room(np.clip(np.rint(image), 0, 255).astype(np.uint8), ground, depth.astype(np.float32))
 
 
 def _ground(rays: Singles, eye: Floats, half: float) -> Singles:
@@ -66,12 +72,16 @@ def _ground(rays: Singles, eye: Floats, half: float) -> Singles:
     return np.where(inside[..., None], ground, np.nan).astype(np.float32)
 
 
+def _to_walls(rays: Singles, eye: Floats, half: float) -> Floats:
+    """How far the walls across x and y are, in lengths of the rays, float64 (v, u, 2)."""
+    with np.errstate(divide="ignore"):
+        far = (np.where(rays[..., :2] < 0, -half, half) - eye[:2]) / np.where(rays[..., :2] == 0, 1e-9, rays[..., :2])
+    return np.asarray(far, float)
+
+
 def _shoot(rays: Singles, eye: Floats, half: float, lattice: Floats) -> Floats:
     """Colours that rays meet, float64 (v, u, 3)."""
-    with np.errstate(divide="ignore"):
-        to_walls = (np.where(rays[..., :2] < 0, -half, half) - eye[:2]) / np.where(
-            rays[..., :2] == 0, 1e-9, rays[..., :2]
-        )
+    to_walls = _to_walls(rays, eye, half)
     side = np.argmin(np.abs(to_walls), axis=-1)
     hit = eye + np.abs(to_walls).min(axis=-1)[..., None] * rays
     along = np.where(side == 0, hit[..., 1], hit[..., 0]) + 3.7 * half * (1 + side + 2 * (hit.sum(axis=-1) > 0))

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 from stseg.errors import ConfigError
+from stseg.simulate.lamps import Lamp
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +37,8 @@ class SceneSpec:
         Standard deviation of the sensor's noise, grey levels.
     light_drift, light_period
         Relative amplitude of the light's slow change, and its period in seconds.
+    lamps
+        Light that changes at once; it adds up.
     shadows
         How much light the people's shadows take from the ground, 0..1.
     quality
@@ -67,6 +70,7 @@ class SceneSpec:
     noise: float = 3.0
     light_drift: float = 0.05
     light_period: float = 20.0
+    lamps: tuple[Lamp, ...] = ()
     shadows: float = 0.35
     quality: int = 85
     speed: tuple[float, float] = (0.6, 1.5)

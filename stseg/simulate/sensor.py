@@ -5,20 +5,20 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from stseg.arrays import Bytes
+from stseg.arrays import Bytes, Singles
 
 _SOFTNESS = 0.6
 """Standard deviation of the lens's blur, pixels."""
 
 
-def expose(light: Bytes, gain: float, noise: float, lots: np.random.Generator) -> Bytes:
+def expose(light: Bytes, gain: Singles | float, noise: float, lots: np.random.Generator) -> Bytes:
     """The frame that a camera delivers.
 
     Parameters
     ----------
     light : uint8 (v, u, 3)
         The scene at normal light.
-    gain
+    gain : float32 (v, u) or float
         Light relative to normal.
     noise
         Standard deviation of the sensor's noise, grey levels.
@@ -32,5 +32,5 @@ def expose(light: Bytes, gain: float, noise: float, lots: np.random.Generator) -
     soft = cv2.GaussianBlur(light, (5, 5), _SOFTNESS)
     frame = lots.standard_normal(light.shape, np.float32)
     frame *= noise
-    frame += np.float32(gain) * soft + 0.5
+    frame += np.float32(gain) * soft + 0.5 if isinstance(gain, float) else gain[..., None] * soft + np.float32(0.5)
     return np.clip(frame, 0, 255, out=frame).astype(np.uint8)
