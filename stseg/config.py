@@ -114,6 +114,23 @@ class ForegroundConfig(MixtureConfig):
 
 
 @dataclass(frozen=True)
+class LightConfig:
+    """Light that changes at once (METHODS 2)."""
+
+    rise: float = 0.2
+    """Share of a view that must turn into foreground for it to be the light that changed, 0..1."""
+    within: float = 2.0
+    """How fast that happens, seconds."""
+    blindness: float = 1.0
+    """How long a view may say nothing while its new light is learned, seconds."""
+
+    def __post_init__(self) -> None:
+        require(0 < self.rise < 1, self, "rise", "a number between 0 and 1")
+        require(self.within > 0, self, "within", "seconds, above 0")
+        require(self.blindness > 0, self, "blindness", "seconds, above 0")
+
+
+@dataclass(frozen=True)
 class GhostConfig:
     """The pass that decides which candidates are people (METHODS 7)."""
 
@@ -225,6 +242,7 @@ class Config:
     """All stages."""
 
     foreground: ForegroundConfig = field(default_factory=ForegroundConfig)
+    light: LightConfig = field(default_factory=LightConfig)
     occupancy: OccupancyConfig = field(default_factory=OccupancyConfig)
     segmentation: SegmentationConfig = field(default_factory=SegmentationConfig)
     identity: IdentityConfig = field(default_factory=IdentityConfig)

@@ -332,7 +332,7 @@ def test_people_stand_in_the_light_of_lamps() -> None:
 @pytest.mark.parametrize(("key", "value"), [("brightness", -1.0), ("off", -2.0), ("rise", -1.0), ("reach", 0.0)])
 def test_lamps_that_cannot_be_are_refused(key: str, value: float) -> None:
     with pytest.raises(ConfigError, match=key):
-        Lamp(**{"brightness": 1.0, "on": 0.0, key: value})
+        Lamp(**{"brightness": 1.0, "on": 0.0, key: value})  # type: ignore[arg-type]
 
 
 # The detector

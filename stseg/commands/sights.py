@@ -10,6 +10,7 @@ import numpy as np
 from stseg.arrays import Bytes
 from stseg.config import Config
 from stseg.foreground import make_background
+from stseg.foreground.light_change import LightWatch
 from stseg.foreground.sight import Sight
 from stseg.io.frames import open_frames, read_background
 from stseg.io.recording import Recording
@@ -38,7 +39,7 @@ def _sight(recording: Recording, camera: int, config: Config, first: int, stop: 
             model.learn(np.asarray(image, np.uint8))
     else:
         model.learn_from(_spread(recording, camera, first, stop))
-    return Sight(model)
+    return Sight(LightWatch(model, recording.rig.frame_rate, config.light))
 
 
 def _spread(recording: Recording, camera: int, first: int, stop: int) -> Iterator[Bytes]:

@@ -7,6 +7,7 @@ from stseg.foreground.choice import make_background
 from stseg.foreground.chromatic import Chromatic
 from stseg.foreground.codebook import Codebook
 from stseg.foreground.instances import instance_boxes
+from stseg.foreground.light_change import LightChange, LightWatch
 from stseg.foreground.masks import mask_likelihood
 from stseg.foreground.mixture import Mixture
 
@@ -16,6 +17,8 @@ __all__ = [
     "ChromaticConfig",
     "Codebook",
     "CodebookConfig",
+    "LightChange",
+    "LightWatch",
     "Mixture",
     "MixtureConfig",
     "box_likelihood",

@@ -46,6 +46,14 @@ class Background(Protocol):
         """The posterior probability that each pixel shows a person, float32 (v, u) in (0, 1); then learns the frame."""
         ...
 
+    def commonest(self) -> Singles:
+        """The commonest background of each pixel, grey levels in the light that it was learned in, (v, u, 3)."""
+        ...
+
+    def relight(self, gain: Singles) -> None:
+        """Take all that it has learned into another light, by gains float32 (v, u, 3)."""
+        ...
+
     def state(self) -> dict[str, AnyArray]:
         """Copies of all that it has learned, from which a model of its kind goes on bit for bit."""
         ...
@@ -185,6 +193,15 @@ class PixelModel(ABC):
         self._follow(slice(self._asked % TURNS, None, TURNS), image, gain, likelihood)
         self._asked += 1
         return likelihood
+
+    def commonest(self) -> Singles:
+        """The commonest background of each pixel, grey levels in the light that it was learned in, (v, u, 3)."""
+        strongest = self._arrays["weight"].argmax(-1)[:, :, None, None]
+        return np.asarray(np.take_along_axis(self._arrays["mean"], strongest, 2)[:, :, 0])
+
+    def relight(self, gain: Singles) -> None:
+        """Take all that it has learned into another light, by gains float32 (v, u, 3)."""
+        self._arrays["mean"] *= gain[:, :, None]
 
     @abstractmethod
     def _start(self, frames: NDArray[np.uint8]) -> None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from stseg.arrays import Boxes, Observation, Singles
-from stseg.foreground.background import Background
 from stseg.foreground.instances import instance_boxes
+from stseg.foreground.light_change import LightChange, LightWatch
 from stseg.foreground.masks import mask_likelihood
 
 Evidence = Boxes | Singles | None
@@ -19,14 +19,21 @@ class Sight:
     Parameters
     ----------
     background
-        The model of the empty scene of a colour camera; None for all others.
+        The model of the empty scene of a colour camera, its light watched; None for all others.
     """
 
-    def __init__(self, background: Background | None = None) -> None:
+    def __init__(self, background: LightWatch | None = None) -> None:
         self.background = background
+
+    @property
+    def light_changes(self) -> list[LightChange]:
+        """When the light changed at once, in frames since the first that was asked for."""
+        return [] if self.background is None else self.background.changes
 
     def evidence(self, seen: Observation) -> Evidence:
         """What the frame shows; colour frames also teach the background model."""
+        if seen is None and self.background is not None:
+            self.background.skip()
         if seen is None or isinstance(seen, Boxes):
             return seen
         if seen.dtype == np.uint16:
@@ -36,7 +43,7 @@ class Sight:
         if self.background is None:
             raise ValueError("a colour frame needs a background model")
         posterior = self.background.likelihood(np.asarray(seen, np.uint8))
-        return without_prior(posterior, self.background.prior)
+        return None if posterior is None else without_prior(posterior, self.background.model.prior)
 
 
 def without_prior(posterior: Singles, prior: float) -> Singles:
