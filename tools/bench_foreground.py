@@ -18,6 +18,7 @@ os.environ.setdefault("NUMBA_NUM_THREADS", "1")
 
 import argparse
 import json
+import sys
 import time
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
@@ -141,16 +142,13 @@ def main() -> None:
     parser.add_argument("--pictures", type=Path)
     asked = parser.parse_args()
     models = asked.models.split(",")
-    scenes: dict[str, Callable[[], list[Shot]]] = {
-        name: lambda name=name: [shoot(name)] for name in asked.films.split(",") if name
-    }  # type: ignore[misc]
-    scenes |= {name: lambda name=name: RECORDINGS[name](asked.data) for name in asked.recordings.split(",") if name}  # type: ignore[misc]
     found = {}
-    for name, make in scenes.items():
+    for name in filter(None, (*asked.films.split(","), *asked.recordings.split(","))):
         folder = asked.pictures / name if asked.pictures else None
         if folder:
             folder.mkdir(parents=True, exist_ok=True)
-        found[name] = compare(make(), models, folder)
+        found[name] = compare(RECORDINGS[name](asked.data) if name in RECORDINGS else [shoot(name)], models, folder)
+        print(name, {method: round(score[0], 3) for method, score in found[name].items()}, file=sys.stderr, flush=True)
     taken = milliseconds(models)
     if found:
         print(score_table(found, 0, "area under the curve"), end="\n\n")
