@@ -54,7 +54,7 @@ def pool_log_odds(log_odds: Singles, radius: int, rows: Singles, likelihood: Sin
         down = 0.0
         for k in range(first, last):
             weight = np.float32(radius + 1 - abs(k - v))
-            down += weight
+            down += radius + 1 - abs(k - v)
             for u in range(width):
                 likelihood[v, u] += weight * rows[k, u]
         mean, value = 0.0, 0.5
