@@ -270,11 +270,12 @@ def follow(
 
 
 def pooled(values: Floats, radius: int) -> Floats:
-    """Logistic function of the mean over a square."""
+    """Logistic function of the mean around each pixel, by weights that fall straight along each axis."""
     out = np.empty(values.shape)
+    row, column = np.indices(values.shape)
     for v, u in np.ndindex(*values.shape):
-        square = values[max(0, v - radius) : v + radius + 1, max(0, u - radius) : u + radius + 1]
-        out[v, u] = 1 / (1 + math.exp(-square.mean()))
+        weight = np.maximum(radius + 1 - np.abs(row - v), 0) * np.maximum(radius + 1 - np.abs(column - u), 0)
+        out[v, u] = 1 / (1 + math.exp(-(weight * values).sum() / weight.sum()))
     return out
 
 

@@ -4,8 +4,9 @@
                                      [--models Mixture,Codebook] [--json FILE] [--pictures FOLDER]
 
 All learn the same frames of the empty scene. Area under the precision-recall curve of all pixels of all frames: ours
-from one pass of soft maps with watched light, the peers' from the best points of 14 passes or, in long films, 28: over
-thresholds, with and without their shadow detection, with a memory of 500 and of 5000 frames. Then the largest overlap
+from one pass of soft maps with watched light, the peers' from the best points of 28 passes or, in long films, 56: over
+thresholds, with and without their shadow detection, at the rate they choose and at a steady one, with a memory of 500
+and of 5000 frames. Then the largest overlap
 (intersection over union) with the masks at one level for all frames, and the median processor time of a frame of
 720x576 on one thread.
 """
@@ -96,7 +97,7 @@ def milliseconds(models: Sequence[str], rounds: int = 60) -> dict[str, float]:
             model.learn(image)
         asked[name] = model.likelihood
     for peer_name, level in (("MOG2", 16.0), ("KNN", 400.0)):
-        peer = Setting(peer_name, level, True, HISTORY[0]).make()
+        peer = Setting(peer_name, level, True, HISTORY[0], False).make()
         for image in empty:
             peer.learn(image)
         asked[peer_name] = peer.mask

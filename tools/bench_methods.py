@@ -49,15 +49,15 @@ def ours(name: str, size: tuple[int, int], frame_rate: float) -> Ours:
 class Peer:
     """A background subtractor of OpenCV; a shadow is background."""
 
-    def __init__(self, subtractor: cv2.BackgroundSubtractor) -> None:
-        self._subtractor = subtractor
+    def __init__(self, subtractor: cv2.BackgroundSubtractor, rate: float) -> None:
+        self._subtractor, self._rate = subtractor, rate
 
     def learn(self, image: Bytes) -> None:
         self._subtractor.apply(image)
 
     def mask(self, image: Bytes) -> Flags:
         """What it calls foreground, bool (v, u)."""
-        return np.asarray(self._subtractor.apply(image) == 255, np.bool_)
+        return np.asarray(self._subtractor.apply(image, learningRate=self._rate) == 255, np.bool_)
 
 
 @dataclass(frozen=True)
@@ -68,20 +68,22 @@ class Setting:
     level: float
     shadows: bool
     history: int
+    steady: bool
+    """Whether it learns at the rate 1 / history once the empty scene is known; else as it chooses, faster at first."""
 
     def make(self) -> Peer:
         """A subtractor of this setting."""
-        if self.peer == "MOG2":
-            return Peer(cv2.createBackgroundSubtractorMOG2(self.history, self.level, self.shadows))
-        return Peer(cv2.createBackgroundSubtractorKNN(self.history, self.level, self.shadows))
+        make = {"MOG2": cv2.createBackgroundSubtractorMOG2, "KNN": cv2.createBackgroundSubtractorKNN}[self.peer]
+        return Peer(make(self.history, self.level, self.shadows), 1.0 / self.history if self.steady else -1.0)
 
 
 def settings(peer: str, frames: int) -> Iterator[Setting]:
     """All settings of a peer for a film of so many frames; until half its memory has passed, that changes nothing."""
     for history in HISTORY if frames > min(HISTORY) / 2 else HISTORY[:1]:
-        for shadows in (False, True):
-            for level in LEVELS[peer]:
-                yield Setting(peer, level, shadows, history)
+        for steady in (False, True):
+            for shadows in (False, True):
+                for level in LEVELS[peer]:
+                    yield Setting(peer, level, shadows, history, steady)
 
 
 class Count:

@@ -186,16 +186,16 @@ def follow(
             nearest, distance, nearest_ratio = -1, reach * reach, _ZERO
             place, oldest = -1, now
             for k in range(weight.shape[2]):
-                away = now - access[v, u, k, 1]
-                moved_in = access[v, u, k, 0] > 0
-                if moved_in and away > (absence if weight[v, u, k] == _ZERO else absorption):
-                    frequency[v, u, k] = weight[v, u, k] = _ZERO
-                if weight[v, u, k] == _ZERO:
-                    last = access[v, u, k, 1] if frequency[v, u, k] > _ZERO else -1
-                    if last < oldest:
-                        place, oldest = k, last
+                if frequency[v, u, k] > _ZERO and access[v, u, k, 0] > 0:
+                    allowed = absence if weight[v, u, k] == _ZERO else absorption
+                    if now - access[v, u, k, 1] > allowed:
+                        frequency[v, u, k] = weight[v, u, k] = _ZERO
                 if frequency[v, u, k] == _ZERO:
+                    if oldest >= 0:
+                        place, oldest = k, -1
                     continue
+                if weight[v, u, k] == _ZERO and access[v, u, k, 1] < oldest:
+                    place, oldest = k, access[v, u, k, 1]
                 m0 = min(gain[0] * mean[v, u, k, 0], _WHITE)
                 m1 = min(gain[1] * mean[v, u, k, 1], _WHITE)
                 m2 = min(gain[2] * mean[v, u, k, 2], _WHITE)
