@@ -20,7 +20,7 @@ from stseg.geometry.bodies import BodyTable
 from stseg.ghosts.explain import Explanation, FramePass, People, ViewEvidence
 from stseg.occupancy.clutter import clutter, clutter_weights
 from stseg.occupancy.fusion import Rates
-from stseg.occupancy.instances import fill_likelihood
+from stseg.occupancy.instances import fill_match_of_planes
 from stseg.occupancy.sampling import Sampling, SamplingKind
 from stseg.occupancy.tables import TOP
 from stseg.occupancy.volume import Occupancy
@@ -177,7 +177,7 @@ def test_likelihood_per_plane_by_definition(seed: int) -> None:
     edges = np.concatenate([shaken.pixel[:, :2], shaken.pixel[:, :2] + shaken.pixel[:, 2:]], 1)
     edges = edges.clip(0, [camera.size[0] - 1, camera.size[1] - 1] * 2)
     likelihood = np.full(grid.shape, np.nan, np.float32)
-    fill_likelihood(
+    fill_match_of_planes(
         bodies.astype(np.float32), tried, 0.1, 1.7, np.array([1.6, 1.8]), grid.heights, edges, np.log(shaken.score),
         box_owner, near, 128.0, 96.0, likelihood,
     )  # fmt: skip

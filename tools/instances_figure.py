@@ -18,7 +18,7 @@ from stseg.arrays import Floats, Singles
 from stseg.config import GhostConfig
 from stseg.geometry import Camera, Grid
 from stseg.geometry.bodies import BodyTable
-from stseg.occupancy.instances import fill_likelihood
+from stseg.occupancy.instances import fill_match_of_planes
 from stseg.simulate import SceneSpec
 from stseg.simulate.cameras import build_rig
 
@@ -64,7 +64,7 @@ def per_plane(table: BodyTable, ground: Floats, grid: Grid, boxes: Floats) -> Si
     bodies = table.boxes(ground, heights).reshape(len(heights), 1, 3, 4).astype(np.float32)
     likelihood = np.zeros((grid.planes, 1, 3), np.float32)
     nobody, (width, height) = np.full((1, 3), -1), map(float, table.size)
-    fill_likelihood(
+    fill_match_of_planes(
         bodies, heights, config.height_spread, config.height_mean, np.zeros(0), grid.heights, boxes, np.zeros(2),
         np.full(2, -1), nobody, width, height, likelihood,
     )  # fmt: skip

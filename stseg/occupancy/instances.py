@@ -1,8 +1,12 @@
 """Likelihood per plane from boxes: each box knows its head and its feet (METHODS 3 'Instances').
 
-    L(X, Z) = max over boxes b and heights h >= Z of N(h) / N(mean) exp(match(b, pillar(X, h)))
+    M(X, Z) = max over boxes b and heights h >= Z of N(h) / N(mean) exp(match(b, pillar(X, h)))
 
-A cell is spoken for by the box of the person near it and by boxes that nobody explains.
+is how well the best box fits a body there. A cell is spoken for by the box of the person near it and by boxes that
+nobody explains. The body is either missed, or shown by a box that fits that well, where clutter boxes are anyhow: odds of
+r = m + M (1 - m) / b. L(X, Z) is the likelihood that says as much in METHODS 4's log-odds,
+
+    ((1 - m) L + m (1 - L)) / (b L + (1 - b) (1 - L)) = r.
 """
 
 from __future__ import annotations
@@ -12,10 +16,19 @@ import numpy as np
 from stseg.accelerate import kernel
 from stseg.arrays import Floats, Ints, Singles
 from stseg.ghosts.boxes import half_square
+from stseg.occupancy.fusion import Rates
+
+
+def likelihood_of(match: Singles, rates: Rates) -> Singles:
+    """L of each cell, float32, 0..1, from M, float32 of any shape."""
+    miss, clutter = rates
+    ratio = miss + match * (1 - miss) / clutter
+    likelihood = (ratio * (1 - clutter) - miss) / (1 - 2 * miss + ratio * (1 - 2 * clutter))
+    return np.asarray(likelihood.clip(0.0, 1.0), np.float32)
 
 
 @kernel
-def fill_likelihood(
+def fill_match_of_planes(
     bodies: Singles,
     heights: Floats,
     spread: float,
@@ -28,9 +41,9 @@ def fill_likelihood(
     near: Ints,
     width: float,
     height: float,
-    likelihood: Singles,
+    match: Singles,
 ) -> None:
-    """Fill likelihood (plane, y, x) of one view.
+    """Fill match, M (plane, y, x), of one view.
 
     Parameters
     ----------
@@ -58,7 +71,7 @@ def fill_likelihood(
             plane = len(planes) - 1
             for h in range(len(heights) - 1, -1, -1):
                 while plane >= 0 and planes[plane] > heights[h]:
-                    likelihood[plane, y, x] = reached
+                    match[plane, y, x] = reached
                     plane -= 1
                 if np.isnan(bodies[h, y, x, 0]):
                     continue
@@ -69,5 +82,5 @@ def fill_likelihood(
                         fit = height_prior + belief[b] - half_square(body, boxes[b], width, height)
                         reached = max(reached, np.exp(fit))
             while plane >= 0:
-                likelihood[plane, y, x] = reached
+                match[plane, y, x] = reached
                 plane -= 1

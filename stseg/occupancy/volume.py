@@ -16,7 +16,7 @@ from stseg.ghosts.explain import Explanation, ViewEvidence
 from stseg.occupancy.clutter import clutter, clutter_side, clutter_weights
 from stseg.occupancy.explained import Owners, fill_share, leave_unexplained
 from stseg.occupancy.fusion import Rates, Tally, log_odds_terms
-from stseg.occupancy.instances import fill_likelihood
+from stseg.occupancy.instances import fill_match_of_planes, likelihood_of
 from stseg.occupancy.means import CellMeans
 from stseg.occupancy.sampling import Sampling
 from stseg.occupancy.tables import TOP, UNSEEN, Levels
@@ -102,16 +102,16 @@ class Occupancy:
 
     def _levels_of_boxes(self, i: int, view: Boxes, explanation: Explanation, near: Ints) -> Levels:
         """Likelihood per plane of each cell."""
-        per_plane = np.zeros(self.rig.grid.shape, np.float32)
+        match = np.zeros(self.rig.grid.shape, np.float32)
         edges = np.concatenate([view.pixel[:, :2], view.pixel[:, :2] + view.pixel[:, 2:]], 1)
         width, height = map(float, self.rig.cameras[i].size)
         edges = edges.clip(0, [width - 1, height - 1] * 2)
         belief = np.log(view.score.clip(0.05, 1.0))
-        fill_likelihood(
+        fill_match_of_planes(
             self.bodies[i], self.heights, self.height_spread, self.height_mean, explanation.people.height,
-            self.rig.grid.heights, edges, belief, explanation.box_owner[i], near, width, height, per_plane,
+            self.rig.grid.heights, edges, belief, explanation.box_owner[i], near, width, height, match,
         )  # fmt: skip
-        levels = np.rint(per_plane * TOP).astype(np.int16)
+        levels = np.rint(likelihood_of(match, self.rates[i]) * TOP).astype(np.int16)
         levels[self.sampling.footprint[i, ..., 2] == 0] = UNSEEN
         return levels
 
