@@ -131,7 +131,7 @@ class Pipeline:
             explanation = self.frame_pass.explain(seen, expected)
         with watch.time("occupancy"):
             log_odds = self.occupancy.fuse(seen, explanation)
-        return Scene(moment.frame, explanation.people, log_odds), explanation
+        return Scene(moment.frame, explanation.people, explanation.ghosts, log_odds), explanation
 
     def finished(self, trajectory: Rows) -> Tracks:
         """The tracks of the whole run from all committed rows: short ones dropped, gaps filled, boxes drawn."""

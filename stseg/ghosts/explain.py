@@ -142,7 +142,7 @@ class FramePass:
         prior = _Prior(
             expected or nobody(), self.config, self.border, 0.0 if expected is None else self.config.newcomer
         )
-        frame = _Frame(self, sights, prior, prior.pool(), np.arange(len(prior.expected)))
+        frame = _Frame(self, sights, prior, pool := prior.pool(), np.arange(len(pool)))
         for _ in range(self.config.rounds):
             fresh = self._fresh(frame)
             moved = frame.refined()[0]
@@ -186,9 +186,9 @@ class _Prior:
     cost: float
 
     def pool(self) -> Pool:
-        """Those expected, as candidates."""
-        heights = self.config.heights
-        return Pool(self.expected.ground, self.expected.height.clip(min(heights), max(heights)))
+        """Those expected inside the border, as candidates: who leaves the area is not followed out of it."""
+        heights, inside = self.config.heights, self.border.away(self.expected.ground) > 0
+        return Pool(self.expected.ground[inside], self.expected.height[inside].clip(min(heights), max(heights)))
 
     def newcomer(self, pool: Pool) -> Floats:
         """What each candidate costs as a newcomer, nats, float64 (n,)."""

@@ -15,6 +15,7 @@ from stseg.arrays import Floats, Ints
 from stseg.config import GhostConfig, IdentityConfig
 from stseg.ghosts.expected import Expected
 from stseg.ghosts.explain import People
+from stseg.identity.linking import distances
 
 _TURN = 0.8
 """How people change their velocity, metres per second per square root of a second (standard deviation)."""
@@ -24,6 +25,12 @@ _GROWTH = 0.002
 """How a person's height changes, metres per square root of a second (standard deviation): shoes, stoop, lens."""
 _STAYING = 1.0
 """Log-odds at most that somebody seen in one frame is found in the next, nats."""
+_DOUBTFUL = -4.0
+"""Log-odds below which somebody who was not found is not looked for again, nats."""
+_REPEATED = 2.0
+"""What is taken off them: a second frame's evidence is not independent of the first's, nats."""
+_BESIDE = 0.5
+"""Nobody new is looked for so near to somebody who is followed, metres."""
 _FORGETTING = 4.0
 """How fast those fall while a walker is out of sight, nats per second."""
 
@@ -35,7 +42,7 @@ class Walker:
     Attributes
     ----------
     chain
-        Number, from 1.
+        Number, from 1; 0 for somebody who was not found yet, but may be there.
     seen
         The last frame that showed them.
     state, covariance : float64 (4,), (4, 4)
@@ -117,7 +124,7 @@ class Walkers:
             np.array([w.odds for w in carried]),
         )
 
-    def follow(self, frame: int, people: People) -> Ints:
+    def follow(self, frame: int, people: People, ghosts: People) -> Ints:
         """The chain of each person of a frame that was explained with what `expected` said.
 
         Returns
@@ -137,10 +144,15 @@ class Walkers:
                     min(float(odds), _STAYING),
                 )
             )  # fmt: skip
-            chains[j] = before.chain
+            if before.chain == 0:
+                self.issued += 1
+                followed[-1] = replace(followed[-1], chain=self.issued)
+            chains[j] = followed[-1].chain
         patience = round(self.config.patience * self.frame_rate)
         hidden = np.setdiff1d(np.arange(len(self.walkers)), people.walker)
-        self.walkers = followed + [self.walkers[k] for k in hidden if frame - self.walkers[k].seen <= patience]
+        lost = [self.walkers[k] for k in hidden if self.walkers[k].chain and frame - self.walkers[k].seen <= patience]
+        self.walkers = followed + lost
+        self.walkers += self._doubtful(frame, ghosts)
         return chains
 
     @property
@@ -152,11 +164,19 @@ class Walkers:
         hidden = seconds - 1 / self.frame_rate
         return replace(walker.carried(seconds), odds=walker.odds - _FORGETTING * hidden)
 
+    def _doubtful(self, frame: int, ghosts: People) -> list[Walker]:
+        """Who was not believed in this frame, but will be if the next shows them again (evidence adds up over time)."""
+        standing = np.array([self._carried(walker, frame).state[:2] for walker in self.walkers]).reshape(-1, 2)
+        near = distances(ghosts.ground, standing).min(1, initial=np.inf) < _BESIDE
+        return [
+            replace(self._newcomer(frame, ghosts, j), odds=float(ghosts.evidence[j]) - _REPEATED)
+            for j in np.flatnonzero(~near & (ghosts.evidence > _DOUBTFUL))
+        ]
+
     def _newcomer(self, frame: int, people: People, j: int) -> Walker:
         """Somebody new: anywhere near the place, as tall as anybody, of any velocity."""
-        self.issued += 1
         spread = np.diag([0.0, 0.0, _STILL**2, _STILL**2])
         spread[:2, :2] = people.covariance[j] + self._place_noise
         state = np.append(people.ground[j], [0.0, 0.0])
         mean, variance = self.ghosts.height_mean, self.ghosts.height_spread**2
-        return Walker(self.issued, frame, state, spread, mean, variance, 0.0)
+        return Walker(0, frame, state, spread, mean, variance, 0.0)

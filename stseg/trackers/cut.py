@@ -82,7 +82,7 @@ class CutTracker:
             done.append(self._solve(self.window))
             self.window = next(self.coming)
             self.held = [linked for linked in self.held if linked.scene.frame >= self.window.solve_first]
-        chains = self.walkers.follow(scene.frame, scene.people)
+        chains = self.walkers.follow(scene.frame, scene.people, scene.ghosts)
         self.held.append(_Linked(scene, chains))
         return done
 

@@ -41,7 +41,7 @@ class FrameTracker:
         """The next frame, decided."""
         people = scene.people
         known = self.walkers.issued
-        ids = self.walkers.follow(scene.frame, people)
+        ids = self.walkers.follow(scene.frame, people, scene.ghosts)
         label, extent = self._label(scene, ids)
         births = [(scene.frame, "birth", int(i), 0, "nobody known was near") for i in np.sort(ids[ids > known])]
         rows = trajectory_rows(

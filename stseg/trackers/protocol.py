@@ -20,12 +20,15 @@ class Scene:
         Its number in the recording.
     people
         Whom the pass of the frame found.
+    ghosts
+        Candidates that the pass did not believe.
     log_odds : float32 (plane, y, x)
         The volume, nats; nan where no view sees the cell.
     """
 
     frame: int
     people: People
+    ghosts: People
     log_odds: Singles
 
 
