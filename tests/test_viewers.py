@@ -171,10 +171,11 @@ def test_the_manifest_leads_npe2_to_the_reader(run_path: Path) -> None:
     manifest.validate_imports()
     manager = npe2.PluginManager(disable=[])
     manager.register(manifest)
+    manager.activate("stseg")
     (contribution,) = manager.iter_compatible_readers([str(run_path)])
     assert contribution.plugin_name == "stseg"
     layers = contribution.exec(kwargs={"path": [str(run_path)], "stack": False, "_registry": manager.commands})
-    assert [kind for _, _, kind in layers(str(run_path))] == ["image", "labels", "tracks"]
+    assert [kind for _, _, kind in layers([str(run_path)], stack=False)] == ["image", "labels", "tracks"]
 
 
 def test_the_package_says_where_its_manifest_is() -> None:
