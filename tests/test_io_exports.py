@@ -30,6 +30,7 @@ from stseg.arrays import Rows
 from stseg.commands.main import main
 from stseg.errors import ConfigError
 from stseg.geometry import Grid
+from stseg.io.box_files import read_boxes
 from stseg.io.exports.benchmarks import wildtrack_positions, wildtrack_size
 from stseg.io.exports.formats import FORMATS
 from stseg.io.extras import load_extra
@@ -167,12 +168,14 @@ def test_pedpy_reads_jupedsim_s_database_with_the_area(run: Run, path: Path) -> 
 # MOTChallenge and WILDTRACK
 
 
-def test_mot_boxes_are_one_file_a_camera_from_pixel_1(run: Run, path: Path) -> None:
+def test_mot_boxes_are_one_file_a_camera_that_reads_as_boxes(run: Run, path: Path) -> None:
     FORMATS["mot-boxes"](path, run)
     with ZipFile(path) as archive:
         assert archive.namelist() == ["left.txt", "right.txt"]
-        assert archive.read("left.txt").decode() == "11,1,2.00,3.00,3.00,4.00,1,-1,-1,-1\n"
+        assert archive.read("left.txt").decode() == "11,1,1.00,2.00,3.00,4.00,1,-1,-1,-1\n"
         assert archive.read("right.txt") == b""
+        boxes = read_boxes(Path(archive.extract("left.txt", path.parent)), first_frame=1)
+    assert (boxes.frame.tolist(), boxes.pixel.tolist()) == ([10], [[1.0, 2.0, 3.0, 4.0]])
 
 
 def wildtrack_files(path: Path) -> tuple[dict[str, Any], dict[int, list[dict[str, Any]]]]:

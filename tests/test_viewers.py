@@ -54,6 +54,7 @@ def test_silx_opens_the_file_at_the_volume(run_path: Path) -> None:
         for axis, name in zip(shown.axes, AXES, strict=True):
             units, values = AXES[name]
             assert axis.attrs["units"] == units
+            assert axis.attrs["long_name"].endswith(f"({units})")  # all that silx writes at the axis
             np.testing.assert_allclose(axis[()], values)
         np.testing.assert_array_equal(shown.auxiliary_signals[0][()], small_volume()[1])
 

@@ -34,14 +34,14 @@ def write_mot(path: Path, run: Run) -> None:
 def write_mot_boxes(path: Path, run: Run) -> None:
     """Write a zip of 2-D MOTChallenge lines, `CAMERA.txt` each: frame, id, left, top, width, height, 1, -1, -1, -1.
 
-    Frames count from 1 there, and so do pixels: the centre of the first one is (1, 1).
+    Frames count from 1 there; left and top are edges in pixels of the real image, as in the boxes that we read.
     """
     texts = {}
     for view, camera in enumerate(run.cameras):
         own = run.boxes[run.boxes["view"] == view]
         own = own[np.lexsort((own["id"], own["frame"]))]
         lines = (
-            f"{row['frame'] + 1},{row['id']},{row['left'] + 1:.2f},{row['top'] + 1:.2f},"
+            f"{row['frame'] + 1},{row['id']},{row['left']:.2f},{row['top']:.2f},"
             f"{row['width']:.2f},{row['height']:.2f},1,-1,-1,-1\n"
             for row in own
         )
