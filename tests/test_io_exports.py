@@ -9,6 +9,7 @@ import sqlite3
 import sys
 import warnings
 from contextlib import closing
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 from zipfile import ZipFile
@@ -33,6 +34,7 @@ from stseg.geometry import Grid
 from stseg.io.box_files import read_boxes
 from stseg.io.exports.benchmarks import wildtrack_positions, wildtrack_size
 from stseg.io.exports.formats import FORMATS
+from stseg.io.exports.geographic import BEGINNING
 from stseg.io.extras import load_extra
 from stseg.io.runs import Run, RunWriter, read_run
 from stseg.tracks import TRAJECTORY, Tracks
@@ -49,15 +51,20 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
     return read_run(write_small_run(tmp_path_factory.mktemp("run") / "night.h5"))
 
 
+def run_of(path: Path, trajectory: Rows) -> Run:
+    """A run of six frames with these rows and nothing else."""
+    with RunWriter(path, small_recording(path.parent), np.ones((3, 4, 6), np.uint8), CONFIG, overwrite=True) as writer:
+        volume = np.zeros((len(FRAMES), 3, 4, 6), np.float32)
+        writer.append_frames(FRAMES, volume, volume.astype(np.int32))
+        writer.append("trajectory", trajectory)
+        writer.finish(Tracks(trajectory).summary())
+    return read_run(path)
+
+
 @pytest.fixture(scope="module")
 def empty_run(tmp_path_factory: pytest.TempPathFactory) -> Run:
     """Six frames in which nobody was found."""
-    path = tmp_path_factory.mktemp("run") / "empty.h5"
-    with RunWriter(path, small_recording(path.parent), np.ones((3, 4, 6), np.uint8), CONFIG, overwrite=False) as writer:
-        volume = np.zeros((len(FRAMES), 3, 4, 6), np.float32)
-        writer.append_frames(FRAMES, volume, volume.astype(np.int32))
-        writer.finish(Tracks(np.zeros(0, TRAJECTORY)).summary())
-    return read_run(path)
+    return run_of(tmp_path_factory.mktemp("run") / "empty.h5", np.zeros(0, TRAJECTORY))
 
 
 @pytest.fixture
@@ -95,6 +102,39 @@ def test_help_and_pages_name_every_format(name: str, capsys: pytest.CaptureFixtu
     assert re.search(rf"(^|\s){name}:", capsys.readouterr().out, re.MULTILINE)
     page = (Path(__file__).parents[1] / "docs" / "file-formats.md").read_text("utf-8")
     assert re.search(rf"^\| `{name}` \|", page, re.MULTILINE)
+
+
+@given(there=st.lists(st.lists(st.booleans(), min_size=3, max_size=3), min_size=6, max_size=6), seed=st.integers(0, 99))
+@settings(max_examples=10, deadline=None)
+def test_tracks_with_gaps_come_back_place_by_place(
+    tmp_path_factory: pytest.TempPathFactory, there: list[list[bool]], seed: int
+) -> None:
+    folder = tmp_path_factory.mktemp("gaps")
+    frame, identity = np.nonzero(np.array(there, bool))
+    table = np.zeros(len(frame), TRAJECTORY)
+    table["frame"], table["id"] = FRAMES[frame], 5 + 2 * identity
+    table["x"], table["y"] = np.random.default_rng(seed).uniform(0, 0.4, (2, len(table))).round(4)
+    run = run_of(folder / "run.h5", table)
+    for name in ("movement", "jupedsim", "mf-json"):
+        FORMATS[name](folder / name, run)
+    expected = in_order_of_ids(table)[["id", "frame", "x", "y"]].tolist()
+    with closing(sqlite3.connect(folder / "jupedsim")) as database:
+        rows = database.execute("SELECT id, frame, pos_x, pos_y FROM trajectory_data ORDER BY id, frame").fetchall()
+    assert rows == expected
+    rows = [
+        (feature["id"], round(5 * (datetime.fromisoformat(time) - BEGINNING).total_seconds()), *place)
+        for feature in json.loads((folder / "mf-json").read_text("utf-8"))["features"]
+        for time, place in zip(*(feature["temporalGeometry"][key] for key in ("datetimes", "coordinates")), strict=True)
+    ]
+    assert rows == expected
+    with xarray.open_dataset(folder / "movement", engine="h5netcdf") as data:
+        places = data.position.isel(keypoint=0).transpose("individual", "time", "space").values
+        names = data.individual.values.tolist()
+    found = [
+        (int(names[i][3:]), int(FRAMES[t]), *places[i, t].tolist())
+        for i, t in zip(*np.nonzero(np.isfinite(places[..., 0])), strict=True)
+    ]
+    assert found == expected
 
 
 @pytest.mark.parametrize(("name", "library"), [("parquet", "pyarrow"), ("movement", "h5netcdf")])
@@ -322,15 +362,9 @@ def test_geojson_lines_are_features_of_geopandas(run: Run, path: Path) -> None:
 def test_one_place_is_a_point_and_no_number_is_null(tmp_path: Path) -> None:
     table = np.zeros(1, TRAJECTORY)
     table["id"], table["frame"], table["score"], table["height"] = 7, 12, np.inf, np.nan
-    with RunWriter(
-        tmp_path / "one.h5", small_recording(tmp_path), np.ones((3, 4, 6), np.uint8), CONFIG, overwrite=False
-    ) as writer:
-        volume = np.zeros((len(FRAMES), 3, 4, 6), np.float32)
-        writer.append_frames(FRAMES, volume, volume.astype(np.int32))
-        writer.append("trajectory", table)
-        writer.finish(Tracks(table).summary())
+    run = run_of(tmp_path / "one.h5", table)
     for name in ("geojson", "mf-json"):
-        FORMATS[name](tmp_path / name, read_run(tmp_path / "one.h5"))
+        FORMATS[name](tmp_path / name, run)
     (feature,) = (json.loads(line) for line in (tmp_path / "geojson").read_text("utf-8").splitlines())
     assert feature["geometry"] == {"type": "Point", "coordinates": [0.0, 0.0]}
     (moving,) = json.loads((tmp_path / "mf-json").read_text("utf-8"))["features"]
