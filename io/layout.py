@@ -37,7 +37,7 @@ class Field:
     units
         Empty where it counts or names something.
     long_name
-        What viewers write beside it.
+        What viewers write beside it, in place of the name and the units; so it ends in the units.
     """
 
     name: str
@@ -48,14 +48,14 @@ class Field:
 
 
 SCALES = (
-    Field("time", np.dtype("<f8"), ("time",), "s", "time since the recording's first frame"),
-    Field("plane", np.dtype("<f8"), ("plane",), "m", "height above the ground"),
-    Field("y", np.dtype("<f8"), ("y",), "m", "y on the ground"),
-    Field("x", np.dtype("<f8"), ("x",), "m", "x on the ground"),
+    Field("time", np.dtype("<f8"), ("time",), "s", "time since the recording's first frame (s)"),
+    Field("plane", np.dtype("<f8"), ("plane",), "m", "height above the ground (m)"),
+    Field("y", np.dtype("<f8"), ("y",), "m", "y on the ground (m)"),
+    Field("x", np.dtype("<f8"), ("x",), "m", "x on the ground (m)"),
 )
 """The coordinates: centres of the cells."""
 
-LOG_ODDS = Field("log_odds", np.dtype("<f2"), AXES, "nat", "log-odds of a person; NaN where no view sees")
+LOG_ODDS = Field("log_odds", np.dtype("<f2"), AXES, "nat", "log-odds of a person (nat)")
 LABEL = Field("label", np.dtype("<i4"), AXES, "", "track id; 0 is background")
 FRAME = Field("frame", np.dtype("<i8"), ("time",), "", "frame of the recording")
 VIEWS = Field("views", np.dtype("u1"), AXES[1:], "", "number of views that see the cell")

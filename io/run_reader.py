@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import h5py
 import numpy as np
@@ -15,9 +15,13 @@ import numpy as np
 from stseg.arrays import Bytes, Floats, Ints, Labels, Rows, Singles
 from stseg.errors import FormatError
 from stseg.io import layout
+from stseg.io.data_frames import to_data_frame
 from stseg.io.provenance import Provenance, read_provenance
 from stseg.io.recording import Recording
 from stseg.io.rigs import parse_rig
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 T = TypeVar("T")
 
@@ -97,6 +101,24 @@ class Run:
     def recording(self) -> Recording:
         """The rig, with its grid, and the streams, as they were when the run began."""
         return parse_rig(self.provenance.rig, self.provenance.rig_path)
+
+    def data_frame(self, table: str) -> DataFrame:
+        """One of the tables as a data frame of pandas, with `time` in seconds where it has frames.
+
+        Parameters
+        ----------
+        table
+            trajectory, tracks, boxes, events, ghosts, windows or timings. Texts are strings; what each view says of a
+            candidate is one column a view, `parts_CAMERA`.
+
+        Raises
+        ------
+        ConfigError
+            Where pandas is not installed.
+        """
+        if table not in layout.ABOUT:
+            raise ValueError(f"table {table!r} is none of {', '.join(layout.ABOUT)}")
+        return to_data_frame(getattr(self, table), self.frame_rate, self.cameras)
 
     def read_frame(self, frame: int) -> tuple[Singles, Labels]:
         """Volume of one frame.

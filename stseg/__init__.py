@@ -4,7 +4,8 @@ The names below are the public ones; each is imported when it is first asked for
 
     import stseg
     run = stseg.read_run("run.h5")
-    run.trajectory["x"], run.trajectory["y"]
+    run.trajectory["x"], run.trajectory["y"]   # a structured array
+    run.data_frame("trajectory")               # the same for pandas
 """
 
 from __future__ import annotations

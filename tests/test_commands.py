@@ -74,7 +74,7 @@ def test_exit_statuses_of_the_program(run_path: Path, tmp_path: Path) -> None:
         (["inspekt", "x.h5"], "command line: found 'inspekt', expected one of demo, run, inspect"),
         (["inspect"], "RUN"),
         (["inspect", "x.h5", "--jsn"], "--jsn"),
-        (["export", "x.h5", "--to", "docx", "-o", "x.docx"], "--to: found 'docx', expected one of csv, mot, pedpy"),
+        (["export", "x.h5", "--to", "docx", "-o", "x.docx"], "--to: found 'docx', expected one of csv, parquet, mot"),
         (["--colour"], "--colour"),
     ],
 )

@@ -50,7 +50,7 @@ def test_ci_runs_the_test_command_of_the_readme() -> None:
     assert f'"$bin/python" {command} |' in (ROOT / ".ci" / "run").read_text("utf-8")
 
 
-@pytest.mark.parametrize("page", ["README.md", "docs/how-it-works.md", "docs/file-formats.md"])
+@pytest.mark.parametrize("page", ["README.md", "docs/how-it-works.md", "docs/file-formats.md", "docs/viewers.md"])
 def test_what_a_page_names_is_there(page: str) -> None:
     text = (ROOT / page).read_text("utf-8")
     assert set(re.findall(r"(?:`|^)stseg (\w+)\b", text, re.MULTILINE)) <= {*COMMANDS, "COMMAND"}

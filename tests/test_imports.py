@@ -45,6 +45,7 @@ AT_HOME = {
     "numba": ("stseg.accelerate",),
     "cyclopts": ("stseg.commands",),
     "rich": ("stseg.commands",),
+    "pandas": ("stseg.io",),  # its types; it is imported where a data frame is asked for
     "tomllib": ("stseg.io",),
     "pathlib": ("stseg.io", "stseg.commands"),
 }

@@ -2,23 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
 
 from stseg.errors import ConfigError
+from stseg.io.exports.formats import FORMATS
 from stseg.io.outputs import replacing, require_new
-from stseg.io.runs import Run, read_run
-from stseg.io.track_exports import write_mot, write_pedpy
-from stseg.io.tracks import write_tracks_csv
-
-_WRITERS: dict[str, Callable[[Path, Run], None]] = {
-    "csv": lambda path, run: write_tracks_csv(path, run.trajectory),
-    "mot": lambda path, run: write_mot(path, run.trajectory),
-    "pedpy": lambda path, run: write_pedpy(path, run.trajectory, run.frame_rate),
-}
+from stseg.io.runs import read_run
 
 
 def export(
@@ -35,27 +27,36 @@ def export(
 
     **csv**: frame, id, x, y, height, score, covariance and views, with a header; metres.
 
-    **pedpy**: the text of PedPy and JuPedSim; id, frame, x, y, z in metres. (PedPy reads the run file itself, too.)
+    **parquet**: every column of the trajectory, and the time.
 
-    **mot**: 3-D MOTChallenge lines; frames count from 1 there.
+    **mot**: 3-D MOTChallenge lines; frames count from 1 there. **mot-boxes**: a zip of 2-D lines, one file a camera.
+
+    **wildtrack**: a zip of WILDTRACK's annotations_positions, and the grid that they use.
+
+    **pedpy**: the text of PedPy and JuPedSim. (PedPy reads the run file itself, too.) **jupedsim**: JuPedSim's SQLite
+    trajectory.
+
+    **movement**: netCDF of the package movement, places on the ground. **movement-boxes**: the boxes of all views.
+
+    **mf-json**: OGC Moving Features JSON. **geojson**: GeoJSON, one track a line. **napari**: the CSV of napari-tracks.
 
     Parameters
     ----------
     run
         The run file.
     to
-        csv, pedpy or mot.
+        One of those above.
     output
         The file to write.
     overwrite
         Replace the file if it exists.
     """
-    if to not in _WRITERS:
-        raise ConfigError("command line", "--to", repr(to), f"one of {', '.join(_WRITERS)}")
+    if to not in FORMATS:
+        raise ConfigError("command line", "--to", repr(to), f"one of {', '.join(FORMATS)}")
     require_new(output, overwrite)
     if output.exists() and run.exists() and output.samefile(run):
         raise ConfigError("command line", "--output", "the run file itself", "another file")
     contents = read_run(run)
     with replacing(output, overwrite) as part:
-        _WRITERS[to](part, contents)
+        FORMATS[to](part, contents)
     print(f"wrote {len(contents.trajectory)} rows of {len(contents.tracks)} tracks to {output}")

@@ -1,0 +1,101 @@
+"""Tracks for geographic information systems: OGC Moving Features JSON, and GeoJSON by lines.
+
+Both are of the plane: coordinates are the run's metres on the ground, not degrees.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+
+from stseg.arrays import Rows
+from stseg.io.run_reader import Run
+
+BEGINNING = datetime(1970, 1, 1, tzinfo=UTC)
+"""What stands for the first frame of the recording: run files do not say at what time of day it was."""
+
+GROUND = 'LOCAL_CS["ground of the rig",UNIT["metre",1]]'
+"""A coordinate system of the place, as well-known text."""
+
+_ISO_8601 = "urn:ogc:data:time:iso8601"
+
+
+def write_moving_features(path: Path, run: Run) -> None:
+    """Write OGC Moving Features JSON (19-045r3, "MF-JSON Prism"): a MovingPoint a track, with its score by time.
+
+    Times count from 1970-01-01T00:00:00Z, which stands for the recording's first frame.
+    """
+    collection = {
+        "type": "FeatureCollection",
+        "crs": {"type": "Name", "properties": {"name": GROUND}},
+        "trs": {"type": "Name", "properties": {"name": _ISO_8601}},
+        "features": [_moving_point(track, own, run.frame_rate) for track, own in _by_track(run)],
+    }
+    with path.open("w", newline="\n", encoding="utf-8") as file:
+        json.dump(collection, file, allow_nan=False)
+
+
+def write_geojson_lines(path: Path, run: Run) -> None:
+    """Write newline-delimited GeoJSON: a line a track, a LineString, or a Point where it has one place."""
+    with path.open("w", newline="\n", encoding="utf-8") as file:
+        for track, own in _by_track(run):
+            places = _places(own)
+            geometry: dict[str, object] = {"type": "LineString", "coordinates": places}
+            if len(places) == 1:
+                geometry = {"type": "Point", "coordinates": places[0]}
+            properties = {
+                **_properties(track),
+                "first": int(track["first"]),
+                "last": int(track["last"]),
+                "start": round(int(track["first"]) / run.frame_rate, 6),
+                "duration": round(int(track["last"] - track["first"]) / run.frame_rate, 6),
+            }
+            feature = {"type": "Feature", "id": int(track["id"]), "geometry": geometry, "properties": properties}
+            file.write(json.dumps(feature, allow_nan=False) + "\n")
+
+
+def _by_track(run: Run) -> Iterator[tuple[np.void, Rows]]:
+    """Each TRACK row with its TRAJECTORY rows in the order of time."""
+    table = run.trajectory[np.lexsort((run.trajectory["frame"], run.trajectory["id"]))]
+    starts = np.searchsorted(table["id"], run.tracks["id"], "left")
+    stops = np.searchsorted(table["id"], run.tracks["id"], "right")
+    for track, start, stop in zip(run.tracks, starts, stops, strict=True):
+        if stop > start:
+            yield track, table[start:stop]
+
+
+def _moving_point(track: np.void, own: Rows, frame_rate: float) -> dict[str, object]:
+    times = [_time_of(frame / frame_rate) for frame in own["frame"].tolist()]
+    score = {"type": "Measure", "values": [_finite(value) for value in own["score"].tolist()]}
+    point = {"type": "MovingPoint", "datetimes": times, "coordinates": _places(own), "interpolation": "Linear"}
+    return {
+        "type": "Feature",
+        "id": int(track["id"]),
+        "properties": _properties(track),
+        "time": [times[0], times[-1]],
+        "temporalGeometry": point,
+        "temporalProperties": [{"datetimes": times, "score": score}],
+    }
+
+
+def _properties(track: np.void) -> dict[str, object]:
+    return {"id": int(track["id"]), "height": _finite(float(track["height"])), "score": _finite(float(track["score"]))}
+
+
+def _places(own: Rows) -> list[list[float]]:
+    """x and y of every row, metres, to 0.1 mm."""
+    return [[round(x, 4), round(y, 4)] for x, y in zip(own["x"].tolist(), own["y"].tolist(), strict=True)]
+
+
+def _time_of(seconds: float) -> str:
+    return (BEGINNING + timedelta(seconds=seconds)).isoformat(timespec="milliseconds").replace("+00:00", "Z")
+
+
+def _finite(value: float) -> float | None:
+    """Three decimals, or null: JSON has no infinity."""
+    return round(value, 3) if math.isfinite(value) else None

@@ -1,0 +1,56 @@
+"""Tracks as plain tables: CSV, Parquet, and the CSV of napari-tracks and trackpy."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from stseg.io.extras import load_extra
+from stseg.io.run_reader import Run
+from stseg.io.tracks import write_tracks_csv
+
+_UNITS = {
+    "x": "m",
+    "y": "m",
+    "z": "m",
+    "xx": "m2",
+    "xy": "m2",
+    "yy": "m2",
+    "height": "m",
+    "extent": "m2",
+    "score": "nat",
+    "time": "s",
+}
+
+
+def write_csv(path: Path, run: Run) -> None:
+    """Write frame, id, x, y, height, score, xx, xy, yy, views; positions to 0.1 mm."""
+    write_tracks_csv(path, run.trajectory)
+
+
+def write_parquet(path: Path, run: Run) -> None:
+    """Write all columns of the trajectory, as they are, and `time` in seconds; each column's metadata has its unit.
+
+    The file's metadata under `stseg` say, as JSON, the scene, the frames per second and the cameras.
+    """
+    arrow, parquet = load_extra("pyarrow", "parquet"), load_extra("pyarrow.parquet", "parquet")
+    columns = {name: run.trajectory[name] for name in run.trajectory.dtype.names or ()}
+    columns["time"] = run.trajectory["frame"] / run.frame_rate
+    fields = [
+        arrow.field(name, arrow.from_numpy_dtype(column.dtype), False, {"units": _UNITS.get(name, "")})
+        for name, column in columns.items()
+    ]
+    about = {"scene": run.scene, "frame_rate": run.frame_rate, "cameras": list(run.cameras)}
+    schema = arrow.schema(fields, {"stseg": json.dumps(about)})
+    arrays = [np.ascontiguousarray(column) for column in columns.values()]
+    parquet.write_table(arrow.table(arrays, schema=schema), path)
+
+
+def write_napari_tracks(path: Path, run: Run) -> None:
+    """Write particle, frame, z, y, x, score, height in metres, by particle, then frame: a tracks layer of napari."""
+    table = run.trajectory[np.lexsort((run.trajectory["frame"], run.trajectory["id"]))]
+    with path.open("w", newline="\n", encoding="utf-8") as file:
+        file.write("particle,frame,z,y,x,score,height\n")
+        np.savetxt(file, table[["id", "frame", "z", "y", "x", "score", "height"]], fmt="%d,%d,%.4f,%.4f,%.4f,%.3f,%.3f")
