@@ -13,10 +13,10 @@ from stseg.report.charts import clock_time
 from stseg.report.colours import NIGHT, PAPER, QUIET, track_colour
 from stseg.report.figures import TRAIL, backdrop
 from stseg.report.labels import place_labels
-from stseg.report.overlay import overlay
+from stseg.report.overlay import View, overlay
 from stseg.report.plan import ground_sheet, plan_map
 
-_TILE = 640  # width of a view, pixels
+_WIDEST, _ALL_VIEWS = 960, 1280  # width of a view, and of all views side by side, pixels
 _LEAST_HEIGHT = 720  # of the film, pixels
 
 
@@ -35,15 +35,15 @@ class Film:
         self._rig = rig
         self._rows = trajectory[np.argsort(trajectory["frame"], kind="stable")]
         self._trail = round(TRAIL * rig.frame_rate)
-        tile_tall = max(round(_TILE * camera.size[1] / camera.size[0]) for camera in rig.cameras)
         count = len(rig.cameras)
-        self._columns = max(min(2, count), round(float(np.sqrt(count * tile_tall / _TILE))))
-        self._tile = (tile_tall, _TILE)
+        self._columns = int(np.ceil(np.sqrt(count)))
+        self._wide = min(_WIDEST, _ALL_VIEWS // self._columns)
+        self._tall = max(View(camera, self._wide).size[1] for camera in rig.cameras)
         rows = -(-count // self._columns)
-        height = max(rows * tile_tall, _LEAST_HEIGHT)
-        self._plan = plan_map(rig, 10 * height, height)
+        height = max(rows * self._tall, _LEAST_HEIGHT)
+        self._plan = plan_map(rig, height, height)
         self._ground = ground_sheet(self._plan, rig, views.max(axis=0), rig.name)
-        wide, tall = self._columns * _TILE + self._plan.size[0], max(height, self._plan.size[1])
+        wide, tall = self._columns * self._wide + self._plan.size[0], max(height, self._plan.size[1])
         self.size = (wide + wide % 2, tall + tall % 2)
         """Width and height, pixels; both even, as video wants them."""
 
@@ -66,11 +66,11 @@ class Film:
         canvas = blank(*self.size, NIGHT)
         for k, (camera, view) in enumerate(zip(self._rig.cameras, views, strict=True)):
             shown = overlay(
-                camera, self._rig.grid, backdrop(view, camera.size), recent, frame, self._trail, width=_TILE
+                camera, self._rig.grid, backdrop(view, camera.size), recent, frame, self._trail, width=self._wide
             )
-            v, u = (k // self._columns) * self._tile[0], (k % self._columns) * self._tile[1]
+            v, u = (k // self._columns) * self._tall, (k % self._columns) * self._wide
             canvas[v : v + shown.shape[0], u : u + shown.shape[1]] = shown
-        left = self._columns * _TILE
+        left = self._columns * self._wide
         canvas[:, left:] = PAPER
         plan = self._plan_of(frame, recent)
         canvas[: plan.shape[0], left : left + plan.shape[1]] = plan

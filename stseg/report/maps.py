@@ -159,7 +159,8 @@ def blind_map(rig: Rig, views: Bytes) -> Bytes:
     plan = PlanMap.fit(rig.grid, np.zeros((0, 2)), 900, 900)
     canvas = sheet(plan, "Views that see the ground")
     seen = views.max(axis=0)
-    tones = [_blind_tone(count, len(rig.cameras)) for count in range(len(rig.cameras) + 1)]
+    most = max(len(rig.cameras), int(seen.max()))
+    tones = [_blind_tone(count, most) for count in range(most + 1)]
     paint(canvas, plan, Bins(rig.grid.x, rig.grid.y, rig.grid.cell), np.array(tones, np.uint8)[seen])
     _frame(canvas, plan, rig)
     u, v = 76.0, plan.size[1] - 38.0
