@@ -77,7 +77,7 @@ def test_ghosts_have_the_reason_that_weighed_most() -> None:
     ghosts = candidates_of(
         np.arange(4),
         np.zeros(4),
-        [[-2.5, 2, 0], [2, 2, 2], [0.1, 0.2, 0], [-1.2, 3, 3]],
+        np.array([[-2.5, 2, 0], [2, 2, 2], [0.1, 0.2, 0], [-1.2, 3, 3]]),
         [-3.5, -9, -2.7, -20],  # nothing else, evidence of others, nothing else, evidence of others above all
     )
     found = ghost_reasons(np.concatenate([people, ghosts]))

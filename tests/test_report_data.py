@@ -132,8 +132,9 @@ def test_places_come_back_to_the_centimetre(tmp_path: Path) -> None:
 
 
 def test_candidates_say_why_they_were_dropped(tmp_path: Path) -> None:
-    moments = embedded(walks(1, 1), run_files.small_ghosts(), np.array([10, 12]), tmp_path)["candidates"]
-    assert moments == [[[0, 0, 0, -1, [2, 0]], [0, 0, 0, 0, [-1, 0]]], []]
+    data = embedded(walks(1, 1), run_files.small_ghosts(), np.array([10, 12]), tmp_path)
+    assert data["ghosts"] == [1, 0]
+    assert data["candidates"] == [[[0, 0, 0, -1, [2, 0]], [0, 0, 0, 0, [-1, 0]]], []]
 
 
 # An hour

@@ -20,7 +20,7 @@ from stseg.report.maps import Bins, Haunt, blind_map, density, dwell, haunts, he
 from stseg.report.page import Contents, Sight
 from stseg.report.sheets import thin_sheets
 
-_SHEETS = 12_000_000  # bytes of all slices, a third more as text
+_SHEETS = 8_000_000  # bytes of all slices, a third more as text
 
 
 def page_contents(

@@ -56,7 +56,7 @@ def _people(span: Span, frames: int, trajectory: Rows, tracks: Rows) -> str:
     lengths = (tracks["last"] - tracks["first"] + 1) / span.frame_rate
     return (
         f"<b>{counts.sum() / max(frames, 1):.1f}</b> at a time on average, at most <b>{counts.max()}</b>. "
-        f"There are <b>{len(tracks)}</b> tracks, half of them longer than {clock_time(float(np.median(lengths)))}; who "
+        f"There are <b>{len(tracks)}</b> tracks, half of them {clock_time(float(np.median(lengths)))} or longer; who "
         "leaves and comes back is a new track."
     )
 
@@ -71,7 +71,7 @@ def _dwelling(places: Sequence[Haunt], rows: int) -> str:
         for letter, place in zip("ABC", places, strict=False)
     ]
     share = "the share is that of all the time that people spend here, within 0.75 m"
-    return f"Most around {'; '.join(named)} ({share})."
+    return f"Most around {'; '.join(named)} ({share}; the map is below)."
 
 
 def _ghosts(frames: int, candidates: int, reasons: GhostReasons, events: Rows) -> str:

@@ -51,6 +51,7 @@ def embedded_json(rig: Rig, views: Bytes, trajectory: Rows, candidates: Rows, sh
         "tracks": _tracks(rig, trajectory, sheets.frames),
         "reasons": REASONS,
         "candidates": _candidates(candidates, sheets.frames),
+        "ghosts": _ghost_counts(candidates, sheets.frames),
     }
     return json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
 
@@ -71,7 +72,7 @@ def thin_tracks(trajectory: Rows, moments: Ints, most: int = _MOST_PLACES) -> tu
 def _tracks(rig: Rig, trajectory: Rows, moments: Ints) -> dict[str, object]:
     table, stride = thin_tracks(trajectory, moments)
     (x0, x1), (y0, y1) = rig.grid.x, rig.grid.y
-    quantum = max(0.01, max(x1 - x0, y1 - y0) / 15000)  # metres; places a little outside the ground still fit 16 bits
+    quantum = max(0.001, max(x1 - x0, y1 - y0) / 15000)  # metres; places a little outside the ground still fit 16 bits
     x, y = (np.clip(np.rint(table[name] / quantum), -32768, 32767) for name in ("x", "y"))
     identities, counts = np.unique(table["id"], return_counts=True)
     return {
@@ -100,6 +101,13 @@ def _candidates(candidates: Rows, moments: Ints) -> list[list[list[object]]]:
         part = range(start, min(stop, start + _MOST_CANDIDATES))
         listed.append([_candidate(shown[k], int(reason[k])) for k in part])
     return listed
+
+
+def _ghost_counts(candidates: Rows, moments: Ints) -> list[int]:
+    """Ghosts of each moment, those that `_candidates` leaves out among them."""
+    frames = np.sort(candidates["frame"][candidates["status"] == 0])
+    counts = np.searchsorted(frames, moments, "right") - np.searchsorted(frames, moments)
+    return [int(count) for count in counts]
 
 
 def _candidate(row: np.void, reason: int) -> list[object]:

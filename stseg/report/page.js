@@ -331,7 +331,7 @@
     moment = Math.min(Math.max(index, 0), data.frames.length - 1);
     picked = -1;
     slider.value = String(moment);
-    const there = people(now()).length, dropped = ghosts().length;
+    const there = people(now()).length, dropped = data.ghosts[moment];
     element("clock").textContent = `${clock(now() / data.frameRate)}, frame ${now()}: ${there} people, ${dropped} ghosts dropped`;
     drawPlan();
     drawSlice();

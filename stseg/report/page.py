@@ -181,7 +181,8 @@ Right: the evidence for a person in each cell, blue against, orange for; grey ce
 <div class="scroll live"><table><thead><tr><th>candidate</th><th>x, y, m</th><th>evidence, nats</th>{views}
 <th>why it was dropped</th></tr></thead><tbody id="weighed"></tbody></table></div>
 <p class="note">Each view answers whether it sees somebody at the place: <b>yes</b>, <b>no</b>, or <b>?</b> where it is
-hidden from it or out of sight. Evidence is in nats: +3 is 20 to 1 for, -3 is 20 to 1 against.</p>"""
+hidden from it or out of sight. Of very many candidates the 120
+with most evidence are listed. Evidence is in nats: +3 is 20 to 1 for, -3 is 20 to 1 against.</p>"""
 
 _GHOSTS = note(
     "A ghost is a place where views seem to agree on somebody who is not there, such as where lines of sight to two "
@@ -226,7 +227,8 @@ def _privacy(contents: Contents) -> str:
 def _reasons(contents: Contents) -> str:
     """How many ghosts were removed for each reason, the commonest first, and how many each view denies."""
     counts, count = contents.ghosts.counts(), len(contents.ghosts.ghosts)
-    reasons = [(REASONS[k], float(counts[k])) for k in np.argsort(-np.array(counts), kind="stable")]
+    ranked = [k for k in np.argsort(-np.array(counts), kind="stable").tolist() if counts[k]]
+    reasons = [(REASONS[k], float(counts[k])) for k in ranked]
     denied = [(f"{sight.name} sees nobody there", float(sight.denied)) for sight in contents.sights]
     parts = [note(f"ghosts removed <b>{count}</b> of {contents.candidates} candidates")]
     if count:
