@@ -264,7 +264,7 @@
     const all = [data.frames[0], Math.max(data.frames[data.frames.length - 1], data.frames[0] + 1)];
     const span = half ? [Math.max(all[0], now() - half), Math.min(all[1], now() + half)] : all;
     if (span[1] <= span[0]) span[1] = span[0] + 1;
-    const side = Math.max(x1 - x0, y1 - y0), scale = 0.58 * page.width / side;
+    const side = Math.max(x1 - x0, y1 - y0), scale = 0.62 * (page.width - 90) / side;
     const [s, c] = [Math.sin(eye.azimuth), Math.cos(eye.azimuth)], [low, high] = [Math.sin(eye.elevation), Math.cos(eye.elevation)];
     const place = (x, y, frame) => {
       const a = x - (x0 + x1) / 2, b = y - (y0 + y1) / 2, t = ((frame - span[0]) / (span[1] - span[0]) - 0.5) * side;

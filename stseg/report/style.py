@@ -20,16 +20,17 @@ figcaption { color: var(--quiet); font-size: 13px; margin-top: 6px }
 img { max-width: 100%; height: auto; display: block; border-radius: 6px }
 h3 { font-size: 15px; margin: 14px 0 2px }
 h3 + p { margin: 0; max-width: 90ch }
-canvas { width: 100%; display: block; border-radius: 6px; touch-action: none }
-#thread { cursor: grab }
+canvas { width: 100%; display: block; border-radius: 6px }
+#thread { cursor: grab; touch-action: none }
 .live { display: none }
 body.scripted .live { display: block }
 body.scripted .pair.live { display: grid }
-#time { display: none; position: sticky; bottom: 0; gap: 14px; align-items: center; padding: 10px 24px;
+#time { display: none; position: sticky; bottom: 0; flex-wrap: wrap; gap: 6px 14px; align-items: center;
+  padding: 10px 24px;
   background: #fffffff2; border-top: 1px solid var(--rule); box-shadow: 0 -4px 16px #0000000d }
 body.scripted #time { display: flex }
-#slider { flex: 1; accent-color: var(--accent) }
-#clock { min-width: 26em; font-variant-numeric: tabular-nums }
+#slider { flex: 1 1 160px; accent-color: var(--accent) }
+#clock { min-width: min(26em, 100%); font-variant-numeric: tabular-nums }
 button, select { font: inherit; color: inherit; background: #fff; border: 1px solid var(--rule); border-radius: 8px;
   padding: 3px 10px }
 select { font-size: 13px }
