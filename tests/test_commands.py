@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -13,8 +14,8 @@ import pytest
 from run_files import CONFIG, small_recording, small_trajectory, write_small_run
 
 import stseg
-from stseg.commands.inspect import look_over
 from stseg.commands.main import COMMANDS, main
+from stseg.commands.overview import look_over
 from stseg.io.runs import RunWriter, read_run
 from stseg.io.tracks import read_tracks_csv
 from stseg.tracks import TRAJECTORY, Tracks
@@ -137,6 +138,67 @@ def test_inspect_sums_up_a_run(run_path: Path) -> None:
     assert (overview.windows, overview.frames_per_window) == (2, 3.0)
     assert overview.bytes == run_path.stat().st_size
     assert overview.warnings == ["view right says nothing of any candidate: is it blind, or its calibration wrong?"]
+
+
+def test_inspect_counts_people_by_the_minute_and_says_why_ghosts_were_dropped(run_path: Path) -> None:
+    overview = look_over(read_run(run_path))
+    assert overview.people_per_minute == [1.5]
+    assert overview.track_seconds == pytest.approx({"shortest": 0.6, "median": 0.9, "longest": 1.2})
+    assert overview.ground_by_views == [0, 0, 1]
+    assert overview.ghost_reasons["a view sees nobody there"] == 1 == sum(overview.ghost_reasons.values())
+    assert overview.ghosts_denied_by == {"left": 1, "right": 0}
+
+
+def test_the_keys_of_the_json_are_documented(run_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["inspect", str(run_path), "--json"]) == 0
+    page = (Path(__file__).parents[1] / "docs" / "file-formats.md").read_text("utf-8")
+    _, _, listed = page.partition("## What `stseg inspect --json` says")
+    assert re.findall(r"^\| `(\w+)` \|", listed, re.MULTILINE) == list(json.loads(capsys.readouterr().out))
+
+
+def test_inspect_writes_a_slice(run_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pictures = []
+    texts = ("t=2.2,plane=0.9", "frame=11,plane=0.85", "t=2.4,plane=0.9", "t=2.2,plane=0", "frame=11,plane=all")
+    for k, text in enumerate(texts):
+        output = tmp_path / f"{k}.png"
+        assert main(["inspect", str(run_path), "--slice", text, "-o", str(output)]) == 0
+        pictures.append(output.read_bytes())
+    assert pictures[0] == pictures[1]
+    assert len(set(pictures)) == 4
+    assert all(picture.startswith(b"\x89PNG") for picture in pictures)
+    assert "0.png: frame 11 (2.20 s), 0.90 m" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["--slice", "t=4,plane=0.9"], "--slice t: found 4, expected seconds of the run, 2 to 3"),
+        (["--slice", "t=nan,plane=0.9"], "--slice t: found nan, expected seconds"),
+        (["--slice", "t=2,plane=7"], "--slice plane: found 7, expected a height in metres, 0 to 1.8, or all"),
+        (["--slice", "frame=9,plane=0"], "--slice frame: found 9, expected a frame of the run, 10 to 15"),
+        (["--slice", "t=now,plane=0"], "--slice t: found 'now', expected a number"),
+        (["--slice", "t=2"], "expected t=SECONDS or frame=NUMBER, and plane=METRES or plane=all"),
+        (["--slice", "t=2,t=2,plane=0"], "expected t=SECONDS"),
+    ],
+)
+def test_a_slice_out_of_range_is_told(
+    run_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], told: str
+) -> None:
+    assert main(["inspect", str(run_path), *arguments, "-o", str(tmp_path / "slice.png")]) == 2
+    assert told in capsys.readouterr().err
+    assert not (tmp_path / "slice.png").exists()
+
+
+def test_a_slice_needs_a_file_and_destroys_none(
+    run_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command = ["inspect", str(run_path), "--slice", "t=2,plane=0"]
+    assert main(command) == 2
+    assert "-o SLICE.png with it" in capsys.readouterr().err
+    assert main(["inspect", str(run_path), "-o", str(tmp_path / "a.png")]) == 2
+    (tmp_path / "old.png").write_text("precious")
+    assert main([*command, "-o", str(tmp_path / "old.png")]) == 2
+    assert (tmp_path / "old.png").read_text() == "precious"
 
 
 def test_inspect_on_a_screen(run_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -12,7 +12,7 @@ from stseg.arrays import Ints, Rows
 from stseg.evaluation import evaluate
 from stseg.io.pages import write_file
 from stseg.io.runs import Run
-from stseg.report.page import png_bytes
+from stseg.report.html import png_bytes
 from stseg.report.plan import plan_view
 
 _SHOWN = 3

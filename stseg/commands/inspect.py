@@ -3,143 +3,62 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 from cyclopts import Parameter
 from rich.console import Console
 from rich.table import Table
 
-from stseg.io.runs import Run, read_run
+from stseg.commands.overview import Overview, look_over, per
+from stseg.commands.slice_of_run import write_slice
+from stseg.errors import ConfigError
+from stseg.io.runs import read_run
 
 _LONGEST = 10  # tracks on the screen
+_MINUTES = 15  # of the run on the screen
 
 
-@dataclass(frozen=True)
-class Overview:
-    """The essentials of a run; seconds, metres, bytes, and frames with both ends included."""
-
-    file: str
-    scene: str
-    cameras: tuple[str, ...]
-    created: str
-    x: tuple[float, float]
-    y: tuple[float, float]
-    top: float
-    cell: float
-    planes: int
-    frame_rate: float
-    frames: int
-    first_frame: int | None
-    last_frame: int | None
-    seconds: float
-    people_mean: float
-    people_most: int
-    tracks: list[dict[str, float]]
-    events: dict[str, int]
-    candidates_per_frame: float
-    ghosts_per_frame: float
-    windows: int
-    frames_per_window: float
-    seconds_by_stage: dict[str, float]
-    bytes_per_frame: float
-    bytes: int
-    warnings: list[str]
-
-
-def inspect(run: Path, /, *, as_json: Annotated[bool, Parameter(name="--json", negative="")] = False) -> None:
-    """Say what is in a run file: extent, windows, tracks, events, timings.
+def inspect(
+    run: Path,
+    /,
+    *,
+    as_json: Annotated[bool, Parameter(name="--json", negative="")] = False,
+    slice_: Annotated[str | None, Parameter(name="--slice", metavar="t=SECONDS,plane=METRES")] = None,
+    output: Annotated[Path | None, Parameter(name=["-o", "--output"], metavar="SLICE.png")] = None,
+    overwrite: Annotated[bool, Parameter(negative="")] = False,
+) -> None:
+    """Say what is in a run file: extent, people, tracks, events, ghosts, timings, and what looks wrong.
 
     Example: stseg inspect night.h5
+
+    Example: stseg inspect night.h5 --slice t=12.4,plane=0.9 -o slice.png
 
     Parameters
     ----------
     run
         The run file.
     as_json
-        Print one JSON object, with every track.
+        Print one JSON object, with every track. Its keys are those of docs/file-formats.md and stay.
+    slice_
+        Write one slice of the occupancy as a picture instead: t in seconds from the recording's first frame (or
+        frame=NUMBER), plane in metres above the ground (or plane=all, the greatest of them); the nearest are taken.
+    output
+        The picture of the slice, PNG.
+    overwrite
+        Replace the picture if it exists.
     """
-    overview = look_over(read_run(run))
-    if as_json:
-        print(json.dumps(asdict(overview), indent=1))
+    found = read_run(run)
+    if (slice_ is None) != (output is None):
+        given, other = ("--slice", "-o SLICE.png") if output is None else ("-o", "--slice t=SECONDS,plane=METRES")
+        raise ConfigError("command line", "", f"{given} alone", f"{other} with it")
+    if slice_ is not None and output is not None:
+        print(f"wrote {output}: {write_slice(found, slice_, output, overwrite)}")
+    elif as_json:
+        print(json.dumps(asdict(look_over(found)), indent=1))
     else:
-        _show(overview, Console(highlight=False, markup=False))
-
-
-def look_over(run: Run) -> Overview:
-    """Sum up a run."""
-    count, size, grid = len(run.frames), run.path.stat().st_size, run.recording.rig.grid
-    people = np.unique(run.trajectory["frame"], return_counts=True)[1]
-    ghosts = run.ghosts["status"] == 0
-    solved = run.windows["solve_stop"] - run.windows["solve_first"]
-    return Overview(
-        file=str(run.path),
-        scene=run.scene,
-        cameras=run.cameras,
-        created=run.provenance.created,
-        x=grid.x,
-        y=grid.y,
-        top=grid.top,
-        cell=grid.cell,
-        planes=grid.planes,
-        frame_rate=run.frame_rate,
-        frames=count,
-        first_frame=int(run.frames[0]) if count else None,
-        last_frame=int(run.frames[-1]) if count else None,
-        seconds=count / run.frame_rate,
-        people_mean=_per(people.sum(), count),
-        people_most=int(people.max(initial=0)),
-        tracks=_tracks(run),
-        events=_counts(run.events["kind"]),
-        candidates_per_frame=_per(len(ghosts), count),
-        ghosts_per_frame=_per(ghosts.sum(), count),
-        windows=len(solved),
-        frames_per_window=_per(solved.sum(), len(solved)),
-        seconds_by_stage=_seconds_by_stage(run),
-        bytes_per_frame=_per(size, count),
-        bytes=size,
-        warnings=_warnings(run),
-    )
-
-
-def _per(total: float, count: int) -> float:
-    return float(total) / count if count else 0.0
-
-
-def _tracks(run: Run) -> list[dict[str, float]]:
-    """Every track, the longest first."""
-    rows = run.tracks[np.lexsort((run.tracks["id"], -run.tracks["frames"]))]
-    return [dict(zip(rows.dtype.names or (), row.tolist(), strict=True)) for row in rows]
-
-
-def _counts(kinds: np.ndarray[tuple[int, ...], np.dtype[np.bytes_]]) -> dict[str, int]:
-    names, counts = np.unique(kinds, return_counts=True)
-    return {name.decode(): int(number) for name, number in zip(names.tolist(), counts, strict=True)}
-
-
-def _seconds_by_stage(run: Run) -> dict[str, float]:
-    """The slowest stage first."""
-    names, stage = np.unique(run.timings["stage"], return_inverse=True)
-    seconds = np.bincount(stage, run.timings["seconds"], len(names))
-    return {names[index].decode(): float(seconds[index]) for index in np.argsort(-seconds, kind="stable")}
-
-
-def _warnings(run: Run) -> list[str]:
-    if not len(run.frames):
-        return ["there are no frames"]
-    warnings = [] if len(run.tracks) else ["nobody was found"]
-    if not run.views.any():
-        warnings.append("no view sees any cell")
-    if len(run.ghosts):
-        silent = (np.nan_to_num(run.ghosts["parts"]) == 0).all(axis=0)
-        warnings += [
-            f"view {name} says nothing of any candidate: is it blind, or its calibration wrong?"
-            for name, is_silent in zip(run.cameras, silent, strict=True)
-            if is_silent
-        ]
-    return warnings
+        _show(look_over(found), Console(highlight=False, markup=False))
 
 
 def _show(overview: Overview, console: Console) -> None:
@@ -164,15 +83,43 @@ def _lines(overview: Overview) -> list[tuple[str, str]]:
         ("scene", f"{o.scene}: {len(o.cameras)} cameras ({', '.join(o.cameras)}), run of {o.created}"),
         ("ground", f"x {o.x[0]:g} to {o.x[1]:g} m, y {o.y[0]:g} to {o.y[1]:g} m, cells of {o.cell:g} m"),
         ("planes", f"{o.planes} up to {o.top:g} m"),
+        ("views", ", ".join(_seen(o.ground_by_views))),
         ("frames", f"{o.frames}{span}; {o.seconds:.1f} s at {o.frame_rate:g} frames/s"),
-        ("people", f"{o.people_mean:.1f} a frame, at most {o.people_most}; {len(o.tracks)} tracks"),
+        ("people", f"{o.people_mean:.1f} a frame, at most {o.people_most}{_minutes(o.people_per_minute)}"),
+        ("tracks", str(len(o.tracks)) + _lengths(o.track_seconds)),
         ("events", ", ".join(f"{count} {kind}" for kind, count in o.events.items()) or "none"),
         ("candidates", f"{o.candidates_per_frame:.1f} a frame, {o.ghosts_per_frame:.1f} of them ghosts"),
+        ("ghosts", "; ".join(_ghosts(o)) or "none"),
         ("windows", f"{o.windows}, {o.frames_per_window:.1f} frames each"),
-        ("time", f"{total:.1f} s" + (f", {_per(o.frames, 1) / total:.1f} frames/s" if total else "")),
+        ("time", f"{total:.1f} s" + (f", {per(o.frames, 1) / total:.1f} frames/s" if total else "")),
         ("stages", ", ".join(stages) or "none"),
         ("size", f"{o.bytes / 1e6:.1f} MB, {o.bytes_per_frame / 1e3:.1f} kB a frame"),
     ]
+
+
+def _seen(shares: list[float]) -> list[str]:
+    """Of the ground, the share that so many views see."""
+    return [f"{views} see {100 * share:.0f} %" for views, share in enumerate(shares) if share > 0]
+
+
+def _minutes(people: list[float]) -> str:
+    if len(people) < 2:
+        return ""
+    shown = " ".join(f"{count:.1f}" for count in people[:_MINUTES])
+    rest = "" if len(people) <= _MINUTES else f" ... ({len(people)} minutes)"
+    return f"; minute by minute {shown}{rest}"
+
+
+def _ghosts(overview: Overview) -> list[str]:
+    """Why candidates were dropped, the commonest reason first."""
+    ranked = sorted(overview.ghost_reasons.items(), key=lambda reason: -reason[1])
+    denied = [f"{name} {count}" for name, count in overview.ghosts_denied_by.items() if count]
+    words = [f"{count} because {words}" for words, count in ranked if count]
+    return [*words, *([f"denied by {', '.join(denied)}"] if denied else [])]
+
+
+def _lengths(seconds: dict[str, float]) -> str:
+    return "".join(f", {name} {length:.1f} s" for name, length in seconds.items())
 
 
 def _share(seconds: float, total: float) -> str:

@@ -1,4 +1,4 @@
-"""`stseg report`: a run as one HTML page and as pictures."""
+"""`stseg report`: a run as one HTML page, as pictures and as a film."""
 
 from __future__ import annotations
 
@@ -11,17 +11,19 @@ import numpy as np
 from cyclopts import Parameter
 
 from stseg.arrays import Observation, Rows
+from stseg.commands.film import film
+from stseg.commands.page_contents import page_contents
 from stseg.errors import ConfigError
-from stseg.evaluation import evaluate
+from stseg.io.films import require_film_name
 from stseg.io.frames import open_frames
 from stseg.io.outputs import require_new
 from stseg.io.pages import make_folder, write_file, write_page
 from stseg.io.recording import Recording
 from stseg.io.runs import Run, read_run
 from stseg.io.tracks import read_tracks_csv
-from stseg.report.charts import Span, clock_time
 from stseg.report.figures import Figure, Instant, camera_figures, ground_figures, slice_figures
-from stseg.report.page import Contents, png_bytes, report_page
+from stseg.report.html import png_bytes
+from stseg.report.page import report_page
 
 _MOMENTS = 3  # shown where none are asked for
 
@@ -30,20 +32,25 @@ def report(
     run_file: Path,
     /,
     *,
-    output: Annotated[Path, Parameter(name=["--output", "-o"], metavar="REPORT.html")],
+    output: Annotated[Path | None, Parameter(name=["--output", "-o"], metavar="REPORT.html")] = None,
     truth: Path | None = None,
     frame: Annotated[tuple[int, ...], Parameter(negative="")] = (),
     pictures: Annotated[Path | None, Parameter(metavar="FOLDER")] = None,
+    video: Annotated[Path | None, Parameter(metavar="FILM.mp4")] = None,
+    frames: Annotated[str | None, Parameter(metavar="A:B")] = None,
     camera_images: Annotated[bool, Parameter(negative="")] = False,
     overwrite: Annotated[bool, Parameter(negative="")] = False,
 ) -> None:
-    """Make an HTML page of a run that needs no other file and loads nothing.
+    """Make an HTML page of a run that needs no other file and loads nothing, or a film of it.
 
     Example: stseg report night.h5 -o night.html --truth truth.csv --frame 60 --pictures night/
 
-    It shows the tracks from above and in space and time, how many people there were, tracks and events, and slices of
-    the occupancy volume and every camera's view at a few frames. No camera image is read or shown without
-    --camera-images.
+    Example: stseg report night.h5 --video night.mp4 --camera-images --frames 0:500
+
+    The page answers how many people there were, where they dwell, what was dropped as a ghost and why, and where the
+    rig is blind; a slider moves the plan, slices of the occupancy and the tracks in space and time. The film shows
+    every view with its people as pillars, and the plan beside. No camera image is read or shown without
+    --camera-images: the views then show the ruled ground.
 
     Parameters
     ----------
@@ -54,25 +61,64 @@ def report(
     truth
         CSV with the columns frame,id,x,y (metres), drawn beside the tracks.
     frame
-        A frame to show; may be given several times. Without it, three frames of the run.
+        A frame whose planes and camera views the page shows; may be given several times. Without it, the camera views
+        of three frames of the run.
     pictures
         Folder to write the pictures to as well: plan.png, spacetime.png, slices.png, marginal.png and an
-        overlay_CAMERA.png for each camera. With several --frame, the frame's number is added to the name.
+        overlay_CAMERA.png for each camera, and the maps density.png, dwell.png, ghosts.png and blind.png. With several
+        --frame, the frame's number is added to the name.
+    video
+        A film to write, MP4. It shows the cameras' frames with --camera-images, else pillars on the ruled ground.
+    frames
+        Part of the run that the film shows, half open.
     camera_images
-        Show the cameras' frames under the tracks. The page and the pictures then hold images of people.
+        Show the cameras' frames under the tracks. Page, pictures and film then hold images of people.
     overwrite
-        Replace the page and the pictures if they exist.
+        Replace the page, the pictures and the film if they exist.
     """
-    require_new(output, overwrite)
+    _require_outputs(output, pictures, video, frames, overwrite)
     run = read_run(run_file)
+    if output is not None:
+        _write_page(run, output, truth, frame, pictures, camera_images, overwrite)
+    if video is not None:
+        count = film(run, video, frames, camera_images, overwrite)
+        print(f"wrote {video}: {count} frames")
+
+
+def _require_outputs(
+    output: Path | None, pictures: Path | None, video: Path | None, frames: str | None, overwrite: bool
+) -> None:
+    """Refuse what cannot be written, or would be of no effect, before any work is done."""
+    if output is None and video is None:
+        raise ConfigError("command line", "", "nothing to write", "-o REPORT.html, or --video FILM.mp4")
+    if output is None and pictures is not None:
+        raise ConfigError("command line", "--pictures", pictures, "-o REPORT.html with it")
+    if video is None and frames is not None:
+        raise ConfigError("command line", "--frames", frames, "--video FILM.mp4 with it")
+    for path in (output, video):
+        if path is not None:
+            require_new(path, overwrite)
+    if video is not None:
+        require_film_name(video)
+
+
+def _write_page(
+    run: Run,
+    output: Path,
+    truth: Path | None,
+    frame: Sequence[int],
+    pictures: Path | None,
+    camera_images: bool,
+    overwrite: bool,
+) -> None:
     true = None if truth is None else _during(run, read_tracks_csv(truth))
     instants = _read_instants(run, run.recording, _frames(run, frame), camera_images)
-    contents = _contents(run, true, instants, camera_images)
+    contents = page_contents(run, true, instants, bool(frame), camera_images)
     write_page(output, report_page(contents), overwrite)
     print(f"wrote {output}")
     if pictures is not None:
         shown = instants if frame else instants[len(instants) // 2 :][:1]
-        figures = [*contents.ground, *_named(run.recording, run, shown)]
+        figures = [*contents.still, *_named(run.recording, run, shown)]
         for path in _write_figures(pictures, figures, overwrite):
             print(f"wrote {path}")
 
@@ -140,51 +186,6 @@ def _read_views(recording: Recording, frames: Sequence[int]) -> dict[int, tuple[
     """What the cameras delivered at these frames, which are in order."""
     with open_frames(recording, frames[0], frames[-1] + 1) as moments:
         return {moment.frame: moment.views for moment in moments if moment.frame in frames}
-
-
-def _contents(run: Run, truth: Rows | None, instants: Sequence[Instant], camera_images: bool) -> Contents:
-    rig = run.recording.rig
-    first, stop = (int(run.frames[0]), int(run.frames[-1]) + 1) if len(run.frames) else (0, 1)
-    span = Span(first, stop, run.frame_rate)
-    return Contents(
-        run.scene,
-        [*_facts(run, span), *_scores(run.trajectory, truth)],
-        span,
-        run.trajectory,
-        run.tracks,
-        run.events,
-        run.ghosts,
-        truth,
-        ground_figures(rig, run.views, run.trajectory, truth),
-        [figure for instant in instants for figure in slice_figures(rig, instant)],
-        [figure for instant in instants for figure in camera_figures(rig, run.trajectory, instant)],
-        camera_images,
-    )
-
-
-def _facts(run: Run, span: Span) -> list[tuple[str, str]]:
-    grid = run.recording.rig.grid
-    computed = float(run.timings["seconds"].sum())
-    return [
-        ("tracks", str(len(run.tracks))),
-        ("cameras", str(len(run.cameras))),
-        ("frames", f"{span.first} to {span.stop - 1}"),
-        ("length", clock_time((span.stop - span.first) / span.frame_rate)),
-        ("frames per second", f"{span.frame_rate:g}"),
-        ("ground", f"{grid.x[1] - grid.x[0]:g} m x {grid.y[1] - grid.y[0]:g} m"),
-        ("cells", f"{grid.cell:g} m, {grid.planes} planes"),
-        *([("computed in", clock_time(computed))] if computed > 0 else []),
-    ]
-
-
-def _scores(trajectory: Rows, truth: Rows | None) -> list[tuple[str, str]]:
-    """How well the run agrees with the truth, within half a metre."""
-    if truth is None or not len(truth):
-        return []
-    scores = evaluate(truth, trajectory)
-    named = (("MOTA", scores.mota, " %"), ("IDF1", scores.idf1, " %"), ("HOTA", scores.hota, " %"))
-    facts = [(name, f"{value:.1f}{unit}") for name, value, unit in named if value is not None]
-    return facts if scores.location_mean is None else [*facts, ("mean error", f"{scores.location_mean:.3f} m")]
 
 
 def _named(recording: Recording, run: Run, instants: Sequence[Instant]) -> list[Figure]:

@@ -3,8 +3,8 @@
     M(X, Z) = max over boxes b and heights h >= Z of N(h) / N(mean) exp(match(b, pillar(X, h)))
 
 is how well the best box fits a body there. A cell is spoken for by the box of the person near it and by boxes that
-nobody explains. The body is either missed, or shown by a box that fits that well, where clutter boxes are anyhow: odds of
-r = m + M (1 - m) / b. L(X, Z) is the likelihood that says as much in METHODS 4's log-odds,
+nobody explains. The body is either missed, or shown by a box that fits that well, where there is clutter anyhow: odds
+of r = m + M (1 - m) / b. L(X, Z) is the likelihood that says as much in METHODS 4's log-odds,
 
     ((1 - m) L + m (1 - L)) / (b L + (1 - b) (1 - L)) = r.
 """

@@ -15,7 +15,8 @@ from stseg.report.plan import plan_view
 from stseg.report.slices import marginal_picture, volume_picture
 from stseg.report.spacetime import spacetime_picture
 
-_TRAIL = 5.0  # seconds
+TRAIL = 5.0
+"""Seconds that the way of somebody reaches back."""
 
 
 @dataclass(frozen=True)
@@ -92,7 +93,7 @@ def slice_figures(rig: Rig, instant: Instant) -> list[Figure]:
 def camera_figures(rig: Rig, trajectory: Rows, instant: Instant) -> list[Figure]:
     """The people of one frame in every view."""
     figures = []
-    trail = round(_TRAIL * rig.frame_rate)
+    trail = round(TRAIL * rig.frame_rate)
     for name, camera, view in zip(_file_names(rig.cameras), rig.cameras, instant.views, strict=True):
         picture = overlay(camera, rig.grid, backdrop(view, camera.size), trajectory, instant.frame, trail)
         figures.append(Figure(f"overlay_{name}", picture, f"{camera.name}, frame {instant.frame}"))

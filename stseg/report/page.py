@@ -1,22 +1,44 @@
-"""The report as one HTML page that needs nothing else: pictures, charts and style are inside, and nothing is loaded."""
+"""The report as one HTML page: pictures, charts, style and script are inside, and nothing is loaded."""
 
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterable, Sequence
+import hashlib
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from html import escape
+from importlib.resources import files
 
-import cv2
 import numpy as np
 
-from stseg.arrays import Bytes, Rows
-from stseg.report.charts import Span, clock_time, lives_chart, people_chart
-from stseg.report.colours import hex_colour, track_colour
+from stseg.arrays import Rows
+from stseg.report.charts import Span, lives_chart, people_chart
 from stseg.report.figures import Figure
+from stseg.report.findings import REASONS, GhostReasons
+from stseg.report.html import MOST_ROWS, bars, chart, figure, figures, note, section, swatch, table, when
 from stseg.report.style import STYLE
 
-_MOST_ROWS = 2000  # of a table
+
+@dataclass(frozen=True)
+class Sight:
+    """What one view has to say.
+
+    Attributes
+    ----------
+    name
+    ground
+        Share of the ground that it sees, 0..1.
+    denied
+        Ghosts at whose place it sees nobody.
+    nats
+        Median of what it says of people whom it can see; nan where it sees none.
+    """
+
+    name: str
+    ground: float
+    denied: int
+    nats: float
 
 
 @dataclass(frozen=True)
@@ -28,15 +50,29 @@ class Contents:
     title
     facts
         Names and values, at the top.
+    answers
+        Questions and answers (HTML), below.
+    warnings
+        What looks wrong.
     span
         The frames of the run.
     trajectory : TRAJECTORY (n,)
     tracks : TRACK (m,)
     events : EVENT (k,)
     candidates
-        Rows with frame and status (1 true, 0 ghost), see CANDIDATE.
+        How many were weighed.
+    ghosts
+        Those of them that are nobody.
     truth : (t,) with frame, or None
-    ground, slices, cameras
+    data
+        JSON for the script, see `embedded`.
+    plan, thread, haunts, ghost_map, blind_map
+        Figures; the thread is shown where no script runs.
+    sights
+        A row for each view.
+    stages
+        Seconds by stage.
+    slices, cameras
         Figures of these sections; a section without figures is left out.
     has_images
         Whether the cameras' figures show camera images: the page says so.
@@ -44,47 +80,78 @@ class Contents:
 
     title: str
     facts: Sequence[tuple[str, str]]
+    answers: Sequence[tuple[str, str]]
+    warnings: Sequence[str]
     span: Span
     trajectory: Rows
     tracks: Rows
     events: Rows
-    candidates: Rows
+    candidates: int
+    ghosts: GhostReasons
     truth: Rows | None
-    ground: Sequence[Figure]
+    data: str
+    plan: Figure
+    thread: Figure
+    haunts: Sequence[Figure]
+    ghost_map: Figure
+    blind_map: Figure
+    sights: Sequence[Sight]
+    stages: Sequence[tuple[str, float]]
     slices: Sequence[Figure]
     cameras: Sequence[Figure]
     has_images: bool
 
+    @property
+    def still(self) -> list[Figure]:
+        """The figures of the ground."""
+        return [self.plan, self.thread, *self.haunts, self.ghost_map, self.blind_map]
+
 
 def report_page(contents: Contents) -> str:
     """The page's text. The same contents give the same text."""
-    span, tracks = contents.span, contents.tracks
-    counted = "people in each frame" + ("" if contents.truth is None else "; dashed: the truth")
-    sections = [
-        _section("On the ground", _figures(contents.ground, "pair")),
-        _section("People over time", _chart(people_chart(span, contents.trajectory, contents.truth), counted)),
-        _section("Tracks", _chart(lives_chart(span, tracks), "from first frame to last") + _track_table(span, tracks)),
-        _section("Events", _event_summary(contents) + _event_table(span, contents.events)),
-        _section("Occupancy", _figures(contents.slices, "sheets")),
-        _section("Cameras", _privacy(contents) + _figures(contents.cameras, "pair")) if contents.cameras else "",
-    ]
-    facts = "".join(f"<div><dt>{escape(name)}</dt><dd>{escape(value)}</dd></div>" for name, value in contents.facts)
+    script = _script()
+    digest = base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
     return _PAGE.format(
-        title=escape(contents.title), style=STYLE, facts=facts, sections="\n".join(filter(None, sections))
+        title=escape(contents.title),
+        style=STYLE,
+        digest=digest,
+        facts="".join(f"<div><dt>{escape(name)}</dt><dd>{escape(value)}</dd></div>" for name, value in contents.facts),
+        sections="\n".join(filter(None, _sections(contents))),
+        data=contents.data,
+        script=script,
     )
 
 
-def png_bytes(picture: Bytes) -> bytes:
-    """A picture as a PNG file's bytes."""
-    _, data = cv2.imencode(".png", picture, [cv2.IMWRITE_PNG_COMPRESSION, 7])
-    return bytes(np.asarray(data, np.uint8))
+@cache
+def _script() -> str:
+    return (files("stseg.report") / "page.js").read_text("utf-8")
+
+
+def _sections(contents: Contents) -> list[str]:
+    span, tracks = contents.span, contents.tracks
+    counted = "people in each frame" + ("" if contents.truth is None else "; dashed: the truth")
+    return [
+        section("In short", _answers(contents.answers), *(note(escape(words), "warn") for words in contents.warnings)),
+        section("On the ground, and in time", _pair(figure(contents.plan), _thread(contents.thread))),
+        section("Moment by moment", _MOMENT.format(views=_view_heads(contents.sights))),
+        section("People over time", chart(people_chart(span, contents.trajectory, contents.truth), counted)),
+        section("Where people are", figures(contents.haunts, "pair")),
+        section("Ghosts removed", _GHOSTS, _pair(figure(contents.ghost_map), _reasons(contents))),
+        section("Where the rig is blind", _pair(figure(contents.blind_map), _sights(contents.sights))),
+        section("Tracks", chart(lives_chart(span, tracks), "from first frame to last"), _track_table(span, tracks)),
+        section("Events", _event_summary(contents), _event_table(span, contents.events)),
+        section("Occupancy", figures(contents.slices, "sheets")),
+        section("Cameras", _privacy(contents), figures(contents.cameras, "pair")) if contents.cameras else "",
+        section("Time to compute", _stages(contents.stages)),
+    ]
 
 
 _PAGE = """<!doctype html>
 <html lang="en">
 <head>
 <meta charset="utf-8">
-<meta http-equiv="Content-Security-Policy" content="default-src 'none'; img-src data:; style-src 'unsafe-inline'">
+<meta http-equiv="Content-Security-Policy"
+ content="default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'sha256-{digest}'">
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <title>{title}</title>
 <style>{style}</style>
@@ -97,61 +164,117 @@ _PAGE = """<!doctype html>
 <main>
 {sections}
 </main>
+<div id="time"><button id="play">Play</button><input id="slider" type="range" min="0" step="1" value="0"
+ aria-label="moment"><output id="clock"></output></div>
+<script id="data" type="application/json">{data}</script>
+<script>{script}</script>
 </body>
 </html>
 """
 
+_MOMENT = """<p class="note">The slider at the foot of the page chooses the moment. Left: people with the way they came
+in the last 5 seconds; crosses are candidates that were dropped as ghosts. Red ground is seen by no view, orange by one.
+Right: the evidence for a person in each cell, blue against, orange for; grey cells are not seen.</p>
+<div class="pair live"><figure><canvas id="plan"></canvas><figcaption>the plan</figcaption></figure>
+<figure><canvas id="slice"></canvas><figcaption>occupancy, <select id="plane" aria-label="plane">
+<option value="greatest">the greatest of all planes</option></select></figcaption></figure></div>
+<div class="scroll live"><table><thead><tr><th>candidate</th><th>x, y, m</th><th>evidence, nats</th>{views}
+<th>why it was dropped</th></tr></thead><tbody id="weighed"></tbody></table></div>
+<p class="note">Each view answers whether it sees somebody at the place: <b>yes</b>, <b>no</b>, or <b>?</b> where it is
+hidden from it or out of sight. Of very many candidates the 120
+with most evidence are listed. Evidence is in nats: +3 is 20 to 1 for, -3 is 20 to 1 against.</p>"""
 
-def _section(heading: str, body: str) -> str:
-    return f"<section>\n<h2>{heading}</h2>\n{body}\n</section>" if body else ""
+_GHOSTS = note(
+    "A ghost is a place where views seem to agree on somebody who is not there, such as where lines of sight to two "
+    "people cross. Every frame is explained by the people who make most of what all views show; what is left over "
+    "is dropped."
+)
 
 
-def _figures(figures: Sequence[Figure], layout: str) -> str:
-    parts = []
-    for figure in figures:
-        data = base64.b64encode(png_bytes(figure.picture)).decode("ascii")
-        tall, wide = figure.picture.shape[:2]
-        words = escape(figure.caption)
-        parts.append(
-            f'<figure><img width="{wide}" height="{tall}" alt="{words}" src="data:image/png;base64,{data}">'
-            f"<figcaption>{words}</figcaption></figure>"
-        )
-    return f'<div class="{layout}">{"".join(parts)}</div>' if parts else ""
+_SIGHTS = note(
+    "What a view says is the median over the people whom it can see. Where it is near 0 or below, others find people "
+    "whom this view does not confirm: look at its calibration, and whether it has moved."
+)
 
 
-def _chart(svg: str, caption: str) -> str:
-    return f"<figure>{svg}<figcaption>{escape(caption)}</figcaption></figure>"
+def _pair(left: str, right: str) -> str:
+    return f'<div class="pair">{left}{right}</div>'
+
+
+def _answers(answers: Sequence[tuple[str, str]]) -> str:
+    return "".join(f"<h3>{escape(question)}</h3><p>{answer}</p>" for question, answer in answers)
+
+
+def _thread(fallback: Figure) -> str:
+    """The picture that can be turned, and the still one where no script runs."""
+    return (
+        '<div><figure class="live"><canvas id="thread"></canvas><figcaption>The ground below, time upwards; pale is '
+        'still to come. Drag to turn. Shown: <select id="span" aria-label="span of time"><option value="0">the whole '
+        f"run</option></select></figcaption></figure><noscript>{figure(fallback)}</noscript></div>"
+    )
+
+
+def _view_heads(sights: Sequence[Sight]) -> str:
+    return "".join(f"<th>{escape(sight.name)}</th>" for sight in sights)
 
 
 def _privacy(contents: Contents) -> str:
     if contents.has_images:
-        return '<p class="note warn">This page shows images from the cameras. Share it with care.</p>'
-    return '<p class="note">Drawn from the tracks alone: this page holds no image from a camera.</p>'
+        return note("This page shows images from the cameras. Share it with care.", "note warn")
+    return note("Drawn from the tracks alone: this page holds no image from a camera.")
+
+
+def _reasons(contents: Contents) -> str:
+    """How many ghosts were removed for each reason, the commonest first, and how many each view denies."""
+    counts, count = contents.ghosts.counts(), len(contents.ghosts.ghosts)
+    ranked = [k for k in np.argsort(-np.array(counts), kind="stable").tolist() if counts[k]]
+    reasons = [(REASONS[k], float(counts[k])) for k in ranked]
+    denied = [(f"{sight.name} sees nobody there", float(sight.denied)) for sight in contents.sights]
+    parts = [note(f"ghosts removed <b>{count}</b> of {contents.candidates} candidates")]
+    if count:
+        parts.append(bars(reasons, count, "{:,.0f}"))
+        parts.append(note("Views that deny them; several may deny the same ghost:"))
+        parts.append(bars(denied, count, "{:,.0f}"))
+    return f"<div>{''.join(parts)}</div>"
+
+
+def _stages(stages: Sequence[tuple[str, float]]) -> str:
+    return bars(stages, sum(seconds for _, seconds in stages), "{:,.1f} s")
+
+
+def _sights(sights: Sequence[Sight]) -> str:
+    rows = [
+        (
+            escape(sight.name),
+            f"{100 * sight.ground:.0f} %",
+            "sees none" if np.isnan(sight.nats) else f"{sight.nats:+.1f}",
+        )
+        for sight in sights
+    ]
+    names = ("view", "of the ground it sees", "says of people, nats")
+    return f"<div>{table(names, rows, len(rows))}{_SIGHTS}</div>"
 
 
 def _track_table(span: Span, tracks: Rows) -> str:
     rows = [
         (
-            _swatch(int(row["id"])),
-            _when(span, int(row["first"])),
-            _when(span, int(row["last"])),
+            swatch(int(row["id"])),
+            when(span, int(row["first"])),
+            when(span, int(row["last"])),
             f"{row['frames']}",
             f"{row['height']:.2f}",
             f"{row['score']:.1f}",
         )
-        for row in tracks[:_MOST_ROWS]
+        for row in tracks[:MOST_ROWS]
     ]
-    return _table(("track", "first", "last", "frames", "height, m", "score, nats"), rows, len(tracks))
+    return table(("track", "first", "last", "frames", "height, m", "score, nats"), rows, len(tracks))
 
 
 def _event_summary(contents: Contents) -> str:
-    """How often each kind of event occurred, and how many candidates were ghosts."""
+    """How often each kind of event occurred."""
     kinds, counts = np.unique(contents.events["kind"], return_counts=True)
     words = [f"{escape(kind.decode())} <b>{count}</b>" for kind, count in zip(kinds, counts.tolist(), strict=True)]
-    if len(contents.candidates):
-        ghosts = int((contents.candidates["status"] == 0).sum())
-        words.append(f"ghosts removed <b>{ghosts}</b> of {len(contents.candidates)} candidates")
-    return f'<p class="note">{" &middot; ".join(words) or "none"}</p>'
+    return note(" &middot; ".join(words) or "none")
 
 
 def _event_table(span: Span, events: Rows) -> str:
@@ -159,27 +282,12 @@ def _event_table(span: Span, events: Rows) -> str:
         return ""
     rows = [
         (
-            _when(span, int(row["frame"])),
+            when(span, int(row["frame"])),
             escape(row["kind"].decode()),
-            _swatch(int(row["id"])),
-            _swatch(int(row["other"])) if row["other"] else "",
+            swatch(int(row["id"])),
+            swatch(int(row["other"])) if row["other"] else "",
             escape(row["reason"].decode(errors="replace")),
         )
-        for row in events[np.argsort(events["frame"], kind="stable")][:_MOST_ROWS]
+        for row in events[np.argsort(events["frame"], kind="stable")][:MOST_ROWS]
     ]
-    return _table(("frame", "event", "track", "other", "reason"), rows, len(events))
-
-
-def _table(names: Sequence[str], rows: Iterable[Sequence[str]], total: int) -> str:
-    head = "".join(f"<th>{escape(name)}</th>" for name in names)
-    body = "\n".join(f"<tr>{''.join(f'<td>{cell}</td>' for cell in row)}</tr>" for row in rows)
-    rest = f'<p class="note">The first {_MOST_ROWS} of {total} rows.</p>' if total > _MOST_ROWS else ""
-    return f'<div class="scroll"><table><thead><tr>{head}</tr></thead><tbody>\n{body}\n</tbody></table></div>{rest}'
-
-
-def _swatch(identity: int) -> str:
-    return f'<i style="background:{hex_colour(track_colour(identity))}"></i>{identity}'
-
-
-def _when(span: Span, frame: int) -> str:
-    return f"{frame} <small>{clock_time(frame / span.frame_rate)}</small>"
+    return table(("frame", "event", "track", "other", "reason"), rows, len(events))

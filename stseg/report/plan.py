@@ -52,18 +52,24 @@ def plan_view(
         Blue, green, red.
     """
     plan = plan_map(rig, width, height)
-    canvas = sheet(plan, title or rig.name)
-    if coverage is not None:
-        _shade(canvas, plan, rig.grid, coverage)
-    rule(canvas, plan)
-    outline(canvas, plan.pixel(_border(rig.grid)), mixed(INK, PAPER, 0.35), 2)
-    _draw_cameras(canvas, plan, rig.cameras)
+    canvas = ground_sheet(plan, rig, coverage, title or rig.name)
     _draw_tracks(canvas, plan, trajectory)
     if truth is not None:
         for _, path in _paths(truth):
             dashes(canvas, plan.pixel(path), _TRUTH)
     _label_tracks(canvas, plan, trajectory)
     _legend(canvas, plan, None if coverage is None else int(coverage.max()), truth is not None)
+    return canvas
+
+
+def ground_sheet(plan: PlanMap, rig: Rig, coverage: Bytes | None, title: str) -> Bytes:
+    """The ground without anybody: what is seen of it (see `plan_view`), its rules, border and cameras."""
+    canvas = sheet(plan, title)
+    if coverage is not None:
+        _shade(canvas, plan, rig.grid, coverage)
+    rule(canvas, plan)
+    outline(canvas, plan.pixel(border(rig.grid)), mixed(INK, PAPER, 0.35), 2)
+    draw_cameras(canvas, plan, rig.cameras)
     return canvas
 
 
@@ -83,7 +89,8 @@ def _stand(camera: Camera, grid: Grid) -> Floats | None:
     return place if beyond <= reach else None
 
 
-def _border(grid: Grid) -> Floats:
+def border(grid: Grid) -> Floats:
+    """Corners of the area that counts, metres, float64 (n, 2)."""
     if grid.polygon is not None:
         return np.asarray(grid.polygon, float)
     (x0, x1), (y0, y1) = grid.x, grid.y
@@ -105,7 +112,7 @@ def _tone(count: int, most: int) -> Colour:
     return mixed(_DARKEST, (252, 251, 250), count / most)
 
 
-def _draw_cameras(canvas: Bytes, plan: PlanMap, cameras: Sequence[Camera]) -> None:
+def draw_cameras(canvas: Bytes, plan: PlanMap, cameras: Sequence[Camera]) -> None:
     """Every camera, and its name behind it, below the names that are there already."""
     named: list[tuple[float, float, int]] = []
     for camera in cameras:

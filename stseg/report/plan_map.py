@@ -86,8 +86,7 @@ def rule(canvas: Bytes, plan: PlanMap) -> None:
         if _is_multiple(metres, every):
             text(canvas, f"{metres + 0.0:g}", (left - 14, v), QUIET, 15, (1, 0.5))
     outline(canvas, np.array([[left, top], [right, top], [right, bottom], [left, bottom]]), RULE)
-    text(canvas, "x, metres", (right, bottom + 42), QUIET, 15, (1, 0))
-    text(canvas, "y, metres", (left, top - 16), QUIET, 15, (0, 1))
+    text(canvas, "x and y, metres", (right, bottom + 42), QUIET, 15, (1, 0))
 
 
 def scale_bar(canvas: Bytes, plan: PlanMap, place: tuple[float, float], colour: Colour = INK) -> None:

@@ -48,7 +48,7 @@ def volume_picture(
         Blue, green, red.
     """
     panels = [_Panel(f"{z:.2f} m", log_odds[k], label[k]) for k, z in enumerate(grid.heights)]
-    return _contact_sheet(panels, title, width, _limit(log_odds) if limit is None else limit)
+    return _contact_sheet(panels, title, width, colour_limit(log_odds) if limit is None else limit)
 
 
 def marginal_picture(
@@ -64,7 +64,20 @@ def marginal_picture(
     highest = np.where(seen, log_odds, -np.inf).max(axis=0)
     highest = np.where(seen.any(axis=0), highest, np.nan)
     panel = _Panel(f"greatest of {grid.planes} planes", highest, _commonest(label))
-    return _contact_sheet([panel], title, width, _limit(log_odds) if limit is None else limit)
+    return _contact_sheet([panel], title, width, colour_limit(log_odds) if limit is None else limit)
+
+
+def plane_picture(
+    log_odds: AnyArray, label: Labels, grid: Grid, plane: int, title: str = "", width: int = 700
+) -> Bytes:
+    """One plane of one frame, coloured as `volume_picture` colours it; `plane` counts from the ground, 0.
+
+    Returns
+    -------
+    uint8 (v, u, 3)
+    """
+    panel = _Panel(f"{grid.heights[plane]:.2f} m", log_odds[plane], label[plane])
+    return _contact_sheet([panel], title, width, colour_limit(log_odds))
 
 
 @dataclass(frozen=True)
@@ -146,7 +159,8 @@ def _commonest(label: Labels) -> Labels:
     return best
 
 
-def _limit(log_odds: AnyArray) -> float:
+def colour_limit(log_odds: AnyArray) -> float:
+    """Log-odds at which colours end where nobody says: the 99th percentile of their sizes, nats."""
     known = np.abs(np.asarray(log_odds, np.float32)[np.isfinite(log_odds)])
     return max(float(np.percentile(known, 99)), 1e-3) if known.size else 1.0
 

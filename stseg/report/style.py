@@ -9,14 +9,42 @@ header, main { max-width: 1240px; margin: 0 auto; padding: 0 24px }
 header { padding-top: 40px }
 h1 { font-size: 30px; letter-spacing: -0.02em; margin: 0 0 20px }
 h2 { font-size: 19px; letter-spacing: -0.01em; margin: 0 0 16px }
-dl { display: flex; flex-wrap: wrap; gap: 10px; margin: 0 }
-dl div { background: #fff; padding: 10px 18px; border: 1px solid var(--rule); border-radius: 12px }
+header dl { display: flex; flex-wrap: wrap; gap: 10px; margin: 0 }
+header dl div { background: #fff; padding: 10px 18px; border: 1px solid var(--rule); border-radius: 12px }
 dt { color: var(--quiet); font-size: 13px }
-dd { margin: 0; font-size: 18px; white-space: nowrap; font-weight: 600; font-variant-numeric: tabular-nums }
+dd { margin: 0 }
+header dd { font-size: 18px; white-space: nowrap; font-weight: 600; font-variant-numeric: tabular-nums }
 section { background: #fff; border: 1px solid var(--rule); border-radius: 12px; padding: 24px; margin: 24px 0 }
 figure { margin: 0 }
 figcaption { color: var(--quiet); font-size: 13px; margin-top: 6px }
 img { max-width: 100%; height: auto; display: block; border-radius: 6px }
+h3 { font-size: 15px; margin: 14px 0 2px }
+h3 + p { margin: 0; max-width: 90ch }
+canvas { width: 100%; display: block; border-radius: 6px }
+#thread { cursor: grab; touch-action: none }
+.live { display: none }
+body.scripted .live { display: block }
+body.scripted .pair.live { display: grid }
+#time { display: none; position: sticky; bottom: 0; flex-wrap: wrap; gap: 6px 14px; align-items: center;
+  padding: 10px 24px;
+  background: #fffffff2; border-top: 1px solid var(--rule); box-shadow: 0 -4px 16px #0000000d }
+body.scripted #time { display: flex }
+#slider { flex: 1 1 160px; accent-color: var(--accent) }
+#clock { min-width: min(26em, 100%); font-variant-numeric: tabular-nums }
+button, select { font: inherit; color: inherit; background: #fff; border: 1px solid var(--rule); border-radius: 8px;
+  padding: 3px 10px }
+select { font-size: 13px }
+tr.ghost { color: var(--quiet) }
+tr.ghost:hover { background: #fff3ec }
+td.no { color: #b0300f }
+td.yes { color: #1d7a46 }
+td.unsure { color: var(--quiet) }
+.bars { display: grid; grid-template-columns: minmax(120px, 240px) 1fr; gap: 6px 14px; align-items: center }
+.bars dt { color: inherit; font-size: 14px }
+.bars dd { font-size: 14px; font-weight: 400 }
+.bars i { display: inline-block; height: 12px; min-width: 1px; background: var(--accent); opacity: 0.55;
+  border-radius: 3px; vertical-align: -1px; margin-right: 6px }
+.bars small { color: var(--quiet) }
 .pair { display: grid; grid-template-columns: repeat(auto-fit, minmax(440px, 1fr)); gap: 20px; align-items: start }
 .sheets { display: grid; grid-template-columns: 2fr 1fr; gap: 32px 20px; align-items: start }
 @media (max-width: 900px) { .sheets { grid-template-columns: 1fr } .pair { grid-template-columns: 1fr } }
@@ -29,6 +57,7 @@ img { max-width: 100%; height: auto; display: block; border-radius: 6px }
 .chart .truth { fill: none; stroke: #464c54; stroke-width: 1.2; stroke-dasharray: 5 4 }
 .note { color: var(--quiet); margin: 0 0 12px }
 .note b { color: var(--ink) }
+.scroll + .note, .bars + .note { margin-top: 12px }
 .warn { color: #a34a00 }
 .scroll { max-height: 420px; overflow: auto; margin-top: 16px; border: 1px solid var(--rule); border-radius: 8px }
 table { border-collapse: collapse; width: 100%; font-variant-numeric: tabular-nums }
@@ -37,5 +66,5 @@ th { position: sticky; top: 0; background: var(--soft); color: var(--quiet); fon
 td i { display: inline-block; width: 12px; height: 12px; border-radius: 4px; margin-right: 8px; vertical-align: -1px }
 td small { color: var(--quiet); margin-left: 6px }
 td:last-child { white-space: normal }
-@media print { section { break-inside: avoid } .scroll { max-height: none } }
+@media print { #time { display: none !important } section { break-inside: avoid } .scroll { max-height: none } }
 """
