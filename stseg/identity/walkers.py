@@ -14,7 +14,7 @@ import numpy as np
 from stseg.arrays import Floats, Ints
 from stseg.config import GhostConfig, IdentityConfig
 from stseg.ghosts.expected import Expected
-from stseg.ghosts.explain import People
+from stseg.ghosts.people import People
 
 _TURN = 0.8
 """How people change their velocity, metres per second per square root of a second (standard deviation)."""
