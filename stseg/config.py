@@ -237,7 +237,7 @@ class IdentityConfig:
     height_noise: float = 0.035
     """How far a frame's height of a person is off, metres (standard deviation)."""
     foresight: float = 0.6
-    """How far ahead committed tracks propose candidates, seconds; beyond that a walker may be anywhere."""
+    """How far ahead a track is carried when a window's cells are divided, seconds; beyond that it may be anywhere."""
     patience: float = 2.0
     """How long somebody may be unseen and still be the same, seconds."""
     shortest: float = 0.8

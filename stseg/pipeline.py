@@ -21,7 +21,8 @@ from stseg.config import Config
 from stseg.foreground.sight import Sight
 from stseg.geometry import Rig
 from stseg.ghosts.expected import Expected
-from stseg.ghosts.explain import Explanation, FramePass, People
+from stseg.ghosts.explain import FramePass
+from stseg.ghosts.people import Explanation, People
 from stseg.identity.smoothing import drop_short, fill_gaps
 from stseg.identity.views import box_rows
 from stseg.occupancy.volume import Occupancy

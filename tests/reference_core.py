@@ -7,11 +7,12 @@ from collections.abc import Iterator, Sequence
 from itertools import combinations, permutations
 
 import numpy as np
+from reference_walkers import greedy_pairs
 
 from stseg.arrays import Boxes, Flags, Floats, Ints, Labels, Singles
 from stseg.ghosts import boxes as tolerance
-from stseg.ghosts.evidence import BoxEvidence, PixelEvidence, Terms
-from stseg.ghosts.explain import Explanation
+from stseg.ghosts.evidence import BoxEvidence, Case, PixelEvidence, Terms
+from stseg.ghosts.people import Explanation
 from stseg.occupancy.explained import SHOULDER
 from stseg.occupancy.fusion import Rates
 from stseg.segmentation.energy import Energy
@@ -66,11 +67,13 @@ def cover(bodies: Floats, distance: Floats, width: float, height: float, i: int,
 # The score of a set
 
 
-def set_score(
-    members: Sequence[int], boxes: BoxEvidence, pixels: PixelEvidence, own: Floats, ground: Floats, terms: Terms
-) -> float:
-    """What a set of people says of a frame: each box serves one of them, each pixel belongs to the nearest body."""
-    total = sum(terms.person + own[j] for j in members)
+def set_score(members: Sequence[int], case: Case) -> float:
+    """What a set of people says of a frame: each box, pixel and walker speaks for one of them."""
+    boxes, pixels, ground, terms = case.boxes, case.pixels, case.ground, case.terms
+    total = sum(terms.person + case.own[j] - case.newcomer[j] for j in members)
+    chosen = np.array(members, int)
+    gains = case.newcomer[chosen, None] + case.known[chosen]
+    total += sum(gains[pair] for pair in greedy_pairs(gains))
     for i, j in combinations(members, 2):
         apart = math.dist(ground[i], ground[j])
         if apart < terms.apart:

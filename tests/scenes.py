@@ -12,11 +12,14 @@ from itertools import pairwise
 
 import cv2
 import numpy as np
+from reference_walkers import greedy_pairs
 
 from stseg.arrays import Boxes, Bytes, Floats, Observation, Rows, Singles
 from stseg.config import Config, GhostConfig
 from stseg.geometry import Camera, Grid, Lens, Rig
 from stseg.geometry.bodies import PROFILE
+from stseg.ghosts.expected import Expected, nobody
+from stseg.ghosts.people import People
 from stseg.tracks import TRAJECTORY
 
 SIZE = (128, 96)
@@ -78,6 +81,26 @@ def room() -> Rig:
 def people(*places: Sequence[float]) -> Floats:
     """People at x, y (metres) and, where it is given, of a height; 1.7 m otherwise."""
     return np.array([(*place, 1.7)[:3] if len(place) == 2 else place for place in places], float).reshape(-1, 3)
+
+
+def expecting(*places: Sequence[float]) -> Expected:
+    """People seen in the frame before, who are expected at places of x, y (metres) and, where given, of a height."""
+    standing, n = people(*places), len(places)
+    return Expected(
+        standing[:, :2], np.tile(np.eye(2) * 0.2**2, (n, 1, 1)), standing[:, 2], np.full(n, 0.05**2), np.ones(n)
+    )
+
+
+def found(standing: Floats, expected: Expected | None = None, evidence: float = 6.0, views: int = 4) -> People:
+    """People as the pass of a frame reports them: in place, wholly visible, and whom of those expected."""
+    n, before = len(standing), expected or nobody()
+    known = before.known(standing[:, :2], standing[:, 2], CONFIG.ghosts) + CONFIG.ghosts.newcomer
+    walker, covariance = np.full(n, -1), np.tile(np.eye(2) * 0.01, (n, 1, 1))
+    for j, k in greedy_pairs(known):
+        walker[j] = k
+        covariance[j] = np.linalg.inv(np.linalg.inv(covariance[j]) + np.linalg.inv(before.covariance[k]))
+    ones, nats = np.ones((views, n)), np.full(n, evidence)
+    return People(standing[:, :2], standing[:, 2], covariance, nats, ones, ones, np.zeros(n), walker)
 
 
 def ring(person: Floats, share: float, radius: float, points: int = 32) -> Floats:

@@ -1,4 +1,4 @@
-"""Who is who: windows that cover every frame once, links by motion, pieces, and identities over windows."""
+"""Who is who: windows that cover every frame once, assignments, pieces, and identities over windows."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from stseg.geometry import Grid
 from stseg.geometry.bodies import BodyTable
 from stseg.geometry.near import near_person
 from stseg.identity.identities import Decision, Identities
-from stseg.identity.linking import Linker, assign, distances
+from stseg.identity.linking import assign, distances
 from stseg.identity.pieces import Piece, chain_pieces
 from stseg.identity.smoothing import drop_short, fill_gaps
 from stseg.identity.views import box_rows
@@ -78,7 +78,7 @@ def test_a_part_is_cut_where_the_whole_is(run: tuple[int, int], other: tuple[int
         assert w == open_ended
 
 
-# Links
+# Assignments
 
 
 @settings(deadline=None)
@@ -99,69 +99,10 @@ def test_distances() -> None:
     np.testing.assert_allclose(distances(a, b), [[5, 1, 3], [0, np.hypot(3, 3), 4]])
 
 
-def chains_of(paths: Sequence[Path], frames: range, order: int = 0) -> list[list[int]]:
-    """The chains that the linker gives to these people, for each path one a frame in which it is seen."""
-    linker = Linker(RATE, CONFIG)
-    rng = np.random.default_rng(order)
-    given_chains: list[list[int]] = [[] for _ in paths]
-    for frame in frames:
-        here = [k for k in rng.permutation(len(paths)).tolist() if frame in paths[k]]
-        ground = np.array([paths[k][frame] for k in here]).reshape(-1, 2)
-        chains = linker.link(frame, ground, np.tile(np.eye(2) * 0.01, (len(here), 1, 1)))
-        for k, chain in zip(here, chains.tolist(), strict=True):
-            given_chains[k].append(chain)
-    return given_chains
-
-
 def walk(start: Sequence[float], velocity: Sequence[float], frames: range) -> Path:
     """Constant velocity in metres per second."""
     dt = 1 / RATE
     return {f: (start[0] + velocity[0] * f * dt, start[1] + velocity[1] * f * dt) for f in frames}
-
-
-@pytest.mark.parametrize("order", range(3))
-def test_crossing_walkers_keep_their_chains(order: int) -> None:
-    frames = range(25)
-    paths = [walk((-1.5, -0.1), (1.0, 0.1), frames), walk((1.55, 0.2), (-1.0, -0.05), frames)]
-    first, second = chains_of(paths, frames, order)
-    assert len(set(first)) == len(set(second)) == 1
-    assert first[0] != second[0]
-
-
-def test_a_walker_may_turn() -> None:
-    straight, aside = walk((-3.0, 0.0), (1.0, 0.0), range(25)), walk((0.0, -3.0), (0.0, 1.0), range(25, 50))
-    (chains,) = chains_of([straight | aside], range(50))
-    assert len(set(chains)) == 1
-
-
-def test_a_gap_of_a_few_frames_is_closed() -> None:
-    path = walk((-1.5, 0.0), (1.2, 0.0), range(24))
-    for unseen in (range(10, 11), range(10, 14)):
-        (chains,) = chains_of([{f: p for f, p in path.items() if f not in unseen}], range(24))
-        assert len(set(chains)) == 1, unseen
-
-
-def test_after_patience_somebody_is_new() -> None:
-    path = walk((-1.5, 0.0), (0.3, 0.0), range(40))
-    unseen = range(10, 10 + round(CONFIG.patience * RATE) + 2)
-    (chains,) = chains_of([{f: p for f, p in path.items() if f not in unseen}], range(40))
-    assert len(set(chains)) == 2
-
-
-def test_far_away_is_somebody_new() -> None:
-    here = dict.fromkeys(range(10), (0.0, 0.0)) | dict.fromkeys(range(10, 20), (1.5, 0.0))
-    (chains,) = chains_of([here], range(20))
-    assert chains[:10] == [1] * 10
-    assert len(set(chains[10:])) == 1
-    assert chains[10] != 1
-
-
-def test_nobody_to_link() -> None:
-    linker = Linker(RATE, CONFIG)
-    assert linker.link(0, np.zeros((0, 2)), np.zeros((0, 2, 2))).shape == (0,)
-    assert linker.link(1, np.zeros((1, 2)), np.eye(2)[None]).tolist() == [1]
-    assert linker.link(2, np.zeros((0, 2)), np.zeros((0, 2, 2))).shape == (0,)
-    assert linker.link(3, np.zeros((1, 2)), np.eye(2)[None]).tolist() == [1]
 
 
 # Pieces
@@ -245,7 +186,7 @@ def test_a_chain_is_one_piece_over_its_gap() -> None:
     after = {f: p for f, p in path.items() if f >= 47}
     _, pieces = pieces_of([before, after], FRAMES, chain=[3, 3])
     assert [(piece.chain, piece.frames) for piece in pieces] == [(3, [*range(40, 45), *range(47, 52)])]
-    _, pieces = pieces_of([before, after], FRAMES, chain=[3, 4])  # whom the linker holds apart are two
+    _, pieces = pieces_of([before, after], FRAMES, chain=[3, 4])  # two who are followed are two
     assert [piece.chain for piece in pieces] == [3, 4]
 
 
@@ -404,14 +345,6 @@ def test_events_are_of_committed_frames_in_order() -> None:
     born = [i for _, i, _ in events_of(decisions, "birth")]
     assert len(set(born)) == len(born)
     assert set(names.values()) == set(born)
-
-
-def test_predictions_are_carried_on() -> None:
-    identities = Identities(RATE, CONFIG)
-    assert identities.predict(7).shape == (0, 2)
-    path = walk((-2, -1), (0.8, 0.2), range(24))
-    decide(identities, [path], 16)
-    np.testing.assert_allclose(identities.predict(19), [path[19]], atol=0.12)
 
 
 # The last look

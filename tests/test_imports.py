@@ -23,6 +23,7 @@ volume is shaped by what it explains (METHODS 7)."""
 CROSSINGS = {
     ("occupancy", "foreground"): "boxes as a soft map, whose clutter is weighed",
     ("occupancy", "ghosts"): "the explanation of the frame, and how well a box fits a body",
+    ("identity", "ghosts"): "whom a frame expects, and whom it found",
     ("identity", "segmentation"): "blobs are what identities are given to",
     ("trackers", "ghosts"): "the people of a frame are part of what is tracked",
     ("trackers", "occupancy"): "how many views see a place",

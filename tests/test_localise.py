@@ -10,13 +10,13 @@ import pytest
 import reference_core as reference
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scenes import FEW_HEIGHTS, corner_cameras, likelihoods, looking, people, rig_of
+from scenes import FEW_HEIGHTS, corner_cameras, found, likelihoods, looking, people, rig_of
 
 from stseg.arrays import Floats, Singles
 from stseg.config import OccupancyConfig
 from stseg.errors import SourceError
 from stseg.geometry import Camera, Grid, Rig
-from stseg.ghosts.explain import Explanation, People
+from stseg.ghosts.people import Explanation
 from stseg.occupancy.fusion import Rates, log_odds_terms, synergy_terms
 from stseg.occupancy.localise import Localiser
 from stseg.occupancy.sampling import Sampling, SamplingKind
@@ -120,8 +120,7 @@ def test_localisation_by_definition(kind: SamplingKind, blind: int | None) -> No
 
 def test_nobody_explained_is_the_plain_localisation() -> None:
     maps = noise(5)
-    none = np.zeros((0, 2))
-    nobody = People(none, none[:, 0], np.zeros((0, 2, 2)), none[:, 0], np.zeros((4, 0)), np.ones((4, 0)))
+    nobody = found(people())
     owner, free = (np.full((96, 128), -1, np.int16),) * 4, (np.zeros(0, np.int64),) * 4
     explanation = Explanation(nobody, nobody, owner, (1,) * 4, free)
     localiser = Localiser(COARSE, "footprint")

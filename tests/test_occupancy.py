@@ -10,14 +10,15 @@ import pytest
 import reference_core as reference
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scenes import FEW_HEIGHTS, boxes, corner_cameras, likelihoods, looking, no_boxes, people, rig_of, room
+from scenes import FEW_HEIGHTS, boxes, corner_cameras, found, likelihoods, looking, no_boxes, people, rig_of, room
 from strategies import numbers, rigs
 
 from stseg.arrays import Boxes, Floats, Ints, Singles
 from stseg.config import OccupancyConfig
 from stseg.geometry import Grid, Rig
 from stseg.geometry.bodies import BodyTable
-from stseg.ghosts.explain import Explanation, FramePass, People, ViewEvidence
+from stseg.ghosts.explain import FramePass
+from stseg.ghosts.people import Explanation, ViewEvidence
 from stseg.occupancy.clutter import clutter, clutter_weights
 from stseg.occupancy.fusion import Rates
 from stseg.occupancy.instances import fill_match_of_planes
@@ -32,21 +33,14 @@ PRIOR = float(np.log(CONFIG.occupied / (1 - CONFIG.occupied)))
 RATES = Rates(FEW_HEIGHTS.pixel_miss, FEW_HEIGHTS.pixel_clutter)
 
 
-def crowd(standing: Floats, views: int = 4) -> People:
-    """People as the pass reports them, wholly visible."""
-    n = len(standing)
-    ones = np.ones((views, n))
-    return People(standing[:, :2], standing[:, 2], np.tile(np.eye(2) * 0.01, (n, 1, 1)), np.full(n, 5.0), ones, ones)
-
-
 def explained(rig: Rig, standing: Floats, owner: Sequence[Ints] | None = None, step: int = 1) -> Explanation:
     """An explanation in which these pixels are whose; nobody's where it is not said."""
-    views, nobody = len(rig.cameras), crowd(people(), len(rig.cameras))
+    views, nobody = len(rig.cameras), found(people(), views=len(rig.cameras))
     width, height = rig.cameras[0].size
     blank = np.full((-(-height // step), -(-width // step)), -1, np.int16)
     owners = [blank] * views if owner is None else [np.asarray(o, np.int16) for o in owner]
     free = tuple(np.zeros(0, np.int64) for _ in range(views))
-    return Explanation(crowd(standing, views), nobody, tuple(owners), (step,) * views, free)
+    return Explanation(found(standing, views=views), nobody, tuple(owners), (step,) * views, free)
 
 
 def flat(value: float) -> Singles:
@@ -323,7 +317,7 @@ def test_a_person_is_a_column_of_occupied_cells(kind: str) -> None:
     seen: list[ViewEvidence] = list(likelihoods(rig.cameras, standing))
     if kind == "boxes":
         seen = [boxes(camera, standing) for camera in rig.cameras]
-    explanation = FramePass(rig, [kind] * 4, FEW_HEIGHTS).explain(seen, np.zeros((0, 3)))
+    explanation = FramePass(rig, [kind] * 4, FEW_HEIGHTS).explain(seen, None)
     fused = Occupancy(rig, [kind] * 4, CONFIG, FEW_HEIGHTS).fuse(seen, explanation)
     away = np.hypot(*np.moveaxis(rig.grid.ground[:, :, None] - standing[:, :2], -1, 0)).min(2)
     assert fused.shape == rig.grid.shape
@@ -331,7 +325,7 @@ def test_a_person_is_a_column_of_occupied_cells(kind: str) -> None:
     assert (fused[:, away > 0.6] < 0).all()
     # A volume from nobody's evidence holds nobody.
     empty: list[ViewEvidence] = [flat(0.0)] * 4 if kind == "pixels" else [no_boxes()] * 4
-    nobody = FramePass(rig, [kind] * 4, FEW_HEIGHTS).explain(empty, np.zeros((0, 3)))
+    nobody = FramePass(rig, [kind] * 4, FEW_HEIGHTS).explain(empty, None)
     assert (Occupancy(rig, [kind] * 4, CONFIG, FEW_HEIGHTS).fuse(empty, nobody) < PRIOR).all()
 
 

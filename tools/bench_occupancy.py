@@ -24,7 +24,8 @@ import numpy as np
 from stseg.arrays import Floats, Singles
 from stseg.config import Config
 from stseg.geometry import Rig
-from stseg.ghosts.explain import FramePass, ViewEvidence
+from stseg.ghosts.explain import FramePass
+from stseg.ghosts.people import ViewEvidence
 from stseg.occupancy.fusion import Rates
 from stseg.occupancy.localise import Localiser
 from stseg.occupancy.volume import Occupancy
@@ -119,7 +120,7 @@ def pipeline_fusion(frames: int) -> None:
             seen: list[ViewEvidence] = [
                 view.boxes if kind == "boxes" else (view.instances > 0).astype(np.float32) for view in moment.views
             ]
-            fuse = partial(occupancy.fuse, seen, frame_pass.explain(seen, np.zeros((0, 3))))
+            fuse = partial(occupancy.fuse, seen, frame_pass.explain(seen, None))
             taken.append(seconds(fuse))
         told = f"{1e3 * np.median(taken[1:]):.2f} ms a frame"
         print(f"explained fusion, {kind}: {told}, 4 views of 480x360, {film.rig.grid.shape}, {frames} frames")

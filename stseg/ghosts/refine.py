@@ -12,8 +12,8 @@ import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints
 from stseg.ghosts.boxes import fill_match
-from stseg.ghosts.expected import Expected
 from stseg.ghosts.pool import Pool
+from stseg.ghosts.prior import Prior
 from stseg.ghosts.views import BoxView, PixelView, Sight, View
 
 _REACH, _SPACING = 2, 0.08
@@ -34,8 +34,7 @@ def refine(
     views: Sequence[View],
     sights: Sequence[Sight | None],
     own: Sequence[Sequence[Own]],
-    height_prior: Floats,
-    expected: Expected,
+    prior: Prior,
     walker: Ints,
 ) -> tuple[Pool, Floats]:
     """Move each person to the mean of their posterior.
@@ -46,10 +45,10 @@ def refine(
         The people.
     own
         For each person and view what is theirs.
-    height_prior : float64 (height,)
-        Log-prior of the heights tried, nats.
-    expected, walker : int64 (n,)
-        Whom the frames before led to expect, and who of them each person is, -1 for newcomers.
+    prior
+        The frame's prior.
+    walker : int64 (n,)
+        Whom of those expected each person is, -1 for newcomers.
 
     Returns
     -------
@@ -59,15 +58,15 @@ def refine(
     axis = np.arange(-_REACH, _REACH + 1) * _SPACING
     offset = np.stack(np.meshgrid(axis, axis), -1).reshape(-1, 2)
     ground, height, covariance = pool.ground.copy(), pool.height.copy(), np.zeros((len(pool), 2, 2))
-    tried = np.asarray(views[0].config.heights)
+    tried = np.asarray(prior.config.heights)
     for j in range(len(pool)):
         patch = pool.ground[j] + offset
-        score = np.repeat(height_prior[:, None], len(patch), 1)
+        score = np.repeat(prior.tall(tried)[:, None], len(patch), 1)
         for view, sight, mine in zip(views, sights, own[j], strict=True):
             if sight is not None:
                 score += _patch_score(view, sight, mine, patch, tried)
         if walker[j] >= 0:
-            score += expected.place(int(walker[j]), patch)
+            score += prior.expected.place(int(walker[j]), patch)
         weight = np.exp(score - score.max())
         height[j] = weight.sum(1) @ tried / weight.sum()
         place = weight.sum(0) / weight.sum()

@@ -14,7 +14,7 @@ import numpy as np
 from stseg.arrays import Floats, Ints
 from stseg.config import GhostConfig, IdentityConfig
 from stseg.ghosts.expected import Expected
-from stseg.ghosts.explain import People
+from stseg.ghosts.people import People
 from stseg.identity.linking import distances
 
 _TURN = 0.8

@@ -12,7 +12,7 @@ from stseg.foreground import box_likelihood
 from stseg.geometry import Rig
 from stseg.geometry.bodies import BodyTable
 from stseg.geometry.near import near_person
-from stseg.ghosts.explain import Explanation, ViewEvidence
+from stseg.ghosts.people import Explanation, ViewEvidence
 from stseg.occupancy.clutter import clutter, clutter_side, clutter_weights
 from stseg.occupancy.explained import Owners, fill_share, leave_unexplained
 from stseg.occupancy.fusion import Rates, Tally, log_odds_terms

@@ -7,7 +7,7 @@ from typing import Protocol
 
 from stseg.arrays import Labels, Rows, Singles
 from stseg.ghosts.expected import Expected
-from stseg.ghosts.explain import People
+from stseg.ghosts.people import People
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,114 @@
+"""One frame while it is being explained: its candidates, and the set of them that explains it best so far."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from stseg.arrays import Flags, Floats, Ints
+from stseg.ghosts.evidence import Case, Terms
+from stseg.ghosts.pool import Pool, box_evidence, pixel_evidence
+from stseg.ghosts.prior import Prior
+from stseg.ghosts.refine import owned, refine
+from stseg.ghosts.scoring import box_score, pixel_score, set_score, walker_score
+from stseg.ghosts.search import search
+from stseg.ghosts.views import BoxView, PixelView, Sight
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What stays the same while a frame is explained: the views, what each shows (None where blind), and the prior."""
+
+    views: Sequence[BoxView | PixelView]
+    sights: Sequence[Sight | None]
+    prior: Prior
+    terms: Terms
+
+
+class Frame:
+    """Candidates, and the best set of them that a search finds.
+
+    Parameters
+    ----------
+    seen
+        What the frame is judged by.
+    pool
+        The candidates.
+    members : int64 (n,)
+        The candidates with whom the search begins.
+    """
+
+    def __init__(self, seen: Seen, pool: Pool, members: Ints) -> None:
+        self.seen, self.pool = seen, pool
+        self.case = _case(seen, pool)
+        # The scores' parts have the views with boxes first; `row` finds those of each view of the rig.
+        pixels_last = np.argsort([isinstance(view, PixelView) for view in seen.views], kind="stable")
+        self.row = np.argsort(pixels_last)
+        room = np.zeros(len(pool) + 1, np.int64)
+        room[: len(members)] = members
+        count = search(room, len(members), self.case)
+        self.members = room[:count].copy()
+        self.box_owner, self.pixel_owner = self._owners()
+        self.walker = self._walkers()
+
+    def score(self, members: Ints) -> float:
+        """Score of a set; the case's `parts` then holds what each view says of each member."""
+        return set_score(members, len(members), self.case)
+
+    def _owners(self) -> tuple[list[Ints], list[Ints]]:
+        """For each view whose boxes are whose, and whose pixels are whose; -1 for nobody."""
+        boxes, pixels = [], []
+        case, count = self.case, len(self.members)
+        box_view = pixel_view = 0
+        for view, sight in zip(self.seen.views, self.seen.sights, strict=True):
+            owner = np.full(len(sight.edges) if sight else 0, -1, np.int64)
+            raster = np.full(view.shape, -1, np.int64)
+            if isinstance(view, BoxView):
+                box_score(box_view, self.members, count, case.boxes, case.terms, case.owner, case.parts[0])
+                owner[:] = case.owner[: len(owner)]
+                box_view += 1
+            else:
+                pixel_score(pixel_view, self.members, count, case.pixels, case.terms, case.owner, case.parts[0])
+                rows, columns = case.pixels.raster.shape[1:]
+                raster[:] = case.owner[: rows * columns].reshape(rows, columns)[: view.shape[0], : view.shape[1]]
+                pixel_view += 1
+            boxes.append(owner)
+            pixels.append(raster)
+        return boxes, pixels
+
+    def _walkers(self) -> Ints:
+        """Which walker each member is, int64 (member,), -1 for newcomers."""
+        case, walker = self.case, np.full(len(self.members), -1, np.int64)
+        walker_score(self.members, len(self.members), case.known, case.newcomer, case.owner)
+        for k, place in enumerate(case.owner[: case.known.shape[1]]):
+            if place >= 0:
+                walker[place] = k
+        return walker
+
+    def free(self) -> list[Flags]:
+        """For each view the boxes, or the pixels, that nobody explains."""
+        return [
+            (pixels if isinstance(view, PixelView) else boxes) < 0
+            for view, boxes, pixels in zip(self.seen.views, self.box_owner, self.pixel_owner, strict=True)
+        ]
+
+    def refined(self) -> tuple[Pool, Floats]:
+        """The set's people at the means of their posteriors, and the covariances."""
+        views = self.seen.views
+        own = [
+            [owned(v, j, b, p) for v, b, p in zip(views, self.box_owner, self.pixel_owner, strict=True)]
+            for j in range(len(self.members))
+        ]
+        return refine(self.pool.at(self.members), views, self.seen.sights, own, self.seen.prior, self.walker)
+
+
+def _case(seen: Seen, pool: Pool) -> Case:
+    """All that is known of the candidates, as the search reads it."""
+    views, sights, prior = seen.views, seen.sights, seen.prior
+    boxes, pixels = box_evidence(views, sights, pool), pixel_evidence(views, sights, pool)
+    owner = np.empty(max(pixels.raster[:1].size, boxes.match.shape[2], len(prior.expected), 1), np.int64)
+    parts = np.zeros((len(views), len(pool) + 1))
+    own, newcomer, known = prior.tall(pool.height), prior.newcomer(pool.ground), prior.known(pool)
+    return Case(boxes, pixels, own, newcomer, known, pool.ground, seen.terms, owner, parts)

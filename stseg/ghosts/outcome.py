@@ -1,0 +1,89 @@
+"""What a frame comes to once nothing changes any more: its people, its ghosts, and who explains what."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stseg.arrays import Floats, Ints
+from stseg.ghosts.frame import Frame
+from stseg.ghosts.people import Explanation, People
+from stseg.ghosts.pool import Pool
+from stseg.ghosts.views import BoxView, PixelView, View
+
+
+def explanation(frame: Frame) -> Explanation:
+    """The result of a frame."""
+    views, members = frame.seen.views, frame.members
+    exact, covariance = frame.refined()
+    total = frame.score(members)
+    parts = frame.case.parts[frame.row, : len(members)]
+    without = [frame.score(np.delete(members, a)) for a in range(len(members))]
+    people = People(
+        exact.ground, exact.height, covariance, total - np.array(without), parts, _visible(frame),
+        _prior(frame, members, frame.walker), frame.walker,
+    )  # fmt: skip
+    painted = [
+        p if isinstance(v, PixelView) else _painted(v, exact) for v, p in zip(views, frame.pixel_owner, strict=True)
+    ]
+    owner = tuple(p.astype(np.int16) for p in painted)
+    return Explanation(people, _ghosts(frame, total), owner, tuple(v.step for v in views), tuple(frame.box_owner))
+
+
+def _prior(frame: Frame, candidates: Ints, walker: Ints) -> Floats:
+    """What speaks for candidates before any view is asked, nats, float64 (n,)."""
+    case = frame.case
+    alone = case.terms.person + case.own[candidates]
+    return np.array(
+        [
+            p + (case.known[i, k] if k >= 0 else -case.newcomer[i])
+            for p, i, k in zip(alone, candidates, walker, strict=True)
+        ]
+    )
+
+
+def _visible(frame: Frame) -> Floats:
+    """How much of each member each view can see past the others, float64 (view, member)."""
+    members, evidence = frame.members, frame.case.boxes
+    visible = np.ones((len(frame.seen.views), len(members)))
+    boxes = iter(range(len(evidence.match)))
+    for row, view in zip(visible, frame.seen.views, strict=True):
+        if isinstance(view, BoxView):
+            k = next(boxes)
+            cover = evidence.cover[k][np.ix_(members, members)]
+            row[:] = view.found_share(evidence.inside[k][members] * np.prod(1.0 - cover, axis=1))
+    return visible
+
+
+def _ghosts(frame: Frame, total: float) -> People:
+    """Candidates that were weighed and found to be nobody, those in the same place as a better one left out."""
+    pool, members, lattice = frame.pool, frame.members, frame.seen.prior.config.lattice
+    weighed = []
+    for i in np.setdiff1d(np.arange(len(pool)), members):
+        gain = frame.score(np.append(members, i)) - total
+        weighed.append((gain, i, frame.case.parts[frame.row, len(members)]))
+    weighed.sort(key=lambda one: (-one[0], one[1]))
+    kept: list[tuple[float, int, Floats]] = []
+    standing = list(pool.ground[members])
+    for gain, i, parts in weighed:
+        place = pool.ground[i]
+        if all(np.hypot(*(place - other)) >= 2 * lattice for other in standing):
+            standing.append(place)
+            kept.append((gain, int(i), parts))
+    which = np.array([i for _, i, _ in kept], np.int64)
+    chosen = pool.at(which)
+    wide = np.tile(np.eye(2) * lattice**2 / 12, (len(kept), 1, 1))
+    parts = np.array([p for _, _, p in kept]).reshape(len(kept), len(frame.seen.views)).T
+    strangers = np.full(len(kept), -1, np.int64)
+    prior, evidence = _prior(frame, which, strangers), np.array([gain for gain, _, _ in kept])
+    return People(chosen.ground, chosen.height, wide, evidence, parts, np.ones_like(parts), prior, strangers)
+
+
+def _painted(view: View, people: Pool) -> Ints:
+    """Whose body is nearest at each raster pixel of a view, int64 (v, u), -1 for nobody."""
+    first, spans, _ = view.outlines(people.ground, people.height)
+    owner = np.full(view.shape, -1, np.int64)
+    for j in np.argsort(-view.distance(people.ground), kind="stable"):
+        for k in range(spans.shape[1]):
+            if first[j] >= 0 and first[j] + k < view.shape[0]:
+                owner[first[j] + k, spans[j, k, 0] : spans[j, k, 1]] = j
+    return owner

@@ -1,0 +1,75 @@
+"""What goes into the pass of one frame and what comes out of it: people, ghosts, and who explains what."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stseg.arrays import Boxes, Floats, Ints, Singles
+
+ViewEvidence = Boxes | Singles | None
+"""One view of one frame: boxes, a likelihood map float32 (v, u), or None where the view is blind."""
+
+
+@dataclass(frozen=True)
+class People:
+    """Places of bodies.
+
+    Attributes
+    ----------
+    ground : float64 (n, 2)
+        Metres.
+    height : float64 (n,)
+        Metres.
+    covariance : float64 (n, 2, 2)
+        Square metres.
+    evidence : float64 (n,)
+        What all views and the prior say, nats.
+    parts : float64 (view, n)
+        What each view says, nats.
+    visible : float64 (view, n)
+        How much of each body a view can see past nearer people, 0..1.
+    prior : float64 (n,)
+        What of the evidence spoke before any view was asked, nats.
+    walker : int64 (n,)
+        Whom of those expected each is, -1 for newcomers.
+    """
+
+    ground: Floats
+    height: Floats
+    covariance: Floats
+    evidence: Floats
+    parts: Floats
+    visible: Floats
+    prior: Floats
+    walker: Ints
+
+    def __len__(self) -> int:
+        return len(self.ground)
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """Who is there, who is not, and who explains what.
+
+    Attributes
+    ----------
+    people
+        The true candidates.
+    ghosts
+        Candidates that were weighed and found to be nobody.
+    owner : tuple of int16 arrays (v, u)
+        For each view the index of the person whose body is nearest at each raster pixel, -1 for nobody.
+    raster_step : tuple of int
+        Image pixels to a raster pixel of `owner`, for each view.
+    box_owner : tuple of int64 arrays (box,)
+        For each view with boxes the person whom each box shows, -1 for nobody; empty for other views.
+    """
+
+    people: People
+    ghosts: People
+    owner: tuple[NDArray[np.int16], ...]
+    raster_step: tuple[int, ...]
+    box_owner: tuple[Ints, ...]

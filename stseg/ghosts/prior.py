@@ -1,0 +1,59 @@
+"""What is known of a frame before any view is asked: who is expected, what a newcomer costs, how tall people are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stseg.arrays import Floats
+from stseg.config import GhostConfig
+from stseg.ghosts.border import Border
+from stseg.ghosts.expected import Expected, nobody
+from stseg.ghosts.pool import Pool
+
+
+@dataclass(frozen=True)
+class Prior:
+    """One frame's prior.
+
+    Attributes
+    ----------
+    expected
+        Whom the frames before lead to expect.
+    config
+        The pass's constants.
+    border
+        Where people may come in.
+    cost
+        What a newcomer far from the border costs, nats.
+    """
+
+    expected: Expected
+    config: GhostConfig
+    border: Border
+    cost: float
+
+    @classmethod
+    def of(cls, expected: Expected | None, config: GhostConfig, border: Border) -> Prior:
+        """The prior of a frame; None expects nobody and takes nobody for a newcomer, as a first frame must."""
+        if expected is None:
+            return cls(nobody(), config, border, 0.0)
+        return cls(expected, config, border, config.newcomer)
+
+    def pool(self) -> Pool:
+        """Those expected inside the border, as candidates: who leaves the area is not followed out of it."""
+        heights, inside = self.config.heights, self.border.away(self.expected.ground) > 0
+        return Pool(self.expected.ground[inside], self.expected.height[inside].clip(min(heights), max(heights)))
+
+    def tall(self, heights: Floats) -> Floats:
+        """What speaks for somebody as tall as this, metres, beyond somebody of mean height: nats, float64 (n,)."""
+        return -0.5 * ((heights - self.config.height_mean) / self.config.height_spread) ** 2
+
+    def newcomer(self, ground: Floats) -> Floats:
+        """What a newcomer costs at ground points (n, 2), nats, float64 (n,)."""
+        return self.cost * np.minimum(self.border.away(ground) / self.config.border, 1.0)
+
+    def known(self, pool: Pool) -> Floats:
+        """What speaks for each candidate by being each walker, nats, float64 (n, walker)."""
+        return self.expected.known(pool.ground, pool.height, self.config)
