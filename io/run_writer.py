@@ -10,7 +10,7 @@ from typing import Self
 import h5py
 import numpy as np
 
-from stseg.arrays import AnyArray, Bytes, Flags, Ints, Labels, Rows, Singles
+from stseg.arrays import AnyArray, Bytes, Ints, Labels, Rows, Singles
 from stseg.geometry import Rig
 from stseg.io import layout
 from stseg.io.outputs import require_new
@@ -104,25 +104,25 @@ class RunWriter:
         with self._disk.step():
             self._tables[table].append(rows)
 
-    def relabel(self, new_id_of: Mapping[int, int]) -> None:
+    def relabel(self, frame: Ints, track: Ints, identity: Ints) -> None:
         """Give tracks of the volume other ids, or 0 to drop them; the tables are the caller's.
 
-        One frame is in memory at a time, and frames without any of these ids are not written again.
+        One frame is in memory at a time, and frames in which no id changes are not written again.
 
         Parameters
         ----------
-        new_id_of
-            New ids by old ones; ids that are not in it stay.
+        frame, track, identity : int64 (n,)
+            In these frames these tracks take these ids; what is not named stays.
         """
-        changed = {old: new for old, new in new_id_of.items() if old != new and old != 0}
-        if not changed:
-            return
-        new_id = np.arange(max(changed) + 1, dtype=np.int32)
-        new_id[list(changed)] = list(changed.values())
-        affected = new_id != np.arange(len(new_id))
-        for index in range(self._frames):
-            with self._disk.step():
-                self._relabel_frame(index, new_id, affected)
+        changed = track != identity
+        frame, track, identity = frame[changed], track[changed], identity[changed]
+        written = self._occupancy["frame"][:] if len(frame) else np.zeros(0, np.int64)
+        order = np.argsort(frame, kind="stable")
+        for rows in np.split(order, np.flatnonzero(np.diff(frame[order])) + 1):
+            if len(rows):
+                with self._disk.step():
+                    index = int(np.searchsorted(written, frame[rows[0]]))
+                    self._relabel_frame(index, track[rows], identity[rows])
 
     def finish(self, tracks: Rows) -> None:
         """Write the TRACK rows, then sync the file and give it its name."""
@@ -161,12 +161,13 @@ class RunWriter:
         dataset.resize(start + len(values), axis=0)
         dataset[start:] = values
 
-    def _relabel_frame(self, index: int, new_id: Labels, affected: Flags) -> None:
+    def _relabel_frame(self, index: int, track: Ints, identity: Ints) -> None:
         volume = self._occupancy["label"]
         label = volume[index]
-        known = np.where(label < len(new_id), label, 0)
-        if affected[known].any():
-            volume[index] = np.where(label < len(new_id), new_id[known], label)
+        renamed = label.copy()
+        for old, new in zip(track.tolist(), identity.tolist(), strict=True):
+            renamed[label == old] = new
+        volume[index] = renamed
 
     def _close(self) -> None:
         if self._file is not None:

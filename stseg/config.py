@@ -240,13 +240,17 @@ class IdentityConfig:
     """How far ahead a track is carried when a window's cells are divided, seconds; beyond that it may be anywhere."""
     patience: float = 2.0
     """How long somebody may be unseen and still be the same, seconds."""
+    reunion: float = 4.0
+    """How long somebody may be out of sight and still be known again by motion and height, seconds."""
+    bridge: float = 1.0
+    """How long a gap is filled on a straight line; longer ones stay gaps, seconds."""
     shortest: float = 0.8
     """Tracks shorter than this are nobody, seconds (HW12's temporal check)."""
 
     def __post_init__(self) -> None:
         for name in ("window", "walking_speed", "place_noise", "height_noise"):
             require(getattr(self, name) > 0, self, name, "a number above 0")
-        for name in ("slack", "foresight", "patience", "shortest"):
+        for name in ("slack", "foresight", "patience", "reunion", "bridge", "shortest"):
             require(getattr(self, name) >= 0, self, name, "0 or more")
 
 

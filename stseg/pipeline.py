@@ -16,15 +16,15 @@ from typing import Protocol
 
 import numpy as np
 
-from stseg.arrays import Floats, Observation, Rows
+from stseg.arrays import Floats, Ints, Observation, Rows
 from stseg.config import Config
 from stseg.foreground.sight import Sight
 from stseg.geometry import Rig
 from stseg.ghosts.expected import Expected
 from stseg.ghosts.explain import FramePass
 from stseg.ghosts.people import Explanation, People
-from stseg.identity.smoothing import drop_short, fill_gaps
 from stseg.identity.views import box_rows
+from stseg.identity.whole import whole_tracks
 from stseg.occupancy.volume import Occupancy
 from stseg.trackers import Commit, Scene, make_tracker
 from stseg.tracks import CANDIDATE, TIMING, Tracks
@@ -134,12 +134,13 @@ class Pipeline:
             log_odds = self.occupancy.fuse(seen, explanation)
         return Scene(moment.frame, explanation.people, explanation.ghosts, log_odds), explanation
 
-    def finished(self, trajectory: Rows) -> Tracks:
-        """The tracks of the whole run from all committed rows: short ones dropped, gaps filled, boxes drawn."""
-        kept, events = drop_short(trajectory, self.rig.frame_rate, self.config.identity)
-        whole = fill_gaps(kept)
+    def finished(self, committed: Rows, events: Rows) -> tuple[Tracks, Ints]:
+        """The tracks of the whole run from all committed rows and events, and the identity of each committed row."""
+        whole = whole_tracks(
+            committed, events, self.rig.frame_rate, self.frame_pass.border, self.config.identity, self.config.ghosts
+        )
         tables = [view.table for view in self.frame_pass.views]
-        return Tracks(whole, box_rows(tables, whole), events)
+        return Tracks(whole.trajectory, box_rows(tables, whole.trajectory), whole.events), whole.identity
 
 
 def _step(commit: Commit, explained: dict[int, Explanation], watch: Stopwatch) -> Step:

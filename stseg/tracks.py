@@ -16,7 +16,7 @@ TRAJECTORY = np.dtype(
     [
         ("frame", "<i8"),
         ("id", "<i8"),
-        ("x", "<f8"),  # metres, ground position
+        ("x", "<f8"),  # metres, ground position, smoothed along the track
         ("y", "<f8"),
         ("z", "<f8"),  # always 0: the ground; viewers of trajectories ask for it
         ("xx", "<f8"),  # covariance of the position, square metres
@@ -26,6 +26,8 @@ TRAJECTORY = np.dtype(
         ("extent", "<f4"),  # ground area of the labelled cells, square metres
         ("score", "<f4"),  # log-odds of a person, nats
         ("views", "u1"),  # number of views that see the place
+        ("raw_x", "<f8"),  # metres, what the frame by itself said
+        ("raw_y", "<f8"),
     ]
 )
 """One row per person and frame."""

@@ -84,13 +84,11 @@ def _follow(pipeline: Pipeline, recording: Recording, first: int, stop: int, wri
             trajectory.append(step.commit.trajectory)
             events.append(step.commit.events)
     committed = np.concatenate(trajectory)
-    tracks = pipeline.finished(committed)
-    gone = np.setdiff1d(committed["id"], tracks.trajectory["id"])
-    writer.relabel({int(identity): 0 for identity in gone})
+    tracks, identity = pipeline.finished(committed, np.concatenate(events))
+    writer.relabel(committed["frame"], committed["id"], identity)
     writer.append("trajectory", tracks.trajectory)
     writer.append("boxes", tracks.boxes)
-    every = np.concatenate([*events, tracks.events])
-    writer.append("events", every[np.argsort(every["frame"], kind="stable")])
+    writer.append("events", tracks.events)
     writer.finish(tracks.summary())
     return tracks
 

@@ -40,3 +40,7 @@ class Border:
         within = ((cell >= 0) & (cell < [columns, rows])).all(1)
         column, row = cell[:, 0].clip(0, columns - 1), cell[:, 1].clip(0, rows - 1)
         return np.where(within, self.distance[row, column], 0.0)
+
+    def inside(self, ground: Floats, width: float) -> Floats:
+        """How far inside ground points (n, 2) are: 0 at the border, 1 from `width` metres on, float64 (n,)."""
+        return np.minimum(self.away(ground) / width, 1.0)

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from stseg.arrays import Floats
 from stseg.config import GhostConfig
 from stseg.ghosts.border import Border
@@ -52,7 +50,7 @@ class Prior:
 
     def newcomer(self, ground: Floats) -> Floats:
         """What a newcomer costs at ground points (n, 2), nats, float64 (n,)."""
-        return self.cost * np.minimum(self.border.away(ground) / self.config.border, 1.0)
+        return self.cost * self.border.inside(ground, self.config.border)
 
     def known(self, pool: Pool) -> Floats:
         """What speaks for each candidate by being each walker, nats, float64 (n, walker)."""

@@ -32,6 +32,7 @@ def trajectory_rows(
     rows = np.zeros(len(ids), TRAJECTORY)
     rows["frame"], rows["id"] = frame, ids
     rows["x"], rows["y"] = ground[:, 0], ground[:, 1]
+    rows["raw_x"], rows["raw_y"] = ground[:, 0], ground[:, 1]
     rows["xx"], rows["xy"], rows["yy"] = covariance[:, 0, 0], covariance[:, 0, 1], covariance[:, 1, 1]
     rows["height"], rows["extent"], rows["score"], rows["views"] = height, extent, score, views
     return rows[np.argsort(ids, kind="stable")]

@@ -1,4 +1,4 @@
-"""The last look at all tracks: short ones go, gaps are filled (HW12's temporal check; METHODS 5)."""
+"""Short tracks go, short gaps are filled (HW12's temporal check; METHODS 5)."""
 
 from __future__ import annotations
 
@@ -30,17 +30,19 @@ def drop_short(trajectory: Rows, frame_rate: float, config: IdentityConfig) -> t
     return trajectory[counts[where] >= least], events
 
 
-def fill_gaps(trajectory: Rows) -> Rows:
-    """Rows for the frames in which a track was not seen, on a straight line between those in which it was.
+def fill_gaps(trajectory: Rows, frame_rate: float, config: IdentityConfig) -> Rows:
+    """Rows for frames in which a track was not seen for a moment, on a straight line between those in which it was.
 
-    Their extent is 0 and their covariance grows with the distance to what was seen. Sorted by frame, then id.
+    Their extent is 0 and their covariance grows with the distance to what was seen. Longer gaps stay: nobody knows where
+    the person was. Sorted by frame, then id.
     """
     rows = [trajectory]
     for identity in np.unique(trajectory["id"]):
         own = trajectory[trajectory["id"] == identity]
         own = own[np.argsort(own["frame"], kind="stable")]
         for before, after in pairwise(own):
-            rows.append(_between(before, after))
+            if after["frame"] - before["frame"] <= config.bridge * frame_rate + 1:
+                rows.append(_between(before, after))
     every = np.concatenate(rows)
     return every[np.lexsort((every["id"], every["frame"]))]
 
@@ -54,7 +56,7 @@ def _between(before: np.void, after: np.void) -> Rows:
     filled = np.zeros(len(frames), TRAJECTORY)
     share = (frames - before["frame"]) / (after["frame"] - before["frame"])
     filled["frame"], filled["id"] = frames, before["id"]
-    for name in ("x", "y", "xx", "xy", "yy", "height", "score"):
+    for name in ("x", "y", "raw_x", "raw_y", "xx", "xy", "yy", "height", "score"):
         filled[name] = before[name] + share * (after[name] - before[name])
     away = np.minimum(frames - before["frame"], after["frame"] - frames)
     filled["xx"] += (_DRIFT * away) ** 2

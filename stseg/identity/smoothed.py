@@ -1,0 +1,82 @@
+"""Places smoothed along each track by what came before and after (Rauch, Tung and Striebel 1965).
+
+A body moves at constant velocity but for a white acceleration; each row is a measurement with its own covariance.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from stseg.arrays import Floats, Rows
+
+TURN = 0.8
+"""How people change their velocity, metres per second per square root of a second (standard deviation)."""
+_PACE = 0.8
+"""Standard deviation of people's velocity, metres per second."""
+
+
+def smooth_places(trajectory: Rows, frame_rate: float) -> Rows:
+    """A copy with smoothed x, y and their covariance; raw_x and raw_y stay what each frame said.
+
+    Parameters
+    ----------
+    trajectory : TRAJECTORY (n,)
+        Sorted by frame.
+    frame_rate
+        Frames per second.
+    """
+    smoothed = trajectory.copy()
+    for identity in np.unique(trajectory["id"]):
+        rows = np.flatnonzero(trajectory["id"] == identity)
+        own = trajectory[rows]
+        places = np.column_stack([own["raw_x"], own["raw_y"]])
+        noise = np.array([[own["xx"], own["xy"]], [own["xy"], own["yy"]]]).transpose(2, 0, 1)
+        ground, covariance = smoothed_path(own["frame"] / frame_rate, places, noise)
+        smoothed["x"][rows], smoothed["y"][rows] = ground.T
+        smoothed["xx"][rows], smoothed["xy"][rows] = covariance[:, 0, 0], covariance[:, 0, 1]
+        smoothed["yy"][rows] = covariance[:, 1, 1]
+    return smoothed
+
+
+def smoothed_path(seconds: Floats, ground: Floats, noise: Floats) -> tuple[Floats, Floats]:
+    """One path.
+
+    Parameters
+    ----------
+    seconds : float64 (n,)
+        Rising.
+    ground, noise : float64 (n, 2), (n, 2, 2)
+        Measured places and their covariances, metres.
+
+    Returns
+    -------
+    float64 (n, 2), float64 (n, 2, 2)
+        Smoothed places and their covariances.
+    """
+    state, spread = np.append(ground[0], [0.0, 0.0]), np.diag([0.0, 0.0, _PACE**2, _PACE**2])
+    spread[:2, :2] = noise[0]
+    filtered, steps = [(state, spread)], [_step(b - a) for a, b in pairwise(seconds.tolist())]
+    for (motion, turn), place, error in zip(steps, ground[1:], noise[1:], strict=True):
+        state, spread = motion @ state, motion @ spread @ motion.T + turn
+        gain = spread[:, :2] @ np.linalg.inv(spread[:2, :2] + error)
+        state, spread = state + gain @ (place - state[:2]), spread - gain @ spread[:2]
+        filtered.append((state, spread))
+    result = [filtered[-1]]
+    for (motion, turn), (state, spread) in zip(steps[::-1], filtered[-2::-1], strict=True):
+        ahead = motion @ spread @ motion.T + turn
+        gain = spread @ motion.T @ np.linalg.inv(ahead)
+        later, later_spread = result[-1]
+        result.append((state + gain @ (later - motion @ state), spread + gain @ (later_spread - ahead) @ gain.T))
+    result.reverse()
+    places, spreads = np.array([state[:2] for state, _ in result]), np.array([spread[:2, :2] for _, spread in result])
+    return places, np.asarray(spreads, float)
+
+
+def _step(seconds: float) -> tuple[Floats, Floats]:
+    """Motion over some time, and the noise that it adds, both float64 (4, 4)."""
+    motion = np.eye(4)
+    motion[:2, 2:] = seconds * np.eye(2)
+    turn = np.array([[seconds**3 / 3, seconds**2 / 2], [seconds**2 / 2, seconds]]) * TURN**2
+    return motion, np.kron(turn, np.eye(2))

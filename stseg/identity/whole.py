@@ -1,0 +1,91 @@
+"""From what was committed window by window to the tracks of the whole run (METHODS 5).
+
+committed rows -> who is who anew -> short tracks dropped -> short gaps filled -> places smoothed
+                  (relink)           (gaps)                  (gaps)              (smoothed)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from stseg.arrays import Ints, Rows
+from stseg.config import GhostConfig, IdentityConfig
+from stseg.ghosts.border import Border
+from stseg.identity.gaps import drop_short, fill_gaps
+from stseg.identity.relink import Link, relink
+from stseg.identity.smoothed import smooth_places
+from stseg.tracks import EVENT
+
+
+@dataclass(frozen=True)
+class Whole:
+    """The tracks of a run.
+
+    Attributes
+    ----------
+    trajectory : TRAJECTORY (n,)
+        Sorted by frame, then id.
+    events : EVENT (m,)
+        Sorted by frame.
+    identity : int64 (k,)
+        Identity of each committed row, 0 where its track was dropped.
+    """
+
+    trajectory: Rows
+    events: Rows
+    identity: Ints
+
+
+def whole_tracks(
+    committed: Rows, events: Rows, frame_rate: float, border: Border, config: IdentityConfig, people: GhostConfig
+) -> Whole:
+    """The tracks of a run from its committed TRAJECTORY and EVENT rows."""
+    relinked = relink(committed, frame_rate, border, config, people)
+    renamed = committed.copy()
+    renamed["id"] = relinked.identity
+    kept, dropped = drop_short(renamed, frame_rate, config)
+    identity = np.where(np.isin(relinked.identity, kept["id"]), relinked.identity, 0)
+    story = np.concatenate([_retold(events, committed, relinked.identity, relinked.links), dropped])
+    smoothed = smooth_places(fill_gaps(kept, frame_rate, config), frame_rate)
+    return Whole(smoothed, story[np.argsort(story["frame"], kind="stable")], identity)
+
+
+def _retold(events: Rows, committed: Rows, identity: Ints, links: Sequence[Link]) -> Rows:
+    """The events under the new identities: where a track goes on as another, nobody was born and nobody died."""
+    name_at = _Names(committed, identity)
+    told = events.copy()
+    for role in ("id", "other"):
+        told[role] = [name_at.name(track, frame) for track, frame in zip(events[role], events["frame"], strict=True)]
+    begun = {(link.frame, link.track) for link in links}
+    untrue = [
+        (kind == b"birth" and (frame, track) in begun) or (kind == b"death" and name_at.last(name) > frame)
+        for frame, kind, track, name in zip(
+            events["frame"].tolist(), events["kind"].tolist(), events["id"].tolist(), told["id"].tolist(), strict=True
+        )
+    ]
+    joined = [(link.frame, b"hand-over", link.identity, link.track, link.reason.encode()) for link in links]
+    return np.concatenate([told[~np.array(untrue, bool)], np.array(joined, EVENT)])
+
+
+class _Names:
+    """Which identity a track has when, and until when an identity is seen."""
+
+    def __init__(self, committed: Rows, identity: Ints) -> None:
+        order = np.lexsort((committed["frame"], committed["id"]))
+        self.track, self.frame, self.identity = committed["id"][order], committed["frame"][order], identity[order]
+        self.until = {int(name): int(committed["frame"][identity == name].max()) for name in np.unique(identity)}
+
+    def name(self, track: int, frame: int) -> int:
+        """The identity of a track in a frame, or when it was last seen before; 0 for no track."""
+        first, stop = self.track.searchsorted([track, track + 1])
+        if first == stop:
+            return int(track)
+        row = int(self.frame[first:stop].searchsorted(frame, side="right")) - 1
+        return int(self.identity[first + max(row, 0)])
+
+    def last(self, identity: int) -> int:
+        """The last frame in which an identity was seen; -1 for never."""
+        return self.until.get(identity, -1)
