@@ -2,13 +2,14 @@
 
 While people stand together who is who is a guess; once they have parted, and have been seen alone for a while, motion
 and height tell. So every track is cut where it meets another, and where it was out of sight, and the stretches are
-linked anew: each end to at most one later beginning, such that the sum of
+linked anew: each end to at most one later beginning, such that the sum over all links of
 
-    log N(d; 0, s^2 I) + log N(h_a - h_b; 0, v_a + v_b) - log N(h_a - h_b; 0, 2 spread^2) + [same track] stays + parted,
+    log N(d; 0, s^2 I) + log N(h_a - h_b; 0, v_a + v_b) - log N(h_a - h_b; 0, 2 spread^2) + parted + [same] stays,
     d = x_b - x_a - t (v_a + v_b) / 2,   s^2 = 2 noise^2 + t^2 (var v_a + var v_b) / 4 + turn^2 t^3 / 12,
 
-over all links is greatest: what speaks for one person, beyond one who ends here and another, of any height, who begins
-there. Parting costs inside the area alone: at its border people come and go. A flow of one unit through each stretch is an assignment of ends to beginnings, so SciPy's exact solver finds it.
+is greatest: what speaks for one person, beyond one who ends here and another, of any height, who begins there. Parting
+costs inside the area alone: at its border people come and go. A flow of one unit through each stretch is an assignment
+of ends to beginnings, so SciPy's exact solver finds it.
 """
 
 from __future__ import annotations

@@ -70,8 +70,8 @@ def smoothed_path(seconds: Floats, ground: Floats, noise: Floats) -> tuple[Float
         later, later_spread = result[-1]
         result.append((state + gain @ (later - motion @ state), spread + gain @ (later_spread - ahead) @ gain.T))
     result.reverse()
-    places, spreads = np.array([state[:2] for state, _ in result]), np.array([spread[:2, :2] for _, spread in result])
-    return places, np.asarray(spreads, float)
+    places = np.array([state[:2] for state, _ in result])
+    return places, np.stack([spread[:2, :2] for _, spread in result])
 
 
 def _step(seconds: float) -> tuple[Floats, Floats]:
