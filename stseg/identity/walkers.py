@@ -170,7 +170,7 @@ class Walkers:
         near = distances(ghosts.ground, standing).min(1, initial=np.inf) < _BESIDE
         return [
             replace(self._newcomer(frame, ghosts, j), odds=float(ghosts.evidence[j]) - _REPEATED)
-            for j in np.flatnonzero(~near & (ghosts.evidence > _DOUBTFUL))
+            for j in np.flatnonzero(~near & (ghosts.evidence > _DOUBTFUL)).tolist()
         ]
 
     def _newcomer(self, frame: int, people: People, j: int) -> Walker:
