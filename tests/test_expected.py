@@ -167,6 +167,14 @@ def test_a_newcomer_costs_away_from_the_border() -> None:
     np.testing.assert_array_equal(Prior.of(None, CONFIG, border).newcomer(places), 0.0)
 
 
+def test_who_leaves_the_area_is_no_candidate() -> None:
+    """They stay expected, should the frame itself find them."""
+    border = Border.of(open_ground(Grid((-2.0, 2.0), (-2.0, 2.0), 0.1, 1.8, 2)))
+    prior = Prior.of(expecting((2.1, 0.0), (1.0, 0.5), (0.0, -9.0)), CONFIG, border)
+    np.testing.assert_array_equal(prior.pool().ground, [[1.0, 0.5]])
+    assert len(prior.expected) == 3
+
+
 def test_those_expected_are_candidates_of_heights_that_are_tried() -> None:
     prior = Prior.of(expecting((0.1, 0.2, 1.3), (0.4, 0.5, 1.74)), CONFIG, Border.of(rig_of(corner_cameras())))
     pool = prior.pool()

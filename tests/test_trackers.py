@@ -31,7 +31,7 @@ def scene(follow: Tracker, frame: int, *places: tuple[float, float]) -> Scene:
     log_odds = np.full(RIG.grid.shape, -3.0, np.float32)
     log_odds[:, near_person(RIG.grid.ground, standing[:, :2], 0.3) >= 0] = 3.0
     log_odds[:, -1, -1] = np.nan
-    return Scene(frame, found(standing, follow.expected(frame)), log_odds)
+    return Scene(frame, found(standing, follow.expected(frame)), found(people()), log_odds)
 
 
 def crossing(frame: int) -> list[tuple[float, float]]:

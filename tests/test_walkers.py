@@ -13,10 +13,13 @@ from scenes import CONFIG, found, people
 from strategies import numbers
 
 from stseg.arrays import Floats
+from stseg.ghosts.people import People
 from stseg.identity.walkers import Walker, Walkers
 
 RATE = 8.0
 IDENTITY = CONFIG.identity
+GHOSTS = found(people())
+"""Nobody."""
 Way = Callable[[int], tuple[float, float, float] | None]
 """Where somebody is in a frame: x, y, height in metres; None where the frame does not see them."""
 STATES = st.tuples(numbers(-3, 3), numbers(-3, 3), numbers(-2, 2), numbers(-2, 2)).map(np.array)
@@ -93,7 +96,7 @@ def follow(ways: list[Way], frames: range, order: int | None = None) -> tuple[li
     for frame in frames:
         turn = range(len(ways)) if order is None else rng.permutation(len(ways)).tolist()
         here = [(k, place) for k in turn if (place := ways[k](frame)) is not None]
-        told = walkers.follow(frame, found(people(*(place for _, place in here)), walkers.expected(frame)))
+        told = walkers.follow(frame, found(people(*(place for _, place in here)), walkers.expected(frame)), GHOSTS)
         assert len(set(told.tolist())) == len(told)  # nobody is in two places
         for (k, _), chain in zip(here, told.tolist(), strict=True):
             chains[k].append(chain)
@@ -199,11 +202,11 @@ def test_far_away_is_somebody_new() -> None:
 def test_before_the_first_frame_nothing_is_known_and_after_an_empty_one_that_nobody_is_there() -> None:
     walkers = Walkers(RATE, CONFIG.ghosts, IDENTITY)
     assert walkers.expected(0) is None
-    assert walkers.follow(0, found(people())).shape == (0,)
+    assert walkers.follow(0, GHOSTS, GHOSTS).shape == (0,)
     expected = walkers.expected(1)
     assert expected is not None
     assert len(expected) == 0
-    assert walkers.follow(1, found(people((0, 0)), expected)).tolist() == [1]
+    assert walkers.follow(1, found(people((0, 0)), expected), GHOSTS).tolist() == [1]
 
 
 def test_the_same_people_twice() -> None:
@@ -213,3 +216,35 @@ def test_the_same_people_twice() -> None:
     for a, b in zip(before.walkers, after.walkers, strict=True):
         np.testing.assert_array_equal(a.state, b.state)
         np.testing.assert_array_equal(a.covariance, b.covariance)
+
+
+# Who was not believed
+
+
+def doubted(*places: tuple[float, float], evidence: float) -> People:
+    """Candidates of whom a frame made nobody."""
+    return found(people(*places), evidence=evidence)
+
+
+def test_who_was_almost_believed_is_looked_for_once_more() -> None:
+    """They have no number before they are found, and are forgotten if the next frame does not find them."""
+    for found_again in (True, False):
+        walkers = Walkers(RATE, CONFIG.ghosts, IDENTITY)
+        assert walkers.follow(0, GHOSTS, doubted((0.5, 0.5), evidence=-1.0)).shape == (0,)
+        expected = walkers.expected(1)
+        assert expected is not None
+        np.testing.assert_array_equal(expected.ground, [[0.5, 0.5]])
+        assert expected.odds[0] < -1.0  # a second look at the same thing is not a second witness
+        assert walkers.issued == 0
+        now = found(people((0.52, 0.5)), expected) if found_again else GHOSTS
+        assert walkers.follow(1, now, GHOSTS).tolist() == [1] * found_again
+        assert walkers.issued == len(walkers.walkers) == int(found_again)
+
+
+@pytest.mark.parametrize(("evidence", "place", "looked_for"), [(-1, 2, 2), (-5, 2, 1), (-1, 0.3, 1)])
+def test_who_is_not_looked_for_again(evidence: float, place: float, looked_for: int) -> None:
+    """Who was hardly believed at all, and whoever stands beside somebody who is followed: it may be the same."""
+    walkers = Walkers(RATE, CONFIG.ghosts, IDENTITY)
+    walkers.follow(0, found(people((0, 0))), doubted((place, 0.0), evidence=evidence))
+    assert len(walkers.expected(1) or ()) == looked_for
+    assert [walker.chain for walker in walkers.walkers] == [1, 0][:looked_for]

@@ -169,8 +169,8 @@ class Walkers:
         standing = np.array([self._carried(walker, frame).state[:2] for walker in self.walkers]).reshape(-1, 2)
         near = distances(ghosts.ground, standing).min(1, initial=np.inf) < _BESIDE
         return [
-            replace(self._newcomer(frame, ghosts, int(j)), odds=float(ghosts.evidence[j]) - _REPEATED)
-            for j in np.flatnonzero(~near & (ghosts.evidence > _DOUBTFUL))
+            replace(self._newcomer(frame, ghosts, j), odds=float(ghosts.evidence[j]) - _REPEATED)
+            for j in np.flatnonzero(~near & (ghosts.evidence > _DOUBTFUL)).tolist()
         ]
 
     def _newcomer(self, frame: int, people: People, j: int) -> Walker:
