@@ -248,8 +248,9 @@ def tracked(film: Filmed) -> Rows:
     views = len(film.rig.cameras)
     pipeline = Pipeline(film.rig, [Sight()] * views, ["pixels"] * views, Config(), "cut")
     masks = [MaskMoment(k, [np.asarray(255 * m, np.uint8) for m in maps]) for k, maps in enumerate(film.maps)]
-    steps = pipeline.steps(masks, 0, lambda _: None)
-    return pipeline.finished(np.concatenate([step.commit.trajectory for step in steps])).trajectory
+    commits = [step.commit for step in pipeline.steps(masks, 0, lambda _: None)]
+    rows, events = (np.concatenate([getattr(c, name) for c in commits]) for name in ("trajectory", "events"))
+    return pipeline.finished(rows, events)[0].trajectory
 
 
 @dataclass(frozen=True)

@@ -71,7 +71,7 @@ def smoothed_path(seconds: Floats, ground: Floats, noise: Floats) -> tuple[Float
         result.append((state + gain @ (later - motion @ state), spread + gain @ (later_spread - ahead) @ gain.T))
     result.reverse()
     places = np.array([state[:2] for state, _ in result])
-    return places, np.stack([spread[:2, :2] for _, spread in result])
+    return places, np.asarray(np.stack([spread[:2, :2] for _, spread in result]), np.float64)
 
 
 def _step(seconds: float) -> tuple[Floats, Floats]:
