@@ -127,7 +127,8 @@ def switches(name: str, kind: str, stop: int) -> int:
         moments = [Moment(seen.frame, tuple(view.boxes for view in seen.views)) for seen in film]
     else:
         moments = [Moment(seen.frame, tuple(silhouette(view.instances > 0) for view in seen.views)) for seen in film]
-    steps = list(pipeline.steps(moments, 0, [].append))
+    done: list[int] = []
+    steps = list(pipeline.steps(moments, 0, done.append))
     tracks = pipeline.finished(np.concatenate([step.commit.trajectory for step in steps]))
     scores = evaluate(np.concatenate([seen.truth for seen in film]), tracks.trajectory)
     assert scores.misses <= 0.02 * scores.truths

@@ -31,6 +31,7 @@ from stseg.arrays import Rows
 from stseg.config import Config
 from stseg.evaluation import evaluate
 from stseg.evaluation.scores import Scores
+from stseg.evaluation.sequence import Area
 from stseg.io.recording import Recording
 from stseg.io.rigs import read_rig
 from stseg.io.tracks import read_tracks_csv
@@ -108,17 +109,16 @@ def _score(one: ResultSet, rows: Rows, bench: Bench) -> Scores:
     """Scores of tracks as the set is scored in docs/results.md."""
     assert one.truth is not None
     options = shlex.split(one.scoring)
-    (area,) = [option.partition("=")[2].split(",") for option in options if option.startswith("--area=")] or [[]]
-    x0, y0, x1, y1 = map(float, area or [-np.inf, -np.inf, np.inf, np.inf])
-    truth = read_tracks_csv(bench.path(one.truth))
-    judged = np.arange(*_frames(one))
+    truth, frames = read_tracks_csv(bench.path(one.truth)), np.arange(*_frames(one))
+    areas = [_area(option.partition("=")[2]) for option in options if option.startswith("--area=")]
     return evaluate(
-        truth,
-        rows,
-        area=(x0, y0, x1, y1) if area else None,
-        frames=judged,
-        ignore_flagged="--ignore-flagged" in options,
+        truth, rows, area=next(iter(areas), None), frames=frames, ignore_flagged="--ignore-flagged" in options
     )
+
+
+def _area(text: str) -> Area:
+    x0, y0, x1, y1 = map(float, text.split(","))
+    return x0, y0, x1, y1
 
 
 def _prepared(one: ResultSet, bench: Bench) -> Recording:
@@ -137,7 +137,7 @@ def _frames(one: ResultSet) -> tuple[int, int]:
 
 
 def _commit() -> str:
-    command = ["git", "describe", "--always", "--dirty", "--exclude", "*"]
+    command = ["git", "rev-parse", "--short", "HEAD"]
     return subprocess.run(command, cwd=ROOT, stdout=subprocess.PIPE, text=True, check=True).stdout.strip()
 
 

@@ -75,8 +75,9 @@ def follow(recording: Recording, first: int, stop: int, way: str, config: Config
     sights = make_sights(recording, config, first, stop)
     kinds = ["boxes" if source.source.kind == "boxes" else "pixels" for source in recording.sources]
     pipeline = Pipeline(recording.rig, sights, kinds, config, way)
+    done: list[int] = []
     with open_frames(recording, first, stop) as moments:
-        steps = list(pipeline.steps(moments, first, [].append))
+        steps = list(pipeline.steps(moments, first, done.append))
     committed = np.concatenate([step.commit.trajectory for step in steps])
     return Outcome(committed, pipeline.finished(committed).trajectory)
 
