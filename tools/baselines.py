@@ -24,6 +24,7 @@ from stseg.evaluation import evaluate
 from stseg.foreground import box_likelihood
 from stseg.geometry import Grid, Rig
 from stseg.io.frames import open_frames
+from stseg.io.recording import Recording
 from stseg.io.rigs import read_rig
 from stseg.io.tracks import POSITION, read_tracks_csv
 from stseg.occupancy.localise import Localiser
@@ -45,9 +46,8 @@ def mean_log(maps: Sequence[Singles | None], localiser: Localiser) -> Singles:
     return np.asarray(mean, np.float32)
 
 
-def volumes(rig_path: Path, first: int, stop: int, sampling: SamplingKind) -> Iterator[Singles]:
+def volumes(recording: Recording, first: int, stop: int, sampling: SamplingKind) -> Iterator[Singles]:
     """The plain volume of each frame."""
-    recording = read_rig(rig_path)
     sights = make_sights(recording, Config(), first, stop)
     localiser = Localiser(recording.rig, sampling)
     with open_frames(recording, first, stop) as moments:
@@ -104,10 +104,11 @@ def main() -> None:
     parser.add_argument("--sampling", choices=("footprint", "point"), default="footprint")
     asked = parser.parse_args()
     first, stop = map(int, asked.frames.split(":"))
-    rig = read_rig(asked.rig).rig
+    recording = read_rig(asked.rig)
+    rig = recording.rig
     truth = read_tracks_csv(asked.truth)
     truth = truth[(truth["frame"] >= first) & (truth["frame"] < stop)]
-    volume = list(volumes(asked.rig, first, stop, asked.sampling))
+    volume = list(volumes(recording, first, stop, asked.sampling))
     for name, found in (
         ("plain KS09", plain_fusion(volume, asked.level, rig.grid)),
         ("plain 4-D cut", plain_cut(volume, asked.level, rig)),

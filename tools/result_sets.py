@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from stseg.simulate import NAMED
+
 __all__ = ["SETS", "ResultSet"]
 
 
@@ -119,16 +121,18 @@ def _wildtrack(name: str, foreground: str, folder: str, *inputs: str) -> ResultS
     )
 
 
-def _simulated(name: str, scene: str, rig: str, foreground: str, views: int, people: str) -> ResultSet:
+def _simulated(
+    name: str, scene: str, rig: str, foreground: str, views: int, people: str, area: str = "6 m x 6 m"
+) -> ResultSet:
     return ResultSet(
         name,
         foreground,
         views,
-        "0:250",
+        f"0:{NAMED[scene].frames}",
         f"$WORK/{scene}/{rig}",
         film=f"stseg simulate $WORK/{scene} --scene {scene}",
         truth=f"$WORK/{scene}/truth.csv",
-        area="6 m x 6 m",
+        area=area,
         remark=people,
     )
 
@@ -199,5 +203,20 @@ _ALL = (
     _simulated("dense4", "dense4", "rig.toml", "Gaussian mixtures on rendered video", 4, "14 people"),
 )
 
-SETS = {one.name: one for one in _ALL}
+_MEETINGS = {
+    "crossing": "7 people who cross at less than 0.5 m",
+    "meeting": "2 people who stand together for 10 s and part",
+    "meeting_heights": "the same, 8 cm apart in height",
+    "border": "5 people who cross, meet, come and go where windows end",
+}
+_TOLD = tuple(
+    _simulated(f"{scene}{ending}", scene, rig, foreground, 4, people, "5 m x 5 m")
+    for scene, people in _MEETINGS.items()
+    for ending, rig, foreground in (
+        ("", "rig.toml", "Gaussian mixtures on rendered video, 240x180"),
+        ("_boxes", "rig_boxes.toml", "a simulated detector's boxes"),
+    )
+)
+
+SETS = {one.name: one for one in (*_ALL, *_TOLD)}
 """In the order of the table."""

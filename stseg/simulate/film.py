@@ -11,6 +11,7 @@ from stseg.simulate.body import pose
 from stseg.simulate.cameras import build_rig, turns
 from stseg.simulate.render import View, Viewer
 from stseg.simulate.scene import SceneSpec
+from stseg.simulate.script import follow
 from stseg.simulate.walkers import walk
 
 EMPTY_FRAMES = 40
@@ -72,7 +73,7 @@ class Film:
 
     def moments(self) -> Iterator[Moment]:
         """The frames from the first to the last."""
-        for crowd in walk(self.spec):
+        for crowd in (follow if self.spec.routes else walk)(self.spec):
             bodies = pose(crowd)
             views = tuple(viewer.view(crowd, bodies) for viewer in self.viewers)
             yield Moment(crowd.frame, crowd.truth(self.spec.area), views)

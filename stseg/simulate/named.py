@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from stseg.simulate.encounters import BORDER, CROSSING, meeting
+from stseg.simulate.routes import Route
 from stseg.simulate.scene import SceneSpec
 
 _DENSE = SceneSpec(
@@ -23,6 +25,23 @@ _DENSE = SceneSpec(
     stay=18.0,
     seed=1402,
 )
+
+
+def _told(name: str, seconds: float, routes: tuple[Route, ...], seed: int) -> SceneSpec:
+    return SceneSpec(
+        name=name,
+        people=len(routes),
+        area=(5.0, 5.0),
+        seconds=seconds,
+        cameras=4,
+        camera_distance=5.8,
+        size=(240, 180),
+        noise=2.5,
+        shadows=0.3,
+        routes=routes,
+        seed=seed,
+    )
+
 
 NAMED: dict[str, SceneSpec] = {
     scene.name: scene
@@ -55,5 +74,9 @@ NAMED: dict[str, SceneSpec] = {
             noise=2.0,
             seed=4,
         ),
+        _told("crossing", 14.0, CROSSING, 91),
+        _told("meeting", 16.0, meeting((1.72, 1.72)), 92),
+        _told("meeting_heights", 16.0, meeting((1.68, 1.76)), 92),
+        _told("border", 14.0, BORDER, 93),
     )
 }

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from stseg.errors import ConfigError
 from stseg.simulate.lamps import Lamp
+from stseg.simulate.routes import Route
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +48,8 @@ class SceneSpec:
         Slowest and fastest preferred walking speed, metres per second.
     stay
         Mean time that a person stays, seconds.
+    routes
+        The ways of all people, one each; without them people go where they like.
     seed
         Of everything that is drawn by lot.
 
@@ -75,6 +78,7 @@ class SceneSpec:
     quality: int = 85
     speed: tuple[float, float] = (0.6, 1.5)
     stay: float = 15.0
+    routes: tuple[Route, ...] = ()
     seed: int = 1
 
     def __post_init__(self) -> None:
@@ -96,6 +100,8 @@ class SceneSpec:
         self._require("quality", 1 <= self.quality <= 100, self.quality, "1 to 100")
         self._require("speed", 0 < self.speed[0] <= self.speed[1], self.speed, "the slowest, then the fastest, m/s")
         self._require("stay", self.stay > 0, self.stay, "seconds")
+        routes = len(self.routes)
+        self._require("routes", routes in (0, self.people), routes, f"none, or {self.people}, one a person")
         self._require("seed", self.seed >= 0, self.seed, "a whole number from 0")
 
     def _require(self, key: str, holds: bool, found: object, expected: str) -> None:

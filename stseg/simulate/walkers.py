@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import overload
 
 import numpy as np
 
@@ -184,8 +185,16 @@ def _turn_and_stride(walker: Walker, way: Floats, step: float) -> None:
         turn = (facing - walker.heading + np.pi) % (2 * np.pi) - np.pi
         walker.heading += turn * min(1.0, step / 0.25)
     walker.swing += (min(1.0, speed) - walker.swing) * min(1.0, step / 0.3)
-    stride = walker.height * (_STRIDE + _STRIDE_RISE * walker.swing)
-    walker.phase += 2 * np.pi * speed * step / stride
+    walker.phase += 2 * np.pi * speed * step / stride(walker.height, walker.swing)
+
+
+@overload
+def stride(height: float, swing: float) -> float: ...
+@overload
+def stride(height: Floats, swing: Floats) -> Floats: ...
+def stride(height: float | Floats, swing: float | Floats) -> float | Floats:
+    """Length of two steps, metres, of people so tall whose limbs swing so far."""
+    return height * (_STRIDE + _STRIDE_RISE * swing)
 
 
 def _crowd(frame: int, walkers: list[Walker]) -> Crowd:

@@ -1,0 +1,49 @@
+"""Ways that people are told to walk, where a scene is about what happens when."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stseg.arrays import Floats
+from stseg.errors import ConfigError
+
+_EASE = 0.6
+"""Seconds over which a change of velocity is spread."""
+
+
+@dataclass(frozen=True, slots=True)
+class Route:
+    """One person's way: straight from stop to stop, who stands still being at two stops of one place.
+
+    Attributes
+    ----------
+    height
+        Of the person, metres.
+    stops
+        Seconds from the first frame, x and y in metres; the person is there from the first stop's time to the last's.
+
+    Raises
+    ------
+    ConfigError
+        Where there are fewer than two stops, or their times do not rise.
+    """
+
+    height: float
+    stops: tuple[tuple[float, float, float], ...]
+
+    def __post_init__(self) -> None:
+        times = [stop[0] for stop in self.stops]
+        if len(times) < 2 or any(np.diff(times) <= 0):
+            raise ConfigError("route", "stops", times, "two or more stops at rising times")
+
+    def is_there(self, time: float) -> bool:
+        """Whether the person is in the scene at a time, seconds."""
+        return self.stops[0][0] <= time <= self.stops[-1][0]
+
+    def ground(self, time: float) -> Floats:
+        """Where the person is, metres, float64 (2,): the mean of the straight way over the time that a turn takes."""
+        times, x, y = np.array(self.stops).T
+        around = np.clip(time + _EASE * np.linspace(-0.5, 0.5, 13), times[0], times[-1])
+        return np.array([np.interp(around, times, x).mean(), np.interp(around, times, y).mean()])
