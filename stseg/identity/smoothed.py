@@ -70,8 +70,10 @@ def smoothed_path(seconds: Floats, ground: Floats, noise: Floats) -> tuple[Float
         later, later_spread = result[-1]
         result.append((state + gain @ (later - motion @ state), spread + gain @ (later_spread - ahead) @ gain.T))
     result.reverse()
-    places = np.array([state[:2] for state, _ in result])
-    return places, np.asarray(np.stack([spread[:2, :2] for _, spread in result]), np.float64)
+    places, spreads = np.zeros((len(result), 2)), np.zeros((len(result), 2, 2))
+    for k, (state, spread) in enumerate(result):
+        places[k], spreads[k] = state[:2], spread[:2, :2]
+    return places, spreads
 
 
 def _step(seconds: float) -> tuple[Floats, Floats]:
