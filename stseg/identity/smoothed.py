@@ -70,9 +70,10 @@ def smoothed_path(seconds: Floats, ground: Floats, noise: Floats) -> tuple[Float
         later, later_spread = result[-1]
         result.append((state + gain @ (later - motion @ state), spread + gain @ (later_spread - ahead) @ gain.T))
     result.reverse()
-    places, spreads = np.zeros((len(result), 2)), np.zeros((len(result), 2, 2))
-    for k, (state, spread) in enumerate(result):
-        places[k], spreads[k] = state[:2], spread[:2, :2]
+    places: Floats = np.zeros((len(result), 2))
+    spreads: Floats = np.zeros((len(result), 2, 2))
+    for k, (middle, covariance) in enumerate(result):
+        places[k], spreads[k] = middle[:2], covariance[:2, :2]
     return places, spreads
 
 
