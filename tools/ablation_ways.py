@@ -57,7 +57,7 @@ class Outcome:
     committed
         As they were linked.
     finished
-        After the last look at all of them, which drops short ones and fills gaps.
+        After the last look at all of them: who is who anew, short ones dropped, gaps filled, places smoothed.
     """
 
     committed: Rows
@@ -78,8 +78,8 @@ def follow(recording: Recording, first: int, stop: int, way: str, config: Config
     done: list[int] = []
     with open_frames(recording, first, stop) as moments:
         steps = list(pipeline.steps(moments, first, done.append))
-    committed = np.concatenate([step.commit.trajectory for step in steps])
-    return Outcome(committed, pipeline.finished(committed).trajectory)
+    committed, events = (np.concatenate([getattr(s.commit, name) for s in steps]) for name in ("trajectory", "events"))
+    return Outcome(committed, pipeline.finished(committed, events)[0].trajectory)
 
 
 def threshold(recording: Recording, first: int, stop: int) -> dict[float, Rows]:
