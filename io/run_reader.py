@@ -84,6 +84,11 @@ class Run:
         return self._table("windows")
 
     @cached_property
+    def rates(self) -> Rows:
+        """RATES (n,)."""
+        return self._table("rates")
+
+    @cached_property
     def timings(self) -> Rows:
         """TIMING (n,)."""
         return self._table("timings")

@@ -77,7 +77,7 @@ def test_every_table_and_frame_reads_back(run_path: Path) -> None:
     np.testing.assert_array_equal(run.tracks, Tracks(small_trajectory()).summary())
     np.testing.assert_array_equal(run.ghosts, small_ghosts())
     np.testing.assert_array_equal(run.views, VIEWS)
-    assert [len(table) for table in (run.boxes, run.events, run.windows, run.timings)] == [1, 2, 2, 4]
+    assert [len(table) for table in (run.boxes, run.events, run.windows, run.rates, run.timings)] == [1, 2, 2, 4, 4]
     assert run.windows["energy"].tolist() == [12345, 12345]
     for index, frame in enumerate(FRAMES):
         read_log_odds, read_label = run.read_frame(int(frame))

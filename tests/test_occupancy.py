@@ -29,7 +29,7 @@ COARSE = rig_of(corner_cameras(), cell=0.5, planes=3)
 PIXELS, BOXES = ["pixels"] * 4, ["boxes"] * 4
 CONFIG = OccupancyConfig()
 PRIOR = float(np.log(CONFIG.occupied / (1 - CONFIG.occupied)))
-RATES = Rates(FEW_HEIGHTS.pixel_miss, FEW_HEIGHTS.pixel_clutter)
+RATES = Rates(FEW_HEIGHTS.pixel_miss, FEW_HEIGHTS.pixel_clutter, FEW_HEIGHTS.pixel_clutter)
 
 
 def crowd(standing: Floats, views: int = 4) -> People:
@@ -232,7 +232,7 @@ def volume_by_definition(
                 speaking.append(weights[i])
         volume[z, y, x] = PRIOR if near < 0 else 0.0
         if terms:
-            volume[z, y, x] += reference.fused(terms, speaking, shares)
+            volume[z, y, x] += CONFIG.looks * reference.fused(terms, speaking, shares)
     return volume
 
 
@@ -258,11 +258,11 @@ def test_more_views_are_sharper_evidence(value: float) -> None:
     """With equal weights u is the plain sum of the views' log-odds and the prior."""
     rig = rig_of([looking(f"cam{k}", (x, y, 2.6), focal=200.0) for k, (x, y) in enumerate([(-3, -3), (3, -3), (3, 3)])])
     fused = Occupancy(rig, PIXELS[:3], CONFIG, FEW_HEIGHTS).fuse([flat(value)] * 3, explained(rig, people()))
-    miss, false = RATES
+    miss, false, _ = RATES
     one = np.log(((1 - miss) * value + miss * (1 - value)) / (false * value + (1 - false) * (1 - value)))
     views = Sampling.of(rig, "point").views()
     assert set(np.unique(views).tolist()) >= {0, 1, 2, 3}
-    np.testing.assert_allclose(fused[views > 0], views[views > 0] * one + PRIOR, atol=LEVEL)
+    np.testing.assert_allclose(fused[views > 0], CONFIG.looks * views[views > 0] * one + PRIOR, atol=LEVEL)
     assert np.isnan(fused[views == 0]).all()
 
 
@@ -311,7 +311,7 @@ def test_a_missing_box_says_less_of_somebody_hidden() -> None:
     whole_says = occupancy.fuse([no_boxes()], explanation)
     half_says = occupancy.fuse([no_boxes()], replace(explanation, people=half))
     near = np.hypot(*np.moveaxis(rig.grid.ground, -1, 0)) <= CONFIG.reach
-    assert (whole_says[0][near] < -1).all()
+    assert (whole_says[0][near] < -CONFIG.looks).all()
     np.testing.assert_allclose(half_says[0][near], whole_says[0][near] / 2, rtol=1e-5)
     np.testing.assert_array_equal(half_says[0][~near], whole_says[0][~near])
 

@@ -43,6 +43,7 @@ class Overview:
     ghosts_per_frame: float
     windows: int
     frames_per_window: float
+    rates: dict[str, dict[str, float]]
     seconds_by_stage: dict[str, float]
     bytes_per_frame: float
     bytes: int
@@ -97,6 +98,7 @@ def look_over(run: Run) -> Overview:
         ghosts_per_frame=_per(ghosts.sum(), count),
         windows=len(solved),
         frames_per_window=_per(solved.sum(), len(solved)),
+        rates=_rates(run),
         seconds_by_stage=_seconds_by_stage(run),
         bytes_per_frame=_per(size, count),
         bytes=size,
@@ -117,6 +119,14 @@ def _tracks(run: Run) -> list[dict[str, float]]:
 def _counts(kinds: np.ndarray[tuple[int, ...], np.dtype[np.bytes_]]) -> dict[str, int]:
     names, counts = np.unique(kinds, return_counts=True)
     return {name.decode(): int(number) for name, number in zip(names.tolist(), counts, strict=True)}
+
+
+def _rates(run: Run) -> dict[str, dict[str, float]]:
+    """How each view errs by the end of the run."""
+    last = run.rates[run.rates["frame"] == run.rates["frame"].max(initial=-1)]
+    return {
+        run.cameras[row["view"]]: {name: float(row[name]) for name in ("miss", "clutter", "beside")} for row in last
+    }
 
 
 def _seconds_by_stage(run: Run) -> dict[str, float]:
@@ -168,11 +178,20 @@ def _lines(overview: Overview) -> list[tuple[str, str]]:
         ("people", f"{o.people_mean:.1f} a frame, at most {o.people_most}; {len(o.tracks)} tracks"),
         ("events", ", ".join(f"{count} {kind}" for kind, count in o.events.items()) or "none"),
         ("candidates", f"{o.candidates_per_frame:.1f} a frame, {o.ghosts_per_frame:.1f} of them ghosts"),
+        ("rates", _errors(o.rates)),
         ("windows", f"{o.windows}, {o.frames_per_window:.1f} frames each"),
         ("time", f"{total:.1f} s" + (f", {_per(o.frames, 1) / total:.1f} frames/s" if total else "")),
         ("stages", ", ".join(stages) or "none"),
         ("size", f"{o.bytes / 1e6:.1f} MB, {o.bytes_per_frame / 1e3:.1f} kB a frame"),
     ]
+
+
+def _errors(rates: dict[str, dict[str, float]]) -> str:
+    """Bodies missed, and empty rays that meet foreground far from people and beside them, view by view, %."""
+    each = (
+        f"{name} {100 * r['miss']:.0f}/{100 * r['clutter']:.1f}/{100 * r['beside']:.0f}" for name, r in rates.items()
+    )
+    return "% missed/clutter/beside people: " + ", ".join(each) if rates else "none"
 
 
 def _share(seconds: float, total: float) -> str:
