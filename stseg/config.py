@@ -161,9 +161,9 @@ class GhostConfig:
     body_weight: float = 2.0
     """How many independent looks one view's pixels of one body are worth."""
     pixel_miss: float = 0.20
-    """How often a body's pixel is missed by the foreground (m of METHODS 4)."""
+    """How often a body's pixel is missed by the foreground (m of METHODS 4); the first guess of what is learned."""
     pixel_clutter: float = 0.07
-    """How often a ray past all bodies meets foreground (b of METHODS 4)."""
+    """How often a ray past all bodies meets foreground (b of METHODS 4); the first guess of what is learned."""
 
     def __post_init__(self) -> None:
         heights = self.heights

@@ -21,6 +21,7 @@ from stseg.config import Config
 from stseg.foreground.sight import Sight
 from stseg.geometry import Rig
 from stseg.ghosts.explain import Explanation, FramePass, People
+from stseg.ghosts.views import PixelView
 from stseg.identity.smoothing import drop_short, fill_gaps
 from stseg.identity.views import box_rows
 from stseg.occupancy.level import Level
@@ -131,6 +132,9 @@ class Pipeline:
         with watch.time("foreground"):
             seen = [sight.evidence(view) for sight, view in zip(self.sights, moment.views, strict=True)]
         with watch.time("ghosts"):
+            for view, learned in zip(self.frame_pass.views, self.occupancy.level.rates, strict=True):
+                if isinstance(view, PixelView):
+                    view.miss, view.clutter = learned.miss, learned.clutter
             standing = np.column_stack([predicted, np.full(len(predicted), self.config.ghosts.height_mean)])
             explanation = self.frame_pass.explain(seen, standing)
         rates = _rate_rows(moment.frame, self.occupancy.level)

@@ -13,7 +13,7 @@ from stseg.geometry import Grid
 
 sys.path.append(str(Path(__file__).parents[1] / "tools"))
 
-import reliability  # noqa: E402
+import reliability
 
 
 def test_what_is_said_as_it_is_has_no_error() -> None:

@@ -3,7 +3,8 @@
     python tools/reliability.py SCENE=RIG... [--frames A:B] [-o docs/figures/reliability.svg]
 
 Scenes are those of `stseg simulate`: truth.csv stands beside each rig file. A cell is occupied where the pillar of
-somebody of the truth covers it. Each frame is explained once, without what tracks foretell, and fused three times:
+somebody of the truth covers it. Each frame is explained once, by the first guesses and without what tracks foretell,
+and fused three times:
 
     constants   by the first guesses of all rates, every view a look of its own
     learned     by the rates learned from the frames before, as the cut is given it: pi is one half beside people
@@ -119,7 +120,7 @@ def show(scene: str, tallies: Mapping[str, Tally]) -> None:
 
 def draw(scenes: Mapping[str, Mapping[str, Tally]], path: Path) -> None:
     """One small diagram a scene."""
-    plt.rcParams["svg.hashsalt"] = "reliability"
+    plt.rcParams.update({"svg.hashsalt": "reliability", "svg.fonttype": "none"})
     figure, axes = plt.subplots(1, len(scenes), figsize=(2.6 * len(scenes), 2.7), sharey=True, squeeze=False)
     for axis, (scene, tallies) in zip(axes[0], scenes.items(), strict=True):
         axis.plot([0, 1], [0, 1], color="0.7", linewidth=0.8)
