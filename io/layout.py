@@ -14,7 +14,7 @@ import numpy as np
 
 from stseg.arrays import Floats
 from stseg.geometry import Grid
-from stseg.tracks import BOX, CANDIDATE, EVENT, TIMING, TRACK, TRAJECTORY, WINDOW
+from stseg.tracks import BOX, CANDIDATE, EVENT, RATES, TIMING, TRACK, TRAJECTORY, WINDOW
 
 FORMAT = "stseg-run"
 VERSION = 1
@@ -68,9 +68,13 @@ ABOUT = {
     "events": "birth, death, merge, split, hand-over, dropped; other is the other track, 0 for none",
     "ghosts": "one row per candidate and frame: status 1 true, 0 ghost; evidence in nats, parts what each view says",
     "windows": "one row per window: half-open ranges of frames; energy of the cut in units of energy_quantum, nats",
+    "rates": "one row per window and view: how often the view misses bodies and shows what is not there, 0..1",
     "timings": "seconds per stage and window; window -1 for work that belongs to none",
 }
 """Every table and what it holds."""
+
+ADDED = frozenset({"rates"})
+"""Tables that the first files of this version lack: readers take them as empty."""
 
 
 def table_types(views: int) -> dict[str, np.dtype[np.void]]:
@@ -82,6 +86,7 @@ def table_types(views: int) -> dict[str, np.dtype[np.void]]:
         "events": EVENT,
         "ghosts": ghost_type(views),
         "windows": WINDOW,
+        "rates": RATES,
         "timings": TIMING,
     }
 

@@ -88,6 +88,11 @@ class Run:
         return self._table("windows")
 
     @cached_property
+    def rates(self) -> Rows:
+        """RATES (n,); empty in a file that has none."""
+        return self._table("rates")
+
+    @cached_property
     def timings(self) -> Rows:
         """TIMING (n,)."""
         return self._table("timings")
@@ -108,8 +113,8 @@ class Run:
         Parameters
         ----------
         table
-            trajectory, tracks, boxes, events, ghosts, windows or timings. Texts are strings; what each view says of a
-            candidate is one column a view, `parts_CAMERA`.
+            trajectory, tracks, boxes, events, ghosts, windows, rates or timings. Texts are strings; what each view says
+            of a candidate is one column a view, `parts_CAMERA`.
 
         Raises
         ------
@@ -141,7 +146,12 @@ class Run:
         return _read(self.path, layout.OCCUPANCY, lambda file: _volume(file[layout.OCCUPANCY], index))
 
     def _table(self, name: str) -> Rows:
-        return _read(self.path, f"/{name}", lambda file: np.asarray(file[name][:]))
+        def take(file: h5py.File) -> Rows:
+            if name in layout.ADDED and name not in file:
+                return np.zeros(0, layout.table_types(len(self.cameras))[name])
+            return np.asarray(file[name][:])
+
+        return _read(self.path, f"/{name}", take)
 
 
 def read_run(path: Path | str) -> Run:
@@ -192,7 +202,8 @@ def _checked_run(path: Path, file: h5py.File) -> Run:
     for field in layout.FIELDS:
         checks.require_field(field, lengths)
     for name, dtype in layout.table_types(len(cameras)).items():
-        checks.require_dataset(f"/{name}", dtype, 1)
+        if name in file or name not in layout.ADDED:
+            checks.require_dataset(f"/{name}", dtype, 1)
     checks.require_provenance()
     frame_rate = checks.attribute("/trajectory", "fps", "frames per second")
     entry, group = checks.require("/entry/title"), file[layout.OCCUPANCY]

@@ -165,9 +165,9 @@ class GhostConfig:
     body_weight: float = 2.0
     """How many independent looks one view's pixels of one body are worth."""
     pixel_miss: float = 0.20
-    """How often a body's pixel is missed by the foreground (m of METHODS 4)."""
+    """How often a body's pixel is missed by the foreground (m of METHODS 4); the first guess of what is learned."""
     pixel_clutter: float = 0.07
-    """How often a ray past all bodies meets foreground (b of METHODS 4)."""
+    """How often a ray past all bodies meets foreground (b of METHODS 4); the first guess of what is learned."""
 
     def __post_init__(self) -> None:
         heights = self.heights
@@ -194,19 +194,38 @@ class OccupancyConfig:
     """Share of the cells that a body fills where the pass of the frame found nobody (pi of METHODS 4)."""
     reach: float = 0.40
     """How far from a person's place their own cells reach, metres."""
+    looks: float = 0.6
+    """How many independent looks at a cell one view is worth, 0..1: views err together (k of METHODS 4)."""
     sampling: Literal["footprint", "point"] = "footprint"
     """What of a view's map a cell sees: the mean over the pixels that it covers, or the pixel at its centre."""
 
     def __post_init__(self) -> None:
         require(0 < self.occupied < 1, self, "occupied", "a number between 0 and 1")
         require(self.reach > 0, self, "reach", "a number above 0")
+        require(0 < self.looks <= 1, self, "looks", "above 0, at most 1")
+
+
+@dataclass(frozen=True)
+class LevelConfig:
+    """How each view errs, learned from the frames that are explained (METHODS 4)."""
+
+    memory: float = 60.0
+    """How long the rates take to follow a change, seconds."""
+    weight: float = 5.0
+    """How long one person, or the empty room, must be seen to count as much as the first guess, seconds."""
+    supported: float = 3.0
+    """What the other views and the prior must say of a person for a view to be measured by them, nats."""
+
+    def __post_init__(self) -> None:
+        require(self.memory > 0, self, "memory", "seconds, above 0")
+        require(self.weight > 0, self, "weight", "seconds, above 0")
 
 
 @dataclass(frozen=True)
 class SegmentationConfig:
     """The cut of a window's volume (METHODS 4)."""
 
-    smoothness: float = 0.2
+    smoothness: float = 0.1
     """lambda: what it costs that two neighbours at no distance differ, nats."""
     spread: float = 0.20
     """s: distance over which that falls to 0.6 of it, metres."""
@@ -261,6 +280,7 @@ class Config:
     foreground: ForegroundConfig = field(default_factory=ForegroundConfig)
     light: LightConfig = field(default_factory=LightConfig)
     occupancy: OccupancyConfig = field(default_factory=OccupancyConfig)
+    level: LevelConfig = field(default_factory=LevelConfig)
     segmentation: SegmentationConfig = field(default_factory=SegmentationConfig)
     identity: IdentityConfig = field(default_factory=IdentityConfig)
     ghosts: GhostConfig = field(default_factory=GhostConfig)

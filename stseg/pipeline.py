@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from time import perf_counter
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -25,9 +25,10 @@ from stseg.ghosts.explain import FramePass
 from stseg.ghosts.people import Explanation, People
 from stseg.identity.views import box_rows
 from stseg.identity.whole import whole_tracks
+from stseg.occupancy.level import Level
 from stseg.occupancy.volume import Occupancy
 from stseg.trackers import Commit, Scene, make_tracker
-from stseg.tracks import CANDIDATE, TIMING, Tracks
+from stseg.tracks import CANDIDATE, RATES, TIMING, Tracks
 
 
 class Moment(Protocol):
@@ -71,12 +72,15 @@ class Step:
         Volume, labels, trajectory, events, windows.
     candidates : CANDIDATE (n,), parts : float32 (n, view)
         Every candidate of the frames, true or ghost, and what each view says of it, nats.
+    rates : RATES (view,)
+        By which the last of the frames was fused.
     timings : TIMING (k,)
     """
 
     commit: Commit
     candidates: Rows
     parts: Floats
+    rates: Rows
     timings: Rows
 
 
@@ -100,7 +104,7 @@ class Pipeline:
     def __init__(self, rig: Rig, sights: Sequence[Sight], kinds: Sequence[str], config: Config, tracker: str) -> None:
         self.rig, self.sights, self.config, self.tracker_name = rig, sights, config, tracker
         self.frame_pass = FramePass(rig, kinds, config.ghosts)
-        self.occupancy = Occupancy(rig, kinds, config.occupancy, config.ghosts)
+        self.occupancy = Occupancy(rig, kinds, config.occupancy, config.ghosts, config.level)
 
     def steps(self, moments: Iterable[Moment], first: int, advance: Callable[[int], None]) -> Iterator[Step]:
         """Run over moments, from frame `first` on; yields what is decided as soon as it is.
@@ -109,7 +113,7 @@ class Pipeline:
         """
         tracker = make_tracker(self.tracker_name, self.rig, self.config, first)
         watch = Stopwatch()
-        explained: dict[int, Explanation] = {}
+        explained: dict[int, _Explained] = {}
         moments = iter(moments)
         while True:
             with watch.time("read"):
@@ -125,14 +129,18 @@ class Pipeline:
             commits = tracker.finish()
         yield from (_step(commit, explained, watch) for commit in commits)
 
-    def _scene(self, moment: Moment, expected: Expected | None, watch: Stopwatch) -> tuple[Scene, Explanation]:
+    def _scene(self, moment: Moment, expected: Expected | None, watch: Stopwatch) -> tuple[Scene, _Explained]:
         with watch.time("foreground"):
             seen = [sight.evidence(view) for sight, view in zip(self.sights, moment.views, strict=True)]
         with watch.time("ghosts"):
+            for view, learned in zip(self.frame_pass.views, self.occupancy.level.rates, strict=True):
+                if isinstance(view, PixelView):
+                    view.miss, view.clutter = learned.miss, learned.clutter
             explanation = self.frame_pass.explain(seen, expected)
+        rates = _rate_rows(moment.frame, self.occupancy.level)
         with watch.time("occupancy"):
-            log_odds = self.occupancy.fuse(seen, explanation)
-        return Scene(moment.frame, explanation.people, explanation.ghosts, log_odds), explanation
+            log_odds = self.occupancy.follow(seen, explanation)
+        return Scene(moment.frame, explanation.people, explanation.ghosts, log_odds), _Explained(explanation, rates)
 
     def finished(self, committed: Rows, events: Rows) -> tuple[Tracks, Ints]:
         """The tracks of the whole run from all committed rows and events, and the identity of each committed row."""
@@ -143,15 +151,29 @@ class Pipeline:
         return Tracks(whole.trajectory, box_rows(tables, whole.trajectory), whole.events), whole.identity
 
 
-def _step(commit: Commit, explained: dict[int, Explanation], watch: Stopwatch) -> Step:
+class _Explained(NamedTuple):
+    """A frame's explanation, and the RATES (view,) by which it was fused."""
+
+    explanation: Explanation
+    rates: Rows
+
+
+def _step(commit: Commit, explained: dict[int, _Explained], watch: Stopwatch) -> Step:
     rows, parts = [], []
     for scene in commit.scenes:
-        explanation = explained.pop(scene.frame)
+        explanation, rates = explained.pop(scene.frame)
         for status, weighed in ((1, explanation.people), (0, explanation.ghosts)):
             rows.append(_candidate_rows(scene.frame, status, weighed))
             parts.append(weighed.parts.T)
     window = int(commit.windows["index"][0]) if len(commit.windows) else commit.scenes[0].frame
-    return Step(commit, np.concatenate(rows), np.concatenate(parts).astype(np.float32), watch.take(window))
+    return Step(commit, np.concatenate(rows), np.concatenate(parts).astype(np.float32), rates, watch.take(window))
+
+
+def _rate_rows(frame: int, level: Level) -> Rows:
+    rows = np.zeros(len(level.rates), RATES)
+    rows["frame"], rows["view"], rows["filled"] = frame, np.arange(len(rows)), level.filled_share
+    rows["miss"], rows["clutter"], rows["beside"] = np.array(level.rates).T
+    return rows
 
 
 def _candidate_rows(frame: int, status: int, people: People) -> Rows:

@@ -93,6 +93,19 @@ TIMING = np.dtype([("stage", "S24"), ("window", "<i8"), ("seconds", "<f8")])
 """One row per stage and window; window -1 for work that belongs to none."""
 
 
+RATES = np.dtype(
+    [
+        ("frame", "<i8"),
+        ("view", "<i4"),
+        ("miss", "<f4"),  # how often a cell of a body is missed
+        ("clutter", "<f4"),  # how often the ray of an empty cell meets foreground where nobody is near
+        ("beside", "<f4"),  # the same within reach of a person
+        ("filled", "<f4"),  # share of the cells within reach of a person that bodies fill, of all views together
+    ]
+)
+"""One row per window and view: the rates by which the window's last frame was fused."""
+
+
 @dataclass(frozen=True)
 class Tracks:
     """What a tracker found.

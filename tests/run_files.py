@@ -11,7 +11,7 @@ from stseg.geometry import Camera, Grid, Rig
 from stseg.io.layout import ghost_type
 from stseg.io.recording import CameraSource, Recording, Source
 from stseg.io.runs import RunWriter
-from stseg.tracks import BOX, EVENT, TIMING, TRAJECTORY, WINDOW, Tracks
+from stseg.tracks import BOX, EVENT, RATES, TIMING, TRAJECTORY, WINDOW, Tracks
 
 FRAMES = np.arange(10, 16)
 CONFIG = "[ghosts]\nperson = -3.0\n"
@@ -62,6 +62,8 @@ def fill(writer: RunWriter) -> None:
         writer.append_frames(FRAMES[part], log_odds[part], label[part])
         bounds = (index, FRAMES[part][0], FRAMES[part][-1] + 1, FRAMES[part][0], FRAMES[part][-1] + 1)
         writer.append("windows", np.array([(*bounds, 12345, 1e-6, 7)], WINDOW))
+        rates = [(FRAMES[part][-1], view, 0.2, 0.05 / (index + 1), 0.4, 0.25) for view in range(2)]
+        writer.append("rates", np.array(rates, RATES))
         writer.append("timings", np.array([(b"cut", index, 1.5), (b"volume", index, 0.5)], TIMING))
     writer.append("trajectory", small_trajectory())
     writer.append("boxes", np.array([(10, 1, 0, 1.0, 2.0, 3.0, 4.0)], BOX))

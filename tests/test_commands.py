@@ -136,6 +136,8 @@ def test_inspect_sums_up_a_run(run_path: Path) -> None:
     assert overview.seconds_by_stage == {"cut": 3.0, "volume": 1.0}
     assert list(overview.seconds_by_stage) == ["cut", "volume"]
     assert (overview.windows, overview.frames_per_window) == (2, 3.0)
+    assert list(overview.rates) == ["left", "right"]
+    assert overview.rates["left"] == pytest.approx({"miss": 0.2, "clutter": 0.025, "beside": 0.4})
     assert overview.bytes == run_path.stat().st_size
     assert overview.warnings == ["view right says nothing of any candidate: is it blind, or its calibration wrong?"]
 

@@ -26,13 +26,14 @@ from run_files import (
 )
 
 from stseg.arrays import Bytes, Labels
+from stseg.commands.overview import look_over
 from stseg.errors import FormatError, OutputError
 from stseg.geometry import Grid
 from stseg.io import layout, part_file
 from stseg.io.outputs import part_of, replacing
 from stseg.io.rig_text import format_rig
 from stseg.io.runs import RunWriter, read_run, read_trajectory
-from stseg.tracks import TRAJECTORY, Tracks
+from stseg.tracks import RATES, TRAJECTORY, Tracks
 
 VIEWS: Bytes = np.full((3, 4, 6), 2, np.uint8)
 
@@ -77,7 +78,7 @@ def test_every_table_and_frame_reads_back(run_path: Path) -> None:
     np.testing.assert_array_equal(run.tracks, Tracks(small_trajectory()).summary())
     np.testing.assert_array_equal(run.ghosts, small_ghosts())
     np.testing.assert_array_equal(run.views, VIEWS)
-    assert [len(table) for table in (run.boxes, run.events, run.windows, run.timings)] == [1, 2, 2, 4]
+    assert [len(table) for table in (run.boxes, run.events, run.windows, run.rates, run.timings)] == [1, 2, 2, 4, 4]
     assert run.windows["energy"].tolist() == [12345, 12345]
     for index, frame in enumerate(FRAMES):
         read_log_odds, read_label = run.read_frame(int(frame))
@@ -441,6 +442,15 @@ def test_what_is_missing_or_wrong_is_named(run_path: Path, edit: Callable[[h5py.
     with pytest.raises(FormatError) as caught:
         read_run(run_path)
     assert f"{run_path}: {named}" in str(caught.value)
+
+
+def test_the_first_files_had_no_rates(run_path: Path) -> None:
+    with h5py.File(run_path, "r+") as file:
+        del file["rates"]
+    run = read_run(run_path)
+    assert (len(run.rates), run.rates.dtype) == (0, RATES)
+    assert not len(run.data_frame("rates"))
+    assert (look_over(run).rates, len(run.windows)) == ({}, 2)
 
 
 def test_a_broken_chunk_is_told_when_it_is_read(run_path: Path) -> None:

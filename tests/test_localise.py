@@ -23,7 +23,7 @@ from stseg.occupancy.sampling import Sampling, SamplingKind
 from stseg.occupancy.tables import TOP, UNSEEN, fill_means, fill_points, fill_sums, sum_of
 from stseg.occupancy.volume import Occupancy
 
-RATES = Rates(0.2, 0.07)
+RATES = Rates(0.2, 0.07, 0.07)
 OCCUPIED = 0.02
 KINDS: list[SamplingKind] = ["point", "footprint"]
 COARSE = rig_of(corner_cameras(), cell=0.5, planes=3)
@@ -92,7 +92,7 @@ def test_localisation_by_definition(kind: SamplingKind, blind: int | None) -> No
     maps: list[Singles | None] = [*noise(3, 3)]
     if blind is not None:
         maps[blind] = None
-    weights, rates = np.array([0.5, 1.0, 2.0]), [RATES, Rates(0.1, 0.02), Rates(0.3, 0.2)]
+    weights, rates = np.array([0.5, 1.0, 2.0]), [RATES, Rates(0.1, 0.02, 0.1), Rates(0.3, 0.2, 0.3)]
     localiser = Localiser(rig, kind)
     synergy = localiser.synergy(maps, weights, 0.05)
     log_odds = localiser.log_odds(maps, weights, rates, OCCUPIED)
@@ -124,19 +124,19 @@ def test_nobody_explained_is_the_plain_localisation() -> None:
     owner, free = (np.full((96, 128), -1, np.int16),) * 4, (np.zeros(0, np.int64),) * 4
     explanation = Explanation(nobody, nobody, owner, (1,) * 4, free)
     localiser = Localiser(COARSE, "footprint")
-    rates = [Rates(FEW_HEIGHTS.pixel_miss, FEW_HEIGHTS.pixel_clutter)] * 4
+    rates = [Rates(FEW_HEIGHTS.pixel_miss, FEW_HEIGHTS.pixel_clutter, FEW_HEIGHTS.pixel_clutter)] * 4
     plain = localiser.log_odds(maps, localiser.clutter_weights(maps), rates, OccupancyConfig().occupied)
-    explained = Occupancy(COARSE, ["pixels"] * 4, OccupancyConfig(sampling="footprint"), FEW_HEIGHTS)
+    explained = Occupancy(COARSE, ["pixels"] * 4, OccupancyConfig(sampling="footprint", looks=1.0), FEW_HEIGHTS)
     np.testing.assert_array_equal(explained.fuse([*maps], explanation), plain)
 
 
 def test_terms_at_their_ends() -> None:
-    terms = log_odds_terms(RATES)
-    assert terms[0] == pytest.approx(np.log(0.2 / 0.93))
-    assert terms[TOP] == pytest.approx(np.log(0.8 / 0.07))
+    terms = log_odds_terms(Rates(0.2, 0.07, 0.4))
+    np.testing.assert_allclose(terms[:, 0], np.log([0.2 / 0.93, 0.2 / 0.6]), rtol=1e-5)
+    np.testing.assert_allclose(terms[:, TOP], np.log([0.8 / 0.07, 0.8 / 0.4]), rtol=1e-5)
     assert (np.diff(terms) > 0).all()
-    assert synergy_terms(0.05)[0] == pytest.approx(np.log(0.05))
-    assert synergy_terms(0.05)[TOP] == 0
+    np.testing.assert_allclose(synergy_terms(0.05)[:, 0], np.log(0.05), rtol=1e-5)
+    assert (synergy_terms(0.05)[:, TOP] == 0).all()
 
 
 def test_maps_that_do_not_fit_the_cameras() -> None:

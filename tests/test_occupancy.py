@@ -20,8 +20,8 @@ from stseg.geometry.bodies import BodyTable
 from stseg.ghosts.explain import FramePass
 from stseg.ghosts.people import Explanation, ViewEvidence
 from stseg.occupancy.clutter import clutter, clutter_weights
-from stseg.occupancy.fusion import Rates
-from stseg.occupancy.instances import fill_match_of_planes
+from stseg.occupancy.fusion import Rates, log_odds_terms
+from stseg.occupancy.instances import fill_match_of_planes, likelihood_of
 from stseg.occupancy.sampling import Sampling, SamplingKind
 from stseg.occupancy.tables import TOP
 from stseg.occupancy.volume import Occupancy
@@ -30,7 +30,7 @@ COARSE = rig_of(corner_cameras(), cell=0.5, planes=3)
 PIXELS, BOXES = ["pixels"] * 4, ["boxes"] * 4
 CONFIG = OccupancyConfig()
 PRIOR = float(np.log(CONFIG.occupied / (1 - CONFIG.occupied)))
-RATES = Rates(FEW_HEIGHTS.pixel_miss, FEW_HEIGHTS.pixel_clutter)
+RATES = Rates(FEW_HEIGHTS.pixel_miss, FEW_HEIGHTS.pixel_clutter, FEW_HEIGHTS.pixel_clutter)
 
 
 def explained(rig: Rig, standing: Floats, owner: Sequence[Ints] | None = None, step: int = 1) -> Explanation:
@@ -185,6 +185,17 @@ def test_likelihood_per_plane_by_definition(seed: int) -> None:
             assert likelihood[z, y, x] == pytest.approx(best, rel=1e-4, abs=1e-6)
 
 
+@pytest.mark.parametrize(("near", "clutter"), [(-1, 0.01), (0, 0.2)])
+def test_a_box_says_as_much_as_its_match_is_worth(near: int, clutter: float) -> None:
+    """The terms of the rates by which L was made give back m + M (1 - m) / b, and an empty cell counts as M."""
+    match, rates = np.linspace(0.05, 0.9, 18).astype(np.float32).reshape(-1, 1, 1), Rates(0.15, 0.01, 0.2)
+    likelihood = likelihood_of(match, np.full((1, 1), near), rates)
+    said = log_odds_terms(rates)[near + 1, np.rint(likelihood * TOP).astype(int)]
+    np.testing.assert_allclose(said, np.log(0.15 + match * 0.85 / clutter), atol=0.02)
+    erring = clutter * likelihood / (clutter * likelihood + (1 - clutter) * (1 - likelihood))
+    np.testing.assert_allclose(erring, match, atol=0.2 * clutter)
+
+
 # Fusion
 
 
@@ -226,7 +237,7 @@ def volume_by_definition(
                 speaking.append(weights[i])
         volume[z, y, x] = PRIOR if near < 0 else 0.0
         if terms:
-            volume[z, y, x] += reference.fused(terms, speaking, shares)
+            volume[z, y, x] += CONFIG.looks * reference.fused(terms, speaking, shares)
     return volume
 
 
@@ -252,11 +263,11 @@ def test_more_views_are_sharper_evidence(value: float) -> None:
     """With equal weights u is the plain sum of the views' log-odds and the prior."""
     rig = rig_of([looking(f"cam{k}", (x, y, 2.6), focal=200.0) for k, (x, y) in enumerate([(-3, -3), (3, -3), (3, 3)])])
     fused = Occupancy(rig, PIXELS[:3], CONFIG, FEW_HEIGHTS).fuse([flat(value)] * 3, explained(rig, people()))
-    miss, false = RATES
+    miss, false, _ = RATES
     one = np.log(((1 - miss) * value + miss * (1 - value)) / (false * value + (1 - false) * (1 - value)))
     views = Sampling.of(rig, "point").views()
     assert set(np.unique(views).tolist()) >= {0, 1, 2, 3}
-    np.testing.assert_allclose(fused[views > 0], views[views > 0] * one + PRIOR, atol=LEVEL)
+    np.testing.assert_allclose(fused[views > 0], CONFIG.looks * views[views > 0] * one + PRIOR, atol=LEVEL)
     assert np.isnan(fused[views == 0]).all()
 
 
@@ -305,7 +316,7 @@ def test_a_missing_box_says_less_of_somebody_hidden() -> None:
     whole_says = occupancy.fuse([no_boxes()], explanation)
     half_says = occupancy.fuse([no_boxes()], replace(explanation, people=half))
     near = np.hypot(*np.moveaxis(rig.grid.ground, -1, 0)) <= CONFIG.reach
-    assert (whole_says[0][near] < -1).all()
+    assert (whole_says[0][near] < -CONFIG.looks).all()
     np.testing.assert_allclose(half_says[0][near], whole_says[0][near] / 2, rtol=1e-5)
     np.testing.assert_array_equal(half_says[0][~near], whole_says[0][~near])
 

@@ -38,7 +38,7 @@ def test_places_are_peaks_one_after_the_other() -> None:
 def test_masks_are_spoiled_at_the_rates() -> None:
     mask = np.zeros((400, 400), np.float32)
     mask[:, 200:] = 1.0
-    seen = occupancy_figures.spoiled(mask, Rates(0.3, 0.1), (1, 2))
+    seen = occupancy_figures.spoiled(mask, Rates(0.3, 0.1, 0.1), (1, 2))
     assert set(np.unique(seen)) == {0.0, 1.0}
     assert abs(seen[:, :200].mean() - 0.1) < 0.03
     assert abs(seen[:, 200:].mean() - 0.7) < 0.05

@@ -17,7 +17,7 @@ from stseg.foreground.sight import Sight
 from stseg.geometry import Rig
 from stseg.ghosts.scoring import set_score
 from stseg.pipeline import Pipeline, Step
-from stseg.tracks import CANDIDATE, TIMING, Tracks
+from stseg.tracks import CANDIDATE, RATES, TIMING, Tracks
 
 INTERPRETED = python_form(set_score) is set_score
 """Without its compiler the recording must be shorter: a frame takes a hundred times as long."""
@@ -132,6 +132,18 @@ def test_candidates_are_told_for_every_frame() -> None:
     assert (timed["seconds"] >= 0).all()
     told = np.concatenate([step.candidates for step in done.steps])
     assert np.unique(told["frame"]).tolist() == list(range(FRAMES))
+
+
+def test_rates_are_told_for_every_window() -> None:
+    done = whole("boxes", "cut")
+    for step in done.steps:
+        assert step.rates.dtype == RATES
+        assert step.rates["frame"].tolist() == [step.commit.scenes[-1].frame] * 4
+        assert step.rates["view"].tolist() == [0, 1, 2, 3]
+    # A perfect detector: it misses less than was guessed, and people's surroundings are told apart from the rest.
+    first, last = done.steps[0].rates, done.steps[-1].rates
+    assert (last["miss"] < first["miss"]).all()
+    assert (last["beside"] > last["clutter"]).all()
 
 
 def test_every_frame_is_committed_once() -> None:

@@ -88,7 +88,7 @@ def localisation(rounds: int) -> bool:
     """Print the times; whether the gates hold."""
     rig, maps, equal = bench_rig(), smooth_noise(), np.ones(VIEWS)
     points, footprints, peer = Localiser(rig, "point"), Localiser(rig, "footprint"), whole_warps(rig)
-    rates = [Rates(0.2, 0.07)] * VIEWS
+    rates = [Rates(0.2, 0.07, 0.07)] * VIEWS
     ways: dict[str, Callable[[], object]] = {
         "whole warps": lambda: peer(maps),
         "points": lambda: points.synergy(maps, equal, LEAST),

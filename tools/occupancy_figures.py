@@ -33,9 +33,9 @@ from stseg.simulate import Film, Moment, SceneSpec
 KINDS: tuple[SamplingKind, ...] = get_args(SamplingKind)
 OCCUPIED = 0.02
 LEAST = 0.05
-RATES = Rates(0.2, 0.07)
-NOISY = Rates(0.4, 0.25)
-GOOD = Rates(0.05, 0.02)
+RATES = Rates(0.2, 0.07, 0.07)
+NOISY = Rates(0.4, 0.25, 0.25)
+GOOD = Rates(0.05, 0.02, 0.02)
 PATCH = 8
 """Pixels: side of the patches in which masks err."""
 BODY = 0.15

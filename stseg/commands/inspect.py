@@ -90,6 +90,7 @@ def _lines(overview: Overview) -> list[tuple[str, str]]:
         ("events", ", ".join(f"{count} {kind}" for kind, count in o.events.items()) or "none"),
         ("candidates", f"{o.candidates_per_frame:.1f} a frame, {o.ghosts_per_frame:.1f} of them ghosts"),
         ("ghosts", "; ".join(_ghosts(o)) or "none"),
+        ("rates", _errors(o.rates)),
         ("windows", f"{o.windows}, {o.frames_per_window:.1f} frames each"),
         ("time", f"{total:.1f} s" + (f", {per(o.frames, 1) / total:.1f} frames/s" if total else "")),
         ("stages", ", ".join(stages) or "none"),
@@ -120,6 +121,14 @@ def _ghosts(overview: Overview) -> list[str]:
 
 def _lengths(seconds: dict[str, float]) -> str:
     return "".join(f", {name} {length:.1f} s" for name, length in seconds.items())
+
+
+def _errors(rates: dict[str, dict[str, float]]) -> str:
+    """Bodies missed, and empty rays that meet foreground far from people and beside them, view by view, %."""
+    each = (
+        f"{name} {100 * r['miss']:.0f}/{100 * r['clutter']:.1f}/{100 * r['beside']:.0f}" for name, r in rates.items()
+    )
+    return "% missed/clutter/beside people: " + ", ".join(each) if rates else "none"
 
 
 def _share(seconds: float, total: float) -> str:

@@ -47,6 +47,8 @@ class Overview:
     """For each view, the ghosts at whose place it sees nobody; several may deny one."""
     windows: int
     frames_per_window: float
+    rates: dict[str, dict[str, float]]
+    """How each view errs by the end of the run: `miss`, `clutter`, `beside` of /rates, 0..1."""
     seconds_by_stage: dict[str, float]
     bytes_per_frame: float
     bytes: int
@@ -88,6 +90,7 @@ def look_over(run: Run) -> Overview:
         ghosts_denied_by=dict(zip(run.cameras, reasons.denies.sum(axis=0).tolist(), strict=True)),
         windows=len(solved),
         frames_per_window=per(solved.sum(), len(solved)),
+        rates=_rates(run),
         seconds_by_stage=seconds_by_stage(run),
         bytes_per_frame=per(size, count),
         bytes=size,
@@ -105,6 +108,13 @@ def seconds_by_stage(run: Run) -> dict[str, float]:
     names, stage = np.unique(run.timings["stage"], return_inverse=True)
     seconds = np.bincount(stage, run.timings["seconds"], len(names))
     return {names[index].decode(): float(seconds[index]) for index in np.argsort(-seconds, kind="stable")}
+
+
+def _rates(run: Run) -> dict[str, dict[str, float]]:
+    last = run.rates[run.rates["frame"] == run.rates["frame"].max(initial=-1)]
+    return {
+        run.cameras[row["view"]]: {name: float(row[name]) for name in ("miss", "clutter", "beside")} for row in last
+    }
 
 
 def _tracks(run: Run) -> list[dict[str, float]]:

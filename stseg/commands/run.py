@@ -103,6 +103,7 @@ def _write(step: Step, writer: RunWriter, views: int) -> None:
     ghosts["parts"] = step.parts
     writer.append("ghosts", ghosts)
     writer.append("windows", commit.windows)
+    writer.append("rates", step.rates)
     writer.append("timings", step.timings)
 
 

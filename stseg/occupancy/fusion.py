@@ -8,11 +8,13 @@ more cluttered they are (eqs 5, 6), and only views that see the cell speak (eq. 
 This is the *synergy map*. It leaves the level from which a cell is occupied open, and that level depends on how many
 views see the cell. The calibrated form is the log-odds
 
-    u = n_vis sum_i w_i log[ ((1 - m) L_i + m (1 - L_i)) / (b L_i + (1 - b)(1 - L_i)) ] + log(pi / (1 - pi))
+    u = k n_vis sum_i w_i log[ ((1 - m) L_i + m (1 - L_i)) / (b L_i + (1 - b)(1 - L_i)) ] + log(pi / (1 - pi))
 
 with m, how often a body is missed, b, how often the ray of an empty cell meets foreground, and pi, how often a cell is
-occupied. Both are sums of terms that depend on one view's L_i alone, so both are the same kernels with another table of
-terms. L_i is the mean over the cell's footprint, taken before the logarithm.
+occupied. b and pi differ between cells within reach of a person and others: rays that pass a person closely often meet
+that person. k, 0..1, is how many independent looks at a cell one view is worth: views err together where a limb leaves
+the pillar or a person stands a little aside. Both are sums of terms that depend on one view's L_i alone, so both are
+the same kernels with other tables of terms. L_i is the mean over the cell's footprint, taken before the logarithm.
 
 A view that sees only a share a_i of the footprint past nearer people counts as that much of a view: w_i is multiplied
 by a_i, and n_vis = sum_i a_i.
@@ -30,24 +32,42 @@ from stseg.occupancy.tables import TOP, Levels
 
 
 class Rates(NamedTuple):
-    """How a view errs: m, how often a body is missed, and b, how often an empty ray meets foreground (METHODS 4)."""
+    """How a view errs (METHODS 4).
+
+    Attributes
+    ----------
+    miss
+        m: how often a cell of a body is missed.
+    clutter
+        b: how often the ray of an empty cell meets foreground where nobody is near.
+    beside
+        b of the empty cells within reach of a person.
+    """
 
     miss: float
     clutter: float
+    beside: float
 
 
 def log_odds_terms(rates: Rates) -> Singles:
-    """log[ ((1 - m) L + m (1 - L)) / (b L + (1 - b)(1 - L)) ] of each level, nats, float32 (TOP + 1,)."""
+    """log[ ((1 - m) L + m (1 - L)) / (b L + (1 - b)(1 - L)) ] of each level, nats.
+
+    Returns
+    -------
+    float32 (2, TOP + 1)
+        Where nobody is near, and within reach of a person.
+    """
     likelihood = np.arange(TOP + 1) / TOP
     body = (1 - rates.miss) * likelihood + rates.miss * (1 - likelihood)
-    empty = rates.clutter * likelihood + (1 - rates.clutter) * (1 - likelihood)
+    clutter = np.array([[rates.clutter], [rates.beside]])
+    empty = clutter * likelihood + (1 - clutter) * (1 - likelihood)
     return np.log(body / empty).astype(np.float32)
 
 
 def synergy_terms(least: float) -> Singles:
-    """log L of each level, L at least `least` (L_min of METHODS 2), nats, float32 (TOP + 1,)."""
+    """log L of each level, L at least `least` (L_min of METHODS 2), nats, float32 (2, TOP + 1): the same everywhere."""
     likelihood = np.arange(TOP + 1) / TOP
-    return np.log(np.maximum(likelihood, least)).astype(np.float32)
+    return np.tile(np.log(np.maximum(likelihood, least)).astype(np.float32), (2, 1))
 
 
 class Tally:
@@ -63,14 +83,15 @@ class Tally:
         self.weighted, self.weights = np.zeros(shape, np.float32), np.zeros(shape, np.float32)
         self.count = np.zeros(shape, np.float32)
 
-    def add(self, levels: Levels, terms: Singles, weight: float, share: Singles, faith: Singles) -> None:
+    def add(self, levels: Levels, terms: Singles, weight: float, share: Singles, faith: Singles, near: Ints) -> None:
         """Add one view; see `add_terms`."""
-        add_terms(levels, terms, np.float32(weight), share, faith, self.weighted, self.weights, self.count)
+        add_terms(levels, terms, np.float32(weight), share, faith, near, self.weighted, self.weights, self.count)
 
-    def total(self, views: Bytes, near: Ints, prior: float) -> Singles:
-        """n_vis sum_i w_i term_i, and the prior where nobody is near, float32 (plane, y, x); see `fill_total`."""
+    def total(self, views: Bytes, near: Ints, looks: float, priors: tuple[float, float]) -> Singles:
+        """k n_vis sum_i w_i term_i and the prior, nats, float32 (plane, y, x); see `fill_total`."""
         total = np.empty(self.weighted.shape, np.float32)
-        fill_total(self.weighted, self.weights, self.count, views, near, np.float32(prior), total)
+        prior, prior_beside = np.float32(priors[0]), np.float32(priors[1])
+        fill_total(self.weighted, self.weights, self.count, views, near, np.float32(looks), prior, prior_beside, total)
         return total
 
 
@@ -81,6 +102,7 @@ def add_terms(
     weight: np.float32,
     share: Singles,
     faith: Singles,
+    near: Ints,
     weighted: Singles,
     weights: Singles,
     count: Singles,
@@ -91,21 +113,24 @@ def add_terms(
     ----------
     levels : int16 (plane, y, x)
         Mean likelihood of each cell, or UNSEEN.
-    terms : float32 (TOP + 1,)
-        The term of each level, nats.
+    terms : float32 (2, TOP + 1)
+        The term of each level where nobody is near, and where somebody is, nats.
     weight
         1 / C_i, in any scale.
     share : float32 (plane, y, x)
         a_i, 0..1.
     faith : float32 (plane, y, x)
         What the term is multiplied by besides, 0..1, without being worth less of a view.
+    near : int64 (y, x)
+        The person near each cell, -1 for nobody.
     """
-    level, seen, trusted = levels.reshape(-1), share.reshape(-1), faith.reshape(-1)
+    level, seen, trusted, person = levels.reshape(-1), share.reshape(-1), faith.reshape(-1), near.reshape(-1)
     to_weighted, to_weights, to_count = weighted.reshape(-1), weights.reshape(-1), count.reshape(-1)
     for c in range(len(level)):
         if level[c] >= 0:
             part = weight * seen[c]
-            to_weighted[c] += part * trusted[c] * terms[level[c]]
+            beside = 1 if person[c % len(person)] >= 0 else 0
+            to_weighted[c] += part * trusted[c] * terms[beside, level[c]]
             to_weights[c] += part
             to_count[c] += seen[c]
 
@@ -117,7 +142,9 @@ def fill_total(
     count: Singles,
     views: Bytes,
     near: Ints,
+    looks: np.float32,
     prior: np.float32,
+    prior_beside: np.float32,
     total: Singles,
 ) -> None:
     """Fill total (plane, y, x): nan where no view's image holds the cell, the prior where all are hidden.
@@ -127,7 +154,11 @@ def fill_total(
     views : uint8 (plane, y, x)
         Number of views whose image holds the cell.
     near : int64 (y, x)
-        The person near each cell, -1 for nobody: pi is one half near a person, where only the cells are left to decide.
+        The person near each cell, -1 for nobody.
+    looks
+        k.
+    prior, prior_beside
+        log(pi / (1 - pi)) where nobody is near, and within reach of a person.
     """
     for z in range(views.shape[0]):
         for y in range(views.shape[1]):
@@ -135,6 +166,6 @@ def fill_total(
                 if views[z, y, x] == 0:
                     total[z, y, x] = np.nan
                     continue
-                total[z, y, x] = prior if near[y, x] < 0 else np.float32(0.0)
+                total[z, y, x] = prior if near[y, x] < 0 else prior_beside
                 if weights[z, y, x] > 0:
-                    total[z, y, x] += count[z, y, x] * weighted[z, y, x] / weights[z, y, x]
+                    total[z, y, x] += looks * count[z, y, x] * weighted[z, y, x] / weights[z, y, x]

@@ -6,7 +6,10 @@ is how well the best box fits a body there. A cell is spoken for by the box of t
 nobody explains. The body is either missed, or shown by a box that fits that well, where there is clutter anyhow: odds
 of r = m + M (1 - m) / b. L(X, Z) is the likelihood that says as much in METHODS 4's log-odds,
 
-    ((1 - m) L + m (1 - L)) / (b L + (1 - b) (1 - L)) = r.
+    ((1 - m) L + m (1 - L)) / (b L + (1 - b) (1 - L)) = r,
+
+with b' for b within reach of a person. An empty cell's ray then met foreground with a probability of about M (the E
+step of `stseg.occupancy.level`), so b and b' become the means of M, whatever they were before.
 """
 
 from __future__ import annotations
@@ -19,9 +22,19 @@ from stseg.ghosts.boxes import half_square
 from stseg.occupancy.fusion import Rates
 
 
-def likelihood_of(match: Singles, rates: Rates) -> Singles:
-    """L of each cell, float32, 0..1, from M, float32 of any shape."""
-    miss, clutter = rates
+def likelihood_of(match: Singles, near: Ints, rates: Rates) -> Singles:
+    """L of each cell, float32 (plane, y, x), 0..1.
+
+    Parameters
+    ----------
+    match : float32 (plane, y, x)
+        M.
+    near : int64 (y, x)
+        The person near each cell, -1 for nobody: their surroundings have a clutter of their own.
+    rates
+        m, b and b' by which the view is fused.
+    """
+    miss, clutter = rates.miss, np.where(near >= 0, rates.beside, rates.clutter)
     ratio = miss + match * (1 - miss) / clutter
     likelihood = (ratio * (1 - clutter) - miss) / (1 - 2 * miss + ratio * (1 - 2 * clutter))
     return np.asarray(likelihood.clip(0.0, 1.0), np.float32)

@@ -107,8 +107,8 @@ class Localiser:
         tally = Tally(self.rig.grid.shape)
         for view, (seen, weight, term) in enumerate(zip(maps, weights, terms, strict=True)):
             if seen is not None:
-                tally.add(self._means.levels(view, seen), term, weight, self._whole, self._whole)
-        return tally.total(self._views, self._nobody, prior)
+                tally.add(self._means.levels(view, seen), term, weight, self._whole, self._whole, self._nobody)
+        return tally.total(self._views, self._nobody, 1.0, (prior, prior))
 
     def _require(self, maps: Maps) -> None:
         cameras = self.rig.cameras

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
+from scipy.special import logit
 
 from stseg.arrays import Boxes, Bytes, Flags, Floats, Ints, Singles
-from stseg.config import GhostConfig, OccupancyConfig
+from stseg.config import GhostConfig, LevelConfig, OccupancyConfig
 from stseg.foreground import box_likelihood
 from stseg.geometry import Rig
 from stseg.geometry.bodies import BodyTable
@@ -17,17 +19,39 @@ from stseg.occupancy.clutter import clutter, clutter_side, clutter_weights
 from stseg.occupancy.explained import Owners, fill_share, leave_unexplained
 from stseg.occupancy.fusion import Rates, Tally, log_odds_terms
 from stseg.occupancy.instances import fill_match_of_planes, likelihood_of
+from stseg.occupancy.level import Level, cells_of_one, fill_counts, inside_bodies
 from stseg.occupancy.means import CellMeans
 from stseg.occupancy.sampling import Sampling
 from stseg.occupancy.tables import TOP, UNSEEN, Levels
 
 _MAP_STEP = 8
+_BESIDE = 0.0
+"""Log-odds of a cell within reach of a person before any view is asked, nats."""
+_WHOLE = 0.99
+"""Share of what a view shows of an unhidden body from which on it counts as unhidden."""
+
+
+class _Said(NamedTuple):
+    """What one view gave to a frame's sums; see `stseg.occupancy.fusion.add_terms`."""
+
+    levels: Levels
+    terms: Singles
+    weight: float
+    share: Singles
+    faith: Singles
 
 
 class Occupancy:
     """Fusion of one rig's views: tables are made once, frames are fused one by one."""
 
-    def __init__(self, rig: Rig, kinds: Sequence[str], config: OccupancyConfig, ghosts: GhostConfig) -> None:
+    def __init__(
+        self,
+        rig: Rig,
+        kinds: Sequence[str],
+        config: OccupancyConfig,
+        ghosts: GhostConfig,
+        level: LevelConfig | None = None,
+    ) -> None:
         self.rig, self.config = rig, config
         self.sampling = Sampling.of(rig, config.sampling)
         self.views: Bytes = self.sampling.views()
@@ -42,36 +66,74 @@ class Occupancy:
             else np.zeros((0, 0, 0, 4), np.float32)
             for camera, kind in zip(rig.cameras, kinds, strict=True)
         ]
-        box_clutter = (1 - ghosts.box_miss) / float(np.exp(ghosts.hit))
-        self.rates = [
-            Rates(ghosts.box_miss, box_clutter) if kind == "boxes" else Rates(ghosts.pixel_miss, ghosts.pixel_clutter)
-            for kind in kinds
-        ]
-        self.terms = [log_odds_terms(rates) for rates in self.rates]
-        self.prior = float(np.log(config.occupied / (1 - config.occupied)))
+        self.level = Level([_first_rates(kind, ghosts) for kind in kinds], rig.frame_rate, level or LevelConfig())
+        self.prior = float(logit(config.occupied))
 
     def fuse(self, seen: Sequence[ViewEvidence], explanation: Explanation) -> Singles:
-        """The frame's log-odds, float32 (plane, y, x), nats; nan where no view sees the cell.
+        """A frame's log-odds by the rates known so far, float32 (plane, y, x), nats; nan where no view sees the cell.
 
         pi is one half within reach of a person whom the pass of the frame found, where only the cells are left to
         decide, and `occupied` elsewhere.
         """
         near = near_person(self.rig.grid.ground, explanation.people.ground, self.config.reach)
+        return self._total(self._tally(self._said(seen, explanation, near), near), near)
+
+    def follow(self, seen: Sequence[ViewEvidence], explanation: Explanation) -> Singles:
+        """The same of a recording's next frame, from which the rates are then learned."""
+        near = near_person(self.rig.grid.ground, explanation.people.ground, self.config.reach)
+        said = self._said(seen, explanation, near)
+        tally = self._tally(said, near)
+        total = self._total(tally, near)
+        self._learn(said, tally, explanation, near)
+        return total
+
+    def _said(self, seen: Sequence[ViewEvidence], explanation: Explanation, near: Ints) -> list[_Said | None]:
         weights = clutter_weights(np.array([self._clutter(i, view) for i, view in enumerate(seen)]))
-        tally = Tally(self.rig.grid.shape)
-        for i, (view, weight) in enumerate(zip(seen, weights, strict=True)):
+        said: list[_Said | None] = []
+        for i, (view, weight, rates) in enumerate(zip(seen, weights, self.level.rates, strict=True)):
             if view is None:
+                said.append(None)
                 continue
             owners = self._owners(i, explanation)
             share, shared = self._share(i, owners, near)
             if isinstance(view, Boxes):
-                levels = self._levels_of_boxes(i, view, explanation, near)
+                levels = self._levels_of_boxes(i, view, explanation, near, rates)
                 faith = _faith(near, owners.own, explanation.people.visible[i], share.shape)
             else:
-                levels = self._levels_of_map(i, view, owners, near, share, shared)
+                levels = self._levels_of_map(i, view, owners, near, share, shared).copy()
                 faith = np.ones_like(share)
-            tally.add(levels, self.terms[i], weight, share, faith)
-        return tally.total(self.views, near, self.prior)
+            said.append(_Said(levels, log_odds_terms(rates), weight, share, faith))
+        return said
+
+    def _tally(self, said: Sequence[_Said | None], near: Ints) -> Tally:
+        tally = Tally(self.rig.grid.shape)
+        for view in said:
+            if view is not None:
+                tally.add(*view, near)
+        return tally
+
+    def _total(self, tally: Tally, near: Ints) -> Singles:
+        return tally.total(self.views, near, self.config.looks, (self.prior, _BESIDE))
+
+    def _learn(self, said: Sequence[_Said | None], tally: Tally, explanation: Explanation, near: Ints) -> None:
+        people, grid = explanation.people, self.rig.grid
+        inside = inside_bodies(grid, near, people.ground, people.height)
+        body, reached = cells_of_one(grid, self.height_mean, self.config.reach)
+        errors, seen = np.zeros((2, len(said), 3))
+        for i, (view, rates) in enumerate(zip(said, self.level.rates, strict=True)):
+            if view is not None:
+                trusted = people.evidence - people.parts[i] >= self.level.config.supported
+                trusted &= people.visible[i] >= _WHOLE
+                fill_counts(
+                    *view, tally.weighted, tally.weights, tally.count, near, inside, trusted,
+                    np.array(rates), self.config.looks, self.prior, errors[i], seen[i],
+                )  # fmt: skip
+        everywhere = np.maximum((self.sampling.footprint[..., 2] > 0).sum((1, 2, 3)), 1)
+        units = np.column_stack([np.full(len(said), body), everywhere, np.full(len(said), reached - body)])
+        sure = np.append(people.evidence >= self.level.config.supported, False)[near]
+        counted = (self.views > 0) & sure
+        filled = np.array([inside[counted].sum(), counted.sum()]) / reached
+        self.level.learn(errors / units, seen / units, filled)
 
     def _owners(self, i: int, explanation: Explanation) -> Owners:
         people, served = explanation.people, explanation.box_owner[i]
@@ -100,7 +162,7 @@ class Occupancy:
         )  # fmt: skip
         return levels
 
-    def _levels_of_boxes(self, i: int, view: Boxes, explanation: Explanation, near: Ints) -> Levels:
+    def _levels_of_boxes(self, i: int, view: Boxes, explanation: Explanation, near: Ints, rates: Rates) -> Levels:
         """Likelihood per plane of each cell."""
         match = np.zeros(self.rig.grid.shape, np.float32)
         edges = np.concatenate([view.pixel[:, :2], view.pixel[:, :2] + view.pixel[:, 2:]], 1)
@@ -111,7 +173,7 @@ class Occupancy:
             self.bodies[i], self.heights, self.height_spread, self.height_mean, explanation.people.height,
             self.rig.grid.heights, edges, belief, explanation.box_owner[i], near, width, height, match,
         )  # fmt: skip
-        levels = np.rint(likelihood_of(match, self.rates[i]) * TOP).astype(np.int16)
+        levels = np.rint(likelihood_of(match, near, rates) * TOP).astype(np.int16)
         levels[self.sampling.footprint[i, ..., 2] == 0] = UNSEEN
         return levels
 
@@ -123,6 +185,14 @@ class Occupancy:
         if isinstance(view, Boxes):
             return clutter(box_likelihood(view, size, _MAP_STEP), side // _MAP_STEP)
         return clutter(view, side)
+
+
+def _first_rates(kind: str, ghosts: GhostConfig) -> Rates:
+    """Before anything is learned, people's surroundings count as any other place."""
+    if kind == "boxes":
+        clutter = (1 - ghosts.box_miss) / float(np.exp(ghosts.hit))
+        return Rates(ghosts.box_miss, clutter, clutter)
+    return Rates(ghosts.pixel_miss, ghosts.pixel_clutter, ghosts.pixel_clutter)
 
 
 def _faith(near: Ints, own: Flags, visible: Floats, shape: tuple[int, ...]) -> Singles:
