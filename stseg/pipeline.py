@@ -133,9 +133,6 @@ class Pipeline:
         with watch.time("foreground"):
             seen = [sight.evidence(view) for sight, view in zip(self.sights, moment.views, strict=True)]
         with watch.time("ghosts"):
-            for view, learned in zip(self.frame_pass.views, self.occupancy.level.rates, strict=True):
-                if isinstance(view, PixelView):
-                    view.miss, view.clutter = learned.miss, learned.clutter
             explanation = self.frame_pass.explain(seen, expected)
         rates = _rate_rows(moment.frame, self.occupancy.level)
         with watch.time("occupancy"):

@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scenes import corner_cameras
 from strategies import numbers
+from stseg.identity.smoothing import drop_short, fill_gaps
 
 from stseg.arrays import Flags, Rows
 from stseg.config import IdentityConfig
@@ -21,7 +22,6 @@ from stseg.geometry.near import near_person
 from stseg.identity.identities import Decision, Identities
 from stseg.identity.linking import assign, distances
 from stseg.identity.pieces import Piece, chain_pieces
-from stseg.identity.smoothing import drop_short, fill_gaps
 from stseg.identity.views import box_rows
 from stseg.identity.windows import LONGEST, SHORTEST, Window, window_length, windows
 from stseg.segmentation.blobs import Blobs, find_blobs
