@@ -165,9 +165,9 @@ class GhostConfig:
     body_weight: float = 2.0
     """How many independent looks one view's pixels of one body are worth."""
     pixel_miss: float = 0.20
-    """How often a body's pixel is missed by the foreground (m of METHODS 4); the first guess of what is learned."""
+    """How often a body's pixel is missed by the foreground (m of METHODS 4); the volume's first guess."""
     pixel_clutter: float = 0.07
-    """How often a ray past all bodies meets foreground (b of METHODS 4); the first guess of what is learned."""
+    """How often a ray past all bodies meets foreground (b of METHODS 4); the volume's first guess."""
 
     def __post_init__(self) -> None:
         heights = self.heights

@@ -23,7 +23,6 @@ from stseg.geometry import Rig
 from stseg.ghosts.expected import Expected
 from stseg.ghosts.explain import FramePass
 from stseg.ghosts.people import Explanation, People
-from stseg.ghosts.views import PixelView
 from stseg.identity.smoothing import drop_short, fill_gaps
 from stseg.identity.views import box_rows
 from stseg.occupancy.level import Level
@@ -134,9 +133,6 @@ class Pipeline:
         with watch.time("foreground"):
             seen = [sight.evidence(view) for sight, view in zip(self.sights, moment.views, strict=True)]
         with watch.time("ghosts"):
-            for view, learned in zip(self.frame_pass.views, self.occupancy.level.rates, strict=True):
-                if isinstance(view, PixelView):
-                    view.miss, view.clutter = learned.miss, learned.clutter
             explanation = self.frame_pass.explain(seen, expected)
         rates = _rate_rows(moment.frame, self.occupancy.level)
         with watch.time("occupancy"):

@@ -99,17 +99,10 @@ class BoxView(View):
 
 
 class PixelView(View):
-    """A view that delivers a likelihood map.
-
-    Attributes
-    ----------
-    miss, clutter
-        How often a body's pixel is missed, and how often a ray past all bodies meets foreground, as far as it is known.
-    """
+    """A view that delivers a likelihood map."""
 
     def __init__(self, camera: Camera, grid: Grid, lattice_ground: Floats, config: GhostConfig) -> None:
         super().__init__(camera, grid, lattice_ground, config)
-        self.miss, self.clutter = config.pixel_miss, config.pixel_clutter
         self.lattice = [
             self.outlines(lattice_ground, np.full(len(lattice_ground), height)) for height in config.heights
         ]
@@ -120,8 +113,9 @@ class PixelView(View):
         if isinstance(seen, np.ndarray):
             mean = np.empty(self.shape, np.float32)
             _fill_means(seen, self.step, mean)
-            body = (1 - self.miss) * mean + self.miss * (1 - mean)
-            empty = self.clutter * mean + (1 - self.clutter) * (1 - mean)
+            miss, clutter = self.config.pixel_miss, self.config.pixel_clutter
+            body = (1 - miss) * mean + miss * (1 - mean)
+            empty = clutter * mean + (1 - clutter) * (1 - mean)
             raster = np.log(body / empty).astype(np.float32)
         return Sight(np.zeros((0, 4)), np.zeros(0), raster)
 
