@@ -18,8 +18,8 @@ from stseg.config import IdentityConfig
 from stseg.geometry import Grid
 from stseg.geometry.bodies import BodyTable
 from stseg.geometry.near import near_person
-from stseg.identity.identities import Decision, Identities
 from stseg.identity.gaps import drop_short, fill_gaps
+from stseg.identity.identities import Decision, Identities
 from stseg.identity.linking import assign, distances
 from stseg.identity.pieces import Piece, chain_pieces
 from stseg.identity.views import box_rows
