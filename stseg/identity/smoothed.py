@@ -79,4 +79,4 @@ def _step(seconds: float) -> tuple[Floats, Floats]:
     motion = np.eye(4)
     motion[:2, 2:] = seconds * np.eye(2)
     turn = np.array([[seconds**3 / 3, seconds**2 / 2], [seconds**2 / 2, seconds]]) * TURN**2
-    return motion, np.kron(turn, np.eye(2))
+    return motion, np.asarray(np.kron(turn, np.eye(2)), np.float64)
