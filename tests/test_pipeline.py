@@ -201,7 +201,10 @@ def test_short_recordings(frames: int) -> None:
     assert len(done.trajectory) == 3 * frames
     shortest = round(CONFIG.identity.shortest * RIG.frame_rate)
     assert len(done.tracks.trajectory) == (3 * frames if frames >= shortest else 0)
-    assert len(done.tracks.events) == (0 if frames >= shortest else 3)
+    kinds = done.tracks.events["kind"].tolist()
+    assert kinds.count(b"birth") == 3
+    assert kinds.count(b"dropped") == (0 if frames >= shortest else 3)
+    assert (done.identity == (done.trajectory["id"] if frames >= shortest else 0)).all()
 
 
 def test_no_moments_no_steps() -> None:
