@@ -19,6 +19,7 @@ from stseg.config import IdentityConfig
 from stseg.geometry import Grid
 from stseg.geometry.bodies import BodyTable
 from stseg.geometry.near import near_person
+from stseg.identity.gaps import drop_short, fill_gaps
 from stseg.identity.identities import Decision, Identities
 from stseg.identity.linking import assign, distances
 from stseg.identity.pieces import Piece, chain_pieces
@@ -356,7 +357,7 @@ def rows_of(paths: dict[int, Path]) -> Rows:
     rows = np.zeros(len(told), TRAJECTORY)
     for row, (frame, identity, x, y) in zip(rows, told, strict=True):
         row["frame"], row["id"], row["x"], row["y"], row["height"] = frame, identity, x, y, 1.7
-        row["xx"] = row["yy"] = 0.01
+        row["raw_x"], row["raw_y"], row["xx"], row["yy"] = x, y, 0.01, 0.01
     return rows
 
 
@@ -372,24 +373,27 @@ def test_short_tracks_go_with_an_event() -> None:
     assert len(empty) == len(none) == 0
 
 
-@given(st.sets(st.integers(0, 20), min_size=2), st.sets(st.integers(0, 20), min_size=1))
-def test_gaps_are_filled_on_straight_lines(first: set[int], second: set[int]) -> None:
-    whole = {4: walk((0, 1), (0.5, -0.3), range(21)), 2: walk((3, 3), (0, 0), range(21))}
+@given(st.sets(st.integers(0, 30), min_size=2), st.sets(st.integers(0, 30), min_size=1))
+def test_short_gaps_are_filled_on_straight_lines(first: set[int], second: set[int]) -> None:
+    whole = {4: walk((0, 1), (0.5, -0.3), range(31)), 2: walk((3, 3), (0, 0), range(31))}
     seen = rows_of({i: {f: whole[i][f] for f in frames} for i, frames in ((4, first), (2, second))})
-    filled = fill_gaps(seen)
+    filled = fill_gaps(seen, RATE, CONFIG)
     for i, frames in ((4, first), (2, second)):
         own = filled[filled["id"] == i]
-        assert own["frame"].tolist() == list(range(min(frames), max(frames) + 1))
-        np.testing.assert_allclose(
-            np.column_stack([own["x"], own["y"]]), [whole[i][f] for f in own["frame"]], atol=1e-9
-        )
+        gaps = [range(a + 1, b) for a, b in pairwise(sorted(frames))]
+        short = [f for gap in gaps if len(gap) <= CONFIG.bridge * RATE for f in gap]
+        assert own["frame"].tolist() == sorted([*frames, *short])
+        for x, y in (("x", "y"), ("raw_x", "raw_y")):
+            np.testing.assert_allclose(
+                np.column_stack([own[x], own[y]]), [whole[i][f] for f in own["frame"]], atol=1e-9
+            )
         unseen = ~np.isin(own["frame"], list(frames))
         assert (own["xx"][unseen] > 0.01).all()
         assert (own["xx"][~unseen] == 0.01).all()
     keys = [(row["frame"], row["id"]) for row in filled]
     assert keys == sorted(keys)
-    np.testing.assert_array_equal(fill_gaps(filled), filled)
-    assert len(fill_gaps(seen[:0])) == 0
+    np.testing.assert_array_equal(fill_gaps(filled, RATE, CONFIG), filled)
+    assert len(fill_gaps(seen[:0], RATE, CONFIG)) == 0
 
 
 def test_boxes_of_tracks_lie_in_the_images() -> None:

@@ -11,7 +11,7 @@ import pytest
 from scenes import CONFIG, Moment, box_moments, mask_moments, room, walkers
 
 from stseg.accelerate import python_form
-from stseg.arrays import Boxes, Labels, Rows
+from stseg.arrays import Boxes, Ints, Labels, Rows
 from stseg.evaluation import evaluate
 from stseg.foreground.sight import Sight
 from stseg.geometry import Rig
@@ -38,11 +38,12 @@ class Run:
 
     steps: list[Step]
     tracks: Tracks
+    identity: Ints
     advanced: list[int]
 
     @property
     def trajectory(self) -> Rows:
-        """All committed rows, before the last look."""
+        """All committed rows, before the whole run was looked at."""
         return np.concatenate([step.commit.trajectory for step in self.steps])
 
     @property
@@ -56,7 +57,8 @@ def run(kind: str, moments: Iterable[Moment], tracker: str = "cut", first: int =
     advanced: list[int] = []
     steps = list(pipeline.steps(moments, first, advanced.append))
     trajectory = np.concatenate([step.commit.trajectory for step in steps])
-    return Run(steps, pipeline.finished(trajectory), advanced)
+    tracks, identity = pipeline.finished(trajectory, np.concatenate([step.commit.events for step in steps]))
+    return Run(steps, tracks, identity, advanced)
 
 
 @cache
@@ -71,6 +73,8 @@ def assert_equal(one: Run, other: Run) -> None:
     np.testing.assert_array_equal(one.trajectory, other.trajectory)
     np.testing.assert_array_equal(one.tracks.trajectory, other.tracks.trajectory)
     np.testing.assert_array_equal(one.tracks.boxes, other.tracks.boxes)
+    np.testing.assert_array_equal(one.tracks.events, other.tracks.events)
+    np.testing.assert_array_equal(one.identity, other.identity)
     for a, b in zip(one.steps, other.steps, strict=True):
         np.testing.assert_array_equal(a.candidates, b.candidates)
         np.testing.assert_array_equal(a.parts, b.parts)
@@ -209,7 +213,10 @@ def test_short_recordings(frames: int) -> None:
     assert len(done.trajectory) == 3 * frames
     shortest = round(CONFIG.identity.shortest * RIG.frame_rate)
     assert len(done.tracks.trajectory) == (3 * frames if frames >= shortest else 0)
-    assert len(done.tracks.events) == (0 if frames >= shortest else 3)
+    kinds = done.tracks.events["kind"].tolist()
+    assert kinds.count(b"birth") == 3
+    assert kinds.count(b"dropped") == (0 if frames >= shortest else 3)
+    assert (done.identity == (done.trajectory["id"] if frames >= shortest else 0)).all()
 
 
 def test_no_moments_no_steps() -> None:

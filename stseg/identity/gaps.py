@@ -33,8 +33,8 @@ def drop_short(trajectory: Rows, frame_rate: float, config: IdentityConfig) -> t
 def fill_gaps(trajectory: Rows, frame_rate: float, config: IdentityConfig) -> Rows:
     """Rows for frames in which a track was not seen for a moment, on a straight line between those in which it was.
 
-    Their extent is 0 and their covariance grows with the distance to what was seen. Longer gaps stay: nobody knows
-    where the person was. Sorted by frame, then id.
+    Their extent is 0 and their covariance grows with the distance to what was seen. Longer gaps stay, since nobody
+    knows where the person was. Sorted by frame, then id.
     """
     rows = [trajectory]
     for identity in np.unique(trajectory["id"]):

@@ -90,8 +90,8 @@ def relink(
     parts = stretches(trajectory, frame_rate, config)
     pairs = _within_reach(parts, frame_rate, config)
     ends, begins = (
-        border.inside(np.array(tips).reshape(-1, 2), people.border)
-        for tips in zip(*((part.end.ground, part.start.ground) for part in parts), strict=True)
+        border.inside(np.array([tip.ground for tip in tips]).reshape(-1, 2), people.border)
+        for tips in ([part.end for part in parts], [part.start for part in parts])
     )
     gain = np.array([_gain(parts[a], parts[b], frame_rate, config, people) for a, b in pairs])
     gain += _PARTED * (ends[pairs[:, 0]] + begins[pairs[:, 1]]) / 2

@@ -1,0 +1,198 @@
+"""Who is who from the whole run: meetings undone by height and motion, people found again, and the greatest sum."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from reference_relink import gain, greatest_sum
+from strollers import BORDER, CONFIG, PEOPLE, RATE, gone, rows_of, runs, swapped, visit
+
+from stseg.arrays import Floats, Ints, Rows
+from stseg.identity.relink import Relinked, relink
+from stseg.identity.stretches import stretches
+from stseg.tracks import EVENT, TRAJECTORY
+
+
+def relinked(rows: Rows) -> Relinked:
+    return relink(rows, RATE, BORDER, CONFIG, PEOPLE)
+
+
+def names(rows: Rows, identity: Ints, track: int, frames: range) -> set[int]:
+    """Identities of a track in some frames."""
+    return set(identity[(rows["id"] == track) & np.isin(rows["frame"], frames)].tolist())
+
+
+MET = range(72, 89)
+"""Frames in which two visitors stand together."""
+
+
+# Meetings
+
+
+@pytest.mark.parametrize(("frame", "taller"), [(80, 0.08), (78, 0.15), (80, 0.15), (82, 0.15)])
+def test_height_tells_two_apart_who_swapped_while_they_stood_together(frame: int, taller: float) -> None:
+    true = rows_of({1: (visit(-1), 1.70, range(160)), 2: (visit(1), 1.70 + taller, range(160))}, noise=0.0)
+    told = swapped(true, frame)
+    found = relinked(told)
+    apart = ~np.isin(true["frame"], MET)
+    np.testing.assert_array_equal(found.identity[apart], true["id"][apart])
+    assert sorted(link.identity for link in found.links) == [1, 2]
+    assert all(link.frame in MET and link.track == 3 - link.identity for link in found.links)
+
+
+def test_who_was_followed_rightly_through_a_meeting_stays() -> None:
+    for taller in (0.0, 0.08):
+        rows = rows_of({1: (visit(-1), 1.70, range(160)), 2: (visit(1), 1.70 + taller, range(160))})
+        found = relinked(rows)
+        np.testing.assert_array_equal(found.identity, rows["id"])
+        assert not found.links
+
+
+def test_who_walk_straight_past_each_other_keep_their_tracks() -> None:
+    """The same height: motion tells, and the track that was followed."""
+    rows = rows_of(
+        {
+            1: (lambda t: (-4 + t, -0.15), 1.7, range(64)),
+            2: (lambda t: (4 - t, 0.15), 1.7, range(64)),
+        }
+    )
+    assert len(stretches(rows, RATE, CONFIG)) == 4
+    found = relinked(rows)
+    np.testing.assert_array_equal(found.identity, rows["id"])
+    assert not found.links
+
+
+# Out of sight
+
+
+def test_somebody_lost_inside_the_area_is_the_same_afterwards() -> None:
+    rows = gone(2.0)
+    found = relinked(rows)
+    assert set(found.identity.tolist()) == {1}
+    (link,) = found.links
+    assert (link.frame, link.identity, link.track) == (40, 1, 2)
+    assert link.reason.startswith("2.1 s on")
+    assert link.reason.isascii()
+    assert len(link.reason) <= EVENT["reason"].itemsize
+
+
+def test_too_long_is_somebody_else() -> None:
+    rows = gone(CONFIG.reunion + 0.25)
+    np.testing.assert_array_equal(relinked(rows).identity, rows["id"])
+
+
+def test_another_height_is_somebody_else() -> None:
+    rows = gone(1.0, tall=1.95)
+    np.testing.assert_array_equal(relinked(rows).identity, rows["id"])
+
+
+def test_one_leaves_at_the_border_and_another_comes_in() -> None:
+    rows = rows_of(
+        {
+            1: (lambda t: (2.9 + t, 0.0), 1.65, range(24)),
+            2: (lambda t: (5.9 - 0.9 * (t - 4), 0.2), 1.82, range(32, 56)),
+        }
+    )
+    found = relinked(rows)
+    np.testing.assert_array_equal(found.identity, rows["id"])
+    assert not found.links
+
+
+# Any run
+
+
+@settings(max_examples=100, deadline=None)
+@given(runs(6))
+def test_nobody_is_in_two_places_at_once(rows: Rows) -> None:
+    found = relinked(rows)
+    keys = list(zip(rows["frame"].tolist(), found.identity.tolist(), strict=True))
+    assert len(set(keys)) == len(rows) == len(found.identity)
+    assert (found.identity > 0).all()
+    for link in found.links:
+        at = (rows["frame"] == link.frame) & (rows["id"] == link.track)
+        assert found.identity[at].tolist() == [link.identity]
+        assert (rows["frame"][found.identity == link.identity] < link.frame).any()
+
+
+@settings(max_examples=60, deadline=None)
+@given(runs(5), st.integers(0, 999))
+def test_the_order_of_rows_does_not_matter(rows: Rows, seed: int) -> None:
+    order = np.random.default_rng(seed).permutation(len(rows))
+    one, other = relinked(rows), relinked(rows[order])
+    np.testing.assert_array_equal(one.identity[order], other.identity)
+    assert one.links == other.links
+    assert relinked(rows).links == one.links
+
+
+@settings(max_examples=150, deadline=None)
+@given(runs(4))
+def test_no_other_links_have_a_greater_sum(rows: Rows) -> None:
+    parts = stretches(rows, RATE, CONFIG)[:5]
+    rows = rows[np.sort(np.concatenate([np.zeros(0, np.int64), *(part.rows for part in parts)]))]
+    parts = stretches(rows, RATE, CONFIG)
+    if len(parts) > 6:
+        return
+    found = relinked(rows)
+
+    def inside(ground: Floats) -> float:
+        return float(BORDER.inside(ground[None], PEOPLE.border)[0])
+
+    gains = [
+        [gain(a, b, (inside(a.end.ground) + inside(b.start.ground)) / 2, RATE, CONFIG, PEOPLE) for b in parts]
+        for a in parts
+    ]
+    identity = [int(found.identity[part.rows[0]]) for part in parts]
+    total = 0.0
+    for name in set(identity):
+        own = [k for k, other in enumerate(identity) if other == name]
+        total += sum(gains[a][b] for a, b in pairwise(own))
+    assert total == pytest.approx(greatest_sum(gains))
+
+
+def test_nobody_at_all() -> None:
+    found = relinked(np.zeros(0, TRAJECTORY))
+    assert len(found.identity) == len(found.links) == 0
+
+
+# Stretches
+
+
+def test_a_track_is_cut_where_it_met_another_and_where_it_was_unseen() -> None:
+    rows = rows_of(
+        {
+            1: (lambda t: (-4 + t, -0.1), 1.7, range(64)),
+            2: (lambda t: (4 - t, 0.1), 1.8, range(64)),
+        },
+        noise=0.0,
+    )
+    rows = rows[(rows["id"] != 1) | (rows["frame"] < 50) | (rows["frame"] >= 53)]
+    parts = [(part.track, part.start.frame, part.end.frame) for part in stretches(rows, RATE, CONFIG)]
+    assert parts == [(1, 0, 31), (2, 0, 31), (1, 32, 49), (2, 32, 63), (1, 53, 63)]
+
+
+@given(runs(6))
+def test_stretches_hold_every_row_once(rows: Rows) -> None:
+    parts = stretches(rows, RATE, CONFIG)
+    held = [row for part in parts for row in part.rows.tolist()]
+    assert sorted(held) == list(range(len(rows)))
+    for part in parts:
+        own = rows[part.rows]
+        assert set(own["id"].tolist()) == {part.track}
+        assert (np.diff(own["frame"]) == 1).all()
+        assert (part.start.frame, part.end.frame) == (own["frame"][0], own["frame"][-1])
+        assert part.height == pytest.approx(own["height"].mean(), rel=1e-5)
+
+
+def test_a_longer_stretch_tells_more() -> None:
+    def path(t: float) -> tuple[float, float]:
+        return -3 + 0.6 * t, 1 - 0.3 * t
+
+    short, long = (stretches(rows_of({1: (path, 1.7, range(n))}, 0.0), RATE, CONFIG)[0] for n in (3, 40))
+    np.testing.assert_allclose(long.end.velocity, [0.6, -0.3], rtol=0.35)
+    assert np.hypot(*short.end.velocity) < np.hypot(*long.end.velocity)
+    assert short.end.velocity_variance > long.end.velocity_variance
+    assert short.height_variance > long.height_variance
