@@ -61,8 +61,9 @@ def test_two_labels_follow_who_is_alone(ways: ModuleType) -> None:
     del ways
     pipeline = Pipeline(rig, [Sight() for _ in rig.cameras], ["boxes"] * 4, CONFIG, "two labels")
     done: list[int] = []
-    steps = list(pipeline.steps(box_moments(rig, truth, 0, 20), 0, done.append))
-    tracks = pipeline.finished(np.concatenate([step.commit.trajectory for step in steps]))
+    commits = [step.commit for step in pipeline.steps(box_moments(rig, truth, 0, 20), 0, done.append)]
+    rows, events = (np.concatenate([getattr(c, name) for c in commits]) for name in ("trajectory", "events"))
+    tracks, _ = pipeline.finished(rows, events)
     scores = evaluate(truth[truth["frame"] < 20], tracks.trajectory)
     assert (scores.switches, scores.misses, scores.false_alarms) == (0, 0, 0)
 

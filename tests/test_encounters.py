@@ -128,8 +128,9 @@ def switches(name: str, kind: str, stop: int) -> int:
     else:
         moments = [Moment(seen.frame, tuple(silhouette(view.instances > 0) for view in seen.views)) for seen in film]
     done: list[int] = []
-    steps = list(pipeline.steps(moments, 0, done.append))
-    tracks = pipeline.finished(np.concatenate([step.commit.trajectory for step in steps]))
+    commits = [step.commit for step in pipeline.steps(moments, 0, done.append)]
+    rows, events = (np.concatenate([getattr(c, name) for c in commits]) for name in ("trajectory", "events"))
+    tracks, _ = pipeline.finished(rows, events)
     scores = evaluate(np.concatenate([seen.truth for seen in film]), tracks.trajectory)
     assert scores.misses <= 0.02 * scores.truths
     return scores.switches

@@ -12,7 +12,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scenes import corner_cameras
 from strategies import numbers
-from stseg.identity.smoothing import drop_short, fill_gaps
 
 from stseg.arrays import Flags, Rows
 from stseg.config import IdentityConfig
