@@ -56,7 +56,7 @@ def run(
     set_
         One constant, for example --set ghosts.person=-2; may be given several times.
     tracker
-        cut: graph cuts of windows of the volume. frames: each frame by itself, linked by motion alone.
+        cut: graph cuts of windows of the volume. frames: the people of each frame as they come, without a cut.
     overwrite
         Replace an older run file of that name, once this one is whole.
     """
