@@ -1,6 +1,7 @@
 """What each part is worth: measure without it, and write docs/ablation.md.
 
-    python tools/ablation.py [--data ../shared/data] [--sets uu4,cmc1,...] [--parts views,smoothness] [--work FOLDER]
+    python tools/ablation.py [--data ../shared/data] [--sets uu4,cmc1,...] [--parts views,smoothness]
+        [--ways threshold,cut,...] [--work FOLDER]
 
 `views` runs every way of tools/ablation_ways.py on two, three and four views of each set (on all views of `wildtrack`
 and `dense_boxes`, of which there are more), `smoothness` the whole way at half, once and twice the default
@@ -53,11 +54,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     options = _options(arguments)
     bench = Bench(options.data.resolve(), options.work.resolve())
     for part in options.parts:
-        for name in MEASURED[part]:
-            if name in options.sets:
-                recording = _prepared(SETS[name], bench)
-                for row in (_views if part == "views" else _smoothness)(SETS[name], recording, bench):
-                    publish([{"part": part, "set": name, "commit": _commit(), **row}])
+        for one in (SETS[name] for name in MEASURED[part] if name in options.sets):
+            taken = one, _prepared(one, bench), bench
+            for row in _views(*taken, options.ways) if part == "views" else _smoothness(*taken):
+                publish([{"part": part, "set": one.name, "commit": _commit(), **row}])
     publish([])
 
 
@@ -76,22 +76,27 @@ def _key(row: Row) -> tuple[str, str, int, str, float]:
     return row["part"], row["set"], row["views"], row["way"], row.get("smoothness", 0.0)
 
 
-def _views(one: ResultSet, recording: Recording, bench: Bench) -> Iterator[Row]:
-    """Every way on some of the views."""
+def _views(one: ResultSet, recording: Recording, bench: Bench, ways: Sequence[str]) -> Iterator[Row]:
+    """The ways on some of the views."""
     first, stop = _frames(one)
     for number in (len(recording.sources),) if one.name in _ALL_VIEWS else (4, 3, 2):
         part = some_views(recording, number)
-        for way in WAYS:
+        for way in ways:
             row: Row = {"views": number, "way": way}
             if way == "threshold":
                 tried = {level: _score(one, rows, bench) for level, rows in threshold(part, first, stop).items()}
-                row["level"] = max(tried, key=lambda level: tried[level].moda or -np.inf)
+                row["level"] = max(tried, key=lambda level: _f1(tried[level]))
                 row["committed"] = row["finished"] = tried[row["level"]].as_dict()
             else:
                 found = follow(part, first, stop, way, Config())
                 row["committed"] = _score(one, found.committed, bench).as_dict()
                 row["finished"] = _score(one, found.finished, bench).as_dict()
             yield row
+
+
+def _f1(scores: Scores) -> float:
+    """Harmonic mean of precision and recall; MODA would be best where nobody is found at all."""
+    return 2 * scores.hits / max(scores.truths + scores.detections, 1)
 
 
 def _smoothness(one: ResultSet, recording: Recording, bench: Bench) -> Iterator[Row]:
@@ -147,6 +152,7 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--work", type=Path, default=ROOT / "build/results")
     parser.add_argument("--sets", type=lambda text: text.split(","), default=list(SETS), help="names of sets, or none")
     parser.add_argument("--parts", type=lambda text: text.split(","), default=list(MEASURED), help="views, smoothness")
+    parser.add_argument("--ways", type=lambda text: text.split(","), default=list(WAYS), help=", ".join(WAYS))
     return parser.parse_args(arguments)
 
 

@@ -29,7 +29,7 @@ from stseg.trackers import TRACKERS
 from stseg.trackers.cut import CutTracker, _Linked
 
 WAYS = ("threshold", "frames", "two labels", "cut")
-LEVELS = (-0.4, -0.7, -1.0, -1.4, -2.0)
+LEVELS = (-0.1, -0.2, -0.3, -0.4, -0.5, -0.7, -1.0, -1.4, -2.0)
 """Nats a plane that the threshold is tried at."""
 
 
