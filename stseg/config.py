@@ -162,7 +162,7 @@ class GhostConfig:
     """Visible share from which on a body is as good as whole."""
     least: float = 0.02
     """Share of hidden people that are found all the same."""
-    body_weight: float = 2.0
+    body_weight: float = 4.0
     """How many independent looks one view's pixels of one body are worth."""
     pixel_miss: float = 0.20
     """How often a body's pixel is missed by the foreground (m of METHODS 4); the volume's first guess."""
