@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -28,7 +28,6 @@ from scenes import (
 from strategies import numbers
 
 from stseg.arrays import Floats, Ints
-from stseg.config import GhostConfig
 from stseg.geometry import Camera, Rig
 from stseg.geometry.bodies import BodyTable
 from stseg.ghosts.boxes import fill_best_match, fill_cover, fill_inside, fill_match, half_square
@@ -359,9 +358,7 @@ def test_somebody_hidden_from_all_but_two_views_stays(kind: str) -> None:
     seen = show(kind, rig.cameras, everybody)
     if kind == "boxes":
         seen[:2] = [boxes(camera, nearer) for camera in rig.cameras[:2]]
-    # the default lattice: on the coarse one of these tests a pillar 0.17 m off is not worth adding, so never moved
-    frame_pass = FramePass(rig, [kind] * 4, replace(FEW_HEIGHTS, lattice=GhostConfig().lattice))
-    explanation = frame_pass.explain(seen, None)
+    explanation = pass_of(kind).explain(seen, None)
     assert_found(explanation, everybody, within=0.2)
 
 
