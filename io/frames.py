@@ -10,14 +10,13 @@ from __future__ import annotations
 
 import math
 import os
-import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from types import TracebackType
 
-from stseg.arrays import Observation
+from stseg.arrays import Floats, Observation
 from stseg.errors import ConfigError, SourceError
 from stseg.geometry import Camera
 from stseg.io.recording import CameraSource, Recording
@@ -38,6 +37,22 @@ class Moment:
 
     frame: int
     views: tuple[Observation, ...]
+
+
+@dataclass(frozen=True)
+class Streams:
+    """What decoding a recording's streams to their ends tells.
+
+    Attributes
+    ----------
+    length
+        Frames of the recording.
+    times : float64 (n,) each
+        Of every frame of each camera, milliseconds; nan where the source states none.
+    """
+
+    length: int
+    times: tuple[Floats, ...]
 
 
 class _Feed:
@@ -66,9 +81,11 @@ class _Feed:
             self._next += 1
         return view
 
-    def run_out(self) -> None:
-        """Pass over all frames, to learn where the stream ends."""
-        self.end = self._stream.skip(sys.maxsize) + self.source.offset
+    def run_out(self) -> Floats:
+        """Pass over all frames, to learn where the stream ends; their times."""
+        times = self._stream.times()
+        self.end = len(times) + self.source.offset
+        return times
 
     def close(self) -> None:
         self._stream.close()
@@ -86,11 +103,11 @@ class FrameReader:
         or has not its camera's size.
     """
 
-    def __init__(self, recording: Recording, first: int, stop: int | None) -> None:
+    def __init__(self, recording: Recording, first: int, stop: int | None, streams: Streams | None) -> None:
         self._recording, self._stop = recording, stop
         self._frame, self._least = first, first if stop is None else stop
         with ExitStack() as opened:
-            self._feeds = _open_feeds(recording, opened)
+            self._feeds = _open_feeds(recording, opened, streams)
             _require_start(self._feeds, first)
             self._pool = opened.enter_context(ThreadPoolExecutor(_threads(recording)))
             self._opened = opened.pop_all()
@@ -132,7 +149,9 @@ class FrameReader:
         return [self._pool.submit(feed.read, self._frame) for feed in self._feeds]
 
 
-def open_frames(recording: Recording, first: int = 0, stop: int | None = None) -> FrameReader:
+def open_frames(
+    recording: Recording, first: int = 0, stop: int | None = None, streams: Streams | None = None
+) -> FrameReader:
     """Read frames first..stop-1 of a recording, all cameras together.
 
     Parameters
@@ -141,6 +160,8 @@ def open_frames(recording: Recording, first: int = 0, stop: int | None = None) -
         The rig and its streams.
     first, stop
         The recording's frames to read, half open; they keep their numbers. None: to the end.
+    streams
+        What `count_streams` told: a far first frame is then sought.
 
     Returns
     -------
@@ -157,11 +178,16 @@ def open_frames(recording: Recording, first: int = 0, stop: int | None = None) -
     if first < 0 or (stop is not None and stop < first):
         found = f"{first}:{'' if stop is None else stop}"
         raise ConfigError(recording.path, "frames", found, "first:stop, with 0 <= first <= stop")
-    return FrameReader(recording, first, stop)
+    return FrameReader(recording, first, stop, streams)
 
 
 def count_frames(recording: Recording) -> int:
-    """How many frames a recording has, found by decoding every stream to its end.
+    """How many frames a recording has; raises as `count_streams` does."""
+    return count_streams(recording).length
+
+
+def count_streams(recording: Recording) -> Streams:
+    """How many frames a recording has, and when they were taken, found by decoding every stream to its end.
 
     Raises
     ------
@@ -171,9 +197,36 @@ def count_frames(recording: Recording) -> int:
     with ExitStack() as opened:
         feeds = _open_feeds(recording, opened)
         pool = opened.enter_context(ThreadPoolExecutor(_threads(recording)))
-        for counted in [pool.submit(feed.run_out) for feed in feeds]:
-            counted.result()
-        return int(_length(feeds))
+        times = [counted.result() for counted in [pool.submit(feed.run_out) for feed in feeds]]
+        return Streams(int(_length(feeds)), tuple(times))
+
+
+def read_camera(
+    recording: Recording, camera_index: int, frames: Iterable[int], streams: Streams | None = None
+) -> Iterator[Observation]:
+    """What one camera shows in some frames of the recording, decoded as they are asked for; None where it is blind.
+
+    Parameters
+    ----------
+    recording
+        The rig and its streams.
+    camera_index
+        The camera, in the rig's order.
+    frames
+        Numbers of the recording's frames, rising.
+    streams
+        What `count_streams` told, for far frames.
+
+    Raises
+    ------
+    SourceError, FormatError
+        Where the source is missing, broken or not of the camera's size.
+    """
+    camera, source = recording.rig.cameras[camera_index], recording.sources[camera_index]
+    times = None if streams is None else streams.times[camera_index]
+    with closing(_Feed(camera, source, open_stream(source.source, camera, times))) as feed:
+        for frame in frames:
+            yield feed.read(frame)
 
 
 def read_background(recording: Recording, camera_index: int) -> Iterator[Observation]:
@@ -199,10 +252,11 @@ def read_background(recording: Recording, camera_index: int) -> Iterator[Observa
             yield view
 
 
-def _open_feeds(recording: Recording, opened: ExitStack) -> list[_Feed]:
-    feeds = []
-    for camera, source in zip(recording.rig.cameras, recording.sources, strict=True):
-        feeds.append(_Feed(camera, source, open_stream(source.source, camera)))
+def _open_feeds(recording: Recording, opened: ExitStack, streams: Streams | None = None) -> list[_Feed]:
+    feeds: list[_Feed] = []
+    times = [None] * len(recording.sources) if streams is None else streams.times
+    for camera, source, own in zip(recording.rig.cameras, recording.sources, times, strict=True):
+        feeds.append(_Feed(camera, source, open_stream(source.source, camera, own)))
         opened.callback(feeds[-1].close)
     return feeds
 

@@ -6,7 +6,9 @@ import re
 from itertools import pairwise
 from pathlib import Path
 
-from stseg.arrays import AnyArray
+import numpy as np
+
+from stseg.arrays import AnyArray, Floats
 from stseg.errors import SourceError
 from stseg.geometry import Camera
 from stseg.io.pictures import read_picture
@@ -44,6 +46,10 @@ class ImageStream:
         frame, self._next = self._next, self._next + 1
         key = f"camera {self._camera.name}, frame {frame}"
         return read_picture(self._paths[frame], self._source.kind, self._camera.size, key)
+
+    def times(self) -> Floats:
+        """Image files state no time."""
+        return np.full(self.skip(len(self._paths)), np.nan)
 
     def close(self) -> None:
         """Nothing is held open."""

@@ -61,6 +61,9 @@ FRAME = Field("frame", np.dtype("<i8"), ("time",), "", "frame of the recording")
 VIEWS = Field("views", np.dtype("u1"), AXES[1:], "", "number of views that see the cell")
 FIELDS = (*SCALES, LOG_ODDS, LABEL, FRAME, VIEWS)
 
+KEPT = ("all", "tracks", "none")
+"""What @kept of the occupancy says: the whole volume, what is near tracks, or nothing of it."""
+
 ABOUT = {
     "trajectory": "one row per person and frame: metres on the ground, covariance in square metres, score in nats",
     "tracks": "one row per track: first and last frame, mean score in nats, median height in metres",

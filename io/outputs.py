@@ -33,8 +33,13 @@ def part_of(path: Path) -> Path:
 def publish(path: Path) -> None:
     """Rename the part of `path`, whole and synced, to its name, and sync the folder."""
     part_of(path).replace(path)
+    sync_folder(path.parent)
+
+
+def sync_folder(path: Path) -> None:
+    """Make sure that names given in a folder stay."""
     with suppress(OSError):  # some systems cannot open folders; the file itself is safe
-        folder = os.open(path.parent, os.O_RDONLY)
+        folder = os.open(path, os.O_RDONLY)
         try:
             os.fsync(folder)
         finally:

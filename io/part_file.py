@@ -10,26 +10,10 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
-from typing import BinaryIO
 
 from stseg.errors import OutputError
+from stseg.io.locks import lock
 from stseg.io.outputs import failure, part_of, publish
-
-try:
-    from fcntl import LOCK_EX, LOCK_NB, flock
-except ImportError:  # Windows has no such locks: two runs into one file go unnoticed there
-
-    def _lock(file: BinaryIO) -> None:
-        pass
-else:
-
-    def _lock(file: BinaryIO) -> None:
-        try:
-            flock(file, LOCK_EX | LOCK_NB)
-        except BlockingIOError:
-            raise
-        except OSError:
-            pass  # a file system without locks
 
 
 class PartFile(io.RawIOBase):
@@ -59,7 +43,7 @@ class PartFile(io.RawIOBase):
         except OSError as error:
             raise failure(path, error) from error
         try:
-            _lock(self._file)
+            lock(self._file)
             self._file.truncate(0)
         except OSError as error:
             self._file.close()

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import platform
+import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -95,6 +97,24 @@ def read_provenance(group: h5py.Group) -> Provenance:
         {name.decode(): number.decode() for name, number in group["versions"][:].tolist()},
         group["sources"][:],
     )
+
+
+def as_tables(provenance: Provenance) -> dict[str, Any]:
+    """All that decides what a run finds, as texts and numbers in nested tables; when it began is left out."""
+    rig = tomllib.loads(provenance.rig)
+    rig["camera"] = {camera.pop("name"): camera for camera in rig["camera"]}
+    sources = {
+        f"{row['camera'].decode() if isinstance(row['camera'], bytes) else row['camera']}, {row['role'].decode()}": (
+            f"{row['files']} files of {row['size']} bytes in all, written {_day(float(row['modified']))}"
+        )
+        for row in provenance.sources
+    }
+    config = tomllib.loads(provenance.config)
+    return {"config": config, "rig": rig, "source": sources, "version": dict(provenance.versions)}
+
+
+def _day(modified: float) -> str:
+    return "never" if np.isnan(modified) else datetime.fromtimestamp(modified, UTC).isoformat()
 
 
 def _versions() -> dict[str, str]:

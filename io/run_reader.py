@@ -45,6 +45,8 @@ class Run:
         Centres of the cells, metres.
     views : uint8 (plane, y, x)
         Number of views that see each cell.
+    kept
+        What of the volume is in the file: "all", what is near "tracks", or "none".
     """
 
     path: Path
@@ -56,6 +58,7 @@ class Run:
     ground_y: Floats
     ground_x: Floats
     views: Bytes
+    kept: str = "all"
 
     @cached_property
     def trajectory(self) -> Rows:
@@ -145,6 +148,14 @@ class Run:
             raise ValueError(f"frame {frame} is not in {self.path}")
         return _read(self.path, layout.OCCUPANCY, lambda file: _volume(file[layout.OCCUPANCY], index))
 
+    def read_volumes(self, number: int) -> Iterator[tuple[Ints, Singles, Labels]]:
+        """The volumes of all frames, `number` at a time: the frames, log-odds and labels as `read_frame` gives them."""
+        with _told_as_format_error(self.path, layout.OCCUPANCY), h5py.File(self.path, "r") as file:
+            group = file[layout.OCCUPANCY]
+            for start in range(0, len(self.frames), number):
+                some = slice(start, start + number)
+                yield self.frames[some], group["log_odds"][some].astype(np.float32), group["label"][some]
+
     def _table(self, name: str) -> Rows:
         def take(file: h5py.File) -> Rows:
             if name in layout.ADDED and name not in file:
@@ -207,13 +218,10 @@ def _checked_run(path: Path, file: h5py.File) -> Run:
     checks.require_provenance()
     frame_rate = checks.attribute("/trajectory", "fps", "frames per second")
     entry, group = checks.require("/entry/title"), file[layout.OCCUPANCY]
-    return Run(
-        path,
-        entry.asstr()[()],
-        float(frame_rate),
-        cameras,
-        *(group[name][:] for name in ("frame", "plane", "y", "x", "views")),
-    )
+    frames, heights, ground_y, ground_x, views = (group[name][:] for name in ("frame", "plane", "y", "x", "views"))
+    kept = str(group.attrs.get("kept", layout.KEPT[0]))
+    title = entry.asstr()[()]
+    return Run(path, title, float(frame_rate), cameras, frames, heights, ground_y, ground_x, views, kept)
 
 
 @dataclass(frozen=True)

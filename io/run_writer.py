@@ -1,4 +1,4 @@
-"""Writing a run file, window by window; it takes its name only once it is whole."""
+"""Writing a run file, or that of a segment, step by step; it takes its name only once it is whole."""
 
 from __future__ import annotations
 
@@ -40,6 +40,8 @@ class RunWriter:
         The resolved configuration, TOML.
     overwrite
         Whether an older file of that name may be replaced, at the end.
+    kept
+        One of `stseg.io.layout.KEPT`: what of the volume is appended; the rest is NaN and background.
 
     Raises
     ------
@@ -47,12 +49,15 @@ class RunWriter:
         Where the file exists and is not to be overwritten, or cannot be written; from every method.
     """
 
-    def __init__(self, path: Path, recording: Recording, views: Bytes, config_text: str, *, overwrite: bool) -> None:
+    def __init__(
+        self, path: Path, recording: Recording, views: Bytes, config_text: str, *, overwrite: bool, kept: str = "all"
+    ) -> None:
         self._path = Path(path)
         require_new(self._path, overwrite)
         if views.shape != recording.rig.grid.shape:
             raise ValueError(f"views {views.shape} on a grid {recording.rig.grid.shape}")
         self._recording, self._views, self._config_text, self._overwrite = recording, views, config_text, overwrite
+        self._kept = kept
         self._frames, self._last_frame = 0, -1
         self._finished = False
         self._file: h5py.File | None = None
@@ -90,7 +95,7 @@ class RunWriter:
             raise ValueError(f"volumes {log_odds.shape} and {label.shape} for {shape}")
         if len(frames) and (frames[0] <= self._last_frame or (np.diff(frames) <= 0).any()):
             raise ValueError(f"frames {frames} after frame {self._last_frame}")
-        half = np.clip(log_odds, -_LARGEST, _LARGEST).astype(np.float16)
+        half = np.clip(log_odds, -_LARGEST, _LARGEST, dtype=np.float32).astype(np.float16)
         with self._disk.step():
             self._extend("log_odds", half)
             self._extend("label", label)
@@ -103,26 +108,6 @@ class RunWriter:
         """Add rows to one of the tables of `stseg.io.layout`, whose dtype they have."""
         with self._disk.step():
             self._tables[table].append(rows)
-
-    def relabel(self, frame: Ints, track: Ints, identity: Ints) -> None:
-        """Give tracks of the volume other ids, or 0 to drop them; the tables are the caller's.
-
-        One frame is in memory at a time, and frames in which no id changes are not written again.
-
-        Parameters
-        ----------
-        frame, track, identity : int64 (n,)
-            In these frames these tracks take these ids; what is not named stays.
-        """
-        changed = track != identity
-        frame, track, identity = frame[changed], track[changed], identity[changed]
-        written = self._occupancy["frame"][:] if len(frame) else np.zeros(0, np.int64)
-        order = np.argsort(frame, kind="stable")
-        for rows in np.split(order, np.flatnonzero(np.diff(frame[order])) + 1):
-            if len(rows):
-                with self._disk.step():
-                    index = int(np.searchsorted(written, frame[rows[0]]))
-                    self._relabel_frame(index, track[rows], identity[rows])
 
     def finish(self, tracks: Rows) -> None:
         """Write the TRACK rows, then sync the file and give it its name."""
@@ -147,6 +132,7 @@ class RunWriter:
         entry.attrs.update(layout.ENTRY_ATTRIBUTES)
         entry["title"] = rig.name
         self._occupancy = _create_occupancy(file, rig, self._views)
+        self._occupancy.attrs["kept"] = self._kept
         self._tables = {
             name: _Table(_create_table(file, name, dtype)) for name, dtype in layout.table_types(len(cameras)).items()
         }
@@ -160,14 +146,6 @@ class RunWriter:
         start = len(dataset)
         dataset.resize(start + len(values), axis=0)
         dataset[start:] = values
-
-    def _relabel_frame(self, index: int, track: Ints, identity: Ints) -> None:
-        volume = self._occupancy["label"]
-        label = volume[index]
-        renamed = label.copy()
-        for old, new in zip(track.tolist(), identity.tolist(), strict=True):
-            renamed[label == old] = new
-        volume[index] = renamed
 
     def _close(self) -> None:
         if self._file is not None:

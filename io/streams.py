@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from stseg.arrays import Boxes, Observation
+import numpy as np
+
+from stseg.arrays import Boxes, Floats, Observation
 from stseg.geometry import Camera
 from stseg.io.box_files import read_boxes
 from stseg.io.image_stream import ImageStream, names_images
@@ -20,6 +22,9 @@ class Stream(Protocol):
 
     def read(self) -> Observation:
         """The next frame; None after the last."""
+
+    def times(self) -> Floats:
+        """Pass over all that is left: the time that each frame states, milliseconds; nan where it states none."""
 
     def close(self) -> None:
         """Let go of what is open."""
@@ -45,12 +50,18 @@ class BoxStream:
         self._next += 1
         return self._table.at(self._next - 1)
 
+    def times(self) -> Floats:
+        """Frames of a text file state no time."""
+        return np.full(self.skip(self._table.frames), np.nan)
+
     def close(self) -> None:
         """Nothing is held open."""
 
 
-def open_stream(source: Source, camera: Camera) -> Stream:
+def open_stream(source: Source, camera: Camera, times: Floats | None = None) -> Stream:
     """The stream of a source for a camera whose image size its frames must have.
+
+    With the times of all its frames, as `Stream.times` gave them, a video need not be decoded up to a far frame.
 
     Raises
     ------
@@ -60,5 +71,5 @@ def open_stream(source: Source, camera: Camera) -> Stream:
     if source.kind == "boxes":
         return BoxStream(source)
     if source.kind == "video" or (source.kind == "masks" and not names_images(source.path)):
-        return VideoStream(source, camera)
+        return VideoStream(source, camera, times)
     return ImageStream(source, camera)

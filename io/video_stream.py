@@ -8,8 +8,9 @@ import os
 os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
 
 import cv2
+import numpy as np
 
-from stseg.arrays import AnyArray
+from stseg.arrays import AnyArray, Floats
 from stseg.errors import SourceError
 from stseg.geometry import Camera
 from stseg.io.pictures import as_observation
@@ -17,9 +18,23 @@ from stseg.io.recording import Source
 
 cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
 
+_NEAR = 250
+"""Frames that are decoded rather than sought past."""
+_BEFORE = 4
+"""Frames before the one that is sought, so that what stands where seeking lands can be told by its time."""
+
 
 class VideoStream:
     """Colour frames uint8 (v, u, 3) or, where the source's kind is masks, uint8 (v, u) of a video file.
+
+    Parameters
+    ----------
+    source, camera
+        The file, and the camera whose size its frames must have.
+    times : float64 (n,)
+        Of all frames, milliseconds, as `times` found them by decoding; far frames are then sought. Seeking is not
+        exact, so where it lands is told by the time of the frame that is there; where that does not tell, the video is
+        decoded from its beginning.
 
     Raises
     ------
@@ -27,23 +42,27 @@ class VideoStream:
         Where the file is missing, no frame of it decodes, or its frames have not the camera's size.
     """
 
-    def __init__(self, source: Source, camera: Camera) -> None:
-        self._source, self._camera = source, camera
+    def __init__(self, source: Source, camera: Camera, times: Floats | None = None) -> None:
+        self._source, self._camera, self._times = source, camera, times
         if not source.path.is_file():
             raise self._error("no such file", "a video")
-        # FFmpeg by name: the same decoder on every system, and seeking fallbacks of other backends stay out.
-        self._capture = cv2.VideoCapture(str(source.path), cv2.CAP_FFMPEG)
-        if not self._capture.isOpened():
-            raise self._error("a file that does not open as a video", "a video that FFmpeg decodes")
-        self._frame = -1
-        self._ended = False
+        self._open()
 
     def skip(self, count: int) -> int:
-        """Drop up to `count` frames by decoding them (seeking is not exact); how many there were."""
-        skipped = 0
-        while skipped < count and self._advance():
-            skipped += 1
-        return skipped
+        """Drop up to `count` frames; how many there were."""
+        before = self._frame
+        if self._times is not None and _NEAR < count <= len(self._times) - 1 - before:
+            self._seek(before + count, self._times)
+        while self._frame < before + count and self._advance():
+            pass
+        return self._frame - before
+
+    def times(self) -> Floats:
+        """Pass over all that is left by decoding it: the time that the file gives each frame, milliseconds."""
+        found = []
+        while self._advance():
+            found.append(self._capture.get(cv2.CAP_PROP_POS_MSEC))
+        return np.array(found, float)
 
     def read(self) -> AnyArray | None:
         """The next frame; None after the last."""
@@ -58,6 +77,25 @@ class VideoStream:
     def close(self) -> None:
         """Let the file go."""
         self._capture.release()
+
+    def _open(self) -> None:
+        # FFmpeg by name: the same decoder on every system, and seeking fallbacks of other backends stay out.
+        self._capture = cv2.VideoCapture(str(self._source.path), cv2.CAP_FFMPEG)
+        if not self._capture.isOpened():
+            raise self._error("a file that does not open as a video", "a video that FFmpeg decodes")
+        self._frame = -1
+        self._ended = False
+
+    def _seek(self, frame: int, times: Floats) -> None:
+        """Go to a frame not after this one, as near as the file allows; to the beginning where that cannot be told."""
+        self._capture.set(cv2.CAP_PROP_POS_FRAMES, frame - _BEFORE)
+        if self._capture.grab():
+            here = np.flatnonzero(times == self._capture.get(cv2.CAP_PROP_POS_MSEC))
+            if len(here) == 1 and self._frame < here[0] <= frame:
+                self._frame = int(here[0])
+                return
+        self.close()
+        self._open()
 
     def _advance(self) -> bool:
         self._ended = self._ended or not self._capture.grab()

@@ -274,6 +274,26 @@ class IdentityConfig:
 
 
 @dataclass(frozen=True)
+class SegmentConfig:
+    """Segments: what of a long recording is worked on at once, and committed to disk."""
+
+    length: float = 120.0
+    """How much of the recording one segment holds, seconds; a killed run goes on from the last whole one."""
+    warm_up: float = 6.0
+    """How far before its first frame a segment begins to look, to know who is there, seconds."""
+    background: float = 300.0
+    """Where no empty scene is given, each so long part of the recording has a background of its own, seconds."""
+    samples: int = 40
+    """Frames that one is learned from, spread over that part."""
+
+    def __post_init__(self) -> None:
+        for name in ("length", "background"):
+            require(getattr(self, name) > 0, self, name, "seconds, above 0")
+        require(self.warm_up >= 0, self, "warm_up", "0 or more seconds")
+        require(self.samples >= 1, self, "samples", "1 or more")
+
+
+@dataclass(frozen=True)
 class Config:
     """All stages."""
 
@@ -284,3 +304,4 @@ class Config:
     segmentation: SegmentationConfig = field(default_factory=SegmentationConfig)
     identity: IdentityConfig = field(default_factory=IdentityConfig)
     ghosts: GhostConfig = field(default_factory=GhostConfig)
+    segments: SegmentConfig = field(default_factory=SegmentConfig)

@@ -10,13 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from copy import copy
 from dataclasses import dataclass, field
 from time import perf_counter
 from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from stseg.arrays import Floats, Ints, Observation, Rows
+from stseg.arrays import Flags, Floats, Ints, Observation, Rows
 from stseg.config import Config
 from stseg.foreground.sight import Sight
 from stseg.geometry import Rig
@@ -83,6 +84,27 @@ class Step:
     rates: Rows
     timings: Rows
 
+    def within(self, first: int, stop: int) -> Step:
+        """What is decided about frames first .. stop - 1, in all the time that it took."""
+        commit, candidates = self.commit, self.candidates
+        kept = np.array([first <= scene.frame < stop for scene in commit.scenes], bool)
+        shown = np.flatnonzero(kept).tolist()
+        weighed = _inside(candidates["frame"], first, stop)
+        windows = commit.windows[_inside(commit.windows["commit_stop"] - 1, first, stop)]
+        return Step(
+            Commit(
+                [commit.scenes[k] for k in shown],
+                commit.label[kept],
+                commit.trajectory[_inside(commit.trajectory["frame"], first, stop)],
+                commit.events[_inside(commit.events["frame"], first, stop)],
+                windows,
+            ),
+            candidates[weighed],
+            self.parts[weighed],
+            self.rates[_inside(self.rates["frame"], first, stop)],
+            self.timings,
+        )
+
 
 class Pipeline:
     """The stages of one rig.
@@ -106,11 +128,18 @@ class Pipeline:
         self.frame_pass = FramePass(rig, kinds, config.ghosts)
         self.occupancy = Occupancy(rig, kinds, config.occupancy, config.ghosts, config.level)
 
+    def seeing_by(self, sights: Sequence[Sight]) -> Pipeline:
+        """The same stages with other sights, for another part of the recording."""
+        other = copy(self)
+        other.sights = sights
+        return other
+
     def steps(self, moments: Iterable[Moment], first: int, advance: Callable[[int], None]) -> Iterator[Step]:
         """Run over moments, from frame `first` on; yields what is decided as soon as it is.
 
-        `advance` is told each frame that was fused.
+        `advance` is told each frame that was fused. Nothing is known from moments that were run over before.
         """
+        self.occupancy.forget()
         tracker = make_tracker(self.tracker_name, self.rig, self.config, first)
         watch = Stopwatch()
         explained: dict[int, _Explained] = {}
@@ -153,6 +182,10 @@ class _Explained(NamedTuple):
 
     explanation: Explanation
     rates: Rows
+
+
+def _inside(frame: Ints, first: int, stop: int) -> Flags:
+    return np.asarray((first <= frame) & (frame < stop))
 
 
 def _step(commit: Commit, explained: dict[int, _Explained], watch: Stopwatch) -> Step:

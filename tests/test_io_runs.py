@@ -12,8 +12,6 @@ from typing import BinaryIO
 import h5py
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
 from run_files import (
     CONFIG,
     FRAMES,
@@ -25,7 +23,7 @@ from run_files import (
     write_small_run,
 )
 
-from stseg.arrays import Bytes, Labels
+from stseg.arrays import Bytes
 from stseg.commands.overview import look_over
 from stseg.errors import FormatError, OutputError
 from stseg.geometry import Grid
@@ -64,7 +62,7 @@ class Hindered:
 def patch_file(monkeypatch: pytest.MonkeyPatch, hinder: Callable[[memoryview], object]) -> None:
     fdopen: Callable[..., BinaryIO] = os.fdopen
     monkeypatch.setattr(os, "fdopen", lambda *given, **how: Hindered(fdopen(*given, **how), hinder))
-    monkeypatch.setattr(part_file, "_lock", lambda _: None)
+    monkeypatch.setattr(part_file, "lock", lambda _: None)
 
 
 # What stands in the file
@@ -203,48 +201,6 @@ def test_slips_of_the_caller_are_refused(tmp_path: Path) -> None:
 # Other ids
 
 
-@st.composite
-def renamings(draw: st.DrawFn) -> list[tuple[int, int, int]]:
-    """Frame, track and the id that it takes there, in any order; no track twice in a frame."""
-    named = st.tuples(st.sampled_from(FRAMES[:4].tolist()), st.integers(1, 9))
-    keys = draw(st.lists(named, unique=True, max_size=12))
-    return [(*key, draw(st.integers(0, 9))) for key in keys]
-
-
-@settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(st.lists(st.integers(0, 6), min_size=4, max_size=4), renamings())
-def test_relabelling_maps_every_cell_once(tmp_path: Path, ids: list[int], named: list[tuple[int, int, int]]) -> None:
-    log_odds, label = small_volume(4)
-    label[:, 0, 0, 0] = ids
-    new_id_of = {(frame, track): identity for frame, track, identity in named}
-    plain = label.copy()
-    for cell in np.ndindex(label.shape):
-        plain[cell] = new_id_of.get((int(FRAMES[cell[0]]), int(label[cell])), label[cell])
-    with writer_at(tmp_path / "relabel.h5", overwrite=True) as writer:
-        writer.append_frames(FRAMES[:4], log_odds, label)
-        writer.relabel(*np.array(named, np.int64).reshape(-1, 3).T)
-        writer.finish(Tracks(np.zeros(0, TRAJECTORY)).summary())
-    run = read_run(tmp_path / "relabel.h5")
-    read: Labels = np.stack([run.read_frame(int(frame))[1] for frame in FRAMES[:4]])
-    np.testing.assert_array_equal(read, plain)
-
-
-def test_frames_in_which_no_id_changes_are_not_written_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    written = []
-    set_item = h5py.Dataset.__setitem__
-
-    def noting(dataset: h5py.Dataset, place: object, values: object) -> None:
-        written.append(place)
-        set_item(dataset, place, values)
-
-    with writer_at(tmp_path / "relabel.h5") as writer:
-        fill(writer)
-        with monkeypatch.context() as patch:
-            patch.setattr(h5py.Dataset, "__setitem__", noting)
-            writer.relabel(np.array([15, 10, 13, 13]), np.array([2, 1, 2, 1]), np.array([1, 1, 1, 2]))
-    assert written == [3, 5]
-
-
 # Whole or not at all
 
 
@@ -294,7 +250,6 @@ def test_an_interrupt_inside_a_write_leaves_nothing(
     patch_file(monkeypatch, lambda _: signal.raise_signal(signal.SIGINT) if next(moments) == moment else None)
     with pytest.raises(KeyboardInterrupt), writer_at(tmp_path / "night.h5") as writer:
         fill(writer)
-        writer.relabel(FRAMES, np.ones_like(FRAMES), np.full_like(FRAMES, 3))
         writer.finish(Tracks(small_trajectory()).summary())
     assert next(moments) > moment
     assert [file.name for file in tmp_path.iterdir()] == ["left.avi"]

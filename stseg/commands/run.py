@@ -2,28 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import sys
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 from cyclopts import Parameter
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from stseg.arrays import Bytes, Rows
-from stseg.commands.sights import make_sights
+from stseg.commands.assembly import Made, assemble
+from stseg.commands.progress import frame_bar
+from stseg.commands.segment_work import Job, SegmentWork, VolumeKind
 from stseg.errors import ConfigError
+from stseg.identity.segments import Segment, segments
 from stseg.io.config_file import format_config, read_config
-from stseg.io.frames import count_frames, open_frames
-from stseg.io.layout import ghost_type
+from stseg.io.frames import Streams, count_streams
 from stseg.io.outputs import require_new
+from stseg.io.provenance import as_tables, gather_provenance
 from stseg.io.recording import Recording
 from stseg.io.rigs import read_rig
-from stseg.io.runs import RunWriter
-from stseg.pipeline import Pipeline, Step
-from stseg.tracks import EVENT, TRAJECTORY, Tracks
+from stseg.io.work_folder import WorkFolder
 
 
 def run(
@@ -35,6 +34,7 @@ def run(
     config: Path | None = None,
     set_: Annotated[tuple[str, ...], Parameter(name="--set", metavar="STAGE.KEY=VALUE", negative="")] = (),
     tracker: str = "cut",
+    volume: VolumeKind = "all",
     overwrite: Annotated[bool, Parameter(negative="")] = False,
 ) -> None:
     """Track the people of a recording, and write everything that was found to one HDF5 file.
@@ -42,6 +42,9 @@ def run(
     Example: stseg run rig.toml -o run.h5
 
     Then: stseg inspect run.h5, stseg report run.h5 -o report.html, stseg export run.h5 --to csv -o tracks.csv
+
+    What is done is kept in the folder run.h5.segments until the run file stands: a run that was stopped or killed goes
+    on from there when the same command is given again.
 
     Parameters
     ----------
@@ -57,59 +60,34 @@ def run(
         One constant, for example --set ghosts.person=-2; may be given several times.
     tracker
         cut: graph cuts of windows of the volume. frames: the people of each frame as they come, without a cut.
+    volume
+        What of the occupancy volume is kept: all of it, what is within a metre of tracks, or none.
     overwrite
         Replace an older run file of that name, once this one is whole.
     """
     require_new(output, overwrite)
-    resolved = read_config(config, set_)
-    recording = read_rig(rig)
-    first, stop = _frames(frames, recording)
-    sights = make_sights(recording, resolved, first, stop)
-    kinds = ["boxes" if s.source.kind in ("boxes", "instances") else "pixels" for s in recording.sources]
-    pipeline = Pipeline(recording.rig, sights, kinds, resolved, tracker)
-    views: Bytes = pipeline.occupancy.views
-    with RunWriter(output, recording, views, format_config(resolved), overwrite=overwrite) as writer:
-        tracks = _follow(pipeline, recording, first, stop, writer)
+    resolved, recording = read_config(config, set_), read_rig(rig)
+    asked = as_tables(gather_provenance(recording, format_config(resolved)))
+    asked |= {"--frames": frames or "all", "--tracker": tracker, "--volume": volume}
+    with WorkFolder(output, asked) as folder, _told_how_to_go_on(folder):
+        streams = _streams(recording, folder)
+        first, stop = frame_range(frames, streams.length)
+        job = Job(recording, resolved, tracker, volume, first, stop, streams)
+        made = _make(job, segments(recording.rig.frame_rate, resolved, first, stop), folder)
+        tracks = assemble(job, made, output, overwrite)
+        folder.remove()
     people = len(np.unique(tracks.trajectory["id"]))
     print(f"{output}: {people} tracks in frames {first} to {stop - 1}")
 
 
-def _follow(pipeline: Pipeline, recording: Recording, first: int, stop: int, writer: RunWriter) -> Tracks:
-    """Write step by step, then what only the whole run tells."""
-    trajectory: list[Rows] = [np.zeros(0, TRAJECTORY)]
-    events: list[Rows] = [np.zeros(0, EVENT)]
-    with open_frames(recording, first, stop) as moments, _progress(first, stop) as advance:
-        for step in pipeline.steps(moments, first, advance):
-            _write(step, writer, len(recording.sources))
-            trajectory.append(step.commit.trajectory)
-            events.append(step.commit.events)
-    committed = np.concatenate(trajectory)
-    tracks, identity = pipeline.finished(committed, np.concatenate(events))
-    writer.relabel(committed["frame"], committed["id"], identity)
-    writer.append("trajectory", tracks.trajectory)
-    writer.append("boxes", tracks.boxes)
-    writer.append("events", tracks.events)
-    writer.finish(tracks.summary())
-    return tracks
+def frame_range(text: str | None, length: int) -> tuple[int, int]:
+    """First and stop of a part of a recording.
 
-
-def _write(step: Step, writer: RunWriter, views: int) -> None:
-    commit = step.commit
-    frames = np.array([scene.frame for scene in commit.scenes])
-    writer.append_frames(frames, np.stack([scene.log_odds for scene in commit.scenes]), commit.label)
-    ghosts = np.zeros(len(step.candidates), ghost_type(views))
-    for name in step.candidates.dtype.names or ():
-        ghosts[name] = step.candidates[name]
-    ghosts["parts"] = step.parts
-    writer.append("ghosts", ghosts)
-    writer.append("windows", commit.windows)
-    writer.append("rates", step.rates)
-    writer.append("timings", step.timings)
-
-
-def _frames(text: str | None, recording: Recording) -> tuple[int, int]:
-    """First and stop of the run; the recording's length is counted by decoding."""
-    length = count_frames(recording)
+    Raises
+    ------
+    ConfigError
+        Where the text is no part of it.
+    """
     if text is None:
         return 0, length
     head, colon, tail = text.partition(":")
@@ -121,20 +99,42 @@ def _frames(text: str | None, recording: Recording) -> tuple[int, int]:
     return first, stop
 
 
+def _make(job: Job, plan: list[Segment], folder: WorkFolder) -> list[Made]:
+    """All segments, those that are there already taken as they are."""
+    kept = folder.segments()
+    for path in folder.broken:
+        print(f"stseg: {path}: its bytes have changed since it was written; made anew", file=sys.stderr)
+    if kept:
+        print(f"stseg: {len(kept)} of {len(plan)} segments are there already", file=sys.stderr)
+    missing = [segment for segment in plan if segment.index not in kept]
+    done = sum(segment.stop - segment.first for segment in plan) - sum(s.stop - s.first for s in missing)
+    if missing:
+        work = SegmentWork(job)
+        with frame_bar("tracking", job.stop - job.first, done) as advance:
+            for segment in missing:
+                kept[segment.index] = work.make(segment, folder.draft(segment.index), advance)
+    return [Made(segment, kept[segment.index]) for segment in plan]
+
+
+def _streams(recording: Recording, folder: WorkFolder) -> Streams:
+    """What counting the recording tells; it is counted once, by decoding."""
+    known = folder.streams()
+    if known is None:
+        with frame_bar("counting", None):
+            known = count_streams(recording)
+        folder.keep_streams(known)
+    return known
+
+
 @contextmanager
-def _progress(first: int, stop: int) -> Iterator[_Advance]:
-    """A bar on a terminal; silence in a log."""
-    console = Console(stderr=True)
-    columns: Sequence[TextColumn | BarColumn | TaskProgressColumn | TimeElapsedColumn | TimeRemainingColumn] = (
-        TextColumn("tracking"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn(), TimeRemainingColumn()
-    )  # fmt: skip
-    with Progress(*columns, console=console, disable=not console.is_terminal, transient=True) as bar:
-        yield _Advance(bar, bar.add_task("tracking", total=stop - first), first)
-
-
-class _Advance:
-    def __init__(self, bar: Progress, task: object, first: int) -> None:
-        self.bar, self.task, self.first = bar, task, first
-
-    def __call__(self, frame: int) -> None:
-        self.bar.update(self.task, completed=frame - self.first + 1)  # type: ignore[arg-type]
+def _told_how_to_go_on(folder: WorkFolder) -> Iterator[None]:
+    """Where something stops a run of which segments are kept, a line says so."""
+    try:
+        yield
+    except BaseException:
+        if number := len(folder.segments()):
+            told = f"{number} finished segments are kept in {folder.path}; the same command goes on from there"
+            print(f"stseg: {told}", file=sys.stderr)
+        else:
+            folder.remove()
+        raise

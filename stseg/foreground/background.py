@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
+from copy import copy
 from typing import Any, ClassVar, Protocol, Self
 
 import numpy as np
@@ -52,6 +53,10 @@ class Background(Protocol):
 
     def relight(self, gain: Singles) -> None:
         """Take all that it has learned into another light, by gains float32 (v, u, 3)."""
+        ...
+
+    def at_rate(self, frame_rate: float) -> Self:
+        """The same model, asked at another rate, frames per second; this one is not to be asked any more."""
         ...
 
     def state(self) -> dict[str, AnyArray]:
@@ -124,6 +129,12 @@ class PixelModel(ABC):
         model._arrays = {key: state[key].copy() for key in model._arrays}
         model._learned, model._asked = int(state["learned"]), int(state["asked"])
         return model
+
+    def at_rate(self, frame_rate: float) -> Self:
+        """The same model, asked at another rate, frames per second; this one is not to be asked any more."""
+        paced = copy(self)
+        paced._turn = TURNS / frame_rate
+        return paced
 
     def state(self) -> dict[str, AnyArray]:
         """Copies of all that it has learned.

@@ -66,8 +66,14 @@ class Occupancy:
             else np.zeros((0, 0, 0, 4), np.float32)
             for camera, kind in zip(rig.cameras, kinds, strict=True)
         ]
-        self.level = Level([_first_rates(kind, ghosts) for kind in kinds], rig.frame_rate, level or LevelConfig())
+        self._first = [_first_rates(kind, ghosts) for kind in kinds]
+        self._level_config = level or LevelConfig()
+        self.forget()
         self.prior = float(logit(config.occupied))
+
+    def forget(self) -> None:
+        """Go back to the first guess of the rates."""
+        self.level = Level(self._first, self.rig.frame_rate, self._level_config)
 
     def fuse(self, seen: Sequence[ViewEvidence], explanation: Explanation) -> Singles:
         """A frame's log-odds by the rates known so far, float32 (plane, y, x), nats; nan where no view sees the cell.

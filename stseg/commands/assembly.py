@@ -1,0 +1,76 @@
+"""From the files of all segments to the run file: what only the whole run tells, and the volume under final names."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from stseg.arrays import Bytes, Ints, Rows
+from stseg.commands.segment_work import Job
+from stseg.identity.seams import Part, Seams, rename_labels
+from stseg.identity.segments import Segment
+from stseg.io.config_file import format_config
+from stseg.io.runs import Run, RunWriter, read_run
+from stseg.tracks import Tracks
+
+_FRAMES = 64
+"""Frames of the volume in memory at a time."""
+_COPIED = ("ghosts", "windows", "rates", "timings")
+
+
+class Made(NamedTuple):
+    """A segment and the file that holds it."""
+
+    segment: Segment
+    path: Path
+
+
+class _Named(NamedTuple):
+    """A segment's file, its committed rows, and what each of them is called in the run, 0 for nobody."""
+
+    run: Run
+    rows: Rows
+    identity: Ints
+
+
+def assemble(job: Job, made: Sequence[Made], output: Path, overwrite: bool) -> Tracks:
+    """Write the run file of a job from its segments, in their order."""
+    pipeline, seams = job.pipeline(), Seams()
+    for segment, path in made:
+        run = read_run(path)
+        seams.add(Part(segment.first, run.trajectory, run.events))
+    joined = seams.joined()
+    tracks, identity = pipeline.finished(joined.committed, joined.events)
+    views: Bytes = pipeline.occupancy.views
+    config = format_config(job.config)
+    with RunWriter(output, job.recording, views, config, overwrite=overwrite, kept=job.volume) as writer:
+        for named in _named(made, joined.committed, joined.local, identity):
+            _copy(named, writer)
+        writer.append("trajectory", tracks.trajectory)
+        writer.append("boxes", tracks.boxes)
+        writer.append("events", tracks.events)
+        writer.finish(tracks.summary())
+    return tracks
+
+
+def _named(made: Sequence[Made], committed: Rows, local: Ints, identity: Ints) -> Iterator[_Named]:
+    """Segment by segment; rows of the run stand in their order."""
+    row = 0
+    for segment, path in made:
+        run = read_run(path)
+        stop = row + int((run.trajectory["frame"] >= segment.first).sum())
+        rows = committed[row:stop].copy()
+        rows["id"] = local[row:stop]
+        yield _Named(run, rows, identity[row:stop])
+        row = stop
+
+
+def _copy(named: _Named, writer: RunWriter) -> None:
+    for frames, log_odds, label in named.run.read_volumes(_FRAMES):
+        rename_labels(label, frames, named.rows, named.identity)
+        writer.append_frames(frames, log_odds, label)
+    for table in _COPIED:
+        writer.append(table, np.asarray(getattr(named.run, table)))

@@ -1,0 +1,131 @@
+"""One segment of a run: read, followed, written to its own file. It depends on no other segment."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from copy import deepcopy
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from stseg.arrays import Bytes, Ints, Labels, Singles
+from stseg.commands.sights import background_part, make_sights
+from stseg.config import Config
+from stseg.foreground.sight import Sight
+from stseg.geometry.near import near_person
+from stseg.identity.segments import Segment
+from stseg.io.config_file import format_config
+from stseg.io.frames import Streams, open_frames
+from stseg.io.layout import ghost_type
+from stseg.io.recording import Recording
+from stseg.io.runs import RunWriter
+from stseg.io.work_folder import keep_segment
+from stseg.pipeline import Pipeline, Step
+from stseg.tracks import TRACK
+
+VolumeKind = Literal["none", "tracks", "all"]
+_AROUND = 1.0
+"""How far from a track the volume is kept where it is kept around tracks, metres."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """What all segments of a run have in common.
+
+    Attributes
+    ----------
+    recording, config, tracker
+        What is run, and how.
+    volume
+        What is kept of the volume: all of it, what is near tracks, or nothing.
+    first, stop
+        The frames of the run, half open.
+    streams
+        What counting the recording told.
+    """
+
+    recording: Recording
+    config: Config
+    tracker: str
+    volume: VolumeKind
+    first: int
+    stop: int
+    streams: Streams
+
+    def pipeline(self) -> Pipeline:
+        """The stages, which see nothing yet."""
+        sources = [source.source.kind for source in self.recording.sources]
+        kinds = ["boxes" if kind in ("boxes", "instances") else "pixels" for kind in sources]
+        return Pipeline(self.recording.rig, [], kinds, self.config, self.tracker)
+
+
+class SegmentWork:
+    """Makes segments of one job, any of them in any order."""
+
+    def __init__(self, job: Job) -> None:
+        self.job, self.pipeline = job, job.pipeline()
+        self._part, self._learned = range(0), list[Sight]()
+
+    def make(self, segment: Segment, draft: Path, advance: Callable[[int], None]) -> Path:
+        """Write a segment's file; its name at the end. `advance` is told how many more of its frames were fused."""
+        job = self.job
+
+        def fused(frame: int) -> None:
+            advance(int(segment.first <= frame < segment.stop))
+
+        views: Bytes = self.pipeline.occupancy.views
+        pipeline = self.pipeline.seeing_by(self._sights(segment))
+        with (
+            open_frames(job.recording, segment.lead, job.stop, job.streams) as moments,
+            RunWriter(
+                draft, job.recording, views, format_config(job.config), overwrite=True, kept=job.volume
+            ) as writer,
+        ):
+            for step in pipeline.steps(moments, segment.lead, fused):
+                self._write(step, segment, writer)
+                if step.commit.scenes[-1].frame >= segment.stop - 1:
+                    break
+            writer.finish(np.zeros(0, TRACK))
+        return keep_segment(draft)
+
+    def _sights(self, segment: Segment) -> list[Sight]:
+        """With the backgrounds that were learned last, if they are this segment's too."""
+        job = self.job
+        part = background_part(job.config.segments, job.recording.rig.frame_rate, job.first, job.stop, segment.first)
+        if part != self._part or not self._learned:
+            self._learned = make_sights(job.recording, job.config, job.first, job.stop, segment.first, job.streams)
+            self._part = part
+        return deepcopy(self._learned)
+
+    def _write(self, step: Step, segment: Segment, writer: RunWriter) -> None:
+        """The segment's frames of a step; of the warm-up the trajectory alone, by which segments are joined."""
+        own = step.within(segment.first, segment.stop)
+        writer.append("trajectory", step.within(segment.lead, segment.stop).commit.trajectory)
+        writer.append("timings", own.timings)
+        if not own.commit.scenes:
+            return
+        frames = np.array([scene.frame for scene in own.commit.scenes])
+        log_odds = np.stack([scene.log_odds for scene in own.commit.scenes])
+        writer.append_frames(frames, *self._kept(own, frames, log_odds))
+        ghosts = np.zeros(len(own.candidates), ghost_type(len(self.job.recording.sources)))
+        for name in own.candidates.dtype.names or ():
+            ghosts[name] = own.candidates[name]
+        ghosts["parts"] = own.parts
+        writer.append("ghosts", ghosts)
+        writer.append("events", own.commit.events)
+        writer.append("windows", own.commit.windows)
+        writer.append("rates", own.rates)
+
+    def _kept(self, step: Step, frames: Ints, log_odds: Singles) -> tuple[Singles, Labels]:
+        """What is kept of the volume of a step."""
+        label, rows = step.commit.label, step.commit.trajectory
+        if self.job.volume == "none":
+            return np.full_like(log_odds, np.nan), np.zeros_like(label)
+        if self.job.volume == "tracks":
+            ground = self.job.recording.rig.grid.ground
+            for frame, volume in zip(frames, log_odds, strict=True):
+                here = rows[rows["frame"] == frame]
+                volume[:, near_person(ground, np.column_stack([here["x"], here["y"]]), _AROUND) < 0] = np.nan
+        return log_odds, label

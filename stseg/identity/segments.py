@@ -1,0 +1,51 @@
+"""Segments: the parts of a long recording that are worked on apart, and committed to disk one by one.
+
+A segment is a whole number of windows. It begins to look a little before its first frame, so that it knows by then who
+is there, and looks on until its last window is solved; what it finds depends on the recording and the configuration
+alone. So a segment is the same whoever makes it and when: after a killed run, by another process, on another machine.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import ceil
+
+from stseg.config import Config
+from stseg.identity.windows import window_length
+
+
+@dataclass(frozen=True)
+class Segment:
+    """Frames of the recording.
+
+    Attributes
+    ----------
+    index
+        Counted from 0 at the run's first.
+    lead
+        The first frame that is looked at; the frames from there to `first` are the warm-up.
+    first, stop
+        The frames that are committed, half open; those of all segments partition the run.
+    """
+
+    index: int
+    lead: int
+    first: int
+    stop: int
+
+
+def segments(frame_rate: float, config: Config, first: int, stop: int) -> list[Segment]:
+    """The segments that cover frames first .. stop - 1; they begin where commit ranges of windows do.
+
+    What is left at the end belongs to the last one if it is no longer than a window.
+    """
+    length, shared = window_length(frame_rate, config.identity)
+    stride = length - shared
+    step = max(1, round(config.segments.length * frame_rate / stride)) * stride
+    warm_up = ceil(config.segments.warm_up * frame_rate / stride) * stride
+    inner = [frame for frame in range(step + shared // 2, stop - length, step) if frame > first]
+    bounds = [first, *inner, stop]
+    return [
+        Segment(k, first if k == 0 else max(first, bounds[k] - warm_up), bounds[k], bounds[k + 1])
+        for k in range(len(bounds) - 1)
+    ]
