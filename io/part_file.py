@@ -15,6 +15,8 @@ from stseg.errors import OutputError
 from stseg.io.locks import lock
 from stseg.io.outputs import failure, part_of, publish
 
+_Handler = Callable[[int, FrameType | None], object]
+
 
 class PartFile(io.RawIOBase):
     """`NAME.part` as a file object that never raises while HDF5 calls it.
@@ -37,7 +39,8 @@ class PartFile(io.RawIOBase):
     def __init__(self, path: Path) -> None:
         self._path = path
         self._failure: OSError | None = None
-        self._in_step = self._interrupted = False
+        self._in_step = False
+        self._interrupted: int | None = None
         try:
             self._file = os.fdopen(os.open(part_of(path), os.O_RDWR | os.O_CREAT, 0o666), "r+b", buffering=0)
         except OSError as error:
@@ -48,7 +51,7 @@ class PartFile(io.RawIOBase):
         except OSError as error:
             self._file.close()
             raise failure(path, error) from error
-        self._on_interrupt = self._shield()
+        self._handlers = self._shield()
 
     @contextmanager
     def step(self) -> Iterator[None]:
@@ -62,9 +65,9 @@ class PartFile(io.RawIOBase):
         finally:
             self._in_step = False
         self._raise_failure()
-        if self._interrupted and self._on_interrupt is not None:
-            self._interrupted = False
-            self._on_interrupt(signal.SIGINT, None)
+        if self._interrupted is not None:
+            number, self._interrupted = self._interrupted, None
+            self._handlers[number](number, None)
 
     def publish(self, overwrite: bool) -> None:
         """Sync, and give the file its name; where that fails the part stays, for it is whole."""
@@ -96,8 +99,8 @@ class PartFile(io.RawIOBase):
         with suppress(OSError):
             self._file.close()
         super().close()
-        if self._on_interrupt is not None:
-            signal.signal(signal.SIGINT, self._on_interrupt)
+        for number, before in self._handlers.items():
+            signal.signal(number, before)
 
     def write(self, data: memoryview) -> int:  # type: ignore[override]  # what h5py gives
         """All of it, or the failure is kept."""
@@ -137,17 +140,21 @@ class PartFile(io.RawIOBase):
         if self._failure is not None:
             raise failure(self._path, self._failure) from self._failure
 
-    def _shield(self) -> Callable[[int, FrameType | None], object] | None:
-        """Keep interrupts out of the steps; what handled them before, None where they cannot strike."""
-        before = signal.getsignal(signal.SIGINT)
-        if threading.current_thread() is not threading.main_thread() or not callable(before):
-            return None
+    def _shield(self) -> dict[int, _Handler]:
+        """Keep interrupts and termination out of the steps; what handled them before, where they can strike."""
+        if threading.current_thread() is not threading.main_thread():
+            return {}
 
         def handle(number: int, frame: FrameType | None) -> None:
             if self._in_step:
-                self._interrupted = True
+                self._interrupted = number
             else:
-                before(number, frame)
+                handlers[number](number, frame)
 
-        signal.signal(signal.SIGINT, handle)
-        return before
+        handlers: dict[int, _Handler] = {}
+        for number in (signal.SIGINT, signal.SIGTERM):
+            before = signal.getsignal(number)
+            if callable(before):
+                handlers[number] = before
+                signal.signal(number, handle)
+        return handlers

@@ -103,18 +103,22 @@ def as_tables(provenance: Provenance) -> dict[str, Any]:
     """All that decides what a run finds, as texts and numbers in nested tables; when it began is left out."""
     rig = tomllib.loads(provenance.rig)
     rig["camera"] = {camera.pop("name"): camera for camera in rig["camera"]}
-    sources = {
-        f"{row['camera'].decode() if isinstance(row['camera'], bytes) else row['camera']}, {row['role'].decode()}": (
-            f"{row['files']} files of {row['size']} bytes in all, written {_day(float(row['modified']))}"
-        )
-        for row in provenance.sources
-    }
+    sources = {f"{_word(row['camera'])}, {_word(row['role'])}": _told(row) for row in provenance.sources}
     config = tomllib.loads(provenance.config)
     return {"config": config, "rig": rig, "source": sources, "version": dict(provenance.versions)}
 
 
-def _day(modified: float) -> str:
-    return "never" if np.isnan(modified) else datetime.fromtimestamp(modified, UTC).isoformat()
+def _told(row: Rows) -> str:
+    """One stream's files, in words."""
+    name = Path(_word(row["path"])).name
+    if not row["files"]:
+        return f"{name}, of which there is nothing"
+    written = datetime.fromtimestamp(float(row["modified"]), UTC).isoformat()
+    return f"{name}, {row['files']} files, {row['size']} bytes in all, written {written}"
+
+
+def _word(text: bytes | str) -> str:
+    return text.decode() if isinstance(text, bytes) else text
 
 
 def _versions() -> dict[str, str]:

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
+import threading
 from collections.abc import Sequence
 from difflib import get_close_matches
+from types import FrameType
+from typing import Any
 
 from cyclopts import App, CycloptsError
 
@@ -26,12 +30,13 @@ COMMANDS = {
 
 _FLAGS = ("--help", "-h", "--version")
 _USER_ERROR = 2
-_INTERRUPTED = 130
+_INTERRUPTED, _TERMINATED = 130, 143
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command line and return its exit status; what the user can mend is one line on standard error."""
     tokens = list(sys.argv[1:] if arguments is None else arguments)
+    termination = Termination()
     try:
         _require_command(tokens)
         _app(tokens)(tokens, exit_on_error=False, print_error=False, result_action="return_value")
@@ -40,11 +45,32 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"stseg: error: {' '.join(str(error).split())}", file=sys.stderr)
         return _USER_ERROR
     except KeyboardInterrupt:
-        print("stseg: interrupted", file=sys.stderr)
-        return _INTERRUPTED
+        print(f"stseg: {'terminated' if termination.asked else 'interrupted'}", file=sys.stderr)
+        return _TERMINATED if termination.asked else _INTERRUPTED
     except BrokenPipeError:  # the reader of our output, such as head, has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    finally:
+        termination.forget()
     return 0
+
+
+class Termination:
+    """SIGTERM does what an interrupt does: what is being written is written or withdrawn, and the command ends."""
+
+    def __init__(self) -> None:
+        self.asked = False
+        self._before: Any = signal.SIG_DFL
+        if threading.current_thread() is threading.main_thread():
+            self._before = signal.signal(signal.SIGTERM, self._ask)
+
+    def forget(self) -> None:
+        """Let SIGTERM do what it did before."""
+        if threading.current_thread() is threading.main_thread():
+            signal.signal(signal.SIGTERM, self._before)
+
+    def _ask(self, _number: int, _frame: FrameType | None) -> None:
+        self.asked = True
+        raise KeyboardInterrupt
 
 
 def _app(tokens: Sequence[str]) -> App:
