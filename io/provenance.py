@@ -108,7 +108,7 @@ def as_tables(provenance: Provenance) -> dict[str, Any]:
     return {"config": config, "rig": rig, "source": sources, "version": dict(provenance.versions)}
 
 
-def _told(row: Rows) -> str:
+def _told(row: np.void) -> str:
     """One stream's files, in words."""
     name = Path(_word(row["path"])).name
     if not row["files"]:
