@@ -8,6 +8,7 @@
         +-- SourceError        recordings: missing, broken, of unequal length or of the wrong size
         +-- FormatError        the contents of any other file that is read
         +-- OutputError        what is written: exists already, cannot be written, disk full
+        +-- WorkerError        a process or machine that works for a run dies again and again
 
 A command turns an `StsegError` into one line on standard error and exit status 2.
 """
@@ -37,6 +38,10 @@ class InputError(StsegError):
         where = f"{self.place}: {key}" if key else self.place
         super().__init__(f"{where}: found {self.found}, expected {expected}")
 
+    def __reduce__(self) -> tuple[type[InputError], tuple[str, str, str, str]]:
+        """So that it comes whole from one process to another."""
+        return type(self), (self.place, self.key, self.found, self.expected)
+
 
 class RigError(InputError):
     """The rig file does not say what it must."""
@@ -60,3 +65,7 @@ class FormatError(InputError):
 
 class OutputError(InputError):
     """A result cannot be written."""
+
+
+class WorkerError(InputError):
+    """A process or machine that works for a run dies again and again."""

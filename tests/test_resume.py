@@ -11,47 +11,24 @@ import sys
 import time
 from pathlib import Path
 
-import h5py
 import numpy as np
 import pytest
-from scenes import box_moments, looking, rig_of, walkers
+from recordings import ENVIRONMENT, FRAMES, OPTIONS, assert_same, track, write_recording
+from scenes import walkers
 
 from stseg.accelerate import python_form
-from stseg.arrays import Boxes
-from stseg.commands.main import main
 from stseg.evaluation import evaluate
 from stseg.ghosts.scoring import set_score
-from stseg.io.recording import CameraSource, Recording, Source
-from stseg.io.rig_text import format_rig
 from stseg.io.runs import read_run
 from stseg.io.work_folder import checksum
 
-FRAMES = 40
-OPTIONS = ("--set", "segments.length=1", "--set", "segments.warm_up=1", "--set", "ghosts.lattice=0.25")
-SEGMENTS = 6
 PROGRAM = "import sys; from stseg.commands.main import main; sys.exit(main())"
 pytestmark = pytest.mark.skipif(python_form(set_score) is set_score, reason="too slow without a compiler")
 
 
 @pytest.fixture(scope="module")
 def rig_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Three walkers in a room as two cameras' boxes."""
-    folder = tmp_path_factory.mktemp("recording")
-    rig = rig_of(
-        [looking("west", (-3.5, -3.5, 2.6)), looking("east", (3.5, -3.4, 2.6)), looking("north", (0, 3.6, 2.6))]
-    )
-    lines = {camera.name: ["frame,left,top,width,height"] for camera in rig.cameras}
-    for moment in box_moments(rig, walkers(FRAMES), 0, FRAMES):
-        for camera, view in zip(rig.cameras, moment.views, strict=True):
-            assert isinstance(view, Boxes)
-            rows = view.pixel.tolist()
-            lines[camera.name] += [f"{moment.frame},{','.join(map(repr, row))}" for row in rows]
-    for name, text in lines.items():
-        (folder / f"{name}.csv").write_text("\n".join(text) + "\n")
-    streams = [CameraSource(Source("boxes", folder / f"{camera.name}.csv", 0, FRAMES)) for camera in rig.cameras]
-    path = folder / "rig.toml"
-    path.write_text(format_rig(Recording(path, rig, tuple(streams)), path))
-    return path
+    return write_recording(tmp_path_factory.mktemp("recording"))
 
 
 @pytest.fixture(scope="module")
@@ -66,32 +43,15 @@ def night(tmp_path: Path) -> Path:
     return tmp_path / "night.h5"
 
 
-def track(rig: Path, output: Path, *more: str) -> int:
-    return main(["run", str(rig), "-o", str(output), *OPTIONS, *more])
-
-
 def process(rig: Path, output: Path) -> subprocess.Popen[str]:
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     arguments = [sys.executable, "-c", PROGRAM, "run", str(rig), "-o", str(output), *OPTIONS]
-    return subprocess.Popen(arguments, env=environment, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    return subprocess.Popen(
+        arguments, env=ENVIRONMENT, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )  # fmt: skip
 
 
 def segments_of(output: Path) -> list[Path]:
     return sorted(output.with_name(f"{output.name}.segments").glob("segment-*-*.h5"))
-
-
-def assert_same(one: Path, other: Path) -> None:
-    """Every dataset but timings and provenance, bit for bit."""
-    with h5py.File(one) as a, h5py.File(other) as b:
-        names: list[str] = []
-        a.visit(names.append)
-        for name in names:
-            if name.split("/")[0] in ("timings", "provenance"):
-                continue
-            assert name in b
-            if isinstance(a[name], h5py.Dataset):
-                assert np.asarray(a[name][()]).tobytes() == np.asarray(b[name][()]).tobytes(), name
-            assert a[name].attrs.keys() == b[name].attrs.keys()
 
 
 def test_a_run_in_segments_follows_everybody(undisturbed: Path) -> None:
@@ -131,9 +91,8 @@ while True:
         os.remove({str(night)!r})
 print(kills)
 """
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     arguments = [sys.executable, "-c", driver, "run", str(rig_path), "-o", str(night), *OPTIONS]
-    done = subprocess.run(arguments, env=environment, capture_output=True, text=True, check=False)
+    done = subprocess.run(arguments, env=ENVIRONMENT, capture_output=True, text=True, check=False)
     assert done.stdout.strip().endswith("20"), done.stderr
     assert_same(night, undisturbed)
     assert [path.name for path in night.parent.iterdir()] == [night.name]

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -12,8 +13,10 @@ import numpy as np
 from cyclopts import Parameter
 
 from stseg.commands.assembly import Made, assemble
+from stseg.commands.cluster import make_by_cluster
 from stseg.commands.progress import frame_bar
 from stseg.commands.segment_work import Job, SegmentWork, VolumeKind
+from stseg.commands.workers import make_by_workers
 from stseg.errors import ConfigError
 from stseg.identity.segments import Segment, segments
 from stseg.io.config_file import format_config, read_config
@@ -35,6 +38,8 @@ def run(
     set_: Annotated[tuple[str, ...], Parameter(name="--set", metavar="STAGE.KEY=VALUE", negative="")] = (),
     tracker: str = "cut",
     volume: VolumeKind = "all",
+    workers: int = 1,
+    scheduler: str | None = None,
     overwrite: Annotated[bool, Parameter(negative="")] = False,
 ) -> None:
     """Track the people of a recording, and write everything that was found to one HDF5 file.
@@ -62,10 +67,16 @@ def run(
         cut: graph cuts of windows of the volume. frames: the people of each frame as they come, without a cut.
     volume
         What of the occupancy volume is kept: all of it, what is within a metre of tracks, or none.
+    workers
+        Processes that share the work on this machine; the result is the same for any number.
+    scheduler
+        Address of a Dask scheduler whose workers share the work instead, such as tcp://10.0.0.5:8786.
     overwrite
         Replace an older run file of that name, once this one is whole.
     """
     require_new(output, overwrite)
+    if workers < 1:
+        raise ConfigError("--workers", "", workers, "1 or more processes")
     resolved, recording = read_config(config, set_), read_rig(rig)
     asked = as_tables(gather_provenance(recording, format_config(resolved)))
     asked |= {"--frames": frames or "all", "--tracker": tracker, "--volume": volume}
@@ -73,7 +84,8 @@ def run(
         streams = _streams(recording, folder)
         first, stop = frame_range(frames, streams.length)
         job = Job(recording, resolved, tracker, volume, first, stop, streams)
-        made = _make(job, segments(recording.rig.frame_rate, resolved, first, stop), folder)
+        plan = segments(recording.rig.frame_rate, resolved, first, stop)
+        made = _make(job, plan, folder, Workforce(workers, scheduler))
         tracks = assemble(job, made, output, overwrite)
         folder.remove()
     people = len(np.unique(tracks.trajectory["id"]))
@@ -99,7 +111,7 @@ def frame_range(text: str | None, length: int) -> tuple[int, int]:
     return first, stop
 
 
-def _make(job: Job, plan: list[Segment], folder: WorkFolder) -> list[Made]:
+def _make(job: Job, plan: list[Segment], folder: WorkFolder, workforce: Workforce) -> list[Made]:
     """All segments, those that are there already taken as they are."""
     kept = folder.segments()
     for path in folder.broken:
@@ -107,13 +119,34 @@ def _make(job: Job, plan: list[Segment], folder: WorkFolder) -> list[Made]:
     if kept:
         print(f"stseg: {len(kept)} of {len(plan)} segments are there already", file=sys.stderr)
     missing = [segment for segment in plan if segment.index not in kept]
-    done = sum(segment.stop - segment.first for segment in plan) - sum(s.stop - s.first for s in missing)
-    if missing:
-        work = SegmentWork(job)
-        with frame_bar("tracking", job.stop - job.first, done) as advance:
-            for segment in missing:
-                kept[segment.index] = work.make(segment, folder.draft(segment.index), advance)
+    done = job.stop - job.first - sum(segment.stop - segment.first for segment in missing)
+    with frame_bar("tracking", job.stop - job.first, done) as advance:
+        for segment, path in workforce.make(job, missing, folder, advance):
+            kept[segment.index] = path
     return [Made(segment, kept[segment.index]) for segment in plan]
+
+
+@dataclass(frozen=True)
+class Workforce:
+    """Who makes the segments: this process, several of this machine, or the workers of a scheduler."""
+
+    workers: int
+    scheduler: str | None
+
+    def make(
+        self, job: Job, missing: list[Segment], folder: WorkFolder, advance: Callable[[int], None]
+    ) -> Iterator[tuple[Segment, Path]]:
+        """Segments and their files, as they are done."""
+        if not missing:
+            return
+        if self.scheduler is not None:
+            yield from make_by_cluster(job, missing, folder.draft, self.scheduler, advance)
+        elif self.workers > 1:
+            yield from make_by_workers(job, missing, folder.draft, self.workers, advance)
+        else:
+            work = SegmentWork(job)
+            for segment in missing:
+                yield segment, work.make(segment, folder.draft(segment.index), advance)
 
 
 def _streams(recording: Recording, folder: WorkFolder) -> Streams:
