@@ -48,11 +48,11 @@ class Streams:
     length
         Frames of the recording.
     times : float64 (n,) each
-        Of every frame of each camera, milliseconds; nan where the source states none.
+        Of every frame of each file of each camera, milliseconds; nan where the source states none.
     """
 
     length: int
-    times: tuple[Floats, ...]
+    times: tuple[tuple[Floats, ...], ...]
 
 
 class _Feed:
@@ -81,11 +81,11 @@ class _Feed:
             self._next += 1
         return view
 
-    def run_out(self) -> Floats:
+    def run_out(self) -> tuple[Floats, ...]:
         """Pass over all frames, to learn where the stream ends; their times."""
         times = self._stream.times()
-        self.end = len(times) + self.source.offset
-        return times
+        self.end = sum(map(len, times)) + self.source.offset
+        return tuple(times)
 
     def close(self) -> None:
         self._stream.close()

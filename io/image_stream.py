@@ -47,9 +47,9 @@ class ImageStream:
         key = f"camera {self._camera.name}, frame {frame}"
         return read_picture(self._paths[frame], self._source.kind, self._camera.size, key)
 
-    def times(self) -> Floats:
+    def times(self) -> list[Floats]:
         """Image files state no time."""
-        return np.full(self.skip(len(self._paths)), np.nan)
+        return [np.full(self.skip(len(self._paths)), np.nan)]
 
     def close(self) -> None:
         """Nothing is held open."""
@@ -59,7 +59,7 @@ def names_images(path: Path) -> bool:
     """Whether a path is an image, a folder or a pattern of images, rather than a video."""
     if path.suffix.lower() in _SUFFIXES or path.is_dir():
         return True
-    return not path.is_file() and (_is_pattern(path) or not path.suffix)
+    return not path.is_file() and (is_pattern(path) or not path.suffix)
 
 
 def image_paths(path: Path, key: str) -> list[Path]:
@@ -71,7 +71,7 @@ def image_paths(path: Path, key: str) -> list[Path]:
         return [path]
     if path.is_dir():
         found = [file for file in path.iterdir() if file.suffix.lower() in _SUFFIXES]
-    elif _is_pattern(path):
+    elif is_pattern(path):
         found = list(path.parent.glob(path.name))
     else:
         raise SourceError(path, key, "no such file or folder", "a folder or pattern of images")
@@ -101,5 +101,6 @@ def _in_order(files: list[Path], path: Path, key: str) -> list[Path]:
     return [file for _, file in order]
 
 
-def _is_pattern(path: Path) -> bool:
+def is_pattern(path: Path) -> bool:
+    """Whether a path stands for several files."""
     return any(sign in path.name for sign in "*?[")

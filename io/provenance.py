@@ -17,9 +17,9 @@ import numpy as np
 from stseg import __version__
 from stseg.arrays import Rows
 from stseg.errors import SourceError
-from stseg.io.image_stream import image_paths
 from stseg.io.recording import Recording, Source
 from stseg.io.rig_text import format_rig
+from stseg.io.source_files import files_of
 
 _PACKAGES = ("numpy", "scipy", "numba", "h5py", "opencv-python-headless", "PyMaxflow")
 _TEXT = h5py.string_dtype()
@@ -143,7 +143,7 @@ def _sources(recording: Recording) -> Rows:
 def _described(source: Source) -> tuple[bytes, str, int, int, float]:
     """kind, path, files, size, modified. Whether a stream can be read is not for here to say."""
     try:
-        states = [path.stat() for path in image_paths(source.path, "")]
+        states = [path.stat() for path in files_of(source)]
     except (OSError, SourceError):
         states = []
     modified = max((state.st_mtime for state in states), default=np.nan)

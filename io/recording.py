@@ -23,7 +23,9 @@ class Source:
         video, folder or pattern. instances: indexed images, one value an instance, 0 background, a folder or pattern.
         boxes: a text file of a detector's boxes.
     path
-        File, folder or pattern (`frame_*.png`), already relative to the rig file's folder.
+        File, folder or pattern (`frame_*.png`, `hour_*.mp4`), already relative to the rig file's folder.
+    more
+        Not for boxes: files, folders or patterns that go on where the one before ends.
     first_frame
         boxes only: the number that the file gives to its first frame.
     frames
@@ -34,6 +36,7 @@ class Source:
     path: Path
     first_frame: int = 0
     frames: int | None = None
+    more: tuple[Path, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -66,12 +66,17 @@ def _stream_lines(streams: CameraSource, folder: Path) -> list[str]:
 
 
 def _source_text(source: Source, folder: Path) -> str:
-    entries = [f"kind = {_text(source.kind)}", f"path = {_text(_relative(source.path, folder).as_posix())}"]
+    entries = [f"kind = {_text(source.kind)}", f"path = {_paths(source, folder)}"]
     if source.first_frame:
         entries.append(f"first_frame = {source.first_frame}")
     if source.frames is not None:
         entries.append(f"frames = {source.frames}")
     return f"{{ {', '.join(entries)} }}"
+
+
+def _paths(source: Source, folder: Path) -> str:
+    names = [_text(_relative(path, folder).as_posix()) for path in (source.path, *source.more)]
+    return f"[{', '.join(names)}]" if source.more else names[0]
 
 
 def _relative(path: Path, folder: Path) -> Path:

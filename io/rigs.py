@@ -196,9 +196,13 @@ def _source(table: Table) -> Source:
     kind = table.choice("kind", SOURCE_KINDS)
     counts = ("first_frame", "frames") if kind == "boxes" else ()
     table.allow("kind", "path", *counts)
+    first, *more = [table.file.parent / name for name in table.texts("path")]
+    if more and kind == "boxes":
+        raise table.error("path", f"{len(more) + 1} files", "one file of boxes")
     return Source(
         kind,
-        table.file.parent / table.text("path"),
+        first,
         table.integer("first_frame") if "first_frame" in table else 0,
         table.integer("frames", least=1) if "frames" in table else None,
+        tuple(more),
     )

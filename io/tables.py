@@ -63,6 +63,14 @@ class Table:
             raise self.error(name, _shown(value), "a text")
         return value
 
+    def texts(self, name: str) -> list[str]:
+        """A string that is not empty, or a list of such."""
+        value = self._get(name, "a text or a list of texts")
+        values = value if isinstance(value, list) else [value]
+        if not values or not all(isinstance(text, str) and text.strip() for text in values):
+            raise self.error(name, _shown(value), "a text or a list of texts")
+        return [str(text) for text in values]
+
     def choice(self, name: str, choices: Iterable[T]) -> T:
         """One of a few strings."""
         choices = tuple(choices)

@@ -46,23 +46,26 @@ class VideoStream:
         self._source, self._camera, self._times = source, camera, times
         if not source.path.is_file():
             raise self._error("no such file", "a video")
+        self._frame, self._ended = -1, False
         self._open()
 
     def skip(self, count: int) -> int:
         """Drop up to `count` frames; how many there were."""
         before = self._frame
+        if self._times is not None and count >= len(self._times) - 1 - before:
+            self._frame, self._ended = len(self._times) - 1, True
         if self._times is not None and _NEAR < count <= len(self._times) - 1 - before:
             self._seek(before + count, self._times)
         while self._frame < before + count and self._advance():
             pass
         return self._frame - before
 
-    def times(self) -> Floats:
+    def times(self) -> list[Floats]:
         """Pass over all that is left by decoding it: the time that the file gives each frame, milliseconds."""
         found = []
         while self._advance():
             found.append(self._capture.get(cv2.CAP_PROP_POS_MSEC))
-        return np.array(found, float)
+        return [np.array(found, float)]
 
     def read(self) -> AnyArray | None:
         """The next frame; None after the last."""
@@ -83,8 +86,7 @@ class VideoStream:
         self._capture = cv2.VideoCapture(str(self._source.path), cv2.CAP_FFMPEG)
         if not self._capture.isOpened():
             raise self._error("a file that does not open as a video", "a video that FFmpeg decodes")
-        self._frame = -1
-        self._ended = False
+        self._frame, self._ended = -1, False
 
     def _seek(self, frame: int, times: Floats) -> None:
         """Go to a frame not after this one, as near as the file allows; to the beginning where that cannot be told."""

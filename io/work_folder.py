@@ -130,16 +130,18 @@ class WorkFolder:
         """What was counted before; None where nothing was, or it cannot be read."""
         try:
             with np.load(self.path / "streams.npz") as kept:
-                number = int(kept["cameras"])
-                return Streams(int(kept["length"]), tuple(kept[f"times{k}"] for k in range(number)))
+                files = [range(int(count)) for count in kept["files"]]
+                times = tuple(tuple(kept[f"times{k}_{j}"] for j in own) for k, own in enumerate(files))
+                return Streams(int(kept["length"]), times)
         except (OSError, KeyError, ValueError, BadZipFile):
             return None
 
     def keep_streams(self, streams: Streams) -> None:
         """Remember what was counted."""
         with replacing(self.path / "streams.npz", overwrite=True) as part, part.open("wb") as file:
-            times = {f"times{k}": own for k, own in enumerate(streams.times)}
-            np.savez_compressed(file, length=streams.length, cameras=len(streams.times), **times)  # type: ignore[arg-type]
+            times = {f"times{k}_{j}": own for k, files in enumerate(streams.times) for j, own in enumerate(files)}
+            files = [len(own) for own in streams.times]
+            np.savez_compressed(file, length=streams.length, files=files, **times)  # type: ignore[arg-type]
 
     def remove(self) -> None:
         """Delete the folder, once the output stands."""

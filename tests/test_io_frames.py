@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from stseg.arrays import AnyArray, Boxes, Observation
 from stseg.errors import ConfigError, FormatError, SourceError, StsegError
 from stseg.geometry import Camera, Grid, Rig
-from stseg.io.frames import Moment, count_frames, open_frames, read_background
+from stseg.io.frames import Moment, Streams, count_frames, count_streams, open_frames, read_background, read_camera
 from stseg.io.recording import CameraSource, Recording, Source, SourceKind
 
 DATA = Path(os.environ.get("STSEG_DATA", Path(__file__).parents[1] / "../shared/data"))
@@ -303,3 +303,74 @@ def test_real_silhouettes_and_boxes() -> None:
     empty = next(read_background(rec, 0))
     assert isinstance(empty, np.ndarray)
     assert empty.shape == (486, 644, 3)
+
+
+# Streams of several files, and frames that are sought
+
+
+def long_video(path: Path, frames: range) -> Path:
+    """A video in which most frames are told by those before them; each shows its number in stripes."""
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"mp4v"), 10, (64, 48))
+    for frame in frames:
+        bits = np.array([255 * (frame >> k & 1) for k in range(12)], np.uint8)
+        stripes = np.pad(np.tile(np.repeat(bits, 5), (48, 1)), ((0, 0), (0, 4)))
+        writer.write(np.dstack([stripes] * 3))
+    writer.release()
+    return path
+
+
+def told(view: Observation) -> int:
+    assert isinstance(view, np.ndarray)
+    return sum(int(view[24, 5 * k + 2, 1] > 127) << k for k in range(12))
+
+
+@pytest.fixture(scope="module")
+def hour(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """One video of 900 frames, and the same in three files."""
+    folder = tmp_path_factory.mktemp("hour")
+    long_video(folder / "whole.mp4", range(900))
+    for k in range(3):
+        long_video(folder / f"part_{9 + k}.mp4", range(300 * k, 300 * k + 300))
+    return folder
+
+
+def camera_of(path: Path, *more: Path) -> Recording:
+    return recording(CameraSource(Source("video", path, more=more)), size=(64, 48))
+
+
+@pytest.mark.parametrize("first", [0, 1, 249, 251, 299, 300, 301, 555, 599, 600, 899])
+@pytest.mark.parametrize("parts", ["whole", "pattern", "list"])
+def test_far_frames_are_sought_exactly(hour: Path, parts: str, first: int) -> None:
+    files = [hour / f"part_{9 + k}.mp4" for k in range(3)]
+    rec = {
+        "whole": camera_of(hour / "whole.mp4"),
+        "pattern": camera_of(hour / "part_*.mp4"),
+        "list": camera_of(files[0], *files[1:]),
+    }[parts]
+    streams = count_streams(rec)
+    assert streams.length == 900
+    assert list(map(len, streams.times[0])) == ([900] if parts == "whole" else [300] * 3)
+    stop = min(first + 3, 900)
+    with open_frames(rec, first, stop, streams) as sought, open_frames(rec, first, stop) as decoded:
+        for one, other in zip(sought, decoded, strict=True):
+            np.testing.assert_array_equal(one.views[0], other.views[0])
+            assert told(one.views[0]) == one.frame
+
+
+def test_times_that_tell_nothing_are_no_harm(hour: Path) -> None:
+    """Where seeking lands cannot be told, the video is decoded from its beginning."""
+    rec = camera_of(hour / "whole.mp4")
+    for times in (np.zeros(900), np.full(900, np.nan), np.arange(900.0)):
+        with open_frames(rec, 700, 702, Streams(900, ((times,),))) as reader:
+            assert [told(moment.views[0]) for moment in reader] == [700, 701]
+
+
+def test_one_camera_by_itself(hour: Path) -> None:
+    rec = camera_of(hour / "part_*.mp4")
+    views = read_camera(rec, 0, range(10, 900, 290), count_streams(rec))
+    assert [told(view) for view in views] == [10, 300, 590, 880]
+
+
+def test_a_pattern_of_no_videos(tmp_path: Path) -> None:
+    with pytest.raises(SourceError, match="no files"):
+        count_frames(camera_of(tmp_path / "hour_*.mp4"))
