@@ -46,6 +46,7 @@ AT_HOME = {
     "numba": ("stseg.accelerate",),
     "cyclopts": ("stseg.commands",),
     "rich": ("stseg.commands",),
+    "distributed": ("stseg.commands.cluster",),  # imported where a scheduler is asked for
     "pandas": ("stseg.io",),  # its types; it is imported where a data frame is asked for
     "tomllib": ("stseg.io",),
     "pathlib": ("stseg.io", "stseg.commands"),
