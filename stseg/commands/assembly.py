@@ -14,6 +14,7 @@ from stseg.identity.seams import Part, Seams, rename_labels
 from stseg.identity.segments import Segment
 from stseg.io.config_file import format_config
 from stseg.io.runs import Run, RunWriter, read_run
+from stseg.pipeline import Pipeline
 from stseg.tracks import Tracks
 
 _FRAMES = 64
@@ -36,9 +37,9 @@ class _Named(NamedTuple):
     identity: Ints
 
 
-def assemble(job: Job, made: Sequence[Made], output: Path, overwrite: bool) -> Tracks:
-    """Write the run file of a job from its segments, in their order."""
-    pipeline, seams = job.pipeline(), Seams()
+def assemble(job: Job, pipeline: Pipeline, made: Sequence[Made], output: Path, overwrite: bool) -> Tracks:
+    """Write the run file of a job from its segments, in their order; the pipeline is the job's."""
+    seams = Seams()
     for segment, path in made:
         run = read_run(path)
         seams.add(Part(segment.first, run.trajectory, run.events))

@@ -19,6 +19,7 @@ from stseg.errors import ConfigError, StsegError
 COMMANDS = {
     "demo": ("stseg.commands.demo:demo", "Render a small scene, track it, score it, write the report."),
     "run": ("stseg.commands.run:run", "Track the people of a recording."),
+    "plan": ("stseg.commands.plan:plan", "Say how long a run will take and how large its file will be."),
     "inspect": ("stseg.commands.inspect:inspect", "Say what is in a run file."),
     "export": ("stseg.commands.export:export", "Write the tracks of a run file in another format."),
     "evaluate": ("stseg.commands.evaluate:evaluate", "Score tracks on the ground against the truth."),

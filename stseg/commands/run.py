@@ -86,7 +86,7 @@ def run(
         job = Job(recording, resolved, tracker, volume, first, stop, streams)
         plan = segments(recording.rig.frame_rate, resolved, first, stop)
         made = _make(job, plan, folder, Workforce(workers, scheduler))
-        tracks = assemble(job, made, output, overwrite)
+        tracks = assemble(job, job.pipeline(), made, output, overwrite)
         folder.remove()
     people = len(np.unique(tracks.trajectory["id"]))
     print(f"{output}: {people} tracks in frames {first} to {stop - 1}")

@@ -76,7 +76,7 @@ class SegmentWork:
             advance(int(segment.first <= frame < segment.stop))
 
         views: Bytes = self.pipeline.occupancy.views
-        pipeline = self.pipeline.seeing_by(self._sights(segment))
+        pipeline = self.pipeline.seeing_by(self.sights(segment))
         with (
             open_frames(job.recording, segment.lead, job.stop, job.streams) as moments,
             RunWriter(
@@ -90,8 +90,8 @@ class SegmentWork:
             writer.finish(np.zeros(0, TRACK))
         return keep_segment(draft)
 
-    def _sights(self, segment: Segment) -> list[Sight]:
-        """With the backgrounds that were learned last, if they are this segment's too."""
+    def sights(self, segment: Segment) -> list[Sight]:
+        """What a segment sees by: with the backgrounds that were learned last, if they are this segment's too."""
         job = self.job
         part = background_part(job.config.segments, job.recording.rig.frame_rate, job.first, job.stop, segment.first)
         if part != self._part or not self._learned:
