@@ -19,11 +19,11 @@ from stseg.errors import ConfigError, StsegError
 COMMANDS = {
     "demo": ("stseg.commands.demo:demo", "Render a small scene, track it, score it, write the report."),
     "run": ("stseg.commands.run:run", "Track the people of a recording."),
-    "plan": ("stseg.commands.plan:plan", "Say how long a run will take and how large its file will be."),
     "inspect": ("stseg.commands.inspect:inspect", "Say what is in a run file."),
     "export": ("stseg.commands.export:export", "Write the tracks of a run file in another format."),
     "evaluate": ("stseg.commands.evaluate:evaluate", "Score tracks on the ground against the truth."),
     "report": ("stseg.commands.report:report", "Write pictures of a run file as one HTML page."),
+    "plan": ("stseg.commands.plan:plan", "Say how long a run will take and how large its file will be."),
     "calibrate": ("stseg.commands.calibrate:app", "Make a rig file."),
     "simulate": ("stseg.commands.simulate:simulate", "Make a scene with truth."),
 }
