@@ -5,10 +5,19 @@ from __future__ import annotations
 from stseg.errors import ConfigError
 from stseg.trackers.cut import CutTracker
 from stseg.trackers.frames import FrameTracker
+from stseg.trackers.kalman import KalmanTracker
+from stseg.trackers.particles import ParticleTracker
 from stseg.trackers.protocol import Commit, Scene, Shown, Tracker
 
-TRACKERS: dict[str, type[Tracker]] = {"cut": CutTracker, "frames": FrameTracker}
-"""cut: graph cuts of windows of the volume (the default). frames: each frame by itself, linked by motion alone."""
+TRACKERS: dict[str, type[Tracker]] = {
+    "cut": CutTracker,
+    "frames": FrameTracker,
+    "kalman": KalmanTracker,
+    "particles": ParticleTracker,
+}
+"""cut: graph cuts of windows of the volume (the default). frames: each frame by itself, linked by motion alone.
+kalman: a filter for each person over the people of each frame (HW12). particles: hypotheses of where everybody stands,
+guided by the colours of their clothes (KD06)."""
 
 
 def find_tracker(name: str) -> type[Tracker]:
