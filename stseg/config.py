@@ -307,7 +307,7 @@ class ParticleConfig:
     """Columns of the raster on which an image is looked at."""
     rounds: int = 3
     """How often a particle is segmented and moved in a frame, at most."""
-    axis: Literal["squares", "median"] = "median"
+    axis: Literal["squares", "median"] = "squares"
     """How a body's axis is fitted to its pixels: by least squares, or by the least median of squares."""
     wander: float = 1.2
     """How fast people walk about, metres per second (standard deviation along x and along y)."""

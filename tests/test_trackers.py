@@ -20,6 +20,8 @@ from stseg.trackers.rows import event_rows, trajectory_rows, views_at
 from stseg.tracks import WINDOW
 
 RIG = room()
+COLOURLESS = sorted(set(TRACKERS) - {"particles"})
+"""Trackers that need no colour; the others have tests of their own."""
 UNSEEN = Shown((None,) * 4, (None,) * 4)
 """What the cameras showed, for trackers that do not ask."""
 LENGTH, SHARED = window_length(FRAME_RATE, CONFIG.identity)
@@ -54,7 +56,7 @@ def rows_of(commits: Sequence[Commit]) -> Rows:
     return np.concatenate([commit.trajectory for commit in commits])
 
 
-@pytest.mark.parametrize("tracker", sorted(TRACKERS))
+@pytest.mark.parametrize("tracker", COLOURLESS)
 @pytest.mark.parametrize("frames", [1, 2, 7, 8, 9, LENGTH, LENGTH + 1, ENDS - 1, ENDS, ENDS + 1, 25])
 @pytest.mark.parametrize("first", [0, 5])
 def test_every_frame_is_committed_once(tracker: str, frames: int, first: int) -> None:
@@ -90,7 +92,7 @@ def test_no_frames_no_commits() -> None:
         assert find_tracker(tracker)(RIG, CONFIG, 3).finish() == []
 
 
-@pytest.mark.parametrize("tracker", sorted(TRACKERS))
+@pytest.mark.parametrize("tracker", COLOURLESS)
 def test_labels_say_who(tracker: str) -> None:
     for commit in run(tracker, 0, 20):
         for at, label in zip(commit.scenes, commit.label, strict=True):
@@ -107,7 +109,7 @@ def test_labels_say_who(tracker: str) -> None:
             assert (own["views"] == 4).all()
 
 
-@pytest.mark.parametrize("tracker", sorted(TRACKERS))
+@pytest.mark.parametrize("tracker", COLOURLESS)
 def test_ids_stay_and_births_are_told(tracker: str) -> None:
     commits = run(tracker, 0, 25)
     for identity in (1, 2):
@@ -149,7 +151,7 @@ def test_who_touches_is_cut_apart() -> None:
         assert (own[:, 1] < 0.1).all() if row["id"] == 1 else (own[:, 1] > -0.1).all()
 
 
-@pytest.mark.parametrize("tracker", sorted(TRACKERS))
+@pytest.mark.parametrize("tracker", COLOURLESS)
 def test_frames_without_people(tracker: str) -> None:
     follow = find_tracker(tracker)(RIG, CONFIG, 0)
     commits = [commit for frame in range(20) for commit in follow.add(scene(follow, frame), UNSEEN)]
@@ -174,7 +176,7 @@ def test_the_cut_does_not_make_people_of_passing_noise() -> None:
     assert len(rows) == 10
 
 
-@pytest.mark.parametrize("tracker", sorted(TRACKERS))
+@pytest.mark.parametrize("tracker", COLOURLESS)
 def test_whom_a_tracker_expects(tracker: str) -> None:
     """Everybody seen so far, where they are now: what is carried is not what was committed, but what was seen."""
     follow = find_tracker(tracker)(RIG, CONFIG, 0)

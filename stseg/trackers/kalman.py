@@ -19,7 +19,7 @@ from stseg.identity.linking import assign
 from stseg.occupancy.sampling import Sampling
 from stseg.trackers.cells import reached_cells
 from stseg.trackers.motion import Filters, begun, carried, corrected, surprise
-from stseg.trackers.protocol import Commit, Scene, Shown
+from stseg.trackers.protocol import FORGETTING, STAYING, Commit, Scene, Shown
 from stseg.trackers.rows import Event, event_rows, trajectory_rows, views_at
 from stseg.tracks import WINDOW
 
@@ -41,14 +41,22 @@ class KalmanTracker:
         self.rig, self.config = rig, config
         self.views = Sampling.of(rig, "point").views()
         self.filters = begun(np.zeros((0, 2)), np.zeros((0, 2, 2)), config.kalman.pace)
-        self.frame, self.issued = first, 0
+        self.frame, self.issued, self.begun = first, 0, False
         self.ids: Ints = np.zeros(0, np.int64)
         self.seen: Ints = np.zeros(0, np.int64)
 
     def expected(self, frame: int) -> Expected | None:
-        """Nobody: the ghosts of a frame are removed by itself, so that a filter meets each evidence once."""
-        del frame
-        return None
+        """Everybody who is followed, carried to the frame; None before the first."""
+        if not self.begun:
+            return None
+        seconds, n = (frame - self.frame) / self.rig.frame_rate, len(self.ids)
+        ghosts, noise = self.config.ghosts, self.config.identity.place_noise**2 * np.eye(2)
+        filters = carried(self.filters, seconds, self.config.kalman.turn)
+        unseen = (frame - 1 - self.seen) / self.rig.frame_rate
+        return Expected(
+            filters.state[:, :2], filters.covariance[:, :2, :2] + noise, np.full(n, ghosts.height_mean),
+            np.full(n, ghosts.height_spread**2), STAYING - FORGETTING * unseen,
+        )  # fmt: skip
 
     def add(self, scene: Scene, shown: Shown) -> list[Commit]:
         """The next frame, decided."""
@@ -62,7 +70,7 @@ class KalmanTracker:
         filters = corrected(filters, tracks, ground[found], noise[found])
         self.filters = filters.and_(begun(ground[fresh], noise[fresh], config.pace))
         newcomers = self.issued + 1 + np.arange(len(fresh))
-        self.frame, self.issued = scene.frame, self.issued + len(fresh)
+        self.frame, self.issued, self.begun = scene.frame, self.issued + len(fresh), True
         person = np.full(len(self.ids), -1)
         person[tracks] = found
         self.ids, person = np.append(self.ids, newcomers), np.append(person, fresh)

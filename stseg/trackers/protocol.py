@@ -12,6 +12,10 @@ from stseg.geometry import Rig
 from stseg.ghosts.expected import Expected
 from stseg.ghosts.people import People, ViewEvidence
 
+STAYING, FORGETTING = 1.0, 4.0
+"""What trackers without odds of their own expect: log-odds that somebody found in one frame is found in the next, nats,
+and how fast they fall after, nats per second."""
+
 
 @dataclass(frozen=True)
 class Scene:

@@ -89,13 +89,14 @@ def fill_density(
                 if n == 0:
                     density[part, v, u] = 1.0
                     continue
-                r, g, s = int(colour[v, u, 0]), int(colour[v, u, 1]), int(colour[v, u, 2])
+                # Signed: a difference of bytes wraps around.
+                r, g, s = np.int64(colour[v, u, 0]), np.int64(colour[v, u, 1]), np.int64(colour[v, u, 2])
                 total = 0.0
                 for i in range(n):
                     total += (
-                        fall[0, abs(r - int(samples[part, i, 0]))]
-                        * fall[1, abs(g - int(samples[part, i, 1]))]
-                        * fall[2, abs(s - int(samples[part, i, 2]))]
+                        fall[0, abs(r - np.int64(samples[part, i, 0]))]
+                        * fall[1, abs(g - np.int64(samples[part, i, 1]))]
+                        * fall[2, abs(s - np.int64(samples[part, i, 2]))]
                     )
                 density[part, v, u] = (1.0 - _STRANGE) * total / n + _STRANGE
 

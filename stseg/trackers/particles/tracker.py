@@ -28,14 +28,12 @@ from stseg.trackers.particles.crowd import Crowd
 from stseg.trackers.particles.filter import estimate, predicted, resampled, weights
 from stseg.trackers.particles.search import search
 from stseg.trackers.particles.views import Look, ParticleView
-from stseg.trackers.protocol import Commit, Scene, Shown
+from stseg.trackers.protocol import FORGETTING, STAYING, Commit, Scene, Shown
 from stseg.trackers.rows import Event, event_rows, trajectory_rows, views_at
 from stseg.tracks import WINDOW
 
 _FLOOR = 0.05
 """No place is known better than this, metres (standard deviation): particles that agree may be wrong together."""
-_STAYING, _FORGETTING = 1.0, 4.0
-"""Log-odds that somebody found in one frame is found in the next, nats, and how they fall after, nats per second."""
 _HEIGHT_NOISE = 0.06
 """How well a person's height is known, metres (standard deviation)."""
 _MARGIN = 0.6
@@ -77,7 +75,7 @@ class ParticleTracker:
         unseen = (frame - 1 - crowd.seen) / self.rig.frame_rate
         return Expected(
             crowd.ground, crowd.covariance + drift * np.eye(2), crowd.height, np.full(len(crowd), _HEIGHT_NOISE**2),
-            _STAYING - _FORGETTING * unseen,
+            STAYING - FORGETTING * unseen,
         )  # fmt: skip
 
     def add(self, scene: Scene, shown: Shown) -> list[Commit]:
@@ -100,8 +98,8 @@ class ParticleTracker:
             looks = self._looks(views)
         for look in looks:
             self._learn(look, seconds)
-        evidence = np.array([evidence.get(int(i), 0.0) for i in self.crowd.ids])
-        return [self._commit(scene, evidence, births + deaths)]
+        nats = np.array([evidence.get(int(i), 0.0) for i in self.crowd.ids])
+        return [self._commit(scene, nats, births + deaths)]
 
     def finish(self) -> list[Commit]:
         """Nothing is open."""
