@@ -206,7 +206,7 @@ def test_the_axis_of_a_whole_body_passes_through_its_place(median: bool) -> None
         fill_axes(bodies, boxes, ideal, canvas, 2.0, widths, camera.ground, camera.vertical, median, room_, axes)
         feet, _ = camera.project(standing[0, :2], 0.0)
         expected = plain.ground_line(camera, feet)
-        assert abs(axes[0, :3] @ np.append(standing[0, :2], 1.0)) < (0.06 if median else 0.04)
+        assert abs(axes[0, :3] @ np.append(standing[0, :2], 1.0)) < (0.08 if median else 0.04)
         assert abs(abs(axes[0, :2] @ expected[:2]) - 1) < 1e-3
         assert axes[0, 3] > 0.7
 

@@ -1,8 +1,8 @@
 """How many frames a second the trackers follow: python tools/bench_trackers.py [--frames 100] [TRACKER ...]
 
 Four people under four cameras of 320 x 240 (scene `similar`). What is timed is the tracker alone, `expected` and `add`,
-in seconds of the processor, of all threads together: the frames in which kernels are compiled left out, the median over the frames.
-Each frame's people are those of the truth, as a pass without errors would find them.
+in seconds of the processor, of all threads together; the frames in which kernels are compiled are left out. Each
+frame's people are those of the truth, as a pass without errors would find them.
 """
 
 from __future__ import annotations

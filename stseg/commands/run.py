@@ -57,6 +57,7 @@ def run(
         One constant, for example --set ghosts.person=-2; may be given several times.
     tracker
         cut: graph cuts of windows of the volume. frames: the people of each frame as they come, without a cut.
+        kalman: a filter for each of them (HW12). particles: followed by the colours of their clothes (KD06).
     overwrite
         Replace an older run file of that name, once this one is whole.
     """
