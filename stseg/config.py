@@ -294,6 +294,62 @@ class SegmentConfig:
 
 
 @dataclass(frozen=True)
+class KalmanConfig:
+    """The tracker `kalman` (HW12 section V.E; METHODS 9)."""
+
+    turn: float = 0.8
+    """How people change their velocity, metres per second per square root of a second (standard deviation)."""
+    pace: float = 0.8
+    """Standard deviation of the velocity of somebody new, metres per second."""
+    gate: float = 0.99
+    """Share of a person's own places that lie within their gate, 0..1."""
+    patience: float = 1.0
+    """How long somebody may be unseen and still be the same, seconds."""
+
+    def __post_init__(self) -> None:
+        for name in ("turn", "pace"):
+            require(getattr(self, name) > 0, self, name, "a number above 0")
+        require(0 < self.gate < 1, self, "gate", "a number between 0 and 1")
+        require(self.patience >= 0, self, "patience", "0 or more seconds")
+
+
+@dataclass(frozen=True)
+class ParticleConfig:
+    """The tracker `particles` (KD06; METHODS 9)."""
+
+    way: Literal["guided", "search", "generic"] = "guided"
+    """guided: particles that search. search: one hypothesis that does. generic: particles that do not (KD06 fig. 5)."""
+    count: int = 15
+    """Number of particles: hypotheses of where everybody stands."""
+    seed: int = 0
+    """Of the random steps."""
+    columns: int = 160
+    """Columns of the raster on which an image is looked at."""
+    rounds: int = 3
+    """How often a particle is segmented and moved in a frame, at most."""
+    axis: Literal["squares", "median"] = "squares"
+    """How a body's axis is fitted to its pixels: by least squares, or by the least median of squares."""
+    wander: float = 1.2
+    """How fast people walk about, metres per second (standard deviation along x and along y)."""
+    sharpness: float = 20.0
+    """lambda: how strongly colours that do not fit speak against a particle, nats."""
+    memory: float = 10.0
+    """How long the colours of a person take to follow a change, seconds."""
+    beside: float = 0.5
+    """How far from a followed person somebody found may be and still be the same, metres."""
+    patience: float = 2.0
+    """How long somebody may be followed whom nothing finds, seconds."""
+
+    def __post_init__(self) -> None:
+        for name in ("count", "columns", "rounds"):
+            require(getattr(self, name) >= 1, self, name, "1 or more")
+        for name in ("wander", "sharpness", "memory", "beside"):
+            require(getattr(self, name) > 0, self, name, "a number above 0")
+        require(self.seed >= 0, self, "seed", "0 or more")
+        require(self.patience >= 0, self, "patience", "0 or more seconds")
+
+
+@dataclass(frozen=True)
 class Config:
     """All stages."""
 
@@ -305,3 +361,5 @@ class Config:
     identity: IdentityConfig = field(default_factory=IdentityConfig)
     ghosts: GhostConfig = field(default_factory=GhostConfig)
     segments: SegmentConfig = field(default_factory=SegmentConfig)
+    kalman: KalmanConfig = field(default_factory=KalmanConfig)
+    particles: ParticleConfig = field(default_factory=ParticleConfig)

@@ -25,10 +25,10 @@ from stseg.ghosts.expected import Expected
 from stseg.ghosts.explain import FramePass
 from stseg.ghosts.people import Explanation, People
 from stseg.identity.views import box_rows
-from stseg.identity.whole import whole_tracks
+from stseg.identity.whole import own_tracks, whole_tracks
 from stseg.occupancy.level import Level
 from stseg.occupancy.volume import Occupancy
-from stseg.trackers import Commit, Scene, make_tracker
+from stseg.trackers import Commit, Scene, Shown, find_tracker
 from stseg.tracks import CANDIDATE, RATES, TIMING, Tracks
 
 
@@ -124,7 +124,7 @@ class Pipeline:
     """
 
     def __init__(self, rig: Rig, sights: Sequence[Sight], kinds: Sequence[str], config: Config, tracker: str) -> None:
-        self.rig, self.sights, self.config, self.tracker_name = rig, sights, config, tracker
+        self.rig, self.sights, self.config, self.tracker = rig, sights, config, find_tracker(tracker)
         self.frame_pass = FramePass(rig, kinds, config.ghosts)
         self.occupancy = Occupancy(rig, kinds, config.occupancy, config.ghosts, config.level)
 
@@ -140,7 +140,7 @@ class Pipeline:
         `advance` is told each frame that was fused. Nothing is known from moments that were run over before.
         """
         self.occupancy.forget()
-        tracker = make_tracker(self.tracker_name, self.rig, self.config, first)
+        tracker = self.tracker(self.rig, self.config, first)
         watch = Stopwatch()
         explained: dict[int, _Explained] = {}
         moments = iter(moments)
@@ -149,16 +149,16 @@ class Pipeline:
                 moment = next(moments, None)
             if moment is None:
                 break
-            scene, explained[moment.frame] = self._scene(moment, tracker.expected(moment.frame), watch)
+            scene, shown, explained[moment.frame] = self._scene(moment, tracker.expected(moment.frame), watch)
             with watch.time("track"):
-                commits = tracker.add(scene)
+                commits = tracker.add(scene, shown)
             yield from (_step(commit, explained, watch) for commit in commits)
             advance(moment.frame)
         with watch.time("track"):
             commits = tracker.finish()
         yield from (_step(commit, explained, watch) for commit in commits)
 
-    def _scene(self, moment: Moment, expected: Expected | None, watch: Stopwatch) -> tuple[Scene, _Explained]:
+    def _scene(self, moment: Moment, expected: Expected | None, watch: Stopwatch) -> tuple[Scene, Shown, _Explained]:
         with watch.time("foreground"):
             seen = [sight.evidence(view) for sight, view in zip(self.sights, moment.views, strict=True)]
         with watch.time("ghosts"):
@@ -166,13 +166,16 @@ class Pipeline:
         rates = _rate_rows(moment.frame, self.occupancy.level)
         with watch.time("occupancy"):
             log_odds = self.occupancy.follow(seen, explanation)
-        return Scene(moment.frame, explanation.people, explanation.ghosts, log_odds), _Explained(explanation, rates)
+        scene = Scene(moment.frame, explanation.people, explanation.ghosts, log_odds)
+        return scene, Shown(moment.views, seen), _Explained(explanation, rates)
 
     def finished(self, committed: Rows, events: Rows) -> tuple[Tracks, Ints]:
         """The tracks of the whole run from all committed rows and events, and the identity of each committed row."""
-        whole = whole_tracks(
-            committed, events, self.rig.frame_rate, self.frame_pass.border, self.config.identity, self.config.ghosts
-        )
+        rate, config = self.rig.frame_rate, self.config
+        if self.tracker.final:
+            whole = own_tracks(committed, events, rate, config.identity)
+        else:
+            whole = whole_tracks(committed, events, rate, self.frame_pass.border, config.identity, config.ghosts)
         tables = [view.table for view in self.frame_pass.views]
         return Tracks(whole.trajectory, box_rows(tables, whole.trajectory), whole.events), whole.identity
 

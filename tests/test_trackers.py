@@ -15,11 +15,15 @@ from stseg.errors import ConfigError
 from stseg.geometry.near import near_person
 from stseg.identity.windows import window_length, windows
 from stseg.segmentation.energy import QUANTUM
-from stseg.trackers import TRACKERS, Commit, Scene, Tracker, make_tracker
+from stseg.trackers import TRACKERS, Commit, Scene, Shown, Tracker, find_tracker
 from stseg.trackers.rows import event_rows, trajectory_rows, views_at
 from stseg.tracks import WINDOW
 
 RIG = room()
+COLOURLESS = sorted(set(TRACKERS) - {"particles"})
+"""Trackers that need no colour; the others have tests of their own."""
+UNSEEN = Shown((None,) * 4, (None,) * 4)
+"""What the cameras showed, for trackers that do not ask."""
 LENGTH, SHARED = window_length(FRAME_RATE, CONFIG.identity)
 ENDS = LENGTH + LENGTH - SHARED
 """A run of so many frames ends exactly where its second window ends."""
@@ -41,8 +45,10 @@ def crossing(frame: int) -> list[tuple[float, float]]:
 
 def run(tracker: str, first: int, stop: int, rest: bool = True) -> list[Commit]:
     """What a tracker commits of frames first .. stop - 1 of two people who pass each other."""
-    follow = make_tracker(tracker, RIG, CONFIG, first)
-    done = [commit for frame in range(first, stop) for commit in follow.add(scene(follow, frame, *crossing(frame)))]
+    follow = find_tracker(tracker)(RIG, CONFIG, first)
+    done = [
+        commit for frame in range(first, stop) for commit in follow.add(scene(follow, frame, *crossing(frame)), UNSEEN)
+    ]
     return done + follow.finish() if rest else done
 
 
@@ -50,7 +56,7 @@ def rows_of(commits: Sequence[Commit]) -> Rows:
     return np.concatenate([commit.trajectory for commit in commits])
 
 
-@pytest.mark.parametrize("tracker", sorted(TRACKERS))
+@pytest.mark.parametrize("tracker", COLOURLESS)
 @pytest.mark.parametrize("frames", [1, 2, 7, 8, 9, LENGTH, LENGTH + 1, ENDS - 1, ENDS, ENDS + 1, 25])
 @pytest.mark.parametrize("first", [0, 5])
 def test_every_frame_is_committed_once(tracker: str, frames: int, first: int) -> None:
@@ -83,10 +89,10 @@ def test_windows_are_those_of_the_run(first: int, frames: int) -> None:
 
 def test_no_frames_no_commits() -> None:
     for tracker in TRACKERS:
-        assert make_tracker(tracker, RIG, CONFIG, 3).finish() == []
+        assert find_tracker(tracker)(RIG, CONFIG, 3).finish() == []
 
 
-@pytest.mark.parametrize("tracker", sorted(TRACKERS))
+@pytest.mark.parametrize("tracker", COLOURLESS)
 def test_labels_say_who(tracker: str) -> None:
     for commit in run(tracker, 0, 20):
         for at, label in zip(commit.scenes, commit.label, strict=True):
@@ -103,7 +109,7 @@ def test_labels_say_who(tracker: str) -> None:
             assert (own["views"] == 4).all()
 
 
-@pytest.mark.parametrize("tracker", sorted(TRACKERS))
+@pytest.mark.parametrize("tracker", COLOURLESS)
 def test_ids_stay_and_births_are_told(tracker: str) -> None:
     commits = run(tracker, 0, 25)
     for identity in (1, 2):
@@ -128,13 +134,13 @@ def test_what_is_committed_early_does_not_change() -> None:
 
 def test_who_touches_is_cut_apart() -> None:
     """Two walk side by side, in one piece of occupied cells; one of them is missed for three frames."""
-    follow = make_tracker("cut", RIG, CONFIG, 0)
+    follow = find_tracker("cut")(RIG, CONFIG, 0)
     commits: list[Commit] = []
     for frame in range(12):
         x = -1.0 + 0.1 * frame
         both = scene(follow, frame, (x, -0.25), (x, 0.3))
         seen = both if frame not in (4, 5, 6) else scene(follow, frame, (x, -0.25))
-        commits += follow.add(replace(seen, log_odds=both.log_odds))
+        commits += follow.add(replace(seen, log_odds=both.log_odds), UNSEEN)
     commits += follow.finish()
     rows, labels = rows_of(commits), np.concatenate([commit.label for commit in commits])
     assert np.unique(rows["id"]).tolist() == [1, 2]
@@ -145,10 +151,10 @@ def test_who_touches_is_cut_apart() -> None:
         assert (own[:, 1] < 0.1).all() if row["id"] == 1 else (own[:, 1] > -0.1).all()
 
 
-@pytest.mark.parametrize("tracker", sorted(TRACKERS))
+@pytest.mark.parametrize("tracker", COLOURLESS)
 def test_frames_without_people(tracker: str) -> None:
-    follow = make_tracker(tracker, RIG, CONFIG, 0)
-    commits = [commit for frame in range(20) for commit in follow.add(scene(follow, frame))]
+    follow = find_tracker(tracker)(RIG, CONFIG, 0)
+    commits = [commit for frame in range(20) for commit in follow.add(scene(follow, frame), UNSEEN)]
     commits += follow.finish()
     assert sum(len(commit.scenes) for commit in commits) == 20
     assert not any(commit.label.any() for commit in commits)
@@ -158,25 +164,25 @@ def test_frames_without_people(tracker: str) -> None:
 
 def test_the_cut_does_not_make_people_of_passing_noise() -> None:
     """A cell that flickers for one frame is nobody: the pass saw nobody there."""
-    follow = make_tracker("cut", RIG, CONFIG, 0)
+    follow = find_tracker("cut")(RIG, CONFIG, 0)
     commits: list[Commit] = []
     for frame in range(10):
         noisy = scene(follow, frame, (-1.0, -1.0))
         if frame == 4:
             noisy.log_odds[1, 12, 12] = 4.0
-        commits += follow.add(noisy)
+        commits += follow.add(noisy, UNSEEN)
     rows = rows_of(commits + follow.finish())
     assert np.unique(rows["id"]).tolist() == [1]
     assert len(rows) == 10
 
 
-@pytest.mark.parametrize("tracker", sorted(TRACKERS))
+@pytest.mark.parametrize("tracker", COLOURLESS)
 def test_whom_a_tracker_expects(tracker: str) -> None:
     """Everybody seen so far, where they are now: what is carried is not what was committed, but what was seen."""
-    follow = make_tracker(tracker, RIG, CONFIG, 0)
+    follow = find_tracker(tracker)(RIG, CONFIG, 0)
     assert follow.expected(0) is None
     for frame in range(LENGTH + 2):
-        follow.add(scene(follow, frame, (-1.5 + 0.1 * frame, 0.2)))
+        follow.add(scene(follow, frame, (-1.5 + 0.1 * frame, 0.2)), UNSEEN)
         expected = follow.expected(frame + 1)
         assert expected is not None
         assert len(expected) == 1
@@ -186,7 +192,7 @@ def test_whom_a_tracker_expects(tracker: str) -> None:
 
 def test_an_unknown_tracker_is_refused() -> None:
     with pytest.raises(ConfigError, match="cut, frames"):
-        make_tracker("magic", RIG, CONFIG, 0)
+        find_tracker("magic")(RIG, CONFIG, 0)
 
 
 # Rows

@@ -65,6 +65,7 @@ def run(
         One constant, for example --set ghosts.person=-2; may be given several times.
     tracker
         cut: graph cuts of windows of the volume. frames: the people of each frame as they come, without a cut.
+        kalman: a filter for each of them (HW12). particles: followed by the colours of their clothes (KD06).
     volume
         What of the occupancy volume is kept: all of it, what is within a metre of tracks, or none.
     workers

@@ -45,9 +45,10 @@ def simulate(
         Where to write; it must be empty or not there yet.
     scene
         easy (5 people, 4 cameras), dense (14 people on 6 m x 6 m, 8 cameras), dense4 (the same crowd, 4 of those
-        cameras), demo (small images, 8 s), tiny (a second of very small images), or small images of people who walk
-        as they are told: crossing, meeting, meeting_heights (the same, 8 cm apart in height), border (people cross,
-        meet, come and go where windows do). The other options change it.
+        cameras), similar (4 people, 3 of them dressed alike, 3 cameras), demo (small images, 8 s), tiny (a second of
+        very small images), or small images of people who walk as they are told: crossing, meeting, meeting_heights
+        (the same, 8 cm apart in height), border (people cross, meet, come and go where windows do). The other options
+        change it.
     people
         How many the area holds.
     cameras

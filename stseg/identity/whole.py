@@ -53,6 +53,14 @@ def whole_tracks(
     return Whole(smoothed, story[np.argsort(story["frame"], kind="stable")], identity)
 
 
+def own_tracks(committed: Rows, events: Rows, frame_rate: float, config: IdentityConfig) -> Whole:
+    """The tracks of a tracker whose own word stands on who is who and where: short ones go, short gaps are filled."""
+    kept, dropped = drop_short(committed, frame_rate, config)
+    story = np.concatenate([events, dropped])
+    identity = np.where(np.isin(committed["id"], kept["id"]), committed["id"], 0)
+    return Whole(fill_gaps(kept, frame_rate, config), story[np.argsort(story["frame"], kind="stable")], identity)
+
+
 def _retold(events: Rows, committed: Rows, identity: Ints, links: Sequence[Link]) -> Rows:
     """The events under the new identities: where a track goes on as another, nobody was born and nobody died."""
     name_at = _Names(committed, identity)

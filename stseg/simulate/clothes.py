@@ -18,6 +18,10 @@ _SKIN = ((150, 175, 215), (120, 150, 200), (85, 115, 165), (50, 70, 110), (140, 
 _HAIR = ((25, 25, 30), (30, 45, 70), (60, 100, 140), (110, 170, 205), (130, 130, 135), (20, 35, 90))
 
 
+_OWN_TONE = 0.2
+"""How far the colours of people who dress alike are towards those that each would wear otherwise, 0..1."""
+
+
 @lru_cache(maxsize=1024)
 def wardrobe(seed: int, person: int) -> Floats:
     """Paint of one person's parts, float64 (part, PAINT); see `PAINT`."""
@@ -39,6 +43,17 @@ def wardrobe(seed: int, person: int) -> Floats:
         "foot": shoes,
     }
     return np.stack([worn[part.name.removeprefix("left ").removeprefix("right ")] for part in PARTS])
+
+
+def worn(seed: int, person: int, alike: int) -> Floats:
+    """What one person wears where the first `alike` people dress as the first does, in tones a little their own."""
+    own = wardrobe(seed, person)
+    if person > alike:
+        return own
+    first = wardrobe(seed, 1)
+    paint = first.copy()
+    paint[:, :6] += _OWN_TONE * (own - first)[:, :6]
+    return paint
 
 
 def _pattern(lots: np.random.Generator) -> Floats:

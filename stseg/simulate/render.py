@@ -12,7 +12,7 @@ from stseg.geometry import Camera
 from stseg.simulate.body import Bodies
 from stseg.simulate.cameras import frame_seed, light_phase, pixel_rays
 from stseg.simulate.chance import Topic, chance
-from stseg.simulate.clothes import wardrobe
+from stseg.simulate.clothes import worn
 from stseg.simulate.detector import detect, visible_boxes
 from stseg.simulate.draw import draw_bodies, pixel_boxes
 from stseg.simulate.lamps import lit
@@ -108,7 +108,7 @@ class Viewer:
         depth = self.room.depth.copy()
         instances = np.zeros(image.shape[:2], np.uint16)
         silhouettes = np.empty((len(crowd.id), 5), np.int64)
-        paint = np.array([wardrobe(self._spec.seed, int(person)) for person in crowd.id])
+        paint = np.array([worn(self._spec.seed, int(person), self._spec.alike) for person in crowd.id])
         if len(crowd.id):
             draw_bodies(
                 self._rays,

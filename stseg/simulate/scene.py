@@ -46,6 +46,8 @@ class SceneSpec:
         JPEG quality of the frames, 1..100.
     speed
         Slowest and fastest preferred walking speed, metres per second.
+    alike
+        How many people, the first ones, wear clothes of similar colours.
     stay
         Mean time that a person stays, seconds.
     routes
@@ -77,6 +79,7 @@ class SceneSpec:
     shadows: float = 0.35
     quality: int = 85
     speed: tuple[float, float] = (0.6, 1.5)
+    alike: int = 0
     stay: float = 15.0
     routes: tuple[Route, ...] = ()
     seed: int = 1
@@ -99,6 +102,7 @@ class SceneSpec:
         self._require("shadows", 0 <= self.shadows <= 1, self.shadows, "0 to 1")
         self._require("quality", 1 <= self.quality <= 100, self.quality, "1 to 100")
         self._require("speed", 0 < self.speed[0] <= self.speed[1], self.speed, "the slowest, then the fastest, m/s")
+        self._require("alike", self.alike >= 0, self.alike, "a number of people")
         self._require("stay", self.stay > 0, self.stay, "seconds")
         routes = len(self.routes)
         self._require("routes", routes in (0, self.people), routes, f"none, or {self.people}, one a person")

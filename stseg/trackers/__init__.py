@@ -2,24 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
-from stseg.config import Config
 from stseg.errors import ConfigError
-from stseg.geometry import Rig
 from stseg.trackers.cut import CutTracker
 from stseg.trackers.frames import FrameTracker
-from stseg.trackers.protocol import Commit, Scene, Tracker
+from stseg.trackers.kalman import KalmanTracker
+from stseg.trackers.particles import ParticleTracker
+from stseg.trackers.protocol import Commit, Scene, Shown, Tracker
 
-TRACKERS: dict[str, Callable[[Rig, Config, int], Tracker]] = {"cut": CutTracker, "frames": FrameTracker}
-"""cut: graph cuts of windows of the volume (the default). frames: each frame by itself, linked by motion alone."""
+TRACKERS: dict[str, type[Tracker]] = {
+    "cut": CutTracker,
+    "frames": FrameTracker,
+    "kalman": KalmanTracker,
+    "particles": ParticleTracker,
+}
+"""cut: graph cuts of windows of the volume (the default). frames: each frame by itself, linked by motion alone.
+kalman: a filter for each person over the people of each frame (HW12). particles: hypotheses of where everybody stands,
+guided by the colours of their clothes (KD06)."""
 
 
-def make_tracker(name: str, rig: Rig, config: Config, first: int) -> Tracker:
-    """The tracker of that name for a run from frame `first` on."""
+def find_tracker(name: str) -> type[Tracker]:
+    """The tracker of that name."""
     if name not in TRACKERS:
         raise ConfigError("--tracker", "", repr(name), f"one of {', '.join(TRACKERS)}")
-    return TRACKERS[name](rig, config, first)
+    return TRACKERS[name]
 
 
-__all__ = ["TRACKERS", "Commit", "Scene", "Tracker", "make_tracker"]
+__all__ = ["TRACKERS", "Commit", "Scene", "Shown", "Tracker", "find_tracker"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import ClassVar
 
 import numpy as np
 
@@ -23,7 +24,7 @@ from stseg.segmentation.division import Division, Found, divide
 from stseg.segmentation.energy import QUANTUM, Energy, build_energy
 from stseg.segmentation.labels import Pillar
 from stseg.segmentation.motion import motion_field
-from stseg.trackers.protocol import Commit, Scene
+from stseg.trackers.protocol import Commit, Scene, Shown
 from stseg.trackers.rows import event_rows, trajectory_rows, views_at
 from stseg.tracks import WINDOW
 
@@ -55,6 +56,8 @@ class CutTracker:
         The run's first frame.
     """
 
+    final: ClassVar[bool] = False
+
     def __init__(self, rig: Rig, config: Config, first: int) -> None:
         self.rig, self.config = rig, config
         self.views = Sampling.of(rig, "point").views()
@@ -71,12 +74,13 @@ class CutTracker:
         """Whom the frames before lead to expect."""
         return self.walkers.expected(frame)
 
-    def add(self, scene: Scene) -> list[Commit]:
+    def add(self, scene: Scene, shown: Shown) -> list[Commit]:
         """The next frame; the window before it, if it is complete.
 
         A window waits for the frame after its last: only then is it known not to be the run's last one, which commits
         to its end.
         """
+        del shown
         done = []
         if scene.frame >= self.window.solve_stop:
             done.append(self._solve(self.window))

@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import ClassVar, Protocol
 
-from stseg.arrays import Labels, Rows, Singles
+from stseg.arrays import Labels, Observation, Rows, Singles
+from stseg.config import Config
+from stseg.geometry import Rig
 from stseg.ghosts.expected import Expected
-from stseg.ghosts.people import People
+from stseg.ghosts.people import People, ViewEvidence
+
+STAYING, FORGETTING = 1.0, 4.0
+"""What trackers without odds of their own expect: log-odds that somebody found in one frame is found in the next, nats,
+and how fast they fall after, nats per second."""
 
 
 @dataclass(frozen=True)
@@ -33,6 +40,22 @@ class Scene:
 
 
 @dataclass(frozen=True)
+class Shown:
+    """What the cameras showed in a frame, in the rig's order: there while the frame is added, held by no one after.
+
+    Attributes
+    ----------
+    observations
+        What each delivered; see `stseg.trackers.colour` for a tracker that needs colour.
+    evidence
+        What the foreground made of it: boxes, a likelihood map float32 (v, u), or None where the view is blind.
+    """
+
+    observations: Sequence[Observation]
+    evidence: Sequence[ViewEvidence]
+
+
+@dataclass(frozen=True)
 class Commit:
     """Frames that are decided.
 
@@ -54,9 +77,22 @@ class Commit:
 
 
 class Tracker(Protocol):
-    """Takes frames in order, gives back what is decided as soon as it is."""
+    """Takes frames in order, gives back what is decided as soon as it is.
 
-    def add(self, scene: Scene) -> list[Commit]:
+    Parameters
+    ----------
+    rig, config
+        The scene, and the constants of all stages.
+    first
+        The run's first frame.
+    """
+
+    final: ClassVar[bool]
+    """Whether who is who stands as it is committed; else it is decided again from the whole run (`identity.whole`)."""
+
+    def __init__(self, rig: Rig, config: Config, first: int) -> None: ...
+
+    def add(self, scene: Scene, shown: Shown) -> list[Commit]:
         """The next frame; what is decided by it."""
 
     def finish(self) -> list[Commit]:

@@ -1,0 +1,110 @@
+"""A Kalman filter for each person over the people of each frame that survived ghost removal (HW12 section V.E).
+
+Frame by frame: every filter is carried to the frame, people found within its gate are assigned to it one to one, those
+assigned correct it, those left over begin tracks. HW12's temporal check, that short tracks are nobody, is the run's
+last step (`identity.whole.own_tracks`).
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from stseg.arrays import Floats, Ints
+from stseg.config import Config
+from stseg.geometry import Rig
+from stseg.ghosts.expected import Expected
+from stseg.identity.linking import assign
+from stseg.occupancy.sampling import Sampling
+from stseg.trackers.cells import reached_cells
+from stseg.trackers.motion import Filters, begun, carried, corrected, surprise
+from stseg.trackers.protocol import FORGETTING, STAYING, Commit, Scene, Shown
+from stseg.trackers.rows import Event, event_rows, trajectory_rows, views_at
+from stseg.tracks import WINDOW
+
+
+class KalmanTracker:
+    """Follows people at constant velocity; every frame is decided as it comes.
+
+    Parameters
+    ----------
+    rig, config
+        The scene, and the constants of all stages.
+    first
+        The run's first frame.
+    """
+
+    final: ClassVar[bool] = True
+
+    def __init__(self, rig: Rig, config: Config, first: int) -> None:
+        self.rig, self.config = rig, config
+        self.views = Sampling.of(rig, "point").views()
+        self.filters = begun(np.zeros((0, 2)), np.zeros((0, 2, 2)), config.kalman.pace)
+        self.frame, self.issued, self.begun = first, 0, False
+        self.ids: Ints = np.zeros(0, np.int64)
+        self.seen: Ints = np.zeros(0, np.int64)
+
+    def expected(self, frame: int) -> Expected | None:
+        """Everybody who is followed, carried to the frame; None before the first."""
+        if not self.begun:
+            return None
+        seconds, n = (frame - self.frame) / self.rig.frame_rate, len(self.ids)
+        ghosts, noise = self.config.ghosts, self.config.identity.place_noise**2 * np.eye(2)
+        filters = carried(self.filters, seconds, self.config.kalman.turn)
+        unseen = (frame - 1 - self.seen) / self.rig.frame_rate
+        return Expected(
+            filters.state[:, :2], filters.covariance[:, :2, :2] + noise, np.full(n, ghosts.height_mean),
+            np.full(n, ghosts.height_spread**2), STAYING - FORGETTING * unseen,
+        )  # fmt: skip
+
+    def add(self, scene: Scene, shown: Shown) -> list[Commit]:
+        """The next frame, decided."""
+        del shown
+        deaths = self._end(scene.frame)
+        ground, config = scene.people.ground, self.config.kalman
+        noise = scene.people.covariance + np.eye(2) * self.config.identity.place_noise**2
+        filters = carried(self.filters, (scene.frame - self.frame) / self.rig.frame_rate, config.turn)
+        tracks, found = self._assigned(filters, ground, noise)
+        fresh = np.setdiff1d(np.arange(len(ground)), found)
+        filters = corrected(filters, tracks, ground[found], noise[found])
+        self.filters = filters.and_(begun(ground[fresh], noise[fresh], config.pace))
+        newcomers = self.issued + 1 + np.arange(len(fresh))
+        self.frame, self.issued, self.begun = scene.frame, self.issued + len(fresh), True
+        person = np.full(len(self.ids), -1)
+        person[tracks] = found
+        self.ids, person = np.append(self.ids, newcomers), np.append(person, fresh)
+        self.seen = np.where(person >= 0, scene.frame, np.append(self.seen, np.zeros_like(fresh)))
+        births = [(scene.frame, "birth", int(i), 0, "a person in nobody's gate") for i in newcomers]
+        return [self._commit(scene, person, births + deaths)]
+
+    def finish(self) -> list[Commit]:
+        """Nothing is open."""
+        return []
+
+    def _assigned(self, filters: Filters, ground: Floats, noise: Floats) -> tuple[Ints, Ints]:
+        """Filters and places of a frame that are one person's, both int64: the likeliest pairs within the gates."""
+        squares, cost = surprise(filters, ground, noise)
+        inside = squares <= -2.0 * np.log1p(-self.config.kalman.gate)  # of chi square with two degrees of freedom
+        return assign(np.where(inside, cost - cost.max(initial=0.0), 1.0), 1.0)
+
+    def _end(self, frame: int) -> list[Event]:
+        """Forget who was not found for too long."""
+        patience = self.config.kalman.patience
+        lost = frame - self.seen > patience * self.rig.frame_rate
+        told = [(frame, "death", int(i), 0, f"not found for {patience:g} s") for i in self.ids[lost]]
+        self.filters, self.ids, self.seen = self.filters.kept(~lost), self.ids[~lost], self.seen[~lost]
+        return told
+
+    def _commit(self, scene: Scene, person: Ints, events: list[Event]) -> Commit:
+        """Those found in the frame: where the filters believe them, beside where the frame saw them."""
+        people, grid = scene.people, self.rig.grid
+        found, which = np.flatnonzero(person >= 0), person[person >= 0]
+        ids, ground = self.ids[found], self.filters.state[found, :2]
+        label, extent = reached_cells(scene, ground, ids, grid, self.config.occupancy.reach)
+        rows = trajectory_rows(
+            scene.frame, ids, ground, self.filters.covariance[found, :2, :2], people.height[which], extent,
+            people.evidence[which], views_at(self.views, ground, grid),
+        )  # fmt: skip
+        rows["raw_x"], rows["raw_y"] = people.ground[which].T
+        return Commit([scene], label[None], rows, event_rows(events), np.zeros(0, WINDOW))

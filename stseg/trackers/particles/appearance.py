@@ -1,0 +1,59 @@
+"""What a person looks like: samples of the colours of each body part (KD06 sections 2 and 3.2)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stseg.arrays import Bytes, Floats, Ints
+from stseg.trackers.particles.bodies import PARTS
+from stseg.trackers.particles.colours import histogram
+
+SAMPLES = 120
+"""Colours kept of each part: N_M of eq. 1."""
+_FEW = 20
+"""A part with fewer is not known yet."""
+
+
+@dataclass(frozen=True)
+class Appearance:
+    """The colours of one person.
+
+    Attributes
+    ----------
+    samples : uint8 (part, SAMPLES, 3)
+        As `colours.normalised` has them.
+    counts : int64 (part,)
+        How many of them there are.
+    reference : float64 (part, bin)
+        q* of eq. 7: their histograms; 0 where too few are known.
+    """
+
+    samples: Bytes
+    counts: Ints
+    reference: Floats
+
+    @classmethod
+    def unknown(cls) -> Appearance:
+        """Of somebody never seen by themselves."""
+        parts = len(PARTS)
+        empty = histogram(np.zeros((0, 3), np.uint8))
+        return cls(np.zeros((parts, SAMPLES, 3), np.uint8), np.zeros(parts, np.int64), np.tile(empty, (parts, 1)))
+
+    @property
+    def known(self) -> Ints:
+        """How many samples of each part may be used, int64 (part,)."""
+        return np.where(self.counts >= _FEW, self.counts, 0)
+
+    def learned(self, part: int, colour: Bytes, share: float, rng: np.random.Generator) -> Appearance:
+        """With new colours, uint8 (n, 3), of a part: room is filled, then this share of the samples is renewed."""
+        samples, counts, reference = self.samples.copy(), self.counts.copy(), self.reference.copy()
+        room = SAMPLES - int(counts[part])
+        wanted = room if room else rng.binomial(SAMPLES, share)
+        fresh = colour[rng.permutation(len(colour))[:wanted]]
+        where = counts[part] + np.arange(len(fresh)) if room else rng.permutation(SAMPLES)[: len(fresh)]
+        samples[part, where] = fresh
+        counts[part] += len(fresh) if room else 0
+        reference[part] = histogram(samples[part, : counts[part]] if counts[part] >= _FEW else fresh[:0])
+        return Appearance(samples, counts, reference)

@@ -1,0 +1,72 @@
+"""Everybody who is followed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stseg.arrays import Flags, Floats, Ints
+from stseg.trackers.particles.appearance import Appearance
+
+
+@dataclass(frozen=True)
+class Crowd:
+    """People who are followed.
+
+    Attributes
+    ----------
+    ids, seen : int64 (n,)
+        Their tracks, and the last frames whose pass found them.
+    height : float64 (n,)
+        Metres.
+    ground, covariance : float64 (n, 2), (n, 2, 2)
+        Where the last frame left them, metres.
+    particles : float64 (particle, n, 2)
+        Hypotheses of where all of them stand, metres.
+    appearances
+        What each looks like.
+    """
+
+    ids: Ints
+    seen: Ints
+    height: Floats
+    ground: Floats
+    covariance: Floats
+    particles: Floats
+    appearances: tuple[Appearance, ...]
+
+    @classmethod
+    def nobody(cls, particles: int) -> Crowd:
+        """Nobody, in so many particles."""
+        none = np.zeros(0, np.int64)
+        return cls(none, none, np.zeros(0), np.zeros((0, 2)), np.zeros((0, 2, 2)), np.zeros((particles, 0, 2)), ())
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+    @property
+    def reference(self) -> Floats:
+        """q* of everybody, float64 (n, part, bin)."""
+        none = np.zeros((0, *Appearance.unknown().reference.shape))
+        return np.concatenate([none, *(one.reference[None] for one in self.appearances)])
+
+    def kept(self, which: Flags) -> Crowd:
+        """Some of them, bool (n,)."""
+        looks = tuple(one for one, stays in zip(self.appearances, which, strict=True) if stays)
+        return Crowd(
+            self.ids[which], self.seen[which], self.height[which], self.ground[which], self.covariance[which],
+            self.particles[:, which], looks,
+        )  # fmt: skip
+
+    def and_(self, others: Crowd) -> Crowd:
+        """These, then others."""
+        return Crowd(
+            np.append(self.ids, others.ids),
+            np.append(self.seen, others.seen),
+            np.append(self.height, others.height),
+            np.concatenate([self.ground, others.ground]),
+            np.concatenate([self.covariance, others.covariance]),
+            np.concatenate([self.particles, others.particles], 1),
+            self.appearances + others.appearances,
+        )

@@ -1,0 +1,36 @@
+"""A particle filter over where everybody stands at once (KD06 section 4).
+
+A particle is one place for every person, float64 (n, 2); particles are float64 (particle, n, 2), metres.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stseg.arrays import Floats
+
+
+def predicted(particles: Floats, spread: float, rng: np.random.Generator) -> Floats:
+    """A step of a random walk with a standard deviation of `spread`, metres."""
+    return particles + rng.normal(0.0, spread, particles.shape)
+
+
+def weights(misfit: Floats, sharpness: float) -> Floats:
+    """Eq. 7: the weight of each particle by its sum of d^2, float64 (particle,), with lambda; they sum to 1."""
+    raw = np.exp(-sharpness * (misfit - misfit.min()))
+    return np.asarray(raw / raw.sum())
+
+
+def resampled(particles: Floats, weight: Floats, rng: np.random.Generator) -> Floats:
+    """As many particles, drawn by weight at evenly spaced quantiles from a random first one."""
+    count = len(particles)
+    quantile = (np.arange(count) + rng.random()) / count
+    drawn = np.searchsorted(np.cumsum(weight), quantile).clip(0, count - 1)
+    return np.asarray(particles[drawn])
+
+
+def estimate(particles: Floats, weight: Floats) -> tuple[Floats, Floats]:
+    """The mean place of each person and the particles' covariance about it, float64 (n, 2), (n, 2, 2)."""
+    mean = np.einsum("p,pkc->kc", weight, particles)
+    off = particles - mean
+    return mean, np.asarray(np.einsum("p,pkc,pkd->kcd", weight, off, off))

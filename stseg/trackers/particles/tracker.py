@@ -1,0 +1,196 @@
+"""Guided particles: a particle filter whose particles look for the people themselves (KD06 section 4.3).
+
+Each frame, every particle takes a random step and is then moved by the search, which segments all views by it and lets
+the people's axes meet; how well the colours then fit weighs it. A few particles are enough, since even one that starts
+beside a person ends on them. The paper starts tracks by hand or from blobs that stand apart; here those whom a frame's
+pass found, and nobody follows, are new.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import ClassVar
+
+import numpy as np
+
+from stseg.arrays import Floats, Ints
+from stseg.config import Config
+from stseg.geometry import Rig
+from stseg.ghosts.border import Border
+from stseg.ghosts.expected import Expected
+from stseg.identity.linking import assign, distances
+from stseg.occupancy.sampling import Sampling
+from stseg.trackers.cells import reached_cells
+from stseg.trackers.colour import ColourView, colour_views
+from stseg.trackers.particles.appearance import Appearance
+from stseg.trackers.particles.crowd import Crowd
+from stseg.trackers.particles.filter import estimate, predicted, resampled, weights
+from stseg.trackers.particles.search import search
+from stseg.trackers.particles.views import Look, ParticleView
+from stseg.trackers.protocol import FORGETTING, STAYING, Commit, Scene, Shown
+from stseg.trackers.rows import Event, event_rows, trajectory_rows, views_at
+from stseg.tracks import WINDOW
+
+_FLOOR = 0.05
+"""No place is known better than this, metres (standard deviation): particles that agree may be wrong together."""
+_HEIGHT_NOISE = 0.06
+"""How well a person's height is known, metres (standard deviation)."""
+_MARGIN = 0.6
+"""How far from their last places people are sought in a frame, metres."""
+_DOUBLED = 0.4
+"""Who stands where another was found for longer than this, seconds, and is not found themselves, is nobody."""
+_HEIGHT_RENEWAL = 0.1
+"""Share of a person's height that a frame that finds them renews."""
+
+
+class ParticleTracker:
+    """Follows people by their colours; every frame is decided as it comes.
+
+    Parameters
+    ----------
+    rig, config
+        The scene, and the constants of all stages.
+    first
+        The run's first frame.
+    """
+
+    final: ClassVar[bool] = True
+
+    def __init__(self, rig: Rig, config: Config, first: int) -> None:
+        self.rig, self.config = rig, config
+        self.grid_views = Sampling.of(rig, "point").views()
+        self.views = [ParticleView(camera, config.particles.columns) for camera in rig.cameras]
+        self.border = Border.of(rig)
+        self.rng = np.random.default_rng(config.particles.seed)
+        self.frame, self.issued, self.begun = first, 0, False
+        self.crowd = Crowd.nobody(1 if config.particles.way == "search" else config.particles.count)
+
+    def expected(self, frame: int) -> Expected | None:
+        """Everybody who is followed, where the last frame left them; None before the first."""
+        if not self.begun:
+            return None
+        crowd, config = self.crowd, self.config
+        drift = config.identity.place_noise**2 + self._step(frame) ** 2
+        unseen = (frame - 1 - crowd.seen) / self.rig.frame_rate
+        return Expected(
+            crowd.ground, crowd.covariance + drift * np.eye(2), crowd.height, np.full(len(crowd), _HEIGHT_NOISE**2),
+            STAYING - FORGETTING * unseen,
+        )  # fmt: skip
+
+    def add(self, scene: Scene, shown: Shown) -> list[Commit]:
+        """The next frame, decided.
+
+        Raises
+        ------
+        SourceError
+            Where no camera delivers colour.
+        """
+        views = colour_views(shown, "particles", scene.frame)
+        looks = self._looks(views)
+        self._follow(looks, self._step(scene.frame))
+        seconds = (scene.frame - self.frame) / self.rig.frame_rate
+        self.frame, self.begun = scene.frame, True
+        evidence, newcomers = self._recognise(scene)
+        deaths = self._end()
+        births = self._begin(scene, newcomers)
+        if births or deaths:
+            looks = self._looks(views)
+        for look in looks:
+            self._learn(look, seconds)
+        nats = np.array([evidence.get(int(i), 0.0) for i in self.crowd.ids])
+        return [self._commit(scene, nats, births + deaths)]
+
+    def finish(self) -> list[Commit]:
+        """Nothing is open."""
+        return []
+
+    def _step(self, frame: int) -> float:
+        """How far a person's step to a frame may go, metres (standard deviation)."""
+        return self.config.particles.wander * (frame - self.frame) / self.rig.frame_rate
+
+    def _looks(self, views: Sequence[ColourView | None]) -> list[Look]:
+        """What the views show of everybody."""
+        crowd = self.crowd
+        return [
+            own.look(view, crowd.ground, crowd.height, crowd.appearances, _MARGIN)
+            for own, view in zip(self.views, views, strict=True)
+            if view is not None
+        ]
+
+    def _follow(self, looks: Sequence[Look], step: float) -> None:
+        """Move the particles to the frame, weigh and draw them."""
+        config, crowd = self.config.particles, self.crowd
+        moved = crowd.particles if config.way == "search" else predicted(crowd.particles, step, self.rng)
+        if config.way != "generic":
+            median = config.axis == "median"
+            moved = np.stack([search(looks, hypothesis, config.rounds, median) for hypothesis in moved])
+        reference, misfit = crowd.reference, np.zeros(moved.shape[:2])
+        for hypothesis, own in zip(moved, misfit, strict=True):
+            for look in looks:
+                look.add_misfit(hypothesis, reference, own)
+        weight = weights(misfit.sum(1), config.sharpness)
+        ground, covariance = estimate(moved, weight)
+        drawn = resampled(moved, weight, self.rng)
+        covariance = covariance + _FLOOR**2 * np.eye(2)
+        self.crowd = replace(crowd, ground=ground, covariance=covariance, particles=drawn)
+
+    def _recognise(self, scene: Scene) -> tuple[dict[int, float], Ints]:
+        """Whom of the crowd the pass found: evidence of each track, nats, and those found whom nobody follows."""
+        crowd, people = self.crowd, scene.people
+        known, found = assign(distances(crowd.ground, people.ground), self.config.particles.beside)
+        seen, height = crowd.seen.copy(), crowd.height.copy()
+        seen[known] = scene.frame
+        height[known] += _HEIGHT_RENEWAL * (people.height[found] - height[known])
+        self.crowd = replace(crowd, seen=seen, height=height)
+        evidence = {int(i): float(nats) for i, nats in zip(crowd.ids[known], people.evidence[found], strict=True)}
+        return evidence, np.setdiff1d(np.arange(len(people)), found)
+
+    def _begin(self, scene: Scene, newcomers: Ints) -> list[Event]:
+        """Follow people of a frame whom nobody follows."""
+        people, count = scene.people, len(newcomers)
+        ids = self.issued + 1 + np.arange(count)
+        self.issued += count
+        places = people.ground[newcomers]
+        particles = predicted(np.repeat(places[None], len(self.crowd.particles), 0), _FLOOR, self.rng)
+        unknown = (Appearance.unknown(),) * count
+        self.crowd = self.crowd.and_(
+            Crowd(
+                ids, np.full(count, scene.frame), people.height[newcomers], places, people.covariance[newcomers],
+                particles, unknown,
+            )
+        )  # fmt: skip
+        return [(scene.frame, "birth", int(i), 0, "found where nobody was followed") for i in ids]
+
+    def _end(self) -> list[Event]:
+        """Follow no longer who left, who was not found for too long, and who stands where another does."""
+        crowd, config = self.crowd, self.config
+        unfound = (self.frame - crowd.seen) / self.rig.frame_rate
+        left = (self.border.away(crowd.ground) == 0.0) & (unfound > 0)
+        near = distances(crowd.ground, crowd.ground) < config.ghosts.apart
+        told: list[Event] = []
+        for k, identity in enumerate(crowd.ids.tolist()):
+            others = crowd.ids[near[k] & (unfound == 0)]
+            if left[k]:
+                told.append((self.frame, "death", identity, 0, "left the area"))
+            elif unfound[k] > config.particles.patience:
+                told.append((self.frame, "death", identity, 0, f"not found for {config.particles.patience:g} s"))
+            elif unfound[k] > _DOUBLED and len(others):
+                told.append((self.frame, "death", identity, int(others[0]), "stands where another was found"))
+        self.crowd = crowd.kept(~np.isin(crowd.ids, [event[2] for event in told]))
+        return told
+
+    def _learn(self, look: Look, seconds: float) -> None:
+        crowd = self.crowd
+        share = min(seconds / self.config.particles.memory, 1.0)
+        learned = look.learned(crowd.ground, crowd.appearances, share, self.rng)
+        self.crowd = replace(crowd, appearances=tuple(learned))
+
+    def _commit(self, scene: Scene, evidence: Floats, events: list[Event]) -> Commit:
+        crowd, grid = self.crowd, self.rig.grid
+        label, extent = reached_cells(scene, crowd.ground, crowd.ids, grid, self.config.occupancy.reach)
+        rows = trajectory_rows(
+            scene.frame, crowd.ids, crowd.ground, crowd.covariance, crowd.height, extent, evidence,
+            views_at(self.grid_views, crowd.ground, grid),
+        )  # fmt: skip
+        return Commit([scene], label[None], rows, event_rows(events), np.zeros(0, WINDOW))

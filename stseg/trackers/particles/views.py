@@ -1,0 +1,150 @@
+"""One camera as the particles see it: a raster of its pixels, and of each frame what is asked of it many times."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from stseg.arrays import Bytes, Floats, Ints, Labels, Singles
+from stseg.geometry import Camera
+from stseg.trackers.colour import ColourView
+from stseg.trackers.particles.appearance import Appearance
+from stseg.trackers.particles.axes import fill_axes
+from stseg.trackers.particles.bodies import HALF_WIDTH, PARTS, fill_bodies, fill_boxes
+from stseg.trackers.particles.colours import FALL, bins_of, fill_density, normalised
+from stseg.trackers.particles.likelihood import add_misfit
+from stseg.trackers.particles.segmentation import STRANGER, Canvas, fill_open, segment
+
+_WIDTHS = 2 * float(HALF_WIDTH.mean())
+_BOUNDS = np.concatenate([[0.0], PARTS[:-1], [1.0]])
+_LEVEL = (np.arange(len(HALF_WIDTH)) + 0.5) / len(HALF_WIDTH)
+_AREAS = np.array(
+    [2 * HALF_WIDTH[(lower <= _LEVEL) & (upper > _LEVEL)].sum() / len(HALF_WIDTH) for lower, upper in pairwise(_BOUNDS)]
+)
+"""Area of each part relative to the square of the body's length."""
+
+
+_OPEN = 0.8
+"""Share of a body that a view must show for somebody's colours to be learned from it."""
+
+
+class ParticleView:
+    """A camera's raster.
+
+    Parameters
+    ----------
+    camera
+        With its lens: the raster knows where its pixels would be without.
+    columns
+        Columns of the raster at most; every so many pixels of the image are asked (KD06 section 6).
+    """
+
+    def __init__(self, camera: Camera, columns: int) -> None:
+        self.camera = camera
+        self.projection, self.centre = camera.projection, camera.centre
+        width, height = camera.size
+        self.step = max(1, -(-width // columns))
+        pixel = np.stack(np.meshgrid(np.arange(0, width, self.step), np.arange(0, height, self.step)), -1).astype(float)
+        ideal = pixel if camera.lens is None else camera.lens.undistort(pixel)
+        self.ideal: Singles = np.nan_to_num(ideal, nan=-1e6).astype(np.float32)
+        self.canvas = Canvas.of(*self.ideal.shape[:2])
+        self.areas = _AREAS / self.step**2
+        self.room_of_pixels: Singles = np.zeros(self.ideal.shape[:2], np.float32)
+        self.room: Floats = np.zeros(self.ideal.shape[0] * self.ideal.shape[1])
+
+    def bodies(self, ground: Floats, height: Floats) -> Floats:
+        """Where people (n, 2) as tall as (n,) stand, `bodies.fill_bodies`."""
+        bodies = np.zeros((len(ground), 5))
+        fill_bodies(self.projection, self.centre, ground, height, bodies)
+        return bodies
+
+    def look(
+        self, view: ColourView, ground: Floats, height: Floats, appearances: Sequence[Appearance], margin: float
+    ) -> Look:
+        """A frame, with people who will be sought within `margin` metres of places (n, 2)."""
+        colour = normalised(view.image[:: self.step, :: self.step])
+        foreground = (view.likelihood[:: self.step, :: self.step] > 0.5).astype(np.uint8)
+        boxes = np.zeros((len(ground), 4), np.int64)
+        fill_boxes(self.ideal, self.bodies(ground, height), margin / height, boxes)
+        density = np.zeros((len(ground), len(PARTS), *foreground.shape), np.float32)
+        for box, own, seen in zip(boxes, appearances, density, strict=True):
+            fill_density(colour, foreground, box, own.samples, own.known, FALL, seen)
+        return Look(self, height, colour, bins_of(colour).astype(np.int32), foreground, boxes, density)
+
+
+@dataclass(frozen=True)
+class Look:
+    """One view of one frame.
+
+    Attributes
+    ----------
+    height : float64 (n,)
+        Of the people, metres.
+    colour : uint8 (v, u, 3), bins : int32 (v, u), foreground : uint8 (v, u)
+        Of each pixel of the raster.
+    boxes : int64 (n, 4)
+        Where each person is sought.
+    density : float32 (n, part, v, u)
+        Eq. 1 of each person's parts.
+    """
+
+    view: ParticleView
+    height: Floats
+    colour: Bytes
+    bins: Labels
+    foreground: Bytes
+    boxes: Ints
+    density: Singles
+
+    def segment(self, ground: Floats) -> tuple[Floats, Ints]:
+        """Label the view's canvas by a hypothesis (n, 2); the bodies, and who stands before whom."""
+        view, bodies = self.view, self.view.bodies(ground, self.height)
+        order = np.argsort(bodies[:, 4], kind="stable")
+        segment(
+            bodies, order, self.boxes, view.ideal, self.foreground, self.density, HALF_WIDTH, PARTS, view.canvas
+        )  # fmt: skip
+        return bodies, order
+
+    def fill_axes(self, ground: Floats, median: bool, axes: Floats) -> None:
+        """The axes (n, 4) of the people of a hypothesis (n, 2)."""
+        view, (bodies, _) = self.view, self.segment(ground)
+        camera = view.camera
+        fill_axes(
+            bodies, self.boxes, view.ideal, view.canvas, float(view.step), _WIDTHS, camera.ground, camera.vertical,
+            median, view.room, axes,
+        )  # fmt: skip
+
+    def add_misfit(self, ground: Floats, reference: Floats, misfit: Floats) -> None:
+        """Add how badly each person's colours fit at (n, 2), given q* (n, part, bin), to misfit (n,)."""
+        view, bodies = self.view, self.view.bodies(ground, self.height)
+        order = np.argsort(bodies[:, 4], kind="stable")
+        counts = np.zeros(reference.shape[1:])
+        add_misfit(
+            bodies, order, self.boxes, view.ideal, self.bins, reference, view.areas, HALF_WIDTH, PARTS,
+            view.canvas.free, counts, misfit,
+        )  # fmt: skip
+
+    def learned(
+        self, ground: Floats, appearances: Sequence[Appearance], share: float, rng: np.random.Generator
+    ) -> list[Appearance]:
+        """What people at places (n, 2) look like, with what of them this view shows openly; a share of it is renewed.
+
+        Whoever stands behind somebody teaches nothing; of whoever is known already, only pixels that fit do.
+        """
+        view, (bodies, order) = self.view, self.segment(ground)
+        owner = np.full(self.foreground.shape, STRANGER, np.int32)
+        shown = np.zeros(len(ground), np.int64)
+        fill_open(bodies, order, self.boxes, view.ideal, HALF_WIDTH, PARTS, view.room_of_pixels, owner, shown)
+        whole = shown >= _OPEN * view.areas.sum() * (bodies[:, 2:4] ** 2).sum(1)
+        result = list(appearances)
+        for k in np.flatnonzero(whole & (shown > 0)).tolist():
+            rows, columns = slice(*self.boxes[k, :2]), slice(*self.boxes[k, 2:])
+            seen = self.foreground[rows, columns] > 0
+            fits = seen & (view.canvas.label[rows, columns] == k)
+            for part in range(len(PARTS)):
+                own = (fits if result[k].known[part] else seen) & (owner[rows, columns] == k * len(PARTS) + part)
+                result[k] = result[k].learned(part, self.colour[rows, columns][own], share, rng)
+        return result
