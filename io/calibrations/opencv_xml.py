@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from stseg.arrays import Floats
 from stseg.errors import FormatError
+from stseg.geometry import Lens
 from stseg.io.calibrations.foreign import Foreign, of_pose
 from stseg.io.calibrations.safe_xml import parse_xml
 
@@ -41,6 +42,21 @@ def read_opencv_xml(files: Sequence[Path]) -> list[Foreign]:
     _, translation = _numbers(roots, _TRANSLATION, (3,))
     turned = np.asarray(Rotation.from_rotvec(rotation).as_matrix())
     return [of_pose(file, "", None, matrix.reshape(3, 3), turned, translation, distortion)]
+
+
+def read_opencv_lens(file: Path) -> Lens:
+    """The lens of a camera whose XML has at least `camera_matrix` and `distortion_coefficients`.
+
+    Raises
+    ------
+    FormatError
+        Where the file is no such XML.
+    """
+    roots = [(file, parse_xml(file, "XML of OpenCV's FileStorage"))]
+    _, matrix = _numbers(roots, _MATRIX, (9,))
+    _, distortion = _numbers(roots, _DISTORTION, (4, 5, 8, 12, 14))
+    alone = of_pose(file, "", None, matrix.reshape(3, 3), np.eye(3), np.zeros(3), distortion)
+    return alone.lens or Lens(matrix.reshape(3, 3), np.zeros(5))
 
 
 def _numbers(

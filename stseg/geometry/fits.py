@@ -6,8 +6,8 @@ import numpy as np
 
 from stseg.arrays import Floats
 
-_NO_FOCAL = 1e-6
-"""Of the squared size of the image's perspective, below which it tells no focal length."""
+_SHORTEST, _LONGEST = 0.2, 10.0
+"""Focal lengths in widths of the image between which those of lenses lie (from 136 down to 6 degrees)."""
 
 
 def fit_homography(ground: Floats, pixel: Floats) -> Floats:
@@ -65,11 +65,10 @@ def fit_vertical(homography: Floats, ground: Floats, height: Floats, pixel: Floa
     return np.asarray(np.linalg.lstsq(np.concatenate([along_u, along_v]), wanted)[0])
 
 
-def vertical_of_square_pixels(homography: Floats, size: tuple[int, int]) -> Floats | None:
-    """The vertical of a camera with square pixels whose axis meets the middle of its image.
+def focal_of_square_pixels(homography: Floats, size: tuple[int, int]) -> float | None:
+    """The focal length of a camera with square pixels whose axis meets the middle of its image.
 
-    With H = K [r1 r2 t] and K known but for the focal length, r1 r2 = 0 and |r1| = |r2| give it; then a v = K (r1 x r2)
-    in the scale of H.
+    With H = K [r1 r2 t] and K known but for it, r1 r2 = 0 and |r1| = |r2| are two equations for 1 / f^2; least squares.
 
     Parameters
     ----------
@@ -80,23 +79,41 @@ def vertical_of_square_pixels(homography: Floats, size: tuple[int, int]) -> Floa
 
     Returns
     -------
-    float64 (3,), or None where the view tells no focal length: it looks straight down, or the points are no camera's.
+    float, pixels, or None where the view tells none: it looks straight down, or along an axis of it.
     """
-    middle = np.array([[1, 0, -(size[0] - 1) / 2], [0, 1, -(size[1] - 1) / 2], [0, 0, 1]])
-    first, second, _ = (middle @ homography).T
-    # flat + f^2 deep = 0 for both conditions, solved for f^2 by least squares
+    first, second, _ = (np.linalg.inv(middle_matrix(1.0, size)) @ homography).T
+    # flat / f^2 + deep = 0
     flat = np.array([first[:2] @ second[:2], first[:2] @ first[:2] - second[:2] @ second[:2]])
     deep = np.array([first[2] * second[2], first[2] ** 2 - second[2] ** 2])
-    weight = float(deep @ deep)
-    if weight <= _NO_FOCAL * float(first[2] ** 2 + second[2] ** 2 + 1e-300) ** 2:
+    inverse = -float(flat @ deep) / max(float(flat @ flat), 1e-300)
+    if inverse <= 0:
         return None
-    square = -float(flat @ deep) / weight
-    if square <= 0:
-        return None
-    to_ray = np.diag([1 / np.sqrt(square), 1 / np.sqrt(square), 1.0]) @ middle
-    r1, r2, _ = (to_ray @ homography).T
+    focal = float(1 / np.sqrt(inverse))
+    return focal if _SHORTEST * size[0] < focal < _LONGEST * size[0] else None
+
+
+def middle_matrix(focal: float, size: tuple[int, int]) -> Floats:
+    """The camera matrix of square pixels and a principal point in the middle of the image, float64 (3, 3)."""
+    return np.array([[focal, 0, (size[0] - 1) / 2], [0, focal, (size[1] - 1) / 2], [0, 0, 1.0]])
+
+
+def vertical_of_matrix(homography: Floats, matrix: Floats) -> Floats:
+    """The vertical of a camera whose matrix K is known: with H = K [r1 r2 t], a v = K (r1 x r2) in the scale of H.
+
+    Parameters
+    ----------
+    homography : float64 (3, 3)
+        Ground metres to undistorted pixels.
+    matrix : float64 (3, 3)
+        K, pixels.
+
+    Returns
+    -------
+    float64 (3,)
+    """
+    r1, r2, _ = np.linalg.solve(matrix, homography).T
     upward = np.cross(r1, r2) / np.sqrt(np.linalg.norm(r1) * np.linalg.norm(r2))
-    return np.asarray(np.linalg.solve(to_ray, upward))
+    return np.asarray(matrix @ upward)
 
 
 def homogeneous(point: Floats) -> Floats:
