@@ -9,8 +9,8 @@ from itertools import combinations
 import numpy as np
 
 from stseg.arrays import Floats
-from stseg.calibrate.agreement import place
-from stseg.calibrate.bystanders import Bystanders, find_bystanders, joined, mismatch
+from stseg.calibrate.agreement import edges, place
+from stseg.calibrate.bystanders import GATE, Bystanders, find_bystanders, joined, mismatch
 from stseg.calibrate.verdict import LEAST
 from stseg.geometry import Rig
 from stseg.geometry.bodies import BodyTable
@@ -19,8 +19,10 @@ Shown = Mapping[int, Sequence[Floats]]
 """Of each frame, the boxes of every view, float64 (n, 4)."""
 _BETTER = 1.3
 """How many times more boxes must find their people for streams to be called exchanged."""
-_NEARER = 0.85
-"""Share of the misfit that must be left at another time for a stream to be called late."""
+_CLOSE = 0.35
+"""Gates within which a box fits a person whom all views place."""
+_NEARER = 0.75
+"""Share of the misfit that may be left at another time for a stream to be called late."""
 
 
 @dataclass(frozen=True)
@@ -65,27 +67,35 @@ def exchanged(
     -------
     (view, view), or None
     """
-    best, pair = _BETTER * max(_fits(people), LEAST), None
+    best, pair = _BETTER * max(_fits(tables, people), LEAST), None
     for first, second in combinations(range(len(tables)), 2):
         if rig.cameras[first].size != rig.cameras[second].size:
             continue
         order = list(range(len(tables)))
         order[first], order[second] = second, first
         turned = {frame: [shown[frame][view] for view in order] for frame in frames}
-        fits = _fits(all_bystanders(rig, tables, turned, frames))
+        fits = _fits(tables, all_bystanders(rig, tables, turned, frames))
         if fits > best:
             best, pair = fits, (first, second)
     return pair
 
 
-def _fits(people: Bystanders) -> float:
-    """Boxes of people whom three views show, or two where there are no more."""
-    count = people.seen.sum(axis=1)
-    return float(count[count >= min(3, people.seen.shape[1])].sum())
+def _fits(tables: Sequence[BodyTable], people: Bystanders) -> int:
+    """Boxes that lie close to where all views together place their people."""
+    views = len(tables)
+    placed = place(people, tables, range(views), min(3, views))
+    told = np.isfinite(placed.height)
+    count = 0
+    for view, table in enumerate(tables):
+        miss, known, tall = edges(table, placed.ground[told], placed.height[told], people.box[told, view])
+        with np.errstate(invalid="ignore"):
+            off = np.hypot(miss[:, 0], miss[:, 1]) / tall
+            count += int((known[:, :2].all(axis=1) & (off < _CLOSE * GATE)).sum())
+    return count
 
 
-def late(tables: Sequence[BodyTable], shown: Shown, people: Bystanders, most: int) -> list[Late]:
-    """Views that show at another time what the others show now.
+def late(tables: Sequence[BodyTable], shown: Shown, people: Bystanders, most: int) -> Late | None:
+    """The view that most clearly shows at another time what the others show now.
 
     Parameters
     ----------
@@ -97,28 +107,34 @@ def late(tables: Sequence[BodyTable], shown: Shown, people: Bystanders, most: in
     most
         Frames by which a stream may be late or early.
     """
-    found = []
-    views = range(len(tables))
-    for view in views:
-        others = [other for other in views if other != view]
+    clearest, found = _NEARER, None
+    shifts = range(-most, most + 1)
+    for view in range(len(tables)):
+        others = [other for other in range(len(tables)) if other != view]
         placed = place(people, tables, others, min(2, len(others)))
         known = replace(people, ground=placed.ground, height=placed.height)
-        shifts = [shift for shift in range(-most, most + 1)]
         misfit = np.array([_misfit(tables[view], view, shown, known, shift) for shift in shifts])
-        if np.isfinite(misfit).all():
-            best = int(misfit.argmin())
-            if shifts[best] and misfit[best] < _NEARER * misfit[most]:
-                found.append(Late(view, shifts[best]))
-    return _likely(found, len(tables))
+        if not np.isfinite(misfit).all():
+            continue
+        best = int(misfit.argmin())
+        if misfit[best] < clearest * misfit[most]:
+            clearest, found = float(misfit[best] / misfit[most]), Late(view, shifts[best])
+    return found
 
 
-def _likely(found: list[Late], views: int) -> list[Late]:
-    """Where most views seem late, it is the others that are early: time is told by the majority."""
-    return found if 2 * len(found) <= views else []
+def in_time(shown: Shown, one: Late, size: int) -> dict[int, list[Floats]]:
+    """The boxes with the late view's brought back to their time; none where that is beyond its end."""
+    nothing = [np.zeros((0, 4))] * size
+    return {
+        frame: [
+            shown.get(frame + one.frames, nothing)[view] if view == one.view else own for view, own in enumerate(boxes)
+        ]
+        for frame, boxes in shown.items()
+    }
 
 
 def _misfit(table: BodyTable, view: int, shown: Shown, people: Bystanders, shift: int) -> float:
-    """Mean distance, in gates and at most 1, from people to the nearest box that the view shows `shift` frames later."""
+    """Median distance, in gates, from people to the nearest box of the view `shift` frames later, of those it meets."""
     body = table.boxes_of(people.ground, people.height)
     with np.errstate(invalid="ignore"):
         inside = (body[:, :2] > 1).all(axis=1) & (body[:, 2:] < np.array(table.size) - 2).all(axis=1)
@@ -128,6 +144,7 @@ def _misfit(table: BodyTable, view: int, shown: Shown, people: Bystanders, shift
         boxes = shown.get(frame + shift)
         if boxes is not None and len(boxes[view]):
             nearest = mismatch(table, people.ground[own], people.height[own], boxes[view]).min(axis=1)
-            misses.append(np.minimum(nearest, 1.0))
+            misses.append(nearest)
     together = np.concatenate(misses) if misses else np.zeros(0)
-    return float(together.mean()) if len(together) >= LEAST else np.nan
+    met = together[together < 1]
+    return float(np.median(met)) if len(met) >= LEAST else np.nan

@@ -19,7 +19,7 @@ from stseg.geometry.bodies import BodyTable
 _COMMON = 1.70
 """Metres: how tall most people are, about."""
 _SHORTEST, _TALLEST = 1.35, 2.10
-_GATE = 0.35
+GATE = 0.35
 """Of a body's height, by which middle and top of its box may be off: 0.6 m."""
 _HIDDEN = 0.6
 """Of a body's height that may be hidden at the feet."""
@@ -124,8 +124,8 @@ def mismatch(table: BodyTable, ground: Floats, height: Floats, boxes: Floats) ->
         top = np.abs(body[:, None, 1] - boxes[None, :, 1]) / tall
         early = (body[:, None, 3] - boxes[None, :, 3]) / tall
         widths = (boxes[:, 2] - boxes[:, 0])[None] / wide
-        off = np.hypot(middle, top) / _GATE
-        fits = (off < 1) & (early < _HIDDEN) & (early > -_GATE) & (widths > _WIDTHS[0]) & (widths < _WIDTHS[1])
+        off = np.hypot(middle, top) / GATE
+        fits = (off < 1) & (early < _HIDDEN) & (early > -GATE) & (widths > _WIDTHS[0]) & (widths < _WIDTHS[1])
     inside = _inside(body, table.size)[:, None]
     return np.where(fits & inside, off, np.inf)
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stseg.calibrate.blunders import Late, Shown, all_bystanders, exchanged, late
+from stseg.calibrate.blunders import Late, Shown, all_bystanders, exchanged, in_time, late
 from stseg.calibrate.bystanders import Bystanders, tables_of
 from stseg.calibrate.verdict import LEAST, Disagreement, Verdict, judge
 from stseg.geometry import Rig
@@ -17,6 +17,8 @@ _MOST = 80
 """Frames that are looked at, evenly spread over those that are given."""
 _LATE = 1.0
 """Seconds by which a stream may be late."""
+_FAR = 1.5
+"""Cells from which on a view is so far off that another's stream is tried in its place."""
 _LOST = 0.5
 """Share of what is usual that a view must confirm not to be lost."""
 
@@ -36,7 +38,7 @@ class Check:
     swapped
         Two views whose streams are exchanged.
     late
-        Views that are not of the time of the others.
+        Views that are not of the time of the others; the verdict is that of their frames brought back to their time.
     people
         Number of people (a person in a frame counts once) whom two views or more show.
     """
@@ -67,13 +69,20 @@ def check_rig(rig: Rig, shown: Shown) -> Check:
     people = all_bystanders(rig, tables, shown, frames)
     share = confirmations(tables, people)
     lost = tuple(int(view) for view in np.flatnonzero(share < _LOST * np.nanmedian(share))) if _known(share) else ()
-    doubtful = bool(lost) or not _known(share)
-    swapped = exchanged(rig, tables, shown, frames, people) if doubtful else None
+    verdict = judge(rig, tables, people)
+    far = any(one.off > _FAR * rig.grid.cell for one in verdict.named)
+    swapped = exchanged(rig, tables, shown, frames, people) if lost or far or not _known(share) else None
     if swapped is not None:
         return Check(Verdict((None,) * len(tables), (), None), tuple(share.tolist()), (), swapped, (), len(people))
-    shifted = tuple(late(tables, shown, people, max(1, round(_LATE * rig.frame_rate))))
-    verdict = judge(rig, tables, people)
-    return Check(verdict, tuple(share.tolist()), lost, None, shifted, len(people))
+    shifted: list[Late] = []
+    most = max(1, round(_LATE * rig.frame_rate))
+    while len(shifted) < len(tables) // 2 and (one := late(tables, shown, people, most)) is not None:
+        shifted.append(one)
+        shown = in_time(shown, one, len(tables))
+        people = all_bystanders(rig, tables, shown, frames)
+    if shifted:
+        verdict, share = judge(rig, tables, people), confirmations(tables, people)
+    return Check(verdict, tuple(share.tolist()), lost, None, tuple(shifted), len(people))
 
 
 def spread(frames: Sequence[int]) -> list[int]:
@@ -105,8 +114,8 @@ def in_words(rig: Rig, check: Check) -> list[str]:
     names = [camera.name for camera in rig.cameras]
     words = []
     if check.swapped is not None:
-        first, second = (names[view] for view in check.swapped)
-        words.append(f"{first} and {second} seem to be swapped: their frames fit far better the other way round")
+        pair = " and ".join(names[view] for view in check.swapped)
+        words.append(f"{pair} seem to be swapped: their frames fit far better the other way round")
     for one in check.late:
         side = "late" if one.frames > 0 else "early"
         words.append(
@@ -118,14 +127,15 @@ def in_words(rig: Rig, check: Check) -> list[str]:
         if view not in named:
             usual = 100 * float(np.nanmedian(check.confirmed))
             words.append(
-                f"{names[view]} shows only {100 * check.confirmed[view]:.0f} % of the people whom others see within its "
-                f"image (usual: {usual:.0f} %): it is off by more than half a metre, blind, or another camera's stream"
+                f"{names[view]} shows only {100 * check.confirmed[view]:.0f} % of the people whom others see within "
+                f"its image (usual: {usual:.0f} %): it is off by more than half a metre, blind, or not this camera's "
+                "stream"
             )
     if check.verdict.quarrel is not None:
-        one, other = check.verdict.quarrel
+        first_view, second_view = check.verdict.quarrel
         words.append(
-            f"{names[one.view]} and {names[other.view]} disagree by {100 * one.off:.0f} cm: two views alone do not tell "
-            "which of them is off"
+            f"{names[first_view.view]} and {names[second_view.view]} disagree by {100 * first_view.off:.0f} cm: two "
+            "views alone do not tell which of them is off"
         )
     silent = [name for name, one in zip(names, check.verdict.views, strict=True) if one is None]
     if silent and check.swapped is None:

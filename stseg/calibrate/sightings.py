@@ -7,7 +7,7 @@ from scipy import ndimage
 
 from stseg.arrays import Boxes, Floats, Singles
 
-_FOREGROUND = 0.5
+_FOREGROUND = 0.8
 """Likelihood from which on a pixel belongs to a blob."""
 _LEAST = 0.0006
 """Of the image's area: smaller blobs are noise."""

@@ -24,6 +24,8 @@ from stseg.geometry.bodies import BodyTable
 LEAST = 20
 """People that a statement on a view needs."""
 _ROUNDS = 15
+_FEET, _HIDDEN = 2, 0.35
+"""The column of the feet, and what a lower edge above them counts: others and furniture hide feet."""
 _SUSPECTS = 3
 """Views that are tried as the one to blame, those that are most off."""
 
@@ -173,7 +175,7 @@ class _Planes:
 
 
 def _smooth(ground: Floats, across: Floats) -> _Planes:
-    """Planes through each column (n, column), nan where unknown: least absolute deviations, by reweighting."""
+    """Planes through middles, heads and feet (n, 3), nan where unknown: least absolute deviations, by reweighting."""
     middle = np.median(ground, axis=0)
     basis = np.column_stack([np.ones(len(ground)), ground - middle])
     found = np.zeros((3, across.shape[1]))
@@ -185,7 +187,9 @@ def _smooth(ground: Floats, across: Floats) -> _Planes:
         for _ in range(_ROUNDS):
             normal = (own * weight[:, None]).T @ own + np.diag([0.0, 1e-3, 1e-3])
             found[:, column] = np.linalg.solve(normal, (own * weight[:, None]).T @ value)
-            weight = 1 / np.maximum(np.abs(value - own @ found[:, column]), 0.01)
+            rest = value - own @ found[:, column]
+            hidden = _HIDDEN if column == _FEET else 1.0
+            weight = np.where(rest < 0, hidden, 1.0) / np.maximum(np.abs(rest), 0.01)
     return _Planes(middle, found)
 
 
