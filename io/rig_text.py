@@ -51,7 +51,8 @@ def _camera_lines(camera: Camera) -> list[str]:
     ]
     if camera.lens is not None:
         matrix, distortion = _rows(camera.lens.matrix), _list(camera.lens.distortion)
-        lines += ["# camera matrix; k1, k2, p1, p2, k3", f"lens = {{ matrix = {matrix}, distortion = {distortion} }}"]
+        names = "k1, k2, p1, p2, k3" if len(camera.lens.distortion) == 5 else "k1, k2, p1, p2, k3, k4, k5, k6"
+        lines += [f"# camera matrix; {names}", f"lens = {{ matrix = {matrix}, distortion = {distortion} }}"]
     return lines
 
 

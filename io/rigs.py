@@ -178,8 +178,8 @@ def _lens(table: Table) -> Lens:
     if min(matrix[0, 0], matrix[1, 1]) <= 0 or matrix[1, 0] != 0 or matrix[2].tolist() != [0, 0, 1]:
         raise table.error("matrix", matrix.tolist(), "a camera matrix [[fx, s, cx], [0, fy, cy], [0, 0, 1]]")
     distortion = table.numbers("distortion", ANY)
-    if len(distortion) > 5:
-        raise table.error("distortion", f"{len(distortion)} numbers", "at most 5: k1, k2, p1, p2, k3")
+    if len(distortion) > 8:
+        raise table.error("distortion", f"{len(distortion)} numbers", "at most 8: k1, k2, p1, p2, k3, k4, k5, k6")
     return Lens(matrix, distortion)
 
 

@@ -6,12 +6,12 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
-from typing import TypeVar
+from typing import Self, TypeVar
 
 import numpy as np
 
 from stseg.arrays import Floats
-from stseg.errors import RigError
+from stseg.errors import InputError, RigError
 
 ANY = -1
 """In a shape: any number of rows."""
@@ -44,7 +44,7 @@ class Table:
         """The key's full name."""
         return f"{self.place}.{name}" if self.place else name
 
-    def error(self, name: str, found: object, expected: str) -> RigError:
+    def error(self, name: str, found: object, expected: str) -> InputError:
         """An error at the key `name`."""
         return RigError(self.file, self.key(name), found, expected)
 
@@ -108,20 +108,20 @@ class Table:
             raise self.error(name, f"{array[~np.isfinite(array)][0]} in it", f"{expected}, all finite")
         return array
 
-    def table(self, name: str) -> Table:
+    def table(self, name: str) -> Self:
         """The table below this key."""
         value = self._get(name, "a table")
         if not isinstance(value, dict):
             raise self.error(name, _shown(value), "a table")
-        return Table(self.file, self.key(name), value)
+        return type(self)(self.file, self.key(name), value)
 
-    def tables(self, name: str) -> tuple[Table, ...]:
+    def tables(self, name: str) -> tuple[Self, ...]:
         """The tables of an array of tables, at least one, counted from 0."""
         expected = f"at least one [[{name}]]"
         value = self._get(name, expected)
         if not isinstance(value, list) or not value or not all(isinstance(row, dict) for row in value):
             raise self.error(name, _shown(value), expected)
-        return tuple(Table(self.file, f"{self.key(name)}[{index}]", row) for index, row in enumerate(value))
+        return tuple(type(self)(self.file, f"{self.key(name)}[{index}]", row) for index, row in enumerate(value))
 
     def _get(self, name: str, expected: str) -> object:
         if name not in self.values:

@@ -152,7 +152,12 @@ class TestCamera:
 
 
 class TestLens:
-    @given(poses(), GROUNDS, HEIGHTS, st.sampled_from((BARREL, BARREL[:2], (0.1, 0.05, 0.002, -0.003, 0.01))))
+    @given(
+        poses(),
+        GROUNDS,
+        HEIGHTS,
+        st.sampled_from((BARREL, BARREL[:2], (0.1, 0.05, 0.002, -0.003, 0.01), (*BARREL, 0.3, 0.1, 0.02))),
+    )
     def test_distorts_as_opencv_does(
         self, pose: Pose, ground: Floats, height: float, distortion: tuple[float, ...]
     ) -> None:
@@ -178,6 +183,10 @@ class TestLens:
         bent = radius * (1 + k1 * radius**2 + k2 * radius**4 + k3 * radius**6)
         turn = radius[np.argmax(np.diff(bent) < 0)]
         assert LENS.fold == pytest.approx(turn, abs=2e-5)
+        rational = Lens(MATRIX, np.array([*BARREL, 0.3, -0.1, 0.02]))
+        bent = radius * (1 + k1 * radius**2 + k2 * radius**4 + k3 * radius**6)
+        bent /= 1 + 0.3 * radius**2 - 0.1 * radius**4 + 0.02 * radius**6
+        assert rational.fold == pytest.approx(radius[np.argmax(np.diff(bent) < 0)], abs=2e-5)
         assert Lens(MATRIX, np.array([0.1, 0.2])).fold == np.inf
         assert Lens(MATRIX, np.zeros(0)).fold == np.inf
 

@@ -35,6 +35,7 @@ CROSSINGS = {
 BESIDE = {
     "evaluation": {"errors", "arrays"},
     "io": {"errors", "arrays", "settings", "config", "tracks", "geometry", "__init__"},
+    "calibrate": {"errors", "arrays", "geometry"},
     "report": {"errors", "arrays", "tracks", "geometry"},
     "simulate": {"errors", "arrays", "accelerate", "geometry"},
 }

@@ -16,9 +16,10 @@ from stseg.arrays import Floats
 from stseg.commands.calibrate import app
 from stseg.errors import CalibrationError, ConfigError, FormatError, OutputError, RigError
 from stseg.geometry import Camera
+from stseg.io.calibrations.foreign import Foreign
 from stseg.io.calibrations.opencv_xml import read_opencv_xml
 from stseg.io.calibrations.projection import read_projection
-from stseg.io.calibrations.world import Unit, Up, World
+from stseg.io.calibrations.world import Up, World
 from stseg.io.rigs import read_rig
 
 DATA = Path(os.environ.get("STSEG_DATA", Path(__file__).parents[1] / "../shared/data"))
@@ -63,7 +64,12 @@ def whole(distortion: Floats | None = None) -> str:
 def opencv_camera(text: str, folder: Path, world: World | None = None) -> Camera:
     file = folder / "config.xml"
     file.write_text(text)
-    return read_opencv_xml([file], "cam", SIZE, world or World("mm", "-z"))
+    return camera_of(read_opencv_xml([file]), world or World("mm", "-z"))
+
+
+def camera_of(read: list[Foreign], world: World, size: tuple[int, int] = SIZE) -> Camera:
+    (foreign,) = read
+    return world.camera(foreign, "cam", size)
 
 
 def in_world(ground: Floats, heights: Floats, per_metre: float, up: float) -> Floats:
@@ -74,27 +80,27 @@ def in_world(ground: Floats, heights: Floats, per_metre: float, up: float) -> Fl
 class TestWorld:
     @pytest.mark.parametrize(("unit", "per_metre"), [("mm", 1000.0), ("cm", 100.0), ("m", 1.0)])
     @pytest.mark.parametrize(("up", "sign"), [("+z", 1.0), ("-z", -1.0)])
-    def test_points_keep_their_pixels(self, unit: Unit, per_metre: float, up: Up, sign: float) -> None:
+    def test_points_keep_their_pixels(self, unit: str, per_metre: float, up: Up, sign: float) -> None:
         points = in_world(GROUND, HEIGHTS, per_metre, sign)
         homogeneous = np.column_stack([GROUND, HEIGHTS, np.ones(4)]) @ World(unit, up).from_metres.T
         np.testing.assert_allclose(homogeneous, np.column_stack([points, np.ones(4)]), rtol=1e-15)
         assert np.linalg.det(World(unit, up).from_metres) > 0, "a mirrored world"
 
     @given(poses(), st.sampled_from(("mm", "cm", "m")), st.sampled_from(("+z", "-z")), numbers(-5.0, 5.0))
-    def test_scale_of_the_matrix_is_depth_in_metres(self, pose: Pose, unit: Unit, up: Up, factor: float) -> None:
+    def test_scale_of_the_matrix_is_depth_in_metres(self, pose: Pose, unit: str, up: Up, factor: float) -> None:
         world = World(unit, up)
         scale = factor if abs(factor) > 0.1 else 1.0
         foreign = pose.projection @ np.linalg.inv(world.from_metres) * scale
-        camera = world.camera(Path("p.txt"), "cam", SIZE, foreign)
+        camera = world.camera(Foreign(Path("p.txt"), "", None, foreign), "cam", SIZE)
         np.testing.assert_allclose(camera.projection, pose.projection, rtol=1e-9, atol=1e-9)
 
     def test_no_camera_names_the_file(self) -> None:
         with pytest.raises(CalibrationError, match=r"p.txt: projection matrix: found a singular"):
-            World().camera(Path("p.txt"), "cam", SIZE, np.zeros((3, 4)))
+            World().camera(Foreign(Path("p.txt"), "", None, np.zeros((3, 4))), "cam", SIZE)
 
 
 class TestOpencvXml:
-    @pytest.mark.parametrize("distortion", [BARREL, BARREL[:4], (0.0,) * 5])
+    @pytest.mark.parametrize("distortion", [BARREL, BARREL[:4], (*BARREL, 0.02, -0.01, 0.03), (0.0,) * 5])
     def test_projects_as_opencv_does(self, tmp_path: Path, distortion: tuple[float, ...]) -> None:
         camera = opencv_camera(whole(np.array(distortion)), tmp_path)
         points = in_world(GROUND, HEIGHTS, 1000.0, -1.0)
@@ -107,7 +113,7 @@ class TestOpencvXml:
         intrinsic, extrinsic = tmp_path / "intr.xml", tmp_path / "extr.xml"
         intrinsic.write_text(xml(camera_matrix=MATRIX, distortion_coefficients=np.array(BARREL)))
         extrinsic.write_text(xml(rvec="\n -1.2 0. -0e0\n", tvec=" ".join(map(repr, TRANSLATION.tolist()))))
-        camera = read_opencv_xml([intrinsic, extrinsic], "cam", SIZE, World("mm", "-z"))
+        camera = camera_of(read_opencv_xml([intrinsic, extrinsic]), World("mm", "-z"))
         np.testing.assert_array_equal(camera.projection, opencv_camera(whole(), tmp_path).projection)
 
     @pytest.mark.parametrize(
@@ -120,7 +126,7 @@ class TestOpencvXml:
             ("500.0 0.0", "0.0", r"camera_matrix: found 8 numbers"),
             ("500.0 0.0", "nan 0.0", r"camera_matrix: found 9 numbers: nan .* finite"),
             ("500.0 0.0", "-500.0 0.0", r"camera_matrix: found \[\[-500.0"),
-            ("-0.107", "-0.107 0.1 0 0", r"distortion_coefficients: found 8 coefficients, expected at most 5"),
+            ("-0.107", "-0.107 0 0 0 .1 0 0 0", r"distortion_coefficients: found 12 coefficients, expected at most 8"),
             ("</opencv_storage>", "", r"found what is not XML"),
         ],
     )
@@ -139,11 +145,11 @@ class TestOpencvXml:
         file = tmp_path / "config.xml"
         file.write_bytes(whole().replace("<opencv_storage>", f"{bomb}<opencv_storage>").encode(encoding))
         with pytest.raises(FormatError, match=r"config.xml: found (a document type declaration|what is not XML)"):
-            read_opencv_xml([file], "cam", SIZE, World())
+            read_opencv_xml([file])
 
     def test_missing_file(self, tmp_path: Path) -> None:
         with pytest.raises(FormatError, match=r"nowhere.xml: found No such file"):
-            read_opencv_xml([tmp_path / "nowhere.xml"], "cam", SIZE, World())
+            read_opencv_xml([tmp_path / "nowhere.xml"])
 
 
 class TestProjection:
@@ -167,7 +173,7 @@ class TestProjection:
 
     @pytest.mark.parametrize("suffix", [".txt", ".csv", ".npy", ".npz", ".mat"])
     def test_every_format_holds_the_same_camera(self, tmp_path: Path, suffix: str) -> None:
-        camera = read_projection(self.write(tmp_path / f"cam{suffix}"), "cam", SIZE, World("mm", "-z"))
+        camera = camera_of(read_projection([self.write(tmp_path / f"cam{suffix}")]), World("mm", "-z"))
         expected = project_by_matrix(self.matrix, in_world(GROUND, HEIGHTS, 1000.0, -1.0))
         np.testing.assert_allclose(camera.project(GROUND, HEIGHTS)[0], expected, rtol=1e-9)
 
@@ -177,25 +183,25 @@ class TestProjection:
         file = tmp_path / f"cam{suffix}"
         file.write_bytes(content)
         with pytest.raises(FormatError, match=rf"cam{suffix}: found .* expected one 3x4 projection matrix"):
-            read_projection(file, "cam", SIZE, World())
+            read_projection([file])
 
     @pytest.mark.parametrize("suffix", [".txt", ".npy", ".npz", ".mat"])
     def test_missing_file(self, tmp_path: Path, suffix: str) -> None:
         with pytest.raises(FormatError, match=r"No such file"):
-            read_projection(tmp_path / f"nowhere{suffix}", "cam", SIZE, World())
+            read_projection([tmp_path / f"nowhere{suffix}"])
 
     def test_refuses_what_is_not_one_matrix(self, tmp_path: Path) -> None:
         np.savez(tmp_path / "two.npz", a=self.matrix, b=self.matrix)
         with pytest.raises(FormatError, match=r"2 arrays of that shape \(a, b\)"):
-            read_projection(tmp_path / "two.npz", "cam", SIZE, World())
+            read_projection([tmp_path / "two.npz"])
         np.save(tmp_path / "nan.npy", self.matrix * np.nan)
         with pytest.raises(FormatError, match=r"not finite numbers"):
-            read_projection(tmp_path / "nan.npy", "cam", SIZE, World())
+            read_projection([tmp_path / "nan.npy"])
         np.save(tmp_path / "objects.npy", self.matrix.astype(object))
         with pytest.raises(FormatError, match=r"cannot be read"):
-            read_projection(tmp_path / "objects.npy", "cam", SIZE, World())
+            read_projection([tmp_path / "objects.npy"])
         with pytest.raises(FormatError, match=r"the suffix '.yml', expected one of .txt"):
-            read_projection(tmp_path / "cam.yml", "cam", SIZE, World())
+            read_projection([tmp_path / "cam.yml"])
 
 
 class TestRealCalibrations:
@@ -207,7 +213,7 @@ class TestRealCalibrations:
         assert len(files) == 4
         grid = np.stack(np.meshgrid(np.linspace(-1.5, 1.5, 7), np.linspace(-2.5, 0.5, 7)), -1).reshape(-1, 2)
         for file in files:
-            camera = read_opencv_xml([file], "cam", (644, 486), World("mm", "-z"))
+            camera = camera_of(read_opencv_xml([file]), World("mm", "-z"), (644, 486))
             assert 1.2 < camera.centre[2] < 2.5, "as high as the cameras hang"
             for height in (0.0, 1.8):
                 expected = self.opencv_pixels([file], in_world(grid, np.full(len(grid), height), 1000.0, -1.0))
@@ -220,7 +226,7 @@ class TestRealCalibrations:
         grid = np.stack(np.meshgrid(np.linspace(-2.5, 8.5, 8), np.linspace(-8.5, 26.5, 9)), -1).reshape(-1, 2)
         for name in ("CVLab1", "CVLab2", "CVLab3", "CVLab4", "IDIAP1", "IDIAP2", "IDIAP3"):
             files = [folder / f"intrinsic_zero/intr_{name}.xml", folder / f"extrinsic/extr_{name}.xml"]
-            camera = read_opencv_xml(files, name, (1920, 1080), World("cm"))
+            camera = camera_of(read_opencv_xml(files), World("cm"), (1920, 1080))
             assert camera.lens is None
             assert 1.5 < camera.centre[2] < 4.0
             for height in (0.0, 1.8):
@@ -234,7 +240,7 @@ class TestRealCalibrations:
         assert len(files) == 4
         grid = np.stack(np.meshgrid(np.linspace(2.0, 6.0, 5), np.linspace(0.0, 3.4, 5)), -1).reshape(-1, 2)
         for file in files:
-            camera = read_projection(file, "cam", (1920, 1024), World("m"))
+            camera = camera_of(read_projection([file]), World("m"), (1920, 1024))
             assert 1.8 < camera.centre[2] < 2.6
             with h5py.File(file) as group:
                 (stored,) = (dataset[()] for dataset in group.values())
@@ -293,7 +299,8 @@ class TestCommand:
         assert recording.sources[1].background is not None
         line = "left: at (0.00, 0.00) m, 2.00 m above the ground"
         printed = capsys.readouterr().out.replace("-0.00", "0.00").splitlines()
-        assert printed == [line, line.replace("left", "right"), "wrote room.toml"]
+        world = "calibrated in mm (given), -z up (given)"
+        assert printed == [world, line, line.replace("left", "right"), "wrote room.toml"]
 
     def test_options_may_stand_apart_from_their_values(self, calibrations: list[str]) -> None:
         apart = [word for option in (*SCENE, *SOURCE) for word in option.split("=")]
@@ -368,6 +375,7 @@ class TestCommand:
         with pytest.raises(FormatError, match=r"nowhere.xml: found No such file"):
             calibrate("opencv", "nowhere.xml", *options)
         Path("left/left").mkdir()
+        Path("left/left/config.xml").write_text(whole())
         with pytest.raises(ConfigError, match=r"--names: found files and folders that share"):
             calibrate("opencv", calibrations[0], "left/left/config.xml", *options)
 

@@ -1,43 +1,42 @@
-"""Cameras given as 3x4 projection matrices: text, NumPy's .npy and .npz, MATLAB's .mat of version 7.3 (HDF5)."""
+"""Cameras given as 3x4 projection matrices: text, NumPy's .npy and .npz, MATLAB's .mat (HDF5 since version 7.3)."""
 
 from __future__ import annotations
 
+import struct
 import zipfile
 import zlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import h5py
 import numpy as np
+from scipy.io import loadmat
+from scipy.io.matlab import MatReadError
 
 from stseg.arrays import AnyArray, Floats
 from stseg.errors import FormatError
-from stseg.geometry import Camera
-from stseg.io.calibrations.world import World
+from stseg.io.calibrations.foreign import Foreign
 
 _EXPECTED = "one 3x4 projection matrix"
 
 
-def read_projection(file: Path, name: str, size: tuple[int, int], world: World) -> Camera:
-    """One camera from the one 3x4 matrix in a file.
+def read_projection(files: Sequence[Path]) -> list[Foreign]:
+    """One camera a file, from the one 3x4 matrix in it.
 
     Parameters
     ----------
-    file
-        Its suffix says the format: .txt or .csv (twelve numbers, row by row, with blanks or commas), .npy, .npz,
-        .mat (version 7.3).
-    name, size
-        Of the camera; the file does not tell.
-    world
-        Unit and upward axis of the points that the matrix projects.
+    files
+        The suffix says the format: .txt or .csv (twelve numbers, row by row, with blanks or commas), .npy, .npz, .mat.
 
     Raises
     ------
     FormatError
-        Where the file does not hold exactly one such matrix.
-    CalibrationError
-        Where the matrix is no camera's.
+        Where a file does not hold exactly one such matrix.
     """
+    return [_read(file) for file in files]
+
+
+def _read(file: Path) -> Foreign:
     reader = _READERS.get(file.suffix.lower())
     if reader is None:
         raise FormatError(file, "", f"the suffix {file.suffix!r}", f"one of {', '.join(_READERS)}")
@@ -54,7 +53,7 @@ def read_projection(file: Path, name: str, size: tuple[int, int], world: World) 
     ((key, matrix),) = matrices.items()
     if matrix.dtype.kind not in "iuf" or not np.isfinite(matrix).all():
         raise FormatError(file, key, "values that are not finite numbers", _EXPECTED)
-    return world.camera(file, name, size, matrix.astype(float))
+    return Foreign(file, "", None, matrix.astype(float))
 
 
 def _read_text(file: Path) -> Mapping[str, Floats]:
@@ -76,11 +75,18 @@ def _read_npz(file: Path) -> Mapping[str, AnyArray]:
 
 def _read_mat(file: Path) -> Mapping[str, AnyArray]:
     if not h5py.is_hdf5(file):
-        raise ValueError("older than version 7.3: save it with '-v7.3', or as text")
+        return {key: array for key, array in _read_old_mat(file).items() if not key.startswith("__")}
     with h5py.File(file, "r") as group:
         stored = {key: group[key] for key in group if isinstance(group.get(key), h5py.Dataset)}
         # MATLAB writes columns first, so HDF5 sees the transpose.
         return {key: np.asarray(array[()]).T for key, array in stored.items() if array.shape == (4, 3)}
+
+
+def _read_old_mat(file: Path) -> Mapping[str, AnyArray]:
+    try:
+        return {key: np.asarray(array) for key, array in loadmat(file).items()}
+    except (MatReadError, NotImplementedError, TypeError, struct.error) as error:
+        raise ValueError(f"no .mat file: {error}") from error
 
 
 _READERS: dict[str, Callable[[Path], Mapping[str, AnyArray]]] = {

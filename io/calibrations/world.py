@@ -2,66 +2,160 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
+from scipy.linalg import rq
 
 from stseg.arrays import Floats
-from stseg.errors import CalibrationError
-from stseg.geometry import Camera, Lens
+from stseg.errors import CalibrationError, ConfigError
+from stseg.geometry import Camera
+from stseg.io.calibrations.foreign import Foreign
 
-Unit = Literal["mm", "cm", "m"]
-Up = Literal["+z", "-z"]
-_PER_METRE: dict[Unit, float] = {"mm": 1000.0, "cm": 100.0, "m": 1.0}
+Up = Literal["+z", "-z", "+y", "-y", "+x", "-x"]
+UNITS = {"mm": 0.001, "cm": 0.01, "m": 1.0}
+"""Metres in each unit that has a name."""
+_TURNS: dict[Up, list[list[float]]] = {
+    "+z": [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
+    "-z": [[1, 0, 0], [0, -1, 0], [0, 0, -1]],
+    "+y": [[1, 0, 0], [0, 0, 1], [0, -1, 0]],
+    "-y": [[1, 0, 0], [0, 0, -1], [0, 1, 0]],
+    "+x": [[0, 0, 1], [1, 0, 0], [0, 1, 0]],
+    "-x": [[0, 0, -1], [0, 1, 0], [1, 0, 0]],
+}
+_HUNG = 2.5  # metres above the ground, where cameras commonly hang
+_HEIGHTS = (0.3, 60.0)  # metres, between which they hang at all
 
 
 @dataclass(frozen=True, slots=True)
 class World:
-    """Unit and upward axis of a calibration.
+    """Unit, upward axis and handedness of a calibration.
 
     Attributes
     ----------
     unit
-        What its lengths are measured in.
+        What its lengths are measured in: mm, cm, m, or how many metres one of its units is.
     up
-        Which way its Z axis points away from the ground. With -z the world is turned half round the X axis:
-        X = x, Y = -y, Z = -z, which keeps it right-handed.
+        Which of its axes points away from the ground. The others follow by half or quarter turns, which keep left and
+        right: with -z, X = x, Y = -y, Z = -z; with -y (a camera's own axes), X = x, Y = -z, Z = y.
+    mirrored
+        It is left-handed, as grids are whose rows count downwards: our y is its other way round.
+
+    Raises
+    ------
+    ConfigError
+        Where the unit is none.
     """
 
-    unit: Unit = "m"
+    unit: str = "m"
     up: Up = "+z"
+    mirrored: bool = False
+
+    def __post_init__(self) -> None:
+        try:
+            sound = 0 < self.metres < np.inf
+        except ValueError:
+            sound = False
+        if not sound:
+            raise ConfigError("--unit", "", repr(self.unit), "mm, cm, m, or how many metres a unit is")
+
+    @property
+    def metres(self) -> float:
+        """Metres in one of its units."""
+        return UNITS[self.unit] if self.unit in UNITS else float(self.unit)
 
     @property
     def from_metres(self) -> Floats:
         """Matrix from homogeneous points in metres, Z up, to this world, float64 (4, 4)."""
-        turn = np.array([1.0, 1.0, 1.0] if self.up == "+z" else [1.0, -1.0, -1.0])
-        return np.diag([*(turn * _PER_METRE[self.unit]), 1.0])
+        matrix = np.eye(4)
+        matrix[:3, :3] = np.array(_TURNS[self.up]) / self.metres
+        return matrix @ np.diag([1.0, -1.0 if self.mirrored else 1.0, 1.0, 1.0])
 
-    def camera(
-        self, file: Path, name: str, size: tuple[int, int], projection: Floats, lens: Lens | None = None
-    ) -> Camera:
-        """The camera whose 3x4 matrix maps points of this world to (undistorted) pixels.
+    def camera(self, foreign: Foreign, name: str, size: tuple[int, int]) -> Camera:
+        """The camera in metres with Z up.
 
         The matrix is scaled so that the third coordinate is the depth in metres where it is a calibrated camera's.
-
-        Parameters
-        ----------
-        file
-            Where the matrix comes from, for errors.
-        name, size, lens
-            As in `Camera`.
-        projection : float64 (3, 4)
 
         Raises
         ------
         CalibrationError
             Where the matrix is no camera's.
         """
-        in_metres = projection @ self.from_metres
+        in_metres = foreign.projection @ self.from_metres
         depth = float(np.linalg.norm(in_metres[2, :3]))
         try:
-            return Camera.from_projection(name, size, in_metres / depth if depth > 0 else in_metres, lens)
+            return Camera.from_projection(name, size, in_metres / depth if depth > 0 else in_metres, foreign.lens)
         except CalibrationError as error:
-            raise CalibrationError(file, "projection matrix", error.found, error.expected) from error
+            raise CalibrationError(foreign.file, "projection matrix", error.found, error.expected) from error
+
+
+def guess_up(cameras: Sequence[Foreign]) -> Up:
+    """The axis that is upwards in most images: people hang cameras upright, or nearly so."""
+    upward = np.sum([-_rotation(camera)[1] for camera in cameras], axis=0)
+    axis = int(np.abs(upward).argmax())
+    name = f"{'+' if upward[axis] > 0 else '-'}{'xyz'[axis]}"
+    return next(up for up in get_args(Up) if up == name)
+
+
+def guess_unit(cameras: Sequence[Foreign], up: Up, mirrored: bool = False) -> str:
+    """The unit in which the cameras hang most nearly as high as cameras do.
+
+    Raises
+    ------
+    CalibrationError
+        Where they hang below the ground in any unit.
+    """
+    height = median_height(cameras, World("m", up, mirrored))
+    if height <= 0:
+        raise CalibrationError(
+            cameras[0].file,
+            "camera centres",
+            f"cameras below the ground with {up} upwards",
+            "them above it: give --up, and --mirrored where the calibration is left-handed",
+        )
+    return min(UNITS, key=lambda unit: abs(np.log(height * UNITS[unit] / _HUNG)))
+
+
+def require_height(cameras: Sequence[Foreign], world: World) -> None:
+    """Refuse a unit in which cameras hang in the clouds or lie on the floor, where another makes sense.
+
+    Raises
+    ------
+    CalibrationError
+    """
+    height = median_height(cameras, world)
+    if height <= 0 or _HEIGHTS[0] <= height <= _HEIGHTS[1]:
+        return
+    better = guess_unit(cameras, world.up, world.mirrored)
+    if _HEIGHTS[0] <= height / world.metres * UNITS[better] <= _HEIGHTS[1]:
+        raise CalibrationError(
+            cameras[0].file,
+            f"--unit {world.unit}",
+            f"cameras {height:.4g} m above the ground",
+            f"{_HEIGHTS[0]} to {_HEIGHTS[1]:.0f} m: are its lengths in {better}? (--unit {better})",
+        )
+
+
+def median_height(cameras: Sequence[Foreign], world: World) -> float:
+    """How high the cameras hang in that world, metres; negative below the ground."""
+    to_metres = np.linalg.inv(world.from_metres)
+    heights = [float((to_metres @ _centre(camera))[2]) for camera in cameras]
+    return float(np.median(heights))
+
+
+def _centre(camera: Foreign) -> Floats:
+    """Homogeneous, in the foreign world, float64 (4,)."""
+    projection = camera.projection
+    try:
+        return np.append(-np.linalg.solve(projection[:, :3], projection[:, 3]), 1.0)
+    except np.linalg.LinAlgError as error:
+        raise CalibrationError(camera.file, "projection matrix", "a singular one", "a camera's") from error
+
+
+def _rotation(camera: Foreign) -> Floats:
+    """R of P ~ K [R | t] with a positive diagonal of K and det R = 1, float64 (3, 3)."""
+    triangle, rotation = rq(camera.projection[:, :3])
+    rotation = np.sign(np.diag(triangle))[:, None] * rotation
+    return np.asarray(rotation * np.sign(np.linalg.det(rotation)))

@@ -1,4 +1,4 @@
-"""A lens: OpenCV's radial and tangential model, with its fold.
+"""A lens: OpenCV's radial (polynomial or rational) and tangential model, with its fold.
 
 Strong barrel distortion is a polynomial that turns round: far off-axis points come back into the image. The model
 means nothing there, so a point is rejected by its angle, beyond the first turning point of r (1 + k1 r^2 + ...).
@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.polynomial import Polynomial
 
 from stseg.arrays import Flags, Floats
 
@@ -23,10 +24,11 @@ class Lens:
     ----------
     matrix : float64 (3, 3)
         Camera matrix, pixels.
-    distortion : float64 (5,)
-        k1, k2, p1, p2, k3 of OpenCV's model; shorter lists are filled with zeros.
+    distortion : float64 (5,) or (8,)
+        k1, k2, p1, p2, k3 of OpenCV's model, or those and the k4, k5, k6 of its rational form; shorter lists are
+        filled with zeros.
     fold : float
-        Tangent of the largest angle from the axis at which the radial polynomial still rises.
+        Tangent of the largest angle from the axis at which the radial function still rises.
     """
 
     matrix: Floats
@@ -36,7 +38,7 @@ class Lens:
     def __post_init__(self) -> None:
         given = np.asarray(self.distortion, float).ravel()
         object.__setattr__(self, "matrix", np.asarray(self.matrix, float).reshape(3, 3))
-        object.__setattr__(self, "distortion", np.concatenate([given, np.zeros(5 - len(given))]))
+        object.__setattr__(self, "distortion", _filled(given, 5 if len(given) <= 5 else 8))
         object.__setattr__(self, "fold", _fold(self.distortion))
 
     def distort(self, pixel: Floats) -> tuple[Floats, Flags]:
@@ -81,10 +83,10 @@ class Lens:
         return np.asarray(ray @ self.matrix[:2, :2].T + self.matrix[:2, 2])
 
     def _bend(self, ray: Floats) -> Floats:
-        k1, k2, p1, p2, k3 = self.distortion
+        _, _, p1, p2, *_ = self.distortion
         x, y = ray[..., 0], ray[..., 1]
         square = x * x + y * y
-        radial = 1 + square * (k1 + square * (k2 + square * k3))
+        radial, _ = self._radial(square)
         return np.stack(
             [
                 x * radial + 2 * p1 * x * y + p2 * (square + 2 * x * x),
@@ -93,13 +95,25 @@ class Lens:
             -1,
         )
 
+    def _radial(self, square: Floats) -> tuple[Floats, Floats]:
+        """How far a ray of squared radius s is stretched, N(s) / D(s), and the slope of that in s."""
+        k1, k2, _, _, k3, *rational = self.distortion
+        over = 1 + square * (k1 + square * (k2 + square * k3))
+        rise = k1 + square * (2 * k2 + square * 3 * k3)
+        if not rational:
+            return over, rise
+        k4, k5, k6 = rational
+        under = 1 + square * (k4 + square * (k5 + square * k6))
+        fall = k4 + square * (2 * k5 + square * 3 * k6)
+        return over / under, (rise - over / under * fall) / under
+
     def _slope(self, ray: Floats) -> Floats:
         """Jacobian of `_bend`, float64 (..., 2, 2)."""
-        k1, k2, p1, p2, k3 = self.distortion
+        _, _, p1, p2, *_ = self.distortion
         x, y = ray[..., 0], ray[..., 1]
         square = x * x + y * y
-        radial = 1 + square * (k1 + square * (k2 + square * k3))
-        rise = 2 * (k1 + square * (2 * k2 + square * 3 * k3))
+        radial, slope = self._radial(square)
+        rise = 2 * slope
         across = x * y * rise + 2 * p1 * x + 2 * p2 * y
         return np.stack(
             [
@@ -117,10 +131,19 @@ def _solve(slope: Floats, miss: Floats) -> Floats:
     return np.asarray(np.stack([d * x - b * y, a * y - c * x], -1) / (a * d - b * c)[..., None])
 
 
+def _filled(given: Floats, length: int) -> Floats:
+    return np.concatenate([given, np.zeros(length - len(given))])
+
+
 def _fold(distortion: Floats) -> float:
-    """First positive root of d/dr [r (1 + k1 r^2 + k2 r^4 + k3 r^6)]; infinite where it never turns."""
-    k1, k2, _, _, k3 = distortion
-    squares = np.roots([7 * k3, 5 * k2, 3 * k1, 1.0])
+    """First positive root of the derivative of r N(r^2) / D(r^2), or of D; infinite where there is neither.
+
+    With s = r^2 the derivative's numerator is N D + 2 s (N' D - N D').
+    """
+    k1, k2, _, _, k3, k4, k5, k6 = _filled(distortion, 8)
+    over, under = Polynomial([1.0, k1, k2, k3]), Polynomial([1.0, k4, k5, k6])
+    rise = over * under + Polynomial([0.0, 2.0]) * (over.deriv() * under - over * under.deriv())
+    squares = np.concatenate([rise.trim().roots(), under.trim().roots()]).astype(complex)
     real = squares[np.abs(squares.imag) < 1e-9].real
     real = real[real > 0]
     return float(np.sqrt(real.min())) if len(real) else float("inf")

@@ -1,0 +1,119 @@
+"""A camera as another program's calibration gives it: in that calibration's own world, before units and axes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from stseg.arrays import Floats
+from stseg.errors import CalibrationError, FormatError, InputError
+from stseg.geometry import Lens
+from stseg.io.tables import Table
+
+MOST_DISTORTION = 8
+"""Coefficients that a lens may have: k1, k2, p1, p2, k3, and k4, k5, k6 of the rational form."""
+_ORTHONORMAL = 0.01  # by which printed rotations may miss
+
+
+@dataclass(frozen=True)
+class Foreign:
+    """A camera in a foreign world.
+
+    Attributes
+    ----------
+    file
+        Where it comes from, for errors.
+    name
+        What the calibration calls it; empty where it does not say.
+    size
+        Width and height of its image, pixels; None where the calibration does not say.
+    projection : float64 (3, 4)
+        Points of the foreign world to (undistorted) pixels.
+    lens
+        The lens, or None for an ideal image.
+    """
+
+    file: Path
+    name: str
+    size: tuple[int, int] | None
+    projection: Floats
+    lens: Lens | None = None
+
+
+Reader = Callable[[Sequence[Path]], list[Foreign]]
+"""Reads the files that belong together."""
+
+
+class ForeignTable(Table):
+    """A table of a calibration: what is wrong in it is a wrong format, not a wrong rig."""
+
+    def error(self, name: str, found: object, expected: str) -> InputError:
+        """An error at the key `name`."""
+        return FormatError(self.file, self.key(name), found, expected)
+
+    def matrix(self, name: str, rows: int, columns: int) -> Floats:
+        """A matrix in nested lists, or all of it in one list, row by row; float64 (rows, columns)."""
+        value = self.values.get(name)
+        flat = isinstance(value, list) and not any(isinstance(row, list) for row in value)
+        return self.numbers(name, rows * columns).reshape(rows, columns) if flat else self.numbers(name, rows, columns)
+
+    def vector(self, name: str, length: int) -> Floats:
+        """A vector in one list, or in a list of lists of one; float64 (length,)."""
+        value = self.values.get(name)
+        nested = isinstance(value, list) and any(isinstance(row, list) for row in value)
+        return self.numbers(name, length, 1)[:, 0] if nested else self.numbers(name, length)
+
+    def image_size(self, name: str) -> tuple[int, int]:
+        """Width and height, pixels."""
+        width, height = self.numbers(name, 2).tolist()
+        if width != int(width) or height != int(height) or min(width, height) < 1:
+            raise self.error(name, [width, height], "width and height in whole pixels")
+        return int(width), int(height)
+
+
+def of_pose(
+    file: Path,
+    name: str,
+    size: tuple[int, int] | None,
+    matrix: Floats,
+    rotation: Floats,
+    translation: Floats,
+    distortion: Floats,
+) -> Foreign:
+    """A camera P = K [R | t], with its lens unless the distortion is zero.
+
+    Parameters
+    ----------
+    file, name, size
+        As in `Foreign`.
+    matrix, rotation : float64 (3, 3)
+        K, pixels, and R.
+    translation : float64 (3,)
+        t, lengths of the foreign world.
+    distortion : float64 (n,)
+        OpenCV's coefficients; those beyond the first eight must be zero.
+
+    Raises
+    ------
+    FormatError
+        Where these are no camera matrix, no rotation, or too many coefficients.
+    CalibrationError
+        Where R is a mirror.
+    """
+    key = f"camera {name}" if name else "camera"
+    if min(matrix[0, 0], matrix[1, 1]) <= 0 or matrix[1, 0] != 0 or matrix[2].tolist() != [0, 0, 1]:
+        raise FormatError(file, f"{key}, camera_matrix", matrix.tolist(), "[[fx, s, cx], [0, fy, cy], [0, 0, 1]]")
+    if np.abs(rotation @ rotation.T - np.eye(3)).max() > _ORTHONORMAL:
+        raise FormatError(file, f"{key}, rotation", np.round(rotation, 3).tolist(), "a rotation")
+    if np.linalg.det(rotation) < 0:
+        raise CalibrationError(file, f"{key}, rotation", "a mirror", "a rotation, which keeps left and right")
+    if distortion[MOST_DISTORTION:].any():
+        found = f"{len(distortion)} coefficients"
+        raise FormatError(file, f"{key}, distortion_coefficients", found, "at most 8: k1, k2, p1, p2, k3, k4, k5, k6")
+    projection = matrix @ np.column_stack([rotation, translation])
+    kept = distortion[: MOST_DISTORTION if distortion[5:].any() else 5]
+    lens = Lens(matrix, kept) if distortion.any() else None
+    return Foreign(file, name, size, projection, lens)

@@ -1,0 +1,154 @@
+"""Calibrations of several cameras in one structured file: JSON, TOML or YAML."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from stseg.arrays import Floats
+from stseg.errors import FormatError
+from stseg.io.calibrations.foreign import Foreign, ForeignTable, of_pose
+from stseg.io.extras import load_extra
+from stseg.io.tables import ANY
+
+
+def read_krt_json(files: Sequence[Path]) -> list[Foreign]:
+    """Cameras by name, each with `K` (9 numbers), `RT` (12) and `imgSize`: `shelf` and `campus`.
+
+    Raises
+    ------
+    FormatError
+        Where a file is no such JSON.
+    """
+    return [camera for file in files for camera in _krt(_table(file, json.loads, "JSON"))]
+
+
+def _krt(top: ForeignTable) -> Iterator[Foreign]:
+    for name in top.values:
+        table = top.table(name)
+        pose = table.matrix("RT", 3, 4)
+        size = table.image_size("imgSize") if "imgSize" in table else None
+        distortion = table.numbers("distCoeff", ANY) if "distCoeff" in table else np.zeros(5)
+        yield of_pose(top.file, name, size, table.matrix("K", 3, 3), pose[:, :3], pose[:, 3], distortion)
+
+
+def read_pose_toml(files: Sequence[Path]) -> list[Foreign]:
+    """A table a camera with `matrix`, `distortions`, `rotation` (Rodrigues) and `translation`.
+
+    aniposelib, FreeMoCap and Pose2Sim write them as `[cam_0]` beside `[metadata]`, caliscope as `[cameras.0]`.
+
+    Raises
+    ------
+    FormatError
+        Where a file is no such TOML, or a lens is a fisheye.
+    """
+    return [camera for file in files for camera in _poses(_table(file, tomllib.loads, "TOML"))]
+
+
+def _poses(top: ForeignTable) -> Iterator[Foreign]:
+    cameras = top.table("cameras") if isinstance(top.values.get("cameras"), dict) else top
+    tables = [cameras.table(name) for name, value in cameras.values.items() if _is_camera(value)]
+    if not tables:
+        raise top.error("", "no camera", "tables with matrix, rotation and translation")
+    for table in tables:
+        if table.values.get("fisheye"):
+            raise table.error("fisheye", "a fisheye lens", "OpenCV's k1, k2, p1, p2, k3: undistort its frames first")
+        name = str(table.values.get("name", table.values.get("cam_id", table.place.rpartition(".")[2])))
+        size = table.image_size("size") if "size" in table else None
+        rotation = np.asarray(Rotation.from_rotvec(table.vector("rotation", 3)).as_matrix())
+        distortion = table.numbers("distortions", ANY) if "distortions" in table else np.zeros(5)
+        translation = table.vector("translation", 3)
+        yield of_pose(top.file, name, size, table.matrix("matrix", 3, 3), rotation, translation, distortion)
+
+
+def _is_camera(value: object) -> bool:
+    return isinstance(value, dict) and {"matrix", "rotation", "translation"} <= set(value)
+
+
+def read_nvidia_json(files: Sequence[Path]) -> list[Foreign]:
+    """NVIDIA's `calibration.json`: `sensors` with `cameraMatrix`, or with `intrinsicMatrix` and `extrinsicMatrix`.
+
+    A sensor that has a homography alone does not say which way is up: give its `imageCoordinates` and
+    `globalCoordinates` to `stseg calibrate points`.
+
+    Raises
+    ------
+    FormatError
+        Where a file is no such JSON, or a sensor has no camera matrix.
+    """
+    return [camera for file in files for camera in _sensors(_table(file, json.loads, "JSON"))]
+
+
+def _sensors(top: ForeignTable) -> Iterator[Foreign]:
+    for sensor in top.tables("sensors"):
+        if "intrinsicMatrix" in sensor and "extrinsicMatrix" in sensor:
+            pose = sensor.matrix("extrinsicMatrix", 3, 4)
+            projection = sensor.matrix("intrinsicMatrix", 3, 3) @ pose
+        elif "cameraMatrix" in sensor:
+            projection = sensor.matrix("cameraMatrix", 3, 4)
+        else:
+            expected = "it, or its points for `stseg calibrate points`: a homography alone does not say what is up"
+            raise sensor.error("cameraMatrix", "nothing", expected)
+        yield Foreign(top.file, sensor.text("id"), _frame_size(sensor), projection)
+
+
+def _frame_size(sensor: ForeignTable) -> tuple[int, int] | None:
+    """Width and height from the sensor's attributes, where it has them."""
+    listed = sensor.values.get("attributes")
+    rows = [row for row in listed if isinstance(row, dict)] if isinstance(listed, list) else []
+    given = {row.get("name"): str(row.get("value")) for row in rows}
+    width, height = given.get("frameWidth", ""), given.get("frameHeight", "")
+    return (int(width), int(height)) if width.isdecimal() and height.isdecimal() else None
+
+
+def read_kalibr_yaml(files: Sequence[Path]) -> list[Foreign]:
+    """Kalibr's camera chain: the world is the first camera's own, every other hangs on the one before it.
+
+    Raises
+    ------
+    FormatError
+        Where a file is no such chain, or a lens is neither `radtan` nor `none`.
+    ConfigError
+        Where PyYAML is not installed.
+    """
+    load: Callable[[str], object] = load_extra("yaml", "kalibr").safe_load
+    return [camera for file in files for camera in _chain(_table(file, load, "YAML"))]
+
+
+def _chain(top: ForeignTable) -> Iterator[Foreign]:
+    pose = np.eye(4)
+    for index, name in enumerate(sorted(top.values, key=_number)):
+        table = top.table(name)
+        model, lens = table.text("camera_model"), table.text("distortion_model")
+        if model != "pinhole" or lens not in ("radtan", "none"):
+            raise table.error("camera_model", f"{model}-{lens}", "pinhole-radtan: undistort its frames first")
+        if index:
+            pose = table.matrix("T_cn_cnm1", 4, 4) @ pose
+        fu, fv, pu, pv = table.numbers("intrinsics", 4)
+        matrix = np.array([[fu, 0, pu], [0, fv, pv], [0, 0, 1]])
+        distortion: Floats = np.zeros(4) if lens == "none" else table.numbers("distortion_coeffs", 4)
+        size = table.image_size("resolution")
+        yield of_pose(top.file, name, size, matrix, pose[:3, :3], pose[:3, 3], distortion)
+
+
+def _number(name: str) -> tuple[int, str]:
+    digits = name.removeprefix("cam")
+    return (int(digits), "") if digits.isdecimal() else (0, name)
+
+
+def _table(file: Path, load: Callable[[str], object], language: str) -> ForeignTable:
+    """The file's top table; what a language's own reader raises is a wrong format."""
+    try:
+        top = load(file.read_bytes().decode("utf-8-sig"))
+    except OSError as error:
+        raise FormatError(file, "", error.strerror or error, f"a calibration in {language}") from error
+    except Exception as error:  # json, tomllib and yaml have no error in common
+        raise FormatError(file, "", f"what is not {language} ({str(error)[:120]})", language) from error
+    if not isinstance(top, dict) or not top or not all(isinstance(name, str) for name in top):
+        raise FormatError(file, "", "no table of cameras", f"one, in {language}")
+    return ForeignTable(file, "", top)

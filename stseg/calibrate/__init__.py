@@ -1,0 +1,1 @@
+"""Rigs made from points and from the recording itself, and rigs checked."""

@@ -1,0 +1,120 @@
+"""What points must be to make a camera, and what the camera must be then; what is wrong is named."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stseg.arrays import Floats
+from stseg.errors import CalibrationError
+from stseg.geometry import Camera
+
+LEAST = 4
+"""Points on the ground that a homography needs."""
+_FLAT = 0.02
+"""Width of a row of points as a share of its length, below which it counts as a line."""
+HEIGHTS = (0.3, 60.0)
+"""Metres above the ground between which cameras hang."""
+
+
+def require_ground(name: str, ground: Floats, pixel: Floats) -> None:
+    """Refuse points that fix no homography.
+
+    Parameters
+    ----------
+    name
+        The camera's.
+    ground, pixel : float64 (n, 2)
+        Points on the ground and where they show, metres and pixels.
+
+    Raises
+    ------
+    CalibrationError
+        Where there are fewer than four, or all but one of them lie on a line, on the ground or in the image.
+    """
+    place = f"camera {name}"
+    if len(ground) < LEAST:
+        raise CalibrationError(place, "points", f"{len(ground)} on the ground (z = 0)", f"at least {LEAST}")
+    for where, points in (("on the ground", ground), ("in the image", pixel)):
+        if _on_line(points):
+            raise CalibrationError(place, "points", f"points on one line {where}", "points spread over the ground")
+        if all_but_one_on_line(points):
+            found = f"points of which all but one lie on one line {where}"
+            raise CalibrationError(place, "points", found, "four of which no three lie on a line")
+
+
+def require_right_handed(name: str, ground: Floats, vertical: Floats) -> None:
+    """Refuse a mirrored camera: one whose points lie before it, and whose upward direction comes out of the mirror.
+
+    Parameters
+    ----------
+    name
+    ground : float64 (3, 3)
+        Homography, signed so that its points lie before the camera.
+    vertical : float64 (3,)
+        a v in its scale.
+
+    Raises
+    ------
+    CalibrationError
+    """
+    if np.linalg.det(np.column_stack([ground[:, :2], vertical])) < 0:
+        raise mirrored(name)
+
+
+def require_upright(camera: Camera) -> None:
+    """Refuse a camera below the ground: it sees the ground from behind, which is a mirrored one.
+
+    Raises
+    ------
+    CalibrationError
+    """
+    if camera.centre[2] <= 0:
+        raise mirrored(camera.name)
+
+
+def mirrored(name: str) -> CalibrationError:
+    """The error of a camera whose points are mirrored."""
+    return CalibrationError(
+        f"camera {name}",
+        "points",
+        "a mirrored ground: left and right are exchanged between its points and the image",
+        "x and y as seen from above, u to the right, v down: are two columns exchanged, or one counted backwards?",
+    )
+
+
+def require_height(camera: Camera, unit: str, metres: dict[str, float]) -> None:
+    """Refuse a unit in which the camera hangs in the clouds or lies on the floor, where another makes sense.
+
+    Parameters
+    ----------
+    camera
+    unit
+        The unit that was taken for its points.
+    metres
+        Metres in each unit that there is.
+
+    Raises
+    ------
+    CalibrationError
+    """
+    height = float(camera.centre[2])
+    if HEIGHTS[0] <= height <= HEIGHTS[1]:
+        return
+    for other, length in metres.items():
+        if HEIGHTS[0] <= height / metres[unit] * length <= HEIGHTS[1]:
+            raise CalibrationError(
+                f"camera {camera.name}",
+                f"--unit {unit}",
+                f"a camera {height:.4g} m above the ground",
+                f"{HEIGHTS[0]} to {HEIGHTS[1]:.0f} m: are its points in {other}? (--unit {other})",
+            )
+
+
+def all_but_one_on_line(points: Floats) -> bool:
+    """Whether leaving out one point leaves a line."""
+    return any(_on_line(np.delete(points, k, axis=0)) for k in range(len(points)))
+
+
+def _on_line(points: Floats) -> bool:
+    spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    return bool(spread[1] <= _FLAT * spread[0])
