@@ -36,6 +36,14 @@ def read_config(path: Path | None, assignments: Sequence[str] = ()) -> Config:
     return build(Config, given, _OPTION if path is None else str(path))
 
 
+def parse_config(text: str, place: str) -> Config:
+    """The configuration that a TOML text makes, which stands at `place`; raises as `read_config` does."""
+    try:
+        return build(Config, _wrapped(tomllib.loads(text), place), place)
+    except ValueError as error:
+        raise ConfigError(place, "", f"what is not TOML ({error})", "TOML") from error
+
+
 def format_config(config: Config) -> str:
     """The whole configuration as TOML; `read_config` of it gives back the same."""
     return as_toml(config)

@@ -19,6 +19,7 @@ COMMANDS = {
     "export": ("stseg.commands.export:export", "Write the tracks of a run file in another format."),
     "evaluate": ("stseg.commands.evaluate:evaluate", "Score tracks on the ground against the truth."),
     "report": ("stseg.commands.report:report", "Write pictures of a run file as one HTML page."),
+    "labels": ("stseg.commands.labels:labels", "Write for every pixel whom it shows."),
     "calibrate": ("stseg.commands.calibrate:app", "Make a rig file."),
     "simulate": ("stseg.commands.simulate:simulate", "Make a scene with truth."),
 }
