@@ -170,4 +170,19 @@ def test_what_the_user_can_mend_is_said(tmp_path: Path, capsys: pytest.CaptureFi
     assert "found boxes alone, expected a camera that delivers pixels" in capsys.readouterr().err
     assert main(["labels", str(run_path), "-o", str(tmp_path / "out"), "--frames", "3:9"]) == 2
     assert "--frames" in capsys.readouterr().err
+    assert main(["labels", str(run_path), "-o", str(tmp_path / "out"), "--set", "labels.draws=0"]) == 2
+    assert "labels.draws: found 0" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+def test_the_constants_are_those_of_the_run_but_for_what_is_set(tmp_path: Path) -> None:
+    moments = list(mask_moments(two_cameras(), walkers(FRAMES), 0, FRAMES))
+    sources = mask_sources(tmp_path, moments)
+    wide = write_run(tmp_path / "wide.h5", sources, walkers(FRAMES), "[labels]\nplace_spread = 0.5\n")
+    plain = write_run(tmp_path / "plain.h5", sources, walkers(FRAMES))
+    for path, options in ((wide, ()), (wide, ("--set", "labels.place_spread=0.1")), (plain, ())):
+        out = str(tmp_path / f"{path.stem}{len(options)}")
+        assert main(["labels", str(path), "-o", out, "--frames", "0:1", *options]) == 0
+    own, back, default = (read(tmp_path / name, "west")[0] for name in ("wide0", "wide2", "plain0"))
+    np.testing.assert_array_equal(back, default)
+    assert (own != default).any()

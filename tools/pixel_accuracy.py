@@ -25,11 +25,10 @@ from stseg.commands.main import main as stseg
 from stseg.io.indexed_png import decode_indexed, stores_numbers
 
 SCENES = {
-    "easy": ("--scene", "easy", "--seconds", "10"),
-    "easy, 8 people": ("--scene", "easy", "--people", "8", "--seconds", "10"),
-    "easy at 320x240": ("--scene", "easy", "--size", "320,240", "--seconds", "10"),
-    "crossing": ("--scene", "crossing"),
-    "dense4": ("--scene", "dense4", "--seconds", "10"),
+    "easy": ("--scene", "easy", "--seconds", "6"),
+    "easy, 8 people": ("--scene", "easy", "--people", "8", "--seconds", "6"),
+    "easy, 320x240": ("--scene", "easy", "--size", "320,240", "--seconds", "6"),
+    "dense4": ("--scene", "dense4", "--seconds", "6"),
 }
 RIGS = {"colour": "rig.toml", "masks": "rig_masks.toml"}
 

@@ -14,6 +14,7 @@ from rich.progress import track
 from stseg.arrays import Bytes, Ints, Observation, Rows, Singles
 from stseg.commands.frames_of_run import frames_of_run
 from stseg.commands.sights import make_sights
+from stseg.config import Config
 from stseg.errors import SourceError
 from stseg.io.config_file import parse_config
 from stseg.io.frames import Moment, open_frames
@@ -30,6 +31,7 @@ def labels(
     *,
     output: Annotated[Path, Parameter(name=["--output", "-o"], metavar="FOLDER")],
     frames: Annotated[str | None, Parameter(metavar="A:B")] = None,
+    set_: Annotated[tuple[str, ...], Parameter(name="--set", metavar="STAGE.KEY=VALUE", negative="")] = (),
     overwrite: Annotated[bool, Parameter(negative="")] = False,
 ) -> None:
     """Write for every pixel of every camera which track it shows.
@@ -48,21 +50,26 @@ def labels(
         Folder to write to.
     frames
         Part of the run, half open.
+    set_
+        One constant other than those of the run, for example --set labels.draws=32; may be given several times.
     overwrite
         Write into a folder that is not empty.
     """
     run = read_run(run_file)
-    count = write_labels(run, output, frames_of_run(run, frames), overwrite)
+    config = parse_config(run.provenance.config, f"{run_file}: the configuration", set_)
+    count = write_labels(run, config, output, frames_of_run(run, frames), overwrite)
     print(f"{output}: {count} label images")
 
 
-def write_labels(run: Run, folder: Path, frames: Ints, overwrite: bool) -> int:
+def write_labels(run: Run, config: Config, folder: Path, frames: Ints, overwrite: bool) -> int:
     """Write the label images of some frames of a run, and count them.
 
     Parameters
     ----------
     run
         A finished run.
+    config
+        The constants of foreground and labels.
     folder
         Where to.
     frames : int64 (n,)
@@ -74,10 +81,9 @@ def write_labels(run: Run, folder: Path, frames: Ints, overwrite: bool) -> int:
     ------
     SourceError
         Where no camera delivers pixels, or a stream cannot be read.
-    OutputError, ConfigError
+    OutputError
     """
     recording, cameras = run.recording, _with_pixels(run)
-    config = parse_config(run.provenance.config, f"{run.path}: the configuration")
     people = _people(run.trajectory, frames)
     largest = int(run.trajectory["id"].max(initial=0))
     images = LabelImages(folder, [run.cameras[k] for k in cameras], largest, _palette(), overwrite)
