@@ -36,6 +36,17 @@ def read_config(path: Path | None, assignments: Sequence[str] = ()) -> Config:
     return build(Config, given, _OPTION if path is None else str(path))
 
 
+def parse_config(text: str, place: str, assignments: Sequence[str] = ()) -> Config:
+    """The configuration that a TOML text and assignments make; the text stands at `place`. As `read_config`."""
+    try:
+        given = _wrapped(tomllib.loads(text), place)
+    except ValueError as error:
+        raise ConfigError(place, "", f"what is not TOML ({error})", "TOML") from error
+    for assignment in assignments:
+        _assign(given, assignment)
+    return build(Config, given, place)
+
+
 def format_config(config: Config) -> str:
     """The whole configuration as TOML; `read_config` of it gives back the same."""
     return as_toml(config)

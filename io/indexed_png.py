@@ -1,4 +1,4 @@
-"""PNG files as the numbers that they store, which OpenCV would turn into colours or stretch to 0..255.
+"""PNG files as the numbers that they store, which OpenCV would turn into colours, stretch to 0..255, or not write.
 
 An indexed PNG holds, for every pixel, a number below 2^bits and a palette of colours; OpenCV delivers the colours. The
 scan lines, filters and interlacing of an indexed PNG are exactly those of a grey one of the same depth, so the file is
@@ -16,7 +16,7 @@ from collections.abc import Iterator
 import cv2
 import numpy as np
 
-from stseg.arrays import AnyArray
+from stseg.arrays import AnyArray, Bytes
 
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _GREY, _INDEXED = 0, 3
@@ -51,6 +51,24 @@ def decode_indexed(data: bytes) -> AnyArray | None:
     grey = _SIGNATURE + b"".join(_chunk(name, body) for name, body in _chunks(data) if name in _KEPT)
     stretched = cv2.imdecode(np.frombuffer(grey, np.uint8), cv2.IMREAD_UNCHANGED)
     return None if stretched is None else np.asarray(stretched // (255 // (2**bits - 1)), np.uint8)
+
+
+def encode_indexed(numbers: Bytes, palette: Bytes) -> bytes:
+    """An indexed PNG of 8 bits.
+
+    Parameters
+    ----------
+    numbers : uint8 (v, u)
+    palette : uint8 (256, 3)
+        Red, green, blue of each number.
+    """
+    height, width = numbers.shape
+    lines = np.zeros((height, width + 1), np.uint8)  # each line begins with its filter, none
+    lines[:, 1:] = numbers
+    header = _HEADER.pack(width, height, 8, _INDEXED, 0, 0, 0)
+    bodies = (header, palette.tobytes(), zlib.compress(lines.tobytes()), b"")
+    names = (b"IHDR", b"PLTE", b"IDAT", b"IEND")
+    return _SIGNATURE + b"".join(_chunk(name, body) for name, body in zip(names, bodies, strict=True))
 
 
 def _chunks(data: bytes) -> Iterator[tuple[bytes, bytes]]:

@@ -350,6 +350,42 @@ class ParticleConfig:
 
 
 @dataclass(frozen=True)
+class LabelConfig:
+    """Which person each pixel shows (METHODS 7; HW12 eqs 13 to 20); the first six by tools/learn_label_weights.py."""
+
+    detection: float = 6.55
+    """c1: what a label costs that contradicts a certain foreground, nats."""
+    adjacency: float = 10.18
+    """c2: what it costs that neighbouring pixels of the same colour differ, nats."""
+    alike: float = 31.0
+    """k1: difference of two colours from which differing labels cost nothing, grey levels."""
+    slope: float = 12.0
+    """k2: over which difference that cost falls, grey levels."""
+    colourless: float = 0.08
+    """What of c2 it costs where there are no colours, in masks: the mean of g at true borders, 0..1."""
+    place_spread: float = 0.10
+    """How far a pillar is off besides its place's own covariance, metres (standard deviation)."""
+    draws: int = 64
+    """How many pillars are drawn for each person."""
+    height_spread: float = 0.05
+    """How far a person's height is off, metres (standard deviation)."""
+    width: float = 0.30
+    """Mean width of a body over its height, metres (HW12)."""
+    width_spread: float = 0.05
+    """How far the widths of bodies differ, metres (standard deviation; HW12)."""
+    outside: float = 1e-3
+    """Share of the pixels that show somebody, or nobody, against all the pillars that were drawn, 0..1."""
+
+    def __post_init__(self) -> None:
+        for name in ("detection", "adjacency", "alike", "colourless", "height_spread", "width_spread"):
+            require(getattr(self, name) >= 0, self, name, "0 or more")
+        for name in ("slope", "place_spread", "width"):
+            require(getattr(self, name) > 0, self, name, "a number above 0")
+        require(self.draws >= 1, self, "draws", "1 or more")
+        require(0 < self.outside < 1, self, "outside", "a number between 0 and 1")
+
+
+@dataclass(frozen=True)
 class Config:
     """All stages."""
 
@@ -363,3 +399,4 @@ class Config:
     segments: SegmentConfig = field(default_factory=SegmentConfig)
     kalman: KalmanConfig = field(default_factory=KalmanConfig)
     particles: ParticleConfig = field(default_factory=ParticleConfig)
+    labels: LabelConfig = field(default_factory=LabelConfig)

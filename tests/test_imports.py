@@ -16,13 +16,15 @@ ROOT = Path(__file__).parents[1]
 FOUNDATION = ("errors", "arrays", "accelerate", "settings", "config", "tracks", "geometry")
 """Records and geometry. Each may import those before it, and everything below may import all of them."""
 
-STAGES = ("foreground", "ghosts", "occupancy", "segmentation", "identity", "trackers")
+STAGES = ("foreground", "ghosts", "occupancy", "segmentation", "labels", "identity", "trackers")
 """In the order in which a frame passes through them. The pass that finds people stands before the volume, since the
 volume is shaped by what it explains (METHODS 7)."""
 
 CROSSINGS = {
     ("occupancy", "foreground"): "boxes as a soft map, whose clutter is weighed",
     ("occupancy", "ghosts"): "the explanation of the frame, and how well a box fits a body",
+    ("labels", "ghosts"): "outlines of bodies",
+    ("labels", "segmentation"): "the expansion that finds the labels",
     ("identity", "ghosts"): "whom a frame expects, and whom it found",
     ("identity", "segmentation"): "blobs are what identities are given to",
     ("trackers", "ghosts"): "the people of a frame are part of what is tracked",

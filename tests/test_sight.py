@@ -60,3 +60,15 @@ def test_colour_is_judged_by_the_background_with_the_prior_taken_out(model: Any)
 def test_a_colour_frame_without_a_background_is_refused() -> None:
     with pytest.raises(ValueError, match="background"):
         Sight().evidence(np.zeros((4, 4, 3), np.uint8))
+
+
+def test_pixels_are_those_of_the_evidence_and_instances_are_certain() -> None:
+    sight = Sight()
+    assert sight.pixels(None) is None
+    assert sight.pixels(Boxes(np.zeros((0, 4)), np.zeros(0))) is None
+    mask = np.array([[0, 51], [255, 0]], np.uint8)
+    seen = sight.pixels(mask)
+    assert seen is not None
+    np.testing.assert_allclose(seen, mask / 255, atol=1e-6)
+    instances = sight.pixels(np.array([[0, 3], [9, 0]], np.uint16))
+    np.testing.assert_array_equal(instances, np.array([[0, 1], [1, 0]], np.float32))

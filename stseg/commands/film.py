@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.progress import track
 
 from stseg.arrays import Bytes, Ints
-from stseg.errors import ConfigError
+from stseg.commands.frames_of_run import frames_of_run
 from stseg.io.films import write_film
 from stseg.io.frames import open_frames
 from stseg.io.runs import Run
@@ -38,7 +38,7 @@ def film(run: Run, output: Path, part: str | None, camera_images: bool, overwrit
         Where the part is none of the run.
     OutputError, SourceError
     """
-    frames = _part(run.frames, part)
+    frames = frames_of_run(run, part)
     shown = Film(run.recording.rig, run.views, run.trajectory)
     return write_film(output, _pictures(run, shown, frames, camera_images), run.frame_rate, overwrite)
 
@@ -57,18 +57,3 @@ def _pictures(run: Run, film: Film, frames: Ints, camera_images: bool) -> Iterat
             if moment.frame == frame:
                 yield film.picture(moment.frame, moment.views)
                 frame = next(wanted, None)
-
-
-def _part(frames: Ints, text: str | None) -> Ints:
-    if not len(frames):
-        raise ConfigError("command line", "--video", "a run without frames", "one that has some")
-    if text is None:
-        return frames
-    head, colon, tail = text.partition(":")
-    some = f"A:B, half open, of the run's frames {frames[0]}:{frames[-1] + 1}"
-    if not colon or not all(part == "" or part.isdecimal() for part in (head, tail)):
-        raise ConfigError("command line", "--frames", repr(text), some)
-    first, stop = int(head or frames[0]), int(tail or frames[-1] + 1)
-    if not frames[0] <= first < stop <= frames[-1] + 1:
-        raise ConfigError("command line", "--frames", repr(text), some)
-    return frames[(frames >= first) & (frames < stop)]

@@ -24,6 +24,7 @@ COMMANDS = {
     "evaluate": ("stseg.commands.evaluate:evaluate", "Score tracks on the ground against the truth."),
     "report": ("stseg.commands.report:report", "Write pictures of a run file as one HTML page."),
     "plan": ("stseg.commands.plan:plan", "Say how long a run will take and how large its file will be."),
+    "labels": ("stseg.commands.labels:labels", "Write for every pixel whom it shows."),
     "calibrate": ("stseg.commands.calibrate:app", "Make a rig file."),
     "simulate": ("stseg.commands.simulate:simulate", "Make a scene with truth."),
 }

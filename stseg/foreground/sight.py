@@ -45,6 +45,17 @@ class Sight:
         posterior = self.background.likelihood(np.asarray(seen, np.uint8))
         return None if posterior is None else without_prior(posterior, self.background.model.prior)
 
+    def pixels(self, seen: Observation) -> Singles | None:
+        """How likely each pixel shows a person, float32 (v, u); None where the view is blind or delivers boxes.
+
+        As `evidence`, but that the instances of an instance image are taken for certain, pixel by pixel. One of the two
+        may be asked of a frame.
+        """
+        if isinstance(seen, np.ndarray) and seen.dtype == np.uint16:
+            return (seen > 0).astype(np.float32)
+        found = self.evidence(seen)
+        return None if isinstance(found, Boxes) else found
+
 
 def without_prior(posterior: Singles, prior: float) -> Singles:
     """What a posterior would be with a prior of one half: the evidence alone.

@@ -1,0 +1,250 @@
+"""Which person each pixel shows."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+import pytest
+import reference_pixel_labels as reference
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scenes import corner_cameras, likelihoods, looking, people, room
+
+from stseg.arrays import Bytes, Floats, Labels, Singles
+from stseg.config import LabelConfig
+from stseg.errors import ConfigError
+from stseg.geometry import Camera
+from stseg.geometry.bodies import PROFILE, BodyTable
+from stseg.ghosts.outlines import outlines
+from stseg.labels.contrast import edge_costs
+from stseg.labels.energy import PixelEnergy, most_likely, pixel_energy
+from stseg.labels.nearest import Nearest, nearest
+from stseg.labels.pillars import Patches, pillar_patches
+from stseg.labels.standing import Standing
+from stseg.labels.views import ViewLabels, view_labels
+from stseg.segmentation.energy import QUANTUM
+
+PROFILE_WIDTH = 2 * float(np.trapezoid(PROFILE[:, 1], PROFILE[:, 0]))
+EXACT = LabelConfig(draws=1, place_spread=1e-3, height_spread=0.0, width=PROFILE_WIDTH, width_spread=0.0)
+"""One pillar a person, just as the micro-scenes draw them."""
+FEW = LabelConfig(draws=8, place_spread=0.03, height_spread=0.03, width=PROFILE_WIDTH, width_spread=0.02)
+"""Almost certain ones: the people of the micro-scenes have no arms and legs."""
+
+
+def standing(everybody: Floats, spread: float = 0.0) -> Standing:
+    covariance = np.tile(spread**2 * np.eye(2), (len(everybody), 1, 1))
+    return Standing(everybody[:, :2], covariance, everybody[:, 2])
+
+
+def labels_in(camera: Camera, everybody: Floats, config: LabelConfig = FEW) -> Labels:
+    """Labels from the exact masks."""
+    view = ViewLabels(camera, BodyTable.of(camera, room().grid), config)
+    return view.label(standing(everybody), likelihoods([camera], everybody)[0], None)
+
+
+# Pillars
+
+
+def test_one_certain_pillar_is_the_outline() -> None:
+    camera, everybody = corner_cameras()[0], people((0.3, -0.4), (1.2, 1.1, 1.6))
+    table = BodyTable.of(camera, room().grid)
+    patches = pillar_patches(table, standing(everybody), EXACT)
+    first, spans, _ = outlines(table, everybody[:, :2], everybody[:, 2], 1, (96, 128))
+    for j in range(2):
+        outline = np.zeros((96, 128))
+        for k, (start, stop) in enumerate(spans[j]):
+            outline[first[j] + k, start:stop] = 1
+        left, top, right, bottom = patches.edges[j]
+        share = patches.share[patches.first[j] : patches.first[j + 1]].reshape(bottom - top, right - left)
+        assert np.abs(outline[top:bottom, left:right] - share).mean() < 0.005
+        assert outline.sum() == outline[top:bottom, left:right].sum()
+
+
+def test_shares_fall_off_with_what_is_not_known_and_stay_in_the_middle() -> None:
+    camera, everybody = corner_cameras()[0], people((0.3, -0.4))
+    table = BodyTable.of(camera, room().grid)
+    sharp, wide = (pillar_patches(table, standing(everybody, spread), FEW).share for spread in (0.0, 0.2))
+    assert wide.min() >= 0
+    assert wide.max() <= 1 + 1e-6
+    assert sharp.max() == pytest.approx(1.0)
+    assert (wide > 0).sum() > 1.3 * (sharp > 0).sum()
+    assert wide.sum() == pytest.approx(sharp.sum(), rel=0.25)
+
+
+def test_nobody_in_sight_has_no_patch() -> None:
+    ahead = looking("ahead", (0.0, 0.0, 1.5), target=(2.0, 0.0, 1.0))
+    view = ViewLabels(ahead, BodyTable.of(ahead, room().grid), FEW)
+    behind = people((-1.5, 0.0))
+    assert len(view.expected(standing(behind)).people.share) == 0
+    bright = np.ones((96, 128), np.float32)
+    assert not view.label(standing(behind), bright, None).any()
+    assert not view.label(standing(behind[:0]), bright, None).any()
+
+
+# The nearest
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 3))
+@settings(max_examples=20, deadline=None)
+def test_the_product_is_what_all_combinations_of_draws_give(seed: int, count: int) -> None:
+    rng = np.random.default_rng(seed)
+    drawn = [rng.random((3, 2, 3)) < 0.6 for _ in range(count)]
+    distance = rng.random(count)
+    cover = np.concatenate([own.mean(0).ravel() for own in drawn]).astype(np.float32)
+    patches = Patches(np.tile([4, 7, 7, 9], (count, 1)), np.arange(count + 1) * 6, cover)
+    shown = nearest(patches, distance)
+    assert (shown.left, shown.top) == (4, 7)
+    np.testing.assert_allclose(reference.dense(shown), reference.nearest_shares(drawn, distance), atol=1e-5)
+
+
+def test_the_most_likely_label_is_the_start() -> None:
+    shown = random_nearest(np.random.default_rng(3), 2, (3, 4))
+    np.testing.assert_array_equal(most_likely(shown), reference.dense(shown).argmax(0))
+
+
+# The adjacency
+
+
+@given(st.integers(0, 2**32 - 1))
+@settings(max_examples=20, deadline=None)
+def test_edges_cost_what_the_sigmoid_says_and_never_less_than_nothing(seed: int) -> None:
+    image = np.random.default_rng(seed).integers(0, 60, (3, 4, 3)).astype(np.uint8)
+    config = LabelConfig(adjacency=3.0, alike=40.0, slope=10.0)
+    across, down = edge_costs(image, (3, 4), config)
+    assert min(across.min(), down.min()) >= 0
+    assert not across[:, -1].any() and not down[-1].any()
+    for v, u in product(range(2), range(3)):
+        for cost, other in ((across, image[v, u + 1]), (down, image[v + 1, u])):
+            assert cost[v, u] * QUANTUM == pytest.approx(reference.adjacency(image[v, u], other, config), abs=QUANTUM)
+
+
+def test_without_colours_all_pairs_cost_the_same() -> None:
+    across, down = edge_costs(None, (3, 4), LabelConfig(adjacency=3.0, colourless=0.5))
+    np.testing.assert_array_equal(across * QUANTUM, np.tile([1.5, 1.5, 1.5, 0.0], (3, 1)))
+    np.testing.assert_array_equal(down * QUANTUM, np.repeat([[1.5], [1.5], [0.0]], 4, 1))
+
+
+# The energy
+
+
+def random_nearest(rng: np.random.Generator, count: int, shape: tuple[int, int]) -> Nearest:
+    """People whose rectangles lie anywhere in a window."""
+    rows, columns = shape
+    top, left = rng.integers(0, rows, count), rng.integers(0, columns, count)
+    edges = np.stack([left, top, rng.integers(left + 1, columns + 1), rng.integers(top + 1, rows + 1)], 1)
+    edges = np.concatenate([edges, [[0, 0, columns, rows]]])[-count:] + np.tile([5, 2], 2)
+    first = np.append(0, np.cumsum((edges[:, 2] - edges[:, 0]) * (edges[:, 3] - edges[:, 1])))
+    share = rng.random(first[-1]).astype(np.float32)
+    return nearest(Patches(edges, first, share), rng.random(count))
+
+
+def problem(seed: int, shape: tuple[int, int]) -> tuple[PixelEnergy, Nearest, Singles, Bytes, LabelConfig]:
+    rng = np.random.default_rng(seed)
+    config = LabelConfig(
+        detection=float(rng.uniform(0, 4)), adjacency=float(rng.uniform(0, 2)), alike=200.0, slope=60.0, outside=0.1
+    )
+    shown = random_nearest(rng, 2, shape)
+    foreground = rng.random(shown.nobody.shape).astype(np.float32)
+    image = rng.integers(0, 256, (*shown.nobody.shape, 3)).astype(np.uint8)
+    ours = pixel_energy(shown, foreground, *edge_costs(image, shown.nobody.shape, config), config)
+    return ours, shown, foreground, image, config
+
+
+@given(st.integers(0, 2**32 - 1))
+@settings(max_examples=40, deadline=None)
+def test_the_energy_is_that_of_the_paper_and_what_is_left_out_cannot_win(seed: int) -> None:
+    ours, shown, foreground, image, config = problem(seed, (2, 3))
+    shares, shape = reference.dense(shown), shown.nobody.shape
+    empty = reference.energy(np.zeros(shape, int), foreground, image, shares, config)
+    cell = np.repeat(np.arange(ours.energy.cells), np.diff(ours.energy.first))
+    allowed = {(int(ours.pixel[p]), int(label)) for p, label in zip(cell, ours.energy.label, strict=True)}
+    best_of_all = best_allowed = np.inf
+    for flat in product(range(3), repeat=shape[0] * shape[1]):
+        label = np.array(flat)
+        if any(k and reference.dense(shown)[k].flat[p] == 0 and (p, k) not in allowed for p, k in enumerate(flat)):
+            continue  # outside that person's rectangle
+        theirs = reference.energy(label.reshape(shape), foreground, image, shares, config) - empty
+        best_of_all = min(best_of_all, theirs)
+        if all(k == 0 or (p, k) in allowed for p, k in enumerate(flat)):
+            assert ours.energy.of(label[ours.pixel]) * QUANTUM == pytest.approx(theirs, abs=0.03)
+            best_allowed = min(best_allowed, theirs)
+    assert best_allowed == pytest.approx(best_of_all, abs=0.03)
+
+
+# Labels
+
+
+def test_one_person_is_their_silhouette() -> None:
+    camera, everybody = corner_cameras()[1], people((0.2, 0.1))
+    seen, label = likelihoods([camera], everybody)[0], labels_in(camera, everybody)
+    assert (label[seen > 0.8] == 1).all()
+    assert not label[seen < 0.2].any()
+
+
+def test_two_people_side_by_side_are_two_and_the_same_in_every_view() -> None:
+    everybody = people((-0.5, 0.3), (0.6, -0.2, 1.8))
+    views = view_labels(room(), FEW)
+    for view, seen in zip(views, likelihoods(room().cameras, everybody), strict=True):
+        label = view.label(standing(everybody), seen, None)
+        for j in range(2):
+            alone = likelihoods([view.camera], everybody[j : j + 1])[0] > 0.8
+            other = likelihoods([view.camera], everybody[1 - j : 2 - j])[0] > 0.2
+            assert (label[alone & ~other] == j + 1).mean() > 0.95
+
+
+def test_the_nearer_of_two_hides_the_farther() -> None:
+    camera = corner_cameras()[0]
+    everybody = people((-0.6, -0.6), (0.6, 0.62))  # on one line from the corner
+    near, far = (likelihoods([camera], everybody[j : j + 1])[0] > 0.5 for j in range(2))
+    label = labels_in(camera, everybody)
+    assert (near & far).any()
+    assert (label[near & far] == 1).mean() > 0.93
+    assert (label[far & ~near] == 2).mean() > 0.8
+
+
+def test_what_nobody_stands_at_is_background() -> None:
+    camera, everybody = corner_cameras()[2], people((-0.5, -0.5))
+    view = ViewLabels(camera, BodyTable.of(camera, room().grid), FEW)
+    seen = likelihoods([camera], everybody)[0]
+    blotch = seen.copy()
+    blotch[:20, :20] = 1.0
+    np.testing.assert_array_equal(
+        view.label(standing(everybody), blotch, None), view.label(standing(everybody), seen, None)
+    )
+
+
+def test_where_colours_are_alike_holes_are_filled_and_specks_are_not_taken() -> None:
+    camera, everybody = corner_cameras()[0], people((0.0, 0.0))
+    seen = likelihoods([camera], everybody)[0]
+    rows, columns = np.nonzero(seen > 0.5)
+    hole, speck = (round(float(rows.mean())), round(float(columns.mean()))), (int(rows.mean()), columns.max() + 3)
+    seen[hole], seen[speck] = 0.0, 1.0
+    view = ViewLabels(camera, BodyTable.of(camera, room().grid), FEW)
+    label = view.label(standing(everybody), seen, np.full((96, 128, 3), 80, np.uint8))
+    assert label[hole] == 1
+    assert label[speck] == 0
+
+
+def test_a_border_between_two_people_follows_the_colours() -> None:
+    camera, everybody = corner_cameras()[0], people((-0.1, 0.35), (0.35, -0.1))
+    seen = likelihoods([camera], everybody)[0]
+    near, far = (likelihoods([camera], everybody[j : j + 1])[0] > 0.5 for j in range(2))
+    image = np.full((96, 128, 3), 60, np.uint8)
+    image[near], image[far & ~near] = 20, 200
+    view = ViewLabels(camera, BodyTable.of(camera, room().grid), FEW)
+    off = everybody + np.array([0.06, -0.06, 0.0])  # to the side, as the camera sees it
+    truth = np.where(near, 1, np.where(far, 2, 0))
+    plain, coloured = (view.label(standing(off, 0.1), seen, colours) for colours in (None, image))
+    assert (coloured != truth).sum() < (plain != truth).sum()
+
+
+def test_the_same_again() -> None:
+    camera, everybody = corner_cameras()[3], people((-0.5, 0.3), (0.3, 0.2))
+    np.testing.assert_array_equal(labels_in(camera, everybody), labels_in(camera, everybody))
+
+
+@pytest.mark.parametrize("change", [{"slope": 0.0}, {"place_spread": 0.0}, {"draws": 0}, {"outside": 1.0}])
+def test_constants_out_of_range(change: dict[str, float]) -> None:
+    with pytest.raises(ConfigError, match=next(iter(change))):
+        LabelConfig(**change)  # type: ignore[arg-type]  # each value has its field's type
