@@ -63,7 +63,10 @@ def beside_peer(views: Sequence[ViewLabels], frame: TrueFrame) -> tuple[float, f
         found = np.zeros(shape, np.int64)
         found.flat[problem.pixel] = expand(problem.energy, admissible(problem.energy, start.flat[problem.pixel]))
         ours += process_time() - begin
-        costs, weight = _dense(view, frame, np.asarray(foreground, float)), round(edge_costs(None, (2, 2), view.config)[0][0, 0])
+        costs, weight = (
+            _dense(view, frame, np.asarray(foreground, float)),
+            round(edge_costs(None, (2, 2), view.config)[0][0, 0]),
+        )
         begin = process_time()
         peer = maxflow.aexpansion_grid(costs, weight * (1.0 - np.eye(costs.shape[-1])), labels=start.copy())
         theirs += process_time() - begin

@@ -19,6 +19,7 @@ from stseg.errors import SourceError
 from stseg.io.config_file import parse_config
 from stseg.io.frames import Moment, open_frames
 from stseg.io.label_images import LabelImages
+from stseg.io.recording import Recording
 from stseg.io.runs import Run, read_run
 from stseg.labels.standing import Standing
 from stseg.labels.views import ViewLabels, view_labels
@@ -83,7 +84,7 @@ def write_labels(run: Run, config: Config, folder: Path, frames: Ints, overwrite
         Where no camera delivers pixels, or a stream cannot be read.
     OutputError
     """
-    recording, cameras = run.recording, _with_pixels(run)
+    recording, cameras = run.recording, require_pixels(run.recording)
     people = _people(run.trajectory, frames)
     largest = int(run.trajectory["id"].max(initial=0))
     images = LabelImages(folder, [run.cameras[k] for k in cameras], largest, _palette(), overwrite)
@@ -100,11 +101,11 @@ def write_labels(run: Run, config: Config, folder: Path, frames: Ints, overwrite
     return count
 
 
-def _with_pixels(run: Run) -> list[int]:
-    """The cameras that deliver pixels."""
-    found = [k for k, source in enumerate(run.recording.sources) if source.source.kind != "boxes"]
+def require_pixels(recording: Recording) -> list[int]:
+    """The cameras that deliver pixels; SourceError where none does."""
+    found = [k for k, source in enumerate(recording.sources) if source.source.kind != "boxes"]
     if not found:
-        raise SourceError(run.recording.path, "camera, source", "boxes alone", "a camera that delivers pixels")
+        raise SourceError(recording.path, "camera, source", "boxes alone", "a camera that delivers pixels")
     return found
 
 

@@ -14,6 +14,7 @@ from cyclopts import Parameter
 
 from stseg.commands.assembly import Made, assemble
 from stseg.commands.cluster import make_by_cluster
+from stseg.commands.labels import require_pixels, write_labels
 from stseg.commands.progress import frame_bar
 from stseg.commands.segment_work import Job, SegmentWork, VolumeKind
 from stseg.commands.workers import make_by_workers
@@ -25,6 +26,7 @@ from stseg.io.outputs import require_new
 from stseg.io.provenance import as_tables, gather_provenance
 from stseg.io.recording import Recording
 from stseg.io.rigs import read_rig
+from stseg.io.runs import read_run
 from stseg.io.work_folder import WorkFolder
 
 
@@ -38,6 +40,7 @@ def run(
     set_: Annotated[tuple[str, ...], Parameter(name="--set", metavar="STAGE.KEY=VALUE", negative="")] = (),
     tracker: str = "cut",
     volume: VolumeKind = "all",
+    labels: Annotated[Path | None, Parameter(metavar="FOLDER")] = None,
     workers: int = 1,
     scheduler: str | None = None,
     overwrite: Annotated[bool, Parameter(negative="")] = False,
@@ -68,6 +71,8 @@ def run(
         kalman: a filter for each of them (HW12). particles: followed by the colours of their clothes (KD06).
     volume
         What of the occupancy volume is kept: all of it, what is within a metre of tracks, or none.
+    labels
+        Write afterwards for every pixel of every camera whom it shows, as stseg labels does, to this folder.
     workers
         Processes that share the work on this machine; the result is the same for any number.
     scheduler
@@ -79,6 +84,8 @@ def run(
     if workers < 1:
         raise ConfigError("--workers", "", workers, "1 or more processes")
     resolved, recording = read_config(config, set_), read_rig(rig)
+    if labels is not None:
+        require_pixels(recording)
     asked = as_tables(gather_provenance(recording, format_config(resolved)))
     asked |= {"--frames": frames or "all", "--tracker": tracker, "--volume": volume}
     with WorkFolder(output, asked) as folder, _told_how_to_go_on(folder):
@@ -91,6 +98,9 @@ def run(
         folder.remove()
     people = len(np.unique(tracks.trajectory["id"]))
     print(f"{output}: {people} tracks in frames {first} to {stop - 1}")
+    if labels is not None:
+        done = read_run(output)
+        print(f"{labels}: {write_labels(done, resolved, labels, done.frames, overwrite)} label images")
 
 
 def frame_range(text: str | None, length: int) -> tuple[int, int]:
