@@ -23,6 +23,9 @@ from stseg.ghosts.pool import Pool, peaks
 from stseg.ghosts.prior import Prior
 from stseg.ghosts.views import BoxView, PixelView
 
+_TRADES = 2
+"""How often trades are tried once the people of a frame are settled."""
+
 
 class FramePass:
     """The pass for one rig: lattice and tables are made once, frames are explained one by one.
@@ -97,7 +100,9 @@ class FramePass:
 
 
 def _settled(frame: Frame) -> Frame:
-    """The frame searched once more from where its people exactly stand, which may show two of them to be one."""
+    """The frame searched from where its people exactly stand, which may show two to be one, then well, by places."""
     exact = frame.refined()[0]
     known = len(frame.pool)
-    return Frame(frame.seen, frame.pool.and_(exact), np.arange(known, known + len(exact)))
+    anew = Frame(frame.seen, frame.pool.and_(exact), np.arange(known, known + len(exact)))
+    places = np.concatenate([anew.members, anew.rivals()])
+    return Frame(anew.seen, anew.pool.at(places), np.arange(len(anew.members)), _TRADES)

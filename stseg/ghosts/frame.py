@@ -38,9 +38,11 @@ class Frame:
         The candidates.
     members : int64 (n,)
         The candidates with whom the search begins.
+    trades
+        How often trades are tried, see `stseg.ghosts.search`.
     """
 
-    def __init__(self, seen: Seen, pool: Pool, members: Ints) -> None:
+    def __init__(self, seen: Seen, pool: Pool, members: Ints, trades: int = 0) -> None:
         self.seen, self.pool = seen, pool
         self.case = _case(seen, pool)
         # The scores' parts have the views with boxes first; `row` finds those of each view of the rig.
@@ -48,7 +50,7 @@ class Frame:
         self.row = np.argsort(pixels_last)
         room = np.zeros(len(pool) + 1, np.int64)
         room[: len(members)] = members
-        count = search(room, len(members), self.case)
+        count = search(room, len(members), self.case, trades)
         self.members = room[:count].copy()
         self.box_owner, self.pixel_owner = self._owners()
         self.walker = self._walkers()
@@ -56,6 +58,19 @@ class Frame:
     def score(self, members: Ints) -> float:
         """Score of a set; the case's `parts` then holds what each view says of each member."""
         return set_score(members, len(members), self.case)
+
+    def rivals(self) -> Ints:
+        """Candidates outside the set, the best of each place, best first: int64 (n,)."""
+        total, apart = self.score(self.members), 2 * self.seen.prior.config.lattice
+        others = np.setdiff1d(np.arange(len(self.pool)), self.members)
+        gain = np.array([self.score(np.append(self.members, i)) - total for i in others])
+        standing, kept = self.pool.ground[self.members], []
+        for i in others[np.argsort(-gain, kind="stable")]:
+            place = self.pool.ground[i]
+            if not (np.hypot(*(standing - place).T) < apart).any():
+                standing = np.concatenate([standing, place[None]])
+                kept.append(i)
+        return np.array(kept, np.int64)
 
     def _owners(self) -> tuple[list[Ints], list[Ints]]:
         """For each view whose boxes are whose, and whose pixels are whose; -1 for nobody."""
@@ -70,6 +85,7 @@ class Frame:
                 owner[:] = case.owner[: len(owner)]
                 box_view += 1
             else:
+                case.owner[:] = -1
                 pixel_score(pixel_view, self.members, count, case.pixels, case.terms, case.owner, case.parts[0])
                 rows, columns = case.pixels.raster.shape[1:]
                 raster[:] = case.owner[: rows * columns].reshape(rows, columns)[: view.shape[0], : view.shape[1]]
