@@ -80,12 +80,12 @@ def _walkers(pool: Pool, prior: Prior) -> Ints:
 def _all_of(view: BoxView | PixelView, sight: Sight | None, candidate: Pool) -> Own:
     """The best box, or every pixel."""
     if isinstance(view, PixelView) or sight is None or not len(sight.edges):
-        return Own(-1, np.ones(view.shape, bool))
+        return Own(-1, np.full(view.shape, -1), 0)
     body = view.table.boxes_of(candidate.ground, candidate.height)
     middle = (sight.edges[:, 0] + sight.edges[:, 2]) / 2, sight.edges[:, 1]
     off = np.hypot(middle[0] - (body[0, 0] + body[0, 2]) / 2, middle[1] - body[0, 1])
     tall = body[0, 3] - body[0, 1]
-    return Own(int(np.argmin(off)) if off.min() < 0.2 * tall else -1, np.zeros((0, 0), bool))
+    return Own(int(np.argmin(off)) if off.min() < 0.2 * tall else -1, np.zeros((0, 0), np.int64), 0)
 
 
 def _none_of(people: People) -> People:

@@ -52,6 +52,7 @@ class Frame:
         room[: len(members)] = members
         count = search(room, len(members), self.case, trades)
         self.members = room[:count].copy()
+        self.total = self.score(self.members)
         self.box_owner, self.pixel_owner = self._owners()
         self.walker = self._walkers()
 
@@ -61,9 +62,9 @@ class Frame:
 
     def rivals(self) -> Ints:
         """Candidates outside the set, the best of each place, best first: int64 (n,)."""
-        total, apart = self.score(self.members), 2 * self.seen.prior.config.lattice
+        apart = 2 * self.seen.prior.config.lattice
         others = np.setdiff1d(np.arange(len(self.pool)), self.members)
-        gain = np.array([self.score(np.append(self.members, i)) - total for i in others])
+        gain = np.array([self.score(np.append(self.members, i)) - self.total for i in others])
         standing, kept = self.pool.ground[self.members], []
         for i in others[np.argsort(-gain, kind="stable")]:
             place = self.pool.ground[i]
@@ -110,14 +111,13 @@ class Frame:
             for view, boxes, pixels in zip(self.seen.views, self.box_owner, self.pixel_owner, strict=True)
         ]
 
-    def refined(self) -> tuple[Pool, Floats]:
-        """The set's people at the means of their posteriors, and the covariances."""
-        views = self.seen.views
-        own = [
-            [owned(v, j, b, p) for v, b, p in zip(views, self.box_owner, self.pixel_owner, strict=True)]
-            for j in range(len(self.members))
-        ]
-        return refine(self.pool.at(self.members), views, self.seen.sights, own, self.seen.prior, self.walker)
+    def refined(self, places: Ints | None = None) -> tuple[Pool, Floats]:
+        """People at the means of their posteriors, and the covariances; of the set, or of some places in it."""
+        some = np.arange(len(self.members)) if places is None else places
+        own = [[owned(j, b, p) for b, p in zip(self.box_owner, self.pixel_owner, strict=True)] for j in some]
+        return refine(
+            self.pool.at(self.members[some]), self.seen.views, self.seen.sights, own, self.seen.prior, self.walker[some]
+        )
 
 
 def _case(seen: Seen, pool: Pool) -> Case:

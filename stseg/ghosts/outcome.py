@@ -15,7 +15,7 @@ def explanation(frame: Frame) -> Explanation:
     """The result of a frame."""
     views, members = frame.seen.views, frame.members
     exact, covariance = frame.refined()
-    total = frame.score(members)
+    total = frame.score(members)  # which fills the parts
     parts = frame.case.parts[frame.row, : len(members)]
     without = [frame.score(np.delete(members, a)) for a in range(len(members))]
     people = People(
