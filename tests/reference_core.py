@@ -125,6 +125,19 @@ def _pixels_of_view(view: int, members: Sequence[int], pixels: PixelEvidence, te
     return total
 
 
+def touch(i: int, j: int, case: Case) -> bool:
+    """Whether one of two candidates bears on what the other adds to a set."""
+    boxes, pixels, terms = case.boxes, case.pixels, case.terms
+    if math.dist(case.ground[i], case.ground[j]) < terms.apart:
+        return True
+    gains = case.newcomer[[i, j], None] + case.known[[i, j]]
+    worth = terms.hit + boxes.match[:, [i, j]] - math.log(terms.box_miss)
+    shared = [(worth[view, :, :number] > 0).all(0).any() for view, number in enumerate(boxes.boxes)]
+    hidden = (boxes.cover[:, i, j] > 0) | (boxes.cover[:, j, i] > 0)
+    overlap = [(covered(pixels, view, i) & covered(pixels, view, j)).any() for view in range(len(pixels.raster))]
+    return bool((gains > 0).all(0).any() or any(shared) or hidden.any() or any(overlap))
+
+
 def subsets(number: int) -> Iterator[tuple[int, ...]]:
     """All sets of candidates."""
     for size in range(number + 1):

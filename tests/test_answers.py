@@ -34,7 +34,7 @@ def test_the_four_questions_are_answered() -> None:
     assert people.startswith("1.5 at a time on average, at most 2. There are 2 tracks, half of them 0.9 s or longer")
     assert "A at (1.0, 2.0), 40 %; B at (-1.0, 0.0), 20 %" in places
     assert ghosts.startswith("1 of 3 candidates (0.2 a frame): 100 % because a view sees nobody there.")
-    assert ghosts.endswith("2 tracks too short to be somebody were dropped as well.")
+    assert ghosts.endswith("2 tracks too short, or too often doubted, to be somebody were dropped as well.")
     assert blind.startswith("10 % of the ground is seen by no view, 25 % by one alone") and "65 % by two" in blind
 
 

@@ -55,7 +55,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     bench = Bench(options.data.resolve(), options.work.resolve())
     for part in options.parts:
         for one in (SETS[name] for name in MEASURED[part] if name in options.sets):
-            taken = one, _prepared(one, bench), bench
+            taken = one, prepared(one, bench), bench
             for row in _views(*taken, options.ways) if part == "views" else _smoothness(*taken):
                 publish([{"part": part, "set": one.name, "commit": _commit(), **row}])
     publish([])
@@ -78,19 +78,19 @@ def _key(row: Row) -> tuple[str, str, int, str, float]:
 
 def _views(one: ResultSet, recording: Recording, bench: Bench, ways: Sequence[str]) -> Iterator[Row]:
     """The ways on some of the views."""
-    first, stop = _frames(one)
+    first, stop = frames_of(one)
     for number in (len(recording.sources),) if one.name in _ALL_VIEWS else (4, 3, 2):
         part = some_views(recording, number)
         for way in ways:
             row: Row = {"views": number, "way": way}
             if way == "threshold":
-                tried = {level: _score(one, rows, bench) for level, rows in threshold(part, first, stop).items()}
+                tried = {level: score(one, rows, bench) for level, rows in threshold(part, first, stop).items()}
                 row["level"] = max(tried, key=lambda level: _f1(tried[level]))
                 row["committed"] = row["finished"] = tried[row["level"]].as_dict()
             else:
                 found = follow(part, first, stop, way, Config())
-                row["committed"] = _score(one, found.committed, bench).as_dict()
-                row["finished"] = _score(one, found.finished, bench).as_dict()
+                row["committed"] = score(one, found.committed, bench).as_dict()
+                row["finished"] = score(one, found.finished, bench).as_dict()
             yield row
 
 
@@ -105,16 +105,16 @@ def _smoothness(one: ResultSet, recording: Recording, bench: Bench) -> Iterator[
     for factor in FACTORS:
         value = factor * default.segmentation.smoothness
         config = replace(default, segmentation=replace(default.segmentation, smoothness=value))
-        found = follow(recording, *_frames(one), "cut", config)
-        scores = _score(one, found.finished, bench).as_dict()
+        found = follow(recording, *frames_of(one), "cut", config)
+        scores = score(one, found.finished, bench).as_dict()
         yield {"views": len(recording.sources), "way": "cut", "smoothness": value, "finished": scores}
 
 
-def _score(one: ResultSet, rows: Rows, bench: Bench) -> Scores:
+def score(one: ResultSet, rows: Rows, bench: Bench) -> Scores:
     """Scores of tracks as the set is scored in docs/results.md."""
     assert one.truth is not None
     options = shlex.split(one.scoring)
-    truth, frames = read_tracks_csv(bench.path(one.truth)), np.arange(*_frames(one))
+    truth, frames = read_tracks_csv(bench.path(one.truth)), np.arange(*frames_of(one))
     areas = [_area(option.partition("=")[2]) for option in options if option.startswith("--area=")]
     return evaluate(
         truth, rows, area=next(iter(areas), None), frames=frames, ignore_flagged="--ignore-flagged" in options
@@ -126,7 +126,7 @@ def _area(text: str) -> Area:
     return x0, y0, x1, y1
 
 
-def _prepared(one: ResultSet, bench: Bench) -> Recording:
+def prepared(one: ResultSet, bench: Bench) -> Recording:
     """The set's recording; its rig and truth are made."""
     bench.work.mkdir(parents=True, exist_ok=True)
     if one.film is not None and not bench.path(one.rig).exists():
@@ -136,7 +136,7 @@ def _prepared(one: ResultSet, bench: Bench) -> Recording:
     return read_rig(bench.path(one.rig))
 
 
-def _frames(one: ResultSet) -> tuple[int, int]:
+def frames_of(one: ResultSet) -> tuple[int, int]:
     first, _, stop = (one.peer_frames or one.frames).partition(":")
     return int(first), int(stop)
 

@@ -2,7 +2,7 @@
 
 Candidates are sought on a ground lattice, in what nobody explains yet, so people behind others are found once those
 others stand. Whom the frames before led to expect are candidates too, and a newcomer away from the border costs. After
-each round the set is searched anew, until a round changes nobody.
+each round the set is searched anew, until a round gains next to nothing.
 """
 
 from __future__ import annotations
@@ -22,6 +22,11 @@ from stseg.ghosts.people import Explanation, ViewEvidence
 from stseg.ghosts.pool import Pool, peaks
 from stseg.ghosts.prior import Prior
 from stseg.ghosts.views import BoxView, PixelView
+
+_STILL = 1.0
+"""A round that changes no number of people and gains less than this only moves them, nats; settling does that too."""
+_TRADES = 2
+"""How often trades are tried once the people of a frame are settled."""
 
 
 class FramePass:
@@ -74,15 +79,16 @@ class FramePass:
         prior = Prior.of(expected, self.config, self.border)
         expected_inside = prior.pool()
         seen_now = Seen(self.views, sights, prior, self.terms)
-        frame = Frame(seen_now, expected_inside, np.arange(len(expected_inside)))
+        frame, moved_from = Frame(seen_now, expected_inside, np.arange(len(expected_inside))), np.zeros(0, np.int64)
         for _ in range(self.config.rounds):
             fresh = self._fresh(frame)
-            moved = frame.refined()[0]
+            unmoved = np.flatnonzero(~np.isin(frame.members, moved_from))
+            moved = frame.refined(unmoved)[0]
             if not len(fresh) and not len(moved):
                 break
-            known = len(frame.pool)
-            frame = Frame(frame.seen, frame.pool.and_(moved).and_(fresh), frame.members)
-            if (frame.members < known).all():
+            before, moved_from = frame, np.append(moved_from, frame.members[unmoved])
+            frame = Frame(before.seen, before.pool.and_(moved).and_(fresh), before.members)
+            if len(frame.members) == len(before.members) and frame.total < before.total + _STILL:
                 break
         return explanation(_settled(frame))
 
@@ -97,7 +103,9 @@ class FramePass:
 
 
 def _settled(frame: Frame) -> Frame:
-    """The frame searched once more from where its people exactly stand, which may show two of them to be one."""
+    """The frame searched from where its people exactly stand, which may show two to be one, then well, by places."""
     exact = frame.refined()[0]
     known = len(frame.pool)
-    return Frame(frame.seen, frame.pool.and_(exact), np.arange(known, known + len(exact)))
+    anew = Frame(frame.seen, frame.pool.and_(exact), np.arange(known, known + len(exact)))
+    places = np.concatenate([anew.members, anew.rivals()])
+    return Frame(anew.seen, anew.pool.at(places), np.arange(len(anew.members)), _TRADES)

@@ -38,9 +38,11 @@ class Frame:
         The candidates.
     members : int64 (n,)
         The candidates with whom the search begins.
+    trades
+        How often trades are tried, see `stseg.ghosts.search`.
     """
 
-    def __init__(self, seen: Seen, pool: Pool, members: Ints) -> None:
+    def __init__(self, seen: Seen, pool: Pool, members: Ints, trades: int = 0) -> None:
         self.seen, self.pool = seen, pool
         self.case = _case(seen, pool)
         # The scores' parts have the views with boxes first; `row` finds those of each view of the rig.
@@ -48,14 +50,28 @@ class Frame:
         self.row = np.argsort(pixels_last)
         room = np.zeros(len(pool) + 1, np.int64)
         room[: len(members)] = members
-        count = search(room, len(members), self.case)
+        count = search(room, len(members), self.case, trades)
         self.members = room[:count].copy()
+        self.total = self.score(self.members)
         self.box_owner, self.pixel_owner = self._owners()
         self.walker = self._walkers()
 
     def score(self, members: Ints) -> float:
         """Score of a set; the case's `parts` then holds what each view says of each member."""
         return set_score(members, len(members), self.case)
+
+    def rivals(self) -> Ints:
+        """Candidates outside the set, the best of each place, best first: int64 (n,)."""
+        apart = 2 * self.seen.prior.config.lattice
+        others = np.setdiff1d(np.arange(len(self.pool)), self.members)
+        gain = np.array([self.score(np.append(self.members, i)) - self.total for i in others])
+        standing, kept = self.pool.ground[self.members], []
+        for i in others[np.argsort(-gain, kind="stable")]:
+            place = self.pool.ground[i]
+            if not (np.hypot(*(standing - place).T) < apart).any():
+                standing = np.concatenate([standing, place[None]])
+                kept.append(i)
+        return np.array(kept, np.int64)
 
     def _owners(self) -> tuple[list[Ints], list[Ints]]:
         """For each view whose boxes are whose, and whose pixels are whose; -1 for nobody."""
@@ -70,6 +86,7 @@ class Frame:
                 owner[:] = case.owner[: len(owner)]
                 box_view += 1
             else:
+                case.owner[:] = -1
                 pixel_score(pixel_view, self.members, count, case.pixels, case.terms, case.owner, case.parts[0])
                 rows, columns = case.pixels.raster.shape[1:]
                 raster[:] = case.owner[: rows * columns].reshape(rows, columns)[: view.shape[0], : view.shape[1]]
@@ -94,14 +111,13 @@ class Frame:
             for view, boxes, pixels in zip(self.seen.views, self.box_owner, self.pixel_owner, strict=True)
         ]
 
-    def refined(self) -> tuple[Pool, Floats]:
-        """The set's people at the means of their posteriors, and the covariances."""
-        views = self.seen.views
-        own = [
-            [owned(v, j, b, p) for v, b, p in zip(views, self.box_owner, self.pixel_owner, strict=True)]
-            for j in range(len(self.members))
-        ]
-        return refine(self.pool.at(self.members), views, self.seen.sights, own, self.seen.prior, self.walker)
+    def refined(self, places: Ints | None = None) -> tuple[Pool, Floats]:
+        """People at the means of their posteriors, and the covariances; of the set, or of some places in it."""
+        some = np.arange(len(self.members)) if places is None else places
+        own = [[owned(j, b, p) for b, p in zip(self.box_owner, self.pixel_owner, strict=True)] for j in some]
+        return refine(
+            self.pool.at(self.members[some]), self.seen.views, self.seen.sights, own, self.seen.prior, self.walker[some]
+        )
 
 
 def _case(seen: Seen, pool: Pool) -> Case:

@@ -15,7 +15,7 @@ def explanation(frame: Frame) -> Explanation:
     """The result of a frame."""
     views, members = frame.seen.views, frame.members
     exact, covariance = frame.refined()
-    total = frame.score(members)
+    total = frame.score(members)  # which fills the parts
     parts = frame.case.parts[frame.row, : len(members)]
     without = [frame.score(np.delete(members, a)) for a in range(len(members))]
     people = People(
@@ -55,26 +55,18 @@ def _visible(frame: Frame) -> Floats:
 
 
 def _ghosts(frame: Frame, total: float) -> People:
-    """Candidates that were weighed and found to be nobody, those in the same place as a better one left out."""
-    pool, members, lattice = frame.pool, frame.members, frame.seen.prior.config.lattice
-    weighed = []
-    for i in np.setdiff1d(np.arange(len(pool)), members):
-        gain = frame.score(np.append(members, i)) - total
-        weighed.append((gain, i, frame.case.parts[frame.row, len(members)]))
-    weighed.sort(key=lambda one: (-one[0], one[1]))
-    kept: list[tuple[float, int, Floats]] = []
-    standing = list(pool.ground[members])
-    for gain, i, parts in weighed:
-        place = pool.ground[i]
-        if all(np.hypot(*(place - other)) >= 2 * lattice for other in standing):
-            standing.append(place)
-            kept.append((gain, int(i), parts))
-    which = np.array([i for _, i, _ in kept], np.int64)
-    chosen = pool.at(which)
+    """The places that were weighed and found to be nobody's."""
+    lattice = frame.seen.prior.config.lattice
+    which = np.setdiff1d(np.arange(len(frame.pool)), frame.members)
+    kept = []
+    for i in which:
+        gain = frame.score(np.append(frame.members, i)) - total
+        kept.append((gain, frame.case.parts[frame.row, len(frame.members)]))
+    chosen = frame.pool.at(which)
     wide = np.tile(np.eye(2) * lattice**2 / 12, (len(kept), 1, 1))
-    parts = np.array([p for _, _, p in kept]).reshape(len(kept), len(frame.seen.views)).T
+    parts = np.array([p for _, p in kept]).reshape(len(kept), len(frame.seen.views)).T
     strangers = np.full(len(kept), -1, np.int64)
-    prior, evidence = _prior(frame, which, strangers), np.array([gain for gain, _, _ in kept])
+    prior, evidence = _prior(frame, which, strangers), np.array([gain for gain, _ in kept])
     return People(chosen.ground, chosen.height, wide, evidence, parts, np.ones_like(parts), prior, strangers)
 
 

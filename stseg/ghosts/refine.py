@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stseg.arrays import Flags, Floats, Ints
+from stseg.arrays import Floats, Ints
 from stseg.ghosts.boxes import fill_match
 from stseg.ghosts.pool import Pool
 from stseg.ghosts.prior import Prior
@@ -23,10 +23,14 @@ _WORST = -8.0
 
 @dataclass(frozen=True)
 class Own:
-    """What belongs to one person in one view: a box (its index, -1 for none), or the raster's pixels open to them."""
+    """What belongs to one person in one view: a box (its index, -1 for none), or what of the raster is open to them.
+
+    Open are the pixels whose owner (v, u) is the person or nobody, -1.
+    """
 
     box: int
-    pixels: Flags
+    owner: Ints
+    person: int
 
 
 def refine(
@@ -89,13 +93,11 @@ def _patch_score(view: View, sight: Sight, mine: Own, patch: Floats, tried: Floa
     if isinstance(view, PixelView):
         everywhere = np.tile(patch, (len(tried), 1))
         first, spans, area = view.outlines(everywhere, np.repeat(tried, len(patch)))
-        score = view.mean_inside(sight.raster, mine.pixels, first, spans, area).reshape(score.shape)
+        score = view.mean_open(sight.raster, mine.owner, mine.person, first, spans, area).reshape(score.shape)
     return score
 
 
-def owned(view: View, person: int, boxes: Ints, pixels: Ints) -> Own:
+def owned(person: int, boxes: Ints, pixels: Ints) -> Own:
     """What of a view belongs to a person: the box assigned, or the pixels of nobody else."""
-    if isinstance(view, PixelView):
-        return Own(-1, (pixels == person) | (pixels < 0))
     theirs = np.flatnonzero(boxes == person)
-    return Own(int(theirs[0]) if len(theirs) else -1, np.zeros((0, 0), bool))
+    return Own(int(theirs[0]) if len(theirs) else -1, pixels, person)

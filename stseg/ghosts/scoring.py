@@ -67,11 +67,15 @@ def crowding(members: Ints, count: int, ground: Floats, apart: float) -> float:
     total = 0.0
     for a in range(count):
         for b in range(a):
-            i, j = members[a], members[b]
-            distance = np.hypot(ground[i, 0] - ground[j, 0], ground[i, 1] - ground[j, 1])
-            if distance < apart:
-                total += 2.0 + _CROWDED * (1.0 - distance / apart)
+            total += crowd(members[a], members[b], ground, apart)
     return total
+
+
+@kernel
+def crowd(i: int, j: int, ground: Floats, apart: float) -> float:
+    """What two of them cost, nats."""
+    distance = np.hypot(ground[i, 0] - ground[j, 0], ground[i, 1] - ground[j, 1])
+    return float(2.0 + _CROWDED * (1.0 - distance / apart)) if distance < apart else 0.0
 
 
 @kernel
@@ -83,41 +87,53 @@ def box_score(
     Boxes go to members in falling order of what they gain, one to one.
     """
     number = boxes.boxes[view]
-    gain = np.empty((count, number))
+    gain, pair, found = np.empty(count * number), np.empty((count * number, 2), np.int64), 0
     for a in range(count):
         i = members[a]
-        visible = boxes.inside[view, i]
-        for b in range(count):
-            visible *= 1.0 - boxes.cover[view, i, members[b]]
-        share = (visible - terms.hidden_below) / (terms.whole_above - terms.hidden_below)
-        found = min(max(share, terms.least), 1.0)
-        parts[a] = np.log(1.0 - (1.0 - terms.box_miss) * found)
+        parts[a] = _missing(_visible(view, i, members, count, boxes), terms)
         for b in range(number):
-            gain[a, b] = terms.hit + boxes.match[view, i, b] - parts[a]
+            worth = terms.hit + boxes.match[view, i, b] - parts[a]
+            if worth > 0:
+                gain[found], pair[found, 0], pair[found, 1] = worth, a, b
+                found += 1
     taken_by[:number] = -1
     served = np.zeros(count, np.bool_)
-    while True:
-        best, best_a, best_b = 0.0, -1, -1
-        for a in range(count):
-            if not served[a]:
-                for b in range(number):
-                    if taken_by[b] < 0 and gain[a, b] > best:
-                        best, best_a, best_b = gain[a, b], a, b
-        if best_a < 0:
-            break
-        served[best_a], taken_by[best_b] = True, best_a
-        parts[best_a] += best
+    for k in np.argsort(-gain[:found], kind="mergesort"):
+        a, b = pair[k]
+        if not served[a] and taken_by[b] < 0:
+            served[a], taken_by[b] = True, a
+            parts[a] += gain[k]
     return float(parts[:count].sum())
+
+
+@kernel
+def _visible(view: int, i: int, members: Ints, count: int, boxes: BoxEvidence) -> float:
+    """How much of candidate i's box is in the image and not behind a member's, 0..1."""
+    visible = boxes.inside[view, i]
+    for b in range(count):
+        visible *= 1.0 - boxes.cover[view, i, members[b]]
+    return float(visible)
+
+
+@kernel
+def _missing(visible: float, terms: Terms) -> float:
+    """What it costs that there is no box of somebody of whom so much is visible, nats."""
+    share = (visible - terms.hidden_below) / (terms.whole_above - terms.hidden_below)
+    return float(np.log(1.0 - (1.0 - terms.box_miss) * min(max(share, terms.least), 1.0)))
 
 
 @kernel
 def pixel_score(
     view: int, members: Ints, count: int, pixels: PixelEvidence, terms: Terms, owner: Ints, parts: Floats
 ) -> float:
-    """One view of pixels; fills parts (member,) and owner (v * u,) with the place in `members`, -1 for nobody."""
+    """One view of pixels; fills parts (member,) and owner (v * u,) inside outlines with the place in `members`."""
     raster = pixels.raster[view]
     rows, columns = raster.shape
-    owner[: rows * columns] = -1
+    for a in range(count):
+        first = pixels.first[view, members[a]]
+        for k in range(min(pixels.spans.shape[2], rows - first) if first >= 0 else 0):
+            line = (first + k) * columns
+            owner[line + pixels.spans[view, members[a], k, 0] : line + pixels.spans[view, members[a], k, 1]] = -1
     order = np.argsort(pixels.order[view][members[:count]])
     for a in order:
         parts[a] = 0.0

@@ -1,12 +1,13 @@
-"""Short tracks go, short gaps are filled (HW12's temporal check; METHODS 5)."""
+"""Tracks that are short, or that most frames take for a ghost, go; short gaps are filled (METHODS 5, HW12 V-E)."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
 
-from stseg.arrays import Rows
+from stseg.arrays import Ints, Rows
 from stseg.config import IdentityConfig
 from stseg.tracks import EVENT, TRAJECTORY
 
@@ -21,13 +22,39 @@ def drop_short(trajectory: Rows, frame_rate: float, config: IdentityConfig) -> t
     """
     ids, where, counts = np.unique(trajectory["id"], return_inverse=True, return_counts=True)
     least = max(2, round(config.shortest * frame_rate))
-    gone = ids[counts < least]
+    short = counts < least
+    reasons = [f"{count} frames, shorter than {least}" for count in counts[short]]
+    return trajectory[~short[where]], _dropped(trajectory, ids[short], reasons)
+
+
+def drop_ghosts(trajectory: Rows, frame_rate: float, config: IdentityConfig) -> tuple[Rows, Rows]:
+    """Tracks that more frames take for a ghost than for a person.
+
+    Frames of gaps that would be filled count as such: who is followed and was not found there was weighed, and not
+    believed. Of longer gaps nobody knows, so they do not count.
+
+    Returns
+    -------
+    TRAJECTORY, EVENT
+        The rows of the others, and one event for each track that goes.
+    """
+    order = np.lexsort((trajectory["frame"], trajectory["id"]))
+    ids, where, counts = np.unique(trajectory["id"], return_inverse=True, return_counts=True)
+    step, same = np.diff(trajectory["frame"][order]), np.diff(trajectory["id"][order]) == 0
+    gap = np.where(same & (step <= config.bridge * frame_rate + 1), step - 1, 0)
+    doubted = np.bincount(where[order][1:], gap, len(ids)).astype(int)
+    ghost = doubted > counts
+    reasons = [f"{no} of {no + yes} frames say ghost" for no, yes in zip(doubted[ghost], counts[ghost], strict=True)]
+    return trajectory[~ghost[where]], _dropped(trajectory, ids[ghost], reasons)
+
+
+def _dropped(trajectory: Rows, gone: Ints, reasons: Sequence[str]) -> Rows:
+    """An event for each track that goes."""
     events = np.zeros(len(gone), EVENT)
-    for event, identity in zip(events, gone, strict=True):
-        own = trajectory[trajectory["id"] == identity]
-        reason = f"{len(own)} frames, shorter than {least}"
-        event["frame"], event["kind"], event["id"], event["reason"] = own["frame"][0], b"dropped", identity, reason
-    return trajectory[counts[where] >= least], events
+    for event, identity, reason in zip(events, gone, reasons, strict=True):
+        first = trajectory["frame"][trajectory["id"] == identity].min()
+        event["frame"], event["kind"], event["id"], event["reason"] = first, b"dropped", identity, reason
+    return events
 
 
 def fill_gaps(trajectory: Rows, frame_rate: float, config: IdentityConfig) -> Rows:

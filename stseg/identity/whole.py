@@ -1,7 +1,7 @@
 """From what was committed window by window to the tracks of the whole run (METHODS 5).
 
-committed rows -> who is who anew -> short tracks dropped -> short gaps filled -> places smoothed
-                  (relink)           (gaps)                  (gaps)              (smoothed)
+committed rows -> who is who anew -> short tracks and ghosts dropped -> short gaps filled -> places smoothed
+                  (relink)           (gaps)                             (gaps)              (smoothed)
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from stseg.arrays import Ints, Rows
 from stseg.config import GhostConfig, IdentityConfig
 from stseg.ghosts.border import Border
-from stseg.identity.gaps import drop_short, fill_gaps
+from stseg.identity.gaps import drop_ghosts, drop_short, fill_gaps
 from stseg.identity.relink import Link, relink
 from stseg.identity.smoothed import smooth_places
 from stseg.tracks import EVENT
@@ -46,9 +46,10 @@ def whole_tracks(
     relinked = relink(committed, frame_rate, border, config, people)
     renamed = committed.copy()
     renamed["id"] = relinked.identity
-    kept, dropped = drop_short(renamed, frame_rate, config)
+    long, short = drop_short(renamed, frame_rate, config)
+    kept, ghosts = drop_ghosts(long, frame_rate, config)
     identity = np.where(np.isin(relinked.identity, kept["id"]), relinked.identity, 0)
-    story = np.concatenate([_retold(events, committed, relinked.identity, relinked.links), dropped])
+    story = np.concatenate([_retold(events, committed, relinked.identity, relinked.links), short, ghosts])
     smoothed = smooth_places(fill_gaps(kept, frame_rate, config), frame_rate)
     return Whole(smoothed, story[np.argsort(story["frame"], kind="stable")], identity)
 

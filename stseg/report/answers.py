@@ -77,7 +77,8 @@ def _dwelling(places: Sequence[Haunt], rows: int) -> str:
 def _ghosts(frames: int, candidates: int, reasons: GhostReasons, events: Rows) -> str:
     count = len(reasons.ghosts)
     short = int((events["kind"] == b"dropped").sum())
-    tracks = f" {_counted(short, 'track')} too short to be somebody {'was' if short == 1 else 'were'} dropped as well."
+    were = "was" if short == 1 else "were"
+    tracks = f" {_counted(short, 'track')} too short, or too often doubted, to be somebody {were} dropped as well."
     if not count:
         return "No candidate was dropped." + (tracks if short else "")
     ranked = sorted(zip(reasons.counts(), REASONS, strict=True), reverse=True)

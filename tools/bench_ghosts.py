@@ -1,0 +1,156 @@
+"""How fast the pass of a frame is: who is there and where, one thread; pixel labels: tools/bench_labels.py.
+
+    python tools/bench_ghosts.py [--frames 20] [--people 3,5,7,9] [--groups 1,2,4,8]
+
+Positions and statuses: simulated people seen by four cameras a quarter turn apart, as silhouettes and as a detector's
+boxes; each frame is expected from those before, as in a run. A candidate is a place that the settled search weighed,
+person or ghost. Gate: 20 frames/s where ten are weighed.
+
+Groups: one frame's candidates so many times over, in rooms whose evidence does not touch. Gate: a group of many takes
+at most a tenth more than one of few.
+
+Seconds are those of the processor, which other programs on the machine hardly change.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Sequence
+
+import numpy as np
+
+from stseg.config import Config
+from stseg.ghosts.evidence import BoxEvidence, Case, PixelEvidence
+from stseg.ghosts.explain import FramePass
+from stseg.ghosts.frame import Frame, Seen
+from stseg.ghosts.people import ViewEvidence
+from stseg.ghosts.pool import Pool
+from stseg.ghosts.prior import Prior
+from stseg.ghosts.search import search
+from stseg.identity.walkers import Walkers
+from stseg.simulate import Film, SceneSpec
+
+WEIGHED, GATE, SLACK = 10, 20.0, 1.1
+_WARM = 3
+_REPEATS = 5
+
+
+def evidence(people: int, frames: int, kind: str) -> tuple[Film, list[list[ViewEvidence]]]:
+    """What four views show of so many people, frame by frame."""
+    spec = SceneSpec(
+        name="bench", people=people, area=(6.0, 6.0), seconds=(frames + _WARM) / 10, cameras=4, camera_distance=6.8,
+        size=(320, 240), seed=11,
+    )  # fmt: skip
+    film = Film(spec)
+    seen: list[list[ViewEvidence]] = [
+        [view.boxes if kind == "boxes" else (view.instances > 0).astype(np.float32) for view in moment.views]
+        for moment in film.moments()
+    ]
+    return film, seen
+
+
+def positions(people: int, frames: int, kind: str) -> tuple[float, float]:
+    """Candidates weighed and seconds, both a frame."""
+    film, seen = evidence(people, frames, kind)
+    config = Config()
+    frame_pass = FramePass(film.rig, [kind] * 4, config.ghosts)
+    follow = Walkers(film.rig.frame_rate, config.ghosts, config.identity)
+    taken, weighed = [], []
+    for frame, views in enumerate(seen):
+        start = time.process_time()
+        found = frame_pass.explain(views, follow.expected(frame))
+        taken.append(time.process_time() - start)
+        follow.follow(frame, found.people, found.ghosts)
+        weighed.append(len(found.people) + len(found.ghosts))
+    return float(np.mean(weighed[_WARM:])), float(np.mean(taken[_WARM:]))
+
+
+def rooms(case: Case, number: int) -> Case:
+    """A case so many times over, side by side: nothing in one room bears on another."""
+    n, room = len(case.own), np.repeat(np.arange(number), len(case.own))
+    same = room[:, None] == room
+    boxes, pixels = case.boxes, case.pixels
+    rows, most, walkers = pixels.raster.shape[1], boxes.match.shape[2], case.known.shape[1]
+    match = np.full((len(boxes.match), n * number, most * number), -np.inf)
+    known = np.full((n * number, walkers * number), -1e3)
+    for k in range(number):
+        own = slice(k * n, (k + 1) * n)
+        for view, count in enumerate(boxes.boxes):
+            match[view, own, k * count : (k + 1) * count] = boxes.match[view, :, :count]
+        known[own, k * walkers : (k + 1) * walkers] = case.known
+    first = np.tile(pixels.first, (1, number))
+    more_boxes = BoxEvidence(
+        match,
+        boxes.boxes * number,
+        np.tile(boxes.cover, (1, number, number)) * same,
+        np.tile(boxes.inside, (1, number)),
+    )
+    more_pixels = PixelEvidence(
+        np.tile(pixels.raster, (1, number, 1)),
+        np.where(first < 0, -1, first + rows * room),
+        np.tile(pixels.spans, (1, number, 1, 1)),
+        np.tile(pixels.area, (1, number)),
+        np.tile(pixels.order, (1, number)),
+    )
+    return Case(
+        more_boxes, more_pixels, np.tile(case.own, number), np.tile(case.newcomer, number), known,
+        np.tile(case.ground, (number, 1)) + 100.0 * room[:, None], case.terms,
+        np.empty(max(more_pixels.raster[:1].size, match.shape[2], known.shape[1], 1), np.int64),
+        np.zeros((len(case.parts), n * number + 1)),
+    )  # fmt: skip
+
+
+def search_seconds(case: Case) -> float:
+    """The best of some searches of a case from nobody."""
+    best = np.inf
+    for _ in range(_REPEATS):
+        start = time.process_time()
+        search(np.zeros(len(case.own) + 1, np.int64), 0, case, 2)
+        best = min(best, time.process_time() - start)
+    return best
+
+
+def one_case(kind: str) -> Case:
+    """All that is known of the candidates of one frame, five people in view."""
+    film, seen = evidence(5, 1, kind)
+    frame_pass, views = FramePass(film.rig, [kind] * 4, Config().ghosts), seen[-1]
+    found = frame_pass.explain(views, None)
+    sights = [view.observe(shown) for view, shown in zip(frame_pass.views, views, strict=True)]
+    state = Seen(frame_pass.views, sights, Prior.of(None, Config().ghosts, frame_pass.border), frame_pass.terms)
+    pool = Pool(found.people.ground, found.people.height).and_(Pool(found.ghosts.ground, found.ghosts.height))
+    return Frame(state, pool, np.zeros(0, np.int64)).case
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Print both tables; exit status 1 where a gate is missed."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--frames", type=int, default=20)
+    parser.add_argument("--people", type=lambda text: [int(n) for n in text.split(",")], default=[3, 5, 7, 9])
+    parser.add_argument("--groups", type=lambda text: [int(n) for n in text.split(",")], default=[1, 2, 4, 8])
+    asked = parser.parse_args(arguments)
+    met = True
+    print("| evidence | people | candidates weighed | ms a frame | frames/s |\n| --- | --: | --: | --: | --: |")
+    for kind in ("pixels", "boxes"):
+        rows = [(people, *positions(people, asked.frames, kind)) for people in asked.people]
+        for people, weighed, seconds in rows:
+            print(f"| {kind} | {people} | {weighed:.1f} | {1e3 * seconds:.1f} | {1 / seconds:.1f} |", flush=True)
+        enough = min((row for row in rows if row[1] >= WEIGHED), default=rows[-1])
+        met &= 1 / enough[2] >= GATE
+        print(f"gate, {kind}: {1 / enough[2]:.1f} frames/s where {enough[1]:.1f} are weighed, {GATE:g} at {WEIGHED}")
+    print("\n| evidence | groups | candidates | ms a search | ms a group |\n| --- | --: | --: | --: | --: |")
+    for kind in ("pixels", "boxes"):
+        case = one_case(kind)
+        search_seconds(case)
+        times = {number: search_seconds(rooms(case, number)) for number in asked.groups}
+        for number, seconds in times.items():
+            each = 1e3 * seconds / number
+            print(f"| {kind} | {number} | {number * len(case.own)} | {1e3 * seconds:.2f} | {each:.2f} |", flush=True)
+        few, many = min(times), max(times)
+        met &= times[many] / many <= SLACK * times[few] / few
+    sys.exit(0 if met else 1)
+
+
+if __name__ == "__main__":
+    main()

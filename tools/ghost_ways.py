@@ -1,0 +1,97 @@
+"""What a frame shows before ghosts are removed: every candidate is somebody.
+
+The same views, lattice, prior odds, refinement and filter as the pass, and each candidate is judged by itself: a place
+whose evidence, all pixels or boxes at its disposal, outweighs the price of a person (`ghosts.person`; nobody pays for
+coming in) is a person, but one of those within half a metre of a better one. Nobody explains anything away, in the
+frame or in the volume. Half a metre is the gate of the scores, so nothing is counted twice.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from stseg.arrays import Floats, Ints
+from stseg.ghosts.expected import Expected
+from stseg.ghosts.explain import FramePass
+from stseg.ghosts.people import Explanation, People, ViewEvidence
+from stseg.ghosts.pool import Pool, peaks
+from stseg.ghosts.prior import Prior
+from stseg.ghosts.refine import Own, refine
+from stseg.ghosts.views import BoxView, PixelView, Sight
+from stseg.identity.linking import assign, distances
+
+MERGED = 0.5
+"""Distance within which candidates are one, metres."""
+
+
+class EveryCandidate(FramePass):
+    """The pass of a frame without the removal of ghosts."""
+
+    def explain(self, seen: Sequence[ViewEvidence], expected: Expected | None) -> Explanation:
+        """Everybody who would be there if nobody else were."""
+        sights = [None if s is None else view.observe(s) for view, s in zip(self.views, seen, strict=True)]
+        prior = Prior.of(expected, self.config, self.border)
+        pool, parts = self._candidates(sights, prior)
+        walker = _walkers(pool, prior)
+        owned = [
+            [_all_of(v, s, pool.at([j])) for v, s in zip(self.views, sights, strict=True)] for j in range(len(pool))
+        ]
+        exact, covariance = refine(pool, self.views, sights, owned, prior, walker)
+        known, own = prior.known(pool), self.config.person + prior.tall(pool.height)
+        before = np.array(
+            [p + (known[j, k] if k >= 0 else 0.0) for j, (p, k) in enumerate(zip(own, walker, strict=True))]
+        )
+        ones = np.ones_like(parts)
+        people = People(exact.ground, exact.height, covariance, parts.sum(0) + before, parts, ones, before, walker)
+        owner = tuple(np.full(view.shape, -1, np.int16) for view in self.views)
+        boxes = tuple(np.full(len(sight.edges) if sight else 0, -1, np.int64) for sight in sights)
+        return Explanation(people, _none_of(people), owner, tuple(view.step for view in self.views), boxes)
+
+    def _candidates(self, sights: Sequence[Sight | None], prior: Prior) -> tuple[Pool, Floats]:
+        """Candidates worth a person, and what each view says of them, nats, float64 (view, n)."""
+        heights, (rows, columns) = np.asarray(self.config.heights), self.lattice_ground.shape[:2]
+        said = np.zeros((len(self.views), len(heights), rows * columns))
+        for view, sight, part in zip(self.views, sights, said, strict=True):
+            if sight is not None:
+                shape = len(sight.edges) if isinstance(view, BoxView) else view.shape
+                part[:] = view.lattice_score(sight, np.ones(shape, bool))
+        score = said.sum(0) + prior.tall(heights)[:, None] + self.config.person
+        found = peaks(score.reshape(-1, rows, columns), self.lattice_ground, heights)
+        kept: list[int] = []
+        for i, away in enumerate(distances(found.ground, found.ground)):
+            if not (away[kept] < MERGED).any():
+                kept.append(i)
+        pool = found.at(kept)
+        flat = self.lattice_ground.reshape(-1, 2)
+        cell = distances(pool.ground, flat).argmin(1) if len(pool) else np.zeros(0, np.int64)
+        return pool, said[:, heights.searchsorted(pool.height), cell]
+
+
+def _walkers(pool: Pool, prior: Prior) -> Ints:
+    """Which walker each candidate is, one to one, int64 (n,), -1 for newcomers."""
+    walker = np.full(len(pool), -1, np.int64)
+    rows, columns = assign(-(prior.known(pool) + prior.newcomer(pool.ground)[:, None]), 0.0)
+    walker[rows] = columns
+    return walker
+
+
+def _all_of(view: BoxView | PixelView, sight: Sight | None, candidate: Pool) -> Own:
+    """The best box, or every pixel."""
+    if isinstance(view, PixelView) or sight is None or not len(sight.edges):
+        return Own(-1, np.full(view.shape, -1), 0)
+    body = view.table.boxes_of(candidate.ground, candidate.height)
+    middle = (sight.edges[:, 0] + sight.edges[:, 2]) / 2, sight.edges[:, 1]
+    off = np.hypot(middle[0] - (body[0, 0] + body[0, 2]) / 2, middle[1] - body[0, 1])
+    tall = body[0, 3] - body[0, 1]
+    return Own(int(np.argmin(off)) if off.min() < 0.2 * tall else -1, np.zeros((0, 0), np.int64), 0)
+
+
+def _none_of(people: People) -> People:
+    """Nobody."""
+    none = np.zeros(0, np.int64)
+    return People(
+        people.ground[none], people.height[none], people.covariance[none], people.evidence[none],
+        people.parts[:, none], people.visible[:, none], people.prior[none], people.walker[none],
+    )  # fmt: skip
