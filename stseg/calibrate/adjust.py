@@ -197,7 +197,7 @@ def _system(state: State, task: Task) -> _System:
     seen = task.seen
     of_view, of_point = state.views[seen.view], state.points[seen.point]
     miss = _misses(of_view, state.toe, of_point, task)
-    ahead: Flags = np.isfinite(miss).all(axis=(1, 2))
+    ahead: Flags = np.asarray(np.isfinite(miss).all(axis=(1, 2)))
     weight = np.where(ahead[:, None], (1.0 + _squares(miss, task) / _OUTLIER**2) ** -2, 0.0)
     root = (np.sqrt(weight / task.alike)[..., None] / task.spread).reshape(-1, 4)
 
@@ -240,7 +240,7 @@ def _unit(k: int, size: int) -> Floats:
 def _reduced(system: _System, damping: float) -> tuple[Floats, Floats]:
     """The cameras' equations with people eliminated (Schur's complement), and people's inverse blocks."""
     people = system.people * (1 + damping * np.eye(3))
-    inverse: Floats = np.linalg.inv(people)
+    inverse = np.asarray(np.linalg.inv(people), float)
     cameras = system.cameras * (1 + damping * np.eye(len(system.cameras)))
     through = system.between @ inverse
     size = len(cameras)

@@ -81,7 +81,7 @@ def meetings(ends: Sequence[Ends], delay: Ints, ground: Sequence[Floats], gate: 
     view = np.repeat(np.arange(len(ends)), [len(one) for one in ends])
     frame = np.concatenate([one.frame - late for one, late in zip(ends, delay, strict=True)])
     place = np.concatenate(ground)
-    known: Flags = np.isfinite(place).all(axis=1)
+    known: Flags = np.asarray(np.isfinite(place).all(axis=1))
     order = np.lexsort((view, frame))
     order = order[known[order]]
     bounds = np.flatnonzero(np.diff(frame[order])) + 1

@@ -49,10 +49,10 @@ def _fold_squared(radial: Floats) -> Floats:
     """Squared tangents where r (1 + k1 r^2 + k2 r^4) stops rising; large where it never does, float64 (n,)."""
     k1, k2 = radial.T
     inside = 9 * k1**2 - 20 * k2
-    with np.errstate(divide="ignore", invalid="ignore"):
-        # The smaller root of 1 + 3 k1 s + 5 k2 s^2, in the form that holds as k2 goes to zero.
-        root = 2.0 / (-3 * k1 + np.sqrt(np.maximum(inside, 0.0)))
-    return np.where((inside >= 0) & (root > 0) & np.isfinite(root), root, 100.0)
+    # The smaller root of 1 + 3 k1 s + 5 k2 s^2, in the form that holds as k2 goes to zero.
+    below = -3 * k1 + np.sqrt(np.maximum(inside, 0.0))
+    turns = (inside >= 0) & (below > 0.02)
+    return np.where(turns, 2.0 / np.where(turns, below, 1.0), 100.0)
 
 
 def rays(view: Floats, size: tuple[int, int], pixel: Floats) -> Floats:

@@ -22,7 +22,8 @@ FORWARD = 0.15
 """Metres by which the lowest point of a silhouette is nearer to the camera than the body's axis: a toe, half a step."""
 _STARTS = tuple(product((0.6, 0.9, 1.4), (0.2, 0.5), (0.0, -0.3)))
 """Focal length in widths, pitch in radians, k1 from which the search starts."""
-_MOST = 400
+_FIRST, _MOST = 60, 300
+"""How many people and frames are asked at first and at last."""
 
 
 def view_of_upright(ends: Ends, size: tuple[int, int], person_height: float) -> tuple[Floats, float]:
@@ -42,19 +43,29 @@ def view_of_upright(ends: Ends, size: tuple[int, int], person_height: float) -> 
     float64 (12,), float
         The camera, and the median miss of heads in lengths of a person.
     """
-    some = ends.of(np.unique(np.linspace(0, len(ends) - 1, min(_MOST, len(ends))).astype(int)))
+    few, some = (_spread_out(ends, most) for most in (_FIRST, _MOST))
 
-    def miss(unknown: Floats) -> Floats:
-        return np.concatenate([_head_misses(_view(unknown), some, size, person_height) / _SPREAD, _prior(unknown)])
+    def fit(rows: Ends, start: Floats, most: int) -> tuple[float, Floats]:
+        def miss(unknown: Floats) -> Floats:
+            return np.concatenate([_head_misses(_view(unknown), rows, size, person_height) / _SPREAD, _prior(unknown)])
 
-    fits = [
-        least_squares(miss, [np.log(focal), pitch, 0.0, np.log(3.0), k1], loss="cauchy", max_nfev=40)
-        for focal, pitch, k1 in _STARTS
-    ]
-    best = min(fits, key=lambda fit: float(fit.cost))
-    view = _view(best.x)
+        found = least_squares(miss, start, loss="cauchy", max_nfev=most)
+        return float(found.cost), np.asarray(found.x)
+
+    starts = [np.array([np.log(focal), pitch, 0.0, np.log(3.0), k1]) for focal, pitch, k1 in _STARTS]
+    rough = sorted((fit(few, start, 10) for start in starts), key=_cost)
+    _, best = min((fit(some, unknown, 40) for _, unknown in rough[:3]), key=_cost)
+    view = _view(best)
     away = _head_misses(view, some, size, person_height).reshape(-1, 2)
     return view, float(np.median(np.hypot(*away.T)))
+
+
+def _spread_out(ends: Ends, most: int) -> Ends:
+    return ends.of(np.unique(np.linspace(0, len(ends) - 1, min(most, len(ends))).astype(np.int64)))
+
+
+def _cost(fit: tuple[float, Floats]) -> float:
+    return fit[0]
 
 
 def _view(unknown: Floats) -> Floats:
@@ -75,7 +86,7 @@ def _prior(unknown: Floats) -> Floats:
 def _head_misses(view: Floats, ends: Ends, size: tuple[int, int], person_height: float) -> Floats:
     """How far heads are from above their feet, in lengths of a person, float64 (2n,); 1 where feet have no ground."""
     ground = axis_of_foot(view, size, ends.foot, FORWARD)
-    known: Flags = np.isfinite(ground).all(axis=1)
+    known: Flags = np.asarray(np.isfinite(ground).all(axis=1))
     top = np.column_stack([np.where(known[:, None], ground, 0.0), np.full(len(ground), person_height)])
     many = np.ones(len(top))
     head = project(np.tile(view, (len(top), 1)), many * size[0], many * size[1], top)
