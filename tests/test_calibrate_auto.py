@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from walking import Walking, changed, delayed, walking
 
-from stseg.arrays import Floats
+from stseg.arrays import Floats, Singles
 from stseg.calibrate.align import Walks, align, mirrored
 from stseg.calibrate.assemble import align_all, assemble
 from stseg.calibrate.blobs import Ends, people_ends
@@ -74,12 +74,12 @@ def test_the_ground_and_heights_come_back_from_pixels() -> None:
     np.testing.assert_allclose(height_of_head(view, IMAGE, high, ground), [1.5, 1.7, 1.9], atol=1e-6)
 
 
-def painted(*bodies: tuple[float, float, float, float]) -> Floats:
+def painted(*bodies: tuple[float, float, float, float]) -> Singles:
     """A likelihood map (180, 240) of lines with round ends from foot to head, 15 pixels wide."""
     image = np.zeros((180, 240), np.uint8)
     for u0, v0, u1, v1 in bodies:
         cv2.line(image, (int(u0), int(v0)), (int(u1), int(v1)), 255, 15)
-    return image.astype(np.float32) / 255
+    return np.asarray(image, np.float32) / np.float32(255)
 
 
 def test_ends_of_one_who_stands_free() -> None:

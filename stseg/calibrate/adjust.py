@@ -70,6 +70,9 @@ class Task:
         How many sightings say what one independent sighting would: those of one step err alike.
     clock_spread
         Standard deviation of the clocks' differences that are left, seconds.
+    body : float64 (m,)
+        1 for a sighting of a person; 0 for that of a mark on the floor, which has no toe in front of it. The head of a
+        mark has an infinite spread.
     """
 
     size: Ints
@@ -79,6 +82,7 @@ class Task:
     height_spread: float
     alike: float
     clock_spread: float
+    body: Floats
 
 
 @dataclass(frozen=True)
@@ -122,8 +126,9 @@ def adjust(state: State, task: Task) -> Outcome:
 
 
 def _covariance(reduced: Floats, state: State) -> Floats:
-    """Inverse of the cameras' equations where the ground's turn and shift are shared out evenly among the cameras."""
-    free = np.zeros((3, len(reduced)))
+    """Inverse of the cameras' equations where the ground's turn and shift, and the time, are shared out evenly."""
+    free = np.zeros((4, len(reduced)))
+    free[3, CLOCK : SIZE * len(state.views) : SIZE] = 1.0
     for k, (turn, shift) in enumerate(((1e-5, (0.0, 0.0)), (0.0, (1e-5, 0.0)), (0.0, (0.0, 1e-5)))):
         changed = np.array([moved(view, turn, np.array(shift), 1.0) for view in state.views])
         free[k, : changed.size] = (changed - state.views).ravel() / 1e-5
@@ -147,6 +152,7 @@ def _misses(views: Floats, toe: Floats, points: Floats, task: Task) -> Floats:
     toward = views[:, CENTRE][:, :2] - place[:, :2]
     toward /= np.maximum(np.linalg.norm(toward, axis=1, keepdims=True), 1e-6)
     forward = toe[0] + toe[1] * np.minimum(np.abs((toward * velocity).sum(axis=1)), _PACE)
+    forward *= task.body
     low = np.column_stack([place[:, :2] + forward[:, None] * toward, np.zeros(len(place))])
     down = seen.foot - seen.head
     square = (down**2).sum(axis=1)[:, None]

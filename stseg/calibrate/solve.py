@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from stseg.calibrate.adjust import Outcome, State, Task, adjust
 from stseg.calibrate.align import Alignment, Walks
 from stseg.calibrate.assemble import Assembly
 from stseg.calibrate.blobs import Ends
+from stseg.calibrate.floor import Marks
 from stseg.calibrate.meet import Meetings, meetings
 from stseg.calibrate.paths import path_of
 from stseg.calibrate.pinhole import CLOCK, height_of_head, moved
@@ -31,6 +32,9 @@ _TRACE = 0.3
 """Pixels below which no end is known."""
 _CLOCKS, _SAME_CLOCK = 0.2, 1e-4
 """Standard deviations of what is left of unknown and of known delays, seconds."""
+_MOST_MARKS = 800
+_MARK_PIXELS = 1.5
+"""Standard deviation of a mark on the floor, pixels: it is found in a plan, where distant ground is stretched."""
 _STEP_SECONDS = 0.5
 """A step's time, in which ends err alike."""
 
@@ -152,9 +156,48 @@ def _turn(views: Views, state: State, delay: Ints, gate: float, spread: Floats) 
         _BOB if known else _HEIGHTS,
         _alike(met, views),
         _CLOCKS if views.most_delay else _SAME_CLOCK,
+        np.ones(len(met.view)),
     )
     points = np.column_stack([met.ground, height])
     return Solution(adjust(State(state.views, state.toe, points), task), task, delay)
+
+
+def refine_with_marks(views: Views, solution: Solution, marks: Marks) -> Solution:
+    """The adjustment again, with marks on the floor that two views share beside the people."""
+    if not len(marks):
+        return solution
+    task, state = solution.task, solution.outcome.state
+    some = marks.of(np.unique(np.linspace(0, len(marks) - 1, min(_MOST_MARKS, len(marks))).astype(np.int64)))
+    joint = _with_marks(task, some)
+    points = np.concatenate([state.points, np.column_stack([some.ground, np.full(len(some), views.person_height)])])
+    outcome = adjust(replace(state, points=points), joint)
+    people, sightings = len(state.points), len(task.seen.view)
+    state = replace(outcome.state, points=outcome.state.points[:people])
+    return Solution(replace(outcome, state=state, miss=outcome.miss[:sightings]), task, solution.delay)
+
+
+def _with_marks(task: Task, marks: Marks) -> Task:
+    """The same task with two sightings of each mark, whose feet alone count."""
+    seen, count = task.seen, len(marks)
+    pixel = marks.pixel.reshape(-1, 2)
+    foot = np.array([_MARK_PIXELS * np.sqrt(task.alike)] * 2)
+    met = Meetings(
+        np.concatenate([seen.frame, np.zeros(count, np.int64)]),
+        np.concatenate([seen.ground, marks.ground]),
+        np.concatenate([seen.velocity, np.zeros((count, 2))]),
+        np.concatenate([seen.person, np.full(count, -1, np.int64)]),
+        np.concatenate([seen.point, len(seen.frame) + np.repeat(np.arange(count), 2)]),
+        np.concatenate([seen.view, marks.view.ravel()]),
+        np.concatenate([seen.foot, pixel]),
+        np.concatenate([seen.head, pixel - [0.0, 1.0]]),  # a person one pixel tall: lengths are pixels
+    )
+    return replace(
+        task,
+        seen=met,
+        spread=np.concatenate([task.spread, np.tile([foot, [np.inf, np.inf]], (2 * count, 1, 1))]),
+        height=np.concatenate([task.height, np.full(count, float(task.height.mean()))]),
+        body=np.concatenate([task.body, np.zeros(2 * count)]),
+    )
 
 
 def _spread_out(met: Meetings) -> Ints:

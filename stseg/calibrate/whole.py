@@ -6,11 +6,27 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from stseg.arrays import Bytes
 from stseg.calibrate.assemble import align_all, assemble
 from stseg.calibrate.doubts import require_met, require_placed, require_walkers
-from stseg.calibrate.result import centred
-from stseg.calibrate.solve import ROUNDS, Solution, Views, placed_views, refine, views_alone, walks_of
+from stseg.calibrate.floor import floor_marks
+from stseg.calibrate.result import cameras_of, centred, grid_of
+from stseg.calibrate.solve import (
+    ROUNDS,
+    Solution,
+    Views,
+    placed_views,
+    refine,
+    refine_with_marks,
+    views_alone,
+    walks_of,
+)
 from stseg.errors import SourceError
+
+_FLOOR_ROUNDS = 2
+"""Marks are found better once the plans fit better."""
+_FLOOR_CELL = 0.1
+"""Metres."""
 
 
 def steps_of(views: int) -> int:
@@ -48,3 +64,23 @@ def calibrate_from_people(names: Sequence[str], views: Views, progress: Callable
     solution = refine(views, placed_views(alone, assembly), delay, progress)
     require_met(names, solution)
     return centred(solution)
+
+
+def sharpen_by_floor(views: Views, solution: Solution, backgrounds: Sequence[Bytes]) -> tuple[Solution, int]:
+    """The same with the help of marks on the floor, and how many there are; 0 on a bare one.
+
+    Parameters
+    ----------
+    views
+        What `solution` was made of.
+    solution
+        Views placed by people.
+    backgrounds
+        The empty scene in each view, uint8 (v, u, 3).
+    """
+    names = [str(view) for view in range(len(backgrounds))]
+    count = 0
+    for _ in range(_FLOOR_ROUNDS):
+        marks = floor_marks(backgrounds, cameras_of(solution, names), grid_of(solution, _FLOOR_CELL))
+        solution, count = centred(refine_with_marks(views, solution, marks)), len(marks)
+    return solution, count

@@ -13,7 +13,7 @@ from cyclopts import Parameter
 from rich.console import Console
 from rich.progress import Progress, TaskID
 
-from stseg.arrays import Floats
+from stseg.arrays import Bytes, Floats
 from stseg.calibrate.blobs import Ends, join_ends, people_ends
 from stseg.calibrate.result import (
     cameras_of,
@@ -24,11 +24,12 @@ from stseg.calibrate.result import (
     scaled,
 )
 from stseg.calibrate.solve import Solution, Views
-from stseg.calibrate.whole import calibrate_from_people, steps_of
+from stseg.calibrate.whole import calibrate_from_people, sharpen_by_floor, steps_of
 from stseg.commands.calibrate_scene import numbers
 from stseg.commands.sights import make_sights
 from stseg.config import Config
 from stseg.errors import ConfigError
+from stseg.foreground.sight import Sight
 from stseg.geometry import Camera, Grid, Rig
 from stseg.io.frames import count_frames, open_frames
 from stseg.io.outputs import require_new
@@ -56,7 +57,8 @@ def calibrate_auto(
 
     Each camera learns its background and finds people who stand free of others; their feet and heads give its lens,
     tilt and height, their ways give where the cameras stand and by how many frames their clocks differ, and one
-    adjustment of everything gives the rig. One or two people who walk all over the ground for a minute are best.
+    adjustment of everything gives the rig, with the marks on the floor that views share, where it has any. One or two
+    people who walk all over the ground for a minute are best.
 
     ```
     stseg calibrate auto cam*.avi -o room.toml --frame-rate 25 --distance cam1,120,340,410,335,2.5
@@ -92,8 +94,9 @@ def calibrate_auto(
     names = [camera.name for camera in streams.rig.cameras]
     known = None if distance is None else _distance(distance, names)
     first, stop = _frames(frames, count_frames(streams))
+    sights = make_sights(streams, Config(), first, stop)
     views = Views(
-        _ends(streams, first, stop),
+        _ends(streams, sights, first, stop),
         tuple(camera.size for camera in streams.rig.cameras),
         frame_rate,
         person_height,
@@ -101,12 +104,20 @@ def calibrate_auto(
     )
     with _bar("calibrating", steps_of(len(names))) as (bar, task):
         solution = calibrate_from_people([str(path) for path in videos], views, lambda: bar.advance(task))
+    backgrounds = _backgrounds(sights)
+    marks = 0
+    if backgrounds:
+        solution, marks = sharpen_by_floor(views, solution, backgrounds)
     if known is not None:
         view, pixels, metres = known
         solution = scaled(solution, _factor(distance_factor(solution, view, pixels, metres)))
     recording = _recording(output, streams, solution, cell)
     write_rig(output, recording)
     _print(recording, solution, person_height if known is None else None)
+    print(
+        f"{output}: {len(names)} cameras, from {len(solution.outcome.state.points)} people and frames"
+        + (f" and {marks} marks on the floor" if marks else ", the floor shows no marks that views share")
+    )
 
 
 def _streams(
@@ -135,9 +146,8 @@ def _streams(
     return Recording(output, Rig(output.stem, frame_rate, Grid((0.0, 1.0), (0.0, 1.0)), cameras), sources)
 
 
-def _ends(streams: Recording, first: int, stop: int) -> tuple[Ends, ...]:
+def _ends(streams: Recording, sights: Sequence[Sight], first: int, stop: int) -> tuple[Ends, ...]:
     """Feet and heads of isolated people, frame by frame and view by view."""
-    sights = make_sights(streams, Config(), first, stop)
     found: list[list[tuple[int, Floats]]] = [[] for _ in sights]
     with open_frames(streams, first, stop) as moments, _bar("looking for people", stop - first) as (bar, task):
         for moment in moments:
@@ -147,6 +157,15 @@ def _ends(streams: Recording, first: int, stop: int) -> tuple[Ends, ...]:
                     ends.append((moment.frame, people_ends(likelihood)))
             bar.advance(task)
     return tuple(join_ends(parts) for parts in found)
+
+
+def _backgrounds(sights: Sequence[Sight]) -> list[Bytes]:
+    """The empty scene in each view; none where the streams are masks."""
+    return [
+        np.clip(np.rint(sight.background.model.commonest()), 0, 255).astype(np.uint8)
+        for sight in sights
+        if sight.background is not None
+    ]
 
 
 def _recording(output: Path, streams: Recording, solution: Solution, cell: float) -> Recording:
@@ -178,7 +197,6 @@ def _print(recording: Recording, solution: Solution, person_height: float | None
         print(f"scale: by the distance given; people are {np.median(points[:, 2]):.2f} m tall on the average")
     else:
         print(f"scale: people are taken to be {person_height:g} m tall on the average (--person-height, --distance)")
-    print(f"{recording.path}: {len(recording.rig.cameras)} cameras, from {len(points)} people and frames")
 
 
 def _distance(text: str, names: Sequence[str]) -> tuple[int, Floats, float]:
