@@ -23,7 +23,7 @@ from stseg.calibrate.pinhole import SIZE, as_camera, height_of_head, looking, mo
 from stseg.calibrate.result import cameras_of, distance_factor, grid_of, offsets_of, reports_of, scaled
 from stseg.calibrate.solve import Solution
 from stseg.calibrate.upright import view_of_upright
-from stseg.calibrate.whole import calibrate_from_people
+from stseg.calibrate.whole import calibrate_from_people, sharpen_by_floor
 from stseg.commands.calibrate_auto import calibrate_auto
 from stseg.errors import ConfigError, SourceError
 from stseg.io.rigs import read_rig
@@ -200,6 +200,13 @@ def test_the_grid_holds_those_who_walked(solution: Solution) -> None:
     grid, points = grid_of(solution, 0.1), solution.outcome.state.points
     for axis, (low, high) in enumerate((grid.x, grid.y)):
         assert low < np.percentile(points[:, axis], 2) and np.percentile(points[:, axis], 98) < high
+
+
+def test_a_bare_floor_changes_nothing(scene: Walking, solution: Solution) -> None:
+    bare = [np.full((height, width, 3), 120, np.uint8) for width, height in scene.views.sizes]
+    same, marks = sharpen_by_floor(scene.views, solution, bare)
+    assert marks == 0
+    np.testing.assert_allclose(same.outcome.state.views, solution.outcome.state.views, atol=1e-6)
 
 
 def test_a_known_distance_fixes_the_scale(solution: Solution) -> None:

@@ -27,7 +27,7 @@ _RATIO = 0.8
 """Of the distances of the best and the next best match nearby, at most (Lowe 2004)."""
 _EXACT = 0.06
 """Metres within which marks follow the homography."""
-_LEAST = 15
+_LEAST = 25
 """Marks that two views share, at least."""
 
 
