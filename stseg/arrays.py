@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
+Complexes = NDArray[np.complex128]
 Ints = NDArray[np.int64]
 Labels = NDArray[np.int32]
 Bytes = NDArray[np.uint8]

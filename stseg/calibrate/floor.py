@@ -1,0 +1,134 @@
+"""Marks on the floor that two views share (KS09 4.2: SIFT features and a robust homography).
+
+The views are placed already, roughly, by the people who walk there. So every view's background is laid out on the
+ground first: there all views have one scale and one direction, and a mark is looked for near its own place alone. What
+is left between two such plans is a homography near the identity, found by MAGSAC++ (Barath et al., CVPR 2020).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import cv2
+import numpy as np
+
+from stseg.arrays import AnyArray, Bytes, Floats, Ints
+from stseg.geometry import Camera, Grid
+
+_STEP = 0.02
+"""Metres between the points of a plan."""
+_COARSEST = 0.08
+"""Metres of ground in a pixel beyond which a place is left out."""
+_NEAR = 0.4
+"""Metres by which a mark's place may differ between two plans."""
+_RATIO = 0.8
+"""Of the distances of the best and the next best match nearby, at most (Lowe 2004)."""
+_EXACT = 0.06
+"""Metres within which marks follow the homography."""
+_LEAST = 25
+"""Marks that two views share, at least."""
+
+
+@dataclass(frozen=True)
+class Marks:
+    """Marks on the floor, each in two views.
+
+    Attributes
+    ----------
+    view : int64 (n, 2)
+        The two views.
+    pixel : float64 (n, 2, 2)
+        Where each of them shows it.
+    ground : float64 (n, 2)
+        Where it roughly is, metres.
+    """
+
+    view: Ints
+    pixel: Floats
+    ground: Floats
+
+    def __len__(self) -> int:
+        return len(self.view)
+
+    def of(self, rows: Ints) -> Marks:
+        """Some of them."""
+        return Marks(self.view[rows], self.pixel[rows], self.ground[rows])
+
+
+def floor_marks(backgrounds: Sequence[Bytes], cameras: Sequence[Camera], grid: Grid) -> Marks:
+    """Marks that every two views share on the ground of the grid.
+
+    Parameters
+    ----------
+    backgrounds
+        The empty scene in each view, uint8 (v, u, 3).
+    cameras
+        The views, roughly placed.
+    grid
+        The ground where they are looked for.
+    """
+    ground = _places(grid)
+    found = [_features(*pair, ground) for pair in zip(backgrounds, cameras, strict=True)]
+    parts = []
+    for i, j in combinations(range(len(cameras)), 2):
+        rows = _shared(found[i], found[j])
+        place = [found[k][0][rows[:, side]] for side, k in enumerate((i, j))]
+        pixel = np.stack([cameras[k].project(place[side], 0.0)[0] for side, k in enumerate((i, j))], 1)
+        parts.append((np.tile([i, j], (len(rows), 1)), pixel, (place[0] + place[1]) / 2))
+    return Marks(
+        np.concatenate([np.zeros((0, 2), np.int64), *(part[0] for part in parts)]),
+        np.concatenate([np.zeros((0, 2, 2)), *(part[1] for part in parts)]),
+        np.concatenate([np.zeros((0, 2)), *(part[2] for part in parts)]),
+    )
+
+
+def _places(grid: Grid) -> Floats:
+    """Ground points of a plan, float64 (y, x, 2)."""
+    x, y = np.arange(grid.x[0], grid.x[1], _STEP), np.arange(grid.y[0], grid.y[1], _STEP)
+    return np.stack(np.meshgrid(x, y), -1)
+
+
+def _features(background: Bytes, camera: Camera, ground: Floats) -> tuple[Floats, AnyArray]:
+    """Ground places and descriptors of a plan's features, all upright, float64 (n, 2) and float32 (n, 128)."""
+    pixel, ahead = camera.project(ground, 0.0)
+    seen = ahead & camera.inside(pixel)
+    across, down = (np.linalg.norm(np.gradient(pixel, axis=axis), axis=-1) for axis in (0, 1))
+    seen &= np.minimum(across, down) > _STEP / _COARSEST
+    place = np.where(seen[..., None], pixel, -1.0).astype(np.float32)
+    plan = cv2.remap(cv2.cvtColor(background, cv2.COLOR_BGR2GRAY), place[..., 0], place[..., 1], cv2.INTER_LINEAR)
+    plan = cv2.createCLAHE(3.0, (8, 8)).apply(plan)
+    inner = cv2.erode(seen.astype(np.uint8), np.ones((9, 9), np.uint8))
+    sift = cv2.SIFT.create(contrastThreshold=0.02)
+    points = [cv2.KeyPoint(point.pt[0], point.pt[1], point.size, 0.0) for point in sift.detect(plan, inner)]
+    if not points:
+        return np.zeros((0, 2)), np.zeros((0, 128), np.float32)
+    kept, descriptor = sift.compute(plan, points)
+    first: Floats = ground[0, 0]
+    return first + _STEP * np.array([point.pt for point in kept]), descriptor
+
+
+def _shared(one: tuple[Floats, AnyArray], other: tuple[Floats, AnyArray]) -> Ints:
+    """Rows of the features of two plans that are one mark, int64 (n, 2)."""
+    if min(len(one[0]), len(other[0])) < _LEAST:
+        return np.zeros((0, 2), np.int64)
+    away = np.linalg.norm(one[0][:, None] - other[0][None], axis=2)
+    unlike = np.where(away < _NEAR, _distances(one[1], other[1]), np.inf)
+    best = unlike.argmin(axis=1)
+    rows = np.arange(len(best))
+    first = unlike[rows, best]
+    unlike[rows, best] = np.inf
+    clear = np.isfinite(first) & (first < _RATIO * np.minimum(unlike.min(axis=1), 1e9))
+    rows, best = rows[clear], best[clear]
+    if len(rows) < _LEAST:
+        return np.zeros((0, 2), np.int64)
+    _, held = cv2.findHomography(one[0][rows], other[0][best], cv2.USAC_MAGSAC, _EXACT, maxIters=5000, confidence=0.999)
+    kept = np.zeros(len(rows), bool) if held is None else held.ravel() > 0
+    pairs = np.stack([rows[kept], best[kept]], -1)
+    return pairs if len(pairs) >= _LEAST else np.zeros((0, 2), np.int64)
+
+
+def _distances(one: AnyArray, other: AnyArray) -> Floats:
+    square = (one**2).sum(axis=1)[:, None] + (other**2).sum(axis=1) - 2 * one @ other.T
+    return np.asarray(np.sqrt(np.maximum(square, 0.0)), float)

@@ -1,0 +1,111 @@
+"""A camera as the few numbers that an adjustment turns: focal length, middle, lens, attitude, place, clock.
+
+Square pixels and a radial lens; the axis passes near the image's middle. Points are x, y, z in metres, z up.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from stseg.arrays import Floats
+from stseg.geometry import Camera, Lens
+
+FOCAL, MIDDLE, RADIAL, TURN, CENTRE, CLOCK = 0, slice(1, 3), slice(3, 5), slice(5, 8), slice(8, 11), 11
+"""Places in the vector: log of the focal length over the image's width; the axis from the image's middle, in widths;
+k1, k2; rotation vector from world to camera; metres; seconds by which the stream is late."""
+SIZE = 12
+
+
+def project(views: Floats, width: Floats, height: Floats, points: Floats) -> Floats:
+    """Pixels of points, each in a view of its own.
+
+    Parameters
+    ----------
+    views : float64 (n, 12)
+        Cameras.
+    width, height : float64 (n,)
+        Of their images, pixels.
+    points : float64 (n, 3)
+        Metres.
+
+    Returns
+    -------
+    float64 (n, 2)
+        Pixels of the real image; nan behind the camera.
+    """
+    seen = Rotation.from_rotvec(views[:, TURN]).apply(points - views[:, CENTRE])
+    depth = np.where(seen[:, 2] > 1e-3, seen[:, 2], np.nan)
+    ray = seen[:, :2] / depth[:, None]
+    # Far outside the image the polynomial of a barrel lens turns round; there the lens is kept from bending more.
+    square = np.minimum((ray**2).sum(axis=1), _fold_squared(views[:, RADIAL]))
+    bend = 1 + square * (views[:, 3] + square * views[:, 4])
+    focal = width * np.exp(views[:, FOCAL])
+    middle = np.stack([(width - 1) / 2, (height - 1) / 2], -1) + views[:, MIDDLE] * width[:, None]
+    return np.asarray(middle + (focal * bend)[:, None] * ray)
+
+
+def _fold_squared(radial: Floats) -> Floats:
+    """Squared tangents where r (1 + k1 r^2 + k2 r^4) stops rising; large where it never does, float64 (n,)."""
+    k1, k2 = radial.T
+    inside = 9 * k1**2 - 20 * k2
+    # The smaller root of 1 + 3 k1 s + 5 k2 s^2, in the form that holds as k2 goes to zero.
+    below = -3 * k1 + np.sqrt(np.maximum(inside, 0.0))
+    turns = (inside >= 0) & (below > 0.02)
+    return np.where(turns, 2.0 / np.where(turns, below, 1.0), 100.0)
+
+
+def rays(view: Floats, size: tuple[int, int], pixel: Floats) -> Floats:
+    """Directions in the world of the pixels of one view, float64 (n, 3); nan beyond the lens's fold."""
+    lens = _lens(view, size)
+    ideal = lens.undistort(pixel)
+    ray = (ideal - lens.matrix[:2, 2]) / lens.matrix[0, 0]
+    return np.asarray(Rotation.from_rotvec(view[TURN]).inv().apply(np.column_stack([ray, np.ones(len(ray))])))
+
+
+def on_plane(view: Floats, size: tuple[int, int], pixel: Floats, height: float) -> Floats:
+    """Ground metres of the points at `height` that pixels of one view show, float64 (n, 2); nan above the horizon."""
+    way = rays(view, size, pixel)
+    rise = height - view[CENTRE][2]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        reach = rise / way[:, 2]
+    reach = np.where(reach > 0, reach, np.nan)
+    return np.asarray(view[CENTRE][:2] + reach[:, None] * way[:, :2])
+
+
+def height_of_head(view: Floats, size: tuple[int, int], pixel: Floats, ground: Floats) -> Floats:
+    """Height above each ground point at which the ray of its pixel passes nearest, metres, float64 (n,)."""
+    way = rays(view, size, pixel)
+    reach = np.linalg.norm(ground - view[CENTRE][:2], axis=1) / np.linalg.norm(way[:, :2], axis=1)
+    return np.asarray(view[CENTRE][2] + reach * way[:, 2])
+
+
+def as_camera(view: Floats, name: str, size: tuple[int, int]) -> Camera:
+    """The same camera as a ground homography, a vertical and a lens."""
+    lens = _lens(view, size)
+    turn = Rotation.from_rotvec(view[TURN]).as_matrix()
+    projection = lens.matrix @ np.column_stack([turn, -turn @ view[CENTRE]])
+    return Camera.from_projection(name, size, projection, lens)
+
+
+def moved(view: Floats, turn: float, shift: Floats, scale: float) -> Floats:
+    """The same camera in a world whose points are scale * R(turn) x + shift on the ground, scale * z above it."""
+    about = Rotation.from_euler("z", turn)
+    new = view.copy()
+    new[TURN] = (Rotation.from_rotvec(view[TURN]) * about.inv()).as_rotvec()
+    new[CENTRE] = scale * about.apply(view[CENTRE]) + np.array([*shift, 0.0])
+    return new
+
+
+def looking(pitch: float, roll: float) -> Floats:
+    """Rotation vector of a camera that looks along +y, `pitch` down and `roll` about its axis, radians."""
+    level = Rotation.from_matrix([[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]])
+    return np.asarray((Rotation.from_euler("z", roll) * Rotation.from_euler("x", pitch) * level).as_rotvec())
+
+
+def _lens(view: Floats, size: tuple[int, int]) -> Lens:
+    width, height = size
+    focal = width * float(np.exp(view[FOCAL]))
+    u, v = np.array([(width - 1) / 2, (height - 1) / 2]) + view[MIDDLE] * width
+    matrix = np.array([[focal, 0, u], [0, focal, v], [0, 0, 1.0]])
+    return Lens(matrix, np.array([view[3], view[4], 0.0, 0.0, 0.0]))

@@ -1,0 +1,234 @@
+"""`stseg calibrate auto`: a rig from the videos themselves."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from cyclopts import Parameter
+from rich.console import Console
+from rich.progress import Progress, TaskID
+
+from stseg.arrays import Bytes, Floats
+from stseg.calibrate.blobs import Ends, join_ends, people_ends
+from stseg.calibrate.result import (
+    cameras_of,
+    distance_factor,
+    grid_of,
+    offsets_of,
+    reports_of,
+    scaled,
+)
+from stseg.calibrate.solve import Solution, Views
+from stseg.calibrate.whole import calibrate_from_people, sharpen_by_floor, steps_of
+from stseg.commands.calibrate_scene import numbers
+from stseg.commands.sights import make_sights
+from stseg.config import Config
+from stseg.errors import ConfigError
+from stseg.foreground.sight import Sight
+from stseg.geometry import Camera, Grid, Rig
+from stseg.io.frames import count_frames, open_frames
+from stseg.io.outputs import require_new
+from stseg.io.recording import CameraSource, Recording, Source
+from stseg.io.rigs import write_rig
+from stseg.io.video_size import read_video_size
+
+_MOST_FRAMES = 3000
+
+
+def calibrate_auto(
+    *videos: Annotated[Path, Parameter(metavar="VIDEO...")],
+    output: Annotated[Path, Parameter(name=["--output", "-o"], metavar="RIG.toml")],
+    frame_rate: float,
+    person_height: float = 1.7,
+    distance: Annotated[str | None, Parameter(metavar="CAMERA,U,V,U,V,METRES")] = None,
+    most_delay: float = 2.0,
+    frames: Annotated[str | None, Parameter(metavar="A:B")] = None,
+    background: Annotated[str | None, Parameter(metavar="PATTERN")] = None,
+    source_kind: Literal["video", "masks"] = "video",
+    cell: float = Grid.cell,
+    overwrite: Annotated[bool, Parameter(negative="")] = False,
+) -> None:
+    """Make a rig file from the videos alone: from people who walk where several cameras see them.
+
+    Each camera learns its background and finds people who stand free of others; their feet and heads give its lens,
+    tilt and height, their ways give where the cameras stand and by how many frames their clocks differ, and one
+    adjustment of everything gives the rig, with the marks on the floor that views share, where it has any. One or two
+    people who walk all over the ground for a minute are best.
+
+    ```
+    stseg calibrate auto cam*.avi -o room.toml --frame-rate 25 --distance cam1,120,340,410,335,2.5
+    ```
+
+    Parameters
+    ----------
+    videos
+        One a camera; their names become the cameras' names.
+    output
+        The rig file to write.
+    frame_rate
+        Frames per second, of all.
+    person_height
+        How tall the people are on the average, metres. It fixes the scale where no distance is given.
+    distance
+        Two pixels of one camera that show ground points so many metres apart; it fixes the scale.
+    most_delay
+        Seconds by which one video may have begun before another; 0 where all are known to run together.
+    frames
+        Part of the videos, half open; without it the first 3000 frames.
+    background
+        Video of every camera's empty scene, `{name}` standing for the camera's name.
+    source_kind
+        Colour videos, or videos of masks.
+    cell
+        Side of a ground cell of the rig, metres.
+    overwrite
+        Replace the rig file if it exists.
+    """
+    require_new(output, overwrite)
+    streams = _streams(videos, output, frame_rate, background, source_kind)
+    names = [camera.name for camera in streams.rig.cameras]
+    known = None if distance is None else _distance(distance, names)
+    first, stop = _frames(frames, count_frames(streams))
+    sights = make_sights(streams, Config(), first, stop)
+    views = Views(
+        _ends(streams, sights, first, stop),
+        tuple(camera.size for camera in streams.rig.cameras),
+        frame_rate,
+        person_height,
+        most_delay,
+    )
+    with _bar("calibrating", steps_of(len(names))) as (bar, task):
+        solution = calibrate_from_people([str(path) for path in videos], views, lambda: bar.advance(task))
+    backgrounds = _backgrounds(sights)
+    marks = 0
+    if backgrounds:
+        solution, marks = sharpen_by_floor(views, solution, backgrounds)
+    if known is not None:
+        view, pixels, metres = known
+        solution = scaled(solution, _factor(distance_factor(solution, view, pixels, metres)))
+    recording = _recording(output, streams, solution, cell)
+    write_rig(output, recording)
+    _print(recording, solution, person_height if known is None else None)
+    print(
+        f"{output}: {len(names)} cameras, from {len(solution.outcome.state.points)} people and frames"
+        + (f" and {marks} marks on the floor" if marks else ", the floor shows no marks that views share")
+    )
+
+
+def _streams(
+    videos: Sequence[Path], output: Path, frame_rate: float, background: str | None, kind: Literal["video", "masks"]
+) -> Recording:
+    """The videos as a recording whose cameras are not known yet; each may end when it likes."""
+    names = [path.stem for path in videos]
+    if len(set(names)) < len(names):
+        names = [path.absolute().parent.name for path in videos]
+    if len(videos) < 2 or len(set(names)) < len(names):
+        raise ConfigError("calibrate auto", "VIDEO", ", ".join(map(str, videos)), "two or more, with different names")
+    if not frame_rate > 0:
+        raise ConfigError("--frame-rate", "", frame_rate, "frames per second, above 0")
+    unknown = np.array([[1.0, 0, 0, 0], [0, 1.0, 0, 0], [0, 0, 1.0, 1.0]])
+    cameras = tuple(
+        Camera.from_projection(name, read_video_size(path), unknown) for name, path in zip(names, videos, strict=True)
+    )
+    sources = tuple(
+        CameraSource(
+            Source(kind, path),
+            None if background is None else Source("video", Path(background.replace("{name}", name))),
+            on_missing="blind",
+        )
+        for name, path in zip(names, videos, strict=True)
+    )
+    return Recording(output, Rig(output.stem, frame_rate, Grid((0.0, 1.0), (0.0, 1.0)), cameras), sources)
+
+
+def _ends(streams: Recording, sights: Sequence[Sight], first: int, stop: int) -> tuple[Ends, ...]:
+    """Feet and heads of isolated people, frame by frame and view by view."""
+    found: list[list[tuple[int, Floats]]] = [[] for _ in sights]
+    with open_frames(streams, first, stop) as moments, _bar("looking for people", stop - first) as (bar, task):
+        for moment in moments:
+            for sight, view, ends in zip(sights, moment.views, found, strict=True):
+                likelihood = sight.evidence(view)
+                if isinstance(likelihood, np.ndarray):
+                    ends.append((moment.frame, people_ends(likelihood)))
+            bar.advance(task)
+    return tuple(join_ends(parts) for parts in found)
+
+
+def _backgrounds(sights: Sequence[Sight]) -> list[Bytes]:
+    """The empty scene in each view; none where the streams are masks."""
+    return [
+        np.clip(np.rint(sight.background.model.commonest()), 0, 255).astype(np.uint8)
+        for sight in sights
+        if sight.background is not None
+    ]
+
+
+def _recording(output: Path, streams: Recording, solution: Solution, cell: float) -> Recording:
+    names = [camera.name for camera in streams.rig.cameras]
+    rig = replace(streams.rig, grid=grid_of(solution, cell), cameras=cameras_of(solution, names))
+    offsets = offsets_of(solution)
+    # Streams that began at different times end at different times too.
+    missing: Literal["blind", "error"] = "blind" if offsets.any() else "error"
+    sources = tuple(
+        replace(source, offset=int(offset), on_missing=missing)
+        for source, offset in zip(streams.sources, offsets, strict=True)
+    )
+    return Recording(output, rig, sources)
+
+
+def _print(recording: Recording, solution: Solution, person_height: float | None) -> None:
+    cameras = zip(recording.rig.cameras, recording.sources, reports_of(solution), strict=True)
+    for camera, source, report in cameras:
+        x, y, z = camera.centre
+        print(
+            f"{camera.name}: at ({x:.2f}, {y:.2f}, {z:.2f}) m ± {report.centre_spread:.2f}, "
+            f"focal length {report.focal:.0f} ± {report.focal_spread:.0f} px, "
+            f"offset {source.offset} and {report.clock:+.3f} ± {report.clock_spread:.3f} s; "
+            f"{report.sightings} sightings: feet {report.foot_pixels:.1f} px ({100 * report.ground_metres:.0f} cm), "
+            f"heads {report.head_pixels:.1f} px ({100 * report.head_metres:.0f} cm) off"
+        )
+    points = solution.outcome.state.points
+    if person_height is None:
+        print(f"scale: by the distance given; people are {np.median(points[:, 2]):.2f} m tall on the average")
+    else:
+        print(f"scale: people are taken to be {person_height:g} m tall on the average (--person-height, --distance)")
+
+
+def _distance(text: str, names: Sequence[str]) -> tuple[int, Floats, float]:
+    camera, _, rest = text.partition(",")
+    expected = f"camera,u,v,u,v,metres with a camera of {', '.join(names)}"
+    if camera not in names:
+        raise ConfigError("--distance", "", repr(text), expected)
+    *pixels, metres = numbers("--distance", rest, expected, 5)
+    if not metres > 0 or pixels[:2] == pixels[2:]:
+        raise ConfigError("--distance", "", repr(text), "two different pixels, and metres above 0")
+    return list(names).index(camera), np.array(pixels).reshape(2, 2), metres
+
+
+def _factor(factor: float) -> float:
+    if not np.isfinite(factor):
+        raise ConfigError("--distance", "", "a pixel above the horizon", "pixels that show the ground")
+    return factor
+
+
+def _frames(text: str | None, length: int) -> tuple[int, int]:
+    head, colon, tail = (text or f"0:{min(length, _MOST_FRAMES)}").partition(":")
+    if not colon or not all(part == "" or part.isdecimal() for part in (head, tail)):
+        raise ConfigError("--frames", "", repr(text), "A:B, two whole numbers, half open")
+    first, stop = int(head or 0), min(int(tail or length), length)
+    if not first < stop:
+        raise ConfigError("--frames", "", repr(text), f"a part of the videos' frames, 0:{length}")
+    return first, stop
+
+
+@contextmanager
+def _bar(title: str, total: int) -> Iterator[tuple[Progress, TaskID]]:
+    """A bar on a terminal; silence in a log."""
+    console = Console(stderr=True)
+    with Progress(console=console, disable=not console.is_terminal, transient=True) as bar:
+        yield bar, bar.add_task(title, total=total)

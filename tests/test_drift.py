@@ -1,0 +1,71 @@
+"""A knocked camera is found at its frame, and nothing else is taken for one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from stseg.arrays import Floats
+from stseg.calibrate.drift import agreement_of_people, find_knocks
+
+
+def correlated(frames: int, views: int, seed: int, correlation: float = 0.6) -> Floats:
+    """Noise of standard deviation 1 whose neighbours are alike."""
+    lots = np.random.default_rng(seed)
+    noise = lots.normal(size=(frames, views))
+    for k in range(1, frames):
+        noise[k] = correlation * noise[k - 1] + np.sqrt(1 - correlation**2) * noise[k]
+    return noise
+
+
+@pytest.mark.parametrize("view", [0, 2])
+def test_a_knock_is_found_at_its_frame(view: int) -> None:
+    agreement = 4.0 + correlated(400, 4, view)
+    agreement[250:, view] -= 4.0
+    (knock,) = find_knocks(agreement)
+    assert knock.view == view and abs(knock.frame - 250) <= 3
+    assert knock.before - knock.after == pytest.approx(4.0, abs=1.0)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_noise_is_no_knock(seed: int) -> None:
+    assert find_knocks(4.0 + correlated(400, 4, seed, 0.8)) == []
+
+
+def test_what_all_views_suffer_is_no_knock() -> None:
+    agreement = 4.0 + correlated(400, 4, 1)
+    agreement[200:] -= 5.0
+    assert find_knocks(agreement) == []
+
+
+def test_a_view_that_gets_better_was_not_knocked() -> None:
+    agreement = 4.0 + correlated(400, 4, 2)
+    agreement[200:, 1] += 5.0
+    assert find_knocks(agreement) == []
+
+
+def test_frames_without_people_and_wild_frames_do_not_matter() -> None:
+    agreement = 4.0 + correlated(600, 3, 3)
+    agreement[100:180] = np.nan
+    agreement[::50, 0] = -1e6
+    agreement[400:, 1] -= 4.0
+    (knock,) = find_knocks(agreement)
+    assert knock.view == 1 and abs(knock.frame - 400) <= 3
+
+
+def test_two_cameras_are_told_apart_by_time() -> None:
+    agreement = 4.0 + correlated(900, 5, 4)
+    agreement[300:, 0] -= 5.0
+    agreement[600:, 3] -= 5.0
+    assert [(knock.view, round(knock.frame, -2)) for knock in find_knocks(agreement)] == [(0, 300), (3, 600)]
+
+
+def test_too_few_frames_say_nothing() -> None:
+    agreement = np.array([4.0] * 15 + [-4.0] * 15)[:, None] * [1.0, 0.0]
+    assert find_knocks(agreement) == []
+
+
+def test_agreement_is_the_mean_over_people_whom_the_view_sees() -> None:
+    parts = np.array([[2.0, 0.0], [4.0, -1.0], [0.0, 3.0]])
+    agreement = agreement_of_people(np.array([0, 0, 2]), parts, 3)
+    np.testing.assert_array_equal(agreement, [[3.0, -1.0], [np.nan, np.nan], [np.nan, 3.0]])
