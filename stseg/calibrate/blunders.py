@@ -10,7 +10,7 @@ import numpy as np
 
 from stseg.arrays import Floats
 from stseg.calibrate.agreement import edges, place
-from stseg.calibrate.bystanders import GATE, Bystanders, find_bystanders, joined, mismatch
+from stseg.calibrate.bystanders import GATE, Bystanders, find_bystanders, joined, mismatch, whole_in
 from stseg.calibrate.verdict import LEAST
 from stseg.geometry import Rig
 from stseg.geometry.bodies import BodyTable
@@ -134,17 +134,23 @@ def in_time(shown: Shown, one: Late, size: int) -> dict[int, list[Floats]]:
 
 
 def _misfit(table: BodyTable, view: int, shown: Shown, people: Bystanders, shift: int) -> float:
-    """Median distance, in gates, from people to the nearest box of the view `shift` frames later, of those it meets."""
-    body = table.boxes_of(people.ground, people.height)
-    with np.errstate(invalid="ignore"):
-        inside = (body[:, :2] > 1).all(axis=1) & (body[:, 2:] < np.array(table.size) - 2).all(axis=1)
-    misses = []
+    """How far the nearest boxes `shift` frames later scatter around their common offset, in bodies' heights.
+
+    The offset itself says nothing of time: a camera that is off has it too.
+    """
+    inside = whole_in(table, people.ground, people.height)
+    offsets = []
     for frame in np.unique(people.frame[inside]).tolist():
-        own = inside & (people.frame == frame)
+        own = np.flatnonzero(inside & (people.frame == frame))
         boxes = shown.get(frame + shift)
-        if boxes is not None and len(boxes[view]):
-            nearest = mismatch(table, people.ground[own], people.height[own], boxes[view]).min(axis=1)
-            misses.append(nearest)
-    together = np.concatenate(misses) if misses else np.zeros(0)
-    met = together[together < 1]
-    return float(np.median(met)) if len(met) >= LEAST else np.nan
+        if boxes is None or not len(boxes[view]):
+            continue
+        apart = mismatch(table, people.ground[own], people.height[own], boxes[view])
+        met = np.isfinite(apart.min(axis=1))
+        nearest = boxes[view][apart.argmin(axis=1)[met]]
+        miss, _, tall = edges(table, people.ground[own[met]], people.height[own[met]], nearest)
+        offsets.append(miss[:, :2] / tall[:, None])
+    together = np.concatenate(offsets) if offsets else np.zeros((0, 2))
+    if len(together) < LEAST:
+        return np.nan
+    return float(np.median(np.hypot(*(together - np.median(together, axis=0)).T)))
