@@ -134,12 +134,12 @@ def in_time(shown: Shown, one: Late, size: int) -> dict[int, list[Floats]]:
 
 
 def _misfit(table: BodyTable, view: int, shown: Shown, people: Bystanders, shift: int) -> float:
-    """How far the nearest boxes `shift` frames later scatter around their common offset, in bodies' heights.
+    """How far the nearest boxes `shift` frames later scatter around a plane over the ground, in bodies' heights.
 
-    The offset itself says nothing of time: a camera that is off has it too.
+    The plane itself says nothing of time: a camera that is off, or turned, has it too.
     """
     inside = whole_in(table, people.ground, people.height)
-    offsets = []
+    offsets, places = [np.zeros((0, 2))], [np.zeros((0, 2))]
     for frame in np.unique(people.frame[inside]).tolist():
         own = np.flatnonzero(inside & (people.frame == frame))
         boxes = shown.get(frame + shift)
@@ -150,7 +150,10 @@ def _misfit(table: BodyTable, view: int, shown: Shown, people: Bystanders, shift
         nearest = boxes[view][apart.argmin(axis=1)[met]]
         miss, _, tall = edges(table, people.ground[own[met]], people.height[own[met]], nearest)
         offsets.append(miss[:, :2] / tall[:, None])
-    together = np.concatenate(offsets) if offsets else np.zeros((0, 2))
+        places.append(people.ground[own[met]])
+    together, ground = np.concatenate(offsets), np.concatenate(places)
     if len(together) < LEAST:
         return np.nan
-    return float(np.median(np.hypot(*(together - np.median(together, axis=0)).T)))
+    basis = np.column_stack([np.ones(len(ground)), ground])
+    rest = together - basis @ np.linalg.lstsq(basis, together)[0]
+    return float(np.median(np.hypot(*rest.T)))

@@ -19,7 +19,7 @@ _LATE = 1.0
 """Seconds by which a stream may be late."""
 _FAR = 1.5
 """Cells from which on a view is so far off that another's stream is tried in its place."""
-_LOST = 0.5
+_LOST = 0.6
 """Share of what is usual that a view must confirm not to be lost."""
 
 
