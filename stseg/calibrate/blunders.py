@@ -10,7 +10,7 @@ import numpy as np
 
 from stseg.arrays import Floats
 from stseg.calibrate.agreement import edges, place
-from stseg.calibrate.bystanders import GATE, Bystanders, find_bystanders, joined, mismatch
+from stseg.calibrate.bystanders import GATE, Bystanders, find_bystanders, joined, mismatch, whole_in
 from stseg.calibrate.verdict import LEAST
 from stseg.geometry import Rig
 from stseg.geometry.bodies import BodyTable
@@ -134,17 +134,26 @@ def in_time(shown: Shown, one: Late, size: int) -> dict[int, list[Floats]]:
 
 
 def _misfit(table: BodyTable, view: int, shown: Shown, people: Bystanders, shift: int) -> float:
-    """Median distance, in gates, from people to the nearest box of the view `shift` frames later, of those it meets."""
-    body = table.boxes_of(people.ground, people.height)
-    with np.errstate(invalid="ignore"):
-        inside = (body[:, :2] > 1).all(axis=1) & (body[:, 2:] < np.array(table.size) - 2).all(axis=1)
-    misses = []
+    """How far the nearest boxes `shift` frames later scatter around a plane over the ground, in bodies' heights.
+
+    The plane itself says nothing of time: a camera that is off, or turned, has it too.
+    """
+    inside = whole_in(table, people.ground, people.height)
+    offsets, places = [np.zeros((0, 2))], [np.zeros((0, 2))]
     for frame in np.unique(people.frame[inside]).tolist():
-        own = inside & (people.frame == frame)
+        own = np.flatnonzero(inside & (people.frame == frame))
         boxes = shown.get(frame + shift)
-        if boxes is not None and len(boxes[view]):
-            nearest = mismatch(table, people.ground[own], people.height[own], boxes[view]).min(axis=1)
-            misses.append(nearest)
-    together = np.concatenate(misses) if misses else np.zeros(0)
-    met = together[together < 1]
-    return float(np.median(met)) if len(met) >= LEAST else np.nan
+        if boxes is None or not len(boxes[view]):
+            continue
+        apart = mismatch(table, people.ground[own], people.height[own], boxes[view])
+        met = np.isfinite(apart.min(axis=1))
+        nearest = boxes[view][apart.argmin(axis=1)[met]]
+        miss, _, tall = edges(table, people.ground[own[met]], people.height[own[met]], nearest)
+        offsets.append(miss[:, :2] / tall[:, None])
+        places.append(people.ground[own[met]])
+    together, ground = np.concatenate(offsets), np.concatenate(places)
+    if len(together) < LEAST:
+        return np.nan
+    basis = np.column_stack([np.ones(len(ground)), ground])
+    rest = together - basis @ np.linalg.lstsq(basis, together)[0]
+    return float(np.median(np.hypot(*rest.T)))

@@ -130,6 +130,13 @@ def mismatch(table: BodyTable, ground: Floats, height: Floats, boxes: Floats) ->
     return np.where(fits & inside, off, np.inf)
 
 
+def whole_in(table: BodyTable, ground: Floats, height: Floats) -> Flags:
+    """People who are whole within a view's image, bool (n,)."""
+    body = table.boxes_of(ground, height)
+    with np.errstate(invalid="ignore"):
+        return np.asarray((body[:, :2] > 1).all(axis=1) & (body[:, 2:] < np.array(table.size) - 2).all(axis=1))
+
+
 def _inside(body: Floats, size: tuple[int, int]) -> Flags:
     """Bodies whose head and sides are within the image."""
     with np.errstate(invalid="ignore"):

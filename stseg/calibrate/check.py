@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stseg.calibrate.blunders import Late, Shown, all_bystanders, exchanged, in_time, late
-from stseg.calibrate.bystanders import Bystanders, tables_of
+from stseg.calibrate.bystanders import Bystanders, tables_of, whole_in
 from stseg.calibrate.verdict import LEAST, Disagreement, Verdict, judge
 from stseg.geometry import Rig
 from stseg.geometry.bodies import BodyTable
@@ -19,7 +19,7 @@ _LATE = 1.0
 """Seconds by which a stream may be late."""
 _FAR = 1.5
 """Cells from which on a view is so far off that another's stream is tried in its place."""
-_LOST = 0.5
+_LOST = 0.6
 """Share of what is usual that a view must confirm not to be lost."""
 
 
@@ -96,9 +96,7 @@ def confirmations(tables: Sequence[BodyTable], people: Bystanders) -> np.ndarray
     """Share of the people within each view's image whom it shows, of those whom two others show; nan where few."""
     share = np.full(len(tables), np.nan)
     for view, table in enumerate(tables):
-        body = table.boxes_of(people.ground, people.height)
-        with np.errstate(invalid="ignore"):
-            inside = (body[:, :2] > 1).all(axis=1) & (body[:, 2:] < np.array(table.size) - 2).all(axis=1)
+        inside = whole_in(table, people.ground, people.height)
         others = np.delete(people.seen, view, axis=1).sum(axis=1) >= min(2, len(tables) - 1)
         if (inside & others).sum() >= LEAST:
             share[view] = people.seen[inside & others, view].mean()
@@ -121,10 +119,9 @@ def in_words(rig: Rig, check: Check) -> list[str]:
         words.append(
             f"{names[one.view]} runs {abs(one.frames)} frames {side}: add {-one.frames} to its offset in the rig file"
         )
-    words += [_off(names[one.view], one) for one in check.verdict.named]
-    named = {one.view for one in check.verdict.named}
+    words += [off_in_words(names[one.view], one) for one in check.verdict.named if one.view not in check.lost]
     for view in check.lost:
-        if view not in named:
+        if check.swapped is None:
             usual = 100 * float(np.nanmedian(check.confirmed))
             words.append(
                 f"{names[view]} shows only {100 * check.confirmed[view]:.0f} % of the people whom others see within "
@@ -149,7 +146,7 @@ def in_words(rig: Rig, check: Check) -> list[str]:
     return words
 
 
-def _off(name: str, one: Disagreement) -> str:
+def off_in_words(name: str, one: Disagreement) -> str:
     """Of a view that is named."""
     feet = f"feet {100 * one.feet:.0f} cm ({one.pixels:.0f} px, {100 * one.ground:.0f} cm on the ground)"
     ways = []

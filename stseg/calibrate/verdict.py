@@ -17,7 +17,7 @@ import numpy as np
 
 from stseg.arrays import Floats
 from stseg.calibrate.agreement import edges, place
-from stseg.calibrate.bystanders import Bystanders
+from stseg.calibrate.bystanders import Bystanders, whole_in
 from stseg.geometry import Camera, Rig
 from stseg.geometry.bodies import BodyTable
 
@@ -133,7 +133,7 @@ def _raw(
     miss, known, tall = edges(tables[view], placed.ground, placed.height, people.box[:, view])
     with np.errstate(invalid="ignore"):
         across = np.where(known, miss / tall[:, None] * placed.height[:, None], np.nan)
-    inside = _inside(tables[view], placed.ground, placed.height)
+    inside = whole_in(tables[view], placed.ground, placed.height)
     told = np.isfinite(across[:, 0])
     if told.sum() < LEAST:
         return None
@@ -144,14 +144,6 @@ def _raw(
     scatter = 1.4826 * float(np.nanmedian(np.abs(across[told, 0] - field[:, 0])))
     slope = np.asarray(np.linalg.inv(_slope(camera, ground)), float)
     return _Raw(view, len(others), confirmed, planes, field, scatter, tall[told] / placed.height[told], slope)
-
-
-def _inside(table: BodyTable, ground: Floats, height: Floats) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
-    """People who are whole in the image."""
-    body = table.boxes_of(ground, height)
-    with np.errstate(invalid="ignore"):
-        low, high = (body[:, :2] > 1).all(axis=1), (body[:, 2:] < np.array(table.size) - 2).all(axis=1)
-    return np.asarray(low & high)
 
 
 @dataclass(frozen=True)
@@ -256,9 +248,21 @@ def _all_raw(rig: Rig, tables: Sequence[BodyTable], people: Bystanders) -> list[
 
 def _without_shared(raw: Sequence[_Raw | None]) -> list[Disagreement | None]:
     """Disagreements less what all views share, where there are enough of them to say."""
-    known = [one for one in raw if one is not None]
-    shared = np.median([one.mean for one in known], axis=0) if len(known) > 2 else np.zeros(3)
+    known = [one.mean for one in raw if one is not None]
+    shared = _common(np.array(known)) if len(known) > 2 else np.zeros(3)
     return [None if one is None else one.without(shared) for one in raw]
+
+
+def _common(means: Floats) -> Floats:
+    """What rows (n, 3) have in common: the medians of heads and feet, which boxes and bodies make.
+
+    To one side only the least, and where all go the same way: of two cameras that face each other both are off where
+    one is.
+    """
+    right = means[:, 0]
+    shared = np.median(means, axis=0)
+    shared[0] = np.abs(right).min() * np.sign(right[0]) if np.abs(np.sign(right).sum()) == len(right) else 0.0
+    return np.asarray(shared)
 
 
 def _known(raw: Sequence[_Raw | None]) -> list[Disagreement]:
