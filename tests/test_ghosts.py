@@ -190,7 +190,7 @@ def apart(frame: Problem, size: int) -> Problem:
     pixels = frame.pixels._replace(raster=taller, first=first)
     most = frame.boxes.match.shape[2]
     match = np.full((*frame.boxes.match.shape[:2], most * rooms), -np.inf)
-    for i, k in enumerate(room):
+    for i, k in enumerate(room.tolist()):
         match[:, i, k * most : (k + 1) * most] = frame.boxes.match[:, i]
     cover = frame.boxes.cover * (room[:, None] == room)
     boxes = frame.boxes._replace(match=match, cover=cover, boxes=np.full(len(match), most * rooms))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from cyclopts import App
 
+from stseg.commands.calibrate_auto import calibrate_auto
 from stseg.commands.calibrate_check import check
 from stseg.commands.calibrate_import import import_calibration
 from stseg.commands.calibrate_points import calibrate_points
@@ -11,4 +12,5 @@ from stseg.commands.calibrate_points import calibrate_points
 app = App(name="calibrate", help="Make a rig file, and see whether one is right.")
 app.command(calibrate_points, name="points")
 app.command(import_calibration, name="import")
+app.command(calibrate_auto, name="auto")
 app.command(check, name="check")
