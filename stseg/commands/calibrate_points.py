@@ -24,9 +24,9 @@ from stseg.io.recording import Recording
 from stseg.io.rigs import write_rig
 
 _SOURCES = {
-    "points": "vertical from points above the ground",
-    "lens": "vertical from the lens's camera matrix",
-    "square pixels": "vertical assumed: square pixels, axis in the middle of the image",
+    "points": "free vertical, from points above the ground",
+    "lens": "camera matrix of the lens",
+    "square pixels": "square pixels, axis in the middle of the image",
 }
 
 
@@ -46,8 +46,8 @@ def calibrate_points(
 
     POINTS is a CSV file with the columns camera,u,v,x,y and perhaps z: pixels (u to the right, v down), and places on
     the ground. Each camera needs four or more points on the ground, well spread over what it sees; six or more show
-    how well they agree. Two or more with z above 0, such as the top of a door, give the vertical; without them it comes
-    from the lens, or from the assumption of square pixels.
+    how well they agree. Cameras are taken for ones with square pixels around the image's middle, or of the matrix of
+    --lens, unless two or more points with z above 0, such as the top of a door, show that they are not.
 
     ```
     stseg calibrate points points.csv -o room.toml --size 640,480 --area=-3,-3,3,3 --frame-rate 25 \\
