@@ -28,6 +28,8 @@ _SOURCES = {
     "lens": "camera matrix of the lens",
     "square pixels": "square pixels, axis in the middle of the image",
 }
+_LITTLE = 0.01
+"""Of the ground that a camera sees, which may be badly known without a word."""
 
 
 def calibrate_points(
@@ -109,9 +111,9 @@ def _show(tables: Sequence[PointTable], fits: Sequence[PointFit], grid: Grid) ->
             shown.add_row(table.camera, str(line), *places, "is it the right one?" if out else "")
     console.print(shown)
     for fit in fits:
-        console.print(_line(fit))
+        console.print(_line(fit), soft_wrap=True)
         for words in warnings(fit, grid):
-            console.print(f"warning: {words}", style="yellow")
+            console.print(f"warning: {words}", style="yellow", soft_wrap=True)
 
 
 def _line(fit: PointFit) -> str:
@@ -125,10 +127,11 @@ def _line(fit: PointFit) -> str:
 def warnings(fit: PointFit, grid: Grid) -> list[str]:
     """What is to be feared of a fit: points that leave part of the ground unknown, or a vertical that was assumed."""
     deviation, words = fit.ground_deviation(grid), []
-    if np.isfinite(deviation).any() and np.nanmax(deviation) > grid.cell:
+    known = deviation[np.isfinite(deviation)]
+    share = float(np.mean(known > grid.cell)) if len(known) else 0.0
+    if share > _LITTLE:
         row, column = np.unravel_index(int(np.nanargmax(deviation)), deviation.shape)
         x, y = grid.ground[row, column].tolist()
-        share = float(np.mean(deviation[np.isfinite(deviation)] > grid.cell))
         words.append(
             f"{fit.camera.name}: its points are badly spread: {100 * share:.0f} % of the ground that it sees is known "
             f"worse than to a cell, and at ({x:.1f}, {y:.1f}) m only to {100 * deviation[row, column]:.0f} cm (one "
