@@ -15,6 +15,7 @@ import numpy as np
 from scipy.optimize import OptimizeResult, least_squares
 
 from stseg.arrays import Flags, Floats
+from stseg.calibrate.posed import Pinhole, fit_pinhole
 from stseg.calibrate.require import require_ground, require_right_handed, require_upright
 from stseg.errors import CalibrationError
 from stseg.geometry import Camera, Grid, Lens
@@ -34,6 +35,8 @@ _MAGSAC = 3.0
 """Pixels within which MAGSAC++ looks for a point's noise."""
 _OUT = 4.0
 """Robust standard deviations beyond which a point is pointed out."""
+_WORSE = 1.5
+"""How much more noise the points may seem to have for a posed camera to be believed."""
 _FEW = 5
 """Points of which none is left out."""
 
@@ -71,7 +74,8 @@ class PointFit:
     points
         What it was fitted to.
     vertical_from
-        points (two or more above the ground), lens (its camera matrix) or square pixels (an assumption).
+        lens (its camera matrix), square pixels around the image's middle, where the points bear that out or there are
+        too few above the ground to say; else points above the ground.
     off_pixel : float64 (n,)
         How far each point is off in the image, pixels.
     off_ground : float64 (n,)
@@ -120,8 +124,8 @@ def fit_points(name: str, size: tuple[int, int], points: Points, lens: Lens | No
     name, size
         The camera's name, width and height of its image in pixels.
     points
-        Two or more above the ground give the vertical. With fewer it comes from the lens's camera matrix, or from the
-        assumption of square pixels around an axis in the middle of the image.
+        With two or more above the ground any camera can be told; with fewer it must be one of the lens's camera matrix,
+        or of square pixels around an axis in the middle of the image.
     lens
         The lens, where it is known.
 
@@ -133,6 +137,9 @@ def fit_points(name: str, size: tuple[int, int], points: Points, lens: Lens | No
     """
     require_ground(name, points.ground[points.low], points.pixel[points.low])
     ideal = points.pixel if lens is None else lens.undistort(points.pixel)
+    if not np.isfinite(ideal).all():
+        found = points.pixel[~np.isfinite(ideal).all(axis=1)][0].tolist()
+        raise CalibrationError(f"camera {name}", "points", f"a pixel {found} that its lens shows nothing at", "others")
     start = _start(points, ideal)
     high = ~points.low
     vertical_from: VerticalFrom = "points" if high.sum() > 1 else "lens" if lens is not None else "square pixels"
@@ -145,16 +152,29 @@ def fit_points(name: str, size: tuple[int, int], points: Points, lens: Lens | No
     wrong = _out(np.hypot(*(_project(robust.x, points.ground, points.height, lens) - points.pixel).T), used)
     used &= ~wrong
     fitted = _refined(robust.x, points, used, lens, "linear")
-    ground = fitted.x[:9].reshape(3, 3)
-    vertical = fitted.x[9:] if len(fitted.x) > 9 else _assumed_vertical(name, ground, size, lens)
+    parameters, covariance = fitted.x, _covariance(fitted.jac, fitted.fun, int(used.sum()))
+    pinhole = fit_pinhole(
+        fitted.x[:9].reshape(3, 3), size, points.ground[used], points.height[used], points.pixel[used], lens
+    )
+    if pinhole is not None and _fits_as_well(pinhole, fitted.fun, len(fitted.x) - 1):
+        parameters, covariance = pinhole.parameters, pinhole.covariance(max(pinhole.noise, _CLICK**2))
+        vertical_from = "square pixels" if lens is None else "lens"
+    ground = parameters[:9].reshape(3, 3)
+    vertical = parameters[9:] if len(parameters) > 9 else _assumed_vertical(name, ground, size, lens)
     require_right_handed(name, ground, vertical)
     camera = Camera(name, size, ground, vertical, lens)
     require_upright(camera)
-    covariance = _covariance(fitted.jac, fitted.fun, int(used.sum()))
     shown, _ = camera.project(points.ground, points.height)
     off = np.hypot(*(shown - points.pixel).T)
     out = wrong | _out(off, used)
-    return PointFit(camera, points, vertical_from, off, _off_ground(camera, points), out, fitted.x, covariance)
+    return PointFit(camera, points, vertical_from, off, _off_ground(camera, points), out, parameters, covariance)
+
+
+def _fits_as_well(pinhole: Pinhole, free_miss: Floats, unknowns: int) -> bool:
+    """Whether a posed camera explains the points as well as a free one, per degree of freedom."""
+    count = len(free_miss)
+    free = max(float(np.sum(free_miss**2)) / max(count - unknowns, 1), _CLICK**2)
+    return pinhole.noise <= _WORSE * free
 
 
 def _out(off: Floats, used: Flags) -> Flags:

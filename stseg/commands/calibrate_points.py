@@ -24,10 +24,12 @@ from stseg.io.recording import Recording
 from stseg.io.rigs import write_rig
 
 _SOURCES = {
-    "points": "vertical from points above the ground",
-    "lens": "vertical from the lens's camera matrix",
-    "square pixels": "vertical assumed: square pixels, axis in the middle of the image",
+    "points": "free vertical, from points above the ground",
+    "lens": "camera matrix of the lens",
+    "square pixels": "square pixels, axis in the middle of the image",
 }
+_LITTLE = 0.01
+"""Of the ground that a camera sees, which may be badly known without a word."""
 
 
 def calibrate_points(
@@ -46,8 +48,8 @@ def calibrate_points(
 
     POINTS is a CSV file with the columns camera,u,v,x,y and perhaps z: pixels (u to the right, v down), and places on
     the ground. Each camera needs four or more points on the ground, well spread over what it sees; six or more show
-    how well they agree. Two or more with z above 0, such as the top of a door, give the vertical; without them it comes
-    from the lens, or from the assumption of square pixels.
+    how well they agree. Cameras are taken for ones with square pixels around the image's middle, or of the matrix of
+    --lens, unless two or more points with z above 0, such as the top of a door, show that they are not.
 
     ```
     stseg calibrate points points.csv -o room.toml --size 640,480 --area=-3,-3,3,3 --frame-rate 25 \\
@@ -109,9 +111,9 @@ def _show(tables: Sequence[PointTable], fits: Sequence[PointFit], grid: Grid) ->
             shown.add_row(table.camera, str(line), *places, "is it the right one?" if out else "")
     console.print(shown)
     for fit in fits:
-        console.print(_line(fit))
+        console.print(_line(fit), soft_wrap=True)
         for words in warnings(fit, grid):
-            console.print(f"warning: {words}", style="yellow")
+            console.print(f"warning: {words}", style="yellow", soft_wrap=True)
 
 
 def _line(fit: PointFit) -> str:
@@ -125,10 +127,11 @@ def _line(fit: PointFit) -> str:
 def warnings(fit: PointFit, grid: Grid) -> list[str]:
     """What is to be feared of a fit: points that leave part of the ground unknown, or a vertical that was assumed."""
     deviation, words = fit.ground_deviation(grid), []
-    if np.isfinite(deviation).any() and np.nanmax(deviation) > grid.cell:
+    known = deviation[np.isfinite(deviation)]
+    share = float(np.mean(known > grid.cell)) if len(known) else 0.0
+    if share > _LITTLE:
         row, column = np.unravel_index(int(np.nanargmax(deviation)), deviation.shape)
         x, y = grid.ground[row, column].tolist()
-        share = float(np.mean(deviation[np.isfinite(deviation)] > grid.cell))
         words.append(
             f"{fit.camera.name}: its points are badly spread: {100 * share:.0f} % of the ground that it sees is known "
             f"worse than to a cell, and at ({x:.1f}, {y:.1f}) m only to {100 * deviation[row, column]:.0f} cm (one "
