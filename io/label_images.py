@@ -22,6 +22,20 @@ from stseg.io.outputs import failure, part_of
 _BYTE, _WORD = 255, 65535
 
 
+def require_label_folder(folder: Path, overwrite: bool) -> None:
+    """Refuse a folder that holds something, before any work is done.
+
+    Raises
+    ------
+    OutputError
+    """
+    try:
+        if folder.exists() and any(folder.iterdir()) and not overwrite:
+            raise OutputError(folder, "", "files in it", "an empty folder, or --overwrite")
+    except OSError as error:
+        raise failure(folder, error) from error
+
+
 class LabelImages:
     """A folder of label images, made when the first camera's is.
 
@@ -48,9 +62,8 @@ class LabelImages:
         if largest > _WORD:
             raise OutputError(folder, "", f"a track with the id {largest}", f"ids up to {_WORD}, the most in a PNG")
         self._folder, self._indexed, self._palette = folder, largest <= _BYTE, palette
+        require_label_folder(folder, overwrite)
         try:
-            if folder.exists() and any(folder.iterdir()) and not overwrite:
-                raise OutputError(folder, "", "files in it", "an empty folder, or --overwrite")
             for camera in cameras:
                 self._clear(self._folder_of(camera))
         except OSError as error:

@@ -355,7 +355,7 @@ class LabelConfig:
 
     detection: float = 6.55
     """c1: what a label costs that contradicts a certain foreground, nats."""
-    adjacency: float = 10.18
+    adjacency: float = 10.01
     """c2: what it costs that neighbouring pixels of the same colour differ, nats."""
     alike: float = 31.0
     """k1: difference of two colours from which differing labels cost nothing, grey levels."""
@@ -363,7 +363,7 @@ class LabelConfig:
     """k2: over which difference that cost falls, grey levels."""
     colourless: float = 0.08
     """What of c2 it costs where there are no colours, in masks: the mean of g at true borders, 0..1."""
-    place_spread: float = 0.10
+    place_spread: float = 0.08
     """How far a pillar is off besides its place's own covariance, metres (standard deviation)."""
     draws: int = 64
     """How many pillars are drawn for each person."""

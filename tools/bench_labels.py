@@ -19,7 +19,7 @@ import numpy as np
 from bench_cut import Row, print_table
 from labelled_scenes import TrueFrame, film_frames, labels_of
 
-from stseg.arrays import Floats, Ints
+from stseg.arrays import Floats, Ints, Singles
 from stseg.config import LabelConfig
 from stseg.labels.contrast import edge_costs
 from stseg.labels.energy import admissible, most_likely, pixel_energy
@@ -76,7 +76,7 @@ def beside_peer(views: Sequence[ViewLabels], frame: TrueFrame) -> tuple[float, f
     return ours, theirs
 
 
-def _dense(view: ViewLabels, frame: TrueFrame, foreground: Floats) -> Floats:
+def _dense(view: ViewLabels, frame: TrueFrame, foreground: Singles) -> Floats:
     """Costs of all labels, float64 (v, u, n + 1), quanta."""
     shown, config = view.expected(frame.standing), view.config
     edges, least = shown.people.edges, config.outside / (len(frame.standing) + 1)
