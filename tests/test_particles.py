@@ -295,7 +295,7 @@ def follow(frames: int, config: Config = CONFIG, shirts: tuple[tuple[int, int, i
     return commits + tracker.finish()
 
 
-QUICK = replace(CONFIG, particles=ParticleConfig(count=6, columns=64))
+QUICK = replace(CONFIG, particles=ParticleConfig(count=6, columns=64, patience=10.0))
 FRAMES = 6 if INTERPRETED else 16
 
 
@@ -327,7 +327,7 @@ def test_the_search_goes_to_the_person_from_beside() -> None:
         appearance = appearance.learned(part, shirt, 0.0, rng)
     beside = standing[:, :2] + np.array([[0.25, -0.15]])
     looks = [
-        view.look(seen, beside, standing[:, 2], [appearance], 0.6)
+        view.look(seen, beside, standing[:, 2], [appearance], np.array([0.6]))
         for view, seen in zip(views, colour, strict=True)
         if seen is not None
     ]
@@ -389,7 +389,10 @@ def test_a_lens_bends_the_raster_not_the_people() -> None:
     silhouette = (mask(camera, standing) / np.float32(255)).astype(np.float32)
     seen = colour_views(Shown([painted(camera, standing)], [silhouette]), "particles", 0)[0]
     assert seen is not None
-    look, axes = view.look(seen, standing[:, :2], standing[:, 2], [Appearance.unknown()], 0.3), np.zeros((1, 4))
+    look, axes = (
+        view.look(seen, standing[:, :2], standing[:, 2], [Appearance.unknown()], np.array([0.3])),
+        np.zeros((1, 4)),
+    )
     look.fill_axes(standing[:, :2], True, axes)
     assert abs(axes[0, :3] @ np.append(standing[0, :2], 1.0)) < 0.05
     assert axes[0, 3] > 0.5
