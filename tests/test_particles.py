@@ -352,6 +352,21 @@ def test_who_is_not_found_or_leaves_is_followed_no_longer() -> None:
     assert events == [(0, b"birth", b"found where nobody was followed"), (6, b"death", b"not found for 0.5 s")]
 
 
+def test_who_was_lost_is_known_again_where_somebody_is_found() -> None:
+    """The particles are a metre off; the pass finds somebody in the old clothes where nobody is followed."""
+    standing, tracker = people((-0.5, 0.2)), ParticleTracker(RIG, QUICK, 0)
+    for frame in range(3):
+        tracker.add(scene(frame, standing), shown(standing))
+    away = np.array([1.0, 0.2])
+    tracker.crowd = replace(
+        tracker.crowd, ground=tracker.crowd.ground + away, particles=tracker.crowd.particles + away
+    )  # fmt: skip
+    (commit,) = tracker.add(scene(3, standing), shown(standing))
+    assert commit.trajectory["id"].tolist() == [1]
+    assert np.hypot(commit.trajectory["x"] + 0.5, commit.trajectory["y"] - 0.2)[0] < 0.15
+    assert len(commit.events) == 0
+
+
 def test_without_colour_it_says_what_it_lacks() -> None:
     standing = people((0.0, 0.0))
     masks: list[Observation] = [mask(camera, standing) for camera in RIG.cameras]
