@@ -337,7 +337,7 @@ class ParticleConfig:
     """How long the colours of a person take to follow a change, seconds."""
     beside: float = 0.5
     """How far from a followed person somebody found may be and still be the same, metres."""
-    patience: float = 2.0
+    patience: float = 1.0
     """How long somebody may be followed whom nothing finds, seconds."""
 
     def __post_init__(self) -> None:

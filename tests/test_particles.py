@@ -295,7 +295,7 @@ def follow(frames: int, config: Config = CONFIG, shirts: tuple[tuple[int, int, i
     return commits + tracker.finish()
 
 
-QUICK = replace(CONFIG, particles=ParticleConfig(count=6, columns=64))
+QUICK = replace(CONFIG, particles=ParticleConfig(count=6, columns=64, patience=10.0))
 FRAMES = 6 if INTERPRETED else 16
 
 
@@ -327,7 +327,7 @@ def test_the_search_goes_to_the_person_from_beside() -> None:
         appearance = appearance.learned(part, shirt, 0.0, rng)
     beside = standing[:, :2] + np.array([[0.25, -0.15]])
     looks = [
-        view.look(seen, beside, standing[:, 2], [appearance], 0.6)
+        view.look(seen, beside, standing[:, 2], [appearance], np.array([0.6]))
         for view, seen in zip(views, colour, strict=True)
         if seen is not None
     ]
@@ -350,6 +350,21 @@ def test_who_is_not_found_or_leaves_is_followed_no_longer() -> None:
         commits = tracker.add(scene(frame, away if frame < 2 else nobody), shown(away))
         events += [(int(e["frame"]), bytes(e["kind"]), bytes(e["reason"])) for e in commits[0].events]
     assert events == [(0, b"birth", b"found where nobody was followed"), (6, b"death", b"not found for 0.5 s")]
+
+
+def test_who_was_lost_is_known_again_where_somebody_is_found() -> None:
+    """The particles are a metre off; the pass finds somebody in the old clothes where nobody is followed."""
+    standing, tracker = people((-0.5, 0.2)), ParticleTracker(RIG, QUICK, 0)
+    for frame in range(3):
+        tracker.add(scene(frame, standing), shown(standing))
+    away = np.array([1.0, 0.2])
+    tracker.crowd = replace(
+        tracker.crowd, ground=tracker.crowd.ground + away, particles=tracker.crowd.particles + away
+    )  # fmt: skip
+    (commit,) = tracker.add(scene(3, standing), shown(standing))
+    assert commit.trajectory["id"].tolist() == [1]
+    assert np.hypot(commit.trajectory["x"] + 0.5, commit.trajectory["y"] - 0.2)[0] < 0.15
+    assert len(commit.events) == 0
 
 
 def test_without_colour_it_says_what_it_lacks() -> None:
@@ -389,7 +404,10 @@ def test_a_lens_bends_the_raster_not_the_people() -> None:
     silhouette = (mask(camera, standing) / np.float32(255)).astype(np.float32)
     seen = colour_views(Shown([painted(camera, standing)], [silhouette]), "particles", 0)[0]
     assert seen is not None
-    look, axes = view.look(seen, standing[:, :2], standing[:, 2], [Appearance.unknown()], 0.3), np.zeros((1, 4))
+    look, axes = (
+        view.look(seen, standing[:, :2], standing[:, 2], [Appearance.unknown()], np.array([0.3])),
+        np.zeros((1, 4)),
+    )
     look.fill_axes(standing[:, :2], True, axes)
     assert abs(axes[0, :3] @ np.append(standing[0, :2], 1.0)) < 0.05
     assert axes[0, 3] > 0.5

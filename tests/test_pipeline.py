@@ -84,7 +84,7 @@ def assert_equal(one: Run, other: Run) -> None:
             np.testing.assert_array_equal(x.log_odds, y.log_odds)
 
 
-@pytest.mark.parametrize("tracker", ["cut", "frames"])
+@pytest.mark.parametrize("tracker", ["cut", "frames", "kalman"])
 @pytest.mark.parametrize("kind", ["pixels", "boxes"])
 def test_three_walkers_are_three_tracks(kind: str, tracker: str) -> None:
     done = whole(kind, tracker)

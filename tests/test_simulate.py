@@ -27,7 +27,7 @@ from stseg.simulate import NAMED, Film, Lamp, SceneSpec
 from stseg.simulate import draw as draw_module
 from stseg.simulate.body import PARTS, pose
 from stseg.simulate.cameras import build_rig, pixel_rays
-from stseg.simulate.clothes import wardrobe
+from stseg.simulate.clothes import wardrobe, worn
 from stseg.simulate.detector import detect, visible_boxes
 from stseg.simulate.draw import draw_bodies, pixel_boxes
 from stseg.simulate.render import LAMP, Viewer
@@ -48,6 +48,16 @@ def crowd_of(ground: Floats, phase: float = 0.7, swing: float = 1.0, heading: fl
 
 def viewers(spec: SceneSpec) -> list[Viewer]:
     return Film(spec).viewers
+
+
+def test_people_who_dress_alike_do_so_in_tones_of_their_own() -> None:
+    dressed = [worn(5, person, 3) for person in (1, 2, 3, 4)]
+    own = [wardrobe(5, person) for person in (1, 2, 3, 4)]
+    np.testing.assert_array_equal(dressed[0], own[0])
+    np.testing.assert_array_equal(dressed[3], own[3])
+    for k in (1, 2):
+        np.testing.assert_allclose((dressed[k] - own[0])[:, :6], 0.2 * (own[k] - own[0])[:, :6])
+        np.testing.assert_array_equal(dressed[k][:, 6:], own[0][:, 6:])
 
 
 # Specification and cameras

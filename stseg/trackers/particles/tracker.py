@@ -38,6 +38,8 @@ _HEIGHT_NOISE = 0.06
 """How well a person's height is known, metres (standard deviation)."""
 _MARGIN = 0.6
 """How far from their last places people are sought in a frame, metres."""
+_TRYING = 3
+"""Every third particle tries whether somebody lost is where somebody new was found."""
 _DOUBLED = 0.4
 """Who stands where another was found for longer than this, seconds, and is not found themselves, is nobody."""
 _HEIGHT_RENEWAL = 0.1
@@ -87,7 +89,7 @@ class ParticleTracker:
             Where no camera delivers colour.
         """
         views = colour_views(shown, "particles", scene.frame)
-        looks = self._looks(views)
+        looks = self._looks(views, self._propose(scene))
         self._follow(looks, self._step(scene.frame))
         seconds = (scene.frame - self.frame) / self.rig.frame_rate
         self.frame, self.begun = scene.frame, True
@@ -95,7 +97,7 @@ class ParticleTracker:
         deaths = self._end()
         births = self._begin(scene, newcomers)
         if births or deaths:
-            looks = self._looks(views)
+            looks = self._looks(views, np.full(len(self.crowd), _MARGIN))
         for look in looks:
             self._learn(look, seconds)
         nats = np.array([evidence.get(int(i), 0.0) for i in self.crowd.ids])
@@ -109,11 +111,36 @@ class ParticleTracker:
         """How far a person's step to a frame may go, metres (standard deviation)."""
         return self.config.particles.wander * (frame - self.frame) / self.rig.frame_rate
 
-    def _looks(self, views: Sequence[ColourView | None]) -> list[Look]:
-        """What the views show of everybody."""
+    def _propose(self, scene: Scene) -> Floats:
+        """Have some particles try whether who is lost is somebody found whom nobody follows.
+
+        Returns
+        -------
+        float64 (n,)
+            How far from their last place everybody is to be sought, metres.
+        """
+        crowd, config, found = self.crowd, self.config, scene.people.ground
+        margin = np.full(len(crowd), _MARGIN)
+        away = distances(crowd.ground, found)
+        known, met = assign(away, config.particles.beside)
+        lost, new = np.setdiff1d(np.arange(len(crowd)), known), np.setdiff1d(np.arange(len(found)), met)
+        reach = (
+            config.particles.beside + config.identity.walking_speed * (scene.frame - crowd.seen) / self.rig.frame_rate
+        )
+        particles = crowd.particles.copy()
+        if config.particles.way != "search":
+            for a, b in zip(*assign(away[np.ix_(lost, new)] - reach[lost, None], 0.0), strict=True):
+                k, j = lost[a], new[b]
+                particles[::_TRYING, k] = found[j]
+                margin[k] += away[k, j]
+        self.crowd = replace(crowd, particles=particles)
+        return margin
+
+    def _looks(self, views: Sequence[ColourView | None], margin: Floats) -> list[Look]:
+        """What the views show of everybody, sought within margins (n,), metres."""
         crowd = self.crowd
         return [
-            own.look(view, crowd.ground, crowd.height, crowd.appearances, _MARGIN)
+            own.look(view, crowd.ground, crowd.height, crowd.appearances, margin)
             for own, view in zip(self.views, views, strict=True)
             if view is not None
         ]

@@ -62,9 +62,9 @@ class ParticleView:
         return bodies
 
     def look(
-        self, view: ColourView, ground: Floats, height: Floats, appearances: Sequence[Appearance], margin: float
+        self, view: ColourView, ground: Floats, height: Floats, appearances: Sequence[Appearance], margin: Floats
     ) -> Look:
-        """A frame, with people who will be sought within `margin` metres of places (n, 2)."""
+        """A frame, with people who will be sought within margins (n,), metres, of places (n, 2)."""
         colour = normalised(view.image[:: self.step, :: self.step])
         foreground = (view.likelihood[:: self.step, :: self.step] > 0.5).astype(np.uint8)
         boxes = np.zeros((len(ground), 4), np.int64)
