@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from walking import Walking, changed, delayed, walking
 
 from stseg.arrays import Floats, Singles
+from stseg.calibrate.adjust import misses
 from stseg.calibrate.align import Walks, align, mirrored
 from stseg.calibrate.assemble import align_all, assemble
 from stseg.calibrate.blobs import Ends, people_ends
@@ -20,8 +21,8 @@ from stseg.calibrate.doubts import require_placed
 from stseg.calibrate.meet import meetings
 from stseg.calibrate.paths import path_of
 from stseg.calibrate.pinhole import SIZE, as_camera, height_of_head, looking, moved, on_plane, project
-from stseg.calibrate.result import cameras_of, distance_factor, grid_of, offsets_of, reports_of, scaled
-from stseg.calibrate.solve import Solution
+from stseg.calibrate.result import cameras_of, centred, distance_factor, grid_of, offsets_of, reports_of, scaled
+from stseg.calibrate.solve import Solution, refine
 from stseg.calibrate.upright import view_of_upright
 from stseg.calibrate.whole import calibrate_from_people, sharpen_by_floor
 from stseg.commands.calibrate_auto import calibrate_auto
@@ -205,8 +206,19 @@ def test_the_grid_holds_those_who_walked(solution: Solution) -> None:
 def test_a_bare_floor_changes_nothing(scene: Walking, solution: Solution) -> None:
     bare = [np.full((height, width, 3), 120, np.uint8) for width, height in scene.views.sizes]
     same, marks = sharpen_by_floor(scene.views, solution, bare)
-    assert marks == 0
-    np.testing.assert_allclose(same.outcome.state.views, solution.outcome.state.views, atol=1e-6)
+    assert marks == 0 and same is solution
+
+
+def test_a_turned_and_scaled_solution_misses_what_it_missed(solution: Solution) -> None:
+    turned = scaled(centred(solution), 1.3)
+    for one in (solution, turned):
+        np.testing.assert_allclose(misses(one.outcome.state, one.task), solution.outcome.miss, atol=2e-3)
+
+
+def test_a_delay_that_is_a_frame_wrong_is_mended(scene: Walking, solution: Solution) -> None:
+    wrong = solution.delay + np.array([0, 0, 1])
+    again = refine(scene.views, solution.outcome.state.views.copy(), wrong, lambda: None)
+    assert (again.delay - again.delay[0]).tolist() == DELAYS
 
 
 def test_a_known_distance_fixes_the_scale(solution: Solution) -> None:

@@ -5,8 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stseg.arrays import Floats
-from stseg.calibrate.drift import agreement_of_people, find_knocks
+from stseg.arrays import Bytes, Floats
+from stseg.calibrate.drift import agreement_of_people, background_shift, find_knocks
+from stseg.simulate import SceneSpec
+from stseg.simulate.cameras import build_rig, pixel_rays
+from stseg.simulate.room import look
 
 
 def correlated(frames: int, views: int, seed: int, correlation: float = 0.6) -> Floats:
@@ -69,3 +72,43 @@ def test_agreement_is_the_mean_over_people_whom_the_view_sees() -> None:
     parts = np.array([[2.0, 0.0], [4.0, -1.0], [0.0, 3.0]])
     agreement = agreement_of_people(np.array([0, 0, 2]), parts, 3)
     np.testing.assert_array_equal(agreement, [[3.0, -1.0], [np.nan, np.nan], [np.nan, 3.0]])
+
+
+def test_a_step_that_harms_nobody_is_none() -> None:
+    agreement = 0.01 * correlated(400, 3, 5)
+    agreement[200:, 1] -= 0.2
+    assert len(find_knocks(agreement)) == 1
+    assert find_knocks(agreement, least=0.5) == []
+
+
+def rooms() -> list[Bytes]:
+    """What three cameras see of an empty room."""
+    spec = SceneSpec("knock", 1, (5.0, 5.0), 1.0, cameras=3, size=(240, 180), seed=3)
+    return [look(spec, pixel_rays(camera), camera.centre).image for camera in build_rig(spec).cameras]
+
+
+def filmed(room: Bytes, frame: int, shift: int, lots: np.random.Generator) -> Bytes:
+    """A noisy frame in which somebody dark walks, by a camera that was turned by so many pixels."""
+    image = np.roll(room, shift, axis=1).astype(float) * (1 + 0.05 * np.sin(frame / 7))
+    left = 30 + 3 * frame % 150
+    image[60:140, left : left + 25] = 40.0
+    return np.asarray(np.clip(image + lots.normal(0, 3, image.shape), 0, 255), np.uint8)
+
+
+def test_a_shifted_background_is_measured() -> None:
+    room, lots = rooms()[0], np.random.default_rng(0)
+    for shift in (-7, 0, 2):
+        np.testing.assert_allclose(background_shift(room, filmed(room, 5, shift, lots)), [shift, 0], atol=0.3)
+
+
+def test_a_simulated_knock_is_reported_with_its_frame() -> None:
+    lots = np.random.default_rng(1)
+    shifts = np.array(
+        [
+            [-np.hypot(*background_shift(room, filmed(room, k, 2 * (view == 1 and k >= 47), lots))) for k in range(80)]
+            for view, room in enumerate(rooms())
+        ]
+    ).T
+    (knock,) = find_knocks(shifts, least=0.5)
+    assert (knock.view, knock.frame) == (1, 47)
+    assert knock.after == pytest.approx(-2.0, abs=0.4)

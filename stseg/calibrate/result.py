@@ -60,7 +60,10 @@ def scaled(solution: Solution, factor: float) -> Solution:
         scale[SIZE * view + CENTRE.start : SIZE * view + CENTRE.stop] = factor
     scale[-2:] = factor
     covariance = scale[:, None] * solution.outcome.covariance * scale
-    return replace(solution, outcome=replace(solution.outcome, state=state, covariance=covariance))
+    seen = solution.task.seen
+    seen = replace(seen, ground=factor * seen.ground, velocity=factor * seen.velocity)
+    outcome = replace(solution.outcome, state=state, covariance=covariance)
+    return replace(solution, outcome=outcome, task=replace(solution.task, seen=seen))
 
 
 def centred(solution: Solution) -> Solution:
@@ -73,7 +76,9 @@ def centred(solution: Solution) -> Solution:
     views = np.array([moved(view, turn, -about @ middle, 1.0) for view in state.views])
     points = np.column_stack([(state.points[:, :2] - middle) @ about.T, state.points[:, 2]])
     state = replace(state, views=views, points=points)
-    return replace(solution, outcome=replace(solution.outcome, state=state))
+    seen = solution.task.seen
+    seen = replace(seen, ground=(seen.ground - middle) @ about.T, velocity=seen.velocity @ about.T)
+    return replace(solution, outcome=replace(solution.outcome, state=state), task=replace(solution.task, seen=seen))
 
 
 def distance_factor(solution: Solution, view: int, pixels: Floats, metres: float) -> float:

@@ -129,7 +129,8 @@ def refine(views: Views, start: Floats, delay: Ints, progress: Callable[[], None
     state = State(start, np.array([FORWARD, 0.0]), np.zeros((0, 3)))
     spread = np.array([[0.07, 0.05], [0.03, 0.03]])
     for gate in _GATES:
-        late = np.rint(state.views[:, CLOCK] * views.frame_rate).astype(np.int64)
+        clock = state.views[:, CLOCK] - np.median(state.views[:, CLOCK])
+        late = np.rint(clock * views.frame_rate).astype(np.int64)
         delay = delay + late - late[0]
         state.views[:, CLOCK] -= late / views.frame_rate
         solution = _turn(views, state, delay, gate, spread)

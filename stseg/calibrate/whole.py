@@ -82,5 +82,7 @@ def sharpen_by_floor(views: Views, solution: Solution, backgrounds: Sequence[Byt
     count = 0
     for _ in range(_FLOOR_ROUNDS):
         marks = floor_marks(backgrounds, cameras_of(solution, names), grid_of(solution, _FLOOR_CELL))
+        if not len(marks):
+            break
         solution, count = centred(refine_with_marks(views, solution, marks)), len(marks)
     return solution, count
