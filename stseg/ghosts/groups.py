@@ -34,7 +34,7 @@ def fill_touch(case: Case, touch: Flags) -> None:
 @kernel
 def _fits(match: Floats, case: Case) -> Flags:
     """Who may be better off with a box than without, from their matches (n,): bool (n,)."""
-    return case.terms.hit + match > np.log(case.terms.box_miss)
+    return np.asarray(case.terms.hit + match > np.log(case.terms.box_miss))
 
 
 @kernel
