@@ -195,8 +195,8 @@ def apart(frame: Problem, size: int) -> Problem:
     cover = frame.boxes.cover * (room[:, None] == room)
     boxes = frame.boxes._replace(match=match, cover=cover, boxes=np.full(len(match), most * rooms))
     known = np.full((len(room), rooms * frame.known.shape[1]), -50.0)
-    for k in range(frame.known.shape[1]):
-        known[np.arange(len(room)), k * rooms + room] = frame.known[:, k]
+    for walker, likes in enumerate(frame.known.T):
+        known[np.arange(len(room)), walker * rooms + room] = likes
     ground = frame.ground + 10.0 * room[:, None]
     return Problem(boxes, pixels, frame.own, ground, frame.newcomer, known)
 

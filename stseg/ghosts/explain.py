@@ -2,7 +2,7 @@
 
 Candidates are sought on a ground lattice, in what nobody explains yet, so people behind others are found once those
 others stand. Whom the frames before led to expect are candidates too, and a newcomer away from the border costs. After
-each round the set is searched anew, until a round gains next to nothing.
+each round the set is searched anew, until a round changes nobody.
 """
 
 from __future__ import annotations
@@ -23,8 +23,6 @@ from stseg.ghosts.pool import Pool, peaks
 from stseg.ghosts.prior import Prior
 from stseg.ghosts.views import BoxView, PixelView
 
-_STILL = 1.0
-"""A round that changes no number of people and gains less than this only moves them, nats; settling does that too."""
 _TRADES = 2
 """How often trades are tried once the people of a frame are settled."""
 
@@ -79,16 +77,15 @@ class FramePass:
         prior = Prior.of(expected, self.config, self.border)
         expected_inside = prior.pool()
         seen_now = Seen(self.views, sights, prior, self.terms)
-        frame, moved_from = Frame(seen_now, expected_inside, np.arange(len(expected_inside))), np.zeros(0, np.int64)
+        frame = Frame(seen_now, expected_inside, np.arange(len(expected_inside)))
         for _ in range(self.config.rounds):
             fresh = self._fresh(frame)
-            unmoved = np.flatnonzero(~np.isin(frame.members, moved_from))
-            moved = frame.refined(unmoved)[0]
+            moved = frame.refined()[0]
             if not len(fresh) and not len(moved):
                 break
-            before, moved_from = frame, np.append(moved_from, frame.members[unmoved])
-            frame = Frame(before.seen, before.pool.and_(moved).and_(fresh), before.members)
-            if len(frame.members) == len(before.members) and frame.total < before.total + _STILL:
+            known = len(frame.pool)
+            frame = Frame(frame.seen, frame.pool.and_(moved).and_(fresh), frame.members)
+            if (frame.members < known).all():
                 break
         return explanation(_settled(frame))
 

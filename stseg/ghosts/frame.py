@@ -111,13 +111,11 @@ class Frame:
             for view, boxes, pixels in zip(self.seen.views, self.box_owner, self.pixel_owner, strict=True)
         ]
 
-    def refined(self, places: Ints | None = None) -> tuple[Pool, Floats]:
-        """People at the means of their posteriors, and the covariances; of the set, or of some places in it."""
-        some = np.arange(len(self.members)) if places is None else places
+    def refined(self) -> tuple[Pool, Floats]:
+        """The set's people at the means of their posteriors, and the covariances."""
+        some = range(len(self.members))
         own = [[owned(j, b, p) for b, p in zip(self.box_owner, self.pixel_owner, strict=True)] for j in some]
-        return refine(
-            self.pool.at(self.members[some]), self.seen.views, self.seen.sights, own, self.seen.prior, self.walker[some]
-        )
+        return refine(self.pool.at(self.members), self.seen.views, self.seen.sights, own, self.seen.prior, self.walker)
 
 
 def _case(seen: Seen, pool: Pool) -> Case:

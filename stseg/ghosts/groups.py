@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from stseg.accelerate import kernel
-from stseg.arrays import Flags, Ints
-from stseg.ghosts.evidence import Case, PixelEvidence
+from stseg.arrays import Flags, Floats, Ints
+from stseg.ghosts.evidence import BoxEvidence, Case, PixelEvidence
 
 
 @kernel
@@ -23,13 +23,18 @@ def fill_touch(case: Case, touch: Flags) -> None:
         _touch_each_other(np.flatnonzero(case.newcomer + known[:, k] > 0), touch)
     for view in range(len(boxes.boxes)):
         for b in range(boxes.boxes[view]):
-            fits = case.terms.hit + boxes.match[view, :, b] > np.log(case.terms.box_miss)
-            _touch_each_other(np.flatnonzero(fits), touch)
+            _touch_each_other(np.flatnonzero(_fits(boxes.match[view, :, b], case)), touch)
     for i in range(len(touch)):
         touch[i, i] = True
         for j in range(i):
             if not touch[i, j]:
                 touch[i, j] = touch[j, i] = _hides(i, j, case) or _too_near(i, j, case) or _overlap(i, j, pixels)
+
+
+@kernel
+def _fits(match: Floats, case: Case) -> Flags:
+    """Who may be better off with a box than without, from their matches (n,): bool (n,)."""
+    return np.asarray(case.terms.hit + match > np.log(case.terms.box_miss))
 
 
 @kernel
@@ -88,3 +93,41 @@ def fill_groups(touch: Flags, group: Ints) -> int:
                     left += 1
         found += 1
     return found
+
+
+@kernel
+def alone(case: Case, own: Ints) -> Case:
+    """A case with the boxes and walkers alone that a group (n,) may have or be; candidates keep their numbers."""
+    boxes = case.boxes
+    number = np.zeros(len(boxes.boxes), np.int64)
+    kept = np.zeros((len(boxes.boxes), boxes.match.shape[2]), np.int64)
+    for view in range(len(boxes.boxes)):
+        for b in range(boxes.boxes[view]):
+            if _fits(boxes.match[view, :, b][own], case).any():
+                kept[view, number[view]] = b
+                number[view] += 1
+    most = number.max() if len(number) else 0
+    match = np.full((len(number), boxes.match.shape[1], most), -np.inf)
+    for view in range(len(number)):
+        for i in own:
+            for k in range(number[view]):
+                match[view, i, k] = boxes.match[view, i, kept[view, k]]
+    known = _walkers_of(case, own)
+    part = BoxEvidence(match, number, boxes.cover, boxes.inside)
+    return Case(part, case.pixels, case.own, case.newcomer, known, case.ground, case.terms, case.owner, case.parts)
+
+
+@kernel
+def _walkers_of(case: Case, own: Ints) -> Floats:
+    """What speaks for each candidate by being each walker that somebody of a group may be, float64 (candidate, k)."""
+    kept = np.zeros(case.known.shape[1], np.int64)
+    count = 0
+    for k in range(len(kept)):
+        if ((case.newcomer + case.known[:, k])[own] > 0).any():
+            kept[count] = k
+            count += 1
+    known = np.zeros((len(case.known), count))
+    for i in own:
+        for k in range(count):
+            known[i, k] = case.known[i, kept[k]]
+    return known

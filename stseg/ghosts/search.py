@@ -14,7 +14,7 @@ import numpy as np
 from stseg.accelerate import kernel
 from stseg.arrays import Ints
 from stseg.ghosts.evidence import Case
-from stseg.ghosts.groups import fill_groups, fill_touch
+from stseg.ghosts.groups import alone, fill_groups, fill_touch
 from stseg.ghosts.moves import GAINED, climb, trade
 from stseg.ghosts.scoring import set_score
 
@@ -42,14 +42,15 @@ def search(members: Ints, count: int, case: Case, trades: int) -> int:
     inside[members[:count]] = True
     for g in range(fill_groups(touch, group)):
         own = np.flatnonzero(group == g)
+        part = alone(case, own)
         if trades > 0 and len(own) <= ENUMERATED:
-            size = _enumerate(chosen, own, case)
+            size = _enumerate(chosen, own, part)
         else:
             start = own[inside[own]]
             size = len(start)
             chosen[:size] = start
-            size = climb(chosen, size, own, inside, owners, case)
-            size = trade(chosen, size, own, inside, touch, owners, trades, case)
+            size = climb(chosen, size, own, inside, owners, part)
+            size = trade(chosen, size, own, inside, touch, owners, trades, part)
         inside[own] = False
         inside[chosen[:size]] = True
     best = np.flatnonzero(inside)
