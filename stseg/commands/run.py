@@ -58,6 +58,7 @@ def run(
     tracker
         cut: graph cuts of windows of the volume. frames: the people of each frame as they come, without a cut.
         kalman: a filter for each of them (HW12). particles: followed by the colours of their clothes (KD06).
+        belief: by colours in each view, the views telling each other (DP06).
     overwrite
         Replace an older run file of that name, once this one is whole.
     """
