@@ -20,7 +20,7 @@ from stseg.trackers.rows import event_rows, trajectory_rows, views_at
 from stseg.tracks import WINDOW
 
 RIG = room()
-COLOURLESS = sorted(set(TRACKERS) - {"particles"})
+COLOURLESS = sorted(set(TRACKERS) - {"particles", "belief"})
 """Trackers that need no colour; the others have tests of their own."""
 UNSEEN = Shown((None,) * 4, (None,) * 4)
 """What the cameras showed, for trackers that do not ask."""

@@ -18,7 +18,7 @@ from stseg.config import Config
 from stseg.simulate.named import NAMED
 from stseg.trackers import TRACKERS, Scene, Tracker, find_tracker
 
-WANTED = {"kalman": 200.0, "particles": 5.0}
+WANTED = {"kalman": 200.0, "particles": 5.0, "belief": 5.0}
 """Trackers that are asked for, and the frames a second that each must reach."""
 _WARM_UP = 5
 _OCCUPIED = 3.0

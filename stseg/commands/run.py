@@ -69,6 +69,7 @@ def run(
     tracker
         cut: graph cuts of windows of the volume. frames: the people of each frame as they come, without a cut.
         kalman: a filter for each of them (HW12). particles: followed by the colours of their clothes (KD06).
+        belief: by colours in each view, the views telling each other (DP06).
     volume
         What of the occupancy volume is kept: all of it, what is within a metre of tracks, or none.
     labels

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from stseg.errors import ConfigError
+from stseg.trackers.belief import BeliefTracker
 from stseg.trackers.cut import CutTracker
 from stseg.trackers.frames import FrameTracker
 from stseg.trackers.kalman import KalmanTracker
@@ -14,10 +15,12 @@ TRACKERS: dict[str, type[Tracker]] = {
     "frames": FrameTracker,
     "kalman": KalmanTracker,
     "particles": ParticleTracker,
+    "belief": BeliefTracker,
 }
 """cut: graph cuts of windows of the volume (the default). frames: each frame by itself, linked by motion alone.
 kalman: a filter for each person over the people of each frame (HW12). particles: hypotheses of where everybody stands,
-guided by the colours of their clothes (KD06)."""
+guided by the colours of their clothes (KD06). belief: particles in every view, which tell each other by way of the
+ground (DP06)."""
 
 
 def find_tracker(name: str) -> type[Tracker]:

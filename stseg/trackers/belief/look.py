@@ -1,0 +1,61 @@
+"""How well a view's picture fits a target at a place (DP06 section 3.3)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stseg.arrays import Bytes, Floats
+from stseg.config import BeliefConfig
+from stseg.trackers.belief.histogram import histograms
+from stseg.trackers.belief.view import StarView
+
+
+@dataclass(frozen=True)
+class Look:
+    """One target in one view of one frame.
+
+    The likelihood of a place is exp(-k D^2) with D^2 = 1 - sum sqrt(p q), Bhattacharyya's coefficient of the histogram
+    there and the one that was learned, the mean over the parts of the body. What is hidden by somebody nearer, or lies
+    beyond the image, says neither yes nor no: it counts as a distance of `doubt`. Beside all places stands one more
+    case, that the view does not see the target at all, which is as likely as a distance of `doubt`.
+
+    Attributes
+    ----------
+    view
+        The view.
+    image : uint8 (v, u, 3)
+        Its frame: blue, green, red.
+    reference : float64 (part, bin)
+        The target's colours.
+    height
+        The target's, metres.
+    nearer : float64 (k, 4)
+        Boxes of those who stand in front of the target.
+    config
+        What the colours are worth.
+    """
+
+    view: StarView
+    image: Bytes
+    reference: Floats
+    height: float
+    nearer: Floats
+    config: BeliefConfig
+
+    @property
+    def hidden(self) -> float:
+        """Likelihood that the view shows the target nowhere."""
+        return float(np.exp(-self.config.sharpness * self.config.doubt))
+
+    def likelihood(self, ground: Floats) -> tuple[Floats, Floats]:
+        """Likelihood of the target at ground points (n, 2), and the share of it that is in sight there; both (n,)."""
+        colours, share = histograms(self.image, self.view.boxes(ground, self.height), self.nearer)
+        square = share * squares(colours, self.reference) + (1 - share) * self.config.doubt
+        return np.exp(-self.config.sharpness * square.mean(1)), share.mean(1)
+
+
+def squares(colours: Floats, reference: Floats) -> Floats:
+    """D^2 of histograms (n, part, bin) and the parts of a reference (part, bin), 0..1, float64 (n, part)."""
+    return np.asarray(1.0 - np.einsum("npb,pb->np", np.sqrt(colours), np.sqrt(reference))).clip(0.0)

@@ -1,0 +1,184 @@
+"""What a node of the star knows: weighted particles, and what they foretell of the next frame (DP06 eq. 7)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stseg.accelerate import kernel
+from stseg.arrays import Floats, Ints
+
+
+@dataclass(frozen=True)
+class Particles:
+    """A node's belief; places are metres on the ground or pixels of the ideal image, as the node's are.
+
+    Attributes
+    ----------
+    place, velocity : float64 (n, 2)
+        Velocities are of one second.
+    weight : float64 (n,)
+        Their sum is 1.
+    """
+
+    place: Floats
+    velocity: Floats
+    weight: Floats
+
+    def __len__(self) -> int:
+        return len(self.place)
+
+    @property
+    def mean(self) -> Floats:
+        """Mean place, float64 (2,)."""
+        return np.asarray(self.weight @ self.place)
+
+    @property
+    def covariance(self) -> Floats:
+        """Covariance of the place, float64 (2, 2)."""
+        off = self.place - self.mean
+        return np.asarray((self.weight * off.T) @ off)
+
+
+@dataclass(frozen=True)
+class Motion:
+    """How people leave the line of a constant velocity within one frame.
+
+    Attributes
+    ----------
+    seconds
+        Length of a frame.
+    wander
+        Standard deviation of the place, metres per square root of a second.
+    turn
+        Standard deviation of the velocity, metres per second per square root of a second.
+    """
+
+    seconds: float
+    wander: float
+    turn: float
+
+    @property
+    def place_variance(self) -> float:
+        """Of the place after a frame, beyond the line, square metres."""
+        return self.wander**2 * self.seconds + self.turn**2 * self.seconds**3 / 3
+
+    @property
+    def gain(self) -> float:
+        """How much faster somebody is who is one metre further than foretold, 1/s: covariance over variance."""
+        return self.turn**2 * self.seconds**2 / 2 / self.place_variance
+
+    @property
+    def velocity_variance(self) -> float:
+        """Of the velocity once the place is known, square metres per square second."""
+        return self.turn**2 * self.seconds - self.gain**2 * self.place_variance
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """The integrals over the last frame in DP06 eqs 8 to 11: a mixture of one Gaussian a particle.
+
+    Attributes
+    ----------
+    centre, velocity : float64 (n, 2), weight : float64 (n,)
+        Where the particles' lines lead.
+    axes : float64 (2, 2)
+        What a metre along either axis of the ground is in the node's own units; the unit matrix on the ground.
+    motion
+        How far people are off those lines.
+    """
+
+    centre: Floats
+    velocity: Floats
+    weight: Floats
+    axes: Floats
+    motion: Motion
+
+    @classmethod
+    def of(cls, particles: Particles, axes: Floats, motion: Motion) -> Prediction:
+        """One frame later, at constant velocity."""
+        centre = particles.place + motion.seconds * particles.velocity
+        return cls(centre, particles.velocity, particles.weight, axes, motion)
+
+    @property
+    def covariance(self) -> Floats:
+        """Covariance of one Gaussian, float64 (2, 2)."""
+        return np.asarray(self.motion.place_variance * self.axes @ self.axes.T)
+
+    @property
+    def mean(self) -> Floats:
+        """Mean place, float64 (2,)."""
+        return np.asarray(self.weight @ self.centre)
+
+    def draw(self, count: int, lots: np.random.Generator) -> Floats:
+        """Places drawn from the mixture, float64 (count, 2)."""
+        chosen = systematic(self.weight, count, lots.random())
+        off = lots.standard_normal((count, 2)) @ self.axes.T
+        return np.asarray(self.centre[chosen] + self.motion.place_variance**0.5 * off)
+
+    def density(self, place: Floats) -> Floats:
+        """Density of the mixture at places (k, 2), float64 (k,)."""
+        filled, (inverse, scale) = np.empty(len(place)), _gaussian(self.covariance)
+        fill_mixture(place, self.centre, self.weight, inverse, scale, filled)
+        return filled
+
+    def settled(self, place: Floats, weight: Floats, lots: np.random.Generator) -> Particles:
+        """Particles at places (k, 2) of weights (k,): each goes on from the particle that it most likely came from."""
+        inverse, _ = _gaussian(self.covariance)
+        origin = np.empty(len(place), np.int64)
+        fill_origin(place, self.centre, self.weight, inverse, lots.random(len(place)), origin)
+        off = lots.standard_normal((len(place), 2)) @ self.axes.T
+        faster = self.motion.gain * (place - self.centre[origin]) + self.motion.velocity_variance**0.5 * off
+        return Particles(place, self.velocity[origin] + faster, weight)
+
+
+def systematic(weight: Floats, count: int, lot: float) -> Ints:
+    """Indices drawn by weight and one lot of 0..1, each as often as its share of `count` says; int64 (count,)."""
+    ladder = np.cumsum(weight)
+    steps = (np.arange(count) + lot) / count * ladder[-1]
+    return np.asarray(np.minimum(np.searchsorted(ladder, steps, side="right"), len(weight) - 1), np.int64)
+
+
+def _gaussian(covariance: Floats) -> tuple[Floats, float]:
+    """xx, xy, yy of the inverse, float64 (3,), and the density at the centre."""
+    (a, b), (_, d) = covariance
+    area = a * d - b * b
+    return np.array([d, -b, a]) / area, float(0.5 / np.pi / np.sqrt(area))
+
+
+@kernel
+def fill_mixture(
+    place: Floats, centre: Floats, weight: Floats, inverse: Floats, scale: float, filled: Floats
+) -> None:  # fmt: skip
+    """Fill (k,) with the density at places (k, 2) of Gaussians of one covariance at centres (n, 2)."""
+    for i in range(len(place)):
+        total = 0.0
+        for r in range(len(centre)):
+            x, y = place[i, 0] - centre[r, 0], place[i, 1] - centre[r, 1]
+            total += weight[r] * np.exp(-0.5 * (inverse[0] * x * x + 2.0 * inverse[1] * x * y + inverse[2] * y * y))
+        filled[i] = scale * total
+
+
+@kernel
+def fill_origin(
+    place: Floats, centre: Floats, weight: Floats, inverse: Floats, lot: Floats, origin: Ints
+) -> None:  # fmt: skip
+    """Fill (k,) with one Gaussian each, drawn with lots (k,) by what it has to do with the place; the nearest if none.
+
+    The exponents are taken relative to the least, so that places far from all Gaussians are served too.
+    """
+    square, ladder = np.empty(len(centre)), np.empty(len(centre))
+    for i in range(len(place)):
+        least, total = np.inf, 0.0
+        for r in range(len(centre)):
+            x, y = place[i, 0] - centre[r, 0], place[i, 1] - centre[r, 1]
+            square[r] = inverse[0] * x * x + 2.0 * inverse[1] * x * y + inverse[2] * y * y
+            if weight[r] > 0.0:
+                least = min(least, square[r])
+        for r in range(len(centre)):
+            total += weight[r] * np.exp(-0.5 * (square[r] - least)) if weight[r] > 0.0 else 0.0
+            ladder[r] = total
+        origin[i] = 0
+        while origin[i] < len(centre) - 1 and ladder[origin[i]] <= lot[i] * total:
+            origin[i] += 1

@@ -1,0 +1,97 @@
+"""The potential between the ground and a view (DP06 eq. 12), and the messages that pass through it (eqs 5, 6, 8, 9).
+
+With ground particles g_n, a view's particles x_m, their places H^-1 x_m on the ground and covariances
+Gamma_m = s^2 J_m J_m^T, J_m the Jacobian of H^-1 at x_m,
+
+    psi_nm = (1 - lambda) N(g_n; H^-1 x_m, Gamma_m) + lambda N(g_n; mu, Lambda)
+
+A view's weights a_m tell how far it sees the target at x_m; what is left of 1 is that it does not see it at all. That
+part says nothing of where the target is: it is flat. So a view that sees nothing sends a flat message.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stseg.accelerate import kernel
+from stseg.arrays import Floats
+
+
+@dataclass(frozen=True)
+class Outlier:
+    """The outlier term of eq. 12: a target that stands elsewhere than the view says.
+
+    Attributes
+    ----------
+    share
+        lambda.
+    mean : float64 (2,)
+        mu, metres.
+    spread
+        Standard deviation along both axes, metres: Lambda is its square times the unit matrix.
+    """
+
+    share: float
+    mean: Floats
+    spread: float
+
+    @property
+    def flat(self) -> float:
+        """Density of a message that says nothing, 1/square metre: the outlier term's at its mean."""
+        return float(0.5 / np.pi / self.spread**2)
+
+    def density(self, ground: Floats) -> Floats:
+        """At ground points (n, 2), 1/square metre, float64 (n,)."""
+        square = ((ground - self.mean) ** 2).sum(1) / self.spread**2
+        return np.asarray(self.flat * np.exp(-0.5 * square))
+
+
+@dataclass(frozen=True)
+class Tie:
+    """All pairs of a ground particle and a view's particle.
+
+    Attributes
+    ----------
+    inlier : float64 (n, m)
+        N(g_n; H^-1 x_m, Gamma_m), 1/square metre.
+    stray : float64 (n,)
+        The outlier term's density at each ground particle.
+    outlier
+        That term.
+    """
+
+    inlier: Floats
+    stray: Floats
+    outlier: Outlier
+
+    @classmethod
+    def of(cls, ground: Floats, mapped: Floats, covariance: Floats, outlier: Outlier) -> Tie:
+        """Between ground particles (n, 2) and those of a view, mapped (m, 2), with covariances (m, 2, 2), metres."""
+        inlier = np.empty((len(ground), len(mapped)))
+        fill_inlier(ground, mapped, covariance, inlier)
+        return cls(inlier, outlier.density(ground), outlier)
+
+    def to_ground(self, seen: Floats) -> Floats:
+        """Message from the view to each ground particle, float64 (n,); seen (m,) are its weights a."""
+        share, through = self.outlier.share, float(seen.sum())
+        told = (1 - share) * (self.inlier @ seen) + share * through * self.stray
+        return np.asarray(told + (1 - through) * self.outlier.flat)
+
+    def to_view(self, weight: Floats) -> Floats:
+        """Message from the ground, whose particles weigh (n,), to each particle of the view, float64 (m,)."""
+        share = self.outlier.share
+        return np.asarray((1 - share) * (weight @ self.inlier) + share * float(weight @ self.stray))
+
+
+@kernel
+def fill_inlier(ground: Floats, mapped: Floats, covariance: Floats, inlier: Floats) -> None:
+    """Fill (n, m) with the density at ground (n, 2) of Gaussians at mapped (m, 2) with covariance (m, 2, 2)."""
+    for m in range(len(mapped)):
+        a, b, d = covariance[m, 0, 0], covariance[m, 0, 1], covariance[m, 1, 1]
+        area = a * d - b * b
+        scale = 0.5 / np.pi / np.sqrt(area)
+        for n in range(len(ground)):
+            x, y = ground[n, 0] - mapped[m, 0], ground[n, 1] - mapped[m, 1]
+            inlier[n, m] = scale * np.exp(-0.5 * (d * x * x - 2.0 * b * x * y + a * y * y) / area)

@@ -1,0 +1,180 @@
+"""Belief propagation between views as a tracker: detections begin and end tracks, colours alone lead them (DP06)."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from stseg.arrays import Bytes, Floats, Ints
+from stseg.config import Config
+from stseg.geometry import Rig
+from stseg.ghosts.border import Border
+from stseg.ghosts.expected import Expected
+from stseg.identity.linking import assign, distances
+from stseg.occupancy.sampling import Sampling
+from stseg.trackers.belief.condensation import condense
+from stseg.trackers.belief.particles import Motion
+from stseg.trackers.belief.star import propagate
+from stseg.trackers.belief.target import Target, in_front, looks
+from stseg.trackers.belief.view import StarView
+from stseg.trackers.cells import reached_cells
+from stseg.trackers.colour import colour_views
+from stseg.trackers.protocol import Commit, Scene, Shown
+from stseg.trackers.rows import Event, event_rows, trajectory_rows, views_at
+from stseg.tracks import WINDOW
+
+_WAYS = {"messages": propagate, "condensation": condense}
+"""How stars go from one frame to the next."""
+_SEEN = 0.5
+"""Probability from which a view is taken to see a target."""
+_STAYING = 1.0
+"""Log-odds that somebody found in one frame is found in the next, nats."""
+_FORGETTING = 4.0
+"""How fast those fall while nobody is found there, nats per second."""
+_MANY = 50
+"""Frames over which a height is averaged."""
+
+
+class BeliefTracker:
+    """Follows people by their colours, one star graph each.
+
+    A detection that is nobody known begins a track; where it was seen whole, its colours are learned. From then on
+    the colours lead, and detections that are it only confirm the track and keep its colours fresh.
+
+    Parameters
+    ----------
+    rig, config
+        The scene, and the constants of all stages.
+    first
+        The run's first frame; it does not matter here.
+    """
+
+    final: ClassVar[bool] = True
+
+    def __init__(self, rig: Rig, config: Config, first: int) -> None:
+        del first
+        self.rig, self.config = rig, config
+        self.motion = Motion(1 / rig.frame_rate, config.belief.wander, config.belief.turn)
+        self.views = [StarView.of(camera, rig.grid) for camera in rig.cameras]
+        self.seen_by = Sampling.of(rig, "point").views()
+        self.border = Border.of(rig)
+        self.targets: list[Target] = []
+        self.issued = 0
+        self.begun = False
+
+    def expected(self, frame: int) -> Expected | None:
+        """Whom the frames before lead to expect."""
+        del frame
+        if not self.begun:
+            return None
+        foretold = [target.foretold(self.motion) for target in self.targets]
+        noise, height_noise = self.config.identity.place_noise**2, self.config.identity.height_noise**2
+        spread = [
+            target.star.ground.covariance + p.covariance for target, p in zip(self.targets, foretold, strict=True)
+        ]
+        missed = np.array([target.missed for target in self.targets]) * self.motion.seconds
+        return Expected(
+            np.array([p.mean for p in foretold]).reshape(-1, 2),
+            np.array(spread).reshape(-1, 2, 2) + noise * np.eye(2),
+            np.array([target.height for target in self.targets]),
+            np.array([height_noise * (1 + 1 / target.found) for target in self.targets]),
+            _STAYING - _FORGETTING * missed,
+        )
+
+    def add(self, scene: Scene, shown: Shown) -> list[Commit]:
+        """The next frame, decided."""
+        self.begun = True
+        images = [view and view.image for view in colour_views(shown, "belief", scene.frame)]
+        self._follow(scene.frame, images)
+        found = self._find(scene, images)
+        events = self._end(scene.frame) + self._begin(scene, found, images)
+        seen = [t for t in self.targets if t.missed == 0 or t.star.sight.max(initial=0.0) >= _SEEN]
+        return [self._commit(scene, seen, events)]
+
+    def finish(self) -> list[Commit]:
+        """Nothing is open."""
+        return []
+
+    def _follow(self, frame: int, images: list[Bytes | None]) -> None:
+        seen = looks(self.targets, self.views, images, self.motion, self.config.belief)
+        lots = [self._lots(frame, target.track) for target in self.targets]
+        follow = _WAYS[self.config.belief.way]
+        stars = follow([target.star for target in self.targets], seen, self.motion, self.config.belief, lots)
+        for target, star in zip(self.targets, stars, strict=True):
+            target.star = star
+
+    def _lots(self, frame: int, track: int) -> np.random.Generator:
+        """Of one target in one frame: nobody's chance hangs on who else is there."""
+        return np.random.default_rng([self.config.belief.seed, track, frame])
+
+    def _find(self, scene: Scene, images: list[Bytes | None]) -> Ints:
+        """Confirm targets by detections; the index of each person's target, int64 (n,), -1 for nobody known."""
+        people = scene.people
+        ground = np.array([target.star.ground.mean for target in self.targets]).reshape(-1, 2)
+        rows, columns = assign(distances(people.ground, ground), self.config.belief.beside)
+        whose = np.full(len(people), -1, np.int64)
+        whose[rows] = columns
+        for target in self.targets:
+            target.missed += 1
+        share = 1 - np.exp(-self.motion.seconds / self.config.belief.memory)
+        nearer = [in_front(people.ground, people.height, view) for view in self.views]
+        for person, k in zip(rows.tolist(), columns.tolist(), strict=True):
+            target = self.targets[k]
+            target.found, target.missed = target.found + 1, 0
+            target.height += (float(people.height[person]) - target.height) / min(target.found, _MANY)
+            target.learn(self.views, images, people.ground[person], [n[person] for n in nearer], share)
+        return whose
+
+    def _end(self, frame: int) -> list[Event]:
+        """Those who have left, and those whom nothing has confirmed for longer than they were known, or patience."""
+        events: list[Event] = []
+        patience = round(self.config.belief.patience * self.rig.frame_rate)
+        for target in list(self.targets):
+            outside = self.border.away(target.star.ground.mean[None])[0] == 0.0
+            if target.missed and outside:
+                reason = "left the area"
+            elif target.missed > min(patience, target.found):
+                seen = target.star.sight.max(initial=0.0) >= _SEEN
+                reason = (
+                    f"nobody was found there for {target.missed} frames; its colours were{'' if seen else ' not'} seen"
+                )
+            else:
+                continue
+            self.targets.remove(target)
+            events.append((frame, "death", target.track, 0, reason))
+        return events
+
+    def _begin(self, scene: Scene, whose: Ints, images: list[Bytes | None]) -> list[Event]:
+        """A target for everybody who is nobody known."""
+        events: list[Event] = []
+        people = scene.people
+        nearer = [in_front(people.ground, people.height, view) for view in self.views]
+        for k in np.flatnonzero(whose < 0).tolist():
+            self.issued += 1
+            lots = self._lots(scene.frame, self.issued)
+            height, count = float(people.height[k]), self.config.belief.count
+            target = Target.at(
+                self.issued, people.ground[k], people.covariance[k], height, len(self.views), count, lots
+            )
+            target.learn(self.views, images, people.ground[k], [n[k] for n in nearer], 1.0)
+            self.targets.append(target)
+            events.append((scene.frame, "birth", target.track, 0, "a detection where nobody was followed"))
+        return events
+
+    def _commit(self, scene: Scene, seen: list[Target], events: list[Event]) -> Commit:
+        grid, ids = self.rig.grid, np.array([target.track for target in seen], np.int64)
+        ground = np.array([target.star.ground.mean for target in seen]).reshape(-1, 2)
+        covariance: Floats = np.array([target.star.ground.covariance for target in seen]).reshape(-1, 2, 2)
+        height, score = (np.array(column, float) for column in ([t.height for t in seen], self._scores(seen)))
+        label, extent = reached_cells(scene, ground, ids, grid, self.config.occupancy.reach)
+        rows = trajectory_rows(
+            scene.frame, ids, ground, covariance, height, extent, score, views_at(self.seen_by, ground, grid)
+        )
+        return Commit([scene], label[None], rows, event_rows(events), np.zeros(0, WINDOW))
+
+    @staticmethod
+    def _scores(seen: list[Target]) -> list[float]:
+        """Log-odds that some view sees each of them, nats."""
+        hidden = [float(np.prod(1 - target.star.sight).clip(1e-9, 1 - 1e-9)) for target in seen]
+        return [float(np.log(1 - share) - np.log(share)) for share in hidden]
