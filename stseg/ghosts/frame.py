@@ -9,11 +9,13 @@ import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints
 from stseg.ghosts.evidence import Case, Terms
+from stseg.ghosts.own import owned
 from stseg.ghosts.pool import Pool, box_evidence, pixel_evidence
 from stseg.ghosts.prior import Prior
-from stseg.ghosts.refine import owned, refine
+from stseg.ghosts.refine import refine
 from stseg.ghosts.scoring import box_score, pixel_score, set_score, walker_score
 from stseg.ghosts.search import search
+from stseg.ghosts.sizes import Sizes, measure
 from stseg.ghosts.views import BoxView, PixelView, Sight
 
 
@@ -25,6 +27,25 @@ class Seen:
     sights: Sequence[Sight | None]
     prior: Prior
     terms: Terms
+
+
+@dataclass(frozen=True)
+class Refined:
+    """A set's people, as exactly as the frame tells.
+
+    Attributes
+    ----------
+    pool
+        Where they stand, and their sizes by all that is known of each.
+    covariance : float64 (n, 2, 2)
+        Of each place, square metres.
+    sizes
+        What the frame by itself says of them, anybody's sizes the prior.
+    """
+
+    pool: Pool
+    covariance: Floats
+    sizes: Sizes
 
 
 class Frame:
@@ -94,14 +115,17 @@ class Frame:
             for view, boxes, pixels in zip(self.seen.views, self.box_owner, self.pixel_owner, strict=True)
         ]
 
-    def refined(self) -> tuple[Pool, Floats]:
-        """The set's people at the means of their posteriors, and the covariances."""
-        views = self.seen.views
+    def refined(self) -> Refined:
+        """The set's people at the means of their posteriors."""
+        views, prior, pool = self.seen.views, self.seen.prior, self.pool.at(self.members)
         own = [
             [owned(v, j, b, p) for v, b, p in zip(views, self.box_owner, self.pixel_owner, strict=True)]
             for j in range(len(self.members))
         ]
-        return refine(self.pool.at(self.members), views, self.seen.sights, own, self.seen.prior, self.walker)
+        ground, covariance = refine(pool, views, self.seen.sights, own, prior, self.walker)
+        sizes = measure(Pool(ground, pool.height, pool.width), views, self.seen.sights, own, prior.config)
+        known = prior.known_sizes(sizes, self.walker)
+        return Refined(Pool(ground, known.height, known.width), covariance, sizes)
 
 
 def _case(seen: Seen, pool: Pool) -> Case:

@@ -14,7 +14,7 @@ _BETWEEN = 3
 
 
 def outlines(
-    table: BodyTable, ground: Floats, heights: Floats, step: int, shape: tuple[int, int]
+    table: BodyTable, ground: Floats, heights: Floats, step: int, shape: tuple[int, int], widths: Floats | None = None
 ) -> tuple[Ints, Spans, Floats]:
     """Outlines of pillars in one view.
 
@@ -30,6 +30,8 @@ def outlines(
         Image pixels to a raster pixel.
     shape
         Rows and columns of the raster.
+    widths : float64 (n,), optional
+        How wide each is beside the profile of `geometry.bodies`; 1 if not given.
 
     Returns
     -------
@@ -42,11 +44,13 @@ def outlines(
     """
     first, count = np.full(len(ground), -1, np.int64), np.zeros(len(ground), np.int64)
     area = np.zeros(len(ground))
+    wide = np.ones(len(ground)) if widths is None else widths
     lattice = (np.asarray(ground, float).reshape(-1, 2) - table.origin) / table.step
     spans = np.zeros((len(ground), shape[0], 2), np.int16)
     _fill_outlines(
-        table.pixel, lattice, heights, LEVELS[1], table.step, PROFILE, float(step), shape[1], first, count, spans, area
-    )
+        table.pixel, lattice, heights, wide, LEVELS[1], table.step, PROFILE, float(step), shape[1], first, count,
+        spans, area,
+    )  # fmt: skip
     return first, spans[:, : max(int(count.max(initial=0)), 1)].copy(), area
 
 
@@ -55,6 +59,7 @@ def _fill_outlines(
     pixel: Singles,
     lattice: Floats,
     heights: Floats,
+    widths: Floats,
     level_step: float,
     step: float,
     profile: Floats,
@@ -72,6 +77,7 @@ def _fill_outlines(
         fill_discs(pixel, lattice[i, 0], lattice[i, 1], heights[i], level_step, step, profile, discs)
         discs /= raster_step
         discs[:, :2] += 0.5 / raster_step - 0.5
+        discs[:, 2:] *= widths[i]
         if np.isnan(discs.sum()):
             continue
         low[:], high[:] = np.inf, -np.inf

@@ -1,0 +1,199 @@
+"""Heights and widths: the E step by its definition, and what it finds of people in named scenes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scenes import FEW_HEIGHTS, body_points, boxes, corner_cameras, expecting, likelihoods, looking, people, room
+from scipy.special import expit
+from strategies import numbers
+
+from stseg.arrays import Boxes, Flags, Floats, Singles
+from stseg.geometry.bodies import PROFILE, WIDTH, BodyTable
+from stseg.ghosts.explain import FramePass
+from stseg.ghosts.outlines import outlines
+from stseg.ghosts.own import Own, owned
+from stseg.ghosts.pool import Pool
+from stseg.ghosts.sizes import BACKGROUND, OWN, Sizes, measure
+from stseg.ghosts.views import PixelView
+
+STEPS = np.linspace(-3.0, 3.0, 13)
+"""The lattice, in standard deviations."""
+VALUES = st.tuples(numbers(1.4, 2.0), numbers(0.01, 0.2), numbers(1.4, 2.0), numbers(0.03, 0.3))
+
+
+def sizes_of(mean: float, spread: float) -> Sizes:
+    one = np.ones(1)
+    return Sizes(mean * one, spread**2 * one, mean / 4 * one, spread**2 * one)
+
+
+def pixel_view(few: int = 0) -> PixelView:
+    rig = room()
+    return PixelView(rig.cameras[few], rig.grid, np.zeros((1, 2)), FEW_HEIGHTS)
+
+
+def everything(view: PixelView) -> list[list[Own]]:
+    return [[Own(-1, np.ones(view.shape, bool))]]
+
+
+# Means and variances
+
+
+@given(VALUES)
+def test_a_prior_can_be_taken_out_again(values: tuple[float, float, float, float]) -> None:
+    measured, prior = sizes_of(*values[:2]), sizes_of(*values[2:])
+    again = measured.with_prior(prior).told_apart_from(prior)
+    for name in ("height", "height_variance", "width", "width_variance"):
+        np.testing.assert_allclose(getattr(again, name), getattr(measured, name), rtol=1e-4)
+
+
+def test_what_says_nothing_leaves_the_prior() -> None:
+    prior = sizes_of(1.8, 0.1)
+    other = sizes_of(1.6, 0.05)
+    after = prior.told_apart_from(prior).with_prior(other)
+    np.testing.assert_allclose([after.height, after.width], [other.height, other.width], atol=1e-5)
+    np.testing.assert_allclose(after.height_variance, other.height_variance, rtol=1e-4)
+
+
+# The E step
+
+
+def by_definition(view: PixelView, raster: Singles, open_pixels: Flags, fits: Pool) -> Floats:
+    """The labels' log-likelihood of each pillar over the union of all of them, pixel by pixel, nats."""
+    first, spans, area = view.outlines(fits.ground, fits.height, fits.width)
+    inside = np.zeros((len(fits), *view.shape), bool)
+    for i in range(len(fits)):
+        for k, (start, stop) in enumerate(spans[i]):
+            if stop > start:
+                inside[i, first[i] + k, start:stop] = True
+    union, own, score = inside.any(0), expit(raster.astype(float)), np.zeros(len(fits))
+    for v, u in np.argwhere(union & open_pixels):
+        within = OWN * own[v, u] + BACKGROUND * (1 - own[v, u])
+        score += np.where(inside[:, v, u], within, -OWN * own[v, u]) / area.mean()
+    return view.config.body_weight * score
+
+
+@pytest.mark.parametrize("hidden", [0.0, 0.5])
+def test_the_e_step_by_definition(hidden: float) -> None:
+    view, rng = pixel_view(), np.random.default_rng(4)
+    sight = replace(view.observe(None), raster=rng.normal(0, 2, view.shape).astype(np.float32))
+    open_pixels = rng.random(view.shape) >= hidden
+    place, width = np.array([[0.3, -0.2]]), np.array([0.45])
+    found = measure(Pool(place, np.array([1.7]), width), [view], [sight], [[Own(-1, open_pixels)]], FEW_HEIGHTS)
+    everywhere, one = np.tile(place, (len(STEPS), 1)), np.ones(len(STEPS))
+    heights = FEW_HEIGHTS.height_mean + FEW_HEIGHTS.height_spread * STEPS
+    widths = FEW_HEIGHTS.width_mean + FEW_HEIGHTS.width_spread * STEPS
+    for lattice, fits, mean, variance in (
+        (heights, Pool(everywhere, heights, 0.45 * one), found.height, found.height_variance),
+        (widths, Pool(everywhere, found.height * one, widths), found.width, found.width_variance),
+    ):
+        score = by_definition(view, sight.raster, open_pixels, fits) - 0.5 * STEPS**2
+        weight = np.exp(score - score.max())
+        weight /= weight.sum()
+        assert mean[0] == pytest.approx(weight @ lattice, abs=1e-6)
+        assert variance[0] == pytest.approx(weight @ (lattice - weight @ lattice) ** 2, abs=1e-6)
+
+
+def test_who_is_hidden_is_like_anybody() -> None:
+    view = pixel_view()
+    sight = view.observe(likelihoods([view.camera], people((0.3, -0.2, 1.9)))[0])
+    nobodys = [[owned(view, 0, np.zeros(0, np.int64), np.ones(view.shape, np.int64))]]
+    pool, anybody = Pool(np.array([[0.3, -0.2]]), np.array([1.7]), np.array([0.42])), Sizes.of_anybody(1, FEW_HEIGHTS)
+    found = measure(pool, [view], [sight], nobodys, FEW_HEIGHTS)
+    np.testing.assert_allclose([found.height, found.width], [anybody.height, anybody.width])
+    blind = measure(pool, [view], [None], nobodys, FEW_HEIGHTS)
+    np.testing.assert_allclose(blind.height_variance, anybody.height_variance, rtol=0.03)  # of the lattice, cut off
+
+
+def test_wider_people_are_found_wider() -> None:
+    """Silhouettes of a body of the profile's width, and of one a fifth slimmer."""
+    rig, found = room(), []
+    for wide in (0.8, 1.0):
+        views = [PixelView(camera, rig.grid, np.zeros((1, 2)), FEW_HEIGHTS) for camera in rig.cameras]
+        sights = []
+        for view in views:
+            seen = np.zeros(view.camera.size[::-1], np.float32)
+            first, spans, _ = outlines(
+                view.table, np.zeros((1, 2)), np.array([1.75]), 1, seen.shape[:2], np.array([wide])
+            )
+            for k, (start, stop) in enumerate(spans[0]):
+                seen[first[0] + k, start:stop] = 1.0
+            sights.append(view.observe(seen))
+        pool = Pool(np.zeros((1, 2)), np.array([1.75]), np.array([0.42]))
+        own = [[Own(-1, np.ones(view.shape, bool)) for view in views]]
+        found.append(float(measure(pool, views, sights, own, FEW_HEIGHTS).width[0]))
+    assert 0.8 * WIDTH - 0.03 < found[0] < found[1] - 0.04
+    assert found[1] == pytest.approx(WIDTH, abs=0.04)
+
+
+# Boxes and outlines of wide people
+
+
+def test_wider_bodies_have_wider_boxes() -> None:
+    camera = looking("sharp", (-4.5, -3.0, 2.6), size=(1280, 960), focal=750.0)
+    table, place = BodyTable.of(camera, room().grid), np.array([[0.2, 0.1], [0.2, 0.1]])
+    mean, wide = table.boxes_of(place, np.array([1.7, 1.7]), np.array([WIDTH, 1.2 * WIDTH]))
+    np.testing.assert_allclose(mean, table.boxes_of(place, np.array([1.7, 1.7]))[0])
+    assert wide[2] - wide[0] == pytest.approx(1.2 * (mean[2] - mean[0]), rel=0.02)
+
+
+def test_the_head_closes() -> None:
+    """The highest point of a body in a picture is its crown, also where the camera looks down."""
+    camera = corner_cameras()[0]
+    pixel, _ = camera.project(body_points(people((0.0, 0.0, 1.8))[0])[:, :2], body_points(people((0, 0, 1.8))[0])[:, 2])
+    crown, _ = camera.project(np.zeros((1, 2)), np.array([1.8]))
+    assert crown[0, 1] - pixel[:, 1].min() < 0.5
+    assert PROFILE[-1, 1] < 0.05
+
+
+# People in rooms
+
+
+def tall_and_short(kind: str) -> tuple[Floats, Sizes]:
+    standing = people((-0.9, 0.4, 1.58), (0.6, -0.5, 1.86), (0.9, 0.9, 1.7))
+    rig = room()
+    frame_pass = FramePass(rig, [kind] * 4, FEW_HEIGHTS)
+    seen: list[Singles] | list[Boxes] = (
+        likelihoods(rig.cameras, standing) if kind == "pixels" else [boxes(camera, standing) for camera in rig.cameras]
+    )
+    found = frame_pass.explain(seen, None).people
+    order = [int(np.hypot(*(found.ground - place[:2]).T).argmin()) for place in standing]
+    assert sorted(order) == [0, 1, 2]
+    return standing, found.sizes.at(order)
+
+
+@pytest.mark.parametrize("kind", ["pixels", "boxes"])
+def test_heights_are_within_five_centimetres(kind: str) -> None:
+    standing, found = tall_and_short(kind)
+    found = found.told_apart_from(Sizes.of_anybody(3, FEW_HEIGHTS))
+    np.testing.assert_allclose(found.height, standing[:, 2], atol=0.05)
+
+
+def test_who_is_known_keeps_their_height() -> None:
+    """A walker's own height is the prior of the next frame's; the frame's own measurement stays free of it."""
+    rig, standing = room(), people((0.2, 0.1, 1.7))
+    frame_pass = FramePass(rig, ["pixels"] * 4, FEW_HEIGHTS)
+    expected = expecting((0.2, 0.1, 1.82))
+    expected = replace(expected, sizes=replace(expected.sizes, height_variance=np.full(1, 0.01**2)))
+    seen = likelihoods(rig.cameras, standing)
+    stranger, known = frame_pass.explain(seen, None).people, frame_pass.explain(seen, expected).people
+    assert known.walker.tolist() == [0]
+    assert known.height[0] > stranger.height[0] + 0.05
+    assert known.sizes.height[0] == pytest.approx(stranger.sizes.height[0], abs=0.03)
+
+
+@settings(max_examples=20, deadline=None)
+@given(numbers(1.45, 1.95))
+def test_taller_people_are_found_taller(height: float) -> None:
+    view = pixel_view()
+    pool = Pool(np.zeros((1, 2)), np.array([1.7]), np.array([WIDTH]))
+    found = [
+        measure(pool, [view], [view.observe(seen)], everything(view), FEW_HEIGHTS).height[0]
+        for tall in (height, height + 0.1)
+        for seen in likelihoods([view.camera], people((0.0, 0.0, tall)))
+    ]
+    assert found[1] > found[0]
