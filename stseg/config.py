@@ -258,9 +258,9 @@ class IdentityConfig:
     place_noise: float = 0.15
     """How far a frame's place is off besides its own covariance, metres (standard deviation)."""
     height_noise: float = 0.035
-    """How far a frame's height of a person is off besides its own variance, metres (standard deviation)."""
+    """How far a frame's height of a person is off where they are seen whole, metres (standard deviation)."""
     width_noise: float = 0.03
-    """How far a frame's width of a person is off besides its own variance, metres (standard deviation)."""
+    """How far a frame's width of a person is off where they are seen whole, metres (standard deviation)."""
     foresight: float = 0.6
     """How far ahead a track is carried when a window's cells are divided, seconds; beyond that it may be anywhere."""
     patience: float = 2.0

@@ -18,7 +18,7 @@ from stseg.geometry.grid import Grid
 
 LEVELS = np.linspace(0.0, 2.2, 12)
 """Heights at which the lattice is projected, metres."""
-PROFILE = np.array([[0.0, 0.13], [0.25, 0.15], [0.5, 0.20], [0.8, 0.22], [0.86, 0.11], [0.95, 0.10], [1.0, 0.02]])
+PROFILE = np.array([[0.0, 0.13], [0.25, 0.15], [0.5, 0.21], [0.8, 0.23], [0.87, 0.12], [0.95, 0.10], [1.0, 0.02]])
 """Relative height and radius (metres) of the discs of a body of the width `WIDTH`; at the top the head closes."""
 WIDTH = 2 * float(PROFILE[:, 1].max())
 """Width of such a body, metres: across its shoulders and arms. Wider ones are wider at all heights."""
@@ -72,15 +72,11 @@ class BodyTable:
         """
         return np.stack([self.boxes_of(ground, np.full(len(ground), height)) for height in heights])
 
-    def boxes_of(self, ground: Floats, heights: Floats, widths: Floats | None = None) -> Floats:
-        """Boxes of pillars with a size each, in metres: ground (n, 2), heights and widths (n,); float64 (n, 4), pixels.
-
-        Without widths all have that of the profile.
-        """
+    def boxes_of(self, ground: Floats, heights: Floats) -> Floats:
+        """Boxes of pillars with a height each, ground (n, 2) and heights (n,) in metres; float64 (n, 4), pixels."""
         filled = np.full((len(ground), 4), np.nan)
         lattice = (np.asarray(ground, float) - self.origin) / self.step
-        wide = np.ones(len(ground)) if widths is None else np.asarray(widths, float) / WIDTH
-        _fill_boxes(self.pixel, lattice, np.asarray(heights, float), wide, LEVELS[1], self.step, PROFILE, filled)
+        _fill_boxes(self.pixel, lattice, np.asarray(heights, float), LEVELS[1], self.step, PROFILE, filled)
         return filled
 
     def discs(self, ground: Floats, height: float) -> Floats:
@@ -127,7 +123,6 @@ def _fill_boxes(
     pixel: Singles,
     lattice: Floats,
     heights: Floats,
-    widths: Floats,
     level_step: float,
     step: float,
     profile: Floats,
@@ -136,7 +131,6 @@ def _fill_boxes(
     discs = np.empty((len(profile), 6))
     for i in range(len(lattice)):
         fill_discs(pixel, lattice[i, 0], lattice[i, 1], heights[i], level_step, step, profile, discs)
-        discs[:, 2:] *= widths[i]
         left, top, right, bottom = np.inf, np.inf, -np.inf, -np.inf
         seen = True
         for k in range(len(profile)):

@@ -9,13 +9,14 @@ import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints
 from stseg.ghosts.evidence import Case, Terms
+from stseg.ghosts.measure import measure
 from stseg.ghosts.own import owned
 from stseg.ghosts.pool import Pool, box_evidence, pixel_evidence
 from stseg.ghosts.prior import Prior
 from stseg.ghosts.refine import refine
 from stseg.ghosts.scoring import box_score, pixel_score, set_score, walker_score
 from stseg.ghosts.search import search
-from stseg.ghosts.sizes import Sizes, measure
+from stseg.ghosts.sizes import Sizes
 from stseg.ghosts.views import BoxView, PixelView, Sight
 
 
@@ -36,16 +37,19 @@ class Refined:
     Attributes
     ----------
     pool
-        Where they stand, and their sizes by all that is known of each.
+        Where they stand, as tall as the frame by itself says: a height that was known before would confirm itself.
     covariance : float64 (n, 2, 2)
         Of each place, square metres.
     sizes
         What the frame by itself says of them, anybody's sizes the prior.
+    known
+        Their sizes by all that was seen of each so far.
     """
 
     pool: Pool
     covariance: Floats
     sizes: Sizes
+    known: Sizes
 
 
 class Frame:
@@ -122,10 +126,10 @@ class Frame:
             [owned(v, j, b, p) for v, b, p in zip(views, self.box_owner, self.pixel_owner, strict=True)]
             for j in range(len(self.members))
         ]
-        ground, covariance = refine(pool, views, self.seen.sights, own, prior, self.walker)
-        sizes = measure(Pool(ground, pool.height, pool.width), views, self.seen.sights, own, prior.config)
+        places = refine(pool, views, self.seen.sights, own, prior, self.walker)
+        sizes = measure(places, pool.width, views, self.seen.sights, own, prior.config)
         known = prior.known_sizes(sizes, self.walker)
-        return Refined(Pool(ground, known.height, known.width), covariance, sizes)
+        return Refined(Pool(places.ground, sizes.height, known.width), places.covariance, sizes, known)
 
 
 def _case(seen: Seen, pool: Pool) -> Case:

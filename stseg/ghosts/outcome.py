@@ -16,7 +16,7 @@ def explanation(frame: Frame) -> Explanation:
     """The result of a frame."""
     views, members = frame.seen.views, frame.members
     refined = frame.refined()
-    exact = refined.pool
+    exact = Pool(refined.pool.ground, refined.known.height, refined.known.width)
     total = frame.score(members)
     parts = frame.case.parts[frame.row, : len(members)]
     without = [frame.score(np.delete(members, a)) for a in range(len(members))]

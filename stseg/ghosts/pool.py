@@ -64,7 +64,7 @@ def box_evidence(views: Sequence[View], sights: Sequence[Sight | None], pool: Po
     for k, (view, sight) in enumerate(chosen):
         if sight is not None:
             width, height = map(float, view.camera.size)
-            bodies = view.table.boxes_of(pool.ground, pool.height, pool.width)
+            bodies = view.table.boxes_of(pool.ground, pool.height)
             match = evidence.match[k, :, : len(sight.edges)]
             fill_match(bodies, sight.edges, sight.belief, width, height, match)
             fill_inside(bodies, width, height, evidence.inside[k])

@@ -57,7 +57,7 @@ class Prior:
         `walker` int64 (n,) says whom of those expected each is, -1 for newcomers.
         """
         before = Sizes.of_anybody(len(walker), self.config)
-        measured, met = sizes.told_apart_from(before), np.flatnonzero(walker >= 0)
+        measured, met = sizes.told(before), np.flatnonzero(walker >= 0)
         before.put(met, self.expected.sizes.at(walker[met]))
         return measured.with_prior(before)
 

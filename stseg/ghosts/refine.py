@@ -6,6 +6,7 @@ Its prior is where they were expected, if they were; its evidence is what is the
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,6 +20,24 @@ from stseg.ghosts.views import BoxView, PixelView, Sight, View
 _REACH, _SPACING = 2, 0.08
 
 
+@dataclass(frozen=True)
+class Places:
+    """Where people stand and how tall they are, as far as both hang together.
+
+    Attributes
+    ----------
+    ground, covariance : float64 (n, 2), (n, 2, 2)
+        Whatever the height; metres, square metres.
+    height, height_variance : float64 (n,)
+        Wherever near, anybody's height the prior; metres, square metres.
+    """
+
+    ground: Floats
+    covariance: Floats
+    height: Floats
+    height_variance: Floats
+
+
 def refine(
     pool: Pool,
     views: Sequence[View],
@@ -26,8 +45,8 @@ def refine(
     own: Sequence[Sequence[Own]],
     prior: Prior,
     walker: Ints,
-) -> tuple[Floats, Floats]:
-    """The posterior of each person's place, whatever their height.
+) -> Places:
+    """The posterior of each person's place and height.
 
     Parameters
     ----------
@@ -42,12 +61,12 @@ def refine(
 
     Returns
     -------
-    float64 (n, 2), float64 (n, 2, 2)
-        The mean of each place, metres, and its covariance, square metres.
+    Places
+        Means and variances.
     """
     axis = np.arange(-_REACH, _REACH + 1) * _SPACING
     offset = np.stack(np.meshgrid(axis, axis), -1).reshape(-1, 2)
-    ground, covariance = pool.ground.copy(), np.zeros((len(pool), 2, 2))
+    found = Places(pool.ground.copy(), np.zeros((len(pool), 2, 2)), pool.height.copy(), np.zeros(len(pool)))
     tried = np.asarray(prior.config.heights)
     for j in range(len(pool)):
         patch = pool.ground[j] + offset
@@ -58,11 +77,12 @@ def refine(
         if walker[j] >= 0:
             score += prior.expected.place(int(walker[j]), patch)
         weight = np.exp(score - score.max())
-        place = weight.sum(0) / weight.sum()
-        ground[j] = place @ patch
-        spread = patch - ground[j]
-        covariance[j] = (spread * place[:, None]).T @ spread + np.eye(2) * _SPACING**2 / 12
-    return ground, covariance
+        place, tall = weight.sum(0) / weight.sum(), weight.sum(1) / weight.sum()
+        found.ground[j], found.height[j] = place @ patch, tall @ tried
+        spread = patch - found.ground[j]
+        found.covariance[j] = (spread * place[:, None]).T @ spread + np.eye(2) * _SPACING**2 / 12
+        found.height_variance[j] = tall @ (tried - found.height[j]) ** 2
+    return found
 
 
 def _patch_score(view: View, sight: Sight, mine: Own, patch: Floats, tried: Floats, width: float) -> Floats:
@@ -74,7 +94,7 @@ def _patch_score(view: View, sight: Sight, mine: Own, patch: Floats, tried: Floa
         columns, rows = map(float, view.camera.size)
         edges, belief = sight.edges[mine.box : mine.box + 1], sight.belief[mine.box : mine.box + 1]
         match = np.empty((score.size, 1))
-        fill_match(view.table.boxes_of(everywhere, tall, wide), edges, belief, columns, rows, match)
+        fill_match(view.table.boxes_of(everywhere, tall), edges, belief, columns, rows, match)
         score = np.maximum(match, WORST).reshape(score.shape)
     if isinstance(view, PixelView):
         first, spans, area = view.outlines(everywhere, tall, wide)

@@ -18,10 +18,9 @@ def box_rows(tables: Sequence[BodyTable], trajectory: Rows) -> Rows:
     """
     rows = []
     ground = np.column_stack([trajectory["x"], trajectory["y"]])
-    sizes = trajectory["height"].astype(float), trajectory["width"].astype(float)
     for view, table in enumerate(tables):
         width, height = table.size
-        edges = table.boxes_of(ground, *sizes).clip(0, [width, height] * 2)
+        edges = table.boxes_of(ground, trajectory["height"].astype(float)).clip(0, [width, height] * 2)
         seen = (edges[:, 2] > edges[:, 0]) & (edges[:, 3] > edges[:, 1])
         own = np.zeros(int(seen.sum()), BOX)
         own["frame"], own["id"], own["view"] = trajectory["frame"][seen], trajectory["id"][seen], view

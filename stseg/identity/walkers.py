@@ -33,6 +33,8 @@ _REPEATED = 2.0
 """What is taken off them: a second frame's evidence is not independent of the first's, nats."""
 _BESIDE = 0.5
 """Nobody new is looked for so near to somebody who is followed, metres."""
+_NOTHING = 1e-6
+"""Share of a size that a frame told below which it told nothing."""
 _FORGETTING = 4.0
 """How fast those fall while a walker is out of sight, nats per second."""
 
@@ -176,14 +178,15 @@ class Walkers:
         return chains
 
     def _measured(self, people: People) -> tuple[list[Measured], list[Measured]]:
-        """Heights and widths of a frame, nobody's size known before."""
-        sizes = people.sizes.told_apart_from(Sizes.of_anybody(len(people), self.ghosts))
-        tall = sizes.height_variance + self.config.height_noise**2
-        wide = sizes.width_variance + self.config.width_noise**2
-        return (
-            [Measured(*one) for one in zip(sizes.height.tolist(), tall.tolist(), strict=True)],
-            [Measured(*one) for one in zip(sizes.width.tolist(), wide.tolist(), strict=True)],
+        """Heights and widths of a frame; one that says nothing beyond what anybody's size is has no weight."""
+        like, noise = self.ghosts, (self.config.height_noise, self.config.width_noise)
+        told = ((people.sizes.height, people.sizes.height_variance), (people.sizes.width, people.sizes.width_variance))
+        before = (like.height_spread**2, like.width_spread**2)
+        tall, wide = (
+            [Measured(float(m), sd**2 / max(1 - float(v) / b, _NOTHING)) for m, v in zip(mean, variance, strict=True)]
+            for (mean, variance), b, sd in zip(told, before, noise, strict=True)
         )
+        return tall, wide
 
     @property
     def _place_noise(self) -> Floats:
