@@ -17,7 +17,7 @@ from reference_walkers import greedy_pairs
 from stseg.arrays import Boxes, Bytes, Floats, Observation, Rows, Singles
 from stseg.config import Config, GhostConfig
 from stseg.geometry import Camera, Grid, Lens, Rig
-from stseg.geometry.bodies import PROFILE
+from stseg.geometry.bodies import PROFILE, SILHOUETTE
 from stseg.ghosts.expected import Expected, nobody
 from stseg.ghosts.people import People
 from stseg.ghosts.sizes import Sizes
@@ -161,7 +161,7 @@ def mask(camera: Camera, standing: Floats) -> Bytes:
     width, height = camera.size
     fine = np.zeros((height * _FINE, width * _FINE), np.uint8)
     for person in standing:
-        for lower, upper in pairwise(PROFILE):
+        for lower, upper in pairwise(SILHOUETTE):
             points = np.concatenate([ring(person, *lower), ring(person, *upper)])
             pixel, ahead = camera.project(points[:, :2], points[:, 2])
             if ahead.all():
