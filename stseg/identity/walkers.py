@@ -33,8 +33,8 @@ _REPEATED = 2.0
 """What is taken off them: a second frame's evidence is not independent of the first's, nats."""
 _BESIDE = 0.5
 """Nobody new is looked for so near to somebody who is followed, metres."""
-_NOTHING = 1e-6
-"""Share of a size that a frame told below which it told nothing."""
+_OPEN = 0.6
+"""A frame that leaves more of the variance of people's sizes than this has not seen somebody's."""
 _FORGETTING = 4.0
 """How fast those fall while a walker is out of sight, nats per second."""
 
@@ -178,15 +178,12 @@ class Walkers:
         return chains
 
     def _measured(self, people: People) -> tuple[list[Measured], list[Measured]]:
-        """Heights and widths of a frame; one that says nothing beyond what anybody's size is has no weight."""
-        like, noise = self.ghosts, (self.config.height_noise, self.config.width_noise)
-        told = ((people.sizes.height, people.sizes.height_variance), (people.sizes.width, people.sizes.width_variance))
-        before = (like.height_spread**2, like.width_spread**2)
-        tall, wide = (
-            [Measured(float(m), sd**2 / max(1 - float(v) / b, _NOTHING)) for m, v in zip(mean, variance, strict=True)]
-            for (mean, variance), b, sd in zip(told, before, noise, strict=True)
+        """Heights and widths of a frame; one that leaves a size as open as it was before has no weight."""
+        sizes, like, noise = people.sizes, self.ghosts, self.config
+        return (
+            _told(sizes.height, sizes.height_variance, like.height_spread, noise.height_noise),
+            _told(sizes.width, sizes.width_variance, like.width_spread, noise.width_noise),
         )
-        return tall, wide
 
     @property
     def _place_noise(self) -> Floats:
@@ -214,3 +211,9 @@ class Walkers:
         like = self.ghosts
         sizes = (like.height_mean, like.height_spread**2, like.width_mean, like.width_spread**2)
         return Walker(0, frame, state, spread, *sizes, 0.0)
+
+
+def _told(mean: Floats, variance: Floats, spread: float, noise: float) -> list[Measured]:
+    """Measurements of one size, metres, from posteriors whose prior has a standard deviation of `spread`."""
+    off = np.where(variance < _OPEN * spread**2, noise**2, np.inf)
+    return [Measured(*one) for one in zip(mean.tolist(), off.tolist(), strict=True)]
