@@ -66,7 +66,7 @@ KEPT = ("all", "tracks", "none")
 
 ABOUT = {
     "trajectory": "one row per person and frame: metres on the ground, covariance in square metres, score in nats",
-    "tracks": "one row per track: first and last frame, mean score in nats, median height in metres",
+    "tracks": "one row per track: first and last frame, mean score in nats, median height and width in metres",
     "boxes": "one row per person, frame and view: pixels of the real image; view counts the cameras from 0",
     "events": "birth, death, merge, split, hand-over, dropped; other is the other track, 0 for none",
     "ghosts": "one row per candidate and frame: status 1 true, 0 ghost; evidence in nats, parts what each view says",
@@ -78,6 +78,9 @@ ABOUT = {
 
 ADDED = frozenset({"rates"})
 """Tables that the first files of this version lack: readers take them as empty."""
+
+ADDED_COLUMNS = frozenset({"width"})
+"""Columns of floats that the first files of this version lack in some tables: readers take them as nan."""
 
 
 def table_types(views: int) -> dict[str, np.dtype[np.void]]:

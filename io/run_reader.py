@@ -160,9 +160,23 @@ class Run:
         def take(file: h5py.File) -> Rows:
             if name in layout.ADDED and name not in file:
                 return np.zeros(0, layout.table_types(len(self.cameras))[name])
-            return np.asarray(file[name][:])
+            return _with_added(np.asarray(file[name][:]), layout.table_types(len(self.cameras))[name])
 
         return _read(self.path, f"/{name}", take)
+
+
+def _with_added(rows: Rows, dtype: np.dtype[np.void]) -> Rows:
+    """Rows of a table with the columns that its first files lack."""
+    if rows.dtype == dtype:
+        return rows
+    whole = np.zeros(len(rows), dtype)
+    for name in dtype.names or ():
+        whole[name] = np.nan if name in _lacking(rows.dtype, dtype) else rows[name]
+    return whole
+
+
+def _lacking(found: np.dtype[np.generic], dtype: np.dtype[np.generic]) -> set[str]:
+    return set(dtype.names or ()) - set(found.names or ())
 
 
 def read_run(path: Path | str) -> Run:
@@ -250,7 +264,9 @@ class _Checks:
 
     def require_dataset(self, name: str, dtype: np.dtype[np.generic], dimensions: int) -> h5py.Dataset:
         dataset = self.require(name)
-        if dataset.dtype != dtype:
+        lacking = _lacking(dataset.dtype, dtype)
+        first = [column for column in dtype.descr if column[0] not in lacking & layout.ADDED_COLUMNS]
+        if dataset.dtype not in (dtype, np.dtype(first)):
             raise FormatError(self.path, name, f"the type {dataset.dtype}", str(dtype))
         if dataset.ndim != dimensions:
             raise FormatError(self.path, name, f"{dataset.ndim} dimensions", str(dimensions))

@@ -140,6 +140,10 @@ class GhostConfig:
     """Mean height of people, metres (HW12)."""
     height_spread: float = 0.12
     """Standard deviation of their heights, metres."""
+    width_mean: float = 0.42
+    """Mean width of people across shoulders and arms, metres."""
+    width_spread: float = 0.04
+    """Standard deviation of their widths, metres."""
     lattice: float = 0.20
     """Spacing of the ground lattice that is searched for candidates, metres."""
     rounds: int = 4
@@ -173,7 +177,7 @@ class GhostConfig:
         heights = self.heights
         require(len(heights) > 0 and min(heights) > 0, self, "heights", "one or more heights above 0 m")
         require(list(heights) == sorted(heights) and max(heights) <= 2.2, self, "heights", "rising, at most 2.2 m")
-        for name in ("height_mean", "height_spread", "lattice", "apart", "body_weight"):
+        for name in ("height_mean", "height_spread", "width_mean", "width_spread", "lattice", "apart", "body_weight"):
             require(getattr(self, name) > 0, self, name, "a number above 0")
         require(self.rounds >= 1, self, "rounds", "1 or more")
         for name in ("box_miss", "least", "pixel_miss", "pixel_clutter"):
@@ -254,7 +258,9 @@ class IdentityConfig:
     place_noise: float = 0.15
     """How far a frame's place is off besides its own covariance, metres (standard deviation)."""
     height_noise: float = 0.035
-    """How far a frame's height of a person is off, metres (standard deviation)."""
+    """How far a frame's height of a person is off where they are seen whole, metres (standard deviation)."""
+    width_noise: float = 0.03
+    """How far a frame's width of a person is off where they are seen whole, metres (standard deviation)."""
     foresight: float = 0.6
     """How far ahead a track is carried when a window's cells are divided, seconds; beyond that it may be anywhere."""
     patience: float = 2.0

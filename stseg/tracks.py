@@ -22,7 +22,8 @@ TRAJECTORY = np.dtype(
         ("xx", "<f8"),  # covariance of the position, square metres
         ("xy", "<f8"),
         ("yy", "<f8"),
-        ("height", "<f4"),  # metres
+        ("height", "<f4"),  # metres, what the frame by itself said
+        ("width", "<f4"),  # metres across the shoulders, likewise
         ("extent", "<f4"),  # ground area of the labelled cells, square metres
         ("score", "<f4"),  # log-odds of a person, nats
         ("views", "u1"),  # number of views that see the place
@@ -40,6 +41,7 @@ TRACK = np.dtype(
         ("frames", "<i8"),  # number of frames with a position
         ("score", "<f4"),  # mean log-odds, nats
         ("height", "<f4"),  # median, metres
+        ("width", "<f4"),  # median, metres
     ]
 )
 """One row per track."""
@@ -132,5 +134,6 @@ class Tracks:
         for row, start, stop in zip(rows, bounds[:-1], bounds[1:], strict=True):
             own = self.trajectory[order[start:stop]]
             row["first"], row["last"], row["frames"] = own["frame"].min(), own["frame"].max(), len(own)
-            row["score"], row["height"] = own["score"].mean(), np.median(own["height"])
+            row["score"] = own["score"].mean()
+            row["height"], row["width"] = np.median(own["height"]), np.median(own["width"])
         return rows

@@ -17,9 +17,10 @@ from reference_walkers import greedy_pairs
 from stseg.arrays import Boxes, Bytes, Floats, Observation, Rows, Singles
 from stseg.config import Config, GhostConfig
 from stseg.geometry import Camera, Grid, Lens, Rig
-from stseg.geometry.bodies import PROFILE
+from stseg.geometry.bodies import PROFILE, SILHOUETTE
 from stseg.ghosts.expected import Expected, nobody
 from stseg.ghosts.people import People
+from stseg.ghosts.sizes import Sizes
 from stseg.tracks import TRAJECTORY
 
 SIZE = (128, 96)
@@ -86,9 +87,14 @@ def people(*places: Sequence[float]) -> Floats:
 def expecting(*places: Sequence[float]) -> Expected:
     """People seen in the frame before, who are expected at places of x, y (metres) and, where given, of a height."""
     standing, n = people(*places), len(places)
-    return Expected(
-        standing[:, :2], np.tile(np.eye(2) * 0.2**2, (n, 1, 1)), standing[:, 2], np.full(n, 0.05**2), np.ones(n)
-    )
+    covariance = np.tile(np.eye(2) * 0.2**2, (n, 1, 1))
+    return Expected(standing[:, :2], covariance, sizes_of(standing[:, 2], 0.05), np.ones(n))
+
+
+def sizes_of(height: Floats, spread: float) -> Sizes:
+    """Sizes of people so tall and of mean width, as sure as `spread`, metres."""
+    variance, width = np.full(len(height), spread**2), np.full(len(height), CONFIG.ghosts.width_mean)
+    return Sizes(height, variance, width, variance)
 
 
 def found(standing: Floats, expected: Expected | None = None, evidence: float = 6.0, views: int = 4) -> People:
@@ -100,7 +106,8 @@ def found(standing: Floats, expected: Expected | None = None, evidence: float = 
         walker[j] = k
         covariance[j] = np.linalg.inv(np.linalg.inv(covariance[j]) + np.linalg.inv(before.covariance[k]))
     ones, nats = np.ones((views, n)), np.full(n, evidence)
-    return People(standing[:, :2], standing[:, 2], covariance, nats, ones, ones, np.zeros(n), walker)
+    sizes = sizes_of(standing[:, 2], 1e-3)
+    return People(standing[:, :2], sizes.height, sizes.width, covariance, nats, ones, ones, np.zeros(n), walker, sizes)
 
 
 def ring(person: Floats, share: float, radius: float, points: int = 32) -> Floats:
@@ -154,7 +161,7 @@ def mask(camera: Camera, standing: Floats) -> Bytes:
     width, height = camera.size
     fine = np.zeros((height * _FINE, width * _FINE), np.uint8)
     for person in standing:
-        for lower, upper in pairwise(PROFILE):
+        for lower, upper in pairwise(SILHOUETTE):
             points = np.concatenate([ring(person, *lower), ring(person, *upper)])
             pixel, ahead = camera.project(points[:, :2], points[:, 2])
             if ahead.all():

@@ -20,6 +20,7 @@ from stseg.ghosts.expected import Expected, nobody
 from stseg.ghosts.pool import Pool
 from stseg.ghosts.prior import Prior
 from stseg.ghosts.scoring import walker_score
+from stseg.ghosts.sizes import Sizes
 
 CONFIG = GhostConfig()
 PLACES = st.tuples(numbers(-2, 2), numbers(-2, 2))
@@ -32,7 +33,8 @@ CANDIDATES = st.tuples(PLACES, numbers(1.5, 1.9))
 
 def expected_of(walkers: list[tuple[tuple[float, float], Floats, float, float, float]]) -> Expected:
     place, covariance, height, sd, odds = zip(*walkers, strict=True)
-    return Expected(np.array(place), np.array(covariance), np.array(height), np.array(sd) ** 2, np.array(odds))
+    sizes = Sizes(np.array(height), np.array(sd) ** 2, np.full(len(sd), 0.42), np.array(sd) ** 2)
+    return Expected(np.array(place), np.array(covariance), sizes, np.array(odds))
 
 
 @settings(deadline=None)
@@ -175,12 +177,12 @@ def test_who_leaves_the_area_is_no_candidate() -> None:
     assert len(prior.expected) == 3
 
 
-def test_those_expected_are_candidates_of_heights_that_are_tried() -> None:
+def test_those_expected_are_candidates_as_tall_as_they_are() -> None:
     prior = Prior.of(expecting((0.1, 0.2, 1.3), (0.4, 0.5, 1.74)), CONFIG, Border.of(rig_of(corner_cameras())))
     pool = prior.pool()
     np.testing.assert_array_equal(pool.ground, [[0.1, 0.2], [0.4, 0.5]])
-    np.testing.assert_array_equal(pool.height, [1.5, 1.74])
+    np.testing.assert_array_equal(pool.height, [1.3, 1.74])
     assert prior.known(pool).shape == (2, 2)
-    assert prior.known(Pool(np.zeros((0, 2)), np.zeros(0))).shape == (0, 2)
+    assert prior.known(Pool(np.zeros((0, 2)), np.zeros(0), np.zeros(0))).shape == (0, 2)
     tall = [reference.normal(h - CONFIG.height_mean, CONFIG.height_spread**2) for h in (1.5, CONFIG.height_mean)]
     np.testing.assert_allclose(np.diff(prior.tall(np.array([1.5, CONFIG.height_mean]))), np.diff(tall))

@@ -405,6 +405,22 @@ def test_what_is_missing_or_wrong_is_named(run_path: Path, edit: Callable[[h5py.
     assert f"{run_path}: {named}" in str(caught.value)
 
 
+def test_the_first_files_had_no_widths(run_path: Path) -> None:
+    with h5py.File(run_path, "r+") as file:
+        for name in ("trajectory", "tracks"):
+            whole, attributes = file[name][:], dict(file[name].attrs)
+            first = np.zeros(len(whole), np.dtype([column for column in whole.dtype.descr if column[0] != "width"]))
+            for column in first.dtype.names or ():
+                first[column] = whole[column]
+            del file[name]
+            file[name] = first
+            file[name].attrs.update(attributes)
+    run = read_run(run_path)
+    assert np.isnan(run.trajectory["width"]).all()
+    assert np.isnan(run.tracks["width"]).all()
+    np.testing.assert_array_equal(run.trajectory["height"], small_trajectory()["height"])
+
+
 def test_the_first_files_had_no_rates(run_path: Path) -> None:
     with h5py.File(run_path, "r+") as file:
         del file["rates"]

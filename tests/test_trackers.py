@@ -209,11 +209,12 @@ def test_rows_are_sorted_by_id() -> None:
     ground: Floats = np.array([[1.0, 2.0], [3.0, 4.0]])
     covariance = np.array([[[0.1, 0.02], [0.02, 0.3]]] * 2)
     ids, height = np.array([9, 4]), np.array([1.7, 1.8])
-    rows = trajectory_rows(7, ids, ground, covariance, height, height / 2, height * 3, np.array([2, 3]))
+    rows = trajectory_rows(7, ids, ground, covariance, height, height / 4, height / 2, height * 3, np.array([2, 3]))
     assert rows["id"].tolist() == [4, 9]
     assert rows["frame"].tolist() == [7, 7]
     assert rows[["x", "y", "z", "xx", "xy", "yy", "views"]].tolist()[0] == (3.0, 4.0, 0.0, 0.1, 0.02, 0.3, 3)
     np.testing.assert_allclose(rows["height"], [1.8, 1.7], rtol=1e-6)
+    np.testing.assert_allclose(rows["width"], [0.45, 0.425], rtol=1e-6)
 
 
 def test_views_at_places() -> None:

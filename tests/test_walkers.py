@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,12 +15,14 @@ from strategies import numbers
 
 from stseg.arrays import Floats
 from stseg.ghosts.people import People
-from stseg.identity.walkers import Walker, Walkers
+from stseg.ghosts.sizes import Sizes
+from stseg.identity.walkers import Measured, Walker, Walkers
 
 RATE = 8.0
 IDENTITY = CONFIG.identity
 GHOSTS = found(people())
 """Nobody."""
+NOTHING = Measured(1.0, np.inf)
 Way = Callable[[int], tuple[float, float, float] | None]
 """Where somebody is in a frame: x, y, height in metres; None where the frame does not see them."""
 STATES = st.tuples(numbers(-3, 3), numbers(-3, 3), numbers(-2, 2), numbers(-2, 2)).map(np.array)
@@ -28,7 +31,7 @@ STATES = st.tuples(numbers(-3, 3), numbers(-3, 3), numbers(-2, 2), numbers(-2, 2
 def somebody(state: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0), odds: float = 1.0) -> Walker:
     spread = np.diag([0.03, 0.02, 0.6, 0.5])
     spread[0, 2] = spread[2, 0] = spread[1, 3] = spread[3, 1] = 0.05
-    return Walker(3, 10, np.array(state), spread, 1.7, 0.12**2, odds)
+    return Walker(3, 10, np.array(state), spread, 1.7, 0.12**2, 0.42, 0.04**2, odds)
 
 
 # One walker
@@ -56,7 +59,7 @@ def test_found_is_the_textbooks_correction(state: Floats, x: float, y: float, sd
     information = np.linalg.inv(walker.covariance[:2, :2]) + np.linalg.inv(noise)
     posterior = np.linalg.inv(information)
     mean = posterior @ (np.linalg.solve(walker.covariance[:2, :2], walker.state[:2]) + np.linalg.solve(noise, place))
-    after = walker.found(11, mean, posterior, 1.7, 0.05, 1.0)
+    after = walker.found(11, mean, posterior, NOTHING, NOTHING, 1.0)
     expected, covariance = reference.kalman(walker.state, walker.covariance, place, noise)
     np.testing.assert_allclose(after.state, expected, atol=1e-8)
     np.testing.assert_allclose(after.covariance, covariance, atol=1e-8)
@@ -64,25 +67,44 @@ def test_found_is_the_textbooks_correction(state: Floats, x: float, y: float, sd
 
 def test_a_posterior_that_says_nothing_new_changes_nothing() -> None:
     walker = somebody((1.0, 2.0, 0.3, -0.2)).carried(0.2)
-    after = walker.found(12, walker.state[:2], walker.covariance[:2, :2], walker.height, 0.05, 0.5)
+    after = walker.found(12, walker.state[:2], walker.covariance[:2, :2], NOTHING, NOTHING, 0.5)
     np.testing.assert_allclose(after.state, walker.state)
     np.testing.assert_allclose(after.covariance, walker.covariance)
     assert (after.chain, after.seen, after.odds) == (3, 12, 0.5)
+    assert (after.height, after.width) == pytest.approx((walker.height, walker.width))
 
 
-def test_heights_converge() -> None:
-    """A height is a property of the person: the mean of what the frames say, and ever surer."""
+def test_sizes_converge() -> None:
+    """They are properties of the person: the mean of what the frames say, and ever surer."""
     noise, rng = 0.05, np.random.default_rng(2)
     seen = rng.normal(1.83, noise, 60)
     walker, sure = somebody(), [0.12**2]
     for height in seen:
-        walker = walker.found(11, walker.state[:2], walker.covariance[:2, :2], float(height), noise, 1.0)
+        tall, wide = Measured(float(height), noise**2), Measured(float(height) - 1.4, noise**2)
+        walker = walker.found(11, walker.state[:2], walker.covariance[:2, :2], tall, wide, 1.0)
         sure.append(walker.height_variance)
     assert (np.diff(sure) < 0).all()
     weight = len(seen) / noise**2
     assert walker.height_variance == pytest.approx(1 / (1 / 0.12**2 + weight))
     assert walker.height == pytest.approx((1.7 / 0.12**2 + weight * seen.mean()) / (1 / 0.12**2 + weight))
-    assert walker.carried(4.0).height_variance > walker.height_variance  # shoes, stoop, lens
+    assert walker.width == pytest.approx((0.42 / 0.04**2 + weight * (seen.mean() - 1.4)) / (1 / 0.04**2 + weight))
+    later = walker.carried(4.0)  # shoes, stoop, lens, clothes
+    assert later.height_variance > walker.height_variance
+    assert later.width_variance > walker.width_variance
+
+
+def test_what_a_frame_tells_of_sizes_is_used_once() -> None:
+    """The prior of a frame's posterior, anybody's size, is taken out before the person's own comes in."""
+    walkers = Walkers(RATE, CONFIG.ghosts, IDENTITY)
+    told = found(people((0.0, 0.0, 1.85)))
+    nothing = replace(told, sizes=Sizes.of_anybody(1, CONFIG.ghosts))
+    walkers.follow(0, told, GHOSTS)
+    sure = walkers.walkers[0]
+    for frame in range(1, 40):
+        walkers.follow(frame, replace(nothing, walker=np.zeros(1, np.int64)), GHOSTS)
+    (walker,) = walkers.walkers
+    assert walker.height == pytest.approx(sure.height, abs=1e-3)
+    assert walker.height_variance > sure.height_variance
 
 
 # All of them

@@ -119,7 +119,8 @@ def one_case(kind: str) -> Case:
     found = frame_pass.explain(views, None)
     sights = [view.observe(shown) for view, shown in zip(frame_pass.views, views, strict=True)]
     state = Seen(frame_pass.views, sights, Prior.of(None, Config().ghosts, frame_pass.border), frame_pass.terms)
-    pool = Pool(found.people.ground, found.people.height).and_(Pool(found.ghosts.ground, found.ghosts.height))
+    people, ghosts = (Pool(some.ground, some.height, some.width) for some in (found.people, found.ghosts))
+    pool = people.and_(ghosts)
     return Frame(state, pool, np.zeros(0, np.int64)).case
 
 

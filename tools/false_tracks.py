@@ -22,6 +22,7 @@ from stseg.config import Config
 from stseg.evaluation import evaluate
 from stseg.ghosts.expected import Expected
 from stseg.ghosts.people import People
+from stseg.ghosts.sizes import Sizes
 from stseg.io.frames import count_frames, open_frames
 from stseg.io.rigs import read_rig
 from stseg.io.tracks import read_tracks_csv
@@ -54,11 +55,15 @@ class WithGhosts(FrameByFrame):
 
 
 def _together(people: People, ghosts: People) -> People:
-    joined = (
-        np.concatenate([getattr(one, name.name) for one in (people, ghosts)], -1 if name.name in _BY_VIEW else 0)
+    joined = {
+        name.name: np.concatenate(
+            [getattr(one, name.name) for one in (people, ghosts)], -1 if name.name in _BY_VIEW else 0
+        )
         for name in fields(People)
-    )
-    return People(*joined)
+        if name.name != "sizes"
+    }
+    sizes = (np.concatenate([getattr(one.sizes, name.name) for one in (people, ghosts)]) for name in fields(Sizes))
+    return People(**joined, sizes=Sizes(*sizes))
 
 
 _BY_VIEW = ("parts", "visible")

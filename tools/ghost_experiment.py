@@ -83,6 +83,7 @@ class Following:
                 people.ground,
                 people.covariance,
                 people.height,
+                people.width,
                 none,
                 people.evidence,
                 none.astype(np.int64),

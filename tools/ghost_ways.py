@@ -15,10 +15,12 @@ import numpy as np
 from stseg.arrays import Floats, Ints
 from stseg.ghosts.expected import Expected
 from stseg.ghosts.explain import FramePass
+from stseg.ghosts.measure import measure
+from stseg.ghosts.own import Own
 from stseg.ghosts.people import Explanation, People, ViewEvidence
 from stseg.ghosts.pool import Pool, peaks
 from stseg.ghosts.prior import Prior
-from stseg.ghosts.refine import Own, refine
+from stseg.ghosts.refine import refine
 from stseg.ghosts.views import BoxView, PixelView, Sight
 from stseg.identity.linking import assign, distances
 
@@ -38,13 +40,18 @@ class EveryCandidate(FramePass):
         owned = [
             [_all_of(v, s, pool.at([j])) for v, s in zip(self.views, sights, strict=True)] for j in range(len(pool))
         ]
-        exact, covariance = refine(pool, self.views, sights, owned, prior, walker)
+        places = refine(pool, self.views, sights, owned, prior, walker)
+        sizes = measure(places, pool.width, self.views, sights, owned, self.config)
+        sized = prior.known_sizes(sizes, walker)
         known, own = prior.known(pool), self.config.person + prior.tall(pool.height)
         before = np.array(
             [p + (known[j, k] if k >= 0 else 0.0) for j, (p, k) in enumerate(zip(own, walker, strict=True))]
         )
         ones = np.ones_like(parts)
-        people = People(exact.ground, exact.height, covariance, parts.sum(0) + before, parts, ones, before, walker)
+        people = People(
+            places.ground, sized.height, sized.width, places.covariance, parts.sum(0) + before, parts, ones, before,
+            walker, sizes,
+        )  # fmt: skip
         owner = tuple(np.full(view.shape, -1, np.int16) for view in self.views)
         boxes = tuple(np.full(len(sight.edges) if sight else 0, -1, np.int64) for sight in sights)
         return Explanation(people, _none_of(people), owner, tuple(view.step for view in self.views), boxes)
@@ -58,7 +65,7 @@ class EveryCandidate(FramePass):
                 shape = len(sight.edges) if isinstance(view, BoxView) else view.shape
                 part[:] = view.lattice_score(sight, np.ones(shape, bool))
         score = said.sum(0) + prior.tall(heights)[:, None] + self.config.person
-        found = peaks(score.reshape(-1, rows, columns), self.lattice_ground, heights)
+        found = peaks(score.reshape(-1, rows, columns), self.lattice_ground, heights, self.config.width_mean)
         kept: list[int] = []
         for i, away in enumerate(distances(found.ground, found.ground)):
             if not (away[kept] < MERGED).any():
@@ -80,18 +87,18 @@ def _walkers(pool: Pool, prior: Prior) -> Ints:
 def _all_of(view: BoxView | PixelView, sight: Sight | None, candidate: Pool) -> Own:
     """The best box, or every pixel."""
     if isinstance(view, PixelView) or sight is None or not len(sight.edges):
-        return Own(-1, np.full(view.shape, -1), 0)
+        return Own(-1, np.ones(view.shape, bool))
     body = view.table.boxes_of(candidate.ground, candidate.height)
     middle = (sight.edges[:, 0] + sight.edges[:, 2]) / 2, sight.edges[:, 1]
     off = np.hypot(middle[0] - (body[0, 0] + body[0, 2]) / 2, middle[1] - body[0, 1])
     tall = body[0, 3] - body[0, 1]
-    return Own(int(np.argmin(off)) if off.min() < 0.2 * tall else -1, np.zeros((0, 0), np.int64), 0)
+    return Own(int(np.argmin(off)) if off.min() < 0.2 * tall else -1, np.zeros((0, 0), bool))
 
 
 def _none_of(people: People) -> People:
     """Nobody."""
     none = np.zeros(0, np.int64)
     return People(
-        people.ground[none], people.height[none], people.covariance[none], people.evidence[none],
-        people.parts[:, none], people.visible[:, none], people.prior[none], people.walker[none],
+        people.ground[none], people.height[none], people.width[none], people.covariance[none], people.evidence[none],
+        people.parts[:, none], people.visible[:, none], people.prior[none], people.walker[none], people.sizes.at(none),
     )  # fmt: skip

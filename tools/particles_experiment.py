@@ -33,6 +33,7 @@ from stseg.foreground.light_change import LightWatch
 from stseg.foreground.sight import Sight
 from stseg.geometry import Rig
 from stseg.ghosts.people import People
+from stseg.ghosts.sizes import Sizes
 from stseg.simulate.film import Film
 from stseg.simulate.named import NAMED
 from stseg.simulate.scene import SceneSpec
@@ -116,9 +117,10 @@ def people(truth: Rows, views: int) -> People:
     """People as a pass finds them: where they are."""
     n, ground = len(truth), np.column_stack([truth["x"], truth["y"]])
     sure, ones = np.full(n, 6.0), np.ones((views, n))
+    sizes = Sizes.of_heights(truth["height"].astype(float), np.full(n, 0.03**2), Config().ghosts)
     return People(
-        ground, truth["height"].astype(float), np.tile(np.eye(2) * 0.01, (n, 1, 1)), sure, ones, ones, np.zeros(n),
-        np.full(n, -1),
+        ground, sizes.height, sizes.width, np.tile(np.eye(2) * 0.01, (n, 1, 1)), sure, ones, ones, np.zeros(n),
+        np.full(n, -1), sizes,
     )  # fmt: skip
 
 

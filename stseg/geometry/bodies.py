@@ -19,7 +19,11 @@ from stseg.geometry.grid import Grid
 LEVELS = np.linspace(0.0, 2.2, 12)
 """Heights at which the lattice is projected, metres."""
 PROFILE = np.array([[0.0, 0.13], [0.25, 0.15], [0.5, 0.21], [0.8, 0.23], [0.88, 0.13], [1.0, 0.08]])
-"""Relative height and radius (metres) of a body's discs."""
+"""Relative height and radius (metres) of a body's discs, as detectors draw boxes: with a margin above the head."""
+SILHOUETTE = np.array([[0.0, 0.13], [0.25, 0.15], [0.5, 0.20], [0.8, 0.22], [0.86, 0.11], [0.95, 0.10], [1.0, 0.02]])
+"""The same as pixels show it: the head closes at the crown, also where the camera looks down on it."""
+WIDTH = 2 * float(SILHOUETTE[:, 1].max())
+"""Width of that silhouette across shoulders and arms, metres. Wider people are wider at all heights."""
 
 
 @dataclass(frozen=True)

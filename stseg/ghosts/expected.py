@@ -17,6 +17,7 @@ import numpy as np
 
 from stseg.arrays import Floats
 from stseg.config import GhostConfig
+from stseg.ghosts.sizes import Sizes
 
 _RESOLUTION = 0.1
 """s: how finely one frame tells places apart, metres (standard deviation)."""
@@ -32,16 +33,15 @@ class Expected:
     ----------
     ground : float64 (n, 2), covariance : float64 (n, 2, 2)
         Metres, square metres; how far the frame's own place may be off is in it.
-    height, height_variance : float64 (n,)
-        Metres, square metres.
+    sizes
+        Heights and widths, how far the frame's own measurement may be off is in their variances.
     odds : float64 (n,)
         Log-odds that the walker is still there, nats.
     """
 
     ground: Floats
     covariance: Floats
-    height: Floats
-    height_variance: Floats
+    sizes: Sizes
     odds: Floats
 
     def __len__(self) -> int:
@@ -52,8 +52,9 @@ class Expected:
         if not len(self):
             return np.zeros((len(ground), 0))
         sharp = np.log(_RESOLUTION**2 / np.sqrt(np.linalg.det(self.covariance)))
-        off = height[:, None] - self.height
-        tall = -0.5 * off**2 / self.height_variance + np.log(config.height_spread / np.sqrt(self.height_variance))
+        variance = self.sizes.height_variance
+        off = height[:, None] - self.sizes.height
+        tall = -0.5 * off**2 / variance + np.log(config.height_spread / np.sqrt(variance))
         anybody = -0.5 * ((height - config.height_mean) / config.height_spread) ** 2
         shape = np.maximum(tall - anybody[:, None], _OUT_OF_SHAPE)
         return np.asarray(self.odds - config.person + sharp - 0.5 * self._squares(ground) + shape)
@@ -70,4 +71,5 @@ class Expected:
 
 def nobody() -> Expected:
     """Nobody was there before."""
-    return Expected(np.zeros((0, 2)), np.zeros((0, 2, 2)), np.zeros(0), np.zeros(0), np.zeros(0))
+    none = np.zeros(0)
+    return Expected(np.zeros((0, 2)), np.zeros((0, 2, 2)), Sizes(none, none, none, none), none)

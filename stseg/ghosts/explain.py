@@ -80,7 +80,7 @@ class FramePass:
         frame = Frame(seen_now, expected_inside, np.arange(len(expected_inside)))
         for _ in range(self.config.rounds):
             fresh = self._fresh(frame)
-            moved = frame.refined()[0]
+            moved = frame.refined().pool
             if not len(fresh) and not len(moved):
                 break
             known = len(frame.pool)
@@ -96,12 +96,12 @@ class FramePass:
         for view, sight, free in zip(self.views, frame.seen.sights, frame.free(), strict=True):
             if sight is not None:
                 score += view.lattice_score(sight, free)
-        return peaks(score.reshape(-1, rows, columns), self.lattice_ground, heights)
+        return peaks(score.reshape(-1, rows, columns), self.lattice_ground, heights, self.config.width_mean)
 
 
 def _settled(frame: Frame) -> Frame:
     """The frame searched from where its people exactly stand, which may show two to be one, then well, by places."""
-    exact = frame.refined()[0]
+    exact = frame.refined().pool
     known = len(frame.pool)
     anew = Frame(frame.seen, frame.pool.and_(exact), np.arange(known, known + len(exact)))
     places = np.concatenate([anew.members, anew.rivals()])

@@ -9,11 +9,14 @@ import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints
 from stseg.ghosts.evidence import Case, Terms
+from stseg.ghosts.measure import measure
+from stseg.ghosts.own import owned
 from stseg.ghosts.pool import Pool, box_evidence, pixel_evidence
 from stseg.ghosts.prior import Prior
-from stseg.ghosts.refine import owned, refine
+from stseg.ghosts.refine import refine
 from stseg.ghosts.scoring import box_score, pixel_score, set_score, walker_score
 from stseg.ghosts.search import search
+from stseg.ghosts.sizes import Sizes
 from stseg.ghosts.views import BoxView, PixelView, Sight
 
 
@@ -25,6 +28,28 @@ class Seen:
     sights: Sequence[Sight | None]
     prior: Prior
     terms: Terms
+
+
+@dataclass(frozen=True)
+class Refined:
+    """A set's people, as exactly as the frame tells.
+
+    Attributes
+    ----------
+    pool
+        Where they stand, as tall as the frame by itself says: a height that was known before would confirm itself.
+    covariance : float64 (n, 2, 2)
+        Of each place, square metres.
+    sizes
+        What the frame by itself says of them, anybody's sizes the prior.
+    known
+        Their sizes by all that was seen of each so far.
+    """
+
+    pool: Pool
+    covariance: Floats
+    sizes: Sizes
+    known: Sizes
 
 
 class Frame:
@@ -111,11 +136,17 @@ class Frame:
             for view, boxes, pixels in zip(self.seen.views, self.box_owner, self.pixel_owner, strict=True)
         ]
 
-    def refined(self) -> tuple[Pool, Floats]:
-        """The set's people at the means of their posteriors, and the covariances."""
-        some = range(len(self.members))
-        own = [[owned(j, b, p) for b, p in zip(self.box_owner, self.pixel_owner, strict=True)] for j in some]
-        return refine(self.pool.at(self.members), self.seen.views, self.seen.sights, own, self.seen.prior, self.walker)
+    def refined(self) -> Refined:
+        """The set's people at the means of their posteriors."""
+        views, prior, pool = self.seen.views, self.seen.prior, self.pool.at(self.members)
+        own = [
+            [owned(v, j, b, p) for v, b, p in zip(views, self.box_owner, self.pixel_owner, strict=True)]
+            for j in range(len(self.members))
+        ]
+        places = refine(pool, views, self.seen.sights, own, prior, self.walker)
+        sizes = measure(places, pool.width, views, self.seen.sights, own, prior.config)
+        known = prior.known_sizes(sizes, self.walker)
+        return Refined(Pool(places.ground, sizes.height, known.width), places.covariance, sizes, known)
 
 
 def _case(seen: Seen, pool: Pool) -> Case:

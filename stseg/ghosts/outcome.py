@@ -8,19 +8,21 @@ from stseg.arrays import Floats, Ints
 from stseg.ghosts.frame import Frame
 from stseg.ghosts.people import Explanation, People
 from stseg.ghosts.pool import Pool
+from stseg.ghosts.sizes import Sizes
 from stseg.ghosts.views import BoxView, PixelView, View
 
 
 def explanation(frame: Frame) -> Explanation:
     """The result of a frame."""
     views, members = frame.seen.views, frame.members
-    exact, covariance = frame.refined()
+    refined = frame.refined()
+    exact = Pool(refined.pool.ground, refined.known.height, refined.known.width)
     total = frame.score(members)  # which fills the parts
     parts = frame.case.parts[frame.row, : len(members)]
     without = [frame.score(np.delete(members, a)) for a in range(len(members))]
     people = People(
-        exact.ground, exact.height, covariance, total - np.array(without), parts, _visible(frame),
-        _prior(frame, members, frame.walker), frame.walker,
+        exact.ground, exact.height, exact.width, refined.covariance, total - np.array(without), parts, _visible(frame),
+        _prior(frame, members, frame.walker), frame.walker, refined.sizes,
     )  # fmt: skip
     painted = [
         p if isinstance(v, PixelView) else _painted(v, exact) for v, p in zip(views, frame.pixel_owner, strict=True)
@@ -67,12 +69,15 @@ def _ghosts(frame: Frame, total: float) -> People:
     parts = np.array([p for _, p in kept]).reshape(len(kept), len(frame.seen.views)).T
     strangers = np.full(len(kept), -1, np.int64)
     prior, evidence = _prior(frame, which, strangers), np.array([gain for gain, _ in kept])
-    return People(chosen.ground, chosen.height, wide, evidence, parts, np.ones_like(parts), prior, strangers)
+    sizes = Sizes.of_anybody(len(kept), frame.seen.prior.config)
+    return People(
+        chosen.ground, chosen.height, chosen.width, wide, evidence, parts, np.ones_like(parts), prior, strangers, sizes
+    )
 
 
 def _painted(view: View, people: Pool) -> Ints:
     """Whose body is nearest at each raster pixel of a view, int64 (v, u), -1 for nobody."""
-    first, spans, _ = view.outlines(people.ground, people.height)
+    first, spans, _ = view.outlines(people.ground, people.height, people.width)
     owner = np.full(view.shape, -1, np.int64)
     for j in np.argsort(-view.distance(people.ground), kind="stable"):
         for k in range(spans.shape[1]):

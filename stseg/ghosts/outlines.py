@@ -6,7 +6,7 @@ import numpy as np
 
 from stseg.accelerate import kernel
 from stseg.arrays import Floats, Ints, Singles
-from stseg.geometry.bodies import LEVELS, PROFILE, BodyTable, fill_discs
+from stseg.geometry.bodies import LEVELS, SILHOUETTE, BodyTable, fill_discs
 from stseg.ghosts.evidence import Spans
 
 _BETWEEN = 3
@@ -31,7 +31,7 @@ def outlines(
     shape
         Rows and columns of the raster.
     widths : float64 (n,), optional
-        How wide each is beside the profile of `geometry.bodies`; 1 if not given.
+        How wide each is beside the silhouette of `geometry.bodies`; 1 if not given.
 
     Returns
     -------
@@ -48,7 +48,7 @@ def outlines(
     lattice = (np.asarray(ground, float).reshape(-1, 2) - table.origin) / table.step
     spans = np.zeros((len(ground), shape[0], 2), np.int16)
     _fill_outlines(
-        table.pixel, lattice, heights, wide, LEVELS[1], table.step, PROFILE, float(step), shape[1], first, count,
+        table.pixel, lattice, heights, wide, LEVELS[1], table.step, SILHOUETTE, float(step), shape[1], first, count,
         spans, area,
     )  # fmt: skip
     return first, spans[:, : max(int(count.max(initial=0)), 1)].copy(), area

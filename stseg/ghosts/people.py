@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stseg.arrays import Boxes, Floats, Ints, Singles
+from stseg.ghosts.sizes import Sizes
 
 ViewEvidence = Boxes | Singles | None
 """One view of one frame: boxes, a likelihood map float32 (v, u), or None where the view is blind."""
@@ -21,8 +22,8 @@ class People:
     ----------
     ground : float64 (n, 2)
         Metres.
-    height : float64 (n,)
-        Metres.
+    height, width : float64 (n,)
+        By all that is known of each, metres.
     covariance : float64 (n, 2, 2)
         Square metres.
     evidence : float64 (n,)
@@ -35,16 +36,20 @@ class People:
         What of the evidence spoke before any view was asked, nats.
     walker : int64 (n,)
         Whom of those expected each is, -1 for newcomers.
+    sizes
+        What the frame by itself says of their sizes, anybody's the prior.
     """
 
     ground: Floats
     height: Floats
+    width: Floats
     covariance: Floats
     evidence: Floats
     parts: Floats
     visible: Floats
     prior: Floats
     walker: Ints
+    sizes: Sizes
 
     def __len__(self) -> int:
         return len(self.ground)

@@ -21,31 +21,33 @@ _WORTH = 0.0
 
 @dataclass(frozen=True)
 class Pool:
-    """Places where somebody may stand: ground float64 (n, 2) in metres, height float64 (n,) in metres."""
+    """Places where somebody may stand: ground float64 (n, 2), height and width float64 (n,), all in metres."""
 
     ground: Floats
     height: Floats
+    width: Floats
 
     def __len__(self) -> int:
         return len(self.ground)
 
     def and_(self, other: Pool) -> Pool:
         """This pool's candidates, then the other's."""
-        return Pool(np.concatenate([self.ground, other.ground]), np.concatenate([self.height, other.height]))
+        pairs = ((self.ground, other.ground), (self.height, other.height), (self.width, other.width))
+        return Pool(*map(np.concatenate, pairs))
 
     def at(self, chosen: Sequence[int] | Ints) -> Pool:
         """The chosen candidates, in that order."""
         index = np.asarray(chosen, int)
-        return Pool(self.ground[index], self.height[index])
+        return Pool(self.ground[index], self.height[index], self.width[index])
 
 
-def peaks(score: Floats, lattice_ground: Floats, heights: Floats) -> Pool:
-    """Local maxima of a lattice score (height, y, x) over the ground (y, x, 2), best first."""
+def peaks(score: Floats, lattice_ground: Floats, heights: Floats, width: float) -> Pool:
+    """Local maxima of a lattice score (height, y, x) over the ground (y, x, 2), all of one width, best first."""
     best, tallest = score.max(0), score.argmax(0)
     rows, columns = np.nonzero((best == maximum_filter(best, 3)) & (best > _WORTH))
     order = np.argsort(-best[rows, columns], kind="stable")[:MOST]
     rows, columns = rows[order], columns[order]
-    return Pool(lattice_ground[rows, columns], heights[tallest[rows, columns]])
+    return Pool(lattice_ground[rows, columns], heights[tallest[rows, columns]], np.full(len(rows), width))
 
 
 def box_evidence(views: Sequence[View], sights: Sequence[Sight | None], pool: Pool) -> BoxEvidence:
@@ -75,7 +77,7 @@ def pixel_evidence(views: Sequence[View], sights: Sequence[Sight | None], pool: 
     chosen = [(view, sight) for view, sight in zip(views, sights, strict=True) if isinstance(view, PixelView)]
     rows = max((view.shape[0] for view, _ in chosen), default=0)
     columns = max((view.shape[1] for view, _ in chosen), default=0)
-    drawn = [view.outlines(pool.ground, pool.height) for view, _ in chosen]
+    drawn = [view.outlines(pool.ground, pool.height, pool.width) for view, _ in chosen]
     tall = max((spans.shape[1] for _, spans, _ in drawn), default=0)
     n = len(pool)
     evidence = PixelEvidence(

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from stseg.arrays import Floats
+import numpy as np
+
+from stseg.arrays import Floats, Ints
 from stseg.config import GhostConfig
 from stseg.ghosts.border import Border
 from stseg.ghosts.expected import Expected, nobody
 from stseg.ghosts.pool import Pool
+from stseg.ghosts.sizes import Sizes
 
 
 @dataclass(frozen=True)
@@ -41,12 +44,22 @@ class Prior:
 
     def pool(self) -> Pool:
         """Those expected inside the border, as candidates: who leaves the area is not followed out of it."""
-        heights, inside = self.config.heights, self.border.away(self.expected.ground) > 0
-        return Pool(self.expected.ground[inside], self.expected.height[inside].clip(min(heights), max(heights)))
+        inside, sizes = self.border.away(self.expected.ground) > 0, self.expected.sizes
+        return Pool(self.expected.ground[inside], sizes.height[inside], sizes.width[inside])
 
     def tall(self, heights: Floats) -> Floats:
         """What speaks for somebody as tall as this, metres, beyond somebody of mean height: nats, float64 (n,)."""
         return -0.5 * ((heights - self.config.height_mean) / self.config.height_spread) ** 2
+
+    def known_sizes(self, sizes: Sizes, walker: Ints) -> Sizes:
+        """Sizes that a frame found as if of anybody, of those who are known by all that was seen of them before.
+
+        `walker` int64 (n,) says whom of those expected each is, -1 for newcomers.
+        """
+        before = Sizes.of_anybody(len(walker), self.config)
+        measured, met = sizes.told(before), np.flatnonzero(walker >= 0)
+        before.put(met, self.expected.sizes.at(walker[met]))
+        return measured.with_prior(before)
 
     def newcomer(self, ground: Floats) -> Floats:
         """What a newcomer costs at ground points (n, 2), nats, float64 (n,)."""

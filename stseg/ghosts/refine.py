@@ -12,25 +12,30 @@ import numpy as np
 
 from stseg.arrays import Floats, Ints
 from stseg.ghosts.boxes import fill_match
+from stseg.ghosts.own import WORST, Own
 from stseg.ghosts.pool import Pool
 from stseg.ghosts.prior import Prior
 from stseg.ghosts.views import BoxView, PixelView, Sight, View
 
 _REACH, _SPACING = 2, 0.08
-_WORST = -8.0
-"""A box never speaks more strongly against a place than this, nats: it may not be theirs after all."""
 
 
 @dataclass(frozen=True)
-class Own:
-    """What belongs to one person in one view: a box (its index, -1 for none), or what of the raster is open to them.
+class Places:
+    """Where people stand and how tall they are, as far as both hang together.
 
-    Open are the pixels whose owner (v, u) is the person or nobody, -1.
+    Attributes
+    ----------
+    ground, covariance : float64 (n, 2), (n, 2, 2)
+        Whatever the height; metres, square metres.
+    height, height_variance : float64 (n,)
+        Wherever near, anybody's height the prior; metres, square metres.
     """
 
-    box: int
-    owner: Ints
-    person: int
+    ground: Floats
+    covariance: Floats
+    height: Floats
+    height_variance: Floats
 
 
 def refine(
@@ -40,8 +45,8 @@ def refine(
     own: Sequence[Sequence[Own]],
     prior: Prior,
     walker: Ints,
-) -> tuple[Pool, Floats]:
-    """Move each person to the mean of their posterior.
+) -> Places:
+    """The posterior of each person's place and height.
 
     Parameters
     ----------
@@ -56,48 +61,42 @@ def refine(
 
     Returns
     -------
-    Pool, float64 (n, 2, 2)
-        The people moved, and the covariance of each place, square metres.
+    Places
+        Means and variances.
     """
     axis = np.arange(-_REACH, _REACH + 1) * _SPACING
     offset = np.stack(np.meshgrid(axis, axis), -1).reshape(-1, 2)
-    ground, height, covariance = pool.ground.copy(), pool.height.copy(), np.zeros((len(pool), 2, 2))
+    found = Places(pool.ground.copy(), np.zeros((len(pool), 2, 2)), pool.height.copy(), np.zeros(len(pool)))
     tried = np.asarray(prior.config.heights)
     for j in range(len(pool)):
         patch = pool.ground[j] + offset
         score = np.repeat(prior.tall(tried)[:, None], len(patch), 1)
         for view, sight, mine in zip(views, sights, own[j], strict=True):
             if sight is not None:
-                score += _patch_score(view, sight, mine, patch, tried)
+                score += _patch_score(view, sight, mine, patch, tried, float(pool.width[j]))
         if walker[j] >= 0:
             score += prior.expected.place(int(walker[j]), patch)
         weight = np.exp(score - score.max())
-        height[j] = weight.sum(1) @ tried / weight.sum()
-        place = weight.sum(0) / weight.sum()
-        ground[j] = place @ patch
-        spread = patch - ground[j]
-        covariance[j] = (spread * place[:, None]).T @ spread + np.eye(2) * _SPACING**2 / 12
-    return Pool(ground, height), covariance
+        place, tall = weight.sum(0) / weight.sum(), weight.sum(1) / weight.sum()
+        found.ground[j], found.height[j] = place @ patch, tall @ tried
+        spread = patch - found.ground[j]
+        found.covariance[j] = (spread * place[:, None]).T @ spread + np.eye(2) * _SPACING**2 / 12
+        found.height_variance[j] = tall @ (tried - found.height[j]) ** 2
+    return found
 
 
-def _patch_score(view: View, sight: Sight, mine: Own, patch: Floats, tried: Floats) -> Floats:
+def _patch_score(view: View, sight: Sight, mine: Own, patch: Floats, tried: Floats, width: float) -> Floats:
     """What one view says of a patch's pillars, nats, float64 (height, place)."""
     score = np.zeros((len(tried), len(patch)))
+    everywhere, tall = np.tile(patch, (len(tried), 1)), np.repeat(tried, len(patch))
+    wide = np.full(len(tall), width)
     if isinstance(view, BoxView) and mine.box >= 0:
-        width, height = map(float, view.camera.size)
+        columns, rows = map(float, view.camera.size)
         edges, belief = sight.edges[mine.box : mine.box + 1], sight.belief[mine.box : mine.box + 1]
         match = np.empty((score.size, 1))
-        bodies = view.table.boxes(patch, tried).reshape(-1, 4)
-        fill_match(bodies, edges, belief, width, height, match)
-        score = np.maximum(match, _WORST).reshape(score.shape)
+        fill_match(view.table.boxes_of(everywhere, tall), edges, belief, columns, rows, match)
+        score = np.maximum(match, WORST).reshape(score.shape)
     if isinstance(view, PixelView):
-        everywhere = np.tile(patch, (len(tried), 1))
-        first, spans, area = view.outlines(everywhere, np.repeat(tried, len(patch)))
-        score = view.mean_open(sight.raster, mine.owner, mine.person, first, spans, area).reshape(score.shape)
+        first, spans, area = view.outlines(everywhere, tall, wide)
+        score = view.mean_open(sight.raster, mine.pixels, first, spans, area).reshape(score.shape)
     return score
-
-
-def owned(person: int, boxes: Ints, pixels: Ints) -> Own:
-    """What of a view belongs to a person: the box assigned, or the pixels of nobody else."""
-    theirs = np.flatnonzero(boxes == person)
-    return Own(int(theirs[0]) if len(theirs) else -1, pixels, person)

@@ -10,7 +10,7 @@ from stseg.accelerate import kernel
 from stseg.arrays import Boxes, Flags, Floats, Ints, Singles
 from stseg.config import GhostConfig
 from stseg.geometry import Camera, Grid
-from stseg.geometry.bodies import BodyTable
+from stseg.geometry.bodies import WIDTH, BodyTable
 from stseg.ghosts.boxes import fill_best_match, fill_inside
 from stseg.ghosts.evidence import Spans
 from stseg.ghosts.outlines import outlines
@@ -56,13 +56,14 @@ class View:
         """Distance of ground points (n, 2) from the camera along the ground, metres, float64 (n,)."""
         return np.asarray(np.hypot(*(ground - self.camera.centre[:2]).T))
 
-    def outlines(self, ground: Floats, heights: Floats) -> tuple[Ints, Spans, Floats]:
-        """Outlines of pillars on this view's raster; see `ghosts.outlines`.
+    def outlines(self, ground: Floats, heights: Floats, widths: Floats) -> tuple[Ints, Spans, Floats]:
+        """Outlines of pillars on this view's raster, sizes in metres; see `ghosts.outlines`.
 
-        Areas are those of people of mean height there: a pillar that covers more of somebody must not count as less.
+        Areas are those of people of mean size there: a pillar that covers more of somebody must not count as less.
         """
-        first, spans, area = outlines(self.table, ground, heights, self.step, self.shape)
-        return first, spans, area * (self.config.height_mean / heights)
+        first, spans, area = outlines(self.table, ground, heights, self.step, self.shape, widths / WIDTH)
+        mean = self.config.height_mean * self.config.width_mean
+        return first, spans, area * (mean / (heights * widths))
 
 
 class BoxView(View):
@@ -103,8 +104,10 @@ class PixelView(View):
 
     def __init__(self, camera: Camera, grid: Grid, lattice_ground: Floats, config: GhostConfig) -> None:
         super().__init__(camera, grid, lattice_ground, config)
+        everywhere = np.ones(len(lattice_ground))
         self.lattice = [
-            self.outlines(lattice_ground, np.full(len(lattice_ground), height)) for height in config.heights
+            self.outlines(lattice_ground, height * everywhere, config.width_mean * everywhere)
+            for height in config.heights
         ]
 
     def observe(self, seen: Boxes | Singles | None) -> Sight:
@@ -121,21 +124,23 @@ class PixelView(View):
 
     def lattice_score(self, sight: Sight, free: Flags) -> Floats:
         """What the free pixels (v, u) say of each lattice pillar, nats, float64 (height, cell)."""
-        sums = self._row_sums(sight.raster, free)
-        return np.stack([self._means(sums, *outlines) for outlines in self.lattice])
+        sums = self.row_sums(sight.raster, free)
+        return np.stack([self.means(sums, *outlines) for outlines in self.lattice])
 
-    def mean_open(self, raster: Singles, owner: Ints, person: int, first: Ints, spans: Spans, area: Floats) -> Floats:
-        """Weighted mean log-odds inside outlines of the pixels that are a person's or nobody's, nats, float64 (n,)."""
+    def mean_open(self, raster: Singles, open_pixels: Flags, first: Ints, spans: Spans, area: Floats) -> Floats:
+        """Weighted mean log-odds inside outlines of the open pixels (v, u), nats, float64 (n,)."""
         means = np.zeros(len(first))
-        _fill_open_means(raster, owner, person, first, spans, area, means)
+        _fill_open_means(raster, open_pixels, first, spans, area, means)
         return means * self.config.body_weight
 
-    def _row_sums(self, raster: Singles, free: Flags) -> Floats:
+    def row_sums(self, raster: Singles | Floats, free: Flags) -> Floats:
+        """Sums of the free pixels (v, u) along rows, from the left, float64 (v, u + 1)."""
         sums = np.zeros((self.shape[0], self.shape[1] + 1))
-        np.cumsum(np.where(free, raster, np.float32(0.0)), axis=1, dtype=np.float64, out=sums[:, 1:])
+        np.cumsum(np.where(free, raster, raster.dtype.type(0)), axis=1, dtype=np.float64, out=sums[:, 1:])
         return sums
 
-    def _means(self, sums: Floats, first: Ints, spans: Spans, area: Floats) -> Floats:
+    def means(self, sums: Floats, first: Ints, spans: Spans, area: Floats) -> Floats:
+        """Weighted means inside outlines, from sums along rows, float64 (n,)."""
         means = np.zeros(len(first))
         _fill_span_means(sums, first, spans, area, means)
         return means * self.config.body_weight
@@ -156,14 +161,14 @@ def _fill_span_means(sums: Floats, first: Ints, spans: Spans, area: Floats, mean
 
 @kernel
 def _fill_open_means(
-    raster: Singles, owner: Ints, person: int, first: Ints, spans: Spans, area: Floats, means: Floats
+    raster: Singles, open_pixels: Flags, first: Ints, spans: Spans, area: Floats, means: Floats
 ) -> None:
     """The same from the raster itself: for few outlines that is less work than the sums of all of it."""
     for i in range(len(first)):
         total = 0.0
         for k in range(min(spans.shape[1], len(raster) - first[i]) if first[i] >= 0 else 0):
             for u in range(spans[i, k, 0], spans[i, k, 1]):
-                if owner[first[i] + k, u] < 0 or owner[first[i] + k, u] == person:
+                if open_pixels[first[i] + k, u]:
                     total += raster[first[i] + k, u]
         means[i] = total / area[i] if first[i] >= 0 else 0.0
 

@@ -83,7 +83,7 @@ def _between(before: np.void, after: np.void) -> Rows:
     filled = np.zeros(len(frames), TRAJECTORY)
     share = (frames - before["frame"]) / (after["frame"] - before["frame"])
     filled["frame"], filled["id"] = frames, before["id"]
-    for name in ("x", "y", "raw_x", "raw_y", "xx", "xy", "yy", "height", "score"):
+    for name in ("x", "y", "raw_x", "raw_y", "xx", "xy", "yy", "height", "width", "score"):
         filled[name] = before[name] + share * (after[name] - before[name])
     away = np.minimum(frames - before["frame"], after["frame"] - frames)
     filled["xx"] += (_DRIFT * away) ** 2

@@ -8,6 +8,7 @@ person: it is what tells two people apart who have just crossed.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from stseg.arrays import Floats, Ints
 from stseg.config import GhostConfig, IdentityConfig
 from stseg.ghosts.expected import Expected
 from stseg.ghosts.people import People
+from stseg.ghosts.sizes import Sizes
 from stseg.identity.linking import distances
 
 _TURN = 0.8
@@ -31,8 +33,17 @@ _REPEATED = 2.0
 """What is taken off them: a second frame's evidence is not independent of the first's, nats."""
 _BESIDE = 0.5
 """Nobody new is looked for so near to somebody who is followed, metres."""
+_OPEN = 0.6
+"""A frame that leaves more of the variance of people's sizes than this has not seen somebody's."""
 _FORGETTING = 4.0
 """How fast those fall while a walker is out of sight, nats per second."""
+
+
+class Measured(NamedTuple):
+    """One measurement and its variance, metres and square metres."""
+
+    mean: float
+    variance: float
 
 
 @dataclass(frozen=True)
@@ -47,7 +58,7 @@ class Walker:
         The last frame that showed them.
     state, covariance : float64 (4,), (4, 4)
         x, y, vx, vy in metres and metres per second, at that frame.
-    height, height_variance
+    height, height_variance, width, width_variance
         Metres, square metres.
     odds
         Log-odds that they are there, nats.
@@ -59,6 +70,8 @@ class Walker:
     covariance: Floats
     height: float
     height_variance: float
+    width: float
+    width_variance: float
     odds: float
 
     def carried(self, seconds: float) -> Walker:
@@ -71,24 +84,29 @@ class Walker:
             state=motion @ self.state,
             covariance=motion @ self.covariance @ motion.T + np.kron(turn, np.eye(2)),
             height_variance=self.height_variance + _GROWTH**2 * seconds,
+            width_variance=self.width_variance + _GROWTH**2 * seconds,
         )
 
-    def found(self, frame: int, ground: Floats, covariance: Floats, height: float, noise: float, odds: float) -> Walker:
+    def found(
+        self, frame: int, ground: Floats, covariance: Floats, height: Measured, width: Measured, odds: float
+    ) -> Walker:
         """Corrected by the posterior of their place, in which the expected place is the prior.
 
-        The velocity follows by what the place and it have in common. The height is a measurement with a standard
-        deviation of `noise`, metres.
+        The velocity follows by what the place and it have in common. Height and width are measurements.
         """
         gain = self.covariance[:, :2] @ np.linalg.inv(self.covariance[:2, :2])
         surplus = self.covariance[:2, :2] - covariance
-        share = self.height_variance / (self.height_variance + noise**2)
+        tall = self.height_variance / (self.height_variance + height.variance)
+        wide = self.width_variance / (self.width_variance + width.variance)
         return Walker(
             self.chain,
             frame,
             self.state + gain @ (ground - self.state[:2]),
             self.covariance - gain @ surplus @ gain.T,
-            self.height + share * (height - self.height),
-            self.height_variance * (1 - share),
+            self.height + tall * (height.mean - self.height),
+            self.height_variance * (1 - tall),
+            self.width + wide * (width.mean - self.width),
+            self.width_variance * (1 - wide),
             odds,
         )
 
@@ -119,8 +137,12 @@ class Walkers:
         return Expected(
             np.array([w.state[:2] for w in carried]).reshape(-1, 2),
             np.array([w.covariance[:2, :2] for w in carried]).reshape(-1, 2, 2) + self._place_noise,
-            np.array([w.height for w in carried]),
-            np.array([w.height_variance for w in carried]) + self.config.height_noise**2,
+            Sizes(
+                np.array([w.height for w in carried]),
+                np.array([w.height_variance for w in carried]) + self.config.height_noise**2,
+                np.array([w.width for w in carried]),
+                np.array([w.width_variance for w in carried]) + self.config.width_noise**2,
+            ),
             np.array([w.odds for w in carried]),
         )
 
@@ -133,6 +155,7 @@ class Walkers:
             Chain numbers from 1; those not met before are new.
         """
         self.begun = True
+        heights, widths = self._measured(people)
         chains, followed = np.zeros(len(people), np.int64), []
         for j in range(len(people)):
             known = int(people.walker[j])
@@ -140,10 +163,9 @@ class Walkers:
             odds = (before.odds if known >= 0 else self.ghosts.person) + people.evidence[j] - people.prior[j]
             followed.append(
                 before.found(
-                    frame, people.ground[j], people.covariance[j], float(people.height[j]), self.config.height_noise,
-                    min(float(odds), _STAYING),
+                    frame, people.ground[j], people.covariance[j], heights[j], widths[j], min(float(odds), _STAYING)
                 )
-            )  # fmt: skip
+            )
             if before.chain == 0:
                 self.issued += 1
                 followed[-1] = replace(followed[-1], chain=self.issued)
@@ -154,6 +176,14 @@ class Walkers:
         self.walkers = followed + lost
         self.walkers += self._doubtful(frame, ghosts)
         return chains
+
+    def _measured(self, people: People) -> tuple[list[Measured], list[Measured]]:
+        """Heights and widths of a frame; one that leaves a size as open as it was before has no weight."""
+        sizes, like, noise = people.sizes, self.ghosts, self.config
+        return (
+            _told(sizes.height, sizes.height_variance, like.height_spread, noise.height_noise),
+            _told(sizes.width, sizes.width_variance, like.width_spread, noise.width_noise),
+        )
 
     @property
     def _place_noise(self) -> Floats:
@@ -178,5 +208,12 @@ class Walkers:
         spread = np.diag([0.0, 0.0, _STILL**2, _STILL**2])
         spread[:2, :2] = people.covariance[j] + self._place_noise
         state = np.append(people.ground[j], [0.0, 0.0])
-        mean, variance = self.ghosts.height_mean, self.ghosts.height_spread**2
-        return Walker(0, frame, state, spread, mean, variance, 0.0)
+        like = self.ghosts
+        sizes = (like.height_mean, like.height_spread**2, like.width_mean, like.width_spread**2)
+        return Walker(0, frame, state, spread, *sizes, 0.0)
+
+
+def _told(mean: Floats, variance: Floats, spread: float, noise: float) -> list[Measured]:
+    """Measurements of one size, metres, from posteriors whose prior has a standard deviation of `spread`."""
+    off = np.where(variance < _OPEN * spread**2, noise**2, np.inf)
+    return [Measured(*one) for one in zip(mean.tolist(), off.tolist(), strict=True)]

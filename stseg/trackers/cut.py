@@ -157,12 +157,14 @@ class CutTracker:
         people = scene.people if len(scene.people) else None
         ground, covariance = blobs.ground[named].copy(), blobs.covariance[named].copy()
         height, score = blobs.height[named].copy(), blobs.mass[named].copy()
+        width = np.full(len(named), self.config.ghosts.width_mean)
         if people is not None:
             ground[held], covariance[held] = people.ground[who[held]], people.covariance[who[held]]
-            height[held], score[held] = people.height[who[held]], people.evidence[who[held]]
+            height[held], score[held] = people.sizes.height[who[held]], people.evidence[who[held]]
+            width[held] = people.sizes.width[who[held]]
         views = views_at(self.views, ground, self.rig.grid)
         return trajectory_rows(
-            scene.frame, identity[named], ground, covariance, height, blobs.extent[named], score, views
+            scene.frame, identity[named], ground, covariance, height, width, blobs.extent[named], score, views
         )
 
 

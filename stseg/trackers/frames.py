@@ -49,8 +49,8 @@ class FrameTracker:
         label, extent = reached_cells(scene, people.ground, ids, self.rig.grid, self.config.occupancy.reach)
         births = [(scene.frame, "birth", int(i), 0, "nobody known was near") for i in np.sort(ids[ids > known])]
         rows = trajectory_rows(
-            scene.frame, ids, people.ground, people.covariance, people.height, extent, people.evidence,
-            views_at(self.views, people.ground, self.rig.grid),
+            scene.frame, ids, people.ground, people.covariance, people.sizes.height, people.sizes.width, extent,
+            people.evidence, views_at(self.views, people.ground, self.rig.grid),
         )  # fmt: skip
         return [Commit([scene], label[None], rows, event_rows(births), np.zeros(0, WINDOW))]
 

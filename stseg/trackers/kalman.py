@@ -15,6 +15,7 @@ from stseg.arrays import Floats, Ints
 from stseg.config import Config
 from stseg.geometry import Rig
 from stseg.ghosts.expected import Expected
+from stseg.ghosts.sizes import Sizes
 from stseg.identity.linking import assign
 from stseg.occupancy.sampling import Sampling
 from stseg.trackers.cells import reached_cells
@@ -54,9 +55,11 @@ class KalmanTracker:
         filters = carried(self.filters, seconds, self.config.kalman.turn)
         unseen = (frame - 1 - self.seen) / self.rig.frame_rate
         return Expected(
-            filters.state[:, :2], filters.covariance[:, :2, :2] + noise, np.full(n, ghosts.height_mean),
-            np.full(n, ghosts.height_spread**2), STAYING - FORGETTING * unseen,
-        )  # fmt: skip
+            filters.state[:, :2],
+            filters.covariance[:, :2, :2] + noise,
+            Sizes.of_anybody(n, ghosts),
+            STAYING - FORGETTING * unseen,
+        )
 
     def add(self, scene: Scene, shown: Shown) -> list[Commit]:
         """The next frame, decided."""
@@ -103,8 +106,8 @@ class KalmanTracker:
         ids, ground = self.ids[found], self.filters.state[found, :2]
         label, extent = reached_cells(scene, ground, ids, grid, self.config.occupancy.reach)
         rows = trajectory_rows(
-            scene.frame, ids, ground, self.filters.covariance[found, :2, :2], people.height[which], extent,
-            people.evidence[which], views_at(self.views, ground, grid),
+            scene.frame, ids, ground, self.filters.covariance[found, :2, :2], people.height[which],
+            people.width[which], extent, people.evidence[which], views_at(self.views, ground, grid),
         )  # fmt: skip
         rows["raw_x"], rows["raw_y"] = people.ground[which].T
         return Commit([scene], label[None], rows, event_rows(events), np.zeros(0, WINDOW))

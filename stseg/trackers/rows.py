@@ -13,8 +13,8 @@ Event = tuple[int, str, int, int, str]
 
 
 def trajectory_rows(
-    frame: int, ids: Ints, ground: Floats, covariance: Floats, height: Floats, extent: Floats, score: Floats,
-    views: Ints,
+    frame: int, ids: Ints, ground: Floats, covariance: Floats, height: Floats, width: Floats, extent: Floats,
+    score: Floats, views: Ints,
 ) -> Rows:  # fmt: skip
     """TRAJECTORY rows of one frame, sorted by id.
 
@@ -24,8 +24,8 @@ def trajectory_rows(
         Tracks.
     ground, covariance : float64 (n, 2), (n, 2, 2)
         Metres, square metres.
-    height, extent, score : float64 (n,)
-        Metres, square metres, nats.
+    height, width, extent, score : float64 (n,)
+        Metres, metres, square metres, nats.
     views : int64 (n,)
         Number of views that see the place.
     """
@@ -34,7 +34,8 @@ def trajectory_rows(
     rows["x"], rows["y"] = ground[:, 0], ground[:, 1]
     rows["raw_x"], rows["raw_y"] = ground[:, 0], ground[:, 1]
     rows["xx"], rows["xy"], rows["yy"] = covariance[:, 0, 0], covariance[:, 0, 1], covariance[:, 1, 1]
-    rows["height"], rows["extent"], rows["score"], rows["views"] = height, extent, score, views
+    rows["height"], rows["width"] = height, width
+    rows["extent"], rows["score"], rows["views"] = extent, score, views
     return rows[np.argsort(ids, kind="stable")]
 
 

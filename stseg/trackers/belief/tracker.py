@@ -11,6 +11,7 @@ from stseg.config import Config
 from stseg.geometry import Rig
 from stseg.ghosts.border import Border
 from stseg.ghosts.expected import Expected
+from stseg.ghosts.sizes import Sizes
 from stseg.identity.linking import assign, distances
 from stseg.occupancy.sampling import Sampling
 from stseg.trackers.belief.condensation import condense
@@ -77,8 +78,11 @@ class BeliefTracker:
         return Expected(
             np.array([p.mean for p in foretold]).reshape(-1, 2),
             np.array(spread).reshape(-1, 2, 2) + noise * np.eye(2),
-            np.array([target.height for target in self.targets]),
-            np.array([height_noise * (1 + 1 / target.found) for target in self.targets]),
+            Sizes.of_heights(
+                np.array([target.height for target in self.targets]),
+                np.array([height_noise * (1 + 1 / target.found) for target in self.targets]),
+                self.config.ghosts,
+            ),
             _STAYING - _FORGETTING * missed,
         )
 
@@ -168,8 +172,9 @@ class BeliefTracker:
         covariance: Floats = np.array([target.star.ground.covariance for target in seen]).reshape(-1, 2, 2)
         height, score = (np.array(column, float) for column in ([t.height for t in seen], self._scores(seen)))
         label, extent = reached_cells(scene, ground, ids, grid, self.config.occupancy.reach)
+        width = np.full(len(seen), self.config.ghosts.width_mean)
         rows = trajectory_rows(
-            scene.frame, ids, ground, covariance, height, extent, score, views_at(self.seen_by, ground, grid)
+            scene.frame, ids, ground, covariance, height, width, extent, score, views_at(self.seen_by, ground, grid)
         )
         return Commit([scene], label[None], rows, event_rows(events), np.zeros(0, WINDOW))
 

@@ -19,6 +19,7 @@ from stseg.config import Config
 from stseg.geometry import Rig
 from stseg.ghosts.border import Border
 from stseg.ghosts.expected import Expected
+from stseg.ghosts.sizes import Sizes
 from stseg.identity.linking import assign, distances
 from stseg.occupancy.sampling import Sampling
 from stseg.trackers.cells import reached_cells
@@ -75,10 +76,8 @@ class ParticleTracker:
         crowd, config = self.crowd, self.config
         drift = config.identity.place_noise**2 + self._step(frame) ** 2
         unseen = (frame - 1 - crowd.seen) / self.rig.frame_rate
-        return Expected(
-            crowd.ground, crowd.covariance + drift * np.eye(2), crowd.height, np.full(len(crowd), _HEIGHT_NOISE**2),
-            STAYING - FORGETTING * unseen,
-        )  # fmt: skip
+        sizes = Sizes.of_heights(crowd.height, np.full(len(crowd), _HEIGHT_NOISE**2), config.ghosts)
+        return Expected(crowd.ground, crowd.covariance + drift * np.eye(2), sizes, STAYING - FORGETTING * unseen)
 
     def add(self, scene: Scene, shown: Shown) -> list[Commit]:
         """The next frame, decided.
@@ -217,7 +216,8 @@ class ParticleTracker:
         crowd, grid = self.crowd, self.rig.grid
         label, extent = reached_cells(scene, crowd.ground, crowd.ids, grid, self.config.occupancy.reach)
         rows = trajectory_rows(
-            scene.frame, crowd.ids, crowd.ground, crowd.covariance, crowd.height, extent, evidence,
+            scene.frame, crowd.ids, crowd.ground, crowd.covariance, crowd.height,
+            np.full(len(crowd), self.config.ghosts.width_mean), extent, evidence,
             views_at(self.grid_views, crowd.ground, grid),
         )  # fmt: skip
         return Commit([scene], label[None], rows, event_rows(events), np.zeros(0, WINDOW))

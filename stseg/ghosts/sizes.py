@@ -1,0 +1,74 @@
+"""Sizes of people as means and variances, and how evidence and priors of them are put together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from stseg.arrays import Floats, Ints
+from stseg.config import GhostConfig
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """Sizes of people as means and variances, each float64 (n,); metres and square metres."""
+
+    height: Floats
+    height_variance: Floats
+    width: Floats
+    width_variance: Floats
+
+    @classmethod
+    def of_anybody(cls, number: int, config: GhostConfig) -> Sizes:
+        """Before anybody was looked at."""
+        height, width = (config.height_mean, config.height_spread), (config.width_mean, config.width_spread)
+        return cls(*(np.full(number, value) for mean, spread in (height, width) for value in (mean, spread**2)))
+
+    @classmethod
+    def of_heights(cls, height: Floats, variance: Floats, config: GhostConfig) -> Sizes:
+        """Of heights with variances, metres and square metres, each (n,); as wide as anybody."""
+        anybody = cls.of_anybody(len(height), config)
+        return cls(height, variance, anybody.width, anybody.width_variance)
+
+    def at(self, chosen: Sequence[int] | Ints) -> Sizes:
+        """Those of the chosen, in that order."""
+        index = np.asarray(chosen, int)
+        return Sizes(self.height[index], self.height_variance[index], self.width[index], self.width_variance[index])
+
+    def put(self, chosen: Ints, others: Sizes) -> None:
+        """Take others' sizes for the chosen."""
+        self.height[chosen], self.height_variance[chosen] = others.height, others.height_variance
+        self.width[chosen], self.width_variance[chosen] = others.width, others.width_variance
+
+    def told(self, prior: Sizes) -> Sizes:
+        """These posteriors as measurements: the prior taken out of their variances.
+
+        The means still lean to the prior as far as the frame left open what it saw. So do those of all frames of a
+        person, which are compared with each other.
+        """
+        return Sizes(
+            self.height, _without(self.height_variance, prior.height_variance),
+            self.width, _without(self.width_variance, prior.width_variance),
+        )  # fmt: skip
+
+    def with_prior(self, prior: Sizes) -> Sizes:
+        """Posteriors of these measurements with a prior."""
+        return Sizes(
+            *_product(self.height, self.height_variance, prior.height, prior.height_variance),
+            *_product(self.width, self.width_variance, prior.width, prior.width_variance),
+        )
+
+
+_NOTHING = 1e-6
+"""Precision of a measurement that was none, one over square metres."""
+
+
+def _without(variance: Floats, prior: Floats) -> Floats:
+    return 1 / np.maximum(1 / variance - 1 / prior, _NOTHING)
+
+
+def _product(mean: Floats, variance: Floats, other: Floats, other_variance: Floats) -> tuple[Floats, Floats]:
+    share = other_variance / (variance + other_variance)
+    return other + share * (mean - other), other_variance * (1 - share)

@@ -1,0 +1,200 @@
+"""Heights and widths: the E step by its definition, and what it finds of people in named scenes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scenes import FEW_HEIGHTS, boxes, corner_cameras, expecting, likelihoods, people, room
+from scipy.special import expit
+from strategies import numbers
+
+from stseg.arrays import Boxes, Flags, Floats, Singles
+from stseg.geometry.bodies import SILHOUETTE, WIDTH
+from stseg.ghosts.explain import FramePass
+from stseg.ghosts.measure import BACKGROUND, OWN, measure
+from stseg.ghosts.outlines import outlines
+from stseg.ghosts.own import Own, owned
+from stseg.ghosts.pool import Pool
+from stseg.ghosts.refine import Places
+from stseg.ghosts.sizes import Sizes
+from stseg.ghosts.views import PixelView
+
+STEPS = np.linspace(-3.0, 3.0, 13)
+"""The lattice, in standard deviations."""
+VALUES = st.tuples(numbers(1.4, 2.0), numbers(0.01, 0.2), numbers(1.4, 2.0), numbers(0.03, 0.3))
+
+
+def sizes_of(mean: float, spread: float) -> Sizes:
+    one = np.ones(1)
+    return Sizes(mean * one, spread**2 * one, mean / 4 * one, spread**2 * one)
+
+
+def pixel_view(few: int = 0) -> PixelView:
+    rig = room()
+    return PixelView(rig.cameras[few], rig.grid, np.zeros((1, 2)), FEW_HEIGHTS)
+
+
+def at(ground: Floats) -> Places:
+    """People whose places say nothing of their heights."""
+    n = len(ground)
+    mean, variance = np.full(n, FEW_HEIGHTS.height_mean), np.full(n, FEW_HEIGHTS.height_spread**2)
+    return Places(ground, np.zeros((n, 2, 2)), mean, variance)
+
+
+def everything(view: PixelView) -> list[list[Own]]:
+    return [[Own(-1, np.ones(view.shape, bool))]]
+
+
+# Means and variances
+
+
+@given(VALUES)
+def test_the_priors_variance_can_be_taken_out_again(values: tuple[float, float, float, float]) -> None:
+    measured, prior = sizes_of(*values[:2]), sizes_of(*values[2:])
+    again = measured.with_prior(prior).told(prior)
+    np.testing.assert_allclose(again.height_variance, measured.height_variance, rtol=1e-4)
+    np.testing.assert_allclose(again.width_variance, measured.width_variance, rtol=1e-4)
+
+
+def test_what_says_nothing_leaves_the_prior() -> None:
+    prior = sizes_of(1.8, 0.1)
+    other = sizes_of(1.6, 0.05)
+    after = prior.told(prior).with_prior(other)
+    np.testing.assert_allclose([after.height, after.width], [other.height, other.width], atol=1e-5)
+    np.testing.assert_allclose(after.height_variance, other.height_variance, rtol=1e-4)
+
+
+# The E step
+
+
+def by_definition(view: PixelView, raster: Singles, open_pixels: Flags, fits: Pool) -> Floats:
+    """The labels' log-likelihood of each pillar over the union of all of them, pixel by pixel, nats."""
+    first, spans, area = view.outlines(fits.ground, fits.height, fits.width)
+    inside = np.zeros((len(fits), *view.shape), bool)
+    for i in range(len(fits)):
+        for k, (start, stop) in enumerate(spans[i]):
+            if stop > start:
+                inside[i, first[i] + k, start:stop] = True
+    union, own, score = inside.any(0), expit(raster.astype(float)), np.zeros(len(fits))
+    for v, u in np.argwhere(union & open_pixels):
+        within = OWN * own[v, u] + BACKGROUND * (1 - own[v, u])
+        score += np.where(inside[:, v, u], within, -OWN * own[v, u]) / area.mean()
+    return view.config.body_weight * score
+
+
+@pytest.mark.parametrize("hidden", [0.0, 0.5])
+def test_the_e_step_by_definition(hidden: float) -> None:
+    view, rng = pixel_view(), np.random.default_rng(4)
+    sight = replace(view.observe(None), raster=rng.normal(0, 2, view.shape).astype(np.float32))
+    open_pixels = rng.random(view.shape) >= hidden
+    place, width = np.array([[0.3, -0.2]]), np.array([0.45])
+    found = measure(at(place), width, [view], [sight], [[Own(-1, open_pixels)]], FEW_HEIGHTS)
+    everywhere, one = np.tile(place, (len(STEPS), 1)), np.ones(len(STEPS))
+    heights = FEW_HEIGHTS.height_mean + FEW_HEIGHTS.height_spread * STEPS
+    widths = FEW_HEIGHTS.width_mean + FEW_HEIGHTS.width_spread * STEPS
+    for lattice, fits, mean, variance in (
+        (heights, Pool(everywhere, heights, 0.45 * one), found.height, found.height_variance),
+        (widths, Pool(everywhere, found.height * one, widths), found.width, found.width_variance),
+    ):
+        score = by_definition(view, sight.raster, open_pixels, fits) - 0.5 * STEPS**2
+        weight = np.exp(score - score.max())
+        weight /= weight.sum()
+        assert mean[0] == pytest.approx(weight @ lattice, abs=1e-6)
+        assert variance[0] == pytest.approx(weight @ (lattice - weight @ lattice) ** 2, abs=1e-6)
+
+
+def test_who_is_hidden_is_like_anybody() -> None:
+    view = pixel_view()
+    sight = view.observe(likelihoods([view.camera], people((0.3, -0.2, 1.9)))[0])
+    nobodys = [[owned(view, 0, np.zeros(0, np.int64), np.ones(view.shape, np.int64))]]
+    place, width, anybody = at(np.array([[0.3, -0.2]])), np.array([0.42]), Sizes.of_anybody(1, FEW_HEIGHTS)
+    found = measure(place, width, [view], [sight], nobodys, FEW_HEIGHTS)
+    np.testing.assert_allclose([found.height, found.width], [anybody.height, anybody.width])
+    blind = measure(place, width, [view], [None], nobodys, FEW_HEIGHTS)
+    np.testing.assert_allclose(blind.height_variance, anybody.height_variance, rtol=0.03)  # of the lattice, cut off
+
+
+def test_wider_people_are_found_wider() -> None:
+    """Silhouettes of a body of the profile's width, and of one a fifth slimmer."""
+    rig, found = room(), []
+    for wide in (0.8, 1.0):
+        views = [PixelView(camera, rig.grid, np.zeros((1, 2)), FEW_HEIGHTS) for camera in rig.cameras]
+        sights = []
+        for view in views:
+            seen = np.zeros(view.camera.size[::-1], np.float32)
+            first, spans, _ = outlines(
+                view.table, np.zeros((1, 2)), np.array([1.75]), 1, seen.shape[:2], np.array([wide])
+            )
+            for k, (start, stop) in enumerate(spans[0]):
+                seen[first[0] + k, start:stop] = 1.0
+            sights.append(view.observe(seen))
+        own = [[Own(-1, np.ones(view.shape, bool)) for view in views]]
+        found.append(float(measure(at(np.zeros((1, 2))), np.array([0.42]), views, sights, own, FEW_HEIGHTS).width[0]))
+    assert 0.8 * WIDTH - 0.03 < found[0] < found[1] - 0.04
+    assert found[1] == pytest.approx(WIDTH, abs=0.04)
+
+
+# The body
+
+
+def test_the_head_closes() -> None:
+    """The highest pixel of a silhouette is that of the crown, also where the camera looks down."""
+    camera = corner_cameras()[0]
+    shown = likelihoods([camera], people((0.0, 0.0, 1.8)))[0]
+    crown, _ = camera.project(np.zeros((1, 2)), np.array([1.8]))
+    assert crown[0, 1] - float(np.flatnonzero(shown.max(1) > 0.5)[0]) < 1.0
+    assert SILHOUETTE[-1, 1] < 0.05
+
+
+# People in rooms
+
+
+def tall_and_short(kind: str) -> tuple[Floats, Sizes]:
+    standing = people((-0.9, 0.4, 1.58), (0.6, -0.5, 1.86), (0.9, 0.9, 1.7))
+    rig = room()
+    frame_pass = FramePass(rig, [kind] * 4, FEW_HEIGHTS)
+    seen: list[Singles] | list[Boxes] = (
+        likelihoods(rig.cameras, standing) if kind == "pixels" else [boxes(camera, standing) for camera in rig.cameras]
+    )
+    found = frame_pass.explain(seen, None).people
+    order = [int(np.hypot(*(found.ground - place[:2]).T).argmin()) for place in standing]
+    assert sorted(order) == [0, 1, 2]
+    return standing, found.sizes.at(order)
+
+
+@pytest.mark.parametrize("kind", ["pixels", "boxes"])
+def test_heights_are_found(kind: str) -> None:
+    standing, found = tall_and_short(kind)
+    # Boxes of thirty pixels are read to two, which leaves open more than the search's few heights reach.
+    np.testing.assert_allclose(found.height, standing[:, 2], atol=0.05 if kind == "pixels" else 0.1)
+    assert (np.diff(found.height[[0, 2, 1]]) > 0.04).all()
+
+
+def test_who_is_known_keeps_their_height() -> None:
+    """A walker's own height is the prior of the next frame's; the frame's own measurement stays free of it."""
+    rig, standing = room(), people((0.2, 0.1, 1.7))
+    frame_pass = FramePass(rig, ["pixels"] * 4, FEW_HEIGHTS)
+    expected = expecting((0.2, 0.1, 1.82))
+    expected = replace(expected, sizes=replace(expected.sizes, height_variance=np.full(1, 0.01**2)))
+    seen = likelihoods(rig.cameras, standing)
+    stranger, known = frame_pass.explain(seen, None).people, frame_pass.explain(seen, expected).people
+    assert known.walker.tolist() == [0]
+    assert known.height[0] > stranger.height[0] + 0.05
+    assert known.sizes.height[0] == pytest.approx(stranger.sizes.height[0], abs=0.03)
+
+
+@settings(max_examples=20, deadline=None)
+@given(numbers(1.45, 1.95))
+def test_taller_people_are_found_taller(height: float) -> None:
+    view = pixel_view()
+    place, width = at(np.zeros((1, 2))), np.array([WIDTH])
+    found = [
+        measure(place, width, [view], [view.observe(seen)], everything(view), FEW_HEIGHTS).height[0]
+        for tall in (height, height + 0.1)
+        for seen in likelihoods([view.camera], people((0.0, 0.0, tall)))
+    ]
+    assert found[1] > found[0]
