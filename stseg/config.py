@@ -172,6 +172,9 @@ class GhostConfig:
     """How often a body's pixel is missed by the foreground (m of METHODS 4); the volume's first guess."""
     pixel_clutter: float = 0.07
     """How often a ray past all bodies meets foreground (b of METHODS 4); the volume's first guess."""
+    trades: int = 0
+    """How often larger groups are improved by trades, one person for two and the like, once a frame is settled; the scores
+    rise by them, the tracks do not get better (docs/ghosts.md)."""
 
     def __post_init__(self) -> None:
         heights = self.heights
@@ -184,6 +187,7 @@ class GhostConfig:
             require(0 < getattr(self, name) < 1, self, name, "a number between 0 and 1")
         require(self.hit > 0, self, "hit", "a number above 0")
         require(self.newcomer >= 0, self, "newcomer", "0 or more nats")
+        require(self.trades >= 0, self, "trades", "0 or more")
         require(self.border > 0, self, "border", "a number above 0")
         require(
             0 <= self.hidden_below < self.whole_above <= 1, self, "hidden_below", "0 to below whole_above, at most 1"

@@ -39,7 +39,7 @@ from stseg.ghosts.groups import fill_groups, fill_touch
 from stseg.ghosts.outlines import outlines
 from stseg.ghosts.people import Explanation, ViewEvidence
 from stseg.ghosts.scoring import set_score
-from stseg.ghosts.search import search
+from stseg.ghosts.search import ENUMERATED, search
 
 WIDTH, HEIGHT = 128.0, 96.0
 KINDS = ("pixels", "boxes")
@@ -147,11 +147,11 @@ class Problem:
         chosen = np.array(members, np.int64)
         return set_score(chosen, len(chosen), self.case())
 
-    def found(self, start: Sequence[int] = (), trades: int = 4) -> list[int]:
+    def found(self, start: Sequence[int] = (), trades: int = 4, enumerated: int = ENUMERATED) -> list[int]:
         """The set that the search ends with."""
         room = np.zeros(len(self.own) + 1, np.int64)
         room[: len(start)] = start
-        count = search(room, len(start), self.case(), trades)
+        count = search(room, len(start), self.case(), enumerated, trades)
         return sorted(room[:count].tolist())
 
 
@@ -272,7 +272,8 @@ def test_of_more_candidates_the_best_set_is_found_here(walkers: int) -> None:
     """Simple moves alone, which cannot trade one person for two, miss the best of some of these crafted frames."""
     frames = [problem(seed, 10, walkers) for seed in range(20)]
     best = np.array([max(f.score(s) for s in reference.subsets(10)) for f in frames])
-    simple, traded = (np.array([f.score(f.found(trades=trades)) for f in frames]) for trades in (0, 4))
+    ways = ((0, 0), (4, ENUMERATED))
+    simple, traded = (np.array([f.score(f.found((), *way)) for f in frames]) for way in ways)
     np.testing.assert_allclose(traded, best, atol=1e-6)
     assert (simple < best - 1e-6).any()
     assert (simple > best - 2.6).all()

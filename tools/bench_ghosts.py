@@ -28,7 +28,7 @@ from stseg.ghosts.frame import Frame, Seen
 from stseg.ghosts.people import ViewEvidence
 from stseg.ghosts.pool import Pool
 from stseg.ghosts.prior import Prior
-from stseg.ghosts.search import search
+from stseg.ghosts.search import ENUMERATED, search
 from stseg.identity.walkers import Walkers
 from stseg.simulate import Film, SceneSpec
 
@@ -107,7 +107,7 @@ def search_seconds(case: Case) -> float:
     best = np.inf
     for _ in range(_REPEATS):
         start = time.process_time()
-        search(np.zeros(len(case.own) + 1, np.int64), 0, case, 2)
+        search(np.zeros(len(case.own) + 1, np.int64), 0, case, ENUMERATED, 2)
         best = min(best, time.process_time() - start)
     return best
 

@@ -21,10 +21,8 @@ from stseg.ghosts.outcome import explanation
 from stseg.ghosts.people import Explanation, ViewEvidence
 from stseg.ghosts.pool import Pool, peaks
 from stseg.ghosts.prior import Prior
+from stseg.ghosts.search import ENUMERATED
 from stseg.ghosts.views import BoxView, PixelView
-
-_TRADES = 2
-"""How often trades are tried once the people of a frame are settled."""
 
 
 class FramePass:
@@ -87,7 +85,7 @@ class FramePass:
             frame = Frame(frame.seen, frame.pool.and_(moved).and_(fresh), frame.members)
             if (frame.members < known).all():
                 break
-        return explanation(_settled(frame))
+        return explanation(_settled(frame, self.config.trades))
 
     def _fresh(self, frame: Frame) -> Pool:
         """Candidates in what nobody explains yet."""
@@ -99,10 +97,10 @@ class FramePass:
         return peaks(score.reshape(-1, rows, columns), self.lattice_ground, heights, self.config.width_mean)
 
 
-def _settled(frame: Frame) -> Frame:
+def _settled(frame: Frame, trades: int) -> Frame:
     """The frame searched from where its people exactly stand, which may show two to be one, then well, by places."""
     exact = frame.refined().pool
     known = len(frame.pool)
     anew = Frame(frame.seen, frame.pool.and_(exact), np.arange(known, known + len(exact)))
     places = np.concatenate([anew.members, anew.rivals()])
-    return Frame(anew.seen, anew.pool.at(places), np.arange(len(anew.members)), _TRADES)
+    return Frame(anew.seen, anew.pool.at(places), np.arange(len(anew.members)), ENUMERATED, trades)

@@ -63,11 +63,11 @@ class Frame:
         The candidates.
     members : int64 (n,)
         The candidates with whom the search begins.
-    trades
-        How often trades are tried, see `stseg.ghosts.search`.
+    enumerated, trades
+        How well the set is searched, see `stseg.ghosts.search`.
     """
 
-    def __init__(self, seen: Seen, pool: Pool, members: Ints, trades: int = 0) -> None:
+    def __init__(self, seen: Seen, pool: Pool, members: Ints, enumerated: int = 0, trades: int = 0) -> None:
         self.seen, self.pool = seen, pool
         self.case = _case(seen, pool)
         # The scores' parts have the views with boxes first; `row` finds those of each view of the rig.
@@ -75,7 +75,7 @@ class Frame:
         self.row = np.argsort(pixels_last)
         room = np.zeros(len(pool) + 1, np.int64)
         room[: len(members)] = members
-        count = search(room, len(members), self.case, trades)
+        count = search(room, len(members), self.case, enumerated, trades)
         self.members = room[:count].copy()
         self.total = self.score(self.members)
         self.box_owner, self.pixel_owner = self._owners()

@@ -19,19 +19,21 @@ from stseg.ghosts.moves import GAINED, climb, trade
 from stseg.ghosts.scoring import set_score
 
 ENUMERATED = 8
-"""Of up to so many candidates all sets are tried."""
+"""Of up to so many candidates all sets are tried, in a set that is not searched again."""
 
 
 @kernel
-def search(members: Ints, count: int, case: Case, trades: int) -> int:
+def search(members: Ints, count: int, case: Case, enumerated: int, trades: int) -> int:
     """Improve the set in place, starting from its first `count` members; returns its new size.
 
     Parameters
     ----------
     members : int64 (candidate + 1,)
         Indices of candidates; the first `count` are the set.
+    enumerated
+        Of groups of up to so many candidates all sets are tried; none is so small where the set is searched again.
     trades
-        How often all trades are tried at most; 0 leaves it at simple moves, for a set that is searched again.
+        How often all trades are tried at most in larger groups; 0 leaves it at simple moves.
     """
     candidates = len(case.own)
     touch, group = np.empty((candidates, candidates), np.bool_), np.empty(candidates, np.int64)
@@ -43,7 +45,7 @@ def search(members: Ints, count: int, case: Case, trades: int) -> int:
     for g in range(fill_groups(touch, group)):
         own = np.flatnonzero(group == g)
         part = alone(case, own)
-        if trades > 0 and len(own) <= ENUMERATED:
+        if len(own) <= enumerated:
             size = _enumerate(chosen, own, part)
         else:
             start = own[inside[own]]
