@@ -173,8 +173,8 @@ class GhostConfig:
     pixel_clutter: float = 0.07
     """How often a ray past all bodies meets foreground (b of METHODS 4); the volume's first guess."""
     trades: int = 0
-    """How often larger groups are improved by trades, one person for two and the like, once a frame is settled; the scores
-    rise by them, the tracks do not get better (docs/ghosts.md)."""
+    """How often larger groups are improved by trades, one person for two and the like, once a frame is settled;
+    scores rise by them, tracks do not get better (docs/ghosts.md)."""
 
     def __post_init__(self) -> None:
         heights = self.heights
