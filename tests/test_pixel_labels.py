@@ -15,7 +15,7 @@ from stseg.arrays import Bytes, Floats, Labels, Singles
 from stseg.config import LabelConfig
 from stseg.errors import ConfigError
 from stseg.geometry import Camera
-from stseg.geometry.bodies import PROFILE, BodyTable
+from stseg.geometry.bodies import SILHOUETTE, BodyTable
 from stseg.ghosts.outlines import outlines
 from stseg.labels.contrast import edge_costs
 from stseg.labels.energy import PixelEnergy, most_likely, pixel_energy
@@ -25,10 +25,10 @@ from stseg.labels.standing import Standing
 from stseg.labels.views import ViewLabels, view_labels
 from stseg.segmentation.energy import QUANTUM
 
-PROFILE_WIDTH = 2 * float(np.trapezoid(PROFILE[:, 1], PROFILE[:, 0]))
-EXACT = LabelConfig(draws=1, place_spread=1e-3, height_spread=0.0, width=PROFILE_WIDTH, width_spread=0.0)
+SILHOUETTE_WIDTH = 2 * float(np.trapezoid(SILHOUETTE[:, 1], SILHOUETTE[:, 0]))
+EXACT = LabelConfig(draws=1, place_spread=1e-3, height_spread=0.0, width=SILHOUETTE_WIDTH, width_spread=0.0)
 """One pillar a person, just as the micro-scenes draw them."""
-FEW = LabelConfig(draws=8, place_spread=0.03, height_spread=0.03, width=PROFILE_WIDTH, width_spread=0.02)
+FEW = LabelConfig(draws=8, place_spread=0.03, height_spread=0.03, width=SILHOUETTE_WIDTH, width_spread=0.02)
 """Almost certain ones: the people of the micro-scenes have no arms and legs."""
 
 

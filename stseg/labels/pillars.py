@@ -15,7 +15,7 @@ from scipy.special import ndtri
 from stseg.accelerate import kernel
 from stseg.arrays import Floats, Ints, Singles
 from stseg.config import LabelConfig
-from stseg.geometry.bodies import PROFILE, BodyTable
+from stseg.geometry.bodies import SILHOUETTE, BodyTable
 from stseg.ghosts.evidence import Spans
 from stseg.ghosts.outlines import outlines
 from stseg.labels.standing import Standing
@@ -24,8 +24,8 @@ MARGIN = 0.15
 """How far around the pillars a body's pixels may lie, as a share of the pillars' height in the image."""
 _THINNEST = 0.3
 """Widths are held above this share of the mean."""
-_MEAN_WIDTH = 2 * float(np.trapezoid(PROFILE[:, 1], PROFILE[:, 0]))
-"""Of the profile over its height, metres."""
+_MEAN_WIDTH = 2 * float(np.trapezoid(SILHOUETTE[:, 1], SILHOUETTE[:, 0]))
+"""Of the silhouette over its height, metres."""
 
 
 class Patches(NamedTuple):
