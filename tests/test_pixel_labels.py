@@ -194,13 +194,15 @@ def test_two_people_side_by_side_are_two_and_the_same_in_every_view() -> None:
 
 
 def test_the_nearer_of_two_hides_the_farther() -> None:
+    """Of pixels that bodies fill, as in the tests above: those at their edges are between two answers."""
     camera = corner_cameras()[0]
     everybody = people((-0.6, -0.6), (0.6, 0.62))  # on one line from the corner
-    near, far = (likelihoods([camera], everybody[j : j + 1])[0] > 0.5 for j in range(2))
+    near, far = (likelihoods([camera], everybody[j : j + 1])[0] for j in range(2))
     label = labels_in(camera, everybody)
-    assert (near & far).any()
-    assert (label[near & far] == 1).mean() > 0.93
-    assert (label[far & ~near] == 2).mean() > 0.8
+    both, behind = (near > 0.8) & (far > 0.8), (near < 0.2) & (far > 0.8)
+    assert both.any()
+    assert (label[both] == 1).mean() > 0.95
+    assert (label[behind] == 2).mean() > 0.9
 
 
 def test_what_nobody_stands_at_is_background() -> None:
