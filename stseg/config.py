@@ -172,9 +172,9 @@ class GhostConfig:
     """How often a body's pixel is missed by the foreground (m of METHODS 4); the volume's first guess."""
     pixel_clutter: float = 0.07
     """How often a ray past all bodies meets foreground (b of METHODS 4); the volume's first guess."""
-    trades: int = 0
-    """How often larger groups are improved by trades, one person for two and the like, once a frame is settled;
-    scores rise by them, tracks do not get better (docs/ghosts.md)."""
+    trades: int = 2
+    """How often larger groups are improved by trades, one person for two and the like, once a frame is settled, where
+    all views show pixels. Boxes' scores are too rough: they rise by it, but tracks get worse (docs/ghosts.md)."""
 
     def __post_init__(self) -> None:
         heights = self.heights

@@ -11,6 +11,7 @@ from scenes import Moment, box_moments, looking, mask_moments, rig_of, standing_
 
 from stseg.arrays import Boxes, Bytes, Rows
 from stseg.commands.main import main
+from stseg.config import LabelConfig
 from stseg.errors import OutputError
 from stseg.geometry import Rig
 from stseg.io.image_stream import ImageStream
@@ -180,7 +181,8 @@ def test_the_constants_are_those_of_the_run_but_for_what_is_set(tmp_path: Path) 
     sources = mask_sources(tmp_path, moments)
     wide = write_run(tmp_path / "wide.h5", sources, walkers(FRAMES), "[labels]\nplace_spread = 0.5\n")
     plain = write_run(tmp_path / "plain.h5", sources, walkers(FRAMES))
-    for path, options in ((wide, ()), (wide, ("--set", "labels.place_spread=0.1")), (plain, ())):
+    narrow = ("--set", f"labels.place_spread={LabelConfig().place_spread}")
+    for path, options in ((wide, ()), (wide, narrow), (plain, ())):
         out = str(tmp_path / f"{path.stem}{len(options)}")
         assert main(["labels", str(path), "-o", out, "--frames", "0:1", *options]) == 0
     own, back, default = (read(tmp_path / name, "west")[0] for name in ("wide0", "wide2", "plain0"))

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from stseg.arrays import Boxes, Floats, Singles
 from stseg.calibrate.blunders import all_bystanders
 from stseg.calibrate.bystanders import tables_of
-from stseg.calibrate.check import off_in_words
 from stseg.calibrate.sightings import sightings
 from stseg.calibrate.verdict import judge
 from stseg.geometry import Rig
@@ -46,4 +45,8 @@ class ViewWatch:
         tables = tables_of(self.rig)
         people = all_bystanders(self.rig, tables, self._shown, sorted(self._shown))
         verdict = judge(self.rig, tables, people)
-        return [off_in_words(self.rig.cameras[one.view].name, one) for one in verdict.named]
+        return [
+            f"{self.rig.cameras[one.view].name} is off: feet {100 * one.feet:.0f} cm, heads {100 * one.heads:.0f} cm "
+            "from where the other views say"
+            for one in verdict.named
+        ]

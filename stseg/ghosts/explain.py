@@ -60,6 +60,7 @@ class FramePass:
             config.body_weight,
         )
         self.border = Border.of(rig)
+        self._trades = 0 if "boxes" in kinds else config.trades
 
     def explain(self, seen: Sequence[ViewEvidence], expected: Expected | None) -> Explanation:
         """Explain one frame.
@@ -85,7 +86,7 @@ class FramePass:
             frame = Frame(frame.seen, frame.pool.and_(moved).and_(fresh), frame.members)
             if (frame.members < known).all():
                 break
-        return explanation(_settled(frame, self.config.trades))
+        return explanation(_settled(frame, self._trades))
 
     def _fresh(self, frame: Frame) -> Pool:
         """Candidates in what nobody explains yet."""
