@@ -50,9 +50,9 @@ def test_ci_runs_the_test_command_of_the_readme() -> None:
     assert f'"$bin/python" {command} |' in (ROOT / ".ci" / "run").read_text("utf-8")
 
 
-@pytest.mark.parametrize("page", ["README.md", "docs/how-it-works.md", "docs/file-formats.md", "docs/viewers.md"])
+@pytest.mark.parametrize("page", sorted(["README.md", *(f"docs/{page.name}" for page in (ROOT / "docs").glob("*.md"))]))
 def test_what_a_page_names_is_there(page: str) -> None:
     text = (ROOT / page).read_text("utf-8")
     assert set(re.findall(r"(?:`|^)stseg (\w+)\b", text, re.MULTILINE)) <= {*COMMANDS, "COMMAND"}
-    for link in re.findall(r"\]\(([^)#]+)\)", text):
+    for link in re.findall(r"\]\((?!https?:)([^)#]+)\)", text):
         assert ((ROOT / page).parent / link).exists(), link
