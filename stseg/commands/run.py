@@ -23,6 +23,7 @@ from stseg.errors import ConfigError
 from stseg.identity.segments import Segment, segments
 from stseg.io.config_file import format_config, read_config
 from stseg.io.frames import Streams, count_streams
+from stseg.io.label_images import require_label_folder
 from stseg.io.outputs import require_new
 from stseg.io.provenance import as_tables, gather_provenance
 from stseg.io.recording import Recording
@@ -88,6 +89,7 @@ def run(
     resolved, recording = read_config(config, set_), read_rig(rig)
     if labels is not None:
         require_pixels(recording)
+        require_label_folder(labels, overwrite)
     asked = as_tables(gather_provenance(recording, format_config(resolved)))
     asked |= {"--frames": frames or "all", "--tracker": tracker, "--volume": volume}
     with WorkFolder(output, asked) as folder, _told_how_to_go_on(folder):
