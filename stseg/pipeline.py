@@ -23,7 +23,7 @@ from stseg.foreground.sight import Sight
 from stseg.geometry import Rig
 from stseg.ghosts.expected import Expected
 from stseg.ghosts.explain import FramePass
-from stseg.ghosts.people import Explanation, People, ViewEvidence
+from stseg.ghosts.people import Explanation, People
 from stseg.identity.views import box_rows
 from stseg.identity.whole import own_tracks, whole_tracks
 from stseg.occupancy.level import Level
@@ -39,10 +39,6 @@ class Moment(Protocol):
     def frame(self) -> int: ...
     @property
     def views(self) -> Sequence[Observation]: ...
-
-
-Witness = Callable[[int, Sequence[ViewEvidence]], None]
-"""Is told a frame and what each view showed of it."""
 
 
 @dataclass
@@ -138,12 +134,10 @@ class Pipeline:
         other.sights = sights
         return other
 
-    def steps(
-        self, moments: Iterable[Moment], first: int, advance: Callable[[int], None], witness: Witness | None = None
-    ) -> Iterator[Step]:
+    def steps(self, moments: Iterable[Moment], first: int, advance: Callable[[int], None]) -> Iterator[Step]:
         """Run over moments, from frame `first` on; yields what is decided as soon as it is.
 
-        `advance` is told each frame that was fused, `witness` what its views showed. Nothing is known from moments that
+        `advance` is told each frame that was fused. Nothing is known from moments that
         were run over before.
         """
         self.occupancy.forget()
@@ -157,8 +151,6 @@ class Pipeline:
             if moment is None:
                 break
             scene, shown, explained[moment.frame] = self._scene(moment, tracker.expected(moment.frame), watch)
-            if witness is not None:
-                witness(moment.frame, shown.evidence)
             with watch.time("track"):
                 commits = tracker.add(scene, shown)
             yield from (_step(commit, explained, watch) for commit in commits)

@@ -11,7 +11,6 @@ from typing import Literal
 import numpy as np
 
 from stseg.arrays import Bytes, Ints, Labels, Singles
-from stseg.commands.rig_watch import RigWatch
 from stseg.commands.sights import background_part, make_sights
 from stseg.config import Config
 from stseg.foreground.sight import Sight
@@ -84,12 +83,10 @@ class SegmentWork:
                 draft, job.recording, views, format_config(job.config), overwrite=True, kept=job.volume
             ) as writer,
         ):
-            watch = RigWatch(job.recording.rig, segment)
-            for step in pipeline.steps(moments, segment.lead, fused, watch.witness):
+            for step in pipeline.steps(moments, segment.lead, fused):
                 self._write(step, segment, writer)
                 if step.commit.scenes[-1].frame >= segment.stop - 1:
                     break
-            writer.append("events", watch.warnings())
             writer.finish(np.zeros(0, TRACK))
         return keep_segment(draft)
 
