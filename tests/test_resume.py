@@ -22,7 +22,12 @@ from stseg.ghosts.scoring import set_score
 from stseg.io.runs import read_run
 from stseg.io.work_folder import checksum
 
-PROGRAM = "import sys; from stseg.commands.main import main; sys.exit(main())"
+PROGRAM = """
+import signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell that runs the tests in its background has it ignored
+from stseg.commands.main import main
+sys.exit(main())
+"""
 pytestmark = pytest.mark.skipif(python_form(set_score) is set_score, reason="too slow without a compiler")
 
 
