@@ -36,7 +36,7 @@ from stseg.ghosts.expected import nobody
 from stseg.ghosts.explain import FramePass
 from stseg.ghosts.gains import fill_owners, gain_of, paired
 from stseg.ghosts.groups import fill_groups, fill_touch
-from stseg.ghosts.outlines import outlines
+from stseg.ghosts.outlines import outlines, sums_inside
 from stseg.ghosts.people import Explanation, ViewEvidence
 from stseg.ghosts.scoring import set_score
 from stseg.ghosts.search import ENUMERATED, search
@@ -111,6 +111,23 @@ def test_an_outline_is_the_silhouette(step: int) -> None:
         edge = (silhouette > 0.0) & (silhouette < 1.0)
         assert (filled == (silhouette > 0.5))[~edge].all()
         assert area[j] == pytest.approx(silhouette.sum(), rel=0.15)
+
+
+@given(st.integers(0, 99), st.sampled_from([1, 3]))
+def test_sums_inside_are_those_of_the_outlines(seed: int, step: int) -> None:
+    chance, table = np.random.default_rng(seed), BodyTable.of(corner_cameras()[0], room().grid)
+    ground, heights, widths = chance.uniform(-2, 2, (5, 2)), chance.uniform(1.4, 2.0, 5), chance.uniform(0.8, 1.3, 5)
+    shape = (-(-96 // step), -(-128 // step))
+    values, counted = chance.normal(size=shape).astype(np.float32), chance.random(shape) < 0.7
+    first, spans, area = outlines(table, ground, heights, step, shape, widths)
+    sums, whole = sums_inside(table, ground, heights, widths, step, values, counted)
+    shown = np.where(counted, values, 0).astype(float)
+    drawn = [
+        sum(shown[first[i] + k, start:stop].sum() for k, (start, stop) in enumerate(spans[i]) if stop > start)
+        for i in range(len(ground))
+    ]
+    np.testing.assert_allclose(sums, drawn, atol=1e-9)
+    np.testing.assert_array_equal(whole, area)
 
 
 def test_outlines_outside_the_image() -> None:

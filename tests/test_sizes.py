@@ -15,13 +15,13 @@ from strategies import numbers
 from stseg.arrays import Boxes, Flags, Floats, Singles
 from stseg.geometry.bodies import SILHOUETTE, WIDTH
 from stseg.ghosts.explain import FramePass
-from stseg.ghosts.measure import BACKGROUND, OWN, measure
+from stseg.ghosts.measure import measure
 from stseg.ghosts.outlines import outlines
 from stseg.ghosts.own import Own, owned
 from stseg.ghosts.pool import Pool
 from stseg.ghosts.refine import Places
 from stseg.ghosts.sizes import Sizes
-from stseg.ghosts.views import PixelView
+from stseg.ghosts.views import BACKGROUND, OWN, PixelView
 
 STEPS = np.linspace(-3.0, 3.0, 13)
 """The lattice, in standard deviations."""

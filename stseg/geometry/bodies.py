@@ -46,7 +46,7 @@ class BodyTable:
     size: tuple[int, int]
 
     @classmethod
-    def of(cls, camera: Camera, grid: Grid, step: float = 0.2, margin: float = 0.6) -> BodyTable:
+    def of(cls, camera: Camera, grid: Grid, step: float = 0.12, margin: float = 0.6) -> BodyTable:
         """The table of `camera` over the grid's rectangle and `margin` metres around it."""
         x = np.arange(grid.x[0] - margin, grid.x[1] + margin + step, step)
         y = np.arange(grid.y[0] - margin, grid.y[1] + margin + step, step)

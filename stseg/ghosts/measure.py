@@ -6,7 +6,9 @@ background speaks against it inside, other people's pixels say nothing (they may
 foreground with probability o is o their own and 1 - o background. Less what is the same for all pillars R of the
 lattice, one view says of each
 
-    looks * sum_R (2 o OWN + (1 - o) BACKGROUND) / area of a body of mean size     nats.
+    looks * sum_R (2 o OWN + (1 - o) BACKGROUND) / area of a body of mean size     nats,
+
+the weights those of `ghosts.views`.
 
 HW12 averages over R, which never rewards a pillar for covering more of the person. Its weight of the background is lost
 in the scan; here it is what makes a pixel that is half foreground say nothing, so that edges lie where people's do.
@@ -20,9 +22,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import expit
 
-from stseg.arrays import Floats
+from stseg.arrays import Flags, Floats, Singles
 from stseg.config import GhostConfig
 from stseg.ghosts.own import Own
 from stseg.ghosts.pool import Pool
@@ -30,8 +31,6 @@ from stseg.ghosts.refine import Places
 from stseg.ghosts.sizes import Sizes
 from stseg.ghosts.views import PixelView, Sight, View
 
-OWN, BACKGROUND = 5.0, -10.0
-"""Weights of labels (eq. 27)."""
 _WITHIN = 3.0
 """How far the lattice goes, standard deviations of people's sizes."""
 _STEPS = 13
@@ -59,12 +58,11 @@ def measure(
     found = Sizes.of_anybody(len(width), config)
     steps = np.linspace(-_WITHIN, _WITHIN, _STEPS)
     heights, widths = config.height_mean + config.height_spread * steps, config.width_mean + config.width_spread * steps
-    values = [_label_values(sight) if sight and len(sight.raster) else None for sight in sights]
     for j in range(len(width)):
         told = [
-            _Told(view, view.row_sums(value, mine.pixels))
-            for view, value, mine in zip(views, values, own[j], strict=True)
-            if isinstance(view, PixelView) and value is not None
+            _Told(view, sight.label_values, mine.pixels)
+            for view, sight, mine in zip(views, sights, own[j], strict=True)
+            if isinstance(view, PixelView) and sight is not None
         ]
         place, one = np.tile(places.ground[j], (_STEPS, 1)), np.ones(_STEPS)
         if not told:
@@ -78,16 +76,11 @@ def measure(
 
 
 class _Told(NamedTuple):
-    """What one view shows of one person: the label values of their pixels, summed along rows."""
+    """What one view shows of one person: the label values (v, u), and which pixels are open to them."""
 
     view: PixelView
-    sums: Floats
-
-
-def _label_values(sight: Sight) -> Floats:
-    """What each pixel of a raster (v, u) says of a pillar that covers it, if it is open to the person."""
-    own = expit(sight.raster.astype(float))
-    return np.asarray(2 * OWN * own + BACKGROUND * (1 - own))
+    values: Singles
+    open_pixels: Flags
 
 
 def _posterior(lattice: Floats, score: Floats, steps: Floats) -> tuple[float, float]:
@@ -102,7 +95,7 @@ def _posterior(lattice: Floats, score: Floats, steps: Floats) -> tuple[float, fl
 def _score(fits: Pool, told: Sequence[_Told]) -> Floats:
     """What all views say of one person's pillars, nats, float64 (pillar,)."""
     score = np.zeros(len(fits))
-    for view, sums in told:
-        first, spans, area = view.outlines(fits.ground, fits.height, fits.width)
-        score += view.means(sums, first, spans, np.full(len(fits), area.mean()))
+    for view, values, open_pixels in told:
+        sums, area = view.open_sums(values, open_pixels, fits.ground, fits.height, fits.width)
+        score += sums / max(area.mean(), 1.0)
     return score

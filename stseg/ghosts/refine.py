@@ -97,6 +97,6 @@ def _patch_score(view: View, sight: Sight, mine: Own, patch: Floats, tried: Floa
         fill_match(view.table.boxes_of(everywhere, tall), edges, belief, columns, rows, match)
         score = np.maximum(match, WORST).reshape(score.shape)
     if isinstance(view, PixelView):
-        first, spans, area = view.outlines(everywhere, tall, wide)
-        score = view.mean_open(sight.raster, mine.pixels, first, spans, area).reshape(score.shape)
+        sums, area = view.open_sums(sight.raster, mine.pixels, everywhere, tall, wide)
+        score = np.divide(sums, area, out=np.zeros_like(sums), where=area > 0).reshape(score.shape)
     return score

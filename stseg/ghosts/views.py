@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+from scipy.special import expit
 
 from stseg.accelerate import kernel
 from stseg.arrays import Boxes, Flags, Floats, Ints, Singles
@@ -13,8 +15,10 @@ from stseg.geometry import Camera, Grid
 from stseg.geometry.bodies import WIDTH, BodyTable
 from stseg.ghosts.boxes import fill_best_match, fill_inside
 from stseg.ghosts.evidence import Spans
-from stseg.ghosts.outlines import outlines
+from stseg.ghosts.outlines import outlines, sums_inside
 
+OWN, BACKGROUND = 5.0, -10.0
+"""Weights of a person's own pixels and of background inside their pillar (HW12 eq. 27)."""
 _BODY_ROWS = 30
 _LEAST_INSIDE = 0.02
 _OPTIMISM = 0.3
@@ -39,6 +43,12 @@ class Sight:
     belief: Floats
     raster: Singles
 
+    @cached_property
+    def label_values(self) -> Singles:
+        """What each pixel says of the size of a pillar that covers it, if it is open to the person: float32 (v, u)."""
+        own = expit(self.raster)
+        return np.asarray(2 * OWN * own + BACKGROUND * (1 - own), np.float32)
+
 
 class View:
     """Pillars of a ground lattice in one camera."""
@@ -62,8 +72,11 @@ class View:
         Areas are those of people of mean size there: a pillar that covers more of somebody must not count as less.
         """
         first, spans, area = outlines(self.table, ground, heights, self.step, self.shape, widths / WIDTH)
-        mean = self.config.height_mean * self.config.width_mean
-        return first, spans, area * (mean / (heights * widths))
+        return first, spans, self._fair(area, heights, widths)
+
+    def _fair(self, area: Floats, heights: Floats, widths: Floats) -> Floats:
+        """Areas of outlines as if people were of mean size there."""
+        return area * (self.config.height_mean * self.config.width_mean / (heights * widths))
 
 
 class BoxView(View):
@@ -127,11 +140,12 @@ class PixelView(View):
         sums = self.row_sums(sight.raster, free)
         return np.stack([self.means(sums, *outlines) for outlines in self.lattice])
 
-    def mean_open(self, raster: Singles, open_pixels: Flags, first: Ints, spans: Spans, area: Floats) -> Floats:
-        """Weighted mean log-odds inside outlines of the open pixels (v, u), nats, float64 (n,)."""
-        means = np.zeros(len(first))
-        _fill_open_means(raster, open_pixels, first, spans, area, means)
-        return means * self.config.body_weight
+    def open_sums(
+        self, values: Singles, open_pixels: Flags, ground: Floats, heights: Floats, widths: Floats
+    ) -> tuple[Floats, Floats]:
+        """Weighted sums of the open pixels (v, u) inside pillars (sizes in metres), and their areas, float64 (n,)."""
+        sums, area = sums_inside(self.table, ground, heights, widths / WIDTH, self.step, values, open_pixels)
+        return sums * self.config.body_weight, self._fair(area, heights, widths)
 
     def row_sums(self, raster: Singles | Floats, free: Flags) -> Floats:
         """Sums of the free pixels (v, u) along rows, from the left, float64 (v, u + 1)."""
@@ -157,20 +171,6 @@ def _fill_span_means(sums: Floats, first: Ints, spans: Spans, area: Floats, mean
             for k in range(min(spans.shape[1], rows - first[i])):
                 total += sums[first[i] + k, spans[i, k, 1]] - sums[first[i] + k, spans[i, k, 0]]
             means[i] = total / area[i]
-
-
-@kernel
-def _fill_open_means(
-    raster: Singles, open_pixels: Flags, first: Ints, spans: Spans, area: Floats, means: Floats
-) -> None:
-    """The same from the raster itself: for few outlines that is less work than the sums of all of it."""
-    for i in range(len(first)):
-        total = 0.0
-        for k in range(min(spans.shape[1], len(raster) - first[i]) if first[i] >= 0 else 0):
-            for u in range(spans[i, k, 0], spans[i, k, 1]):
-                if open_pixels[first[i] + k, u]:
-                    total += raster[first[i] + k, u]
-        means[i] = total / area[i] if first[i] >= 0 else 0.0
 
 
 @kernel
