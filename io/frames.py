@@ -19,6 +19,7 @@ from types import TracebackType
 from stseg.arrays import Floats, Observation
 from stseg.errors import ConfigError, SourceError
 from stseg.geometry import Camera
+from stseg.io.pictures import reduced_view
 from stseg.io.recording import CameraSource, Recording
 from stseg.io.streams import Stream, open_stream
 
@@ -58,8 +59,8 @@ class Streams:
 class _Feed:
     """A stream that is asked for frames of the recording rather than its own."""
 
-    def __init__(self, camera: Camera, source: CameraSource, stream: Stream) -> None:
-        self.camera, self.source, self._stream = camera, source, stream
+    def __init__(self, camera: Camera, source: CameraSource, stream: Stream, factor: int) -> None:
+        self.camera, self.source, self._stream, self._factor = camera, source, stream, factor
         self._next = 0
         self.end = math.inf
         """The recording's frame at which the stream ended; infinite while it goes on."""
@@ -79,7 +80,7 @@ class _Feed:
             self.end = self._next + self.source.offset
         else:
             self._next += 1
-        return view
+        return reduced_view(view, self._factor)
 
     def run_out(self) -> tuple[Floats, ...]:
         """Pass over all frames, to learn where the stream ends; their times."""
@@ -224,7 +225,8 @@ def read_camera(
     """
     camera, source = recording.rig.cameras[camera_index], recording.sources[camera_index]
     times = None if streams is None else streams.times[camera_index]
-    with closing(_Feed(camera, source, open_stream(source.source, camera, times))) as feed:
+    factor = recording.factors[camera_index]
+    with closing(_Feed(camera, source, open_stream(source.source, camera, times), factor)) as feed:
         for frame in frames:
             yield feed.read(frame)
 
@@ -249,14 +251,15 @@ def read_background(recording: Recording, camera_index: int) -> Iterator[Observa
         raise SourceError(recording.path, f"camera {camera.name}, background", "none", "a source of the empty scene")
     with closing(open_stream(background, camera)) as stream:
         while (view := stream.read()) is not None:
-            yield view
+            yield reduced_view(view, recording.factors[camera_index])
 
 
 def _open_feeds(recording: Recording, opened: ExitStack, streams: Streams | None = None) -> list[_Feed]:
     feeds: list[_Feed] = []
     times = [None] * len(recording.sources) if streams is None else streams.times
-    for camera, source, own in zip(recording.rig.cameras, recording.sources, times, strict=True):
-        feeds.append(_Feed(camera, source, open_stream(source.source, camera, own)))
+    cameras = zip(recording.rig.cameras, recording.sources, times, recording.factors, strict=True)
+    for camera, source, own, factor in cameras:
+        feeds.append(_Feed(camera, source, open_stream(source.source, camera, own), factor))
         opened.callback(feeds[-1].close)
     return feeds
 

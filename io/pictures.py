@@ -7,7 +7,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from stseg.arrays import AnyArray
+from stseg.arrays import AnyArray, Observation
 from stseg.errors import SourceError
 from stseg.io.indexed_png import decode_indexed, stores_numbers
 from stseg.io.recording import SourceKind
@@ -43,6 +43,15 @@ def read_picture(path: Path, kind: SourceKind, size: tuple[int, int], key: str) 
     if picture is None:
         raise SourceError(path, key, "a broken file", "an image that decodes")
     return as_observation(picture, kind, size, path, key)
+
+
+def reduced_view(view: Observation, factor: int) -> Observation:
+    """A colour frame reduced by a whole factor, each pixel the mean of a square; what is no colour frame stays."""
+    if factor == 1 or not isinstance(view, np.ndarray) or view.ndim != 3:
+        return view
+    height, width = view.shape[0] // factor, view.shape[1] // factor
+    whole = view[: height * factor, : width * factor]
+    return cv2.resize(whole, (width, height), interpolation=cv2.INTER_AREA)
 
 
 def _decode(data: bytes, kind: SourceKind) -> AnyArray | None:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
-from stseg.geometry import Rig
+from stseg.geometry import Camera, Rig
+from stseg.geometry.reduction import greatest_reduction
 
 SourceKind = Literal["video", "masks", "images", "instances", "boxes"]
 SOURCE_KINDS: tuple[SourceKind, ...] = ("video", "masks", "images", "instances", "boxes")
@@ -68,3 +69,24 @@ class Recording:
     path: Path
     rig: Rig
     sources: tuple[CameraSource, ...]
+    reduction: tuple[int, ...] = ()
+    """Whole factors by which the cameras' colour frames are reduced as they are read; empty for frames as they are."""
+
+    @property
+    def factors(self) -> tuple[int, ...]:
+        """The reduction of every camera, 1 for none."""
+        return self.reduction or (1,) * len(self.sources)
+
+    @property
+    def read_rig(self) -> Rig:
+        """The rig of the frames as they are read."""
+        return self.rig.reduced(self.reduction) if self.reduction else self.rig
+
+    def reduced(self, rows: float) -> Recording:
+        """The recording with its colour frames reduced as far as standing people still span so many rows."""
+        cameras = zip(self.rig.cameras, self.sources, strict=True)
+        return replace(self, reduction=tuple(self._factor(camera, own, rows) for camera, own in cameras))
+
+    def _factor(self, camera: Camera, own: CameraSource, rows: float) -> int:
+        colour = own.source.kind in ("video", "images")
+        return greatest_reduction(camera, self.rig.grid, rows) if colour else 1

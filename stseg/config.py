@@ -107,10 +107,16 @@ class ForegroundConfig(MixtureConfig):
 
     model: Literal["auto", "mixture", "chromatic", "codebook"] = "auto"
     """Which background model; auto is the one that is best where nothing is known of the scene."""
+    body_rows: float = 60.0
+    """Rows of a standing person that are enough: larger images are reduced by whole factors; 10000 for none."""
     chromatic: ChromaticConfig = field(default_factory=ChromaticConfig)
     """Constants of the chromatic mixture."""
     codebook: CodebookConfig = field(default_factory=CodebookConfig)
     """Constants of the codebook."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        require(self.body_rows > 0, self, "body_rows", "rows, above 0")
 
 
 @dataclass(frozen=True)

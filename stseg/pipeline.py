@@ -21,6 +21,7 @@ from stseg.arrays import Flags, Floats, Ints, Observation, Rows
 from stseg.config import Config
 from stseg.foreground.sight import Sight
 from stseg.geometry import Rig
+from stseg.geometry.bodies import BodyTable
 from stseg.ghosts.expected import Expected
 from stseg.ghosts.explain import FramePass
 from stseg.ghosts.people import Explanation, People
@@ -170,14 +171,19 @@ class Pipeline:
         scene = Scene(moment.frame, explanation.people, explanation.ghosts, log_odds)
         return scene, Shown(moment.views, seen), _Explained(explanation, rates)
 
-    def finished(self, committed: Rows, events: Rows) -> tuple[Tracks, Ints]:
-        """The tracks of the whole run from all committed rows and events, and the identity of each committed row."""
+    def finished(self, committed: Rows, events: Rows, shown: Rig | None = None) -> tuple[Tracks, Ints]:
+        """The tracks of the whole run from all committed rows and events, and the identity of each committed row.
+
+        Boxes are in the pixels of the rig `shown`, where it is not this one.
+        """
         rate, config = self.rig.frame_rate, self.config
         if self.tracker.final:
             whole = own_tracks(committed, events, rate, config.identity)
         else:
             whole = whole_tracks(committed, events, rate, self.frame_pass.border, config.identity, config.ghosts)
         tables = [view.table for view in self.frame_pass.views]
+        if shown is not None:
+            tables = [BodyTable.of(camera, shown.grid) for camera in shown.cameras]
         return Tracks(whole.trajectory, box_rows(tables, whole.trajectory), whole.events), whole.identity
 
 

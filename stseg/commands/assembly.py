@@ -44,7 +44,7 @@ def assemble(job: Job, pipeline: Pipeline, made: Sequence[Made], output: Path, o
         run = read_run(path)
         seams.add(Part(segment.first, run.trajectory, run.events))
     joined = seams.joined()
-    tracks, identity = pipeline.finished(joined.committed, joined.events)
+    tracks, identity = pipeline.finished(joined.committed, joined.events, job.recording.rig)
     views: Bytes = pipeline.occupancy.views
     config = format_config(job.config)
     with RunWriter(output, job.recording, views, config, overwrite=overwrite, kept=job.volume) as writer:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from copy import deepcopy
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Literal
 
@@ -54,11 +55,16 @@ class Job:
     stop: int
     streams: Streams
 
+    @cached_property
+    def read(self) -> Recording:
+        """The recording as it is read: with images no larger than the foreground needs."""
+        return self.recording.reduced(self.config.foreground.body_rows)
+
     def pipeline(self) -> Pipeline:
         """The stages, which see nothing yet."""
         sources = [source.source.kind for source in self.recording.sources]
         kinds = ["boxes" if kind in ("boxes", "instances") else "pixels" for kind in sources]
-        return Pipeline(self.recording.rig, [], kinds, self.config, self.tracker)
+        return Pipeline(self.read.read_rig, [], kinds, self.config, self.tracker)
 
 
 class SegmentWork:
@@ -78,7 +84,7 @@ class SegmentWork:
         views: Bytes = self.pipeline.occupancy.views
         pipeline = self.pipeline.seeing_by(self.sights(segment))
         with (
-            open_frames(job.recording, segment.lead, job.stop, job.streams) as moments,
+            open_frames(job.read, segment.lead, job.stop, job.streams) as moments,
             RunWriter(
                 draft, job.recording, views, format_config(job.config), overwrite=True, kept=job.volume
             ) as writer,
@@ -95,7 +101,7 @@ class SegmentWork:
         job = self.job
         part = background_part(job.config.segments, job.recording.rig.frame_rate, job.first, job.stop, segment.first)
         if part != self._part or not self._learned:
-            self._learned = make_sights(job.recording, job.config, job.first, job.stop, segment.first, job.streams)
+            self._learned = make_sights(job.read, job.config, job.first, job.stop, segment.first, job.streams)
             self._part = part
         return deepcopy(self._learned)
 

@@ -56,7 +56,7 @@ def _sight(
     if recording.sources[camera].source.kind not in ("video", "images"):
         return Sight()
     frame_rate = recording.rig.frame_rate
-    model = make_background(recording.rig.cameras[camera].size, frame_rate, config.foreground)
+    model = make_background(recording.read_rig.cameras[camera].size, frame_rate, config.foreground)
     if recording.sources[camera].background is None:
         model.learn_from(_colours(recording, camera, sampled(part, config.segments), streams))
     else:

@@ -9,7 +9,7 @@ import numpy as np
 from stseg.arrays import Flags, Floats
 from stseg.errors import CalibrationError
 from stseg.geometry.lens import Lens
-from stseg.geometry.planes import plane_homography
+from stseg.geometry.planes import plane_homography, reduction
 
 _SINGULAR = 1e12
 
@@ -77,6 +77,14 @@ class Camera:
     def centre(self) -> Floats:
         """The camera's centre in metres (x, y, z), float64 (3,)."""
         return np.asarray(-np.linalg.solve(self.projection[:, :3], self.projection[:, 3]))
+
+    def reduced(self, factor: int) -> Camera:
+        """The view in images reduced by a whole factor; the rest at their right and lower edges is left out."""
+        width, height = self.size
+        lens = None if self.lens is None else self.lens.reduced(factor)
+        smaller = reduction(factor)
+        size = (width // factor, height // factor)
+        return Camera(self.name, size, smaller @ self.ground, smaller @ self.vertical, lens)
 
     def plane(self, height: float) -> Floats:
         """Homography of the plane at `height` metres, float64 (3, 3)."""

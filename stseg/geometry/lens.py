@@ -12,6 +12,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from stseg.arrays import Flags, Floats
+from stseg.geometry.planes import reduction
 
 _UNDISTORT_ROUNDS = 50
 
@@ -73,6 +74,10 @@ class Lens:
             miss = np.abs(target - self._bend(ray)).max(axis=-1)
             unfolded = (miss < 1e-9) & (np.hypot(ray[..., 0], ray[..., 1]) < self.fold)
         return self._pixel(np.where(unfolded[..., None], ray, np.nan))
+
+    def reduced(self, factor: int) -> Lens:
+        """The lens of images reduced by a whole factor, each pixel the mean of a square."""
+        return Lens(reduction(factor) @ self.matrix, self.distortion)
 
     def _ray(self, pixel: Floats) -> Floats:
         offset = np.asarray(pixel, float) - self.matrix[:2, 2]

@@ -32,6 +32,12 @@ def plane_homography(ground: Floats, vertical: Floats, height: float) -> Floats:
     return np.asarray(ground + height * np.outer(vertical, _E3))
 
 
+def reduction(factor: int) -> Floats:
+    """From pixels to those of an image reduced by a whole factor, each the mean of a square; float64 (3, 3)."""
+    corner = (1 / factor - 1) / 2
+    return np.array([[1 / factor, 0.0, corner], [0.0, 1 / factor, corner], [0.0, 0.0, 1.0]])
+
+
 def vanishing_line(ground: Floats) -> Floats:
     """The ground's vanishing line in the image, l^T = e3^T H^-1, float64 (3,)."""
     return np.asarray(np.linalg.inv(ground)[2])

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -32,6 +33,11 @@ class Rig:
     frame_rate: float
     grid: Grid
     cameras: tuple[Camera, ...]
+
+    def reduced(self, factors: Sequence[int]) -> Rig:
+        """The rig with each camera's images reduced by a whole factor."""
+        cameras = tuple(camera.reduced(factor) for camera, factor in zip(self.cameras, factors, strict=True))
+        return replace(self, cameras=cameras)
 
     def require_sight(self) -> None:
         """Raise CalibrationError for a camera that sees no cell of the area on any plane."""
