@@ -51,7 +51,7 @@ def reduced_view(view: Observation, factor: int) -> Observation:
         return view
     height, width = view.shape[0] // factor, view.shape[1] // factor
     whole = view[: height * factor, : width * factor]
-    return cv2.resize(whole, (width, height), interpolation=cv2.INTER_AREA)
+    return np.asarray(cv2.resize(whole, (width, height), interpolation=cv2.INTER_AREA), np.uint8)
 
 
 def _decode(data: bytes, kind: SourceKind) -> AnyArray | None:
