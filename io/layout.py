@@ -71,7 +71,7 @@ ABOUT = {
     "events": "birth, death, merge, split, hand-over, dropped; other is the other track, 0 for none",
     "ghosts": "one row per candidate and frame: status 1 true, 0 ghost; evidence in nats, parts what each view says",
     "windows": "one row per window: half-open ranges of frames; energy of the cut in units of energy_quantum, nats",
-    "rates": "one row per window and view: how often the view misses bodies and shows what is not there, 0..1",
+    "rates": "one row per window and view: how often the view errs, 0..1, and how far beside people it is, metres",
     "timings": "seconds per stage and window; window -1 for work that belongs to none",
 }
 """Every table and what it holds."""
@@ -79,7 +79,7 @@ ABOUT = {
 ADDED = frozenset({"rates"})
 """Tables that the first files of this version lack: readers take them as empty."""
 
-ADDED_COLUMNS = frozenset({"width"})
+ADDED_COLUMNS = frozenset({"width", "aside"})
 """Columns of floats that the first files of this version lack in some tables: readers take them as nan."""
 
 

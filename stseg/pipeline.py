@@ -75,7 +75,7 @@ class Step:
     candidates : CANDIDATE (n,), parts : float32 (n, view)
         Every candidate of the frames, true or ghost, and what each view says of it, nats.
     rates : RATES (view,)
-        By which the last of the frames was fused.
+        By which the last of the frames was fused; `aside` of all of them.
     timings : TIMING (k,)
     """
 
@@ -199,19 +199,28 @@ def _inside(frame: Ints, first: int, stop: int) -> Flags:
 
 
 def _step(commit: Commit, explained: dict[int, _Explained], watch: Stopwatch) -> Step:
-    rows, parts = [], []
+    rows, parts, aside = [], [], []
     for scene in commit.scenes:
         explanation, rates = explained.pop(scene.frame)
+        aside.append(explanation.aside)
         for status, weighed in ((1, explanation.people), (0, explanation.ghosts)):
             rows.append(_candidate_rows(scene.frame, status, weighed))
             parts.append(weighed.parts.T)
+    rates["aside"] = _mean_told(np.array(aside))
     window = int(commit.windows["index"][0]) if len(commit.windows) else commit.scenes[0].frame
     return Step(commit, np.concatenate(rows), np.concatenate(parts).astype(np.float32), rates, watch.take(window))
+
+
+def _mean_told(values: Floats) -> Floats:
+    """Mean over frames (frame, view) of what is not nan; nan where everything is."""
+    told = np.isfinite(values)
+    return np.where(told.any(0), np.where(told, values, 0).sum(0) / np.maximum(told.sum(0), 1), np.nan)
 
 
 def _rate_rows(frame: int, level: Level) -> Rows:
     rows = np.zeros(len(level.rates), RATES)
     rows["frame"], rows["view"], rows["filled"] = frame, np.arange(len(rows)), level.filled_share
+    rows["aside"] = np.nan
     rows["miss"], rows["clutter"], rows["beside"] = np.array(level.rates).T
     return rows
 

@@ -103,9 +103,10 @@ RATES = np.dtype(
         ("clutter", "<f4"),  # how often the ray of an empty cell meets foreground where nobody is near
         ("beside", "<f4"),  # the same within reach of a person
         ("filled", "<f4"),  # share of the cells within reach of a person that bodies fill, of all views together
+        ("aside", "<f4"),  # how far to the right of where all views put people this one sees them, metres
     ]
 )
-"""One row per window and view: the rates by which the window's last frame was fused."""
+"""One row per window and view: the rates by which its last frame was fused; `aside`, nan where untold, its mean."""
 
 
 @dataclass(frozen=True)

@@ -62,7 +62,7 @@ def fill(writer: RunWriter) -> None:
         writer.append_frames(FRAMES[part], log_odds[part], label[part])
         bounds = (index, FRAMES[part][0], FRAMES[part][-1] + 1, FRAMES[part][0], FRAMES[part][-1] + 1)
         writer.append("windows", np.array([(*bounds, 12345, 1e-6, 7)], WINDOW))
-        rates = [(FRAMES[part][-1], view, 0.2, 0.05 / (index + 1), 0.4, 0.25) for view in range(2)]
+        rates = [(FRAMES[part][-1], view, 0.2, 0.05 / (index + 1), 0.4, 0.25, 0.02) for view in range(2)]
         writer.append("rates", np.array(rates, RATES))
         writer.append("timings", np.array([(b"cut", index, 1.5), (b"volume", index, 0.5)], TIMING))
     writer.append("trajectory", small_trajectory())

@@ -16,7 +16,6 @@ from stseg.calibrate.bystanders import tables_of
 from stseg.calibrate.check import Check, check_rig, in_words
 from stseg.calibrate.coverage import coverage
 from stseg.calibrate.sightings import sightings
-from stseg.calibrate.watch import ViewWatch
 from stseg.commands.calibrate import app
 from stseg.errors import ConfigError, OutputError
 from stseg.foreground.sight import Sight
@@ -142,26 +141,6 @@ class TestBlunders:
         check, words = judged(RIG, boxes)
         assert 3 in check.lost
         assert any("cam4 shows only" in sentence for sentence in words)
-
-
-class TestWatch:
-    def test_a_run_is_warned(self) -> None:
-        watch, sound = ViewWatch(moved(RIG, 1, "u", 30.0)), ViewWatch(RIG)
-        for frame in range(40):
-            seen = [Boxes(np.concatenate([b[:, :2], b[:, 2:] - b[:, :2]], 1), np.ones(len(b))) for b in SHOWN[frame]]
-            watch.add(frame, seen)
-            sound.add(frame, seen)
-        (words,) = watch.warnings()
-        assert words.startswith("cam2 is off")
-        assert sound.warnings() == []
-        assert ViewWatch(RIG).warnings() == []
-
-    def test_its_memory_does_not_grow(self) -> None:
-        watch = ViewWatch(RIG)
-        for frame in range(2000):
-            watch.add(frame, [None] * 4)
-        assert 80 <= len(watch._shown) <= 160
-        assert watch.warnings() == []
 
 
 def test_coverage_counts_views() -> None:

@@ -122,7 +122,7 @@ def test_nobody_explained_is_the_plain_localisation() -> None:
     maps = noise(5)
     nobody = found(people())
     owner, free = (np.full((96, 128), -1, np.int16),) * 4, (np.zeros(0, np.int64),) * 4
-    explanation = Explanation(nobody, nobody, owner, (1,) * 4, free)
+    explanation = Explanation(nobody, nobody, owner, (1,) * 4, free, np.full(4, np.nan))
     localiser = Localiser(COARSE, "footprint")
     rates = [Rates(FEW_HEIGHTS.pixel_miss, FEW_HEIGHTS.pixel_clutter, FEW_HEIGHTS.pixel_clutter)] * 4
     plain = localiser.log_odds(maps, localiser.clutter_weights(maps), rates, OccupancyConfig().occupied)

@@ -40,7 +40,9 @@ def explained(rig: Rig, standing: Floats, owner: Sequence[Ints] | None = None, s
     blank = np.full((-(-height // step), -(-width // step)), -1, np.int16)
     owners = [blank] * views if owner is None else [np.asarray(o, np.int16) for o in owner]
     free = tuple(np.zeros(0, np.int64) for _ in range(views))
-    return Explanation(found(standing, views=views), nobody, tuple(owners), (step,) * views, free)
+    return Explanation(
+        found(standing, views=views), nobody, tuple(owners), (step,) * views, free, np.full(views, np.nan)
+    )
 
 
 def flat(value: float) -> Singles:

@@ -54,7 +54,14 @@ class EveryCandidate(FramePass):
         )  # fmt: skip
         owner = tuple(np.full(view.shape, -1, np.int16) for view in self.views)
         boxes = tuple(np.full(len(sight.edges) if sight else 0, -1, np.int64) for sight in sights)
-        return Explanation(people, _none_of(people), owner, tuple(view.step for view in self.views), boxes)
+        return Explanation(
+            people,
+            _none_of(people),
+            owner,
+            tuple(view.step for view in self.views),
+            boxes,
+            np.full(len(self.views), np.nan),
+        )
 
     def _candidates(self, sights: Sequence[Sight | None], prior: Prior) -> tuple[Pool, Floats]:
         """Candidates worth a person, and what each view says of them, nats, float64 (view, n)."""

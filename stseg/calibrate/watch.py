@@ -1,52 +1,76 @@
-"""A run's own look at its rig: which view disagrees with the others by more than a cell, said at its end."""
+"""A run's own look at its rig: which views see people beside where all views put them, and from when on.
+
+What `ghosts.aside` measures of each frame, window by window. A view that is wrong draws the places of people towards
+itself, so that what is told is less than its error, and views along the same line of sight are aside too: with three
+views, or with two that face each other, places alone cannot tell which is wrong, and all that are as far off are named.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import dataclass
 
-from stseg.arrays import Boxes, Floats, Singles
-from stseg.calibrate.blunders import all_bystanders
-from stseg.calibrate.bystanders import tables_of
-from stseg.calibrate.sightings import sightings
-from stseg.calibrate.verdict import judge
-from stseg.geometry import Rig
+import numpy as np
 
-_MOST = 160
-"""Frames that are kept; when there are more, every second one goes, and half as many are taken from then on."""
+from stseg.arrays import Floats
+from stseg.calibrate.drift import Knock, find_knocks
+
+_LEAST = 5
+"""Windows in which a view must have told of somebody."""
+_CLEAR = 3.0
+"""Standard errors that a view must be aside."""
+_ALIKE = 0.6
+"""Share of the most that any view is aside, from which on a view is named too."""
 
 
-class ViewWatch:
-    """Boxes of some frames of a run, evenly spread however long it becomes.
+@dataclass(frozen=True)
+class Aside:
+    """A view that sees people beside their places.
+
+    Attributes
+    ----------
+    view
+        Its number.
+    metres
+        To its right, in the median.
+    """
+
+    view: int
+    metres: float
+
+
+def views_aside(aside: Floats, cell: float) -> list[Aside]:
+    """The views that are aside most, if that is by more than a cell; the farthest first.
 
     Parameters
     ----------
-    rig
-        The rig that the run goes by.
+    aside : float64 (window, view)
+        Metres; nan where a view tells nothing.
+    cell
+        Side of a cell, metres.
     """
+    median = np.array([_clear_median(own[np.isfinite(own)]) for own in aside.T])
+    order = np.argsort(-np.abs(median), kind="stable")
+    farthest = float(np.abs(median).max(initial=0.0))
+    named = [int(view) for view in order if abs(median[view]) >= _ALIKE * farthest]
+    return [Aside(view, float(median[view])) for view in named] if farthest > cell else []
 
-    def __init__(self, rig: Rig) -> None:
-        self.rig = rig
-        self._every = 1
-        self._shown: dict[int, list[Floats]] = {}
 
-    def add(self, frame: int, seen: Sequence[Boxes | Singles | None]) -> None:
-        """Take what the views show at a frame."""
-        if frame % self._every:
-            return
-        self._shown[frame] = [sightings(one, camera.size) for one, camera in zip(seen, self.rig.cameras, strict=True)]
-        if len(self._shown) > _MOST:
-            self._every *= 2
-            self._shown = {kept: boxes for kept, boxes in self._shown.items() if kept % self._every == 0}
+def _clear_median(told: Floats) -> float:
+    """The median, 0 where too little is told or that is not clear."""
+    if len(told) < _LEAST:
+        return 0.0
+    median = float(np.median(told))
+    error = 1.4826 * float(np.median(np.abs(told - median))) / np.sqrt(len(told))
+    return median if abs(median) > _CLEAR * error else 0.0
 
-    def warnings(self) -> list[str]:
-        """A sentence for each view that is off by more than a cell; nothing where all is well or little is known."""
-        if len(self.rig.cameras) < 3 or not self._shown:
-            return []
-        tables = tables_of(self.rig)
-        people = all_bystanders(self.rig, tables, self._shown, sorted(self._shown))
-        verdict = judge(self.rig, tables, people)
-        return [
-            f"{self.rig.cameras[one.view].name} is off: feet {100 * one.feet:.0f} cm, heads {100 * one.heads:.0f} cm "
-            "from where the other views say"
-            for one in verdict.named
-        ]
+
+def knocked(aside: Floats, cell: float) -> Knock | None:
+    """The view that is aside by another half a cell or more from one window on: the one where that is clearest.
+
+    The knock's frame is the index of a window; what is before and after it is in metres.
+    """
+    steps = [(side, knock) for side in (1.0, -1.0) for knock in find_knocks(side * aside, cell / 2)]
+    if not steps:
+        return None
+    side, knock = max(steps, key=lambda step: abs(step[1].before - step[1].after))
+    return Knock(knock.view, knock.frame, side * knock.before, side * knock.after, knock.errors)

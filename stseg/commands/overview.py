@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from stseg.commands.warnings_of_run import run_warnings
 from stseg.io.runs import Run
-from stseg.report.findings import REASONS, ghost_reasons, ground_by_views, people_per_minute, view_warnings
+from stseg.report.findings import REASONS, ghost_reasons, ground_by_views, people_per_minute
 
 _BLIND_SHARE = 0.05  # of the ground that no view sees, from which on it is worth a warning
 
@@ -143,4 +144,4 @@ def _warnings(run: Run, shares: list[float]) -> list[str]:
         warnings.append("no view sees any cell")
     elif shares[0] > _BLIND_SHARE:
         warnings.append(f"no view sees {100 * shares[0]:.0f} % of the ground")
-    return warnings + view_warnings(run.cameras, run.ghosts, run.frames, run.frame_rate)
+    return warnings + run_warnings(run)

@@ -8,6 +8,7 @@ import numpy as np
 
 from stseg.arrays import Rows
 from stseg.commands.overview import seconds_by_stage
+from stseg.commands.warnings_of_run import run_warnings
 from stseg.evaluation import evaluate
 from stseg.geometry import Camera, Grid
 from stseg.io.runs import Run
@@ -15,7 +16,7 @@ from stseg.report.answers import answers
 from stseg.report.charts import Span, clock_time
 from stseg.report.embedded import embedded_json
 from stseg.report.figures import Figure, Instant, camera_figures, ground_figures, slice_figures
-from stseg.report.findings import GhostReasons, ghost_reasons, ground_by_views, says, view_warnings
+from stseg.report.findings import GhostReasons, ghost_reasons, ground_by_views, says
 from stseg.report.maps import Bins, Haunt, blind_map, density, dwell, haunts, heat_map
 from stseg.report.page import Contents, Sight
 from stseg.report.sheets import thin_sheets
@@ -50,7 +51,7 @@ def page_contents(
         title=run.scene,
         facts=[*_facts(run, span), *_scores(trajectory, truth)],
         answers=answers(span, *counts, ghosts, places, shares),
-        warnings=view_warnings(run.cameras, run.ghosts, run.frames, run.frame_rate),
+        warnings=run_warnings(run),
         span=span,
         trajectory=trajectory,
         tracks=run.tracks,

@@ -17,6 +17,7 @@ from stseg.commands.cluster import make_by_cluster
 from stseg.commands.labels import require_pixels, write_labels
 from stseg.commands.progress import frame_bar
 from stseg.commands.segment_work import Job, SegmentWork, VolumeKind
+from stseg.commands.warnings_of_run import rig_warnings
 from stseg.commands.workers import make_by_workers
 from stseg.errors import ConfigError
 from stseg.identity.segments import Segment, segments
@@ -100,6 +101,8 @@ def run(
         tracks = assemble(job, job.pipeline(), made, output, overwrite)
         folder.remove()
     people = len(np.unique(tracks.trajectory["id"]))
+    for warning in rig_warnings(read_run(output)):
+        print(f"stseg: warning: {warning}", file=sys.stderr)
     print(f"{output}: {people} tracks in frames {first} to {stop - 1}")
     if labels is not None:
         done = read_run(output)

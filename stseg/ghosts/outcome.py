@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from stseg.arrays import Floats, Ints
+from stseg.ghosts.aside import aside
 from stseg.ghosts.frame import Frame
 from stseg.ghosts.people import Explanation, People
 from stseg.ghosts.pool import Pool
@@ -28,7 +29,8 @@ def explanation(frame: Frame) -> Explanation:
         p if isinstance(v, PixelView) else _painted(v, exact) for v, p in zip(views, frame.pixel_owner, strict=True)
     ]
     owner = tuple(p.astype(np.int16) for p in painted)
-    return Explanation(people, _ghosts(frame, total), owner, tuple(v.step for v in views), tuple(frame.box_owner))
+    told = aside(exact, views, frame.seen.sights, frame.box_owner)
+    return Explanation(people, _ghosts(frame, total), owner, tuple(v.step for v in views), tuple(frame.box_owner), told)
 
 
 def _prior(frame: Frame, candidates: Ints, walker: Ints) -> Floats:

@@ -71,6 +71,8 @@ class Explanation:
         Image pixels to a raster pixel of `owner`, for each view.
     box_owner : tuple of int64 arrays (box,)
         For each view with boxes the person whom each box shows, -1 for nobody; empty for other views.
+    aside : float64 (view,)
+        How far beside their places each view sees people, metres (see `ghosts.aside`); nan where it tells nothing.
     """
 
     people: People
@@ -78,3 +80,4 @@ class Explanation:
     owner: tuple[NDArray[np.int16], ...]
     raster_step: tuple[int, ...]
     box_owner: tuple[Ints, ...]
+    aside: Floats
