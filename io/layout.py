@@ -14,7 +14,7 @@ import numpy as np
 
 from stseg.arrays import Floats
 from stseg.geometry import Grid
-from stseg.tracks import BOX, CANDIDATE, EVENT, RATES, TIMING, TRACK, TRAJECTORY, WINDOW
+from stseg.tracks import BOX, CANDIDATE, EVENT, RATES, SHIFT, TIMING, TRACK, TRAJECTORY, WINDOW
 
 FORMAT = "stseg-run"
 VERSION = 1
@@ -72,11 +72,12 @@ ABOUT = {
     "ghosts": "one row per candidate and frame: status 1 true, 0 ghost; evidence in nats, parts what each view says",
     "windows": "one row per window: half-open ranges of frames; energy of the cut in units of energy_quantum, nats",
     "rates": "one row per window and view: how often the view errs, 0..1, and how far beside people it is, metres",
+    "shifts": "every other second, how far a colour view's picture has moved since its background was learned, pixels",
     "timings": "seconds per stage and window; window -1 for work that belongs to none",
 }
 """Every table and what it holds."""
 
-ADDED = frozenset({"rates"})
+ADDED = frozenset({"rates", "shifts"})
 """Tables that the first files of this version lack: readers take them as empty."""
 
 ADDED_COLUMNS = frozenset({"width", "aside"})
@@ -93,6 +94,7 @@ def table_types(views: int) -> dict[str, np.dtype[np.void]]:
         "ghosts": ghost_type(views),
         "windows": WINDOW,
         "rates": RATES,
+        "shifts": SHIFT,
         "timings": TIMING,
     }
 

@@ -96,6 +96,11 @@ class Run:
         return self._table("rates")
 
     @cached_property
+    def shifts(self) -> Rows:
+        """SHIFT (n,); empty in a file that has none."""
+        return self._table("shifts")
+
+    @cached_property
     def timings(self) -> Rows:
         """TIMING (n,)."""
         return self._table("timings")
@@ -116,8 +121,8 @@ class Run:
         Parameters
         ----------
         table
-            trajectory, tracks, boxes, events, ghosts, windows, rates or timings. Texts are strings; what each view says
-            of a candidate is one column a view, `parts_CAMERA`.
+            trajectory, tracks, boxes, events, ghosts, windows, rates, shifts or timings. Texts are strings; what each
+            view says of a candidate is one column a view, `parts_CAMERA`.
 
         Raises
         ------

@@ -109,6 +109,10 @@ RATES = np.dtype(
 """One row per window and view: the rates by which its last frame was fused; `aside`, nan where untold, its mean."""
 
 
+SHIFT = np.dtype([("frame", "<i8"), ("view", "<i4"), ("u", "<f4"), ("v", "<f4")])
+"""How far a colour view's picture has moved since its background was learned, pixels, every other second."""
+
+
 @dataclass(frozen=True)
 class Tracks:
     """What a tracker found.

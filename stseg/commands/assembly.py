@@ -19,7 +19,7 @@ from stseg.tracks import Tracks
 
 _FRAMES = 64
 """Frames of the volume in memory at a time."""
-_COPIED = ("ghosts", "windows", "rates", "timings")
+_COPIED = ("ghosts", "windows", "rates", "shifts", "timings")
 
 
 class Made(NamedTuple):

@@ -13,6 +13,7 @@ import numpy as np
 
 from stseg.arrays import Bytes, Ints, Labels, Singles
 from stseg.commands.sights import background_part, make_sights
+from stseg.commands.view_shifts import ViewShifts
 from stseg.config import Config
 from stseg.foreground.sight import Sight
 from stseg.geometry.near import near_person
@@ -83,16 +84,18 @@ class SegmentWork:
 
         views: Bytes = self.pipeline.occupancy.views
         pipeline = self.pipeline.seeing_by(self.sights(segment))
+        shifts = ViewShifts(pipeline.sights, job.read.factors, job.recording.rig.frame_rate)
         with (
             open_frames(job.read, segment.lead, job.stop, job.streams) as moments,
             RunWriter(
                 draft, job.recording, views, format_config(job.config), overwrite=True, kept=job.volume
             ) as writer,
         ):
-            for step in pipeline.steps(moments, segment.lead, fused):
+            for step in pipeline.steps(shifts.seen(moments), segment.lead, fused):
                 self._write(step, segment, writer)
                 if step.commit.scenes[-1].frame >= segment.stop - 1:
                     break
+            writer.append("shifts", shifts.rows(segment.first, segment.stop))
             writer.finish(np.zeros(0, TRACK))
         return keep_segment(draft)
 
