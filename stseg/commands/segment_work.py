@@ -15,7 +15,7 @@ from stseg.commands.sights import background_part, make_sights
 from stseg.config import Config
 from stseg.foreground.sight import Sight
 from stseg.geometry.near import near_person
-from stseg.identity.segments import Segment
+from stseg.identity.segments import Segment, find_gaps, longest_absence, segments
 from stseg.io.config_file import format_config
 from stseg.io.frames import Streams, open_frames
 from stseg.io.layout import ghost_type
@@ -54,6 +54,13 @@ class Job:
     stop: int
     streams: Streams
 
+    def segments(self) -> list[Segment]:
+        """What the run is divided into, in the order of time."""
+        rate = self.recording.rig.frame_rate
+        longest = longest_absence(self.config.identity) * rate
+        gaps = find_gaps(self.streams.seen(self.recording), self.first, self.stop, longest)
+        return segments(rate, self.config, self.first, self.stop, gaps)
+
     def pipeline(self) -> Pipeline:
         """The stages, which see nothing yet."""
         sources = [source.source.kind for source in self.recording.sources]
@@ -78,7 +85,7 @@ class SegmentWork:
         views: Bytes = self.pipeline.occupancy.views
         pipeline = self.pipeline.seeing_by(self.sights(segment))
         with (
-            open_frames(job.recording, segment.lead, job.stop, job.streams) as moments,
+            open_frames(job.recording, segment.lead, segment.end, job.streams) as moments,
             RunWriter(
                 draft, job.recording, views, format_config(job.config), overwrite=True, kept=job.volume
             ) as writer,
