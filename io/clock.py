@@ -187,12 +187,15 @@ def _believed(camera: _Files, others: Sequence[_Files], rate: float) -> tuple[St
     if source.clock == "stamps":
         return stamps, ""
     if not stamps.steady:
-        return stamps, "its time stamps vary, and place its frames"
-    said = f"its time stamps say {stamps.rate * rate:.5g} frames per second, the rig {rate:.5g}"
+        return (
+            stamps,
+            'the time stamps vary; each moment is shown by the frame nearest to it (clock = "count" would count)',
+        )
+    said = f"the time stamps say {stamps.rate * rate:.4g} frames per second, the rig {rate:.4g}"
     vouching = [other for other in others if other.keeps_rate or other.source.clock == "stamps"]
     if not vouching or _same_count(camera, stamps, vouching):
-        return None, f'{said}; its frames are counted (clock = "stamps" would go by the stamps)'
-    return stamps, f'{said}; each moment is shown by the nearest frame (clock = "count" would count them)'
+        return None, f'{said}; the frames are counted (clock = "stamps" would go by the stamps)'
+    return stamps, f'{said}; each moment is shown by the frame nearest to it (clock = "count" would count)'
 
 
 def _same_count(camera: _Files, stamps: Stamps, vouching: Sequence[_Files]) -> bool:
