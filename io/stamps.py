@@ -19,6 +19,8 @@ _RESOLUTION = 0.002
 """How far a stamp may be off by the rounding of containers, seconds."""
 _ROUNDED = 1e-5
 """How far a rate may be off by its rounding in the rig file (29.97 for 30000 / 1001), relative."""
+_LEAP = 24 * 3600.0
+"""What no two frames of one file lie apart, seconds: such stamps are broken."""
 _REGULAR = 0.5
 """How far frames may lie from the ticks of their numbers and still be theirs, ticks."""
 
@@ -53,7 +55,7 @@ class Stamps:
 
 
 def read_stamps(times: Sequence[Floats], frame_rate: float, paths: Sequence[Path], starts: Floats) -> Stamps | None:
-    """What the stamps of a camera's files say; None where there are none, or they do not rise.
+    """What the stamps of a camera's files say; None where there are none, or they do not rise, or leap by a day.
 
     AVI states a rate and no times: what decoders make of B-frames and empty chunks in it is no clock.
 
@@ -74,7 +76,7 @@ def read_stamps(times: Sequence[Floats], frame_rate: float, paths: Sequence[Path
         Where a file starts before the one before has ended.
     """
     files = [(own - own[:1]) / 1000 * frame_rate for own in times]
-    if not all(np.isfinite(own).all() and (np.diff(own) > 0).all() for own in files):
+    if not all(np.isfinite(own).all() and _rises(np.diff(own), _LEAP * frame_rate) for own in files):
         return None
     steps = np.concatenate([np.diff(own) for own in files])
     if not len(steps):
@@ -86,6 +88,10 @@ def read_stamps(times: Sequence[Floats], frame_rate: float, paths: Sequence[Path
         return None
     period = mean if steady else float(np.median(steps))
     return Stamps(joined(files, period, frame_rate, paths, starts), period, steady)
+
+
+def _rises(steps: Floats, leap: float) -> bool:
+    return bool(((steps > 0) & (steps < leap)).all())
 
 
 def joined(files: Sequence[Floats], period: float, frame_rate: float, paths: Sequence[Path], starts: Floats) -> Floats:

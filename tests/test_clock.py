@@ -142,7 +142,7 @@ def test_another_rate_goes_on_over_borders() -> None:
     assert stamps.steady
 
 
-@pytest.mark.parametrize("times", [[0.0, 100, 100], [0.0, 100, 0], [np.nan] * 3, [0.0, 0.0, 0.0]])
+@pytest.mark.parametrize("times", [[0.0, 100, 100], [0.0, 100, 0], [np.nan] * 3, [0.0, 0.0, 0.0], [0.0, 100, 1e8]])
 def test_stamps_that_do_not_rise_are_none(times: list[float]) -> None:
     assert read_stamps([np.array(times)], RATE, [Path("x.mkv")], NONE) is None
 
