@@ -144,8 +144,7 @@ def _parts(job: Job) -> list[Segment]:
     total, length = job.stop - job.first, max(1, round(_SECONDS / _PLACES * job.recording.rig.frame_rate))
     length = min(length, max(1, total // _PLACES))
     begins = [job.first + (total - length) * place // (_PLACES - 1) for place in range(_PLACES)]
-    some = begins if total > _PLACES else begins[:1]
-    return [Segment(k, begin, begin, begin + length, job.stop) for k, begin in enumerate(some)]
+    return [Segment(k, begin, begin, begin + length) for k, begin in enumerate(begins) if k == 0 or total > _PLACES]
 
 
 class _Clock:

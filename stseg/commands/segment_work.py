@@ -54,12 +54,14 @@ class Job:
     stop: int
     streams: Streams
 
+    def gaps(self) -> list[tuple[int, int]]:
+        """Frames of the run that no camera shows, for longer than anybody is waited for: half-open ranges."""
+        longest = longest_absence(self.config.identity) * self.recording.rig.frame_rate
+        return find_gaps(self.streams.seen(self.recording), self.first, self.stop, longest)
+
     def segments(self) -> list[Segment]:
         """What the run is divided into, in the order of time."""
-        rate = self.recording.rig.frame_rate
-        longest = longest_absence(self.config.identity) * rate
-        gaps = find_gaps(self.streams.seen(self.recording), self.first, self.stop, longest)
-        return segments(rate, self.config, self.first, self.stop, gaps)
+        return segments(self.recording.rig.frame_rate, self.config, self.first, self.stop, self.gaps())
 
     def pipeline(self) -> Pipeline:
         """The stages, which see nothing yet."""
@@ -74,6 +76,7 @@ class SegmentWork:
     def __init__(self, job: Job) -> None:
         self.job, self.pipeline = job, job.pipeline()
         self._part, self._learned = range(0), list[Sight]()
+        self._ends = [*(begin for begin, _ in job.gaps()), job.stop]
 
     def make(self, segment: Segment, draft: Path, advance: Callable[[int], None]) -> Path:
         """Write a segment's file; its name at the end. `advance` is told how many more of its frames were fused."""
@@ -84,8 +87,9 @@ class SegmentWork:
 
         views: Bytes = self.pipeline.occupancy.views
         pipeline = self.pipeline.seeing_by(self.sights(segment))
+        end = min(end for end in self._ends if end >= segment.stop)
         with (
-            open_frames(job.recording, segment.lead, segment.end, job.streams) as moments,
+            open_frames(job.recording, segment.lead, end, job.streams) as moments,
             RunWriter(
                 draft, job.recording, views, format_config(job.config), overwrite=True, kept=job.volume
             ) as writer,

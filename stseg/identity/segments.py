@@ -30,15 +30,12 @@ class Segment:
         The first frame that is looked at; the frames from there to `first` are the warm-up.
     first, stop
         The frames that are committed, half open; those of all segments partition the run, but for its gaps.
-    end
-        Where the run ends, or the next gap begins: nothing after that is looked at.
     """
 
     index: int
     lead: int
     first: int
     stop: int
-    end: int
 
 
 def segments(
@@ -94,6 +91,6 @@ def _parts(frame_rate: float, config: Config, first: int, stop: int) -> list[Seg
     inner = [frame for frame in range(step + shared // 2, stop - length, step) if frame > first]
     bounds = [first, *inner, stop]
     return [
-        Segment(k, first if k == 0 else max(first, bounds[k] - warm_up), bounds[k], bounds[k + 1], stop)
+        Segment(k, first if k == 0 else max(first, bounds[k] - warm_up), bounds[k], bounds[k + 1])
         for k in range(len(bounds) - 1)
     ]
