@@ -22,7 +22,7 @@ from stseg.arrays import Flags, Floats, Ints
 from stseg.errors import SourceError
 from stseg.io.recording import CameraSource, Recording
 from stseg.io.source_files import parts_of
-from stseg.io.stamps import Stamps, joined, read_stamps, require_starts
+from stseg.io.stamps import Stamps, are_stated, joined, read_stamps, require_starts
 
 _JITTER = 0.5
 """How much farther than the last frame a new one may lie and be shown instead, ticks: else a camera whose frames lie
@@ -51,10 +51,11 @@ class Clock:
 
 @dataclass(frozen=True)
 class _Files:
-    """One camera's files: what their stamps say, and where their frames lie by their numbers alone."""
+    """One camera's files: whether they state times, what these say, and where the frames lie by their numbers alone."""
 
     name: str
     source: CameraSource
+    states: bool
     stamps: Stamps | None
     counted: Floats
 
@@ -169,7 +170,7 @@ def _files(name: str, source: CameraSource, times: Sequence[Floats], rate: float
     require_starts(source.source.starts, len(paths), source.source.path, f"camera {name}, source.starts")
     starts = np.array(source.source.starts, float)
     counted = joined([np.arange(float(len(own))) for own in times], 1.0, rate, paths, starts)
-    return _Files(name, source, read_stamps(times, rate, paths, starts), counted)
+    return _Files(name, source, are_stated(times, paths), read_stamps(times, rate, paths, starts), counted)
 
 
 def _believed(camera: _Files, others: Sequence[_Files], rate: float) -> tuple[Stamps | None, str]:
@@ -181,7 +182,7 @@ def _believed(camera: _Files, others: Sequence[_Files], rate: float) -> tuple[St
         if source.clock == "stamps":
             found = "files without time stamps that rise"
             raise SourceError(source.source.path, f"camera {camera.name}, clock", found, 'some, or clock = "count"')
-        return None, ""
+        return None, "the time stamps do not rise, or leap by a day; the frames are counted" if camera.states else ""
     if camera.regular:
         return None, ""
     if source.clock == "stamps":

@@ -90,6 +90,11 @@ def read_stamps(times: Sequence[Floats], frame_rate: float, paths: Sequence[Path
     return Stamps(joined(files, period, frame_rate, paths, starts), period, steady)
 
 
+def are_stated(times: Sequence[Floats], paths: Sequence[Path]) -> bool:
+    """Whether a camera's files claim to say when each of their frames was taken."""
+    return all(np.isfinite(own).all() for own in times) and not any(map(_is_avi, paths))
+
+
 def _rises(steps: Floats, leap: float) -> bool:
     return bool(((steps > 0) & (steps < leap)).all())
 

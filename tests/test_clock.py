@@ -214,6 +214,13 @@ def test_avi_holds_no_times(tmp_path: Path) -> None:
     assert decided((video(str(path)), WAVERING)) == Clock((None,), ())
 
 
+def test_stamps_that_are_broken_are_told() -> None:
+    clock = decided((video(), np.array([0.0, 1, 1, 2])), (video(), np.full(4, np.nan)))
+    assert clock == Clock(
+        (None, None), ("cam1: the time stamps do not rise, or leap by a day; the frames are counted",)
+    )
+
+
 @pytest.mark.parametrize("blind", [False, True])
 def test_ends_that_nearly_meet_are_made_to(blind: bool) -> None:
     missing = "blind" if blind else "error"
