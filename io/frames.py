@@ -4,6 +4,10 @@ A recording's frames count from 0. A camera with offset o shows frame f of the r
 positive offset is a camera that started late and a negative one a camera that started early. A camera whose
 `on_missing` is "blind" sees nothing before its start and after its end; the others must be there from the first frame
 that is asked for and must end together, and there the recording ends (where all may be blind, with the longest).
+
+That is so where a camera's frames are counted. Where their times are known, and are not those of their numbers, the
+camera shows a frame of the recording in the own frame that was taken nearest to then, and is blind where there is none
+(`stseg.io.clock`).
 """
 
 from __future__ import annotations
@@ -16,9 +20,12 @@ from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from types import TracebackType
 
-from stseg.arrays import Floats, Observation
+import numpy as np
+
+from stseg.arrays import Flags, Floats, Ints, Observation
 from stseg.errors import ConfigError, SourceError
 from stseg.geometry import Camera
+from stseg.io.clock import clock_of, placed, seen
 from stseg.io.pictures import reduced_view
 from stseg.io.recording import CameraSource, Recording
 from stseg.io.streams import Stream, open_stream
@@ -50,10 +57,31 @@ class Streams:
         Frames of the recording.
     times : float64 (n,) each
         Of every frame of each file of each camera, milliseconds; nan where the source states none.
+    shown : int64 (tick,) or None each
+        `CameraSource.shown` of each camera.
+    notes
+        What a user should be told of it, one line each.
     """
 
     length: int
     times: tuple[tuple[Floats, ...], ...]
+    shown: tuple[Ints | None, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    def seen(self, recording: Recording) -> Flags:
+        """Which frames of the recording that was counted each camera shows, bool (camera, length)."""
+        counts = [sum(map(len, own)) for own in self.times]
+        return seen(placed(recording, self.shown), counts, self.length)
+
+    def shared(self, recording: Recording) -> tuple[int, int]:
+        """The part of it that two cameras show, where none must be there all the time; else all of it.
+
+        Two views tell where somebody is; of what one alone shows, at the beginning and the end, little can be told.
+        """
+        if any(source.on_missing == "error" for source in recording.sources):
+            return 0, self.length
+        told = np.flatnonzero(self.seen(recording).sum(axis=0) >= min(2, len(recording.sources)))
+        return (int(told[0]), int(told[-1]) + 1) if len(told) else (0, self.length)
 
 
 class _Feed:
@@ -62,6 +90,7 @@ class _Feed:
     def __init__(self, camera: Camera, source: CameraSource, stream: Stream, factor: int) -> None:
         self.camera, self.source, self._stream, self._factor = camera, source, stream, factor
         self._next = 0
+        self._last: Observation = None
         self.end = math.inf
         """The recording's frame at which the stream ended; infinite while it goes on."""
 
@@ -71,11 +100,23 @@ class _Feed:
 
     def read(self, frame: int) -> Observation:
         """The view at a frame not before the last one asked for; None where the camera is blind."""
-        own = frame - self.source.offset
-        if own < 0 or self.end < math.inf:
+        tick, shown = frame - self.source.offset, self.source.shown
+        if tick < 0 or self.end < math.inf:
             return None
-        self._next += self._stream.skip(own - self._next)
-        view = self._stream.read() if self._next == own else None
+        if shown is None:
+            return self._own(tick)
+        if tick >= len(shown):
+            self.end = len(shown) + self.source.offset
+            return None
+        own = int(shown[tick])
+        if own >= self._next:
+            self._last = self._own(own)
+        return None if own < 0 else self._last
+
+    def _own(self, number: int) -> Observation:
+        """One of the stream's own frames, not before the last that was read."""
+        self._next += self._stream.skip(number - self._next)
+        view = self._stream.read() if self._next == number else None
         if view is None:
             self.end = self._next + self.source.offset
         else:
@@ -83,10 +124,13 @@ class _Feed:
         return reduced_view(view, self._factor)
 
     def run_out(self) -> tuple[Floats, ...]:
-        """Pass over all frames, to learn where the stream ends; their times."""
-        times = self._stream.times()
-        self.end = sum(map(len, times)) + self.source.offset
-        return tuple(times)
+        """Pass over all frames; their times."""
+        return tuple(self._stream.times())
+
+    def place(self, source: CameraSource, frames: int) -> None:
+        """Learn which of the stream's frames shows when, and so where it ends."""
+        self.source = source
+        self.end = source.offset + (frames if source.shown is None else len(source.shown))
 
     def close(self) -> None:
         self._stream.close()
@@ -162,7 +206,7 @@ def open_frames(
     first, stop
         The recording's frames to read, half open; they keep their numbers. None: to the end.
     streams
-        What `count_streams` told: a far first frame is then sought.
+        What `count_streams` told: frames are then placed in time, and a far first one is sought.
 
     Returns
     -------
@@ -179,7 +223,7 @@ def open_frames(
     if first < 0 or (stop is not None and stop < first):
         found = f"{first}:{'' if stop is None else stop}"
         raise ConfigError(recording.path, "frames", found, "first:stop, with 0 <= first <= stop")
-    return FrameReader(recording, first, stop, streams)
+    return FrameReader(placed(recording, streams.shown) if streams else recording, first, stop, streams)
 
 
 def count_frames(recording: Recording) -> int:
@@ -188,7 +232,7 @@ def count_frames(recording: Recording) -> int:
 
 
 def count_streams(recording: Recording) -> Streams:
-    """How many frames a recording has, and when they were taken, found by decoding every stream to its end.
+    """How many frames a recording has, and which frames of the cameras show them, by decoding all to their ends.
 
     Raises
     ------
@@ -198,8 +242,11 @@ def count_streams(recording: Recording) -> Streams:
     with ExitStack() as opened:
         feeds = _open_feeds(recording, opened)
         pool = opened.enter_context(ThreadPoolExecutor(_threads(recording)))
-        times = [counted.result() for counted in [pool.submit(feed.run_out) for feed in feeds]]
-        return Streams(int(_length(feeds)), tuple(times))
+        times = tuple(counted.result() for counted in [pool.submit(feed.run_out) for feed in feeds])
+    clock = clock_of(recording, times)
+    for feed, source, own in zip(feeds, placed(recording, clock.shown).sources, times, strict=True):
+        feed.place(source, sum(map(len, own)))
+    return Streams(int(_length(feeds)), times, clock.shown, clock.notes)
 
 
 def read_camera(
@@ -216,14 +263,15 @@ def read_camera(
     frames
         Numbers of the recording's frames, rising.
     streams
-        What `count_streams` told, for far frames.
+        What `count_streams` told, for frames placed in time and far ones.
 
     Raises
     ------
     SourceError, FormatError
         Where the source is missing, broken or not of the camera's size.
     """
-    camera, source = recording.rig.cameras[camera_index], recording.sources[camera_index]
+    sources = placed(recording, streams.shown).sources if streams else recording.sources
+    camera, source = recording.rig.cameras[camera_index], sources[camera_index]
     times = None if streams is None else streams.times[camera_index]
     factor = recording.factors[camera_index]
     with closing(_Feed(camera, source, open_stream(source.source, camera, times), factor)) as feed:

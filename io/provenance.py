@@ -5,7 +5,7 @@ from __future__ import annotations
 import platform
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -15,7 +15,7 @@ import h5py
 import numpy as np
 
 from stseg import __version__
-from stseg.arrays import Rows
+from stseg.arrays import Ints, Rows
 from stseg.errors import SourceError
 from stseg.io.recording import Recording, Source
 from stseg.io.rig_text import format_rig
@@ -53,6 +53,8 @@ class Provenance:
     versions
         Of this package, Python and the libraries that compute.
     sources : SOURCE (n,)
+    shown
+        By camera, where its frames do not count themselves: `CameraSource.shown`, int64 (tick,).
     """
 
     created: str
@@ -61,6 +63,7 @@ class Provenance:
     rig_path: Path
     versions: Mapping[str, str]
     sources: Rows
+    shown: Mapping[str, Ints] = field(default_factory=dict)
 
 
 def gather_provenance(recording: Recording, config_text: str) -> Provenance:
@@ -73,6 +76,11 @@ def gather_provenance(recording: Recording, config_text: str) -> Provenance:
         path,
         _versions(),
         _sources(recording),
+        {
+            camera.name: source.shown
+            for camera, source in zip(recording.rig.cameras, recording.sources, strict=True)
+            if source.shown is not None
+        },
     )
 
 
@@ -85,6 +93,10 @@ def write_provenance(group: h5py.Group, provenance: Provenance) -> None:
     versions = [(name.encode(), number.encode()) for name, number in provenance.versions.items()]
     group["versions"] = np.array(versions, _VERSION)
     group.create_dataset("sources", data=provenance.sources, dtype=SOURCE)
+    for number, (camera, shown) in enumerate(provenance.shown.items()):
+        # By number: a camera's name may hold a slash.
+        dataset = group.create_dataset(f"shown/{number}", data=shown, compression="gzip", shuffle=True)
+        dataset.attrs["camera"] = camera
 
 
 def read_provenance(group: h5py.Group) -> Provenance:
@@ -96,6 +108,7 @@ def read_provenance(group: h5py.Group) -> Provenance:
         Path(group.attrs["rig_path"]),
         {name.decode(): number.decode() for name, number in group["versions"][:].tolist()},
         group["sources"][:],
+        {dataset.attrs["camera"]: dataset[:] for dataset in group.get("shown", {}).values()},
     )
 
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
+from stseg.arrays import Ints
 from stseg.geometry import Camera, Rig
 from stseg.geometry.reduction import greatest_reduction
 
 SourceKind = Literal["video", "masks", "images", "instances", "boxes"]
+Clock = Literal["auto", "stamps", "count"]
 SOURCE_KINDS: tuple[SourceKind, ...] = ("video", "masks", "images", "instances", "boxes")
 
 
@@ -27,6 +29,9 @@ class Source:
         File, folder or pattern (`frame_*.png`, `hour_*.mp4`), already relative to the rig file's folder.
     more
         Not for boxes: files, folders or patterns that go on where the one before ends.
+    starts
+        When each of the files begins, seconds after the camera's frame 0; empty where each begins as the one before
+        ends.
     first_frame
         boxes only: the number that the file gives to its first frame.
     frames
@@ -38,6 +43,7 @@ class Source:
     first_frame: int = 0
     frames: int | None = None
     more: tuple[Path, ...] = ()
+    starts: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,13 +59,20 @@ class CameraSource:
     offset
         Its frame k shows the scene at frame k + offset of the recording.
     on_missing
-        What to do where its stream ends early: an error, or a view that sees nothing from there on.
+        What to do where its stream starts late or ends early: an error, or a view that sees nothing there.
+    clock
+        What says when its frames were taken: the files' time stamps, their count, or what `stseg.io.clock` finds.
+    shown : int64 (tick,)
+        The camera's own frame that shows each tick of its clock, -1 where it is blind; None where frame k shows tick k,
+        or nothing is known yet.
     """
 
     source: Source
     background: Source | None = None
     offset: int = 0
     on_missing: Literal["error", "blind"] = "error"
+    clock: Clock = "auto"
+    shown: Ints | None = field(default=None, compare=False, repr=False)
 
 
 @dataclass(frozen=True)

@@ -62,7 +62,9 @@ def _stream_lines(streams: CameraSource, folder: Path) -> list[str]:
     if streams.background is not None:
         lines.append(f"background = {_source_text(streams.background, folder)}  # the empty scene")
     if streams.on_missing != "error":
-        lines.append(f"on_missing = {_text(streams.on_missing)}  # where the stream ends early")
+        lines.append(f"on_missing = {_text(streams.on_missing)}  # where the stream starts late or ends early")
+    if streams.clock != "auto":
+        lines.append(f"clock = {_text(streams.clock)}  # what says when its frames were taken")
     return lines
 
 
@@ -72,6 +74,8 @@ def _source_text(source: Source, folder: Path) -> str:
         entries.append(f"first_frame = {source.first_frame}")
     if source.frames is not None:
         entries.append(f"frames = {source.frames}")
+    if source.starts:
+        entries.append(f"starts = {_list(np.array(source.starts))}")
     return f"{{ {', '.join(entries)} }}"
 
 

@@ -15,15 +15,16 @@ from typing import Literal
 
 from stseg.errors import CalibrationError, OutputError, RigError
 from stseg.geometry import Camera, Grid, Lens, Rig
-from stseg.io.recording import SOURCE_KINDS, CameraSource, Recording, Source
+from stseg.io.recording import SOURCE_KINDS, CameraSource, Clock, Recording, Source
 from stseg.io.rig_text import FORMAT, format_rig
 from stseg.io.tables import ANY, Table
 
 _MOST_CELLS = 100_000_000  # of one frame's volume: beyond it a slip of the pen, not a scene
 _ON_MISSING: tuple[Literal["error", "blind"], ...] = ("error", "blind")
+_CLOCKS: tuple[Clock, ...] = ("auto", "stamps", "count")
 _CAMERA_KEYS = (
     *("name", "size", "ground", "vertical", "projection", "lens"),
-    *("offset", "source", "background", "on_missing"),
+    *("offset", "source", "background", "on_missing", "clock"),
 )
 
 
@@ -189,12 +190,13 @@ def _camera_source(table: Table) -> CameraSource:
     if background is not None and background.kind not in ("video", "images"):
         raise table.error("background.kind", repr(background.kind), "video or images: the empty scene in colour")
     offset = table.integer("offset") if "offset" in table else 0
-    return CameraSource(_source(table.table("source")), background, offset, on_missing)
+    clock = table.choice("clock", _CLOCKS) if "clock" in table else "auto"
+    return CameraSource(_source(table.table("source"), "starts"), background, offset, on_missing, clock)
 
 
-def _source(table: Table) -> Source:
+def _source(table: Table, *more_keys: str) -> Source:
     kind = table.choice("kind", SOURCE_KINDS)
-    counts = ("first_frame", "frames") if kind == "boxes" else ()
+    counts = ("first_frame", "frames") if kind == "boxes" else more_keys
     table.allow("kind", "path", *counts)
     first, *more = [table.file.parent / name for name in table.texts("path")]
     if more and kind == "boxes":
@@ -205,4 +207,5 @@ def _source(table: Table) -> Source:
         table.integer("first_frame") if "first_frame" in table else 0,
         table.integer("frames", least=1) if "frames" in table else None,
         tuple(more),
+        tuple(table.numbers("starts", ANY).tolist()) if "starts" in table else (),
     )

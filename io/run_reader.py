@@ -15,6 +15,7 @@ import numpy as np
 from stseg.arrays import Bytes, Floats, Ints, Labels, Rows, Singles
 from stseg.errors import FormatError
 from stseg.io import layout
+from stseg.io.clock import placed
 from stseg.io.data_frames import to_data_frame
 from stseg.io.provenance import Provenance, read_provenance
 from stseg.io.recording import Recording
@@ -113,7 +114,8 @@ class Run:
     @cached_property
     def recording(self) -> Recording:
         """The rig, with its grid, and the streams, as they were when the run began."""
-        return parse_rig(self.provenance.rig, self.provenance.rig_path)
+        told = self.provenance
+        return placed(parse_rig(told.rig, told.rig_path), [told.shown.get(name) for name in self.cameras])
 
     def data_frame(self, table: str) -> DataFrame:
         """One of the tables as a data frame of pandas, with `time` in seconds where it has frames.

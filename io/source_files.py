@@ -23,7 +23,7 @@ def parts_of(source: Source, key: str) -> list[Source]:
         Where a pattern of videos means none.
     """
     paths = [part for path in (source.path, *source.more) for part in _expanded(path, source.kind, key)]
-    return [replace(source, path=path, more=()) for path in paths]
+    return [replace(source, path=path, more=(), starts=()) for path in paths]
 
 
 def files_of(source: Source) -> Iterator[Path]:

@@ -1,7 +1,7 @@
 """What an unfinished run has done: the folder `RUN.h5.segments` beside its output.
 
     begun.json                  what is run: the same command goes on from here, any other is refused
-    streams.npz                 how long the streams are, counted once
+    streams.npz                 how long the streams are and when their frames were taken, counted once
     segment-00003-CHECKSUM.h5   the run file of one segment
     lock                        held by the run that writes here
 
@@ -132,7 +132,9 @@ class WorkFolder:
             with np.load(self.path / "streams.npz") as kept:
                 files = [range(int(count)) for count in kept["files"]]
                 times = tuple(tuple(kept[f"times{k}_{j}"] for j in own) for k, own in enumerate(files))
-                return Streams(int(kept["length"]), times)
+                placed = set(kept["placed"].tolist())
+                shown = tuple(kept[f"shown{k}"] if k in placed else None for k in range(len(files)))
+                return Streams(int(kept["length"]), times, shown, tuple(kept["notes"].tolist()))
         except (OSError, KeyError, ValueError, BadZipFile):
             return None
 
@@ -140,8 +142,16 @@ class WorkFolder:
         """Remember what was counted."""
         with replacing(self.path / "streams.npz", overwrite=True) as part, part.open("wb") as file:
             times = {f"times{k}_{j}": own for k, files in enumerate(streams.times) for j, own in enumerate(files)}
-            files = [len(own) for own in streams.times]
-            np.savez_compressed(file, length=streams.length, files=files, **times)  # type: ignore[arg-type]
+            shown = {k: own for k, own in enumerate(streams.shown) if own is not None}
+            np.savez_compressed(
+                file,
+                length=np.array(streams.length),
+                files=np.array([len(own) for own in streams.times]),
+                placed=np.array(list(shown), np.int64),
+                notes=np.array(streams.notes, str),
+                **times,  # type: ignore[arg-type]
+                **{f"shown{k}": own for k, own in shown.items()},  # type: ignore[arg-type]
+            )
 
     def remove(self) -> None:
         """Delete the folder, once the output stands."""

@@ -32,7 +32,7 @@ from stseg.config import Config
 from stseg.geometry import Grid
 from stseg.geometry.near import near_person
 from stseg.ghosts.explain import FramePass
-from stseg.io.frames import count_frames, open_frames
+from stseg.io.frames import count_streams, open_frames
 from stseg.io.rigs import read_rig
 from stseg.occupancy.level import inside_bodies
 from stseg.occupancy.volume import Occupancy
@@ -102,9 +102,11 @@ def measure(rig: Path, frames: slice) -> dict[str, Tally]:
 
 def _explained(rig: Path, kinds: list[str], frames: slice, config: Config) -> Iterator[tuple]:  # type: ignore[type-arg]
     recording = read_rig(rig)
-    first, stop, _ = frames.indices(count_frames(recording))
-    sights, frame_pass = make_sights(recording, config, first, stop), FramePass(recording.rig, kinds, config.ghosts)
-    with open_frames(recording, first, stop) as moments:
+    streams = count_streams(recording)
+    first, stop, _ = frames.indices(streams.length)
+    sights = make_sights(recording, config, first, stop, streams=streams)
+    frame_pass = FramePass(recording.rig, kinds, config.ghosts)
+    with open_frames(recording, first, stop, streams) as moments:
         for moment in moments:
             seen = [sight.evidence(view) for sight, view in zip(sights, moment.views, strict=True)]
             yield moment.frame, seen, frame_pass.explain(seen, None)

@@ -12,6 +12,7 @@ from stseg.arrays import Bytes, Ints, Rows
 from stseg.commands.segment_work import Job
 from stseg.identity.seams import Part, Seams, rename_labels
 from stseg.identity.segments import Segment
+from stseg.io.clock import placed
 from stseg.io.config_file import format_config
 from stseg.io.runs import Run, RunWriter, read_run
 from stseg.pipeline import Pipeline
@@ -39,15 +40,18 @@ class _Named(NamedTuple):
 
 def assemble(job: Job, pipeline: Pipeline, made: Sequence[Made], output: Path, overwrite: bool) -> Tracks:
     """Write the run file of a job from its segments, in their order; the pipeline is the job's."""
-    seams = Seams()
+    seams = Seams(round(job.config.identity.patience * job.recording.rig.frame_rate))
+    before = made[0].segment.first if made else 0
     for segment, path in made:
         run = read_run(path)
-        seams.add(Part(segment.first, run.trajectory, run.events))
+        seams.add(Part(segment.first, run.trajectory, run.events, segment.first - before))
+        before = segment.stop
     joined = seams.joined()
     tracks, identity = pipeline.finished(joined.committed, joined.events, job.recording.rig)
     views: Bytes = pipeline.occupancy.views
     config = format_config(job.config)
-    with RunWriter(output, job.recording, views, config, overwrite=overwrite, kept=job.volume) as writer:
+    recording = placed(job.recording, job.streams.shown)
+    with RunWriter(output, recording, views, config, overwrite=overwrite, kept=job.volume) as writer:
         for named in _named(made, joined.committed, joined.local, identity):
             _copy(named, writer)
         writer.append("trajectory", tracks.trajectory)

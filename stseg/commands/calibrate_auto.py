@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -31,7 +32,7 @@ from stseg.config import Config
 from stseg.errors import ConfigError
 from stseg.foreground.sight import Sight
 from stseg.geometry import Camera, Grid, Rig
-from stseg.io.frames import count_frames, open_frames
+from stseg.io.frames import Streams, count_streams, open_frames
 from stseg.io.outputs import require_new
 from stseg.io.recording import CameraSource, Recording, Source
 from stseg.io.rigs import write_rig
@@ -93,10 +94,13 @@ def calibrate_auto(
     streams = _streams(videos, output, frame_rate, background, source_kind)
     names = [camera.name for camera in streams.rig.cameras]
     known = None if distance is None else _distance(distance, names)
-    first, stop = _frames(frames, count_frames(streams))
-    sights = make_sights(streams, Config(), first, stop)
+    counted = count_streams(streams)
+    for note in counted.notes:
+        print(f"stseg: {note}", file=sys.stderr)
+    first, stop = _frames(frames, counted.length)
+    sights = make_sights(streams, Config(), first, stop, streams=counted)
     views = Views(
-        _ends(streams, sights, first, stop),
+        _ends(streams, counted, sights, first, stop),
         tuple(camera.size for camera in streams.rig.cameras),
         frame_rate,
         person_height,
@@ -146,10 +150,10 @@ def _streams(
     return Recording(output, Rig(output.stem, frame_rate, Grid((0.0, 1.0), (0.0, 1.0)), cameras), sources)
 
 
-def _ends(streams: Recording, sights: Sequence[Sight], first: int, stop: int) -> tuple[Ends, ...]:
+def _ends(streams: Recording, counted: Streams, sights: Sequence[Sight], first: int, stop: int) -> tuple[Ends, ...]:
     """Feet and heads of isolated people, frame by frame and view by view."""
     found: list[list[tuple[int, Floats]]] = [[] for _ in sights]
-    with open_frames(streams, first, stop) as moments, _bar("looking for people", stop - first) as (bar, task):
+    with open_frames(streams, first, stop, counted) as moments, _bar("looking for people", stop - first) as (bar, task):
         for moment in moments:
             for sight, view, ends in zip(sights, moment.views, found, strict=True):
                 likelihood = sight.evidence(view)

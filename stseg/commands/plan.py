@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -15,7 +16,7 @@ from stseg.commands.assembly import Made, assemble
 from stseg.commands.run import frame_range
 from stseg.commands.segment_work import Job, SegmentWork, VolumeKind
 from stseg.errors import ConfigError
-from stseg.identity.segments import Segment, segments
+from stseg.identity.segments import Segment
 from stseg.io.config_file import read_config
 from stseg.io.frames import count_streams
 from stseg.io.recording import Recording
@@ -103,7 +104,9 @@ def plan(
     start = perf_counter()
     streams = count_streams(recording)
     counting = perf_counter() - start
-    first, stop = frame_range(frames, streams.length)
+    for note in streams.notes:
+        print(f"stseg: {note}", file=sys.stderr)
+    first, stop = frame_range(frames, streams, recording)
     job = Job(recording, resolved, tracker, volume, first, stop, streams)
     told = forecast(job, counting, workers)
     print(json.dumps(asdict(told) | {"seconds": told.seconds}, indent=1) if as_json else _text(told, recording))
@@ -127,7 +130,7 @@ def forecast(job: Job, counting: float, workers: int) -> Forecast:
         watch = _Clock()
         assemble(job, work.pipeline, made, folder / "run.h5", overwrite=True)
         joining, size = watch.lap(), (folder / "run.h5").stat().st_size
-    cuts = segments(job.recording.rig.frame_rate, job.config, job.first, job.stop)
+    cuts = job.segments()
     looked_at = sum(segment.stop - segment.lead for segment in cuts)
     learned = -(-frames // round(job.config.segments.background * job.recording.rig.frame_rate))
     return Forecast(

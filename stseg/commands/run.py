@@ -20,7 +20,7 @@ from stseg.commands.segment_work import Job, SegmentWork, VolumeKind
 from stseg.commands.warnings_of_run import rig_warnings
 from stseg.commands.workers import make_by_workers
 from stseg.errors import ConfigError
-from stseg.identity.segments import Segment, segments
+from stseg.identity.segments import Segment
 from stseg.io.config_file import format_config, read_config
 from stseg.io.frames import Streams, count_streams
 from stseg.io.label_images import require_label_folder
@@ -94,9 +94,13 @@ def run(
     asked |= {"--frames": frames or "all", "--tracker": tracker, "--volume": volume}
     with WorkFolder(output, asked) as folder, _told_how_to_go_on(folder):
         streams = _streams(recording, folder)
-        first, stop = frame_range(frames, streams.length)
+        for note in streams.notes:
+            print(f"stseg: {note}", file=sys.stderr)
+        first, stop = frame_range(frames, streams, recording)
         job = Job(recording, resolved, tracker, volume, first, stop, streams)
-        plan = segments(recording.rig.frame_rate, resolved, first, stop)
+        plan = job.segments()
+        if not plan:
+            raise ConfigError("--frames", "", f"{first}:{stop}, which no camera shows", "a part that some camera shows")
         made = _make(job, plan, folder, Workforce(workers, scheduler))
         tracks = assemble(job, job.pipeline(), made, output, overwrite)
         folder.remove()
@@ -109,8 +113,8 @@ def run(
         print(f"{labels}: {write_labels(done, resolved, labels, done.frames, overwrite)} label images")
 
 
-def frame_range(text: str | None, length: int) -> tuple[int, int]:
-    """First and stop of a part of a recording.
+def frame_range(text: str | None, streams: Streams, recording: Recording) -> tuple[int, int]:
+    """First and stop of a part of a recording; where no text says which, of all that tells of places.
 
     Raises
     ------
@@ -118,7 +122,8 @@ def frame_range(text: str | None, length: int) -> tuple[int, int]:
         Where the text is no part of it.
     """
     if text is None:
-        return 0, length
+        return streams.shared(recording)
+    length = streams.length
     head, colon, tail = text.partition(":")
     if not colon or not all(part == "" or part.isdecimal() for part in (head, tail)):
         raise ConfigError("--frames", "", repr(text), "A:B, two whole numbers, half open")

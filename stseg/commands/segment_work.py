@@ -17,7 +17,7 @@ from stseg.commands.view_shifts import ViewShifts
 from stseg.config import Config
 from stseg.foreground.sight import Sight
 from stseg.geometry.near import near_person
-from stseg.identity.segments import Segment
+from stseg.identity.segments import Segment, find_gaps, longest_absence, segments
 from stseg.io.config_file import format_config
 from stseg.io.frames import Streams, open_frames
 from stseg.io.layout import ghost_type
@@ -61,6 +61,15 @@ class Job:
         """The recording as it is read: with images no larger than the foreground needs."""
         return self.recording.reduced(self.config.foreground.body_rows)
 
+    def gaps(self) -> list[tuple[int, int]]:
+        """Frames of the run that no camera shows, for longer than anybody is waited for: half-open ranges."""
+        longest = longest_absence(self.config.identity) * self.recording.rig.frame_rate
+        return find_gaps(self.streams.seen(self.recording), self.first, self.stop, longest)
+
+    def segments(self) -> list[Segment]:
+        """What the run is divided into, in the order of time."""
+        return segments(self.recording.rig.frame_rate, self.config, self.first, self.stop, self.gaps())
+
     def pipeline(self) -> Pipeline:
         """The stages, which see nothing yet."""
         sources = [source.source.kind for source in self.recording.sources]
@@ -74,6 +83,7 @@ class SegmentWork:
     def __init__(self, job: Job) -> None:
         self.job, self.pipeline = job, job.pipeline()
         self._part, self._learned = range(0), list[Sight]()
+        self._ends = [*(begin for begin, _ in job.gaps()), job.stop]
 
     def make(self, segment: Segment, draft: Path, advance: Callable[[int], None]) -> Path:
         """Write a segment's file; its name at the end. `advance` is told how many more of its frames were fused."""
@@ -85,8 +95,9 @@ class SegmentWork:
         views: Bytes = self.pipeline.occupancy.views
         pipeline = self.pipeline.seeing_by(self.sights(segment))
         shifts = ViewShifts(pipeline.sights, job.read.factors, job.recording.rig.frame_rate)
+        end = min(end for end in self._ends if end >= segment.stop)
         with (
-            open_frames(job.read, segment.lead, job.stop, job.streams) as moments,
+            open_frames(job.read, segment.lead, end, job.streams) as moments,
             RunWriter(
                 draft, job.recording, views, format_config(job.config), overwrite=True, kept=job.volume
             ) as writer,

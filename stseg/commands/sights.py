@@ -6,7 +6,8 @@ day and furniture that is moved matter little, and so that what a segment finds 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from typing import TypeVar
 
 import numpy as np
 
@@ -19,13 +20,16 @@ from stseg.foreground.sight import Sight
 from stseg.io.frames import Streams, read_background, read_camera
 from stseg.io.recording import Recording
 
+_Frames = TypeVar("_Frames", range, Sequence[int])
+
 
 def make_sights(
     recording: Recording, config: Config, first: int, stop: int, at: int | None = None, streams: Streams | None = None
 ) -> list[Sight]:
     """The foreground of every camera, in the rig's order, for frames from `at` on.
 
-    A colour camera learns its background from frames of the part of the run in which `at` lies. Where it has empty
+    A colour camera learns its background from frames of the part of the run in which `at` lies, and where it is blind
+    there, from the nearest in which it sees; one that sees nowhere learns nothing and is not asked. Where it has empty
     frames it learns those, and what has changed since from the part before.
 
     Parameters
@@ -58,13 +62,27 @@ def _sight(
     frame_rate = recording.rig.frame_rate
     model = make_background(recording.read_rig.cameras[camera].size, frame_rate, config.foreground)
     if recording.sources[camera].background is None:
-        model.learn_from(_colours(recording, camera, sampled(part, config.segments), streams))
+        frames = sampled(_seeing(recording, camera, part, streams), config.segments)
+        if len(frames):
+            model.learn_from(_colours(recording, camera, frames, streams))
     else:
         for empty in read_background(recording, camera):
             model.learn(np.asarray(empty, np.uint8))
         before = range(max(first, part.start - len(part)), part.start)
         model = _followed(model, recording, camera, config, before, streams)
     return Sight(LightWatch(model, frame_rate, config.light))
+
+
+def _seeing(recording: Recording, camera: int, part: range, streams: Streams | None) -> Sequence[int]:
+    """As many frames as a part has in which the camera sees: those of the part, then those nearest to it."""
+    if streams is None:
+        return part
+    frames = np.flatnonzero(streams.seen(recording)[camera])
+    begin, end = frames.searchsorted([part.start, part.stop]).tolist()
+    lacking = len(part) - (end - begin)
+    begin = max(0, min(begin - lacking // 2, len(frames) - len(part)))
+    nearest: list[int] = frames[begin : begin + len(part)].tolist()
+    return nearest
 
 
 def _followed(
@@ -82,13 +100,13 @@ def _followed(
     return paced.at_rate(frame_rate)
 
 
-def _colours(recording: Recording, camera: int, frames: range, streams: Streams | None) -> Iterator[Bytes]:
+def _colours(recording: Recording, camera: int, frames: Sequence[int], streams: Streams | None) -> Iterator[Bytes]:
     """What a colour camera shows in some frames, where it sees."""
     for image in read_camera(recording, camera, frames, streams):
         if image is not None:
             yield np.asarray(image, np.uint8)
 
 
-def sampled(part: range, config: SegmentConfig) -> range:
+def sampled(part: _Frames, config: SegmentConfig) -> _Frames:
     """Frames spread over a part of the recording."""
     return part[:: max(1, len(part) // config.samples)]

@@ -2,7 +2,8 @@
 
 A segment looks at the last frames of the one before as its warm-up, so both have tracks there. A track takes the name
 of the earlier track that it lies on in most of those frames, one to one; what nobody claims was born or has died at the
-seam. Meetings near a seam are decided anew with the whole run (`identity.relink`).
+seam. Meetings near a seam are decided anew with the whole run (`identity.relink`). Over a gap, which no camera saw and
+which is longer than anybody is waited for, no segment looks: all tracks end at it.
 """
 
 from __future__ import annotations
@@ -15,6 +16,8 @@ from stseg.arrays import Ints, Labels, Rows
 from stseg.identity.linking import assign, distances
 from stseg.tracks import EVENT, TRAJECTORY
 
+_Told = tuple[int, bytes, int, int, bytes]
+"""A row of EVENT."""
 _SAME = 0.35
 """Two segments' places of one person differ by less, metres."""
 
@@ -31,11 +34,14 @@ class Part:
         Also of its warm-up, the frames before `first`.
     events : EVENT (m,)
         Of the frames that it commits.
+    gap
+        Frames before `first` that no camera saw; 0 where it goes on from the part before.
     """
 
     first: int
     trajectory: Rows
     events: Rows
+    gap: int = 0
 
 
 @dataclass(frozen=True)
@@ -56,10 +62,16 @@ class Joined:
 
 
 class Seams:
-    """Joins segments in their order."""
+    """Joins segments in their order.
 
-    def __init__(self) -> None:
-        self.issued = 0
+    Parameters
+    ----------
+    patience
+        How long somebody may be unseen and still be the same, frames.
+    """
+
+    def __init__(self, patience: int = 0) -> None:
+        self.issued, self.patience = 0, patience
         self._joined: list[Joined] = []
 
     def add(self, part: Part) -> None:
@@ -83,6 +95,8 @@ class Seams:
         events["id"], events["other"] = names[events["id"]], names[events["other"]]
         told = [(frame, b"birth", names[i], 0, b"nobody known was near, where a segment begins") for frame, i in births]
         told += self._deaths(before, set(committed["id"].tolist()))
+        if part.gap:
+            told += self._ended(part)
         events = np.concatenate([events, np.array(told, EVENT)])
         self._joined.append(Joined(committed, rows["id"].copy(), events[np.argsort(events["frame"], kind="stable")]))
 
@@ -98,17 +112,30 @@ class Seams:
         rows = self._joined[-1].committed
         return np.asarray(rows[rows["frame"] >= lead["frame"].min()])
 
-    def _deaths(self, before: Rows, living: set[int]) -> list[tuple[int, bytes, int, int, bytes]]:
+    def _ended(self, part: Part) -> list[_Told]:
+        """Tracks that were still followed when the gap before a part began."""
+        rows = np.concatenate([one.committed for one in self._joined[-2:]] or [part.trajectory[:0]])
+        followed = rows[rows["frame"] >= part.first - part.gap - self.patience - 1]
+        said = np.concatenate([one.events for one in self._joined[-2:]] or [part.events[:0]])
+        reason = f"gap: no camera has any of the {part.gap} frames before frame {part.first}"
+        return _deaths(followed, _dead(said), reason)
+
+    def _deaths(self, before: Rows, living: set[int]) -> list[_Told]:
         """Tracks of the seam that do not go on and have not been said to end."""
         if not len(before):
             return []
-        said = self._joined[-1].events
-        dead = set(said["id"][said["kind"] == b"death"].tolist())
-        gone = sorted(set(before["id"].tolist()) - living - dead)
-        return [
-            (int(before["frame"][before["id"] == i].max()), b"death", i, 0, b"not found again where a segment ends")
-            for i in gone
-        ]
+        over = living | _dead(self._joined[-1].events)
+        return _deaths(before, over, "not found again where a segment ends")
+
+
+def _dead(events: Rows) -> set[int]:
+    return set(events["id"][events["kind"] == b"death"].tolist())
+
+
+def _deaths(rows: Rows, others: set[int], reason: str) -> list[_Told]:
+    """An event at the end of each track of these rows but for others."""
+    gone = sorted(set(rows["id"].tolist()) - others)
+    return [(int(rows["frame"][rows["id"] == i].max()), b"death", i, 0, reason.encode()) for i in gone]
 
 
 def rename_labels(label: Labels, frames: Ints, rows: Rows, identity: Ints) -> None:

@@ -7,10 +7,14 @@ alone. So a segment is the same whoever makes it and when: after a killed run, b
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from math import ceil
 
-from stseg.config import Config
+import numpy as np
+
+from stseg.arrays import Flags
+from stseg.config import Config, IdentityConfig
 from stseg.identity.windows import window_length
 
 
@@ -25,7 +29,7 @@ class Segment:
     lead
         The first frame that is looked at; the frames from there to `first` are the warm-up.
     first, stop
-        The frames that are committed, half open; those of all segments partition the run.
+        The frames that are committed, half open; those of all segments partition the run, but for its gaps.
     """
 
     index: int
@@ -34,11 +38,52 @@ class Segment:
     stop: int
 
 
-def segments(frame_rate: float, config: Config, first: int, stop: int) -> list[Segment]:
-    """The segments that cover frames first .. stop - 1; they begin where commit ranges of windows do.
+def segments(
+    frame_rate: float, config: Config, first: int, stop: int, gaps: Sequence[tuple[int, int]] = ()
+) -> list[Segment]:
+    """The segments that cover frames first .. stop - 1 but for gaps; they begin where commit ranges of windows do.
 
-    What is left at the end belongs to the last one if it is no longer than a window.
+    What is left at the end, and before a gap, belongs to the last one if it is no longer than a window. After a gap all
+    begins anew, as at the beginning of a run: neither a segment nor its warm-up reaches over one.
+
+    Parameters
+    ----------
+    frame_rate
+        Frames per second.
+    config
+        How long segments and windows are.
+    first, stop
+        The frames of the run, half open.
+    gaps
+        Frames that no camera shows, half open, in their order, within the run (`find_gaps`).
     """
+    begins, ends = [first, *(end for _, end in gaps)], [*(begin for begin, _ in gaps), stop]
+    parts = [part for begin, end in zip(begins, ends, strict=True) for part in _parts(frame_rate, config, begin, end)]
+    return [replace(part, index=k) for k, part in enumerate(parts)]
+
+
+def longest_absence(config: IdentityConfig) -> float:
+    """How long at most somebody may be unseen and still be followed, known again or filled in, seconds."""
+    return max(config.patience, config.reunion, config.bridge)
+
+
+def find_gaps(seen: Flags, first: int, stop: int, longest: float) -> list[tuple[int, int]]:
+    """Where no camera shows anything for longer than so many frames: half-open ranges of frames first .. stop - 1.
+
+    Parameters
+    ----------
+    seen : bool (camera, frame)
+        Which frames each camera shows.
+    """
+    blind = np.concatenate([[False], ~seen[:, first:stop].any(axis=0), [False]])
+    edges = first + np.flatnonzero(np.diff(blind.astype(np.int8)))
+    return [(begin, end) for begin, end in edges.reshape(-1, 2).tolist() if end - begin > longest]
+
+
+def _parts(frame_rate: float, config: Config, first: int, stop: int) -> list[Segment]:
+    """The segments of frames in which no gap lies; none of none."""
+    if first == stop:
+        return []
     length, shared = window_length(frame_rate, config.identity)
     stride = length - shared
     step = max(1, round(config.segments.length * frame_rate / stride)) * stride
