@@ -218,7 +218,7 @@ class DetectionConfig:
     """Share of a pillar that must show foreground for a view to speak for somebody, 0..1."""
     spacing: float = 0.20
     """Spacing of the ground lattice, metres."""
-    kernel: float = 0.40
+    kernel: float = 0.30
     """C: kernel of the mean shift, metres; HW12's 0.80 takes two people a metre apart for one."""
 
     def __post_init__(self) -> None:

@@ -1,19 +1,23 @@
 """Model-driven against data-driven localisation (HW12 section V.C): the tables and the picture of docs/localisation.md.
 
     python tools/localisation_experiment.py [--sets uu4,easy,dense4,dense4:3,cmc1,wildtrack] [--every 5] [--least 20]
-        [--picture docs/figures/localisation.png] [--data ../shared/data] [--work build/results]
+        [--torn 0.3] [--picture docs/figures/localisation.png] [--data ../shared/data] [--work build/results]
 
 Each frame is taken by itself, nobody is expected from those before (colour sets' backgrounds see all frames).
 `dense4:3` are the first three cameras of `dense4`. Ways:
 
 - probability: modes of the target detection probability (model-driven), or its local maxima;
-- volume: modes of the marginal of the volume before anybody is explained (data-driven), or its local maxima;
+- hull: modes of HW12's voxel histogram, its data-driven way: a voxel counts where all views that see it, two or more,
+  show foreground with more than one half;
+- volume: the same of the marginal of the calibrated volume, soft, before anybody is explained; or its local maxima;
 - pass, lattice: the candidates that the pass of the frame would begin with, before any is a ghost;
 - pass: the people whom it finds.
 
 `C` is the kernel of the mean shift, metres (HW12: 0.80). A candidate matches a person within 0.5 m, one to one, as the
 set is scored in docs/results.md. `error` is the distance of those matched; `same` its mean over the people whom both
 the probability's and the volume's modes of the default kernel find: nobody gains by missing who is hard to place.
+With --torn, so large a share of every view's map is erased in squares of a twelfth of the image's height, as where
+clothes look like the background; sets of boxes are left out.
 """
 
 from __future__ import annotations
@@ -35,11 +39,12 @@ from result_sets import SETS, ResultSet
 from results import ROOT, Bench
 from scipy.ndimage import maximum_filter
 
-from stseg.arrays import Floats, Rows
+from stseg.arrays import Boxes, Floats, Rows
 from stseg.commands.sights import make_sights
 from stseg.config import Config, DetectionConfig
 from stseg.evaluation.matching import match
 from stseg.evaluation.sequence import line_up
+from stseg.foreground import box_likelihood
 from stseg.ghosts.explain import FramePass
 from stseg.ghosts.frame import Frame, Seen
 from stseg.ghosts.people import ViewEvidence
@@ -50,11 +55,13 @@ from stseg.io.tracks import read_tracks_csv
 from stseg.occupancy.candidates import map_steps, marginal, soft_maps, unexplained, weights
 from stseg.occupancy.modes import modes
 from stseg.occupancy.probability import DetectionProbability
+from stseg.occupancy.tables import TOP, UNSEEN
 from stseg.occupancy.volume import Occupancy
 from stseg.tracks import TRAJECTORY
 
 GATE = 0.5
 KERNELS = (0.80, DetectionConfig().kernel)
+_SQUARES = 12
 T = TypeVar("T")
 _MODEL, _DATA = "probability, modes", "volume, modes"
 
@@ -84,12 +91,13 @@ class Ways:
         one, other, grid = self.probability, self.occupancy, self.recording.rig.grid
         said = self._timed("probability", lambda: one.log_ratio(soft_maps(one, seen)))
         volume = self._timed("volume", lambda: other.fuse(seen, unexplained(other, seen)))
+        hull = self._timed("hull", lambda: self._hull(seen))
         filled, found = marginal(volume), {}
         for kernel in KERNELS:
-            model, data = weights(said), filled
             for name, weight, ground, spacing in (
-                (_MODEL, model, one.ground, one.spacing),
-                (_DATA, data, grid.ground, grid.cell),
+                (_MODEL, weights(said), one.ground, one.spacing),
+                ("hull, modes", hull, grid.ground, grid.cell),
+                (_DATA, filled, grid.ground, grid.cell),
             ):
                 way = f"{name}, C {kernel:.2f}"
                 found[way] = self._timed(way, partial(modes, weight, ground, spacing, kernel)).ground
@@ -98,6 +106,17 @@ class Ways:
         found["pass, lattice"] = self._timed("pass, lattice", lambda: self._lattice(seen))
         found["pass"] = self._timed("pass", lambda: self.frame_pass.explain(seen, None).people.ground)
         return found, Shown(one.ground, said, grid.ground, filled, found)
+
+    def _hull(self, seen: Sequence[ViewEvidence]) -> Floats:
+        """Voxels of the visual hull in each column, float64 (y, x)."""
+        inside, views = np.ones(self.recording.rig.grid.shape), np.zeros(self.recording.rig.grid.shape)
+        for k, (view, camera) in enumerate(zip(seen, self.recording.rig.cameras, strict=True)):
+            if view is not None:
+                shown = box_likelihood(view, camera.size) if isinstance(view, Boxes) else view
+                levels = self.occupancy.means.levels(k, shown)
+                inside *= (levels == UNSEEN) | (levels > TOP / 2)
+                views += levels != UNSEEN
+        return np.asarray((inside * (views >= 2)).sum(0))
 
     def _lattice(self, seen: Sequence[ViewEvidence]) -> Floats:
         """Candidates of the pass's first round, nobody explained."""
@@ -112,6 +131,19 @@ class Ways:
         found = ask()
         self.seconds.setdefault(name, []).append(time.process_time() - start)
         return found
+
+
+def torn(seen: Sequence[ViewEvidence], share: float, lots: np.random.Generator) -> list[ViewEvidence]:
+    """Maps of which squares are erased."""
+    found: list[ViewEvidence] = []
+    for view in seen:
+        assert view is None or isinstance(view, np.ndarray)
+        if view is not None:
+            side = -(-view.shape[0] // _SQUARES)
+            kept = lots.random((_SQUARES, -(-view.shape[1] // side))) >= share
+            view = view * kept.repeat(side, 0).repeat(side, 1)[: view.shape[0], : view.shape[1]]
+        found.append(view)
+    return found
 
 
 def _maxima(weight: Floats, ground: Floats) -> Floats:
@@ -146,13 +178,14 @@ def measured(name: str, bench: Bench, asked: argparse.Namespace) -> Iterator[str
     (first, stop), ways = frames_of(one), Ways(recording)
     frames = range(first, stop, max(1, min(asked.every, (stop - first) // asked.least)))
     found: dict[str, list[Rows]] = {}
+    lots = np.random.default_rng(0)
     sights = make_sights(recording, Config(), first, stop)
     with open_frames(recording, first, stop) as moments:
         for moment in moments:
             seen = [sight.evidence(view) for sight, view in zip(sights, moment.views, strict=True)]
             if moment.frame not in frames:
                 continue
-            places, shown = ways.places(seen)
+            places, shown = ways.places(torn(seen, asked.torn, lots) if asked.torn else seen)
             for way, ground in places.items():
                 found.setdefault(way, []).append(_rows(moment.frame, ground))
             if asked.picture and name == asked.pictured and moment.frame == frames[len(frames) // 2]:
@@ -207,6 +240,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--sets", type=lambda text: text.split(","), default=sets)
     parser.add_argument("--every", type=int, default=5, help="of so many frames one is taken")
     parser.add_argument("--least", type=int, default=20, help="frames of each set at least")
+    parser.add_argument("--torn", type=float, default=0.0, help="share of every map that is erased")
     parser.add_argument("--picture", type=Path, help="where to draw the maps of one frame")
     parser.add_argument("--pictured", default="easy", help="of which set")
     parser.add_argument("--data", type=Path, default=ROOT / "../shared/data")
