@@ -128,7 +128,7 @@ class Pipeline:
         self.rig, self.sights, self.config, self.tracker = rig, sights, config, find_tracker(tracker)
         self.frame_pass = FramePass(rig, kinds, config.ghosts)
         self.occupancy = Occupancy(rig, kinds, config.occupancy, config.ghosts, config.level)
-        self.candidates = Candidates(self.occupancy, kinds, config.detection, config.ghosts)
+        self.candidates = Candidates(self.occupancy, kinds, config)
 
     def seeing_by(self, sights: Sequence[Sight]) -> Pipeline:
         """The same stages with other sights, for another part of the recording."""

@@ -50,7 +50,7 @@ def evidence(kind: str, standing: Floats = STANDING) -> list[ViewEvidence]:
 def candidates(kind: str, asked: Asked) -> Candidates:
     kinds = [kind] * 4
     occupancy = Occupancy(RIG, kinds, CONFIG.occupancy, FEW_HEIGHTS)
-    return Candidates(occupancy, kinds, replace(FEW, candidates=asked), FEW_HEIGHTS)
+    return Candidates(occupancy, kinds, replace(CONFIG, detection=replace(FEW, candidates=asked)))
 
 
 def pool(*places: tuple[float, float]) -> Pool:
@@ -125,12 +125,12 @@ def test_who_is_expected_comes_before_who_is_proposed_there() -> None:
 @pytest.mark.parametrize("asked", ("probability", "volume", "both"))
 @pytest.mark.parametrize("kind", ("boxes", "pixels"))
 def test_the_pipeline_finds_the_same_people_by_any_source(kind: str, asked: Asked) -> None:
-    rig, truth = room(), walkers(4)
-    moments = list((box_moments if kind == "boxes" else mask_moments)(rig, truth, 0, 4))
+    rig, truth = room(), walkers(2)
+    moments = list((box_moments if kind == "boxes" else mask_moments)(rig, truth, 0, 2))
     config = replace(CONFIG, detection=replace(FEW, candidates=asked))
     pipeline = Pipeline(rig, [Sight()] * 4, [kind] * 4, config, "frames")
     rows = np.concatenate([s.commit.trajectory for s in pipeline.steps(moments, 0, lambda _: None)])
-    for frame in range(4):
+    for frame in range(2):
         own, standing = rows[rows["frame"] == frame], standing_at(truth, frame)
         assert len(own) == len(standing)
         away = np.hypot(own["x"][:, None] - standing[:, 0], own["y"][:, None] - standing[:, 1])

@@ -51,6 +51,7 @@ def picture(path: Path, shown: Shown, standing: Floats) -> None:
                 label=way.partition(", ")[2],
             )
         axes.legend(loc="upper left", fontsize=8, framealpha=0.9)
+    left.set_ylabel("y, metres")
     figure.savefig(path, dpi=110, metadata={"Software": None})
     plt.close(figure)
 

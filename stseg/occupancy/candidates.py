@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from stseg.arrays import Boxes, Floats, Singles
-from stseg.config import DetectionConfig, GhostConfig
+from stseg.config import Config
 from stseg.foreground import box_likelihood
 from stseg.geometry import Grid, Rig
 from stseg.ghosts.people import Explanation, People, ViewEvidence
@@ -41,19 +41,15 @@ class Candidates:
     kinds
         What each camera delivers: "boxes" or "pixels".
     config
-        Which sources are asked.
-    ghosts
-        How far apart candidates are that are not one, and how tall and wide people are.
+        Which sources are asked; how far apart candidates are that are not one; how tall and wide people are.
     """
 
-    def __init__(
-        self, occupancy: Occupancy, kinds: Sequence[str], config: DetectionConfig, ghosts: GhostConfig
-    ) -> None:
-        self.occupancy, self.config, self.ghosts = occupancy, config, ghosts
+    def __init__(self, occupancy: Occupancy, kinds: Sequence[str], config: Config) -> None:
+        self.occupancy, self.config, self.ghosts = occupancy, config.detection, config.ghosts
         rig = occupancy.rig
         self.probability = None
-        if config.candidates in ("probability", "both"):
-            self.probability = DetectionProbability(rig, config, map_steps(rig, kinds))
+        if self.config.candidates in ("probability", "both"):
+            self.probability = DetectionProbability(rig, self.config, map_steps(rig, kinds))
 
     def of(self, seen: Sequence[ViewEvidence]) -> Pool | None:
         """Candidates of a frame, best first by source; None where none is asked for."""
