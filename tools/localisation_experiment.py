@@ -1,7 +1,8 @@
 """Model-driven against data-driven localisation (HW12 section V.C): the tables and the picture of docs/localisation.md.
 
     python tools/localisation_experiment.py [--sets uu4,easy,dense4,dense4:3,cmc1,wildtrack] [--every 5] [--least 20]
-        [--torn 0.3] [--picture docs/figures/localisation.png] [--data ../shared/data] [--work build/results]
+        [--set stage.key=value]... [--torn 0.3] [--picture docs/figures/localisation.png] [--data ../shared/data]
+        [--work build/results]
 
 Each frame is taken by itself, nobody is expected from those before (colour sets' backgrounds see all frames).
 `dense4:3` are the first three cameras of `dense4`. Ways:
@@ -49,6 +50,7 @@ from stseg.ghosts.explain import FramePass
 from stseg.ghosts.frame import Frame, Seen
 from stseg.ghosts.people import ViewEvidence
 from stseg.ghosts.prior import Prior
+from stseg.io.config_file import read_config
 from stseg.io.frames import open_frames
 from stseg.io.recording import Recording
 from stseg.io.tracks import read_tracks_csv
@@ -74,13 +76,16 @@ class Ways:
     ----------
     recording
         The set's cameras and what they deliver.
+    config
+        The constants of all ways.
     """
 
     recording: Recording
+    config: Config
     seconds: dict[str, list[float]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        rig, config = self.recording.rig, Config()
+        rig, config = self.recording.rig, self.config
         kinds = ["boxes" if source.source.kind == "boxes" else "pixels" for source in self.recording.sources]
         self.probability = DetectionProbability(rig, config.detection, map_steps(rig, kinds))
         self.occupancy = Occupancy(rig, kinds, config.occupancy, config.ghosts, config.level)
@@ -174,12 +179,12 @@ def judged(one: ResultSet, bench: Bench, rows: Rows, frames: Sequence[int]) -> J
 
 def measured(name: str, bench: Bench, asked: argparse.Namespace) -> Iterator[str]:
     """Rows of the table for one set; draws the picture where it is asked for."""
-    one, recording = _recording(name, bench)
-    (first, stop), ways = frames_of(one), Ways(recording)
+    (one, recording), config = _recording(name, bench), read_config(None, tuple(asked.set))
+    (first, stop), ways = frames_of(one), Ways(recording, config)
     frames = range(first, stop, max(1, min(asked.every, (stop - first) // asked.least)))
     found: dict[str, list[Rows]] = {}
     lots = np.random.default_rng(0)
-    sights = make_sights(recording, Config(), first, stop)
+    sights = make_sights(recording, config, first, stop)
     with open_frames(recording, first, stop) as moments:
         for moment in moments:
             seen = [sight.evidence(view) for sight, view in zip(sights, moment.views, strict=True)]
@@ -240,6 +245,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--sets", type=lambda text: text.split(","), default=sets)
     parser.add_argument("--every", type=int, default=5, help="of so many frames one is taken")
     parser.add_argument("--least", type=int, default=20, help="frames of each set at least")
+    parser.add_argument("--set", action="append", default=[], help="detection.level=0.08, or any other constant")
     parser.add_argument("--torn", type=float, default=0.0, help="share of every map that is erased")
     parser.add_argument("--picture", type=Path, help="where to draw the maps of one frame")
     parser.add_argument("--pictured", default="easy", help="of which set")
