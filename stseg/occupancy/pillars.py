@@ -87,8 +87,7 @@ class Pillars:
         edge[:, 0] -= sign[:, 0] * end[:, 0]
         half = 0.5 * _across(jacobian, rise, upright).T
         middle, half = 0.5 * (middle[:, 1:] + middle[:, :-1]), 0.5 * (half[:, 1:] + half[:, :-1])
-        unseen = np.isnan(edge).any(1) | np.isnan(half).any(1)
-        edge[unseen] = np.nan
+        edge[~np.isfinite(np.column_stack([edge, middle, half])).all(1)] = np.nan
         edge, middle, half = (edge + 0.5) / step, (middle + 0.5) / step, half / step
         return cls(upright, edge.astype(np.float32), middle.astype(np.float32), half.astype(np.float32), strips - 1)
 
