@@ -201,6 +201,46 @@ class GhostConfig:
 
 
 @dataclass(frozen=True)
+class DetectionConfig:
+    """Target detection probability, and where the candidates of a frame come from (METHODS 6, 7; HW12 section III)."""
+
+    candidates: Literal["lattice", "probability", "volume", "both"] = "lattice"
+    """Where candidates come from beside tracks: the lattice alone, or also the probability, the volume or both."""
+    height_mean: float = 1.70
+    """Mean height of pillars, metres (HW12)."""
+    height_spread: float = 0.15
+    """Standard deviation of their heights, metres (HW12)."""
+    width_mean: float = 0.30
+    """Mean width of pillars, metres (HW12)."""
+    width_spread: float = 0.05
+    """Standard deviation of their widths, metres (HW12)."""
+    sizes: int = 10
+    """How many heights, and how many widths, are tried (HW12)."""
+    outside: float = 0.08
+    """e: what stands for foreground outside the image, the rate of people who are partly seen, 0..1 (HW12)."""
+    least: float = 0.02
+    """How often a view misses somebody wholly, 0..1."""
+    level: float = 0.50
+    """Share of a pillar that must show foreground for a view to speak for somebody, 0..1."""
+    spacing: float = 0.20
+    """Spacing of the ground lattice, metres."""
+    kernel: float = 0.30
+    """C: kernel of the mean shift, metres; HW12's 0.80 takes two people a metre apart for one."""
+
+    def __post_init__(self) -> None:
+        for name in ("height_mean", "height_spread", "width_mean", "width_spread", "spacing", "kernel"):
+            require(getattr(self, name) > 0, self, name, "a number above 0")
+        for name, mean, spread in (
+            ("height_mean", self.height_mean, self.height_spread),
+            ("width_mean", self.width_mean, self.width_spread),
+        ):
+            require(mean > 2 * spread, self, name, "more than two standard deviations")
+        require(self.sizes >= 2, self, "sizes", "2 or more")
+        for name in ("outside", "least", "level"):
+            require(0 < getattr(self, name) < 1, self, name, "a number between 0 and 1")
+
+
+@dataclass(frozen=True)
 class OccupancyConfig:
     """Fusion of the views into the volume (METHODS 3, 4)."""
 
@@ -461,6 +501,7 @@ class Config:
     segmentation: SegmentationConfig = field(default_factory=SegmentationConfig)
     identity: IdentityConfig = field(default_factory=IdentityConfig)
     ghosts: GhostConfig = field(default_factory=GhostConfig)
+    detection: DetectionConfig = field(default_factory=DetectionConfig)
     segments: SegmentConfig = field(default_factory=SegmentConfig)
     kalman: KalmanConfig = field(default_factory=KalmanConfig)
     particles: ParticleConfig = field(default_factory=ParticleConfig)

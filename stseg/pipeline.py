@@ -27,6 +27,7 @@ from stseg.ghosts.explain import FramePass
 from stseg.ghosts.people import Explanation, People
 from stseg.identity.views import box_rows
 from stseg.identity.whole import own_tracks, whole_tracks
+from stseg.occupancy.candidates import Candidates
 from stseg.occupancy.level import Level
 from stseg.occupancy.volume import Occupancy
 from stseg.trackers import Commit, Scene, Shown, find_tracker
@@ -128,6 +129,7 @@ class Pipeline:
         self.rig, self.sights, self.config, self.tracker = rig, sights, config, find_tracker(tracker)
         self.frame_pass = FramePass(rig, kinds, config.ghosts)
         self.occupancy = Occupancy(rig, kinds, config.occupancy, config.ghosts, config.level)
+        self.candidates = Candidates(self.occupancy, kinds, config)
 
     def seeing_by(self, sights: Sequence[Sight]) -> Pipeline:
         """The same stages with other sights, for another part of the recording."""
@@ -164,7 +166,7 @@ class Pipeline:
         with watch.time("foreground"):
             seen = [sight.evidence(view) for sight, view in zip(self.sights, moment.views, strict=True)]
         with watch.time("ghosts"):
-            explanation = self.frame_pass.explain(seen, expected)
+            explanation = self.frame_pass.explain(seen, expected, self.candidates.of(seen))
         rates = _rate_rows(moment.frame, self.occupancy.level)
         with watch.time("occupancy"):
             log_odds = self.occupancy.follow(seen, explanation)

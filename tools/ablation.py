@@ -113,17 +113,18 @@ def _smoothness(one: ResultSet, recording: Recording, bench: Bench) -> Iterator[
 def score(one: ResultSet, rows: Rows, bench: Bench) -> Scores:
     """Scores of tracks as the set is scored in docs/results.md."""
     assert one.truth is not None
-    options = shlex.split(one.scoring)
     truth, frames = read_tracks_csv(bench.path(one.truth)), np.arange(*frames_of(one))
-    areas = [_area(option.partition("=")[2]) for option in options if option.startswith("--area=")]
-    return evaluate(
-        truth, rows, area=next(iter(areas), None), frames=frames, ignore_flagged="--ignore-flagged" in options
-    )
+    flagged = "--ignore-flagged" in shlex.split(one.scoring)
+    return evaluate(truth, rows, area=area_of(one), frames=frames, ignore_flagged=flagged)
 
 
-def _area(text: str) -> Area:
-    x0, y0, x1, y1 = map(float, text.split(","))
-    return x0, y0, x1, y1
+def area_of(one: ResultSet) -> Area | None:
+    """The rectangle that counts, None for all."""
+    for option in shlex.split(one.scoring):
+        if option.startswith("--area="):
+            x0, y0, x1, y1 = map(float, option.partition("=")[2].split(","))
+            return x0, y0, x1, y1
+    return None
 
 
 def prepared(one: ResultSet, bench: Bench) -> Recording:

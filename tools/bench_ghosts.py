@@ -1,10 +1,12 @@
 """How fast the pass of a frame is: who is there and where, one thread; pixel labels: tools/bench_labels.py.
 
-    python tools/bench_ghosts.py [--frames 20] [--people 3,5,7,9] [--groups 1,2,4,8]
+    python tools/bench_ghosts.py [--frames 20] [--people 3,5,7,9] [--groups 1,2,4,8] [--candidates probability]
 
 Positions and statuses: simulated people seen by four cameras a quarter turn apart, as silhouettes and as a detector's
 boxes; each frame is expected from those before, as in a run. A candidate is a place that the settled search weighed,
-person or ghost. Gate: 20 frames/s where ten are weighed.
+person or ghost; `--candidates` says from where they come beside tracks, which takes its own time
+(`detection.candidates`).
+Gate: 20 frames/s where ten are weighed.
 
 Groups: one frame's candidates so many times over, in rooms whose evidence does not touch. Gate: a group of many takes
 at most a tenth more than one of few.
@@ -18,6 +20,7 @@ import argparse
 import sys
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -30,6 +33,8 @@ from stseg.ghosts.pool import Pool
 from stseg.ghosts.prior import Prior
 from stseg.ghosts.search import ENUMERATED, search
 from stseg.identity.walkers import Walkers
+from stseg.occupancy.candidates import Candidates
+from stseg.occupancy.volume import Occupancy
 from stseg.simulate import Film, SceneSpec
 
 WEIGHED, GATE, SLACK = 10, 20.0, 1.1
@@ -51,16 +56,17 @@ def evidence(people: int, frames: int, kind: str) -> tuple[Film, list[list[ViewE
     return film, seen
 
 
-def positions(people: int, frames: int, kind: str) -> tuple[float, float]:
+def positions(people: int, frames: int, kind: str, config: Config) -> tuple[float, float]:
     """Candidates weighed and seconds, both a frame."""
     film, seen = evidence(people, frames, kind)
-    config = Config()
+    kinds = [kind] * 4
+    candidates = Candidates(Occupancy(film.rig, kinds, config.occupancy, config.ghosts), kinds, config)
     frame_pass = FramePass(film.rig, [kind] * 4, config.ghosts)
     follow = Walkers(film.rig.frame_rate, config.ghosts, config.identity)
     taken, weighed = [], []
     for frame, views in enumerate(seen):
         start = time.process_time()
-        found = frame_pass.explain(views, follow.expected(frame))
+        found = frame_pass.explain(views, follow.expected(frame), candidates.of(views))
         taken.append(time.process_time() - start)
         follow.follow(frame, found.people, found.ghosts)
         weighed.append(len(found.people) + len(found.ghosts))
@@ -130,11 +136,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--frames", type=int, default=20)
     parser.add_argument("--people", type=lambda text: [int(n) for n in text.split(",")], default=[3, 5, 7, 9])
     parser.add_argument("--groups", type=lambda text: [int(n) for n in text.split(",")], default=[1, 2, 4, 8])
+    sources = ("lattice", "probability", "volume", "both")
+    parser.add_argument("--candidates", choices=sources, default=Config().detection.candidates)
     asked = parser.parse_args(arguments)
+    config = replace(Config(), detection=replace(Config().detection, candidates=asked.candidates))
     met = True
     print("| evidence | people | candidates weighed | ms a frame | frames/s |\n| --- | --: | --: | --: | --: |")
     for kind in ("pixels", "boxes"):
-        rows = [(people, *positions(people, asked.frames, kind)) for people in asked.people]
+        rows = [(people, *positions(people, asked.frames, kind, config)) for people in asked.people]
         for people, weighed, seconds in rows:
             print(f"| {kind} | {people} | {weighed:.1f} | {1e3 * seconds:.1f} | {1 / seconds:.1f} |", flush=True)
         enough = min((row for row in rows if row[1] >= WEIGHED), default=rows[-1])

@@ -31,8 +31,11 @@ MERGED = 0.5
 class EveryCandidate(FramePass):
     """The pass of a frame without the removal of ghosts."""
 
-    def explain(self, seen: Sequence[ViewEvidence], expected: Expected | None) -> Explanation:
-        """Everybody who would be there if nobody else were."""
+    def explain(
+        self, seen: Sequence[ViewEvidence], expected: Expected | None, proposed: Pool | None = None
+    ) -> Explanation:
+        """Everybody who would be there if nobody else were; all of the lattice is tried, so nobody can be proposed."""
+        assert proposed is None
         sights = [None if s is None else view.observe(s) for view, s in zip(self.views, seen, strict=True)]
         prior = Prior.of(expected, self.config, self.border)
         pool, parts = self._candidates(sights, prior)

@@ -62,7 +62,9 @@ class FramePass:
         self.border = Border.of(rig)
         self._trades = 0 if "boxes" in kinds else config.trades
 
-    def explain(self, seen: Sequence[ViewEvidence], expected: Expected | None) -> Explanation:
+    def explain(
+        self, seen: Sequence[ViewEvidence], expected: Expected | None, proposed: Pool | None = None
+    ) -> Explanation:
         """Explain one frame.
 
         Parameters
@@ -71,6 +73,8 @@ class FramePass:
             What each view shows.
         expected
             Whom the frames before lead to expect; None in a first frame, in which nobody is a newcomer.
+        proposed
+            Candidates from elsewhere, best first: beside those of the first round's lattice, but for duplicates.
         """
         sights = [None if s is None else view.observe(s) for view, s in zip(self.views, seen, strict=True)]
         prior = Prior.of(expected, self.config, self.border)
@@ -78,7 +82,9 @@ class FramePass:
         seen_now = Seen(self.views, sights, prior, self.terms)
         frame = Frame(seen_now, expected_inside, np.arange(len(expected_inside)))
         for _ in range(self.config.rounds):
-            fresh = self._fresh(frame)
+            fresh = self.fresh(frame)
+            if proposed is not None:
+                fresh, proposed = fresh.and_apart(proposed, self.config.lattice), None
             moved = frame.refined().pool
             if not len(fresh) and not len(moved):
                 break
@@ -88,7 +94,7 @@ class FramePass:
                 break
         return explanation(_settled(frame, self._trades))
 
-    def _fresh(self, frame: Frame) -> Pool:
+    def fresh(self, frame: Frame) -> Pool:
         """Candidates in what nobody explains yet."""
         heights, (rows, columns) = np.asarray(self.config.heights), self.lattice_ground.shape[:2]
         score = np.repeat(frame.seen.prior.tall(heights)[:, None], rows * columns, 1)

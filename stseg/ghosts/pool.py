@@ -35,6 +35,15 @@ class Pool:
         pairs = ((self.ground, other.ground), (self.height, other.height), (self.width, other.width))
         return Pool(*map(np.concatenate, pairs))
 
+    def and_apart(self, other: Pool, apart: float) -> Pool:
+        """This pool's candidates, then those of the other that stand `apart` metres or more from all before them."""
+        every = self.and_(other)
+        kept = list(range(len(self)))
+        for i in range(len(self), len(every)):
+            if not (np.hypot(*(every.ground[kept] - every.ground[i]).T) < apart).any():
+                kept.append(i)
+        return every.at(kept)
+
     def at(self, chosen: Sequence[int] | Ints) -> Pool:
         """The chosen candidates, in that order."""
         index = np.asarray(chosen, int)

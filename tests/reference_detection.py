@@ -1,0 +1,74 @@
+"""The detection probability and mean shift by their definitions, pixel by pixel and sample by sample: slow, plain."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from stseg.arrays import Flags, Floats, Ints, Singles
+from stseg.occupancy.modes import _REACH, _SAME, _STEPS, _STILL
+from stseg.occupancy.pillars import Pillars
+
+
+def nearest(edge: float) -> int:
+    """The nearest whole number, halves upwards."""
+    return math.floor(edge + 0.5)
+
+
+def region(pillars: Pillars, place: int, heights: int, width: float, pad: int, shape: tuple[int, int]) -> Flags:
+    """M_i of the pillar that reaches to the given one of the heights, on a map (v, u) with a margin all around."""
+    mask = np.zeros((shape[0] + 2 * pad, shape[1] + 2 * pad), bool)
+    for k in range(pillars.base + heights + 1):
+        first, last = sorted(nearest(float(e)) + pad for e in pillars.edge[place, k : k + 2])
+        middle, half = float(pillars.middle[place, k]), float(pillars.half[place, k]) * width
+        left = nearest(middle - half) + pad
+        right = max(nearest(middle + half) + pad, left + 1)
+        if pillars.upright[place]:
+            mask[first:last, left:right] = True
+        else:
+            mask[left:right, first:last] = True
+    return mask
+
+
+def chance(
+    likelihood: Singles, pillars: Pillars, place: int, widths: Floats, height_share: Floats, width_share: Floats,
+    outside: float, pad: int,
+) -> float:  # fmt: skip
+    """p(F_i | X): the mean of F_i over each pillar's region (HW12 eqs 2 to 6); nan where the view sees none of it."""
+    shown = np.full((likelihood.shape[0] + 2 * pad, likelihood.shape[1] + 2 * pad), outside)
+    image = np.zeros(shown.shape, bool)
+    shown[pad:-pad, pad:-pad], image[pad:-pad, pad:-pad] = likelihood, True
+    total, seen = 0.0, False
+    for h, tall in enumerate(height_share):
+        for width, wide in zip(widths, width_share, strict=True):
+            mask = region(pillars, place, h, float(width), pad, (likelihood.shape[0], likelihood.shape[1]))
+            if mask.any():
+                total += float(tall * wide) * float(shown[mask].mean())
+                seen |= bool((mask & image).any())
+    return total if seen else math.nan
+
+
+def mean_shift(weight: Floats, reach: float) -> tuple[Floats, Ints]:
+    """Places (row, column) of the modes, and the mode of each sample in the order of rows and columns (HW12 eq. 7)."""
+    samples = np.argwhere(weight > 0)
+    share = weight[weight > 0]
+    window = math.ceil(_REACH * reach)
+    found: list[Floats] = []
+    own = []
+    for start in samples:
+        place = start.astype(float)
+        for _ in range(_STEPS):
+            off = samples - place
+            near = (np.abs(off) <= window).all(1)
+            pull = np.where(near, share * np.exp(-(off**2).sum(1) / reach**2), 0.0)
+            to = (pull[:, None] * samples).sum(0) / pull.sum()
+            moved = math.dist(to, place)
+            place = to
+            if moved < _STILL:
+                break
+        met = [m for m, mode in enumerate(found) if math.dist(mode, place) < _SAME * reach]
+        if not met:
+            found.append(place)
+        own.append(met[0] if met else len(found) - 1)
+    return np.array(found).reshape(-1, 2), np.array(own, np.int64)
