@@ -17,32 +17,21 @@ from stseg.geometry import Rig
 from stseg.ghosts.expected import Expected
 from stseg.ghosts.sizes import Sizes
 from stseg.identity.linking import assign
-from stseg.occupancy.sampling import Sampling
-from stseg.trackers.cells import reached_cells
+from stseg.trackers.each_frame import EachFrame
 from stseg.trackers.motion import Filters, begun, carried, corrected, surprise
 from stseg.trackers.protocol import FORGETTING, STAYING, Commit, Scene, Shown
-from stseg.trackers.rows import Event, event_rows, trajectory_rows, views_at
-from stseg.tracks import WINDOW
+from stseg.trackers.rows import Event
 
 
-class KalmanTracker:
-    """Follows people at constant velocity; every frame is decided as it comes.
-
-    Parameters
-    ----------
-    rig, config
-        The scene, and the constants of all stages.
-    first
-        The run's first frame.
-    """
+class KalmanTracker(EachFrame):
+    """Follows people at constant velocity."""
 
     final: ClassVar[bool] = True
 
     def __init__(self, rig: Rig, config: Config, first: int) -> None:
-        self.rig, self.config = rig, config
-        self.views = Sampling.of(rig, "point").views()
+        super().__init__(rig, config, first)
         self.filters = begun(np.zeros((0, 2)), np.zeros((0, 2, 2)), config.kalman.pace)
-        self.frame, self.issued, self.begun = first, 0, False
+        self.issued, self.begun = 0, False
         self.ids: Ints = np.zeros(0, np.int64)
         self.seen: Ints = np.zeros(0, np.int64)
 
@@ -81,10 +70,6 @@ class KalmanTracker:
         births = [(scene.frame, "birth", int(i), 0, "a person in nobody's gate") for i in newcomers]
         return [self._commit(scene, person, births + deaths)]
 
-    def finish(self) -> list[Commit]:
-        """Nothing is open."""
-        return []
-
     def _assigned(self, filters: Filters, ground: Floats, noise: Floats) -> tuple[Ints, Ints]:
         """Filters and places of a frame that are one person's, both int64: the likeliest pairs within the gates."""
         squares, cost = surprise(filters, ground, noise)
@@ -101,13 +86,12 @@ class KalmanTracker:
 
     def _commit(self, scene: Scene, person: Ints, events: list[Event]) -> Commit:
         """Those found in the frame: where the filters believe them, beside where the frame saw them."""
-        people, grid = scene.people, self.rig.grid
+        people = scene.people
         found, which = np.flatnonzero(person >= 0), person[person >= 0]
         ids, ground = self.ids[found], self.filters.state[found, :2]
-        label, extent = reached_cells(scene, ground, ids, grid, self.config.occupancy.reach)
-        rows = trajectory_rows(
-            scene.frame, ids, ground, self.filters.covariance[found, :2, :2], people.height[which],
-            people.width[which], extent, people.evidence[which], views_at(self.views, ground, grid),
+        commit = self.commit(
+            scene, ids, ground, self.filters.covariance[found, :2, :2], people.height[which], people.width[which],
+            people.evidence[which], events,
         )  # fmt: skip
-        rows["raw_x"], rows["raw_y"] = people.ground[which].T
-        return Commit([scene], label[None], rows, event_rows(events), np.zeros(0, WINDOW))
+        commit.trajectory["raw_x"], commit.trajectory["raw_y"] = people.ground[which].T
+        return commit
