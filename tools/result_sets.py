@@ -42,7 +42,7 @@ class ResultSet:
     peer_frames
         The part of the frames that peers were measured on, where it is not all of them.
     colour
-        Whether the cameras deliver colour images.
+        Whether it is followed in the ways, too, that need colour images.
     """
 
     name: str
@@ -144,19 +144,20 @@ def _simulated(
         truth=f"$WORK/{scene}/truth.csv",
         area=area,
         remark=people,
-        colour=rig == "rig.toml",
     )
 
 
-def _part_of_scene(name: str, options: str, frames: str, views: int, people: str, area: str) -> ResultSet:
+def _filmed(
+    name: str, folder: str, options: str, frames: str, views: int, people: str, area: str = "6 m x 6 m"
+) -> ResultSet:
     return ResultSet(
         name,
         "Gaussian mixtures on rendered video",
         views,
         frames,
-        f"$WORK/{name}/rig.toml",
-        film=f"stseg simulate $WORK/{name} {options}",
-        truth=f"$WORK/{name}/truth.csv",
+        f"$WORK/{folder}/rig.toml",
+        film=f"stseg simulate $WORK/{folder} {options}",
+        truth=f"$WORK/{folder}/truth.csv",
         area=area,
         remark=people,
         colour=True,
@@ -224,13 +225,14 @@ _ALL = (
         remark="1 person, no truth: counts alone",
         colour=True,
     ),
-    _simulated("easy", "easy", "rig.toml", "Gaussian mixtures on rendered video", 4, "5 people"),
+    _filmed("easy", "easy", "--scene easy", "0:250", 4, "5 people"),
     _simulated("dense", "dense", "rig.toml", "Gaussian mixtures on rendered video", 8, "14 people"),
     _simulated("dense_masks", "dense", "rig_masks.toml", "exact silhouettes of the rendered crowd", 8, "14 people"),
     _simulated("dense_boxes", "dense", "rig_boxes.toml", "a simulated detector's boxes", 8, "14 people"),
     _simulated("dense4", "dense4", "rig.toml", "Gaussian mixtures on rendered video", 4, "14 people"),
-    _part_of_scene("similar", "--scene similar --seconds 30", "0:300", 3, "4 people, 3 dressed alike", "5 m x 5 m"),
-    _part_of_scene("two_cameras", "--scene easy --cameras 2", "0:250", 2, "5 people", "6 m x 6 m"),
+    _filmed("dense_100", "dense", "--scene dense", "0:100", 8, "14 people"),
+    _filmed("similar", "similar", "--scene similar --seconds 30", "0:300", 3, "4 people, 3 dressed alike", "5 m x 5 m"),
+    _filmed("two_cameras", "two_cameras", "--scene easy --cameras 2", "0:250", 2, "5 people"),
 )
 
 _MEETINGS = {
