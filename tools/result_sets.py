@@ -230,9 +230,9 @@ _ALL = (
     _simulated("dense_masks", "dense", "rig_masks.toml", "exact silhouettes of the rendered crowd", 8, "14 people"),
     _simulated("dense_boxes", "dense", "rig_boxes.toml", "a simulated detector's boxes", 8, "14 people"),
     _simulated("dense4", "dense4", "rig.toml", "Gaussian mixtures on rendered video", 4, "14 people"),
-    _filmed("dense_100", "dense", "--scene dense", "0:100", 8, "14 people"),
-    _filmed("similar", "similar", "--scene similar --seconds 30", "0:300", 3, "4 people, 3 dressed alike", "5 m x 5 m"),
-    _filmed("two_cameras", "two_cameras", "--scene easy --cameras 2", "0:250", 2, "5 people"),
+    _filmed("dense_50", "dense", "--scene dense", "0:50", 8, "14 people"),
+    _filmed("similar", "similar", "--scene similar --seconds 30", "0:150", 3, "4 people, 3 dressed alike", "5 m x 5 m"),
+    _filmed("two_cameras", "two_cameras", "--scene easy --cameras 2", "0:150", 2, "5 people"),
 )
 
 _MEETINGS = {

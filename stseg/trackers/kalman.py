@@ -31,6 +31,7 @@ class KalmanTracker(EachFrame):
     def __init__(self, rig: Rig, config: Config, first: int) -> None:
         super().__init__(rig, config, first)
         self.filters = begun(np.zeros((0, 2)), np.zeros((0, 2, 2)), config.kalman.pace)
+        self.sizes = Sizes.of_anybody(0, config.ghosts)
         self.issued, self.begun = 0, False
         self.ids: Ints = np.zeros(0, np.int64)
         self.seen: Ints = np.zeros(0, np.int64)
@@ -39,14 +40,13 @@ class KalmanTracker(EachFrame):
         """Everybody who is followed, carried to the frame; None before the first."""
         if not self.begun:
             return None
-        seconds, n = (frame - self.frame) / self.rig.frame_rate, len(self.ids)
-        ghosts, noise = self.config.ghosts, self.config.identity.place_noise**2 * np.eye(2)
+        seconds, noise = (frame - self.frame) / self.rig.frame_rate, self.config.identity.place_noise**2 * np.eye(2)
         filters = carried(self.filters, seconds, self.config.kalman.turn)
         unseen = (frame - 1 - self.seen) / self.rig.frame_rate
         return Expected(
             filters.state[:, :2],
             filters.covariance[:, :2, :2] + noise,
-            Sizes.of_anybody(n, ghosts),
+            self.sizes.blurred(self.config.identity),
             STAYING - FORGETTING * unseen,
         )
 
@@ -57,10 +57,14 @@ class KalmanTracker(EachFrame):
         ground, config = scene.people.ground, self.config.kalman
         noise = scene.people.covariance + np.eye(2) * self.config.identity.place_noise**2
         filters = carried(self.filters, (scene.frame - self.frame) / self.rig.frame_rate, config.turn)
-        tracks, found = self._assigned(filters, ground, noise)
+        sizes = self._measured(scene.people.sizes)
+        tracks, found = self._assigned(filters, ground, noise, sizes)
         fresh = np.setdiff1d(np.arange(len(ground)), found)
         filters = corrected(filters, tracks, ground[found], noise[found])
         self.filters = filters.and_(begun(ground[fresh], noise[fresh], config.pace))
+        self.sizes.put(tracks, sizes.at(found).with_prior(self.sizes.at(tracks)))
+        anybody = Sizes.of_anybody(len(fresh), self.config.ghosts)
+        self.sizes = self.sizes.and_(sizes.at(fresh).with_prior(anybody))
         newcomers = self.issued + 1 + np.arange(len(fresh))
         self.frame, self.issued, self.begun = scene.frame, self.issued + len(fresh), True
         person = np.full(len(self.ids), -1)
@@ -70,9 +74,16 @@ class KalmanTracker(EachFrame):
         births = [(scene.frame, "birth", int(i), 0, "a person in nobody's gate") for i in newcomers]
         return [self._commit(scene, person, births + deaths)]
 
-    def _assigned(self, filters: Filters, ground: Floats, noise: Floats) -> tuple[Ints, Ints]:
-        """Filters and places of a frame that are one person's, both int64: the likeliest pairs within the gates."""
+    def _measured(self, sizes: Sizes) -> Sizes:
+        """What a frame adds to what was known of people's sizes."""
+        anybody = Sizes.of_anybody(len(sizes.height), self.config.ghosts)
+        return sizes.told(anybody).blurred(self.config.identity)
+
+    def _assigned(self, filters: Filters, ground: Floats, noise: Floats, sizes: Sizes) -> tuple[Ints, Ints]:
+        """Filters and people of a frame that are one person's, both int64: the likeliest pairs within the gates."""
         squares, cost = surprise(filters, ground, noise)
+        variance = self.sizes.height_variance[:, None] + sizes.height_variance
+        cost = cost + (self.sizes.height[:, None] - sizes.height) ** 2 / variance + np.log(variance)
         inside = squares <= -2.0 * np.log1p(-self.config.kalman.gate)  # of chi square with two degrees of freedom
         return assign(np.where(inside, cost - cost.max(initial=0.0), 1.0), 1.0)
 
@@ -82,6 +93,7 @@ class KalmanTracker(EachFrame):
         lost = frame - self.seen > patience * self.rig.frame_rate
         told = [(frame, "death", int(i), 0, f"not found for {patience:g} s") for i in self.ids[lost]]
         self.filters, self.ids, self.seen = self.filters.kept(~lost), self.ids[~lost], self.seen[~lost]
+        self.sizes = self.sizes.at(np.flatnonzero(~lost))
         return told
 
     def _commit(self, scene: Scene, person: Ints, events: list[Event]) -> Commit:
