@@ -129,3 +129,18 @@ def test_settings_out_of_range_are_refused() -> None:
     for bad in ({"gate": 1.0}, {"turn": 0.0}, {"patience": -1.0}):
         with pytest.raises(ConfigError):
             KalmanConfig(**bad)
+
+
+def test_heights_tell_apart_two_who_turn_back_where_they_meet() -> None:
+    """By their ways alone they would have passed each other."""
+    step, turned = 1.2 / FRAME_RATE, 10
+    short, tall = 1.62, 1.86
+    tracker, names = KalmanTracker(RIG, CONFIG, 0), []
+    for frame in range(2 * turned):
+        away = 0.05 + step * abs(frame - turned)
+        standing = people((-away, 0.0, short), (away, 0.0, tall))
+        shown = found(standing, tracker.expected(frame))
+        (commit,) = tracker.add(Scene(frame, shown, found(people()), EMPTY), UNSEEN)
+        rows = commit.trajectory[np.argsort(commit.trajectory["raw_x"])]
+        names.append(rows["id"].tolist())
+    assert names == [names[0]] * len(names)

@@ -22,7 +22,7 @@ ROOT = Path(__file__).parents[1]
 DATA = Path(os.environ.get("STSEG_DATA", ROOT / "../shared/data"))
 PAGE = "\n".join(
     f"before {name}\n<!-- {name}: begin, written by tools/results.py -->\nold\n<!-- {name}: end -->"
-    for name in ("table", "peers", "commands")
+    for name in ("table", "trackers", "peers", "commands")
 )
 
 
@@ -43,13 +43,14 @@ def rows(*places: tuple[int, int, float, float]) -> np.ndarray[tuple[int], np.dt
     return np.array([(*place, 0) for place in places], POSITION)
 
 
-def figure_row(name: str, tracker: str, scores: dict[str, Any] | None) -> dict[str, Any]:
+def figure_row(name: str, way: str, scores: dict[str, Any] | None) -> dict[str, Any]:
     row = {
         "set": name,
-        "tracker": tracker,
+        "way": way,
+        "frames": "0:136",
         "version": "1.2",
         "date": "2030-01-01",
-        "frames_per_second": 4.0,
+        "milliseconds": {"read": 10.0, "ghosts": 220.0, "track": 20.0},
         "tracks": 7,
         "people_a_frame": 2.5,
         "run": "stseg run RIG",
@@ -76,6 +77,20 @@ def test_page_is_filled_and_the_text_around_stays(page_tool: ModuleType) -> None
     assert page_tool.rewrite(page, figures) == page
 
 
+def test_ways_stand_side_by_side(page_tool: ModuleType) -> None:
+    figures = {
+        "easy belief-condensation": figure_row("easy", "belief-condensation", some_scores()),
+        "easy kalman": {**figure_row("easy", "kalman", some_scores()), "frames": "0:50"},
+    }
+    page = page_tool.rewrite(PAGE, figures)
+    table = page.partition("<!-- trackers: begin")[2].partition("<!-- trackers: end")[0].splitlines()
+    assert table[3].startswith("| easy | 0:50 | kalman | 0.0 | 50.0 |")
+    assert table[4].startswith("| easy | 0:136 | belief: each view by itself |")
+    assert table[4].endswith("| 0.250 | 7 | 20.0 | 250.0 |")
+    assert len({line.count("|") for line in table[1:]}) == 1
+    assert "kalman" not in page.partition("<!-- trackers: end")[2]
+
+
 def test_page_without_its_marks_is_refused(page_tool: ModuleType) -> None:
     with pytest.raises(SystemExit, match="no single part marked 'table'"):
         page_tool.rewrite("# Results\n", {})
@@ -94,10 +109,13 @@ def test_every_row_of_a_table_has_a_cell_for_every_heading(page_tool: ModuleType
 
 
 def test_sets_are_commands_that_exist(tools: Path) -> None:
-    sets = importlib.import_module("result_sets").SETS
+    sets, ways = importlib.import_module("result_sets").SETS, importlib.import_module("result_ways").WAYS
+    assert [way.name for way in sets["easy"].ways] == list(ways)
+    assert [way.name for way in sets["dense_boxes"].ways] == ["cut", "frames", "kalman"]
     for name, one in sets.items():
+        run, score = one.run_command(one.ways[-1]), one.score_command(one.ways[-1])
         film = [] if one.film is None else [one.film]
-        for command in [*film, *one.prepare, one.run_command("cut"), one.score_command("cut")]:
+        for command in [*film, *one.prepare, run, score]:
             program, what, *rest = shlex.split(command)
             assert program in ("stseg", "python"), name
             assert program == "stseg" or (tools.parent / what).is_file()
@@ -110,6 +128,14 @@ def test_unknown_set_is_refused(tools: Path, capsys: pytest.CaptureFixture[str])
         importlib.import_module("results").main(["--sets", "uu4,uu5"])
     assert stop.value.code == 2
     assert "uu5: expected names among uu4," in capsys.readouterr().err
+
+
+def test_unknown_way_is_refused(tools: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    del tools
+    with pytest.raises(SystemExit) as stop:
+        importlib.import_module("results").main(["--sets", "none", "--ways", "kalman,magic"])
+    assert stop.value.code == 2
+    assert "magic: expected names among cut, frames, kalman," in capsys.readouterr().err
 
 
 def test_errors_of_a_frame_are_judged_in_the_area_alone(tools: Path) -> None:

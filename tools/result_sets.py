@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from result_ways import WAYS, Way
+
 from stseg.simulate import NAMED
 
 __all__ = ["SETS", "ResultSet"]
@@ -39,6 +41,8 @@ class ResultSet:
         In words.
     peer_frames
         The part of the frames that peers were measured on, where it is not all of them.
+    colour
+        Whether it is followed in the ways, too, that need colour images.
     """
 
     name: str
@@ -53,19 +57,25 @@ class ResultSet:
     area: str = "all the ground"
     remark: str = ""
     peer_frames: str | None = None
+    colour: bool = False
 
-    def run_file(self, tracker: str) -> str:
+    @property
+    def ways(self) -> tuple[Way, ...]:
+        """The ways that can follow here."""
+        return tuple(way for way in WAYS.values() if self.colour or not way.colour)
+
+    def run_file(self, way: Way) -> str:
         """Where a run goes."""
-        return f"$WORK/{self.name}_{tracker}.h5"
+        return f"$WORK/{self.name}_{way.name}.h5"
 
-    def run_command(self, tracker: str) -> str:
+    def run_command(self, way: Way) -> str:
         """The run that the row was measured on."""
-        return f"stseg run {self.rig} -o {self.run_file(tracker)} --frames {self.frames} --tracker {tracker}"
+        return f"stseg run {self.rig} -o {self.run_file(way)} --frames {self.frames} {way.options}"
 
-    def score_command(self, tracker: str, frames: str | None = None) -> str:
+    def score_command(self, way: Way, frames: str | None = None) -> str:
         """How it was scored."""
         options = f" {self.scoring}" if self.scoring else ""
-        return f"stseg evaluate {self.run_file(tracker)} {self.truth} --frames {frames or self.frames}{options}"
+        return f"stseg evaluate {self.run_file(way)} {self.truth} --frames {frames or self.frames}{options}"
 
 
 _ROOM = "--size 644,486 --unit mm --up=-z --area=-2.5,-4.5,2.5,1.5"
@@ -137,6 +147,23 @@ def _simulated(
     )
 
 
+def _filmed(
+    name: str, folder: str, options: str, frames: str, views: int, people: str, area: str = "6 m x 6 m"
+) -> ResultSet:
+    return ResultSet(
+        name,
+        "Gaussian mixtures on rendered video",
+        views,
+        frames,
+        f"$WORK/{folder}/rig.toml",
+        film=f"stseg simulate $WORK/{folder} {options}",
+        truth=f"$WORK/{folder}/truth.csv",
+        area=area,
+        remark=people,
+        colour=True,
+    )
+
+
 _ALL = (
     ResultSet(
         "uu4",
@@ -165,6 +192,7 @@ _ALL = (
         truth="$DATA/uu4/reference_tracks.csv",
         scoring="--ignore-flagged",
         remark="4 people, flagged rows not judged",
+        colour=True,
     ),
     _cmc(1, "3 people"),
     _cmc(2, "up to 10 people"),
@@ -195,12 +223,16 @@ _ALL = (
             "--source-pattern '$DATA/uu1/{name}/video.avi' --background '$DATA/uu1/{name}/background.avi' --overwrite",
         ),
         remark="1 person, no truth: counts alone",
+        colour=True,
     ),
-    _simulated("easy", "easy", "rig.toml", "Gaussian mixtures on rendered video", 4, "5 people"),
+    _filmed("easy", "easy", "--scene easy", "0:250", 4, "5 people"),
     _simulated("dense", "dense", "rig.toml", "Gaussian mixtures on rendered video", 8, "14 people"),
     _simulated("dense_masks", "dense", "rig_masks.toml", "exact silhouettes of the rendered crowd", 8, "14 people"),
     _simulated("dense_boxes", "dense", "rig_boxes.toml", "a simulated detector's boxes", 8, "14 people"),
     _simulated("dense4", "dense4", "rig.toml", "Gaussian mixtures on rendered video", 4, "14 people"),
+    _filmed("dense_50", "dense", "--scene dense", "0:50", 8, "14 people"),
+    _filmed("similar", "similar", "--scene similar --seconds 30", "0:150", 3, "4 people, 3 dressed alike", "5 m x 5 m"),
+    _filmed("two_cameras", "two_cameras", "--scene easy --cameras 2", "0:150", 2, "5 people"),
 )
 
 _MEETINGS = {

@@ -1,10 +1,16 @@
 """Measure stseg on every set at hand and write docs/results.md.
 
-    python tools/results.py [--data ../shared/data] [--sets uu4,cmc1,...] [--tracker cut|frames|both] [--work FOLDER]
+    python tools/results.py [--data ../shared/data] [--sets uu4,cmc1,...] [--ways cut,kalman,...] [--frames A:B]
+        [--work FOLDER] [--no-pictures]
 
 Makes rig files, runs, scores and draws, all through the command line of `stseg`. Figures go to docs/results.json, each
 row replacing the same row of an earlier run, and from there into the marked parts of docs/results.md. `--sets none`
-writes the page anew from the figures that there are.
+writes the page anew from the figures that there are. Ways are the trackers, and the ablations of their papers
+(tools/result_ways.py); a set is followed in those of them that its foreground allows. `--frames` measures a part of the
+frames, and the row says so.
+
+Times are of the processor: those of the run file's /timings, which are of the wall, by the share of the wall time in
+which the run had a processor.
 
 Pictures are written under WORK/pictures and hold images of people; run files and rendered scenes stay in WORK.
 Rendered scenes are used again: remove WORK after a change to the simulator.
@@ -15,24 +21,27 @@ from __future__ import annotations
 import argparse
 import datetime
 import json
+import resource
 import shlex
 import subprocess
 import sys
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from time import perf_counter
 from typing import Any
 
+import numpy as np
 from result_page import rewrite
 from result_pictures import draw, worst_frames
 from result_sets import SETS, ResultSet
+from result_ways import WAYS, Way
 
 from stseg import __version__
-from stseg.io.runs import read_run
+from stseg.io.runs import Run, read_run
 from stseg.io.tracks import read_tracks_csv
 
 ROOT = Path(__file__).parents[1]
-TRACKERS = ("cut", "frames")
 _PROGRAMS = {
     "stseg": [sys.executable, "-c", "import sys; from stseg.commands.main import main; sys.exit(main())"],
     "python": [sys.executable],
@@ -76,10 +85,19 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Measure the sets that are asked for, then write the page."""
     options = _options(arguments)
     bench = Bench(options.data.resolve(), options.work.resolve())
+    warm: set[tuple[str, str]] = set()
     for name in options.sets:
-        _prepare(SETS[name], bench, options.tracker[0])
-        for tracker in options.tracker:
-            publish({f"{name} {tracker}": measure(SETS[name], bench, tracker)})
+        one = SETS[name] if options.frames is None else replace(SETS[name], frames=options.frames, peer_frames=None)
+        ways = [way for way in one.ways if way.name in options.ways]
+        _prepare(one, bench)
+        for way in ways:
+            if (one.foreground, way.tracker) not in warm:
+                warm.add((one.foreground, way.tracker))
+                _warm_up(one, bench, way)
+            row = measure(one, bench, way)
+            if options.pictures:
+                _draw(one, bench, way, row.get("worst_frames", []))
+            publish({f"{name} {way.name}": row})
     publish({})
 
 
@@ -93,57 +111,84 @@ def publish(rows: dict[str, dict[str, Any]]) -> None:
     print(f"wrote {page.relative_to(ROOT)}: {', '.join(rows) or 'no new row'}")
 
 
-def measure(one: ResultSet, bench: Bench, tracker: str) -> dict[str, Any]:
-    """Run, score and draw one row; what docs/results.json holds of it."""
-    command = one.run_command(tracker)
+def measure(one: ResultSet, bench: Bench, way: Way) -> dict[str, Any]:
+    """Run and score one row; what docs/results.json holds of it."""
+    command = one.run_command(way)
+    begin = perf_counter(), _processor_seconds()
     bench.do(f"{command} --overwrite")
-    run = read_run(bench.path(one.run_file(tracker)))
+    share = (_processor_seconds() - begin[1]) / (perf_counter() - begin[0])
+    run = read_run(bench.path(one.run_file(way)))
     row: dict[str, Any] = {
         "set": one.name,
-        "tracker": tracker,
+        "way": way.name,
+        "frames": one.frames,
         "version": __version__,
+        "commit": _commit(),
         "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
-        "frames_per_second": round(len(run.frames) / float(run.timings["seconds"].sum()), 2),
+        "milliseconds": _milliseconds(run, share),
         "tracks": len(run.tracks),
         "people_a_frame": round(len(run.trajectory) / len(run.frames), 2),
         "run": command,
     }
-    worst: list[int] = []
     if one.truth is not None:
-        row["evaluate"] = one.score_command(tracker)
+        row["evaluate"] = one.score_command(way)
         row["scores"] = json.loads(bench.do(f"{row['evaluate']} --json"))
         if one.peer_frames is not None:
-            row["peer_scores"] = json.loads(bench.do(f"{one.score_command(tracker, one.peer_frames)} --json"))
-        worst = worst_frames(run, read_tracks_csv(bench.path(one.truth)), row["scores"], "--ignore" in one.scoring)
-        row["worst_frames"] = worst
-    _draw(one, bench, tracker, worst)
+            row["peer_scores"] = json.loads(bench.do(f"{one.score_command(way, one.peer_frames)} --json"))
+        truth = read_tracks_csv(bench.path(one.truth))
+        row["worst_frames"] = worst_frames(run, truth, row["scores"], "--ignore" in one.scoring)
     return row
 
 
-def _prepare(one: ResultSet, bench: Bench, tracker: str) -> None:
-    """Rig and truth; and a short run, so that no row's time holds the compiling of kernels."""
+def _processor_seconds() -> float:
+    """Of all commands until now."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
+def _milliseconds(run: Run, share: float) -> dict[str, float]:
+    """What each stage took a frame of a run that had a processor for a share of its time."""
+    stages, which = np.unique(run.timings["stage"], return_inverse=True)
+    seconds = np.bincount(which, run.timings["seconds"], len(stages))
+    return {
+        stage.decode(): round(1000 * share * took / len(run.frames), 2)
+        for stage, took in zip(stages.tolist(), seconds.tolist(), strict=True)
+    }
+
+
+def _commit() -> str:
+    command = ["git", "rev-parse", "--short", "HEAD"]
+    return subprocess.run(command, cwd=ROOT, stdout=subprocess.PIPE, text=True, check=True).stdout.strip()
+
+
+def _prepare(one: ResultSet, bench: Bench) -> None:
+    """Rig and truth."""
     bench.work.mkdir(parents=True, exist_ok=True)
     if one.film is not None and not bench.path(one.rig).exists():
         bench.do(f"{one.film} --overwrite")
     for command in one.prepare:
         bench.do(command)
+
+
+def _warm_up(one: ResultSet, bench: Bench, way: Way) -> None:
+    """A short run, so that no row's time holds the compiling of kernels."""
     first = int(one.frames.partition(":")[0])
     part = f"--frames {first}:{first + _WARM_UP}"
-    bench.do(f"stseg run {one.rig} -o $WORK/warm_up.h5 {part} --tracker {tracker} --overwrite")
+    bench.do(f"stseg run {one.rig} -o $WORK/warm_up.h5 {part} --tracker {way.tracker} --overwrite")
 
 
-def _draw(one: ResultSet, bench: Bench, tracker: str, frames: Sequence[int]) -> None:
+def _draw(one: ResultSet, bench: Bench, way: Way, frames: Sequence[int]) -> None:
     """The report with its pictures, and the ground at each of the worst frames."""
-    folder = f"$WORK/pictures/{one.name}_{tracker}"
+    folder = f"$WORK/pictures/{one.name}_{way.name}"
     bench.path(folder).mkdir(parents=True, exist_ok=True)
     truth = "" if one.truth is None else f" --truth {one.truth}"
     shown = "".join(f" --frame {frame}" for frame in frames)
     bench.do(
-        f"stseg report {one.run_file(tracker)} -o {folder}/report.html --pictures {folder}{truth}{shown} "
+        f"stseg report {one.run_file(way)} -o {folder}/report.html --pictures {folder}{truth}{shown} "
         "--camera-images --overwrite"
     )
     if one.truth is not None:
-        run, true = read_run(bench.path(one.run_file(tracker))), read_tracks_csv(bench.path(one.truth))
+        run, true = read_run(bench.path(one.run_file(way))), read_tracks_csv(bench.path(one.truth))
         draw(run, true, frames, bench.path(folder))
 
 
@@ -152,22 +197,26 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--data", type=Path, default=ROOT / "../shared/data")
     parser.add_argument("--work", type=Path, default=ROOT / "build/results")
     parser.add_argument("--sets", type=_names, default=list(SETS), help="names of sets; none for the page alone")
-    parser.add_argument("--tracker", type=_trackers, default=list(TRACKERS), help="cut, frames or both")
+    parser.add_argument("--ways", type=_ways, default=list(WAYS), help=f"of {', '.join(WAYS)}")
+    parser.add_argument("--frames", help="A:B, half open; else all that the set's row is of")
+    parser.add_argument("--no-pictures", dest="pictures", action="store_false")
     return parser.parse_args(arguments)
 
 
 def _names(text: str) -> list[str]:
-    names = [] if text == "none" else text.split(",")
-    unknown = [name for name in names if name not in SETS]
+    return [] if text == "none" else _known(text, SETS, ", or none")
+
+
+def _ways(text: str) -> list[str]:
+    return _known(text, WAYS)
+
+
+def _known(text: str, known: Iterable[str], otherwise: str = "") -> list[str]:
+    names, known = text.split(","), tuple(known)
+    unknown = [name for name in names if name not in known]
     if unknown:
-        raise argparse.ArgumentTypeError(f"{', '.join(unknown)}: expected names among {', '.join(SETS)}, or none")
+        raise argparse.ArgumentTypeError(f"{', '.join(unknown)}: expected names among {', '.join(known)}{otherwise}")
     return names
-
-
-def _trackers(text: str) -> list[str]:
-    if text not in ("both", *TRACKERS):
-        raise argparse.ArgumentTypeError(f"{text}: expected cut, frames or both")
-    return list(TRACKERS) if text == "both" else [text]
 
 
 if __name__ == "__main__":

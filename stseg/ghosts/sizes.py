@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
 from stseg.arrays import Floats, Ints
-from stseg.config import GhostConfig
+from stseg.config import GhostConfig, IdentityConfig
 
 
 @dataclass(frozen=True)
@@ -41,6 +41,18 @@ class Sizes:
         """Take others' sizes for the chosen."""
         self.height[chosen], self.height_variance[chosen] = others.height, others.height_variance
         self.width[chosen], self.width_variance[chosen] = others.width, others.width_variance
+
+    def and_(self, others: Sizes) -> Sizes:
+        """These, then others."""
+        pairs = ((getattr(self, one.name), getattr(others, one.name)) for one in fields(Sizes))
+        return Sizes(*(np.concatenate(pair) for pair in pairs))
+
+    def blurred(self, noise: IdentityConfig) -> Sizes:
+        """These, one frame's measurements of them off by its noise besides."""
+        return Sizes(
+            self.height, self.height_variance + noise.height_noise**2,
+            self.width, self.width_variance + noise.width_noise**2,
+        )  # fmt: skip
 
     def told(self, prior: Sizes) -> Sizes:
         """These posteriors as measurements: the prior taken out of their variances.

@@ -17,32 +17,22 @@ from stseg.geometry import Rig
 from stseg.ghosts.expected import Expected
 from stseg.ghosts.sizes import Sizes
 from stseg.identity.linking import assign
-from stseg.occupancy.sampling import Sampling
-from stseg.trackers.cells import reached_cells
+from stseg.trackers.each_frame import EachFrame
 from stseg.trackers.motion import Filters, begun, carried, corrected, surprise
 from stseg.trackers.protocol import FORGETTING, STAYING, Commit, Scene, Shown
-from stseg.trackers.rows import Event, event_rows, trajectory_rows, views_at
-from stseg.tracks import WINDOW
+from stseg.trackers.rows import Event
 
 
-class KalmanTracker:
-    """Follows people at constant velocity; every frame is decided as it comes.
-
-    Parameters
-    ----------
-    rig, config
-        The scene, and the constants of all stages.
-    first
-        The run's first frame.
-    """
+class KalmanTracker(EachFrame):
+    """Follows people at constant velocity."""
 
     final: ClassVar[bool] = True
 
     def __init__(self, rig: Rig, config: Config, first: int) -> None:
-        self.rig, self.config = rig, config
-        self.views = Sampling.of(rig, "point").views()
+        super().__init__(rig, config, first)
         self.filters = begun(np.zeros((0, 2)), np.zeros((0, 2, 2)), config.kalman.pace)
-        self.frame, self.issued, self.begun = first, 0, False
+        self.sizes = Sizes.of_anybody(0, config.ghosts)
+        self.issued, self.begun = 0, False
         self.ids: Ints = np.zeros(0, np.int64)
         self.seen: Ints = np.zeros(0, np.int64)
 
@@ -50,14 +40,13 @@ class KalmanTracker:
         """Everybody who is followed, carried to the frame; None before the first."""
         if not self.begun:
             return None
-        seconds, n = (frame - self.frame) / self.rig.frame_rate, len(self.ids)
-        ghosts, noise = self.config.ghosts, self.config.identity.place_noise**2 * np.eye(2)
+        seconds, noise = (frame - self.frame) / self.rig.frame_rate, self.config.identity.place_noise**2 * np.eye(2)
         filters = carried(self.filters, seconds, self.config.kalman.turn)
         unseen = (frame - 1 - self.seen) / self.rig.frame_rate
         return Expected(
             filters.state[:, :2],
             filters.covariance[:, :2, :2] + noise,
-            Sizes.of_anybody(n, ghosts),
+            self.sizes.blurred(self.config.identity),
             STAYING - FORGETTING * unseen,
         )
 
@@ -68,10 +57,14 @@ class KalmanTracker:
         ground, config = scene.people.ground, self.config.kalman
         noise = scene.people.covariance + np.eye(2) * self.config.identity.place_noise**2
         filters = carried(self.filters, (scene.frame - self.frame) / self.rig.frame_rate, config.turn)
-        tracks, found = self._assigned(filters, ground, noise)
+        sizes = self._measured(scene.people.sizes)
+        tracks, found = self._assigned(filters, ground, noise, sizes)
         fresh = np.setdiff1d(np.arange(len(ground)), found)
         filters = corrected(filters, tracks, ground[found], noise[found])
         self.filters = filters.and_(begun(ground[fresh], noise[fresh], config.pace))
+        self.sizes.put(tracks, sizes.at(found).with_prior(self.sizes.at(tracks)))
+        anybody = Sizes.of_anybody(len(fresh), self.config.ghosts)
+        self.sizes = self.sizes.and_(sizes.at(fresh).with_prior(anybody))
         newcomers = self.issued + 1 + np.arange(len(fresh))
         self.frame, self.issued, self.begun = scene.frame, self.issued + len(fresh), True
         person = np.full(len(self.ids), -1)
@@ -81,13 +74,16 @@ class KalmanTracker:
         births = [(scene.frame, "birth", int(i), 0, "a person in nobody's gate") for i in newcomers]
         return [self._commit(scene, person, births + deaths)]
 
-    def finish(self) -> list[Commit]:
-        """Nothing is open."""
-        return []
+    def _measured(self, sizes: Sizes) -> Sizes:
+        """What a frame adds to what was known of people's sizes."""
+        anybody = Sizes.of_anybody(len(sizes.height), self.config.ghosts)
+        return sizes.told(anybody).blurred(self.config.identity)
 
-    def _assigned(self, filters: Filters, ground: Floats, noise: Floats) -> tuple[Ints, Ints]:
-        """Filters and places of a frame that are one person's, both int64: the likeliest pairs within the gates."""
+    def _assigned(self, filters: Filters, ground: Floats, noise: Floats, sizes: Sizes) -> tuple[Ints, Ints]:
+        """Filters and people of a frame that are one person's, both int64: the likeliest pairs within the gates."""
         squares, cost = surprise(filters, ground, noise)
+        variance = self.sizes.height_variance[:, None] + sizes.height_variance
+        cost = cost + (self.sizes.height[:, None] - sizes.height) ** 2 / variance + np.log(variance)
         inside = squares <= -2.0 * np.log1p(-self.config.kalman.gate)  # of chi square with two degrees of freedom
         return assign(np.where(inside, cost - cost.max(initial=0.0), 1.0), 1.0)
 
@@ -97,17 +93,17 @@ class KalmanTracker:
         lost = frame - self.seen > patience * self.rig.frame_rate
         told = [(frame, "death", int(i), 0, f"not found for {patience:g} s") for i in self.ids[lost]]
         self.filters, self.ids, self.seen = self.filters.kept(~lost), self.ids[~lost], self.seen[~lost]
+        self.sizes = self.sizes.at(np.flatnonzero(~lost))
         return told
 
     def _commit(self, scene: Scene, person: Ints, events: list[Event]) -> Commit:
         """Those found in the frame: where the filters believe them, beside where the frame saw them."""
-        people, grid = scene.people, self.rig.grid
+        people = scene.people
         found, which = np.flatnonzero(person >= 0), person[person >= 0]
         ids, ground = self.ids[found], self.filters.state[found, :2]
-        label, extent = reached_cells(scene, ground, ids, grid, self.config.occupancy.reach)
-        rows = trajectory_rows(
-            scene.frame, ids, ground, self.filters.covariance[found, :2, :2], people.height[which],
-            people.width[which], extent, people.evidence[which], views_at(self.views, ground, grid),
+        commit = self.commit(
+            scene, ids, ground, self.filters.covariance[found, :2, :2], people.height[which], people.width[which],
+            people.evidence[which], events,
         )  # fmt: skip
-        rows["raw_x"], rows["raw_y"] = people.ground[which].T
-        return Commit([scene], label[None], rows, event_rows(events), np.zeros(0, WINDOW))
+        commit.trajectory["raw_x"], commit.trajectory["raw_y"] = people.ground[which].T
+        return commit

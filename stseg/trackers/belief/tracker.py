@@ -13,52 +13,37 @@ from stseg.ghosts.border import Border
 from stseg.ghosts.expected import Expected
 from stseg.ghosts.sizes import Sizes
 from stseg.identity.linking import assign, distances
-from stseg.occupancy.sampling import Sampling
 from stseg.trackers.belief.condensation import condense
 from stseg.trackers.belief.particles import Motion
 from stseg.trackers.belief.star import propagate
 from stseg.trackers.belief.target import Target, in_front, looks
 from stseg.trackers.belief.view import StarView
-from stseg.trackers.cells import reached_cells
 from stseg.trackers.colour import colour_views
-from stseg.trackers.protocol import Commit, Scene, Shown
-from stseg.trackers.rows import Event, event_rows, trajectory_rows, views_at
-from stseg.tracks import WINDOW
+from stseg.trackers.each_frame import EachFrame
+from stseg.trackers.protocol import FORGETTING, STAYING, Commit, Scene, Shown
+from stseg.trackers.rows import Event
 
 _WAYS = {"messages": propagate, "condensation": condense}
 """How stars go from one frame to the next."""
 _SEEN = 0.5
 """Probability from which a view is taken to see a target."""
-_STAYING = 1.0
-"""Log-odds that somebody found in one frame is found in the next, nats."""
-_FORGETTING = 4.0
-"""How fast those fall while nobody is found there, nats per second."""
 _MANY = 50
 """Frames over which a height is averaged."""
 
 
-class BeliefTracker:
+class BeliefTracker(EachFrame):
     """Follows people by their colours, one star graph each.
 
     A detection that is nobody known begins a track; where it was seen whole, its colours are learned. From then on
     the colours lead, and detections that are it only confirm the track and keep its colours fresh.
-
-    Parameters
-    ----------
-    rig, config
-        The scene, and the constants of all stages.
-    first
-        The run's first frame; it does not matter here.
     """
 
     final: ClassVar[bool] = True
 
     def __init__(self, rig: Rig, config: Config, first: int) -> None:
-        del first
-        self.rig, self.config = rig, config
+        super().__init__(rig, config, first)
         self.motion = Motion(1 / rig.frame_rate, config.belief.wander, config.belief.turn)
         self.views = [StarView.of(camera, rig.grid) for camera in rig.cameras]
-        self.seen_by = Sampling.of(rig, "point").views()
         self.border = Border.of(rig)
         self.targets: list[Target] = []
         self.issued = 0
@@ -83,7 +68,7 @@ class BeliefTracker:
                 np.array([height_noise * (1 + 1 / target.found) for target in self.targets]),
                 self.config.ghosts,
             ),
-            _STAYING - _FORGETTING * missed,
+            STAYING - FORGETTING * missed,
         )
 
     def add(self, scene: Scene, shown: Shown) -> list[Commit]:
@@ -95,10 +80,6 @@ class BeliefTracker:
         events = self._end(scene.frame) + self._begin(scene, found, images)
         seen = [t for t in self.targets if t.missed == 0 or t.star.sight.max(initial=0.0) >= _SEEN]
         return [self._commit(scene, seen, events)]
-
-    def finish(self) -> list[Commit]:
-        """Nothing is open."""
-        return []
 
     def _follow(self, frame: int, images: list[Bytes | None]) -> None:
         seen = looks(self.targets, self.views, images, self.motion, self.config.belief)
@@ -167,16 +148,12 @@ class BeliefTracker:
         return events
 
     def _commit(self, scene: Scene, seen: list[Target], events: list[Event]) -> Commit:
-        grid, ids = self.rig.grid, np.array([target.track for target in seen], np.int64)
+        ids = np.array([target.track for target in seen], np.int64)
         ground = np.array([target.star.ground.mean for target in seen]).reshape(-1, 2)
         covariance: Floats = np.array([target.star.ground.covariance for target in seen]).reshape(-1, 2, 2)
         height, score = (np.array(column, float) for column in ([t.height for t in seen], self._scores(seen)))
-        label, extent = reached_cells(scene, ground, ids, grid, self.config.occupancy.reach)
         width = np.full(len(seen), self.config.ghosts.width_mean)
-        rows = trajectory_rows(
-            scene.frame, ids, ground, covariance, height, width, extent, score, views_at(self.seen_by, ground, grid)
-        )
-        return Commit([scene], label[None], rows, event_rows(events), np.zeros(0, WINDOW))
+        return self.commit(scene, ids, ground, covariance, height, width, score, events)
 
     @staticmethod
     def _scores(seen: list[Target]) -> list[float]:

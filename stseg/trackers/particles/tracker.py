@@ -21,17 +21,15 @@ from stseg.ghosts.border import Border
 from stseg.ghosts.expected import Expected
 from stseg.ghosts.sizes import Sizes
 from stseg.identity.linking import assign, distances
-from stseg.occupancy.sampling import Sampling
-from stseg.trackers.cells import reached_cells
 from stseg.trackers.colour import ColourView, colour_views
+from stseg.trackers.each_frame import EachFrame
 from stseg.trackers.particles.appearance import Appearance
 from stseg.trackers.particles.crowd import Crowd
 from stseg.trackers.particles.filter import estimate, predicted, resampled, weights
 from stseg.trackers.particles.search import search
 from stseg.trackers.particles.views import Look, ParticleView
 from stseg.trackers.protocol import FORGETTING, STAYING, Commit, Scene, Shown
-from stseg.trackers.rows import Event, event_rows, trajectory_rows, views_at
-from stseg.tracks import WINDOW
+from stseg.trackers.rows import Event
 
 _FLOOR = 0.05
 """No place is known better than this, metres (standard deviation): particles that agree may be wrong together."""
@@ -47,26 +45,17 @@ _HEIGHT_RENEWAL = 0.1
 """Share of a person's height that a frame that finds them renews."""
 
 
-class ParticleTracker:
-    """Follows people by their colours; every frame is decided as it comes.
-
-    Parameters
-    ----------
-    rig, config
-        The scene, and the constants of all stages.
-    first
-        The run's first frame.
-    """
+class ParticleTracker(EachFrame):
+    """Follows people by their colours."""
 
     final: ClassVar[bool] = True
 
     def __init__(self, rig: Rig, config: Config, first: int) -> None:
-        self.rig, self.config = rig, config
-        self.grid_views = Sampling.of(rig, "point").views()
+        super().__init__(rig, config, first)
         self.views = [ParticleView(camera, config.particles.columns) for camera in rig.cameras]
         self.border = Border.of(rig)
         self.rng = np.random.default_rng(config.particles.seed)
-        self.frame, self.issued, self.begun = first, 0, False
+        self.issued, self.begun = 0, False
         self.crowd = Crowd.nobody(1 if config.particles.way == "search" else config.particles.count)
 
     def expected(self, frame: int) -> Expected | None:
@@ -99,12 +88,10 @@ class ParticleTracker:
             looks = self._looks(views, np.full(len(self.crowd), _MARGIN))
         for look in looks:
             self._learn(look, seconds)
-        nats = np.array([evidence.get(int(i), 0.0) for i in self.crowd.ids])
-        return [self._commit(scene, nats, births + deaths)]
-
-    def finish(self) -> list[Commit]:
-        """Nothing is open."""
-        return []
+        crowd, events = self.crowd, births + deaths
+        nats = np.array([evidence.get(int(i), 0.0) for i in crowd.ids])
+        width = np.full(len(crowd), self.config.ghosts.width_mean)
+        return [self.commit(scene, crowd.ids, crowd.ground, crowd.covariance, crowd.height, width, nats, events)]
 
     def _step(self, frame: int) -> float:
         """How far a person's step to a frame may go, metres (standard deviation)."""
@@ -211,13 +198,3 @@ class ParticleTracker:
         share = min(seconds / self.config.particles.memory, 1.0)
         learned = look.learned(crowd.ground, crowd.appearances, share, self.rng)
         self.crowd = replace(crowd, appearances=tuple(learned))
-
-    def _commit(self, scene: Scene, evidence: Floats, events: list[Event]) -> Commit:
-        crowd, grid = self.crowd, self.rig.grid
-        label, extent = reached_cells(scene, crowd.ground, crowd.ids, grid, self.config.occupancy.reach)
-        rows = trajectory_rows(
-            scene.frame, crowd.ids, crowd.ground, crowd.covariance, crowd.height,
-            np.full(len(crowd), self.config.ghosts.width_mean), extent, evidence,
-            views_at(self.grid_views, crowd.ground, grid),
-        )  # fmt: skip
-        return Commit([scene], label[None], rows, event_rows(events), np.zeros(0, WINDOW))
