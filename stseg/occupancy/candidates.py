@@ -135,4 +135,4 @@ def unexplained(occupancy: Occupancy, seen: Sequence[ViewEvidence]) -> Explanati
     steps = tuple(max(camera.size) for camera in occupancy.rig.cameras)
     owner = tuple(np.full((1, 1), -1, np.int16) for _ in steps)
     boxes = tuple(np.full(len(view) if isinstance(view, Boxes) else 0, -1, np.int64) for view in seen)
-    return Explanation(people, people, owner, steps, boxes)
+    return Explanation(people, people, owner, steps, boxes, np.full(len(steps), np.nan))
