@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -10,11 +11,12 @@ from stseg.geometry import Rig
 
 SourceKind = Literal["video", "masks", "images", "instances", "boxes"]
 SOURCE_KINDS: tuple[SourceKind, ...] = ("video", "masks", "images", "instances", "boxes")
+_PASSWORD = re.compile(r"(://[^/\s:@\"]*):[^/\s\"]*@")
 
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """One stream of frames on disk.
+    """One stream of frames on disk, or a live one.
 
     Attributes
     ----------
@@ -23,7 +25,8 @@ class Source:
         video, folder or pattern. instances: indexed images, one value an instance, 0 background, a folder or pattern.
         boxes: a text file of a detector's boxes.
     path
-        File, folder or pattern (`frame_*.png`, `hour_*.mp4`), already relative to the rig file's folder.
+        File, folder or pattern (`frame_*.png`, `hour_*.mp4`), already relative to the rig file's folder; of a live
+        stream the last part of its address.
     more
         Not for boxes: files, folders or patterns that go on where the one before ends.
     first_frame
@@ -37,6 +40,7 @@ class Source:
     first_frame: int = 0
     frames: int | None = None
     more: tuple[Path, ...] = ()
+    address: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,3 +72,8 @@ class Recording:
     path: Path
     rig: Rig
     sources: tuple[CameraSource, ...]
+
+
+def without_passwords(text: str) -> str:
+    """A text in which the addresses of live streams (`rtsp://name:password@...`) show no password."""
+    return _PASSWORD.sub(r"\1:***@", text)
