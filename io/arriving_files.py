@@ -13,7 +13,6 @@ from threading import Event, Lock
 from stseg.arrays import Observation
 from stseg.errors import SourceError
 from stseg.geometry import Camera
-from stseg.io.image_stream import is_pattern
 from stseg.io.live import now
 from stseg.io.outputs import replacing
 from stseg.io.recording import Source
@@ -180,10 +179,3 @@ class ArrivingVideos:
             self._known.pop(0)
         else:
             self._notes.note(self._camera.name, self._path.name, self._read)
-
-
-def require_arriving(source: Source, key: str) -> None:
-    """Raise SourceError where a source is none that can be followed: videos by one pattern."""
-    if source.kind not in ("video", "masks") or source.more or not is_pattern(source.path):
-        found = f"{len(source.more) + 1} paths" if source.more else f"kind {source.kind}, path {source.path.name}"
-        raise SourceError(source.path, key, found, "videos by a pattern (cam1_*.mp4), or an address (rtsp://...)")

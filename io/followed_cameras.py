@@ -20,7 +20,6 @@ from typing import Self
 
 from stseg.arrays import Observation
 from stseg.config import LiveConfig
-from stseg.errors import SourceError
 from stseg.io.live import LiveMoment, now
 from stseg.io.live_stream import Arrived, Capture, FFmpegCapture, LiveStream
 from stseg.io.recording import Recording
@@ -197,16 +196,7 @@ class FollowedCameras:
         return self._halt.is_set() or self._over.is_set()
 
 
-def require_all_live(recording: Recording) -> None:
-    """Raise SourceError where some cameras are live and others are files."""
-    for camera, source in zip(recording.rig.cameras, recording.sources, strict=True):
-        if not source.source.address:
-            raise SourceError(
-                source.source.path, f"camera {camera.name}", "files beside live streams", "all cameras live, or none"
-            )
-
-
 def _most_waiting(recording: Recording, config: LiveConfig) -> int:
     """How many moments may wait with their views."""
     bytes_of_one = sum(3 * camera.size[0] * camera.size[1] for camera in recording.rig.cameras)
-    return max(2, int(config.waiting * _MEBI) // bytes_of_one)
+    return max(2, int(min(config.waiting * recording.rig.frame_rate, config.pictures * _MEBI / bytes_of_one)))

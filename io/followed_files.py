@@ -17,7 +17,7 @@ from stseg.arrays import Observation
 from stseg.config import LiveConfig
 from stseg.errors import SourceError
 from stseg.geometry import Camera
-from stseg.io.arriving_files import ArrivingFiles, ArrivingVideos, FileNotes, require_arriving
+from stseg.io.arriving_files import ArrivingFiles, ArrivingVideos, FileNotes
 from stseg.io.live import LiveMoment
 from stseg.io.recording import CameraSource, Recording
 
@@ -26,7 +26,7 @@ _POLL = 0.2
 
 
 class FollowedFiles:
-    """Moments of a recording whose cameras' videos arrive as files, by a pattern each.
+    """Moments of a recording whose cameras' videos arrive as files, by a pattern each (see `stseg.io.live.is_live`).
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ class FollowedFiles:
     Raises
     ------
     SourceError
-        Where a source is no pattern of videos, or, while iterating, where a video is broken.
+        Where a camera starts after the first frame, or, while iterating, where a video is broken.
     """
 
     def __init__(
@@ -64,7 +64,6 @@ class FollowedFiles:
         """Set for the threads that wait for files, when this is closed."""
         self._feeds: list[_Feed] = []
         for camera, source in zip(recording.rig.cameras, recording.sources, strict=True):
-            require_arriving(source.source, f"camera {camera.name}")
             files = ArrivingFiles(source.source.path, config.settled, self._over, say)
             self._feeds.append(_Feed(camera, source, ArrivingVideos(source.source, camera, files, notes)))
             self._feeds[-1].require_start(first)

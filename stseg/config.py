@@ -320,11 +320,13 @@ class LiveConfig:
     """How long to wait before a broken stream is asked again, seconds; each time in vain it is twice as long."""
     longest_pause: float = 60.0
     """But no longer than this, seconds."""
-    waiting: float = 512.0
-    """How much of live streams may wait to be worked on, MiB of pictures; beyond that the oldest are dropped."""
+    waiting: float = 10.0
+    """How much of live streams may wait to be worked on, seconds; beyond that the oldest moments are dropped."""
+    pictures: float = 512.0
+    """How much memory their pictures may take, MiB; beyond that, too."""
 
     def __post_init__(self) -> None:
-        for name in ("settled", "learning", "stale", "silence", "pause", "longest_pause", "waiting"):
+        for name in ("settled", "learning", "stale", "silence", "pause", "longest_pause", "waiting", "pictures"):
             require(getattr(self, name) > 0, self, name, "a number above 0")
 
 

@@ -74,9 +74,10 @@ def write_pieces(folder: Path, *, empty: bool) -> Path:
     return path
 
 
-def arrive(folder: Path, *numbers: int) -> None:
-    """Pieces of all cameras come into the folder, each first in half and then whole."""
+def arrive(folder: Path, *numbers: int, pause: float = 0.0) -> None:
+    """Pieces of all cameras come into the folder, a pause apart, each first in half and then whole."""
     for number in numbers:
+        time.sleep(pause)
         for name in PLACES:
             content = (folder / "pieces" / f"{name}_{number}.avi").read_bytes()
             with (folder / "in" / f"{name}_{number}.avi").open("wb", buffering=0) as file:
@@ -85,7 +86,7 @@ def arrive(folder: Path, *numbers: int) -> None:
                 file.write(content[len(content) // 2 :])
 
 
-def meanwhile(work: Callable[[], None]) -> Thread:
+def meanwhile(work: Callable[[], object]) -> Thread:
     """Something that goes on beside the test."""
     thread = Thread(target=work, daemon=True)
     thread.start()

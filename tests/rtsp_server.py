@@ -1,7 +1,7 @@
 """Serve a video as RTSP streams, in real time, with GStreamer: rtsp_server.py PORT NAME=FILE...
 
-A stream ends when its video does, and begins again for whoever asks again. It says `ready` and the port once it listens,
-or what it misses. It runs under the system's Python, which alone has GStreamer's bindings, and needs nothing of ours.
+A stream ends when its video does, and begins again for whoever asks again. Once it listens it says `ready` and the
+port, else what it misses. It runs under the system's Python, which alone has GStreamer's bindings.
 """
 
 from __future__ import annotations

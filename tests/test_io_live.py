@@ -5,14 +5,15 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from threading import Event
+from threading import Event, current_thread
 
 import numpy as np
 import pytest
 from arrivals import FRAMES, PIECE, PLACES, StandIn, arrive, filmed_rig, meanwhile, write_pieces, write_video
 
-from stseg.arrays import Bytes
+from stseg.arrays import AnyArray, Bytes
 from stseg.config import LiveConfig
 from stseg.errors import RigError, SourceError
 from stseg.geometry import Rig
@@ -20,12 +21,13 @@ from stseg.io.arriving_files import ArrivingFiles, FileNotes
 from stseg.io.followed_cameras import FollowedCameras
 from stseg.io.followed_files import FollowedFiles
 from stseg.io.frames import count_frames, open_frames
-from stseg.io.live import LiveMoment, now
+from stseg.io.live import LiveMoment, is_live, now
 from stseg.io.live_stream import Capture
 from stseg.io.provenance import gather_provenance
 from stseg.io.recording import CameraSource, Recording, Source, without_passwords
 from stseg.io.rig_text import format_rig
 from stseg.io.rigs import parse_rig, read_rig
+from stseg.io.video_stream import VideoStream
 
 QUICK = LiveConfig(settled=0.3, silence=0.5, pause=0.02, longest_pause=1.0, stale=0.1)
 
@@ -53,21 +55,27 @@ def test_files_are_taken_in_order_once_they_are_complete(tmp_path: Path) -> None
     begun = time.monotonic()
     assert [files.next(), files.next()] == [tmp_path / "cam_9.mp4", tmp_path / "cam_10.mp4"]
     assert time.monotonic() - begun < 0.3
-    growing = meanwhile(lambda: [_add(tmp_path / "cam_11.mp4") for _ in range(4)] and None)
+    growing = meanwhile(partial(_add, tmp_path / "cam_11.mp4"))
     assert files.next() == tmp_path / "cam_11.mp4"
     assert not growing.is_alive()
     assert time.monotonic() - begun > 0.6
     (tmp_path / "cam_8.mp4").write_bytes(b"late")
     (tmp_path / "cam_12.mp4").write_bytes(b"")
-    meanwhile(lambda: (time.sleep(0.5), halt.set())[1])
+    meanwhile(partial(_later, halt, 0.5))
     assert files.next() is None  # nothing was ever added to it
     assert [line.split(":")[0] for line in said] == [str(tmp_path / "cam_8.mp4")]
 
 
 def _add(path: Path) -> None:
-    time.sleep(0.1)
-    with path.open("ab") as file:
-        file.write(b"more")
+    for _ in range(4):
+        time.sleep(0.1)
+        with path.open("ab") as file:
+            file.write(b"more")
+
+
+def _later(halt: Event, seconds: float) -> None:
+    time.sleep(seconds)
+    halt.set()
 
 
 def test_files_that_arrive_show_what_they_show_afterwards(arriving: Path, tmp_path: Path) -> None:
@@ -105,10 +113,13 @@ def test_files_that_were_read_may_go(tmp_path: Path) -> None:
 def test_reading_waits_for_whoever_takes_the_moments(
     arriving: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from stseg.io.video_stream import VideoStream
-
     read, whole = list[int](), VideoStream.read
-    monkeypatch.setattr(VideoStream, "read", lambda stream: read.append(1) or whole(stream))
+
+    def counted(stream: VideoStream) -> AnyArray | None:
+        read.append(1)
+        return whole(stream)
+
+    monkeypatch.setattr(VideoStream, "read", counted)
     with followed(arriving, 0, FRAMES, FileNotes(tmp_path / "files.json"), print) as moments:
         for count, moment in enumerate(moments, 1):
             if count < 4:
@@ -123,18 +134,26 @@ def test_who_is_waited_for_is_said(tmp_path: Path) -> None:
     arrive(tmp_path, 1)
     (tmp_path / "in" / "east_1.avi").unlink()
     halt = Event()
-    meanwhile(lambda: (time.sleep(1.6), halt.set())[1])
+    meanwhile(partial(_later, halt, 1.6))
     with FollowedFiles(read_rig(rig), 0, None, QUICK, FileNotes(tmp_path / "files.json"), halt, said.append) as moments:
         assert list(moments) == []
     assert said == ["waiting for the next file of east, at frame 0"]
 
 
-@pytest.mark.parametrize("path", ["cam.avi", "frames"])
-def test_what_cannot_be_followed_is_refused(arriving: Path, tmp_path: Path, path: str) -> None:
+@pytest.mark.parametrize(
+    "source",
+    [
+        Source("video", Path("cam.avi")),
+        Source("images", Path("*.png")),
+        Source("video", Path("a*"), more=(Path("b*"),)),
+    ],
+)
+def test_what_cannot_be_followed_is_refused(arriving: Path, source: Source) -> None:
     recording = read_rig(arriving)
-    fixed = replace(recording, sources=(CameraSource(Source("video", tmp_path / path)), *recording.sources[1:]))
+    assert not is_live(recording)
+    assert is_live(live())
     with pytest.raises(SourceError, match="by a pattern"):
-        FollowedFiles(fixed, 0, None, QUICK, FileNotes(tmp_path / "files.json"), Event(), print)
+        is_live(replace(recording, sources=(CameraSource(source), *recording.sources[1:])))
 
 
 # Live cameras
@@ -156,12 +175,10 @@ def live(offsets: tuple[int, ...] = (0, 0)) -> Recording:
 
 def opening(*cameras: StandIn) -> Callable[[str, float], Capture]:
     """Each thread opens its own camera, the same one whenever it does."""
-    import threading
-
     own: dict[str, StandIn] = {}
 
     def open_own(address: str, silence: float) -> Capture:
-        name = threading.current_thread().name
+        name = current_thread().name
         names = [f"camera {place}" for place in PLACES]
         return own.setdefault(name, cameras[names.index(name)]).open(address, silence)
 
@@ -180,7 +197,7 @@ def test_cameras_are_aligned_by_when_their_pictures_arrive() -> None:
         some = taken(moments, 20)
     assert [moment.frame for moment in some] == list(range(20))
     assert moments.dropped == 0
-    shown = np.array([[int(view[0, 0, 0]) for view in moment.views if view is not None] for moment in some])  # type: ignore[call-overload, index]
+    shown = np.array([[int(view[0, 0, 0]) for view in moment.views if view is not None] for moment in some])  # type: ignore[index]
     assert shown.shape == (20, 2)
     # Half a frame off at most, and what a busy machine adds.
     np.testing.assert_allclose(np.median(shown[:, 1] / 2 - shown[:, 0]), 5, atol=1.1)
@@ -206,7 +223,7 @@ def test_a_broken_stream_is_asked_again_with_growing_pauses_and_its_view_is_blin
 
 
 def test_what_cannot_be_worked_on_in_time_loses_its_oldest_moments_and_says_so() -> None:
-    small = replace(QUICK, waiting=5 * 2 * 128 * 96 * 3 / 2**20)
+    small = replace(QUICK, pictures=5 * 2 * 128 * 96 * 3 / 2**20)
     cameras, halt, said = (StandIn(numbered(0), 0.05), StandIn(numbered(1), 0.05)), Event(), list[str]()
     with FollowedCameras(live(), small, None, halt, said.append, opening(*cameras)) as moments:
         first = next(moments)

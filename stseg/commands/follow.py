@@ -22,11 +22,10 @@ from stseg.commands.stopping import stop_asked
 from stseg.errors import ConfigError, SourceError
 from stseg.identity.segments import Segment, endless_segments
 from stseg.io.arriving_files import FileNotes
-from stseg.io.followed_cameras import FollowedCameras, require_all_live
+from stseg.io.followed_cameras import FollowedCameras
 from stseg.io.followed_files import FollowedFiles
-from stseg.io.live import LiveMoment
+from stseg.io.live import LiveMoment, is_live
 from stseg.io.live_table import LiveTable
-from stseg.io.recording import Recording
 from stseg.io.runs import read_run
 from stseg.io.work_folder import WorkFolder
 
@@ -78,11 +77,6 @@ def follow(job: Job, folder: WorkFolder, output: Path, overwrite: bool) -> str:
     tracks = assemble(whole, follower.pipeline, made, output, overwrite)
     people = len(np.unique(tracks.trajectory["id"]))
     return f"{output}: {people} tracks in frames {whole.first} to {whole.stop - 1}{follower.delay}"
-
-
-def is_live(recording: Recording) -> bool:
-    """Whether cameras of a recording are live streams."""
-    return any(source.source.address for source in recording.sources)
 
 
 def live_table_of(output: Path) -> Path:
@@ -149,7 +143,6 @@ def _files(job: Job, folder: WorkFolder, follower: Follower, halt: Event) -> Ite
 def _cameras(job: Job, folder: WorkFolder, follower: Follower, halt: Event) -> Iterator[_Coming | None]:
     """Live streams from now on; None where it is stopped before anything came."""
     recording, config, sights = job.recording, job.config, follower.sights
-    require_all_live(recording)
     with FollowedCameras(recording, config.live, folder.clock(), halt, say) as moments:
         if sights.unlearned and not _learn(sights, moments, config.live.learning):
             yield None

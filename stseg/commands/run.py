@@ -25,6 +25,7 @@ from stseg.identity.segments import Segment, segments
 from stseg.io.config_file import format_config, read_config
 from stseg.io.frames import Streams, count_streams
 from stseg.io.label_images import require_label_folder
+from stseg.io.live import is_live
 from stseg.io.outputs import require_new
 from stseg.io.provenance import as_tables, gather_provenance
 from stseg.io.recording import Recording
@@ -120,6 +121,7 @@ def run(
 
 def _follow(job: Job, asked: dict[str, Any], output: Path, overwrite: bool) -> str:
     """What there is to say of a run that followed a recording; its files change while it goes on."""
+    is_live(job.recording)  # or it cannot be followed
     del asked["source"], asked["--frames"]
     with WorkFolder(output, asked | {"--follow": "yes"}) as folder, _told_how_to_go_on(folder):
         if not folder.segments():
