@@ -92,7 +92,7 @@ class FollowedCameras:
             LiveStream(source.source, camera, 1 / rig.frame_rate, config, kept, self._came, say, opening)
             for camera, source in zip(rig.cameras, recording.sources, strict=True)
         ]
-        self._clock = Thread(target=self._tick, name="frame clock", daemon=True)
+        self._clock = Thread(target=self._run_clock, name="frame clock", daemon=True)
         self._over = Event()
 
     def __enter__(self) -> Self:
@@ -125,10 +125,18 @@ class FollowedCameras:
         for stream in self._streams:
             stream.close()
         for thread in (*self._streams, self._clock):
-            thread.join(self._config.silence + 1)
+            thread.join()
+
+    def _run_clock(self) -> None:
+        """What the clock's thread does; when it ends nobody needs pictures any more."""
+        try:
+            self._tick()
+        finally:
+            for stream in self._streams:
+                stream.close()
 
     def _tick(self) -> None:
-        """What the clock's thread does."""
+        """Let moments wait one after the other, until the run is stopped."""
         if not self._wait_for_pictures():
             return
         if self.start is None:

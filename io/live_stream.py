@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections import deque
 from collections.abc import Callable, Iterator
 from threading import Condition, Event, Thread
@@ -17,6 +18,9 @@ from stseg.geometry import Camera
 from stseg.io.live import now
 from stseg.io.pictures import as_observation
 from stseg.io.recording import Source, without_passwords
+
+_OPTIONS = "rtsp_transport;tcp|fflags;nobuffer|analyzeduration;1000000"
+"""RTSP over TCP; nothing that came before is held back, and a second is enough to tell what is sent, microseconds."""
 
 
 class Capture(Protocol):
@@ -37,9 +41,9 @@ class Arrived(NamedTuple):
 
 
 class FFmpegCapture:
-    """A stream that OpenCV's FFmpeg reads; RTSP comes over TCP.
+    """A stream that OpenCV's FFmpeg reads.
 
-    The environment variable OPENCV_FFMPEG_CAPTURE_OPTIONS, if it is set, is heeded by OpenCV.
+    Its options are those of the environment variable OPENCV_FFMPEG_CAPTURE_OPTIONS where it is set, else `_OPTIONS`.
 
     Raises
     ------
@@ -48,6 +52,7 @@ class FFmpegCapture:
     """
 
     def __init__(self, address: str, silence: float) -> None:
+        os.environ.setdefault("OPENCV_FFMPEG_CAPTURE_OPTIONS", _OPTIONS)
         limit = round(1000 * silence)
         # One thread: FFmpeg's threads of frames hold back a frame each.
         options = [cv2.CAP_PROP_OPEN_TIMEOUT_MSEC, limit, cv2.CAP_PROP_READ_TIMEOUT_MSEC, limit]
