@@ -49,9 +49,16 @@ def reduced_view(view: Observation, factor: int) -> Observation:
     """A colour frame reduced by a whole factor, each pixel the mean of a square; what is no colour frame stays."""
     if factor == 1 or not isinstance(view, np.ndarray) or view.ndim != 3:
         return view
-    height, width = view.shape[0] // factor, view.shape[1] // factor
-    whole = view[: height * factor, : width * factor]
-    return np.asarray(cv2.resize(whole, (width, height), interpolation=cv2.INTER_AREA), np.uint8)
+    return np.asarray(reduced_picture(view, factor), np.uint8)
+
+
+def reduced_picture(picture: AnyArray, factor: int) -> AnyArray:
+    """A picture (v, u) or (v, u, 3) reduced by a whole factor; the rest at its right and lower edges is left out."""
+    if factor == 1:
+        return picture
+    height, width = picture.shape[0] // factor, picture.shape[1] // factor
+    whole = picture[: height * factor, : width * factor]
+    return cv2.resize(whole, (width, height), interpolation=cv2.INTER_AREA)
 
 
 def _decode(data: bytes, kind: SourceKind) -> AnyArray | None:

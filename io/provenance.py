@@ -17,7 +17,7 @@ import numpy as np
 from stseg import __version__
 from stseg.arrays import Ints, Rows
 from stseg.errors import SourceError
-from stseg.io.recording import Recording, Source
+from stseg.io.recording import Recording, Source, without_passwords
 from stseg.io.rig_text import format_rig
 from stseg.io.source_files import files_of
 
@@ -72,7 +72,7 @@ def gather_provenance(recording: Recording, config_text: str) -> Provenance:
     return Provenance(
         datetime.now(UTC).isoformat(timespec="seconds"),
         config_text,
-        format_rig(recording, recording.path),
+        without_passwords(format_rig(recording, recording.path)),
         path,
         _versions(),
         _sources(recording),
@@ -156,8 +156,9 @@ def _sources(recording: Recording) -> Rows:
 def _described(source: Source) -> tuple[bytes, str, int, int, float]:
     """kind, path, files, size, modified. Whether a stream can be read is not for here to say."""
     try:
-        states = [path.stat() for path in files_of(source)]
+        states = [path.stat() for path in files_of(source)] if not source.address else []
     except (OSError, SourceError):
         states = []
     modified = max((state.st_mtime for state in states), default=np.nan)
-    return source.kind.encode(), str(source.path), len(states), sum(state.st_size for state in states), modified
+    path = without_passwords(source.address) or str(source.path)
+    return source.kind.encode(), path, len(states), sum(state.st_size for state in states), modified

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
@@ -13,11 +14,12 @@ from stseg.geometry.reduction import greatest_reduction
 SourceKind = Literal["video", "masks", "images", "instances", "boxes"]
 Clock = Literal["auto", "stamps", "count"]
 SOURCE_KINDS: tuple[SourceKind, ...] = ("video", "masks", "images", "instances", "boxes")
+_PASSWORD = re.compile(r"(://[^/\s:@\"]*):[^/\s\"]*@")
 
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """One stream of frames on disk.
+    """One stream of frames on disk, or a live one.
 
     Attributes
     ----------
@@ -26,7 +28,8 @@ class Source:
         video, folder or pattern. instances: indexed images, one value an instance, 0 background, a folder or pattern.
         boxes: a text file of a detector's boxes.
     path
-        File, folder or pattern (`frame_*.png`, `hour_*.mp4`), already relative to the rig file's folder.
+        File, folder or pattern (`frame_*.png`, `hour_*.mp4`), already relative to the rig file's folder; of a live
+        stream the last part of its address.
     more
         Not for boxes: files, folders or patterns that go on where the one before ends.
     starts
@@ -44,6 +47,7 @@ class Source:
     frames: int | None = None
     more: tuple[Path, ...] = ()
     starts: tuple[float, ...] = ()
+    address: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,3 +107,8 @@ class Recording:
     def _factor(self, camera: Camera, own: CameraSource, rows: float) -> int:
         colour = own.source.kind in ("video", "images")
         return greatest_reduction(camera, self.rig.grid, rows) if colour else 1
+
+
+def without_passwords(text: str) -> str:
+    """A text in which the addresses of live streams (`rtsp://name:password@...`) show no password."""
+    return _PASSWORD.sub(r"\1:***@", text)

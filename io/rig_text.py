@@ -80,6 +80,8 @@ def _source_text(source: Source, folder: Path) -> str:
 
 
 def _paths(source: Source, folder: Path) -> str:
+    if source.address:
+        return _text(source.address)
     names = [_text(_relative(path, folder).as_posix()) for path in (source.path, *source.more)]
     return f"[{', '.join(names)}]" if source.more else names[0]
 

@@ -15,7 +15,7 @@ from typing import Literal
 
 from stseg.errors import CalibrationError, OutputError, RigError
 from stseg.geometry import Camera, Grid, Lens, Rig
-from stseg.io.recording import SOURCE_KINDS, CameraSource, Clock, Recording, Source
+from stseg.io.recording import SOURCE_KINDS, CameraSource, Clock, Recording, Source, SourceKind
 from stseg.io.rig_text import FORMAT, format_rig
 from stseg.io.tables import ANY, Table
 
@@ -198,6 +198,8 @@ def _source(table: Table, *more_keys: str) -> Source:
     kind = table.choice("kind", SOURCE_KINDS)
     counts = ("first_frame", "frames") if kind == "boxes" else more_keys
     table.allow("kind", "path", *counts)
+    if any("://" in name for name in table.texts("path")):
+        return _live_source(table, kind)
     first, *more = [table.file.parent / name for name in table.texts("path")]
     if more and kind == "boxes":
         raise table.error("path", f"{len(more) + 1} files", "one file of boxes")
@@ -209,3 +211,11 @@ def _source(table: Table, *more_keys: str) -> Source:
         tuple(more),
         tuple(table.numbers("starts", ANY).tolist()) if "starts" in table else (),
     )
+
+
+def _live_source(table: Table, kind: SourceKind) -> Source:
+    address, *more = table.texts("path")
+    if kind != "video" or more:
+        found = f"{address} of kind {kind}" if kind != "video" else f"{len(more) + 1} streams"
+        raise table.error("path", found, "one address, of kind video")
+    return Source(kind, Path(address.rpartition("/")[2]), address=address)

@@ -37,12 +37,12 @@ def _expanded(path: Path, kind: str, key: str) -> list[Path]:
     videos = kind == "video" or (kind == "masks" and not names_images(path.with_name(path.name.replace("*", "_"))))
     if not videos or not is_pattern(path) or path.is_file():
         return [path]
-    found = sorted(path.parent.glob(path.name), key=_by_numbers)
+    found = sorted(path.parent.glob(path.name), key=by_numbers)
     if not found:
         raise SourceError(path, key, "no files", "videos")
     return found
 
 
-def _by_numbers(path: Path) -> list[tuple[int, str]]:
-    """Words in alphabetical order, numbers by their value."""
+def by_numbers(path: Path) -> list[tuple[int, str]]:
+    """The order of files in time: words of their names in alphabetical order, numbers by their value."""
     return [(int(word), "") if word.isdigit() else (-1, word) for word in _NUMBER.split(path.name)]

@@ -8,10 +8,11 @@ from typing import Protocol
 import numpy as np
 
 from stseg.arrays import Boxes, Floats, Observation
+from stseg.errors import SourceError
 from stseg.geometry import Camera
 from stseg.io.box_files import read_boxes
 from stseg.io.image_stream import ImageStream, names_images
-from stseg.io.recording import Source
+from stseg.io.recording import Source, without_passwords
 from stseg.io.source_files import parts_of
 from stseg.io.video_stream import VideoStream
 
@@ -138,6 +139,10 @@ def open_stream(source: Source, camera: Camera, times: Sequence[Floats] | None =
     SourceError, FormatError
         Where the source is missing, empty or not of its kind.
     """
+    if source.address:
+        raise SourceError(
+            without_passwords(source.address), f"camera {camera.name}", "a live stream", "files; or stseg run --follow"
+        )
     parts = parts_of(source, f"camera {camera.name}")
     if len(parts) > 1:
         return JoinedStream(parts, camera, times)

@@ -2,6 +2,7 @@
 
     begun.json                  what is run: the same command goes on from here, any other is refused
     streams.npz                 how long the streams are and when their frames were taken, counted once
+    files.json, clock.json      of a run that follows: which files were read, and when frame 0 was
     segment-00003-CHECKSUM.h5   the run file of one segment
     lock                        held by the run that writes here
 
@@ -152,6 +153,18 @@ class WorkFolder:
                 **times,  # type: ignore[arg-type]
                 **{f"shown{k}": own for k, own in shown.items()},  # type: ignore[arg-type]
             )
+
+    def clock(self) -> float | None:
+        """When frame 0 of a live recording was, seconds since 1970; None where none was kept."""
+        try:
+            return float(json.loads((self.path / "clock.json").read_text("utf-8")))
+        except (OSError, ValueError):
+            return None
+
+    def keep_clock(self, start: float) -> None:
+        """Remember when frame 0 was."""
+        with replacing(self.path / "clock.json", overwrite=True) as part:
+            part.write_text(json.dumps(start), "utf-8")
 
     def remove(self) -> None:
         """Delete the folder, once the output stands."""

@@ -350,6 +350,33 @@ class SegmentConfig:
 
 
 @dataclass(frozen=True)
+class LiveConfig:
+    """A recording that still goes on: `stseg run --follow`."""
+
+    settled: float = 2.0
+    """A file to which nothing was added for so long is complete even if it is the last, seconds."""
+    learning: float = 60.0
+    """Where a camera has no empty scene, how long it is looked at before the run begins, seconds."""
+    stale: float = 0.3
+    """How far from a moment, in time, what a live camera shows still stands for it, seconds; three quarters of a frame
+    at least."""
+    silence: float = 5.0
+    """A live stream from which nothing comes for so long is broken, seconds."""
+    pause: float = 1.0
+    """How long to wait before a broken stream is asked again, seconds; each time in vain it is twice as long."""
+    longest_pause: float = 60.0
+    """But no longer than this, seconds."""
+    waiting: float = 10.0
+    """How much of live streams may wait to be worked on, seconds; beyond that the oldest moments are dropped."""
+    pictures: float = 512.0
+    """How much memory their pictures may take, MiB; beyond that, too."""
+
+    def __post_init__(self) -> None:
+        for name in ("settled", "learning", "stale", "silence", "pause", "longest_pause", "waiting", "pictures"):
+            require(getattr(self, name) > 0, self, name, "a number above 0")
+
+
+@dataclass(frozen=True)
 class KalmanConfig:
     """The tracker `kalman` (HW12 section V.E; METHODS 9)."""
 
@@ -503,6 +530,7 @@ class Config:
     ghosts: GhostConfig = field(default_factory=GhostConfig)
     detection: DetectionConfig = field(default_factory=DetectionConfig)
     segments: SegmentConfig = field(default_factory=SegmentConfig)
+    live: LiveConfig = field(default_factory=LiveConfig)
     kalman: KalmanConfig = field(default_factory=KalmanConfig)
     particles: ParticleConfig = field(default_factory=ParticleConfig)
     labels: LabelConfig = field(default_factory=LabelConfig)

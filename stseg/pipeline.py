@@ -143,35 +143,16 @@ class Pipeline:
         `advance` is told each frame that was fused. Nothing is known from moments that
         were run over before.
         """
-        self.occupancy.forget()
-        tracker = self.tracker(self.rig, self.config, first)
-        watch = Stopwatch()
-        explained: dict[int, _Explained] = {}
+        passage = Passage(self, first)
         moments = iter(moments)
         while True:
-            with watch.time("read"):
+            with passage.watch.time("read"):
                 moment = next(moments, None)
             if moment is None:
                 break
-            scene, shown, explained[moment.frame] = self._scene(moment, tracker.expected(moment.frame), watch)
-            with watch.time("track"):
-                commits = tracker.add(scene, shown)
-            yield from (_step(commit, explained, watch) for commit in commits)
+            yield from passage.add(moment)
             advance(moment.frame)
-        with watch.time("track"):
-            commits = tracker.finish()
-        yield from (_step(commit, explained, watch) for commit in commits)
-
-    def _scene(self, moment: Moment, expected: Expected | None, watch: Stopwatch) -> tuple[Scene, Shown, _Explained]:
-        with watch.time("foreground"):
-            seen = [sight.evidence(view) for sight, view in zip(self.sights, moment.views, strict=True)]
-        with watch.time("ghosts"):
-            explanation = self.frame_pass.explain(seen, expected, self.candidates.of(seen))
-        rates = _rate_rows(moment.frame, self.occupancy.level)
-        with watch.time("occupancy"):
-            log_odds = self.occupancy.follow(seen, explanation)
-        scene = Scene(moment.frame, explanation.people, explanation.ghosts, log_odds)
-        return scene, Shown(moment.views, seen), _Explained(explanation, rates)
+        yield from passage.finish()
 
     def finished(self, committed: Rows, events: Rows, shown: Rig | None = None) -> tuple[Tracks, Ints]:
         """The tracks of the whole run from all committed rows and events, and the identity of each committed row.
@@ -187,6 +168,49 @@ class Pipeline:
         if shown is not None:
             tables = [BodyTable.of(camera, shown.grid) for camera in shown.cameras]
         return Tracks(whole.trajectory, box_rows(tables, whole.trajectory), whole.events), whole.identity
+
+
+class Passage:
+    """A pipeline under way: takes moments as they come, and gives what is decided by each. One at a time of a pipeline.
+
+    Parameters
+    ----------
+    pipeline
+        The stages. Nothing is known from moments that they were run over before.
+    first
+        The first frame.
+    """
+
+    def __init__(self, pipeline: Pipeline, first: int) -> None:
+        self.pipeline, self.watch = pipeline, Stopwatch()
+        self._tracker = pipeline.tracker(pipeline.rig, pipeline.config, first)
+        self._explained: dict[int, _Explained] = {}
+        pipeline.occupancy.forget()
+
+    def add(self, moment: Moment) -> list[Step]:
+        """The next moment; what is decided by it."""
+        scene, shown, self._explained[moment.frame] = self._scene(moment, self._tracker.expected(moment.frame))
+        with self.watch.time("track"):
+            commits = self._tracker.add(scene, shown)
+        return [_step(commit, self._explained, self.watch) for commit in commits]
+
+    def finish(self) -> list[Step]:
+        """No more moments; what was still open."""
+        with self.watch.time("track"):
+            commits = self._tracker.finish()
+        return [_step(commit, self._explained, self.watch) for commit in commits]
+
+    def _scene(self, moment: Moment, expected: Expected | None) -> tuple[Scene, Shown, _Explained]:
+        stages, watch = self.pipeline, self.watch
+        with watch.time("foreground"):
+            seen = [sight.evidence(view) for sight, view in zip(stages.sights, moment.views, strict=True)]
+        with watch.time("ghosts"):
+            explanation = stages.frame_pass.explain(seen, expected, stages.candidates.of(seen))
+        rates = _rate_rows(moment.frame, stages.occupancy.level)
+        with watch.time("occupancy"):
+            log_odds = stages.occupancy.follow(seen, explanation)
+        scene = Scene(moment.frame, explanation.people, explanation.ghosts, log_odds)
+        return scene, Shown(moment.views, seen), _Explained(explanation, rates)
 
 
 class _Explained(NamedTuple):

@@ -13,8 +13,9 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from scipy.fft import irfft2, rfft2
 
-from stseg.arrays import Bytes, Floats, Ints, Singles
+from stseg.arrays import Bytes, Floats, Ints
 
 _LEAST = 20
 """Frames with a number, before and after a step."""
@@ -22,6 +23,8 @@ _CLEAR = 6.0
 """Standard errors that a step is, at least."""
 _LARGE = 1.0
 """Standard deviations of single frames that a step is, at least: what is smaller harms nobody."""
+_AROUND = 2
+"""Pixels around a peak that tell where exactly it is."""
 
 
 @dataclass(frozen=True)
@@ -72,17 +75,36 @@ def background_shift(background: Bytes, image: Bytes) -> Floats:
     background, image : uint8 (v, u, 3)
         Of one size.
     """
-    one, other = _edges(background), _edges(image)
-    window = cv2.createHanningWindow((one.shape[1], one.shape[0]), cv2.CV_32F)
-    shift, _ = cv2.phaseCorrelate(one, other, window)
-    return np.array(shift, float)
+    # With SciPy's transforms: OpenCV's differ in the last digits from one call to the next.
+    one, other = (rfft2(_edges(picture) * _window(picture.shape[:2])) for picture in (background, image))
+    crossed = np.conj(one) * other
+    likeness = irfft2(crossed / np.maximum(np.abs(crossed), 1e-12), image.shape[:2])
+    return _peak(np.asarray(likeness))
 
 
-def _edges(image: Bytes) -> Singles:
-    grey = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), np.float32)
-    across, down = cv2.Sobel(grey, cv2.CV_32F, 1, 0), cv2.Sobel(grey, cv2.CV_32F, 0, 1)
-    # Strong edges count no more than others: what is before the lens changes, what is behind it stays.
-    return np.asarray(np.log1p(cv2.magnitude(across, down)), np.float32)
+def _window(shape: tuple[int, ...]) -> Floats:
+    """Weights that fall to 0 at an image's borders, which otherwise would count as edges that do not move."""
+    return np.asarray(np.outer(*(np.hanning(side) for side in shape)))
+
+
+def _peak(likeness: Floats) -> Floats:
+    """The shift (u, v) at which two pictures are most alike: the centre of what stands around the highest pixel."""
+    middle = np.array(likeness.shape) // 2
+    centred = np.roll(likeness, tuple(middle), (0, 1))
+    v, u = map(int, np.unravel_index(int(np.argmax(centred)), centred.shape))
+    rows = np.arange(max(v - _AROUND, 0), min(v + _AROUND + 1, centred.shape[0]))
+    columns = np.arange(max(u - _AROUND, 0), min(u + _AROUND + 1, centred.shape[1]))
+    weight = np.maximum(centred[np.ix_(rows, columns)], 0.0)
+    centre = np.array([weight.sum(0) @ columns, weight.sum(1) @ rows]) / max(float(weight.sum()), 1e-12)
+    return np.asarray(centre - middle[::-1])
+
+
+def _edges(image: Bytes) -> Floats:
+    grey = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
+    across, down = (np.asarray(cv2.Sobel(grey, cv2.CV_16S, *step), float) for step in ((1, 0), (0, 1)))
+    # The root's root, so that strong edges count little more than others: what is before the lens changes, what is
+    # behind it stays. Roots are rounded exactly, logarithms not: the same pictures tell the same to the last digit.
+    return np.asarray(np.sqrt(np.sqrt(across**2 + down**2)))
 
 
 def agreement_of_people(frame: Ints, parts: Floats, frames: int) -> Floats:
@@ -121,7 +143,9 @@ def _step(agreement: Floats, view: int, least: float) -> Knock | None:
     left = np.concatenate([before - before.mean(), after - after.mean()])
     step, spread = float(before.mean() - after.mean()), max(float(left.std()), 1e-9)
     errors = step / (spread * np.sqrt(_alike(left) * (1 / len(before) + 1 / len(after))))
-    if errors < _CLEAR or step < max(_LARGE * spread, least):
+    # The clipped step is clear or not; how large it truly is the medians say.
+    drop = float(np.median(own[rows][:cut]) - np.median(own[rows][cut:]))
+    if errors < _CLEAR or step < _LARGE * spread or drop < least:
         return None
     seen = agreement[rows, view]
     return Knock(view, int(rows[cut]), float(np.median(seen[:cut])), float(np.median(seen[cut:])), float(errors))

@@ -7,13 +7,15 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from cyclopts import Parameter
 
 from stseg.commands.assembly import Made, assemble
 from stseg.commands.cluster import make_by_cluster
+from stseg.commands.follow import follow as follow_recording
+from stseg.commands.follow import last_frame, live_table_of
 from stseg.commands.labels import require_pixels, write_labels
 from stseg.commands.progress import frame_bar
 from stseg.commands.segment_work import Job, SegmentWork, VolumeKind
@@ -24,6 +26,7 @@ from stseg.identity.segments import Segment
 from stseg.io.config_file import format_config, read_config
 from stseg.io.frames import Streams, count_streams
 from stseg.io.label_images import require_label_folder
+from stseg.io.live import is_live
 from stseg.io.outputs import require_new
 from stseg.io.provenance import as_tables, gather_provenance
 from stseg.io.recording import Recording
@@ -45,6 +48,7 @@ def run(
     labels: Annotated[Path | None, Parameter(metavar="FOLDER")] = None,
     workers: int = 1,
     scheduler: str | None = None,
+    follow: Annotated[bool, Parameter(negative="")] = False,
     overwrite: Annotated[bool, Parameter(negative="")] = False,
 ) -> None:
     """Track the people of a recording, and write everything that was found to one HDF5 file.
@@ -80,6 +84,10 @@ def run(
         Processes that share the work on this machine; the result is the same for any number.
     scheduler
         Address of a Dask scheduler whose workers share the work instead, such as tcp://10.0.0.5:8786.
+    follow
+        The recording still goes on: the path of every source is a pattern of videos that arrive (cam1_*.mp4), or every
+        one an address (rtsp://...). The tracks of each window are added to run.h5.live.csv as soon as it is decided.
+        Ctrl-C or SIGTERM finishes the run file; --frames 0:B ends it by itself.
     overwrite
         Replace an older run file of that name, once this one is whole.
     """
@@ -92,6 +100,11 @@ def run(
         require_label_folder(labels, overwrite)
     asked = as_tables(gather_provenance(recording, format_config(resolved)))
     asked |= {"--frames": frames or "all", "--tracker": tracker, "--volume": volume}
+    if follow:
+        _require_alone(workers, scheduler, labels)
+        job = Job(recording, resolved, tracker, volume, 0, last_frame(frames), Streams(0, ()))
+        print(_follow(job, asked, output, overwrite))
+        return
     with WorkFolder(output, asked) as folder, _told_how_to_go_on(folder):
         streams = _streams(recording, folder)
         for note in streams.notes:
@@ -111,6 +124,24 @@ def run(
     if labels is not None:
         done = read_run(output)
         print(f"{labels}: {write_labels(done, resolved, labels, done.frames, overwrite)} label images")
+
+
+def _follow(job: Job, asked: dict[str, Any], output: Path, overwrite: bool) -> str:
+    """What there is to say of a run that followed a recording; its files change while it goes on."""
+    is_live(job.recording)  # or it cannot be followed
+    del asked["source"], asked["--frames"]
+    with WorkFolder(output, asked | {"--follow": "yes"}) as folder, _told_how_to_go_on(folder):
+        if not folder.segments():
+            require_new(live_table_of(output), overwrite)
+        told = follow_recording(job, folder, output, overwrite)
+        folder.remove()
+    return told
+
+
+def _require_alone(workers: int, scheduler: str | None, labels: Path | None) -> None:
+    for name, given in (("--workers", workers > 1), ("--scheduler", scheduler), ("--labels", labels)):
+        if given:
+            raise ConfigError(name, "", "that beside --follow", "one of them: a recording that goes on has one worker")
 
 
 def frame_range(text: str | None, streams: Streams, recording: Recording) -> tuple[int, int]:

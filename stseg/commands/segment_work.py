@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 
 from stseg.arrays import Bytes, Ints, Labels, Singles
-from stseg.commands.sights import background_part, make_sights
+from stseg.commands.sights import Looks, looks_of, make_sights
 from stseg.commands.view_shifts import ViewShifts
 from stseg.config import Config
 from stseg.foreground.sight import Sight
@@ -82,8 +82,9 @@ class SegmentWork:
 
     def __init__(self, job: Job) -> None:
         self.job, self.pipeline = job, job.pipeline()
-        self._part, self._learned = range(0), list[Sight]()
         self._ends = [*(begin for begin, _ in job.gaps()), job.stop]
+        self._learned = list[Sight]()
+        self._looks: Looks | None = None
 
     def make(self, segment: Segment, draft: Path, advance: Callable[[int], None]) -> Path:
         """Write a segment's file; its name at the end. `advance` is told how many more of its frames were fused."""
@@ -103,7 +104,7 @@ class SegmentWork:
             ) as writer,
         ):
             for step in pipeline.steps(shifts.seen(moments), segment.lead, fused):
-                self._write(step, segment, writer)
+                write_step(job, step, segment, writer)
                 if step.commit.scenes[-1].frame >= segment.stop - 1:
                     break
             writer.append("shifts", shifts.rows(segment.first, segment.stop))
@@ -113,39 +114,41 @@ class SegmentWork:
     def sights(self, segment: Segment) -> list[Sight]:
         """What a segment sees by: with the backgrounds that were learned last, if they are this segment's too."""
         job = self.job
-        part = background_part(job.config.segments, job.recording.rig.frame_rate, job.first, job.stop, segment.first)
-        if part != self._part or not self._learned:
-            self._learned = make_sights(job.read, job.config, job.first, job.stop, segment.first, job.streams)
-            self._part = part
+        looks = looks_of(segment, job.config.segments, job.recording.rig.frame_rate, job.first, job.stop)
+        if looks != self._looks:
+            self._learned = make_sights(job.read, job.config, job.first, job.stop, segment, job.streams)
+            self._looks = looks
         return deepcopy(self._learned)
 
-    def _write(self, step: Step, segment: Segment, writer: RunWriter) -> None:
-        """The segment's frames of a step; of the warm-up the trajectory alone, by which segments are joined."""
-        own = step.within(segment.first, segment.stop)
-        writer.append("trajectory", step.within(segment.lead, segment.stop).commit.trajectory)
-        writer.append("timings", own.timings)
-        if not own.commit.scenes:
-            return
-        frames = np.array([scene.frame for scene in own.commit.scenes])
-        log_odds = np.stack([scene.log_odds for scene in own.commit.scenes])
-        writer.append_frames(frames, *self._kept(own, frames, log_odds))
-        ghosts = np.zeros(len(own.candidates), ghost_type(len(self.job.recording.sources)))
-        for name in own.candidates.dtype.names or ():
-            ghosts[name] = own.candidates[name]
-        ghosts["parts"] = own.parts
-        writer.append("ghosts", ghosts)
-        writer.append("events", own.commit.events)
-        writer.append("windows", own.commit.windows)
-        writer.append("rates", own.rates)
 
-    def _kept(self, step: Step, frames: Ints, log_odds: Singles) -> tuple[Singles, Labels]:
-        """What is kept of the volume of a step."""
-        label, rows = step.commit.label, step.commit.trajectory
-        if self.job.volume == "none":
-            return np.full_like(log_odds, np.nan), np.zeros_like(label)
-        if self.job.volume == "tracks":
-            ground = self.job.recording.rig.grid.ground
-            for frame, volume in zip(frames, log_odds, strict=True):
-                here = rows[rows["frame"] == frame]
-                volume[:, near_person(ground, np.column_stack([here["x"], here["y"]]), _AROUND) < 0] = np.nan
-        return log_odds, label
+def write_step(job: Job, step: Step, segment: Segment, writer: RunWriter) -> None:
+    """The segment's frames of a step; of the warm-up the trajectory alone, by which segments are joined."""
+    own = step.within(segment.first, segment.stop)
+    writer.append("trajectory", step.within(segment.lead, segment.stop).commit.trajectory)
+    writer.append("timings", own.timings)
+    if not own.commit.scenes:
+        return
+    frames = np.array([scene.frame for scene in own.commit.scenes])
+    log_odds = np.stack([scene.log_odds for scene in own.commit.scenes])
+    writer.append_frames(frames, *_kept(job, own, frames, log_odds))
+    ghosts = np.zeros(len(own.candidates), ghost_type(len(job.recording.sources)))
+    for name in own.candidates.dtype.names or ():
+        ghosts[name] = own.candidates[name]
+    ghosts["parts"] = own.parts
+    writer.append("ghosts", ghosts)
+    writer.append("events", own.commit.events)
+    writer.append("windows", own.commit.windows)
+    writer.append("rates", own.rates)
+
+
+def _kept(job: Job, step: Step, frames: Ints, log_odds: Singles) -> tuple[Singles, Labels]:
+    """What is kept of the volume of a step."""
+    label, rows = step.commit.label, step.commit.trajectory
+    if job.volume == "none":
+        return np.full_like(log_odds, np.nan), np.zeros_like(label)
+    if job.volume == "tracks":
+        ground = job.recording.rig.grid.ground
+        for frame, volume in zip(frames, log_odds, strict=True):
+            here = rows[rows["frame"] == frame]
+            volume[:, near_person(ground, np.column_stack([here["x"], here["y"]]), _AROUND) < 0] = np.nan
+    return log_odds, label

@@ -7,30 +7,54 @@ day and furniture that is moved matter little, and so that what a segment finds 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
 
 from stseg.arrays import Bytes
-from stseg.config import Config, SegmentConfig
+from stseg.config import Config, LightConfig, SegmentConfig
 from stseg.foreground import make_background
 from stseg.foreground.background import Background
 from stseg.foreground.light_change import LightWatch
 from stseg.foreground.sight import Sight
+from stseg.identity.segments import Segment
 from stseg.io.frames import Streams, read_background, read_camera
 from stseg.io.recording import Recording
 
 _Frames = TypeVar("_Frames", range, Sequence[int])
 
 
-def make_sights(
-    recording: Recording, config: Config, first: int, stop: int, at: int | None = None, streams: Streams | None = None
-) -> list[Sight]:
-    """The foreground of every camera, in the rig's order, for frames from `at` on.
+@dataclass(frozen=True)
+class Looks:
+    """What of a run teaches the backgrounds of a segment.
 
-    A colour camera learns its background from frames of the part of the run in which `at` lies, and where it is blind
-    there, from the nearest in which it sees; one that sees nowhere learns nothing and is not asked. Where it has empty
-    frames it learns those, and what has changed since from the part before.
+    Attributes
+    ----------
+    part
+        Frames from which a camera without an empty scene learns.
+    before
+        Frames of which a camera with an empty scene learns what has changed since; they end before the segment begins
+        to look.
+    """
+
+    part: range
+    before: range
+
+
+def make_sights(
+    recording: Recording,
+    config: Config,
+    first: int,
+    stop: int,
+    segment: Segment | None = None,
+    streams: Streams | None = None,
+) -> list[Sight]:
+    """The foreground of every camera, in the rig's order, for the frames of a segment.
+
+    A colour camera learns its background from frames of the part of the run in which the segment lies, and where it is
+    blind there, from the nearest in which it sees; one that sees nowhere learns nothing and is not asked. Where it has
+    empty frames it learns those, and what has changed since from the part before.
 
     Parameters
     ----------
@@ -38,38 +62,86 @@ def make_sights(
         The streams, and the constants of all stages.
     first, stop
         The frames of the run.
-    at
-        The first frame that will be asked for; by default the run's.
+    segment
+        Whose frames will be asked for; by default they begin with the run's.
     streams
         What `count_streams` told, for far frames.
     """
-    part = background_part(config.segments, recording.rig.frame_rate, first, stop, first if at is None else at)
-    return [_sight(recording, k, config, part, first, streams) for k in range(len(recording.sources))]
+    segment = Segment(0, first, first, stop) if segment is None else segment
+    looks = looks_of(segment, config.segments, recording.rig.frame_rate, first, stop)
+    return [_sight(recording, k, config, looks, streams) for k in range(len(recording.sources))]
 
 
-def background_part(config: SegmentConfig, frame_rate: float, first: int, stop: int, at: int) -> range:
-    """The frames of the part of a run, frames first .. stop - 1, whose background holds for a frame."""
-    length = max(1, round(config.background * frame_rate))
-    begin = max(first, min(first + (at - first) // length * length, stop - length))
-    return range(begin, min(begin + length, stop))
+def looks_of(segment: Segment, config: SegmentConfig, frame_rate: float, first: int, stop: int) -> Looks:
+    """What teaches the backgrounds of a segment of a run of frames first .. stop - 1."""
+    length = part_length(config, frame_rate)
+    begin = max(first, min(first + (segment.first - first) // length * length, stop - length))
+    seen = first + (segment.lead - first) // length * length
+    return Looks(range(begin, min(begin + length, stop)), range(max(first, seen - length), seen))
 
 
-def _sight(
-    recording: Recording, camera: int, config: Config, part: range, first: int, streams: Streams | None
-) -> Sight:
-    if recording.sources[camera].source.kind not in ("video", "images"):
-        return Sight()
-    frame_rate = recording.rig.frame_rate
-    model = make_background(recording.read_rig.cameras[camera].size, frame_rate, config.foreground)
-    if recording.sources[camera].background is None:
-        frames = sampled(_seeing(recording, camera, part, streams), config.segments)
-        if len(frames):
-            model.learn_from(_colours(recording, camera, frames, streams))
-    else:
+def part_length(config: SegmentConfig, frame_rate: float) -> int:
+    """Frames of a part of the recording whose background holds."""
+    return max(1, round(config.background * frame_rate))
+
+
+def is_colour(recording: Recording, camera: int) -> bool:
+    """Whether a camera's foreground is told by a background."""
+    return recording.sources[camera].source.kind in ("video", "images")
+
+
+def empty_background(recording: Recording, camera: int, config: Config) -> Background:
+    """A background that has learned the camera's empty scene, if it has one; else nothing."""
+    model = make_background(recording.read_rig.cameras[camera].size, recording.rig.frame_rate, config.foreground)
+    if recording.sources[camera].background is not None:
         for empty in read_background(recording, camera):
             model.learn(np.asarray(empty, np.uint8))
-        before = range(max(first, part.start - len(part)), part.start)
-        model = _followed(model, recording, camera, config, before, streams)
+    return model
+
+
+class Learner:
+    """A background that sees frames now and then, a step apart, to know what has changed.
+
+    Parameters
+    ----------
+    model
+        The background; it is not to be asked any more.
+    frame_rate
+        Of the recording, frames per second.
+    step
+        Frames from one that it sees to the next.
+    config
+        What is a change of light.
+    """
+
+    def __init__(self, model: Background, frame_rate: float, step: int, config: LightConfig) -> None:
+        self._model, self._frame_rate = model.at_rate(frame_rate / step), frame_rate
+        self._watch = LightWatch(self._model, frame_rate / step, config)
+
+    def see(self, image: Bytes) -> None:
+        """The next frame."""
+        self._watch.likelihood(image)
+
+    def learned(self) -> Background:
+        """The background for every frame of the recording; this one is not to be asked any more."""
+        return self._model.at_rate(self._frame_rate)
+
+
+def _sight(recording: Recording, camera: int, config: Config, looks: Looks, streams: Streams | None) -> Sight:
+    if not is_colour(recording, camera):
+        return Sight()
+    frame_rate = recording.rig.frame_rate
+    model = empty_background(recording, camera, config)
+    if recording.sources[camera].background is None:
+        shown = sampled(_seeing(recording, camera, looks.part, streams), config.segments)
+        if len(shown):
+            model.learn_from(_colours(recording, camera, shown, streams))
+    elif looks.before:
+        frames = sampled(looks.before, config.segments)
+        learner = Learner(model, frame_rate, frames.step, config.light)
+        for image in _colours(recording, camera, frames, streams):
+            learner.see(image)
+        model = learner.learned()
     return Sight(LightWatch(model, frame_rate, config.light))
 
 
@@ -83,21 +155,6 @@ def _seeing(recording: Recording, camera: int, part: range, streams: Streams | N
     begin = max(0, min(begin - lacking // 2, len(frames) - len(part)))
     nearest: list[int] = frames[begin : begin + len(part)].tolist()
     return nearest
-
-
-def _followed(
-    model: Background, recording: Recording, camera: int, config: Config, before: range, streams: Streams | None
-) -> Background:
-    """A model of the empty scene after a part of the recording of which it sees some frames."""
-    frames = sampled(before, config.segments)
-    if not frames:
-        return model
-    frame_rate = recording.rig.frame_rate
-    paced = model.at_rate(frame_rate / frames.step)
-    watch = LightWatch(paced, frame_rate / frames.step, config.light)
-    for image in _colours(recording, camera, frames, streams):
-        watch.likelihood(image)
-    return paced.at_rate(frame_rate)
 
 
 def _colours(recording: Recording, camera: int, frames: Sequence[int], streams: Streams | None) -> Iterator[Bytes]:

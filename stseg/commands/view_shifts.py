@@ -9,7 +9,7 @@ import numpy as np
 from stseg.arrays import Rows
 from stseg.calibrate.drift import background_shift
 from stseg.foreground.sight import Sight
-from stseg.io.frames import Moment
+from stseg.pipeline import Moment
 from stseg.tracks import SHIFT
 
 _EVERY = 2.0
@@ -35,11 +35,15 @@ class ViewShifts:
         self._rows: list[tuple[int, int, float, float]] = []
 
     def seen(self, moments: Iterator[Moment]) -> Iterator[Moment]:
-        """The moments, some of them looked at."""
+        """The moments, each looked at as it is handed on."""
         for moment in moments:
-            if moment.frame % self._every == 0:
-                self._look(moment)
+            self.look(moment)
             yield moment
+
+    def look(self, moment: Moment) -> None:
+        """Look at a moment, if it is time."""
+        if moment.frame % self._every == 0:
+            self._look(moment)
 
     def rows(self, first: int, stop: int) -> Rows:
         """SHIFT rows of frames first .. stop - 1."""

@@ -81,7 +81,7 @@ class Seams:
         local = np.unique(np.concatenate([rows["id"], part.events["id"], part.events["other"]]))
         local = local[local > 0]
         before = self._tail(lead)
-        named = _matches(before, lead)
+        named = matches(before, lead)
         births = [(int(rows["frame"][rows["id"] == i].min()), int(i)) for i in np.unique(lead["id"])
                   if i not in named and (rows["id"] == i).any()]  # fmt: skip
         for i in local.tolist():
@@ -162,7 +162,7 @@ def rename_labels(label: Labels, frames: Ints, rows: Rows, identity: Ints) -> No
         cells[...] = names[cells]
 
 
-def _matches(before: Rows, lead: Rows) -> dict[int, int]:
+def matches(before: Rows, lead: Rows) -> dict[int, int]:
     """The earlier track that each track of a warm-up lies on."""
     known, fresh = np.unique(before["id"]), np.unique(lead["id"])
     shared = np.zeros((len(known), len(fresh)))

@@ -7,8 +7,9 @@ alone. So a segment is the same whoever makes it and when: after a killed run, b
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import count
 from math import ceil
 
 import numpy as np
@@ -84,13 +85,26 @@ def _parts(frame_rate: float, config: Config, first: int, stop: int) -> list[Seg
     """The segments of frames in which no gap lies; none of none."""
     if first == stop:
         return []
+    found: list[Segment] = []
+    for segment in endless_segments(frame_rate, config, first):
+        if segment.stop >= stop - window_length(frame_rate, config.identity)[0]:
+            return [*found, replace(segment, stop=stop)]
+        found.append(segment)
+    raise AssertionError("segments without an end ended")
+
+
+def endless_segments(frame_rate: float, config: Config, first: int, index: int = 0) -> Iterator[Segment]:
+    """The segments of a run whose end nobody knows yet, numbered from `index`.
+
+    One of them is to be left open until a window's frames have come after it: if they do not come it is the last, and
+    what came belongs to it.
+    """
     length, shared = window_length(frame_rate, config.identity)
     stride = length - shared
     step = max(1, round(config.segments.length * frame_rate / stride)) * stride
     warm_up = ceil(config.segments.warm_up * frame_rate / stride) * stride
-    inner = [frame for frame in range(step + shared // 2, stop - length, step) if frame > first]
-    bounds = [first, *inner, stop]
-    return [
-        Segment(k, first if k == 0 else max(first, bounds[k] - warm_up), bounds[k], bounds[k + 1])
-        for k in range(len(bounds) - 1)
-    ]
+    begin = lead = first
+    for bound in count(step + shared // 2, step):
+        if bound > begin:
+            yield Segment(index, lead, begin, bound)
+            index, begin, lead = index + 1, bound, max(first, bound - warm_up)

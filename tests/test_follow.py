@@ -1,0 +1,293 @@
+"""`stseg run --follow`: what is followed ends as what is run afterwards; signals, kills and breaks lose nothing."""
+
+from __future__ import annotations
+
+import re
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+from arrivals import FRAMES, PLACES, StandIn, arrive, filmed_rig, films, meanwhile, write_pieces, write_video
+from recordings import ENVIRONMENT, assert_same
+from scenes import walkers
+
+import stseg.commands.follow
+from stseg.accelerate import python_form
+from stseg.arrays import Rows
+from stseg.commands.follow import ENDLESS, last_frame
+from stseg.commands.main import main
+from stseg.errors import ConfigError
+from stseg.evaluation import evaluate
+from stseg.ghosts.scoring import set_score
+from stseg.identity.live_names import LiveNames
+from stseg.io.followed_cameras import FollowedCameras
+from stseg.io.runs import read_run
+from stseg.io.tracks import read_tracks_csv
+from stseg.tracks import TRAJECTORY
+
+PROGRAM = """
+import signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell that runs the tests in its background has it ignored
+from stseg.commands.main import main
+sys.exit(main())
+"""
+OPTIONS = tuple(
+    word
+    for constant in (
+        *("segments.length=1", "segments.warm_up=1", "segments.background=2", "segments.samples=4"),
+        *("ghosts.lattice=0.25", "live.settled=0.3", "live.learning=1", "live.pause=0.1", "live.silence=1"),
+    )
+    for word in ("--set", constant)
+)
+"""Segments of six frames; backgrounds that hold for sixteen."""
+quick = pytest.mark.skipif(python_form(set_score) is set_score, reason="too slow without a compiler")
+
+
+def track(rig: Path, output: Path, *more: str) -> int:
+    return main(["run", str(rig), "-o", str(output), *OPTIONS, *more])
+
+
+def process(rig: Path, output: Path, *more: str) -> subprocess.Popen[str]:
+    arguments = [sys.executable, "-c", PROGRAM, "run", str(rig), "-o", str(output), "--follow", *OPTIONS, *more]
+    return subprocess.Popen(
+        arguments, env=ENVIRONMENT, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )  # fmt: skip
+
+
+def lines(output: Path) -> list[str]:
+    path = output.with_name(f"{output.name}.live.csv")
+    return path.read_text().splitlines() if path.exists() else []
+
+
+def wait_for_frame(output: Path, frame: int, running: subprocess.Popen[str]) -> None:
+    while running.poll() is None and not any(line.startswith(f"{frame},") for line in lines(output)):
+        time.sleep(0.02)
+
+
+# Files that arrive
+
+
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Nothing has arrived yet."""
+    return write_pieces(tmp_path_factory.mktemp("arriving"), empty=True)
+
+
+@pytest.fixture(scope="module")
+def live(rig: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What following the files made, while they arrived."""
+    output = tmp_path_factory.mktemp("live") / "run.h5"
+    coming = meanwhile(partial(arrive, rig.parent, 1, 2, 3, 4, pause=0.5))
+    assert track(rig, output, "--follow", "--frames", f"0:{FRAMES}") == 0
+    coming.join()
+    return output
+
+
+@pytest.fixture(scope="module")
+def afterwards(rig: Path, live: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What a run of all files made, once they were there."""
+    assert live.exists()
+    output = tmp_path_factory.mktemp("afterwards") / "run.h5"
+    assert track(rig, output) == 0
+    return output
+
+
+@quick
+def test_what_is_followed_ends_as_what_is_run_afterwards(live: Path, afterwards: Path) -> None:
+    assert_same(live, afterwards)
+    scores = evaluate(walkers(FRAMES), read_run(live).trajectory)
+    assert (scores.tracks, scores.switches, scores.false_alarms) == (3, 0, 0)
+    assert sorted(path.name for path in live.parent.iterdir()) == ["run.h5", "run.h5.live.csv"]
+
+
+@quick
+def test_tracks_are_told_window_by_window_under_lasting_names(live: Path) -> None:
+    told = read_tracks_csv(live.with_name("run.h5.live.csv"))
+    assert np.unique(told["frame"]).tolist() == list(range(FRAMES))
+    assert (np.diff(told["frame"]) >= 0).all()
+    scores = evaluate(walkers(FRAMES), told)
+    assert (scores.tracks, scores.switches, scores.false_alarms) == (3, 0, 0)
+
+
+@quick
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_finishes_the_run_file(tmp_path: Path, number: signal.Signals) -> None:
+    rig, output = write_pieces(tmp_path, empty=True), tmp_path / "run.h5"
+    arrive(tmp_path, 1, 2)
+    running = process(rig, output)
+    wait_for_frame(output, 9, running)
+    running.send_signal(number)
+    said, told = running.communicate(timeout=60)
+    assert running.returncode == 0, told
+    assert told.splitlines()[-1] == "stseg: finishing; once more to stop at once"
+    assert re.search(r"run.h5: 3 tracks in frames 0 to \d+, told \d+.\d s after them", said)
+    stop = int(read_run(output).frames[-1]) + 1
+    assert stop > 9
+    assert track(rig, tmp_path / "afterwards.h5", "--frames", f"0:{stop}") == 0
+    assert_same(output, tmp_path / "afterwards.h5")
+    assert len({line.split(",")[0] for line in lines(output)[1:]}) == stop
+
+
+@quick
+def test_a_run_that_was_killed_goes_on(rig: Path, live: Path, afterwards: Path, tmp_path: Path) -> None:
+    assert live.exists()
+    output = tmp_path / "run.h5"
+    running = process(rig, output)
+    wait_for_frame(output, 24, running)
+    running.kill()
+    running.communicate()
+    assert 0 < len(list((tmp_path / "run.h5.segments").glob("segment-*-*.h5"))) < 6
+    assert track(rig, output, "--follow", "--frames", f"0:{FRAMES}") == 0
+    assert_same(output, afterwards)
+    told = read_tracks_csv(output.with_name("run.h5.live.csv"))
+    assert (np.diff(told["frame"]) >= 0).all()
+    assert (evaluate(walkers(FRAMES), told).switches, len(told)) == (0, 3 * FRAMES)
+
+
+@quick
+def test_without_an_empty_scene_it_learns_first_and_loses_nothing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rig, output = write_pieces(tmp_path, empty=False), tmp_path / "run.h5"
+    arrive(tmp_path, 1, 2, 3, 4)
+    assert track(rig, output, "--follow", "--frames", f":{FRAMES}", "--set", "live.learning=5") == 0
+    assert "no empty scene of west, east, north: learning from 5 s before the run begins" in capsys.readouterr().err
+    run = read_run(output)
+    assert run.frames.tolist() == list(range(FRAMES))
+    scores = evaluate(walkers(FRAMES), run.trajectory)
+    assert scores.misses < 0.1 * 3 * FRAMES
+
+
+# Live cameras
+
+
+@pytest.fixture(scope="module")
+def cameras_rig(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Three live cameras of the room and their empty scenes."""
+    path = write_pieces(tmp_path_factory.mktemp("cameras"), empty=True)
+    return _as_live(path, path.with_name("live.toml"), {name: f"rtsp://there/{name}" for name in PLACES})
+
+
+def _as_live(rig: Path, path: Path, addresses: dict[str, str]) -> Path:
+    text = rig.read_text()
+    for name, address in addresses.items():
+        text = re.sub(rf'path = "[^"]*in/{name}_[^"]*"', f'path = "{address}"', text)
+    path.write_text(text)
+    return path
+
+
+@quick
+def test_a_camera_that_breaks_is_blind_and_the_run_says_so(
+    cameras_rig: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    begun = time.monotonic()
+    own = {f"camera {camera.name}": StandIn(film * 9, 0.125, begun=begun)
+           for camera, film in zip(filmed_rig().cameras, films(filmed_rig()), strict=True)}  # fmt: skip
+    own["camera east"].breaks, own["camera east"].refused = [20], 2
+    opening = partial(FollowedCameras, opening=lambda *asked: own[threading.current_thread().name].open(*asked))
+    monkeypatch.setattr(stseg.commands.follow, "FollowedCameras", opening)
+    assert track(cameras_rig, tmp_path / "run.h5", "--follow", "--frames", "0:40", "--set", "segments.length=2") == 0
+    run, told = read_run(tmp_path / "run.h5"), capsys.readouterr().err
+    assert told.count("camera east: nothing comes from rtsp://there/east") == 1
+    assert told.count("camera east: it sees again") == 1
+    assert run.frames.tolist() == list(range(40))
+    blind = run.events[run.events["kind"] == b"blind"]
+    assert len(blind) >= 1
+    assert all(re.fullmatch(rb"camera east showed nothing in \d+ of \d+ frames", row["reason"]) for row in blind)
+    assert len(run.tracks) >= 3
+
+
+def test_files_beside_live_cameras_are_refused(
+    cameras_rig: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    mixed = _as_live(
+        cameras_rig.with_name("rig.toml"), cameras_rig.with_name("mixed.toml"), {"east": "rtsp://there/east"}
+    )
+    assert track(mixed, tmp_path / "run.h5", "--follow") == 2
+    assert "camera west: found files beside live streams" in capsys.readouterr().err
+    assert track(cameras_rig, tmp_path / "run.h5") == 2
+    assert "stseg run --follow" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.fixture(scope="module")
+def server(cameras_rig: Path) -> Iterator[dict[str, str]]:
+    """Addresses of a real RTSP server that shows ten seconds of the recording, again and again."""
+    folder = cameras_rig.parent
+    streams = []
+    for camera, film in zip(filmed_rig().cameras, films(filmed_rig()), strict=True):
+        write_video(folder / f"{camera.name}.avi", film * 2)
+        streams.append(f"{camera.name}={folder / camera.name}.avi")
+    command = ["/usr/bin/python3", str(Path(__file__).with_name("rtsp_server.py")), "0", *streams]
+    try:
+        serving = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+    except OSError:
+        pytest.skip("no /usr/bin/python3, which has GStreamer's RTSP server where that is installed")
+    try:
+        assert serving.stdout is not None
+        state, *rest = serving.stdout.readline().split(maxsplit=1)
+        if state != "ready":
+            pytest.skip(" ".join([state, *rest]).strip() or "the RTSP server does not start")
+        yield {name: f"rtsp://127.0.0.1:{rest[0].strip()}/{name}" for name in PLACES}
+    finally:
+        serving.kill()
+        serving.communicate()
+
+
+@quick
+def test_a_real_rtsp_server_whose_streams_end_is_followed(
+    cameras_rig: Path, server: dict[str, str], tmp_path: Path
+) -> None:
+    rig = _as_live(cameras_rig.with_name("rig.toml"), cameras_rig.with_name("served.toml"), server)
+    running = process(rig, tmp_path / "run.h5", "--set", "segments.length=5")
+    wait_for_frame(tmp_path / "run.h5", 120, running)
+    running.terminate()
+    said, told = running.communicate(timeout=60)
+    assert running.returncode == 0, told
+    assert "tracks in frames 0 to" in said
+    assert 3 <= told.count("it sees again") <= told.count("nothing comes from") <= told.count("it sees again") + 3
+    run = read_run(tmp_path / "run.h5")
+    assert run.frames.tolist() == list(range(run.frames[-1] + 1))
+    assert len(run.tracks) >= 3
+
+
+# What is asked, and names
+
+
+def test_where_it_ends_by_itself() -> None:
+    assert (last_frame(None), last_frame("0:7"), last_frame(":7")) == (ENDLESS, 7, 7)
+    for wrong in ("5:7", "7", "0:", "0:0", "0:x"):
+        with pytest.raises(ConfigError, match="--frames"):
+            last_frame(wrong)
+
+
+@pytest.mark.parametrize("more", [("--workers", "2"), ("--scheduler", "tcp://there:1")])
+def test_what_does_not_go_with_it(tmp_path: Path, more: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
+    rig = write_pieces(tmp_path, empty=True)
+    assert track(rig, tmp_path / "run.h5", "--follow", *more) == 2
+    assert f"{more[0]}: found that beside --follow" in capsys.readouterr().err
+
+
+def places(track: int, frames: range, x: float) -> Rows:
+    rows = np.zeros(len(frames), TRAJECTORY)
+    rows["frame"], rows["id"], rows["x"] = frames, track, x
+    return rows
+
+
+def test_names_last_over_segments() -> None:
+    names = LiveNames(np.zeros(0, TRAJECTORY), 20)
+    first = names.begin(np.zeros(0, TRAJECTORY))
+    told = names.named(np.concatenate([places(4, range(10), 0.0), places(7, range(10), 3.0)]), first)
+    assert told["id"].tolist() == [1] * 10 + [2] * 10
+    second = names.begin(np.concatenate([places(1, range(5, 10), 3.1), places(2, range(5, 10), 9.0)]))
+    later = np.concatenate([places(k, range(10, 12), 0.0) for k in (1, 2, 3)])
+    assert names.named(later, second)["id"].tolist() == [2, 2, 3, 3, 4, 4]
+    again = LiveNames(told, 20)  # a run that goes on from what it has told
+    assert again.named(later, again.begin(places(1, range(5, 10), 0.1)))["id"].tolist() == [1, 1, 3, 3, 4, 4]
