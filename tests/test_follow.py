@@ -138,6 +138,35 @@ def test_a_signal_finishes_the_run_file(tmp_path: Path, number: signal.Signals) 
     assert len({line.split(",")[0] for line in lines(output)[1:]}) == stop
 
 
+def test_a_run_to_which_nothing_came_leaves_nothing(tmp_path: Path) -> None:
+    rig, output = write_pieces(tmp_path, empty=True), tmp_path / "out" / "run.h5"
+    output.parent.mkdir()
+    running = process(rig, output)
+    while running.poll() is None and not lines(output):
+        time.sleep(0.05)
+    time.sleep(0.5)
+    running.terminate()
+    said, told = running.communicate(timeout=60)
+    assert (running.returncode, told) == (0, "stseg: finishing; once more to stop at once\n")
+    assert said == f"{output}: not written, since nothing came\n"
+    assert list(output.parent.iterdir()) == []
+
+
+@quick
+def test_a_second_signal_ends_it_at_once(tmp_path: Path) -> None:
+    rig, output = write_pieces(tmp_path, empty=True), tmp_path / "run.h5"
+    arrive(tmp_path, 1, 2)
+    running = process(rig, output)
+    wait_for_frame(output, 3, running)
+    running.terminate()
+    running.terminate()
+    running.send_signal(signal.SIGINT)
+    _, told = running.communicate(timeout=60)
+    assert running.returncode in (130, 143)
+    assert "Traceback" not in told
+    assert not output.exists()
+
+
 @quick
 def test_a_run_that_was_killed_goes_on(rig: Path, live: Path, afterwards: Path, tmp_path: Path) -> None:
     assert live.exists()
