@@ -1,7 +1,8 @@
 """Synchronised frames of live cameras, by the rig's frame clock.
 
 Frame f stands for one time; a camera with offset o shows it when its pictures of o frames before that arrive. Each view
-is the picture that came nearest to its time, so views are half a frame off at most, whatever the rate of a camera.
+is the picture that came nearest to its time, so views are half a frame off at most, whatever the rate of a camera. The
+clock is in step with the first camera, so views are not off where cameras are in step with each other.
 
     camera threads -> newest pictures -> the clock's thread -> moments that wait -> whoever takes them
                       (bounded)                                (bounded: the oldest lose their views)
@@ -140,7 +141,7 @@ class FollowedCameras:
         if not self._wait_for_pictures():
             return
         if self.start is None:
-            first, self.start = 0, now() + _BEFORE + max(0, *self._offsets) * self._period
+            first, self.start = 0, self._in_step(now() + _BEFORE + max(0, *self._offsets) * self._period)
         else:
             first = max(0, ceil((now() + _BEFORE - self.start) / self._period))
         start = self.start
@@ -150,6 +151,12 @@ class FollowedCameras:
             if views is None:
                 return
             self._put(LiveMoment(frame, views, max(at)))
+
+    def _in_step(self, least: float) -> float:
+        """The first time from then on at which the first camera that shows anything is to show a picture."""
+        with self._came:
+            shown = next(stream.pictures[-1].at for stream in self._streams if stream.pictures)
+        return shown + ceil((least - shown) / self._period) * self._period
 
     def _wait_for_pictures(self) -> bool:
         """Until the clock can start; False where the run is stopped before."""

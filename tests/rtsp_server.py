@@ -48,31 +48,32 @@ def main() -> None:
     for name in named:
         factory = GstRtspServer.RTSPMediaFactory()
         factory.set_launch(STREAM)
-        factory.set_shared(True)
         factory.connect("media-configure", lambda _, media, own: configure(media, own), sources[name])
         server.get_mount_points().add_factory(f"/{name}", factory)
     server.attach(None)
-    cameras = Gst.parse_launch(" ".join(CAMERA.format(path=path, name=name) for name, path in named.items()))
-    for name in named:
-        sink = cameras.get_by_name(name)
-        sink.set_property("emit-signals", True)
-        sink.connect("new-sample", lambda taken, own: show(taken, own, Gst), sources[name])
-    bus = cameras.get_bus()
-    bus.add_signal_watch()
+    playing: list[Any] = []
+
+    def begin() -> bool:
+        cameras = Gst.parse_launch(" ".join(CAMERA.format(path=path, name=name) for name, path in named.items()))
+        for name in named:
+            sink = cameras.get_by_name(name)
+            sink.set_property("emit-signals", True)
+            sink.connect("new-sample", lambda taken, own: show(taken, own, Gst), sources[name])
+        bus = cameras.get_bus()
+        bus.add_signal_watch()
+        bus.connect("message::eos", end)
+        cameras.set_state(Gst.State.PLAYING)
+        playing.append(cameras)
+        return False
 
     def end(*_: object) -> None:
         for own in sources.values():
             for source in own:
                 source.emit("end-of-stream")
             own.clear()
-        cameras.set_state(Gst.State.NULL)
+        playing.pop().set_state(Gst.State.NULL)
         GLib.timeout_add(1000, begin)
 
-    def begin() -> bool:
-        cameras.set_state(Gst.State.PLAYING)
-        return False
-
-    bus.connect("message::eos", end)
     begin()
     say(f"ready {server.get_bound_port()}")
     GLib.MainLoop().run()

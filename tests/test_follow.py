@@ -41,12 +41,12 @@ sys.exit(main())
 OPTIONS = tuple(
     word
     for constant in (
-        *("segments.length=1", "segments.warm_up=1", "segments.background=2", "segments.samples=4"),
+        *("segments.length=1.5", "segments.warm_up=0.5", "segments.background=2", "segments.samples=4"),
         *("ghosts.lattice=0.25", "live.settled=0.3", "live.learning=1", "live.pause=0.1", "live.silence=1"),
     )
     for word in ("--set", constant)
 )
-"""Segments of six frames; backgrounds that hold for sixteen."""
+"""Segments of twelve frames; backgrounds that hold for sixteen."""
 quick = pytest.mark.skipif(python_form(set_score) is set_score, reason="too slow without a compiler")
 
 
@@ -67,8 +67,11 @@ def lines(output: Path) -> list[str]:
 
 
 def wait_for_frame(output: Path, frame: int, running: subprocess.Popen[str]) -> None:
-    while running.poll() is None and not any(line.startswith(f"{frame},") for line in lines(output)):
-        time.sleep(0.02)
+    """Until somebody was told of in that frame or a later one."""
+    deadline = time.monotonic() + 90
+    while running.poll() is None and max([-1, *(int(line.split(",")[0]) for line in lines(output)[1:])]) < frame:
+        assert time.monotonic() < deadline
+        time.sleep(0.1)
 
 
 # Files that arrive
@@ -135,6 +138,35 @@ def test_a_signal_finishes_the_run_file(tmp_path: Path, number: signal.Signals) 
     assert len({line.split(",")[0] for line in lines(output)[1:]}) == stop
 
 
+def test_a_run_to_which_nothing_came_leaves_nothing(tmp_path: Path) -> None:
+    rig, output = write_pieces(tmp_path, empty=True), tmp_path / "out" / "run.h5"
+    output.parent.mkdir()
+    running = process(rig, output)
+    while running.poll() is None and not lines(output):
+        time.sleep(0.05)
+    time.sleep(0.5)
+    running.terminate()
+    said, told = running.communicate(timeout=60)
+    assert (running.returncode, told) == (0, "stseg: finishing; once more to stop at once\n")
+    assert said == f"{output}: not written, since nothing came\n"
+    assert list(output.parent.iterdir()) == []
+
+
+@quick
+def test_a_second_signal_ends_it_at_once(tmp_path: Path) -> None:
+    rig, output = write_pieces(tmp_path, empty=True), tmp_path / "run.h5"
+    arrive(tmp_path, 1, 2)
+    running = process(rig, output)
+    wait_for_frame(output, 3, running)
+    running.terminate()
+    running.terminate()
+    running.send_signal(signal.SIGINT)
+    _, told = running.communicate(timeout=60)
+    assert running.returncode in (130, 143)
+    assert "Traceback" not in told
+    assert not output.exists()
+
+
 @quick
 def test_a_run_that_was_killed_goes_on(rig: Path, live: Path, afterwards: Path, tmp_path: Path) -> None:
     assert live.exists()
@@ -143,7 +175,7 @@ def test_a_run_that_was_killed_goes_on(rig: Path, live: Path, afterwards: Path, 
     wait_for_frame(output, 24, running)
     running.kill()
     running.communicate()
-    assert 0 < len(list((tmp_path / "run.h5.segments").glob("segment-*-*.h5"))) < 6
+    assert 0 < len(list((tmp_path / "run.h5.segments").glob("segment-*-*.h5"))) < 3
     assert track(rig, output, "--follow", "--frames", f"0:{FRAMES}") == 0
     assert_same(output, afterwards)
     told = read_tracks_csv(output.with_name("run.h5.live.csv"))
@@ -246,8 +278,8 @@ def test_a_real_rtsp_server_whose_streams_end_is_followed(
     cameras_rig: Path, server: dict[str, str], tmp_path: Path
 ) -> None:
     rig = _as_live(cameras_rig.with_name("rig.toml"), cameras_rig.with_name("served.toml"), server)
-    running = process(rig, tmp_path / "run.h5", "--set", "segments.length=5")
-    wait_for_frame(tmp_path / "run.h5", 120, running)
+    running = process(rig, tmp_path / "run.h5", "--set", "segments.length=5", "--set", "live.silence=3")
+    wait_for_frame(tmp_path / "run.h5", 100, running)
     running.terminate()
     said, told = running.communicate(timeout=60)
     assert running.returncode == 0, told

@@ -72,6 +72,7 @@ def follow(job: Job, folder: WorkFolder, output: Path, overwrite: bool) -> str:
                     advance(1)
         made = follower.finish()
     if not made:
+        table.path.unlink()
         return f"{output}: not written, since nothing came"
     whole = replace(job, first=made[0].segment.first, stop=made[-1].segment.stop)
     tracks = assemble(whole, follower.pipeline, made, output, overwrite)

@@ -130,10 +130,16 @@ def _follow(job: Job, asked: dict[str, Any], output: Path, overwrite: bool) -> s
     """What there is to say of a run that followed a recording; its files change while it goes on."""
     is_live(job.recording)  # or it cannot be followed
     del asked["source"], asked["--frames"]
-    with WorkFolder(output, asked | {"--follow": "yes"}) as folder, _told_how_to_go_on(folder):
-        if not folder.segments():
-            require_new(live_table_of(output), overwrite)
-        told = follow_recording(job, folder, output, overwrite)
+    work, table = WorkFolder(output, asked | {"--follow": "yes"}), live_table_of(output)
+    if not work.begun:
+        require_new(table, overwrite)
+    with work as folder, _told_how_to_go_on(folder):
+        try:
+            told = follow_recording(job, folder, output, overwrite)
+        except BaseException:
+            if not folder.segments():  # nothing goes on from it
+                table.unlink(missing_ok=True)
+            raise
         folder.remove()
     return told
 
