@@ -112,12 +112,13 @@ def gaps_of(run: Run) -> list[tuple[int, str]]:
     return [(int(row["frame"]), row["reason"].decode()) for row in found if row["reason"].startswith(b"gap")]
 
 
-def test_a_gap_of_all_cameras_ends_tracks(tmp_path: Path) -> None:
+def test_a_gap_of_all_cameras_ends_tracks(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """What no camera has for longer than anybody is waited for. Two tell it by stamps, one by its files' starts."""
     seconds = np.delete(regular(90), np.s_[28:64])
     told = Film(seconds, files=(28, 26), suffix=".avi", starts=(0.0, 64 * TICK))
     rig = write_films(tmp_path, [Film(seconds), Film(seconds), told])
     run = track(rig, "--workers", "2", *SHORT)
+    assert "stseg: no camera shows frames 28 to 63: a gap, at which all tracks end\n" in capsys.readouterr().err
     assert run.frames.tolist() == [*range(28), *range(64, 90)]
     assert presence(run) == [(0, 27)] * 3 + [(64, 89)] * 3
     assert gaps_of(run) == [(27, "gap: no camera has any of the 36 frames before frame 64")] * 3
