@@ -334,11 +334,13 @@ def _length(feeds: list[_Feed]) -> float:
         return max(feed.end for feed in feeds)
     shortest, longest = min(required, key=_end), max(required, key=_end)
     if shortest.end < longest.end:
+        by_time = any(feed.source.shown is not None for feed in (shortest, longest))
         raise SourceError(
             shortest.source.source.path,
             f"camera {shortest.camera.name}",
             f"its end at frame {shortest.end} while others go on",
-            f'frames as long as camera {longest.camera.name}\'s, or on_missing = "blind"',
+            f'frames as long as camera {longest.camera.name}\'s, or on_missing = "blind"'
+            + (', or clock = "count" where it went by time stamps' if by_time else ""),
         )
     return shortest.end
 

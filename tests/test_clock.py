@@ -308,6 +308,15 @@ def test_frames_are_read_where_they_were_taken(uneven: Recording) -> None:
     assert streams.seen(uneven).sum(axis=1).tolist() == [20, 17, 19]
 
 
+def test_cameras_that_do_not_end_together_by_their_stamps_are_told_what_to_do(tmp_path: Path) -> None:
+    rec = recording(
+        stamped(tmp_path / "a.mkv", every(0.1, 31)), stamped(tmp_path / "b.mkv", np.delete(every(0.1, 20), 5))
+    )
+    said = r'cam2: found its end at frame 20 .* or on_missing = "blind", or clock = "count" where it went by'
+    with pytest.raises(SourceError, match=said):
+        count_streams(rec)
+
+
 def test_what_was_found_of_time_is_kept(uneven: Recording, tmp_path: Path) -> None:
     streams = count_streams(uneven)
     with WorkFolder(tmp_path / "run.h5", {}) as folder:

@@ -6,14 +6,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from films import TICK, Film, regular, standing, write_films
+from films import TICK, Film, regular, standing, write_at_rate, write_films
 from recordings import assert_same
 from scenes import FRAME_RATE
 
 from stseg.accelerate import python_form
 from stseg.arrays import Floats
 from stseg.commands.main import main
+from stseg.commands.sights import make_sights
+from stseg.config import Config, SegmentConfig
+from stseg.geometry import Camera, Grid, Rig
 from stseg.ghosts.scoring import set_score
+from stseg.io.frames import count_streams, read_camera
+from stseg.io.recording import CameraSource, Recording, Source
 from stseg.io.runs import Run, read_run
 
 pytestmark = pytest.mark.skipif(python_form(set_score) is set_score, reason="too slow without a compiler")
@@ -107,14 +112,32 @@ def gaps_of(run: Run) -> list[tuple[int, str]]:
     return [(int(row["frame"]), row["reason"].decode()) for row in found if row["reason"].startswith(b"gap")]
 
 
-def test_a_gap_of_all_cameras_ends_tracks(tmp_path: Path) -> None:
+def test_a_gap_of_all_cameras_ends_tracks(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """What no camera has for longer than anybody is waited for. Two tell it by stamps, one by its files' starts."""
     seconds = np.delete(regular(90), np.s_[28:64])
     told = Film(seconds, files=(28, 26), suffix=".avi", starts=(0.0, 64 * TICK))
     rig = write_films(tmp_path, [Film(seconds), Film(seconds), told])
     run = track(rig, "--workers", "2", *SHORT)
+    assert "stseg: no camera shows frames 28 to 63: a gap, at which all tracks end\n" in capsys.readouterr().err
     assert run.frames.tolist() == [*range(28), *range(64, 90)]
     assert presence(run) == [(0, 27)] * 3 + [(64, 89)] * 3
     assert gaps_of(run) == [(27, "gap: no camera has any of the 36 frames before frame 64")] * 3
     windows = run.windows
     assert ((windows["solve_stop"] <= 28) | (windows["solve_first"] >= 64)).all()
+
+
+def test_a_camera_learns_its_background_where_it_sees(tmp_path: Path) -> None:
+    """It starts after the part of the recording from which the others learn, and so learns from its own beginning."""
+    pictures = [np.full((12, 16, 3), 100 + k % 3, np.uint8) for k in range(60)]
+    write_at_rate(tmp_path / "a.avi", pictures, FRAME_RATE)
+    eye = Camera("late", (16, 12), np.eye(3), np.array([0.0, 0.0, -1.0]))
+    source = CameraSource(Source("video", tmp_path / "a.avi"), None, 40, "blind")
+    late = Recording(tmp_path / "rig.toml", Rig("late", FRAME_RATE, Grid((0, 1), (0, 1)), (eye,)), (source,))
+    config = Config(segments=SegmentConfig(background=2.0))
+    for streams in (None, count_streams(late)):
+        (sight,) = make_sights(late, config, 0, 100, streams=streams)
+        assert sight.evidence(None) is None
+        (view,) = read_camera(late, 0, [50], streams)
+        likelihood = sight.evidence(view)
+        assert isinstance(likelihood, np.ndarray)
+        assert likelihood.max() < 0.5

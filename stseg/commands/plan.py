@@ -114,7 +114,8 @@ def plan(
 
 def forecast(job: Job, counting: float, workers: int) -> Forecast:
     """What a job will cost, from parts of it that are tracked now; counting took so many seconds."""
-    work, frames = SegmentWork(job), job.stop - job.first
+    work, cuts = SegmentWork(job), job.segments()
+    frames = sum(segment.stop - segment.first for segment in cuts)
     parts = list(_parts(job))
     tried = sum(len(range(part.first, part.stop)) for part in parts)
     with TemporaryDirectory() as name:
@@ -130,7 +131,6 @@ def forecast(job: Job, counting: float, workers: int) -> Forecast:
         watch = _Clock()
         assemble(job, work.pipeline, made, folder / "run.h5", overwrite=True)
         joining, size = watch.lap(), (folder / "run.h5").stat().st_size
-    cuts = job.segments()
     looked_at = sum(segment.stop - segment.lead for segment in cuts)
     learned = -(-frames // round(job.config.segments.background * job.recording.rig.frame_rate))
     return Forecast(

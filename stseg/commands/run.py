@@ -112,6 +112,10 @@ def run(
         first, stop = frame_range(frames, streams, recording)
         job = Job(recording, resolved, tracker, volume, first, stop, streams)
         plan = job.segments()
+        for begin, end in job.gaps():
+            print(
+                f"stseg: no camera shows frames {begin} to {end - 1}: a gap, at which all tracks end", file=sys.stderr
+            )
         if not plan:
             raise ConfigError("--frames", "", f"{first}:{stop}, which no camera shows", "a part that some camera shows")
         made = _make(job, plan, folder, Workforce(workers, scheduler))

@@ -146,9 +146,13 @@ def _sight(recording: Recording, camera: int, config: Config, looks: Looks, stre
 
 
 def _seeing(recording: Recording, camera: int, part: range, streams: Streams | None) -> Sequence[int]:
-    """As many frames as a part has in which the camera sees: those of the part, then those nearest to it."""
+    """As many frames as a part has in which the camera sees: those of the part, then those nearest to it.
+
+    Where nothing was counted, it is taken to see from its offset on.
+    """
     if streams is None:
-        return part
+        late = max(0, recording.sources[camera].offset - part.start)
+        return range(part.start + late, part.stop + late)
     frames = np.flatnonzero(streams.seen(recording)[camera])
     begin, end = frames.searchsorted([part.start, part.stop]).tolist()
     lacking = len(part) - (end - begin)
