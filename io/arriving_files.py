@@ -126,7 +126,7 @@ class ArrivingVideos:
         self._source, self._camera, self._files, self._notes = source, camera, files, notes
         self._known = list(notes.read.get(camera.name, []))
         self._stream: VideoStream | None = None
-        self._path, self._read = Path(), 0
+        self._path, self._read, self._size = Path(), 0, 0
         self.arrived = 0.0
         """When the file of the last frame was found complete, by `stseg.io.live.now`."""
 
@@ -168,9 +168,23 @@ class ArrivingVideos:
             if self._known and path.name != self._known[0][0]:
                 found, expected = f"{path.name} next", f"{self._known[0][0]}, from which the run is to go on"
                 raise SourceError(self._source.path, f"camera {self._camera.name}", found, expected)
+            self._require_unchanged()
+            self._size = path.stat().st_size
             self._stream = VideoStream(replace(self._source, path=path), self._camera)
             self._path, self._read, self.arrived = path, 0, now()
         return True
+
+    def _require_unchanged(self) -> None:
+        """Notice if the file before was not complete: some of its frames were missed then."""
+        try:
+            size = self._path.stat().st_size if self._path.name else 0
+        except OSError:  # it may have been deleted since
+            size = self._size
+        if size != self._size:
+            found = f"{size} bytes, of which only the first {self._size} were there when it was read"
+            raise SourceError(
+                self._path, f"camera {self._camera.name}", found, "live.settled above the pauses of the recorder"
+            )
 
     def _end(self) -> None:
         self.close()

@@ -353,7 +353,7 @@ class SegmentConfig:
 class LiveConfig:
     """A recording that still goes on: `stseg run --follow`."""
 
-    settled: float = 2.0
+    settled: float = 10.0
     """A file to which nothing was added for so long is complete even if it is the last, seconds."""
     learning: float = 60.0
     """Where a camera has no empty scene, how long it is looked at before the run begins, seconds."""

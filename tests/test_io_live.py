@@ -129,6 +129,20 @@ def test_reading_waits_for_whoever_takes_the_moments(
     assert count == FRAMES
 
 
+def test_a_file_that_was_not_complete_is_told(tmp_path: Path) -> None:
+    rig = write_pieces(tmp_path, empty=True)
+    arrive(tmp_path, 1)
+    content = (tmp_path / "pieces" / "east_1.avi").read_bytes()
+    (tmp_path / "in" / "east_1.avi").write_bytes(content[: len(content) // 2])
+    with followed(rig, 0, None, FileNotes(tmp_path / "files.json"), print) as moments:
+        next(moments)
+        arrive(tmp_path, 1, 2)
+        with pytest.raises(
+            SourceError, match=rf"{len(content)} bytes, of which only the first .* expected live\.settled above"
+        ):
+            list(moments)
+
+
 def test_who_is_waited_for_is_said(tmp_path: Path) -> None:
     rig, said = write_pieces(tmp_path, empty=True), list[str]()
     arrive(tmp_path, 1)
