@@ -24,7 +24,7 @@ FORMATS = (ROOT / "docs" / "file-formats.md").read_text("utf-8")
 
 def test_the_tables_of_constants_are_those_of_the_configuration() -> None:
     page = constants_page.PAGE.read_text("utf-8")
-    source = (ROOT / "stseg" / "config.py").read_text("utf-8")
+    source = constants_page.configuration()
     assert set(re.findall(r"<!-- constants: (\w+) -->", page)) == set(constants_page.stages(source))
     assert page == constants_page.rewrite(page, source), "python tools/constants_page.py writes them anew"
 

@@ -1,4 +1,4 @@
-"""Write the tables of constants in docs/how-it-works.md anew, from stseg/config.py.
+"""Write the tables of constants in docs/how-it-works.md anew, from stseg/config.
 
     python tools/constants_page.py
 
@@ -14,6 +14,11 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "how-it-works.md"
 _MARKED = re.compile(r"<!-- constants: (\w+) -->\n.*?<!-- end -->", re.DOTALL)
+
+
+def configuration() -> str:
+    """The source of all modules of the configuration, one after the other."""
+    return "\n".join(path.read_text(encoding="utf-8") for path in sorted((ROOT / "stseg" / "config").glob("*.py")))
 
 
 def stages(source: str) -> dict[str, list[tuple[str, str, str]]]:
@@ -50,7 +55,7 @@ def _constants(stage: ast.ClassDef, classes: dict[str, ast.ClassDef]) -> list[tu
             found = [*found, *((f"{name}.{key}", default, meaning) for key, default, meaning in inner)]
             continue
         if not (isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant)):
-            raise SystemExit(f"config.py line {field.lineno}: {name} has no meaning below it")
+            raise SystemExit(f"stseg/config: {name} has no meaning below it")
         default = ast.unparse(field.value).strip("()") if field.value else ""
         found.append((name, default, " ".join(str(below.value.value).split())))
     return found
@@ -58,8 +63,7 @@ def _constants(stage: ast.ClassDef, classes: dict[str, ast.ClassDef]) -> list[tu
 
 def main() -> None:
     """Rewrite the page."""
-    source = (ROOT / "stseg" / "config.py").read_text(encoding="utf-8")
-    PAGE.write_text(rewrite(PAGE.read_text(encoding="utf-8"), source), encoding="utf-8")
+    PAGE.write_text(rewrite(PAGE.read_text(encoding="utf-8"), configuration()), encoding="utf-8")
 
 
 if __name__ == "__main__":

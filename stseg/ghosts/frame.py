@@ -166,7 +166,8 @@ class Frame:
 def _key(pool: Pool, j: int, own: Sequence[Own], walker: int) -> bytes:
     """All on which it depends what is told of a person."""
     theirs = b"".join(mine.box.to_bytes(4, "little", signed=True) + mine.pixels.tobytes() for mine in own)
-    return pool.ground[j].tobytes() + pool.width[j].tobytes() + walker.to_bytes(4, "little", signed=True) + theirs
+    place = bytes(pool.ground[j].tobytes()) + bytes(pool.width[j].tobytes())
+    return place + walker.to_bytes(4, "little", signed=True) + theirs
 
 
 def _case(seen: Seen, pool: Pool) -> Case:
