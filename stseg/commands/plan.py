@@ -121,20 +121,22 @@ def forecast(job: Job, counting: float, workers: int) -> Forecast:
     with TemporaryDirectory() as name:
         folder = Path(name)
         work.make(replace(parts[0], stop=min(parts[0].first + _READY, job.stop)), folder / "ready.h5", _untold)
-        tracking, learning, made = 0.0, [], []
+        tracking, learning, made, fused = 0.0, [], [], _Count()
         for part in parts:
             watch = _Clock()
             work.sights(part)
             learning.append(watch.lap())
-            made.append(Made(part, work.make(part, folder / f"{part.index}.h5", _untold)))
+            made.append(Made(part, work.make(part, folder / f"{part.index}.h5", fused)))
             tracking += watch.lap()
         watch = _Clock()
         assemble(job, work.pipeline, made, folder / "run.h5", overwrite=True)
         joining, size = watch.lap(), (folder / "run.h5").stat().st_size
-    looked_at = sum(segment.stop - segment.lead for segment in cuts)
+    # A segment looks on until its last window is solved, which is much of a short part and little of a long one.
+    beyond = (fused.calls - tried) / len(parts)
+    looked_at = sum(segment.stop - segment.lead + beyond for segment in cuts)
     learned = -(-frames // round(job.config.segments.background * job.recording.rig.frame_rate))
     return Forecast(
-        frames, len(cuts), workers, counting, max(learning) * learned, tracking / tried * looked_at,
+        frames, len(cuts), workers, counting, max(learning) * learned, tracking / fused.calls * looked_at,
         joining / tried * frames, round(size / tried * frames),
     )  # fmt: skip
 
@@ -157,6 +159,16 @@ class _Clock:
         """Since the last lap."""
         last, self._last = self._last, perf_counter()
         return self._last - last
+
+
+class _Count:
+    """How often it is called: once for each frame that is looked at."""
+
+    def __init__(self) -> None:
+        self.calls = 0
+
+    def __call__(self, _: int) -> None:
+        self.calls += 1
 
 
 def _untold(_: int) -> None:

@@ -146,7 +146,7 @@ def _fill_sums(
             if low[row] <= high[row]:
                 for u in range(max(int(np.ceil(low[row])), 0), min(int(np.floor(high[row])) + 1, columns)):
                     if counted[row, u]:
-                        total += values[row, u]
+                        total += float(values[row, u])
         sums[i] = total
 
 
