@@ -30,6 +30,8 @@ from stseg.occupancy.tables import TOP, Sums, fill_sums, sum_of
 
 _WITHIN = 2.0
 """How far the lattice of heights and widths goes, standard deviations: the paper's range is lost in the scan."""
+_FAR = 1e6
+"""Pixels; nothing farther outside an image matters."""
 
 
 class DetectionProbability:
@@ -162,13 +164,13 @@ def fill_chance(
         # Rows and columns change places where the pillar lies across the image.
         length, breadth = (rows, columns) if upright[i] else (columns, rows)
         for k in range(middle.shape[1]):
-            one, other = _nearest(edge[i, k], length), _nearest(edge[i, k + 1], length)
+            one, other = _nearest(edge[i, k]), _nearest(edge[i, k + 1])
             first, last = min(one, other), max(one, other)
             tall = last - first
             first, last = min(max(first, 0), length), min(max(last, 0), length)
             for j in range(len(widths)):
-                left = _nearest(middle[i, k] - half[i, k] * widths[j], breadth)
-                right = max(_nearest(middle[i, k] + half[i, k] * widths[j], breadth), left + 1)
+                left = _nearest(middle[i, k] - half[i, k] * widths[j])
+                right = max(_nearest(middle[i, k] + half[i, k] * widths[j]), left + 1)
                 covered[j] += tall * (right - left)
                 left, right = min(max(left, 0), breadth), min(max(right, 0), breadth)
                 if first < last and left < right:
@@ -185,6 +187,6 @@ def fill_chance(
 
 
 @kernel
-def _nearest(edge: float, length: int) -> int:
+def _nearest(edge: float) -> int:
     """The nearest edge between pixels; what is far outside the image is held within reach of whole numbers."""
-    return int(np.floor(min(max(edge, -4.0 * length), 5.0 * length) + 0.5))
+    return int(np.floor(min(max(float(edge), -_FAR), _FAR) + 0.5))
