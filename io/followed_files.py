@@ -131,6 +131,7 @@ class _Feed:
         self._next = 0
 
     def require_start(self, first: int) -> None:
+        """Raise SourceError where the camera must show the recording's frame `first` and begins after it."""
         if self.source.on_missing == "error" and first < self.source.offset:
             raise SourceError(
                 self.source.source.path,

@@ -270,6 +270,7 @@ class _Checks:
             raise FormatError(self.path, f"{name}@{key}", repr(found), repr(expected))
 
     def require_dataset(self, name: str, dtype: np.dtype[np.generic], dimensions: int) -> h5py.Dataset:
+        """A dataset of that dtype, or of its first form without the columns that were added, and so many dimensions."""
         dataset = self.require(name)
         lacking = _lacking(dataset.dtype, dtype)
         first = [column for column in dtype.descr if column[0] not in lacking & layout.ADDED_COLUMNS]

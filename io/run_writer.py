@@ -161,6 +161,7 @@ class _Table:
         self._count = 0
 
     def append(self, rows: Rows) -> None:
+        """Add rows (n,) of the table's dtype; they are held until there are enough to write."""
         if rows.dtype != self._dataset.dtype:
             raise ValueError(f"rows {rows.dtype} for the table {self._dataset.name} of {self._dataset.dtype}")
         self._held.append(rows.copy())

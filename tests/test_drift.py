@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from stseg.arrays import Bytes, Floats
-from stseg.calibrate.drift import agreement_of_people, background_shift, find_knocks
+from stseg.calibrate.drift import background_shift, find_knocks
 from stseg.simulate import SceneSpec
 from stseg.simulate.cameras import build_rig, pixel_rays
 from stseg.simulate.room import look
@@ -66,12 +66,6 @@ def test_two_cameras_are_told_apart_by_time() -> None:
 def test_too_few_frames_say_nothing() -> None:
     agreement = np.array([4.0] * 15 + [-4.0] * 15)[:, None] * [1.0, 0.0]
     assert find_knocks(agreement) == []
-
-
-def test_agreement_is_the_mean_over_people_whom_the_view_sees() -> None:
-    parts = np.array([[2.0, 0.0], [4.0, -1.0], [0.0, 3.0]])
-    agreement = agreement_of_people(np.array([0, 0, 2]), parts, 3)
-    np.testing.assert_array_equal(agreement, [[3.0, -1.0], [np.nan, np.nan], [np.nan, 3.0]])
 
 
 def test_a_step_that_harms_nobody_is_none() -> None:

@@ -1,10 +1,10 @@
 """A camera that was knocked while it recorded: from one frame on it agrees less with the others than before.
 
 Each frame and view brings a number that is higher the better the view agrees: with its own background, by how little
-that has moved in the image (`background_shift`), which a knock of a pixel shows; or with the other views, by the mean
-evidence that it gives for the people who were accepted (`agreement_of_people`), which needs no picture but a larger
-knock or a longer recording. A knock is a step down in one view's numbers. Where all views fall at once it is the scene
-that changed (a crowd, the light), so each is judged against the median of the others.
+that has moved in the image (`background_shift`), which a knock of a pixel shows; or with the other views, by how far
+beside their people it is (`stseg.calibrate.watch`), which needs no picture but a larger knock. A knock is a step down
+in one view's numbers. Where all views fall at once it is the scene that changed (a crowd, the light), so each is judged
+against the median of the others.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 from scipy.fft import irfft2, rfft2
 
-from stseg.arrays import Bytes, Floats, Ints
+from stseg.arrays import Bytes, Floats
 
 _LEAST = 20
 """Frames with a number, before and after a step."""
@@ -105,29 +105,6 @@ def _edges(image: Bytes) -> Floats:
     # The root's root, so that strong edges count little more than others: what is before the lens changes, what is
     # behind it stays. Roots are rounded exactly, logarithms not: the same pictures tell the same to the last digit.
     return np.asarray(np.sqrt(np.sqrt(across**2 + down**2)))
-
-
-def agreement_of_people(frame: Ints, parts: Floats, frames: int) -> Floats:
-    """What `find_knocks` asks for, from what each view says of the people who were accepted.
-
-    Parameters
-    ----------
-    frame : int64 (n,)
-        Of each person and frame, counted from the first.
-    parts : float64 (n, view)
-        What each view says of that person, nats; 0 where it says nothing.
-    frames
-        How many there are.
-
-    Returns
-    -------
-    float64 (frame, view)
-        Mean over the people of whom the view says something; nan where it says nothing of anybody.
-    """
-    total, count = (np.zeros((frames, parts.shape[1])) for _ in range(2))
-    np.add.at(total, frame, parts)
-    np.add.at(count, frame, parts != 0)
-    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
 
 
 def _step(agreement: Floats, view: int, least: float) -> Knock | None:

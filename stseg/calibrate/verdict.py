@@ -107,6 +107,7 @@ class _Raw:
         return np.asarray(self.field.mean(axis=0))
 
     def without(self, shared: Floats) -> Disagreement:
+        """What is left once that is taken off which all views share, in the form and units of `field`."""
         field = self.field - shared
         feet = field[:, [0, 2]] * self.scale[:, None]
         moved = (self.slope @ feet[..., None])[..., 0]
