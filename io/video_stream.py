@@ -1,4 +1,4 @@
-"""A video file, frame after frame. Its length is what decodes: headers of real files lie."""
+"""A video file, frame after frame. Its length is what decodes, whatever its header says."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import numpy as np
 from stseg.arrays import AnyArray, Floats
 from stseg.errors import SourceError
 from stseg.geometry import Camera
+from stseg.io.packets import packet_times
 from stseg.io.pictures import as_observation
 from stseg.io.recording import Source
 
@@ -61,7 +62,13 @@ class VideoStream:
         return self._frame - before
 
     def times(self) -> list[Floats]:
-        """Pass over all that is left by decoding it: the time that the file gives each frame, milliseconds."""
+        """Pass over all that is left: the time that the file gives each frame, milliseconds.
+
+        By decoding them, unless packets tell: headers of real files lie.
+        """
+        if self._frame < 0 and (told := packet_times(self._source.path)) is not None:
+            self._frame, self._ended = len(told) - 1, True
+            return [told]
         found = []
         while self._advance():
             found.append(self._capture.get(cv2.CAP_PROP_POS_MSEC))
