@@ -12,23 +12,20 @@ camera shows a frame of the recording in the own frame that was taken nearest to
 
 from __future__ import annotations
 
-import math
-import os
 from collections.abc import Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from types import TracebackType
 
-import numpy as np
-
-from stseg.arrays import Flags, Floats, Ints, Observation
+from stseg.arrays import Observation
 from stseg.errors import ConfigError, SourceError
-from stseg.geometry import Camera
-from stseg.io.clock import clock_of, placed, seen
+from stseg.io.clock import placed
+from stseg.io.counted import Streams
+from stseg.io.feeds import Feed, length_of, open_feed, open_feeds, threads_for
 from stseg.io.pictures import reduced_view
-from stseg.io.recording import CameraSource, Recording
-from stseg.io.streams import Stream, open_stream
+from stseg.io.recording import Recording
+from stseg.io.streams import open_stream
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,95 +44,6 @@ class Moment:
     views: tuple[Observation, ...]
 
 
-@dataclass(frozen=True)
-class Streams:
-    """What decoding a recording's streams to their ends tells.
-
-    Attributes
-    ----------
-    length
-        Frames of the recording.
-    times : float64 (n,) each
-        Of every frame of each file of each camera, milliseconds; nan where the source states none.
-    shown : int64 (tick,) or None each
-        `CameraSource.shown` of each camera.
-    notes
-        What a user should be told of it, one line each.
-    """
-
-    length: int
-    times: tuple[tuple[Floats, ...], ...]
-    shown: tuple[Ints | None, ...] = ()
-    notes: tuple[str, ...] = ()
-
-    def seen(self, recording: Recording) -> Flags:
-        """Which frames of the recording that was counted each camera shows, bool (camera, length)."""
-        counts = [sum(map(len, own)) for own in self.times]
-        return seen(placed(recording, self.shown), counts, self.length)
-
-    def shared(self, recording: Recording) -> tuple[int, int]:
-        """The part of it that two cameras show, where none must be there all the time; else all of it.
-
-        Two views tell where somebody is; of what one alone shows, at the beginning and the end, little can be told.
-        """
-        if any(source.on_missing == "error" for source in recording.sources):
-            return 0, self.length
-        told = np.flatnonzero(self.seen(recording).sum(axis=0) >= min(2, len(recording.sources)))
-        return (int(told[0]), int(told[-1]) + 1) if len(told) else (0, self.length)
-
-
-class _Feed:
-    """A stream that is asked for frames of the recording rather than its own."""
-
-    def __init__(self, camera: Camera, source: CameraSource, stream: Stream, factor: int) -> None:
-        self.camera, self.source, self._stream, self._factor = camera, source, stream, factor
-        self._next = 0
-        self._last: Observation = None
-        self.end = math.inf
-        """The recording's frame at which the stream ended; infinite while it goes on."""
-
-    @property
-    def required(self) -> bool:
-        return self.source.on_missing == "error"
-
-    def read(self, frame: int) -> Observation:
-        """The view at a frame not before the last one asked for; None where the camera is blind."""
-        tick, shown = frame - self.source.offset, self.source.shown
-        if tick < 0 or self.end < math.inf:
-            return None
-        if shown is None:
-            return self._own(tick)
-        if tick >= len(shown):
-            self.end = len(shown) + self.source.offset
-            return None
-        own = int(shown[tick])
-        if own >= self._next:
-            self._last = self._own(own)
-        return None if own < 0 else self._last
-
-    def _own(self, number: int) -> Observation:
-        """One of the stream's own frames, not before the last that was read."""
-        self._next += self._stream.skip(number - self._next)
-        view = self._stream.read() if self._next == number else None
-        if view is None:
-            self.end = self._next + self.source.offset
-        else:
-            self._next += 1
-        return reduced_view(view, self._factor)
-
-    def run_out(self) -> tuple[Floats, ...]:
-        """Pass over all frames; their times."""
-        return tuple(self._stream.times())
-
-    def place(self, source: CameraSource, frames: int) -> None:
-        """Learn which of the stream's frames shows when, and so where it ends."""
-        self.source = source
-        self.end = source.offset + (frames if source.shown is None else len(source.shown))
-
-    def close(self) -> None:
-        self._stream.close()
-
-
 class FrameReader:
     """Moments of a recording in order; made by `open_frames`.
 
@@ -152,9 +60,9 @@ class FrameReader:
         self._recording, self._stop = recording, stop
         self._frame, self._least = first, first if stop is None else stop
         with ExitStack() as opened:
-            self._feeds = _open_feeds(recording, opened, streams)
+            self._feeds = open_feeds(recording, opened, streams.times if streams else ())
             _require_start(self._feeds, first)
-            self._pool = opened.enter_context(ThreadPoolExecutor(_threads(recording)))
+            self._pool = opened.enter_context(ThreadPoolExecutor(threads_for(recording)))
             self._opened = opened.pop_all()
         self._ahead = self._read_ahead()
 
@@ -173,7 +81,7 @@ class FrameReader:
         if self._frame == self._stop:
             raise StopIteration
         views = tuple(view.result() for view in self._ahead)
-        length = _length(self._feeds)
+        length = length_of(self._feeds)
         if length <= self._frame:
             if length < self._least:
                 found = f"a recording of {length} frames"
@@ -226,29 +134,6 @@ def open_frames(
     return FrameReader(placed(recording, streams.shown) if streams else recording, first, stop, streams)
 
 
-def count_frames(recording: Recording) -> int:
-    """How many frames a recording has; raises as `count_streams` does."""
-    return count_streams(recording).length
-
-
-def count_streams(recording: Recording) -> Streams:
-    """How many frames a recording has, and which frames of the cameras show them, by decoding all to their ends.
-
-    Raises
-    ------
-    SourceError, FormatError
-        Where a source is missing, empty or not of its kind, or the streams do not end together.
-    """
-    with ExitStack() as opened:
-        feeds = _open_feeds(recording, opened)
-        pool = opened.enter_context(ThreadPoolExecutor(_threads(recording)))
-        times = tuple(counted.result() for counted in [pool.submit(feed.run_out) for feed in feeds])
-    clock = clock_of(recording, times)
-    for feed, source, own in zip(feeds, placed(recording, clock.shown).sources, times, strict=True):
-        feed.place(source, sum(map(len, own)))
-    return Streams(int(_length(feeds)), times, clock.shown, clock.notes)
-
-
 def read_camera(
     recording: Recording, camera_index: int, frames: Iterable[int], streams: Streams | None = None
 ) -> Iterator[Observation]:
@@ -270,11 +155,9 @@ def read_camera(
     SourceError, FormatError
         Where the source is missing, broken or not of the camera's size.
     """
-    sources = placed(recording, streams.shown).sources if streams else recording.sources
-    camera, source = recording.rig.cameras[camera_index], sources[camera_index]
-    times = None if streams is None else streams.times[camera_index]
-    factor = recording.factors[camera_index]
-    with closing(_Feed(camera, source, open_stream(source.source, camera, times), factor)) as feed:
+    if streams:
+        recording = placed(recording, streams.shown)
+    with closing(open_feed(recording, camera_index, streams.times[camera_index] if streams else None)) as feed:
         for frame in frames:
             yield feed.read(frame)
 
@@ -302,21 +185,7 @@ def read_background(recording: Recording, camera_index: int) -> Iterator[Observa
             yield reduced_view(view, recording.factors[camera_index])
 
 
-def _open_feeds(recording: Recording, opened: ExitStack, streams: Streams | None = None) -> list[_Feed]:
-    feeds: list[_Feed] = []
-    times = [None] * len(recording.sources) if streams is None else streams.times
-    cameras = zip(recording.rig.cameras, recording.sources, times, recording.factors, strict=True)
-    for camera, source, own, factor in cameras:
-        feeds.append(_Feed(camera, source, open_stream(source.source, camera, own), factor))
-        opened.callback(feeds[-1].close)
-    return feeds
-
-
-def _threads(recording: Recording) -> int:
-    return max(1, min(len(recording.sources), os.cpu_count() or 1))
-
-
-def _require_start(feeds: list[_Feed], first: int) -> None:
+def _require_start(feeds: list[Feed], first: int) -> None:
     for feed in feeds:
         if feed.required and first < feed.source.offset:
             raise SourceError(
@@ -325,25 +194,3 @@ def _require_start(feeds: list[_Feed], first: int) -> None:
                 f"a stream that starts at frame {feed.source.offset}",
                 'one that shows it, or on_missing = "blind"',
             )
-
-
-def _length(feeds: list[_Feed]) -> float:
-    """Where the recording ends; infinite while it goes on. SourceError where required streams do not end together."""
-    required = [feed for feed in feeds if feed.required]
-    if not required:
-        return max(feed.end for feed in feeds)
-    shortest, longest = min(required, key=_end), max(required, key=_end)
-    if shortest.end < longest.end:
-        by_time = any(feed.source.shown is not None for feed in (shortest, longest))
-        raise SourceError(
-            shortest.source.source.path,
-            f"camera {shortest.camera.name}",
-            f"its end at frame {shortest.end} while others go on",
-            f'frames as long as camera {longest.camera.name}\'s, or on_missing = "blind"'
-            + (', or clock = "count" where it went by time stamps' if by_time else ""),
-        )
-    return shortest.end
-
-
-def _end(feed: _Feed) -> float:
-    return feed.end

@@ -26,7 +26,7 @@ from zipfile import BadZipFile
 import numpy as np
 
 from stseg.errors import OutputError
-from stseg.io.frames import Streams
+from stseg.io.counted import Streams
 from stseg.io.locks import lock
 from stseg.io.outputs import failure, replacing, sync_folder
 

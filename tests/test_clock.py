@@ -17,7 +17,8 @@ from stseg.errors import RigError, SourceError
 from stseg.geometry import Camera, Grid, Rig
 from stseg.identity.segments import find_gaps
 from stseg.io.clock import Clock, clock_of, nearest, placed, seen
-from stseg.io.frames import Streams, count_streams, open_frames, read_camera
+from stseg.io.counted import Streams, count_streams
+from stseg.io.frames import open_frames, read_camera
 from stseg.io.provenance import gather_provenance
 from stseg.io.recording import CameraSource, Recording, Source
 from stseg.io.rigs import read_rig, write_rig

@@ -16,7 +16,8 @@ from hypothesis import strategies as st
 from stseg.arrays import AnyArray, Boxes, Observation
 from stseg.errors import ConfigError, FormatError, SourceError, StsegError
 from stseg.geometry import Camera, Grid, Rig
-from stseg.io.frames import Moment, Streams, count_frames, count_streams, open_frames, read_background, read_camera
+from stseg.io.counted import Streams, count_frames, count_streams
+from stseg.io.frames import Moment, open_frames, read_background, read_camera
 from stseg.io.recording import CameraSource, Recording, Source, SourceKind
 
 DATA = Path(os.environ.get("STSEG_DATA", Path(__file__).parents[1] / "../shared/data"))

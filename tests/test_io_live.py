@@ -18,9 +18,10 @@ from stseg.config import LiveConfig
 from stseg.errors import RigError, SourceError
 from stseg.geometry import Rig
 from stseg.io.arriving_files import ArrivingFiles, FileNotes
+from stseg.io.counted import count_frames
 from stseg.io.followed_cameras import FollowedCameras
 from stseg.io.followed_files import FollowedFiles
-from stseg.io.frames import count_frames, open_frames
+from stseg.io.frames import open_frames
 from stseg.io.live import LiveMoment, is_live, now
 from stseg.io.live_stream import Capture
 from stseg.io.provenance import gather_provenance

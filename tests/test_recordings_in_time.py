@@ -17,7 +17,8 @@ from stseg.commands.sights import make_sights
 from stseg.config import Config, SegmentConfig
 from stseg.geometry import Camera, Grid, Rig
 from stseg.ghosts.scoring import set_score
-from stseg.io.frames import count_streams, read_camera
+from stseg.io.counted import count_streams
+from stseg.io.frames import read_camera
 from stseg.io.recording import CameraSource, Recording, Source
 from stseg.io.runs import Run, read_run
 

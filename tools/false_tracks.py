@@ -23,7 +23,8 @@ from stseg.evaluation import evaluate
 from stseg.ghosts.expected import Expected
 from stseg.ghosts.people import People
 from stseg.ghosts.sizes import Sizes
-from stseg.io.frames import count_frames, open_frames
+from stseg.io.counted import count_frames
+from stseg.io.frames import open_frames
 from stseg.io.rigs import read_rig
 from stseg.io.tracks import read_tracks_csv
 from stseg.pipeline import Pipeline

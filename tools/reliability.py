@@ -32,7 +32,8 @@ from stseg.config import Config
 from stseg.geometry import Grid
 from stseg.geometry.near import near_person
 from stseg.ghosts.explain import FramePass
-from stseg.io.frames import count_streams, open_frames
+from stseg.io.counted import count_streams
+from stseg.io.frames import open_frames
 from stseg.io.rigs import read_rig
 from stseg.occupancy.level import inside_bodies
 from stseg.occupancy.volume import Occupancy

@@ -32,7 +32,8 @@ from stseg.config import Config
 from stseg.errors import ConfigError
 from stseg.foreground.sight import Sight
 from stseg.geometry import Camera, Grid, Rig
-from stseg.io.frames import Streams, count_streams, open_frames
+from stseg.io.counted import Streams, count_streams
+from stseg.io.frames import open_frames
 from stseg.io.outputs import require_new
 from stseg.io.recording import CameraSource, Recording, Source
 from stseg.io.rigs import write_rig

@@ -18,7 +18,7 @@ from stseg.commands.segment_work import Job, SegmentWork, VolumeKind
 from stseg.errors import ConfigError
 from stseg.identity.segments import Segment
 from stseg.io.config_file import read_config
-from stseg.io.frames import count_streams
+from stseg.io.counted import count_streams
 from stseg.io.recording import Recording
 from stseg.io.rigs import read_rig
 

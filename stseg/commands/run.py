@@ -24,7 +24,7 @@ from stseg.commands.workers import make_by_workers
 from stseg.errors import ConfigError
 from stseg.identity.segments import Segment
 from stseg.io.config_file import format_config, read_config
-from stseg.io.frames import Streams, count_streams
+from stseg.io.counted import Streams, count_streams
 from stseg.io.label_images import require_label_folder
 from stseg.io.live import is_live
 from stseg.io.outputs import require_new

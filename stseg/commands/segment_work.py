@@ -19,7 +19,8 @@ from stseg.foreground.sight import Sight
 from stseg.geometry.near import near_person
 from stseg.identity.segments import Segment, find_gaps, longest_absence, segments
 from stseg.io.config_file import format_config
-from stseg.io.frames import Streams, open_frames
+from stseg.io.counted import Streams
+from stseg.io.frames import open_frames
 from stseg.io.layout import ghost_type
 from stseg.io.recording import Recording
 from stseg.io.runs import RunWriter

@@ -19,7 +19,8 @@ from stseg.foreground.background import Background
 from stseg.foreground.light_change import LightWatch
 from stseg.foreground.sight import Sight
 from stseg.identity.segments import Segment
-from stseg.io.frames import Streams, read_background, read_camera
+from stseg.io.counted import Streams
+from stseg.io.frames import read_background, read_camera
 from stseg.io.recording import Recording
 
 _Frames = TypeVar("_Frames", range, Sequence[int])
