@@ -116,18 +116,24 @@ def test_an_outline_is_the_silhouette(step: int) -> None:
 @given(st.integers(0, 99), st.sampled_from([1, 3]))
 def test_sums_inside_are_those_of_the_outlines(seed: int, step: int) -> None:
     chance, table = np.random.default_rng(seed), BodyTable.of(corner_cameras()[0], room().grid)
-    ground, heights, widths = chance.uniform(-2, 2, (5, 2)), chance.uniform(1.4, 2.0, 5), chance.uniform(0.8, 1.3, 5)
+    many = (2, 3)
+    ground, heights, widths = (
+        chance.uniform(-3, 3, (*many, 2)),
+        chance.uniform(1.4, 2, many),
+        chance.uniform(0.8, 1.3, many),
+    )
     shape = (-(-96 // step), -(-128 // step))
-    values, counted = chance.normal(size=shape).astype(np.float32), chance.random(shape) < 0.7
-    first, spans, area = outlines(table, ground, heights, step, shape, widths)
-    sums, whole = sums_inside(table, ground, heights, widths, step, values, counted)
-    shown = np.where(counted, values, 0).astype(float)
-    drawn = [
-        sum(shown[first[i] + k, start:stop].sum() for k, (start, stop) in enumerate(spans[i]) if stop > start)
-        for i in range(len(ground))
-    ]
-    np.testing.assert_allclose(sums, drawn, atol=1e-9)
-    np.testing.assert_array_equal(whole, area)
+    values, owner = chance.normal(size=shape).astype(np.float32), chance.integers(-1, 3, shape)
+    sums, whole = sums_inside(table, ground, heights, widths, step, values, owner)
+    for person in range(2):
+        first, spans, area = outlines(table, ground[person], heights[person], step, shape, widths[person])
+        shown = np.where((owner < 0) | (owner == person), values, 0).astype(float)
+        drawn = [
+            sum(shown[first[i] + k, start:stop].sum() for k, (start, stop) in enumerate(spans[i]) if stop > start)
+            for i in range(3)
+        ]
+        np.testing.assert_allclose(sums[person], drawn, atol=1e-9)
+        np.testing.assert_array_equal(whole[person], area)
 
 
 def test_outlines_outside_the_image() -> None:

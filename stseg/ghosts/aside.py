@@ -86,7 +86,8 @@ def _by_pixels(people: Pool, j: int, right: Floats, view: PixelView, sight: Sigh
     count = len(_SHIFTS)
     places = people.ground[j] + _SHIFTS[:, None] * right
     heights, widths = np.full(count, people.height[j]), np.full(count, people.width[j])
-    sums, area = view.open_sums(sight.raster, np.ones(view.shape, bool), places, heights, widths)
-    score = sums / np.maximum(area, 1.0)
+    nobodys = np.full(view.shape, -1, np.int64)
+    sums, area = view.open_sums(sight.raster, nobodys, places[None], heights[None], widths[None])
+    score = sums[0] / np.maximum(area[0], 1.0)
     weight = np.exp(score - score.max())
     return float(weight @ _SHIFTS / weight.sum())

@@ -141,10 +141,13 @@ class PixelView(View):
         return np.stack([self.means(sums, *outlines) for outlines in self.lattice])
 
     def open_sums(
-        self, values: Singles, open_pixels: Flags, ground: Floats, heights: Floats, widths: Floats
+        self, values: Singles, owner: Ints, ground: Floats, heights: Floats, widths: Floats
     ) -> tuple[Floats, Floats]:
-        """Weighted sums of the open pixels (v, u) inside pillars (sizes in metres), and their areas, float64 (n,)."""
-        sums, area = sums_inside(self.table, ground, heights, widths / WIDTH, self.step, values, open_pixels)
+        """Weighted sums of the pixels open to each person inside their pillars, and the pillars' fair areas.
+
+        Both float64 (person, pillar); see `ghosts.outlines.sums_inside`, sizes in metres.
+        """
+        sums, area = sums_inside(self.table, ground, heights, widths / WIDTH, self.step, values, owner)
         return sums * self.config.body_weight, self._fair(area, heights, widths)
 
     def row_sums(self, raster: Singles | Floats, free: Flags) -> Floats:
