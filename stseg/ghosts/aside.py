@@ -65,7 +65,7 @@ def _of_view(people: Pool, view: BoxView | PixelView, sight: Sight, owner: Ints)
 
 def _right(ground: Floats, view: View) -> Floats:
     """The ground's direction that a view sees as to the right of each place, float64 (n, 2)."""
-    ahead = ground - view.camera.centre[:2]
+    ahead = ground - view.centre
     across = np.column_stack([ahead[:, 1], -ahead[:, 0]])
     return np.asarray(across / np.maximum(np.hypot(*across.T), 1e-9)[:, None])
 

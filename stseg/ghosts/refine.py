@@ -66,8 +66,8 @@ def refine(
     for k, (view, sight) in enumerate(zip(views, sights, strict=True)):
         if sight is not None and len(pool):
             score += _patch_score(view, sight, own.box[k], own.pixels[k], patch, tried, pool.width)
-    for j in np.flatnonzero(walker >= 0):
-        score[j] += prior.expected.place(int(walker[j]), patch[j])
+    met = np.flatnonzero(walker >= 0)
+    score[met] += prior.expected.place(walker[met], patch[met])[:, None]
     return _posterior(score, patch, tried)
 
 
