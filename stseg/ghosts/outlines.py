@@ -11,9 +11,6 @@ from stseg.arrays import Floats, Ints, Singles
 from stseg.geometry.bodies import LEVELS, SILHOUETTE, BodyTable, fill_discs
 from stseg.ghosts.evidence import Spans
 
-_BETWEEN = 3
-"""Discs that are drawn for each step of the profile."""
-
 
 def outlines(
     table: BodyTable, ground: Floats, heights: Floats, step: int, shape: tuple[int, int], widths: Floats | None = None
@@ -109,7 +106,7 @@ def _fill_outlines(
     area: Floats,
 ) -> None:
     rows = spans.shape[1]
-    discs, drawn = np.empty((len(profile), 6)), np.empty(((len(profile) - 1) * _BETWEEN + 1, 6))
+    discs, drawn = np.empty((len(profile), 6)), np.empty((len(profile), 6))
     low, high = np.empty(rows), np.empty(rows)
     for i in range(len(lattice)):
         fill_discs(pixel, lattice[i, 0], lattice[i, 1], heights[i], level_step, step, profile, discs)
@@ -137,7 +134,7 @@ def _fill_sums(
 ) -> None:
     people, pillars = heights.shape
     rows, columns = values.shape
-    discs, drawn = np.empty((pillars, len(profile), 6)), np.empty(((len(profile) - 1) * _BETWEEN + 1, 6))
+    discs, drawn = np.empty((pillars, len(profile), 6)), np.empty((len(profile), 6))
     low, high, left_of = np.empty(rows), np.empty(rows), np.empty((rows, columns + 1))
     for j in range(people):
         for i in range(pillars):
@@ -156,7 +153,7 @@ def _fill_sums(
 def _window(discs: Floats, area: Floats, rows: int, columns: int) -> tuple[int, int, int, int]:
     """Rows from and to (excluded), then columns, that hold all of the pillars' discs (pillar, disc, 6) on the raster.
 
-    Discs between those of the profile, and what joins them, lie within.
+    What joins them lies within.
     """
     top, bottom, left, right = np.inf, -np.inf, np.inf, -np.inf
     for i in range(len(discs)):
@@ -239,30 +236,20 @@ def _draw(discs: Floats, drawn: Floats, low: Floats, high: Floats) -> tuple[int,
     return top, bottom
 
 
-@kernel
+@part
 def _fill_drawn(discs: Floats, drawn: Floats) -> None:
-    """Fill drawn (k, 6) with the discs of the profile and those between: centre u, v, slope, half widths, half height.
+    """Fill drawn (k, 6) with each disc's centre u, v, slope, half widths, half height.
 
     The slope is that of the ellipse's middle from row to row, the first half width that of its middle row, the second
     that of its shadow on the u axis.
     """
-    for k in range(len(drawn)):
-        lower = min(k // _BETWEEN, len(discs) - 2)
-        share = (k - lower * _BETWEEN) / _BETWEEN
-        u, v = _mixed(discs, lower, share, 0), _mixed(discs, lower, share, 1)
-        uu, uv = _mixed(discs, lower, share, 2), _mixed(discs, lower, share, 3)
-        vu, vv = _mixed(discs, lower, share, 4), _mixed(discs, lower, share, 5)
+    for k in range(len(discs)):
+        u, v, uu, uv, vu, vv = discs[k, 0], discs[k, 1], discs[k, 2], discs[k, 3], discs[k, 4], discs[k, 5]
         tall = math.sqrt(vu * vu + vv * vv)
         drawn[k, 0], drawn[k, 1] = u, v
         drawn[k, 2] = (uu * vu + uv * vv) / (tall * tall + 1e-12)
         drawn[k, 3] = abs(uu * vv - uv * vu) / (tall + 1e-12)
         drawn[k, 4], drawn[k, 5] = math.sqrt(uu * uu + uv * uv), tall
-
-
-@kernel
-def _mixed(discs: Floats, lower: int, share: float, which: int) -> float:
-    """Component `which` of a disc between two of the profile."""
-    return float(discs[lower, which] * (1.0 - share) + discs[lower + 1, which] * share)
 
 
 @part
