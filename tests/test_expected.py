@@ -61,8 +61,11 @@ def test_what_speaks_for_a_walker_by_hand(
 def test_a_place_is_told_up_to_a_constant() -> None:
     expected = expecting((0.3, -0.4), (1.0, 1.0))
     points = np.array([[0.3, -0.4], [0.5, -0.4], [0.3, 0.2]])
-    by_hand = [reference.normal_place(p - expected.ground[0], expected.covariance[0]) for p in points]
-    np.testing.assert_allclose(expected.place(0, points), np.subtract(by_hand, by_hand[0]), atol=1e-9)
+    told = expected.place(np.array([1, 0]), points[[[2, 1, 0], [0, 1, 2]]])
+    for k, walker in enumerate((1, 0)):
+        by_hand = [reference.normal_place(p - expected.ground[walker], expected.covariance[walker]) for p in points]
+        at_home = reference.normal_place(np.zeros(2), expected.covariance[walker])
+        np.testing.assert_allclose(told[k], np.subtract(by_hand, at_home)[[[2, 1, 0], [0, 1, 2]][k]], atol=1e-9)
 
 
 def test_a_wrong_height_never_rules_a_walker_out() -> None:

@@ -34,7 +34,7 @@ from stseg.ghosts.boxes import fill_best_match, fill_cover, fill_inside, fill_ma
 from stseg.ghosts.evidence import BoxEvidence, Case, PixelEvidence, Terms
 from stseg.ghosts.expected import nobody
 from stseg.ghosts.explain import FramePass
-from stseg.ghosts.gains import fill_owners, gain_of, paired
+from stseg.ghosts.gains import come_in, fill_owners, gain_of, leave, paired, wipe_owners
 from stseg.ghosts.groups import fill_groups, fill_touch
 from stseg.ghosts.outlines import outlines, sums_inside
 from stseg.ghosts.people import Explanation, ViewEvidence
@@ -113,21 +113,28 @@ def test_an_outline_is_the_silhouette(step: int) -> None:
         assert area[j] == pytest.approx(silhouette.sum(), rel=0.15)
 
 
+@settings(deadline=None)
 @given(st.integers(0, 99), st.sampled_from([1, 3]))
 def test_sums_inside_are_those_of_the_outlines(seed: int, step: int) -> None:
     chance, table = np.random.default_rng(seed), BodyTable.of(corner_cameras()[0], room().grid)
-    ground, heights, widths = chance.uniform(-2, 2, (5, 2)), chance.uniform(1.4, 2.0, 5), chance.uniform(0.8, 1.3, 5)
+    many = (2, 3)
+    ground, heights, widths = (
+        chance.uniform(-3, 3, (*many, 2)),
+        chance.uniform(1.4, 2, many),
+        chance.uniform(0.8, 1.3, many),
+    )
     shape = (-(-96 // step), -(-128 // step))
-    values, counted = chance.normal(size=shape).astype(np.float32), chance.random(shape) < 0.7
-    first, spans, area = outlines(table, ground, heights, step, shape, widths)
-    sums, whole = sums_inside(table, ground, heights, widths, step, values, counted)
-    shown = np.where(counted, values, 0).astype(float)
-    drawn = [
-        sum(shown[first[i] + k, start:stop].sum() for k, (start, stop) in enumerate(spans[i]) if stop > start)
-        for i in range(len(ground))
-    ]
-    np.testing.assert_allclose(sums, drawn, atol=1e-9)
-    np.testing.assert_array_equal(whole, area)
+    values, owner = chance.normal(size=shape).astype(np.float32), chance.integers(-1, 3, shape)
+    sums, whole = sums_inside(table, ground, heights, widths, step, values, owner)
+    for person in range(2):
+        first, spans, area = outlines(table, ground[person], heights[person], step, shape, widths[person])
+        shown = np.where((owner < 0) | (owner == person), values, 0).astype(float)
+        drawn = [
+            sum(shown[first[i] + k, start:stop].sum() for k, (start, stop) in enumerate(spans[i]) if stop > start)
+            for i in range(3)
+        ]
+        np.testing.assert_allclose(sums[person], drawn, atol=1e-9)
+        np.testing.assert_array_equal(whole[person], area)
 
 
 def test_outlines_outside_the_image() -> None:
@@ -303,10 +310,35 @@ def test_what_one_more_adds_is_the_difference_of_scores(seed: int, walkers: int)
     case, chosen = frame.case(), np.random.default_rng(seed).permutation(8)
     for count in range(7):
         members = np.append(chosen, 0)
-        owners = np.empty((2, case.pixels.raster[0].size), np.int64)
+        owners = np.full((2, case.pixels.raster[0].size), -1, np.int16)
         fill_owners(members, count, case.pixels, owners)
         gain = gain_of(int(chosen[count]), members, count, paired(members, count, case), owners, case)
         assert gain == pytest.approx(frame.score(chosen[: count + 1]) - frame.score(chosen[:count]), abs=1e-5)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_owners_after_comings_and_goings_are_those_of_the_set(seed: int) -> None:
+    """Each pixel shows the nearest of the set who covers it, however the set came about; and wiped, nobody."""
+    pixels, rng = problem(seed, 8).pixels, np.random.default_rng(seed)
+    owners, inside = np.full((2, pixels.raster[0].size), -1, np.int16), list(range(4))
+    fill_owners(np.arange(4), 4, pixels, owners)
+    for i in rng.integers(0, 8, 12).tolist():
+        if i in inside:
+            inside.remove(i)
+            leave(i, np.array(inside, np.int64), len(inside), pixels, owners)
+        else:
+            inside.append(i)
+            come_in(i, pixels, owners)
+        for view, shown in enumerate(owners.reshape(pixels.raster.shape)):
+            nearest = np.full(shown.shape, -1)
+            for j in sorted(inside, key=lambda j: -pixels.order[view, j]):
+                rows = len(nearest) - pixels.first[view, j] if pixels.first[view, j] >= 0 else 0
+                for k, (start, stop) in enumerate(pixels.spans[view, j, :rows]):
+                    if stop > start:
+                        nearest[pixels.first[view, j] + k, start:stop] = j
+            np.testing.assert_array_equal(shown, nearest)
+    wipe_owners(np.array(inside, np.int64), len(inside), pixels, owners)
+    assert (owners == -1).all()
 
 
 @pytest.mark.parametrize("seed", range(20))

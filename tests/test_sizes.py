@@ -17,7 +17,7 @@ from stseg.geometry.bodies import SILHOUETTE, WIDTH
 from stseg.ghosts.explain import FramePass
 from stseg.ghosts.measure import measure
 from stseg.ghosts.outlines import outlines
-from stseg.ghosts.own import Own, owned
+from stseg.ghosts.own import Own
 from stseg.ghosts.pool import Pool
 from stseg.ghosts.refine import Places
 from stseg.ghosts.sizes import Sizes
@@ -45,8 +45,13 @@ def at(ground: Floats) -> Places:
     return Places(ground, np.zeros((n, 2, 2)), mean, variance)
 
 
-def everything(view: PixelView) -> list[list[Own]]:
-    return [[Own(-1, np.ones(view.shape, bool))]]
+def open_to_one(*views: Flags) -> Own:
+    """Of a single person, the pixels that are open to them in each view."""
+    return Own(np.full((len(views), 1), -1), [np.where(pixels, -1, 1) for pixels in views])
+
+
+def everything(view: PixelView) -> Own:
+    return open_to_one(np.ones(view.shape, bool))
 
 
 # Means and variances
@@ -92,7 +97,7 @@ def test_the_e_step_by_definition(hidden: float) -> None:
     sight = replace(view.observe(None), raster=rng.normal(0, 2, view.shape).astype(np.float32))
     open_pixels = rng.random(view.shape) >= hidden
     place, width = np.array([[0.3, -0.2]]), np.array([0.45])
-    found = measure(at(place), width, [view], [sight], [[Own(-1, open_pixels)]], FEW_HEIGHTS)
+    found = measure(at(place), width, [view], [sight], open_to_one(open_pixels), FEW_HEIGHTS)
     everywhere, one = np.tile(place, (len(STEPS), 1)), np.ones(len(STEPS))
     heights = FEW_HEIGHTS.height_mean + FEW_HEIGHTS.height_spread * STEPS
     widths = FEW_HEIGHTS.width_mean + FEW_HEIGHTS.width_spread * STEPS
@@ -110,7 +115,7 @@ def test_the_e_step_by_definition(hidden: float) -> None:
 def test_who_is_hidden_is_like_anybody() -> None:
     view = pixel_view()
     sight = view.observe(likelihoods([view.camera], people((0.3, -0.2, 1.9)))[0])
-    nobodys = [[owned(view, 0, np.zeros(0, np.int64), np.ones(view.shape, np.int64))]]
+    nobodys = open_to_one(np.zeros(view.shape, bool))
     place, width, anybody = at(np.array([[0.3, -0.2]])), np.array([0.42]), Sizes.of_anybody(1, FEW_HEIGHTS)
     found = measure(place, width, [view], [sight], nobodys, FEW_HEIGHTS)
     np.testing.assert_allclose([found.height, found.width], [anybody.height, anybody.width])
@@ -132,7 +137,7 @@ def test_wider_people_are_found_wider() -> None:
             for k, (start, stop) in enumerate(spans[0]):
                 seen[first[0] + k, start:stop] = 1.0
             sights.append(view.observe(seen))
-        own = [[Own(-1, np.ones(view.shape, bool)) for view in views]]
+        own = open_to_one(*(np.ones(view.shape, bool) for view in views))
         found.append(float(measure(at(np.zeros((1, 2))), np.array([0.42]), views, sights, own, FEW_HEIGHTS).width[0]))
     assert 0.8 * WIDTH - 0.03 < found[0] < found[1] - 0.04
     assert found[1] == pytest.approx(WIDTH, abs=0.04)

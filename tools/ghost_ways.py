@@ -40,15 +40,17 @@ class EveryCandidate(FramePass):
         prior = Prior.of(expected, self.config, self.border)
         pool, parts = self._candidates(sights, prior)
         walker = _walkers(pool, prior)
-        owned = [
-            [_all_of(v, s, pool.at([j])) for v, s in zip(self.views, sights, strict=True)] for j in range(len(pool))
+        best = [
+            [_box_of(v, s, pool.at([j])) for j in range(len(pool))] for v, s in zip(self.views, sights, strict=True)
         ]
-        places = refine(pool, self.views, sights, owned, prior, walker)
-        sizes = measure(places, pool.width, self.views, sights, owned, self.config)
+        nobodys = [np.full(view.shape, -1, np.int64) for view in self.views]
+        own = Own(np.array(best, np.int64).reshape(len(self.views), len(pool)), nobodys)
+        places = refine(pool, self.views, sights, own, prior, walker)
+        sizes = measure(places, pool.width, self.views, sights, own, self.config)
         sized = prior.known_sizes(sizes, walker)
-        known, own = prior.known(pool), self.config.person + prior.tall(pool.height)
+        known, alone = prior.known(pool), self.config.person + prior.tall(pool.height)
         before = np.array(
-            [p + (known[j, k] if k >= 0 else 0.0) for j, (p, k) in enumerate(zip(own, walker, strict=True))]
+            [p + (known[j, k] if k >= 0 else 0.0) for j, (p, k) in enumerate(zip(alone, walker, strict=True))]
         )
         ones = np.ones_like(parts)
         people = People(
@@ -94,15 +96,15 @@ def _walkers(pool: Pool, prior: Prior) -> Ints:
     return walker
 
 
-def _all_of(view: BoxView | PixelView, sight: Sight | None, candidate: Pool) -> Own:
-    """The best box, or every pixel."""
+def _box_of(view: BoxView | PixelView, sight: Sight | None, candidate: Pool) -> int:
+    """The best box, -1 for none; of pixels every one."""
     if isinstance(view, PixelView) or sight is None or not len(sight.edges):
-        return Own(-1, np.ones(view.shape, bool))
+        return -1
     body = view.table.boxes_of(candidate.ground, candidate.height)
     middle = (sight.edges[:, 0] + sight.edges[:, 2]) / 2, sight.edges[:, 1]
     off = np.hypot(middle[0] - (body[0, 0] + body[0, 2]) / 2, middle[1] - body[0, 1])
     tall = body[0, 3] - body[0, 1]
-    return Own(int(np.argmin(off)) if off.min() < 0.2 * tall else -1, np.zeros((0, 0), bool))
+    return int(np.argmin(off)) if off.min() < 0.2 * tall else -1
 
 
 def _none_of(people: People) -> People:

@@ -65,7 +65,7 @@ def _of_view(people: Pool, view: BoxView | PixelView, sight: Sight, owner: Ints)
 
 def _right(ground: Floats, view: View) -> Floats:
     """The ground's direction that a view sees as to the right of each place, float64 (n, 2)."""
-    ahead = ground - view.camera.centre[:2]
+    ahead = ground - view.centre
     across = np.column_stack([ahead[:, 1], -ahead[:, 0]])
     return np.asarray(across / np.maximum(np.hypot(*across.T), 1e-9)[:, None])
 
@@ -86,7 +86,8 @@ def _by_pixels(people: Pool, j: int, right: Floats, view: PixelView, sight: Sigh
     count = len(_SHIFTS)
     places = people.ground[j] + _SHIFTS[:, None] * right
     heights, widths = np.full(count, people.height[j]), np.full(count, people.width[j])
-    sums, area = view.open_sums(sight.raster, np.ones(view.shape, bool), places, heights, widths)
-    score = sums / np.maximum(area, 1.0)
+    nobodys = np.full(view.shape, -1, np.int64)
+    sums, area = view.open_sums(sight.raster, nobodys, places[None], heights[None], widths[None])
+    score = sums[0] / np.maximum(area[0], 1.0)
     weight = np.exp(score - score.max())
     return float(weight @ _SHIFTS / weight.sum())

@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 from stseg.arrays import Floats, Ints, Singles
 
 Spans = NDArray[np.int16]
+Owners = NDArray[np.int16]
+"""int16 (view, v * u): the candidate whom each raster pixel shows, -1 for nobody. Small: it is walked all the time."""
 
 
 class Terms(NamedTuple):

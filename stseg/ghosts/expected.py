@@ -12,10 +12,12 @@ with d_jk the Mahalanobis distance of the places. Each walker speaks for one can
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from stseg.arrays import Floats
+from stseg.arrays import Floats, Ints
 from stseg.config import GhostConfig
 from stseg.ghosts.sizes import Sizes
 
@@ -56,17 +58,21 @@ class Expected:
         off = height[:, None] - self.sizes.height
         tall = -0.5 * off**2 / variance + np.log(config.height_spread / np.sqrt(variance))
         anybody = -0.5 * ((height - config.height_mean) / config.height_spread) ** 2
+        squares = _squares(ground[:, None] - self.ground, np.linalg.inv(self.covariance))
         shape = np.maximum(tall - anybody[:, None], _OUT_OF_SHAPE)
-        return np.asarray(self.odds - config.person + sharp - 0.5 * self._squares(ground) + shape)
+        return np.asarray(self.odds - config.person + sharp - 0.5 * squares + shape)
 
-    def place(self, walker: int, ground: Floats) -> Floats:
-        """Log-density of a walker's place at points (n, 2), up to a constant, nats, float64 (n,)."""
-        return np.asarray(-0.5 * self._squares(ground)[:, walker])
+    def place(self, walker: Ints, ground: Floats) -> Floats:
+        """Log-densities of some walkers' places (n,) at points of each (n, point, 2), up to constants, nats."""
+        off = ground - self.ground[walker, None]
+        return -0.5 * _squares(off, np.linalg.inv(self.covariance[walker])[:, None])
 
-    def _squares(self, ground: Floats) -> Floats:
-        """Squared Mahalanobis distances, float64 (n, walker)."""
-        off = ground[:, None] - self.ground
-        return np.asarray(np.einsum("nki,kij,nkj->nk", off, np.linalg.inv(self.covariance), off))
+
+def _squares(off: Floats, precision: NDArray[np.floating[Any]]) -> Floats:
+    """Squared Mahalanobis distances of points that are off (..., 2) by precisions (..., 2, 2), float64 (...)."""
+    x, y = off[..., 0], off[..., 1]
+    both = precision[..., 0, 1] + precision[..., 1, 0]
+    return np.asarray(precision[..., 0, 0] * x * x + both * x * y + precision[..., 1, 1] * y * y)
 
 
 def nobody() -> Expected:

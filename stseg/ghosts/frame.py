@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass
 
 import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints
 from stseg.ghosts.evidence import Case, Terms
 from stseg.ghosts.measure import measure
-from stseg.ghosts.own import Own, owned
+from stseg.ghosts.own import Own
 from stseg.ghosts.pool import Pool, box_evidence, pixel_evidence
 from stseg.ghosts.prior import Prior
-from stseg.ghosts.refine import Places, refine
+from stseg.ghosts.refine import refine
 from stseg.ghosts.scoring import box_score, pixel_score, set_score, walker_score
 from stseg.ghosts.search import search
 from stseg.ghosts.sizes import Sizes
@@ -28,8 +28,6 @@ class Seen:
     sights: Sequence[Sight | None]
     prior: Prior
     terms: Terms
-    told: dict[bytes, tuple[Floats, ...]] = field(default_factory=dict)
-    """What was told of somebody at a place by what was theirs: in later rounds many stand as they stood."""
 
 
 @dataclass(frozen=True)
@@ -140,34 +138,20 @@ class Frame:
 
     def refined(self) -> Refined:
         """The set's people at the means of their posteriors."""
-        views, prior, pool = self.seen.views, self.seen.prior, self.pool.at(self.members)
-        own = [
-            [owned(v, j, b, p) for v, b, p in zip(views, self.box_owner, self.pixel_owner, strict=True)]
-            for j in range(len(self.members))
-        ]
-        keys = [_key(pool, j, own[j], int(self.walker[j])) for j in range(len(pool))]
-        new = [j for j, key in enumerate(keys) if key not in self.seen.told]
-        told = self._told(pool.at(new), [own[j] for j in new], self.walker[new])
-        self.seen.told.update(zip((keys[j] for j in new), zip(*told, strict=True), strict=True))
-        if len(new) < len(pool):
-            told = tuple(map(np.array, zip(*(self.seen.told[key] for key in keys), strict=True)))
-        places, sizes = Places(*told[:4]), Sizes(*told[4:])
+        views, sights, prior, pool = self.seen.views, self.seen.sights, self.seen.prior, self.pool.at(self.members)
+        own = Own(self._boxes(), self.pixel_owner)
+        places = refine(pool, views, sights, own, prior, self.walker)
+        sizes = measure(places, pool.width, views, sights, own, prior.config)
         known = prior.known_sizes(sizes, self.walker)
         return Refined(Pool(places.ground, sizes.height, known.width), places.covariance, sizes, known)
 
-    def _told(self, pool: Pool, own: Sequence[Sequence[Own]], walker: Ints) -> tuple[Floats, ...]:
-        """The fields of people's places, then those of their sizes."""
-        views, sights, prior = self.seen.views, self.seen.sights, self.seen.prior
-        places = refine(pool, views, sights, own, prior, walker)
-        sizes = measure(places, pool.width, views, sights, own, prior.config)
-        return tuple(getattr(part, one.name) for part in (places, sizes) for one in fields(part))
-
-
-def _key(pool: Pool, j: int, own: Sequence[Own], walker: int) -> bytes:
-    """All on which it depends what is told of a person."""
-    theirs = b"".join(mine.box.to_bytes(4, "little", signed=True) + mine.pixels.tobytes() for mine in own)
-    place = bytes(pool.ground[j].tobytes()) + bytes(pool.width[j].tobytes())
-    return place + walker.to_bytes(4, "little", signed=True) + theirs
+    def _boxes(self) -> Ints:
+        """The box of each member in each view, int64 (view, member), -1 for none."""
+        box = np.full((len(self.seen.views), len(self.members)), -1, np.int64)
+        for row, owner in zip(box, self.box_owner, strict=True):
+            taken = np.flatnonzero(owner >= 0)
+            row[owner[taken]] = taken
+        return box
 
 
 def _case(seen: Seen, pool: Pool) -> Case:

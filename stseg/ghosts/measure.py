@@ -19,14 +19,14 @@ what a box's sides tell of. M step: the frame is searched again with the sizes f
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from stseg.arrays import Flags, Floats, Singles
+from stseg.arrays import Floats, Ints, Singles
 from stseg.config import GhostConfig
 from stseg.ghosts.own import Own
-from stseg.ghosts.pool import Pool
 from stseg.ghosts.refine import Places
 from stseg.ghosts.sizes import Sizes
 from stseg.ghosts.views import PixelView, Sight, View
@@ -41,7 +41,7 @@ def measure(
     width: Floats,
     views: Sequence[View],
     sights: Sequence[Sight | None],
-    own: Sequence[Sequence[Own]],
+    own: Own,
     config: GhostConfig,
 ) -> Sizes:
     """The E step: posteriors of people's sizes after one frame, anybody's sizes the prior.
@@ -53,49 +53,46 @@ def measure(
     width : float64 (n,)
         So far, metres.
     own
-        For each person and view what is theirs.
+        What of the frame is whose.
     """
     found = Sizes.of_anybody(len(width), config)
+    told = [
+        _Told(view, sight.label_values, owner)
+        for view, sight, owner in zip(views, sights, own.pixels, strict=True)
+        if isinstance(view, PixelView) and sight is not None
+    ]
+    if not told or not len(width):
+        return replace(found, height=places.height, height_variance=places.height_variance)
     steps = np.linspace(-_WITHIN, _WITHIN, _STEPS)
     heights, widths = config.height_mean + config.height_spread * steps, config.width_mean + config.width_spread * steps
-    for j in range(len(width)):
-        told = [
-            _Told(view, sight.label_values, mine.pixels)
-            for view, sight, mine in zip(views, sights, own[j], strict=True)
-            if isinstance(view, PixelView) and sight is not None
-        ]
-        place, one = np.tile(places.ground[j], (_STEPS, 1)), np.ones(_STEPS)
-        if not told:
-            found.height[j], found.height_variance[j] = places.height[j], places.height_variance[j]
-            continue
-        score = _score(Pool(place, heights, width[j] * one), told)
-        found.height[j], found.height_variance[j] = _posterior(heights, score, steps)
-        score = _score(Pool(place, found.height[j] * one, widths), told)
-        found.width[j], found.width_variance[j] = _posterior(widths, score, steps)
-    return found
+    each, all_steps = (len(width), 1), (1, _STEPS)
+    score = _score(places.ground, np.tile(heights, each), np.tile(width[:, None], all_steps), told)
+    height, height_variance = _posterior(heights, score, steps)
+    score = _score(places.ground, np.tile(height[:, None], all_steps), np.tile(widths, each), told)
+    return Sizes(height, height_variance, *_posterior(widths, score, steps))
 
 
 class _Told(NamedTuple):
-    """What one view shows of one person: the label values (v, u), and which pixels are open to them."""
+    """What one view shows: the label values, and to whom pixels belong, both (v, u)."""
 
     view: PixelView
     values: Singles
-    open_pixels: Flags
+    owner: Ints
 
 
-def _posterior(lattice: Floats, score: Floats, steps: Floats) -> tuple[float, float]:
-    """Mean and variance of one size on the lattice, from what the views say of it, nats."""
+def _posterior(lattice: Floats, score: Floats, steps: Floats) -> tuple[Floats, Floats]:
+    """Mean and variance of each one's size on the lattice, from what the views say of it, nats (person, pillar)."""
     score = score - 0.5 * steps**2
-    weight = np.exp(score - score.max())
-    weight /= weight.sum()
-    mean = float(weight @ lattice)
-    return mean, float(weight @ (lattice - mean) ** 2)
+    weight = np.exp(score - score.max(1, keepdims=True))
+    weight /= weight.sum(1, keepdims=True)
+    mean = weight @ lattice
+    return mean, (weight * (lattice - mean[:, None]) ** 2).sum(1)
 
 
-def _score(fits: Pool, told: Sequence[_Told]) -> Floats:
-    """What all views say of one person's pillars, nats, float64 (pillar,)."""
-    score = np.zeros(len(fits))
-    for view, values, open_pixels in told:
-        sums, area = view.open_sums(values, open_pixels, fits.ground, fits.height, fits.width)
-        score += sums / max(area.mean(), 1.0)
+def _score(ground: Floats, heights: Floats, widths: Floats, told: Sequence[_Told]) -> Floats:
+    """What all views say of people's pillars at their places (person, 2), nats, float64 (person, pillar)."""
+    score, everywhere = np.zeros(heights.shape), np.repeat(ground[:, None], _STEPS, 1)
+    for view, values, owner in told:
+        sums, area = view.open_sums(values, owner, everywhere, heights, widths)
+        score += sums / np.maximum(area.mean(1, keepdims=True), 1.0)
     return score

@@ -11,8 +11,8 @@ import numpy as np
 
 from stseg.accelerate import kernel
 from stseg.arrays import Flags, Ints
-from stseg.ghosts.evidence import Case
-from stseg.ghosts.gains import fill_owners, gain_of, paired
+from stseg.ghosts.evidence import Case, Owners
+from stseg.ghosts.gains import come_in, fill_owners, gain_of, leave, paired, unpaired_gain, wipe_owners
 from stseg.ghosts.scoring import set_score
 
 SWEEPS = 8
@@ -24,7 +24,7 @@ _HOPELESS = -12.0
 
 
 @kernel
-def climb(members: Ints, count: int, own: Ints, inside: Flags, owners: Ints, case: Case) -> int:
+def climb(members: Ints, count: int, own: Ints, inside: Flags, owners: Owners, case: Case) -> int:
     """Simple moves until none helps; returns the set's new size.
 
     Parameters
@@ -35,12 +35,12 @@ def climb(members: Ints, count: int, own: Ints, inside: Flags, owners: Ints, cas
         The candidates who may come in.
     inside : bool (candidate,)
         Who of all is in the set.
-    owners : int64 (view, v * u)
-        Scratch.
+    owners : int16 (view, v * u)
+        Scratch, -1 everywhere before and after.
     """
     for _ in range(SWEEPS):
         grown = _add(members, count, own, inside, owners, case)
-        shrunk = _remove(members, grown, -1, inside, inside, case)
+        shrunk = _remove(members, grown, -1, inside, inside, owners, case)
         exchanged = _exchange(members, shrunk, own, inside, owners, case)
         if grown == count and shrunk == grown and not exchanged:
             break
@@ -50,7 +50,7 @@ def climb(members: Ints, count: int, own: Ints, inside: Flags, owners: Ints, cas
 
 @kernel
 def trade(
-    members: Ints, count: int, own: Ints, inside: Flags, touch: Flags, owners: Ints, trades: int, case: Case
+    members: Ints, count: int, own: Ints, inside: Flags, touch: Flags, owners: Owners, trades: int, case: Case
 ) -> int:
     """All trades, at most so many times, until none helps; takes what `climb` takes, and who touches whom."""
     trial, trial_inside = members.copy(), inside.copy()
@@ -76,7 +76,7 @@ def trade(
 
 
 @kernel
-def _leave(members: Ints, count: int, i: int, near: Ints, inside: Flags, owners: Ints, case: Case) -> int:
+def _leave(members: Ints, count: int, i: int, near: Ints, inside: Flags, owners: Owners, case: Case) -> int:
     """Somebody leaves, and those near come in who had been in their shade; the set's size, or -1 where nobody does."""
     for a in range(count):
         if members[a] == i:
@@ -87,17 +87,19 @@ def _leave(members: Ints, count: int, i: int, near: Ints, inside: Flags, owners:
 
 
 @kernel
-def _let_in(members: Ints, count: int, i: int, inside: Flags, touch: Flags, owners: Ints, case: Case) -> int:
+def _let_in(members: Ints, count: int, i: int, inside: Flags, touch: Flags, owners: Owners, case: Case) -> int:
     """Somebody is let in, and those leave who are worth nothing beside them; the set's size, or -1 where nobody does.
 
     Where one leaves to whom they stand near, that is an exchange, and was tried.
     """
     fill_owners(members, count, case.pixels, owners)
-    if gain_of(i, members, count, paired(members, count, case), owners, case) < _HOPELESS:
+    gain = gain_of(i, members, count, paired(members, count, case), owners, case)
+    wipe_owners(members, count, case.pixels, owners)
+    if gain < _HOPELESS:
         return -1
     before = members[:count].copy()
     members[count], inside[i] = i, True
-    left = _remove(members, count + 1, i, touch[i], inside, case)
+    left = _remove(members, count + 1, i, touch[i], inside, owners, case)
     gone = before[~inside[before]]
     if len(gone) == 0 or (len(gone) == 1 and _apart(i, gone[0], case) <= _NEAR):
         return -1
@@ -110,12 +112,12 @@ def _apart(i: int, j: int, case: Case) -> float:
 
 
 @kernel
-def _add(members: Ints, count: int, own: Ints, inside: Flags, owners: Ints, case: Case) -> int:
+def _add(members: Ints, count: int, own: Ints, inside: Flags, owners: Owners, case: Case) -> int:
     """Add the best candidate while one helps; a candidate's gain seldom rises, so hopeless ones are tried once."""
     gain = np.full(len(own), np.inf)
+    fill_owners(members, count, case.pixels, owners)
     while True:
         best, best_gain = -1, GAINED
-        fill_owners(members, count, case.pixels, owners)
         pairs = paired(members, count, case)
         for k in range(len(own)):
             if inside[own[k]] or gain[k] < best_gain - _SLACK:
@@ -124,38 +126,49 @@ def _add(members: Ints, count: int, own: Ints, inside: Flags, owners: Ints, case
             if gain[k] > best_gain:
                 best, best_gain = own[k], gain[k]
         if best < 0:
-            return count
+            break
         members[count], inside[best] = best, True
         count += 1
-
-
-@kernel
-def _remove(members: Ints, count: int, keep: int, may: Flags, inside: Flags, case: Case) -> int:
-    """Remove each member without whom the score is higher, of those who may (candidate,) leave, but not `keep`."""
-    score = set_score(members, count, case)
-    a = 0
-    while a < count:
-        leaving = members[a]
-        members[a] = members[count - 1]
-        without = set_score(members, count - 1, case) if may[leaving] and leaving != keep else -np.inf
-        if without > score + GAINED:
-            inside[leaving] = False
-            count -= 1
-            score = without
-        else:
-            members[a] = leaving
-            a += 1
+        come_in(best, case.pixels, owners)
+    wipe_owners(members, count, case.pixels, owners)
     return count
 
 
 @kernel
-def _exchange(members: Ints, count: int, own: Ints, inside: Flags, owners: Ints, case: Case) -> bool:
+def _remove(members: Ints, count: int, keep: int, may: Flags, inside: Flags, owners: Owners, case: Case) -> int:
+    """Remove each member without whom the score is higher, of those who may (candidate,) leave, but not `keep`."""
+    fill_owners(members, count, case.pixels, owners)
+    pairs = paired(members, count, case)
+    a = 0
+    while a < count:
+        leaving = members[a]
+        if not may[leaving] or leaving == keep:
+            a += 1
+            continue
+        members[a] = members[count - 1]
+        leave(leaving, members, count - 1, case.pixels, owners)
+        without = paired(members, count - 1, case)
+        if unpaired_gain(leaving, members, count - 1, owners, case) + pairs - without < -GAINED:
+            inside[leaving] = False
+            count -= 1
+            pairs = without
+        else:
+            members[a] = leaving
+            come_in(leaving, case.pixels, owners)
+            a += 1
+    wipe_owners(members, count, case.pixels, owners)
+    return count
+
+
+@kernel
+def _exchange(members: Ints, count: int, own: Ints, inside: Flags, owners: Owners, case: Case) -> bool:
     """Replace each member by the near candidate that raises the score most."""
     changed = False
+    fill_owners(members, count, case.pixels, owners)
     for a in range(count):
         old = members[a]
         members[a] = members[count - 1]
-        fill_owners(members, count - 1, case.pixels, owners)
+        leave(old, members, count - 1, case.pixels, owners)
         pairs = paired(members, count - 1, case)
         best, best_gain = old, gain_of(old, members, count - 1, pairs, owners, case) + GAINED
         for i in own:
@@ -166,7 +179,9 @@ def _exchange(members: Ints, count: int, own: Ints, inside: Flags, owners: Ints,
                 best, best_gain = i, gain
         members[count - 1] = members[a]
         members[a] = best
+        come_in(best, case.pixels, owners)
         if best != old:
             inside[old], inside[best] = False, True
             changed = True
+    wipe_owners(members, count, case.pixels, owners)
     return changed

@@ -6,13 +6,10 @@ import math
 
 import numpy as np
 
-from stseg.accelerate import kernel
-from stseg.arrays import Flags, Floats, Ints, Singles
+from stseg.accelerate import kernel, part
+from stseg.arrays import Floats, Ints, Singles
 from stseg.geometry.bodies import LEVELS, SILHOUETTE, BodyTable, fill_discs
 from stseg.ghosts.evidence import Spans
-
-_BETWEEN = 3
-"""Discs that are drawn for each step of the profile."""
 
 
 def outlines(
@@ -57,30 +54,33 @@ def outlines(
 
 
 def sums_inside(
-    table: BodyTable, ground: Floats, heights: Floats, widths: Floats, step: int, values: Singles, counted: Flags
+    table: BodyTable, ground: Floats, heights: Floats, widths: Floats, step: int, values: Singles, owner: Ints
 ) -> tuple[Floats, Floats]:
-    """Sums of a map inside the outlines of pillars: quicker than outlines where nobody else asks for those.
+    """Sums of a map inside outlines of pillars, several for each person: quicker than outlines that are kept.
 
     Parameters
     ----------
-    table, ground, heights, widths, step
+    table, step
         As for `outlines`.
+    ground : float64 (person, pillar, 2)
+        Where they stand, metres.
+    heights, widths : float64 (person, pillar)
+        Metres, and beside the silhouette of `geometry.bodies`.
     values : float32 (v, u)
         On the raster.
-    counted : bool (v, u)
-        Which of its pixels count.
+    owner : int64 (v, u)
+        Which person each of its pixels belongs to, -1 for nobody. What is theirs or nobody's counts for a person.
 
     Returns
     -------
-    sums, area : float64 (n,)
+    sums, area : float64 (person, pillar)
         Of what counts, and pixels of the whole outline; both 0 where the view does not see the pillar.
     """
-    sums, area = np.zeros(len(ground)), np.zeros(len(ground))
-    lattice = _lattice(table, ground)
+    sums, area = np.zeros(heights.shape), np.zeros(heights.shape)
+    lattice = _lattice(table, ground).reshape(ground.shape)
     _fill_sums(
-        table.pixel, lattice, heights, widths, LEVELS[1], table.step, SILHOUETTE, float(step), values, counted, sums,
-        area,
-    )  # fmt: skip
+        table.pixel, lattice, heights, widths, LEVELS[1], table.step, SILHOUETTE, float(step), values, owner, sums, area
+    )
     return sums, area
 
 
@@ -106,7 +106,7 @@ def _fill_outlines(
     area: Floats,
 ) -> None:
     rows = spans.shape[1]
-    discs, drawn = np.empty((len(profile), 6)), np.empty(((len(profile) - 1) * _BETWEEN + 1, 6))
+    discs, drawn = np.empty((len(profile), 6)), np.empty((len(profile), 6))
     low, high = np.empty(rows), np.empty(rows)
     for i in range(len(lattice)):
         fill_discs(pixel, lattice[i, 0], lattice[i, 1], heights[i], level_step, step, profile, discs)
@@ -128,26 +128,77 @@ def _fill_sums(
     profile: Floats,
     raster_step: float,
     values: Singles,
-    counted: Flags,
+    owner: Ints,
     sums: Floats,
     area: Floats,
 ) -> None:
+    people, pillars = heights.shape
     rows, columns = values.shape
-    discs, drawn = np.empty((len(profile), 6)), np.empty(((len(profile) - 1) * _BETWEEN + 1, 6))
-    low, high = np.empty(rows), np.empty(rows)
-    for i in range(len(lattice)):
-        fill_discs(pixel, lattice[i, 0], lattice[i, 1], heights[i], level_step, step, profile, discs)
-        if not _seen(discs):
-            continue
-        area[i] = _to_raster(discs, raster_step, widths[i])
-        top, bottom = _draw(discs, drawn, low, high)
+    discs, drawn = np.empty((pillars, len(profile), 6)), np.empty((len(profile), 6))
+    low, high, left_of = np.empty(rows), np.empty(rows), np.empty((rows, columns + 1))
+    for j in range(people):
+        for i in range(pillars):
+            x, y = lattice[j, i]
+            fill_discs(pixel, x, y, heights[j, i], level_step, step, profile, discs[i])
+            if _seen(discs[i]):
+                area[j, i] = _to_raster(discs[i], raster_step, widths[j, i])
+        _fill_left_of(values, owner, j, _window(discs, area[j], rows, columns), left_of)
+        for i in range(pillars):
+            if area[j, i] > 0:
+                top, bottom = _draw(discs[i], drawn, low, high)
+                sums[j, i] = _between(left_of, low, high, top, bottom)
+
+
+@kernel
+def _window(discs: Floats, area: Floats, rows: int, columns: int) -> tuple[int, int, int, int]:
+    """Rows from and to (excluded), then columns, that hold all of the pillars' discs (pillar, disc, 6) on the raster.
+
+    What joins them lies within.
+    """
+    top, bottom, left, right = np.inf, -np.inf, np.inf, -np.inf
+    for i in range(len(discs)):
+        if area[i] > 0:
+            for u, v, uu, uv, vu, vv in discs[i]:
+                wide, tall = math.sqrt(uu * uu + uv * uv), math.sqrt(vu * vu + vv * vv)
+                top, bottom = min(top, v - tall), max(bottom, v + tall)
+                left, right = min(left, u - wide), max(right, u + wide)
+    if top > bottom:
+        return 0, 0, 0, 0
+    return _from(top, rows), _from(bottom + 2, rows), _from(left, columns), _from(right + 2, columns)
+
+
+@kernel
+def _from(place: float, most: int) -> int:
+    """The pixel at or before a place, 0..most."""
+    return int(min(max(place, 0.0), float(most)))
+
+
+@kernel
+def _fill_left_of(
+    values: Singles, owner: Ints, person: int, window: tuple[int, int, int, int], left_of: Floats
+) -> None:
+    """Fill left_of (v, u + 1), inside a window, with sums along rows of what counts for a person, from its left."""
+    top, bottom, left, right = window
+    for row in range(top, bottom):
         total = 0.0
-        for row in range(top, bottom):
-            if low[row] <= high[row]:
-                for u in range(max(int(np.ceil(low[row])), 0), min(int(np.floor(high[row])) + 1, columns)):
-                    if counted[row, u]:
-                        total += float(values[row, u])
-        sums[i] = total
+        left_of[row, left] = 0.0
+        for u in range(left, right):
+            if owner[row, u] < 0 or owner[row, u] == person:
+                total += float(values[row, u])
+            left_of[row, u + 1] = total
+
+
+@kernel
+def _between(left_of: Floats, low: Floats, high: Floats, top: int, bottom: int) -> float:
+    """Sum from column low to high (row,) of the rows from `top` to before `bottom`, from sums along rows."""
+    total = 0.0
+    columns = left_of.shape[1] - 1
+    for row in range(top, bottom):
+        if low[row] <= high[row]:
+            start, stop = max(int(np.ceil(low[row])), 0), min(int(np.floor(high[row])) + 1, columns)
+            if start < stop:
+                total += left_of[row, stop] - left_of[row, start]
+    return total
 
 
 @kernel
@@ -185,19 +236,15 @@ def _draw(discs: Floats, drawn: Floats, low: Floats, high: Floats) -> tuple[int,
     return top, bottom
 
 
-@kernel
+@part
 def _fill_drawn(discs: Floats, drawn: Floats) -> None:
-    """Fill drawn (k, 6) with the discs of the profile and those between: centre u, v, slope, half widths, half height.
+    """Fill drawn (k, 6) with each disc's centre u, v, slope, half widths, half height.
 
     The slope is that of the ellipse's middle from row to row, the first half width that of its middle row, the second
     that of its shadow on the u axis.
     """
-    for k in range(len(drawn)):
-        lower = min(k // _BETWEEN, len(discs) - 2)
-        share = (k - lower * _BETWEEN) / _BETWEEN
-        u, v = _mixed(discs, lower, share, 0), _mixed(discs, lower, share, 1)
-        uu, uv = _mixed(discs, lower, share, 2), _mixed(discs, lower, share, 3)
-        vu, vv = _mixed(discs, lower, share, 4), _mixed(discs, lower, share, 5)
+    for k in range(len(discs)):
+        u, v, uu, uv, vu, vv = discs[k, 0], discs[k, 1], discs[k, 2], discs[k, 3], discs[k, 4], discs[k, 5]
         tall = math.sqrt(vu * vu + vv * vv)
         drawn[k, 0], drawn[k, 1] = u, v
         drawn[k, 2] = (uu * vu + uv * vv) / (tall * tall + 1e-12)
@@ -205,25 +252,22 @@ def _fill_drawn(discs: Floats, drawn: Floats) -> None:
         drawn[k, 4], drawn[k, 5] = math.sqrt(uu * uu + uv * uv), tall
 
 
-@kernel
-def _mixed(discs: Floats, lower: int, share: float, which: int) -> float:
-    """Component `which` of a disc between two of the profile."""
-    return float(discs[lower, which] * (1.0 - share) + discs[lower + 1, which] * share)
-
-
-@kernel
+@part
 def _widen(drawn: Floats, k: int, rows: int, low: Floats, high: Floats) -> None:
     """Widen the rows' spans by the k-th drawn disc, and by the trapezoid to the disc before it."""
     u, v, slope, flat, wide, tall = drawn[k, 0], drawn[k, 1], drawn[k, 2], drawn[k, 3], drawn[k, 4], drawn[k, 5]
+    shrink = 1.0 / (tall + 1e-12)
     for row in range(max(int(np.ceil(v - tall)), 0), min(int(np.floor(v + tall)) + 1, rows)):
-        middle, along = u + slope * (row - v), (row - v) / (tall + 1e-12)
-        half = flat * math.sqrt(max(1.0 - along * along, 0.0))
+        away = row - v
+        along = away * shrink
+        middle, half = u + slope * away, flat * math.sqrt(max(1.0 - along * along, 0.0))
         low[row], high[row] = min(low[row], middle - half), max(high[row], middle + half)
     if k == 0:
         return
     u0, v0, wide0 = drawn[k - 1, 0], drawn[k - 1, 1], drawn[k - 1, 4]
+    per_row = 0.0 if v == v0 else 1.0 / (v - v0)
     for row in range(max(int(np.ceil(min(v, v0))), 0), min(int(np.floor(max(v, v0))) + 1, rows)):
-        share = 0.5 if v == v0 else (row - v0) / (v - v0)
+        share = 0.5 if v == v0 else (row - v0) * per_row
         middle, half = u0 + (u - u0) * share, wide0 + (wide - wide0) * share
         low[row], high[row] = min(low[row], middle - half), max(high[row], middle + half)
 

@@ -1,13 +1,11 @@
-"""What of a frame belongs to one person once somebody explains it."""
+"""What of a frame belongs to whom once people explain it."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
-from stseg.arrays import Flags, Ints
-from stseg.ghosts.views import PixelView, View
+from stseg.arrays import Ints
 
 WORST = -8.0
 """A box never speaks more strongly against a place or a size than this, nats: it may not be theirs after all."""
@@ -15,15 +13,16 @@ WORST = -8.0
 
 @dataclass(frozen=True)
 class Own:
-    """What belongs to one person in one view: a box (its index, -1 for none), or the raster's pixels open to them."""
+    """What belongs to each of some people.
 
-    box: int
-    pixels: Flags
+    Attributes
+    ----------
+    box : int64 (view, person)
+        The box of each; -1 for none, and in views with pixels.
+    pixels : sequence of int64 (v, u), one a view
+        The person to whom each raster pixel belongs, -1 for nobody: those are open to everybody. Nothing reads it of a
+        view with boxes.
+    """
 
-
-def owned(view: View, person: int, boxes: Ints, pixels: Ints) -> Own:
-    """What of a view belongs to a person: the box assigned, or the pixels of nobody else."""
-    if isinstance(view, PixelView):
-        return Own(-1, (pixels == person) | (pixels < 0))
-    theirs = np.flatnonzero(boxes == person)
-    return Own(int(theirs[0]) if len(theirs) else -1, np.zeros((0, 0), bool))
+    box: Ints
+    pixels: Sequence[Ints]

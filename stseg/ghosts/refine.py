@@ -39,12 +39,7 @@ class Places:
 
 
 def refine(
-    pool: Pool,
-    views: Sequence[View],
-    sights: Sequence[Sight | None],
-    own: Sequence[Sequence[Own]],
-    prior: Prior,
-    walker: Ints,
+    pool: Pool, views: Sequence[View], sights: Sequence[Sight | None], own: Own, prior: Prior, walker: Ints
 ) -> Places:
     """The posterior of each person's place and height.
 
@@ -53,7 +48,7 @@ def refine(
     pool
         The people.
     own
-        For each person and view what is theirs.
+        What of the frame is whose.
     prior
         The frame's prior.
     walker : int64 (n,)
@@ -65,38 +60,45 @@ def refine(
         Means and variances.
     """
     axis = np.arange(-_REACH, _REACH + 1) * _SPACING
-    offset = np.stack(np.meshgrid(axis, axis), -1).reshape(-1, 2)
-    found = Places(pool.ground.copy(), np.zeros((len(pool), 2, 2)), pool.height.copy(), np.zeros(len(pool)))
-    tried = np.asarray(prior.config.heights)
-    for j in range(len(pool)):
-        patch = pool.ground[j] + offset
-        score = np.repeat(prior.tall(tried)[:, None], len(patch), 1)
-        for view, sight, mine in zip(views, sights, own[j], strict=True):
-            if sight is not None:
-                score += _patch_score(view, sight, mine, patch, tried, float(pool.width[j]))
-        if walker[j] >= 0:
-            score += prior.expected.place(int(walker[j]), patch)
-        weight = np.exp(score - score.max())
-        place, tall = weight.sum(0) / weight.sum(), weight.sum(1) / weight.sum()
-        found.ground[j], found.height[j] = place @ patch, tall @ tried
-        spread = patch - found.ground[j]
-        found.covariance[j] = (spread * place[:, None]).T @ spread + np.eye(2) * _SPACING**2 / 12
-        found.height_variance[j] = tall @ (tried - found.height[j]) ** 2
-    return found
+    offset, tried = np.stack(np.meshgrid(axis, axis), -1).reshape(-1, 2), np.asarray(prior.config.heights)
+    patch = pool.ground[:, None] + offset
+    score = np.tile(prior.tall(tried)[:, None], (len(pool), 1, len(offset)))
+    for k, (view, sight) in enumerate(zip(views, sights, strict=True)):
+        if sight is not None and len(pool):
+            score += _patch_score(view, sight, own.box[k], own.pixels[k], patch, tried, pool.width)
+    met = np.flatnonzero(walker >= 0)
+    score[met] += prior.expected.place(walker[met], patch[met])[:, None]
+    return _posterior(score, patch, tried)
 
 
-def _patch_score(view: View, sight: Sight, mine: Own, patch: Floats, tried: Floats, width: float) -> Floats:
-    """What one view says of a patch's pillars, nats, float64 (height, place)."""
-    score = np.zeros((len(tried), len(patch)))
-    everywhere, tall = np.tile(patch, (len(tried), 1)), np.repeat(tried, len(patch))
-    wide = np.full(len(tall), width)
-    if isinstance(view, BoxView) and mine.box >= 0:
+def _posterior(score: Floats, patch: Floats, tried: Floats) -> Places:
+    """Means and variances from scores (person, height, place) of patches (person, place, 2), nats and metres."""
+    weight = np.exp(score - score.max((1, 2), keepdims=True))
+    total = weight.reshape(len(score), len(tried) * patch.shape[1]).sum(1)[:, None]
+    place, tall = weight.sum(1) / total, weight.sum(2) / total
+    ground, height = np.matmul(place[:, None], patch)[:, 0], tall @ tried
+    spread = patch - ground[:, None]
+    covariance = np.matmul((spread * place[..., None]).transpose(0, 2, 1), spread) + np.eye(2) * _SPACING**2 / 12
+    return Places(ground, covariance, height, (tall * (tried - height[:, None]) ** 2).sum(1))
+
+
+def _patch_score(
+    view: View, sight: Sight, box: Ints, owner: Ints, patch: Floats, tried: Floats, width: Floats
+) -> Floats:
+    """What one view says of pillars on patches (person, place, 2), nats, float64 (person, height, place)."""
+    people, places = patch.shape[:2]
+    score = np.zeros((people, len(tried), places))
+    everywhere = np.repeat(patch[:, None], len(tried), 1).reshape(people, -1, 2)
+    tall = np.tile(np.repeat(tried, places), (people, 1))
+    if isinstance(view, BoxView):
         columns, rows = map(float, view.camera.size)
-        edges, belief = sight.edges[mine.box : mine.box + 1], sight.belief[mine.box : mine.box + 1]
-        match = np.empty((score.size, 1))
-        fill_match(view.table.boxes_of(everywhere, tall), edges, belief, columns, rows, match)
-        score = np.maximum(match, WORST).reshape(score.shape)
+        for j in np.flatnonzero(box >= 0):
+            edges, belief = sight.edges[box[j]][None], sight.belief[box[j]][None]
+            match = np.empty((len(tried) * places, 1))
+            fill_match(view.table.boxes_of(everywhere[j], tall[j]), edges, belief, columns, rows, match)
+            score[j] = np.maximum(match, WORST).reshape(score[j].shape)
     if isinstance(view, PixelView):
-        sums, area = view.open_sums(sight.raster, mine.pixels, everywhere, tall, wide)
+        wide = np.repeat(width[:, None], len(tried) * places, 1)
+        sums, area = view.open_sums(sight.raster, owner, everywhere, tall, wide)
         score = np.divide(sums, area, out=np.zeros_like(sums), where=area > 0).reshape(score.shape)
     return score

@@ -39,7 +39,7 @@ def search(members: Ints, count: int, case: Case, enumerated: int, trades: int) 
     touch, group = np.empty((candidates, candidates), np.bool_), np.empty(candidates, np.int64)
     fill_touch(case, touch)
     views, rows, columns = case.pixels.raster.shape
-    owners, chosen = np.empty((views, rows * columns), np.int64), np.empty(candidates + 1, np.int64)
+    owners, chosen = np.full((views, rows * columns), -1, np.int16), np.empty(candidates + 1, np.int64)
     inside = np.zeros(candidates, np.bool_)
     inside[members[:count]] = True
     for g in range(fill_groups(touch, group)):

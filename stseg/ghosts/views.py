@@ -56,6 +56,7 @@ class View:
     def __init__(self, camera: Camera, grid: Grid, lattice_ground: Floats, config: GhostConfig) -> None:
         self.camera = camera
         self.config = config
+        self.centre = camera.centre[:2]
         self.table = BodyTable.of(camera, grid)
         self.bodies = self.table.boxes(lattice_ground, np.asarray(config.heights))
         self.step = _raster_step(self.bodies, camera.size)
@@ -64,7 +65,7 @@ class View:
 
     def distance(self, ground: Floats) -> Floats:
         """Distance of ground points (n, 2) from the camera along the ground, metres, float64 (n,)."""
-        return np.asarray(np.hypot(*(ground - self.camera.centre[:2]).T))
+        return np.asarray(np.hypot(*(ground - self.centre).T))
 
     def outlines(self, ground: Floats, heights: Floats, widths: Floats) -> tuple[Ints, Spans, Floats]:
         """Outlines of pillars on this view's raster, sizes in metres; see `ghosts.outlines`.
@@ -117,11 +118,11 @@ class PixelView(View):
 
     def __init__(self, camera: Camera, grid: Grid, lattice_ground: Floats, config: GhostConfig) -> None:
         super().__init__(camera, grid, lattice_ground, config)
-        everywhere = np.ones(len(lattice_ground))
-        self.lattice = [
-            self.outlines(lattice_ground, height * everywhere, config.width_mean * everywhere)
-            for height in config.heights
-        ]
+        heights = np.repeat(np.asarray(config.heights), len(lattice_ground))
+        places = np.tile(lattice_ground, (len(config.heights), 1))
+        self.lattice = self.outlines(places, heights, np.full(len(heights), config.width_mean))
+        drawn = self.lattice[1][:, ::-1, 1] > 0
+        self.lattice_rows = np.where(drawn.any(1), drawn.shape[1] - drawn.argmax(1), 0)
 
     def observe(self, seen: Boxes | Singles | None) -> Sight:
         """The frame's log-odds on the raster; all zero where the view is blind."""
@@ -137,40 +138,43 @@ class PixelView(View):
 
     def lattice_score(self, sight: Sight, free: Flags) -> Floats:
         """What the free pixels (v, u) say of each lattice pillar, nats, float64 (height, cell)."""
-        sums = self.row_sums(sight.raster, free)
-        return np.stack([self.means(sums, *outlines) for outlines in self.lattice])
+        first, spans, area = self.lattice
+        left_of, means = np.empty((self.shape[0], self.shape[1] + 1)), np.empty(len(first))
+        _fill_left_of(sight.raster, free, left_of)
+        _fill_span_means(left_of, first, self.lattice_rows, spans, area, means)
+        return means.reshape(len(self.config.heights), -1) * self.config.body_weight
 
     def open_sums(
-        self, values: Singles, open_pixels: Flags, ground: Floats, heights: Floats, widths: Floats
+        self, values: Singles, owner: Ints, ground: Floats, heights: Floats, widths: Floats
     ) -> tuple[Floats, Floats]:
-        """Weighted sums of the open pixels (v, u) inside pillars (sizes in metres), and their areas, float64 (n,)."""
-        sums, area = sums_inside(self.table, ground, heights, widths / WIDTH, self.step, values, open_pixels)
+        """Weighted sums of the pixels open to each person inside their pillars, and the pillars' fair areas.
+
+        Both float64 (person, pillar); see `ghosts.outlines.sums_inside`, sizes in metres.
+        """
+        sums, area = sums_inside(self.table, ground, heights, widths / WIDTH, self.step, values, owner)
         return sums * self.config.body_weight, self._fair(area, heights, widths)
-
-    def row_sums(self, raster: Singles | Floats, free: Flags) -> Floats:
-        """Sums of the free pixels (v, u) along rows, from the left, float64 (v, u + 1)."""
-        sums = np.zeros((self.shape[0], self.shape[1] + 1))
-        np.cumsum(np.where(free, raster, raster.dtype.type(0)), axis=1, dtype=np.float64, out=sums[:, 1:])
-        return sums
-
-    def means(self, sums: Floats, first: Ints, spans: Spans, area: Floats) -> Floats:
-        """Weighted means inside outlines, from sums along rows, float64 (n,)."""
-        means = np.zeros(len(first))
-        _fill_span_means(sums, first, spans, area, means)
-        return means * self.config.body_weight
 
 
 @kernel
-def _fill_span_means(sums: Floats, first: Ints, spans: Spans, area: Floats, means: Floats) -> None:
-    """Fill means (cell,) with each outline's sum over its area, from sums along rows (v, u + 1)."""
-    rows = sums.shape[0]
+def _fill_left_of(raster: Singles, free: Flags, left_of: Floats) -> None:
+    """Fill left_of (v, u + 1) with the sums of the free pixels (v, u) along rows, from the left."""
+    rows, columns = raster.shape
+    for v in range(rows):
+        total = 0.0
+        left_of[v, 0] = 0.0
+        for u in range(columns):
+            total += float(raster[v, u]) if free[v, u] else 0.0
+            left_of[v, u + 1] = total
+
+
+@kernel
+def _fill_span_means(left_of: Floats, first: Ints, rows: Ints, spans: Spans, area: Floats, means: Floats) -> None:
+    """Fill means (pillar,) with sums over outlines of so many rows, by their areas, from sums along rows (v, u + 1)."""
     for i in range(len(first)):
-        means[i] = 0.0
-        if first[i] >= 0:
-            total = 0.0
-            for k in range(min(spans.shape[1], rows - first[i])):
-                total += sums[first[i] + k, spans[i, k, 1]] - sums[first[i] + k, spans[i, k, 0]]
-            means[i] = total / area[i]
+        total = 0.0
+        for k in range(rows[i]):
+            total += left_of[first[i] + k, spans[i, k, 1]] - left_of[first[i] + k, spans[i, k, 0]]
+        means[i] = total / area[i] if rows[i] > 0 else 0.0
 
 
 @kernel
