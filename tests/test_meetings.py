@@ -19,11 +19,10 @@ LENGTH, RATE = 30, 5.0
 def frame_of(pairs: set[tuple[int, int]]) -> Blobs:
     """Four blobs, of which these touch."""
     none = np.zeros((0, 2))
-    counts = np.zeros(4, np.int64)
+    names, amounts = np.zeros(4, np.int64), np.zeros(4)
     touching = np.array(sorted(pairs), np.int64).reshape(-1, 2)
-    return Blobs(
-        np.zeros((1, 1), np.int32), counts, counts, none, none, counts, counts, counts, touching
-    )  # fmt: skip
+    cells = np.zeros((1, 1), np.int32)
+    return Blobs(cells, names, names, none, none, amounts, amounts, amounts, touching)
 
 
 def told(touching: list[set[tuple[int, int]]], names: list[int], cuts: list[int]) -> Rows:

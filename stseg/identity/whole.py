@@ -102,7 +102,7 @@ class _Names:
         names, where = np.unique(identity, return_inverse=True)
         until = np.full(len(names), -1)
         np.maximum.at(until, where, committed["frame"])
-        self.until = dict(zip(names.tolist(), until.tolist(), strict=True))
+        self.until: dict[int, int] = dict(zip(names.tolist(), until.tolist(), strict=True))
 
     def name(self, track: int, frame: int) -> int:
         """The identity of a track in a frame, or when it was last seen before; 0 for no track."""

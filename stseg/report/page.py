@@ -289,7 +289,7 @@ def _event_summary(contents: Contents) -> str:
 
 def _told(events: Rows) -> Rows:
     """Events without splits: the merge says how long an encounter was."""
-    return events[events["kind"] != b"split"]
+    return np.asarray(events[events["kind"] != b"split"])
 
 
 def _kind(kind: bytes) -> str:
