@@ -55,10 +55,12 @@ SCALES = (
 )
 """The coordinates: centres of the cells."""
 
-LOG_ODDS = Field("log_odds", np.dtype("<f2"), AXES, "nat", "log-odds of a person (nat)")
+LOG_ODDS = Field("log_odds", np.dtype("<f4"), AXES, "nat", "log-odds of a person (nat)")
 LABEL = Field("label", np.dtype("<i4"), AXES, "", "track id; 0 is background")
 FRAME = Field("frame", np.dtype("<i8"), ("time",), "", "frame of the recording")
 VIEWS = Field("views", np.dtype("u1"), AXES[1:], "", "number of views that see the cell")
+STEP = 1 / 32
+"""Nats between two values that log_odds may have: what is finer is noise, and would make files larger."""
 FIELDS = (*SCALES, LOG_ODDS, LABEL, FRAME, VIEWS)
 
 KEPT = ("all", "tracks", "none")
@@ -76,6 +78,9 @@ ABOUT = {
     "timings": "seconds per stage and window; window -1 for work that belongs to none",
 }
 """Every table and what it holds."""
+
+EARLIER = {LOG_ODDS.name: np.dtype("<f2")}
+"""Types that fields had in the first files of this version: readers take them, but browsers cannot show halves."""
 
 ADDED = frozenset({"rates", "shifts"})
 """Tables that the first files of this version lack: readers take them as empty."""

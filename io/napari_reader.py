@@ -34,7 +34,7 @@ def read_layers(path: str) -> list[Layer]:
     Returns
     -------
     list of (data, arguments, kind)
-        image `log_odds` float16 (time, plane, y, x), labels `label` int32 (time, plane, y, x), and tracks float64
+        image `log_odds` float32 (time, plane, y, x), labels `label` int32 (time, plane, y, x), and tracks float64
         (n, 5): id, index of the frame, height of the place (0), y, x in metres.
 
     Raises

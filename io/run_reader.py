@@ -283,7 +283,9 @@ class _Checks:
     def require_field(self, field: layout.Field, lengths: dict[str, int]) -> None:
         """Scales come first and say how long the axes are."""
         name = f"{layout.OCCUPANCY}/{field.name}"
-        dataset = self.require_dataset(name, field.dtype, len(field.axes))
+        found = self.require(name).dtype
+        dtype = found if found == layout.EARLIER.get(field.name) else field.dtype
+        dataset = self.require_dataset(name, dtype, len(field.axes))
         expected = tuple(lengths.setdefault(axis, len(dataset)) for axis in field.axes)
         if dataset.shape != expected:
             raise FormatError(self.path, name, f"the shape {dataset.shape}", f"{expected}, as its axes say")

@@ -18,8 +18,8 @@ from stseg.io.part_file import PartFile
 from stseg.io.provenance import gather_provenance, write_provenance
 from stseg.io.recording import Recording
 
+_LARGEST = 65536.0  # nats
 _HELD_ROWS = 4096  # of one table, before they are written
-_LARGEST = float(np.finfo(np.float16).max)
 
 
 class RunWriter:
@@ -86,7 +86,7 @@ class RunWriter:
         frames : int64 (time,)
             Their numbers in the recording, rising.
         log_odds : float32 (time, plane, y, x)
-            Nats, NaN where no view sees the cell; kept to half precision.
+            Nats, NaN where no view sees the cell; kept to `layout.STEP`.
         label : int32 (time, plane, y, x)
             Track ids, 0 for background.
         """
@@ -95,9 +95,10 @@ class RunWriter:
             raise ValueError(f"volumes {log_odds.shape} and {label.shape} for {shape}")
         if len(frames) and (frames[0] <= self._last_frame or (np.diff(frames) <= 0).any()):
             raise ValueError(f"frames {frames} after frame {self._last_frame}")
-        half = np.clip(log_odds, -_LARGEST, _LARGEST, dtype=np.float32).astype(np.float16)
+        finite = np.clip(log_odds, -_LARGEST, _LARGEST, dtype=np.float32)
+        coarse = np.round(finite / np.float32(layout.STEP)) * np.float32(layout.STEP)
         with self._disk.step():
-            self._extend("log_odds", half)
+            self._extend("log_odds", coarse)
             self._extend("label", label)
             self._extend("frame", frames)
             self._extend("time", frames / self._recording.rig.frame_rate)
@@ -118,7 +119,8 @@ class RunWriter:
             self._close()  # flushes
         self._finished = True  # the part is whole: from here it is kept, whatever happens
         try:
-            self._disk.publish(self._overwrite)
+            with self._disk.step():  # an interrupt waits until the part has its name
+                self._disk.publish(self._overwrite)
         finally:
             self._disk.close()
 

@@ -14,6 +14,7 @@ import pytest
 from run_files import CONFIG, small_recording, small_trajectory, write_small_run
 
 import stseg
+from stseg.commands.inspect import events_in_words
 from stseg.commands.main import COMMANDS, main
 from stseg.commands.overview import look_over
 from stseg.io.runs import RunWriter, read_run
@@ -208,6 +209,11 @@ def test_inspect_on_a_screen(run_path: Path, capsys: pytest.CaptureFixture[str])
     screen = capsys.readouterr().out
     for said in ("hall", "10 to 15", "2 birth", "cut 3.0 s (75 %)", "warning: view right", "x 0 to 0.6 m"):
         assert said in screen
+    assert re.search(r"left +20\.0 +2\.5 +40\.0 +1 *\n", screen)  # of each view, how it errs and what it denies
+
+
+def test_inspect_counts_a_merge_and_its_split_as_one_encounter() -> None:
+    assert events_in_words({"birth": 3, "merge": 2, "split": 1}) == "3 birth, 2 encounter"
 
 
 def test_inspect_as_json(run_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -35,6 +35,7 @@ from stseg.io.box_files import read_boxes
 from stseg.io.exports.benchmarks import wildtrack_positions, wildtrack_size
 from stseg.io.exports.formats import FORMATS
 from stseg.io.exports.geographic import BEGINNING
+from stseg.io.exports.pedestrians import headings
 from stseg.io.extras import load_extra
 from stseg.io.runs import Run, RunWriter, read_run
 from stseg.tracks import TRAJECTORY, Tracks
@@ -203,6 +204,25 @@ def test_pedpy_reads_jupedsim_s_database_with_the_area(run: Run, path: Path) -> 
     with closing(sqlite3.connect(path)) as database:
         frames = database.execute("SELECT frame FROM frame_data JOIN geometry ON geometry_hash = hash").fetchall()
     assert [frame for (frame,) in frames] == FRAMES.tolist()
+
+
+def test_jupedsim_replays_its_database(run: Run, path: Path) -> None:
+    recording = pytest.importorskip("jupedsim.recording", reason="jupedsim is not installed")
+    FORMATS["jupedsim"](path, run)
+    found = recording.Recording(str(path))
+    assert (found.num_frames, found.fps, found.bounds().xmax) == (len(FRAMES), 5.0, 0.6)
+    here = run.trajectory[run.trajectory["frame"] == FRAMES[-1]]
+    shown = [(agent.id, *agent.position) for agent in found.frame(int(FRAMES[-1])).agents]
+    assert shown == here[["id", "x", "y"]].tolist()
+
+
+def test_people_look_where_they_go() -> None:
+    table = np.zeros(5, TRAJECTORY)
+    table["frame"], table["id"] = (0, 0, 1, 1, 2), (1, 2, 1, 3, 1)
+    table["x"], table["y"] = (0, 7, 0, 9, 3), (0, 7, 4, 9, 4)
+    expected = [(0, 1), (1, 0), (0.6, 0.8), (1, 0), (1, 0)]
+    np.testing.assert_allclose(headings(table), expected)
+    assert headings(table[:0]).shape == (0, 2)
 
 
 # MOTChallenge and WILDTRACK

@@ -117,7 +117,7 @@ def test_viewers_find_their_attributes(run_path: Path) -> None:
             assert (dataset.chunks, dataset.compression, dataset.shuffle) == ((1, 3, 4, 6), "gzip", True)
             assert (dataset.compression_opts, dataset.maxshape[0]) == (1, None)
             assert [dimension[0].name.rsplit("/")[-1] for dimension in dataset.dims] == list(group.attrs["axes"])
-        assert group["log_odds"].dtype == np.float16
+        assert group["log_odds"].dtype == np.float32
         assert [group[name].attrs["units"] for name in group.attrs["axes"]] == ["s", "m", "m", "m"]
         np.testing.assert_allclose(group["time"][:], FRAMES / 5)
         np.testing.assert_allclose(group["x"][:], [0.05, 0.15, 0.25, 0.35, 0.45, 0.55])
@@ -163,13 +163,23 @@ def test_a_run_of_no_frames_is_a_run(tmp_path: Path) -> None:
         run.read_frame(3)
 
 
-def test_log_odds_beyond_half_precision_stay_finite(tmp_path: Path) -> None:
+def test_log_odds_are_kept_in_steps_and_finite(tmp_path: Path) -> None:
     log_odds, label = small_volume(1)
-    log_odds[0, 0, 0, 1:3] = np.inf, -1e6
+    log_odds[0, 0, 0, 1:5] = np.inf, -1e6, 0.3, -0.33
     with writer_at(tmp_path / "far.h5") as writer:
         writer.append_frames(FRAMES[:1], log_odds, label)
         writer.finish(Tracks(np.zeros(0, TRAJECTORY)).summary())
-    np.testing.assert_array_equal(read_run(tmp_path / "far.h5").read_frame(10)[0][0, 0, :3], [np.nan, 65504, -65504])
+    kept = read_run(tmp_path / "far.h5").read_frame(10)[0][0, 0, :5]
+    np.testing.assert_array_equal(kept, [np.nan, 65536, -65536, 10 / 32, -11 / 32])
+
+
+def test_a_file_with_halves_of_before_is_read(run_path: Path) -> None:
+    with h5py.File(run_path, "r+") as file:
+        group = file[layout.OCCUPANCY]
+        halves = group["log_odds"][:].astype("f2")
+        del group["log_odds"]
+        group["log_odds"] = halves
+    np.testing.assert_array_equal(read_run(run_path).read_frame(12)[0], small_volume()[0][2])
 
 
 def test_many_small_appends_make_one_table(tmp_path: Path) -> None:

@@ -30,7 +30,7 @@ from stseg.report.overlay import View, pillar_outline
 from stseg.report.plan import plan_map
 from stseg.report.slices import colours_of
 from stseg.report.spacetime import Block
-from stseg.tracks import TRACK, TRAJECTORY, Tracks
+from stseg.tracks import EVENT, TRACK, TRAJECTORY, Tracks
 
 GRID = Grid((0.0, 4.0), (-1.0, 2.0), 0.5, 1.8, 3)
 
@@ -428,6 +428,20 @@ def test_the_page_holds_everything_and_loads_nothing(run_file: Path, tmp_path: P
     assert len(pictures_in(page)) == 6 + 3 * 2  # plan, space-time and four maps; two cameras at three frames
     for fact in ("hall", "ghosts removed <b>1</b> of 3", "birth <b>2</b>", "entered", "no image from a camera"):
         assert fact in page
+
+
+def test_an_encounter_is_one_line_and_says_how_long_it_was(tmp_path: Path) -> None:
+    recording, path = run_files.small_recording(tmp_path), tmp_path / "met.h5"
+    told = [(11, b"merge", 1, 2, b"their cells touch, for 0.4 s"), (13, b"split", 1, 2, b"their cells part")]
+    with RunWriter(path, recording, np.ones((3, 4, 6), np.uint8), "", overwrite=False, kept="tracks") as writer:
+        run_files.fill(writer)
+        writer.append("events", np.array(told, EVENT))
+        writer.finish(Tracks(run_files.small_trajectory()).summary())
+    report(path, output=tmp_path / "met.html", frame=(11,))
+    page = (tmp_path / "met.html").read_text()
+    assert "encounter <b>1</b>" in page and "their cells touch, for 0.4 s" in page
+    assert "split" not in page.split("<h2>Events</h2>")[1].split("</section>")[0]
+    assert "which this run did not keep (--volume tracks)" in page
 
 
 def test_the_same_run_gives_the_same_page(run_file: Path, tmp_path: Path) -> None:

@@ -70,7 +70,7 @@ def test_a_swap_is_told_under_the_names_that_are_right() -> None:
         (70, b"merge", 1, 2),
         (80, b"hand-over", 2, 1),
         (80, b"hand-over", 1, 2),
-        (95, b"split", 2, 1),
+        (96, b"split", 1, 2),
         (159, b"death", 2, 0),
         (159, b"death", 1, 0),
     ]

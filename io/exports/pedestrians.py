@@ -8,17 +8,20 @@ from pathlib import Path
 
 import numpy as np
 
+from stseg.arrays import Floats, Rows
 from stseg.io import layout
 from stseg.io.run_reader import Run
 
 _JUPEDSIM_VERSION = 2  # PedPy refuses the area of version 3; JuPedSim reads both
+_STILL = 1e-6  # metres
 _ONLY_AREA = 1  # its number among the areas of the recording; it does not change
 _JUPEDSIM_TABLES = """
 CREATE TABLE metadata(key TEXT NOT NULL UNIQUE PRIMARY KEY, value TEXT NOT NULL);
 CREATE TABLE geometry(hash INTEGER NOT NULL, wkt TEXT NOT NULL);
 CREATE UNIQUE INDEX geometry_hash ON geometry(hash);
 CREATE TABLE frame_data(frame INTEGER NOT NULL, geometry_hash INTEGER NOT NULL);
-CREATE TABLE trajectory_data(frame INTEGER NOT NULL, id INTEGER NOT NULL, pos_x REAL NOT NULL, pos_y REAL NOT NULL);
+CREATE TABLE trajectory_data(frame INTEGER NOT NULL, id INTEGER NOT NULL, pos_x REAL NOT NULL, pos_y REAL NOT NULL,
+    ori_x REAL NOT NULL, ori_y REAL NOT NULL);
 CREATE INDEX frame_id_idx ON trajectory_data(frame, id);
 """
 
@@ -41,7 +44,8 @@ def write_jupedsim(path: Path, run: Run) -> None:
     grid, area = run.recording.rig.grid, layout.walkable_area(run.recording.rig.grid)
     bounds = {"xmin": grid.x[0], "xmax": grid.x[1], "ymin": grid.y[0], "ymax": grid.y[1]}
     about = {"version": _JUPEDSIM_VERSION, "fps": run.frame_rate, **bounds}
-    rows = run.trajectory[["frame", "id", "x", "y"]].tolist()
+    table = run.trajectory
+    columns = [table[name].tolist() for name in ("frame", "id", "x", "y")] + headings(table).T.tolist()
     path.unlink(missing_ok=True)  # left behind by a run that was killed; SQLite would write into it
     with closing(sqlite3.connect(path)) as database, database:
         database.executescript(_JUPEDSIM_TABLES)
@@ -50,4 +54,21 @@ def write_jupedsim(path: Path, run: Run) -> None:
         database.executemany(
             "INSERT INTO frame_data VALUES(?, ?)", [(frame, _ONLY_AREA) for frame in run.frames.tolist()]
         )
-        database.executemany("INSERT INTO trajectory_data VALUES(?, ?, ?, ?)", rows)
+        database.executemany("INSERT INTO trajectory_data VALUES(?, ?, ?, ?, ?, ?)", zip(*columns, strict=True))
+
+
+def headings(table: Rows) -> Floats:
+    """Where each row's person is going: from their row before to their row after, float64 (n, 2) of length 1.
+
+    Who stands still, or is there for one frame, looks along x: JuPedSim knows nobody without a direction.
+    """
+    order = np.lexsort((table["frame"], table["id"]))
+    place, track = np.stack([table["x"], table["y"]], -1)[order], table["id"][order]
+    begins = np.append(True, np.diff(track) != 0)[: len(track)]
+    rows = np.arange(len(track))
+    way = place[np.where(np.roll(begins, -1), rows, rows + 1)] - place[np.where(begins, rows, rows - 1)]
+    length = np.hypot(*way.T)
+    still = length < _STILL
+    heading = np.zeros((len(table), 2))
+    heading[order] = np.where(still[:, None], (1.0, 0.0), way / np.where(still, 1.0, length)[:, None])
+    return heading

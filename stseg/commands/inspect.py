@@ -16,7 +16,7 @@ from stseg.commands.slice_of_run import write_slice
 from stseg.errors import ConfigError
 from stseg.io.runs import read_run
 
-_LONGEST = 10  # tracks on the screen
+_LONGEST = 8  # tracks on the screen
 _MINUTES = 15  # of the run on the screen
 
 
@@ -68,6 +68,7 @@ def _show(overview: Overview, console: Console) -> None:
     for name, text in _lines(overview):
         table.add_row(name, text)
     console.print(table)
+    console.print(_views(overview))
     if overview.tracks:
         console.print(_longest(overview))
     for warning in overview.warnings:
@@ -87,10 +88,9 @@ def _lines(overview: Overview) -> list[tuple[str, str]]:
         ("frames", f"{o.frames}{span}; {o.seconds:.1f} s at {o.frame_rate:g} frames/s"),
         ("people", f"{o.people_mean:.1f} a frame, at most {o.people_most}{_minutes(o.people_per_minute)}"),
         ("tracks", str(len(o.tracks)) + _lengths(o.track_seconds)),
-        ("events", ", ".join(f"{count} {kind}" for kind, count in o.events.items()) or "none"),
+        ("events", events_in_words(o.events) or "none"),
         ("candidates", f"{o.candidates_per_frame:.1f} a frame, {o.ghosts_per_frame:.1f} of them ghosts"),
         ("ghosts", "; ".join(_ghosts(o)) or "none"),
-        ("rates", _errors(o.rates)),
         ("windows", f"{o.windows}, {o.frames_per_window:.1f} frames each"),
         ("time", f"{total:.1f} s" + (f", {per(o.frames, 1) / total:.1f} frames/s" if total else "")),
         ("stages", ", ".join(stages) or "none"),
@@ -114,21 +114,31 @@ def _minutes(people: list[float]) -> str:
 def _ghosts(overview: Overview) -> list[str]:
     """Why candidates were dropped, the commonest reason first."""
     ranked = sorted(overview.ghost_reasons.items(), key=lambda reason: -reason[1])
-    denied = [f"{name} {count}" for name, count in overview.ghosts_denied_by.items() if count]
-    words = [f"{count} because {words}" for words, count in ranked if count]
-    return [*words, *([f"denied by {', '.join(denied)}"] if denied else [])]
+    return [f"{count} because {words}" for words, count in ranked if count]
 
 
 def _lengths(seconds: dict[str, float]) -> str:
     return "".join(f", {name} {length:.1f} s" for name, length in seconds.items())
 
 
-def _errors(rates: dict[str, dict[str, float]]) -> str:
-    """Bodies missed, and empty rays that meet foreground far from people and beside them, view by view, %."""
-    each = (
-        f"{name} {100 * r['miss']:.0f}/{100 * r['clutter']:.1f}/{100 * r['beside']:.0f}" for name, r in rates.items()
-    )
-    return "% missed/clutter/beside people: " + ", ".join(each) if rates else "none"
+def events_in_words(counts: dict[str, int]) -> str:
+    """How many of each kind; a merge and the split that ends it are one encounter."""
+    named = {"encounter" if kind == "merge" else kind: count for kind, count in counts.items() if kind != "split"}
+    return ", ".join(f"{count} {kind}" for kind, count in named.items())
+
+
+def _views(overview: Overview) -> Table:
+    """How each view errs by the end of the run, and the ghosts that it denies."""
+    table = Table(title="views", title_justify="left", box=None, padding=(0, 2, 0, 0))
+    for heading in ("view", "misses %", "clutter %", "beside people %", "denies ghosts"):
+        table.add_column(heading, justify="left" if heading == "view" else "right")
+    for name in overview.cameras:
+        rates = overview.rates.get(name)
+        errors = (
+            ("", "", "") if rates is None else tuple(f"{100 * rates[k]:.1f}" for k in ("miss", "clutter", "beside"))
+        )
+        table.add_row(name, *errors, str(overview.ghosts_denied_by[name]))
+    return table
 
 
 def _share(seconds: float, total: float) -> str:

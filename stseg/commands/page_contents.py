@@ -59,6 +59,7 @@ def page_contents(
         candidates=len(run.ghosts),
         ghosts=ghosts,
         truth=truth,
+        kept=run.kept,
         data=embedded_json(rig, run.views, trajectory, run.ghosts, sheets),
         plan=plan,
         thread=thread,

@@ -53,11 +53,13 @@ class IdentityConfig:
     """How long a gap is filled on a straight line; longer ones stay gaps, seconds."""
     shortest: float = 0.8
     """Tracks shorter than this are nobody, seconds (HW12's temporal check)."""
+    parting: float = 1.0
+    """How long the cells of two people are apart before their encounter is over, seconds."""
 
     def __post_init__(self) -> None:
         for name in ("window", "walking_speed", "place_noise", "height_noise"):
             require(getattr(self, name) > 0, self, name, "a number above 0")
-        for name in ("slack", "foresight", "patience", "reunion", "bridge", "shortest"):
+        for name in ("slack", "foresight", "patience", "reunion", "bridge", "shortest", "parting"):
             require(getattr(self, name) >= 0, self, name, "0 or more")
 
 

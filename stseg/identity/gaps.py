@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
 
 import numpy as np
 
@@ -63,13 +62,10 @@ def fill_gaps(trajectory: Rows, frame_rate: float, config: IdentityConfig) -> Ro
     Their extent is 0 and their covariance grows with the distance to what was seen. Longer gaps stay, since nobody
     knows where the person was. Sorted by frame, then id.
     """
-    rows = [trajectory]
-    for identity in np.unique(trajectory["id"]):
-        own = trajectory[trajectory["id"] == identity]
-        own = own[np.argsort(own["frame"], kind="stable")]
-        for before, after in pairwise(own):
-            if after["frame"] - before["frame"] <= config.bridge * frame_rate + 1:
-                rows.append(_between(before, after))
+    table = trajectory[np.lexsort((trajectory["frame"], trajectory["id"]))]
+    step, same = np.diff(table["frame"]), np.diff(table["id"]) == 0
+    gaps = np.flatnonzero(same & (step > 1) & (step <= config.bridge * frame_rate + 1))
+    rows = [trajectory, *(_between(table[k], table[k + 1]) for k in gaps.tolist())]
     every = np.concatenate(rows)
     return every[np.lexsort((every["id"], every["frame"]))]
 

@@ -15,6 +15,7 @@ import numpy as np
 from stseg.arrays import Ints, Labels
 from stseg.config import IdentityConfig
 from stseg.identity.linking import assign
+from stseg.identity.meetings import touches
 from stseg.identity.pieces import Piece
 from stseg.identity.windows import Window
 from stseg.segmentation.blobs import Blobs
@@ -53,7 +54,6 @@ class Identities:
     alive: list[Track] = field(default_factory=list)
     issued: int = 0
     shared_cells: dict[int, Labels] = field(default_factory=dict)
-    touching: set[tuple[int, int]] = field(default_factory=set)
 
     def decide(self, window: Window, blobs: Sequence[Blobs], pieces: Sequence[Piece]) -> Decision:
         """Give every piece of a window its identity, and note what happened.
@@ -71,7 +71,8 @@ class Identities:
             for frame, blob in zip(piece.frames, piece.blobs, strict=True):
                 identity[frame - window.solve_first][blob] = name
         events = self._births_and_deaths(window, pieces, names)
-        events += self._meetings(window, blobs, identity)
+        kept = slice(window.commit_first - window.solve_first, window.commit_stop - window.solve_first)
+        events += touches(window.commit_first, blobs[kept], identity[kept])
         self.shared_cells = {
             window.solve_first + k: np.append(0, identity[k])[found.cells].astype(np.int32)
             for k, found in enumerate(blobs)
@@ -133,20 +134,6 @@ class Identities:
             else:
                 track.tail = _within(track.tail, track.tail.frames[-1] - 8, track.tail.frames[-1] + 1)
                 self.alive.append(track)
-        return events
-
-    def _meetings(
-        self, window: Window, blobs: Sequence[Blobs], identity: Sequence[Ints]
-    ) -> list[tuple[int, str, int, int, str]]:
-        """Merges and splits: tracks whose cells come to share one piece of ground, and cease to."""
-        events: list[tuple[int, str, int, int, str]] = []
-        for frame in range(window.commit_first, window.commit_stop):
-            k = frame - window.solve_first
-            pairs = {tuple(sorted((int(identity[k][a]), int(identity[k][b])))) for a, b in blobs[k].touches}
-            now = {(a, b) for a, b in pairs if a != b}
-            events += [(frame, "merge", a, b, "their cells touch") for a, b in sorted(now - self.touching)]
-            events += [(frame, "split", a, b, "their cells part") for a, b in sorted(self.touching - now)]
-            self.touching = now
         return events
 
 

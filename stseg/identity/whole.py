@@ -15,6 +15,7 @@ from stseg.arrays import Ints, Rows
 from stseg.config import GhostConfig, IdentityConfig
 from stseg.ghosts.border import Border
 from stseg.identity.gaps import drop_ghosts, drop_short, fill_gaps
+from stseg.identity.meetings import encounters
 from stseg.identity.relink import Link, relink
 from stseg.identity.smoothed import smooth_places
 from stseg.tracks import EVENT
@@ -49,7 +50,9 @@ def whole_tracks(
     long, short = drop_short(renamed, frame_rate, config)
     kept, ghosts = drop_ghosts(long, frame_rate, config)
     identity = np.where(np.isin(relinked.identity, kept["id"]), relinked.identity, 0)
-    story = np.concatenate([_retold(events, committed, relinked.identity, relinked.links), short, ghosts])
+    names = _Names(committed, relinked.identity)
+    met = _met(events, _Names(committed, identity), frame_rate, config)
+    story = np.concatenate([_retold(events, names, relinked.links), met, short, ghosts])
     smoothed = smooth_places(fill_gaps(kept, frame_rate, config), frame_rate)
     return Whole(smoothed, story[np.argsort(story["frame"], kind="stable")], identity)
 
@@ -62,9 +65,9 @@ def own_tracks(committed: Rows, events: Rows, frame_rate: float, config: Identit
     return Whole(fill_gaps(kept, frame_rate, config), story[np.argsort(story["frame"], kind="stable")], identity)
 
 
-def _retold(events: Rows, committed: Rows, identity: Ints, links: Sequence[Link]) -> Rows:
-    """The events under the new identities: where a track goes on as another, nobody was born and nobody died."""
-    name_at = _Names(committed, identity)
+def _retold(events: Rows, name_at: _Names, links: Sequence[Link]) -> Rows:
+    """Lives under the new identities: where a track goes on as another, nobody was born and nobody died."""
+    events = events[~np.isin(events["kind"], (b"merge", b"split"))]
     told = events.copy()
     for role in ("id", "other"):
         told[role] = [name_at.name(track, frame) for track, frame in zip(events[role], events["frame"], strict=True)]
@@ -79,13 +82,27 @@ def _retold(events: Rows, committed: Rows, identity: Ints, links: Sequence[Link]
     return np.concatenate([told[~np.array(untrue, bool)], np.array(joined, EVENT)])
 
 
+def _met(events: Rows, name_at: _Names, frame_rate: float, config: IdentityConfig) -> Rows:
+    """Who met whom of those who are somebody."""
+    known = set(name_at.track.tolist())
+    last = max(name_at.until.values(), default=-1)
+
+    def name(track: int, frame: int) -> int:
+        return name_at.name(track, frame) if track in known else 0
+
+    return encounters(events, name, round(config.parting * frame_rate), frame_rate, last)
+
+
 class _Names:
     """Which identity a track has when, and until when an identity is seen."""
 
     def __init__(self, committed: Rows, identity: Ints) -> None:
         order = np.lexsort((committed["frame"], committed["id"]))
         self.track, self.frame, self.identity = committed["id"][order], committed["frame"][order], identity[order]
-        self.until = {int(name): int(committed["frame"][identity == name].max()) for name in np.unique(identity)}
+        names, where = np.unique(identity, return_inverse=True)
+        until = np.full(len(names), -1)
+        np.maximum.at(until, where, committed["frame"])
+        self.until: dict[int, int] = dict(zip(names.tolist(), until.tolist(), strict=True))
 
     def name(self, track: int, frame: int) -> int:
         """The identity of a track in a frame, or when it was last seen before; 0 for no track."""

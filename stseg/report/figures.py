@@ -19,6 +19,10 @@ TRAIL = 5.0
 """Seconds that the way of somebody reaches back."""
 
 
+_PLAN = (900, 1000)
+"""Width and height of the plan at most, pixels: as it is shown beside another picture, its labels can be read."""
+
+
 @dataclass(frozen=True)
 class Figure:
     """A picture.
@@ -70,7 +74,7 @@ def ground_figures(rig: Rig, views: Bytes, trajectory: Rows, truth: Rows | None)
     trajectory : TRAJECTORY (n,)
     truth : (m,) with frame, id, x, y, or None
     """
-    plan = plan_view(rig, trajectory, truth, views.max(axis=0), rig.name)
+    plan = plan_view(rig, trajectory, truth, views.max(axis=0), rig.name, *_PLAN)
     thread = spacetime_picture(rig.grid, trajectory, rig.frame_rate, rig.name)
     return [
         Figure("plan", plan, "From above. The lighter the ground, the more views see what stands there."),

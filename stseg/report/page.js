@@ -278,6 +278,7 @@
     pen.strokeStyle = INK;
     line(pen, floor(span[0]));
     drawClock(pen, span, place);
+    nameAxes(page, span, place);
     const far = (track) => { const k = track.x.length >> 1; return s * track.x[k] + c * track.y[k]; };
     const near = tracks.map((track) => ({ track, first: rowAt(track, span[0]), last: rowAt(track, span[1] + 1) }))
       .filter(({ first, last }) => last > first).sort((a, b) => far(b.track) - far(a.track));
@@ -322,6 +323,18 @@
       line(pen, [[u - 5, v], [u, v]]);
       pen.fillText(clock(frame / data.frameRate), u - 9, v + 4);
     }
+  };
+
+  // What x and y span, beside the edges of the ground that are nearest to who looks.
+  const nameAxes = ({ pen, height }, span, place) => {
+    const middle = (x, y) => place(x, y, span[0]);
+    const lower = (a, b) => (a[1] >= b[1] ? a : b);
+    pen.fillStyle = QUIET;
+    [["x", x0, x1, lower(middle((x0 + x1) / 2, y0), middle((x0 + x1) / 2, y1))],
+      ["y", y0, y1, lower(middle(x0, (y0 + y1) / 2), middle(x1, (y0 + y1) / 2))]].forEach(([name, from, to, [u, v]]) => {
+      pen.textAlign = u < middle((x0 + x1) / 2, (y0 + y1) / 2)[0] ? "right" : "left";
+      pen.fillText(`${name}: ${+from.toFixed(1)} to ${+to.toFixed(1)} m`, u, Math.min(v + 20, height - 4));
+    });
   };
 
   // ---- the time bar ----

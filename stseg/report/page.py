@@ -64,6 +64,8 @@ class Contents:
     ghosts
         Those of them that are nobody.
     truth : (t,) with frame, or None
+    kept
+        What the run kept of the volume: all, tracks or none.
     data
         JSON for the script, see `embedded`.
     plan, thread, haunts, ghost_map, blind_map
@@ -89,6 +91,7 @@ class Contents:
     candidates: int
     ghosts: GhostReasons
     truth: Rows | None
+    kept: str
     data: str
     plan: Figure
     thread: Figure
@@ -133,7 +136,7 @@ def _sections(contents: Contents) -> list[str]:
     return [
         section("In short", _answers(contents.answers), *(note(escape(words), "warn") for words in contents.warnings)),
         section("On the ground, and in time", _pair(figure(contents.plan), _thread(contents.thread))),
-        section("Moment by moment", _MOMENT.format(views=_view_heads(contents.sights))),
+        section("Moment by moment", _MOMENT.format(grey=_GREY[contents.kept], views=_view_heads(contents.sights))),
         section("People over time", chart(people_chart(span, contents.trajectory, contents.truth), counted)),
         section("Where people are", figures(contents.haunts, "pair")),
         section("Ghosts removed", _GHOSTS, _pair(figure(contents.ghost_map), _reasons(contents))),
@@ -174,7 +177,8 @@ _PAGE = """<!doctype html>
 
 _MOMENT = """<p class="note">The slider at the foot of the page chooses the moment. Left: people with the way they came
 in the last 5 seconds; crosses are candidates that were dropped as ghosts. Red ground is seen by no view, orange by one.
-Right: the evidence for a person in each cell, blue against, orange for; grey cells are not seen.</p>
+Right: the evidence for a person in each cell, blue against, orange for; grey cells
+{grey}.</p>
 <div class="pair live"><figure><canvas id="plan"></canvas><figcaption>the plan</figcaption></figure>
 <figure><canvas id="slice"></canvas><figcaption>occupancy, <select id="plane" aria-label="plane">
 <option value="greatest">the greatest of all planes</option></select></figcaption></figure></div>
@@ -183,6 +187,12 @@ Right: the evidence for a person in each cell, blue against, orange for; grey ce
 <p class="note">Each view answers whether it sees somebody at the place: <b>yes</b>, <b>no</b>, or <b>?</b> where it is
 hidden from it or out of sight. Of very many candidates the 120
 with most evidence are listed. Evidence is in nats: +3 is 20 to 1 for, -3 is 20 to 1 against.</p>"""
+
+_GREY = {
+    "all": "are not seen",
+    "tracks": "are not seen, or farther from all tracks than a metre, which this run did not keep (--volume tracks)",
+    "none": "are not known, since this run kept no volume (--volume none)",
+}
 
 _GHOSTS = note(
     "A ghost is a place where views seem to agree on somebody who is not there, such as where lines of sight to two "
@@ -271,19 +281,29 @@ def _track_table(span: Span, tracks: Rows) -> str:
 
 
 def _event_summary(contents: Contents) -> str:
-    """How often each kind of event occurred."""
-    kinds, counts = np.unique(contents.events["kind"], return_counts=True)
-    words = [f"{escape(kind.decode())} <b>{count}</b>" for kind, count in zip(kinds, counts.tolist(), strict=True)]
+    """How often each kind of event occurred; a merge and its split are one encounter."""
+    kinds, counts = np.unique(_told(contents.events)["kind"], return_counts=True)
+    words = [f"{_kind(kind)} <b>{count}</b>" for kind, count in zip(kinds, counts.tolist(), strict=True)]
     return note(" &middot; ".join(words) or "none")
 
 
+def _told(events: Rows) -> Rows:
+    """Events without splits: the merge says how long an encounter was."""
+    return np.asarray(events[events["kind"] != b"split"])
+
+
+def _kind(kind: bytes) -> str:
+    return "encounter" if kind == b"merge" else escape(kind.decode())
+
+
 def _event_table(span: Span, events: Rows) -> str:
+    events = _told(events)
     if not len(events):
         return ""
     rows = [
         (
             when(span, int(row["frame"])),
-            escape(row["kind"].decode()),
+            _kind(row["kind"]),
             swatch(int(row["id"])),
             swatch(int(row["other"])) if row["other"] else "",
             escape(row["reason"].decode(errors="replace")),

@@ -185,7 +185,7 @@ def _frame_step(frames: AnyArray) -> int:
 def _draw_tracks(canvas: Bytes, plan: PlanMap, trajectory: Rows) -> None:
     paths = _paths(trajectory)
     few, some = len(paths) <= 12, len(paths) <= 60
-    width, opacity = (3 if few else 2 if some else 1), (1.0 if some else 0.7)
+    width, opacity = (3 if few else 2 if some else 1), (1.0 if some else max(0.2, 0.7 * (60 / len(paths)) ** 0.5))
     for identity, path in paths:
         colour, pixel = track_colour(identity), plan.pixel(path)
         known = pixel[np.isfinite(pixel[:, 0])]

@@ -10,7 +10,7 @@ from scipy.ndimage import maximum_filter, minimum_filter
 
 from stseg.arrays import AnyArray, Bytes, Flags, Labels
 from stseg.geometry import Grid
-from stseg.report.canvas import blank, outline, text
+from stseg.report.canvas import blank, chip, outline, text
 from stseg.report.colours import INK, PAPER, QUIET, RULE, track_colour
 
 _STOPS = np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
@@ -63,7 +63,7 @@ def marginal_picture(
     seen = np.isfinite(log_odds)
     highest = np.where(seen, log_odds, -np.inf).max(axis=0)
     highest = np.where(seen.any(axis=0), highest, np.nan)
-    panel = _Panel(f"greatest of {grid.planes} planes", highest, _commonest(label))
+    panel = _Panel(f"greatest of {grid.planes} planes; {_extent(grid)}", highest, _commonest(label))
     return _contact_sheet([panel], title, width, colour_limit(log_odds) if limit is None else limit)
 
 
@@ -76,7 +76,7 @@ def plane_picture(
     -------
     uint8 (v, u, 3)
     """
-    panel = _Panel(f"{grid.heights[plane]:.2f} m", log_odds[plane], label[plane])
+    panel = _Panel(f"{grid.heights[plane]:.2f} m high; {_extent(grid)}", log_odds[plane], label[plane])
     return _contact_sheet([panel], title, width, colour_limit(log_odds))
 
 
@@ -107,8 +107,27 @@ def _contact_sheet(panels: Sequence[_Panel], title: str, width: int, limit: floa
         corners = np.array([[u - 1, v - 1], [u + wide, v - 1], [u + wide, v + tall], [u - 1, v + tall]])
         outline(canvas, corners, RULE)
         canvas[v : v + tall, u : u + wide] = _panel_picture(panel, scale, limit)
+        if len(panels) == 1:
+            _name_tracks(canvas, panel.label, (u, v), scale)
     _colour_bar(canvas, limit)
     return canvas
+
+
+def _extent(grid: Grid) -> str:
+    """What a panel shows, from left to right and from bottom to top."""
+    (left, right), (bottom, top) = grid.x, grid.y
+    return f"x {left:g} to {right:g} m, y {bottom:g} to {top:g} m upwards"
+
+
+def _name_tracks(canvas: Bytes, label: Labels, corner: tuple[int, int], scale: int) -> None:
+    """The id of each track above its cells."""
+    for identity in np.unique(label[label > 0]).tolist():
+        rows, columns = np.nonzero(label[::-1] == identity)
+        place = (
+            corner[0] + (columns.mean() + 0.5) * scale,
+            max(corner[1] + rows.min() * scale - 14.0, corner[1] + 12.0),
+        )
+        chip(canvas, str(identity), place, track_colour(identity), 14)
 
 
 def _arrange(count: int, shape: tuple[int, ...], width: int) -> tuple[int, int, int]:
