@@ -127,7 +127,7 @@ class Pipeline:
 
     def __init__(self, rig: Rig, sights: Sequence[Sight], kinds: Sequence[str], config: Config, tracker: str) -> None:
         self.rig, self.sights, self.config, self.tracker = rig, sights, config, find_tracker(tracker)
-        self.frame_pass = FramePass(rig, kinds, config.ghosts)
+        self.frame_pass = FramePass(rig, kinds, config.ghosts, config.level)
         self.occupancy = Occupancy(rig, kinds, config.occupancy, config.ghosts, config.level)
         self.candidates = Candidates(self.occupancy, kinds, config)
 
@@ -185,6 +185,7 @@ class Passage:
         self.pipeline, self.watch = pipeline, Stopwatch()
         self._tracker = pipeline.tracker(pipeline.rig, pipeline.config, first)
         self._explained: dict[int, _Explained] = {}
+        pipeline.frame_pass.forget()
         pipeline.occupancy.forget()
 
     def add(self, moment: Moment) -> list[Step]:
@@ -205,7 +206,7 @@ class Passage:
         with watch.time("foreground"):
             seen = [sight.evidence(view) for sight, view in zip(stages.sights, moment.views, strict=True)]
         with watch.time("ghosts"):
-            explanation = stages.frame_pass.explain(seen, expected, stages.candidates.of(seen))
+            explanation = stages.frame_pass.follow(seen, expected, stages.candidates.of(seen))
         rates = _rate_rows(moment.frame, stages.occupancy.level)
         with watch.time("occupancy"):
             log_odds = stages.occupancy.follow(seen, explanation)

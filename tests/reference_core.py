@@ -10,7 +10,7 @@ import numpy as np
 from reference_walkers import greedy_pairs
 
 from stseg.arrays import Boxes, Flags, Floats, Ints, Labels, Singles
-from stseg.ghosts import boxes as tolerance
+from stseg.ghosts.boxes import GRAIN, TOLERANCE
 from stseg.ghosts.evidence import BoxEvidence, Case, PixelEvidence, Terms
 from stseg.ghosts.people import Explanation
 from stseg.occupancy.explained import SHOULDER
@@ -24,21 +24,17 @@ Edge = tuple[int, int, int]
 # Boxes and pillars
 
 
-def half_square(body: Floats, box: Floats, width: float, height: float) -> float:
+def half_square(body: Floats, box: Floats, tolerance: Floats, width: float, height: float) -> float:
     """Half the squared distance of a box from a pillar's box in units of its tolerances; infinite far to the side."""
     left, right = np.clip(body[[0, 2]], 0, width - 1)
     top, bottom = np.clip(body[[1, 3]], 0, height - 1)
     if left >= right or top >= bottom:
         return math.inf
-    tall = max(float(body[3] - body[1]), 8.0)
-    sd = {name: getattr(tolerance, name) * tall + tolerance.PIXELS for name in ("SIDE", "WIDTH", "HEAD", "FEET")}
-    middle = ((left + right) / 2 - (box[0] + box[2]) / 2) / sd["SIDE"]
-    width_off = ((right - left) - (box[2] - box[0])) / sd["WIDTH"]
-    feet = (bottom - box[3]) / sd["FEET"]
-    feet = feet / tolerance.EARLY_FEET if box[3] < bottom else feet
-    if abs(middle) > 4.5:
-        return math.inf
-    return float(middle**2 + width_off**2 + ((top - box[1]) / sd["HEAD"]) ** 2 + feet**2) / 2
+    middle, width_off, head, late, early = tolerance * (max(float(body[3] - body[1]), 8.0) + GRAIN)
+    off = np.array([(left + right) / 2 - (box[0] + box[2]) / 2, right - left - box[2] + box[0], top - box[1]])
+    off = off / [middle, width_off, head]
+    feet = (bottom - box[3]) / (early if box[3] < bottom else late)
+    return math.inf if abs(off[0]) > 4.5 else float((off**2).sum() + feet**2) / 2
 
 
 def overlap(a: Floats, b: Floats) -> float:
@@ -191,7 +187,7 @@ def plane_likelihood(
             edges = np.clip([left, top, left + wide, top + tall], 0, [size[0] - 1, size[1] - 1] * 2)
             if height >= plane and not np.isnan(body).any():
                 prior = math.exp(-0.5 * ((height - expected) / spread) ** 2)
-                fit = math.exp(-half_square(body, edges, *map(float, size)))
+                fit = math.exp(-half_square(body, edges, TOLERANCE, *map(float, size)))
                 best = max(best, prior * fit * float(np.clip(boxes.score[b], 0.05, 1)))
     return best
 

@@ -30,7 +30,7 @@ from strategies import numbers
 from stseg.arrays import Floats, Ints
 from stseg.geometry import Camera, Rig
 from stseg.geometry.bodies import BodyTable
-from stseg.ghosts.boxes import fill_best_match, fill_cover, fill_inside, fill_match, half_square
+from stseg.ghosts.boxes import TOLERANCE, fill_best_match, fill_cover, fill_inside, fill_match, half_square
 from stseg.ghosts.evidence import BoxEvidence, Case, PixelEvidence, Terms
 from stseg.ghosts.expected import nobody
 from stseg.ghosts.explain import FramePass
@@ -40,6 +40,7 @@ from stseg.ghosts.outlines import outlines, sums_inside
 from stseg.ghosts.people import Explanation, ViewEvidence
 from stseg.ghosts.scoring import set_score
 from stseg.ghosts.search import ENUMERATED, search
+from stseg.ghosts.sharpness import FIRST
 
 WIDTH, HEIGHT = 128.0, 96.0
 KINDS = ("pixels", "boxes")
@@ -55,15 +56,16 @@ EDGES = st.tuples(numbers(-60, 150), numbers(-80, 100), numbers(1, 60), numbers(
 @settings(deadline=None)
 @given(EDGES, EDGES)
 def test_half_square_by_definition(body: Floats, box: Floats) -> None:
-    expected = reference.half_square(body, box, WIDTH, HEIGHT)
-    assert half_square(body, box, WIDTH, HEIGHT) == pytest.approx(expected, rel=1e-9)
+    expected = reference.half_square(body, box, TOLERANCE, WIDTH, HEIGHT)
+    assert half_square(body, box, TOLERANCE, WIDTH, HEIGHT) == pytest.approx(expected, rel=1e-9)
 
 
 def test_a_box_that_fits_costs_nothing_and_early_feet_little() -> None:
     body = np.array([50.0, 20.0, 62.0, 70.0])
-    assert half_square(body, body, WIDTH, HEIGHT) == 0.0
+    assert half_square(body, body, TOLERANCE, WIDTH, HEIGHT) == 0.0
     early, late = body + np.array([[0, 0, 0, -8], [0, 0, 0, 8]])
-    assert half_square(body, late, WIDTH, HEIGHT) == pytest.approx(16 * half_square(body, early, WIDTH, HEIGHT))
+    late_cost, early_cost = (half_square(body, box, TOLERANCE, WIDTH, HEIGHT) for box in (late, early))
+    assert late_cost == pytest.approx(16 * early_cost)
 
 
 @settings(deadline=None)
@@ -71,12 +73,15 @@ def test_a_box_that_fits_costs_nothing_and_early_feet_little() -> None:
 def test_matches_by_definition(bodies: Floats, found: list[Floats], seed: int) -> None:
     bodies[seed % len(bodies)] = np.nan if seed % 3 == 0 else bodies[0]
     edges = np.array(found).reshape(-1, 4)
-    belief = np.log(np.random.default_rng(seed).uniform(0.1, 1, len(edges)))
+    tolerance, belief = FIRST.of(np.random.default_rng(seed).uniform(0.1, 1, len(edges)))
     match, best = np.empty((len(bodies), len(edges))), np.empty((1, len(bodies)))
-    fill_match(bodies, edges, belief, WIDTH, HEIGHT, match)
-    fill_best_match(bodies[None], edges, belief, WIDTH, HEIGHT, best)
+    fill_match(bodies, edges, tolerance, belief, WIDTH, HEIGHT, match)
+    fill_best_match(bodies[None], edges, tolerance, belief, WIDTH, HEIGHT, best)
     for i, body in enumerate(bodies):
-        costs = [np.inf if np.isnan(body).any() else reference.half_square(body, e, WIDTH, HEIGHT) for e in edges]
+        costs = [
+            np.inf if np.isnan(body).any() else reference.half_square(body, *one, WIDTH, HEIGHT)
+            for one in zip(edges, tolerance, strict=True)
+        ]
         np.testing.assert_allclose(match[i], belief - np.array(costs).reshape(-1), rtol=1e-9)
     np.testing.assert_array_equal(best[0], match.max(1, initial=-np.inf))
 

@@ -17,6 +17,7 @@ from stseg.arrays import Boxes, Floats, Ints, Singles
 from stseg.config import OccupancyConfig
 from stseg.geometry import Grid, Rig
 from stseg.geometry.bodies import BodyTable
+from stseg.ghosts.boxes import TOLERANCE
 from stseg.ghosts.explain import FramePass
 from stseg.ghosts.people import Explanation, ViewEvidence
 from stseg.occupancy.clutter import clutter, clutter_weights
@@ -174,8 +175,8 @@ def test_likelihood_per_plane_by_definition(seed: int) -> None:
     edges = edges.clip(0, [camera.size[0] - 1, camera.size[1] - 1] * 2)
     likelihood = np.full(grid.shape, np.nan, np.float32)
     fill_match_of_planes(
-        bodies.astype(np.float32), tried, 0.1, 1.7, np.array([1.6, 1.8]), grid.heights, edges, np.log(shaken.score),
-        box_owner, near, 128.0, 96.0, likelihood,
+        bodies.astype(np.float32), tried, 0.1, 1.7, np.array([1.6, 1.8]), grid.heights, edges, TOLERANCE,
+        np.log(shaken.score), box_owner, near, 128.0, 96.0, likelihood,
     )  # fmt: skip
     for y, x in np.ndindex(4, 4):
         free = [b for b in range(len(found)) if box_owner[b] in (-1, near[y, x])]

@@ -18,6 +18,7 @@ from stseg.arrays import Floats, Singles
 from stseg.config import GhostConfig
 from stseg.geometry import Camera, Grid
 from stseg.geometry.bodies import BodyTable
+from stseg.ghosts.boxes import TOLERANCE
 from stseg.occupancy.instances import fill_match_of_planes
 from stseg.simulate import SceneSpec
 from stseg.simulate.cameras import build_rig
@@ -65,8 +66,8 @@ def per_plane(table: BodyTable, ground: Floats, grid: Grid, boxes: Floats) -> Si
     likelihood = np.zeros((grid.planes, 1, 3), np.float32)
     nobody, (width, height) = np.full((1, 3), -1), map(float, table.size)
     fill_match_of_planes(
-        bodies, heights, config.height_spread, config.height_mean, np.zeros(0), grid.heights, boxes, np.zeros(2),
-        np.full(2, -1), nobody, width, height, likelihood,
+        bodies, heights, config.height_spread, config.height_mean, np.zeros(0), grid.heights, boxes, TOLERANCE,
+        np.zeros(2), np.full(2, -1), nobody, width, height, likelihood,
     )  # fmt: skip
     return likelihood[:, 0]
 

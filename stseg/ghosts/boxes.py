@@ -1,8 +1,8 @@
 """How well boxes fit pillars, and how pillars hide each other (METHODS 3 'Instances').
 
-A box is compared with the box of the pillar, both clipped to the image: sharp at the head, less so at the sides, loose
-at the feet where the box ends early, because nearer people and furniture hide feet. Tolerances are shares of the
-body's height, so they mean the same near and far.
+A box is compared with the box of the pillar, both clipped to the image: its middle, its width, its upper edge, and its
+lower edge, which is looser where the box ends early, because nearer people and furniture hide feet. How loose each is
+differs from detector to detector, and is learned (`ghosts.sharpness`).
 """
 
 from __future__ import annotations
@@ -12,53 +12,81 @@ import numpy as np
 from stseg.accelerate import kernel
 from stseg.arrays import Floats
 
-SIDE, WIDTH, HEAD, FEET = 0.06, 0.15, 0.045, 0.06
-"""Standard deviations as shares of the body's height: middle, width, upper edge, lower edge."""
-EARLY_FEET = 4.0
-"""How many times looser the lower edge is where the box ends above the feet."""
-PIXELS = 2.0
-"""Added to every tolerance, pixels: what a detector's grid cannot tell."""
+MIDDLE, WIDE, HEAD, LATE, EARLY = range(5)
+"""What of a box is compared: middle, width, upper edge, lower edge below the feet, and above them."""
+TOLERANCE = np.array([0.06, 0.15, 0.045, 0.06, 0.24])
+"""How loose they are in a sure box before anything is learned: standard deviations, shares of the body's height."""
+_PIXELS = np.array([2.0, 2.0, 2.0, 2.0, 8.0])
+"""What these have besides, pixels: what a detector's grid cannot tell."""
+GRAIN = _PIXELS / TOLERANCE
+"""The same as pixels added to the height of which tolerances are shares: a sharper detector's grid is finer, too."""
 _FAR = 4.5
 
 
 @kernel
-def half_square(body: Floats, box: Floats, width: float, height: float) -> float:
-    """Half the squared Mahalanobis distance of a box from a pillar's box, both left, top, right, bottom in pixels."""
-    left, right = min(max(body[0], 0.0), width - 1.0), min(max(body[2], 0.0), width - 1.0)
-    top, bottom = min(max(body[1], 0.0), height - 1.0), min(max(body[3], 0.0), height - 1.0)
-    if right <= left or bottom <= top:
+def half_square(body: Floats, box: Floats, tolerance: Floats, width: float, height: float) -> float:
+    """Half the squared Mahalanobis distance of a box from a pillar's box, both left, top, right, bottom in pixels.
+
+    `tolerance` float64 (5,) holds standard deviations, shares of the body's height in the image and its grain.
+    """
+    middle, wide, head, feet = _offsets(body, box, width, height)
+    middle /= tolerance[MIDDLE]
+    if not abs(middle) <= _FAR:
         return np.inf
-    tall = max(body[3] - body[1], 8.0)
-    middle = ((left + right) - (box[0] + box[2])) / 2.0 / (SIDE * tall + PIXELS)
-    if abs(middle) > _FAR:
-        return np.inf
-    wide = ((right - left) - (box[2] - box[0])) / (WIDTH * tall + PIXELS)
-    head = (top - box[1]) / (HEAD * tall + PIXELS)
-    feet = (bottom - box[3]) / (FEET * tall + PIXELS)
-    if feet > 0:
-        feet /= EARLY_FEET
+    wide /= tolerance[WIDE]
+    head /= tolerance[HEAD]
+    feet /= tolerance[EARLY if feet > 0 else LATE]
     return float(0.5 * (middle * middle + wide * wide + head * head + feet * feet))
 
 
 @kernel
-def fill_match(bodies: Floats, boxes: Floats, belief: Floats, width: float, height: float, match: Floats) -> None:
+def fill_offsets(bodies: Floats, boxes: Floats, width: float, height: float, offsets: Floats) -> None:
+    """Fill offsets (n, 4): how far each box (n, 4) is from its pillar's (n, 4): middle, width, upper and lower edge.
+
+    Shares as the tolerances of `half_square`; nan where the pillar is not in the image.
+    """
+    for i in range(len(bodies)):
+        offsets[i] = _offsets(bodies[i], boxes[i], width, height)
+
+
+@kernel
+def _offsets(body: Floats, box: Floats, width: float, height: float) -> tuple[float, float, float, float]:
+    left, right = min(max(body[0], 0.0), width - 1.0), min(max(body[2], 0.0), width - 1.0)
+    top, bottom = min(max(body[1], 0.0), height - 1.0), min(max(body[3], 0.0), height - 1.0)
+    if right <= left or bottom <= top:
+        return np.nan, np.nan, np.nan, np.nan
+    tall = max(body[3] - body[1], 8.0)
+    return (
+        ((left + right) - (box[0] + box[2])) / 2.0 / (tall + GRAIN[MIDDLE]),
+        ((right - left) - (box[2] - box[0])) / (tall + GRAIN[WIDE]),
+        (top - box[1]) / (tall + GRAIN[HEAD]),
+        (bottom - box[3]) / (tall + GRAIN[LATE]),
+    )
+
+
+@kernel
+def fill_match(
+    bodies: Floats, boxes: Floats, tolerance: Floats, belief: Floats, width: float, height: float, match: Floats
+) -> None:
     """Fill match (candidate, box): log-likelihood of each box (n, 4) given each pillar's box (candidate, 4)."""
     for i in range(len(bodies)):
         for b in range(len(boxes)):
             match[i, b] = -np.inf
             if not np.isnan(bodies[i, 0]):
-                match[i, b] = belief[b] - half_square(bodies[i], boxes[b], width, height)
+                match[i, b] = belief[b] - half_square(bodies[i], boxes[b], tolerance[b], width, height)
 
 
 @kernel
-def fill_best_match(bodies: Floats, boxes: Floats, belief: Floats, width: float, height: float, best: Floats) -> None:
+def fill_best_match(
+    bodies: Floats, boxes: Floats, tolerance: Floats, belief: Floats, width: float, height: float, best: Floats
+) -> None:
     """Fill best (height, cell) with the best log-likelihood over all boxes; -inf where none fits."""
     for h in range(bodies.shape[0]):
         for i in range(bodies.shape[1]):
             best[h, i] = -np.inf
             if not np.isnan(bodies[h, i, 0]):
                 for b in range(len(boxes)):
-                    fit = belief[b] - half_square(bodies[h, i], boxes[b], width, height)
+                    fit = belief[b] - half_square(bodies[h, i], boxes[b], tolerance[b], width, height)
                     best[h, i] = max(best[h, i], fit)
 
 

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from stseg.config import GhostConfig
+from stseg.config import GhostConfig, LevelConfig
 from stseg.geometry import Rig
 from stseg.ghosts.border import Border
 from stseg.ghosts.evidence import Terms
@@ -22,7 +22,8 @@ from stseg.ghosts.people import Explanation, ViewEvidence
 from stseg.ghosts.pool import Pool, peaks
 from stseg.ghosts.prior import Prior
 from stseg.ghosts.search import ENUMERATED
-from stseg.ghosts.views import BoxView, PixelView
+from stseg.ghosts.sharpening import Sharpening
+from stseg.ghosts.views import BoxView, PixelView, Sight
 
 
 class FramePass:
@@ -36,10 +37,14 @@ class FramePass:
         What each camera delivers: "boxes" or "pixels".
     config
         The pass's constants.
+    level
+        How fast it learns how sharp boxes are.
     """
 
-    def __init__(self, rig: Rig, kinds: Sequence[str], config: GhostConfig) -> None:
+    def __init__(self, rig: Rig, kinds: Sequence[str], config: GhostConfig, level: LevelConfig | None = None) -> None:
         self.config = config
+        self._rate, self._level = rig.frame_rate, level or LevelConfig()
+        self.forget()
         grid = rig.grid
         x = np.arange(grid.x[0] + config.lattice / 2, grid.x[1], config.lattice)
         y = np.arange(grid.y[0] + config.lattice / 2, grid.y[1], config.lattice)
@@ -62,6 +67,23 @@ class FramePass:
         self.border = Border.of(rig)
         self._trades = 0 if "boxes" in kinds else config.trades
 
+    def forget(self) -> None:
+        """Go back to the first guess of how sharp boxes are."""
+        self.sharpening = Sharpening(self._rate, self._level)
+
+    def follow(
+        self, seen: Sequence[ViewEvidence], expected: Expected | None, proposed: Pool | None = None
+    ) -> Explanation:
+        """Explain a recording's next frame, from which it is then learned how sharp boxes are."""
+        explained = self.explain(seen, expected, proposed)
+        self.sharpening.learn(explained, self.views, self.sights(seen))
+        return explained
+
+    def sights(self, seen: Sequence[ViewEvidence]) -> list[Sight | None]:
+        """What each view shows, by all that is known of how sharp boxes are; None where it is blind."""
+        sharpness = self.sharpening.sharpness
+        return [None if s is None else view.observe(s, sharpness) for view, s in zip(self.views, seen, strict=True)]
+
     def explain(
         self, seen: Sequence[ViewEvidence], expected: Expected | None, proposed: Pool | None = None
     ) -> Explanation:
@@ -76,7 +98,7 @@ class FramePass:
         proposed
             Candidates from elsewhere, best first: beside those of the first round's lattice, but for duplicates.
         """
-        sights = [None if s is None else view.observe(s) for view, s in zip(self.views, seen, strict=True)]
+        sights = self.sights(seen)
         prior = Prior.of(expected, self.config, self.border)
         expected_inside = prior.pool()
         seen_now = Seen(self.views, sights, prior, self.terms)

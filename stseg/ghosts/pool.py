@@ -75,7 +75,7 @@ def box_evidence(views: Sequence[View], sights: Sequence[Sight | None], pool: Po
             width, height = map(float, view.camera.size)
             bodies = view.table.boxes_of(pool.ground, pool.height)
             match = evidence.match[k, :, : len(sight.edges)]
-            fill_match(bodies, sight.edges, sight.belief, width, height, match)
+            fill_match(bodies, sight.edges, sight.tolerance, sight.belief, width, height, match)
             fill_inside(bodies, width, height, evidence.inside[k])
             fill_cover(bodies, view.distance(pool.ground), width, height, evidence.cover[k])
     return evidence

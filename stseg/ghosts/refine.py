@@ -93,9 +93,9 @@ def _patch_score(
     if isinstance(view, BoxView):
         columns, rows = map(float, view.camera.size)
         for j in np.flatnonzero(box >= 0):
-            edges, belief = sight.edges[box[j]][None], sight.belief[box[j]][None]
+            edges, tolerance, belief = (told[box[j], None] for told in (sight.edges, sight.tolerance, sight.belief))
             match = np.empty((len(tried) * places, 1))
-            fill_match(view.table.boxes_of(everywhere[j], tall[j]), edges, belief, columns, rows, match)
+            fill_match(view.table.boxes_of(everywhere[j], tall[j]), edges, tolerance, belief, columns, rows, match)
             score[j] = np.maximum(match, WORST).reshape(score[j].shape)
     if isinstance(view, PixelView):
         wide = np.repeat(width[:, None], len(tried) * places, 1)

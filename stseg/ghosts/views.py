@@ -16,6 +16,7 @@ from stseg.geometry.bodies import WIDTH, BodyTable
 from stseg.ghosts.boxes import fill_best_match, fill_inside
 from stseg.ghosts.evidence import Spans
 from stseg.ghosts.outlines import outlines, sums_inside
+from stseg.ghosts.sharpness import FIRST, Sharpness
 
 OWN, BACKGROUND = 5.0, -10.0
 """Weights of a person's own pixels and of background inside their pillar (HW12 eq. 27)."""
@@ -33,13 +34,17 @@ class Sight:
     ----------
     edges : float64 (box, 4)
         left, top, right, bottom, pixels.
-    belief : float64 (box,)
-        Logarithm of the scores.
+    score : float64 (box,)
+        0..1.
+    tolerance : float64 (box, 5), belief : float64 (box,)
+        See `stseg.ghosts.sharpness`.
     raster : float32 (v, u)
         Log-odds of foreground, nats.
     """
 
     edges: Floats
+    score: Floats
+    tolerance: Floats
     belief: Floats
     raster: Singles
 
@@ -97,19 +102,19 @@ class BoxView(View):
         share = (visible - config.hidden_below) / (config.whole_above - config.hidden_below)
         return np.asarray(share.clip(config.least, 1.0))
 
-    def observe(self, seen: Boxes | Singles | None) -> Sight:
+    def observe(self, seen: Boxes | Singles | None, sharpness: Sharpness = FIRST) -> Sight:
         """The frame's boxes."""
         boxes = seen if isinstance(seen, Boxes) else Boxes(np.zeros((0, 4)), np.zeros(0))
         width, height = self.camera.size
         corner, extent = boxes.pixel[:, :2], boxes.pixel[:, 2:]
         edges = np.concatenate([corner, corner + extent], 1).clip(0, [width - 1, height - 1] * 2)
-        return Sight(edges, np.log(boxes.score.clip(0.05, 1.0)), np.zeros((0, 0), np.float32))
+        return Sight(edges, boxes.score, *sharpness.of(boxes.score), np.zeros((0, 0), np.float32))
 
     def lattice_score(self, sight: Sight, free: Flags) -> Floats:
         """What the free boxes say of each lattice pillar, nats, float64 (height, cell)."""
         width, height = map(float, self.camera.size)
         best = np.full(self.bodies.shape[:2], -np.inf)
-        fill_best_match(self.bodies, sight.edges[free], sight.belief[free], width, height, best)
+        fill_best_match(self.bodies, sight.edges[free], sight.tolerance[free], sight.belief[free], width, height, best)
         return np.where(self.found > 0, np.maximum(self.config.hit + best, -_OPTIMISM * self.found), 0.0)
 
 
@@ -124,8 +129,9 @@ class PixelView(View):
         drawn = self.lattice[1][:, ::-1, 1] > 0
         self.lattice_rows = np.where(drawn.any(1), drawn.shape[1] - drawn.argmax(1), 0)
 
-    def observe(self, seen: Boxes | Singles | None) -> Sight:
+    def observe(self, seen: Boxes | Singles | None, sharpness: Sharpness = FIRST) -> Sight:
         """The frame's log-odds on the raster; all zero where the view is blind."""
+        del sharpness
         raster = np.zeros(self.shape, np.float32)
         if isinstance(seen, np.ndarray):
             mean = np.empty(self.shape, np.float32)
@@ -134,7 +140,7 @@ class PixelView(View):
             body = (1 - miss) * mean + miss * (1 - mean)
             empty = clutter * mean + (1 - clutter) * (1 - mean)
             raster = np.log(body / empty).astype(np.float32)
-        return Sight(np.zeros((0, 4)), np.zeros(0), raster)
+        return Sight(np.zeros((0, 4)), np.zeros(0), np.zeros((0, 5)), np.zeros(0), raster)
 
     def lattice_score(self, sight: Sight, free: Flags) -> Floats:
         """What the free pixels (v, u) say of each lattice pillar, nats, float64 (height, cell)."""

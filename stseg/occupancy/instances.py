@@ -49,6 +49,7 @@ def fill_match_of_planes(
     person_height: Floats,
     planes: Floats,
     boxes: Floats,
+    tolerance: Floats,
     belief: Floats,
     box_owner: Ints,
     near: Ints,
@@ -69,6 +70,8 @@ def fill_match_of_planes(
         Metres.
     planes : float64 (plane,)
         Heights of the planes, metres.
+    tolerance : float64 (5,)
+        See `stseg.ghosts.boxes`.
     boxes, belief, box_owner : (box, 4), (box,), (box,)
         Edges in pixels, log-score, and the person whom each box shows, -1 for nobody.
     near : int64 (y, x)
@@ -92,7 +95,7 @@ def fill_match_of_planes(
                 height_prior = -0.5 * ((heights[h] - expected) / spread) ** 2
                 for b in range(len(boxes)):
                     if box_owner[b] < 0 or box_owner[b] == near[y, x]:
-                        fit = height_prior + belief[b] - half_square(body, boxes[b], width, height)
+                        fit = height_prior + belief[b] - half_square(body, boxes[b], tolerance, width, height)
                         reached = max(reached, np.exp(fit))
             while plane >= 0:
                 match[plane, y, x] = reached

@@ -14,6 +14,7 @@ from stseg.foreground import box_likelihood
 from stseg.geometry import Rig
 from stseg.geometry.bodies import BodyTable
 from stseg.geometry.near import near_person
+from stseg.ghosts.boxes import TOLERANCE
 from stseg.ghosts.people import Explanation, ViewEvidence
 from stseg.occupancy.clutter import clutter, clutter_side, clutter_weights
 from stseg.occupancy.explained import Owners, fill_share, leave_unexplained
@@ -177,7 +178,7 @@ class Occupancy:
         belief = np.log(view.score.clip(0.05, 1.0))
         fill_match_of_planes(
             self.bodies[i], self.heights, self.height_spread, self.height_mean, explanation.people.height,
-            self.rig.grid.heights, edges, belief, explanation.box_owner[i], near, width, height, match,
+            self.rig.grid.heights, edges, TOLERANCE, belief, explanation.box_owner[i], near, width, height, match,
         )  # fmt: skip
         levels = np.rint(likelihood_of(match, near, rates) * TOP).astype(np.int16)
         levels[self.sampling.footprint[i, ..., 2] == 0] = UNSEEN
