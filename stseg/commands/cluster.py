@@ -58,7 +58,7 @@ def make_by_cluster(
             for segment in missing
         }  # fmt: skip
         for future in as_completed(futures):
-            segment = futures[future]
+            segment = futures.pop(future)  # its file stands: who made it may die, and nobody makes it again
             try:
                 path = future.result()
             except KilledWorker as error:
