@@ -17,15 +17,15 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from stseg.config import Config
+    from stseg.engine.pipeline import Pipeline
     from stseg.errors import InputError, StsegError
     from stseg.evaluation import Scores, evaluate
     from stseg.geometry import Camera, Grid, Lens, Rig
     from stseg.io.config_file import read_config
-    from stseg.io.recording import Recording
-    from stseg.io.rigs import read_rig, write_rig
-    from stseg.io.runs import Run, read_run
-    from stseg.io.tracks import read_tracks_csv
-    from stseg.pipeline import Pipeline
+    from stseg.io.recording.recording import Recording
+    from stseg.io.recording.rigs import read_rig, write_rig
+    from stseg.io.runfile.runs import Run, read_run
+    from stseg.io.track_csv import read_tracks_csv
 
 __all__ = [
     "Camera",
@@ -53,11 +53,11 @@ _HOMES = {
     "stseg.evaluation": ("Scores", "evaluate"),
     "stseg.geometry": ("Camera", "Grid", "Lens", "Rig"),
     "stseg.io.config_file": ("read_config",),
-    "stseg.io.recording": ("Recording",),
-    "stseg.io.rigs": ("read_rig", "write_rig"),
-    "stseg.io.runs": ("Run", "read_run"),
-    "stseg.io.tracks": ("read_tracks_csv",),
-    "stseg.pipeline": ("Pipeline",),
+    "stseg.io.recording.recording": ("Recording",),
+    "stseg.io.recording.rigs": ("read_rig", "write_rig"),
+    "stseg.io.runfile.runs": ("Run", "read_run"),
+    "stseg.io.track_csv": ("read_tracks_csv",),
+    "stseg.engine.pipeline": ("Pipeline",),
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 

@@ -21,7 +21,7 @@ Labels = NDArray[np.int32]
 Bytes = NDArray[np.uint8]
 Flags = NDArray[np.bool_]
 Rows = NDArray[np.void]
-"""A structured array; its dtype is one of those in `stseg.tracks`."""
+"""A structured array; its dtype is one of those in `stseg.model.tables`."""
 AnyArray = NDArray[Any]
 
 

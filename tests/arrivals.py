@@ -14,8 +14,8 @@ from scenes import looking, mask, rig_of, standing_at, walkers
 
 from stseg.arrays import AnyArray, Bytes
 from stseg.geometry import Rig
-from stseg.io.recording import CameraSource, Recording, Source
-from stseg.io.rig_text import format_rig
+from stseg.io.recording.recording import CameraSource, Recording, Source
+from stseg.io.recording.rig_text import format_rig
 
 FRAMES, PIECE = 40, 10
 """Frames of the recording, and of each of its files."""

@@ -13,8 +13,8 @@ from scenes import FRAME_RATE, corner_cameras, mask, rig_of
 
 from stseg.arrays import Bytes, Floats
 from stseg.geometry import Camera
-from stseg.io.recording import CameraSource, Clock, Recording, Source
-from stseg.io.rig_text import format_rig
+from stseg.io.recording.recording import CameraSource, Clock, Recording, Source
+from stseg.io.recording.rig_text import format_rig
 
 TICK = 1.0 / FRAME_RATE
 

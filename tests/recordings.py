@@ -12,8 +12,8 @@ from scenes import box_moments, looking, rig_of, walkers
 
 from stseg.arrays import Boxes
 from stseg.commands.main import main
-from stseg.io.recording import CameraSource, Recording, Source
-from stseg.io.rig_text import format_rig
+from stseg.io.recording.recording import CameraSource, Recording, Source
+from stseg.io.recording.rig_text import format_rig
 
 FRAMES = 40
 OPTIONS = ("--set", "segments.length=1", "--set", "segments.warm_up=1", "--set", "ghosts.lattice=0.25")

@@ -10,12 +10,12 @@ import numpy as np
 from reference_walkers import greedy_pairs
 
 from stseg.arrays import Boxes, Flags, Floats, Ints, Labels, Singles
-from stseg.ghosts.boxes import GRAIN, TOLERANCE
-from stseg.ghosts.evidence import BoxEvidence, Case, PixelEvidence, Terms
-from stseg.ghosts.people import Explanation
-from stseg.occupancy.explained import SHOULDER
+from stseg.detection.problem import BoxEvidence, Parameters, PixelEvidence, Problem
+from stseg.graphcut.energy import Energy
+from stseg.model.box_fit import GRAIN, TOLERANCE
+from stseg.model.people import Explanation
 from stseg.occupancy.fusion import Rates
-from stseg.segmentation.energy import Energy
+from stseg.occupancy.unexplained import SHOULDER
 
 Edge = tuple[int, int, int]
 """Two cells of a flattened volume, and the capacity between them."""
@@ -63,7 +63,7 @@ def cover(bodies: Floats, distance: Floats, width: float, height: float, i: int,
 # The score of a set
 
 
-def set_score(members: Sequence[int], case: Case) -> float:
+def set_score(members: Sequence[int], case: Problem) -> float:
     """What a set of people says of a frame: each box, pixel and walker speaks for one of them."""
     boxes, pixels, ground, terms = case.boxes, case.pixels, case.ground, case.terms
     total = sum(terms.person + case.own[j] - case.newcomer[j] for j in members)
@@ -79,7 +79,7 @@ def set_score(members: Sequence[int], case: Case) -> float:
     return float(total)
 
 
-def _boxes_of_view(view: int, members: Sequence[int], boxes: BoxEvidence, terms: Terms) -> float:
+def _boxes_of_view(view: int, members: Sequence[int], boxes: BoxEvidence, terms: Parameters) -> float:
     total = 0.0
     gains: list[tuple[float, int, int]] = []
     for j in members:
@@ -110,7 +110,7 @@ def covered(pixels: PixelEvidence, view: int, j: int) -> Flags:
     return shown
 
 
-def _pixels_of_view(view: int, members: Sequence[int], pixels: PixelEvidence, terms: Terms) -> float:
+def _pixels_of_view(view: int, members: Sequence[int], pixels: PixelEvidence, terms: Parameters) -> float:
     total = 0.0
     bodies = {j: covered(pixels, view, j) for j in members}
     for v, u in np.ndindex(*pixels.raster.shape[1:]):
@@ -121,7 +121,7 @@ def _pixels_of_view(view: int, members: Sequence[int], pixels: PixelEvidence, te
     return total
 
 
-def touch(i: int, j: int, case: Case) -> bool:
+def touch(i: int, j: int, case: Problem) -> bool:
     """Whether one of two candidates bears on what the other adds to a set."""
     boxes, pixels, terms = case.boxes, case.pixels, case.terms
     if math.dist(case.ground[i], case.ground[j]) < terms.apart:

@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints, Singles
-from stseg.occupancy.modes import _REACH, _SAME, _STEPS, _STILL
-from stseg.occupancy.pillars import Pillars
+from stseg.detection.mean_shift import _REACH, _SAME, _STEPS, _STILL
+from stseg.detection.pillar_strips import Pillars
 
 
 def nearest(edge: float) -> int:

@@ -9,8 +9,9 @@ import maxflow
 import numpy as np
 
 from stseg.arrays import Floats, Ints
-from stseg.segmentation.expansion import LabelEnergy
-from stseg.segmentation.labels import Pillar, Places
+from stseg.graphcut.expansion import LabelEnergy
+from stseg.model.predictions import PredictedPlaces
+from stseg.segmentation.unary import BodyShape
 
 
 def costs(energy: LabelEnergy) -> list[dict[int, int]]:
@@ -68,7 +69,7 @@ def _plain_move(energy: LabelEnergy, own: list[dict[int, int]], labels: Ints, al
     return np.array([alpha if graph.get_segment(p) else labels[p] for p in range(energy.cells)])
 
 
-def share(frame: int, ground: Floats, height: float, places: Places, pillar: Pillar) -> Floats:
+def share(frame: int, ground: Floats, height: float, places: PredictedPlaces, pillar: BodyShape) -> Floats:
     """Of one cell, as the formula reads; nothing is out of reach."""
     body = np.eye(2) * pillar.reach**2 / 4
     weights = []

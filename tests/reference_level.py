@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints, Singles
+from stseg.geometry.summed_area import TOP, Levels
 from stseg.occupancy.fusion import Rates, log_odds_terms
-from stseg.occupancy.tables import TOP, Levels
 
 
 class Shown(NamedTuple):

@@ -9,7 +9,7 @@ import numpy as np
 
 from stseg.arrays import Bytes, Flags, Floats, Ints, Singles
 from stseg.config import LabelConfig
-from stseg.labels.nearest import Nearest
+from stseg.labels.label_likelihood import LabelLikelihood
 
 
 def nearest_shares(drawn: Sequence[Flags], distance: Floats) -> Floats:
@@ -30,7 +30,7 @@ def nearest_shares(drawn: Sequence[Flags], distance: Floats) -> Floats:
     return shares / count
 
 
-def dense(shown: Nearest) -> Floats:
+def dense(shown: LabelLikelihood) -> Floats:
     """p_0, p_1, ... in the window, float64 (n + 1, v, u)."""
     edges, first = shown.people.edges, shown.people.first
     shares = np.zeros((len(edges) + 1, *shown.nobody.shape))

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from stseg.config import GhostConfig, IdentityConfig
-from stseg.identity.stretches import Stretch
+from stseg.tracking.isolated_tracklets import IsolatedTracklet
 
 TURN, STAYS, PARTED = 0.8, 3.0, 6.0
 
@@ -18,7 +18,12 @@ def log_normal(off: float, variance: float) -> float:
 
 
 def gain(
-    a: Stretch, b: Stretch, inside: float, frame_rate: float, config: IdentityConfig, people: GhostConfig
+    a: IsolatedTracklet,
+    b: IsolatedTracklet,
+    inside: float,
+    frame_rate: float,
+    config: IdentityConfig,
+    people: GhostConfig,
 ) -> float:
     """What speaks for one person in both, nats; `inside` is the mean of how far inside they part."""
     seconds = (b.start.frame - a.end.frame) / frame_rate

@@ -8,10 +8,10 @@ import numpy as np
 
 from stseg.arrays import Labels, Rows, Singles
 from stseg.geometry import Camera, Grid, Rig
-from stseg.io.layout import STEP, ghost_type
-from stseg.io.recording import CameraSource, Recording, Source
-from stseg.io.runs import RunWriter
-from stseg.tracks import BOX, EVENT, RATES, TIMING, TRAJECTORY, WINDOW, Tracks
+from stseg.io.recording.recording import CameraSource, Recording, Source
+from stseg.io.runfile.layout import STEP, ghost_type
+from stseg.io.runfile.runs import RunWriter
+from stseg.model.tables import BOX, EVENT, RATES, TIMING, TRAJECTORY, WINDOW, Tracks
 
 FRAMES = np.arange(10, 16)
 CONFIG = "[ghosts]\nperson = -3.0\n"

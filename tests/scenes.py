@@ -18,10 +18,10 @@ from stseg.arrays import Boxes, Bytes, Floats, Observation, Rows, Singles
 from stseg.config import Config, GhostConfig
 from stseg.geometry import Camera, Grid, Lens, Rig
 from stseg.geometry.bodies import PROFILE, SILHOUETTE
-from stseg.ghosts.expected import Expected, nobody
-from stseg.ghosts.people import People
-from stseg.ghosts.sizes import Sizes
-from stseg.tracks import TRAJECTORY
+from stseg.model.expected import Expected, nobody
+from stseg.model.people import People
+from stseg.model.sizes import Sizes
+from stseg.model.tables import TRAJECTORY
 
 SIZE = (128, 96)
 FOCAL = 75.0

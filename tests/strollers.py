@@ -11,8 +11,8 @@ from strategies import numbers
 from stseg.arrays import Rows
 from stseg.config import GhostConfig, IdentityConfig
 from stseg.geometry import Grid
-from stseg.ghosts.border import Border
-from stseg.tracks import TRAJECTORY
+from stseg.model.border import Border
+from stseg.model.tables import TRAJECTORY
 
 RATE = 8.0
 CONFIG, PEOPLE = IdentityConfig(), GhostConfig()

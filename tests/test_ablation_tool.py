@@ -15,10 +15,10 @@ from scenes import CONFIG, box_moments, room, walkers
 
 from stseg.accelerate import python_form
 from stseg.config import IdentityConfig
+from stseg.detection.scoring import set_score
+from stseg.engine.pipeline import Pipeline
 from stseg.evaluation import evaluate
-from stseg.foreground.sight import Sight
-from stseg.ghosts.scoring import set_score
-from stseg.pipeline import Pipeline
+from stseg.foreground.view_foreground import ViewForeground
 
 ROOT = Path(__file__).parents[1]
 INTERPRETED = python_form(set_score) is set_score
@@ -59,7 +59,7 @@ def test_who_was_away_too_long_is_somebody_new(ways: ModuleType) -> None:
 def test_two_labels_follow_who_is_alone(ways: ModuleType) -> None:
     rig, truth = room(), walkers(40)
     del ways
-    pipeline = Pipeline(rig, [Sight() for _ in rig.cameras], ["boxes"] * 4, CONFIG, "two labels")
+    pipeline = Pipeline(rig, [ViewForeground() for _ in rig.cameras], ["boxes"] * 4, CONFIG, "two labels")
     done: list[int] = []
     commits = [step.commit for step in pipeline.steps(box_moments(rig, truth, 0, 20), 0, done.append)]
     rows, events = (np.concatenate([getattr(c, name) for c in commits]) for name in ("trajectory", "events"))

@@ -7,11 +7,11 @@ import re
 import numpy as np
 import run_files
 
+from stseg.model.tables import EVENT, Tracks
 from stseg.report.answers import answers
 from stseg.report.charts import Span
 from stseg.report.findings import ghost_reasons
 from stseg.report.maps import Haunt
-from stseg.tracks import EVENT, Tracks
 
 
 def told(places: list[Haunt], shares: list[float], dropped: int = 0) -> list[str]:

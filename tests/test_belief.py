@@ -20,11 +20,11 @@ from stseg.config import BeliefConfig, Config
 from stseg.errors import CalibrationError, ConfigError, SourceError
 from stseg.geometry import Camera
 from stseg.geometry.upright import vertical_of
-from stseg.trackers import Commit, Scene, Shown, find_tracker
+from stseg.trackers import Commit, FrameObservations, FusedFrame, find_tracker
 from stseg.trackers.belief import BeliefTracker
 from stseg.trackers.belief.exclusion import exclusion
 from stseg.trackers.belief.histogram import BINS, HSV_BINS, PARTS, POINTS, histograms
-from stseg.trackers.belief.look import Look, squares
+from stseg.trackers.belief.look import TargetLikelihood, squares
 from stseg.trackers.belief.particles import Motion, Particles, Prediction, fill_origin, systematic
 from stseg.trackers.belief.potential import Outlier, Tie
 from stseg.trackers.belief.star import Rounds, Star, propagate
@@ -50,10 +50,10 @@ def painted(camera: Camera, standing: Floats, shirts: Sequence[tuple[int, int, i
     return image
 
 
-def shown(standing: Floats, shirts: Sequence[tuple[int, int, int]] = SHIRTS) -> Shown:
+def shown(standing: Floats, shirts: Sequence[tuple[int, int, int]] = SHIRTS) -> FrameObservations:
     """What the four cameras show of people."""
     flat = np.full(SIZE[::-1], 0.5, np.float32)
-    return Shown([painted(camera, standing, shirts) for camera in RIG.cameras], [flat] * 4)
+    return FrameObservations([painted(camera, standing, shirts) for camera in RIG.cameras], [flat] * 4)
 
 
 def images_of(standing: Floats) -> list[Bytes | None]:
@@ -61,9 +61,9 @@ def images_of(standing: Floats) -> list[Bytes | None]:
     return [painted(camera, standing) for camera in RIG.cameras]
 
 
-def scene(frame: int, standing: Floats, seen: Floats | None = None) -> Scene:
+def scene(frame: int, standing: Floats, seen: Floats | None = None) -> FusedFrame:
     """A frame in which the pass finds these people; occupied where they stand."""
-    return Scene(
+    return FusedFrame(
         frame, found(standing if seen is None else seen), found(people()), np.full(RIG.grid.shape, 3.0, np.float32)
     )
 
@@ -215,7 +215,7 @@ def test_a_look_prefers_the_target_and_does_not_mind_what_is_hidden() -> None:
     target = known(standing)
     colours = target.colours[0]
     assert colours is not None
-    look = Look(VIEWS[0], painted(RIG.cameras[0], standing), colours, 1.7, np.zeros((0, 4)), FEW)
+    look = TargetLikelihood(VIEWS[0], painted(RIG.cameras[0], standing), colours, 1.7, np.zeros((0, 4)), FEW)
     likelihood, share = look.likelihood(np.array([[0.0, 0.0], [1.2, -0.6], [-0.5, 0.9]]))
     assert likelihood[0] > 100 * likelihood[1:].max()
     np.testing.assert_allclose(share[0], 1.0)
@@ -405,7 +405,7 @@ def test_each_view_by_itself_is_worse_where_one_sees_nothing() -> None:
             if frame > 1:
                 views[0] = np.full((*SIZE[::-1], 3), FLOOR, np.uint8)
                 views[1] = np.full((*SIZE[::-1], 3), FLOOR, np.uint8)
-            tracker.add(scene(frame, standing), Shown(views, shown(standing).evidence))
+            tracker.add(scene(frame, standing), FrameObservations(views, shown(standing).evidence))
         away[way] = float(np.hypot(*(tracker.targets[0].star.ground.mean - standing[0, :2])))
     assert away["messages"] < 0.15
     assert away["condensation"] > away["messages"]
@@ -415,7 +415,7 @@ def test_each_view_by_itself_is_worse_where_one_sees_nothing() -> None:
 def test_without_colour_it_says_what_it_lacks(observation: Observation) -> None:
     tracker = find_tracker("belief")(RIG, CONFIG, 0)
     with pytest.raises(SourceError, match=r"--tracker belief.*colour"):
-        tracker.add(scene(0, people((0.0, 0.0))), Shown((observation,) * 4, (None,) * 4))
+        tracker.add(scene(0, people((0.0, 0.0))), FrameObservations((observation,) * 4, (None,) * 4))
 
 
 def test_constants_out_of_range_are_refused() -> None:

@@ -13,21 +13,21 @@ from hypothesis import strategies as st
 from walking import Walking, changed, delayed, walking
 
 from stseg.arrays import Floats, Singles
-from stseg.calibrate.adjust import misses
-from stseg.calibrate.align import Walks, align, mirrored
-from stseg.calibrate.assemble import align_all, assemble
-from stseg.calibrate.blobs import Ends, people_ends
-from stseg.calibrate.doubts import require_placed
-from stseg.calibrate.meet import meetings
-from stseg.calibrate.paths import path_of
-from stseg.calibrate.pinhole import SIZE, as_camera, height_of_head, looking, moved, on_plane, project
-from stseg.calibrate.result import cameras_of, centred, distance_factor, grid_of, offsets_of, reports_of, scaled
-from stseg.calibrate.solve import Solution, refine
-from stseg.calibrate.upright import view_of_upright
-from stseg.calibrate.whole import calibrate_from_people, sharpen_by_floor
+from stseg.calibration.adjusted_rig import cameras_of, centred, distance_factor, grid_of, offsets_of, reports_of, scaled
+from stseg.calibration.auto import calibrate_from_people, sharpen_by_floor
+from stseg.calibration.auto_diagnosis import require_placed
+from stseg.calibration.bundle_adjustment import misses
+from stseg.calibration.correspondence import meetings
+from stseg.calibration.endpoint_paths import path_of
+from stseg.calibration.endpoints import Ends, people_ends
+from stseg.calibration.pinhole import SIZE, as_camera, height_of_head, looking, moved, on_plane, project
+from stseg.calibration.single_view import view_of_upright
+from stseg.calibration.solution import Solution, refine
+from stseg.calibration.view_alignment import Walks, align, mirrored
+from stseg.calibration.view_merging import align_all, assemble
 from stseg.commands.calibrate_auto import calibrate_auto
 from stseg.errors import ConfigError, SourceError
-from stseg.io.rigs import read_rig
+from stseg.io.recording.rigs import read_rig
 
 IMAGE = (480, 360)
 

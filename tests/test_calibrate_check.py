@@ -10,19 +10,19 @@ import pytest
 from walkabout import SIZE, exchanged, moved, ring, shown, walkers
 
 from stseg.arrays import Boxes, Floats
-from stseg.calibrate.agreement import place
-from stseg.calibrate.blunders import all_bystanders
-from stseg.calibrate.bystanders import tables_of
-from stseg.calibrate.check import Check, check_rig, in_words
-from stseg.calibrate.coverage import coverage
-from stseg.calibrate.sightings import sightings
+from stseg.calibration.blunders import all_bystanders
+from stseg.calibration.box_correspondence import tables_of
+from stseg.calibration.coverage import coverage
+from stseg.calibration.isolated_boxes import sightings
+from stseg.calibration.leave_one_out import place
+from stseg.calibration.rig_check import Check, check_rig, in_words
 from stseg.commands.calibrate import app
 from stseg.errors import ConfigError, OutputError
-from stseg.foreground.sight import Sight
+from stseg.foreground.view_foreground import ViewForeground
 from stseg.geometry import Rig
-from stseg.io.frames import open_frames
-from stseg.io.recording import CameraSource, Recording, Source
-from stseg.io.rigs import read_rig, write_rig
+from stseg.io.recording.frames import open_frames
+from stseg.io.recording.recording import CameraSource, Recording, Source
+from stseg.io.recording.rigs import read_rig, write_rig
 from stseg.report.ground_grid import grid_picture
 
 DATA = Path(os.environ.get("STSEG_DATA", Path(__file__).parents[1] / "../shared/data"))
@@ -216,7 +216,7 @@ class TestRealRigs:
         boxes = {}
         with open_frames(recording, 0, frames) as moments:
             for moment in moments:
-                maps = [Sight().evidence(view) for view in moment.views]
+                maps = [ViewForeground().evidence(view) for view in moment.views]
                 boxes[moment.frame] = [sightings(one, (644, 486)) for one in maps]
         return recording.rig, boxes
 

@@ -10,14 +10,14 @@ from scenes import looking
 from strategies import BARREL, Pose, poses
 
 from stseg.arrays import Floats
-from stseg.calibrate.points import PointFit, Points, fit_points
+from stseg.calibration.point_fit import PointFit, Points, fit_points
 from stseg.commands.calibrate import app
 from stseg.commands.calibrate_points import warnings
 from stseg.errors import CalibrationError, ConfigError, FormatError, InputError
 from stseg.geometry import Camera, Grid
 from stseg.geometry.fits import fit_homography, focal_of_square_pixels, middle_matrix, vertical_of_matrix
-from stseg.io.point_files import read_points
-from stseg.io.rigs import read_rig
+from stseg.io.calibrations.point_files import read_points
+from stseg.io.recording.rigs import read_rig
 
 SIZE = (640, 480)
 GRID = Grid((-2.0, 2.0), (-2.0, 2.0))

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from walkabout import ring, shown, walkers
 
-from stseg.io.point_files import read_points
-from stseg.io.recording import CameraSource, Recording, Source
-from stseg.io.rigs import write_rig
+from stseg.io.calibrations.point_files import read_points
+from stseg.io.recording.recording import CameraSource, Recording, Source
+from stseg.io.recording.rigs import write_rig
 
 sys.path.append(str(Path(__file__).parents[1] / "tools"))
 

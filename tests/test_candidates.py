@@ -27,14 +27,14 @@ from scenes import (
 
 from stseg.arrays import Floats
 from stseg.config import DetectionConfig
+from stseg.detection.detector import Detector
+from stseg.detection.proposals import Proposals, marginal
+from stseg.engine.pipeline import Pipeline
 from stseg.errors import InputError
-from stseg.foreground.sight import Sight
-from stseg.ghosts.explain import FramePass
-from stseg.ghosts.people import ViewEvidence
-from stseg.ghosts.pool import Pool
-from stseg.occupancy.candidates import Candidates, marginal, unexplained
+from stseg.foreground.view_foreground import ViewForeground
+from stseg.model.candidates import Candidates
+from stseg.model.people import ViewEvidence, empty_explanation
 from stseg.occupancy.volume import Occupancy
-from stseg.pipeline import Pipeline
 
 Asked = Literal["lattice", "probability", "volume", "both"]
 VIEWS = corner_cameras()
@@ -47,15 +47,15 @@ def evidence(kind: str, standing: Floats = STANDING) -> list[ViewEvidence]:
     return [boxes(camera, standing) for camera in VIEWS] if kind == "boxes" else list(likelihoods(VIEWS, standing))
 
 
-def candidates(kind: str, asked: Asked) -> Candidates:
+def candidates(kind: str, asked: Asked) -> Proposals:
     kinds = [kind] * 4
     occupancy = Occupancy(RIG, kinds, CONFIG.occupancy, FEW_HEIGHTS)
-    return Candidates(occupancy, kinds, replace(CONFIG, detection=replace(FEW, candidates=asked)))
+    return Proposals(occupancy.rig, occupancy.fuse, kinds, replace(CONFIG, detection=replace(FEW, candidates=asked)))
 
 
-def pool(*places: tuple[float, float]) -> Pool:
+def pool(*places: tuple[float, float]) -> Candidates:
     ones = np.ones(len(places))
-    return Pool(np.array(places, float).reshape(-1, 2), 1.7 * ones, 0.42 * ones)
+    return Candidates(np.array(places, float).reshape(-1, 2), 1.7 * ones, 0.42 * ones)
 
 
 @pytest.mark.parametrize("kind", ("boxes", "pixels"))
@@ -90,7 +90,7 @@ def test_both_sources_have_no_duplicates_of_each_other() -> None:
 def test_the_volume_of_an_unexplained_frame_is_filled_where_people_stand() -> None:
     occupancy = Occupancy(RIG, ["pixels"] * 4, CONFIG.occupancy, FEW_HEIGHTS)
     seen = evidence("pixels")
-    filled = marginal(occupancy.fuse(seen, unexplained(occupancy, seen)))
+    filled = marginal(occupancy.fuse(seen, empty_explanation(occupancy.rig, seen)))
     away = np.hypot(*np.moveaxis(RIG.grid.ground[:, :, None] - STANDING[:, :2], -1, 0)).min(-1)
     assert filled[away < 0.12].min() > 0.5
     assert filled[away > 0.8].max() < 0.1
@@ -106,7 +106,7 @@ def test_duplicates_are_dropped_in_order() -> None:
 
 @pytest.mark.parametrize("kind", ("boxes", "pixels"))
 def test_the_pass_takes_what_is_proposed_and_drops_what_is_nobody(kind: str) -> None:
-    frame_pass = FramePass(RIG, [kind] * 4, FEW_HEIGHTS)
+    frame_pass = Detector(RIG, [kind] * 4, FEW_HEIGHTS)
     proposed = pool(*(tuple(place) for place in STANDING[:, :2]), (-1.5, 1.5), (0.0, 1.6))
     plain, given = (frame_pass.explain(evidence(kind), None, asked).people for asked in (None, proposed))
     assert len(plain) == len(given) == len(STANDING)
@@ -115,7 +115,7 @@ def test_the_pass_takes_what_is_proposed_and_drops_what_is_nobody(kind: str) -> 
 
 
 def test_who_is_expected_comes_before_who_is_proposed_there() -> None:
-    frame_pass = FramePass(RIG, ["pixels"] * 4, FEW_HEIGHTS)
+    frame_pass = Detector(RIG, ["pixels"] * 4, FEW_HEIGHTS)
     expected = expecting(*STANDING.tolist())
     proposed = pool(*(tuple(place + 0.05) for place in STANDING[:, :2]))
     found = frame_pass.explain(evidence("pixels"), expected, proposed).people
@@ -128,7 +128,7 @@ def test_the_pipeline_finds_the_same_people_by_any_source(kind: str, asked: Aske
     rig, truth = room(), walkers(2)
     moments = list((box_moments if kind == "boxes" else mask_moments)(rig, truth, 0, 2))
     config = replace(CONFIG, detection=replace(FEW, candidates=asked))
-    pipeline = Pipeline(rig, [Sight()] * 4, [kind] * 4, config, "frames")
+    pipeline = Pipeline(rig, [ViewForeground()] * 4, [kind] * 4, config, "frames")
     rows = np.concatenate([s.commit.trajectory for s in pipeline.steps(moments, 0, lambda _: None)])
     for frame in range(2):
         own, standing = rows[rows["frame"] == frame], standing_at(truth, frame)

@@ -13,17 +13,17 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from stseg.arrays import Boxes, Bytes, Floats, Ints, Observation
+from stseg.engine.segments import find_gaps
 from stseg.errors import RigError, SourceError
 from stseg.geometry import Camera, Grid, Rig
-from stseg.identity.segments import find_gaps
-from stseg.io.clock import Clock, clock_of, nearest, placed, seen
-from stseg.io.counted import Streams, count_streams
-from stseg.io.frames import open_frames, read_camera
-from stseg.io.provenance import gather_provenance
-from stseg.io.recording import CameraSource, Recording, Source
-from stseg.io.rigs import read_rig, write_rig
-from stseg.io.stamps import joined, read_stamps
-from stseg.io.work_folder import WorkFolder
+from stseg.io.recording.clock import Clock, clock_of, nearest, placed, seen
+from stseg.io.recording.frames import open_frames, read_camera
+from stseg.io.recording.recording import CameraSource, Recording, Source
+from stseg.io.recording.rigs import read_rig, write_rig
+from stseg.io.recording.stamps import joined, read_stamps
+from stseg.io.recording.stream_index import StreamIndex, index_streams
+from stseg.io.runfile.provenance import gather_provenance
+from stseg.io.runfile.work_folder import WorkFolder
 
 RATE = 10.0
 SIZE = (16, 12)
@@ -294,7 +294,7 @@ def uneven(tmp_path: Path) -> Recording:
 
 
 def test_frames_are_read_where_they_were_taken(uneven: Recording) -> None:
-    streams = count_streams(uneven)
+    streams = index_streams(uneven)
     assert streams.length == 20
     with open_frames(uneven, 0, None, streams) as reader:
         views = [tuple(map(told, moment.views)) for moment in reader]
@@ -315,16 +315,16 @@ def test_cameras_that_do_not_end_together_by_their_stamps_are_told_what_to_do(tm
     )
     said = r'cam2: found its end at frame 20 .* or on_missing = "blind", or clock = "count" where it went by'
     with pytest.raises(SourceError, match=said):
-        count_streams(rec)
+        index_streams(rec)
 
 
 def test_what_was_found_of_time_is_kept(uneven: Recording, tmp_path: Path) -> None:
-    streams = count_streams(uneven)
+    streams = index_streams(uneven)
     with WorkFolder(tmp_path / "run.h5", {}) as folder:
         folder.keep_streams(streams)
         kept = folder.streams()
     for again in (kept, pickle.loads(pickle.dumps(streams))):
-        assert isinstance(again, Streams)
+        assert isinstance(again, StreamIndex)
         assert (again.length, again.notes) == (streams.length, streams.notes)
         for one, other in zip(again.shown, streams.shown, strict=True):
             np.testing.assert_array_equal(none_as_empty(one), none_as_empty(other))

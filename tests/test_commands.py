@@ -16,10 +16,10 @@ from run_files import CONFIG, small_recording, small_trajectory, write_small_run
 import stseg
 from stseg.commands.inspect import events_in_words
 from stseg.commands.main import COMMANDS, main
-from stseg.commands.overview import look_over
-from stseg.io.runs import RunWriter, read_run
-from stseg.io.tracks import read_tracks_csv
-from stseg.tracks import TRAJECTORY, Tracks
+from stseg.commands.run_overview import look_over
+from stseg.io.runfile.runs import RunWriter, read_run
+from stseg.io.track_csv import read_tracks_csv
+from stseg.model.tables import TRAJECTORY, Tracks
 
 
 @pytest.fixture

@@ -21,13 +21,14 @@ from stseg.arrays import Flags
 from stseg.config import SegmentationConfig
 from stseg.errors import ConfigError
 from stseg.geometry import Grid
-from stseg.segmentation import cut as cut_module
-from stseg.segmentation.arcs import in_place, in_rows
-from stseg.segmentation.compact import MOST, least_cut
-from stseg.segmentation.cut import Storage, minimum_cut
-from stseg.segmentation.energy import QUANTUM, Energy, build_energy, neighbourhood
+from stseg.graphcut import cut as cut_module
+from stseg.graphcut.arcs import in_place, in_rows
+from stseg.graphcut.compact import MOST, least_cut
+from stseg.graphcut.cut import Storage, minimum_cut
+from stseg.graphcut.energy import QUANTUM, Energy
+from stseg.graphcut.reduction import OCCUPIED, OPEN, reduce
+from stseg.segmentation.energy import build_energy, neighbourhood
 from stseg.segmentation.motion import follow
-from stseg.segmentation.reduction import OCCUPIED, OPEN, reduce
 
 ROOT = Path(__file__).parents[1]
 DATA = Path(os.environ.get("STSEG_DATA", ROOT / "../shared/data"))

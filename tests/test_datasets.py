@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from stseg.evaluation import evaluate
-from stseg.io.tracks import read_tracks_csv
+from stseg.io.track_csv import read_tracks_csv
 
 ROOT = Path(__file__).parents[1]
 DATA = Path(os.environ.get("STSEG_DATA", ROOT / "../shared/data"))

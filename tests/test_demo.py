@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 from stseg.commands.main import main
-from stseg.io.runs import read_run
-from stseg.io.tracks import read_tracks_csv
+from stseg.io.runfile.runs import read_run
+from stseg.io.track_csv import read_tracks_csv
 
 ROOT = Path(__file__).parents[1]
 LEAST_MODA = 80.0

@@ -16,13 +16,13 @@ from strategies import BARREL, cameras, numbers
 
 from stseg.arrays import Floats, Singles
 from stseg.config import DetectionConfig
+from stseg.detection.detection_probability import DetectionProbability, fill_chance
+from stseg.detection.mean_shift import fill_modes, modes
+from stseg.detection.pillar_strips import Pillars
 from stseg.errors import SourceError
 from stseg.geometry import Camera
 from stseg.geometry.planes import plane_homography
-from stseg.occupancy.modes import fill_modes, modes
-from stseg.occupancy.pillars import Pillars
-from stseg.occupancy.probability import DetectionProbability, fill_chance
-from stseg.occupancy.tables import TOP, fill_sums
+from stseg.geometry.summed_area import TOP, fill_sums
 
 sys.path.append(str(Path(__file__).parents[1] / "tools"))
 

@@ -14,18 +14,21 @@ from strategies import numbers
 from stseg.arrays import Flags, Floats, Ints, Labels
 from stseg.config import IdentityConfig, SegmentationConfig
 from stseg.geometry import Grid
-from stseg.identity.pieces import Piece
-from stseg.identity.places import Sightings, earlier_sightings, expected_places, together
-from stseg.segmentation.cut import minimum_cut
-from stseg.segmentation.division import STRANGER, Division, Found, divide
-from stseg.segmentation.energy import QUANTUM, Energy, build_energy, neighbourhood
-from stseg.segmentation.expansion import LabelEnergy, expand
-from stseg.segmentation.labels import Pillar, Places, label_energy, shares
+from stseg.graphcut.cell_subset import CellSubset, subset_of
+from stseg.graphcut.cut import minimum_cut
+from stseg.graphcut.energy import QUANTUM, Energy
+from stseg.graphcut.expansion import LabelEnergy, expand
+from stseg.model.blobs import UNASSIGNED
+from stseg.model.predictions import PredictedPlaces
+from stseg.segmentation.energy import build_energy, neighbourhood
+from stseg.segmentation.labelling import WindowDetections, WindowLabels, label_cells
 from stseg.segmentation.motion import follow
-from stseg.segmentation.part import Part, part_of
+from stseg.segmentation.unary import BodyShape, label_energy, shares
+from stseg.tracking.prediction import DetectionHistory, earlier_detections, predicted_places, together
+from stseg.tracking.tracklets import Tracklet
 
 GRID = Grid((0.0, 2.4), (0.0, 1.4), cell=0.1, top=1.8, planes=4)
-PILLAR = Pillar(reach=0.4, height_spread=0.12, stranger=0.02)
+PILLAR = BodyShape(reach=0.4, height_spread=0.12, stranger=0.02)
 CONFIG = IdentityConfig()
 
 
@@ -46,7 +49,7 @@ def random_window(seed: int, shape: tuple[int, ...]) -> Energy:
 def test_a_part_has_the_edges_of_its_window(seed: int, shape: tuple[int, ...]) -> None:
     energy = random_window(seed, shape)
     inside = np.random.default_rng(seed).random(shape) < 0.6
-    part = part_of(energy, inside)
+    part = subset_of(energy, inside)
     assert part.cell.tolist() == np.flatnonzero(inside).tolist()
     within = inside.ravel()
     every = list(zip(*(side.tolist() for side in energy.edges()), strict=True))
@@ -62,14 +65,14 @@ def test_a_part_has_the_edges_of_its_window(seed: int, shape: tuple[int, ...]) -
 @pytest.mark.parametrize("seed", range(5))
 def test_whole_pieces_of_a_part(seed: int) -> None:
     energy = random_window(seed, (2, 2, 4, 5))
-    part = part_of(energy, np.random.default_rng(seed).random((2, 2, 4, 5)) < 0.4)
+    part = subset_of(energy, np.random.default_rng(seed).random((2, 2, 4, 5)) < 0.4)
     piece = part.components()
     assert (piece[part.start] == piece[part.end]).all()
     kept = piece % 2 == 0
     only = part.only(kept)
     inside = np.zeros(energy.unary.size, bool)
     inside[part.cell[kept]] = True
-    same = part_of(energy, inside.reshape(energy.unary.shape))
+    same = subset_of(energy, inside.reshape(energy.unary.shape))
     for one, other in zip(vars(only).values(), vars(same).values(), strict=True):
         np.testing.assert_array_equal(one, other)
 
@@ -77,12 +80,16 @@ def test_whole_pieces_of_a_part(seed: int) -> None:
 # Shares
 
 
-def places_at(*tracks: tuple[float, float], frames: int = 1, spread: float = 0.05, height: float = 1.7) -> Places:
+def places_at(
+    *tracks: tuple[float, float], frames: int = 1, spread: float = 0.05, height: float = 1.7
+) -> PredictedPlaces:
     """Tracks 1, 2, ... that stand still, metres."""
     size = (frames, len(tracks))
     ground = np.tile(np.array(tracks, float).reshape(-1, 2), (frames, 1, 1))
     covariance = np.tile(np.eye(2) * spread**2, (*size, 1, 1))
-    return Places(np.arange(1, len(tracks) + 1), np.ones(size, bool), ground, covariance, np.full(size, height))
+    return PredictedPlaces(
+        np.arange(1, len(tracks) + 1), np.ones(size, bool), ground, covariance, np.full(size, height)
+    )
 
 
 @settings(deadline=None, max_examples=40)
@@ -98,7 +105,7 @@ def test_shares_by_definition(x: float, y: float, height: float, spread: float, 
     assert (share[1] == 0) == gone or share[1] < 2e-3
 
 
-def share_at(places: Places, *cells: tuple[float, float, float], appearance: Floats | None = None) -> Floats:
+def share_at(places: PredictedPlaces, *cells: tuple[float, float, float], appearance: Floats | None = None) -> Floats:
     x, y, z = np.array(cells).T
     return shares(np.zeros(len(cells), np.int64), np.column_stack([x, y]), z, places, PILLAR, appearance)
 
@@ -134,7 +141,7 @@ def test_appearance_tells_apart_who_stand_in_one_place() -> None:
 
 
 def test_costs_of_labels_in_quanta() -> None:
-    part = Part(np.array([3, 5]), np.array([0]), np.array([1]), np.array([7]), np.array([2, 0]))
+    part = CellSubset(np.array([3, 5]), np.array([0]), np.array([1]), np.array([7]), np.array([2, 0]))
     energy = label_energy(np.array([1000, -50]), np.array([[0.5, 0.0, 0.5], [0.0, 1.0, 0.0]]), part)
     half = round(np.log(2) / QUANTUM)
     assert (energy.first.tolist(), energy.label.tolist()) == ([0, 2, 3], [1, 3, 2])
@@ -159,14 +166,14 @@ def window_of(truth: Labels, seed: int = 1) -> Energy:
     return build_energy(log_odds, still, GRID, SegmentationConfig())
 
 
-def divided(energy: Energy, places: Places, seen: Flags | None = None) -> tuple[Flags, Division]:
+def divided(energy: Energy, places: PredictedPlaces, seen: Flags | None = None) -> tuple[Flags, WindowLabels]:
     """Cut, and divided; who is not seen in a frame is still expected there."""
     seen = places.expected if seen is None else seen
-    found = Found(
+    found = WindowDetections(
         [ground[who] for ground, who in zip(places.ground, seen, strict=True)], [places.track[who] for who in seen]
     )
     occupied = minimum_cut(energy).occupied
-    return occupied, divide(energy, occupied, found, places, PILLAR, GRID)
+    return occupied, label_cells(energy, occupied, found, places, PILLAR, GRID)
 
 
 def meeting(frames: int = 5) -> Floats:
@@ -175,7 +182,7 @@ def meeting(frames: int = 5) -> Floats:
     return np.stack([np.column_stack([1.2 + side * apart / 2, np.full(frames, 0.7)]) for side in (-1, 1)], 1)
 
 
-def walking(tracks: Floats) -> Places:
+def walking(tracks: Floats) -> PredictedPlaces:
     """Places of tracks that are all seen."""
     still = places_at(*tracks[0], frames=len(tracks))
     return replace(still, ground=tracks)
@@ -186,7 +193,7 @@ def test_touching_people_are_cut_apart_where_the_truth_says() -> None:
     truth = bodies(tracks)
     energy = window_of(truth)
     occupied, division = divided(energy, walking(tracks))
-    assert part_of(energy, occupied).components().max() == 0  # one piece of space and time
+    assert subset_of(energy, occupied).components().max() == 0  # one piece of space and time
     assert division.cells == occupied.sum()
     both = (truth > 0) & (division.label > 0)
     assert (division.label[both] == truth[both]).mean() > 0.98
@@ -219,9 +226,9 @@ def test_what_nobody_claims_is_a_strangers() -> None:
     truth = bodies(three)
     _, division = divided(window_of(truth), walking(meeting()))
     unknown = truth == 3
-    assert (division.label[unknown] == STRANGER).mean() > 0.97
+    assert (division.label[unknown] == UNASSIGNED).mean() > 0.97
     lonely, alone = divided(window_of(bodies(three[:, 2:])), walking(meeting()))
-    assert set(np.unique(alone.label[lonely])) == {STRANGER}
+    assert set(np.unique(alone.label[lonely])) == {UNASSIGNED}
 
 
 def test_somebody_seen_elsewhere_has_no_cells_here() -> None:
@@ -231,7 +238,7 @@ def test_somebody_seen_elsewhere_has_no_cells_here() -> None:
     gone = tracks.copy()
     gone[2, 1] = 3.0, 0.7
     _, division = divided(energy, walking(gone))
-    assert set(np.unique(division.label[2])) <= {0, 1, STRANGER}
+    assert set(np.unique(division.label[2])) <= {0, 1, UNASSIGNED}
     assert 2 in division.label[1]
 
 
@@ -249,12 +256,12 @@ def test_the_pieces_are_all_that_need_be_moved(seed: int) -> None:
     places = walking(tracks)
     energy = window_of(bodies(tracks), seed)
     occupied, division = divided(energy, places)
-    whole = part_of(energy, np.ones_like(occupied))
+    whole = subset_of(energy, np.ones_like(occupied))
     frame, plane, y, x = np.unravel_index(whole.cell, occupied.shape)
     share = shares(frame, GRID.ground[y, x], GRID.heights[plane], places, PILLAR)
     problem: LabelEnergy = label_energy(energy.unary.ravel(), share, whole)
     start: Ints = np.where(occupied.ravel(), problem.best(), 0)
-    everywhere = np.array([0, 1, 2, STRANGER])[expand(problem, start)]
+    everywhere = np.array([0, 1, 2, UNASSIGNED])[expand(problem, start)]
     outside = ~occupied.ravel()
     assert not everywhere[outside].any()
     if division.cells == occupied.sum():
@@ -264,17 +271,17 @@ def test_the_pieces_are_all_that_need_be_moved(seed: int) -> None:
 # Places
 
 
-def sightings(*seen: tuple[int, int, float, float]) -> Sightings:
+def sightings(*seen: tuple[int, int, float, float]) -> DetectionHistory:
     """Rows of frame, chain, x, y."""
     rows = np.array(seen, float).reshape(-1, 4)
     n = len(rows)
     frame, chain = rows[:, :2].T.astype(np.int64)
-    return Sightings(frame, chain, rows[:, 2:], np.tile(np.eye(2) * 0.01, (n, 1, 1)), np.full(n, 1.8))
+    return DetectionHistory(frame, chain, rows[:, 2:], np.tile(np.eye(2) * 0.01, (n, 1, 1)), np.full(n, 1.8))
 
 
 def test_places_between_and_after_sightings() -> None:
     seen = sightings((14, 7, 1.4, 0.0), (10, 7, 1.0, 0.0), (12, 3, 0.0, 5.0))
-    places = expected_places(seen, 8, 20, 8.0, CONFIG)
+    places = predicted_places(seen, 8, 20, 8.0, CONFIG)
     assert places.track.tolist() == [3, 7]
     # From the first sighting on, for as long as a walker can be foreseen.
     ahead = int(CONFIG.foresight * 8.0)
@@ -291,19 +298,19 @@ def test_places_between_and_after_sightings() -> None:
 
 
 def test_places_are_carried_from_the_window_before() -> None:
-    tail = Piece(5)
+    tail = Tracklet(5)
     for frame in range(6, 12):
         tail.add(frame, 0, np.array([0.1 * frame, 1.0]))
-    before = earlier_sightings([tail], 10, 1.7, CONFIG)
+    before = earlier_detections([tail], 10, 1.7, CONFIG)
     assert before.frame.tolist() == [6, 7, 8, 9]
-    places = expected_places(together([before, sightings((11, 5, 1.2, 1.0))]), 10, 12, 8.0, CONFIG)
+    places = predicted_places(together([before, sightings((11, 5, 1.2, 1.0))]), 10, 12, 8.0, CONFIG)
     np.testing.assert_allclose(places.ground[0, 0], [1.05, 1.0])
-    alone = expected_places(before, 10, 12, 8.0, CONFIG)
+    alone = predicted_places(before, 10, 12, 8.0, CONFIG)
     np.testing.assert_allclose(alone.ground[:, 0], [[1.0, 1.0], [1.1, 1.0]])
     assert (alone.height == 1.7).all()
 
 
 def test_nobody_is_expected() -> None:
-    places = expected_places(together([earlier_sightings([], 4, 1.7, CONFIG), sightings()]), 4, 9, 8.0, CONFIG)
+    places = predicted_places(together([earlier_detections([], 4, 1.7, CONFIG), sightings()]), 4, 9, 8.0, CONFIG)
     assert places.ground.shape == (5, 0, 2)
     assert places.expected.shape == (5, 0)

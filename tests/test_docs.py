@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from stseg.commands.main import COMMANDS
-from stseg.io import layout
-from stseg.io.recording import SOURCE_KINDS
-from stseg.io.rigs import parse_rig
+from stseg.io.recording.recording import SOURCE_KINDS
+from stseg.io.recording.rigs import parse_rig
+from stseg.io.runfile import layout
 
 ROOT = Path(__file__).parents[1]
 sys.path.append(str(ROOT / "tools"))

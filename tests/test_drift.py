@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from stseg.arrays import Bytes, Floats
-from stseg.calibrate.drift import background_shift, find_knocks
-from stseg.simulate import SceneSpec
-from stseg.simulate.cameras import build_rig, pixel_rays
-from stseg.simulate.room import look
+from stseg.calibration.knock_detection import background_shift, find_knocks
+from stseg.simulation import SceneSpec
+from stseg.simulation.cameras import build_rig, pixel_rays
+from stseg.simulation.room import look
 
 
 def correlated(frames: int, views: int, seed: int, correlation: float = 0.6) -> Floats:

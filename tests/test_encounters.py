@@ -13,15 +13,15 @@ from scenes import Moment
 from stseg.accelerate import python_form
 from stseg.arrays import Bytes, Flags
 from stseg.config import Config, IdentityConfig
+from stseg.detection.scoring import set_score
+from stseg.engine.pipeline import Pipeline
 from stseg.errors import ConfigError
 from stseg.evaluation import evaluate
-from stseg.foreground.sight import Sight
-from stseg.ghosts.scoring import set_score
-from stseg.identity.windows import windows
-from stseg.pipeline import Pipeline
-from stseg.simulate import NAMED, Film, Route, SceneSpec
-from stseg.simulate.film import Moment as Filmed
-from stseg.simulate.script import follow
+from stseg.foreground.view_foreground import ViewForeground
+from stseg.simulation import NAMED, Film, Route, SceneSpec
+from stseg.simulation.film import SimulatedFrame as Filmed
+from stseg.simulation.script import follow
+from stseg.tracking.windows import windows
 
 SCENES = ("crossing", "meeting", "meeting_heights", "border")
 INTERPRETED = python_form(set_score) is set_score
@@ -122,7 +122,7 @@ def filmed(name: str, stop: int) -> tuple[Filmed, ...]:
 def switches(name: str, kind: str, stop: int) -> int:
     """How often somebody is taken for somebody else in the first frames of a scene."""
     rig, film = Film(NAMED[name]).rig, filmed(name, stop)
-    pipeline = Pipeline(rig, [Sight() for _ in rig.cameras], [kind] * len(rig.cameras), Config(), "cut")
+    pipeline = Pipeline(rig, [ViewForeground() for _ in rig.cameras], [kind] * len(rig.cameras), Config(), "cut")
     if kind == "boxes":
         moments = [Moment(seen.frame, tuple(view.boxes for view in seen.views)) for seen in film]
     else:

@@ -21,8 +21,8 @@ from stseg.arrays import Rows
 from stseg.commands.evaluate import evaluate as command
 from stseg.errors import ConfigError, FormatError
 from stseg.evaluation import evaluate
-from stseg.io.tracks import POSITION, read_tracks_csv
-from stseg.tracks import TRAJECTORY
+from stseg.io.track_csv import POSITION, read_tracks_csv
+from stseg.model.tables import TRAJECTORY
 
 GOLDEN = json.loads((Path(__file__).parent / "golden" / "evaluation.json").read_text(encoding="utf-8"))
 SEEDS = st.integers(0, 2**32 - 1)
@@ -385,8 +385,8 @@ def test_areas_that_make_no_sense_are_refused(files: tuple[Path, Path], area: st
 def test_a_run_file_is_read_as_a_run(
     files: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    runs = ModuleType("stseg.io.runs")
+    runs = ModuleType("stseg.io.runfile.runs")
     runs.read_trajectory = lambda _: read_tracks_csv(files[1])  # type: ignore[attr-defined]
-    monkeypatch.setitem(sys.modules, "stseg.io.runs", runs)
+    monkeypatch.setitem(sys.modules, "stseg.io.runfile.runs", runs)
     command(Path("night.h5"), files[1], as_json=True)
     assert json.loads(capsys.readouterr().out)["MODA"] == 100

@@ -13,10 +13,10 @@ import pytest
 from run_files import CONFIG, small_recording
 
 from stseg.geometry import Grid
-from stseg.io.runs import Run, RunWriter, read_run
-from stseg.simulate import NAMED
-from stseg.simulate.walkers import walk
-from stseg.tracks import TRAJECTORY, Tracks
+from stseg.io.runfile.runs import Run, RunWriter, read_run
+from stseg.model.tables import TRAJECTORY, Tracks
+from stseg.simulation import NAMED
+from stseg.simulation.crowd import walk
 
 sys.path.append(str(Path(__file__).parents[1] / "docs" / "examples"))
 

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from maxflow.fastmin import aexpansion_grid
 
 from stseg.arrays import Ints
-from stseg.segmentation.compact import least_cut
-from stseg.segmentation.expansion import LabelEnergy, Moves, expand
+from stseg.graphcut.compact import least_cut
+from stseg.graphcut.expansion import LabelEnergy, Moves, expand
 
 
 def lattice(shape: tuple[int, ...]) -> tuple[Ints, Ints]:

@@ -14,13 +14,13 @@ from strategies import numbers
 
 from stseg.arrays import Floats
 from stseg.config import GhostConfig
+from stseg.detection.prior import Prior
+from stseg.detection.scoring import walker_score
 from stseg.geometry import Grid, Rig
-from stseg.ghosts.border import Border
-from stseg.ghosts.expected import Expected, nobody
-from stseg.ghosts.pool import Pool
-from stseg.ghosts.prior import Prior
-from stseg.ghosts.scoring import walker_score
-from stseg.ghosts.sizes import Sizes
+from stseg.model.border import Border
+from stseg.model.candidates import Candidates
+from stseg.model.expected import Expected, nobody
+from stseg.model.sizes import Sizes
 
 CONFIG = GhostConfig()
 PLACES = st.tuples(numbers(-2, 2), numbers(-2, 2))
@@ -186,6 +186,6 @@ def test_those_expected_are_candidates_as_tall_as_they_are() -> None:
     np.testing.assert_array_equal(pool.ground, [[0.1, 0.2], [0.4, 0.5]])
     np.testing.assert_array_equal(pool.height, [1.3, 1.74])
     assert prior.known(pool).shape == (2, 2)
-    assert prior.known(Pool(np.zeros((0, 2)), np.zeros(0), np.zeros(0))).shape == (0, 2)
+    assert prior.known(Candidates(np.zeros((0, 2)), np.zeros(0), np.zeros(0))).shape == (0, 2)
     tall = [reference.normal(h - CONFIG.height_mean, CONFIG.height_spread**2) for h in (1.5, CONFIG.height_mean)]
     np.testing.assert_allclose(np.diff(prior.tall(np.array([1.5, CONFIG.height_mean]))), np.diff(tall))

@@ -14,13 +14,13 @@ from stseg.arrays import Bytes, Rows
 from stseg.commands.main import main
 from stseg.errors import OutputError
 from stseg.geometry import Camera, Grid, Rig
-from stseg.io.films import write_film
-from stseg.io.recording import CameraSource, Recording, Source
-from stseg.io.runs import RunWriter
+from stseg.io.outputs.films import write_film
+from stseg.io.recording.recording import CameraSource, Recording, Source
+from stseg.io.runfile.runs import RunWriter
+from stseg.model.tables import TRAJECTORY, Tracks
 from stseg.report.colours import track_colour
 from stseg.report.film import Film
-from stseg.report.overlay import View
-from stseg.tracks import TRAJECTORY, Tracks
+from stseg.report.overlay import OverlayView
 
 VIVID = (20, 240, 160)
 _TURN = np.array([[1, 0, 0], [0, -np.sin(0.4), -np.cos(0.4)], [0, np.cos(0.4), -np.sin(0.4)]])
@@ -83,7 +83,7 @@ def test_pillars_and_the_plan_are_drawn_where_people_are(recording: Recording) -
     assert film.size[0] % 2 == film.size[1] % 2 == 0
     for picture, row in zip(pictures, walk()[[0, -1]], strict=True):
         for k, camera in enumerate(rig.cameras):
-            u, v = np.rint(View(camera, 640).pixel(np.array([row["x"], row["y"]]), 0.0)).astype(int)
+            u, v = np.rint(OverlayView(camera, 640).pixel(np.array([row["x"], row["y"]]), 0.0)).astype(int)
             assert tuple(picture[v, u + 640 * k].tolist()) == track_colour(1)
     assert not np.array_equal(pictures[0][:, 1280:], pictures[1][:, 1280:])
     assert (pictures[1][:, 1280:] == track_colour(1)).all(axis=-1).any()
@@ -99,7 +99,7 @@ def test_the_film_has_the_frames_that_were_asked_for(
     shown = tuple(round(0.85 * tone) for tone in VIVID)
     assert near(whole[0][400, 20], (shown[0], shown[1], shown[2]), 12)
     row = walk()[0]
-    body = np.rint(View(front_camera("left", 1), 640).pixel(np.array([row["x"], row["y"]]), 0.9)).astype(int)
+    body = np.rint(OverlayView(front_camera("left", 1), 640).pixel(np.array([row["x"], row["y"]]), 0.9)).astype(int)
     assert not near(whole[0][body[1], body[0]], (shown[0], shown[1], shown[2]), 30)  # the pillar
     assert main(["report", str(run_path), "--video", str(tmp_path / "b.mp4"), "--frames", "12:14"]) == 0
     assert len(frames_of(tmp_path / "b.mp4")) == 2

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from numpy.typing import ArrayLike
 
 from stseg.arrays import AnyArray, Rows
-from stseg.io.layout import ghost_type
+from stseg.io.runfile.layout import ghost_type
+from stseg.model.tables import TRAJECTORY
 from stseg.report.findings import (
     DENIED,
     OTHERS,
@@ -19,7 +20,6 @@ from stseg.report.findings import (
     people_per_minute,
     view_warnings,
 )
-from stseg.tracks import TRAJECTORY
 
 FRAMES = np.arange(100, 400)
 

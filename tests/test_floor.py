@@ -9,15 +9,15 @@ import pytest
 from walking import Walking, walking
 
 from stseg.arrays import Bytes, Floats
-from stseg.calibrate.assemble import align_all, assemble
-from stseg.calibrate.floor import Marks, floor_marks
-from stseg.calibrate.pinhole import CENTRE
-from stseg.calibrate.result import cameras_of
-from stseg.calibrate.solve import Solution, placed_views, refine, refine_with_marks, views_alone, walks_of
+from stseg.calibration.adjusted_rig import cameras_of
+from stseg.calibration.floor_features import Marks, floor_marks
+from stseg.calibration.pinhole import CENTRE
+from stseg.calibration.solution import Solution, placed_views, refine, refine_with_marks, views_alone, walks_of
+from stseg.calibration.view_merging import align_all, assemble
 from stseg.geometry import Camera, Grid
-from stseg.simulate import SceneSpec
-from stseg.simulate.cameras import build_rig, pixel_rays
-from stseg.simulate.room import look
+from stseg.simulation import SceneSpec
+from stseg.simulation.cameras import build_rig, pixel_rays
+from stseg.simulation.room import look
 
 SPEC = SceneSpec("walking", 2, (6.0, 6.0), 40.0, 5.0, 2, seed=1, distortion=(-0.2, 0.03))
 GRID = Grid((-2.5, 2.5), (-2.5, 2.5))

@@ -18,19 +18,19 @@ from arrivals import FRAMES, PLACES, StandIn, arrive, filmed_rig, films, meanwhi
 from recordings import ENVIRONMENT, assert_same
 from scenes import walkers
 
-import stseg.commands.follow
+import stseg.engine.following
 from stseg.accelerate import python_form
 from stseg.arrays import Rows
-from stseg.commands.follow import ENDLESS, last_frame
 from stseg.commands.main import main
+from stseg.detection.scoring import set_score
+from stseg.engine.following import ENDLESS, last_frame
 from stseg.errors import ConfigError
 from stseg.evaluation import evaluate
-from stseg.ghosts.scoring import set_score
-from stseg.identity.live_names import LiveNames
-from stseg.io.followed_cameras import FollowedCameras
-from stseg.io.runs import read_run
-from stseg.io.tracks import read_tracks_csv
-from stseg.tracks import TRAJECTORY
+from stseg.io.live.followed_cameras import FollowedCameras
+from stseg.io.runfile.runs import read_run
+from stseg.io.track_csv import read_tracks_csv
+from stseg.model.tables import TRAJECTORY
+from stseg.tracking.live_ids import LiveIds
 
 PROGRAM = """
 import signal, sys
@@ -224,7 +224,7 @@ def test_a_camera_that_breaks_is_blind_and_the_run_says_so(
            for camera, film in zip(filmed_rig().cameras, films(filmed_rig()), strict=True)}  # fmt: skip
     own["camera east"].breaks, own["camera east"].refused = [20], 2
     opening = partial(FollowedCameras, opening=lambda *asked: own[threading.current_thread().name].open(*asked))
-    monkeypatch.setattr(stseg.commands.follow, "FollowedCameras", opening)
+    monkeypatch.setattr(stseg.engine.following, "FollowedCameras", opening)
     assert track(cameras_rig, tmp_path / "run.h5", "--follow", "--frames", "0:40", "--set", "segments.length=2") == 0
     run, told = read_run(tmp_path / "run.h5"), capsys.readouterr().err
     assert told.count("camera east: nothing comes from rtsp://there/east") == 1
@@ -314,12 +314,12 @@ def places(track: int, frames: range, x: float) -> Rows:
 
 
 def test_names_last_over_segments() -> None:
-    names = LiveNames(np.zeros(0, TRAJECTORY), 20)
+    names = LiveIds(np.zeros(0, TRAJECTORY), 20)
     first = names.begin(np.zeros(0, TRAJECTORY))
     told = names.named(np.concatenate([places(4, range(10), 0.0), places(7, range(10), 3.0)]), first)
     assert told["id"].tolist() == [1] * 10 + [2] * 10
     second = names.begin(np.concatenate([places(1, range(5, 10), 3.1), places(2, range(5, 10), 9.0)]))
     later = np.concatenate([places(k, range(10, 12), 0.0) for k in (1, 2, 3)])
     assert names.named(later, second)["id"].tolist() == [2, 2, 3, 3, 4, 4]
-    again = LiveNames(told, 20)  # a run that goes on from what it has told
+    again = LiveIds(told, 20)  # a run that goes on from what it has told
     assert again.named(later, again.begin(places(1, range(5, 10), 0.1)))["id"].tolist() == [1, 1, 3, 3, 4, 4]

@@ -18,11 +18,11 @@ from stseg.accelerate import python_form
 from stseg.arrays import Boxes, Bytes, Floats, Singles
 from stseg.errors import InputError, SourceError, StsegError
 from stseg.foreground import Mixture, MixtureConfig, box_likelihood, instance_boxes, mask_likelihood
-from stseg.foreground.boxes import body
-from stseg.foreground.commonest import commonest_colours
-from stseg.foreground.light import channel_gains
+from stseg.foreground.channel_gain import channel_gains
 from stseg.foreground.mixture_kernels import evaluate, update
 from stseg.foreground.smoothing import pool_log_odds
+from stseg.foreground.temporal_mode import commonest_colours
+from stseg.model.box_likelihood import body
 
 DATA = Path(os.environ.get("STSEG_DATA", Path(__file__).parents[1] / "../shared/data"))
 FLOOR = (110, 140, 60)  # BGR

@@ -24,15 +24,15 @@ from scenes import (
 )
 
 from stseg.arrays import Floats
-from stseg.foreground.sight import Sight
+from stseg.detection.detector import Detector
+from stseg.detection.views import BoxView
+from stseg.engine.pipeline import CommittedFrames, Pipeline
+from stseg.foreground.view_foreground import ViewForeground
 from stseg.geometry import Camera, Rig
-from stseg.ghosts.explain import FramePass
-from stseg.ghosts.people import Explanation, ViewEvidence
-from stseg.ghosts.views import BoxView
-from stseg.identity.linking import assign, distances
-from stseg.identity.walkers import Walkers
-from stseg.pipeline import Pipeline, Step
-from stseg.tracks import Tracks
+from stseg.model.people import Explanation, ViewEvidence
+from stseg.model.tables import Tracks
+from stseg.tracking.assignment import assign, distances
+from stseg.tracking.track_filter import TrackFilter
 
 KINDS = ("pixels", "boxes")
 FRAMES = 20
@@ -54,9 +54,9 @@ def facing_pair() -> Rig:
 
 
 @cache
-def pass_of(kind: str, cameras: int) -> FramePass:
+def pass_of(kind: str, cameras: int) -> Detector:
     """The pass under the first corner cameras."""
-    return FramePass(rig_of(corner_cameras()[:cameras]), [kind] * cameras, FEW_HEIGHTS)
+    return Detector(rig_of(corner_cameras()[:cameras]), [kind] * cameras, FEW_HEIGHTS)
 
 
 def show(kind: str, cameras: Sequence[Camera], standing: Floats) -> list[ViewEvidence]:
@@ -75,7 +75,7 @@ def assert_these(explanation: Explanation, standing: Floats, within: float = 0.2
 @pytest.mark.parametrize("kind", KINDS)
 def test_figure_4(kind: str) -> None:
     rig = facing_pair()
-    explanation = FramePass(rig, [kind] * 2, FEW_HEIGHTS).explain(show(kind, rig.cameras, FIGURE_4), None)
+    explanation = Detector(rig, [kind] * 2, FEW_HEIGHTS).explain(show(kind, rig.cameras, FIGURE_4), None)
     assert_these(explanation, FIGURE_4)
     if kind == "pixels":  # a box knows how far away its person is, so its lines of sight cross nowhere else
         assert len(explanation.ghosts) >= 1
@@ -122,7 +122,7 @@ def crossings(standing: Floats, rig: Rig) -> Floats:
 class Run:
     """What the whole way made of a scene."""
 
-    steps: list[Step]
+    steps: list[CommittedFrames]
     tracks: Tracks
 
 
@@ -130,7 +130,7 @@ class Run:
 def moving_ghosts(kind: str) -> Run:
     """The strollers, from frame 0 on, by the whole pipeline."""
     rig = facing_pair()
-    pipeline = Pipeline(rig, [Sight()] * 2, [kind] * 2, CONFIG, "cut")
+    pipeline = Pipeline(rig, [ViewForeground()] * 2, [kind] * 2, CONFIG, "cut")
     moments = [
         Moment(f, tuple((mask if kind == "pixels" else boxes)(camera, strollers(f)) for camera in rig.cameras))
         for f in range(FRAMES)
@@ -155,7 +155,7 @@ def test_a_ghost_that_moves_with_its_makers(kind: str) -> None:
 def test_the_moving_ghost_is_borne_out_by_both_views() -> None:
     """It was there to be picked up: taken by itself it is worth a person, in nearly every frame."""
     rig, worth = facing_pair(), 0
-    frame_pass = FramePass(rig, ["pixels"] * 2, FEW_HEIGHTS)
+    frame_pass = Detector(rig, ["pixels"] * 2, FEW_HEIGHTS)
     ground = frame_pass.lattice_ground.reshape(-1, 2)
     for frame in range(FRAMES):
         seen, said = show("pixels", rig.cameras, strollers(frame)), np.zeros(len(ground))
@@ -182,7 +182,7 @@ def test_a_ghost_is_not_picked_up_by_the_cut_in_later_frames() -> None:
 @pytest.mark.parametrize("kind", KINDS)
 def test_somebody_hidden_from_all_views_but_one_stays(kind: str) -> None:
     """Seen by all at first; then three taller people step between them and three of the cameras, and stand there."""
-    rig, follow = room(), Walkers(8.0, CONFIG.ghosts, CONFIG.identity)
+    rig, follow = room(), TrackFilter(8.0, CONFIG.ghosts, CONFIG.identity)
     hidden, who = people((0.0, 0.0, 1.6)), set[int]()
     for frame in range(FRAMES):
         side = max(1.2 - 0.1 * frame, 0.0)

@@ -28,23 +28,23 @@ from scenes import (
 from strategies import numbers
 
 from stseg.arrays import Floats, Ints
+from stseg.detection.detector import Detector
+from stseg.detection.gains import come_in, fill_owners, gain_of, leave, paired, wipe_owners
+from stseg.detection.groups import fill_groups, fill_touch
+from stseg.detection.problem import BoxEvidence, Parameters, PixelEvidence, Problem
+from stseg.detection.scoring import set_score
+from stseg.detection.search import ENUMERATED, search
 from stseg.geometry import Camera, Rig
 from stseg.geometry.bodies import BodyTable
-from stseg.ghosts.boxes import TOLERANCE, fill_best_match, fill_cover, fill_inside, fill_match, half_square
-from stseg.ghosts.evidence import BoxEvidence, Case, PixelEvidence, Terms
-from stseg.ghosts.expected import nobody
-from stseg.ghosts.explain import FramePass
-from stseg.ghosts.gains import come_in, fill_owners, gain_of, leave, paired, wipe_owners
-from stseg.ghosts.groups import fill_groups, fill_touch
-from stseg.ghosts.outlines import outlines, sums_inside
-from stseg.ghosts.people import Explanation, ViewEvidence
-from stseg.ghosts.scoring import set_score
-from stseg.ghosts.search import ENUMERATED, search
-from stseg.ghosts.sharpness import FIRST
+from stseg.model.box_fit import TOLERANCE, fill_best_match, fill_cover, fill_inside, fill_match, half_square
+from stseg.model.box_noise import FIRST
+from stseg.model.expected import nobody
+from stseg.model.outlines import outlines, sums_inside
+from stseg.model.people import Explanation, ViewEvidence
 
 WIDTH, HEIGHT = 128.0, 96.0
 KINDS = ("pixels", "boxes")
-TERMS = Terms(-3.0, 0.3, 3.0, 0.2, 0.2, 0.9, 0.02, 2.0)
+TERMS = Parameters(-3.0, 0.3, 3.0, 0.2, 0.2, 0.9, 0.02, 2.0)
 EDGES = st.tuples(numbers(-60, 150), numbers(-80, 100), numbers(1, 60), numbers(2, 150)).map(
     lambda b: np.array([b[0], b[1], b[0] + b[2], b[1] + b[3]])
 )
@@ -154,7 +154,7 @@ def test_outlines_outside_the_image() -> None:
 
 
 @dataclass(frozen=True)
-class Problem:
+class CraftedFrame:
     """A crafted frame: the evidence of some candidates."""
 
     boxes: BoxEvidence
@@ -164,12 +164,12 @@ class Problem:
     newcomer: Floats
     known: Floats
 
-    def case(self) -> Case:
+    def case(self) -> Problem:
         """The frame as the kernels take it."""
         views = len(self.boxes.boxes) + len(self.pixels.raster)
         owner = np.empty(max(self.pixels.raster[0].size, self.boxes.match.shape[2], self.known.shape[1]), np.int64)
         parts = np.zeros((views, len(self.own) + 1))
-        return Case(self.boxes, self.pixels, self.own, self.newcomer, self.known, self.ground, TERMS, owner, parts)
+        return Problem(self.boxes, self.pixels, self.own, self.newcomer, self.known, self.ground, TERMS, owner, parts)
 
     def score(self, members: Sequence[int] | Ints) -> float:
         """The fast score of a set."""
@@ -184,7 +184,7 @@ class Problem:
         return sorted(room[:count].tolist())
 
 
-def problem(seed: int, candidates: int, walkers: int = 0) -> Problem:
+def problem(seed: int, candidates: int, walkers: int = 0) -> CraftedFrame:
     """Two views with boxes, two with pixels; candidates that share boxes, hide each other and crowd."""
     rng = np.random.default_rng(seed)
     views, most, rows, columns = 2, 4, 8, 10
@@ -206,10 +206,10 @@ def problem(seed: int, candidates: int, walkers: int = 0) -> Problem:
     )
     own, ground = rng.normal(0, 0.5, candidates), rng.uniform(0, 1.2, (candidates, 2))
     newcomer = rng.uniform(0, 5, candidates) * (walkers > 0)
-    return Problem(evidence, pixels, own, ground, newcomer, rng.normal(-3, 4, (candidates, walkers)))
+    return CraftedFrame(evidence, pixels, own, ground, newcomer, rng.normal(-3, 4, (candidates, walkers)))
 
 
-def apart(frame: Problem, size: int) -> Problem:
+def apart(frame: CraftedFrame, size: int) -> CraftedFrame:
     """The same candidates, so many at a time in rooms of their own: their evidence lies on rasters side by side."""
     room = np.arange(len(frame.own)) // size
     rooms, rows = int(room.max()) + 1, frame.pixels.raster.shape[1]
@@ -227,13 +227,13 @@ def apart(frame: Problem, size: int) -> Problem:
     for walker, likes in enumerate(frame.known.T):
         known[np.arange(len(room)), walker * rooms + room] = likes
     ground = frame.ground + 10.0 * room[:, None]
-    return Problem(boxes, pixels, frame.own, ground, frame.newcomer, known)
+    return CraftedFrame(boxes, pixels, frame.own, ground, frame.newcomer, known)
 
 
-def strangers(boxes: BoxEvidence, pixels: PixelEvidence) -> Problem:
+def strangers(boxes: BoxEvidence, pixels: PixelEvidence) -> CraftedFrame:
     """Two candidates far apart, whom nobody expects and who may come in where they stand."""
     ground = np.array([[0.0, 0.0], [2.0, 0.0]])
-    return Problem(boxes, pixels, np.zeros(2), ground, np.zeros(2), np.zeros((2, 0)))
+    return CraftedFrame(boxes, pixels, np.zeros(2), ground, np.zeros(2), np.zeros((2, 0)))
 
 
 @pytest.mark.parametrize("walkers", [0, 3])
@@ -374,8 +374,8 @@ def test_groups_are_decided_apart() -> None:
 
 
 @cache
-def pass_of(kind: str) -> FramePass:
-    return FramePass(room(), [kind] * 4, FEW_HEIGHTS)
+def pass_of(kind: str) -> Detector:
+    return Detector(room(), [kind] * 4, FEW_HEIGHTS)
 
 
 def show(kind: str, cameras: Sequence[Camera], standing: Floats) -> list[ViewEvidence]:
@@ -443,11 +443,11 @@ def test_one_behind_the_other_in_a_view(kind: str) -> None:
         assert explanation.people.parts[0, far] > -1.0  # a box that nobody expects is not missed
 
 
-def crossing(kind: str) -> tuple[Rig, FramePass]:
+def crossing(kind: str) -> tuple[Rig, Detector]:
     """Two cameras whose lines of sight to two people cross in four places."""
     west, south = looking("west", (-4.0, 0.0, 2.2)), looking("south", (0.0, -4.0, 2.2))
     rig = rig_of([west, south])
-    return rig, FramePass(rig, [kind] * 2, FEW_HEIGHTS)
+    return rig, Detector(rig, [kind] * 2, FEW_HEIGHTS)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -566,7 +566,7 @@ def test_a_blind_view_says_nothing(kind: str) -> None:
     standing = people((-0.83, 0.31), (0.9, -0.62))
     cameras = corner_cameras()
     seen = show(kind, cameras, standing)
-    three = FramePass(rig_of(cameras[:3]), [kind] * 3, FEW_HEIGHTS).explain(seen[:3], None)
+    three = Detector(rig_of(cameras[:3]), [kind] * 3, FEW_HEIGHTS).explain(seen[:3], None)
     four = pass_of(kind).explain([*seen[:3], None], None)
     np.testing.assert_allclose(four.people.ground, three.people.ground, atol=1e-9)
     np.testing.assert_array_equal(four.people.height, three.people.height)
@@ -585,7 +585,7 @@ def test_all_blind() -> None:
 def test_nobody_is_sought_where_nothing_speaks_for_it() -> None:
     for kind in KINDS:
         assert len(pass_of(kind).explain([None] * 4, None).ghosts) == 0
-    three = FramePass(rig_of(corner_cameras()[:3]), ["boxes"] * 3, FEW_HEIGHTS)
+    three = Detector(rig_of(corner_cameras()[:3]), ["boxes"] * 3, FEW_HEIGHTS)
     assert len(three.explain([no_boxes()] * 3, None).ghosts) == 0
 
 
@@ -595,7 +595,7 @@ def test_parts_stand_in_the_order_of_the_rig() -> None:
     kinds = ["pixels", "boxes", "pixels", "boxes"]
     standing = people((0.4, 0.3))
     seen: list[ViewEvidence] = [show(kind, [c], standing)[0] for kind, c in zip(kinds, cameras, strict=True)]
-    frame_pass = FramePass(rig_of(cameras), kinds, FEW_HEIGHTS)
+    frame_pass = Detector(rig_of(cameras), kinds, FEW_HEIGHTS)
     for silent, kind in enumerate(kinds):
         partly = [*seen]
         partly[silent] = show(kind, cameras[silent : silent + 1], people())[0]
@@ -607,7 +607,7 @@ def test_parts_stand_in_the_order_of_the_rig() -> None:
 def test_the_same_frame_twice(kind: str) -> None:
     rig = room()
     first, second = people((-0.83, 0.31), (0.9, -0.62), (0.5, 0.1)), people((0.1, 0.1))
-    fresh = FramePass(rig, [kind] * 4, FEW_HEIGHTS).explain(show(kind, rig.cameras, first), None)
+    fresh = Detector(rig, [kind] * 4, FEW_HEIGHTS).explain(show(kind, rig.cameras, first), None)
     used = pass_of(kind)
     used.explain(show(kind, rig.cameras, second), None)
     again = used.explain(show(kind, rig.cameras, first), None)

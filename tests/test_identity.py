@@ -18,15 +18,15 @@ from stseg.config import IdentityConfig
 from stseg.geometry import Grid
 from stseg.geometry.bodies import BodyTable
 from stseg.geometry.near import near_person
-from stseg.identity.gaps import drop_ghosts, drop_short, fill_gaps
-from stseg.identity.identities import Decision, Identities
-from stseg.identity.linking import assign, distances
-from stseg.identity.pieces import Piece, chain_pieces
-from stseg.identity.views import box_rows
-from stseg.identity.windows import LONGEST, SHORTEST, Window, window_length, windows
-from stseg.segmentation.blobs import Blobs, find_blobs
-from stseg.segmentation.division import STRANGER
-from stseg.tracks import TRAJECTORY
+from stseg.model.blobs import UNASSIGNED, Blobs
+from stseg.model.tables import TRAJECTORY
+from stseg.segmentation.blobs import find_blobs
+from stseg.tracking.assignment import assign, distances
+from stseg.tracking.pruning import drop_ghosts, drop_short, fill_gaps
+from stseg.tracking.track_boxes import box_rows
+from stseg.tracking.tracklets import Tracklet, form_tracklets
+from stseg.tracking.window_association import TrackAssociation, WindowAssignment
+from stseg.tracking.windows import LONGEST, SHORTEST, Window, window_length, windows
 
 RATE = 8.0
 CONFIG = IdentityConfig()
@@ -124,7 +124,7 @@ def blobs_in(
     names = np.array(chain or range(1, len(paths) + 1))[[frame in path for path in paths]]
     held = np.array([path[frame] for path in paths if frame in path]).reshape(-1, 2)
     occupied = column([*map(tuple, held), *(path[frame] for path in unheld if frame in path)])
-    owner = np.append(names, STRANGER)[near_person(GRID.ground, held, 0.4)]
+    owner = np.append(names, UNASSIGNED)[near_person(GRID.ground, held, 0.4)]
     label = np.where(occupied, owner, 0).astype(np.int32)
     log_odds = np.where(occupied, 2.0, -2.0).astype(np.float32)
     return find_blobs(label, log_odds, held, names, 0.4, GRID)
@@ -132,10 +132,10 @@ def blobs_in(
 
 def pieces_of(
     paths: Sequence[Path], frames: range, unheld: Sequence[Path] = (), chain: Sequence[int] | None = None
-) -> tuple[list[Blobs], list[Piece]]:
+) -> tuple[list[Blobs], list[Tracklet]]:
     """Blobs and pieces of some frames; each path is a chain of its own unless `chain` says otherwise."""
     blobs = [blobs_in(paths, frame, unheld, chain) for frame in frames]
-    return blobs, chain_pieces(blobs, frames[0], CONFIG)
+    return blobs, form_tracklets(blobs, frames[0], CONFIG)
 
 
 FRAMES = range(40, 52)
@@ -164,11 +164,11 @@ def test_a_gap_is_bridged_by_cells_of_the_track_itself() -> None:
     path = walk((-2, 0), (0.4, 0), FRAMES)
     seen = {f: p for f, p in path.items() if f != 45}
     blobs = [blobs_in([seen], f) for f in FRAMES]
-    for whose, bridged in ((1, True), (STRANGER, True), (2, False)):
+    for whose, bridged in ((1, True), (UNASSIGNED, True), (2, False)):
         label = np.where(column([path[45]]), whose, 0).astype(np.int32)
         nobody = np.zeros((0, 2)), np.zeros(0, np.int64)
         blobs[5] = find_blobs(label, np.ones(GRID.shape, np.float32), *nobody, 0.4, GRID)
-        (one,) = chain_pieces(blobs, FRAMES[0], CONFIG)
+        (one,) = form_tracklets(blobs, FRAMES[0], CONFIG)
         assert (45 in one.frames) == bridged
 
 
@@ -190,8 +190,8 @@ def test_a_chain_is_one_piece_over_its_gap() -> None:
     assert [piece.chain for piece in pieces] == [3, 4]
 
 
-def piece(chain: int, path: Path) -> Piece:
-    made = Piece(chain)
+def piece(chain: int, path: Path) -> Tracklet:
+    made = Tracklet(chain)
     for frame, place in path.items():
         made.add(frame, 0, np.array(place))
     return made
@@ -220,11 +220,11 @@ HALF = 4
 
 
 def decide(
-    identities: Identities, paths: Sequence[Path], stop: int, chain: Sequence[int] | None = None
-) -> tuple[list[Window], list[Decision], dict[tuple[int, int], int]]:
+    identities: TrackAssociation, paths: Sequence[Path], stop: int, chain: Sequence[int] | None = None
+) -> tuple[list[Window], list[WindowAssignment], dict[tuple[int, int], int]]:
     """Run windows of eight frames over paths; the identity of each path in each committed frame."""
     made: list[Window] = []
-    decisions: list[Decision] = []
+    decisions: list[WindowAssignment] = []
     names: dict[tuple[int, int], int] = {}
     for index, start in enumerate(range(0, stop - HALF, 8 - HALF)):
         end = start + 8
@@ -251,7 +251,7 @@ def ids_of(names: dict[tuple[int, int], int], path: int) -> list[int]:
     return [name for k, name in enumerate(found) if k == 0 or name != found[k - 1]]
 
 
-def events_of(decisions: Sequence[Decision], kind: str) -> list[tuple[int, int, int]]:
+def events_of(decisions: Sequence[WindowAssignment], kind: str) -> list[tuple[int, int, int]]:
     """Frame, id and other id of the events of one kind."""
     return [(f, i, other) for d in decisions for f, k, i, other, _ in d.events if k == kind]
 
@@ -259,7 +259,7 @@ def events_of(decisions: Sequence[Decision], kind: str) -> list[tuple[int, int, 
 def test_identities_last_over_windows() -> None:
     frames = range(32)
     paths = [walk((-3, -1), (0.5, 0), frames), walk((3, 1), (-0.5, 0), frames)]
-    windows_made, decisions, names = decide(Identities(RATE, CONFIG), paths, 32)
+    windows_made, decisions, names = decide(TrackAssociation(RATE, CONFIG), paths, 32)
     assert len(windows_made) == 7
     assert len(names) == 64
     assert sorted([ids_of(names, 0), ids_of(names, 1)]) == [[1], [2]]
@@ -272,7 +272,7 @@ def test_identities_follow_the_cells_whatever_the_chains_say() -> None:
     """Chains that begin anew in each window: what two windows share tells."""
     frames = range(24)
     paths = [walk((-3, -1), (0.5, 0), frames), walk((3, 1), (-0.5, 0), frames)]
-    identities = Identities(RATE, CONFIG)
+    identities = TrackAssociation(RATE, CONFIG)
     found = []
     for index, start in enumerate(range(0, 20, 4)):
         window = Window(index, start, start + 8, start + 2 if index else 0, start + 6)
@@ -288,7 +288,7 @@ def test_birth_and_death() -> None:
     stays = walk((-3, -1), (0.3, 0), range(40))
     leaves = walk((3, 1), (0.1, 0), range(11))
     comes = walk((0, 3), (0.2, 0), range(17, 40))
-    _, decisions, names = decide(Identities(RATE, CONFIG), [stays, leaves, comes], 40)
+    _, decisions, names = decide(TrackAssociation(RATE, CONFIG), [stays, leaves, comes], 40)
     ids = [ids_of(names, k) for k in range(3)]
     assert [len(i) for i in ids] == [1, 1, 1]
     assert len({i[0] for i in ids}) == 3
@@ -299,7 +299,7 @@ def test_birth_and_death() -> None:
 def test_somebody_unseen_for_a_moment_is_found_again() -> None:
     path = walk((-3, 0), (0.5, 0), range(40))
     seen = {f: p for f, p in path.items() if f not in range(13, 19)}
-    _, decisions, names = decide(Identities(RATE, CONFIG), [seen], 40)
+    _, decisions, names = decide(TrackAssociation(RATE, CONFIG), [seen], 40)
     assert set(names.values()) == {1}
     assert events_of(decisions, "hand-over") == [(19, 1, 0)]
     assert len(events_of(decisions, "birth")) == 1
@@ -311,7 +311,7 @@ def test_merge_and_split() -> None:
     frames = range(32)
     near = {f: 0.25 + 0.13 * abs(f - 16) for f in frames}
     paths: list[Path] = [{f: (-near[f], 0.1) for f in frames}, {f: (near[f], 0.1) for f in frames}]
-    _, decisions, names = decide(Identities(RATE, CONFIG), paths, 32)
+    _, decisions, names = decide(TrackAssociation(RATE, CONFIG), paths, 32)
     assert [len(ids_of(names, k)) for k in range(2)] == [1, 1]
     merges, splits = events_of(decisions, "merge"), events_of(decisions, "split")
     assert {(i, other) for _, i, other in [*merges, *splits]} == {(1, 2)}
@@ -329,7 +329,7 @@ def test_events_are_of_committed_frames_in_order() -> None:
         }
         for _ in range(4)
     ]
-    made, decisions, names = decide(Identities(RATE, CONFIG), paths, 40)
+    made, decisions, names = decide(TrackAssociation(RATE, CONFIG), paths, 40)
     for window, decision in zip(made, decisions, strict=True):
         assert decision.events == sorted(decision.events)
         for frame, kind, *_ in decision.events:

@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from stseg.errors import FormatError, SourceError
-from stseg.io.box_files import BoxTable, read_boxes
+from stseg.io.recording.box_files import BoxTable, read_boxes
 
 DATA = Path(os.environ.get("STSEG_DATA", Path(__file__).parents[1] / "../shared/data"))
 

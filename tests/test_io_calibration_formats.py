@@ -25,7 +25,7 @@ from stseg.io.calibrations.projection import read_projection
 from stseg.io.calibrations.structured import read_kalibr_yaml, read_krt_json, read_nvidia_json, read_pose_toml
 from stseg.io.calibrations.tsai import read_tsai_xml
 from stseg.io.calibrations.world import World, guess_unit, guess_up, median_height, require_height
-from stseg.io.rigs import read_rig
+from stseg.io.recording.rigs import read_rig
 
 DATA = Path(os.environ.get("STSEG_DATA", Path(__file__).parents[1] / "../shared/data"))
 SIZE = (640, 480)

@@ -20,7 +20,7 @@ from stseg.io.calibrations.foreign import Foreign
 from stseg.io.calibrations.opencv_xml import read_opencv_xml
 from stseg.io.calibrations.projection import read_projection
 from stseg.io.calibrations.world import Up, World
-from stseg.io.rigs import read_rig
+from stseg.io.recording.rigs import read_rig
 
 DATA = Path(os.environ.get("STSEG_DATA", Path(__file__).parents[1] / "../shared/data"))
 SIZE = (640, 480)

@@ -31,14 +31,14 @@ from stseg.arrays import Rows
 from stseg.commands.main import main
 from stseg.errors import ConfigError
 from stseg.geometry import Grid
-from stseg.io.box_files import read_boxes
 from stseg.io.exports.benchmarks import wildtrack_positions, wildtrack_size
 from stseg.io.exports.formats import FORMATS
 from stseg.io.exports.geographic import BEGINNING
 from stseg.io.exports.pedestrians import headings
 from stseg.io.extras import load_extra
-from stseg.io.runs import Run, RunWriter, read_run
-from stseg.tracks import TRAJECTORY, Tracks
+from stseg.io.recording.box_files import read_boxes
+from stseg.io.runfile.runs import Run, RunWriter, read_run
+from stseg.model.tables import TRAJECTORY, Tracks
 
 with warnings.catch_warnings():  # it tells on import of what it could do with more libraries
     warnings.simplefilter("ignore")

@@ -16,9 +16,9 @@ from hypothesis import strategies as st
 from stseg.arrays import AnyArray, Boxes, Observation
 from stseg.errors import ConfigError, FormatError, SourceError, StsegError
 from stseg.geometry import Camera, Grid, Rig
-from stseg.io.counted import Streams, count_frames, count_streams
-from stseg.io.frames import Moment, open_frames, read_background, read_camera
-from stseg.io.recording import CameraSource, Recording, Source, SourceKind
+from stseg.io.recording.frames import FrameSet, open_frames, read_background, read_camera
+from stseg.io.recording.recording import CameraSource, Recording, Source, SourceKind
+from stseg.io.recording.stream_index import StreamIndex, count_frames, index_streams
 
 DATA = Path(os.environ.get("STSEG_DATA", Path(__file__).parents[1] / "../shared/data"))
 SIZE = (16, 12)
@@ -159,7 +159,7 @@ def test_a_short_camera_is_an_error_or_blind(tmp_path: Path) -> None:
     said = (
         "boxes2.csv: camera cam2: found its end at frame 2 while others go on, expected frames as long as camera cam1"
     )
-    seen: list[Moment] = []
+    seen: list[FrameSet] = []
     with pytest.raises(SourceError, match=said), open_frames(recording(whole, short)) as reader:
         seen.extend(reader)
     assert [moment.frame for moment in seen] == [0, 1]
@@ -348,7 +348,7 @@ def test_far_frames_are_sought_exactly(hour: Path, parts: str, first: int) -> No
         "pattern": camera_of(hour / "part_*.mp4"),
         "list": camera_of(files[0], *files[1:]),
     }[parts]
-    streams = count_streams(rec)
+    streams = index_streams(rec)
     assert streams.length == 900
     assert list(map(len, streams.times[0])) == ([900] if parts == "whole" else [300] * 3)
     stop = min(first + 3, 900)
@@ -362,13 +362,13 @@ def test_times_that_tell_nothing_are_no_harm(hour: Path) -> None:
     """Where seeking lands cannot be told, the video is decoded from its beginning."""
     rec = camera_of(hour / "whole.mp4")
     for times in (np.zeros(900), np.full(900, np.nan), np.arange(900.0)):
-        with open_frames(rec, 700, 702, Streams(900, ((times,),))) as reader:
+        with open_frames(rec, 700, 702, StreamIndex(900, ((times,),))) as reader:
             assert [told(moment.views[0]) for moment in reader] == [700, 701]
 
 
 def test_one_camera_by_itself(hour: Path) -> None:
     rec = camera_of(hour / "part_*.mp4")
-    views = read_camera(rec, 0, range(10, 900, 290), count_streams(rec))
+    views = read_camera(rec, 0, range(10, 900, 290), index_streams(rec))
     assert [told(view) for view in views] == [10, 300, 590, 880]
 
 

@@ -17,18 +17,18 @@ from stseg.arrays import AnyArray, Bytes
 from stseg.config import LiveConfig
 from stseg.errors import RigError, SourceError
 from stseg.geometry import Rig
-from stseg.io.arriving_files import ArrivingFiles, FileNotes
-from stseg.io.counted import count_frames
-from stseg.io.followed_cameras import FollowedCameras
-from stseg.io.followed_files import FollowedFiles
-from stseg.io.frames import open_frames
-from stseg.io.live import LiveMoment, is_live, now
-from stseg.io.live_stream import Capture
-from stseg.io.provenance import gather_provenance
-from stseg.io.recording import CameraSource, Recording, Source, without_passwords
-from stseg.io.rig_text import format_rig
-from stseg.io.rigs import parse_rig, read_rig
-from stseg.io.video_stream import VideoStream
+from stseg.io.live.arriving_files import ArrivingFiles, FileNotes
+from stseg.io.live.followed_cameras import FollowedCameras
+from stseg.io.live.followed_files import FollowedFiles
+from stseg.io.live.live_rig import LiveFrameSet, is_live, now
+from stseg.io.live.live_stream import Capture
+from stseg.io.recording.frames import open_frames
+from stseg.io.recording.recording import CameraSource, Recording, Source, without_passwords
+from stseg.io.recording.rig_text import format_rig
+from stseg.io.recording.rigs import parse_rig, read_rig
+from stseg.io.recording.stream_index import count_frames
+from stseg.io.recording.video_stream import VideoStream
+from stseg.io.runfile.provenance import gather_provenance
 
 QUICK = LiveConfig(settled=0.3, silence=0.5, pause=0.02, longest_pause=1.0, stale=0.1)
 
@@ -200,7 +200,7 @@ def opening(*cameras: StandIn) -> Callable[[str, float], Capture]:
     return open_own
 
 
-def taken(moments: FollowedCameras, count: int) -> list[LiveMoment]:
+def taken(moments: FollowedCameras, count: int) -> list[LiveFrameSet]:
     return [next(moments) for _ in range(count)]
 
 

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from stseg.arrays import Bytes
 from stseg.errors import SourceError
-from stseg.io.image_stream import image_paths
-from stseg.io.indexed_png import decode_indexed, stores_numbers
-from stseg.io.pictures import read_picture
-from stseg.io.recording import SourceKind
+from stseg.io.recording.image_stream import image_paths
+from stseg.io.recording.indexed_png import decode_indexed, stores_numbers
+from stseg.io.recording.pictures import read_picture
+from stseg.io.recording.recording import SourceKind
 
 GREY, INDEXED = 0, 3
 NONE, SUB, UP, AVERAGE, PAETH = range(5)

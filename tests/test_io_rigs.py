@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from strategies import recordings
 
 from stseg.errors import CalibrationError, InputError, OutputError, RigError
-from stseg.io.recording import CameraSource, Recording, Source
-from stseg.io.rigs import parse_rig, read_rig, write_rig
+from stseg.io.recording.recording import CameraSource, Recording, Source
+from stseg.io.recording.rigs import parse_rig, read_rig, write_rig
 
 RIG = """\
 format = 1

@@ -24,14 +24,14 @@ from run_files import (
 )
 
 from stseg.arrays import Bytes
-from stseg.commands.overview import look_over
+from stseg.commands.run_overview import look_over
 from stseg.errors import FormatError, OutputError
 from stseg.geometry import Grid
-from stseg.io import layout, part_file
-from stseg.io.outputs import part_of, replacing
-from stseg.io.rig_text import format_rig
-from stseg.io.runs import RunWriter, read_run, read_trajectory
-from stseg.tracks import RATES, TRAJECTORY, Tracks
+from stseg.io.outputs.whole_files import part_of, replacing
+from stseg.io.recording.rig_text import format_rig
+from stseg.io.runfile import layout, part_file
+from stseg.io.runfile.runs import RunWriter, read_run, read_trajectory
+from stseg.model.tables import RATES, TRAJECTORY, Tracks
 
 VIEWS: Bytes = np.full((3, 4, 6), 2, np.uint8)
 

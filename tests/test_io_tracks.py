@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from stseg.errors import FormatError, OutputError
-from stseg.io.tracks import POSITION, read_tracks_csv, write_tracks_csv, write_truth_csv
-from stseg.tracks import TRAJECTORY
+from stseg.io.track_csv import POSITION, read_tracks_csv, write_tracks_csv, write_truth_csv
+from stseg.model.tables import TRAJECTORY
 
 
 @pytest.fixture

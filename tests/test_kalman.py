@@ -13,13 +13,13 @@ from scenes import CONFIG, FRAME_RATE, found, people, room
 from stseg.arrays import Floats, Rows
 from stseg.config import Config, KalmanConfig
 from stseg.errors import ConfigError
-from stseg.identity.whole import own_tracks
-from stseg.trackers import Scene, Shown
+from stseg.trackers import FrameObservations, FusedFrame
 from stseg.trackers.kalman import KalmanTracker
 from stseg.trackers.motion import begun, carried, corrected, surprise
+from stseg.tracking.final_tracks import committed_tracks
 
 RIG = room()
-UNSEEN = Shown((None,) * 4, (None,) * 4)
+UNSEEN = FrameObservations((None,) * 4, (None,) * 4)
 EMPTY = np.full(RIG.grid.shape, -3.0, np.float32)
 
 
@@ -30,7 +30,7 @@ def follow(frames: list[list[tuple[float, float]]], config: Config = CONFIG) -> 
         commit
         for frame, places in enumerate(frames)
         for commit in tracker.add(
-            Scene(frame, found(people(*places), tracker.expected(frame)), found(people()), EMPTY), UNSEEN
+            FusedFrame(frame, found(people(*places), tracker.expected(frame)), found(people()), EMPTY), UNSEEN
         )
     ]
     assert tracker.finish() == []
@@ -118,7 +118,7 @@ def test_identities_stand_short_tracks_go_and_gaps_are_filled() -> None:
     places = [[(-1.0, 0.0)]] * 8 + [[]] * 2 + [[(-1.0, 0.0)]] * 8
     places[3] = [(-1.0, 0.0), (1.5, 1.5)]
     rows, events = follow(places)
-    whole = own_tracks(rows, events, FRAME_RATE, CONFIG.identity)
+    whole = committed_tracks(rows, events, FRAME_RATE, CONFIG.identity)
     assert whole.trajectory["id"].tolist() == [1] * 18
     assert whole.trajectory["frame"].tolist() == list(range(18))
     assert sorted(set(whole.identity.tolist())) == [0, 1]
@@ -140,7 +140,7 @@ def test_heights_tell_apart_two_who_turn_back_where_they_meet() -> None:
         away = 0.05 + step * abs(frame - turned)
         standing = people((-away, 0.0, short), (away, 0.0, tall))
         shown = found(standing, tracker.expected(frame))
-        (commit,) = tracker.add(Scene(frame, shown, found(people()), EMPTY), UNSEEN)
+        (commit,) = tracker.add(FusedFrame(frame, shown, found(people()), EMPTY), UNSEEN)
         rows = commit.trajectory[np.argsort(commit.trajectory["raw_x"])]
         names.append(rows["id"].tolist())
     assert names == [names[0]] * len(names)

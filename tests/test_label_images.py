@@ -14,11 +14,11 @@ from stseg.commands.main import main
 from stseg.config import LabelConfig
 from stseg.errors import OutputError
 from stseg.geometry import Rig
-from stseg.io.image_stream import ImageStream
-from stseg.io.label_images import LabelImages
-from stseg.io.recording import CameraSource, Recording, Source
-from stseg.io.runs import RunWriter
-from stseg.tracks import Tracks
+from stseg.io.outputs.label_images import LabelImages
+from stseg.io.recording.image_stream import ImageStream
+from stseg.io.recording.recording import CameraSource, Recording, Source
+from stseg.io.runfile.runs import RunWriter
+from stseg.model.tables import Tracks
 
 PALETTE = np.random.default_rng(0).integers(0, 256, (256, 3)).astype(np.uint8)
 FRAMES = 4

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
-from stseg.io.label_images import LabelImages
+from stseg.io.outputs.label_images import LabelImages
 
 sys.path.append(str(Path(__file__).parents[1] / "tools"))
 

@@ -14,13 +14,21 @@ from scenes import FEW_HEIGHTS, boxes, corner_cameras, likelihoods, no_boxes, pe
 
 from stseg.arrays import Flags, Floats, Ints
 from stseg.config import LevelConfig, OccupancyConfig
+from stseg.detection.detector import Detector
 from stseg.geometry import Grid
 from stseg.geometry.near import near_person
-from stseg.ghosts.explain import FramePass
-from stseg.ghosts.people import Explanation, ViewEvidence
-from stseg.occupancy.fusion import Rates, Tally, log_odds_terms
-from stseg.occupancy.level import BESIDE, CLUTTER, MISS, Level, cells_of_one, fill_counts, inside_bodies
-from stseg.occupancy.tables import TOP, UNSEEN, Levels
+from stseg.geometry.summed_area import TOP, UNSEEN, Levels
+from stseg.model.people import Explanation, ViewEvidence
+from stseg.occupancy.fusion import Accumulator, Rates, log_odds_terms
+from stseg.occupancy.rate_calibration import (
+    BESIDE,
+    CLUTTER,
+    MISS,
+    RateCalibration,
+    cells_of_one,
+    fill_counts,
+    inside_bodies,
+)
 from stseg.occupancy.volume import Occupancy
 
 FIRST = Rates(0.2, 0.07, 0.07)
@@ -30,16 +38,16 @@ RIG = rig_of(corner_cameras(), cell=0.5, planes=3)
 STANDING = people((-0.75, 0.25), (0.75, -0.75))
 
 
-def one_level(views: int = 1) -> Level:
+def one_level(views: int = 1) -> RateCalibration:
     """Ten frames a second."""
-    return Level([FIRST] * views, 10.0, CONFIG)
+    return RateCalibration([FIRST] * views, 10.0, CONFIG)
 
 
 def teach(
     view: int, shown: reference.Shown, near: Ints, inside: Flags, trusted: Flags, rates: list[Rates], looks: float
 ) -> tuple[Floats, Floats]:
     """What the kernel counts of one of several views of equal weight."""
-    tally = Tally(inside.shape)
+    tally = Accumulator(inside.shape)
     sure = np.ones(inside.shape, np.float32)
     for levels, share, rate in zip(*shown, rates, strict=True):
         tally.add(levels, log_odds_terms(rate), 1.0, share, sure, near)
@@ -143,7 +151,7 @@ def test_the_first_guess_holds_at_first_and_comes_back() -> None:
 
 
 def test_memory_is_in_seconds() -> None:
-    slow, fast = Level([FIRST], 5.0, CONFIG), Level([FIRST], 20.0, CONFIG)
+    slow, fast = RateCalibration([FIRST], 5.0, CONFIG), RateCalibration([FIRST], 20.0, CONFIG)
     once = np.ones((1, 3))
     for level, frames in ((slow, 100), (fast, 400)):
         for _ in range(frames):
@@ -171,7 +179,7 @@ def frame(kind: str, lots: int) -> tuple[list[ViewEvidence], Explanation]:
     if kind == "pixels":
         clean = likelihoods(RIG.cameras, STANDING)
         seen = [np.where(rng.random(m.shape) < 0.1, 1 - m, m).astype(np.float32) for m in clean]
-    return seen, FramePass(RIG, [kind] * 4, FEW_HEIGHTS).explain(seen, None)
+    return seen, Detector(RIG, [kind] * 4, FEW_HEIGHTS).explain(seen, None)
 
 
 def occupancy(kind: str) -> Occupancy:

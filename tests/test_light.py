@@ -13,9 +13,9 @@ from stseg.arrays import Bytes, Flags, Floats, Singles
 from stseg.config import LightConfig
 from stseg.errors import ConfigError
 from stseg.foreground import Background, Chromatic, Codebook, LightChange, LightWatch, Mixture
-from stseg.foreground.light_change import still_gain
-from stseg.foreground.light_field import gain_field
-from stseg.foreground.sight import Sight
+from stseg.foreground.gain_field import gain_field
+from stseg.foreground.illumination import still_gain
+from stseg.foreground.view_foreground import ViewForeground
 
 SIZE = (64, 48)
 RATE = 10.0
@@ -132,7 +132,7 @@ def test_somebody_before_the_lens_is_no_light() -> None:
 
 def test_a_blind_view_has_no_evidence_and_says_when() -> None:
     watch = watched(Mixture)
-    sight, rng = Sight(watch), np.random.default_rng(5)
+    sight, rng = ViewForeground(watch), np.random.default_rng(5)
     nobody = np.zeros(SIZE[::-1], bool)
     assert sight.evidence(None) is None
     for _ in range(EVENT):
@@ -142,7 +142,7 @@ def test_a_blind_view_has_no_evidence_and_says_when() -> None:
     assert seen[0] is None
     assert all(one is not None for one in seen[10:])
     assert sight.light_changes == [LightChange(EVENT + 1, EVENT + 9, 9)]
-    assert Sight().light_changes == []
+    assert ViewForeground().light_changes == []
 
 
 @settings(max_examples=15, deadline=None)

@@ -11,7 +11,7 @@ import pytest
 import reference_detection as reference
 from scenes import corner_cameras
 
-from stseg.occupancy.pillars import Pillars
+from stseg.detection.pillar_strips import Pillars
 
 sys.path.append(str(Path(__file__).parents[1] / "tools"))
 

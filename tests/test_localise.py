@@ -16,11 +16,11 @@ from stseg.arrays import Floats, Singles
 from stseg.config import OccupancyConfig
 from stseg.errors import SourceError
 from stseg.geometry import Camera, Grid, Rig
-from stseg.ghosts.people import Explanation
+from stseg.geometry.sampling import Sampling, SamplingKind
+from stseg.geometry.summed_area import TOP, UNSEEN, fill_means, fill_points, fill_sums, sum_of
+from stseg.model.people import Explanation
 from stseg.occupancy.fusion import Rates, log_odds_terms, synergy_terms
-from stseg.occupancy.localise import Localiser
-from stseg.occupancy.sampling import Sampling, SamplingKind
-from stseg.occupancy.tables import TOP, UNSEEN, fill_means, fill_points, fill_sums, sum_of
+from stseg.occupancy.localisation import Localiser
 from stseg.occupancy.volume import Occupancy
 
 RATES = Rates(0.2, 0.07, 0.07)

@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 
 from stseg.arrays import Rows
 from stseg.geometry import Grid, Rig
+from stseg.model.tables import TRAJECTORY
 from stseg.report.maps import Bins, blind_map, density, dwell, haunts, heat_map, warm_colours
 from stseg.report.plan_map import PlanMap
-from stseg.tracks import TRAJECTORY
 
 GRID = Grid((0.0, 4.0), (-1.0, 2.0), 0.5, 1.8, 3)
 RIG = Rig("hall", 2.0, GRID, ())

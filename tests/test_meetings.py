@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from stseg.arrays import Rows
-from stseg.identity.meetings import encounters, touches
-from stseg.segmentation.blobs import Blobs
+from stseg.model.blobs import Blobs
 from stseg.trackers.rows import event_rows
+from stseg.tracking.encounters import encounters, touches
 
 LENGTH, RATE = 30, 5.0
 

@@ -15,16 +15,16 @@ from strategies import numbers, rigs
 
 from stseg.arrays import Boxes, Floats, Ints, Singles
 from stseg.config import OccupancyConfig
+from stseg.detection.detector import Detector
 from stseg.geometry import Grid, Rig
 from stseg.geometry.bodies import BodyTable
-from stseg.ghosts.boxes import TOLERANCE
-from stseg.ghosts.explain import FramePass
-from stseg.ghosts.people import Explanation, ViewEvidence
+from stseg.geometry.sampling import Sampling, SamplingKind
+from stseg.geometry.summed_area import TOP
+from stseg.model.box_fit import TOLERANCE
+from stseg.model.people import Explanation, ViewEvidence
+from stseg.occupancy.box_planes import fill_match_of_planes, likelihood_of
 from stseg.occupancy.clutter import clutter, clutter_weights
 from stseg.occupancy.fusion import Rates, log_odds_terms
-from stseg.occupancy.instances import fill_match_of_planes, likelihood_of
-from stseg.occupancy.sampling import Sampling, SamplingKind
-from stseg.occupancy.tables import TOP
 from stseg.occupancy.volume import Occupancy
 
 COARSE = rig_of(corner_cameras(), cell=0.5, planes=3)
@@ -331,7 +331,7 @@ def test_a_person_is_a_column_of_occupied_cells(kind: str) -> None:
     seen: list[ViewEvidence] = list(likelihoods(rig.cameras, standing))
     if kind == "boxes":
         seen = [boxes(camera, standing) for camera in rig.cameras]
-    explanation = FramePass(rig, [kind] * 4, FEW_HEIGHTS).explain(seen, None)
+    explanation = Detector(rig, [kind] * 4, FEW_HEIGHTS).explain(seen, None)
     fused = Occupancy(rig, [kind] * 4, CONFIG, FEW_HEIGHTS).fuse(seen, explanation)
     away = np.hypot(*np.moveaxis(rig.grid.ground[:, :, None] - standing[:, :2], -1, 0)).min(2)
     assert fused.shape == rig.grid.shape
@@ -339,7 +339,7 @@ def test_a_person_is_a_column_of_occupied_cells(kind: str) -> None:
     assert (fused[:, away > 0.6] < 0).all()
     # A volume from nobody's evidence holds nobody.
     empty: list[ViewEvidence] = [flat(0.0)] * 4 if kind == "pixels" else [no_boxes()] * 4
-    nobody = FramePass(rig, [kind] * 4, FEW_HEIGHTS).explain(empty, None)
+    nobody = Detector(rig, [kind] * 4, FEW_HEIGHTS).explain(empty, None)
     assert (Occupancy(rig, [kind] * 4, CONFIG, FEW_HEIGHTS).fuse(empty, nobody) < PRIOR).all()
 
 

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from stseg.arrays import AnyArray, Floats
 from stseg.errors import SourceError
 from stseg.geometry import Camera
-from stseg.io.packets import packet_times
-from stseg.io.recording import Source
-from stseg.io.video_stream import VideoStream
+from stseg.io.recording.packets import packet_times
+from stseg.io.recording.recording import Source
+from stseg.io.recording.video_stream import VideoStream
 
 SIZE = (32, 24)
 CAMERA = Camera("cam1", SIZE, np.eye(3), np.array([0.0, 0.0, -1.0]))

@@ -11,8 +11,8 @@ import run_files
 from browser import CHROMIUM, Page, chromium
 
 from stseg.commands.report import report
-from stseg.io.runs import RunWriter
-from stseg.tracks import TRACK
+from stseg.io.runfile.runs import RunWriter
+from stseg.model.tables import TRACK
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium (.ci/run installs it where it may)")
 

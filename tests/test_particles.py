@@ -16,8 +16,8 @@ from stseg.arrays import Boxes, Bytes, Floats, Observation, Rows, Singles
 from stseg.config import Config, ParticleConfig
 from stseg.errors import ConfigError, SourceError
 from stseg.geometry import Camera
-from stseg.trackers import Commit, Scene, Shown
-from stseg.trackers.colour import colour_views
+from stseg.trackers import Commit, FrameObservations, FusedFrame
+from stseg.trackers.colour_views import colour_views
 from stseg.trackers.particles import ParticleTracker
 from stseg.trackers.particles.appearance import SAMPLES, Appearance
 from stseg.trackers.particles.axes import HELD, _middle_of_shortest_half, fill_axes, meet
@@ -46,15 +46,15 @@ def painted(camera: Camera, standing: Floats, shirts: tuple[tuple[int, int, int]
     return image
 
 
-def shown(standing: Floats, shirts: tuple[tuple[int, int, int], ...] = SHIRTS) -> Shown:
+def shown(standing: Floats, shirts: tuple[tuple[int, int, int], ...] = SHIRTS) -> FrameObservations:
     """What the four cameras show of people, and perfect foreground."""
     likelihood = [(mask(camera, standing) / np.float32(255)).astype(np.float32) for camera in RIG.cameras]
-    return Shown([painted(camera, standing, shirts) for camera in RIG.cameras], likelihood)
+    return FrameObservations([painted(camera, standing, shirts) for camera in RIG.cameras], likelihood)
 
 
-def scene(frame: int, standing: Floats) -> Scene:
+def scene(frame: int, standing: Floats) -> FusedFrame:
     """A frame in which the pass finds these people."""
-    return Scene(frame, found(standing), found(people()), np.full(RIG.grid.shape, -3.0, np.float32))
+    return FusedFrame(frame, found(standing), found(people()), np.full(RIG.grid.shape, -3.0, np.float32))
 
 
 def rows_of(commits: list[Commit]) -> Rows:
@@ -374,18 +374,18 @@ def test_without_colour_it_says_what_it_lacks() -> None:
     for observations, kind in ((masks, "masks"), (boxes, "boxes"), (masks[:2] + boxes[:2], "boxes and masks")):
         tracker = ParticleTracker(RIG, QUICK, 0)
         with pytest.raises(SourceError, match=f"particles.*frame 3.*{kind} and no colour"):
-            tracker.add(scene(3, standing), Shown(observations, [None] * 4))
+            tracker.add(scene(3, standing), FrameObservations(observations, [None] * 4))
 
 
 def test_one_camera_in_colour_is_enough_and_blind_frames_are_borne() -> None:
     standing = people((0.0, 0.0))
     full = shown(standing)
     tracker = ParticleTracker(RIG, QUICK, 0)
-    alone = Shown(
+    alone = FrameObservations(
         [full.observations[0], mask(RIG.cameras[1], standing), None, None],
         [full.evidence[0], full.evidence[1], None, None],
     )
-    blind = Shown([None] * 4, [None] * 4)
+    blind = FrameObservations([None] * 4, [None] * 4)
     rows = rows_of([*tracker.add(scene(0, standing), alone), *tracker.add(scene(1, standing), blind)])
     assert rows["id"].tolist() == [1, 1]
     assert [view is not None for view in colour_views(alone, "particles", 0)] == [True, False, False, False]
@@ -402,7 +402,7 @@ def test_a_lens_bends_the_raster_not_the_people() -> None:
     camera = looking("barrel", (-3.5, -3.5, 2.6), distortion=(-0.2, 0.03, 0.0, 0.0, 0.0))
     view, standing = ParticleView(camera, SIZE[0]), people((0.6, 0.4))
     silhouette = (mask(camera, standing) / np.float32(255)).astype(np.float32)
-    seen = colour_views(Shown([painted(camera, standing)], [silhouette]), "particles", 0)[0]
+    seen = colour_views(FrameObservations([painted(camera, standing)], [silhouette]), "particles", 0)[0]
     assert seen is not None
     look, axes = (
         view.look(seen, standing[:, :2], standing[:, 2], [Appearance.unknown()], np.array([0.3])),

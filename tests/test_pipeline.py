@@ -12,12 +12,12 @@ from scenes import CONFIG, Moment, box_moments, mask_moments, room, walkers
 
 from stseg.accelerate import python_form
 from stseg.arrays import Boxes, Ints, Labels, Rows
+from stseg.detection.scoring import set_score
+from stseg.engine.pipeline import CommittedFrames, Pipeline
 from stseg.evaluation import evaluate
-from stseg.foreground.sight import Sight
+from stseg.foreground.view_foreground import ViewForeground
 from stseg.geometry import Rig
-from stseg.ghosts.scoring import set_score
-from stseg.pipeline import Pipeline, Step
-from stseg.tracks import CANDIDATE, RATES, TIMING, Tracks
+from stseg.model.tables import CANDIDATE, RATES, TIMING, Tracks
 
 INTERPRETED = python_form(set_score) is set_score
 """Without its compiler the recording must be shorter: a frame takes a hundred times as long."""
@@ -36,7 +36,7 @@ def recording(kind: str, stop: int) -> tuple[Moment, ...]:
 class Run:
     """Everything that a run gave."""
 
-    steps: list[Step]
+    steps: list[CommittedFrames]
     tracks: Tracks
     identity: Ints
     advanced: list[int]
@@ -53,7 +53,7 @@ class Run:
 
 
 def run(kind: str, moments: Iterable[Moment], tracker: str = "cut", first: int = 0) -> Run:
-    pipeline = Pipeline(RIG, [Sight() for _ in RIG.cameras], [kind] * len(RIG.cameras), CONFIG, tracker)
+    pipeline = Pipeline(RIG, [ViewForeground() for _ in RIG.cameras], [kind] * len(RIG.cameras), CONFIG, tracker)
     advanced: list[int] = []
     steps = list(pipeline.steps(moments, first, advanced.append))
     trajectory = np.concatenate([step.commit.trajectory for step in steps])
@@ -197,7 +197,7 @@ def test_where_a_run_began_is_soon_forgotten(first: int) -> None:
     Its first frame is explained as any first frame is, by itself.
     """
     part = run("boxes", recording("boxes", FRAMES)[first:FRAMES], "frames", first)
-    pipeline = Pipeline(RIG, [Sight() for _ in RIG.cameras], ["boxes"] * 4, CONFIG, "frames")
+    pipeline = Pipeline(RIG, [ViewForeground() for _ in RIG.cameras], ["boxes"] * 4, CONFIG, "frames")
     views = recording("boxes", FRAMES)[first].views
     alone = pipeline.frame_pass.explain([view for view in views if isinstance(view, Boxes)], None)
     np.testing.assert_array_equal(part.steps[0].commit.scenes[0].people.ground, alone.people.ground)
@@ -220,7 +220,7 @@ def test_short_recordings(frames: int) -> None:
 
 
 def test_no_moments_no_steps() -> None:
-    pipeline = Pipeline(RIG, [Sight() for _ in RIG.cameras], ["boxes"] * 4, CONFIG, "cut")
+    pipeline = Pipeline(RIG, [ViewForeground() for _ in RIG.cameras], ["boxes"] * 4, CONFIG, "cut")
     assert list(pipeline.steps([], 0, lambda _: None)) == []
 
 

@@ -16,14 +16,14 @@ from stseg.config import LabelConfig
 from stseg.errors import ConfigError
 from stseg.geometry import Camera
 from stseg.geometry.bodies import SILHOUETTE, BodyTable
-from stseg.ghosts.outlines import outlines
-from stseg.labels.contrast import edge_costs
+from stseg.graphcut.energy import QUANTUM
+from stseg.labels.adjacency import edge_costs
+from stseg.labels.body_masks import Patches, pillar_patches
 from stseg.labels.energy import PixelEnergy, most_likely, pixel_energy
-from stseg.labels.nearest import Nearest, nearest
-from stseg.labels.pillars import Patches, pillar_patches
-from stseg.labels.standing import Standing
+from stseg.labels.label_likelihood import LabelLikelihood, nearest
+from stseg.labels.placed_people import PlacedPeople
 from stseg.labels.views import ViewLabels, view_labels
-from stseg.segmentation.energy import QUANTUM
+from stseg.model.outlines import outlines
 
 SILHOUETTE_WIDTH = 2 * float(np.trapezoid(SILHOUETTE[:, 1], SILHOUETTE[:, 0]))
 EXACT = LabelConfig(draws=1, place_spread=1e-3, height_spread=0.0, width=SILHOUETTE_WIDTH, width_spread=0.0)
@@ -32,9 +32,9 @@ FEW = LabelConfig(draws=8, place_spread=0.03, height_spread=0.03, width=SILHOUET
 """Almost certain ones: the people of the micro-scenes have no arms and legs."""
 
 
-def standing(everybody: Floats, spread: float = 0.0) -> Standing:
+def standing(everybody: Floats, spread: float = 0.0) -> PlacedPeople:
     covariance = np.tile(spread**2 * np.eye(2), (len(everybody), 1, 1))
-    return Standing(everybody[:, :2], covariance, everybody[:, 2])
+    return PlacedPeople(everybody[:, :2], covariance, everybody[:, 2])
 
 
 def labels_in(camera: Camera, everybody: Floats, config: LabelConfig = FEW) -> Labels:
@@ -128,7 +128,7 @@ def test_without_colours_all_pairs_cost_the_same() -> None:
 # The energy
 
 
-def random_nearest(rng: np.random.Generator, count: int, shape: tuple[int, int]) -> Nearest:
+def random_nearest(rng: np.random.Generator, count: int, shape: tuple[int, int]) -> LabelLikelihood:
     """People whose rectangles lie anywhere in a window."""
     rows, columns = shape
     top, left = rng.integers(0, rows, count), rng.integers(0, columns, count)
@@ -139,7 +139,7 @@ def random_nearest(rng: np.random.Generator, count: int, shape: tuple[int, int])
     return nearest(Patches(edges, first, share), rng.random(count))
 
 
-def problem(seed: int, shape: tuple[int, int]) -> tuple[PixelEnergy, Nearest, Singles, Bytes, LabelConfig]:
+def problem(seed: int, shape: tuple[int, int]) -> tuple[PixelEnergy, LabelLikelihood, Singles, Bytes, LabelConfig]:
     rng = np.random.default_rng(seed)
     config = LabelConfig(
         detection=float(rng.uniform(0, 4)), adjacency=float(rng.uniform(0, 2)), alike=200.0, slope=60.0, outside=0.1

@@ -11,7 +11,7 @@ from recordings import FRAMES, OPTIONS, track, write_recording
 from stseg.accelerate import python_form
 from stseg.commands.main import main
 from stseg.commands.plan import Forecast
-from stseg.ghosts.scoring import set_score
+from stseg.detection.scoring import set_score
 
 pytestmark = pytest.mark.skipif(python_form(set_score) is set_score, reason="too slow without a compiler")
 

@@ -13,14 +13,14 @@ from scenes import FRAME_RATE
 from stseg.accelerate import python_form
 from stseg.arrays import Floats
 from stseg.commands.main import main
-from stseg.commands.sights import make_sights
 from stseg.config import Config, SegmentConfig
+from stseg.detection.scoring import set_score
+from stseg.engine.backgrounds import make_foregrounds
 from stseg.geometry import Camera, Grid, Rig
-from stseg.ghosts.scoring import set_score
-from stseg.io.counted import count_streams
-from stseg.io.frames import read_camera
-from stseg.io.recording import CameraSource, Recording, Source
-from stseg.io.runs import Run, read_run
+from stseg.io.recording.frames import read_camera
+from stseg.io.recording.recording import CameraSource, Recording, Source
+from stseg.io.recording.stream_index import index_streams
+from stseg.io.runfile.runs import Run, read_run
 
 pytestmark = pytest.mark.skipif(python_form(set_score) is set_score, reason="too slow without a compiler")
 
@@ -135,8 +135,8 @@ def test_a_camera_learns_its_background_where_it_sees(tmp_path: Path) -> None:
     source = CameraSource(Source("video", tmp_path / "a.avi"), None, 40, "blind")
     late = Recording(tmp_path / "rig.toml", Rig("late", FRAME_RATE, Grid((0, 1), (0, 1)), (eye,)), (source,))
     config = Config(segments=SegmentConfig(background=2.0))
-    for streams in (None, count_streams(late)):
-        (sight,) = make_sights(late, config, 0, 100, streams=streams)
+    for streams in (None, index_streams(late)):
+        (sight,) = make_foregrounds(late, config, 0, 100, streams=streams)
         assert sight.evidence(None) is None
         (view,) = read_camera(late, 0, [50], streams)
         likelihood = sight.evidence(view)

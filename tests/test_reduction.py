@@ -14,13 +14,13 @@ from strategies import BARREL, numbers
 
 from stseg.accelerate import python_form
 from stseg.commands.main import main
+from stseg.detection.scoring import set_score
 from stseg.geometry import Grid, Rig
 from stseg.geometry.reduction import greatest_reduction
-from stseg.ghosts.scoring import set_score
-from stseg.io.frames import open_frames, read_background
-from stseg.io.recording import CameraSource, Recording, Source
-from stseg.io.rigs import read_rig
-from stseg.io.runs import read_run
+from stseg.io.recording.frames import open_frames, read_background
+from stseg.io.recording.recording import CameraSource, Recording, Source
+from stseg.io.recording.rigs import read_rig
+from stseg.io.runfile.runs import read_run
 
 GRID = Grid((-2.0, 2.0), (-2.0, 2.0))
 

@@ -19,18 +19,18 @@ from stseg.arrays import AnyArray, Boxes, Bytes, Rows
 from stseg.commands.report import report, write_pictures
 from stseg.errors import ConfigError, OutputError, SourceError
 from stseg.geometry import Camera, Grid, Rig
-from stseg.io.recording import CameraSource, Source
-from stseg.io.runs import RunWriter, read_run
+from stseg.io.recording.recording import CameraSource, Source
+from stseg.io.runfile.runs import RunWriter, read_run
+from stseg.model.tables import EVENT, TRACK, TRAJECTORY, Tracks
 from stseg.report import marginal_picture, overlay, plan_view, spacetime_picture, volume_picture
 from stseg.report.charts import Span, clock_time, lives_chart, people_chart
 from stseg.report.colours import NIGHT, PAPER, track_colour
 from stseg.report.figures import backdrop
 from stseg.report.labels import place_labels
-from stseg.report.overlay import View, pillar_outline
+from stseg.report.overlay import OverlayView, pillar_outline
 from stseg.report.plan import plan_map
 from stseg.report.slices import colours_of
 from stseg.report.spacetime import Block
-from stseg.tracks import EVENT, TRACK, TRAJECTORY, Tracks
 
 GRID = Grid((0.0, 4.0), (-1.0, 2.0), 0.5, 1.8, 3)
 
@@ -202,12 +202,12 @@ def test_the_overlay_puts_a_dot_where_the_feet_are() -> None:
     picture = overlay(camera, GRID, None, people, 4, width=640)
     assert picture.shape == (480, 640, 3)
     for row in people:
-        foot = View(camera, 640).pixel(np.array([row["x"], row["y"]]), 0.0)
+        foot = OverlayView(camera, 640).pixel(np.array([row["x"], row["y"]]), 0.0)
         assert at(picture, foot) == track_colour(int(row["id"]))
 
 
 def test_a_pillar_is_as_tall_as_its_person() -> None:
-    view = View(front_camera(), 640)
+    view = OverlayView(front_camera(), 640)
     (body,) = pillar_outline(view, np.array([2.0, 0.0]), 1.8)
     foot, head = (view.pixel(np.array([2.0, 0.0]), z) for z in (0.0, 1.8))
     assert abs(body[:, 1].min() - head[1]) < 6 and abs(body[:, 1].max() - foot[1]) < 8
@@ -217,7 +217,7 @@ def test_a_pillar_is_as_tall_as_its_person() -> None:
 @settings(max_examples=25, deadline=None)
 @given(strategies.cameras(), st.floats(1.2, 2.0))
 def test_the_axis_of_a_body_is_inside_its_outline(camera: Camera, height: float) -> None:
-    view = View(camera, 640)
+    view = OverlayView(camera, 640)
     polygons = pillar_outline(view, np.zeros(2), height)
     axis = view.pixel(np.zeros((9, 2)), np.linspace(0.05, 0.95, 9) * height)
     for polygon in polygons:
@@ -235,7 +235,7 @@ def test_people_whom_the_camera_cannot_see_are_left_out() -> None:
 def test_who_walks_beside_the_picture_leaves_no_trace_in_it() -> None:
     camera = front_camera()
     beside = trajectory_of((0, 1, 9.0, 0.0), (1, 1, 9.0, 0.2))
-    pixel = View(camera, 640).pixel(np.array([9.0, 0.0]), 0.0)
+    pixel = OverlayView(camera, 640).pixel(np.array([9.0, 0.0]), 0.0)
     assert 660 < pixel[0] < 1200
     np.testing.assert_array_equal(
         overlay(camera, GRID, None, beside, 1, width=640), overlay(camera, GRID, None, beside[:0], 1, width=640)

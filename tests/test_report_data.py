@@ -16,11 +16,11 @@ from hypothesis import strategies as st
 from stseg.arrays import AnyArray, Bytes, Labels, Rows, Singles
 from stseg.commands.report import report
 from stseg.geometry import Grid
-from stseg.io.layout import ghost_type
-from stseg.io.runs import RunWriter, read_run
+from stseg.io.runfile.layout import ghost_type
+from stseg.io.runfile.runs import RunWriter, read_run
+from stseg.model.tables import EVENT, TRAJECTORY, Tracks
 from stseg.report.embedded import embedded_json, thin_tracks
 from stseg.report.sheets import Sheets, coarse, spread, thin_sheets
-from stseg.tracks import EVENT, TRAJECTORY, Tracks
 
 GRID = Grid((0.0, 4.0), (-1.0, 2.0), 0.5, 1.8, 3)
 NONE = np.zeros(0, np.int64)

@@ -15,8 +15,8 @@ import pytest
 
 from stseg.evaluation import evaluate
 from stseg.geometry import Camera
-from stseg.io.rigs import read_rig
-from stseg.io.tracks import POSITION
+from stseg.io.recording.rigs import read_rig
+from stseg.io.track_csv import POSITION
 
 ROOT = Path(__file__).parents[1]
 DATA = Path(os.environ.get("STSEG_DATA", ROOT / "../shared/data"))

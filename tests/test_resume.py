@@ -17,10 +17,10 @@ from recordings import ENVIRONMENT, FRAMES, OPTIONS, assert_same, track, write_r
 from scenes import walkers
 
 from stseg.accelerate import python_form
+from stseg.detection.scoring import set_score
 from stseg.evaluation import evaluate
-from stseg.ghosts.scoring import set_score
-from stseg.io.runs import read_run
-from stseg.io.work_folder import checksum
+from stseg.io.runfile.runs import read_run
+from stseg.io.runfile.work_folder import checksum
 
 PROGRAM = """
 import signal, sys

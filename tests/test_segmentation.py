@@ -11,8 +11,8 @@ from strategies import numbers
 from stseg.arrays import Flags, Floats
 from stseg.geometry import Grid
 from stseg.geometry.near import near_person
-from stseg.segmentation.blobs import Blobs, find_blobs
-from stseg.segmentation.division import STRANGER
+from stseg.model.blobs import UNASSIGNED, Blobs
+from stseg.segmentation.blobs import find_blobs
 from stseg.segmentation.motion import motion_field
 
 GRID = Grid((0.0, 2.0), (0.0, 1.5), cell=0.1, top=1.8, planes=4)
@@ -58,7 +58,7 @@ def blobs_of(occupied: Flags, *standing: tuple[float, float], strength: Floats |
     ground = np.array(standing).reshape(-1, 2)
     log_odds = np.where(occupied, strength, -3.0).astype(np.float32)
     label = np.where(
-        occupied, np.append(np.arange(len(ground)) + 11, STRANGER)[near_person(GRID.ground, ground, 0.4)], 0
+        occupied, np.append(np.arange(len(ground)) + 11, UNASSIGNED)[near_person(GRID.ground, ground, 0.4)], 0
     )
     return find_blobs(label.astype(np.int32), log_odds, ground, np.arange(len(ground)) + 11, 0.4, GRID)
 
@@ -99,7 +99,7 @@ def test_touching_people_are_two_blobs() -> None:
 
 def test_a_piece_without_a_person_is_kept() -> None:
     found = blobs_of(disc((0.45, 0.75), (1.55, 0.75)), (0.45, 0.75))
-    assert (found.person.tolist(), found.track.tolist()) == ([0, -1], [11, STRANGER])
+    assert (found.person.tolist(), found.track.tolist()) == ([0, -1], [11, UNASSIGNED])
     assert len(found.touches) == 0
     unknown = found.person.tolist().index(-1)
     np.testing.assert_allclose(found.ground[unknown], (1.55, 0.75), atol=1e-9)
@@ -117,9 +117,9 @@ def test_people_without_cells_are_no_blobs() -> None:
 def test_a_track_is_one_blob_strangers_are_many() -> None:
     label = np.zeros(GRID.shape, np.int32)
     label[1, 3, 3], label[1, 3, 8] = 4, 4
-    label[1, 9, 3], label[1, 9, 8] = STRANGER, STRANGER
+    label[1, 9, 3], label[1, 9, 8] = UNASSIGNED, UNASSIGNED
     found = find_blobs(label, np.ones(GRID.shape, np.float32), np.zeros((0, 2)), np.zeros(0, np.int64), 0.4, GRID)
-    assert found.track.tolist() == [4, STRANGER, STRANGER]
+    assert found.track.tolist() == [4, UNASSIGNED, UNASSIGNED]
     assert found.person.tolist() == [-1, -1, -1]
     np.testing.assert_allclose(found.ground[0], (GRID.ground[3, 3] + GRID.ground[3, 8]) / 2)
 
@@ -149,7 +149,7 @@ def test_a_blob_holds_who_stands_in_it() -> None:
 def test_blobs_partition_what_is_occupied(standing: list[tuple[float, float]], seed: int) -> None:
     rng = np.random.default_rng(seed)
     tracks = rng.permutation(5)[: len(standing)] + 1
-    label = np.where(rng.random(GRID.shape) < 0.08, rng.choice([STRANGER, 1, 2, 3], GRID.shape), 0).astype(np.int32)
+    label = np.where(rng.random(GRID.shape) < 0.08, rng.choice([UNASSIGNED, 1, 2, 3], GRID.shape), 0).astype(np.int32)
     log_odds = rng.normal(0, 2, GRID.shape).astype(np.float32)
     log_odds[rng.random(GRID.shape) < 0.1] = np.nan
     found = find_blobs(label, log_odds, np.array(standing).reshape(-1, 2), tracks, 0.4, GRID)
@@ -158,7 +158,7 @@ def test_blobs_partition_what_is_occupied(standing: list[tuple[float, float]], s
     assert np.unique(found.cells[found.cells > 0]).tolist() == list(range(1, number + 1))
     for blob in range(number):
         assert (label[:, found.cells == blob + 1] == found.track[blob]).any(0).all()
-    known = found.track[found.track != STRANGER]
+    known = found.track[found.track != UNASSIGNED]
     assert len(np.unique(known)) == len(known)
     held = found.person >= 0
     np.testing.assert_array_equal(found.track[held], tracks[found.person[held]])

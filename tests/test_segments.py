@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 
 from stseg.arrays import Rows
 from stseg.config import Config, IdentityConfig, SegmentConfig
+from stseg.engine.segments import segments
 from stseg.errors import ConfigError
-from stseg.identity.seams import Part, Seams, rename_labels
-from stseg.identity.segments import segments
-from stseg.identity.windows import windows
-from stseg.tracks import EVENT, TRAJECTORY
+from stseg.model.tables import EVENT, TRAJECTORY
+from stseg.tracking.stitching import SegmentTracks, Stitcher, rename_labels
+from stseg.tracking.windows import windows
 
 
 def walk(track: int, frames: range, x: float, speed: float = 0.0) -> Rows:
@@ -62,10 +62,12 @@ def test_windows_end_where_segments_do(rate: float, first: int, length: int) -> 
 
 
 def test_a_track_keeps_its_name_over_a_seam() -> None:
-    seams = Seams()
-    seams.add(Part(0, np.concatenate([walk(1, range(20), 0.0), walk(2, range(20), 4.0)]), events((0, "birth", 1, 0))))
+    seams = Stitcher()
+    seams.add(
+        SegmentTracks(0, np.concatenate([walk(1, range(20), 0.0), walk(2, range(20), 4.0)]), events((0, "birth", 1, 0)))
+    )
     later = np.concatenate([walk(1, range(15, 40), 4.1), walk(2, range(15, 40), 0.1)])
-    seams.add(Part(20, later, events((25, "merge", 1, 2))))
+    seams.add(SegmentTracks(20, later, events((25, "merge", 1, 2))))
     joined = seams.joined()
     assert joined.committed["frame"].tolist() == [*range(20), *range(20), *range(20, 40), *range(20, 40)]
     assert joined.committed["id"].tolist() == [1] * 20 + [2] * 20 + [2] * 20 + [1] * 20
@@ -74,42 +76,42 @@ def test_a_track_keeps_its_name_over_a_seam() -> None:
 
 
 def test_whom_nobody_claims_was_born_or_has_died_at_the_seam() -> None:
-    seams = Seams()
-    seams.add(Part(0, walk(1, range(20), 0.0), events()))
-    seams.add(Part(20, walk(1, range(18, 40), 3.0), events()))
+    seams = Stitcher()
+    seams.add(SegmentTracks(0, walk(1, range(20), 0.0), events()))
+    seams.add(SegmentTracks(20, walk(1, range(18, 40), 3.0), events()))
     joined = seams.joined()
     assert np.unique(joined.committed["id"]).tolist() == [1, 2]
     assert [(e["frame"], e["kind"], e["id"]) for e in joined.events] == [(19, b"death", 1), (20, b"birth", 2)]
 
 
 def test_who_was_said_to_be_dead_or_born_is_not_told_again() -> None:
-    seams = Seams()
-    seams.add(Part(0, walk(1, range(19), 0.0), events((18, "death", 1, 0))))
-    seams.add(Part(20, walk(1, range(21, 40), 3.0), events((21, "birth", 1, 0))))
+    seams = Stitcher()
+    seams.add(SegmentTracks(0, walk(1, range(19), 0.0), events((18, "death", 1, 0))))
+    seams.add(SegmentTracks(20, walk(1, range(21, 40), 3.0), events((21, "birth", 1, 0))))
     told = seams.joined().events
     assert [(e["frame"], e["kind"], e["id"]) for e in told] == [(18, b"death", 1), (21, b"birth", 2)]
 
 
 def test_a_track_of_the_warm_up_alone_leaves_nothing() -> None:
-    seams = Seams()
-    seams.add(Part(0, walk(1, range(20), 0.0), events()))
-    seams.add(Part(20, np.concatenate([walk(1, range(15, 40), 0.0), walk(2, range(15, 19), 5.0)]), events()))
+    seams = Stitcher()
+    seams.add(SegmentTracks(0, walk(1, range(20), 0.0), events()))
+    seams.add(SegmentTracks(20, np.concatenate([walk(1, range(15, 40), 0.0), walk(2, range(15, 19), 5.0)]), events()))
     assert np.unique(seams.joined().committed["id"]).tolist() == [1]
     assert len(seams.joined().events) == 0
 
 
 def test_the_track_that_is_shared_longest_wins() -> None:
     """One to one: two tracks of the warm-up lie near one earlier track."""
-    seams = Seams()
-    seams.add(Part(0, walk(1, range(20), 0.0), events()))
+    seams = Stitcher()
+    seams.add(SegmentTracks(0, walk(1, range(20), 0.0), events()))
     both = np.concatenate([walk(1, range(17, 40), 0.2), walk(2, range(10, 40), -0.2)])
-    seams.add(Part(20, both, events()))
+    seams.add(SegmentTracks(20, both, events()))
     later = seams.joined()
     assert later.committed["id"][later.local == 2].tolist()[-1] == 1
 
 
 def test_no_segments() -> None:
-    assert len(Seams().joined().committed) == 0
+    assert len(Stitcher().joined().committed) == 0
 
 
 # Names in the volume

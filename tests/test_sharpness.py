@@ -12,10 +12,10 @@ from scenes import FEW_HEIGHTS, corner_cameras, people, rig_of
 
 from stseg.arrays import Boxes, Floats
 from stseg.config import LevelConfig
-from stseg.ghosts.boxes import GRAIN, LATE, TOLERANCE, WIDE, half_square
-from stseg.ghosts.explain import FramePass
-from stseg.ghosts.sharpening import Sharpening
-from stseg.ghosts.sharpness import FIRST, KNOTS, LOOKS, Sharpness
+from stseg.detection.box_noise_calibration import BoxNoiseCalibration
+from stseg.detection.detector import Detector
+from stseg.model.box_fit import GRAIN, LATE, TOLERANCE, WIDE, half_square
+from stseg.model.box_noise import FIRST, KNOTS, LOOKS, BoxNoise
 
 RATE = 5.0
 CONFIG = LevelConfig(memory=1e6, weight=2.0)
@@ -32,13 +32,13 @@ def test_a_sure_box_has_the_first_tolerance_and_others_the_logarithm_of_their_sc
 def test_what_is_sharper_says_more(scores: list[float]) -> None:
     score = np.array(scores)
     tolerance, belief = FIRST.of(score)
-    sharper, more = Sharpness(FIRST.spread / 2).of(score)
+    sharper, more = BoxNoise(FIRST.spread / 2).of(score)
     np.testing.assert_allclose(sharper, tolerance / 2)
     np.testing.assert_allclose(more - belief, 4 * LOOKS * np.log(2))
 
 
 def test_nothing_seen_is_the_first_guess_and_what_is_seen_is_forgotten() -> None:
-    sharpening = Sharpening(RATE, replace(CONFIG, memory=1.0))
+    sharpening = BoxNoiseCalibration(RATE, replace(CONFIG, memory=1.0))
     np.testing.assert_allclose(sharpening.sharpness.spread, FIRST.spread)
     taught(sharpening, 0.01, 1.0, 20)
     learned = sharpening.sharpness.spread[-1]
@@ -48,10 +48,10 @@ def test_nothing_seen_is_the_first_guess_and_what_is_seen_is_forgotten() -> None
     np.testing.assert_allclose(sharpening.sharpness.spread[-1], FIRST.spread[-1], rtol=1e-3)
 
 
-def taught(sharpening: Sharpening, spread: float, score: float, frames: int) -> None:
+def taught(sharpening: BoxNoiseCalibration, spread: float, score: float, frames: int) -> None:
     """Boxes of three people in four views, edges off by so much of the height; every fourth ends far above the feet."""
     rng, rig = np.random.default_rng(3), rig_of(corner_cameras())
-    frame_pass = FramePass(rig, ["boxes"] * 4, FEW_HEIGHTS)
+    frame_pass = Detector(rig, ["boxes"] * 4, FEW_HEIGHTS)
     standing = people((-0.8, 0.3, 1.7), (0.7, -0.6, 1.7), (0.6, 0.8, 1.7))
     for _ in range(frames):
         seen = [shaken(view.table.boxes_of(*standing_of(standing)), spread, score, rng) for view in frame_pass.views]
@@ -73,7 +73,7 @@ def shaken(bodies: Floats, spread: float, score: float, rng: np.random.Generator
 
 @pytest.mark.parametrize("spread", [0.015, 0.04])
 def test_the_spread_of_boxes_is_found(spread: float) -> None:
-    sharpening = Sharpening(RATE, CONFIG)
+    sharpening = BoxNoiseCalibration(RATE, CONFIG)
     taught(sharpening, spread, 1.0, 60)
     learned, loosest = sharpening.sharpness.spread, np.delete(FIRST.spread[-1], WIDE)
     # An edge counts as half a look, so places are less sure than such independent edges make them, and spreads wider.
@@ -83,7 +83,7 @@ def test_the_spread_of_boxes_is_found(spread: float) -> None:
 
 
 def test_the_width_is_not_learned_and_nothing_gets_looser() -> None:
-    sharpening = Sharpening(RATE, CONFIG)
+    sharpening = BoxNoiseCalibration(RATE, CONFIG)
     taught(sharpening, 0.1, 1.0, 30)
     learned = sharpening.sharpness.spread
     assert (learned <= FIRST.spread).all()
@@ -91,7 +91,7 @@ def test_the_width_is_not_learned_and_nothing_gets_looser() -> None:
 
 
 def test_only_knots_beside_a_score_learn_of_it() -> None:
-    sharpening = Sharpening(RATE, CONFIG)
+    sharpening = BoxNoiseCalibration(RATE, CONFIG)
     taught(sharpening, 0.02, 0.7, 10)
     changed = ~np.isclose(sharpening.sharpness.spread, FIRST.spread).all(1)
     np.testing.assert_array_equal(changed, np.isin(KNOTS, (0.6, 0.8)))
@@ -105,7 +105,7 @@ def test_a_boxs_distance_is_measured_by_its_own_tolerance() -> None:
 
 def test_a_recording_begun_anew_forgets() -> None:
     rig = rig_of(corner_cameras())
-    frame_pass = FramePass(rig, ["boxes"] * 4, FEW_HEIGHTS)
+    frame_pass = Detector(rig, ["boxes"] * 4, FEW_HEIGHTS)
     standing = people((-0.8, 0.3, 1.7), (0.7, -0.6, 1.7))
     rng = np.random.default_rng(0)
     seen = [shaken(view.table.boxes_of(*standing_of(standing)), 0.02, 1.0, rng) for view in frame_pass.views]

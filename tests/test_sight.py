@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from stseg.arrays import Boxes
 from stseg.config import ForegroundConfig
 from stseg.foreground import make_background
-from stseg.foreground.light_change import LightWatch
-from stseg.foreground.sight import Sight, without_prior
+from stseg.foreground.illumination import LightWatch
+from stseg.foreground.view_foreground import ViewForeground, without_prior
 
 
 @given(st.floats(0.01, 0.99), st.floats(0.01, 0.99))
@@ -25,7 +25,7 @@ def test_without_prior_keeps_the_likelihood_ratio(ratio_share: float, prior: flo
 
 
 def test_each_kind_of_observation_has_its_evidence() -> None:
-    sight = Sight()
+    sight = ViewForeground()
     boxes = Boxes(np.array([[1.0, 2.0, 3.0, 4.0]]), np.ones(1))
     assert sight.evidence(None) is None
     assert sight.evidence(boxes) is boxes
@@ -50,7 +50,7 @@ def test_colour_is_judged_by_the_background_with_the_prior_taken_out(model: Any)
     frame = empty.copy()
     frame[4:8, 5:10] = (124, 116, 126)
     posterior = models[0].likelihood(frame)
-    seen = Sight(LightWatch(models[1], 10.0)).evidence(frame)
+    seen = ViewForeground(LightWatch(models[1], 10.0)).evidence(frame)
     assert isinstance(seen, np.ndarray)
     np.testing.assert_array_equal(seen, without_prior(posterior, models[1].prior))
     assert (seen >= posterior).all()
@@ -59,11 +59,11 @@ def test_colour_is_judged_by_the_background_with_the_prior_taken_out(model: Any)
 
 def test_a_colour_frame_without_a_background_is_refused() -> None:
     with pytest.raises(ValueError, match="background"):
-        Sight().evidence(np.zeros((4, 4, 3), np.uint8))
+        ViewForeground().evidence(np.zeros((4, 4, 3), np.uint8))
 
 
 def test_pixels_are_those_of_the_evidence_and_instances_are_certain() -> None:
-    sight = Sight()
+    sight = ViewForeground()
     assert sight.pixels(None) is None
     assert sight.pixels(Boxes(np.zeros((0, 4)), np.zeros(0))) is None
     mask = np.array([[0, 51], [255, 0]], np.uint8)

@@ -19,20 +19,20 @@ from stseg.arrays import Floats
 from stseg.commands.simulate import simulate
 from stseg.errors import ConfigError, OutputError
 from stseg.geometry import Camera
-from stseg.io.frames import open_frames, read_background
-from stseg.io.rigs import read_rig
-from stseg.io.scenes import write_scene
-from stseg.io.tracks import read_tracks_csv
-from stseg.simulate import NAMED, Film, Lamp, SceneSpec
-from stseg.simulate import draw as draw_module
-from stseg.simulate.body import PARTS, pose
-from stseg.simulate.cameras import build_rig, pixel_rays
-from stseg.simulate.clothes import wardrobe, worn
-from stseg.simulate.detector import detect, visible_boxes
-from stseg.simulate.draw import draw_bodies, pixel_boxes
-from stseg.simulate.render import LAMP, Viewer
-from stseg.simulate.shadows import PENUMBRA, darken
-from stseg.simulate.walkers import Crowd, walk
+from stseg.io.outputs.scenes import write_scene
+from stseg.io.recording.frames import open_frames, read_background
+from stseg.io.recording.rigs import read_rig
+from stseg.io.track_csv import read_tracks_csv
+from stseg.simulation import NAMED, Film, Lamp, SceneSpec
+from stseg.simulation import ray_casting as draw_module
+from stseg.simulation.body import PARTS, pose
+from stseg.simulation.cameras import build_rig, pixel_rays
+from stseg.simulation.clothes import wardrobe, worn
+from stseg.simulation.crowd import Crowd, walk
+from stseg.simulation.detector import detect, visible_boxes
+from stseg.simulation.ray_casting import draw_bodies, pixel_boxes
+from stseg.simulation.render import LAMP, Viewer
+from stseg.simulation.shadows import PENUMBRA, darken
 
 TINY = NAMED["tiny"]
 SHARP = replace(TINY, noise=0.0, light_drift=0.0, shadows=0.0)

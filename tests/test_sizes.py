@@ -13,15 +13,15 @@ from scipy.special import expit
 from strategies import numbers
 
 from stseg.arrays import Boxes, Flags, Floats, Singles
+from stseg.detection.assignment import Assignment
+from stseg.detection.body_size import measure
+from stseg.detection.detector import Detector
+from stseg.detection.refine import RefinedPlaces
+from stseg.detection.views import BACKGROUND, OWN, PixelView
 from stseg.geometry.bodies import SILHOUETTE, WIDTH
-from stseg.ghosts.explain import FramePass
-from stseg.ghosts.measure import measure
-from stseg.ghosts.outlines import outlines
-from stseg.ghosts.own import Own
-from stseg.ghosts.pool import Pool
-from stseg.ghosts.refine import Places
-from stseg.ghosts.sizes import Sizes
-from stseg.ghosts.views import BACKGROUND, OWN, PixelView
+from stseg.model.candidates import Candidates
+from stseg.model.outlines import outlines
+from stseg.model.sizes import Sizes
 
 STEPS = np.linspace(-3.0, 3.0, 13)
 """The lattice, in standard deviations."""
@@ -38,19 +38,19 @@ def pixel_view(few: int = 0) -> PixelView:
     return PixelView(rig.cameras[few], rig.grid, np.zeros((1, 2)), FEW_HEIGHTS)
 
 
-def at(ground: Floats) -> Places:
+def at(ground: Floats) -> RefinedPlaces:
     """People whose places say nothing of their heights."""
     n = len(ground)
     mean, variance = np.full(n, FEW_HEIGHTS.height_mean), np.full(n, FEW_HEIGHTS.height_spread**2)
-    return Places(ground, np.zeros((n, 2, 2)), mean, variance)
+    return RefinedPlaces(ground, np.zeros((n, 2, 2)), mean, variance)
 
 
-def open_to_one(*views: Flags) -> Own:
+def open_to_one(*views: Flags) -> Assignment:
     """Of a single person, the pixels that are open to them in each view."""
-    return Own(np.full((len(views), 1), -1), [np.where(pixels, -1, 1) for pixels in views])
+    return Assignment(np.full((len(views), 1), -1), [np.where(pixels, -1, 1) for pixels in views])
 
 
-def everything(view: PixelView) -> Own:
+def everything(view: PixelView) -> Assignment:
     return open_to_one(np.ones(view.shape, bool))
 
 
@@ -76,7 +76,7 @@ def test_what_says_nothing_leaves_the_prior() -> None:
 # The E step
 
 
-def by_definition(view: PixelView, raster: Singles, open_pixels: Flags, fits: Pool) -> Floats:
+def by_definition(view: PixelView, raster: Singles, open_pixels: Flags, fits: Candidates) -> Floats:
     """The labels' log-likelihood of each pillar over the union of all of them, pixel by pixel, nats."""
     first, spans, area = view.outlines(fits.ground, fits.height, fits.width)
     inside = np.zeros((len(fits), *view.shape), bool)
@@ -102,8 +102,8 @@ def test_the_e_step_by_definition(hidden: float) -> None:
     heights = FEW_HEIGHTS.height_mean + FEW_HEIGHTS.height_spread * STEPS
     widths = FEW_HEIGHTS.width_mean + FEW_HEIGHTS.width_spread * STEPS
     for lattice, fits, mean, variance in (
-        (heights, Pool(everywhere, heights, 0.45 * one), found.height, found.height_variance),
-        (widths, Pool(everywhere, found.height * one, widths), found.width, found.width_variance),
+        (heights, Candidates(everywhere, heights, 0.45 * one), found.height, found.height_variance),
+        (widths, Candidates(everywhere, found.height * one, widths), found.width, found.width_variance),
     ):
         score = by_definition(view, sight.raster, open_pixels, fits) - 0.5 * STEPS**2
         weight = np.exp(score - score.max())
@@ -161,7 +161,7 @@ def test_the_head_closes() -> None:
 def tall_and_short(kind: str) -> tuple[Floats, Sizes]:
     standing = people((-0.9, 0.4, 1.58), (0.6, -0.5, 1.86), (0.9, 0.9, 1.7))
     rig = room()
-    frame_pass = FramePass(rig, [kind] * 4, FEW_HEIGHTS)
+    frame_pass = Detector(rig, [kind] * 4, FEW_HEIGHTS)
     seen: list[Singles] | list[Boxes] = (
         likelihoods(rig.cameras, standing) if kind == "pixels" else [boxes(camera, standing) for camera in rig.cameras]
     )
@@ -182,7 +182,7 @@ def test_heights_are_found(kind: str) -> None:
 def test_who_is_known_keeps_their_height() -> None:
     """A walker's own height is the prior of the next frame's; the frame's own measurement stays free of it."""
     rig, standing = room(), people((0.2, 0.1, 1.7))
-    frame_pass = FramePass(rig, ["pixels"] * 4, FEW_HEIGHTS)
+    frame_pass = Detector(rig, ["pixels"] * 4, FEW_HEIGHTS)
     expected = expecting((0.2, 0.1, 1.82))
     expected = replace(expected, sizes=replace(expected.sizes, height_variance=np.full(1, 0.01**2)))
     seen = likelihoods(rig.cameras, standing)

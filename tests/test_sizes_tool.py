@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from stseg.tracks import TRAJECTORY
+from stseg.model.tables import TRAJECTORY
 
 sys.path.append(str(Path(__file__).parents[1] / "tools"))
 

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from strategies import numbers
 
 from stseg.arrays import Floats, Ints
-from stseg.identity.smoothed import TURN, smooth_places, smoothed_path
-from stseg.tracks import TRAJECTORY
+from stseg.model.tables import TRAJECTORY
+from stseg.tracking.smoother import TURN, smooth_places, smoothed_path
 
 RATE = 8.0
 PACE = 0.8

@@ -13,29 +13,29 @@ from scenes import CONFIG, FRAME_RATE, found, people, room
 from stseg.arrays import Floats, Rows
 from stseg.errors import ConfigError
 from stseg.geometry.near import near_person
-from stseg.identity.windows import window_length, windows
-from stseg.segmentation.energy import QUANTUM
-from stseg.trackers import TRACKERS, Commit, Scene, Shown, Tracker, find_tracker
+from stseg.graphcut.energy import QUANTUM
+from stseg.model.tables import WINDOW
+from stseg.trackers import TRACKERS, Commit, FrameObservations, FusedFrame, Tracker, find_tracker
 from stseg.trackers.rows import event_rows, trajectory_rows, views_at
-from stseg.tracks import WINDOW
+from stseg.tracking.windows import window_length, windows
 
 RIG = room()
 COLOURLESS = sorted(set(TRACKERS) - {"particles", "belief"})
 """Trackers that need no colour; the others have tests of their own."""
-UNSEEN = Shown((None,) * 4, (None,) * 4)
+UNSEEN = FrameObservations((None,) * 4, (None,) * 4)
 """What the cameras showed, for trackers that do not ask."""
 LENGTH, SHARED = window_length(FRAME_RATE, CONFIG.identity)
 ENDS = LENGTH + LENGTH - SHARED
 """A run of so many frames ends exactly where its second window ends."""
 
 
-def scene(follow: Tracker, frame: int, *places: tuple[float, float]) -> Scene:
+def scene(follow: Tracker, frame: int, *places: tuple[float, float]) -> FusedFrame:
     """A frame in which people stand at places, metres: cells within 0.3 m are occupied, one corner is unseen."""
     standing = people(*places)
     log_odds = np.full(RIG.grid.shape, -3.0, np.float32)
     log_odds[:, near_person(RIG.grid.ground, standing[:, :2], 0.3) >= 0] = 3.0
     log_odds[:, -1, -1] = np.nan
-    return Scene(frame, found(standing, follow.expected(frame)), found(people()), log_odds)
+    return FusedFrame(frame, found(standing, follow.expected(frame)), found(people()), log_odds)
 
 
 def crossing(frame: int) -> list[tuple[float, float]]:

@@ -20,9 +20,9 @@ import xarray
 from run_files import FRAMES, small_ghosts, small_trajectory, small_volume, write_small_run
 
 from stseg.errors import ConfigError
-from stseg.io import layout
-from stseg.io.napari_reader import get_reader, read_layers
-from stseg.io.runs import read_run
+from stseg.io.runfile import layout
+from stseg.io.runfile.napari_reader import get_reader, read_layers
+from stseg.io.runfile.runs import read_run
 
 ROOT = Path(__file__).parents[1]
 AXES = {

@@ -13,7 +13,7 @@ import silx.io.nxdata
 import xarray
 
 from stseg.commands.main import main
-from stseg.io.runs import read_run
+from stseg.io.runfile.runs import read_run
 
 DATA = Path(os.environ.get("STSEG_DATA", Path(__file__).parents[1] / "../shared/data")) / "uu4"
 pytestmark = pytest.mark.skipif(not DATA.is_dir(), reason="the data set uu4 is not here: set STSEG_DATA to its parent")

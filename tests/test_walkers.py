@@ -14,24 +14,24 @@ from scenes import CONFIG, found, people
 from strategies import numbers
 
 from stseg.arrays import Floats
-from stseg.ghosts.people import People
-from stseg.ghosts.sizes import Sizes
-from stseg.identity.walkers import Measured, Walker, Walkers
+from stseg.model.people import People
+from stseg.model.sizes import Sizes
+from stseg.tracking.track_filter import Measurement, TrackFilter, TrackState
 
 RATE = 8.0
 IDENTITY = CONFIG.identity
 GHOSTS = found(people())
 """Nobody."""
-NOTHING = Measured(1.0, np.inf)
+NOTHING = Measurement(1.0, np.inf)
 Way = Callable[[int], tuple[float, float, float] | None]
 """Where somebody is in a frame: x, y, height in metres; None where the frame does not see them."""
 STATES = st.tuples(numbers(-3, 3), numbers(-3, 3), numbers(-2, 2), numbers(-2, 2)).map(np.array)
 
 
-def somebody(state: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0), odds: float = 1.0) -> Walker:
+def somebody(state: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0), odds: float = 1.0) -> TrackState:
     spread = np.diag([0.03, 0.02, 0.6, 0.5])
     spread[0, 2] = spread[2, 0] = spread[1, 3] = spread[3, 1] = 0.05
-    return Walker(3, 10, np.array(state), spread, 1.7, 0.12**2, 0.42, 0.04**2, odds)
+    return TrackState(3, 10, np.array(state), spread, 1.7, 0.12**2, 0.42, 0.04**2, odds)
 
 
 # One walker
@@ -80,7 +80,7 @@ def test_sizes_converge() -> None:
     seen = rng.normal(1.83, noise, 60)
     walker, sure = somebody(), [0.12**2]
     for height in seen:
-        tall, wide = Measured(float(height), noise**2), Measured(float(height) - 1.4, noise**2)
+        tall, wide = Measurement(float(height), noise**2), Measurement(float(height) - 1.4, noise**2)
         walker = walker.found(11, walker.state[:2], walker.covariance[:2, :2], tall, wide, 1.0)
         sure.append(walker.height_variance)
     assert (np.diff(sure) < 0).all()
@@ -95,7 +95,7 @@ def test_sizes_converge() -> None:
 
 def test_what_a_frame_tells_of_sizes_is_used_once() -> None:
     """The prior of a frame's posterior, anybody's size, is taken out before the person's own comes in."""
-    walkers = Walkers(RATE, CONFIG.ghosts, IDENTITY)
+    walkers = TrackFilter(RATE, CONFIG.ghosts, IDENTITY)
     told = found(people((0.0, 0.0, 1.85)))
     nothing = replace(told, sizes=Sizes.of_anybody(1, CONFIG.ghosts))
     walkers.follow(0, told, GHOSTS)
@@ -110,9 +110,9 @@ def test_what_a_frame_tells_of_sizes_is_used_once() -> None:
 # All of them
 
 
-def follow(ways: list[Way], frames: range, order: int | None = None) -> tuple[list[list[int]], Walkers]:
+def follow(ways: list[Way], frames: range, order: int | None = None) -> tuple[list[list[int]], TrackFilter]:
     """The chains that these people get, one for each frame that sees them, and who is followed in the end."""
-    walkers = Walkers(RATE, CONFIG.ghosts, IDENTITY)
+    walkers = TrackFilter(RATE, CONFIG.ghosts, IDENTITY)
     chains: list[list[int]] = [[] for _ in ways]
     rng = np.random.default_rng(order)
     for frame in frames:
@@ -222,7 +222,7 @@ def test_far_away_is_somebody_new() -> None:
 
 
 def test_before_the_first_frame_nothing_is_known_and_after_an_empty_one_that_nobody_is_there() -> None:
-    walkers = Walkers(RATE, CONFIG.ghosts, IDENTITY)
+    walkers = TrackFilter(RATE, CONFIG.ghosts, IDENTITY)
     assert walkers.expected(0) is None
     assert walkers.follow(0, GHOSTS, GHOSTS).shape == (0,)
     expected = walkers.expected(1)
@@ -251,7 +251,7 @@ def doubted(*places: tuple[float, float], evidence: float) -> People:
 def test_who_was_almost_believed_is_looked_for_once_more() -> None:
     """They have no number before they are found, and are forgotten if the next frame does not find them."""
     for found_again in (True, False):
-        walkers = Walkers(RATE, CONFIG.ghosts, IDENTITY)
+        walkers = TrackFilter(RATE, CONFIG.ghosts, IDENTITY)
         assert walkers.follow(0, GHOSTS, doubted((0.5, 0.5), evidence=-1.0)).shape == (0,)
         expected = walkers.expected(1)
         assert expected is not None
@@ -266,7 +266,7 @@ def test_who_was_almost_believed_is_looked_for_once_more() -> None:
 @pytest.mark.parametrize(("evidence", "place", "looked_for"), [(-1, 2, 2), (-5, 2, 1), (-1, 0.3, 1)])
 def test_who_is_not_looked_for_again(evidence: float, place: float, looked_for: int) -> None:
     """Who was hardly believed at all, and whoever stands beside somebody who is followed: it may be the same."""
-    walkers = Walkers(RATE, CONFIG.ghosts, IDENTITY)
+    walkers = TrackFilter(RATE, CONFIG.ghosts, IDENTITY)
     walkers.follow(0, found(people((0, 0))), doubted((place, 0.0), evidence=evidence))
     assert len(walkers.expected(1) or ()) == looked_for
     assert [walker.chain for walker in walkers.walkers] == [1, 0][:looked_for]

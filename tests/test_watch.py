@@ -12,14 +12,14 @@ from scenes import FEW_HEIGHTS, boxes, likelihoods, people, room
 
 from stseg.accelerate import python_form
 from stseg.arrays import Floats
-from stseg.calibrate.watch import knocked, views_aside
-from stseg.commands.overview import look_over
+from stseg.calibration.run_check import knocked, views_aside
+from stseg.commands.run_overview import look_over
+from stseg.detection.detector import Detector
+from stseg.detection.scoring import set_score
 from stseg.geometry import Camera, Rig
-from stseg.ghosts.explain import FramePass
-from stseg.ghosts.people import ViewEvidence
-from stseg.ghosts.scoring import set_score
-from stseg.io.rigs import read_rig, write_rig
-from stseg.io.runs import read_run
+from stseg.io.recording.rigs import read_rig, write_rig
+from stseg.io.runfile.runs import read_run
+from stseg.model.people import ViewEvidence
 
 CELL = 0.1
 slow = pytest.mark.skipif(python_form(set_score) is set_score, reason="too slow without a compiler")
@@ -40,7 +40,7 @@ def told(rig: Rig, kind: str, standing: Floats) -> Floats:
         if kind == "pixels"
         else [boxes(camera, standing) for camera in room().cameras]
     )
-    return FramePass(rig, [kind] * 4, FEW_HEIGHTS).explain(seen, None).aside
+    return Detector(rig, [kind] * 4, FEW_HEIGHTS).explain(seen, None).aside
 
 
 @pytest.mark.parametrize("kind", ["pixels", "boxes"])

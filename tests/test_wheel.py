@@ -13,7 +13,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 _BUILD = "import sys; from setuptools.build_meta import build_wheel; build_wheel(sys.argv[1])"
-_IMPORT = "import stseg.io.runs, stseg.io.calibrations.opencv_xml, stseg.pipeline; print(stseg.__file__)"
+_IMPORT = "import stseg.io.runfile.runs, stseg.io.calibrations.opencv_xml, stseg.engine.pipeline; print(stseg.__file__)"
 
 
 @pytest.fixture(scope="module")

@@ -7,8 +7,8 @@ from hypothesis import given, settings
 from strollers import BORDER, CONFIG, PEOPLE, RATE, gone, rows_of, runs, swapped, visit
 
 from stseg.arrays import Rows
-from stseg.identity.whole import Whole, whole_tracks
-from stseg.tracks import EVENT, TRAJECTORY
+from stseg.model.tables import EVENT, TRAJECTORY
+from stseg.tracking.final_tracks import FinalTracks, final_tracks
 
 
 def committed(rows: Rows) -> Rows:
@@ -32,8 +32,8 @@ def lives(rows: Rows) -> Rows:
     return told(*sorted(born + [(int(frames.max()), "death", i, 0) for i, frames in spans]))
 
 
-def whole(rows: Rows, events: Rows) -> Whole:
-    return whole_tracks(rows, events, RATE, BORDER, CONFIG, PEOPLE)
+def whole(rows: Rows, events: Rows) -> FinalTracks:
+    return final_tracks(rows, events, RATE, BORDER, CONFIG, PEOPLE)
 
 
 def story(events: Rows) -> list[tuple[int, bytes, int, int]]:

@@ -18,7 +18,7 @@ import pytest
 from recordings import ENVIRONMENT, assert_same, track, write_recording
 
 from stseg.accelerate import python_form
-from stseg.ghosts.scoring import set_score
+from stseg.detection.scoring import set_score
 
 pytestmark = pytest.mark.skipif(python_form(set_score) is set_score, reason="too slow without a compiler")
 

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stseg.arrays import Floats
-from stseg.calibrate.blobs import Ends
-from stseg.calibrate.solve import Views
+from stseg.calibration.endpoints import Ends
+from stseg.calibration.solution import Views
 from stseg.geometry import Rig
-from stseg.simulate import SceneSpec
-from stseg.simulate.cameras import build_rig
+from stseg.simulation import SceneSpec
+from stseg.simulation.cameras import build_rig
 
 TOE = 0.1
 """Metres by which lowest points are nearer than axes."""

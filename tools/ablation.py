@@ -33,9 +33,9 @@ from stseg.config import Config
 from stseg.evaluation import evaluate
 from stseg.evaluation.scores import Scores
 from stseg.evaluation.sequence import Area
-from stseg.io.recording import Recording
-from stseg.io.rigs import read_rig
-from stseg.io.tracks import read_tracks_csv
+from stseg.io.recording.recording import Recording
+from stseg.io.recording.rigs import read_rig
+from stseg.io.track_csv import read_tracks_csv
 
 SCENES = ("crossing", "meeting", "meeting_heights", "border")
 MEASURED = {

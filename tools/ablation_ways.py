@@ -14,19 +14,20 @@ import numpy as np
 from baselines import plain_fusion, rows, volumes
 
 from stseg.arrays import Flags, Floats, Ints, Rows, Singles
-from stseg.commands.sights import make_sights
 from stseg.config import Config, IdentityConfig
+from stseg.engine.backgrounds import make_foregrounds
+from stseg.engine.pipeline import Pipeline
 from stseg.geometry import Rig
 from stseg.geometry.near import near_person
-from stseg.identity.linking import assign, distances
-from stseg.identity.windows import Window
-from stseg.io.frames import open_frames
-from stseg.io.recording import Recording
-from stseg.pipeline import Pipeline
-from stseg.segmentation.division import STRANGER, Division
-from stseg.segmentation.energy import Energy
+from stseg.graphcut.energy import Energy
+from stseg.io.recording.frames import open_frames
+from stseg.io.recording.recording import Recording
+from stseg.model.blobs import UNASSIGNED
+from stseg.segmentation.labelling import WindowLabels
 from stseg.trackers import TRACKERS
 from stseg.trackers.cut import CutTracker, _Linked
+from stseg.tracking.assignment import assign, distances
+from stseg.tracking.windows import Window
 
 WAYS = ("threshold", "frames", "two labels", "cut")
 LEVELS = (-0.1, -0.2, -0.3, -0.4, -0.5, -0.7, -1.0, -1.4, -2.0)
@@ -36,13 +37,13 @@ LEVELS = (-0.1, -0.2, -0.3, -0.4, -0.5, -0.7, -1.0, -1.4, -2.0)
 class TwoLabels(CutTracker):
     """The cut without the expansion."""
 
-    def _divide(self, window: Window, held: list[_Linked], energy: Energy, occupied: Flags) -> Division:
+    def _divide(self, window: Window, held: list[_Linked], energy: Energy, occupied: Flags) -> WindowLabels:
         del window, energy
         label = np.zeros(occupied.shape, np.int32)
         for cells, own, linked in zip(occupied, label, held, strict=True):
             near = near_person(self.rig.grid.ground, linked.scene.people.ground, self.config.occupancy.reach)
-            own[cells] = np.broadcast_to(np.append(linked.chains, STRANGER)[near], cells.shape)[cells]
-        return Division(label, 0)
+            own[cells] = np.broadcast_to(np.append(linked.chains, UNASSIGNED)[near], cells.shape)[cells]
+        return WindowLabels(label, 0)
 
 
 TRACKERS["two labels"] = TwoLabels
@@ -72,7 +73,7 @@ def some_views(recording: Recording, number: int) -> Recording:
 
 def follow(recording: Recording, first: int, stop: int, way: str, config: Config) -> Outcome:
     """Track the people of a recording by `frames`, `two labels` or `cut`."""
-    sights = make_sights(recording, config, first, stop)
+    sights = make_foregrounds(recording, config, first, stop)
     kinds = ["boxes" if source.source.kind == "boxes" else "pixels" for source in recording.sources]
     pipeline = Pipeline(recording.rig, sights, kinds, config, way)
     done: list[int] = []

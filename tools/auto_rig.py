@@ -19,8 +19,8 @@ import numpy as np
 
 from stseg.arrays import Complexes, Floats
 from stseg.geometry import Camera, Rig
-from stseg.io.recording import Recording
-from stseg.io.rigs import read_rig, write_rig
+from stseg.io.recording.recording import Recording
+from stseg.io.recording.rigs import read_rig, write_rig
 
 HEAD = 1.7
 """Metres."""

@@ -18,18 +18,18 @@ import numpy as np
 from scipy.ndimage import label
 
 from stseg.arrays import Boxes, Flags, Floats, Rows, Singles
-from stseg.commands.sights import make_sights
 from stseg.config import Config, SegmentationConfig
+from stseg.engine.backgrounds import make_foregrounds
 from stseg.evaluation import evaluate
 from stseg.foreground import box_likelihood
 from stseg.geometry import Grid, Rig
-from stseg.io.frames import open_frames
-from stseg.io.recording import Recording
-from stseg.io.rigs import read_rig
-from stseg.io.tracks import POSITION, read_tracks_csv
-from stseg.occupancy.localise import Localiser
-from stseg.occupancy.sampling import SamplingKind
-from stseg.segmentation.cut import minimum_cut
+from stseg.geometry.sampling import SamplingKind
+from stseg.graphcut.cut import minimum_cut
+from stseg.io.recording.frames import open_frames
+from stseg.io.recording.recording import Recording
+from stseg.io.recording.rigs import read_rig
+from stseg.io.track_csv import POSITION, read_tracks_csv
+from stseg.occupancy.localisation import Localiser
 from stseg.segmentation.energy import build_energy
 
 LEAST = 0.05
@@ -48,7 +48,7 @@ def mean_log(maps: Sequence[Singles | None], localiser: Localiser) -> Singles:
 
 def volumes(recording: Recording, first: int, stop: int, sampling: SamplingKind) -> Iterator[Singles]:
     """The plain volume of each frame."""
-    sights = make_sights(recording, Config(), first, stop)
+    sights = make_foregrounds(recording, Config(), first, stop)
     localiser = Localiser(recording.rig, sampling)
     with open_frames(recording, first, stop) as moments:
         for moment in moments:

@@ -22,7 +22,7 @@ from stseg.arrays import Bytes, Floats
 from stseg.config import BeliefConfig
 from stseg.geometry import Camera
 from stseg.geometry.upright import vertical_of
-from stseg.simulate import Film, Route, SceneSpec
+from stseg.simulation import Film, Route, SceneSpec
 from stseg.trackers.belief.condensation import condense
 from stseg.trackers.belief.particles import Motion
 from stseg.trackers.belief.star import Star, propagate

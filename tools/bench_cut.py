@@ -25,9 +25,9 @@ import numpy as np
 from bench_windows import real, synthetic
 
 from stseg.arrays import Flags
-from stseg.segmentation.arcs import in_place, in_rows
-from stseg.segmentation.cut import minimum_cut
-from stseg.segmentation.energy import Energy
+from stseg.graphcut.arcs import in_place, in_rows
+from stseg.graphcut.cut import minimum_cut
+from stseg.graphcut.energy import Energy
 
 T = TypeVar("T")
 _REAL = {"uu4": "0:40", "cmc1": "0:40", "cmc2": "0:40", "wildtrack": "0:20"}

@@ -20,11 +20,12 @@ from bench_cut import Row, print_table
 
 from stseg.accelerate import kernel
 from stseg.arrays import Floats, Ints, Labels, Singles
-from stseg.segmentation.cut import minimum_cut
-from stseg.segmentation.energy import Energy, neighbourhood
-from stseg.segmentation.expansion import LabelEnergy, expand
+from stseg.graphcut.cell_subset import subset_of
+from stseg.graphcut.cut import minimum_cut
+from stseg.graphcut.energy import Energy
+from stseg.graphcut.expansion import LabelEnergy, expand
+from stseg.segmentation.energy import neighbourhood
 from stseg.segmentation.motion import follow
-from stseg.segmentation.part import part_of
 
 SHAPE = (15, 10, 100, 100)
 CELL, RISE, STEP = 0.10, 0.20, 1 / 15  # metres, metres, seconds
@@ -80,7 +81,7 @@ def solve(cost: Labels) -> Ints:
     _fill_best(cost, best)
     still = follow(np.zeros((SHAPE[0] - 1, *SHAPE[2:], 2), np.int64))
     window = Energy(best, neighbourhood(8), np.full(4, WEIGHT, np.int32), still)
-    part = part_of(window, minimum_cut(window).occupied)
+    part = subset_of(window, minimum_cut(window).occupied)
     own = cost.reshape(-1, cost.shape[-1])[part.cell].astype(np.int64)
     more = own[:, 1:] - own[:, :1]
     size = len(part.cell)

@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 
 from stseg.arrays import Bytes, Flags
-from stseg.simulate import Film, Lamp, SceneSpec
+from stseg.simulation import Film, Lamp, SceneSpec
 
 __all__ = ["FILMS", "Shot", "shoot"]
 

@@ -25,17 +25,17 @@ from dataclasses import replace
 import numpy as np
 
 from stseg.config import Config
-from stseg.ghosts.evidence import BoxEvidence, Case, PixelEvidence
-from stseg.ghosts.explain import FramePass
-from stseg.ghosts.frame import Frame, Seen
-from stseg.ghosts.people import ViewEvidence
-from stseg.ghosts.pool import Pool
-from stseg.ghosts.prior import Prior
-from stseg.ghosts.search import ENUMERATED, search
-from stseg.identity.walkers import Walkers
-from stseg.occupancy.candidates import Candidates
+from stseg.detection.detector import Detector
+from stseg.detection.map_estimate import FrameEvidence, MapEstimate
+from stseg.detection.prior import Prior
+from stseg.detection.problem import BoxEvidence, PixelEvidence, Problem
+from stseg.detection.proposals import Proposals
+from stseg.detection.search import ENUMERATED, search
+from stseg.model.candidates import Candidates
+from stseg.model.people import ViewEvidence
 from stseg.occupancy.volume import Occupancy
-from stseg.simulate import Film, SceneSpec
+from stseg.simulation import Film, SceneSpec
+from stseg.tracking.track_filter import TrackFilter
 
 WEIGHED, GATE, SLACK = 10, 20.0, 1.1
 _WARM = 3
@@ -60,9 +60,9 @@ def positions(people: int, frames: int, kind: str, config: Config) -> tuple[floa
     """Candidates weighed and seconds, both a frame."""
     film, seen = evidence(people, frames, kind)
     kinds = [kind] * 4
-    candidates = Candidates(Occupancy(film.rig, kinds, config.occupancy, config.ghosts), kinds, config)
-    frame_pass = FramePass(film.rig, [kind] * 4, config.ghosts)
-    follow = Walkers(film.rig.frame_rate, config.ghosts, config.identity)
+    candidates = Proposals(film.rig, Occupancy(film.rig, kinds, config.occupancy, config.ghosts).fuse, kinds, config)
+    frame_pass = Detector(film.rig, [kind] * 4, config.ghosts)
+    follow = TrackFilter(film.rig.frame_rate, config.ghosts, config.identity)
     taken, weighed = [], []
     for frame, views in enumerate(seen):
         start = time.process_time()
@@ -73,7 +73,7 @@ def positions(people: int, frames: int, kind: str, config: Config) -> tuple[floa
     return float(np.mean(weighed[_WARM:])), float(np.mean(taken[_WARM:]))
 
 
-def rooms(case: Case, number: int) -> Case:
+def rooms(case: Problem, number: int) -> Problem:
     """A case so many times over, side by side: nothing in one room bears on another."""
     n, room = len(case.own), np.repeat(np.arange(number), len(case.own))
     same = room[:, None] == room
@@ -100,7 +100,7 @@ def rooms(case: Case, number: int) -> Case:
         np.tile(pixels.area, (1, number)),
         np.tile(pixels.order, (1, number)),
     )
-    return Case(
+    return Problem(
         more_boxes, more_pixels, np.tile(case.own, number), np.tile(case.newcomer, number), known,
         np.tile(case.ground, (number, 1)) + 100.0 * room[:, None], case.terms,
         np.empty(max(more_pixels.raster[:1].size, match.shape[2], known.shape[1], 1), np.int64),
@@ -108,7 +108,7 @@ def rooms(case: Case, number: int) -> Case:
     )  # fmt: skip
 
 
-def search_seconds(case: Case) -> float:
+def search_seconds(case: Problem) -> float:
     """The best of some searches of a case from nobody."""
     best = np.inf
     for _ in range(_REPEATS):
@@ -118,16 +118,18 @@ def search_seconds(case: Case) -> float:
     return best
 
 
-def one_case(kind: str) -> Case:
+def one_case(kind: str) -> Problem:
     """All that is known of the candidates of one frame, five people in view."""
     film, seen = evidence(5, 1, kind)
-    frame_pass, views = FramePass(film.rig, [kind] * 4, Config().ghosts), seen[-1]
+    frame_pass, views = Detector(film.rig, [kind] * 4, Config().ghosts), seen[-1]
     found = frame_pass.explain(views, None)
     sights = [view.observe(shown) for view, shown in zip(frame_pass.views, views, strict=True)]
-    state = Seen(frame_pass.views, sights, Prior.of(None, Config().ghosts, frame_pass.border), frame_pass.terms)
-    people, ghosts = (Pool(some.ground, some.height, some.width) for some in (found.people, found.ghosts))
+    state = FrameEvidence(
+        frame_pass.views, sights, Prior.of(None, Config().ghosts, frame_pass.border), frame_pass.terms
+    )
+    people, ghosts = (Candidates(some.ground, some.height, some.width) for some in (found.people, found.ghosts))
     pool = people.and_(ghosts)
-    return Frame(state, pool, np.zeros(0, np.int64)).case
+    return MapEstimate(state, pool, np.zeros(0, np.int64)).case
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

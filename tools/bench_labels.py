@@ -21,12 +21,12 @@ from labelled_scenes import TrueFrame, film_frames, labels_of
 
 from stseg.arrays import Floats, Ints, Singles
 from stseg.config import LabelConfig
-from stseg.labels.contrast import edge_costs
+from stseg.graphcut.energy import QUANTUM
+from stseg.graphcut.expansion import expand
+from stseg.labels.adjacency import edge_costs
 from stseg.labels.energy import admissible, most_likely, pixel_energy
 from stseg.labels.views import ViewLabels, view_labels
-from stseg.segmentation.energy import QUANTUM
-from stseg.segmentation.expansion import expand
-from stseg.simulate import NAMED
+from stseg.simulation import NAMED
 
 SIZE = (320, 240)
 CROWDS = (5, 10, 14)

@@ -23,14 +23,14 @@ import numpy as np
 
 from stseg.arrays import Floats, Singles
 from stseg.config import Config
+from stseg.detection.detector import Detector
 from stseg.geometry import Rig
-from stseg.ghosts.explain import FramePass
-from stseg.ghosts.people import ViewEvidence
+from stseg.model.people import ViewEvidence
 from stseg.occupancy.fusion import Rates
-from stseg.occupancy.localise import Localiser
+from stseg.occupancy.localisation import Localiser
 from stseg.occupancy.volume import Occupancy
-from stseg.simulate import Film, SceneSpec
-from stseg.simulate.cameras import build_rig
+from stseg.simulation import Film, SceneSpec
+from stseg.simulation.cameras import build_rig
 
 SIZE = (720, 480)
 VIEWS = 8
@@ -113,7 +113,7 @@ def pipeline_fusion(frames: int) -> None:
     spec = SceneSpec(name="bench", people=6, area=(6.0, 6.0), seconds=frames / 10.0, camera_distance=6.8, seed=5)
     film, config = Film(spec), Config()
     for kind in ("pixels", "boxes"):
-        frame_pass = FramePass(film.rig, [kind] * 4, config.ghosts)
+        frame_pass = Detector(film.rig, [kind] * 4, config.ghosts)
         occupancy = Occupancy(film.rig, [kind] * 4, config.occupancy, config.ghosts)
         taken = []
         for moment in film.moments():

@@ -15,8 +15,8 @@ import numpy as np
 from particles_experiment import film, people
 
 from stseg.config import Config
-from stseg.simulate.named import NAMED
-from stseg.trackers import TRACKERS, Scene, Tracker, find_tracker
+from stseg.simulation.named_scenes import NAMED
+from stseg.trackers import TRACKERS, FusedFrame, Tracker, find_tracker
 
 WANTED = {"kalman": 200.0, "particles": 5.0, "belief": 5.0}
 """Trackers that are asked for, and the frames a second that each must reach."""
@@ -50,7 +50,7 @@ def seconds(name: str, frames: int) -> list[float]:
         for place in found.ground:
             near = np.hypot(*np.moveaxis(rig.grid.ground - place, -1, 0)) < Config().occupancy.reach
             log_odds[:, near] = _OCCUPIED
-        scene = Scene(frame, found, people(truth[:0], len(rig.cameras)), log_odds)
+        scene = FusedFrame(frame, found, people(truth[:0], len(rig.cameras)), log_odds)
         begin = process_time()
         tracker.expected(frame)
         tracker.add(scene, shown)

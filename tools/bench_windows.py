@@ -13,8 +13,9 @@ from results import Bench
 
 from stseg.arrays import Floats, Singles
 from stseg.commands.main import main as stseg
-from stseg.segmentation import cut
-from stseg.segmentation.energy import QUANTUM, Energy, neighbourhood
+from stseg.graphcut import cut
+from stseg.graphcut.energy import QUANTUM, Energy
+from stseg.segmentation.energy import neighbourhood
 from stseg.segmentation.motion import follow
 
 SHAPE = (15, 10, 100, 100)

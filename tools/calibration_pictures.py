@@ -13,8 +13,8 @@ import cv2
 import numpy as np
 from check_figures import spoilt
 
-from stseg.io.frames import open_frames
-from stseg.io.rigs import read_rig
+from stseg.io.recording.frames import open_frames
+from stseg.io.recording.rigs import read_rig
 from stseg.report.ground_grid import grid_picture
 
 _FRAME, _VIEW, _WIDTH = 30, 0, 760

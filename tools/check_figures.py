@@ -17,16 +17,16 @@ from pathlib import Path
 import numpy as np
 
 from stseg.arrays import Floats
-from stseg.calibrate.blunders import Shown, all_bystanders
-from stseg.calibrate.bystanders import tables_of
-from stseg.calibrate.check import spread
-from stseg.calibrate.sightings import sightings
-from stseg.calibrate.verdict import Verdict, judge
-from stseg.commands.sights import make_sights
+from stseg.calibration.blunders import Shown, all_bystanders
+from stseg.calibration.box_correspondence import tables_of
+from stseg.calibration.isolated_boxes import sightings
+from stseg.calibration.rig_check import spread
+from stseg.calibration.verdict import Verdict, judge
+from stseg.engine.backgrounds import make_foregrounds
 from stseg.geometry import Camera, Rig
 from stseg.io.config_file import read_config
-from stseg.io.frames import open_frames
-from stseg.io.rigs import read_rig
+from stseg.io.recording.frames import open_frames
+from stseg.io.recording.rigs import read_rig
 
 WAYS = ("moved 0.30 m", "raised 0.20 m", "turned 6 deg", "shifted 5 %", "rolled 5 deg")
 
@@ -34,7 +34,7 @@ WAYS = ("moved 0.30 m", "raised 0.20 m", "turned 6 deg", "shifted 5 %", "rolled 
 def read(path: Path, frames: int) -> tuple[Rig, Shown]:
     """The rig and the boxes of its first frames."""
     recording = read_rig(path)
-    sights = make_sights(recording, read_config(None, ()), 0, frames)
+    sights = make_foregrounds(recording, read_config(None, ()), 0, frames)
     shown: dict[int, list[Floats]] = {}
     with open_frames(recording, 0, None) as moments:
         for moment in moments:

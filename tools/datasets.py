@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from stseg.arrays import Rows
-from stseg.io.tracks import POSITION, write_truth_csv
+from stseg.io.track_csv import POSITION, write_truth_csv
 
 __all__ = ["WILDTRACK_VIEWS", "cmc_truth", "wildtrack_annotated_boxes", "wildtrack_truth", "write_truth_csv"]
 

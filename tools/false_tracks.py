@@ -17,18 +17,18 @@ from pathlib import Path
 import numpy as np
 
 from stseg.arrays import Rows
-from stseg.commands.sights import make_sights
 from stseg.config import Config
+from stseg.engine.backgrounds import make_foregrounds
+from stseg.engine.pipeline import Pipeline
 from stseg.evaluation import evaluate
-from stseg.ghosts.expected import Expected
-from stseg.ghosts.people import People
-from stseg.ghosts.sizes import Sizes
-from stseg.io.counted import count_frames
-from stseg.io.frames import open_frames
-from stseg.io.rigs import read_rig
-from stseg.io.tracks import read_tracks_csv
-from stseg.pipeline import Pipeline
-from stseg.trackers import TRACKERS, Commit, Scene, Shown
+from stseg.io.recording.frames import open_frames
+from stseg.io.recording.rigs import read_rig
+from stseg.io.recording.stream_index import count_frames
+from stseg.io.track_csv import read_tracks_csv
+from stseg.model.expected import Expected
+from stseg.model.people import People
+from stseg.model.sizes import Sizes
+from stseg.trackers import TRACKERS, Commit, FrameObservations, FusedFrame
 from stseg.trackers.kalman import KalmanTracker
 
 CHECK = 6
@@ -50,7 +50,7 @@ class FrameByFrame(KalmanTracker):
 class WithGhosts(FrameByFrame):
     """Follows ghosts, too."""
 
-    def add(self, scene: Scene, shown: Shown) -> list[Commit]:
+    def add(self, scene: FusedFrame, shown: FrameObservations) -> list[Commit]:
         """The next frame, its ghosts people."""
         return super().add(replace(scene, people=_together(scene.people, scene.ghosts)), shown)
 
@@ -75,12 +75,12 @@ def committed(rig_path: Path, first: int, stop: int) -> dict[str, Rows]:
     """Rows of both ways on one explanation of each frame."""
     recording, config = read_rig(rig_path), Config()
     kinds = ["boxes" if one.source.kind in ("boxes", "instances") else "pixels" for one in recording.sources]
-    sights = make_sights(recording, config, first, stop)
+    sights = make_foregrounds(recording, config, first, stop)
     TRACKERS["frame by frame"] = FrameByFrame
     pipeline = Pipeline(recording.rig, sights, kinds, config, "frame by frame")
     both = {name: make(recording.rig, config, first) for name, make in _BOTH.items()}
     rows: dict[str, list[Rows]] = {name: [] for name in both}
-    unseen, done = Shown((), ()), list[int]()
+    unseen, done = FrameObservations((), ()), list[int]()
     with open_frames(recording, first, stop) as moments:
         for step in pipeline.steps(moments, first, done.append):
             for name, tracker in both.items():

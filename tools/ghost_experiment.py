@@ -25,23 +25,23 @@ from result_sets import SETS, ResultSet
 from results import ROOT, Bench
 
 from stseg.arrays import Rows
-from stseg.commands.sights import make_sights
 from stseg.config import Config
+from stseg.detection.detector import Detector
+from stseg.engine.backgrounds import make_foregrounds
+from stseg.engine.pipeline import Pipeline
 from stseg.evaluation import evaluate
 from stseg.evaluation.scores import Scores
 from stseg.foreground import make_background
-from stseg.foreground.light_change import LightWatch
-from stseg.foreground.sight import Sight
+from stseg.foreground.illumination import LightWatch
+from stseg.foreground.view_foreground import ViewForeground
 from stseg.geometry import Rig
-from stseg.ghosts.explain import FramePass
-from stseg.ghosts.people import ViewEvidence
-from stseg.identity.walkers import Walkers
-from stseg.io.frames import open_frames
-from stseg.pipeline import Pipeline
-from stseg.simulate import Film, SceneSpec
+from stseg.io.recording.frames import open_frames
+from stseg.model.people import ViewEvidence
+from stseg.simulation import Film, SceneSpec
 from stseg.trackers.rows import trajectory_rows
+from stseg.tracking.track_filter import TrackFilter
 
-PASSES = {"before": EveryCandidate, "after": FramePass}
+PASSES = {"before": EveryCandidate, "after": Detector}
 CHECK = 6
 """Frames: tracks as short as that are dropped."""
 _FIRST_SEED = 7100
@@ -69,7 +69,7 @@ class Following:
     def __post_init__(self) -> None:
         config = Config()
         self.frame_pass = PASSES[self.way](self.rig, self.kinds, config.ghosts)
-        self.walkers = Walkers(self.rig.frame_rate, config.ghosts, config.identity)
+        self.walkers = TrackFilter(self.rig.frame_rate, config.ghosts, config.identity)
 
     def add(self, frame: int, seen: Sequence[ViewEvidence]) -> None:
         """The next frame."""
@@ -116,7 +116,7 @@ def simulated(seed: int, seconds: float, cameras: Sequence[int]) -> dict[tuple[i
     for images in film.empty():
         for model, image in zip(models, images, strict=True):
             model.learn(image)
-    sights = [Sight(LightWatch(model, spec.frame_rate, config.light)) for model in models]
+    sights = [ViewForeground(LightWatch(model, spec.frame_rate, config.light)) for model in models]
     ways = {
         (number, way): Following(replace(film.rig, cameras=film.rig.cameras[:number]), ["pixels"] * number, way)
         for number in cameras
@@ -165,7 +165,7 @@ def frame_by_frame(one: ResultSet, bench: Bench) -> dict[str, Scores]:
     recording, (first, stop), config = prepared(one, bench), frames_of(one), Config()
     kinds = ["boxes" if source.source.kind == "boxes" else "pixels" for source in recording.sources]
     ways = {way: Following(recording.rig, kinds, way) for way in PASSES}
-    sights = make_sights(recording, config, first, stop)
+    sights = make_foregrounds(recording, config, first, stop)
     with open_frames(recording, first, stop) as moments:
         for moment in moments:
             seen = [sight.evidence(view) for sight, view in zip(sights, moment.views, strict=True)]
@@ -178,7 +178,7 @@ def whole(one: ResultSet, bench: Bench, way: str) -> Scores:
     """A real set by the whole pipeline, its pass replaced by one of PASSES."""
     recording, (first, stop), config = prepared(one, bench), frames_of(one), Config()
     kinds = ["boxes" if source.source.kind == "boxes" else "pixels" for source in recording.sources]
-    pipeline = Pipeline(recording.rig, make_sights(recording, config, first, stop), kinds, config, "cut")
+    pipeline = Pipeline(recording.rig, make_foregrounds(recording, config, first, stop), kinds, config, "cut")
     pipeline.frame_pass = PASSES[way](recording.rig, kinds, config.ghosts)
     done: list[int] = []
     with open_frames(recording, first, stop) as moments:

@@ -13,26 +13,27 @@ from collections.abc import Sequence
 import numpy as np
 
 from stseg.arrays import Floats, Ints
-from stseg.ghosts.expected import Expected
-from stseg.ghosts.explain import FramePass
-from stseg.ghosts.measure import measure
-from stseg.ghosts.own import Own
-from stseg.ghosts.people import Explanation, People, ViewEvidence
-from stseg.ghosts.pool import Pool, peaks
-from stseg.ghosts.prior import Prior
-from stseg.ghosts.refine import refine
-from stseg.ghosts.views import BoxView, PixelView, Sight
-from stseg.identity.linking import assign, distances
+from stseg.detection.assignment import Assignment
+from stseg.detection.body_size import measure
+from stseg.detection.detector import Detector
+from stseg.detection.evidence import peaks
+from stseg.detection.prior import Prior
+from stseg.detection.refine import refine
+from stseg.detection.views import BoxView, PixelView, ViewObservation
+from stseg.model.candidates import Candidates
+from stseg.model.expected import Expected
+from stseg.model.people import Explanation, People, ViewEvidence
+from stseg.tracking.assignment import assign, distances
 
 MERGED = 0.5
 """Distance within which candidates are one, metres."""
 
 
-class EveryCandidate(FramePass):
+class EveryCandidate(Detector):
     """The pass of a frame without the removal of ghosts."""
 
     def explain(
-        self, seen: Sequence[ViewEvidence], expected: Expected | None, proposed: Pool | None = None
+        self, seen: Sequence[ViewEvidence], expected: Expected | None, proposed: Candidates | None = None
     ) -> Explanation:
         """Everybody who would be there if nobody else were; all of the lattice is tried, so nobody can be proposed."""
         assert proposed is None
@@ -44,7 +45,7 @@ class EveryCandidate(FramePass):
             [_box_of(v, s, pool.at([j])) for j in range(len(pool))] for v, s in zip(self.views, sights, strict=True)
         ]
         nobodys = [np.full(view.shape, -1, np.int64) for view in self.views]
-        own = Own(np.array(best, np.int64).reshape(len(self.views), len(pool)), nobodys)
+        own = Assignment(np.array(best, np.int64).reshape(len(self.views), len(pool)), nobodys)
         places = refine(pool, self.views, sights, own, prior, walker)
         sizes = measure(places, pool.width, self.views, sights, own, self.config)
         sized = prior.known_sizes(sizes, walker)
@@ -68,7 +69,7 @@ class EveryCandidate(FramePass):
             np.full(len(self.views), np.nan),
         )
 
-    def _candidates(self, sights: Sequence[Sight | None], prior: Prior) -> tuple[Pool, Floats]:
+    def _candidates(self, sights: Sequence[ViewObservation | None], prior: Prior) -> tuple[Candidates, Floats]:
         """Candidates worth a person, and what each view says of them, nats, float64 (view, n)."""
         heights, (rows, columns) = np.asarray(self.config.heights), self.lattice_ground.shape[:2]
         said = np.zeros((len(self.views), len(heights), rows * columns))
@@ -88,7 +89,7 @@ class EveryCandidate(FramePass):
         return pool, said[:, heights.searchsorted(pool.height), cell]
 
 
-def _walkers(pool: Pool, prior: Prior) -> Ints:
+def _walkers(pool: Candidates, prior: Prior) -> Ints:
     """Which walker each candidate is, one to one, int64 (n,), -1 for newcomers."""
     walker = np.full(len(pool), -1, np.int64)
     rows, columns = assign(-(prior.known(pool) + prior.newcomer(pool.ground)[:, None]), 0.0)
@@ -96,7 +97,7 @@ def _walkers(pool: Pool, prior: Prior) -> Ints:
     return walker
 
 
-def _box_of(view: BoxView | PixelView, sight: Sight | None, candidate: Pool) -> int:
+def _box_of(view: BoxView | PixelView, sight: ViewObservation | None, candidate: Candidates) -> int:
     """The best box, -1 for none; of pixels every one."""
     if isinstance(view, PixelView) or sight is None or not len(sight.edges):
         return -1

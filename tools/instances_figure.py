@@ -18,10 +18,10 @@ from stseg.arrays import Floats, Singles
 from stseg.config import GhostConfig
 from stseg.geometry import Camera, Grid
 from stseg.geometry.bodies import BodyTable
-from stseg.ghosts.boxes import TOLERANCE
-from stseg.occupancy.instances import fill_match_of_planes
-from stseg.simulate import SceneSpec
-from stseg.simulate.cameras import build_rig
+from stseg.model.box_fit import TOLERANCE
+from stseg.occupancy.box_planes import fill_match_of_planes
+from stseg.simulation import SceneSpec
+from stseg.simulation.cameras import build_rig
 
 PAGE = Path(__file__).parents[1] / "docs" / "figures" / "instances.svg"
 AWAY = np.array([[-0.6, 0.0], [0.4, 0.0], [0.7, 0.35]])

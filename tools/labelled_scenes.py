@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from stseg.arrays import Bytes, Ints, Labels, Singles
 from stseg.config import Config, LabelConfig
 from stseg.foreground import make_background
-from stseg.foreground.light_change import LightWatch
-from stseg.foreground.sight import Sight
+from stseg.foreground.illumination import LightWatch
+from stseg.foreground.view_foreground import ViewForeground
 from stseg.geometry import Rig
-from stseg.labels.standing import Standing
+from stseg.labels.placed_people import PlacedPeople
 from stseg.labels.views import ViewLabels, view_labels
-from stseg.simulate import Film, SceneSpec
+from stseg.simulation import Film, SceneSpec
 
 PLACE_ERROR, HEIGHT_ERROR = 0.03, 0.05
 """How far places, along x and y, and heights of a tracker are off, metres: as measured on `easy` with 8 people."""
@@ -43,7 +43,7 @@ class TrueView:
 class TrueFrame:
     """One frame: who stands where, about as well as a tracker would know it, and what each view shows."""
 
-    standing: Standing
+    standing: PlacedPeople
     views: Sequence[TrueView]
 
 
@@ -54,7 +54,7 @@ def film_frames(spec: SceneSpec, every: int, seed: int = 0) -> tuple[Rig, list[T
     for images in film.empty():
         for model, image in zip(models, images, strict=True):
             model.learn(image)
-    sights = [Sight(LightWatch(model, spec.frame_rate, config.light)) for model in models]
+    sights = [ViewForeground(LightWatch(model, spec.frame_rate, config.light)) for model in models]
     rng, frames = np.random.default_rng(seed), []
     for moment in film.moments():
         seen = [sight.evidence(view.image) for sight, view in zip(sights, moment.views, strict=True)]
@@ -62,7 +62,7 @@ def film_frames(spec: SceneSpec, every: int, seed: int = 0) -> tuple[Rig, list[T
             continue
         people = moment.truth
         off = rng.normal(0.0, 1.0, (len(people), 3)) * (PLACE_ERROR, PLACE_ERROR, HEIGHT_ERROR)
-        standing = Standing(
+        standing = PlacedPeople(
             np.stack([people["x"], people["y"]], 1) + off[:, :2],
             np.tile(PLACE_ERROR**2 * np.eye(2), (len(people), 1, 1)),
             people["height"] + off[:, 2],

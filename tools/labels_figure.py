@@ -13,8 +13,8 @@ import cv2
 import numpy as np
 
 from stseg.arrays import Bytes
-from stseg.io.frames import open_frames
-from stseg.io.rigs import read_rig
+from stseg.io.recording.frames import open_frames
+from stseg.io.recording.rigs import read_rig
 
 _COLUMNS = 2
 

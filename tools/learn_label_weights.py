@@ -36,9 +36,9 @@ from scipy.optimize import linprog, minimize
 from stseg.arrays import Floats, Ints, Labels
 from stseg.config import LabelConfig
 from stseg.geometry import Rig
-from stseg.labels.contrast import adjacency
+from stseg.labels.adjacency import adjacency
 from stseg.labels.views import ViewLabels, view_labels
-from stseg.simulate import SceneSpec
+from stseg.simulation import SceneSpec
 
 SCENES = tuple(
     SceneSpec(f"learn{seed}", people, (6.0, 6.0), 6.0, camera_distance=6.8, noise=noise, seed=seed)

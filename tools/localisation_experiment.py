@@ -41,25 +41,25 @@ from results import ROOT, Bench
 from scipy.ndimage import maximum_filter
 
 from stseg.arrays import Boxes, Floats, Rows
-from stseg.commands.sights import make_sights
 from stseg.config import Config, DetectionConfig
+from stseg.detection.detection_probability import DetectionProbability
+from stseg.detection.detector import Detector
+from stseg.detection.map_estimate import FrameEvidence, MapEstimate
+from stseg.detection.mean_shift import modes
+from stseg.detection.prior import Prior
+from stseg.detection.proposals import map_steps, marginal, soft_maps, weights
+from stseg.engine.backgrounds import make_foregrounds
 from stseg.evaluation.matching import match
 from stseg.evaluation.sequence import line_up
 from stseg.foreground import box_likelihood
-from stseg.ghosts.explain import FramePass
-from stseg.ghosts.frame import Frame, Seen
-from stseg.ghosts.people import ViewEvidence
-from stseg.ghosts.prior import Prior
+from stseg.geometry.summed_area import TOP, UNSEEN
 from stseg.io.config_file import read_config
-from stseg.io.frames import open_frames
-from stseg.io.recording import Recording
-from stseg.io.tracks import read_tracks_csv
-from stseg.occupancy.candidates import map_steps, marginal, soft_maps, unexplained, weights
-from stseg.occupancy.modes import modes
-from stseg.occupancy.probability import DetectionProbability
-from stseg.occupancy.tables import TOP, UNSEEN
+from stseg.io.recording.frames import open_frames
+from stseg.io.recording.recording import Recording
+from stseg.io.track_csv import read_tracks_csv
+from stseg.model.people import ViewEvidence, empty_explanation
+from stseg.model.tables import TRAJECTORY
 from stseg.occupancy.volume import Occupancy
-from stseg.tracks import TRAJECTORY
 
 GATE = 0.5
 KERNELS = (0.80, DetectionConfig().kernel)
@@ -89,13 +89,13 @@ class Ways:
         kinds = ["boxes" if source.source.kind == "boxes" else "pixels" for source in self.recording.sources]
         self.probability = DetectionProbability(rig, config.detection, map_steps(rig, kinds))
         self.occupancy = Occupancy(rig, kinds, config.occupancy, config.ghosts, config.level)
-        self.frame_pass = FramePass(rig, kinds, config.ghosts)
+        self.frame_pass = Detector(rig, kinds, config.ghosts)
 
     def places(self, seen: Sequence[ViewEvidence]) -> tuple[dict[str, Floats], Shown]:
         """Ground places (n, 2) that each way finds in a frame, and the two maps."""
         one, other, grid = self.probability, self.occupancy, self.recording.rig.grid
         said = self._timed("probability", lambda: one.log_ratio(soft_maps(one, seen)))
-        volume = self._timed("volume", lambda: other.fuse(seen, unexplained(other, seen)))
+        volume = self._timed("volume", lambda: other.fuse(seen, empty_explanation(other.rig, seen)))
         hull = self._timed("hull", lambda: self._hull(seen))
         filled, found = marginal(volume), {}
         for kernel in KERNELS:
@@ -128,7 +128,9 @@ class Ways:
         views, config = self.frame_pass.views, self.frame_pass.config
         sights = [None if s is None else view.observe(s) for view, s in zip(views, seen, strict=True)]
         prior = Prior.of(None, config, self.frame_pass.border)
-        first = Frame(Seen(views, sights, prior, self.frame_pass.terms), prior.pool(), np.zeros(0, np.int64))
+        first = MapEstimate(
+            FrameEvidence(views, sights, prior, self.frame_pass.terms), prior.pool(), np.zeros(0, np.int64)
+        )
         return self.frame_pass.fresh(first).ground
 
     def _timed(self, name: str, ask: Callable[[], T]) -> T:
@@ -184,7 +186,7 @@ def measured(name: str, bench: Bench, asked: argparse.Namespace) -> Iterator[str
     frames = range(first, stop, max(1, min(asked.every, (stop - first) // asked.least)))
     found: dict[str, list[Rows]] = {}
     lots = np.random.default_rng(0)
-    sights = make_sights(recording, config, first, stop)
+    sights = make_foregrounds(recording, config, first, stop)
     with open_frames(recording, first, stop) as moments:
         for moment in moments:
             seen = [sight.evidence(view) for sight, view in zip(sights, moment.views, strict=True)]

@@ -19,16 +19,16 @@ from baselines import rows
 
 from stseg.arrays import AnyArray, Bytes, Flags, Floats, Rows, Singles
 from stseg.config import Config, MixtureConfig
+from stseg.engine.pipeline import Pipeline
 from stseg.evaluation import evaluate
 from stseg.foreground import Mixture
-from stseg.foreground.sight import Sight, without_prior
+from stseg.foreground.view_foreground import ViewForeground, without_prior
 from stseg.geometry import Grid, Rig
-from stseg.io.tracks import POSITION
+from stseg.geometry.sampling import SamplingKind
+from stseg.io.track_csv import POSITION
 from stseg.occupancy.fusion import Rates
-from stseg.occupancy.localise import Localiser
-from stseg.occupancy.sampling import SamplingKind
-from stseg.pipeline import Pipeline
-from stseg.simulate import Film, Moment, SceneSpec
+from stseg.occupancy.localisation import Localiser
+from stseg.simulation import Film, SceneSpec, SimulatedFrame
 
 KINDS: tuple[SamplingKind, ...] = get_args(SamplingKind)
 OCCUPIED = 0.02
@@ -143,7 +143,7 @@ class Filmed:
         return replace(self, rig=replace(self.rig, cameras=self.rig.cameras[: len(rates)]), maps=maps)
 
 
-Looks = Callable[[Moment], list[Singles]]
+Looks = Callable[[SimulatedFrame], list[Singles]]
 """From a moment to the map of each view."""
 
 
@@ -169,14 +169,14 @@ def mixtures(film: Film) -> Looks:
         for model, image in zip(models, images, strict=True):
             model.learn(image)
 
-    def look(moment: Moment) -> list[Singles]:
+    def look(moment: SimulatedFrame) -> list[Singles]:
         posteriors = [model.likelihood(view.image) for model, view in zip(models, moment.views, strict=True)]
         return [without_prior(posterior, MixtureConfig().foreground) for posterior in posteriors]
 
     return look
 
 
-def positions(moment: Moment) -> Rows:
+def positions(moment: SimulatedFrame) -> Rows:
     """Who truly stands where."""
     table = np.zeros(len(moment.truth), POSITION)
     table["frame"] = moment.frame
@@ -246,7 +246,7 @@ def same_hits(mean: AnyArray, u: AnyArray, body: AnyArray) -> float:
 def tracked(film: Filmed) -> Rows:
     """Tracks by the whole pipeline."""
     views = len(film.rig.cameras)
-    pipeline = Pipeline(film.rig, [Sight()] * views, ["pixels"] * views, Config(), "cut")
+    pipeline = Pipeline(film.rig, [ViewForeground()] * views, ["pixels"] * views, Config(), "cut")
     masks = [MaskMoment(k, [np.asarray(255 * m, np.uint8) for m in maps]) for k, maps in enumerate(film.maps)]
     commits = [step.commit for step in pipeline.steps(masks, 0, lambda _: None)]
     rows, events = (np.concatenate([getattr(c, name) for c in commits]) for name in ("trajectory", "events"))

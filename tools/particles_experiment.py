@@ -29,15 +29,15 @@ from matplotlib.figure import Figure
 from stseg.arrays import Floats, Rows
 from stseg.config import Config, ParticleConfig
 from stseg.foreground import make_background
-from stseg.foreground.light_change import LightWatch
-from stseg.foreground.sight import Sight
+from stseg.foreground.illumination import LightWatch
+from stseg.foreground.view_foreground import ViewForeground
 from stseg.geometry import Rig
-from stseg.ghosts.people import People
-from stseg.ghosts.sizes import Sizes
-from stseg.simulate.film import Film
-from stseg.simulate.named import NAMED
-from stseg.simulate.scene import SceneSpec
-from stseg.trackers import Scene, Shown
+from stseg.model.people import People
+from stseg.model.sizes import Sizes
+from stseg.simulation.film import Film
+from stseg.simulation.named_scenes import NAMED
+from stseg.simulation.scene import SceneSpec
+from stseg.trackers import FrameObservations, FusedFrame
 from stseg.trackers.particles import ParticleTracker
 
 HELD = 0.5
@@ -67,7 +67,7 @@ class Trial:
     off: list[Floats] = field(default_factory=list)
     seconds: float = 0.0
 
-    def add(self, scene: Scene, shown: Shown, truth: Rows) -> None:
+    def add(self, scene: FusedFrame, shown: FrameObservations, truth: Rows) -> None:
         """The next frame; tracks are numbered as the truth of the first frame is."""
         begin = process_time()
         (commit,) = self.tracker.add(scene, shown)
@@ -97,20 +97,20 @@ class Trial:
         return float(off[off < HELD].mean())
 
 
-def film(spec: SceneSpec, frames: int) -> Iterator[tuple[Rig, int, Rows, Shown]]:
+def film(spec: SceneSpec, frames: int) -> Iterator[tuple[Rig, int, Rows, FrameObservations]]:
     """Frames of a scene with its truth, images and foreground, the background learned from the empty room."""
     recording, config = Film(spec), Config()
     models = [make_background(camera.size, spec.frame_rate, config.foreground) for camera in recording.rig.cameras]
     for images in recording.empty():
         for model, image in zip(models, images, strict=True):
             model.learn(image)
-    sights = [Sight(LightWatch(model, spec.frame_rate, config.light)) for model in models]
+    sights = [ViewForeground(LightWatch(model, spec.frame_rate, config.light)) for model in models]
     for moment in recording.moments():
         if moment.frame == frames:
             return
         images = tuple(view.image for view in moment.views)
         evidence = [sight.evidence(image) for sight, image in zip(sights, images, strict=True)]
-        yield recording.rig, moment.frame, moment.truth, Shown(images, evidence)
+        yield recording.rig, moment.frame, moment.truth, FrameObservations(images, evidence)
 
 
 def people(truth: Rows, views: int) -> People:
@@ -133,7 +133,7 @@ def trials(spec: SceneSpec, frames: int, ways: dict[str, ParticleConfig]) -> dic
         }
         views = len(rig.cameras)
         nothing = np.full(rig.grid.shape, -3.0, np.float32)
-        scene = Scene(frame, people(truth if frame == 0 else truth[:0], views), people(truth[:0], views), nothing)
+        scene = FusedFrame(frame, people(truth if frame == 0 else truth[:0], views), people(truth[:0], views), nothing)
         for trial in found.values():
             trial.add(scene, shown, truth)
     return found

@@ -4,7 +4,7 @@
 
 A pillar is drawn exactly: discs a thirtieth of its height apart, each projected point by point through lens and
 tilt, the convex hull of each two filled at four times the resolution. Beside it the strips of
-`stseg.occupancy.pillars`, at full resolution and rounded to whole pixels as they are used, and the one rectangle
+`stseg.detection.pillar_strips`, at full resolution and rounded to whole pixels as they are used, and the one rectangle
 about the true image. Pillars are of sizes within two standard deviations of HW12's, at places in view at 1 m
 height: some anywhere, for which the overlap (intersection over union) is measured, and as many within 0.5 m of
 people of one frame, for which Omega is.
@@ -24,13 +24,13 @@ from result_sets import SETS, ResultSet
 from results import ROOT, Bench
 
 from stseg.arrays import AnyArray, Boxes, Flags, Floats
-from stseg.commands.sights import make_sights
 from stseg.config import Config
+from stseg.detection.pillar_strips import Pillars
+from stseg.engine.backgrounds import make_foregrounds
 from stseg.foreground import box_likelihood
 from stseg.geometry import Camera, Rig
-from stseg.io.frames import open_frames
-from stseg.io.tracks import read_tracks_csv
-from stseg.occupancy.pillars import Pillars
+from stseg.io.recording.frames import open_frames
+from stseg.io.track_csv import read_tracks_csv
 
 STRIPS = (1, 3, 6, 12)
 HEIGHTS = np.linspace(1.4, 2.0, 10)
@@ -121,7 +121,9 @@ def measured(one: ResultSet, bench: Bench, places: int) -> list[str]:
     near: list[tuple[Floats, Floats]] = []
     with open_frames(recording, frame, frame + 1) as moments:
         views = next(iter(moments)).views
-    for camera, sight, view in zip(rig.cameras, make_sights(recording, Config(), frame, frame + 1), views, strict=True):
+    for camera, sight, view in zip(
+        rig.cameras, make_foregrounds(recording, Config(), frame, frame + 1), views, strict=True
+    ):
         seen = sight.evidence(view)
         shown = box_likelihood(seen, camera.size) if isinstance(seen, Boxes) else seen
         assert shown is not None

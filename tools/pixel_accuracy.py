@@ -22,7 +22,7 @@ from scipy.optimize import linear_sum_assignment
 
 from stseg.arrays import Ints
 from stseg.commands.main import main as stseg
-from stseg.io.indexed_png import decode_indexed, stores_numbers
+from stseg.io.recording.indexed_png import decode_indexed, stores_numbers
 
 SCENES = {
     "easy": ("--scene", "easy", "--seconds", "6"),

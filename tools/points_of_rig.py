@@ -15,7 +15,7 @@ import numpy as np
 
 from stseg.arrays import Floats
 from stseg.geometry import Lens
-from stseg.io.rigs import read_rig
+from stseg.io.recording.rigs import read_rig
 
 _SHARES = (0.15, 0.5, 0.85)
 

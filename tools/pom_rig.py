@@ -18,8 +18,8 @@ import numpy as np
 
 from stseg.arrays import Floats
 from stseg.geometry import Camera, Grid, Rig
-from stseg.io.recording import CameraSource, Recording, Source
-from stseg.io.rigs import write_rig
+from stseg.io.recording.recording import CameraSource, Recording, Source
+from stseg.io.recording.rigs import write_rig
 
 ROW, ROWS = 36, 37
 CELL, BODY = 0.20, 1.75  # metres

@@ -27,15 +27,15 @@ import numpy as np
 from scipy.special import expit, logit
 
 from stseg.arrays import Flags, Floats, Rows
-from stseg.commands.sights import make_sights
 from stseg.config import Config
+from stseg.detection.detector import Detector
+from stseg.engine.backgrounds import make_foregrounds
 from stseg.geometry import Grid
 from stseg.geometry.near import near_person
-from stseg.ghosts.explain import FramePass
-from stseg.io.counted import count_streams
-from stseg.io.frames import open_frames
-from stseg.io.rigs import read_rig
-from stseg.occupancy.level import inside_bodies
+from stseg.io.recording.frames import open_frames
+from stseg.io.recording.rigs import read_rig
+from stseg.io.recording.stream_index import index_streams
+from stseg.occupancy.rate_calibration import inside_bodies
 from stseg.occupancy.volume import Occupancy
 
 BINS = 10
@@ -103,10 +103,10 @@ def measure(rig: Path, frames: slice) -> dict[str, Tally]:
 
 def _explained(rig: Path, kinds: list[str], frames: slice, config: Config) -> Iterator[tuple]:  # type: ignore[type-arg]
     recording = read_rig(rig)
-    streams = count_streams(recording)
+    streams = index_streams(recording)
     first, stop, _ = frames.indices(streams.length)
-    sights = make_sights(recording, config, first, stop, streams=streams)
-    frame_pass = FramePass(recording.rig, kinds, config.ghosts)
+    sights = make_foregrounds(recording, config, first, stop, streams=streams)
+    frame_pass = Detector(recording.rig, kinds, config.ghosts)
     with open_frames(recording, first, stop, streams) as moments:
         for moment in moments:
             seen = [sight.evidence(view) for sight, view in zip(sights, moment.views, strict=True)]

@@ -10,8 +10,8 @@ import numpy as np
 
 from stseg.arrays import Ints, Rows
 from stseg.evaluation import evaluate
-from stseg.io.pages import write_file
-from stseg.io.runs import Run
+from stseg.io.outputs.pages import write_file
+from stseg.io.runfile.runs import Run
 from stseg.report.html import png_bytes
 from stseg.report.plan import plan_view
 

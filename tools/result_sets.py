@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from result_ways import WAYS, Way
 
-from stseg.simulate import NAMED
+from stseg.simulation import NAMED
 
 __all__ = ["SETS", "ResultSet"]
 

@@ -38,8 +38,8 @@ from result_sets import SETS, ResultSet
 from result_ways import WAYS, Way
 
 from stseg import __version__
-from stseg.io.runs import Run, read_run
-from stseg.io.tracks import read_tracks_csv
+from stseg.io.runfile.runs import Run, read_run
+from stseg.io.track_csv import read_tracks_csv
 
 ROOT = Path(__file__).parents[1]
 _PROGRAMS = {

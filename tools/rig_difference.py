@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from stseg.io.rigs import read_rig
+from stseg.io.recording.rigs import read_rig
 
 
 def main(true: Path, other: Path) -> None:

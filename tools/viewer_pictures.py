@@ -18,7 +18,7 @@ import numpy as np
 import xarray
 
 from stseg.arrays import Bytes
-from stseg.io.napari_reader import read_layers
+from stseg.io.runfile.napari_reader import read_layers
 
 _SECONDS, _HEIGHT = 3.0, 1.0
 _UPRIGHT = (0.0, -10.0, -75.0)  # napari's first axis points at who looks: turn it up

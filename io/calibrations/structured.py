@@ -14,7 +14,7 @@ from stseg.arrays import Floats
 from stseg.errors import FormatError
 from stseg.io.calibrations.foreign import Foreign, ForeignTable, of_pose
 from stseg.io.extras import load_extra
-from stseg.io.tables import ANY
+from stseg.io.toml_table import ANY
 
 
 def read_krt_json(files: Sequence[Path]) -> list[Foreign]:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from stseg.io.exports import benchmarks, geographic, movement, pedestrians, tables
-from stseg.io.run_reader import Run
+from stseg.io.runfile.run_reader import Run
 
 FORMATS: Mapping[str, Callable[[Path, Run], None]] = {
     "csv": tables.write_csv,

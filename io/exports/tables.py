@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from stseg.io.extras import load_extra
-from stseg.io.run_reader import Run
-from stseg.io.tracks import write_tracks_csv
+from stseg.io.runfile.run_reader import Run
+from stseg.io.track_csv import write_tracks_csv
 
 _UNITS = {
     "x": "m",

@@ -15,8 +15,7 @@ from rich.console import Console
 from rich.progress import Progress, TaskID
 
 from stseg.arrays import Bytes, Floats
-from stseg.calibrate.blobs import Ends, join_ends, people_ends
-from stseg.calibrate.result import (
+from stseg.calibration.adjusted_rig import (
     cameras_of,
     distance_factor,
     grid_of,
@@ -24,20 +23,21 @@ from stseg.calibrate.result import (
     reports_of,
     scaled,
 )
-from stseg.calibrate.solve import Solution, Views
-from stseg.calibrate.whole import calibrate_from_people, sharpen_by_floor, steps_of
+from stseg.calibration.auto import calibrate_from_people, sharpen_by_floor, steps_of
+from stseg.calibration.endpoints import Ends, join_ends, people_ends
+from stseg.calibration.solution import Solution, Views
 from stseg.commands.calibrate_scene import numbers
-from stseg.commands.sights import make_sights
 from stseg.config import Config
+from stseg.engine.backgrounds import make_foregrounds
 from stseg.errors import ConfigError
-from stseg.foreground.sight import Sight
+from stseg.foreground.view_foreground import ViewForeground
 from stseg.geometry import Camera, Grid, Rig
-from stseg.io.counted import Streams, count_streams
-from stseg.io.frames import open_frames
-from stseg.io.outputs import require_new
-from stseg.io.recording import CameraSource, Recording, Source
-from stseg.io.rigs import write_rig
-from stseg.io.video_size import read_video_size
+from stseg.io.outputs.whole_files import require_new
+from stseg.io.recording.frames import open_frames
+from stseg.io.recording.recording import CameraSource, Recording, Source
+from stseg.io.recording.rigs import write_rig
+from stseg.io.recording.stream_index import StreamIndex, index_streams
+from stseg.io.recording.video_size import read_video_size
 
 _MOST_FRAMES = 3000
 
@@ -95,11 +95,11 @@ def calibrate_auto(
     streams = _streams(videos, output, frame_rate, background, source_kind)
     names = [camera.name for camera in streams.rig.cameras]
     known = None if distance is None else _distance(distance, names)
-    counted = count_streams(streams)
+    counted = index_streams(streams)
     for note in counted.notes:
         print(f"stseg: {note}", file=sys.stderr)
     first, stop = _frames(frames, counted.length)
-    sights = make_sights(streams, Config(), first, stop, streams=counted)
+    sights = make_foregrounds(streams, Config(), first, stop, streams=counted)
     views = Views(
         _ends(streams, counted, sights, first, stop),
         tuple(camera.size for camera in streams.rig.cameras),
@@ -151,7 +151,9 @@ def _streams(
     return Recording(output, Rig(output.stem, frame_rate, Grid((0.0, 1.0), (0.0, 1.0)), cameras), sources)
 
 
-def _ends(streams: Recording, counted: Streams, sights: Sequence[Sight], first: int, stop: int) -> tuple[Ends, ...]:
+def _ends(
+    streams: Recording, counted: StreamIndex, sights: Sequence[ViewForeground], first: int, stop: int
+) -> tuple[Ends, ...]:
     """Feet and heads of isolated people, frame by frame and view by view."""
     found: list[list[tuple[int, Floats]]] = [[] for _ in sights]
     with open_frames(streams, first, stop, counted) as moments, _bar("looking for people", stop - first) as (bar, task):
@@ -164,7 +166,7 @@ def _ends(streams: Recording, counted: Streams, sights: Sequence[Sight], first: 
     return tuple(join_ends(parts) for parts in found)
 
 
-def _backgrounds(sights: Sequence[Sight]) -> list[Bytes]:
+def _backgrounds(sights: Sequence[ViewForeground]) -> list[Bytes]:
     """The empty scene in each view; none where the streams are masks."""
     return [
         np.clip(np.rint(sight.background.model.commonest()), 0, 255).astype(np.uint8)

@@ -16,19 +16,19 @@ from rich.progress import track
 from rich.table import Table
 
 from stseg.arrays import Floats, Observation
-from stseg.calibrate.check import Check, check_rig, in_words
-from stseg.calibrate.coverage import coverage
-from stseg.calibrate.sightings import sightings
-from stseg.calibrate.verdict import Disagreement
-from stseg.commands.sights import make_sights
+from stseg.calibration.coverage import coverage
+from stseg.calibration.isolated_boxes import sightings
+from stseg.calibration.rig_check import Check, check_rig, in_words
+from stseg.calibration.verdict import Disagreement
+from stseg.engine.backgrounds import make_foregrounds
 from stseg.errors import ConfigError
 from stseg.geometry import Rig
 from stseg.io.config_file import read_config
-from stseg.io.frames import open_frames
-from stseg.io.outputs import require_new
-from stseg.io.pages import make_folder, write_file, write_page
-from stseg.io.recording import Recording
-from stseg.io.rigs import read_rig
+from stseg.io.outputs.pages import make_folder, write_file, write_page
+from stseg.io.outputs.whole_files import require_new
+from stseg.io.recording.frames import open_frames
+from stseg.io.recording.recording import Recording
+from stseg.io.recording.rigs import read_rig
 from stseg.report.figures import Figure, backdrop
 from stseg.report.ground_grid import grid_picture
 from stseg.report.html import figures, note, png_bytes, section, table
@@ -115,7 +115,7 @@ def _part(text: str | None) -> tuple[int, int]:
 
 
 def _look(recording: Recording, first: int, stop: int) -> _Seen:
-    sights = make_sights(recording, read_config(None, ()), first, stop)
+    sights = make_foregrounds(recording, read_config(None, ()), first, stop)
     shown: dict[int, list[Floats]] = {}
     kept: tuple[int, tuple[Observation, ...]] = (first, (None,) * len(sights))
     console = Console(stderr=True)

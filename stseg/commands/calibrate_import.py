@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from stseg.commands.calibrate_scene import Scene, Streams, size_of, words
+from stseg.commands.calibrate_scene import SceneOptions, StreamOptions, size_of, words
 from stseg.errors import CalibrationError, ConfigError
 from stseg.geometry import Camera, Rig
 from stseg.geometry.handedness import is_mirrored
@@ -20,9 +20,9 @@ from stseg.io.calibrations.projection import read_projection
 from stseg.io.calibrations.structured import read_kalibr_yaml, read_krt_json, read_nvidia_json, read_pose_toml
 from stseg.io.calibrations.tsai import read_tsai_xml
 from stseg.io.calibrations.world import UNITS, Up, World, guess_unit, guess_up, require_height
-from stseg.io.outputs import require_new
-from stseg.io.recording import Recording
-from stseg.io.rigs import write_rig
+from stseg.io.outputs.whole_files import require_new
+from stseg.io.recording.recording import Recording
+from stseg.io.recording.rigs import write_rig
 
 _READERS: dict[str, Reader] = {
     "opencv": read_opencv_xml,
@@ -46,8 +46,8 @@ def import_calibration(
     /,
     *files: Annotated[str, Parameter(metavar="FILE...")],
     output: Annotated[Path, Parameter(name=["--output", "-o"], metavar="RIG.toml")],
-    scene: Scene,
-    streams: Streams | None = None,
+    scene: SceneOptions,
+    streams: StreamOptions | None = None,
     size: Annotated[str | None, Parameter(metavar="W,H")] = None,
     unit: Annotated[str | None, Parameter(metavar="mm|cm|m|METRES")] = None,
     up: Annotated[Up | None, Parameter(allow_leading_hyphen=True)] = None,
@@ -114,7 +114,7 @@ def import_calibration(
     cameras = tuple(world.camera(one, one.name, _size(one, shared)) for one in foreign)
     rig = Rig(scene.scene or output.stem, scene.frame_rate, scene.grid, cameras)
     try:
-        write_rig(output, Recording(output, rig, (streams or Streams()).of([camera.name for camera in cameras])))
+        write_rig(output, Recording(output, rig, (streams or StreamOptions()).of([camera.name for camera in cameras])))
     except CalibrationError:
         _require_front(foreign, rig, world)
         raise

@@ -11,17 +11,17 @@ from cyclopts import Parameter
 from rich.console import Console
 from rich.table import Table
 
-from stseg.calibrate.points import PointFit, Points, fit_points
-from stseg.calibrate.require import require_height
-from stseg.commands.calibrate_scene import Scene, Streams, size_of
+from stseg.calibration.point_fit import PointFit, Points, fit_points
+from stseg.calibration.point_requirements import require_height
+from stseg.commands.calibrate_scene import SceneOptions, StreamOptions, size_of
 from stseg.errors import ConfigError
 from stseg.geometry import Grid, Lens, Rig
 from stseg.io.calibrations.opencv_xml import read_opencv_lens
+from stseg.io.calibrations.point_files import PointTable, read_points
 from stseg.io.calibrations.world import UNITS
-from stseg.io.outputs import require_new
-from stseg.io.point_files import PointTable, read_points
-from stseg.io.recording import Recording
-from stseg.io.rigs import write_rig
+from stseg.io.outputs.whole_files import require_new
+from stseg.io.recording.recording import Recording
+from stseg.io.recording.rigs import write_rig
 
 _SOURCES = {
     "points": "free vertical, from points above the ground",
@@ -38,8 +38,8 @@ def calibrate_points(
     *,
     output: Annotated[Path, Parameter(name=["--output", "-o"], metavar="RIG.toml")],
     size: Annotated[str, Parameter(metavar="W,H")],
-    scene: Scene,
-    streams: Streams | None = None,
+    scene: SceneOptions,
+    streams: StreamOptions | None = None,
     unit: Literal["mm", "cm", "m"] = "m",
     lens: Annotated[str | None, Parameter(metavar="PATTERN")] = None,
     overwrite: Annotated[bool, Parameter(negative="")] = False,
@@ -80,7 +80,7 @@ def calibrate_points(
         require_height(fits[-1].camera, unit, UNITS)
     names = [table.camera for table in tables]
     rig = Rig(scene.scene or output.stem, scene.frame_rate, grid, tuple(fit.camera for fit in fits))
-    write_rig(output, Recording(output, rig, (streams or Streams()).of(names)))
+    write_rig(output, Recording(output, rig, (streams or StreamOptions()).of(names)))
     _show(tables, fits, grid)
     print(f"wrote {output}")
 

@@ -12,12 +12,12 @@ from cyclopts import Parameter
 
 from stseg.errors import ConfigError
 from stseg.geometry import Grid
-from stseg.io.recording import CameraSource, Source, SourceKind
+from stseg.io.recording.recording import CameraSource, Source, SourceKind
 
 
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
-class Scene:
+class SceneOptions:
     """What the rig file says of the scene and the grid."""
 
     area: Annotated[str, Parameter(metavar="X0,Y0,X1,Y1", allow_leading_hyphen=True)]
@@ -50,7 +50,7 @@ class Scene:
 
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
-class Streams:
+class StreamOptions:
     """What the rig file says of the frames."""
 
     source_pattern: Annotated[str | None, Parameter(metavar="PATTERN")] = None

@@ -12,9 +12,9 @@ from stseg.commands.report import report, write_pictures
 from stseg.commands.run import run
 from stseg.commands.simulate import simulate
 from stseg.errors import OutputError
-from stseg.io.rigs import read_rig
-from stseg.io.runs import read_run
-from stseg.io.tracks import read_tracks_csv
+from stseg.io.recording.rigs import read_rig
+from stseg.io.runfile.runs import read_run
+from stseg.io.track_csv import read_tracks_csv
 
 
 def demo(

@@ -16,7 +16,7 @@ from stseg.errors import ConfigError
 from stseg.evaluation import Scores
 from stseg.evaluation import evaluate as score
 from stseg.evaluation.sequence import Area
-from stseg.io.tracks import read_tracks_csv
+from stseg.io.track_csv import read_tracks_csv
 
 
 def evaluate(
@@ -68,7 +68,7 @@ def evaluate(
 def _read(tracks: Path) -> Rows:
     if tracks.suffix.lower() not in (".h5", ".hdf5"):
         return read_tracks_csv(tracks)
-    from stseg.io.runs import read_trajectory
+    from stseg.io.runfile.runs import read_trajectory
 
     return read_trajectory(tracks)
 

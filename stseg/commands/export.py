@@ -9,8 +9,8 @@ from cyclopts import Parameter
 
 from stseg.errors import ConfigError
 from stseg.io.exports.formats import FORMATS
-from stseg.io.outputs import replacing, require_new
-from stseg.io.runs import read_run
+from stseg.io.outputs.whole_files import replacing, require_new
+from stseg.io.runfile.runs import read_run
 
 
 def export(

@@ -11,10 +11,10 @@ from cyclopts import Parameter
 from rich.console import Console
 from rich.table import Table
 
-from stseg.commands.overview import Overview, look_over, per
-from stseg.commands.slice_of_run import write_slice
+from stseg.commands.run_overview import Overview, look_over, per
+from stseg.commands.run_slice import write_slice
 from stseg.errors import ConfigError
-from stseg.io.runs import read_run
+from stseg.io.runfile.runs import read_run
 
 _LONGEST = 8  # tracks on the screen
 _MINUTES = 15  # of the run on the screen

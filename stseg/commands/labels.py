@@ -12,16 +12,16 @@ from rich.console import Console
 from rich.progress import track
 
 from stseg.arrays import Bytes, Ints, Observation, Rows, Singles
-from stseg.commands.frames_of_run import frames_of_run
-from stseg.commands.sights import make_sights
+from stseg.commands.run_frames import frames_of_run
 from stseg.config import Config
+from stseg.engine.backgrounds import make_foregrounds
 from stseg.errors import SourceError
 from stseg.io.config_file import parse_config
-from stseg.io.frames import Moment, open_frames
-from stseg.io.label_images import LabelImages
-from stseg.io.recording import Recording
-from stseg.io.runs import Run, read_run
-from stseg.labels.standing import Standing
+from stseg.io.outputs.label_images import LabelImages
+from stseg.io.recording.frames import FrameSet, open_frames
+from stseg.io.recording.recording import Recording
+from stseg.io.runfile.runs import Run, read_run
+from stseg.labels.placed_people import PlacedPeople
 from stseg.labels.views import ViewLabels, view_labels
 from stseg.report.colours import track_colour
 
@@ -89,7 +89,7 @@ def write_labels(run: Run, config: Config, folder: Path, frames: Ints, overwrite
     largest = int(run.trajectory["id"].max(initial=0))
     images = LabelImages(folder, [run.cameras[k] for k in cameras], largest, _palette(), overwrite)
     views = view_labels(recording.rig, config.labels)
-    sights = make_sights(recording, config, int(run.frames[0]), int(run.frames[-1]) + 1)
+    sights = make_foregrounds(recording, config, int(run.frames[0]), int(run.frames[-1]) + 1)
     count = 0
     for moment in _moments(run, frames, config.foreground.memory):
         for k in cameras:
@@ -117,7 +117,7 @@ def _people(trajectory: Rows, frames: Ints) -> dict[int, Rows]:
     return {frame: trajectory[order[first:stop]] for frame, first, stop in parts}
 
 
-def _moments(run: Run, frames: Ints, memory: float) -> Iterator[Moment]:
+def _moments(run: Run, frames: Ints, memory: float) -> Iterator[FrameSet]:
     """The frames that are asked for, and before them as many as it takes a background to follow the light, seconds."""
     first = max(int(run.frames[0]), int(frames[0]) - round(memory * run.frame_rate))
     console = Console(stderr=True)
@@ -135,7 +135,7 @@ def _ids(view: ViewLabels, people: Rows, pixels: Singles | None, seen: Observati
     covariance = np.stack([people[name] for name in ("xx", "xy", "xy", "yy")], -1).reshape(-1, 2, 2)
     ground, height = np.stack([people["x"], people["y"]], -1), people["height"].astype(float)
     image = np.asarray(seen, np.uint8) if isinstance(seen, np.ndarray) and seen.ndim == 3 else None
-    index = view.label(Standing(ground, covariance, height), pixels, image)
+    index = view.label(PlacedPeople(ground, covariance, height), pixels, image)
     return np.asarray(np.append(0, people["id"])[index], np.int64)
 
 

@@ -12,15 +12,15 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from stseg.commands.assembly import Made, assemble
 from stseg.commands.run import frame_range
-from stseg.commands.segment_work import Job, SegmentWork, VolumeKind
+from stseg.engine.assembly import FinishedSegment, assemble
+from stseg.engine.segment import Job, SegmentWorker, VolumeKind
+from stseg.engine.segments import Segment
 from stseg.errors import ConfigError
-from stseg.identity.segments import Segment
 from stseg.io.config_file import read_config
-from stseg.io.counted import count_streams
-from stseg.io.recording import Recording
-from stseg.io.rigs import read_rig
+from stseg.io.recording.recording import Recording
+from stseg.io.recording.rigs import read_rig
+from stseg.io.recording.stream_index import index_streams
 
 _SECONDS = 10.0
 """How much of the recording is tried."""
@@ -102,7 +102,7 @@ def plan(
         raise ConfigError("--workers", "", workers, "1 or more processes")
     recording, resolved = read_rig(rig), read_config(config, set_)
     start = perf_counter()
-    streams = count_streams(recording)
+    streams = index_streams(recording)
     counting = perf_counter() - start
     for note in streams.notes:
         print(f"stseg: {note}", file=sys.stderr)
@@ -114,7 +114,7 @@ def plan(
 
 def forecast(job: Job, counting: float, workers: int) -> Forecast:
     """What a job will cost, from parts of it that are tracked now; counting took so many seconds."""
-    work, cuts = SegmentWork(job), job.segments()
+    work, cuts = SegmentWorker(job), job.segments()
     frames = sum(segment.stop - segment.first for segment in cuts)
     parts = list(_parts(job))
     tried = sum(len(range(part.first, part.stop)) for part in parts)
@@ -126,7 +126,7 @@ def forecast(job: Job, counting: float, workers: int) -> Forecast:
             watch = _Clock()
             work.sights(part)
             learning.append(watch.lap())
-            made.append(Made(part, work.make(part, folder / f"{part.index}.h5", fused)))
+            made.append(FinishedSegment(part, work.make(part, folder / f"{part.index}.h5", fused)))
             tracking += watch.lap()
         watch = _Clock()
         assemble(job, work.pipeline, made, folder / "run.h5", overwrite=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
@@ -25,3 +26,14 @@ def frame_bar(work: str, total: int | None, done: int = 0) -> Iterator[Callable[
     with Progress(*columns, console=console, disable=not console.is_terminal, transient=True) as bar:
         task = bar.add_task(work, total=total, completed=done)
         yield lambda more: bar.advance(task, more)
+
+
+class TerminalReporter:
+    """The engine's notes and progress on standard error (`stseg.engine.reporter.Reporter`)."""
+
+    progress = staticmethod(frame_bar)
+
+    @staticmethod
+    def note(line: str) -> None:
+        """A line about the run."""
+        print(f"stseg: {line}", file=sys.stderr, flush=True)

@@ -11,16 +11,16 @@ import numpy as np
 from cyclopts import Parameter
 
 from stseg.arrays import Observation, Rows
-from stseg.commands.film import film
-from stseg.commands.page_contents import page_contents
+from stseg.commands.report_contents import page_contents
+from stseg.commands.report_film import film
 from stseg.errors import ConfigError
-from stseg.io.films import require_film_name
-from stseg.io.frames import open_frames
-from stseg.io.outputs import require_new
-from stseg.io.pages import make_folder, write_file, write_page
-from stseg.io.recording import Recording
-from stseg.io.runs import Run, read_run
-from stseg.io.tracks import read_tracks_csv
+from stseg.io.outputs.films import require_film_name
+from stseg.io.outputs.pages import make_folder, write_file, write_page
+from stseg.io.outputs.whole_files import require_new
+from stseg.io.recording.frames import open_frames
+from stseg.io.recording.recording import Recording
+from stseg.io.runfile.runs import Run, read_run
+from stseg.io.track_csv import read_tracks_csv
 from stseg.report.figures import Figure, Instant, camera_figures, ground_figures, slice_figures
 from stseg.report.html import png_bytes
 from stseg.report.page import report_page

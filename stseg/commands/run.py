@@ -12,27 +12,27 @@ from typing import Annotated, Any
 import numpy as np
 from cyclopts import Parameter
 
-from stseg.commands.assembly import Made, assemble
-from stseg.commands.cluster import make_by_cluster
-from stseg.commands.follow import follow as follow_recording
-from stseg.commands.follow import last_frame, live_table_of
 from stseg.commands.labels import require_pixels, write_labels
-from stseg.commands.progress import frame_bar
-from stseg.commands.segment_work import Job, SegmentWork, VolumeKind
-from stseg.commands.warnings_of_run import rig_warnings
-from stseg.commands.workers import make_by_workers
+from stseg.commands.progress import TerminalReporter, frame_bar
+from stseg.engine.assembly import FinishedSegment, assemble
+from stseg.engine.cluster import make_by_cluster
+from stseg.engine.following import follow as follow_recording
+from stseg.engine.following import last_frame, live_table_of
+from stseg.engine.segment import Job, SegmentWorker, VolumeKind
+from stseg.engine.segments import Segment
+from stseg.engine.warnings import rig_warnings
+from stseg.engine.workers import make_by_workers
 from stseg.errors import ConfigError
-from stseg.identity.segments import Segment
 from stseg.io.config_file import format_config, read_config
-from stseg.io.counted import Streams, count_streams
-from stseg.io.label_images import require_label_folder
-from stseg.io.live import is_live
-from stseg.io.outputs import require_new
-from stseg.io.provenance import as_tables, gather_provenance
-from stseg.io.recording import Recording
-from stseg.io.rigs import read_rig
-from stseg.io.runs import read_run
-from stseg.io.work_folder import WorkFolder
+from stseg.io.live.live_rig import is_live
+from stseg.io.outputs.label_images import require_label_folder
+from stseg.io.outputs.whole_files import require_new
+from stseg.io.recording.recording import Recording
+from stseg.io.recording.rigs import read_rig
+from stseg.io.recording.stream_index import StreamIndex, index_streams
+from stseg.io.runfile.provenance import as_tables, gather_provenance
+from stseg.io.runfile.runs import read_run
+from stseg.io.runfile.work_folder import WorkFolder
 
 
 def run(
@@ -102,7 +102,7 @@ def run(
     asked |= {"--frames": frames or "all", "--tracker": tracker, "--volume": volume}
     if follow:
         _require_alone(workers, scheduler, labels)
-        job = Job(recording, resolved, tracker, volume, 0, last_frame(frames), Streams(0, ()))
+        job = Job(recording, resolved, tracker, volume, 0, last_frame(frames), StreamIndex(0, ()))
         print(_follow(job, asked, output, overwrite))
         return
     with WorkFolder(output, asked) as folder, _told_how_to_go_on(folder):
@@ -139,7 +139,7 @@ def _follow(job: Job, asked: dict[str, Any], output: Path, overwrite: bool) -> s
         require_new(table, overwrite)
     with work as folder, _told_how_to_go_on(folder):
         try:
-            told = follow_recording(job, folder, output, overwrite)
+            told = follow_recording(job, folder, output, overwrite, TerminalReporter())
         except BaseException:
             if not folder.segments():  # nothing goes on from it
                 table.unlink(missing_ok=True)
@@ -154,7 +154,7 @@ def _require_alone(workers: int, scheduler: str | None, labels: Path | None) -> 
             raise ConfigError(name, "", "that beside --follow", "one of them: a recording that goes on has one worker")
 
 
-def frame_range(text: str | None, streams: Streams, recording: Recording) -> tuple[int, int]:
+def frame_range(text: str | None, streams: StreamIndex, recording: Recording) -> tuple[int, int]:
     """First and stop of a part of a recording; where no text says which, of all that tells of places.
 
     Raises
@@ -174,7 +174,7 @@ def frame_range(text: str | None, streams: Streams, recording: Recording) -> tup
     return first, stop
 
 
-def _make(job: Job, plan: list[Segment], folder: WorkFolder, workforce: Workforce) -> list[Made]:
+def _make(job: Job, plan: list[Segment], folder: WorkFolder, workforce: Workforce) -> list[FinishedSegment]:
     """All segments, those that are there already taken as they are."""
     kept = folder.segments()
     for path in folder.broken:
@@ -186,7 +186,7 @@ def _make(job: Job, plan: list[Segment], folder: WorkFolder, workforce: Workforc
     with frame_bar("tracking", job.stop - job.first, done) as advance:
         for segment, path in workforce.make(job, missing, folder, advance):
             kept[segment.index] = path
-    return [Made(segment, kept[segment.index]) for segment in plan]
+    return [FinishedSegment(segment, kept[segment.index]) for segment in plan]
 
 
 @dataclass(frozen=True)
@@ -207,17 +207,17 @@ class Workforce:
         elif self.workers > 1:
             yield from make_by_workers(job, missing, folder.draft, self.workers, advance)
         else:
-            work = SegmentWork(job)
+            work = SegmentWorker(job)
             for segment in missing:
                 yield segment, work.make(segment, folder.draft(segment.index), advance)
 
 
-def _streams(recording: Recording, folder: WorkFolder) -> Streams:
+def _streams(recording: Recording, folder: WorkFolder) -> StreamIndex:
     """What counting the recording tells; it is counted once, by decoding."""
     known = folder.streams()
     if known is None:
         with frame_bar("counting", None):
-            known = count_streams(recording)
+            known = index_streams(recording)
         folder.keep_streams(known)
     return known
 

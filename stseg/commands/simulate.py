@@ -12,8 +12,8 @@ from rich.console import Console
 from rich.progress import Progress
 
 from stseg.errors import ConfigError
-from stseg.io.scenes import write_scene
-from stseg.simulate import NAMED, Film, SceneSpec
+from stseg.io.outputs.scenes import write_scene
+from stseg.simulation import NAMED, Film, SceneSpec
 
 
 def simulate(

@@ -2,14 +2,14 @@
 
 from stseg.config import ChromaticConfig, CodebookConfig, MixtureConfig
 from stseg.foreground.background import Background
-from stseg.foreground.boxes import box_likelihood
-from stseg.foreground.choice import make_background
 from stseg.foreground.chromatic import Chromatic
 from stseg.foreground.codebook import Codebook
+from stseg.foreground.illumination import LightChange, LightWatch
 from stseg.foreground.instances import instance_boxes
-from stseg.foreground.light_change import LightChange, LightWatch
 from stseg.foreground.masks import mask_likelihood
 from stseg.foreground.mixture import Mixture
+from stseg.foreground.registry import make_background
+from stseg.model.box_likelihood import box_likelihood
 
 __all__ = [
     "Background",

@@ -4,7 +4,7 @@ A background model is of one view. It learns the empty scene, then gives each fr
 the scene while it does; what it has learned can be taken out as arrays and put back.
 
 The likelihood is a posterior: the probability that the pixel shows a person, with the model's `prior` for it, whatever
-the model. Whoever fuses views takes the prior out (`stseg.foreground.sight`).
+the model. Whoever fuses views takes the prior out (`stseg.foreground.view_foreground`).
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from stseg.arrays import AnyArray, Bytes, Floats, Singles
 from stseg.config import BackgroundConfig
 from stseg.errors import ConfigError, InputError, SourceError
-from stseg.foreground.light import channel_gains
+from stseg.foreground.channel_gain import channel_gains
 from stseg.foreground.smoothing import pool_log_odds
 
 TURNS = 4
@@ -78,7 +78,7 @@ class PixelModel(ABC):
     arrays
         All that it has learned, each (v, u, K, ...) for K modes a pixel, by name and in the order in which its kernels
         take them. `mean` float32 (v, u, K, 3), grey levels BGR in the light that they were learned in, and `weight`
-        float32 (v, u, K) are among them: `stseg.foreground.light` asks the strongest mode.
+        float32 (v, u, K) are among them: `stseg.foreground.channel_gain` asks the strongest mode.
 
     Notes
     -----

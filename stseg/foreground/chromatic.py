@@ -29,8 +29,8 @@ from stseg.arrays import Bytes, Floats, Singles
 from stseg.config import ChromaticConfig
 from stseg.foreground.background import PixelModel
 from stseg.foreground.chromatic_kernels import evaluate, update
-from stseg.foreground.commonest import commonest_colours
 from stseg.foreground.mixture import learning_rates
+from stseg.foreground.temporal_mode import commonest_colours
 
 
 class Chromatic(PixelModel):

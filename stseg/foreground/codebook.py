@@ -42,7 +42,7 @@ from stseg.arrays import Bytes, Floats, Singles
 from stseg.config import CodebookConfig
 from stseg.foreground.background import TURNS, PixelModel
 from stseg.foreground.codebook_kernels import evaluate, follow, settle, teach
-from stseg.foreground.commonest import commonest_colours
+from stseg.foreground.temporal_mode import commonest_colours
 
 
 class Codebook(PixelModel):

@@ -24,7 +24,7 @@ Where background shows meanwhile, such a mode is forgotten within the memory; so
 the empty scene. A colour that only a shadow explains teaches nothing, and background gives up no mode to people.
 
 Light that changes over the whole view, slowly or at once, is a gain of each channel on all means
-(`stseg.foreground.light`); where a part of it turns darker that is a shadow, where brighter new background after
+(`stseg.foreground.channel_gain`); where a part of it turns darker that is a shadow, where brighter new background after
 `absorption`.
 """
 
@@ -39,8 +39,8 @@ from numpy.typing import NDArray
 from stseg.arrays import Bytes, Floats, Singles
 from stseg.config import MixtureConfig
 from stseg.foreground.background import PixelModel
-from stseg.foreground.commonest import commonest_colours
 from stseg.foreground.mixture_kernels import evaluate, update
+from stseg.foreground.temporal_mode import commonest_colours
 
 
 class Mixture(PixelModel):

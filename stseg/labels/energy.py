@@ -16,9 +16,9 @@ import numpy as np
 from stseg.accelerate import kernel
 from stseg.arrays import Ints, Labels, Singles
 from stseg.config import LabelConfig
-from stseg.labels.nearest import Nearest
-from stseg.segmentation.energy import QUANTUM
-from stseg.segmentation.expansion import BACKGROUND, LabelEnergy
+from stseg.graphcut.energy import QUANTUM
+from stseg.graphcut.expansion import BACKGROUND, LabelEnergy
+from stseg.labels.label_likelihood import LabelLikelihood
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class PixelEnergy:
 
 
 def pixel_energy(
-    shown: Nearest, foreground: Singles, across: Labels, down: Labels, config: LabelConfig
+    shown: LabelLikelihood, foreground: Singles, across: Labels, down: Labels, config: LabelConfig
 ) -> PixelEnergy:  # fmt: skip
     """The energy of a window of a view.
 
@@ -69,7 +69,7 @@ def pixel_energy(
     return PixelEnergy(pixel, LabelEnergy(first, label, price, start[:joined], end[:joined], weight[:joined]))
 
 
-def most_likely(shown: Nearest) -> Ints:
+def most_likely(shown: LabelLikelihood) -> Ints:
     """The label of greatest likelihood at each pixel of the window (HW12 eq. 24), int64 (v, u)."""
     best, label = shown.nobody.copy(), np.zeros(shown.nobody.shape, np.int64)
     for j, (left, top, right, bottom) in enumerate(shown.people.edges.tolist()):

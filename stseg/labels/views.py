@@ -10,12 +10,12 @@ from stseg.arrays import Bytes, Labels, Singles
 from stseg.config import LabelConfig
 from stseg.geometry import Camera, Rig
 from stseg.geometry.bodies import BodyTable
-from stseg.labels.contrast import edge_costs
+from stseg.graphcut.expansion import expand
+from stseg.labels.adjacency import edge_costs
+from stseg.labels.body_masks import pillar_patches
 from stseg.labels.energy import admissible, most_likely, pixel_energy
-from stseg.labels.nearest import Nearest, nearest
-from stseg.labels.pillars import pillar_patches
-from stseg.labels.standing import Standing
-from stseg.segmentation.expansion import expand
+from stseg.labels.label_likelihood import LabelLikelihood, nearest
+from stseg.labels.placed_people import PlacedPeople
 
 
 class ViewLabels:
@@ -34,7 +34,7 @@ class ViewLabels:
     def __init__(self, camera: Camera, table: BodyTable, config: LabelConfig) -> None:
         self.camera, self.table, self.config = camera, table, config
 
-    def label(self, standing: Standing, foreground: Singles, image: Bytes | None) -> Labels:
+    def label(self, standing: PlacedPeople, foreground: Singles, image: Bytes | None) -> Labels:
         """Whom each pixel shows.
 
         Parameters
@@ -60,7 +60,7 @@ class ViewLabels:
         labels[shown.window].flat[problem.pixel] = expand(problem.energy, admissible(problem.energy, start))
         return labels
 
-    def expected(self, standing: Standing) -> Nearest:
+    def expected(self, standing: PlacedPeople) -> LabelLikelihood:
         """Whom each pixel around the people shows, before it is looked at."""
         patches = pillar_patches(self.table, standing, self.config)
         return nearest(patches, np.hypot(*(standing.ground - self.camera.centre[:2]).T))

@@ -28,7 +28,7 @@ import numpy as np
 
 from stseg.accelerate import kernel
 from stseg.arrays import Bytes, Ints, Singles
-from stseg.occupancy.tables import TOP, Levels
+from stseg.geometry.summed_area import TOP, Levels
 
 
 class Rates(NamedTuple):
@@ -70,7 +70,7 @@ def synergy_terms(least: float) -> Singles:
     return np.tile(np.log(np.maximum(likelihood, least)).astype(np.float32), (2, 1))
 
 
-class Tally:
+class Accumulator:
     """What the views said so far of each cell of a frame.
 
     Attributes
@@ -107,7 +107,7 @@ def add_terms(
     weights: Singles,
     count: Singles,
 ) -> None:
-    """Add one view's terms to the frame's sums; see `Tally`.
+    """Add one view's terms to the frame's sums; see `Accumulator`.
 
     Parameters
     ----------

@@ -10,20 +10,20 @@ from scipy.special import logit
 
 from stseg.arrays import Boxes, Bytes, Flags, Floats, Ints, Singles
 from stseg.config import GhostConfig, LevelConfig, OccupancyConfig
-from stseg.foreground import box_likelihood
 from stseg.geometry import Rig
 from stseg.geometry.bodies import BodyTable
+from stseg.geometry.cell_means import CellMeans
 from stseg.geometry.near import near_person
-from stseg.ghosts.boxes import TOLERANCE
-from stseg.ghosts.people import Explanation, ViewEvidence
+from stseg.geometry.sampling import Sampling
+from stseg.geometry.summed_area import TOP, UNSEEN, Levels
+from stseg.model.box_fit import TOLERANCE
+from stseg.model.box_likelihood import box_likelihood
+from stseg.model.people import Explanation, ViewEvidence
+from stseg.occupancy.box_planes import fill_match_of_planes, likelihood_of
 from stseg.occupancy.clutter import clutter, clutter_side, clutter_weights
-from stseg.occupancy.explained import Owners, fill_share, leave_unexplained
-from stseg.occupancy.fusion import Rates, Tally, log_odds_terms
-from stseg.occupancy.instances import fill_match_of_planes, likelihood_of
-from stseg.occupancy.level import Level, cells_of_one, fill_counts, inside_bodies
-from stseg.occupancy.means import CellMeans
-from stseg.occupancy.sampling import Sampling
-from stseg.occupancy.tables import TOP, UNSEEN, Levels
+from stseg.occupancy.fusion import Accumulator, Rates, log_odds_terms
+from stseg.occupancy.rate_calibration import RateCalibration, cells_of_one, fill_counts, inside_bodies
+from stseg.occupancy.unexplained import PixelAssignment, fill_share, leave_unexplained
 
 _MAP_STEP = 8
 _BESIDE = 0.0
@@ -74,7 +74,7 @@ class Occupancy:
 
     def forget(self) -> None:
         """Go back to the first guess of the rates."""
-        self.level = Level(self._first, self.rig.frame_rate, self._level_config)
+        self.level = RateCalibration(self._first, self.rig.frame_rate, self._level_config)
 
     def fuse(self, seen: Sequence[ViewEvidence], explanation: Explanation) -> Singles:
         """A frame's log-odds by the rates known so far, float32 (plane, y, x), nats; nan where no view sees the cell.
@@ -112,17 +112,17 @@ class Occupancy:
             said.append(_Said(levels, log_odds_terms(rates), weight, share, faith))
         return said
 
-    def _tally(self, said: Sequence[_Said | None], near: Ints) -> Tally:
-        tally = Tally(self.rig.grid.shape)
+    def _tally(self, said: Sequence[_Said | None], near: Ints) -> Accumulator:
+        tally = Accumulator(self.rig.grid.shape)
         for view in said:
             if view is not None:
                 tally.add(*view, near)
         return tally
 
-    def _total(self, tally: Tally, near: Ints) -> Singles:
+    def _total(self, tally: Accumulator, near: Ints) -> Singles:
         return tally.total(self.views, near, self.config.looks, (self.prior, _BESIDE))
 
-    def _learn(self, said: Sequence[_Said | None], tally: Tally, explanation: Explanation, near: Ints) -> None:
+    def _learn(self, said: Sequence[_Said | None], tally: Accumulator, explanation: Explanation, near: Ints) -> None:
         people, grid = explanation.people, self.rig.grid
         inside = inside_bodies(grid, near, people.ground, people.height)
         body, reached = cells_of_one(grid, self.height_mean, self.config.reach)
@@ -142,23 +142,25 @@ class Occupancy:
         filled = np.array([inside[counted].sum(), counted.sum()]) / reached
         self.level.learn(errors / units, seen / units, filled)
 
-    def _owners(self, i: int, explanation: Explanation) -> Owners:
+    def _owners(self, i: int, explanation: Explanation) -> PixelAssignment:
         people, served = explanation.people, explanation.box_owner[i]
         own = np.zeros(len(people) + 1, bool)
         own[served[served >= 0]] = True
         camera, step = self.rig.cameras[i], explanation.raster_step[i]
         width, height = camera.size
         away = np.hypot(*(people.ground - camera.centre[:2]).T)
-        return Owners(explanation.owner[i], step, np.arange(height) // step, np.arange(width) // step, away, own)
+        return PixelAssignment(
+            explanation.owner[i], step, np.arange(height) // step, np.arange(width) // step, away, own
+        )
 
-    def _share(self, i: int, owners: Owners, near: Ints) -> tuple[Singles, Flags]:
+    def _share(self, i: int, owners: PixelAssignment, near: Ints) -> tuple[Singles, Flags]:
         """How much of each cell the view sees past nearer people, and whether its footprint shows anybody else."""
         share, shared = np.empty(self.rig.grid.shape, np.float32), np.empty(self.rig.grid.shape, bool)
         fill_share(self.sampling.footprint[i], *owners, near, self.sampling.distance[i], share, shared)
         return share, shared
 
     def _levels_of_map(
-        self, i: int, view: Singles, owners: Owners, near: Ints, share: Singles, shared: Flags
+        self, i: int, view: Singles, owners: PixelAssignment, near: Ints, share: Singles, shared: Flags
     ) -> Levels:
         """Mean likelihood that the explanation leaves each cell."""
         table = self.means.sum_table(i, view)

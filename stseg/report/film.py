@@ -13,7 +13,7 @@ from stseg.report.charts import clock_time
 from stseg.report.colours import NIGHT, PAPER, QUIET, track_colour
 from stseg.report.figures import TRAIL, backdrop
 from stseg.report.labels import place_labels
-from stseg.report.overlay import View, overlay
+from stseg.report.overlay import OverlayView, overlay
 from stseg.report.plan import ground_sheet, plan_map
 
 _WIDEST, _ALL_VIEWS = 960, 1280  # width of a view, and of all views side by side, pixels
@@ -38,7 +38,7 @@ class Film:
         count = len(rig.cameras)
         self._columns = int(np.ceil(np.sqrt(count)))
         self._wide = min(_WIDEST, _ALL_VIEWS // self._columns)
-        self._tall = max(View(camera, self._wide).size[1] for camera in rig.cameras)
+        self._tall = max(OverlayView(camera, self._wide).size[1] for camera in rig.cameras)
         rows = -(-count // self._columns)
         height = max(rows * self._tall, _LEAST_HEIGHT)
         self._plan = plan_map(rig, height, height)

@@ -8,7 +8,7 @@ from stseg.arrays import AnyArray, Bytes, Floats
 from stseg.geometry import Camera, Grid
 from stseg.report.canvas import chip, disc, stroke, text
 from stseg.report.colours import INK, PAPER, Colour
-from stseg.report.overlay import View
+from stseg.report.overlay import OverlayView
 
 _LINE: Colour = (255, 196, 64)
 _BORDER: Colour = (64, 220, 255)
@@ -40,7 +40,7 @@ def grid_picture(camera: Camera, grid: Grid, image: Bytes | None, frame: int, wi
     uint8 (v, u, 3)
         Blue, green, red.
     """
-    view = View(camera, width)
+    view = OverlayView(camera, width)
     canvas = view.canvas(image)
     step = next((s for s in _STEPS if s * _MOST_LINES >= max(grid.x[1] - grid.x[0], grid.y[1] - grid.y[0])), _STEPS[-1])
     for x in _stops(grid.x, step):
@@ -61,7 +61,7 @@ def _stops(bounds: tuple[float, float], step: float) -> list[float]:
     return sorted({low, high, *inner.tolist()})
 
 
-def _line(canvas: Bytes, view: View, x: Floats, y: Floats, is_border: bool) -> None:
+def _line(canvas: Bytes, view: OverlayView, x: Floats, y: Floats, is_border: bool) -> None:
     stroke(canvas, view.pixel(np.stack([x, y], -1), 0.0), _BORDER if is_border else _LINE, 2 if is_border else 1)
 
 
@@ -75,7 +75,7 @@ def _pole_places(grid: Grid) -> list[Floats]:
     return list(np.stack(np.meshgrid(x, y), -1).reshape(-1, 2))
 
 
-def _pole(canvas: Bytes, view: View, ground: AnyArray) -> None:
+def _pole(canvas: Bytes, view: OverlayView, ground: AnyArray) -> None:
     heights = np.linspace(0.0, _TALL, 35)
     pixel = view.pixel(np.broadcast_to(ground, (len(heights), 2)), heights)
     if not np.isfinite(pixel).all():

@@ -54,7 +54,7 @@ def overlay(
     uint8 (v, u, 3)
         Blue, green, red.
     """
-    view = View(camera, width)
+    view = OverlayView(camera, width)
     canvas = view.canvas(image)
     if image is None or image.ndim == 2:
         _rule(canvas, view, grid)
@@ -70,7 +70,7 @@ def overlay(
 
 
 @dataclass(frozen=True)
-class View:
+class OverlayView:
     """A camera whose image is shown `width` pixels wide."""
 
     camera: Camera
@@ -104,7 +104,7 @@ class View:
         return np.asarray(np.where(near[..., None], place, np.nan))
 
 
-def pillar_outline(view: View, ground: Floats, height: float) -> list[Floats]:
+def pillar_outline(view: OverlayView, ground: Floats, height: float) -> list[Floats]:
     """Outlines of a standing body (`PROFILE`) in the picture: closed polygons float64 (n, 2), none where it is unseen.
 
     Each slice between two discs shows as the convex hull of both; the body is their union.
@@ -124,7 +124,7 @@ def pillar_outline(view: View, ground: Floats, height: float) -> list[Floats]:
     return [cv2.approxPolyDP(contour, 1.2, True)[:, 0] / _FINE + low for contour in found]
 
 
-def _draw_pillar(canvas: Bytes, view: View, row: np.void) -> None:
+def _draw_pillar(canvas: Bytes, view: OverlayView, row: np.void) -> None:
     ground, colour = np.array([row["x"], row["y"]]), track_colour(int(row["id"]))
     for polygon in pillar_outline(view, ground, _height(row)):
         fill(canvas, polygon, colour, 0.28)
@@ -135,7 +135,7 @@ def _draw_pillar(canvas: Bytes, view: View, row: np.void) -> None:
         disc(canvas, foot, 5, colour)
 
 
-def _draw_trail(canvas: Bytes, view: View, rows: Rows, frame: int, trail: int) -> None:
+def _draw_trail(canvas: Bytes, view: OverlayView, rows: Rows, frame: int, trail: int) -> None:
     """The way here on the ground, fading with age."""
     rows = rows[np.argsort(rows["frame"], kind="stable")]
     pixel = view.pixel(np.stack([rows["x"], rows["y"]], -1), 0.0)
@@ -144,7 +144,7 @@ def _draw_trail(canvas: Bytes, view: View, rows: Rows, frame: int, trail: int) -
     fading_stroke(canvas, pixel, colour, 3, 1 - 0.85 * age)
 
 
-def _label(canvas: Bytes, view: View, own: Rows) -> None:
+def _label(canvas: Bytes, view: OverlayView, own: Rows) -> None:
     """Ids above the heads."""
     heights = np.array([_height(row) for row in own])
     heads = view.pixel(np.stack([own["x"], own["y"]], -1), heights + 0.12)
@@ -165,7 +165,7 @@ def _distance(camera: Camera, rows: Rows) -> Floats:
     return np.asarray(np.hypot(rows["x"] - camera.centre[0], rows["y"] - camera.centre[1]))
 
 
-def _rule(canvas: Bytes, view: View, grid: Grid) -> None:
+def _rule(canvas: Bytes, view: OverlayView, grid: Grid) -> None:
     """The ground's metres, and its rectangle a little brighter."""
     (x0, x1), (y0, y1) = grid.x, grid.y
     along_x, along_y = np.linspace(x0, x1, 400), np.linspace(y0, y1, 400)
@@ -175,6 +175,6 @@ def _rule(canvas: Bytes, view: View, grid: Grid) -> None:
         _ground_line(canvas, view, along_x, np.full(400, y), y in (y0, y1))
 
 
-def _ground_line(canvas: Bytes, view: View, x: Floats, y: Floats, is_border: bool) -> None:
+def _ground_line(canvas: Bytes, view: OverlayView, x: Floats, y: Floats, is_border: bool) -> None:
     colour: Colour = mixed(_LINE, PAPER, 0.3) if is_border else _LINE
     stroke(canvas, view.pixel(np.stack([x, y], -1), 0.0), colour, 2 if is_border else 1)

@@ -21,7 +21,7 @@ from stseg.report.style import STYLE
 
 
 @dataclass(frozen=True)
-class Sight:
+class ViewSummary:
     """What one view has to say.
 
     Attributes
@@ -98,7 +98,7 @@ class Contents:
     haunts: Sequence[Figure]
     ghost_map: Figure
     blind_map: Figure
-    sights: Sequence[Sight]
+    sights: Sequence[ViewSummary]
     stages: Sequence[tuple[str, float]]
     slices: Sequence[Figure]
     cameras: Sequence[Figure]
@@ -224,7 +224,7 @@ def _thread(fallback: Figure) -> str:
     )
 
 
-def _view_heads(sights: Sequence[Sight]) -> str:
+def _view_heads(sights: Sequence[ViewSummary]) -> str:
     return "".join(f"<th>{escape(sight.name)}</th>" for sight in sights)
 
 
@@ -252,7 +252,7 @@ def _stages(stages: Sequence[tuple[str, float]]) -> str:
     return bars(stages, sum(seconds for _, seconds in stages), "{:,.1f} s")
 
 
-def _sights(sights: Sequence[Sight]) -> str:
+def _sights(sights: Sequence[ViewSummary]) -> str:
     rows = [
         (
             escape(sight.name),

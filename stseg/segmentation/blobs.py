@@ -2,55 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.ndimage import label as connected
 
 from stseg.arrays import Floats, Ints, Labels, Singles
 from stseg.geometry import Grid
-from stseg.segmentation.division import STRANGER
+from stseg.model.blobs import UNASSIGNED, Blobs
 
 _EIGHT = np.ones((3, 3), int)
 _FAINT = 1e-6
 """Mass of a cell without evidence, nats."""
-
-
-@dataclass(frozen=True)
-class Blobs:
-    """The blobs of one frame.
-
-    Attributes
-    ----------
-    cells : int32 (y, x)
-        Blob of each ground cell, counted from 1; 0 for none.
-    track : int64 (n,)
-        Whose each blob is; STRANGER where no track claims it.
-    person : int64 (n,)
-        The person of the frame's pass whom each blob holds, -1 for nobody.
-    ground : float64 (n, 2)
-        Centroid of the likelihood-weighted mass, metres.
-    covariance : float64 (n, 2, 2)
-        Square metres.
-    extent : float64 (n,)
-        Ground area, square metres.
-    height : float64 (n,)
-        Height of the uppermost occupied plane, metres.
-    mass : float64 (n,)
-        Mean log-odds of the occupied cells, nats.
-    touches : int64 (k, 2)
-        Pairs of blobs (counted from 0) that share one connected piece of ground.
-    """
-
-    cells: Labels
-    track: Ints
-    person: Ints
-    ground: Floats
-    covariance: Floats
-    extent: Floats
-    height: Floats
-    mass: Floats
-    touches: Ints
 
 
 def find_blobs(
@@ -64,7 +25,7 @@ def find_blobs(
     Parameters
     ----------
     label : int32 (plane, y, x)
-        Whose each cell is: a track, STRANGER, or 0 for background.
+        Whose each cell is: a track, UNASSIGNED, or 0 for background.
     log_odds : float32 (plane, y, x)
         u, nats.
     people_ground, people_track : float64 (n, 2), int64 (n,)
@@ -74,11 +35,11 @@ def find_blobs(
         who has a cell of it within half a reach.
     """
     owner = _owner(label, log_odds)
-    strange, number = connected(owner == STRANGER, _EIGHT)
+    strange, number = connected(owner == UNASSIGNED, _EIGHT)
     known = np.unique(owner[owner > 0])
     cells = np.where(owner > 0, 1 + np.searchsorted(known, owner), 0).astype(np.int32)
     cells[strange > 0] = len(known) + strange[strange > 0]
-    track = np.concatenate([known, np.full(number, STRANGER)]).astype(np.int64)
+    track = np.concatenate([known, np.full(number, UNASSIGNED)]).astype(np.int64)
     person = np.full(len(track), -1, np.int64)
     ground = grid.ground
     for j, (place, name) in enumerate(zip(people_ground, people_track, strict=True)):

@@ -8,7 +8,7 @@ from stseg.trackers.cut import CutTracker
 from stseg.trackers.frames import FrameTracker
 from stseg.trackers.kalman import KalmanTracker
 from stseg.trackers.particles import ParticleTracker
-from stseg.trackers.protocol import Commit, Scene, Shown, Tracker
+from stseg.trackers.protocol import Commit, FrameObservations, FusedFrame, Tracker
 
 TRACKERS: dict[str, type[Tracker]] = {
     "cut": CutTracker,
@@ -30,4 +30,4 @@ def find_tracker(name: str) -> type[Tracker]:
     return TRACKERS[name]
 
 
-__all__ = ["TRACKERS", "Commit", "Scene", "Shown", "Tracker", "find_tracker"]
+__all__ = ["TRACKERS", "Commit", "FrameObservations", "FusedFrame", "Tracker", "find_tracker"]

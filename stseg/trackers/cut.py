@@ -11,22 +11,24 @@ import numpy as np
 from stseg.arrays import Flags, Ints, Labels, Rows
 from stseg.config import Config
 from stseg.geometry import Rig
-from stseg.ghosts.expected import Expected
-from stseg.identity.identities import Decision, Identities
-from stseg.identity.pieces import chain_pieces
-from stseg.identity.places import Sightings, earlier_sightings, expected_places, together
-from stseg.identity.walkers import Walkers
-from stseg.identity.windows import Window, windows
-from stseg.occupancy.sampling import Sampling
-from stseg.segmentation.blobs import Blobs, find_blobs
-from stseg.segmentation.cut import minimum_cut
-from stseg.segmentation.division import Division, Found, divide
-from stseg.segmentation.energy import QUANTUM, Energy, build_energy
-from stseg.segmentation.labels import Pillar
+from stseg.geometry.sampling import Sampling
+from stseg.graphcut.cut import minimum_cut
+from stseg.graphcut.energy import QUANTUM, Energy
+from stseg.model.blobs import Blobs
+from stseg.model.expected import Expected
+from stseg.model.tables import WINDOW
+from stseg.segmentation.blobs import find_blobs
+from stseg.segmentation.energy import build_energy
+from stseg.segmentation.labelling import WindowDetections, WindowLabels, label_cells
 from stseg.segmentation.motion import motion_field
-from stseg.trackers.protocol import Commit, Scene, Shown
+from stseg.segmentation.unary import BodyShape
+from stseg.trackers.protocol import Commit, FrameObservations, FusedFrame
 from stseg.trackers.rows import event_rows, trajectory_rows, views_at
-from stseg.tracks import WINDOW
+from stseg.tracking.prediction import DetectionHistory, earlier_detections, predicted_places, together
+from stseg.tracking.track_filter import TrackFilter
+from stseg.tracking.tracklets import form_tracklets
+from stseg.tracking.window_association import TrackAssociation, WindowAssignment
+from stseg.tracking.windows import Window, windows
 
 _ENDLESS = 1 << 62
 """A stop that is not known yet."""
@@ -36,13 +38,13 @@ _ENDLESS = 1 << 62
 class _Linked:
     """A frame and the chains of its people."""
 
-    scene: Scene
+    scene: FusedFrame
     chains: Ints
 
-    def sightings(self) -> Sightings:
+    def sightings(self) -> DetectionHistory:
         """Who was seen where."""
         people, frame = self.scene.people, np.full(len(self.chains), self.scene.frame)
-        return Sightings(frame, self.chains, people.ground, people.covariance, people.height)
+        return DetectionHistory(frame, self.chains, people.ground, people.covariance, people.height)
 
 
 class CutTracker:
@@ -61,10 +63,10 @@ class CutTracker:
     def __init__(self, rig: Rig, config: Config, first: int) -> None:
         self.rig, self.config = rig, config
         self.views = Sampling.of(rig, "point").views()
-        self.walkers = Walkers(rig.frame_rate, config.ghosts, config.identity)
-        self.identities = Identities(rig.frame_rate, config.identity)
+        self.walkers = TrackFilter(rig.frame_rate, config.ghosts, config.identity)
+        self.identities = TrackAssociation(rig.frame_rate, config.identity)
         spread, stranger = config.ghosts.height_spread, config.occupancy.occupied
-        self.pillar = Pillar(config.occupancy.reach, spread, stranger)
+        self.pillar = BodyShape(config.occupancy.reach, spread, stranger)
         self.held: list[_Linked] = []
         self.first = self.committed = first
         self.coming = windows(rig.frame_rate, config.identity, first, _ENDLESS)
@@ -74,7 +76,7 @@ class CutTracker:
         """Whom the frames before lead to expect."""
         return self.walkers.expected(frame)
 
-    def add(self, scene: Scene, shown: Shown) -> list[Commit]:
+    def add(self, scene: FusedFrame, shown: FrameObservations) -> list[Commit]:
         """The next frame; the window before it, if it is complete.
 
         A window waits for the frame after its last: only then is it known not to be the run's last one, which commits
@@ -108,7 +110,7 @@ class CutTracker:
             find_blobs(cells, linked.scene.log_odds, linked.scene.people.ground, linked.chains, reach, grid)
             for cells, linked in zip(label, held, strict=True)
         ]
-        pieces = chain_pieces(blobs, window.solve_first, self.config.identity)
+        pieces = form_tracklets(blobs, window.solve_first, self.config.identity)
         decision = self.identities.decide(window, blobs, pieces)
         row = np.array([(*_ranges(window), energy.of(cut.occupied), QUANTUM, cut.nodes)], WINDOW)
         self.committed = window.commit_stop
@@ -124,20 +126,26 @@ class CutTracker:
         steps = np.array(motion, np.int64).reshape(-1, *grid.shape[1:], 2)
         return build_energy(log_odds, steps, grid, self.config.segmentation)
 
-    def _divide(self, window: Window, held: list[_Linked], energy: Energy, occupied: Flags) -> Division:
+    def _divide(self, window: Window, held: list[_Linked], energy: Energy, occupied: Flags) -> WindowLabels:
         """Whose the occupied cells are: chains of this window and of tracks that live."""
         tails = [track.tail for track in self.identities.alive]
         mean_height = self.config.ghosts.height_mean
-        seen = [earlier_sightings(tails, window.solve_first, mean_height, self.config.identity)]
+        seen = [earlier_detections(tails, window.solve_first, mean_height, self.config.identity)]
         seen += [linked.sightings() for linked in held]
-        places = expected_places(
+        places = predicted_places(
             together(seen), window.solve_first, window.solve_stop, self.rig.frame_rate, self.config.identity
         )
-        found = Found([linked.scene.people.ground for linked in held], [linked.chains for linked in held])
-        return divide(energy, occupied, found, places, self.pillar, self.rig.grid)
+        found = WindowDetections([linked.scene.people.ground for linked in held], [linked.chains for linked in held])
+        return label_cells(energy, occupied, found, places, self.pillar, self.rig.grid)
 
     def _commit(
-        self, window: Window, held: list[_Linked], label: Labels, blobs: list[Blobs], decision: Decision, row: Rows
+        self,
+        window: Window,
+        held: list[_Linked],
+        label: Labels,
+        blobs: list[Blobs],
+        decision: WindowAssignment,
+        row: Rows,
     ) -> Commit:
         kept = range(window.commit_first - held[0].scene.frame, window.commit_stop - held[0].scene.frame)
         named = np.zeros((len(kept), *self.rig.grid.shape), np.int32)
@@ -149,7 +157,7 @@ class CutTracker:
         scenes = [held[k].scene for k in kept]
         return Commit(scenes, named, np.concatenate(rows), event_rows(decision.events), row)
 
-    def _rows(self, scene: Scene, blobs: Blobs, identity: Ints) -> Rows:
+    def _rows(self, scene: FusedFrame, blobs: Blobs, identity: Ints) -> Rows:
         """Where a blob holds a person of the pass, the pass knows best where; else the blob's mass tells."""
         named = np.flatnonzero(identity)
         person = blobs.person[named]

@@ -8,10 +8,10 @@ import numpy as np
 
 from stseg.config import Config
 from stseg.geometry import Rig
-from stseg.ghosts.expected import Expected
-from stseg.identity.walkers import Walkers
-from stseg.trackers.each_frame import EachFrame
-from stseg.trackers.protocol import Commit, Scene, Shown
+from stseg.model.expected import Expected
+from stseg.trackers.framewise import EachFrame
+from stseg.trackers.protocol import Commit, FrameObservations, FusedFrame
+from stseg.tracking.track_filter import TrackFilter
 
 
 class FrameTracker(EachFrame):
@@ -21,13 +21,13 @@ class FrameTracker(EachFrame):
 
     def __init__(self, rig: Rig, config: Config, first: int) -> None:
         super().__init__(rig, config, first)
-        self.walkers = Walkers(rig.frame_rate, config.ghosts, config.identity)
+        self.walkers = TrackFilter(rig.frame_rate, config.ghosts, config.identity)
 
     def expected(self, frame: int) -> Expected | None:
         """Whom the frames before lead to expect."""
         return self.walkers.expected(frame)
 
-    def add(self, scene: Scene, shown: Shown) -> list[Commit]:
+    def add(self, scene: FusedFrame, shown: FrameObservations) -> list[Commit]:
         """The next frame, decided."""
         del shown
         people, sizes = scene.people, scene.people.sizes

@@ -14,13 +14,13 @@ import numpy as np
 from stseg.arrays import Floats, Ints
 from stseg.config import Config
 from stseg.geometry import Rig
-from stseg.ghosts.expected import Expected
-from stseg.ghosts.sizes import Sizes
-from stseg.identity.linking import assign
-from stseg.trackers.each_frame import EachFrame
+from stseg.model.expected import Expected
+from stseg.model.sizes import Sizes
+from stseg.trackers.framewise import EachFrame
 from stseg.trackers.motion import Filters, begun, carried, corrected, surprise
-from stseg.trackers.protocol import FORGETTING, STAYING, Commit, Scene, Shown
+from stseg.trackers.protocol import FORGETTING, STAYING, Commit, FrameObservations, FusedFrame
 from stseg.trackers.rows import Event
+from stseg.tracking.assignment import assign
 
 
 class KalmanTracker(EachFrame):
@@ -50,7 +50,7 @@ class KalmanTracker(EachFrame):
             STAYING - FORGETTING * unseen,
         )
 
-    def add(self, scene: Scene, shown: Shown) -> list[Commit]:
+    def add(self, scene: FusedFrame, shown: FrameObservations) -> list[Commit]:
         """The next frame, decided."""
         del shown
         deaths = self._end(scene.frame)
@@ -96,7 +96,7 @@ class KalmanTracker(EachFrame):
         self.sizes = self.sizes.at(np.flatnonzero(~lost))
         return told
 
-    def _commit(self, scene: Scene, person: Ints, events: list[Event]) -> Commit:
+    def _commit(self, scene: FusedFrame, person: Ints, events: list[Event]) -> Commit:
         """Those found in the frame: where the filters believe them, beside where the frame saw them."""
         people = scene.people
         found, which = np.flatnonzero(person >= 0), person[person >= 0]

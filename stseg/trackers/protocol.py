@@ -9,8 +9,8 @@ from typing import ClassVar, Protocol
 from stseg.arrays import Labels, Observation, Rows, Singles
 from stseg.config import Config
 from stseg.geometry import Rig
-from stseg.ghosts.expected import Expected
-from stseg.ghosts.people import People, ViewEvidence
+from stseg.model.expected import Expected
+from stseg.model.people import People, ViewEvidence
 
 STAYING, FORGETTING = 1.0, 4.0
 """What trackers without odds of their own expect: log-odds that somebody found in one frame is found in the next, nats,
@@ -18,7 +18,7 @@ and how fast they fall after, nats per second."""
 
 
 @dataclass(frozen=True)
-class Scene:
+class FusedFrame:
     """One frame, explained and fused.
 
     Attributes
@@ -40,13 +40,13 @@ class Scene:
 
 
 @dataclass(frozen=True)
-class Shown:
+class FrameObservations:
     """What the cameras showed in a frame, in the rig's order: there while the frame is added, held by no one after.
 
     Attributes
     ----------
     observations
-        What each delivered; see `stseg.trackers.colour` for a tracker that needs colour.
+        What each delivered; see `stseg.trackers.colour_views` for a tracker that needs colour.
     evidence
         What the foreground made of it: boxes, a likelihood map float32 (v, u), or None where the view is blind.
     """
@@ -66,10 +66,10 @@ class Commit:
     label : int32 (time, plane, y, x)
         Track ids, 0 for background.
     trajectory, events, windows
-        Rows of `stseg.tracks`: TRAJECTORY, EVENT, WINDOW.
+        Rows of `stseg.model.tables`: TRAJECTORY, EVENT, WINDOW.
     """
 
-    scenes: list[Scene]
+    scenes: list[FusedFrame]
     label: Labels
     trajectory: Rows
     events: Rows
@@ -92,7 +92,7 @@ class Tracker(Protocol):
 
     def __init__(self, rig: Rig, config: Config, first: int) -> None: ...
 
-    def add(self, scene: Scene, shown: Shown) -> list[Commit]:
+    def add(self, scene: FusedFrame, shown: FrameObservations) -> list[Commit]:
         """The next frame; what is decided by it."""
 
     def finish(self) -> list[Commit]:

@@ -13,14 +13,14 @@ import numpy as np
 
 from stseg.config import BeliefConfig
 from stseg.trackers.belief.leaf import Leaf
-from stseg.trackers.belief.look import Look
+from stseg.trackers.belief.look import TargetLikelihood
 from stseg.trackers.belief.particles import Motion, Particles, Prediction
 from stseg.trackers.belief.star import Star, grow
 
 
 def condense(
     stars: Sequence[Star],
-    looks: Sequence[Sequence[Look | None]],
+    looks: Sequence[Sequence[TargetLikelihood | None]],
     motion: Motion,
     config: BeliefConfig,
     lots: Sequence[np.random.Generator],
@@ -30,7 +30,11 @@ def condense(
 
 
 def _alone(
-    star: Star, looks: Sequence[Look | None], motion: Motion, config: BeliefConfig, lots: np.random.Generator
+    star: Star,
+    looks: Sequence[TargetLikelihood | None],
+    motion: Motion,
+    config: BeliefConfig,
+    lots: np.random.Generator,
 ) -> Star:
     foretold = Prediction.of(star.ground, np.eye(2), motion)
     leaves = grow(star, looks, foretold, config.count)

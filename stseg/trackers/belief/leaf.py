@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from stseg.arrays import Floats, Ints
-from stseg.trackers.belief.look import Look
+from stseg.trackers.belief.look import TargetLikelihood
 from stseg.trackers.belief.particles import Motion, Particles, Prediction, systematic
 from stseg.trackers.belief.potential import Outlier, Tie
 from stseg.trackers.belief.view import StarView
@@ -35,7 +35,7 @@ class Leaf:
         Weights of the belief before any message, whose sum is 1; and the part of each in which the view sees it.
     """
 
-    def __init__(self, look: Look, prior: Prediction, place: Floats, count: int) -> None:
+    def __init__(self, look: TargetLikelihood, prior: Prediction, place: Floats, count: int) -> None:
         self.look, self.prior, self.count = look, prior, count
         box = look.view.boxes(place[None], look.height)[0]
         tall = box[3] - box[1]

@@ -13,7 +13,7 @@ from stseg.trackers.belief.view import StarView
 
 
 @dataclass(frozen=True)
-class Look:
+class TargetLikelihood:
     """One target in one view of one frame.
 
     The likelihood of a place is exp(-k D^2) with D^2 = 1 - sum sqrt(p q), Bhattacharyya's coefficient of the histogram

@@ -25,7 +25,7 @@ from stseg.arrays import Floats
 from stseg.config import BeliefConfig
 from stseg.trackers.belief.exclusion import exclusion
 from stseg.trackers.belief.leaf import Leaf, arrival
-from stseg.trackers.belief.look import Look
+from stseg.trackers.belief.look import TargetLikelihood
 from stseg.trackers.belief.particles import Motion, Particles, Prediction, systematic
 from stseg.trackers.belief.potential import Outlier, Tie
 from stseg.trackers.belief.view import StarView
@@ -79,7 +79,7 @@ class Rounds:
     def __init__(
         self,
         star: Star,
-        looks: Sequence[Look | None],
+        looks: Sequence[TargetLikelihood | None],
         motion: Motion,
         config: BeliefConfig,
         lots: np.random.Generator,
@@ -162,7 +162,7 @@ class Rounds:
         return Star(self.prior.settled(self.ground, self.weight, self.lots), tuple(views), sight)
 
 
-def grow(star: Star, looks: Sequence[Look | None], ground: Prediction, count: int) -> list[Leaf | None]:
+def grow(star: Star, looks: Sequence[TargetLikelihood | None], ground: Prediction, count: int) -> list[Leaf | None]:
     """The leaves of the views that can show the target."""
     leaves: list[Leaf | None] = []
     for j, (look, particles) in enumerate(zip(looks, star.views, strict=True)):
@@ -177,7 +177,7 @@ def grow(star: Star, looks: Sequence[Look | None], ground: Prediction, count: in
 
 def propagate(
     stars: Sequence[Star],
-    looks: Sequence[Sequence[Look | None]],
+    looks: Sequence[Sequence[TargetLikelihood | None]],
     motion: Motion,
     config: BeliefConfig,
     lots: Sequence[np.random.Generator],

@@ -10,7 +10,7 @@ import numpy as np
 from stseg.arrays import Bytes, Floats
 from stseg.config import BeliefConfig
 from stseg.trackers.belief.histogram import histograms
-from stseg.trackers.belief.look import Look
+from stseg.trackers.belief.look import TargetLikelihood
 from stseg.trackers.belief.particles import Motion, Particles, Prediction
 from stseg.trackers.belief.star import Star
 from stseg.trackers.belief.view import StarView
@@ -100,11 +100,11 @@ def looks(
     images: Sequence[Bytes | None],
     motion: Motion,
     config: BeliefConfig,
-) -> list[list[Look | None]]:
+) -> list[list[TargetLikelihood | None]]:
     """What each view can show of each target in the next frame, whose images these are."""
     foretold = [target.foretold(motion) for target in targets]
     heights = np.array([target.height for target in targets])
-    found: list[list[Look | None]] = [[] for _ in targets]
+    found: list[list[TargetLikelihood | None]] = [[] for _ in targets]
     for j, (view, image) in enumerate(zip(views, images, strict=True)):
         places = [t.star.place(j, view, coming) for t, coming in zip(targets, foretold, strict=True)]
         ground = np.array(places).reshape(-1, 2)
@@ -114,5 +114,5 @@ def looks(
             if image is None or colours is None or not view.shows(ground[k], target.height, _IN_SIGHT):
                 found[k].append(None)
             else:
-                found[k].append(Look(view, image, colours, target.height, nearer[k], config))
+                found[k].append(TargetLikelihood(view, image, colours, target.height, nearer[k], config))
     return found

@@ -9,19 +9,19 @@ import numpy as np
 from stseg.arrays import Bytes, Floats, Ints
 from stseg.config import Config
 from stseg.geometry import Rig
-from stseg.ghosts.border import Border
-from stseg.ghosts.expected import Expected
-from stseg.ghosts.sizes import Sizes
-from stseg.identity.linking import assign, distances
+from stseg.model.border import Border
+from stseg.model.expected import Expected
+from stseg.model.sizes import Sizes
 from stseg.trackers.belief.condensation import condense
 from stseg.trackers.belief.particles import Motion
 from stseg.trackers.belief.star import propagate
 from stseg.trackers.belief.target import Target, in_front, looks
 from stseg.trackers.belief.view import StarView
-from stseg.trackers.colour import colour_views
-from stseg.trackers.each_frame import EachFrame
-from stseg.trackers.protocol import FORGETTING, STAYING, Commit, Scene, Shown
+from stseg.trackers.colour_views import colour_views
+from stseg.trackers.framewise import EachFrame
+from stseg.trackers.protocol import FORGETTING, STAYING, Commit, FrameObservations, FusedFrame
 from stseg.trackers.rows import Event
+from stseg.tracking.assignment import assign, distances
 
 _WAYS = {"messages": propagate, "condensation": condense}
 """How stars go from one frame to the next."""
@@ -71,7 +71,7 @@ class BeliefTracker(EachFrame):
             STAYING - FORGETTING * missed,
         )
 
-    def add(self, scene: Scene, shown: Shown) -> list[Commit]:
+    def add(self, scene: FusedFrame, shown: FrameObservations) -> list[Commit]:
         """The next frame, decided."""
         self.begun = True
         images = [view and view.image for view in colour_views(shown, "belief", scene.frame)]
@@ -93,7 +93,7 @@ class BeliefTracker(EachFrame):
         """Of one target in one frame: nobody's chance hangs on who else is there."""
         return np.random.default_rng([self.config.belief.seed, track, frame])
 
-    def _find(self, scene: Scene, images: list[Bytes | None]) -> Ints:
+    def _find(self, scene: FusedFrame, images: list[Bytes | None]) -> Ints:
         """Confirm targets by detections; the index of each person's target, int64 (n,), -1 for nobody known."""
         people = scene.people
         ground = np.array([target.star.ground.mean for target in self.targets]).reshape(-1, 2)
@@ -130,7 +130,7 @@ class BeliefTracker(EachFrame):
             events.append((frame, "death", target.track, 0, reason))
         return events
 
-    def _begin(self, scene: Scene, whose: Ints, images: list[Bytes | None]) -> list[Event]:
+    def _begin(self, scene: FusedFrame, whose: Ints, images: list[Bytes | None]) -> list[Event]:
         """A target for everybody who is nobody known."""
         events: list[Event] = []
         people = scene.people
@@ -147,7 +147,7 @@ class BeliefTracker(EachFrame):
             events.append((scene.frame, "birth", target.track, 0, "a detection where nobody was followed"))
         return events
 
-    def _commit(self, scene: Scene, seen: list[Target], events: list[Event]) -> Commit:
+    def _commit(self, scene: FusedFrame, seen: list[Target], events: list[Event]) -> Commit:
         ids = np.array([target.track for target in seen], np.int64)
         ground = np.array([target.star.ground.mean for target in seen]).reshape(-1, 2)
         covariance: Floats = np.array([target.star.ground.covariance for target in seen]).reshape(-1, 2, 2)

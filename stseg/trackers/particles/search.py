@@ -8,13 +8,13 @@ import numpy as np
 
 from stseg.arrays import Floats
 from stseg.trackers.particles.axes import HELD, meet
-from stseg.trackers.particles.views import Look
+from stseg.trackers.particles.views import ParticleFrame
 
 _SETTLED = 0.02
 """A hypothesis that moves less is settled, metres: the paper's epsilon."""
 
 
-def search(looks: Sequence[Look], ground: Floats, rounds: int, median: bool) -> Floats:
+def search(looks: Sequence[ParticleFrame], ground: Floats, rounds: int, median: bool) -> Floats:
     """Where people end who are sought from places (n, 2) on, float64 (n, 2), metres.
 
     Parameters

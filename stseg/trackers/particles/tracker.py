@@ -17,19 +17,19 @@ import numpy as np
 from stseg.arrays import Floats, Ints
 from stseg.config import Config
 from stseg.geometry import Rig
-from stseg.ghosts.border import Border
-from stseg.ghosts.expected import Expected
-from stseg.ghosts.sizes import Sizes
-from stseg.identity.linking import assign, distances
-from stseg.trackers.colour import ColourView, colour_views
-from stseg.trackers.each_frame import EachFrame
+from stseg.model.border import Border
+from stseg.model.expected import Expected
+from stseg.model.sizes import Sizes
+from stseg.trackers.colour_views import ColourView, colour_views
+from stseg.trackers.framewise import EachFrame
 from stseg.trackers.particles.appearance import Appearance
 from stseg.trackers.particles.crowd import Crowd
 from stseg.trackers.particles.filter import estimate, predicted, resampled, weights
 from stseg.trackers.particles.search import search
-from stseg.trackers.particles.views import Look, ParticleView
-from stseg.trackers.protocol import FORGETTING, STAYING, Commit, Scene, Shown
+from stseg.trackers.particles.views import ParticleFrame, ParticleView
+from stseg.trackers.protocol import FORGETTING, STAYING, Commit, FrameObservations, FusedFrame
 from stseg.trackers.rows import Event
+from stseg.tracking.assignment import assign, distances
 
 _FLOOR = 0.05
 """No place is known better than this, metres (standard deviation): particles that agree may be wrong together."""
@@ -68,7 +68,7 @@ class ParticleTracker(EachFrame):
         sizes = Sizes.of_heights(crowd.height, np.full(len(crowd), _HEIGHT_NOISE**2), config.ghosts)
         return Expected(crowd.ground, crowd.covariance + drift * np.eye(2), sizes, STAYING - FORGETTING * unseen)
 
-    def add(self, scene: Scene, shown: Shown) -> list[Commit]:
+    def add(self, scene: FusedFrame, shown: FrameObservations) -> list[Commit]:
         """The next frame, decided.
 
         Raises
@@ -97,7 +97,7 @@ class ParticleTracker(EachFrame):
         """How far a person's step to a frame may go, metres (standard deviation)."""
         return self.config.particles.wander * (frame - self.frame) / self.rig.frame_rate
 
-    def _propose(self, scene: Scene) -> Floats:
+    def _propose(self, scene: FusedFrame) -> Floats:
         """Have some particles try whether who is lost is somebody found whom nobody follows.
 
         Returns
@@ -122,7 +122,7 @@ class ParticleTracker(EachFrame):
         self.crowd = replace(crowd, particles=particles)
         return margin
 
-    def _looks(self, views: Sequence[ColourView | None], margin: Floats) -> list[Look]:
+    def _looks(self, views: Sequence[ColourView | None], margin: Floats) -> list[ParticleFrame]:
         """What the views show of everybody, sought within margins (n,), metres."""
         crowd = self.crowd
         return [
@@ -131,7 +131,7 @@ class ParticleTracker(EachFrame):
             if view is not None
         ]
 
-    def _follow(self, looks: Sequence[Look], step: float) -> None:
+    def _follow(self, looks: Sequence[ParticleFrame], step: float) -> None:
         """Move the particles to the frame, weigh and draw them."""
         config, crowd = self.config.particles, self.crowd
         moved = crowd.particles if config.way == "search" else predicted(crowd.particles, step, self.rng)
@@ -148,7 +148,7 @@ class ParticleTracker(EachFrame):
         covariance = covariance + _FLOOR**2 * np.eye(2)
         self.crowd = replace(crowd, ground=ground, covariance=covariance, particles=drawn)
 
-    def _recognise(self, scene: Scene) -> tuple[dict[int, float], Ints]:
+    def _recognise(self, scene: FusedFrame) -> tuple[dict[int, float], Ints]:
         """Whom of the crowd the pass found: evidence of each track, nats, and those found whom nobody follows."""
         crowd, people = self.crowd, scene.people
         known, found = assign(distances(crowd.ground, people.ground), self.config.particles.beside)
@@ -159,7 +159,7 @@ class ParticleTracker(EachFrame):
         evidence = {int(i): float(nats) for i, nats in zip(crowd.ids[known], people.evidence[found], strict=True)}
         return evidence, np.setdiff1d(np.arange(len(people)), found)
 
-    def _begin(self, scene: Scene, newcomers: Ints) -> list[Event]:
+    def _begin(self, scene: FusedFrame, newcomers: Ints) -> list[Event]:
         """Follow people of a frame whom nobody follows."""
         people, count = scene.people, len(newcomers)
         ids = self.issued + 1 + np.arange(count)
@@ -193,7 +193,7 @@ class ParticleTracker(EachFrame):
         self.crowd = crowd.kept(~np.isin(crowd.ids, [event[2] for event in told]))
         return told
 
-    def _learn(self, look: Look, seconds: float) -> None:
+    def _learn(self, look: ParticleFrame, seconds: float) -> None:
         crowd = self.crowd
         share = min(seconds / self.config.particles.memory, 1.0)
         learned = look.learned(crowd.ground, crowd.appearances, share, self.rng)

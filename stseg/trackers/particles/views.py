@@ -10,7 +10,7 @@ import numpy as np
 
 from stseg.arrays import Bytes, Floats, Ints, Labels, Singles
 from stseg.geometry import Camera
-from stseg.trackers.colour import ColourView
+from stseg.trackers.colour_views import ColourView
 from stseg.trackers.particles.appearance import Appearance
 from stseg.trackers.particles.axes import fill_axes
 from stseg.trackers.particles.bodies import HALF_WIDTH, PARTS, fill_bodies, fill_boxes
@@ -63,7 +63,7 @@ class ParticleView:
 
     def look(
         self, view: ColourView, ground: Floats, height: Floats, appearances: Sequence[Appearance], margin: Floats
-    ) -> Look:
+    ) -> ParticleFrame:
         """A frame, with people who will be sought within margins (n,), metres, of places (n, 2)."""
         colour = normalised(view.image[:: self.step, :: self.step])
         foreground = (view.likelihood[:: self.step, :: self.step] > 0.5).astype(np.uint8)
@@ -72,11 +72,11 @@ class ParticleView:
         density = np.zeros((len(ground), len(PARTS), *foreground.shape), np.float32)
         for box, own, seen in zip(boxes, appearances, density, strict=True):
             fill_density(colour, foreground, box, own.samples, own.known, FALL, seen)
-        return Look(self, height, colour, bins_of(colour).astype(np.int32), foreground, boxes, density)
+        return ParticleFrame(self, height, colour, bins_of(colour).astype(np.int32), foreground, boxes, density)
 
 
 @dataclass(frozen=True)
-class Look:
+class ParticleFrame:
     """One view of one frame.
 
     Attributes

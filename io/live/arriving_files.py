@@ -1,0 +1,195 @@
+"""Videos that a recorder writes into a folder, one after the other: one camera's frames as they become complete."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from threading import Event, Lock
+
+from stseg.arrays import Observation
+from stseg.errors import SourceError
+from stseg.geometry import Camera
+from stseg.io.live.live_rig import now
+from stseg.io.outputs.whole_files import replacing
+from stseg.io.recording.recording import Source
+from stseg.io.recording.source_files import by_numbers
+from stseg.io.recording.video_stream import VideoStream
+
+_POLL = 0.1
+"""How often a folder is looked at, seconds."""
+
+
+class FileNotes:
+    """Which files of each camera were read to their ends, and how many frames they had: kept in a file.
+
+    Parameters
+    ----------
+    path
+        Where it is kept; what stands there is gone on from.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path, self._lock = path, Lock()
+        self.read: dict[str, list[tuple[str, int]]] = {}
+        with suppress(OSError, ValueError):
+            self.read = {
+                camera: [(str(name), int(frames)) for name, frames in files]
+                for camera, files in json.loads(path.read_text("utf-8")).items()
+            }
+
+    def note(self, camera: str, name: str, frames: int) -> None:
+        """A file was read to its end."""
+        with self._lock:
+            self.read.setdefault(camera, []).append((name, frames))
+            with replacing(self._path, overwrite=True) as part:
+                part.write_text(json.dumps(self.read, indent=1), "utf-8")
+
+
+class ArrivingFiles:
+    """The files of a pattern in the order of time, each once it is complete.
+
+    A file is complete when there is a later one, or when nothing was added to it for some time.
+
+    Parameters
+    ----------
+    pattern
+        Such as `cam1_*.mp4`.
+    settled
+        For how long nothing must be added to the last file, seconds.
+    halt
+        Once it is set nothing is waited for.
+    say
+        Is told, in a line, of a file that came too late to be read.
+    """
+
+    def __init__(self, pattern: Path, settled: float, halt: Event, say: Callable[[str], None]) -> None:
+        self._pattern, self._settled, self._halt, self._say = pattern, settled, halt, say
+        self._taken: set[str] = set()
+        self._last: Path | None = None
+        self._coming: list[Path] = []
+        self._size, self._since = -1, 0.0
+
+    def pass_over(self, name: str) -> None:
+        """Take a file for read, whether it is still there or not."""
+        self._last = self._pattern.with_name(name)
+        self._taken.add(name)
+
+    def next(self) -> Path | None:
+        """The next complete file, waited for; None once `halt` is set."""
+        while not self._halt.is_set():
+            if len(self._coming) < 2:
+                self._look()
+            if len(self._coming) > 1 or (self._coming and self._is_settled(self._coming[0])):
+                path = self._coming.pop(0)
+                self.pass_over(path.name)
+                return path
+            self._halt.wait(_POLL)
+        return None
+
+    def _look(self) -> None:
+        found = [path for path in self._pattern.parent.glob(self._pattern.name) if path.name not in self._taken]
+        last = None if self._last is None else by_numbers(self._last)
+        self._coming = sorted((path for path in found if last is None or by_numbers(path) > last), key=by_numbers)
+        for path in found:
+            if path not in self._coming:
+                self._taken.add(path.name)
+                self._say(f"{path}: it came after later files had been read, and is left out")
+
+    def _is_settled(self, path: Path) -> bool:
+        try:
+            size = path.stat().st_size
+        except OSError:
+            size = -1
+        if size != self._size:
+            self._size, self._since = size, time.monotonic()
+        return size > 0 and time.monotonic() - self._since >= self._settled
+
+
+class ArrivingVideos:
+    """One camera's frames from files that arrive; reading waits for them.
+
+    Parameters
+    ----------
+    source, camera
+        Videos of colour or of masks, by a pattern.
+    files
+        The files of that pattern.
+    notes
+        What was read before; the files in it are not opened again to be passed over.
+    """
+
+    def __init__(self, source: Source, camera: Camera, files: ArrivingFiles, notes: FileNotes) -> None:
+        self._source, self._camera, self._files, self._notes = source, camera, files, notes
+        self._known = list(notes.read.get(camera.name, []))
+        self._stream: VideoStream | None = None
+        self._path, self._read, self._size = Path(), 0, 0
+        self.arrived = 0.0
+        """When the file of the last frame was found complete, by `stseg.io.live.live_rig.now`."""
+
+    def skip(self, count: int) -> int:
+        """Pass over up to `count` frames; how many there were."""
+        skipped = 0
+        while self._stream is None and self._known and skipped + self._known[0][1] <= count:
+            name, frames = self._known.pop(0)
+            self._files.pass_over(name)
+            skipped += frames
+        while skipped < count and self._open():
+            more = self._stream.skip(count - skipped) if self._stream is not None else 0
+            skipped, self._read = skipped + more, self._read + more
+            if skipped < count:
+                self._end()
+        return skipped
+
+    def read(self) -> Observation:
+        """The next frame, waited for; None once nothing is waited for any more."""
+        while self._open() and self._stream is not None:
+            view = self._stream.read()
+            if view is not None:
+                self._read += 1
+                return view
+            self._end()
+        return None
+
+    def close(self) -> None:
+        """Let go of what is open."""
+        if self._stream is not None:
+            self._stream.close()
+
+    def _open(self) -> bool:
+        """Open the next file unless one is open; whether there is one."""
+        if self._stream is None:
+            path = self._files.next()
+            if path is None:
+                return False
+            if self._known and path.name != self._known[0][0]:
+                found, expected = f"{path.name} next", f"{self._known[0][0]}, from which the run is to go on"
+                raise SourceError(self._source.path, f"camera {self._camera.name}", found, expected)
+            self._require_unchanged()
+            self._size = path.stat().st_size
+            self._stream = VideoStream(replace(self._source, path=path), self._camera)
+            self._path, self._read, self.arrived = path, 0, now()
+        return True
+
+    def _require_unchanged(self) -> None:
+        """Notice if the file before was not complete: some of its frames were missed then."""
+        try:
+            size = self._path.stat().st_size if self._path.name else 0
+        except OSError:  # it may have been deleted since
+            size = self._size
+        if size != self._size:
+            found = f"{size} bytes, of which only the first {self._size} were there when it was read"
+            raise SourceError(
+                self._path, f"camera {self._camera.name}", found, "live.settled above the pauses of the recorder"
+            )
+
+    def _end(self) -> None:
+        self.close()
+        self._stream = None
+        if self._known and self._known[0][0] == self._path.name:
+            self._known.pop(0)
+        else:
+            self._notes.note(self._camera.name, self._path.name, self._read)

@@ -1,0 +1,90 @@
+"""The tracks of a run that still goes on: lines of text that grow, `RUN.h5.live.csv`."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Self, TextIO
+
+import numpy as np
+
+from stseg.arrays import Rows
+from stseg.io.outputs.whole_files import failure, replacing
+from stseg.model.tables import TRAJECTORY
+
+_COLUMNS = ("frame", "time", "id", "x", "y", "height", "score")
+
+
+class LiveTable:
+    """A table to which each window adds its tracks, flushed at once.
+
+    Parameters
+    ----------
+    path
+        Where it stands. What an unfinished run has left there is gone on from.
+    frame_rate
+        Frames per second.
+    stop
+        Frames from here on are not known yet: their lines are taken out.
+
+    Attributes
+    ----------
+    rows : TRAJECTORY (n,)
+        What the lines that were kept say: frame, id, place.
+
+    Raises
+    ------
+    OutputError
+        Where it cannot be written; from every method.
+    """
+
+    def __init__(self, path: Path, frame_rate: float, stop: int) -> None:
+        self.path, self._frame_rate = path, frame_rate
+        lines = _lines_before(path, stop)
+        self.rows = np.zeros(len(lines), TRAJECTORY)
+        for name, kind in (("frame", int), ("id", int), ("x", float), ("y", float)):
+            self.rows[name] = [kind(line[_COLUMNS.index(name)]) for line in lines]
+        with replacing(path, overwrite=True) as part, part.open("w", newline="", encoding="utf-8") as file:
+            csv.writer(file).writerows([_COLUMNS, *lines])
+        self._file: TextIO | None = None
+
+    def __enter__(self) -> Self:
+        try:
+            self._file = self.path.open("a", newline="", encoding="utf-8")
+        except OSError as error:
+            raise failure(self.path, error) from error
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._file is not None:
+            self._file.close()
+
+    def append(self, rows: Rows) -> None:
+        """Add TRAJECTORY rows."""
+        if self._file is None:
+            raise ValueError("a live table that is not open")
+        try:
+            csv.writer(self._file).writerows(map(self._line, rows))
+            self._file.flush()
+        except OSError as error:
+            raise failure(self.path, error) from error
+
+    def _line(self, row: np.void) -> Sequence[object]:
+        frame = int(row["frame"])
+        numbers = (f"{float(row[name]):.3f}" for name in ("x", "y", "height", "score"))
+        return (frame, f"{frame / self._frame_rate:.3f}", int(row["id"]), *numbers)
+
+
+def _lines_before(path: Path, stop: int) -> list[list[str]]:
+    """Lines of frames before `stop`; those that are no such lines, such as one half written, go."""
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            _, *lines = csv.reader(file)
+    except (OSError, ValueError):
+        return []
+    whole = [line for line in lines if len(line) == len(_COLUMNS) and line[0].isdecimal() and line[-1]]
+    return [line for line in whole if int(line[0]) < stop]

@@ -1,0 +1,73 @@
+"""Pictures on their way to a video file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import cv2
+
+from stseg.arrays import Bytes
+from stseg.errors import OutputError
+from stseg.io.outputs.whole_files import replacing
+
+_ENDING = ".mp4"
+
+
+def require_film_name(path: Path) -> None:
+    """Refuse a name whose ending is none of a video that is written here.
+
+    Raises
+    ------
+    OutputError
+    """
+    if path.suffix.lower() != _ENDING:
+        raise OutputError(path, "", f"the ending {path.suffix!r}", f"a name that ends in {_ENDING}")
+
+
+def write_film(path: Path, pictures: Iterable[Bytes], frame_rate: float, overwrite: bool) -> int:
+    """Write pictures as an MP4 file (MPEG-4 part 2), whole or not at all, and count them.
+
+    Parameters
+    ----------
+    path
+        Ends in .mp4.
+    pictures : uint8 (v, u, 3), one or more
+        Blue, green, red; all of one size.
+    frame_rate
+        Frames per second.
+    overwrite
+        Whether an older file may be replaced.
+
+    Raises
+    ------
+    OutputError
+        Where the file cannot be written.
+    """
+    require_film_name(path)
+    with replacing(path, overwrite) as part:
+        film = part.with_name(part.name + _ENDING)  # the ending is what tells the container
+        try:
+            count = _write(film, pictures, frame_rate)
+            film.replace(part)
+        finally:
+            film.unlink(missing_ok=True)
+    return count
+
+
+def _write(film: Path, pictures: Iterable[Bytes], frame_rate: float) -> int:
+    writer, count = cv2.VideoWriter(), 0
+    try:
+        for picture in pictures:
+            size = (picture.shape[1], picture.shape[0])
+            if not count and not writer.open(
+                str(film), cv2.CAP_FFMPEG, cv2.VideoWriter.fourcc(*"mp4v"), frame_rate, size
+            ):
+                raise OutputError(film, "", "a video that cannot be opened", "a place that can be written")
+            writer.write(picture)
+            count += 1
+    finally:
+        writer.release()
+    if not film.is_file() or not film.stat().st_size:
+        raise OutputError(film, "", "an empty file after writing", "room on the disk")
+    return count

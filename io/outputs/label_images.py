@@ -1,0 +1,101 @@
+"""Label images: for every pixel of a camera the id of the track that it shows, 0 for nobody.
+
+FOLDER/CAMERA/000123.png    one image a frame, numbered as the recording's frames
+
+Ids below 256 make indexed PNGs of 8 bits, whose palette holds the colours of the tracks; larger ones grey PNGs of 16
+bits. All images of a folder are of one kind, and either may be the `instances` of a rig file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from stseg.arrays import Bytes, Ints
+from stseg.errors import OutputError
+from stseg.io.outputs.whole_files import failure, part_of
+from stseg.io.recording.indexed_png import encode_indexed
+
+_BYTE, _WORD = 255, 65535
+
+
+def require_label_folder(folder: Path, overwrite: bool) -> None:
+    """Refuse a folder that holds something, before any work is done.
+
+    Raises
+    ------
+    OutputError
+    """
+    try:
+        if folder.exists() and any(folder.iterdir()) and not overwrite:
+            raise OutputError(folder, "", "files in it", "an empty folder, or --overwrite")
+    except OSError as error:
+        raise failure(folder, error) from error
+
+
+class LabelImages:
+    """A folder of label images, made when the first camera's is.
+
+    Parameters
+    ----------
+    folder
+        Where to; made if it is not there.
+    cameras
+        The names of those of whom there will be images.
+    largest
+        The largest id.
+    palette : uint8 (256, 3)
+        Red, green, blue of each id.
+    overwrite
+        Write into a folder that is not empty; label images of these cameras that are there go.
+
+    Raises
+    ------
+    OutputError
+        Where the folder holds something already, cannot be written to, or an id is too large.
+    """
+
+    def __init__(self, folder: Path, cameras: Sequence[str], largest: int, palette: Bytes, overwrite: bool) -> None:
+        if largest > _WORD:
+            raise OutputError(folder, "", f"a track with the id {largest}", f"ids up to {_WORD}, the most in a PNG")
+        self._folder, self._indexed, self._palette = folder, largest <= _BYTE, palette
+        require_label_folder(folder, overwrite)
+        try:
+            for camera in cameras:
+                self._clear(self._folder_of(camera))
+        except OSError as error:
+            raise failure(folder, error) from error
+
+    def write(self, camera: str, frame: int, ids: Ints) -> None:
+        """Write one image, int64 (v, u).
+
+        Raises
+        ------
+        OutputError
+        """
+        path = self._folder_of(camera) / f"{frame:06d}.png"
+        try:
+            part_of(path).write_bytes(self._encoded(ids))
+            part_of(path).replace(path)
+        except OSError as error:
+            raise failure(path, error) from error
+
+    def _encoded(self, ids: Ints) -> bytes:
+        if self._indexed:
+            return encode_indexed(ids.astype(np.uint8), self._palette)
+        return bytes(cv2.imencode(".png", ids.astype(np.uint16))[1])
+
+    def _folder_of(self, camera: str) -> Path:
+        if Path(camera).name != camera:
+            raise OutputError(self._folder, f"camera {camera}", repr(camera), "a name that a folder can have")
+        return self._folder / camera
+
+    @staticmethod
+    def _clear(folder: Path) -> None:
+        """Make a camera's folder; images of a longer run that was here before must not be taken for ours."""
+        folder.mkdir(parents=True, exist_ok=True)
+        for file in folder.glob("[0-9]*.png"):
+            file.unlink()

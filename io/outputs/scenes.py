@@ -1,0 +1,224 @@
+"""A simulated scene as a folder of files: rigs, films, masks, boxes and truth, written frame by frame.
+
+rig.toml  rig_masks.toml  rig_boxes.toml  [rig_instances.toml]    one rig file for each kind of foreground
+truth.csv                                                         frame,id,x,y,height of who is in the area
+cam1.avi  cam1_empty.avi                                          films in colour (Motion JPEG)
+cam1_masks.avi                                                    exact silhouettes, 0 or 255 (FFV1: lossless)
+cam1_boxes.csv                                                    what a detector would find
+cam1_instances/000000.png                                         ids, 16 bits, where asked for
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, ExitStack, contextmanager
+from pathlib import Path
+from typing import IO, Protocol
+
+os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from stseg.arrays import Boxes, Bytes, Rows
+from stseg.errors import OutputError
+from stseg.geometry import Camera, Rig
+from stseg.io.recording.recording import CameraSource, Recording, Source, SourceKind
+from stseg.io.recording.rigs import write_rig
+
+Progress = Callable[[int, int], None]
+"""Told after each frame how many are done, and of how many."""
+
+
+class SimulatedView(Protocol):
+    """One camera's frame: image uint8 (v, u, 3) BGR, instances uint16 (v, u), a detector's boxes."""
+
+    @property
+    def image(self) -> Bytes: ...
+    @property
+    def instances(self) -> NDArray[np.uint16]: ...
+    @property
+    def boxes(self) -> Boxes: ...
+
+
+class SimulatedFrame(Protocol):
+    """One frame of all cameras: its number, the truth as rows of frame, id, x, y, height, the views."""
+
+    @property
+    def frame(self) -> int: ...
+    @property
+    def truth(self) -> Rows: ...
+    @property
+    def views(self) -> tuple[SimulatedView, ...]: ...
+
+
+class SimulatedScene(Protocol):
+    """A scene that can be filmed, see `stseg.simulation.Film`."""
+
+    @property
+    def rig(self) -> Rig: ...
+    @property
+    def frames(self) -> int: ...
+    @property
+    def quality(self) -> int: ...
+    def empty(self) -> Iterator[tuple[Bytes, ...]]: ...
+    def moments(self) -> Iterator[SimulatedFrame]: ...
+
+
+def write_scene(
+    folder: Path,
+    scene: SimulatedScene,
+    *,
+    instances: bool = False,
+    overwrite: bool = False,
+    progress: Progress | None = None,
+) -> None:
+    """Film a scene into a folder.
+
+    Parameters
+    ----------
+    folder
+        Where to; made if it is not there.
+    scene
+        What to film.
+    instances
+        Keep the instance images too, one file a camera and frame.
+    overwrite
+        Write into a folder that is not empty, over files of the same name.
+    progress
+        Told after each frame how many are done, and of how many.
+
+    Raises
+    ------
+    OutputError
+        Where the folder holds something already, or cannot be written to.
+    """
+    with _told_as_output_error(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+        if any(folder.iterdir()) and not overwrite:
+            raise OutputError(folder, "", "files in it", "an empty folder, or leave to overwrite")
+        _write_empty(folder, scene)
+        with ExitStack() as open_files:
+            truth = open_files.enter_context((folder / "truth.csv").open("w", encoding="utf-8"))
+            truth.write("frame,id,x,y,height\n")
+            films = [
+                open_files.enter_context(_CameraFiles(folder, camera, scene, instances)) for camera in scene.rig.cameras
+            ]
+            for done, moment in enumerate(scene.moments(), start=1):
+                np.savetxt(truth, moment.truth, fmt="%d,%d,%.4f,%.4f,%.3f")
+                for film, view in zip(films, moment.views, strict=True):
+                    film.write(moment.frame, view)
+                if progress is not None:
+                    progress(done, scene.frames)
+    # Last of all: a rig file says that what it names is there.
+    _write_rigs(folder, scene, instances)
+
+
+class _Video:
+    """A video file that is written; what OpenCV would pass over in silence is an OutputError."""
+
+    def __init__(self, path: Path, camera: Camera, rate: float, quality: int | None) -> None:
+        self._path, (width, height) = path, camera.size
+        # OpenCV's own encoder has a quality, FFmpeg's has none; FFmpeg has a lossless one.
+        if quality is not None:
+            code, backend = cv2.VideoWriter.fourcc(*"MJPG"), cv2.CAP_OPENCV_MJPEG
+        else:
+            code, backend = cv2.VideoWriter.fourcc(*"FFV1"), cv2.CAP_FFMPEG
+        self._writer = cv2.VideoWriter(str(path), backend, code, rate, (width, height), quality is not None)
+        if not self._writer.isOpened():
+            raise OutputError(path, f"camera {camera.name}", "a video that cannot be opened", "a place to write to")
+        if quality is not None:
+            self._writer.set(cv2.VIDEOWRITER_PROP_QUALITY, quality)
+
+    def write(self, picture: Bytes) -> None:
+        self._writer.write(picture)
+
+    def close(self) -> None:
+        self._writer.release()
+        if not self._path.is_file() or not self._path.stat().st_size:
+            raise OutputError(self._path, "", "an empty file after writing", "room on the disk")
+
+
+class _CameraFiles(AbstractContextManager["_CameraFiles"]):
+    """All that is written of one camera."""
+
+    def __init__(self, folder: Path, camera: Camera, scene: SimulatedScene, instances: bool) -> None:
+        rate, paths = scene.rig.frame_rate, _paths(folder, camera)
+        self._instances: Path | None = paths["instances"] if instances else None
+        if self._instances is not None:
+            _clear(self._instances)
+        with ExitStack() as stack:
+            self._boxes: IO[str] = stack.enter_context(paths["boxes"].open("w", encoding="utf-8"))
+            self._image = _Video(paths["video"], camera, rate, scene.quality)
+            stack.callback(self._image.close)
+            self._masks = _Video(paths["masks"], camera, rate, None)
+            stack.callback(self._masks.close)
+            self._boxes.write("frame,left,top,width,height,score\n")
+            self._stack = stack.pop_all()
+
+    def write(self, frame: int, view: SimulatedView) -> None:
+        """Write one frame."""
+        self._image.write(view.image)
+        self._masks.write(np.where(view.instances > 0, 255, 0).astype(np.uint8))
+        rows = np.column_stack([np.full(len(view.boxes), frame), view.boxes.pixel, view.boxes.score])
+        np.savetxt(self._boxes, rows, fmt="%d,%.1f,%.1f,%.1f,%.1f,%.3f")
+        if self._instances is not None:
+            _, png = cv2.imencode(".png", view.instances)
+            (self._instances / f"{frame:06d}.png").write_bytes(png.tobytes())
+
+    def __exit__(self, *reason: object) -> None:
+        self._stack.close()
+
+
+def _write_empty(folder: Path, scene: SimulatedScene) -> None:
+    """Films of the scene without people."""
+    with ExitStack() as stack:
+        videos = []
+        for camera in scene.rig.cameras:
+            videos.append(_Video(_paths(folder, camera)["empty"], camera, scene.rig.frame_rate, scene.quality))
+            stack.callback(videos[-1].close)
+        for images in scene.empty():
+            for video, image in zip(videos, images, strict=True):
+                video.write(image)
+
+
+def _write_rigs(folder: Path, scene: SimulatedScene, instances: bool) -> None:
+    kinds: tuple[SourceKind, ...] = ("video", "masks", "boxes", *(("instances",) if instances else ()))
+    for kind in kinds:
+        path = folder / ("rig.toml" if kind == "video" else f"rig_{kind}.toml")
+        sources = tuple(_source(folder, camera, kind, scene.frames) for camera in scene.rig.cameras)
+        write_rig(path, Recording(path, scene.rig, sources))
+
+
+def _source(folder: Path, camera: Camera, kind: SourceKind, frames: int) -> CameraSource:
+    paths = _paths(folder, camera)
+    source = Source(kind, paths[kind], frames=frames if kind == "boxes" else None)
+    return CameraSource(source, Source("video", paths["empty"]) if kind == "video" else None)
+
+
+def _paths(folder: Path, camera: Camera) -> dict[str, Path]:
+    names = {
+        "video": f"{camera.name}.avi",
+        "empty": f"{camera.name}_empty.avi",
+        "masks": f"{camera.name}_masks.avi",
+        "boxes": f"{camera.name}_boxes.csv",
+        "instances": f"{camera.name}_instances",
+    }
+    return {kind: folder / name for kind, name in names.items()}
+
+
+def _clear(folder: Path) -> None:
+    """Make a folder for frames; those of a longer recording that was here before must not be read as ours."""
+    folder.mkdir(exist_ok=True)
+    for file in folder.glob("[0-9]*.png"):
+        file.unlink()
+
+
+@contextmanager
+def _told_as_output_error(folder: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise OutputError(error.filename or folder, "", error.strerror or error, "a place to write to") from error

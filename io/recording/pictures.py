@@ -1,0 +1,110 @@
+"""What a decoded picture must be to count as a colour frame, a mask or an instance image."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from stseg.arrays import AnyArray, Observation
+from stseg.errors import SourceError
+from stseg.io.recording.indexed_png import decode_indexed, stores_numbers
+from stseg.io.recording.recording import SourceKind
+
+# Video codecs leave a trace of colour on grey; a picture painted in colours has far more.
+_GREY_SPREAD = 32
+
+
+def read_picture(path: Path, kind: SourceKind, size: tuple[int, int], key: str) -> AnyArray:
+    """One image file as an observation.
+
+    Parameters
+    ----------
+    path
+        The file.
+    kind
+        video or images: uint8 (v, u, 3) BGR; masks: uint8 (v, u); instances: uint16 (v, u).
+    size
+        Width and height that it must have, pixels.
+    key
+        What to call it in an error: the camera and frame.
+
+    Raises
+    ------
+    SourceError
+        Where the file cannot be read or decoded, or is not of that kind or size.
+    """
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise SourceError(path, key, error.strerror or error, "an image") from error
+    picture = _decode(data, kind)
+    if picture is None:
+        raise SourceError(path, key, "a broken file", "an image that decodes")
+    return as_observation(picture, kind, size, path, key)
+
+
+def reduced_view(view: Observation, factor: int) -> Observation:
+    """A colour frame reduced by a whole factor, each pixel the mean of a square; what is no colour frame stays."""
+    if factor == 1 or not isinstance(view, np.ndarray) or view.ndim != 3:
+        return view
+    return np.asarray(reduced_picture(view, factor), np.uint8)
+
+
+def reduced_picture(picture: AnyArray, factor: int) -> AnyArray:
+    """A picture (v, u) or (v, u, 3) reduced by a whole factor; the rest at its right and lower edges is left out."""
+    if factor == 1:
+        return picture
+    height, width = picture.shape[0] // factor, picture.shape[1] // factor
+    whole = picture[: height * factor, : width * factor]
+    return cv2.resize(whole, (width, height), interpolation=cv2.INTER_AREA)
+
+
+def _decode(data: bytes, kind: SourceKind) -> AnyArray | None:
+    """The picture in a file's bytes, None where it is broken."""
+    if not data:
+        return None
+    flags = cv2.IMREAD_COLOR if kind in ("video", "images") else cv2.IMREAD_UNCHANGED
+    try:
+        if kind == "instances" and stores_numbers(data):
+            return decode_indexed(data)
+        return cv2.imdecode(np.frombuffer(data, np.uint8), flags)
+    except cv2.error:
+        return None
+
+
+def as_observation(picture: AnyArray, kind: SourceKind, size: tuple[int, int], place: Path, key: str) -> AnyArray:
+    """A decoded picture as the kind's array, see `read_picture`; SourceError where it cannot be."""
+    height, width = picture.shape[:2]
+    if (width, height) != size:
+        raise SourceError(place, key, f"an image of {width}x{height}", f"{size[0]}x{size[1]}, the size of the camera")
+    if kind == "instances":
+        return _instances(picture, place, key)
+    if picture.dtype != np.uint8:
+        raise SourceError(place, key, f"values of type {picture.dtype}", "8 bits a channel")
+    return _mask(picture, place, key) if kind == "masks" else _colour(picture)
+
+
+def _colour(picture: AnyArray) -> AnyArray:
+    if picture.ndim == 2:
+        return cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR)
+    return picture if picture.shape[2] == 3 else cv2.cvtColor(picture, cv2.COLOR_BGRA2BGR)
+
+
+def _mask(picture: AnyArray, place: Path, key: str) -> AnyArray:
+    if picture.ndim == 2:
+        return picture
+    colour = _colour(picture)
+    blue, green, red = np.moveaxis(colour[::4, ::4], 2, 0)
+    spread = np.maximum(np.maximum(blue, green), red) - np.minimum(np.minimum(blue, green), red)
+    if spread.max() > _GREY_SPREAD:
+        raise SourceError(place, key, "a picture in colours", 'a grey mask, 0..255 (kind = "masks")')
+    return cv2.cvtColor(colour, cv2.COLOR_BGR2GRAY)
+
+
+def _instances(picture: AnyArray, place: Path, key: str) -> AnyArray:
+    if picture.ndim != 2 or picture.dtype not in (np.uint8, np.uint16):
+        found = "a picture in colours" if picture.ndim != 2 else f"values of type {picture.dtype}"
+        raise SourceError(place, key, found, "one channel of 8 or 16 bits, one value an instance, or an indexed PNG")
+    return picture.astype(np.uint16)

@@ -1,0 +1,115 @@
+"""What a rig file describes: the rig, and where the frames of each camera come from."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Literal
+
+from stseg.arrays import Ints
+from stseg.geometry import Camera, Rig
+from stseg.geometry.reduction import greatest_reduction
+
+SourceKind = Literal["video", "masks", "images", "instances", "boxes"]
+Clock = Literal["auto", "stamps", "count"]
+SOURCE_KINDS: tuple[SourceKind, ...] = ("video", "masks", "images", "instances", "boxes")
+_PASSWORD = re.compile(r"(://[^/\s:@\"]*):[^/\s\"]*@")
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """One stream of frames on disk, or a live one.
+
+    Attributes
+    ----------
+    kind
+        video: colour frames of a video file. images: colour frames, a folder or pattern. masks: likelihoods 0..255, a
+        video, folder or pattern. instances: indexed images, one value an instance, 0 background, a folder or pattern.
+        boxes: a text file of a detector's boxes.
+    path
+        File, folder or pattern (`frame_*.png`, `hour_*.mp4`), already relative to the rig file's folder; of a live
+        stream the last part of its address.
+    more
+        Not for boxes: files, folders or patterns that go on where the one before ends.
+    starts
+        When each of the files begins, seconds after the camera's frame 0; empty where each begins as the one before
+        ends.
+    first_frame
+        boxes only: the number that the file gives to its first frame.
+    frames
+        boxes only: how many frames there are, where the file's last line does not say it; None to take the last line.
+    """
+
+    kind: SourceKind
+    path: Path
+    first_frame: int = 0
+    frames: int | None = None
+    more: tuple[Path, ...] = ()
+    starts: tuple[float, ...] = ()
+    address: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class CameraSource:
+    """One camera's stream.
+
+    Attributes
+    ----------
+    source
+        Its frames.
+    background
+        The empty scene to learn from, or None.
+    offset
+        Its frame k shows the scene at frame k + offset of the recording.
+    on_missing
+        What to do where its stream starts late or ends early: an error, or a view that sees nothing there.
+    clock
+        What says when its frames were taken: the files' time stamps, their count, or what
+        `stseg.io.recording.clock` finds.
+    shown : int64 (tick,)
+        The camera's own frame that shows each tick of its clock, -1 where it is blind; None where frame k shows tick k,
+        or nothing is known yet.
+    """
+
+    source: Source
+    background: Source | None = None
+    offset: int = 0
+    on_missing: Literal["error", "blind"] = "error"
+    clock: Clock = "auto"
+    shown: Ints | None = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True)
+class Recording:
+    """A rig and its streams, one per camera in the rig's order."""
+
+    path: Path
+    rig: Rig
+    sources: tuple[CameraSource, ...]
+    reduction: tuple[int, ...] = ()
+    """Whole factors by which the cameras' colour frames are reduced as they are read; empty for frames as they are."""
+
+    @property
+    def factors(self) -> tuple[int, ...]:
+        """The reduction of every camera, 1 for none."""
+        return self.reduction or (1,) * len(self.sources)
+
+    @property
+    def read_rig(self) -> Rig:
+        """The rig of the frames as they are read."""
+        return self.rig.reduced(self.reduction) if self.reduction else self.rig
+
+    def reduced(self, rows: float) -> Recording:
+        """The recording with its colour frames reduced as far as standing people still span so many rows."""
+        cameras = zip(self.rig.cameras, self.sources, strict=True)
+        return replace(self, reduction=tuple(self._factor(camera, own, rows) for camera, own in cameras))
+
+    def _factor(self, camera: Camera, own: CameraSource, rows: float) -> int:
+        colour = own.source.kind in ("video", "images")
+        return greatest_reduction(camera, self.rig.grid, rows) if colour else 1
+
+
+def without_passwords(text: str) -> str:
+    """A text in which the addresses of live streams (`rtsp://name:password@...`) show no password."""
+    return _PASSWORD.sub(r"\1:***@", text)

@@ -1,0 +1,109 @@
+"""The text of a rig file, laid out for people: one matrix row a line, units beside the numbers, every digit kept."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+
+from stseg.arrays import Floats
+from stseg.geometry import Camera
+from stseg.io.recording.recording import CameraSource, Recording, Source
+
+FORMAT = 1
+
+
+def format_rig(recording: Recording, path: Path) -> str:
+    """The text of the rig file that is to stand at `path`, which decides how the paths of streams are written."""
+    rig, grid = recording.rig, recording.rig.grid
+    lines = [
+        f"format = {FORMAT}",
+        "",
+        "[scene]",
+        f"name = {_text(rig.name)}",
+        f"frame_rate = {_number(rig.frame_rate)}  # frames per second",
+        f"x = {_list(np.array(grid.x))}  # ground rectangle, metres",
+        f"y = {_list(np.array(grid.y))}",
+        *([] if grid.polygon is None else [f"polygon = {_rows(grid.polygon)}  # the part of it that counts"]),
+        "",
+        "[grid]",
+        f"cell = {_number(grid.cell)}  # side of a cell, metres",
+        f"top = {_number(grid.top)}  # height of the uppermost plane, metres",
+        f"planes = {grid.planes}  # at linspace(0, top, planes)",
+    ]
+    for camera, streams in zip(rig.cameras, recording.sources, strict=True):
+        lines += ["", *_camera_lines(camera), *_stream_lines(streams, path.parent)]
+    return "\n".join(lines) + "\n"
+
+
+def _camera_lines(camera: Camera) -> list[str]:
+    pixels = "pixels" if camera.lens is None else "undistorted pixels"
+    lines = [
+        "[[camera]]",
+        f"name = {_text(camera.name)}",
+        f"size = [{camera.size[0]}, {camera.size[1]}]  # width, height, pixels",
+        f"# homography: ground metres -> {pixels}",
+        f"ground = {_rows(camera.ground)}",
+        "# what one metre of height adds to the third column of ground",
+        f"vertical = {_list(camera.vertical)}",
+    ]
+    if camera.lens is not None:
+        matrix, distortion = _rows(camera.lens.matrix), _list(camera.lens.distortion)
+        names = "k1, k2, p1, p2, k3" if len(camera.lens.distortion) == 5 else "k1, k2, p1, p2, k3, k4, k5, k6"
+        lines += [f"# camera matrix; {names}", f"lens = {{ matrix = {matrix}, distortion = {distortion} }}"]
+    return lines
+
+
+def _stream_lines(streams: CameraSource, folder: Path) -> list[str]:
+    lines = [f"offset = {streams.offset}  # its frame k shows the scene at frame k + offset"]
+    lines.append(f"source = {_source_text(streams.source, folder)}")
+    if streams.background is not None:
+        lines.append(f"background = {_source_text(streams.background, folder)}  # the empty scene")
+    if streams.on_missing != "error":
+        lines.append(f"on_missing = {_text(streams.on_missing)}  # where the stream starts late or ends early")
+    if streams.clock != "auto":
+        lines.append(f"clock = {_text(streams.clock)}  # what says when its frames were taken")
+    return lines
+
+
+def _source_text(source: Source, folder: Path) -> str:
+    entries = [f"kind = {_text(source.kind)}", f"path = {_paths(source, folder)}"]
+    if source.first_frame:
+        entries.append(f"first_frame = {source.first_frame}")
+    if source.frames is not None:
+        entries.append(f"frames = {source.frames}")
+    if source.starts:
+        entries.append(f"starts = {_list(np.array(source.starts))}")
+    return f"{{ {', '.join(entries)} }}"
+
+
+def _paths(source: Source, folder: Path) -> str:
+    if source.address:
+        return _text(source.address)
+    names = [_text(_relative(path, folder).as_posix()) for path in (source.path, *source.more)]
+    return f"[{', '.join(names)}]" if source.more else names[0]
+
+
+def _relative(path: Path, folder: Path) -> Path:
+    if path.is_relative_to(folder):
+        return path.relative_to(folder)
+    return path if path.is_absolute() else Path(os.path.relpath(path, folder))
+
+
+def _text(text: str) -> str:
+    # TOML's basic strings are JSON's, but for the delete character.
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def _number(number: float) -> str:
+    return repr(float(number))
+
+
+def _list(numbers: Floats) -> str:
+    return f"[{', '.join(map(_number, numbers))}]"
+
+
+def _rows(matrix: Floats) -> str:
+    return "\n".join(["[", *(f"    {_list(row)}," for row in matrix), "]"])

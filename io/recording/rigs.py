@@ -1,0 +1,221 @@
+"""The rig file: the scene, the grid, the cameras and their streams, as TOML that people read and write.
+
+Everything is checked on load, so that no later stage has to: an error names the file, the key (cameras count from 0),
+what was found and what was expected. Paths in the file are relative to it.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Literal
+
+from stseg.errors import CalibrationError, OutputError, RigError
+from stseg.geometry import Camera, Grid, Lens, Rig
+from stseg.io.recording.recording import SOURCE_KINDS, CameraSource, Clock, Recording, Source, SourceKind
+from stseg.io.recording.rig_text import FORMAT, format_rig
+from stseg.io.toml_table import ANY, Table
+
+_MOST_CELLS = 100_000_000  # of one frame's volume: beyond it a slip of the pen, not a scene
+_ON_MISSING: tuple[Literal["error", "blind"], ...] = ("error", "blind")
+_CLOCKS: tuple[Clock, ...] = ("auto", "stamps", "count")
+_CAMERA_KEYS = (
+    *("name", "size", "ground", "vertical", "projection", "lens"),
+    *("offset", "source", "background", "on_missing", "clock"),
+)
+
+
+def read_rig(path: str | Path) -> Recording:
+    """Read and check a rig file.
+
+    Parameters
+    ----------
+    path
+        The file. Paths in it are relative to its folder.
+
+    Raises
+    ------
+    RigError
+        Where the file is missing, no TOML, or says something that cannot be.
+    CalibrationError
+        Where a camera's geometry is singular or sees nothing of the area.
+    """
+    path = Path(path)
+    try:
+        text = path.read_bytes().decode("utf-8-sig")
+    except OSError as error:
+        raise RigError(path, "", error.strerror or error, "a rig file") from error
+    except UnicodeDecodeError as error:
+        raise RigError(path, "", f"bytes that are not UTF-8 at {error.start}", "TOML, which is UTF-8") from error
+    return parse_rig(text, path)
+
+
+def parse_rig(text: str, path: Path) -> Recording:
+    """`read_rig` of a text that stands, or is to stand, in the file `path`."""
+    try:
+        top = Table(path, "", tomllib.loads(text))
+    except (ValueError, RecursionError) as error:
+        raise RigError(path, "", f"what is not TOML ({error})", "TOML") from error
+    if top.integer("format") != FORMAT:
+        raise top.error("format", top.integer("format"), f"{FORMAT}, the format that this version reads")
+    top.allow("format", "scene", "grid", "camera")
+    scene, tables = top.table("scene"), _named(top.tables("camera"))
+    scene.allow("name", "frame_rate", "x", "y", "polygon")
+    grid = _grid(scene, top.table("grid"))
+    cameras = tuple(_camera(table) for table in tables)
+    rig = Rig(scene.text("name"), scene.positive("frame_rate"), grid, cameras)
+    for table, camera in zip(tables, cameras, strict=True):
+        with _placed(table, "projection" in table):
+            replace(rig, cameras=(camera,)).require_sight()
+    return Recording(path, rig, tuple(_camera_source(table) for table in tables))
+
+
+def write_rig(path: str | Path, recording: Recording) -> None:
+    """Write a rig file; `read_rig` gives back the same recording, to the last bit.
+
+    Paths of streams are written relative to the file, unless they are absolute and lie elsewhere. An existing file is
+    replaced, whole or not at all.
+
+    Raises
+    ------
+    RigError, CalibrationError
+        Where the recording describes what `read_rig` would refuse; nothing is written then.
+    OutputError
+        Where the file cannot be written.
+    """
+    path = Path(path)
+    text = format_rig(recording, path)
+    parse_rig(text, path)
+    part = path.with_name(f"{path.name}.part")
+    try:
+        part.write_bytes(text.encode("utf-8"))
+        part.replace(path)
+    except UnicodeEncodeError as error:
+        raise OutputError(path, "", "a name that UTF-8 cannot hold", "names of readable characters") from error
+    except OSError as error:
+        raise OutputError(path, "", error.strerror or error, "a place to write to") from error
+
+
+def _named(tables: tuple[Table, ...]) -> tuple[Table, ...]:
+    """The cameras' tables with their names in their places; no name twice."""
+    names = [table.text("name") for table in tables]
+    for index, (table, name) in enumerate(zip(tables, names, strict=True)):
+        if name in names[:index]:
+            raise table.error("name", f"{name!r}, the name of camera[{names.index(name)}] too", "a name of its own")
+    return tuple(replace(table, place=f"{table.place} ({name})") for table, name in zip(tables, names, strict=True))
+
+
+def _grid(scene: Table, table: Table) -> Grid:
+    table.allow("cell", "top", "planes")
+    polygon = None
+    if "polygon" in scene:
+        polygon = scene.numbers("polygon", ANY, 2)
+        if len(polygon) < 3:
+            raise scene.error("polygon", f"{len(polygon)} corners", "at least 3")
+    grid = Grid(
+        x=_bounds(scene, "x"),
+        y=_bounds(scene, "y"),
+        cell=table.positive("cell"),
+        top=table.positive("top"),
+        planes=table.integer("planes", least=1),
+        polygon=polygon,
+    )
+    cells = (grid.x[1] - grid.x[0]) / grid.cell * (grid.y[1] - grid.y[0]) / grid.cell * grid.planes
+    if not cells < _MOST_CELLS:
+        raise table.error(
+            "cell", f"{grid.cell!r}, which makes {cells:.1e} cells", f"fewer than {_MOST_CELLS:.0e} cells"
+        )
+    if not grid.inside().any():
+        raise scene.error("polygon", "a polygon that holds no cell", "one that overlaps the rectangle x, y")
+    return grid
+
+
+def _bounds(table: Table, name: str) -> tuple[float, float]:
+    low, high = table.numbers(name, 2).tolist()
+    if not low < high:
+        raise table.error(name, [low, high], "the lower bound, then the upper")
+    return low, high
+
+
+def _camera(table: Table) -> Camera:
+    table.allow(*_CAMERA_KEYS)
+    name = table.text("name")
+    size = _size(table)
+    lens = _lens(table.table("lens")) if "lens" in table else None
+    by_projection = "projection" in table
+    if by_projection and ("ground" in table or "vertical" in table):
+        raise table.error("projection", "ground or vertical beside it", "either projection, or ground and vertical")
+    if not by_projection and "ground" not in table:
+        raise table.error("ground", "nothing", "a homography (ground and vertical), or projection")
+    with _placed(table, by_projection):
+        if by_projection:
+            return Camera.from_projection(name, size, table.numbers("projection", 3, 4), lens)
+        return Camera(name, size, table.numbers("ground", 3, 3), table.numbers("vertical", 3), lens)
+
+
+def _size(table: Table) -> tuple[int, int]:
+    size = table.numbers("size", 2)
+    if (size != size.round()).any() or (size < 1).any():
+        raise table.error("size", size.tolist(), "width and height in whole pixels")
+    return int(size[0]), int(size[1])
+
+
+@contextmanager
+def _placed(table: Table, by_projection: bool) -> Iterator[None]:
+    """Say of a calibration error which key of the file it stands in."""
+    try:
+        yield
+    except CalibrationError as error:
+        key = table.key("projection" if by_projection else error.key)
+        raise CalibrationError(table.file, key, error.found, error.expected) from error
+
+
+def _lens(table: Table) -> Lens:
+    table.allow("matrix", "distortion")
+    matrix = table.numbers("matrix", 3, 3)
+    if min(matrix[0, 0], matrix[1, 1]) <= 0 or matrix[1, 0] != 0 or matrix[2].tolist() != [0, 0, 1]:
+        raise table.error("matrix", matrix.tolist(), "a camera matrix [[fx, s, cx], [0, fy, cy], [0, 0, 1]]")
+    distortion = table.numbers("distortion", ANY)
+    if len(distortion) > 8:
+        raise table.error("distortion", f"{len(distortion)} numbers", "at most 8: k1, k2, p1, p2, k3, k4, k5, k6")
+    return Lens(matrix, distortion)
+
+
+def _camera_source(table: Table) -> CameraSource:
+    on_missing = table.choice("on_missing", _ON_MISSING) if "on_missing" in table else "error"
+    background = _source(table.table("background")) if "background" in table else None
+    if background is not None and background.kind not in ("video", "images"):
+        raise table.error("background.kind", repr(background.kind), "video or images: the empty scene in colour")
+    offset = table.integer("offset") if "offset" in table else 0
+    clock = table.choice("clock", _CLOCKS) if "clock" in table else "auto"
+    return CameraSource(_source(table.table("source"), "starts"), background, offset, on_missing, clock)
+
+
+def _source(table: Table, *more_keys: str) -> Source:
+    kind = table.choice("kind", SOURCE_KINDS)
+    counts = ("first_frame", "frames") if kind == "boxes" else more_keys
+    table.allow("kind", "path", *counts)
+    if any("://" in name for name in table.texts("path")):
+        return _live_source(table, kind)
+    first, *more = [table.file.parent / name for name in table.texts("path")]
+    if more and kind == "boxes":
+        raise table.error("path", f"{len(more) + 1} files", "one file of boxes")
+    return Source(
+        kind,
+        first,
+        table.integer("first_frame") if "first_frame" in table else 0,
+        table.integer("frames", least=1) if "frames" in table else None,
+        tuple(more),
+        tuple(table.numbers("starts", ANY).tolist()) if "starts" in table else (),
+    )
+
+
+def _live_source(table: Table, kind: SourceKind) -> Source:
+    address, *more = table.texts("path")
+    if kind != "video" or more:
+        found = f"{address} of kind {kind}" if kind != "video" else f"{len(more) + 1} streams"
+        raise table.error("path", found, "one address, of kind video")
+    return Source(kind, Path(address.rpartition("/")[2]), address=address)

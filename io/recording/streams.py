@@ -1,0 +1,154 @@
+"""One camera's frames in order, whatever they are stored in."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+import numpy as np
+
+from stseg.arrays import Boxes, Floats, Observation
+from stseg.errors import SourceError
+from stseg.geometry import Camera
+from stseg.io.recording.box_files import read_boxes
+from stseg.io.recording.image_stream import ImageStream, names_images
+from stseg.io.recording.recording import Source, without_passwords
+from stseg.io.recording.source_files import parts_of
+from stseg.io.recording.video_stream import VideoStream
+
+
+class Stream(Protocol):
+    """Frames that are read once, from the first to the last."""
+
+    def skip(self, count: int) -> int:
+        """Pass over up to `count` frames; how many there were."""
+
+    def read(self) -> Observation:
+        """The next frame; None after the last."""
+
+    def times(self) -> list[Floats]:
+        """Pass over all that is left: the time that each frame states, milliseconds; nan where it states none.
+
+        One array a file; a file's times begin anew.
+        """
+
+    def close(self) -> None:
+        """Let go of what is open."""
+
+
+class BoxStream:
+    """Boxes of a text file, read whole at once."""
+
+    def __init__(self, source: Source) -> None:
+        self._table = read_boxes(source.path, source.first_frame, source.frames)
+        self._next = 0
+
+    def skip(self, count: int) -> int:
+        """Pass over up to `count` frames; how many there were."""
+        skipped = min(count, self._table.frames - self._next)
+        self._next += skipped
+        return skipped
+
+    def read(self) -> Boxes | None:
+        """The next frame's boxes, none where nothing was found; None after the last frame."""
+        if self._next == self._table.frames:
+            return None
+        self._next += 1
+        return self._table.at(self._next - 1)
+
+    def times(self) -> list[Floats]:
+        """Frames of a text file state no time."""
+        return [np.full(self.skip(self._table.frames), np.nan)]
+
+    def close(self) -> None:
+        """Nothing is held open."""
+
+
+class JoinedStream:
+    """Streams of one camera that follow one another; one is open at a time.
+
+    Parameters
+    ----------
+    parts, camera
+        One source a file or folder, in the order of time.
+    times
+        Of the frames of each part, where they are known.
+    """
+
+    def __init__(self, parts: Sequence[Source], camera: Camera, times: Sequence[Floats] | None) -> None:
+        self._parts, self._camera, self._times = parts, camera, times
+        self._at = 0
+        self._stream = self._open()
+
+    def skip(self, count: int) -> int:
+        """Pass over up to `count` frames; how many there were. Parts of known length are not opened to be skipped."""
+        skipped = self._skip_here(count)
+        while skipped < count and self._next():
+            skipped += self._skip_here(count - skipped)
+        return skipped
+
+    def read(self) -> Observation:
+        """The next frame; None after the last."""
+        view = self._stream.read()
+        while view is None and self._next():
+            view = self._stream.read()
+        return view
+
+    def times(self) -> list[Floats]:
+        """Pass over all that is left: the time that each frame states, one array a part."""
+        found = self._stream.times()
+        while self._next():
+            found += self._stream.times()
+        return found
+
+    def close(self) -> None:
+        """Let go of what is open."""
+        self._stream.close()
+
+    def _skip_here(self, count: int) -> int:
+        """In this part, and in whole parts after it whose length is known."""
+        skipped = self._stream.skip(count)
+        while skipped < count and self._times is not None and self._at + 1 < len(self._parts) - 1:
+            length = len(self._times[self._at + 1])
+            if length > count - skipped:
+                break
+            self._at += 1
+            skipped += length
+        return skipped
+
+    def _next(self) -> bool:
+        if self._at + 1 == len(self._parts):
+            return False
+        self._stream.close()
+        self._at += 1
+        self._stream = self._open()
+        return True
+
+    def _open(self) -> Stream:
+        known = None if self._times is None else [self._times[self._at]]
+        return open_stream(self._parts[self._at], self._camera, known)
+
+
+def open_stream(source: Source, camera: Camera, times: Sequence[Floats] | None = None) -> Stream:
+    """The stream of a source for a camera whose image size its frames must have.
+
+    With the times of all its frames, as `Stream.times` gave them, a video need not be decoded up to a far frame.
+
+    Raises
+    ------
+    SourceError, FormatError
+        Where the source is missing, empty or not of its kind.
+    """
+    if source.address:
+        raise SourceError(
+            without_passwords(source.address), f"camera {camera.name}", "a live stream", "files; or stseg run --follow"
+        )
+    parts = parts_of(source, f"camera {camera.name}")
+    if len(parts) > 1:
+        return JoinedStream(parts, camera, times)
+    (source,) = parts
+    if source.kind == "boxes":
+        return BoxStream(source)
+    if source.kind == "video" or (source.kind == "masks" and not names_images(source.path)):
+        return VideoStream(source, camera, None if times is None else times[0])
+    return ImageStream(source, camera)

@@ -1,0 +1,117 @@
+"""A video file, frame after frame. Its length is what decodes, whatever its header says."""
+
+from __future__ import annotations
+
+import os
+
+# FFmpeg reads this at its first use; what goes wrong is said by a SourceError instead.
+os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
+
+import cv2
+import numpy as np
+
+from stseg.arrays import AnyArray, Floats
+from stseg.errors import SourceError
+from stseg.geometry import Camera
+from stseg.io.recording.packets import packet_times
+from stseg.io.recording.pictures import as_observation
+from stseg.io.recording.recording import Source
+
+cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+
+_NEAR = 250
+"""Frames that are decoded rather than sought past."""
+_BEFORE = 4
+"""Frames before the one that is sought, so that what stands where seeking lands can be told by its time."""
+
+
+class VideoStream:
+    """Colour frames uint8 (v, u, 3) or, where the source's kind is masks, uint8 (v, u) of a video file.
+
+    Parameters
+    ----------
+    source, camera
+        The file, and the camera whose size its frames must have.
+    times : float64 (n,)
+        Of all frames, milliseconds, as `times` found them by decoding; far frames are then sought. Seeking is not
+        exact, so where it lands is told by the time of the frame that is there; where that does not tell, the video is
+        decoded from its beginning.
+
+    Raises
+    ------
+    SourceError
+        Where the file is missing, no frame of it decodes, or its frames have not the camera's size.
+    """
+
+    def __init__(self, source: Source, camera: Camera, times: Floats | None = None) -> None:
+        self._source, self._camera, self._times = source, camera, times
+        if not source.path.is_file():
+            raise self._error("no such file", "a video")
+        self._frame, self._ended = -1, False
+        self._open()
+
+    def skip(self, count: int) -> int:
+        """Drop up to `count` frames; how many there were."""
+        before = self._frame
+        if self._times is not None and count >= len(self._times) - 1 - before:
+            self._frame, self._ended = len(self._times) - 1, True
+        if self._times is not None and _NEAR < count <= len(self._times) - 1 - before:
+            self._seek(before + count, self._times)
+        while self._frame < before + count and self._advance():
+            pass
+        return self._frame - before
+
+    def times(self) -> list[Floats]:
+        """Pass over all that is left: the time that the file gives each frame, milliseconds.
+
+        By decoding them, unless packets tell: headers of real files lie.
+        """
+        if self._frame < 0 and (told := packet_times(self._source.path)) is not None:
+            self._frame, self._ended = len(told) - 1, True
+            return [told]
+        found = []
+        while self._advance():
+            found.append(self._capture.get(cv2.CAP_PROP_POS_MSEC))
+        return [np.array(found, float)]
+
+    def read(self) -> AnyArray | None:
+        """The next frame; None after the last."""
+        if not self._advance():
+            return None
+        decoded, picture = self._capture.retrieve()
+        key = f"camera {self._camera.name}, frame {self._frame}"
+        if not decoded:
+            raise SourceError(self._source.path, key, "a broken frame", "one that decodes")
+        return as_observation(picture, self._source.kind, self._camera.size, self._source.path, key)
+
+    def close(self) -> None:
+        """Let the file go."""
+        self._capture.release()
+
+    def _open(self) -> None:
+        # FFmpeg by name: the same decoder on every system, and seeking fallbacks of other backends stay out.
+        self._capture = cv2.VideoCapture(str(self._source.path), cv2.CAP_FFMPEG)
+        if not self._capture.isOpened():
+            raise self._error("a file that does not open as a video", "a video that FFmpeg decodes")
+        self._frame, self._ended = -1, False
+
+    def _seek(self, frame: int, times: Floats) -> None:
+        """Go to a frame not after this one, as near as the file allows; to the beginning where that cannot be told."""
+        self._capture.set(cv2.CAP_PROP_POS_FRAMES, frame - _BEFORE)
+        if self._capture.grab():
+            here = np.flatnonzero(times == self._capture.get(cv2.CAP_PROP_POS_MSEC))
+            if len(here) == 1 and self._frame < here[0] <= frame:
+                self._frame = int(here[0])
+                return
+        self.close()
+        self._open()
+
+    def _advance(self) -> bool:
+        self._ended = self._ended or not self._capture.grab()
+        if self._ended and self._frame < 0:
+            raise self._error("no frame that decodes", "a video that FFmpeg decodes")
+        self._frame += not self._ended
+        return not self._ended
+
+    def _error(self, found: str, expected: str) -> SourceError:
+        return SourceError(self._source.path, f"camera {self._camera.name}", found, expected)

@@ -1,0 +1,138 @@
+"""The run file as a specification: names, dtypes, axes, units and attributes of everything in it.
+
+The writer makes what stands here, the reader checks it. The NeXus attributes are those that silx, h5web and nexpy ask
+for (NXdata: signal, axes, interpretation); the dimension scales are what xarray reads, /trajectory with @fps and the
+root's @wkt_geometry what PedPy reads.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from stseg.arrays import Floats
+from stseg.geometry import Grid
+from stseg.model.tables import BOX, CANDIDATE, EVENT, RATES, SHIFT, TIMING, TRACK, TRAJECTORY, WINDOW
+
+FORMAT = "stseg-run"
+VERSION = 1
+
+OCCUPANCY = "/entry/occupancy"
+PROVENANCE = "/provenance"
+AXES = ("time", "plane", "y", "x")
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """One array of /entry/occupancy.
+
+    Attributes
+    ----------
+    name
+    dtype
+    axes
+        Names of the scales along it. What has a time axis grows along it, one frame a chunk.
+    units
+        Empty where it counts or names something.
+    long_name
+        What viewers write beside it, in place of the name and the units; so it ends in the units.
+    """
+
+    name: str
+    dtype: np.dtype[np.generic]
+    axes: tuple[str, ...]
+    units: str
+    long_name: str
+
+
+SCALES = (
+    Field("time", np.dtype("<f8"), ("time",), "s", "time since the recording's first frame (s)"),
+    Field("plane", np.dtype("<f8"), ("plane",), "m", "height above the ground (m)"),
+    Field("y", np.dtype("<f8"), ("y",), "m", "y on the ground (m)"),
+    Field("x", np.dtype("<f8"), ("x",), "m", "x on the ground (m)"),
+)
+"""The coordinates: centres of the cells."""
+
+LOG_ODDS = Field("log_odds", np.dtype("<f4"), AXES, "nat", "log-odds of a person (nat)")
+LABEL = Field("label", np.dtype("<i4"), AXES, "", "track id; 0 is background")
+FRAME = Field("frame", np.dtype("<i8"), ("time",), "", "frame of the recording")
+VIEWS = Field("views", np.dtype("u1"), AXES[1:], "", "number of views that see the cell")
+STEP = 1 / 32
+"""Nats between two values that log_odds may have: what is finer is noise, and would make files larger."""
+FIELDS = (*SCALES, LOG_ODDS, LABEL, FRAME, VIEWS)
+
+KEPT = ("all", "tracks", "none")
+"""What @kept of the occupancy says: the whole volume, what is near tracks, or nothing of it."""
+
+ABOUT = {
+    "trajectory": "one row per person and frame: metres on the ground, covariance in square metres, score in nats",
+    "tracks": "one row per track: first and last frame, mean score in nats, median height and width in metres",
+    "boxes": "one row per person, frame and view: pixels of the real image; view counts the cameras from 0",
+    "events": "birth, death, merge, split, hand-over, dropped, blind; other is the other track, 0 for none",
+    "ghosts": "one row per candidate and frame: status 1 true, 0 ghost; evidence in nats, parts what each view says",
+    "windows": "one row per window: half-open ranges of frames; energy of the cut in units of energy_quantum, nats",
+    "rates": "one row per window and view: how often the view errs, 0..1, and how far beside people it is, metres",
+    "shifts": "every other second, how far a colour view's picture has moved since its background was learned, pixels",
+    "timings": "seconds per stage and window; window -1 for work that belongs to none",
+}
+"""Every table and what it holds."""
+
+EARLIER = {LOG_ODDS.name: np.dtype("<f2")}
+"""Types that fields had in the first files of this version: readers take them, but browsers cannot show halves."""
+
+ADDED = frozenset({"rates", "shifts"})
+"""Tables that the first files of this version lack: readers take them as empty."""
+
+ADDED_COLUMNS = frozenset({"width", "aside"})
+"""Columns of floats that the first files of this version lack in some tables: readers take them as nan."""
+
+
+def table_types(views: int) -> dict[str, np.dtype[np.void]]:
+    """The dtype of every table of a run with so many views."""
+    return {
+        "trajectory": TRAJECTORY,
+        "tracks": TRACK,
+        "boxes": BOX,
+        "events": EVENT,
+        "ghosts": ghost_type(views),
+        "windows": WINDOW,
+        "rates": RATES,
+        "shifts": SHIFT,
+        "timings": TIMING,
+    }
+
+
+def ghost_type(views: int) -> np.dtype[np.void]:
+    """CANDIDATE and `parts`, float32 (views,): what each view says of the candidate, nats."""
+    return np.dtype([*CANDIDATE.descr, ("parts", "<f4", (views,))])
+
+
+ROOT_ATTRIBUTES: Mapping[str, str | int] = {
+    "format": FORMAT,
+    "format_version": VERSION,
+    "NX_class": "NXroot",
+    "default": "entry",
+}
+ENTRY_ATTRIBUTES: Mapping[str, object] = {"NX_class": "NXentry", "default": "occupancy"}
+OCCUPANCY_ATTRIBUTES: Mapping[str, object] = {
+    "NX_class": "NXdata",
+    "signal": LOG_ODDS.name,
+    "auxiliary_signals": [LABEL.name],
+    "axes": list(AXES),
+    **{f"{name}_indices": index for index, name in enumerate(AXES)},
+    "frame_indices": 0,
+    "default_slice": ["0", "0", ".", "."],  # h5web
+    "SILX_style": '{"signal_scale_type": "linear"}',
+}
+
+
+def walkable_area(grid: Grid) -> str:
+    """The area that counts as well-known text, metres."""
+    corners: Floats | list[tuple[float, float]] | None = grid.polygon
+    if corners is None:
+        (left, right), (bottom, top) = grid.x, grid.y
+        corners = [(left, bottom), (right, bottom), (right, top), (left, top)]
+    points = [f"{float(x)!r} {float(y)!r}" for x, y in (*corners, corners[0])]
+    return f"POLYGON (({', '.join(points)}))"

@@ -1,0 +1,160 @@
+"""The part of an output that HDF5 writes: a file object that shows HDF5 neither failures nor interrupts."""
+
+from __future__ import annotations
+
+import io
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from types import FrameType
+
+from stseg.errors import OutputError
+from stseg.io.outputs.whole_files import failure, part_of, publish
+from stseg.io.runfile.locks import lock
+
+_Handler = Callable[[int, FrameType | None], object]
+
+
+class PartFile(io.RawIOBase):
+    """`NAME.part` as a file object that never raises while HDF5 calls it.
+
+    HDF5 cannot close a file once a write has failed, and crashes on trying. So the first failure is kept and later
+    writes are dropped, and an interrupt (Ctrl-C) is kept as well, to be raised at the end of the step. All that HDF5
+    does, the closing of its datasets too, belongs into a `step`.
+
+    Parameters
+    ----------
+    path
+        The output whose part this is. An old part is overwritten, unless another process holds it open.
+
+    Raises
+    ------
+    OutputError
+        Where the part cannot be made.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._failure: OSError | None = None
+        self._in_step = False
+        self._interrupted: int | None = None
+        try:
+            self._file = os.fdopen(os.open(part_of(path), os.O_RDWR | os.O_CREAT, 0o666), "r+b", buffering=0)
+        except OSError as error:
+            raise failure(path, error) from error
+        try:
+            lock(self._file)
+            self._file.truncate(0)
+        except OSError as error:
+            self._file.close()
+            raise failure(path, error) from error
+        self._handlers = self._shield()
+
+    @contextmanager
+    def step(self) -> Iterator[None]:
+        """Raise at the end what was kept: OutputError where a write has failed, or the interrupt."""
+        self._in_step = True
+        try:
+            yield
+        except (OSError, RuntimeError):  # what HDF5 makes of reading what was never written
+            self._raise_failure()
+            raise
+        finally:
+            self._in_step = False
+        self._raise_failure()
+        if self._interrupted is not None:
+            number, self._interrupted = self._interrupted, None
+            self._handlers[number](number, None)
+
+    def publish(self, overwrite: bool) -> None:
+        """Sync, and give the file its name; where that fails the part stays, for it is whole."""
+        kept = f"the whole result is kept in {part_of(self._path)}"
+        if self._path.exists() and not overwrite:
+            raise OutputError(self._path, "", "a file that has appeared meanwhile", f"none; {kept}")
+        try:
+            os.fsync(self._file.fileno())
+            if os.name == "nt":  # cannot rename what is open; elsewhere the lock is held until the name is taken
+                self._file.close()
+            publish(self._path)
+        except OSError as error:
+            told = failure(self._path, error)
+            raise OutputError(told.place, "", told.found, f"{told.expected}; {kept}") from error
+
+    def discard(self, close_hdf5: Callable[[], object]) -> None:
+        """Delete the part; nothing that happens on the way may hide what stopped the run."""
+        self._in_step = True
+        with suppress(OSError, RuntimeError):
+            close_hdf5()
+        with suppress(OSError):
+            part_of(self._path).unlink(missing_ok=True)
+        self.close()
+
+    def close(self) -> None:
+        """Let go of the file and its lock; HDF5 has closed it by then."""
+        if self.closed:
+            return
+        with suppress(OSError):
+            self._file.close()
+        super().close()
+        for number, before in self._handlers.items():
+            signal.signal(number, before)
+
+    def write(self, data: memoryview) -> int:  # type: ignore[override]  # what h5py gives
+        """All of it, or the failure is kept."""
+        rest = memoryview(data)
+        try:
+            while self._failure is None and rest.nbytes:
+                rest = rest[self._file.write(rest) :]
+        except OSError as error:
+            self._failure = error
+        return memoryview(data).nbytes
+
+    def truncate(self, size: int | None = None) -> int:
+        """Set the length, or the failure is kept."""
+        try:
+            if self._failure is None:
+                self._file.truncate(size)
+        except OSError as error:
+            self._failure = error
+        return size or 0
+
+    def readinto(self, buffer: memoryview) -> int:  # type: ignore[override]  # what h5py gives
+        """As of any file."""
+        return self._file.readinto(buffer) or 0
+
+    def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
+        """As of any file."""
+        return self._file.seek(offset, whence)
+
+    def tell(self) -> int:
+        """As of any file."""
+        return self._file.tell()
+
+    def flush(self) -> None:
+        """Nothing is buffered here."""
+
+    def _raise_failure(self) -> None:
+        if self._failure is not None:
+            raise failure(self._path, self._failure) from self._failure
+
+    def _shield(self) -> dict[int, _Handler]:
+        """Keep interrupts and termination out of the steps; what handled them before, where they can strike."""
+        if threading.current_thread() is not threading.main_thread():
+            return {}
+
+        def handle(number: int, frame: FrameType | None) -> None:
+            if self._in_step:
+                self._interrupted = number
+            else:
+                handlers[number](number, frame)
+
+        handlers: dict[int, _Handler] = {}
+        for number in (signal.SIGINT, signal.SIGTERM):
+            before = signal.getsignal(number)
+            if callable(before):
+                handlers[number] = before
+                signal.signal(number, handle)
+        return handlers

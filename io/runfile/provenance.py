@@ -1,0 +1,164 @@
+"""What a run was made from: the resolved configuration, the rig, versions, and the files of every stream."""
+
+from __future__ import annotations
+
+import platform
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from stseg import __version__
+from stseg.arrays import Ints, Rows
+from stseg.errors import SourceError
+from stseg.io.recording.recording import Recording, Source, without_passwords
+from stseg.io.recording.rig_text import format_rig
+from stseg.io.recording.source_files import files_of
+
+_PACKAGES = ("numpy", "scipy", "numba", "h5py", "opencv-python-headless", "PyMaxflow")
+_TEXT = h5py.string_dtype()
+_VERSION = np.dtype([("name", "S32"), ("version", "S32")])
+SOURCE = np.dtype(
+    [
+        ("camera", _TEXT),
+        ("role", "S16"),  # frames or background
+        ("kind", "S16"),
+        ("path", _TEXT),
+        ("files", "<i8"),  # 0 where nothing could be found
+        ("size", "<i8"),  # bytes of all of them
+        ("modified", "<f8"),  # the latest of them, seconds since 1970; NaN where there is none
+    ]
+)
+"""One row per stream."""
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """What a run was made from.
+
+    Attributes
+    ----------
+    created
+        When the run began, ISO 8601, UTC.
+    config
+        The resolved configuration, TOML.
+    rig
+        The rig file, TOML; it stood at `rig_path`.
+    versions
+        Of this package, Python and the libraries that compute.
+    sources : SOURCE (n,)
+    shown
+        By camera, where its frames do not count themselves: `CameraSource.shown`, int64 (tick,).
+    """
+
+    created: str
+    config: str
+    rig: str
+    rig_path: Path
+    versions: Mapping[str, str]
+    sources: Rows
+    shown: Mapping[str, Ints] = field(default_factory=dict)
+
+
+def gather_provenance(recording: Recording, config_text: str) -> Provenance:
+    """The provenance of a run that begins now."""
+    path = recording.path.absolute()
+    return Provenance(
+        datetime.now(UTC).isoformat(timespec="seconds"),
+        config_text,
+        without_passwords(format_rig(recording, recording.path)),
+        path,
+        _versions(),
+        _sources(recording),
+        {
+            camera.name: source.shown
+            for camera, source in zip(recording.rig.cameras, recording.sources, strict=True)
+            if source.shown is not None
+        },
+    )
+
+
+def write_provenance(group: h5py.Group, provenance: Provenance) -> None:
+    """Fill the group /provenance."""
+    group.attrs["created"] = provenance.created
+    group.attrs["rig_path"] = str(provenance.rig_path)
+    group["config"] = provenance.config
+    group["rig"] = provenance.rig
+    versions = [(name.encode(), number.encode()) for name, number in provenance.versions.items()]
+    group["versions"] = np.array(versions, _VERSION)
+    group.create_dataset("sources", data=provenance.sources, dtype=SOURCE)
+    for number, (camera, shown) in enumerate(provenance.shown.items()):
+        # By number: a camera's name may hold a slash.
+        dataset = group.create_dataset(f"shown/{number}", data=shown, compression="gzip", shuffle=True)
+        dataset.attrs["camera"] = camera
+
+
+def read_provenance(group: h5py.Group) -> Provenance:
+    """What `write_provenance` wrote."""
+    return Provenance(
+        group.attrs["created"],
+        group["config"].asstr()[()],
+        group["rig"].asstr()[()],
+        Path(group.attrs["rig_path"]),
+        {name.decode(): number.decode() for name, number in group["versions"][:].tolist()},
+        group["sources"][:],
+        {dataset.attrs["camera"]: dataset[:] for dataset in group.get("shown", {}).values()},
+    )
+
+
+def as_tables(provenance: Provenance) -> dict[str, Any]:
+    """All that decides what a run finds, as texts and numbers in nested tables; when it began is left out."""
+    rig = tomllib.loads(provenance.rig)
+    rig["camera"] = {camera.pop("name"): camera for camera in rig["camera"]}
+    sources = {f"{_word(row['camera'])}, {_word(row['role'])}": _told(row) for row in provenance.sources}
+    config = tomllib.loads(provenance.config)
+    return {"config": config, "rig": rig, "source": sources, "version": dict(provenance.versions)}
+
+
+def _told(row: np.void) -> str:
+    """One stream's files, in words."""
+    name = Path(_word(row["path"])).name
+    if not row["files"]:
+        return f"{name}, of which there is nothing"
+    written = datetime.fromtimestamp(float(row["modified"]), UTC).isoformat()
+    return f"{name}, {row['files']} files, {row['size']} bytes in all, written {written}"
+
+
+def _word(text: bytes | str) -> str:
+    return text.decode() if isinstance(text, bytes) else text
+
+
+def _versions() -> dict[str, str]:
+    found = {"stseg": __version__, "python": platform.python_version(), "hdf5": h5py.version.hdf5_version}
+    for package in _PACKAGES:
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:  # another build of the same library, such as opencv-python
+            found[package] = "unknown"
+    return found
+
+
+def _sources(recording: Recording) -> Rows:
+    rows = []
+    for camera, streams in zip(recording.rig.cameras, recording.sources, strict=True):
+        rows.append((camera.name, b"frames", *_described(streams.source)))
+        if streams.background is not None:
+            rows.append((camera.name, b"background", *_described(streams.background)))
+    return np.array(rows, SOURCE)
+
+
+def _described(source: Source) -> tuple[bytes, str, int, int, float]:
+    """kind, path, files, size, modified. Whether a stream can be read is not for here to say."""
+    try:
+        states = [path.stat() for path in files_of(source)] if not source.address else []
+    except (OSError, SourceError):
+        states = []
+    modified = max((state.st_mtime for state in states), default=np.nan)
+    path = without_passwords(source.address) or str(source.path)
+    return source.kind.encode(), path, len(states), sum(state.st_size for state in states), modified

@@ -1,0 +1,56 @@
+"""Paths of people through one view: ends of frame after frame that nobody else could be."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stseg.arrays import Floats, Ints
+from stseg.calibration.endpoints import Ends
+
+_STEP = 0.25
+"""How far foot and head may move between two frames, in lengths of the person, and again for each second between."""
+_GAP = 0.35
+"""Seconds that a path may be without ends."""
+
+
+def path_of(ends: Ends, frame_rate: float) -> Ints:
+    """Number of the path that each row belongs to, int64 (n,).
+
+    A path goes on with the nearest ends in reach where there is no second choice on either side.
+    """
+    path = np.full(len(ends), -1, np.int64)
+    places = np.stack([ends.foot, ends.head], 1)
+    length = ends.length
+    open_rows: list[int] = []
+    started = 0
+    for frame in np.unique(ends.frame):
+        now = np.flatnonzero(ends.frame == frame)
+        open_rows = [row for row in open_rows if frame - ends.frame[row] <= max(1.0, _GAP * frame_rate)]
+        before = np.array(open_rows, np.int64)
+        seconds = (frame - ends.frame[before]) / frame_rate
+        away = np.abs(places[before][:, None] - places[now][None]).max(axis=(2, 3))
+        near = away <= (_STEP * (1 + seconds) * length[before])[:, None]
+        for k, row in enumerate(now):
+            (mine,) = np.nonzero(near[:, k])
+            if len(mine) == 1 and near[mine[0]].sum() == 1:
+                path[row] = path[before[mine[0]]]
+                open_rows.remove(int(before[mine[0]]))
+            else:
+                path[row] = started
+                started += 1
+            open_rows.append(int(row))
+    return path
+
+
+def as_signals(ground: Floats, frame: Ints, path: Ints, least: int) -> list[tuple[int, Floats]]:
+    """First frame and ground places (frames, 2) of each path of at least so many frames; nan where it has a gap."""
+    signals = []
+    for number in np.unique(path):
+        rows = np.flatnonzero((path == number) & np.isfinite(ground).all(axis=1))
+        if len(rows) < least:
+            continue
+        first = int(frame[rows[0]])
+        places = np.full((int(frame[rows[-1]]) - first + 1, 2), np.nan)
+        places[frame[rows] - first] = ground[rows]
+        signals.append((first, places))
+    return signals

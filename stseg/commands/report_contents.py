@@ -1,0 +1,149 @@
+"""From a run file to what the report's page tells."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from stseg.arrays import Rows
+from stseg.commands.run_overview import seconds_by_stage
+from stseg.engine.warnings import run_warnings
+from stseg.evaluation import evaluate
+from stseg.geometry import Camera, Grid
+from stseg.io.runfile.runs import Run
+from stseg.report.answers import answers
+from stseg.report.charts import Span, clock_time
+from stseg.report.embedded import embedded_json
+from stseg.report.figures import Figure, Instant, camera_figures, ground_figures, slice_figures
+from stseg.report.findings import GhostReasons, ghost_reasons, ground_by_views, says
+from stseg.report.maps import Bins, Haunt, blind_map, density, dwell, haunts, heat_map
+from stseg.report.page import Contents, ViewSummary
+from stseg.report.sheets import thin_sheets
+
+_SHEETS = 8_000_000  # bytes of all slices, a third more as text
+
+
+def page_contents(
+    run: Run, truth: Rows | None, instants: Sequence[Instant], has_slices: bool, has_images: bool
+) -> Contents:
+    """Gather what the page tells.
+
+    Parameters
+    ----------
+    run
+    truth : (m,) with frame, id, x, y, or None
+    instants
+        The frames that the cameras show.
+    has_slices
+        Whether all planes of these frames are shown too.
+    has_images
+        Whether the instants hold camera images.
+    """
+    rig, trajectory = run.recording.rig, run.trajectory
+    span, ghosts, bins = _span(run), ghost_reasons(run.ghosts), Bins.of(rig.grid)
+    places, shares = haunts(trajectory, bins), ground_by_views(run.views, rig.grid.inside(), len(run.cameras))
+    shown = np.array([instant.frame for instant in instants], np.int64)
+    sheets = thin_sheets(run.frames, rig.grid, run.read_frame, _SHEETS, shown)
+    plan, thread = ground_figures(rig, run.views, trajectory, truth)
+    counts = (len(run.frames), trajectory, run.tracks, run.events, len(run.ghosts))
+    return Contents(
+        title=run.scene,
+        facts=[*_facts(run, span), *_scores(trajectory, truth)],
+        answers=answers(span, *counts, ghosts, places, shares),
+        warnings=run_warnings(run),
+        span=span,
+        trajectory=trajectory,
+        tracks=run.tracks,
+        events=run.events,
+        candidates=len(run.ghosts),
+        ghosts=ghosts,
+        truth=truth,
+        kept=run.kept,
+        data=embedded_json(rig, run.views, trajectory, run.ghosts, sheets),
+        plan=plan,
+        thread=thread,
+        haunts=_haunt_figures(run, bins, places),
+        ghost_map=_ghost_figure(run, bins, ghosts),
+        blind_map=Figure("blind", blind_map(rig, run.views), "Red is seen by no view, orange by one alone."),
+        sights=_sights(run, ghosts),
+        stages=list(seconds_by_stage(run).items()),
+        slices=[figure for instant in instants for figure in slice_figures(rig, instant)] if has_slices else [],
+        cameras=[figure for instant in instants for figure in camera_figures(rig, trajectory, instant)],
+        has_images=has_images,
+    )
+
+
+def _span(run: Run) -> Span:
+    first, stop = (int(run.frames[0]), int(run.frames[-1]) + 1) if len(run.frames) else (0, 1)
+    return Span(first, stop, run.frame_rate)
+
+
+def _facts(run: Run, span: Span) -> list[tuple[str, str]]:
+    grid = run.recording.rig.grid
+    computed = float(run.timings["seconds"].sum())
+    return [
+        ("tracks", str(len(run.tracks))),
+        ("cameras", str(len(run.cameras))),
+        ("frames", f"{span.first} to {span.stop - 1}"),
+        ("length", clock_time((span.stop - span.first) / span.frame_rate)),
+        ("frames per second", f"{span.frame_rate:g}"),
+        ("ground", f"{grid.x[1] - grid.x[0]:g} m x {grid.y[1] - grid.y[0]:g} m"),
+        ("cells", f"{grid.cell:g} m, {grid.planes} planes"),
+        *([("computed in", clock_time(computed))] if computed > 0 else []),
+    ]
+
+
+def _scores(trajectory: Rows, truth: Rows | None) -> list[tuple[str, str]]:
+    """How well the run agrees with the truth, within half a metre."""
+    if truth is None or not len(truth):
+        return []
+    scores = evaluate(truth, trajectory)
+    named = (("MOTA", scores.mota, " %"), ("IDF1", scores.idf1, " %"), ("HOTA", scores.hota, " %"))
+    facts = [(name, f"{value:.1f}{unit}") for name, value, unit in named if value is not None]
+    return facts if scores.location_mean is None else [*facts, ("mean error", f"{scores.location_mean:.3f} m")]
+
+
+def _haunt_figures(run: Run, bins: Bins, places: Sequence[Haunt]) -> list[Figure]:
+    rig, square = run.recording.rig, f"squares of {bins.side:g} m"
+    people = density(bins, run.trajectory, len(run.frames))
+    stays = dwell(bins, run.trajectory, run.frame_rate)
+    return [
+        Figure(
+            "density",
+            heat_map(rig, bins, people, "How many people, on average", "people a square metre", places),
+            f"Density, {square}. A, B, C: where most time is spent.",
+        ),
+        Figure(
+            "dwell",
+            heat_map(rig, bins, stays, "How long somebody stays", "seconds a stay", places),
+            f"Dwell time: the mean time from entering a square to leaving it, {square}.",
+        ),
+    ]
+
+
+def _ghost_figure(run: Run, bins: Bins, ghosts: GhostReasons) -> Figure:
+    values = density(bins, ghosts.ghosts, len(run.frames))
+    picture = heat_map(run.recording.rig, bins, values, "Where ghosts were removed", "ghosts a frame and square metre")
+    return Figure("ghosts", picture, f"Ghosts removed, {bins.side:g} m squares.")
+
+
+def _sights(run: Run, ghosts: GhostReasons) -> list[ViewSummary]:
+    rig, parts = run.recording.rig, np.nan_to_num(run.ghosts["parts"][run.ghosts["status"] == 1])
+    sights = []
+    for view, camera in enumerate(rig.cameras):
+        own = parts[:, view][says(parts[:, view])]
+        nats = float(np.median(own)) if len(own) else float("nan")
+        denied = int(ghosts.denies[:, view].sum())
+        sights.append(ViewSummary(camera.name, _ground_seen(camera, rig.grid), denied, nats))
+    return sights
+
+
+def _ground_seen(camera: Camera, grid: Grid) -> float:
+    """Share of the ground that counts over which the camera sees some plane."""
+    ground = grid.ground[grid.inside()]
+    seen = np.zeros(len(ground), bool)
+    for height in grid.heights.tolist():
+        pixel, ahead = camera.project(ground, height)
+        seen |= ahead & camera.inside(pixel)
+    return float(seen.mean()) if len(seen) else 0.0

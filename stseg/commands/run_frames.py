@@ -1,0 +1,30 @@
+"""`--frames A:B` of the frames that a run file has."""
+
+from __future__ import annotations
+
+from stseg.arrays import Ints
+from stseg.errors import ConfigError
+from stseg.io.runfile.runs import Run
+
+
+def frames_of_run(run: Run, text: str | None) -> Ints:
+    """Numbers of the frames that are asked for, all of them where nothing is said, int64 (n,).
+
+    Raises
+    ------
+    ConfigError
+        Where the run has no frames, or the text is no part of them.
+    """
+    frames = run.frames
+    if not len(frames):
+        raise ConfigError(run.path, "", "a run without frames", "one that has some")
+    if text is None:
+        return frames
+    head, colon, tail = text.partition(":")
+    some = f"A:B, half open, of the run's frames {frames[0]}:{frames[-1] + 1}"
+    if not colon or not all(part == "" or part.isdecimal() for part in (head, tail)):
+        raise ConfigError("command line", "--frames", repr(text), some)
+    first, stop = int(head or frames[0]), int(tail or frames[-1] + 1)
+    if not frames[0] <= first < stop <= frames[-1] + 1:
+        raise ConfigError("command line", "--frames", repr(text), some)
+    return frames[(frames >= first) & (frames < stop)]

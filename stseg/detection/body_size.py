@@ -1,0 +1,98 @@
+"""How tall and how wide people are, by HW12's refinement (eqs 25 to 28; METHODS 8).
+
+E step: the sizes of one person on a lattice around those of people in general, heights first, then widths. Over all
+that the lattice's pillars cover, the person's own pixels speak for a pillar inside it and against it outside,
+background speaks against it inside, other people's pixels say nothing (they may hide anything). A pixel that is
+foreground with probability o is o their own and 1 - o background. Less what is the same for all pillars R of the
+lattice, one view says of each
+
+    looks * sum_R (2 o OWN + (1 - o) BACKGROUND) / area of a body of mean size     nats,
+
+the weights those of `ghosts.views`.
+
+HW12 averages over R, which never rewards a pillar for covering more of the person. Its weight of the background is lost
+in the scan; here it is what makes a pixel that is half foreground say nothing, so that edges lie where people's do.
+Of who is seen in boxes alone the height is found with the place (`ghosts.refine`), and no width: arms and strides are
+what a box's sides tell of. M step: the frame is searched again with the sizes found (`ghosts.explain`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from stseg.arrays import Floats, Ints, Singles
+from stseg.config import GhostConfig
+from stseg.detection.assignment import Assignment
+from stseg.detection.refine import RefinedPlaces
+from stseg.detection.views import PixelView, View, ViewObservation
+from stseg.model.sizes import Sizes
+
+_WITHIN = 3.0
+"""How far the lattice goes, standard deviations of people's sizes."""
+_STEPS = 13
+
+
+def measure(
+    places: RefinedPlaces,
+    width: Floats,
+    views: Sequence[View],
+    sights: Sequence[ViewObservation | None],
+    own: Assignment,
+    config: GhostConfig,
+) -> Sizes:
+    """The E step: posteriors of people's sizes after one frame, anybody's sizes the prior.
+
+    Parameters
+    ----------
+    places
+        Where they stand, and the heights that hang together with it: all that is known of who is seen in boxes alone.
+    width : float64 (n,)
+        So far, metres.
+    own
+        What of the frame is whose.
+    """
+    found = Sizes.of_anybody(len(width), config)
+    told = [
+        _Told(view, sight.label_values, owner)
+        for view, sight, owner in zip(views, sights, own.pixels, strict=True)
+        if isinstance(view, PixelView) and sight is not None
+    ]
+    if not told or not len(width):
+        return replace(found, height=places.height, height_variance=places.height_variance)
+    steps = np.linspace(-_WITHIN, _WITHIN, _STEPS)
+    heights, widths = config.height_mean + config.height_spread * steps, config.width_mean + config.width_spread * steps
+    each, all_steps = (len(width), 1), (1, _STEPS)
+    score = _score(places.ground, np.tile(heights, each), np.tile(width[:, None], all_steps), told)
+    height, height_variance = _posterior(heights, score, steps)
+    score = _score(places.ground, np.tile(height[:, None], all_steps), np.tile(widths, each), told)
+    return Sizes(height, height_variance, *_posterior(widths, score, steps))
+
+
+class _Told(NamedTuple):
+    """What one view shows: the label values, and to whom pixels belong, both (v, u)."""
+
+    view: PixelView
+    values: Singles
+    owner: Ints
+
+
+def _posterior(lattice: Floats, score: Floats, steps: Floats) -> tuple[Floats, Floats]:
+    """Mean and variance of each one's size on the lattice, from what the views say of it, nats (person, pillar)."""
+    score = score - 0.5 * steps**2
+    weight = np.exp(score - score.max(1, keepdims=True))
+    weight /= weight.sum(1, keepdims=True)
+    mean = weight @ lattice
+    return mean, (weight * (lattice - mean[:, None]) ** 2).sum(1)
+
+
+def _score(ground: Floats, heights: Floats, widths: Floats, told: Sequence[_Told]) -> Floats:
+    """What all views say of people's pillars at their places (person, 2), nats, float64 (person, pillar)."""
+    score, everywhere = np.zeros(heights.shape), np.repeat(ground[:, None], _STEPS, 1)
+    for view, values, owner in told:
+        sums, area = view.open_sums(values, owner, everywhere, heights, widths)
+        score += sums / np.maximum(area.mean(1, keepdims=True), 1.0)
+    return score

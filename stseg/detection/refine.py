@@ -1,0 +1,109 @@
+"""Where exactly a person stands: the posterior over a small patch of ground.
+
+Its prior is where they were expected, if they were; its evidence is what is theirs alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from stseg.arrays import Floats, Ints
+from stseg.detection.assignment import WORST, Assignment
+from stseg.detection.prior import Prior
+from stseg.detection.views import BoxView, PixelView, View, ViewObservation
+from stseg.model.box_fit import fill_match
+from stseg.model.candidates import Candidates
+
+_REACH, _SPACING = 2, 0.08
+
+
+@dataclass(frozen=True)
+class RefinedPlaces:
+    """Where people stand and how tall they are, as far as both hang together.
+
+    Attributes
+    ----------
+    ground, covariance : float64 (n, 2), (n, 2, 2)
+        Whatever the height; metres, square metres.
+    height, height_variance : float64 (n,)
+        Wherever near, anybody's height the prior; metres, square metres.
+    """
+
+    ground: Floats
+    covariance: Floats
+    height: Floats
+    height_variance: Floats
+
+
+def refine(
+    pool: Candidates,
+    views: Sequence[View],
+    sights: Sequence[ViewObservation | None],
+    own: Assignment,
+    prior: Prior,
+    walker: Ints,
+) -> RefinedPlaces:
+    """The posterior of each person's place and height.
+
+    Parameters
+    ----------
+    pool
+        The people.
+    own
+        What of the frame is whose.
+    prior
+        The frame's prior.
+    walker : int64 (n,)
+        Whom of those expected each person is, -1 for newcomers.
+
+    Returns
+    -------
+    Places
+        Means and variances.
+    """
+    axis = np.arange(-_REACH, _REACH + 1) * _SPACING
+    offset, tried = np.stack(np.meshgrid(axis, axis), -1).reshape(-1, 2), np.asarray(prior.config.heights)
+    patch = pool.ground[:, None] + offset
+    score = np.tile(prior.tall(tried)[:, None], (len(pool), 1, len(offset)))
+    for k, (view, sight) in enumerate(zip(views, sights, strict=True)):
+        if sight is not None and len(pool):
+            score += _patch_score(view, sight, own.box[k], own.pixels[k], patch, tried, pool.width)
+    met = np.flatnonzero(walker >= 0)
+    score[met] += prior.expected.place(walker[met], patch[met])[:, None]
+    return _posterior(score, patch, tried)
+
+
+def _posterior(score: Floats, patch: Floats, tried: Floats) -> RefinedPlaces:
+    """Means and variances from scores (person, height, place) of patches (person, place, 2), nats and metres."""
+    weight = np.exp(score - score.max((1, 2), keepdims=True))
+    total = weight.reshape(len(score), len(tried) * patch.shape[1]).sum(1)[:, None]
+    place, tall = weight.sum(1) / total, weight.sum(2) / total
+    ground, height = np.matmul(place[:, None], patch)[:, 0], tall @ tried
+    spread = patch - ground[:, None]
+    covariance = np.matmul((spread * place[..., None]).transpose(0, 2, 1), spread) + np.eye(2) * _SPACING**2 / 12
+    return RefinedPlaces(ground, covariance, height, (tall * (tried - height[:, None]) ** 2).sum(1))
+
+
+def _patch_score(
+    view: View, sight: ViewObservation, box: Ints, owner: Ints, patch: Floats, tried: Floats, width: Floats
+) -> Floats:
+    """What one view says of pillars on patches (person, place, 2), nats, float64 (person, height, place)."""
+    people, places = patch.shape[:2]
+    score = np.zeros((people, len(tried), places))
+    everywhere = np.repeat(patch[:, None], len(tried), 1).reshape(people, -1, 2)
+    tall = np.tile(np.repeat(tried, places), (people, 1))
+    if isinstance(view, BoxView):
+        columns, rows = map(float, view.camera.size)
+        for j in np.flatnonzero(box >= 0):
+            edges, tolerance, belief = (told[box[j], None] for told in (sight.edges, sight.tolerance, sight.belief))
+            match = np.empty((len(tried) * places, 1))
+            fill_match(view.table.boxes_of(everywhere[j], tall[j]), edges, tolerance, belief, columns, rows, match)
+            score[j] = np.maximum(match, WORST).reshape(score[j].shape)
+    if isinstance(view, PixelView):
+        wide = np.repeat(width[:, None], len(tried) * places, 1)
+        sums, area = view.open_sums(sight.raster, owner, everywhere, tall, wide)
+        score = np.divide(sums, area, out=np.zeros_like(sums), where=area > 0).reshape(score.shape)
+    return score

@@ -1,0 +1,206 @@
+"""One view as the pass sees it: where the lattice's pillars appear, and what a frame shows there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.special import expit
+
+from stseg.accelerate import kernel
+from stseg.arrays import Boxes, Flags, Floats, Ints, Singles
+from stseg.config import GhostConfig
+from stseg.geometry import Camera, Grid
+from stseg.geometry.bodies import WIDTH, BodyTable
+from stseg.model.box_fit import fill_best_match, fill_inside
+from stseg.model.box_noise import FIRST, BoxNoise
+from stseg.model.outlines import Spans, outlines, sums_inside
+
+OWN, BACKGROUND = 5.0, -10.0
+"""Weights of a person's own pixels and of background inside their pillar (HW12 eq. 27)."""
+_BODY_ROWS = 30
+_LEAST_INSIDE = 0.02
+_OPTIMISM = 0.3
+"""Cost of a missing box while candidates are sought, nats: whoever hides them is not known yet."""
+
+
+@dataclass(frozen=True)
+class ViewObservation:
+    """What one view shows in one frame: boxes clipped to the image, or a raster of log-odds; the other is empty.
+
+    Attributes
+    ----------
+    edges : float64 (box, 4)
+        left, top, right, bottom, pixels.
+    score : float64 (box,)
+        0..1.
+    tolerance : float64 (box, 5), belief : float64 (box,)
+        See `stseg.model.box_noise`.
+    raster : float32 (v, u)
+        Log-odds of foreground, nats.
+    """
+
+    edges: Floats
+    score: Floats
+    tolerance: Floats
+    belief: Floats
+    raster: Singles
+
+    @cached_property
+    def label_values(self) -> Singles:
+        """What each pixel says of the size of a pillar that covers it, if it is open to the person: float32 (v, u)."""
+        own = expit(self.raster)
+        return np.asarray(2 * OWN * own + BACKGROUND * (1 - own), np.float32)
+
+
+class View:
+    """Pillars of a ground lattice in one camera."""
+
+    def __init__(self, camera: Camera, grid: Grid, lattice_ground: Floats, config: GhostConfig) -> None:
+        self.camera = camera
+        self.config = config
+        self.centre = camera.centre[:2]
+        self.table = BodyTable.of(camera, grid)
+        self.bodies = self.table.boxes(lattice_ground, np.asarray(config.heights))
+        self.step = _raster_step(self.bodies, camera.size)
+        width, height = camera.size
+        self.shape = (-(-height // self.step), -(-width // self.step))
+
+    def distance(self, ground: Floats) -> Floats:
+        """Distance of ground points (n, 2) from the camera along the ground, metres, float64 (n,)."""
+        return np.asarray(np.hypot(*(ground - self.centre).T))
+
+    def outlines(self, ground: Floats, heights: Floats, widths: Floats) -> tuple[Ints, Spans, Floats]:
+        """Outlines of pillars on this view's raster, sizes in metres; see `ghosts.outlines`.
+
+        Areas are those of people of mean size there: a pillar that covers more of somebody must not count as less.
+        """
+        first, spans, area = outlines(self.table, ground, heights, self.step, self.shape, widths / WIDTH)
+        return first, spans, self._fair(area, heights, widths)
+
+    def _fair(self, area: Floats, heights: Floats, widths: Floats) -> Floats:
+        """Areas of outlines as if people were of mean size there."""
+        return area * (self.config.height_mean * self.config.width_mean / (heights * widths))
+
+
+class BoxView(View):
+    """A view that delivers boxes."""
+
+    def __init__(self, camera: Camera, grid: Grid, lattice_ground: Floats, config: GhostConfig) -> None:
+        super().__init__(camera, grid, lattice_ground, config)
+        width, height = map(float, camera.size)
+        inside = np.zeros(self.bodies.shape[:2])
+        for row, bodies in zip(inside, self.bodies, strict=True):
+            fill_inside(bodies, width, height, row)
+        self.found = np.where(inside > _LEAST_INSIDE, self.found_share(inside), 0.0)
+
+    def found_share(self, visible: Floats) -> Floats:
+        """How often a body of which so much is visible is found, relative to a whole one."""
+        config = self.config
+        share = (visible - config.hidden_below) / (config.whole_above - config.hidden_below)
+        return np.asarray(share.clip(config.least, 1.0))
+
+    def observe(self, seen: Boxes | Singles | None, sharpness: BoxNoise = FIRST) -> ViewObservation:
+        """The frame's boxes."""
+        boxes = seen if isinstance(seen, Boxes) else Boxes(np.zeros((0, 4)), np.zeros(0))
+        width, height = self.camera.size
+        corner, extent = boxes.pixel[:, :2], boxes.pixel[:, 2:]
+        edges = np.concatenate([corner, corner + extent], 1).clip(0, [width - 1, height - 1] * 2)
+        return ViewObservation(edges, boxes.score, *sharpness.of(boxes.score), np.zeros((0, 0), np.float32))
+
+    def lattice_score(self, sight: ViewObservation, free: Flags) -> Floats:
+        """What the free boxes say of each lattice pillar, nats, float64 (height, cell)."""
+        width, height = map(float, self.camera.size)
+        best = np.full(self.bodies.shape[:2], -np.inf)
+        fill_best_match(self.bodies, sight.edges[free], sight.tolerance[free], sight.belief[free], width, height, best)
+        return np.where(self.found > 0, np.maximum(self.config.hit + best, -_OPTIMISM * self.found), 0.0)
+
+
+class PixelView(View):
+    """A view that delivers a likelihood map."""
+
+    def __init__(self, camera: Camera, grid: Grid, lattice_ground: Floats, config: GhostConfig) -> None:
+        super().__init__(camera, grid, lattice_ground, config)
+        heights = np.repeat(np.asarray(config.heights), len(lattice_ground))
+        places = np.tile(lattice_ground, (len(config.heights), 1))
+        self.lattice = self.outlines(places, heights, np.full(len(heights), config.width_mean))
+        drawn = self.lattice[1][:, ::-1, 1] > 0
+        self.lattice_rows = np.where(drawn.any(1), drawn.shape[1] - drawn.argmax(1), 0)
+
+    def observe(self, seen: Boxes | Singles | None, sharpness: BoxNoise = FIRST) -> ViewObservation:
+        """The frame's log-odds on the raster; all zero where the view is blind."""
+        del sharpness
+        raster = np.zeros(self.shape, np.float32)
+        if isinstance(seen, np.ndarray):
+            mean = np.empty(self.shape, np.float32)
+            _fill_means(seen, self.step, mean)
+            miss, clutter = self.config.pixel_miss, self.config.pixel_clutter
+            body = (1 - miss) * mean + miss * (1 - mean)
+            empty = clutter * mean + (1 - clutter) * (1 - mean)
+            raster = np.log(body / empty).astype(np.float32)
+        return ViewObservation(np.zeros((0, 4)), np.zeros(0), np.zeros((0, 5)), np.zeros(0), raster)
+
+    def lattice_score(self, sight: ViewObservation, free: Flags) -> Floats:
+        """What the free pixels (v, u) say of each lattice pillar, nats, float64 (height, cell)."""
+        first, spans, area = self.lattice
+        left_of, means = np.empty((self.shape[0], self.shape[1] + 1)), np.empty(len(first))
+        _fill_left_of(sight.raster, free, left_of)
+        _fill_span_means(left_of, first, self.lattice_rows, spans, area, means)
+        return means.reshape(len(self.config.heights), -1) * self.config.body_weight
+
+    def open_sums(
+        self, values: Singles, owner: Ints, ground: Floats, heights: Floats, widths: Floats
+    ) -> tuple[Floats, Floats]:
+        """Weighted sums of the pixels open to each person inside their pillars, and the pillars' fair areas.
+
+        Both float64 (person, pillar); see `ghosts.outlines.sums_inside`, sizes in metres.
+        """
+        sums, area = sums_inside(self.table, ground, heights, widths / WIDTH, self.step, values, owner)
+        return sums * self.config.body_weight, self._fair(area, heights, widths)
+
+
+@kernel
+def _fill_left_of(raster: Singles, free: Flags, left_of: Floats) -> None:
+    """Fill left_of (v, u + 1) with the sums of the free pixels (v, u) along rows, from the left."""
+    rows, columns = raster.shape
+    for v in range(rows):
+        total = 0.0
+        left_of[v, 0] = 0.0
+        for u in range(columns):
+            total += float(raster[v, u]) if free[v, u] else 0.0
+            left_of[v, u + 1] = total
+
+
+@kernel
+def _fill_span_means(left_of: Floats, first: Ints, rows: Ints, spans: Spans, area: Floats, means: Floats) -> None:
+    """Fill means (pillar,) with sums over outlines of so many rows, by their areas, from sums along rows (v, u + 1)."""
+    for i in range(len(first)):
+        total = 0.0
+        for k in range(rows[i]):
+            total += left_of[first[i] + k, spans[i, k, 1]] - left_of[first[i] + k, spans[i, k, 0]]
+        means[i] = total / area[i] if rows[i] > 0 else 0.0
+
+
+@kernel
+def _fill_means(likelihood: Singles, step: int, mean: Singles) -> None:
+    """Fill mean (v, u) with the means over squares of `step` pixels; those at the border may be smaller."""
+    height, width = likelihood.shape
+    for v in range(mean.shape[0]):
+        for u in range(mean.shape[1]):
+            total, count = 0.0, 0
+            for row in range(v * step, min((v + 1) * step, height)):
+                for column in range(u * step, min((u + 1) * step, width)):
+                    total += likelihood[row, column]
+                    count += 1
+            mean[v, u] = total / count
+
+
+def _raster_step(bodies: Floats, size: tuple[int, int]) -> int:
+    """Image pixels to a raster pixel, so that a body in the image is some thirty rows tall."""
+    middle = bodies[len(bodies) // 2]
+    width, height = size
+    within = (middle[:, 2] > 0) & (middle[:, 0] < width) & (middle[:, 3] > 0) & (middle[:, 1] < height)
+    if not within.any():
+        return max(1, height // 120)
+    return max(1, int(np.median(middle[within, 3] - middle[within, 1]) / _BODY_ROWS))

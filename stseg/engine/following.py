@@ -1,0 +1,173 @@
+"""`stseg run --follow`: a recording that still goes on, in folders into which files arrive or as live streams."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from itertools import chain, takewhile
+from pathlib import Path
+from threading import Event
+
+import numpy as np
+
+from stseg.engine.assembly import FinishedSegment, assemble
+from stseg.engine.backgrounds import background_frames
+from stseg.engine.live_foreground import LiveForegrounds
+from stseg.engine.live_run import LiveRun
+from stseg.engine.reporter import Reporter
+from stseg.engine.segment import Job
+from stseg.engine.segments import Segment, endless_segments
+from stseg.engine.stopping import stop_asked
+from stseg.errors import ConfigError, SourceError
+from stseg.io.live.arriving_files import FileNotes
+from stseg.io.live.followed_cameras import FollowedCameras
+from stseg.io.live.followed_files import FollowedFiles
+from stseg.io.live.live_rig import LiveFrameSet, is_live
+from stseg.io.live.live_table import LiveTable
+from stseg.io.runfile.runs import read_run
+from stseg.io.runfile.work_folder import WorkFolder
+
+ENDLESS = 1 << 62
+"""The end of a run that nobody knows yet."""
+
+
+@dataclass(frozen=True)
+class _Coming:
+    """Moments that come, the segments into which they belong, and the frame from which parts of backgrounds count."""
+
+    moments: Iterable[LiveFrameSet]
+    plan: Iterator[Segment]
+    since: int
+
+
+def follow(job: Job, folder: WorkFolder, output: Path, overwrite: bool, reporter: Reporter) -> str:
+    """Follow a recording until the run is asked to stop, then write its run file; what there is to say of it.
+
+    Parameters
+    ----------
+    job
+        What is run; its last frame is `ENDLESS` where there is none.
+    folder
+        Of the unfinished run.
+    output, overwrite
+        The run file, and whether it may replace an older one.
+    reporter
+        Receives notes and progress.
+    """
+    live = is_live(job.recording)
+    made = _kept(folder, live, reporter)
+    stop = made[-1].segment.stop if made else 0
+    total = None if job.stop == ENDLESS else job.stop
+    with (
+        stop_asked() as halt,
+        LiveTable(live_table_of(output), job.recording.rig.frame_rate, stop) as table,
+        reporter.progress("following", total, stop) as advance,
+    ):
+        follower = LiveRun(job, folder, table, LiveForegrounds(job.read, job.config), made)
+        with follower, (_cameras if live else _files)(job, folder, follower, halt, reporter) as coming:
+            if coming is not None:
+                follower.begin(coming.plan, coming.since)
+                for moment in coming.moments:
+                    follower.add(moment)
+                    advance(1)
+        made = follower.finish()
+    if not made:
+        table.path.unlink()
+        return f"{output}: not written, since nothing came"
+    whole = replace(job, first=made[0].segment.first, stop=made[-1].segment.stop)
+    tracks = assemble(whole, follower.pipeline, made, output, overwrite)
+    people = len(np.unique(tracks.trajectory["id"]))
+    return f"{output}: {people} tracks in frames {whole.first} to {whole.stop - 1}{follower.delay}"
+
+
+def live_table_of(output: Path) -> Path:
+    """Where the tracks of a run are told while it goes on."""
+    return output.with_name(f"{output.name}.live.csv")
+
+
+def last_frame(frames: str | None) -> int:
+    """Where a run that follows ends by itself, from the option --frames; `ENDLESS` where it does not."""
+    if frames is None:
+        return ENDLESS
+    head, colon, tail = frames.partition(":")
+    if head not in ("", "0") or not colon or not tail.isdecimal() or not int(tail):
+        raise ConfigError("--frames", "", repr(frames), "0:B with --follow, which begins where the recording does")
+    return int(tail)
+
+
+def _kept(folder: WorkFolder, live: bool, reporter: Reporter) -> list[FinishedSegment]:
+    """The segments of an unfinished run. What is missing between those of files is made anew, with all after it."""
+    found, made = folder.segments(), list[FinishedSegment]()
+    for path in folder.broken:
+        reporter.note(f"{path}: its bytes have changed since it was written; {'left out' if live else 'made anew'}")
+    for index in sorted(found):
+        if not live and index != len(made):
+            found[index].unlink()
+            continue
+        frames = read_run(found[index]).frames
+        first, stop = int(frames[0]), int(frames[-1]) + 1
+        made.append(FinishedSegment(Segment(index, first, first, stop), found[index]))
+    if made:
+        reporter.note(f"{len(made)} segments are there already, up to frame {made[-1].segment.stop - 1}")
+    return made
+
+
+@contextmanager
+def _files(
+    job: Job, folder: WorkFolder, follower: LiveRun, halt: Event, reporter: Reporter
+) -> Iterator[_Coming | None]:
+    """Files that arrive, from where an unfinished run stopped; None where it is stopped before anything came."""
+    recording, config, sights = job.read, job.config, follower.sights
+    frame_rate, made = recording.rig.frame_rate, follower.made
+    plan = endless_segments(frame_rate, config, 0)
+    coming = [next(plan) for _ in range(len(made) + 1)][-1]
+    if made and coming.first != made[-1].segment.stop:  # the last one was to be the end
+        plan = endless_segments(frame_rate, config, made[-1].segment.stop, len(made))
+        coming = next(plan)
+    before = background_frames(coming, config.segments, frame_rate, 0, ENDLESS).before
+    first = before.start if sights.learns else coming.lead
+    notes = FileNotes(folder.path / "files.json")
+    if sights.unlearned:
+        with FollowedFiles(recording, first, None, config.live, notes, halt, reporter.note) as moments:
+            if not _learn(sights, moments, config.live.learning, reporter):
+                yield None
+                return
+    stop = None if job.stop == ENDLESS else job.stop
+    with FollowedFiles(recording, first, stop, config.live, notes, halt, reporter.note) as moments:
+        yield _Coming(moments, chain([coming], plan), 0)
+
+
+@contextmanager
+def _cameras(
+    job: Job, folder: WorkFolder, follower: LiveRun, halt: Event, reporter: Reporter
+) -> Iterator[_Coming | None]:
+    """Live streams from now on; None where it is stopped before anything came."""
+    recording, config, sights = job.read, job.config, follower.sights
+    with FollowedCameras(recording, config.live, folder.clock(), halt, reporter.note) as moments:
+        if sights.unlearned and not _learn(sights, moments, config.live.learning, reporter):
+            yield None
+            return
+        begun = next(moments, None)
+        if begun is None or moments.start is None:
+            yield None
+            return
+        folder.keep_clock(moments.start)
+        index = follower.made[-1].segment.index + 1 if follower.made else 0
+        plan = endless_segments(recording.rig.frame_rate, config, begun.frame, index)
+        until = takewhile(lambda moment: moment.frame < job.stop, chain([begun], moments))
+        yield _Coming(until, plan, begun.frame)
+        if moments.dropped:
+            reporter.note(f"{moments.dropped} moments were dropped in all; /events says which")
+
+
+def _learn(sights: LiveForegrounds, moments: Iterable[LiveFrameSet], seconds: float, reporter: Reporter) -> bool:
+    """Teach the cameras that have no empty scene; False where the run is stopped before anything came."""
+    reporter.note(f"no empty scene of {', '.join(sights.unlearned)}: learning from {seconds:g} s before the run begins")
+    count = sights.learn(moments)
+    if count and sights.unlearned:
+        found = f"nothing in the first {count} frames"
+        raise SourceError(
+            f"camera {sights.unlearned[0]}", "", found, "a camera that shows something, or its empty scene"
+        )
+    return count > 0

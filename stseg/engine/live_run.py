@@ -1,0 +1,159 @@
+"""The work of a run that follows a recording: moments in, segments and lines of tracks out.
+
+Every moment goes to the segment that is open, and around its end to the next one as well, which looks at the frames
+before its own to know who is there. So frames are read once, and none is kept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from statistics import median
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+
+from stseg.arrays import Rows
+from stseg.engine.assembly import FinishedSegment
+from stseg.engine.blind_views import BlindViews
+from stseg.engine.live_foreground import LiveForegrounds
+from stseg.engine.open_segment import OpenSegment
+from stseg.engine.pipeline import CommittedFrames
+from stseg.engine.segment import Job
+from stseg.engine.segments import Segment
+from stseg.io.live.live_rig import LiveFrameSet, now
+from stseg.io.live.live_table import LiveTable
+from stseg.io.runfile.work_folder import WorkFolder
+from stseg.model.tables import TRAJECTORY
+from stseg.tracking.live_ids import LiveIds, Names
+from stseg.tracking.windows import window_length
+
+
+@dataclass
+class _Member:
+    """An open segment, and who is who in it."""
+
+    segment: OpenSegment
+    lead: list[Rows] = field(default_factory=list)
+    names: Names | None = None
+    """None while it is in its warm-up."""
+
+
+class LiveRun:
+    """Hands moments to the segments that are open. Use it in a `with`: what was not finished is discarded.
+
+    Parameters
+    ----------
+    job, folder
+        What is run, and where its segments are kept.
+    table
+        To which tracks are told.
+    sights
+        What the cameras see by.
+    made
+        The segments of an unfinished run; those that become whole are added.
+    """
+
+    def __init__(
+        self, job: Job, folder: WorkFolder, table: LiveTable, sights: LiveForegrounds, made: list[FinishedSegment]
+    ) -> None:
+        self.sights, self.made = sights, made
+        self._job, self._folder, self._table = job, folder, table
+        frame_rate = job.recording.rig.frame_rate
+        self._window = window_length(frame_rate, job.config.identity)[0]
+        warm_up = round(job.config.segments.warm_up * frame_rate)
+        self._names = LiveIds(table.rows, warm_up + 2 * self._window)
+        self._blindness = BlindViews([camera.name for camera in job.recording.rig.cameras])
+        self._idle = [job.pipeline() for _ in range(2)]
+        self.pipeline = self._idle[0]
+        self._members: list[_Member] = []
+        self._plan: Iterator[Segment] = iter(())
+        self._coming: Segment | None = None
+        self._since, self._stop, self._told = 0, 0, 0
+        self._arrived: dict[int, float] = {}
+        self._delays: list[float] = []
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if error is not None:
+            self._discard()
+
+    @property
+    def delay(self) -> str:
+        """How long after frames their tracks were told, in words; nothing where none was."""
+        if not self._delays:
+            return ""
+        return f", told {median(self._delays):.1f} s after them (median; at most {max(self._delays):.1f} s)"
+
+    def begin(self, plan: Iterator[Segment], since: int) -> None:
+        """The segments to come, and the frame from which the parts of backgrounds count."""
+        self._plan, self._coming, self._since = plan, next(plan), since
+        self._told = self._coming.first
+
+    def add(self, moment: LiveFrameSet) -> None:
+        """The next moment."""
+        self.sights.see(moment, self._since)
+        self._blindness.note(moment)
+        self._arrived[moment.frame] = moment.arrived
+        self._stop = moment.frame + 1
+        while self._coming is not None and moment.frame >= self._coming.lead:
+            self._open(self._coming)
+            self._coming = next(self._plan, None)
+        for member in self._members:
+            self._take(member, member.segment.add(moment), member.segment.segment.stop)
+        if self._members:
+            oldest = self._members[0].segment
+            if oldest.whole and moment.frame >= oldest.segment.stop + self._window:
+                self._keep(oldest.segment.stop)
+
+    def finish(self) -> list[FinishedSegment]:
+        """No more moments come; all segments of the run."""
+        if self._members and self._members[0].segment.segment.first < self._stop:
+            self._take(self._members[0], self._members[0].segment.finish(), self._stop)
+            self._keep(self._stop)
+        self._discard()
+        return self.made
+
+    def _open(self, segment: Segment) -> None:
+        pipeline = self._idle.pop() if self._idle else self._job.pipeline()
+        seeing = pipeline.seeing_by(self.sights.sights())
+        self._members.append(_Member(OpenSegment(self._job, segment, seeing, self._folder.draft(segment.index))))
+
+    def _take(self, member: _Member, steps: list[CommittedFrames], stop: int) -> None:
+        for step in steps:
+            frames = [scene.frame for scene in step.commit.scenes]
+            member.segment.write(step, self._blindness.events(frames))
+            self._tell(member, step, stop)
+
+    def _tell(self, member: _Member, step: CommittedFrames, stop: int) -> None:
+        """Say the tracks of a step that nobody has told yet: those of the warm-up are the earlier segment's to tell."""
+        segment, rows = member.segment.segment, step.commit.trajectory
+        last = step.commit.scenes[-1].frame
+        member.lead.append(rows[rows["frame"] < segment.first])
+        if last < segment.first:
+            return
+        if member.names is None:
+            member.names = self._names.begin(np.concatenate([*member.lead, np.zeros(0, TRAJECTORY)]))
+        new = step.within(max(segment.first, self._told), stop)
+        if not new.commit.scenes:
+            return
+        self._table.append(self._names.named(new.commit.trajectory, member.names))
+        self._told = new.commit.scenes[-1].frame + 1
+        self._delays += [now() - self._arrived.pop(scene.frame) for scene in new.commit.scenes]
+
+    def _keep(self, stop: int) -> None:
+        """The oldest segment is whole."""
+        member = self._members.pop(0)
+        self.made.append(FinishedSegment(*member.segment.keep(stop)))
+        self._idle.append(member.segment.pipeline)
+        self._blindness.forget(min((other.segment.segment.lead for other in self._members), default=stop))
+
+    def _discard(self) -> None:
+        for member in self._members:
+            member.segment.close()
+        self._members = []

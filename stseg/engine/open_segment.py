@@ -1,0 +1,91 @@
+"""A segment of a run that still goes on: moments come in, and its file grows until it is known where it ends."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from stseg.arrays import Bytes, Rows
+from stseg.engine.image_shift import ImageShifts
+from stseg.engine.pipeline import CommittedFrames, Pipeline, Session
+from stseg.engine.segment import Job, write_step
+from stseg.engine.segments import Segment
+from stseg.io.config_file import format_config
+from stseg.io.live.live_rig import LiveFrameSet
+from stseg.io.runfile.runs import RunWriter
+from stseg.io.runfile.work_folder import keep_segment
+from stseg.model.tables import TRACK
+
+
+class OpenSegment:
+    """One segment. Use it in a `with`: unless it was kept, nothing is left of it.
+
+    Parameters
+    ----------
+    job, segment
+        What is run, and the segment; the last of a run may end elsewhere than it says.
+    pipeline
+        The stages, with the sights of the segment; nobody else's until it is closed.
+    draft
+        Where it is written.
+    """
+
+    def __init__(self, job: Job, segment: Segment, pipeline: Pipeline, draft: Path) -> None:
+        self.segment, self.pipeline = segment, pipeline
+        self._job, self._draft = job, draft
+        self._passage = Session(pipeline, segment.lead)
+        self._shifts = ImageShifts(pipeline.sights, job.read.factors, job.recording.rig.frame_rate)
+        self._beyond: list[tuple[CommittedFrames, Rows]] = []
+        """Steps that go past its end: its own only if it is the last."""
+        self._committed = segment.lead
+        self._opened = ExitStack()
+        views: Bytes = pipeline.occupancy.views
+        writer = RunWriter(
+            draft, job.recording, views, format_config(job.config), overwrite=True, kept=job.volume
+        )  # fmt: skip
+        self._writer = self._opened.enter_context(writer)
+
+    @property
+    def whole(self) -> bool:
+        """Whether all its frames are decided."""
+        return self._committed >= self.segment.stop
+
+    def close(self) -> None:
+        """Discard it unless it was kept."""
+        self._opened.close()
+
+    def add(self, moment: LiveFrameSet) -> list[CommittedFrames]:
+        """The next moment; what is decided by it."""
+        self._shifts.look(moment)
+        return self._passage.add(moment)
+
+    def finish(self) -> list[CommittedFrames]:
+        """No more moments will come; what was still open."""
+        return self._passage.finish()
+
+    def write(self, step: CommittedFrames, events: Rows) -> None:
+        """Write a step that `add` or `finish` gave, and EVENT rows of its frames besides."""
+        self._committed = step.commit.scenes[-1].frame + 1
+        if self._committed > self.segment.stop:
+            self._beyond.append((step, events))
+        else:
+            self._write(step, events)
+
+    def keep(self, stop: int) -> tuple[Segment, Path]:
+        """End it before frame `stop`, and give it its name."""
+        self.segment = replace(self.segment, stop=stop)
+        for step, events in self._beyond:
+            if step.commit.scenes[0].frame < stop:
+                self._write(step, events)
+        self._writer.append("shifts", self._shifts.rows(self.segment.first, self.segment.stop))
+        self._writer.finish(np.zeros(0, TRACK))
+        self._opened.close()
+        return self.segment, keep_segment(self._draft)
+
+    def _write(self, step: CommittedFrames, events: Rows) -> None:
+        write_step(self._job, step, self.segment, self._writer)
+        own = (self.segment.first <= events["frame"]) & (events["frame"] < self.segment.stop)
+        self._writer.append("events", events[own])

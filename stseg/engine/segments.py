@@ -1,0 +1,110 @@
+"""Segments: the parts of a long recording that are worked on apart, and committed to disk one by one.
+
+A segment is a whole number of windows. It begins to look a little before its first frame, so that it knows by then who
+is there, and looks on until its last window is solved; what it finds depends on the recording and the configuration
+alone. So a segment is the same whoever makes it and when: after a killed run, by another process, on another machine.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import count
+from math import ceil
+
+import numpy as np
+
+from stseg.arrays import Flags
+from stseg.config import Config, IdentityConfig
+from stseg.tracking.windows import window_length
+
+
+@dataclass(frozen=True)
+class Segment:
+    """Frames of the recording.
+
+    Attributes
+    ----------
+    index
+        Counted from 0 at the run's first.
+    lead
+        The first frame that is looked at; the frames from there to `first` are the warm-up.
+    first, stop
+        The frames that are committed, half open; those of all segments partition the run, but for its gaps.
+    """
+
+    index: int
+    lead: int
+    first: int
+    stop: int
+
+
+def segments(
+    frame_rate: float, config: Config, first: int, stop: int, gaps: Sequence[tuple[int, int]] = ()
+) -> list[Segment]:
+    """The segments that cover frames first .. stop - 1 but for gaps; they begin where commit ranges of windows do.
+
+    What is left at the end, and before a gap, belongs to the last one if it is no longer than a window. After a gap all
+    begins anew, as at the beginning of a run: neither a segment nor its warm-up reaches over one.
+
+    Parameters
+    ----------
+    frame_rate
+        Frames per second.
+    config
+        How long segments and windows are.
+    first, stop
+        The frames of the run, half open.
+    gaps
+        Frames that no camera shows, half open, in their order, within the run (`find_gaps`).
+    """
+    begins, ends = [first, *(end for _, end in gaps)], [*(begin for begin, _ in gaps), stop]
+    parts = [part for begin, end in zip(begins, ends, strict=True) for part in _parts(frame_rate, config, begin, end)]
+    return [replace(part, index=k) for k, part in enumerate(parts)]
+
+
+def longest_absence(config: IdentityConfig) -> float:
+    """How long at most somebody may be unseen and still be followed, known again or filled in, seconds."""
+    return max(config.patience, config.reunion, config.bridge)
+
+
+def find_gaps(seen: Flags, first: int, stop: int, longest: float) -> list[tuple[int, int]]:
+    """Where no camera shows anything for longer than so many frames: half-open ranges of frames first .. stop - 1.
+
+    Parameters
+    ----------
+    seen : bool (camera, frame)
+        Which frames each camera shows.
+    """
+    blind = np.concatenate([[False], ~seen[:, first:stop].any(axis=0), [False]])
+    edges = first + np.flatnonzero(np.diff(blind.astype(np.int8)))
+    return [(begin, end) for begin, end in edges.reshape(-1, 2).tolist() if end - begin > longest]
+
+
+def _parts(frame_rate: float, config: Config, first: int, stop: int) -> list[Segment]:
+    """The segments of frames in which no gap lies; none of none."""
+    if first == stop:
+        return []
+    found: list[Segment] = []
+    for segment in endless_segments(frame_rate, config, first):
+        if segment.stop >= stop - window_length(frame_rate, config.identity)[0]:
+            return [*found, replace(segment, stop=stop)]
+        found.append(segment)
+    raise AssertionError("segments without an end ended")
+
+
+def endless_segments(frame_rate: float, config: Config, first: int, index: int = 0) -> Iterator[Segment]:
+    """The segments of a run whose end nobody knows yet, numbered from `index`.
+
+    One of them is to be left open until a window's frames have come after it: if they do not come it is the last, and
+    what came belongs to it.
+    """
+    length, shared = window_length(frame_rate, config.identity)
+    stride = length - shared
+    step = max(1, round(config.segments.length * frame_rate / stride)) * stride
+    warm_up = ceil(config.segments.warm_up * frame_rate / stride) * stride
+    begin = lead = first
+    for bound in count(step + shared // 2, step):
+        if bound > begin:
+            yield Segment(index, lead, begin, bound)
+            index, begin, lead = index + 1, bound, max(first, bound - warm_up)

@@ -1,0 +1,60 @@
+"""From a view's map to the mean likelihood of every cell."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from stseg.arrays import Singles
+from stseg.geometry.sampling import Sampling
+from stseg.geometry.summed_area import Levels, Sums, fill_means, fill_points, fill_sums
+
+
+class SumTable(NamedTuple):
+    """Summed-area table of a part of a view, and the column and row where that part begins."""
+
+    sums: Sums
+    left: int
+    top: int
+
+
+class CellMeans:
+    """Means over the footprints of a rig's cells. Its room is used anew by every call: one object a thread.
+
+    Parameters
+    ----------
+    sampling
+        The rig's footprints.
+    """
+
+    def __init__(self, sampling: Sampling) -> None:
+        self.footprint = sampling.footprint
+        self.regions = sampling.regions()
+        self.points = [int(boxes[..., 2:].max(initial=0)) <= 1 for boxes in self.footprint]
+        largest = max(
+            (rows.stop - rows.start + 1) * (columns.stop - columns.start + 1) for rows, columns in self.regions
+        )
+        self._room = np.empty(largest, np.uint32)
+        self._levels = np.empty(self.footprint.shape[1:4], np.int16)
+
+    def sum_table(self, view: int, likelihood: Singles) -> SumTable:
+        """Sums over the part of a view's map (v, u) that cells ask for."""
+        rows, columns = self.regions[view]
+        part = likelihood[rows, columns]
+        shape = part.shape[0] + 1, part.shape[1] + 1
+        sums = self._room[: shape[0] * shape[1]].reshape(shape)
+        fill_sums(part, sums)
+        return SumTable(sums, columns.start, rows.start)
+
+    def levels(self, view: int, likelihood: Singles) -> Levels:
+        """Mean levels of all cells in a view's map (v, u); see `stseg.geometry.summed_area`."""
+        if self.points[view]:
+            fill_points(likelihood, self.footprint[view], self._levels)
+            return self._levels
+        return self.levels_from(view, self.sum_table(view, likelihood))
+
+    def levels_from(self, view: int, table: SumTable) -> Levels:
+        """The same from the map's sums."""
+        fill_means(table.sums, self.footprint[view], table.left, table.top, self._levels)
+        return self._levels

@@ -1,0 +1,77 @@
+"""What it costs that two neighbouring pixels have different labels: the adjacency energy of HW12 eqs 16 to 18.
+
+    w = c2 max(g(d), 0),     g(d) = tanh((k1 - d) / (2 k2)),
+
+with d the distance of the two colours. HW12's g falls through zero at k1 and is negative beyond: a reward for labels
+that differ. An energy with rewards is not submodular, so no minimum cut solves it; here g ends at zero, and colours
+farther apart than k1 say nothing. g = 2 P(same person | d) - 1 where log-odds fall linearly in d, which is how k1 and
+k2 are learned (`tools/learn_label_weights.py`).
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from stseg.accelerate import kernel
+from stseg.arrays import Bytes, Floats, Labels
+from stseg.config import LabelConfig
+from stseg.graphcut.energy import QUANTUM
+
+_FARTHEST = 3 * 255**2
+
+
+def adjacency(difference: Floats, config: LabelConfig) -> Floats:
+    """Costs in nats at distances of colours in grey levels, float64 of the same shape."""
+    return config.adjacency * np.tanh((config.alike - difference) / (2 * config.slope)).clip(0)
+
+
+def edge_costs(image: Bytes | None, shape: tuple[int, int], config: LabelConfig) -> tuple[Labels, Labels]:
+    """Costs between each pixel and the next one in its row, and between it and the one below.
+
+    Parameters
+    ----------
+    image : uint8 (v, u, 3)
+        None where there are no colours, only masks: all pairs then cost what a border costs on the average.
+    shape
+        Of the image, (v, u).
+
+    Returns
+    -------
+    int32 (v, u), int32 (v, u)
+        Quanta; 0 where there is no such neighbour.
+    """
+    across, down = np.zeros(shape, np.int32), np.zeros(shape, np.int32)
+    if image is None:
+        across[:, :-1] = down[:-1] = round(config.adjacency * config.colourless / QUANTUM)
+    else:
+        _fill_edge_costs(image, _table(config), across, down)
+    return across, down
+
+
+@lru_cache(maxsize=8)
+def _table(config: LabelConfig) -> Labels:
+    """Costs by the square of the distance, quanta."""
+    costs = adjacency(np.sqrt(np.arange(_FARTHEST + 1)), config)
+    return np.asarray(np.rint(costs / QUANTUM), np.int32)
+
+
+@kernel
+def _fill_edge_costs(image: Bytes, table: Labels, across: Labels, down: Labels) -> None:
+    rows, columns, _ = image.shape
+    for v in range(rows):
+        for u in range(columns):
+            if u + 1 < columns:
+                across[v, u] = table[_square(image, v, u, v, u + 1)]
+            if v + 1 < rows:
+                down[v, u] = table[_square(image, v, u, v + 1, u)]
+
+
+@kernel
+def _square(image: Bytes, v: int, u: int, other_v: int, other_u: int) -> int:
+    total = 0
+    for channel in range(3):
+        off = int(image[v, u, channel]) - int(image[other_v, other_u, channel])
+        total += off * off
+    return total

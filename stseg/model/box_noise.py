@@ -1,0 +1,58 @@
+"""How sharply a detector's boxes fit bodies, as far as it is known, by the boxes' scores.
+
+One detector draws the sides of a box within 2 % of a body's height, another within 7 %; most draw worse what they are
+less sure of. So the standard deviations of a box's offsets from its body (`ghosts.boxes`) are a table over the score.
+Edges of one box err together, and views err together where a body is no pillar, so an edge counts as half a look: its
+tolerance is wider than its standard deviation by the root of two, and a box that fits less sharply says less for the
+person whom it fits by half the logarithms of the ratios of its tolerances. By the first guess, in which standard
+deviations grow with one over the root of the score, that is the logarithm of the score.
+
+The first guess is also the loosest: what fits worse than that is no error of edges but a box of somebody else. And the
+width is not learned: arms and strides change it, from frame to frame together, however sharp the detector is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stseg.arrays import Floats
+from stseg.model.box_fit import EARLY, LATE, TOLERANCE
+
+LOOKS = 0.5
+"""How many independent looks at a body one edge of a box is worth: edges err together, and so do views."""
+KNOTS = np.array([0.05, 0.2, 0.4, 0.6, 0.8, 1.0])
+"""Scores at which they are known; between them their logarithms are interpolated."""
+
+
+@dataclass(frozen=True)
+class BoxNoise:
+    """Standard deviations of boxes' offsets at each knot of the score, float64 (knot, 5)."""
+
+    spread: Floats
+
+    def of(self, score: Floats) -> tuple[Floats, Floats]:
+        """Boxes' tolerances float64 (box, 5), and what each says by itself, nats, float64 (box,); scores are 0..1."""
+        lower, share = knots_of(score)
+        logs = np.log(self.spread)
+        spread = np.exp(logs[lower] * (1 - share[:, None]) + logs[lower + 1] * share[:, None])
+        tolerance = spread / np.sqrt(LOOKS)
+        return tolerance, LOOKS * np.log(_sides(TOLERANCE) / _sides(tolerance)).sum(-1)
+
+
+def knots_of(score: Floats) -> tuple[np.ndarray, Floats]:
+    """The knot below each score, int64 (box,), and how far on to the next it is, 0..1."""
+    at = np.interp(score, KNOTS, np.arange(len(KNOTS)))
+    lower = np.minimum(at.astype(int), len(KNOTS) - 2)
+    return lower, at - lower
+
+
+def _sides(spread: Floats) -> Floats:
+    """The lower edge's two standard deviations as one, (..., 4)."""
+    foot = (spread[..., LATE] + spread[..., EARLY]) / 2
+    return np.concatenate([spread[..., :LATE], foot[..., None]], -1)
+
+
+FIRST = BoxNoise(TOLERANCE * np.sqrt(LOOKS / KNOTS)[:, None])
+"""Before anything is learned."""

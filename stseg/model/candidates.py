@@ -1,0 +1,41 @@
+"""Candidate places of a frame."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from stseg.arrays import Floats, Ints
+
+
+@dataclass(frozen=True)
+class Candidates:
+    """Places where somebody may stand: ground float64 (n, 2), height and width float64 (n,), all in metres."""
+
+    ground: Floats
+    height: Floats
+    width: Floats
+
+    def __len__(self) -> int:
+        return len(self.ground)
+
+    def and_(self, other: Candidates) -> Candidates:
+        """This pool's candidates, then the other's."""
+        pairs = ((self.ground, other.ground), (self.height, other.height), (self.width, other.width))
+        return Candidates(*map(np.concatenate, pairs))
+
+    def and_apart(self, other: Candidates, apart: float) -> Candidates:
+        """This pool's candidates, then those of the other that stand `apart` metres or more from all before them."""
+        every = self.and_(other)
+        kept = list(range(len(self)))
+        for i in range(len(self), len(every)):
+            if not (np.hypot(*(every.ground[kept] - every.ground[i]).T) < apart).any():
+                kept.append(i)
+        return every.at(kept)
+
+    def at(self, chosen: Sequence[int] | Ints) -> Candidates:
+        """The chosen candidates, in that order."""
+        index = np.asarray(chosen, int)
+        return Candidates(self.ground[index], self.height[index], self.width[index])

@@ -1,0 +1,309 @@
+"""Outlines of pillars on a raster: one span of columns a row, from the discs of `geometry.bodies`."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stseg.accelerate import kernel, part
+from stseg.arrays import Floats, Ints, Singles
+from stseg.geometry.bodies import LEVELS, SILHOUETTE, BodyTable, fill_discs
+
+Spans = NDArray[np.int16]
+"""int16 (..., row, 2): first and last column (exclusive) of an outline in each raster row."""
+
+
+def outlines(
+    table: BodyTable, ground: Floats, heights: Floats, step: int, shape: tuple[int, int], widths: Floats | None = None
+) -> tuple[Ints, Spans, Floats]:
+    """Outlines of pillars in one view.
+
+    Parameters
+    ----------
+    table
+        The view.
+    ground : float64 (n, 2)
+        Where they stand, metres.
+    heights : float64 (n,)
+        How tall each is, metres.
+    step
+        Image pixels to a raster pixel.
+    shape
+        Rows and columns of the raster.
+    widths : float64 (n,), optional
+        How wide each is beside the silhouette of `geometry.bodies`; 1 if not given.
+
+    Returns
+    -------
+    first : int64 (n,)
+        First row; -1 where the view does not see the pillar.
+    spans : int16 (n, row, 2)
+        Columns from (included) to (excluded) of each row from `first` on; as many rows as the tallest outline needs.
+    area : float64 (n,)
+        Pixels of the whole outline, those outside the raster included.
+    """
+    first, count = np.full(len(ground), -1, np.int64), np.zeros(len(ground), np.int64)
+    area = np.zeros(len(ground))
+    wide = np.ones(len(ground)) if widths is None else widths
+    lattice = _lattice(table, ground)
+    spans = np.zeros((len(ground), shape[0], 2), np.int16)
+    _fill_outlines(
+        table.pixel, lattice, heights, wide, LEVELS[1], table.step, SILHOUETTE, float(step), shape[1], first, count,
+        spans, area,
+    )  # fmt: skip
+    return first, spans[:, : max(int(count.max(initial=0)), 1)].copy(), area
+
+
+def sums_inside(
+    table: BodyTable, ground: Floats, heights: Floats, widths: Floats, step: int, values: Singles, owner: Ints
+) -> tuple[Floats, Floats]:
+    """Sums of a map inside outlines of pillars, several for each person: quicker than outlines that are kept.
+
+    Parameters
+    ----------
+    table, step
+        As for `outlines`.
+    ground : float64 (person, pillar, 2)
+        Where they stand, metres.
+    heights, widths : float64 (person, pillar)
+        Metres, and beside the silhouette of `geometry.bodies`.
+    values : float32 (v, u)
+        On the raster.
+    owner : int64 (v, u)
+        Which person each of its pixels belongs to, -1 for nobody. What is theirs or nobody's counts for a person.
+
+    Returns
+    -------
+    sums, area : float64 (person, pillar)
+        Of what counts, and pixels of the whole outline; both 0 where the view does not see the pillar.
+    """
+    sums, area = np.zeros(heights.shape), np.zeros(heights.shape)
+    lattice = _lattice(table, ground).reshape(ground.shape)
+    _fill_sums(
+        table.pixel, lattice, heights, widths, LEVELS[1], table.step, SILHOUETTE, float(step), values, owner, sums, area
+    )
+    return sums, area
+
+
+def _lattice(table: BodyTable, ground: Floats) -> Floats:
+    """Ground points in steps of the table's lattice."""
+    return np.asarray((np.asarray(ground, float).reshape(-1, 2) - table.origin) / table.step)
+
+
+@kernel
+def _fill_outlines(
+    pixel: Singles,
+    lattice: Floats,
+    heights: Floats,
+    widths: Floats,
+    level_step: float,
+    step: float,
+    profile: Floats,
+    raster_step: float,
+    columns: int,
+    first: Ints,
+    count: Ints,
+    spans: Spans,
+    area: Floats,
+) -> None:
+    rows = spans.shape[1]
+    discs, drawn = np.empty((len(profile), 6)), np.empty((len(profile), 6))
+    low, high = np.empty(rows), np.empty(rows)
+    for i in range(len(lattice)):
+        fill_discs(pixel, lattice[i, 0], lattice[i, 1], heights[i], level_step, step, profile, discs)
+        if not _seen(discs):
+            continue
+        area[i] = _to_raster(discs, raster_step, widths[i])
+        top, bottom = _draw(discs, drawn, low, high)
+        _store(low, high, top, bottom, columns, i, first, count, spans)
+
+
+@kernel
+def _fill_sums(
+    pixel: Singles,
+    lattice: Floats,
+    heights: Floats,
+    widths: Floats,
+    level_step: float,
+    step: float,
+    profile: Floats,
+    raster_step: float,
+    values: Singles,
+    owner: Ints,
+    sums: Floats,
+    area: Floats,
+) -> None:
+    people, pillars = heights.shape
+    rows, columns = values.shape
+    discs, drawn = np.empty((pillars, len(profile), 6)), np.empty((len(profile), 6))
+    low, high, left_of = np.empty(rows), np.empty(rows), np.empty((rows, columns + 1))
+    for j in range(people):
+        for i in range(pillars):
+            x, y = lattice[j, i]
+            fill_discs(pixel, x, y, heights[j, i], level_step, step, profile, discs[i])
+            if _seen(discs[i]):
+                area[j, i] = _to_raster(discs[i], raster_step, widths[j, i])
+        _fill_left_of(values, owner, j, _window(discs, area[j], rows, columns), left_of)
+        for i in range(pillars):
+            if area[j, i] > 0:
+                top, bottom = _draw(discs[i], drawn, low, high)
+                sums[j, i] = _between(left_of, low, high, top, bottom)
+
+
+@kernel
+def _window(discs: Floats, area: Floats, rows: int, columns: int) -> tuple[int, int, int, int]:
+    """Rows from and to (excluded), then columns, that hold all of the pillars' discs (pillar, disc, 6) on the raster.
+
+    What joins them lies within.
+    """
+    top, bottom, left, right = np.inf, -np.inf, np.inf, -np.inf
+    for i in range(len(discs)):
+        if area[i] > 0:
+            for u, v, uu, uv, vu, vv in discs[i]:
+                wide, tall = math.sqrt(uu * uu + uv * uv), math.sqrt(vu * vu + vv * vv)
+                top, bottom = min(top, v - tall), max(bottom, v + tall)
+                left, right = min(left, u - wide), max(right, u + wide)
+    if top > bottom:
+        return 0, 0, 0, 0
+    return _from(top, rows), _from(bottom + 2, rows), _from(left, columns), _from(right + 2, columns)
+
+
+@kernel
+def _from(place: float, most: int) -> int:
+    """The pixel at or before a place, 0..most."""
+    return int(min(max(place, 0.0), float(most)))
+
+
+@kernel
+def _fill_left_of(
+    values: Singles, owner: Ints, person: int, window: tuple[int, int, int, int], left_of: Floats
+) -> None:
+    """Fill left_of (v, u + 1), inside a window, with sums along rows of what counts for a person, from its left."""
+    top, bottom, left, right = window
+    for row in range(top, bottom):
+        total = 0.0
+        left_of[row, left] = 0.0
+        for u in range(left, right):
+            if owner[row, u] < 0 or owner[row, u] == person:
+                total += float(values[row, u])
+            left_of[row, u + 1] = total
+
+
+@kernel
+def _between(left_of: Floats, low: Floats, high: Floats, top: int, bottom: int) -> float:
+    """Sum from column low to high (row,) of the rows from `top` to before `bottom`, from sums along rows."""
+    total = 0.0
+    columns = left_of.shape[1] - 1
+    for row in range(top, bottom):
+        if low[row] <= high[row]:
+            start, stop = max(int(np.ceil(low[row])), 0), min(int(np.floor(high[row])) + 1, columns)
+            if start < stop:
+                total += left_of[row, stop] - left_of[row, start]
+    return total
+
+
+@kernel
+def _seen(discs: Floats) -> bool:
+    """Whether the view sees all of a pillar's discs."""
+    total = 0.0
+    for disc in discs:
+        total += disc[0] + disc[2] + disc[3]
+    return not np.isnan(total)
+
+
+@kernel
+def _to_raster(discs: Floats, raster_step: float, width: float) -> float:
+    """Take discs from image pixels to the raster's, as wide as asked; the area of the whole outline."""
+    for disc in discs:
+        for axis in range(2):
+            disc[axis] = disc[axis] / raster_step + (0.5 / raster_step - 0.5)
+        for side in range(2, 6):
+            disc[side] *= width / raster_step
+    return float(_whole_area(discs))
+
+
+@kernel
+def _draw(discs: Floats, drawn: Floats, low: Floats, high: Floats) -> tuple[int, int]:
+    """Fill low and high (row,) with the outline's first and last column from row `top` to before `bottom`."""
+    rows = len(low)
+    _fill_drawn(discs, drawn)
+    least, most = drawn[0, 1], drawn[0, 1]
+    for k in range(len(drawn)):
+        least, most = min(least, drawn[k, 1] - drawn[k, 5]), max(most, drawn[k, 1] + drawn[k, 5])
+    top, bottom = min(max(int(np.ceil(least)), 0), rows), max(min(int(np.floor(most)) + 1, rows), 0)
+    low[top:bottom], high[top:bottom] = np.inf, -np.inf
+    for k in range(len(drawn)):
+        _widen(drawn, k, rows, low, high)
+    return top, bottom
+
+
+@part
+def _fill_drawn(discs: Floats, drawn: Floats) -> None:
+    """Fill drawn (k, 6) with each disc's centre u, v, slope, half widths, half height.
+
+    The slope is that of the ellipse's middle from row to row, the first half width that of its middle row, the second
+    that of its shadow on the u axis.
+    """
+    for k in range(len(discs)):
+        u, v, uu, uv, vu, vv = discs[k, 0], discs[k, 1], discs[k, 2], discs[k, 3], discs[k, 4], discs[k, 5]
+        tall = math.sqrt(vu * vu + vv * vv)
+        drawn[k, 0], drawn[k, 1] = u, v
+        drawn[k, 2] = (uu * vu + uv * vv) / (tall * tall + 1e-12)
+        drawn[k, 3] = abs(uu * vv - uv * vu) / (tall + 1e-12)
+        drawn[k, 4], drawn[k, 5] = math.sqrt(uu * uu + uv * uv), tall
+
+
+@part
+def _widen(drawn: Floats, k: int, rows: int, low: Floats, high: Floats) -> None:
+    """Widen the rows' spans by the k-th drawn disc, and by the trapezoid to the disc before it."""
+    u, v, slope, flat, wide, tall = drawn[k, 0], drawn[k, 1], drawn[k, 2], drawn[k, 3], drawn[k, 4], drawn[k, 5]
+    shrink = 1.0 / (tall + 1e-12)
+    for row in range(max(int(np.ceil(v - tall)), 0), min(int(np.floor(v + tall)) + 1, rows)):
+        away = row - v
+        along = away * shrink
+        middle, half = u + slope * away, flat * math.sqrt(max(1.0 - along * along, 0.0))
+        low[row], high[row] = min(low[row], middle - half), max(high[row], middle + half)
+    if k == 0:
+        return
+    u0, v0, wide0 = drawn[k - 1, 0], drawn[k - 1, 1], drawn[k - 1, 4]
+    per_row = 0.0 if v == v0 else 1.0 / (v - v0)
+    for row in range(max(int(np.ceil(min(v, v0))), 0), min(int(np.floor(max(v, v0))) + 1, rows)):
+        share = 0.5 if v == v0 else (row - v0) * per_row
+        middle, half = u0 + (u - u0) * share, wide0 + (wide - wide0) * share
+        low[row], high[row] = min(low[row], middle - half), max(high[row], middle + half)
+
+
+@kernel
+def _whole_area(discs: Floats) -> float:
+    """Pixels of the outline as trapezoids along its axis plus half a disc at either end."""
+    total = 0.0
+    before = 0.0
+    for k in range(len(discs)):
+        wide = math.sqrt(discs[k, 2] * discs[k, 2] + discs[k, 3] * discs[k, 3])
+        if k > 0:
+            across, down = discs[k, 0] - discs[k - 1, 0], discs[k, 1] - discs[k - 1, 1]
+            total += math.sqrt(across * across + down * down) * (wide + before)
+        before = wide
+    for k in (0, len(discs) - 1):
+        total += 0.5 * np.pi * abs(discs[k, 2] * discs[k, 5] - discs[k, 3] * discs[k, 4])
+    return max(total, 1.0)
+
+
+@kernel
+def _store(
+    low: Floats, high: Floats, top: int, bottom: int, columns: int, i: int, first: Ints, count: Ints, spans: Spans
+) -> None:
+    """Clip the rows' spans to the raster and keep those that are not empty."""
+    for row in range(top, bottom):
+        if low[row] > high[row]:
+            continue
+        start = max(int(np.ceil(low[row])), 0)
+        stop = min(int(np.floor(high[row])) + 1, columns)
+        if stop <= start:
+            continue
+        if first[i] < 0:
+            first[i] = row
+        spans[i, row - first[i], 0], spans[i, row - first[i], 1] = start, stop
+        count[i] = row - first[i] + 1

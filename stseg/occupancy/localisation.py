@@ -1,0 +1,119 @@
+"""KS09's localisation: what all views say of each cell, nobody explained (KS09 section 4; METHODS 3, 4).
+
+localiser = Localiser(rig, "footprint")
+volume = localiser.synergy(maps, localiser.clutter_weights(maps), least=0.05)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from stseg.arrays import Bytes, Floats, Singles
+from stseg.errors import SourceError
+from stseg.geometry import Rig
+from stseg.geometry.cell_means import CellMeans
+from stseg.geometry.sampling import Sampling, SamplingKind
+from stseg.occupancy.clutter import clutter, clutter_side, clutter_weights
+from stseg.occupancy.fusion import Accumulator, Rates, log_odds_terms, synergy_terms
+
+Maps = Sequence[Singles | None]
+"""The likelihood map float32 (v, u) of each view, 0..1, or None where it is blind."""
+
+
+class Localiser:
+    """Fusion of one rig's maps: tables are made once, frames are fused one by one.
+
+    The reference plane may be any: nothing here knows which way is up.
+
+    Parameters
+    ----------
+    rig
+        The cameras and the grid.
+    sampling
+        "footprint": a cell is the mean over the pixels that it covers; "point": the pixel at its centre.
+    """
+
+    def __init__(self, rig: Rig, sampling: SamplingKind = "footprint") -> None:
+        self.rig, self.sampling = rig, Sampling.of(rig, sampling)
+        self._means = CellMeans(self.sampling)
+        self._views = self.sampling.views()
+        self._whole = np.ones(rig.grid.shape, np.float32)
+        self._nobody = np.full(rig.grid.shape[1:], -1, np.int64)
+
+    def clutter_weights(self, maps: Maps) -> Floats:
+        """1 / C_i of each view, scaled to a mean of 1, 0 where it is blind, float64 (view,) (KS09 eqs 5, 6)."""
+        sides = [clutter_side(camera.size) for camera in self.rig.cameras]
+        unrest = [np.nan if seen is None else clutter(seen, side) for seen, side in zip(maps, sides, strict=True)]
+        return clutter_weights(np.array(unrest))
+
+    def views(self, maps: Maps) -> Bytes:
+        """n_vis: how many of the views that are not blind see each cell, uint8 (plane, y, x)."""
+        awake = [seen is not None for seen in maps]
+        return np.asarray((self.sampling.footprint[awake][..., 2] > 0).sum(0), np.uint8)
+
+    def synergy(self, maps: Maps, weights: Floats, least: float) -> Singles:
+        """The synergy maps of all planes, nats (KS09 eq. 7).
+
+        Parameters
+        ----------
+        maps
+            One a view.
+        weights : float64 (view,)
+            1 / C_i in any scale; all equal where clutter is not modelled.
+        least
+            L_min: how often a person is missed. Smaller likelihoods are taken for it, so that no view alone has a veto.
+
+        Returns
+        -------
+        float32 (plane, y, x)
+            nan where no view sees the cell.
+
+        Raises
+        ------
+        SourceError
+            Where a map is missing or of another size than its camera's image.
+        """
+        return self._fuse(maps, weights, [synergy_terms(least)] * len(maps), 0.0)
+
+    def log_odds(self, maps: Maps, weights: Floats, rates: Sequence[Rates], occupied: float) -> Singles:
+        """The calibrated log-odds u of all planes, nats (METHODS 4).
+
+        Parameters
+        ----------
+        maps, weights
+            As in `synergy`.
+        rates
+            How each view errs.
+        occupied
+            pi, the share of cells that bodies fill.
+
+        Returns
+        -------
+        float32 (plane, y, x)
+            nan where no view sees the cell.
+
+        Raises
+        ------
+        SourceError
+            Where a map is missing or of another size than its camera's image.
+        """
+        prior = float(np.log(occupied / (1 - occupied)))
+        return self._fuse(maps, weights, [log_odds_terms(rate) for rate in rates], prior)
+
+    def _fuse(self, maps: Maps, weights: Floats, terms: Sequence[Singles], prior: float) -> Singles:
+        self._require(maps)
+        tally = Accumulator(self.rig.grid.shape)
+        for view, (seen, weight, term) in enumerate(zip(maps, weights, terms, strict=True)):
+            if seen is not None:
+                tally.add(self._means.levels(view, seen), term, weight, self._whole, self._whole, self._nobody)
+        return tally.total(self._views, self._nobody, 1.0, (prior, prior))
+
+    def _require(self, maps: Maps) -> None:
+        cameras = self.rig.cameras
+        if len(maps) != len(cameras):
+            raise SourceError("maps", "number", len(maps), f"{len(cameras)}, one a camera")
+        for camera, seen in zip(cameras, maps, strict=True):
+            if seen is not None and seen.shape != camera.size[::-1]:
+                raise SourceError(f"camera {camera.name}", "shape of the map", seen.shape, f"{camera.size[::-1]}")

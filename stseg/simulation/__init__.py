@@ -1,0 +1,10 @@
+"""Scenes with truth: a crowd that walks about a room, seen by cameras through their lenses."""
+
+from stseg.simulation.film import Film, SimulatedFrame
+from stseg.simulation.illumination import Lamp
+from stseg.simulation.named_scenes import NAMED
+from stseg.simulation.render import RenderedView
+from stseg.simulation.routes import Route
+from stseg.simulation.scene import SceneSpec
+
+__all__ = ["NAMED", "Film", "Lamp", "RenderedView", "Route", "SceneSpec", "SimulatedFrame"]

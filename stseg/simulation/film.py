@@ -1,0 +1,79 @@
+"""A scene filmed: frames of all cameras one after the other, with the truth of each."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from stseg.arrays import Bytes, Rows
+from stseg.geometry import Rig
+from stseg.simulation.body import pose
+from stseg.simulation.cameras import build_rig, turns
+from stseg.simulation.crowd import walk
+from stseg.simulation.render import RenderedView, Viewer
+from stseg.simulation.scene import SceneSpec
+from stseg.simulation.script import follow
+
+EMPTY_FRAMES = 40
+"""Length of the films of the empty room; they end just before the first frame."""
+
+
+@dataclass(frozen=True, slots=True)
+class SimulatedFrame:
+    """One frame of the recording.
+
+    Attributes
+    ----------
+    frame
+        From 0.
+    truth : TRUTH (n,)
+        Who is in the area and where, see `stseg.simulation.crowd`.
+    views
+        One a camera, in the rig's order.
+    """
+
+    frame: int
+    truth: Rows
+    views: tuple[RenderedView, ...]
+
+
+class Film:
+    """A scene and its cameras; nothing of it is kept, so that it may be long.
+
+    Parameters
+    ----------
+    spec
+        The scene.
+
+    Attributes
+    ----------
+    rig
+        Its cameras and grid.
+    """
+
+    def __init__(self, spec: SceneSpec) -> None:
+        self.spec = spec
+        self.rig: Rig = build_rig(spec)
+        self.viewers = [Viewer(spec, *place) for place in zip(self.rig.cameras, turns(spec), strict=True)]
+
+    @property
+    def frames(self) -> int:
+        """Number of frames."""
+        return self.spec.frames
+
+    @property
+    def quality(self) -> int:
+        """JPEG quality of the frames, 1..100."""
+        return self.spec.quality
+
+    def empty(self) -> Iterator[tuple[Bytes, ...]]:
+        """Frames of the empty room, one uint8 (v, u, 3) a camera, from the time before the first frame."""
+        for frame in range(-EMPTY_FRAMES, 0):
+            yield tuple(viewer.empty(frame) for viewer in self.viewers)
+
+    def moments(self) -> Iterator[SimulatedFrame]:
+        """The frames from the first to the last."""
+        for crowd in (follow if self.spec.routes else walk)(self.spec):
+            bodies = pose(crowd)
+            views = tuple(viewer.view(crowd, bodies) for viewer in self.viewers)
+            yield SimulatedFrame(crowd.frame, crowd.truth(self.spec.area), views)

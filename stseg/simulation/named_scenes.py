@@ -1,0 +1,95 @@
+"""Scenes with names.
+
+Their difficulty and their seeds were fixed before anything was tuned on them; change neither, make a new one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from stseg.simulation.encounters import BORDER, CROSSING, meeting
+from stseg.simulation.routes import Route
+from stseg.simulation.scene import SceneSpec
+
+_DENSE = SceneSpec(
+    name="dense",
+    people=14,
+    area=(6.0, 6.0),
+    seconds=25.0,
+    cameras=8,
+    camera_distance=6.8,
+    camera_height=3.0,
+    noise=3.5,
+    light_drift=0.06,
+    shadows=0.4,
+    stay=18.0,
+    seed=1402,
+)
+
+
+def _told(name: str, seconds: float, routes: tuple[Route, ...], seed: int) -> SceneSpec:
+    return SceneSpec(
+        name=name,
+        people=len(routes),
+        area=(5.0, 5.0),
+        seconds=seconds,
+        cameras=4,
+        camera_distance=5.8,
+        size=(240, 180),
+        noise=2.5,
+        shadows=0.3,
+        routes=routes,
+        seed=seed,
+    )
+
+
+NAMED: dict[str, SceneSpec] = {
+    scene.name: scene
+    for scene in (
+        SceneSpec(name="easy", people=5, area=(6.0, 6.0), seconds=25.0, cameras=4, camera_distance=6.8, seed=501),
+        _DENSE,
+        replace(_DENSE, name="dense4", cameras=4),
+        SceneSpec(
+            name="demo",
+            people=4,
+            area=(5.0, 5.0),
+            seconds=8.0,
+            cameras=4,
+            camera_distance=5.8,
+            size=(240, 180),
+            noise=2.5,
+            shadows=0.3,
+            stay=8.0,
+            seed=77,
+        ),
+        SceneSpec(
+            name="tiny",
+            people=2,
+            area=(3.0, 3.0),
+            seconds=1.0,
+            cameras=2,
+            camera_distance=4.2,
+            camera_height=2.4,
+            size=(64, 48),
+            noise=2.0,
+            seed=4,
+        ),
+        SceneSpec(
+            name="similar",
+            people=4,
+            area=(5.0, 5.0),
+            seconds=100.0,
+            cameras=3,
+            camera_distance=5.8,
+            size=(320, 240),
+            light_drift=0.08,
+            alike=3,
+            stay=10000.0,
+            seed=605,
+        ),
+        _told("crossing", 14.0, CROSSING, 91),
+        _told("meeting", 16.0, meeting((1.72, 1.72)), 92),
+        _told("meeting_heights", 16.0, meeting((1.68, 1.76)), 92),
+        _told("border", 14.0, BORDER, 93),
+    )
+}

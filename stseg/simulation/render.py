@@ -1,0 +1,147 @@
+"""One camera's frames of a scene: the room, shadows on its floor, the people, and what the sensor makes of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stseg.arrays import Boxes, Bytes, Floats, Ints, Singles
+from stseg.geometry import Camera
+from stseg.simulation.body import Bodies
+from stseg.simulation.cameras import frame_seed, light_phase, pixel_rays
+from stseg.simulation.clothes import worn
+from stseg.simulation.crowd import Crowd
+from stseg.simulation.detector import detect, visible_boxes
+from stseg.simulation.illumination import lit
+from stseg.simulation.random_streams import Topic, chance
+from stseg.simulation.ray_casting import draw_bodies, pixel_boxes
+from stseg.simulation.room import look
+from stseg.simulation.scene import SceneSpec
+from stseg.simulation.sensor import expose
+from stseg.simulation.shadows import PENUMBRA, darken
+
+LAMP = np.array([0.5, -0.35, 1.0]) / np.linalg.norm([0.5, -0.35, 1.0])
+"""Direction towards the light."""
+
+
+@dataclass(frozen=True, slots=True)
+class RenderedView:
+    """One camera's frame and what is known of it.
+
+    Attributes
+    ----------
+    image : uint8 (v, u, 3)
+        Blue, green, red.
+    instances : uint16 (v, u)
+        The id of the person whom each pixel shows, 0 for nobody; also people just outside the area.
+    boxes
+        What a detector would find.
+    """
+
+    image: Bytes
+    instances: NDArray[np.uint16]
+    boxes: Boxes
+
+
+@dataclass(frozen=True, slots=True)
+class Drawing:
+    """The people before the sensor sees them.
+
+    Attributes
+    ----------
+    light : uint8 (v, u, 3)
+        The scene at normal light: no softness, no noise.
+    instances : uint16 (v, u)
+        As in `RenderedView`.
+    silhouettes : int64 (n, 5)
+        See `stseg.simulation.ray_casting.draw_bodies`.
+    depth : float32 (v, u)
+        Of what is seen, in lengths of the pixels' rays, metres.
+    """
+
+    light: Bytes
+    instances: NDArray[np.uint16]
+    silhouettes: Ints
+    depth: Singles
+
+
+class Viewer:
+    """A camera in a scene.
+
+    Parameters
+    ----------
+    spec
+        The scene.
+    camera
+        The view.
+    turn
+        Its place in the ring, see `stseg.simulation.cameras.turns`.
+    """
+
+    def __init__(self, spec: SceneSpec, camera: Camera, turn: float) -> None:
+        self.camera = camera
+        self._spec, self._turn, self._phase = spec, turn, light_phase(spec, turn)
+        self._rays, self._eye = pixel_rays(camera), camera.centre
+        self.room = look(spec, self._rays, self._eye)
+
+    def empty(self, frame: int) -> Bytes:
+        """The camera's frame of the empty room, uint8 (v, u, 3)."""
+        return self._expose(self.room.image, self.room.depth, frame)
+
+    def view(self, crowd: Crowd, bodies: Bodies) -> RenderedView:
+        """The camera's frame of a crowd whose `bodies` are those of `stseg.simulation.body.pose`."""
+        drawing = self.draw(crowd, bodies)
+        visible = np.empty((len(crowd.id), 5), np.int64)
+        row_of = np.zeros(int(crowd.id.max(initial=0)) + 1, np.int64)
+        row_of[crowd.id] = np.arange(len(crowd.id))
+        visible_boxes(drawing.instances, row_of, visible)
+        lots = chance(self._spec.seed, Topic.DETECTOR, *frame_seed(self._turn, crowd.frame))
+        boxes = detect(self.camera, visible, drawing.silhouettes, np.array(self._spec.area) / 2, lots)
+        image = self._expose(drawing.light, drawing.depth, crowd.frame)
+        return RenderedView(image, drawing.instances, boxes)
+
+    def draw(self, crowd: Crowd, bodies: Bodies) -> Drawing:
+        """The crowd in the room."""
+        image = self._with_shadows(bodies)
+        depth = self.room.depth.copy()
+        instances = np.zeros(image.shape[:2], np.uint16)
+        silhouettes = np.empty((len(crowd.id), 5), np.int64)
+        paint = np.array([worn(self._spec.seed, int(person), self._spec.alike) for person in crowd.id])
+        if len(crowd.id):
+            draw_bodies(
+                self._rays,
+                self._eye,
+                pixel_boxes(self.camera, bodies.corners(1.0)),
+                bodies.centre,
+                bodies.form,
+                paint,
+                LAMP,
+                crowd.id.astype(np.uint16),
+                depth,
+                image,
+                instances,
+                silhouettes,
+            )
+        return Drawing(image, instances, silhouettes, depth)
+
+    def _with_shadows(self, bodies: Bodies) -> Bytes:
+        """The room with the people's shadows and without the people."""
+        corners = bodies.corners(PENUMBRA)
+        fallen: Floats = corners - corners[..., 2:] / LAMP[2] * LAMP
+        boxes = pixel_boxes(self.camera, fallen).reshape(-1, 4)
+        shade = np.zeros(self.room.image.shape[:2], np.float32)
+        darken(self.room.ground, boxes, bodies.centre.reshape(-1, 3), bodies.form.reshape(-1, 3, 3), LAMP, shade)
+        image = self.room.image.copy()
+        dark = shade > 0
+        image[dark] = np.rint(image[dark] * (1 - self._spec.shadows * shade[dark])[:, None])
+        return image
+
+    def _expose(self, light: Bytes, depth: Singles, frame: int) -> Bytes:
+        lots = chance(self._spec.seed, Topic.SENSOR, *frame_seed(self._turn, frame))
+        gain: Singles | float = self._spec.gain(frame, self._phase)
+        if self._spec.lamps:
+            points = self._eye + depth[..., None] * self._rays
+            gain = np.float32(gain) * lit(self._spec.lamps, frame / self._spec.frame_rate, points)
+        return expose(light, gain, self._spec.noise, lots)

@@ -1,0 +1,123 @@
+"""What a simulated scene is, in physical quantities."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from stseg.errors import ConfigError
+from stseg.simulation.illumination import Lamp
+from stseg.simulation.routes import Route
+
+
+@dataclass(frozen=True, slots=True)
+class SceneSpec:
+    """A scene to simulate. Equal specifications make equal scenes, to the last pixel.
+
+    Attributes
+    ----------
+    name
+        The scene's name.
+    people
+        How many the area holds; now and then one leaves and another comes.
+    area
+        Sides of the ground rectangle along x and y, metres; its centre is the origin.
+    seconds, frame_rate
+        Length of the recording and frames per second.
+    cameras
+        Number of views, evenly around the area. Half of an even number are every other one of the same cameras.
+    camera_distance, camera_height
+        From the area's centre along the ground, and above it, metres; each camera is a little off.
+    field_of_view
+        Of the ideal image along its width, degrees.
+    size
+        Width and height of the images, pixels.
+    distortion
+        k1, k2, p1, p2, k3 of OpenCV's lens model; shorter lists are filled with zeros.
+    noise
+        Standard deviation of the sensor's noise, grey levels.
+    light_drift, light_period
+        Relative amplitude of the light's slow change, and its period in seconds.
+    lamps
+        Light that changes at once; it adds up.
+    shadows
+        How much light the people's shadows take from the ground, 0..1.
+    quality
+        JPEG quality of the frames, 1..100.
+    speed
+        Slowest and fastest preferred walking speed, metres per second.
+    alike
+        How many people, the first ones, wear clothes of similar colours.
+    stay
+        Mean time that a person stays, seconds.
+    routes
+        The ways of all people, one each; without them people go where they like.
+    seed
+        Of everything that is drawn by lot.
+
+    Raises
+    ------
+    ConfigError
+        Where a value is out of its range.
+    """
+
+    name: str
+    people: int
+    area: tuple[float, float]
+    seconds: float
+    frame_rate: float = 10.0
+    cameras: int = 4
+    camera_distance: float = 6.5
+    camera_height: float = 2.8
+    field_of_view: float = 66.0
+    size: tuple[int, int] = (480, 360)
+    distortion: tuple[float, ...] = (-0.22, 0.05, 0.001, -0.001)
+    noise: float = 3.0
+    light_drift: float = 0.05
+    light_period: float = 20.0
+    lamps: tuple[Lamp, ...] = ()
+    shadows: float = 0.35
+    quality: int = 85
+    speed: tuple[float, float] = (0.6, 1.5)
+    alike: int = 0
+    stay: float = 15.0
+    routes: tuple[Route, ...] = ()
+    seed: int = 1
+
+    def __post_init__(self) -> None:
+        width, depth = self.area
+        room = math.hypot(width, depth) / 2
+        self._require("people", 0 <= self.people <= 2.5 * width * depth, self.people, "0 to 2.5 a square metre")
+        self._require("area", min(self.area) >= 1, self.area, "sides of at least 1 metre")
+        self._require("seconds", self.frames >= 1, self.seconds, "time for at least one frame")
+        self._require("frame_rate", self.frame_rate > 0, self.frame_rate, "frames per second")
+        self._require("cameras", self.cameras >= 1, self.cameras, "at least one")
+        self._require("camera_distance", self.camera_distance > room, self.camera_distance, f"more than {room:.1f} m")
+        self._require("camera_height", self.camera_height > 0, self.camera_height, "metres above the ground")
+        self._require("field_of_view", 0 < self.field_of_view < 150, self.field_of_view, "0 to 150 degrees")
+        self._require("size", min(self.size) >= 16, self.size, "images of at least 16 pixels")
+        self._require("noise", self.noise >= 0, self.noise, "grey levels, 0 or more")
+        self._require("light_drift", 0 <= self.light_drift < 1, self.light_drift, "0 to 1")
+        self._require("light_period", self.light_period > 0, self.light_period, "seconds")
+        self._require("shadows", 0 <= self.shadows <= 1, self.shadows, "0 to 1")
+        self._require("quality", 1 <= self.quality <= 100, self.quality, "1 to 100")
+        self._require("speed", 0 < self.speed[0] <= self.speed[1], self.speed, "the slowest, then the fastest, m/s")
+        self._require("alike", self.alike >= 0, self.alike, "a number of people")
+        self._require("stay", self.stay > 0, self.stay, "seconds")
+        routes = len(self.routes)
+        self._require("routes", routes in (0, self.people), routes, f"none, or {self.people}, one a person")
+        self._require("seed", self.seed >= 0, self.seed, "a whole number from 0")
+
+    def _require(self, key: str, holds: bool, found: object, expected: str) -> None:
+        if not holds:
+            raise ConfigError(f"scene {self.name}", key, found, expected)
+
+    @property
+    def frames(self) -> int:
+        """Number of frames."""
+        return round(self.seconds * self.frame_rate)
+
+    def gain(self, frame: int, phase: float) -> float:
+        """The light at a frame, 1 on the average; `phase` is a camera's share of the period, 0..1."""
+        turns = frame / self.frame_rate / self.light_period + phase
+        return 1.0 + self.light_drift * math.sin(2 * math.pi * turns)

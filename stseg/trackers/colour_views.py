@@ -1,0 +1,68 @@
+"""The views in which people can be known by the colours of their clothes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from stseg.arrays import Boxes, Bytes, Observation, Singles
+from stseg.errors import SourceError
+from stseg.trackers.protocol import FrameObservations
+
+
+class ColourView(NamedTuple):
+    """A colour image and its foreground.
+
+    Attributes
+    ----------
+    image : uint8 (v, u, 3)
+        BGR.
+    likelihood : float32 (v, u)
+        Of foreground, 0..1.
+    """
+
+    image: Bytes
+    likelihood: Singles
+
+
+def colour_views(shown: FrameObservations, tracker: str, frame: int) -> list[ColourView | None]:
+    """The colour views of a frame, in the rig's order; None where one is blind or delivers no colour.
+
+    Raises
+    ------
+    SourceError
+        Where cameras show something, but none of them in colour.
+    """
+    views = [
+        _view(observation, evidence) for observation, evidence in zip(shown.observations, shown.evidence, strict=True)
+    ]
+    seen = [observation for observation in shown.observations if observation is not None]
+    if seen and not any(_is_colour(observation) for observation in seen):
+        raise SourceError(
+            f"--tracker {tracker}", f"frame {frame}", f"{_kinds(seen)} and no colour",
+            "a camera that delivers colour images: this tracker knows people by their clothes",
+        )  # fmt: skip
+    return views
+
+
+def _view(observation: Observation, evidence: object) -> ColourView | None:
+    if observation is None or isinstance(observation, Boxes) or not _is_colour(observation):
+        return None
+    if not isinstance(evidence, np.ndarray):  # the view is blind while it learns a new light
+        return None
+    return ColourView(np.asarray(observation, np.uint8), evidence)
+
+
+def _is_colour(observation: Observation) -> bool:
+    return isinstance(observation, np.ndarray) and observation.ndim == 3
+
+
+def _kinds(seen: Sequence[Observation]) -> str:
+    kinds = {"boxes" if isinstance(one, Boxes) else _dtype_kind(one) for one in seen}
+    return " and ".join(sorted(kinds))
+
+
+def _dtype_kind(one: Observation) -> str:
+    return "instances" if isinstance(one, np.ndarray) and one.dtype == np.uint16 else "masks"

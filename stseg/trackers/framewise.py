@@ -1,0 +1,55 @@
+"""What trackers share that decide every frame as it comes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stseg.arrays import Floats, Ints
+from stseg.config import Config
+from stseg.geometry import Rig
+from stseg.geometry.sampling import Sampling
+from stseg.model.tables import WINDOW
+from stseg.trackers.nearest_cells import reached_cells
+from stseg.trackers.protocol import Commit, FusedFrame
+from stseg.trackers.rows import Event, event_rows, trajectory_rows, views_at
+
+
+class EachFrame:
+    """Leaves nothing open, and commits a frame from where people are in it.
+
+    Parameters
+    ----------
+    rig, config
+        The scene, and the constants of all stages.
+    first
+        The run's first frame.
+    """
+
+    def __init__(self, rig: Rig, config: Config, first: int) -> None:
+        self.rig, self.config, self.frame = rig, config, first
+        self.seen_by = Sampling.of(rig, "point").views()
+
+    def finish(self) -> list[Commit]:
+        """Nothing is open."""
+        return []
+
+    def commit(
+        self, scene: FusedFrame, ids: Ints, ground: Floats, covariance: Floats, height: Floats, width: Floats,
+        score: Floats, events: list[Event],
+    ) -> Commit:  # fmt: skip
+        """A frame and who is where in it.
+
+        Parameters
+        ----------
+        ids : int64 (n,)
+            Tracks.
+        ground, covariance : float64 (n, 2), (n, 2, 2)
+            Metres, square metres.
+        height, width, score : float64 (n,)
+            Metres, metres, nats.
+        """
+        grid = self.rig.grid
+        label, extent = reached_cells(scene, ground, ids, grid, self.config.occupancy.reach)
+        views = views_at(self.seen_by, ground, grid)
+        rows = trajectory_rows(scene.frame, ids, ground, covariance, height, width, extent, score, views)
+        return Commit([scene], label[None], rows, event_rows(events), np.zeros(0, WINDOW))

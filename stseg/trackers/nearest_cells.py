@@ -1,0 +1,34 @@
+"""Whose the occupied cells are where no cut says so: those of the nearest person within reach."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stseg.arrays import Floats, Ints, Labels
+from stseg.geometry import Grid
+from stseg.geometry.near import near_person
+from stseg.trackers.protocol import FusedFrame
+
+
+def reached_cells(scene: FusedFrame, ground: Floats, ids: Ints, grid: Grid, reach: float) -> tuple[Labels, Floats]:
+    """Occupied cells of a frame within reach of people.
+
+    Parameters
+    ----------
+    ground : float64 (n, 2)
+        Where they are, metres.
+    ids : int64 (n,)
+        Their tracks.
+    reach
+        Metres.
+
+    Returns
+    -------
+    int32 (plane, y, x), float64 (n,)
+        Track ids of the cells, 0 for background, and each person's ground area, square metres.
+    """
+    near = near_person(grid.ground, ground, reach)
+    occupied = (scene.log_odds > 0) & (near >= 0)
+    label = np.where(occupied, np.append(ids, 0)[near], 0).astype(np.int32)
+    cells = np.bincount(near[occupied.any(0)], minlength=len(ids))[: len(ids)]
+    return label, np.asarray(cells * grid.cell**2, float)

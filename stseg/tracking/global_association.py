@@ -1,0 +1,169 @@
+"""Who is who over the whole recording: a minimum-cost flow over stretches of tracks (METHODS 5).
+
+While people stand together who is who is a guess; once they have parted, and have been seen alone for a while, motion
+and height tell. So every track is cut where it meets another, and where it was out of sight, and the stretches are
+linked anew: each end to at most one later beginning, such that the sum over all links of
+
+    log N(d; 0, s^2 I) + log N(h_a - h_b; 0, v_a + v_b) - log N(h_a - h_b; 0, 2 spread^2) + parted + [same] stays,
+    d = x_b - x_a - t (v_a + v_b) / 2,   s^2 = 2 noise^2 + t^2 (var v_a + var v_b) / 4 + turn^2 t^3 / 12,
+
+is greatest: what speaks for one person, beyond one who ends here and another, of any height, who begins there. Parting
+costs inside the area alone: at its border people come and go. A flow of one unit through each stretch is an assignment
+of ends to beginnings, so SciPy's exact solver finds it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from stseg.arrays import Floats, Ints, Rows
+from stseg.config import GhostConfig, IdentityConfig
+from stseg.model.border import Border
+from stseg.tracking.assignment import assign
+from stseg.tracking.isolated_tracklets import IsolatedTracklet, isolated_tracklets
+
+_TURN = 0.8
+"""How people change their velocity, metres per second per square root of a second (standard deviation)."""
+_STAYS = 3.0
+"""What speaks for the track that was followed through a meeting, nats."""
+_PARTED = 6.0
+"""What it costs that one person ends and another begins, both inside the area, nats per square metre."""
+
+
+@dataclass(frozen=True)
+class Link:
+    """A track that goes on under the identity of another.
+
+    Attributes
+    ----------
+    frame
+        The first under the other's identity.
+    identity, track
+        The identity that it takes, and the one that it had.
+    reason
+        In words.
+    """
+
+    frame: int
+    identity: int
+    track: int
+    reason: str
+
+
+@dataclass(frozen=True)
+class GlobalAssociation:
+    """Identities of a whole run.
+
+    Attributes
+    ----------
+    identity : int64 (row,)
+        Of each row of the trajectory.
+    links
+        Where they differ from the tracks that were followed.
+    """
+
+    identity: Ints
+    links: list[Link]
+
+
+def associate_globally(
+    trajectory: Rows, frame_rate: float, border: Border, config: IdentityConfig, people: GhostConfig
+) -> GlobalAssociation:
+    """Decide who is who from the whole run.
+
+    Parameters
+    ----------
+    trajectory : TRAJECTORY (n,)
+        In any order.
+    frame_rate
+        Frames per second.
+    border
+        Where people come and go.
+    config, people
+        How people walk, and how tall they are.
+    """
+    parts = isolated_tracklets(trajectory, frame_rate, config)
+    pairs = _within_reach(parts, frame_rate, config)
+    ends, begins = (
+        border.inside(np.array([tip.ground for tip in tips]).reshape(-1, 2), people.border)
+        for tips in ([part.end for part in parts], [part.start for part in parts])
+    )
+    gain = np.array([_gain(parts[a], parts[b], frame_rate, config, people) for a, b in pairs])
+    gain += _PARTED * (ends[pairs[:, 0]] + begins[pairs[:, 1]]) / 2
+    before = _flow(len(parts), pairs[gain > 0], gain[gain > 0])
+    identity, links, used = np.zeros(len(parts), np.int64), [], set[int]()
+    fresh = int(trajectory["id"].max(initial=0))
+    for p, part in enumerate(parts):
+        if before[p] >= 0:
+            identity[p] = identity[before[p]]
+        elif part.track not in used:
+            identity[p] = part.track
+        else:
+            fresh += 1
+            identity[p] = fresh
+        used.add(int(identity[p]))
+        if before[p] >= 0 and parts[before[p]].track != part.track:
+            links.append(_link(parts[before[p]], part, int(identity[p]), frame_rate))
+    named = np.zeros(len(trajectory), np.int64)
+    for p, part in enumerate(parts):
+        named[part.rows] = identity[p]
+    return GlobalAssociation(named, links)
+
+
+def _flow(number: int, pairs: Ints, gain: Floats) -> Ints:
+    """The stretch that each one continues, int64 (number,), -1 for none: the pairs of greatest sum, group by group."""
+    before = np.full(number, -1, np.int64)
+    shape = (2 * number, 2 * number)
+    joined = coo_array((np.ones(len(pairs)), (pairs[:, 0], number + pairs[:, 1])), shape=shape)
+    group = connected_components(joined, directed=False)[1][pairs[:, 0]]
+    for name in np.unique(group):
+        own = group == name
+        ends, row = np.unique(pairs[own, 0], return_inverse=True)
+        begins, column = np.unique(pairs[own, 1], return_inverse=True)
+        cost = np.full((len(ends), len(begins)), np.inf)
+        cost[row, column] = -gain[own]
+        a, b = assign(cost, 0.0)
+        before[begins[b]] = ends[a]
+    return before
+
+
+def _within_reach(parts: Sequence[IsolatedTracklet], frame_rate: float, config: IdentityConfig) -> Ints:
+    """Pairs of a stretch and one that begins later, not too long after its end: int64 (pair, 2)."""
+    begins = np.array([part.start.frame for part in parts])
+    pairs = []
+    for a, part in enumerate(parts):
+        end = part.end.frame
+        first, stop = begins.searchsorted([end + 1, end + config.reunion * frame_rate + 1])
+        pairs += [(a, b) for b in range(first, stop)]
+    return np.array(pairs, np.int64).reshape(-1, 2)
+
+
+def _gain(
+    a: IsolatedTracklet, b: IsolatedTracklet, frame_rate: float, config: IdentityConfig, people: GhostConfig
+) -> float:
+    """What speaks for one person in both, parting aside, nats."""
+    seconds, off = _between(a, b, frame_rate)
+    velocity_variance = a.end.velocity_variance + b.start.velocity_variance
+    spread = 2 * config.place_noise**2 + seconds**2 * velocity_variance / 4 + _TURN**2 * seconds**3 / 12
+    place = -0.5 * float(off @ off) / spread - np.log(2 * np.pi * spread)
+    known, anybody = a.height_variance + b.height_variance, 2 * people.height_spread**2
+    taller = (a.height - b.height) ** 2
+    height = -0.5 * taller / known + 0.5 * taller / anybody + 0.5 * np.log(anybody / known)
+    return float(place + height + (_STAYS if a.track == b.track else 0.0))
+
+
+def _between(a: IsolatedTracklet, b: IsolatedTracklet, frame_rate: float) -> tuple[float, Floats]:
+    """Seconds from the end of one to the start of another, and how far that is from where both lead, metres (2,)."""
+    seconds = (b.start.frame - a.end.frame) / frame_rate
+    return seconds, b.start.ground - a.end.ground - seconds * (a.end.velocity + b.start.velocity) / 2
+
+
+def _link(a: IsolatedTracklet, b: IsolatedTracklet, identity: int, frame_rate: float) -> Link:
+    seconds, off = _between(a, b, frame_rate)
+    reason = f"{seconds:.1f} s on, {np.hypot(*off):.2f} m off the way, {a.height:.2f} and {b.height:.2f} m tall"
+    return Link(b.start.frame, identity, b.track, reason)

@@ -1,0 +1,134 @@
+"""Stretches of tracks in which nobody else was near: what is known of one person for certain."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stseg.arrays import Floats, Ints, Rows
+from stseg.config import IdentityConfig
+from stseg.tracking.assignment import distances
+
+NEAR = 0.6
+"""Distance at which two people meet, metres."""
+_TOLD = 1.0
+"""How much of a stretch tells the velocity at its end, seconds."""
+_PACE = 0.8
+"""Standard deviation of people's velocity, metres per second."""
+_FIRM = 0.02
+"""How far the heights of one person differ between two stretches, however long, metres (standard deviation)."""
+_INDEPENDENT = 2.0
+"""Frames to an independent look at somebody's height."""
+
+
+@dataclass(frozen=True)
+class TrackletEnd:
+    """One end of a stretch.
+
+    Attributes
+    ----------
+    frame
+        Of the recording.
+    ground, velocity : float64 (2,)
+        Metres, metres per second.
+    velocity_variance
+        Square metres per square second.
+    """
+
+    frame: int
+    ground: Floats
+    velocity: Floats
+    velocity_variance: float
+
+
+@dataclass(frozen=True)
+class IsolatedTracklet:
+    """Rows of one track, in the order of time.
+
+    Attributes
+    ----------
+    track
+        Whose.
+    rows : int64 (n,)
+        Which rows of the trajectory.
+    start, end
+        Its two ends.
+    height, height_variance
+        Metres, square metres.
+    """
+
+    track: int
+    rows: Ints
+    start: TrackletEnd
+    end: TrackletEnd
+    height: float
+    height_variance: float
+
+
+def isolated_tracklets(trajectory: Rows, frame_rate: float, config: IdentityConfig) -> list[IsolatedTracklet]:
+    """Every track cut where it was out of sight, and where it came nearest to whom it met; sorted by first frame.
+
+    Parameters
+    ----------
+    trajectory : TRAJECTORY (n,)
+        Of the whole run, in any order.
+    frame_rate
+        Frames per second.
+    """
+    order = np.lexsort((trajectory["frame"], trajectory["id"]))
+    track, frame = trajectory["id"][order], trajectory["frame"][order]
+    met = np.isin(_keys(track, frame), _keys(*_meetings(trajectory, frame_rate)))
+    begins = (np.diff(track, prepend=-1) != 0) | (np.diff(frame, prepend=-2) != 1) | met
+    parts = np.split(order, np.flatnonzero(begins)[1:]) if len(order) else []
+    found = [_measured(trajectory, rows, frame_rate, config) for rows in parts]
+    return sorted(found, key=lambda stretch: (stretch.start.frame, stretch.track))
+
+
+def _keys(track: Ints, frame: Ints) -> Ints:
+    return track * (1 << 40) + frame
+
+
+def _meetings(trajectory: Rows, frame_rate: float) -> tuple[Ints, Ints]:
+    """Tracks, and the frames in which they were nearest to whom they met."""
+    close: dict[tuple[int, int], list[tuple[int, float]]] = {}
+    order = np.argsort(trajectory["frame"], kind="stable")
+    for rows in np.split(order, np.flatnonzero(np.diff(trajectory["frame"][order])) + 1):
+        ground = np.column_stack([trajectory["x"][rows], trajectory["y"][rows]])
+        away = distances(ground, ground)
+        for a, b in np.argwhere(np.triu(away < NEAR, 1)):
+            one, other = sorted((int(trajectory["id"][rows[a]]), int(trajectory["id"][rows[b]])))
+            close.setdefault((one, other), []).append((int(trajectory["frame"][rows[0]]), float(away[a, b])))
+    track: list[int] = []
+    frame: list[int] = []
+    for pair, seen in close.items():
+        when = np.array([f for f, _ in seen])
+        for part in np.split(np.arange(len(seen)), np.flatnonzero(np.diff(when) > frame_rate) + 1):
+            nearest = min(part, key=lambda k: seen[k][1])
+            track += pair
+            frame += [seen[nearest][0]] * 2
+    return np.array(track, np.int64), np.array(frame, np.int64)
+
+
+def _measured(trajectory: Rows, rows: Ints, frame_rate: float, config: IdentityConfig) -> IsolatedTracklet:
+    told = max(2, round(_TOLD * frame_rate))
+    own = trajectory[rows]
+    looks = max(len(rows) / _INDEPENDENT, 1.0)
+    return IsolatedTracklet(
+        int(own["id"][0]),
+        rows,
+        _tip(own[:told], 0, frame_rate, config),
+        _tip(own[-told:], -1, frame_rate, config),
+        float(own["height"].mean()),
+        _FIRM**2 + config.height_noise**2 / looks,
+    )
+
+
+def _tip(own: Rows, at: int, frame_rate: float, config: IdentityConfig) -> TrackletEnd:
+    """An end of a stretch from the rows that tell of it: their velocity, held back by how fast people walk."""
+    ground = np.column_stack([own["x"], own["y"]])
+    seconds = (own["frame"] - own["frame"].mean()) / frame_rate
+    told = float((seconds**2).sum()) / config.place_noise**2
+    variance = 1.0 / (told + 1.0 / _PACE**2)
+    velocity = variance / config.place_noise**2 * (seconds @ ground)
+    return TrackletEnd(int(own["frame"][at]), ground[at], np.asarray(velocity), variance)
