@@ -13,7 +13,7 @@ from scenes import FRAME_RATE, corner_cameras, mask, rig_of
 
 from stseg.arrays import Bytes, Floats
 from stseg.geometry import Camera
-from stseg.io.recording.recording import CameraSource, Clock, Recording, Source
+from stseg.io.recording.recording import CameraSource, ClockSource, Recording, Source
 from stseg.io.recording.rig_text import format_rig
 
 TICK = 1.0 / FRAME_RATE
@@ -61,7 +61,7 @@ class Film:
     starts: tuple[float, ...] = ()
     source: CameraSource = field(default_factory=lambda: CameraSource(Source("masks", Path())))
 
-    def told(self, offset: int = 0, blind: bool = False, clock: Clock = "auto") -> Film:
+    def told(self, offset: int = 0, blind: bool = False, clock: ClockSource = "auto") -> Film:
         """The same, with more said of it in the rig file."""
         missing: Literal["blind", "error"] = "blind" if blind else "error"
         return replace(self, source=CameraSource(Source("masks", Path()), None, offset, missing, clock))

@@ -14,7 +14,7 @@ from stseg.arrays import Bytes, Rows
 from stseg.commands.main import main
 from stseg.errors import OutputError
 from stseg.geometry import Camera, Grid, Rig
-from stseg.io.outputs.films import write_film
+from stseg.io.outputs.video_writer import write_film
 from stseg.io.recording.recording import CameraSource, Recording, Source
 from stseg.io.runfile.runs import RunWriter
 from stseg.model.tables import TRAJECTORY, Tracks

@@ -19,12 +19,12 @@ from stseg.arrays import Floats
 from stseg.commands.calibrate import app
 from stseg.errors import CalibrationError, ConfigError, FormatError, InputError
 from stseg.geometry import Camera
-from stseg.io.calibrations.foreign import Foreign, of_pose
+from stseg.io.calibrations.foreign_camera import ForeignCamera, camera_from_pose
 from stseg.io.calibrations.pom import read_pom
 from stseg.io.calibrations.projection import read_projection
 from stseg.io.calibrations.structured import read_kalibr_yaml, read_krt_json, read_nvidia_json, read_pose_toml
 from stseg.io.calibrations.tsai import read_tsai_xml
-from stseg.io.calibrations.world import World, guess_unit, guess_up, median_height, require_height
+from stseg.io.calibrations.world_frame import World, guess_unit, guess_up, median_height, require_height
 from stseg.io.recording.rigs import read_rig
 
 DATA = Path(os.environ.get("STSEG_DATA", Path(__file__).parents[1] / "../shared/data"))
@@ -51,7 +51,7 @@ def expected(turn: float, distortion: Floats) -> Floats:
     return project_by_opencv(MATRIX, distortion, *pose(turn), points)
 
 
-def pixels(foreign: Foreign, world: World) -> Floats:
+def pixels(foreign: ForeignCamera, world: World) -> Floats:
     return world.camera(foreign, foreign.name, foreign.size or SIZE).project(GROUND, HEIGHTS)[0]
 
 
@@ -113,7 +113,7 @@ class TestStructured:
     def test_every_camera_shows_what_opencv_does(
         self,
         tmp_path: Path,
-        read: Callable[[list[Path]], list[Foreign]],
+        read: Callable[[list[Path]], list[ForeignCamera]],
         write: Callable[[Path], Path],
         distortion: Floats,
         unit: str,
@@ -169,7 +169,7 @@ class TestStructured:
         cameras = read_kalibr_yaml([path])
         points = np.column_stack([GROUND, HEIGHTS, np.ones(25)])
         for k, camera in enumerate(cameras):
-            in_world = Foreign(path, "", SIZE, camera.projection @ first, camera.lens)
+            in_world = ForeignCamera(path, "", SIZE, camera.projection @ first, camera.lens)
             want = expected(k, np.array(BARREL[:4]))
             np.testing.assert_allclose(pixels(in_world, World()), want, rtol=0, atol=1e-6)
         assert points.shape == (25, 4)
@@ -294,11 +294,11 @@ class TestPom:
             read_pom([path], SIZE, 7.0)
 
 
-def turned(up: str, unit: float) -> list[Foreign]:
+def turned(up: str, unit: float) -> list[ForeignCamera]:
     """The ring of cameras in a world with another axis up and another unit."""
     world = World(str(unit), up)  # type: ignore[arg-type]
     to_metres = np.linalg.inv(world.from_metres)
-    return [Foreign(Path("c"), str(k), SIZE, matrix_of(MATRIX, *pose(k)) @ to_metres) for k in range(4)]
+    return [ForeignCamera(Path("c"), str(k), SIZE, matrix_of(MATRIX, *pose(k)) @ to_metres) for k in range(4)]
 
 
 class TestGuesses:
@@ -320,12 +320,12 @@ class TestGuesses:
 
     def test_a_mirrored_world_is_named(self) -> None:
         mirror = np.diag([1.0, -1.0, 1.0, 1.0])
-        cameras = [Foreign(c.file, c.name, SIZE, c.projection @ mirror) for c in turned("+z", 1.0)]
+        cameras = [ForeignCamera(c.file, c.name, SIZE, c.projection @ mirror) for c in turned("+z", 1.0)]
         with pytest.raises(CalibrationError, match=r"cameras below the ground .*--mirrored"):
             guess_unit(cameras, guess_up(cameras))
         rotation = Rotation.from_rotvec(pose(0)[0]).as_matrix() @ mirror[:3, :3]
         with pytest.raises(CalibrationError, match=r"rotation: found a mirror"):
-            of_pose(Path("c"), "a", SIZE, MATRIX, np.asarray(rotation), pose(0)[1], np.zeros(5))
+            camera_from_pose(Path("c"), "a", SIZE, MATRIX, np.asarray(rotation), pose(0)[1], np.zeros(5))
 
     @pytest.mark.parametrize("unit", ["km", "-1", "nan", "0"])
     def test_no_unit(self, unit: str) -> None:

@@ -16,10 +16,10 @@ from stseg.arrays import Floats
 from stseg.commands.calibrate import app
 from stseg.errors import CalibrationError, ConfigError, FormatError, OutputError, RigError
 from stseg.geometry import Camera
-from stseg.io.calibrations.foreign import Foreign
+from stseg.io.calibrations.foreign_camera import ForeignCamera
 from stseg.io.calibrations.opencv_xml import read_opencv_xml
 from stseg.io.calibrations.projection import read_projection
-from stseg.io.calibrations.world import Up, World
+from stseg.io.calibrations.world_frame import Up, World
 from stseg.io.recording.rigs import read_rig
 
 DATA = Path(os.environ.get("STSEG_DATA", Path(__file__).parents[1] / "../shared/data"))
@@ -67,7 +67,7 @@ def opencv_camera(text: str, folder: Path, world: World | None = None) -> Camera
     return camera_of(read_opencv_xml([file]), world or World("mm", "-z"))
 
 
-def camera_of(read: list[Foreign], world: World, size: tuple[int, int] = SIZE) -> Camera:
+def camera_of(read: list[ForeignCamera], world: World, size: tuple[int, int] = SIZE) -> Camera:
     (foreign,) = read
     return world.camera(foreign, "cam", size)
 
@@ -91,12 +91,12 @@ class TestWorld:
         world = World(unit, up)
         scale = factor if abs(factor) > 0.1 else 1.0
         foreign = pose.projection @ np.linalg.inv(world.from_metres) * scale
-        camera = world.camera(Foreign(Path("p.txt"), "", None, foreign), "cam", SIZE)
+        camera = world.camera(ForeignCamera(Path("p.txt"), "", None, foreign), "cam", SIZE)
         np.testing.assert_allclose(camera.projection, pose.projection, rtol=1e-9, atol=1e-9)
 
     def test_no_camera_names_the_file(self) -> None:
         with pytest.raises(CalibrationError, match=r"p.txt: projection matrix: found a singular"):
-            World().camera(Foreign(Path("p.txt"), "", None, np.zeros((3, 4))), "cam", SIZE)
+            World().camera(ForeignCamera(Path("p.txt"), "", None, np.zeros((3, 4))), "cam", SIZE)
 
 
 class TestOpencvXml:

@@ -20,10 +20,10 @@ from stseg.geometry import Rig
 from stseg.io.live.arriving_files import ArrivingFiles, FileNotes
 from stseg.io.live.followed_cameras import FollowedCameras
 from stseg.io.live.followed_files import FollowedFiles
-from stseg.io.live.live_rig import LiveFrameSet, is_live, now
+from stseg.io.live.live_frames import LiveFrameSet, is_live, now
 from stseg.io.live.live_stream import Capture
 from stseg.io.recording.frames import open_frames
-from stseg.io.recording.recording import CameraSource, Recording, Source, without_passwords
+from stseg.io.recording.recording import CameraSource, Recording, Source, mask_passwords
 from stseg.io.recording.rig_text import format_rig
 from stseg.io.recording.rigs import parse_rig, read_rig
 from stseg.io.recording.stream_index import count_frames
@@ -292,7 +292,7 @@ def test_an_address_in_the_rig_file(tmp_path: Path) -> None:
 
 
 def test_only_passwords_are_hidden() -> None:
-    assert without_passwords('"rtsp://a:b@c/d" "rtsp://c:554/d@e"') == '"rtsp://a:***@c/d" "rtsp://c:554/d@e"'
+    assert mask_passwords('"rtsp://a:b@c/d" "rtsp://c:554/d@e"') == '"rtsp://a:***@c/d" "rtsp://c:554/d@e"'
 
 
 def test_a_broken_video_among_those_that_arrive_is_told(tmp_path: Path) -> None:

@@ -27,7 +27,7 @@ from stseg.arrays import Bytes
 from stseg.commands.run_overview import look_over
 from stseg.errors import FormatError, OutputError
 from stseg.geometry import Grid
-from stseg.io.outputs.whole_files import part_of, replacing
+from stseg.io.outputs.whole_files import part_path, replacing
 from stseg.io.recording.rig_text import format_rig
 from stseg.io.runfile import layout, part_file
 from stseg.io.runfile.runs import RunWriter, read_run, read_trajectory
@@ -219,7 +219,7 @@ def test_an_existing_file_is_refused_before_any_work(run_path: Path) -> None:
     with pytest.raises(OutputError, match="exists"):
         writer_at(run_path)
     assert run_path.read_bytes() == before
-    assert not part_of(run_path).exists()
+    assert not part_path(run_path).exists()
 
 
 def test_overwriting_replaces_only_at_the_end(run_path: Path) -> None:
@@ -227,10 +227,10 @@ def test_overwriting_replaces_only_at_the_end(run_path: Path) -> None:
     with writer_at(run_path, overwrite=True) as writer:
         fill(writer)
         assert run_path.read_bytes() == before
-        assert part_of(run_path).exists()
+        assert part_path(run_path).exists()
         writer.finish(Tracks(small_trajectory()[:0]).summary())
     assert len(read_run(run_path).tracks) == 0
-    assert not part_of(run_path).exists()
+    assert not part_path(run_path).exists()
 
 
 @pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt])
@@ -240,7 +240,7 @@ def test_an_exception_leaves_the_old_file_and_no_part(run_path: Path, error: typ
         fill(writer)
         raise error
     assert run_path.read_bytes() == before
-    assert not part_of(run_path).exists()
+    assert not part_path(run_path).exists()
 
 
 @pytest.fixture
@@ -268,7 +268,7 @@ def test_an_interrupt_inside_a_write_leaves_nothing(
 
 
 def test_the_part_of_a_killed_run_is_written_over(tmp_path: Path) -> None:
-    part_of(tmp_path / "night.h5").write_bytes(b"half of something" * 10_000)
+    part_path(tmp_path / "night.h5").write_bytes(b"half of something" * 10_000)
     assert len(read_run(write_small_run(tmp_path / "night.h5")).frames) == 6
 
 
@@ -289,7 +289,7 @@ def test_a_file_that_appears_meanwhile_is_not_destroyed(tmp_path: Path) -> None:
         path.write_text("precious")
         writer.finish(Tracks(small_trajectory()).summary())
     assert path.read_text() == "precious"
-    assert len(read_run(part_of(path)).frames) == 6
+    assert len(read_run(part_path(path)).frames) == 6
 
 
 @pytest.mark.parametrize(
@@ -328,7 +328,7 @@ def test_a_full_disk_is_told_and_leaves_the_old_file(
         fill(writer)
         writer.finish(Tracks(small_trajectory()).summary())
     assert path.read_text() == "old"
-    assert not part_of(path).exists()
+    assert not part_path(path).exists()
     gc.collect()  # a file that HDF5 could not close would crash here
 
 

@@ -19,7 +19,7 @@ from stseg.arrays import Floats
 from stseg.commands.simulate import simulate
 from stseg.errors import ConfigError, OutputError
 from stseg.geometry import Camera
-from stseg.io.outputs.scenes import write_scene
+from stseg.io.outputs.simulated_scene import write_scene
 from stseg.io.recording.frames import open_frames, read_background
 from stseg.io.recording.rigs import read_rig
 from stseg.io.track_csv import read_tracks_csv

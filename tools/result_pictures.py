@@ -10,7 +10,7 @@ import numpy as np
 
 from stseg.arrays import Ints, Rows
 from stseg.evaluation import evaluate
-from stseg.io.outputs.pages import write_file
+from stseg.io.outputs.output_files import write_file
 from stseg.io.runfile.runs import Run
 from stseg.report.html import png_bytes
 from stseg.report.plan import plan_view

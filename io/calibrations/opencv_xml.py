@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from stseg.arrays import Floats
 from stseg.errors import FormatError
 from stseg.geometry import Lens
-from stseg.io.calibrations.foreign import Foreign, of_pose
+from stseg.io.calibrations.foreign_camera import ForeignCamera, camera_from_pose
 from stseg.io.calibrations.safe_xml import parse_xml
 
 _MATRIX = ("camera_matrix",)
@@ -21,7 +21,7 @@ _ROTATION = ("rotation_vectors", "rvec")
 _TRANSLATION = ("translation_vectors", "tvec")
 
 
-def read_opencv_xml(files: Sequence[Path]) -> list[Foreign]:
+def read_opencv_xml(files: Sequence[Path]) -> list[ForeignCamera]:
     """One camera, P = K [R | t], with its lens unless the distortion is zero.
 
     Parameters
@@ -41,7 +41,7 @@ def read_opencv_xml(files: Sequence[Path]) -> list[Foreign]:
     _, rotation = _numbers(roots, _ROTATION, (3,))
     _, translation = _numbers(roots, _TRANSLATION, (3,))
     turned = np.asarray(Rotation.from_rotvec(rotation).as_matrix())
-    return [of_pose(file, "", None, matrix.reshape(3, 3), turned, translation, distortion)]
+    return [camera_from_pose(file, "", None, matrix.reshape(3, 3), turned, translation, distortion)]
 
 
 def read_opencv_lens(file: Path) -> Lens:
@@ -55,7 +55,7 @@ def read_opencv_lens(file: Path) -> Lens:
     roots = [(file, parse_xml(file, "XML of OpenCV's FileStorage"))]
     _, matrix = _numbers(roots, _MATRIX, (9,))
     _, distortion = _numbers(roots, _DISTORTION, (4, 5, 8, 12, 14))
-    alone = of_pose(file, "", None, matrix.reshape(3, 3), np.eye(3), np.zeros(3), distortion)
+    alone = camera_from_pose(file, "", None, matrix.reshape(3, 3), np.eye(3), np.zeros(3), distortion)
     return alone.lens or Lens(matrix.reshape(3, 3), np.zeros(5))
 
 

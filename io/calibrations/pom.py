@@ -14,13 +14,13 @@ import numpy as np
 from stseg.arrays import Floats
 from stseg.errors import CalibrationError, FormatError
 from stseg.geometry.fits import fit_vertical, homogeneous
-from stseg.io.calibrations.foreign import Foreign
+from stseg.io.calibrations.foreign_camera import ForeignCamera
 
 _EXPECTED = "two 3x3 matrices, image to ground plane and image to head plane, a row a line"
 _SAMPLES = 9  # pixels along each side of the image at which the head plane is asked
 
 
-def read_pom(files: Sequence[Path], size: tuple[int, int], head: float) -> list[Foreign]:
+def read_pom(files: Sequence[Path], size: tuple[int, int], head: float) -> list[ForeignCamera]:
     """One camera.
 
     Parameters
@@ -60,7 +60,7 @@ def read_pom(files: Sequence[Path], size: tuple[int, int], head: float) -> list[
     above = image[:, :2] / image[:, 2:]
     vertical = fit_vertical(homography, place[seen], np.full(int(seen.sum()), head), above)
     projection = np.column_stack([homography[:, :2], vertical, homography[:, 2]])
-    return [Foreign(files[0], "", size, projection)]
+    return [ForeignCamera(files[0], "", size, projection)]
 
 
 def _seen(homography: Floats, ground: Floats) -> tuple[Floats, Floats]:

@@ -15,12 +15,12 @@ from scipy.io.matlab import MatReadError
 
 from stseg.arrays import AnyArray, Floats
 from stseg.errors import FormatError
-from stseg.io.calibrations.foreign import Foreign
+from stseg.io.calibrations.foreign_camera import ForeignCamera
 
 _EXPECTED = "one 3x4 projection matrix"
 
 
-def read_projection(files: Sequence[Path]) -> list[Foreign]:
+def read_projection(files: Sequence[Path]) -> list[ForeignCamera]:
     """One camera a file, from the one 3x4 matrix in it.
 
     Parameters
@@ -36,7 +36,7 @@ def read_projection(files: Sequence[Path]) -> list[Foreign]:
     return [_read(file) for file in files]
 
 
-def _read(file: Path) -> Foreign:
+def _read(file: Path) -> ForeignCamera:
     reader = _READERS.get(file.suffix.lower())
     if reader is None:
         raise FormatError(file, "", f"the suffix {file.suffix!r}", f"one of {', '.join(_READERS)}")
@@ -53,7 +53,7 @@ def _read(file: Path) -> Foreign:
     ((key, matrix),) = matrices.items()
     if matrix.dtype.kind not in "iuf" or not np.isfinite(matrix).all():
         raise FormatError(file, key, "values that are not finite numbers", _EXPECTED)
-    return Foreign(file, "", None, matrix.astype(float))
+    return ForeignCamera(file, "", None, matrix.astype(float))
 
 
 def _read_text(file: Path) -> Mapping[str, Floats]:

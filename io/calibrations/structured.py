@@ -12,12 +12,12 @@ from scipy.spatial.transform import Rotation
 
 from stseg.arrays import Floats
 from stseg.errors import FormatError
-from stseg.io.calibrations.foreign import Foreign, ForeignTable, of_pose
+from stseg.io.calibrations.foreign_camera import ForeignCamera, ForeignTable, camera_from_pose
 from stseg.io.extras import load_extra
 from stseg.io.toml_table import ANY
 
 
-def read_krt_json(files: Sequence[Path]) -> list[Foreign]:
+def read_krt_json(files: Sequence[Path]) -> list[ForeignCamera]:
     """Cameras by name, each with `K` (9 numbers), `RT` (12) and `imgSize`: `shelf` and `campus`.
 
     Raises
@@ -28,16 +28,16 @@ def read_krt_json(files: Sequence[Path]) -> list[Foreign]:
     return [camera for file in files for camera in _krt(_table(file, json.loads, "JSON"))]
 
 
-def _krt(top: ForeignTable) -> Iterator[Foreign]:
+def _krt(top: ForeignTable) -> Iterator[ForeignCamera]:
     for name in top.values:
         table = top.table(name)
         pose = table.matrix("RT", 3, 4)
         size = table.image_size("imgSize") if "imgSize" in table else None
         distortion = table.numbers("distCoeff", ANY) if "distCoeff" in table else np.zeros(5)
-        yield of_pose(top.file, name, size, table.matrix("K", 3, 3), pose[:, :3], pose[:, 3], distortion)
+        yield camera_from_pose(top.file, name, size, table.matrix("K", 3, 3), pose[:, :3], pose[:, 3], distortion)
 
 
-def read_pose_toml(files: Sequence[Path]) -> list[Foreign]:
+def read_pose_toml(files: Sequence[Path]) -> list[ForeignCamera]:
     """A table a camera with `matrix`, `distortions`, `rotation` (Rodrigues) and `translation`.
 
     aniposelib, FreeMoCap and Pose2Sim write them as `[cam_0]` beside `[metadata]`, caliscope as `[cameras.0]`.
@@ -50,7 +50,7 @@ def read_pose_toml(files: Sequence[Path]) -> list[Foreign]:
     return [camera for file in files for camera in _poses(_table(file, tomllib.loads, "TOML"))]
 
 
-def _poses(top: ForeignTable) -> Iterator[Foreign]:
+def _poses(top: ForeignTable) -> Iterator[ForeignCamera]:
     cameras = top.table("cameras") if isinstance(top.values.get("cameras"), dict) else top
     tables = [cameras.table(name) for name, value in cameras.values.items() if _is_camera(value)]
     if not tables:
@@ -63,14 +63,14 @@ def _poses(top: ForeignTable) -> Iterator[Foreign]:
         rotation = np.asarray(Rotation.from_rotvec(table.vector("rotation", 3)).as_matrix())
         distortion = table.numbers("distortions", ANY) if "distortions" in table else np.zeros(5)
         translation = table.vector("translation", 3)
-        yield of_pose(top.file, name, size, table.matrix("matrix", 3, 3), rotation, translation, distortion)
+        yield camera_from_pose(top.file, name, size, table.matrix("matrix", 3, 3), rotation, translation, distortion)
 
 
 def _is_camera(value: object) -> bool:
     return isinstance(value, dict) and {"matrix", "rotation", "translation"} <= set(value)
 
 
-def read_nvidia_json(files: Sequence[Path]) -> list[Foreign]:
+def read_nvidia_json(files: Sequence[Path]) -> list[ForeignCamera]:
     """NVIDIA's `calibration.json`: `sensors` with `cameraMatrix`, or with `intrinsicMatrix` and `extrinsicMatrix`.
 
     A sensor that has a homography alone does not say which way is up: give its `imageCoordinates` and
@@ -84,7 +84,7 @@ def read_nvidia_json(files: Sequence[Path]) -> list[Foreign]:
     return [camera for file in files for camera in _sensors(_table(file, json.loads, "JSON"))]
 
 
-def _sensors(top: ForeignTable) -> Iterator[Foreign]:
+def _sensors(top: ForeignTable) -> Iterator[ForeignCamera]:
     for sensor in top.tables("sensors"):
         if "intrinsicMatrix" in sensor and "extrinsicMatrix" in sensor:
             pose = sensor.matrix("extrinsicMatrix", 3, 4)
@@ -94,7 +94,7 @@ def _sensors(top: ForeignTable) -> Iterator[Foreign]:
         else:
             expected = "it, or its points for `stseg calibrate points`: a homography alone does not say what is up"
             raise sensor.error("cameraMatrix", "nothing", expected)
-        yield Foreign(top.file, sensor.text("id"), _frame_size(sensor), projection)
+        yield ForeignCamera(top.file, sensor.text("id"), _frame_size(sensor), projection)
 
 
 def _frame_size(sensor: ForeignTable) -> tuple[int, int] | None:
@@ -106,7 +106,7 @@ def _frame_size(sensor: ForeignTable) -> tuple[int, int] | None:
     return (int(width), int(height)) if width.isdecimal() and height.isdecimal() else None
 
 
-def read_kalibr_yaml(files: Sequence[Path]) -> list[Foreign]:
+def read_kalibr_yaml(files: Sequence[Path]) -> list[ForeignCamera]:
     """Kalibr's camera chain: the world is the first camera's own, every other hangs on the one before it.
 
     Raises
@@ -120,7 +120,7 @@ def read_kalibr_yaml(files: Sequence[Path]) -> list[Foreign]:
     return [camera for file in files for camera in _chain(_table(file, load, "YAML"))]
 
 
-def _chain(top: ForeignTable) -> Iterator[Foreign]:
+def _chain(top: ForeignTable) -> Iterator[ForeignCamera]:
     pose = np.eye(4)
     for index, name in enumerate(sorted(top.values, key=_number)):
         table = top.table(name)
@@ -133,7 +133,7 @@ def _chain(top: ForeignTable) -> Iterator[Foreign]:
         matrix = np.array([[fu, 0, pu], [0, fv, pv], [0, 0, 1]])
         distortion: Floats = np.zeros(4) if lens == "none" else table.numbers("distortion_coeffs", 4)
         size = table.image_size("resolution")
-        yield of_pose(top.file, name, size, matrix, pose[:3, :3], pose[:3, 3], distortion)
+        yield camera_from_pose(top.file, name, size, matrix, pose[:3, :3], pose[:3, 3], distortion)
 
 
 def _number(name: str) -> tuple[int, str]:

@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 
 from stseg.arrays import Floats
 from stseg.errors import FormatError
-from stseg.io.calibrations.foreign import Foreign, of_pose
+from stseg.io.calibrations.foreign_camera import ForeignCamera, camera_from_pose
 from stseg.io.calibrations.safe_xml import parse_xml
 
 _BEFORE_TURN = 0.9
@@ -25,7 +25,7 @@ _BEFORE_TURN = 0.9
 _ROUNDS = 3
 
 
-def read_tsai_xml(files: Sequence[Path]) -> list[Foreign]:
+def read_tsai_xml(files: Sequence[Path]) -> list[ForeignCamera]:
     """One camera a file, `<Camera>` with `<Geometry>`, `<Intrinsic>` and `<Extrinsic>`.
 
     Raises
@@ -36,7 +36,7 @@ def read_tsai_xml(files: Sequence[Path]) -> list[Foreign]:
     return [_read(file) for file in files]
 
 
-def _read(file: Path) -> Foreign:
+def _read(file: Path) -> ForeignCamera:
     root = parse_xml(file, "XML of a Tsai calibration")
     width, height, dpx, dpy = _numbers(file, root, "Geometry", "width height dpx dpy")
     focal, kappa, cx, cy, sx = _numbers(file, root, "Intrinsic", "focal kappa1 cx cy sx")
@@ -48,7 +48,7 @@ def _read(file: Path) -> Foreign:
     radial = _inverse_radial(kappa * focal**2, float(np.hypot(*corners.T).max()))
     rotation = np.asarray(Rotation.from_euler("xyz", [rx, ry, rz]).as_matrix())  # Rz Ry Rx
     size = (int(width), int(height))
-    return of_pose(file, root.get("name", ""), size, matrix, rotation, np.array(translation), radial)
+    return camera_from_pose(file, root.get("name", ""), size, matrix, rotation, np.array(translation), radial)
 
 
 def _inverse_radial(kappa: float, reach: float) -> Floats:

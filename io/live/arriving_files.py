@@ -13,10 +13,10 @@ from threading import Event, Lock
 from stseg.arrays import Observation
 from stseg.errors import SourceError
 from stseg.geometry import Camera
-from stseg.io.live.live_rig import now
+from stseg.io.live.live_frames import now
 from stseg.io.outputs.whole_files import replacing
 from stseg.io.recording.recording import Source
-from stseg.io.recording.source_files import by_numbers
+from stseg.io.recording.source_files import numeric_order
 from stseg.io.recording.video_stream import VideoStream
 
 _POLL = 0.1
@@ -92,8 +92,8 @@ class ArrivingFiles:
 
     def _look(self) -> None:
         found = [path for path in self._pattern.parent.glob(self._pattern.name) if path.name not in self._taken]
-        last = None if self._last is None else by_numbers(self._last)
-        self._coming = sorted((path for path in found if last is None or by_numbers(path) > last), key=by_numbers)
+        last = None if self._last is None else numeric_order(self._last)
+        self._coming = sorted((path for path in found if last is None or numeric_order(path) > last), key=numeric_order)
         for path in found:
             if path not in self._coming:
                 self._taken.add(path.name)
@@ -128,7 +128,7 @@ class ArrivingVideos:
         self._stream: VideoStream | None = None
         self._path, self._read, self._size = Path(), 0, 0
         self.arrived = 0.0
-        """When the file of the last frame was found complete, by `stseg.io.live.live_rig.now`."""
+        """When the file of the last frame was found complete, by `stseg.io.live.live_frames.now`."""
 
     def skip(self, count: int) -> int:
         """Pass over up to `count` frames; how many there were."""

@@ -21,8 +21,8 @@ from typing import Self
 
 from stseg.arrays import Observation
 from stseg.config import LiveConfig
-from stseg.io.live.live_rig import LiveFrameSet, now
-from stseg.io.live.live_stream import Arrived, Capture, FFmpegCapture, LiveStream
+from stseg.io.live.live_frames import LiveFrameSet, now
+from stseg.io.live.live_stream import Capture, FFmpegCapture, LiveStream, TimedPicture
 from stseg.io.recording.recording import Recording
 
 _POLL = 0.2
@@ -46,7 +46,7 @@ class FollowedCameras:
     config
         How patient it is, and how much may wait.
     start
-        When frame 0 was, by `stseg.io.live.live_rig.now`, if the run began before; else the clock starts when all
+        When frame 0 was, by `stseg.io.live.live_frames.now`, if the run began before; else the clock starts when all
         cameras show something, or `config.silence` after the first does.
     halt
         Once it is set no more moments begin; what waits is given out still.
@@ -186,7 +186,7 @@ class FollowedCameras:
     def _nearest(self, stream: LiveStream, time: float) -> Observation:
         """What a camera showed at a time; None where nothing came near it."""
 
-        def distance(picture: Arrived) -> float:
+        def distance(picture: TimedPicture) -> float:
             return abs(picture.at - time)
 
         nearest = min(stream.pictures, key=distance, default=None)

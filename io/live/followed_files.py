@@ -18,7 +18,7 @@ from stseg.config import LiveConfig
 from stseg.errors import SourceError
 from stseg.geometry import Camera
 from stseg.io.live.arriving_files import ArrivingFiles, ArrivingVideos, FileNotes
-from stseg.io.live.live_rig import LiveFrameSet
+from stseg.io.live.live_frames import LiveFrameSet
 from stseg.io.recording.pictures import reduced_view
 from stseg.io.recording.recording import CameraSource, Recording
 
@@ -27,7 +27,7 @@ _POLL = 0.2
 
 
 class FollowedFiles:
-    """Frame sets of a recording whose videos arrive as files, a pattern each (see `stseg.io.live.live_rig.is_live`).
+    """Frame sets of a recording whose videos arrive as files, a pattern each (see `stseg.io.live.live_frames.is_live`).
 
     Parameters
     ----------
@@ -63,11 +63,13 @@ class FollowedFiles:
         self._frame, self._stop, self._config, self._halt, self._say = first, stop, config, halt, say
         self._over = Event()
         """Set for the threads that wait for files, when this is closed."""
-        self._feeds: list[_Feed] = []
+        self._feeds: list[_AlignedFiles] = []
         cameras = zip(recording.rig.cameras, recording.sources, recording.factors, strict=True)
         for camera, source, factor in cameras:
             files = ArrivingFiles(source.source.path, config.settled, self._over, say)
-            self._feeds.append(_Feed(camera, source, ArrivingVideos(source.source, camera, files, notes), factor))
+            self._feeds.append(
+                _AlignedFiles(camera, source, ArrivingVideos(source.source, camera, files, notes), factor)
+            )
             self._feeds[-1].require_start(first)
         with ExitStack() as opened:
             for feed in self._feeds:
@@ -123,7 +125,7 @@ class FollowedFiles:
         return [self._pool.submit(feed.read, self._frame) for feed in self._feeds]
 
 
-class _Feed:
+class _AlignedFiles:
     """A stream that is asked for frames of the recording rather than its own."""
 
     def __init__(self, camera: Camera, source: CameraSource, stream: ArrivingVideos, factor: int) -> None:

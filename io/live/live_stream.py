@@ -15,9 +15,9 @@ from stseg.arrays import AnyArray
 from stseg.config import LiveConfig
 from stseg.errors import SourceError
 from stseg.geometry import Camera
-from stseg.io.live.live_rig import now
+from stseg.io.live.live_frames import now
 from stseg.io.recording.pictures import as_observation, reduced_picture
-from stseg.io.recording.recording import Source, without_passwords
+from stseg.io.recording.recording import Source, mask_passwords
 
 _OPTIONS = "rtsp_transport;tcp|fflags;nobuffer|analyzeduration;1000000"
 """RTSP over TCP; nothing that came before is held back, and a second is enough to tell what is sent, microseconds."""
@@ -33,8 +33,8 @@ class Capture(Protocol):
         """Let it go."""
 
 
-class Arrived(NamedTuple):
-    """A picture and when it came, by `stseg.io.live.live_rig.now`."""
+class TimedPicture(NamedTuple):
+    """A picture and when it came, by `stseg.io.live.live_frames.now`."""
 
     at: float
     picture: AnyArray
@@ -108,7 +108,7 @@ class LiveStream(Thread):
         super().__init__(name=f"camera {camera.name}", daemon=True)
         self._source, self._camera, self._config, self._say, self._opening = source, camera, config, say, opening
         self._period, self._kept, self._factor = period, kept, factor
-        self.pictures: deque[Arrived] = deque()
+        self.pictures: deque[TimedPicture] = deque()
         """The newest, in the order in which they came; `came` guards them. The very newest stays."""
         self.failure: SourceError | None = None
         """What makes it useless to go on, such as pictures of another size."""
@@ -123,7 +123,7 @@ class LiveStream(Thread):
             if self.failure is not None:
                 return
             if not broken and not self._over.is_set():
-                self._tell(f"nothing comes from {without_passwords(self._source.address)}; it is blind until it does")
+                self._tell(f"nothing comes from {mask_passwords(self._source.address)}; it is blind until it does")
                 broken = True
             self._over.wait(pause)
             pause = min(2 * pause, self._config.longest_pause)
@@ -169,7 +169,7 @@ class LiveStream(Thread):
         source, camera = self._source, self._camera
         view = as_observation(picture, source.kind, camera.size, source.path, f"camera {camera.name}")
         with self._came:
-            self.pictures.append(Arrived(now(), reduced_picture(view, self._factor)))
+            self.pictures.append(TimedPicture(now(), reduced_picture(view, self._factor)))
             while self.pictures[0].at < self.pictures[-1].at - self._kept:
                 self.pictures.popleft()
             self._came.notify_all()

@@ -11,7 +11,7 @@ from typing import Self, TextIO
 import numpy as np
 
 from stseg.arrays import Rows
-from stseg.io.outputs.whole_files import failure, replacing
+from stseg.io.outputs.whole_files import output_error, replacing
 from stseg.model.tables import TRAJECTORY
 
 _COLUMNS = ("frame", "time", "id", "x", "y", "height", "score")
@@ -54,7 +54,7 @@ class LiveTable:
         try:
             self._file = self.path.open("a", newline="", encoding="utf-8")
         except OSError as error:
-            raise failure(self.path, error) from error
+            raise output_error(self.path, error) from error
         return self
 
     def __exit__(
@@ -71,7 +71,7 @@ class LiveTable:
             csv.writer(self._file).writerows(map(self._line, rows))
             self._file.flush()
         except OSError as error:
-            raise failure(self.path, error) from error
+            raise output_error(self.path, error) from error
 
     def _line(self, row: np.void) -> Sequence[object]:
         frame = int(row["frame"])

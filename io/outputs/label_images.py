@@ -16,7 +16,7 @@ import numpy as np
 
 from stseg.arrays import Bytes, Ints
 from stseg.errors import OutputError
-from stseg.io.outputs.whole_files import failure, part_of
+from stseg.io.outputs.whole_files import output_error, part_path
 from stseg.io.recording.indexed_png import encode_indexed
 
 _BYTE, _WORD = 255, 65535
@@ -33,7 +33,7 @@ def require_label_folder(folder: Path, overwrite: bool) -> None:
         if folder.exists() and any(folder.iterdir()) and not overwrite:
             raise OutputError(folder, "", "files in it", "an empty folder, or --overwrite")
     except OSError as error:
-        raise failure(folder, error) from error
+        raise output_error(folder, error) from error
 
 
 class LabelImages:
@@ -67,7 +67,7 @@ class LabelImages:
             for camera in cameras:
                 self._clear(self._folder_of(camera))
         except OSError as error:
-            raise failure(folder, error) from error
+            raise output_error(folder, error) from error
 
     def write(self, camera: str, frame: int, ids: Ints) -> None:
         """Write one image, int64 (v, u).
@@ -78,10 +78,10 @@ class LabelImages:
         """
         path = self._folder_of(camera) / f"{frame:06d}.png"
         try:
-            part_of(path).write_bytes(self._encoded(ids))
-            part_of(path).replace(path)
+            part_path(path).write_bytes(self._encoded(ids))
+            part_path(path).replace(path)
         except OSError as error:
-            raise failure(path, error) from error
+            raise output_error(path, error) from error
 
     def _encoded(self, ids: Ints) -> bytes:
         if self._indexed:

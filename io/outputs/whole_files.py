@@ -25,14 +25,14 @@ def require_new(path: Path, overwrite: bool) -> None:
         raise OutputError(path, "", "no such folder", "a name in a folder that exists")
 
 
-def part_of(path: Path) -> Path:
+def part_path(path: Path) -> Path:
     """Where a file stands until it is whole."""
     return path.with_name(f"{path.name}.part")
 
 
-def publish(path: Path) -> None:
+def publish_part(path: Path) -> None:
     """Rename the part of `path`, whole and synced, to its name, and sync the folder."""
-    part_of(path).replace(path)
+    part_path(path).replace(path)
     sync_folder(path.parent)
 
 
@@ -56,22 +56,22 @@ def replacing(path: Path, overwrite: bool) -> Iterator[Path]:
         Where the file exists and is not to be overwritten, or cannot be written.
     """
     require_new(path, overwrite)
-    part = part_of(path)
+    part = part_path(path)
     try:
         yield part
         with part.open("rb+") as file:
             os.fsync(file.fileno())
-        publish(path)
+        publish_part(path)
     except OutputError as error:
         raise OutputError(path, error.key, error.found, error.expected) from error
     except OSError as error:
-        raise failure(path, error) from error
+        raise output_error(path, error) from error
     finally:
         with suppress(OSError):
             part.unlink(missing_ok=True)
 
 
-def failure(path: Path, error: OSError) -> OutputError:
+def output_error(path: Path, error: OSError) -> OutputError:
     """What the user is told when the system refuses to write."""
     if isinstance(error, BlockingIOError):
         return OutputError(path, "", "a file that another run is writing", "a name of its own for each run")

@@ -1,7 +1,7 @@
 """Cameras' streams, asked for frames of the recording: what each shows then, and where they end.
 
 A camera with offset o shows frame f of the recording in its own frame f - o, or where its frames are placed in time
-(`stseg.io.recording.clock`) in the one that was taken nearest to then.
+(`stseg.io.recording.time_alignment`) in the one that was taken nearest to then.
 """
 
 from __future__ import annotations
@@ -71,7 +71,9 @@ class AlignedStream:
         self._stream.close()
 
 
-def open_feed(recording: Recording, camera_index: int, times: Sequence[Floats] | None = None) -> AlignedStream:
+def open_aligned_stream(
+    recording: Recording, camera_index: int, times: Sequence[Floats] | None = None
+) -> AlignedStream:
     """One camera's stream, placed as the recording says; with the times of its frames, far ones are sought.
 
     Raises
@@ -83,21 +85,23 @@ def open_feed(recording: Recording, camera_index: int, times: Sequence[Floats] |
     return AlignedStream(camera, source, open_stream(source.source, camera, times), recording.factors[camera_index])
 
 
-def open_feeds(recording: Recording, opened: ExitStack, times: Sequence[Sequence[Floats]] = ()) -> list[AlignedStream]:
-    """All cameras' streams, in the rig's order, closed with `opened`; raises as `open_feed` does."""
+def open_aligned_streams(
+    recording: Recording, opened: ExitStack, times: Sequence[Sequence[Floats]] = ()
+) -> list[AlignedStream]:
+    """All cameras' streams, in the rig's order, closed with `opened`; raises as `open_aligned_stream` does."""
     feeds = list[AlignedStream]()
     for camera_index in range(len(recording.sources)):
-        feeds.append(open_feed(recording, camera_index, times[camera_index] if times else None))
+        feeds.append(open_aligned_stream(recording, camera_index, times[camera_index] if times else None))
         opened.callback(feeds[-1].close)
     return feeds
 
 
-def threads_for(recording: Recording) -> int:
+def decoder_threads(recording: Recording) -> int:
     """As many threads as decode at once: one a camera, no more than there are cores."""
     return max(1, min(len(recording.sources), os.cpu_count() or 1))
 
 
-def length_of(feeds: list[AlignedStream]) -> float:
+def recording_length(feeds: list[AlignedStream]) -> float:
     """Where the recording ends; infinite while it goes on. SourceError where required streams do not end together."""
     required = [feed for feed in feeds if feed.required]
     if not required:

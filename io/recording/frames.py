@@ -7,7 +7,7 @@ that is asked for and must end together, and there the recording ends (where all
 
 That is so where a camera's frames are counted. Where their times are known, and are not those of their numbers, the
 camera shows a frame of the recording in the own frame that was taken nearest to then, and is blind where there is none
-(`stseg.io.recording.clock`).
+(`stseg.io.recording.time_alignment`).
 """
 
 from __future__ import annotations
@@ -20,12 +20,18 @@ from types import TracebackType
 
 from stseg.arrays import Observation
 from stseg.errors import ConfigError, SourceError
-from stseg.io.recording.aligned_stream import AlignedStream, length_of, open_feed, open_feeds, threads_for
-from stseg.io.recording.clock import placed
+from stseg.io.recording.aligned_stream import (
+    AlignedStream,
+    decoder_threads,
+    open_aligned_stream,
+    open_aligned_streams,
+    recording_length,
+)
 from stseg.io.recording.pictures import reduced_view
 from stseg.io.recording.recording import Recording
 from stseg.io.recording.stream_index import StreamIndex
 from stseg.io.recording.streams import open_stream
+from stseg.io.recording.time_alignment import with_alignment
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,9 +66,9 @@ class FrameReader:
         self._recording, self._stop = recording, stop
         self._frame, self._least = first, first if stop is None else stop
         with ExitStack() as opened:
-            self._feeds = open_feeds(recording, opened, streams.times if streams else ())
+            self._feeds = open_aligned_streams(recording, opened, streams.times if streams else ())
             _require_start(self._feeds, first)
-            self._pool = opened.enter_context(ThreadPoolExecutor(threads_for(recording)))
+            self._pool = opened.enter_context(ThreadPoolExecutor(decoder_threads(recording)))
             self._opened = opened.pop_all()
         self._ahead = self._read_ahead()
 
@@ -81,7 +87,7 @@ class FrameReader:
         if self._frame == self._stop:
             raise StopIteration
         views = tuple(view.result() for view in self._ahead)
-        length = length_of(self._feeds)
+        length = recording_length(self._feeds)
         if length <= self._frame:
             if length < self._least:
                 found = f"a recording of {length} frames"
@@ -131,7 +137,7 @@ def open_frames(
     if first < 0 or (stop is not None and stop < first):
         found = f"{first}:{'' if stop is None else stop}"
         raise ConfigError(recording.path, "frames", found, "first:stop, with 0 <= first <= stop")
-    return FrameReader(placed(recording, streams.shown) if streams else recording, first, stop, streams)
+    return FrameReader(with_alignment(recording, streams.shown) if streams else recording, first, stop, streams)
 
 
 def read_camera(
@@ -156,8 +162,10 @@ def read_camera(
         Where the source is missing, broken or not of the camera's size.
     """
     if streams:
-        recording = placed(recording, streams.shown)
-    with closing(open_feed(recording, camera_index, streams.times[camera_index] if streams else None)) as feed:
+        recording = with_alignment(recording, streams.shown)
+    with closing(
+        open_aligned_stream(recording, camera_index, streams.times[camera_index] if streams else None)
+    ) as feed:
         for frame in frames:
             yield feed.read(frame)
 

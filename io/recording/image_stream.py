@@ -55,7 +55,7 @@ class ImageStream:
         """Nothing is held open."""
 
 
-def names_images(path: Path) -> bool:
+def is_image_source(path: Path) -> bool:
     """Whether a path is an image, a folder or a pattern of images, rather than a video."""
     if path.suffix.lower() in _SUFFIXES or path.is_dir():
         return True

@@ -12,7 +12,7 @@ from stseg.geometry import Camera, Rig
 from stseg.geometry.reduction import greatest_reduction
 
 SourceKind = Literal["video", "masks", "images", "instances", "boxes"]
-Clock = Literal["auto", "stamps", "count"]
+ClockSource = Literal["auto", "stamps", "count"]
 SOURCE_KINDS: tuple[SourceKind, ...] = ("video", "masks", "images", "instances", "boxes")
 _PASSWORD = re.compile(r"(://[^/\s:@\"]*):[^/\s\"]*@")
 
@@ -66,7 +66,7 @@ class CameraSource:
         What to do where its stream starts late or ends early: an error, or a view that sees nothing there.
     clock
         What says when its frames were taken: the files' time stamps, their count, or what
-        `stseg.io.recording.clock` finds.
+        `stseg.io.recording.time_alignment` finds.
     shown : int64 (tick,)
         The camera's own frame that shows each tick of its clock, -1 where it is blind; None where frame k shows tick k,
         or nothing is known yet.
@@ -76,7 +76,7 @@ class CameraSource:
     background: Source | None = None
     offset: int = 0
     on_missing: Literal["error", "blind"] = "error"
-    clock: Clock = "auto"
+    clock: ClockSource = "auto"
     shown: Ints | None = field(default=None, compare=False, repr=False)
 
 
@@ -110,6 +110,6 @@ class Recording:
         return greatest_reduction(camera, self.rig.grid, rows) if colour else 1
 
 
-def without_passwords(text: str) -> str:
+def mask_passwords(text: str) -> str:
     """A text in which the addresses of live streams (`rtsp://name:password@...`) show no password."""
     return _PASSWORD.sub(r"\1:***@", text)

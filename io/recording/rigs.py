@@ -15,13 +15,13 @@ from typing import Literal
 
 from stseg.errors import CalibrationError, OutputError, RigError
 from stseg.geometry import Camera, Grid, Lens, Rig
-from stseg.io.recording.recording import SOURCE_KINDS, CameraSource, Clock, Recording, Source, SourceKind
+from stseg.io.recording.recording import SOURCE_KINDS, CameraSource, ClockSource, Recording, Source, SourceKind
 from stseg.io.recording.rig_text import FORMAT, format_rig
 from stseg.io.toml_table import ANY, Table
 
 _MOST_CELLS = 100_000_000  # of one frame's volume: beyond it a slip of the pen, not a scene
 _ON_MISSING: tuple[Literal["error", "blind"], ...] = ("error", "blind")
-_CLOCKS: tuple[Clock, ...] = ("auto", "stamps", "count")
+_CLOCKS: tuple[ClockSource, ...] = ("auto", "stamps", "count")
 _CAMERA_KEYS = (
     *("name", "size", "ground", "vertical", "projection", "lens"),
     *("offset", "source", "background", "on_missing", "clock"),

@@ -8,13 +8,13 @@ from dataclasses import replace
 from pathlib import Path
 
 from stseg.errors import SourceError
-from stseg.io.recording.image_stream import image_paths, is_pattern, names_images
+from stseg.io.recording.image_stream import image_paths, is_image_source, is_pattern
 from stseg.io.recording.recording import Source
 
 _NUMBER = re.compile(r"(\d+)")
 
 
-def parts_of(source: Source, key: str) -> list[Source]:
+def source_parts(source: Source, key: str) -> list[Source]:
     """One source for each file or folder that is a stream by itself.
 
     Raises
@@ -26,23 +26,23 @@ def parts_of(source: Source, key: str) -> list[Source]:
     return [replace(source, path=path, more=(), starts=()) for path in paths]
 
 
-def files_of(source: Source) -> Iterator[Path]:
+def source_files(source: Source) -> Iterator[Path]:
     """Every file of a source; raises SourceError where there is none."""
-    for part in parts_of(source, ""):
+    for part in source_parts(source, ""):
         yield from image_paths(part.path, "")
 
 
 def _expanded(path: Path, kind: str, key: str) -> list[Path]:
     """A pattern of videos stands for its files, ordered by the numbers in their names; all else for itself."""
-    videos = kind == "video" or (kind == "masks" and not names_images(path.with_name(path.name.replace("*", "_"))))
+    videos = kind == "video" or (kind == "masks" and not is_image_source(path.with_name(path.name.replace("*", "_"))))
     if not videos or not is_pattern(path) or path.is_file():
         return [path]
-    found = sorted(path.parent.glob(path.name), key=by_numbers)
+    found = sorted(path.parent.glob(path.name), key=numeric_order)
     if not found:
         raise SourceError(path, key, "no files", "videos")
     return found
 
 
-def by_numbers(path: Path) -> list[tuple[int, str]]:
+def numeric_order(path: Path) -> list[tuple[int, str]]:
     """The order of files in time: words of their names in alphabetical order, numbers by their value."""
     return [(int(word), "") if word.isdigit() else (-1, word) for word in _NUMBER.split(path.name)]

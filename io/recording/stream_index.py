@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints
-from stseg.io.recording.aligned_stream import length_of, open_feeds, threads_for
-from stseg.io.recording.clock import clock_of, placed, seen
+from stseg.io.recording.aligned_stream import decoder_threads, open_aligned_streams, recording_length
 from stseg.io.recording.recording import Recording
+from stseg.io.recording.time_alignment import align_in_time, coverage, with_alignment
 
 
 @dataclass(frozen=True)
@@ -35,19 +35,19 @@ class StreamIndex:
     shown: tuple[Ints | None, ...] = ()
     notes: tuple[str, ...] = ()
 
-    def seen(self, recording: Recording) -> Flags:
+    def coverage(self, recording: Recording) -> Flags:
         """Which frames of the recording that was counted each camera shows, bool (camera, length)."""
         counts = [sum(map(len, own)) for own in self.times]
-        return seen(placed(recording, self.shown), counts, self.length)
+        return coverage(with_alignment(recording, self.shown), counts, self.length)
 
-    def shared(self, recording: Recording) -> tuple[int, int]:
+    def multi_view_range(self, recording: Recording) -> tuple[int, int]:
         """The part of it that two cameras show, where none must be there all the time; else all of it.
 
         Two views tell where somebody is; of what one alone shows, at the beginning and the end, little can be told.
         """
         if any(source.on_missing == "error" for source in recording.sources):
             return 0, self.length
-        told = np.flatnonzero(self.seen(recording).sum(axis=0) >= min(2, len(recording.sources)))
+        told = np.flatnonzero(self.coverage(recording).sum(axis=0) >= min(2, len(recording.sources)))
         return (int(told[0]), int(told[-1]) + 1) if len(told) else (0, self.length)
 
 
@@ -65,10 +65,10 @@ def index_streams(recording: Recording) -> StreamIndex:
         Where a source is missing, empty or not of its kind, or the streams do not end together.
     """
     with ExitStack() as opened:
-        feeds = open_feeds(recording, opened)
-        pool = opened.enter_context(ThreadPoolExecutor(threads_for(recording)))
+        feeds = open_aligned_streams(recording, opened)
+        pool = opened.enter_context(ThreadPoolExecutor(decoder_threads(recording)))
         times = tuple(counted.result() for counted in [pool.submit(feed.run_out) for feed in feeds])
-    clock = clock_of(recording, times)
-    for feed, source, own in zip(feeds, placed(recording, clock.shown).sources, times, strict=True):
+    clock = align_in_time(recording, times)
+    for feed, source, own in zip(feeds, with_alignment(recording, clock.shown).sources, times, strict=True):
         feed.place(source, sum(map(len, own)))
-    return StreamIndex(int(length_of(feeds)), times, clock.shown, clock.notes)
+    return StreamIndex(int(recording_length(feeds)), times, clock.shown, clock.notes)

@@ -11,9 +11,9 @@ from stseg.arrays import Boxes, Floats, Observation
 from stseg.errors import SourceError
 from stseg.geometry import Camera
 from stseg.io.recording.box_files import read_boxes
-from stseg.io.recording.image_stream import ImageStream, names_images
-from stseg.io.recording.recording import Source, without_passwords
-from stseg.io.recording.source_files import parts_of
+from stseg.io.recording.image_stream import ImageStream, is_image_source
+from stseg.io.recording.recording import Source, mask_passwords
+from stseg.io.recording.source_files import source_parts
 from stseg.io.recording.video_stream import VideoStream
 
 
@@ -141,14 +141,14 @@ def open_stream(source: Source, camera: Camera, times: Sequence[Floats] | None =
     """
     if source.address:
         raise SourceError(
-            without_passwords(source.address), f"camera {camera.name}", "a live stream", "files; or stseg run --follow"
+            mask_passwords(source.address), f"camera {camera.name}", "a live stream", "files; or stseg run --follow"
         )
-    parts = parts_of(source, f"camera {camera.name}")
+    parts = source_parts(source, f"camera {camera.name}")
     if len(parts) > 1:
         return JoinedStream(parts, camera, times)
     (source,) = parts
     if source.kind == "boxes":
         return BoxStream(source)
-    if source.kind == "video" or (source.kind == "masks" and not names_images(source.path)):
+    if source.kind == "video" or (source.kind == "masks" and not is_image_source(source.path)):
         return VideoStream(source, camera, None if times is None else times[0])
     return ImageStream(source, camera)

@@ -12,7 +12,7 @@ from pathlib import Path
 from types import FrameType
 
 from stseg.errors import OutputError
-from stseg.io.outputs.whole_files import failure, part_of, publish
+from stseg.io.outputs.whole_files import output_error, part_path, publish_part
 from stseg.io.runfile.locks import lock
 
 _Handler = Callable[[int, FrameType | None], object]
@@ -42,15 +42,15 @@ class PartFile(io.RawIOBase):
         self._in_step = False
         self._interrupted: int | None = None
         try:
-            self._file = os.fdopen(os.open(part_of(path), os.O_RDWR | os.O_CREAT, 0o666), "r+b", buffering=0)
+            self._file = os.fdopen(os.open(part_path(path), os.O_RDWR | os.O_CREAT, 0o666), "r+b", buffering=0)
         except OSError as error:
-            raise failure(path, error) from error
+            raise output_error(path, error) from error
         try:
             lock(self._file)
             self._file.truncate(0)
         except OSError as error:
             self._file.close()
-            raise failure(path, error) from error
+            raise output_error(path, error) from error
         self._handlers = self._shield()
 
     @contextmanager
@@ -71,16 +71,16 @@ class PartFile(io.RawIOBase):
 
     def publish(self, overwrite: bool) -> None:
         """Sync, and give the file its name; where that fails the part stays, for it is whole."""
-        kept = f"the whole result is kept in {part_of(self._path)}"
+        kept = f"the whole result is kept in {part_path(self._path)}"
         if self._path.exists() and not overwrite:
             raise OutputError(self._path, "", "a file that has appeared meanwhile", f"none; {kept}")
         try:
             os.fsync(self._file.fileno())
             if os.name == "nt":  # cannot rename what is open; elsewhere the lock is held until the name is taken
                 self._file.close()
-            publish(self._path)
+            publish_part(self._path)
         except OSError as error:
-            told = failure(self._path, error)
+            told = output_error(self._path, error)
             raise OutputError(told.place, "", told.found, f"{told.expected}; {kept}") from error
 
     def discard(self, close_hdf5: Callable[[], object]) -> None:
@@ -89,7 +89,7 @@ class PartFile(io.RawIOBase):
         with suppress(OSError, RuntimeError):
             close_hdf5()
         with suppress(OSError):
-            part_of(self._path).unlink(missing_ok=True)
+            part_path(self._path).unlink(missing_ok=True)
         self.close()
 
     def close(self) -> None:
@@ -138,7 +138,7 @@ class PartFile(io.RawIOBase):
 
     def _raise_failure(self) -> None:
         if self._failure is not None:
-            raise failure(self._path, self._failure) from self._failure
+            raise output_error(self._path, self._failure) from self._failure
 
     def _shield(self) -> dict[int, _Handler]:
         """Keep interrupts and termination out of the steps; what handled them before, where they can strike."""

@@ -17,9 +17,9 @@ import numpy as np
 from stseg import __version__
 from stseg.arrays import Ints, Rows
 from stseg.errors import SourceError
-from stseg.io.recording.recording import Recording, Source, without_passwords
+from stseg.io.recording.recording import Recording, Source, mask_passwords
 from stseg.io.recording.rig_text import format_rig
-from stseg.io.recording.source_files import files_of
+from stseg.io.recording.source_files import source_files
 
 _PACKAGES = ("numpy", "scipy", "numba", "h5py", "opencv-python-headless", "PyMaxflow")
 _TEXT = h5py.string_dtype()
@@ -72,7 +72,7 @@ def gather_provenance(recording: Recording, config_text: str) -> Provenance:
     return Provenance(
         datetime.now(UTC).isoformat(timespec="seconds"),
         config_text,
-        without_passwords(format_rig(recording, recording.path)),
+        mask_passwords(format_rig(recording, recording.path)),
         path,
         _versions(),
         _sources(recording),
@@ -112,7 +112,7 @@ def read_provenance(group: h5py.Group) -> Provenance:
     )
 
 
-def as_tables(provenance: Provenance) -> dict[str, Any]:
+def run_request(provenance: Provenance) -> dict[str, Any]:
     """All that decides what a run finds, as texts and numbers in nested tables; when it began is left out."""
     rig = tomllib.loads(provenance.rig)
     rig["camera"] = {camera.pop("name"): camera for camera in rig["camera"]}
@@ -156,9 +156,9 @@ def _sources(recording: Recording) -> Rows:
 def _described(source: Source) -> tuple[bytes, str, int, int, float]:
     """kind, path, files, size, modified. Whether a stream can be read is not for here to say."""
     try:
-        states = [path.stat() for path in files_of(source)] if not source.address else []
+        states = [path.stat() for path in source_files(source)] if not source.address else []
     except (OSError, SourceError):
         states = []
     modified = max((state.st_mtime for state in states), default=np.nan)
-    path = without_passwords(source.address) or str(source.path)
+    path = mask_passwords(source.address) or str(source.path)
     return source.kind.encode(), path, len(states), sum(state.st_size for state in states), modified

@@ -14,9 +14,9 @@ import numpy as np
 
 from stseg.arrays import Bytes, Floats, Ints, Labels, Rows, Singles
 from stseg.errors import FormatError
-from stseg.io.recording.clock import placed
 from stseg.io.recording.recording import Recording
 from stseg.io.recording.rigs import parse_rig
+from stseg.io.recording.time_alignment import with_alignment
 from stseg.io.runfile import layout
 from stseg.io.runfile.data_frames import to_data_frame
 from stseg.io.runfile.provenance import Provenance, read_provenance
@@ -115,7 +115,7 @@ class Run:
     def recording(self) -> Recording:
         """The rig, with its grid, and the streams, as they were when the run began."""
         told = self.provenance
-        return placed(parse_rig(told.rig, told.rig_path), [told.shown.get(name) for name in self.cameras])
+        return with_alignment(parse_rig(told.rig, told.rig_path), [told.shown.get(name) for name in self.cameras])
 
     def data_frame(self, table: str) -> DataFrame:
         """One of the tables as a data frame of pandas, with `time` in seconds where it has frames.

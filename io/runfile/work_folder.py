@@ -26,7 +26,7 @@ from zipfile import BadZipFile
 import numpy as np
 
 from stseg.errors import OutputError
-from stseg.io.outputs.whole_files import failure, replacing, sync_folder
+from stseg.io.outputs.whole_files import output_error, replacing, sync_folder
 from stseg.io.recording.stream_index import StreamIndex
 from stseg.io.runfile.locks import lock
 
@@ -80,7 +80,7 @@ class WorkFolder:
             lock(self._lock)
         except OSError as error:
             self.close()
-            raise failure(self.output, error) from error
+            raise output_error(self.output, error) from error
         try:
             self._begin()
         except BaseException:

@@ -24,7 +24,7 @@ from stseg.engine.backgrounds import make_foregrounds
 from stseg.errors import ConfigError
 from stseg.geometry import Rig
 from stseg.io.config_file import read_config
-from stseg.io.outputs.pages import make_folder, write_file, write_page
+from stseg.io.outputs.output_files import make_folder, write_file, write_page
 from stseg.io.outputs.whole_files import require_new
 from stseg.io.recording.frames import open_frames
 from stseg.io.recording.recording import Recording

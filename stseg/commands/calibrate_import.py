@@ -13,13 +13,13 @@ from stseg.commands.calibrate_scene import SceneOptions, StreamOptions, size_of,
 from stseg.errors import CalibrationError, ConfigError
 from stseg.geometry import Camera, Rig
 from stseg.geometry.handedness import is_mirrored
-from stseg.io.calibrations.foreign import Foreign, Reader
+from stseg.io.calibrations.foreign_camera import ForeignCamera, Reader
 from stseg.io.calibrations.opencv_xml import read_opencv_xml
 from stseg.io.calibrations.pom import read_pom
 from stseg.io.calibrations.projection import read_projection
 from stseg.io.calibrations.structured import read_kalibr_yaml, read_krt_json, read_nvidia_json, read_pose_toml
 from stseg.io.calibrations.tsai import read_tsai_xml
-from stseg.io.calibrations.world import UNITS, Up, World, guess_unit, guess_up, require_height
+from stseg.io.calibrations.world_frame import UNITS, Up, World, guess_unit, guess_up, require_height
 from stseg.io.outputs.whole_files import require_new
 from stseg.io.recording.recording import Recording
 from stseg.io.recording.rigs import write_rig
@@ -126,7 +126,7 @@ def import_calibration(
 
 def _read(
     format: Format, files: Sequence[str], size: tuple[int, int] | None, unit: str | None, head: float
-) -> list[Foreign]:
+) -> list[ForeignCamera]:
     """The cameras, as their calibrations have them."""
     if not files:
         raise ConfigError("calibrate import", "FILE", "nothing", "one calibration a camera")
@@ -140,7 +140,7 @@ def _read(
     return [camera for group in groups for camera in read_pom(group, size, head / World(unit).metres)]
 
 
-def _named(cameras: Sequence[Foreign], files: Sequence[str], given: str | None) -> list[Foreign]:
+def _named(cameras: Sequence[ForeignCamera], files: Sequence[str], given: str | None) -> list[ForeignCamera]:
     if given is not None:
         names = words("--names", given, len(cameras))
     elif all(camera.name for camera in cameras):
@@ -160,14 +160,14 @@ def _file_names(files: Sequence[Path]) -> list[str]:
     raise ConfigError("--names", "", "files and folders that share their names", "a name for each camera")
 
 
-def _world(cameras: Sequence[Foreign], unit: str | None, up: Up | None, mirrored: bool) -> World:
+def _world(cameras: Sequence[ForeignCamera], unit: str | None, up: Up | None, mirrored: bool) -> World:
     upward = up or guess_up(cameras)
     world = World(unit or guess_unit(cameras, upward, mirrored), upward, mirrored)
     require_height(cameras, world)
     return world
 
 
-def _size(camera: Foreign, shared: tuple[int, int] | None) -> tuple[int, int]:
+def _size(camera: ForeignCamera, shared: tuple[int, int] | None) -> tuple[int, int]:
     if camera.size is None and shared is None:
         raise ConfigError("--size", "", "nothing", f"width,height of the images: {camera.file} does not say it")
     if camera.size is not None and shared is not None and camera.size != shared:
@@ -176,7 +176,7 @@ def _size(camera: Foreign, shared: tuple[int, int] | None) -> tuple[int, int]:
     return camera.size or shared or (0, 0)
 
 
-def _require_front(foreign: Sequence[Foreign], rig: Rig, world: World) -> None:
+def _require_front(foreign: Sequence[ForeignCamera], rig: Rig, world: World) -> None:
     """Name a mirrored world, in which the cameras that look at the area have it behind them."""
     if all(is_mirrored(camera, rig.grid) for camera in rig.cameras):
         found = "a mirrored world, in which the area lies behind every camera"

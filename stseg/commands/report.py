@@ -14,8 +14,8 @@ from stseg.arrays import Observation, Rows
 from stseg.commands.report_contents import page_contents
 from stseg.commands.report_film import film
 from stseg.errors import ConfigError
-from stseg.io.outputs.films import require_film_name
-from stseg.io.outputs.pages import make_folder, write_file, write_page
+from stseg.io.outputs.output_files import make_folder, write_file, write_page
+from stseg.io.outputs.video_writer import require_film_name
 from stseg.io.outputs.whole_files import require_new
 from stseg.io.recording.frames import open_frames
 from stseg.io.recording.recording import Recording

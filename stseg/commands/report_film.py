@@ -11,7 +11,7 @@ from rich.progress import track
 
 from stseg.arrays import Bytes, Ints
 from stseg.commands.run_frames import frames_of_run
-from stseg.io.outputs.films import write_film
+from stseg.io.outputs.video_writer import write_film
 from stseg.io.recording.frames import open_frames
 from stseg.io.runfile.runs import Run
 from stseg.report.film import Film

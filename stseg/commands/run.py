@@ -24,13 +24,13 @@ from stseg.engine.warnings import rig_warnings
 from stseg.engine.workers import make_by_workers
 from stseg.errors import ConfigError
 from stseg.io.config_file import format_config, read_config
-from stseg.io.live.live_rig import is_live
+from stseg.io.live.live_frames import is_live
 from stseg.io.outputs.label_images import require_label_folder
 from stseg.io.outputs.whole_files import require_new
 from stseg.io.recording.recording import Recording
 from stseg.io.recording.rigs import read_rig
 from stseg.io.recording.stream_index import StreamIndex, index_streams
-from stseg.io.runfile.provenance import as_tables, gather_provenance
+from stseg.io.runfile.provenance import gather_provenance, run_request
 from stseg.io.runfile.runs import read_run
 from stseg.io.runfile.work_folder import WorkFolder
 
@@ -98,7 +98,7 @@ def run(
     if labels is not None:
         require_pixels(recording)
         require_label_folder(labels, overwrite)
-    asked = as_tables(gather_provenance(recording, format_config(resolved)))
+    asked = run_request(gather_provenance(recording, format_config(resolved)))
     asked |= {"--frames": frames or "all", "--tracker": tracker, "--volume": volume}
     if follow:
         _require_alone(workers, scheduler, labels)
@@ -163,7 +163,7 @@ def frame_range(text: str | None, streams: StreamIndex, recording: Recording) ->
         Where the text is no part of it.
     """
     if text is None:
-        return streams.shared(recording)
+        return streams.multi_view_range(recording)
     length = streams.length
     head, colon, tail = text.partition(":")
     if not colon or not all(part == "" or part.isdecimal() for part in (head, tail)):

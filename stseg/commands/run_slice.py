@@ -8,7 +8,7 @@ import numpy as np
 
 from stseg.arrays import Floats
 from stseg.errors import ConfigError
-from stseg.io.outputs.pages import write_file
+from stseg.io.outputs.output_files import write_file
 from stseg.io.outputs.whole_files import require_new
 from stseg.io.runfile.runs import Run
 from stseg.report.html import png_bytes

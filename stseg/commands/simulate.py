@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.progress import Progress
 
 from stseg.errors import ConfigError
-from stseg.io.outputs.scenes import write_scene
+from stseg.io.outputs.simulated_scene import write_scene
 from stseg.simulation import NAMED, Film, SceneSpec
 
 

@@ -13,7 +13,7 @@ from stseg.engine.pipeline import Pipeline
 from stseg.engine.segment import Job
 from stseg.engine.segments import Segment
 from stseg.io.config_file import format_config
-from stseg.io.recording.clock import placed
+from stseg.io.recording.time_alignment import with_alignment
 from stseg.io.runfile.runs import Run, RunWriter, read_run
 from stseg.model.tables import Tracks
 from stseg.tracking.stitching import SegmentTracks, Stitcher, rename_labels
@@ -50,7 +50,7 @@ def assemble(job: Job, pipeline: Pipeline, made: Sequence[FinishedSegment], outp
     tracks, identity = pipeline.finished(joined.committed, joined.events, job.recording.rig)
     views: Bytes = pipeline.occupancy.views
     config = format_config(job.config)
-    recording = placed(job.recording, job.streams.shown)
+    recording = with_alignment(job.recording, job.streams.shown)
     with RunWriter(output, recording, views, config, overwrite=overwrite, kept=job.volume) as writer:
         for named in _named(made, joined.committed, joined.local, identity):
             _copy(named, writer)

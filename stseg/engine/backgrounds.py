@@ -158,7 +158,7 @@ def _seeing(recording: Recording, camera: int, part: range, streams: StreamIndex
     if streams is None:
         late = max(0, recording.sources[camera].offset - part.start)
         return range(part.start + late, part.stop + late)
-    frames = np.flatnonzero(streams.seen(recording)[camera])
+    frames = np.flatnonzero(streams.coverage(recording)[camera])
     begin, end = frames.searchsorted([part.start, part.stop]).tolist()
     lacking = len(part) - (end - begin)
     begin = max(0, min(begin - lacking // 2, len(frames) - len(part)))

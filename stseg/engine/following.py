@@ -23,7 +23,7 @@ from stseg.errors import ConfigError, SourceError
 from stseg.io.live.arriving_files import FileNotes
 from stseg.io.live.followed_cameras import FollowedCameras
 from stseg.io.live.followed_files import FollowedFiles
-from stseg.io.live.live_rig import LiveFrameSet, is_live
+from stseg.io.live.live_frames import LiveFrameSet, is_live
 from stseg.io.live.live_table import LiveTable
 from stseg.io.runfile.runs import read_run
 from stseg.io.runfile.work_folder import WorkFolder

@@ -17,7 +17,7 @@ from stseg.engine.backgrounds import BackgroundLearner, empty_background, is_col
 from stseg.foreground.background import Background
 from stseg.foreground.illumination import LightWatch
 from stseg.foreground.view_foreground import ViewForeground
-from stseg.io.live.live_rig import LiveFrameSet
+from stseg.io.live.live_frames import LiveFrameSet
 from stseg.io.recording.recording import Recording
 
 

@@ -22,7 +22,7 @@ from stseg.engine.open_segment import OpenSegment
 from stseg.engine.pipeline import CommittedFrames
 from stseg.engine.segment import Job
 from stseg.engine.segments import Segment
-from stseg.io.live.live_rig import LiveFrameSet, now
+from stseg.io.live.live_frames import LiveFrameSet, now
 from stseg.io.live.live_table import LiveTable
 from stseg.io.runfile.work_folder import WorkFolder
 from stseg.model.tables import TRAJECTORY

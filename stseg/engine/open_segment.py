@@ -14,7 +14,7 @@ from stseg.engine.pipeline import CommittedFrames, Pipeline, Session
 from stseg.engine.segment import Job, write_step
 from stseg.engine.segments import Segment
 from stseg.io.config_file import format_config
-from stseg.io.live.live_rig import LiveFrameSet
+from stseg.io.live.live_frames import LiveFrameSet
 from stseg.io.runfile.runs import RunWriter
 from stseg.io.runfile.work_folder import keep_segment
 from stseg.model.tables import TRACK

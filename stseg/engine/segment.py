@@ -65,7 +65,7 @@ class Job:
     def gaps(self) -> list[tuple[int, int]]:
         """Frames of the run that no camera shows, for longer than anybody is waited for: half-open ranges."""
         longest = longest_absence(self.config.identity) * self.recording.rig.frame_rate
-        return find_gaps(self.streams.seen(self.recording), self.first, self.stop, longest)
+        return find_gaps(self.streams.coverage(self.recording), self.first, self.stop, longest)
 
     def segments(self) -> list[Segment]:
         """What the run is divided into, in the order of time."""

@@ -26,7 +26,7 @@ _REGULAR = 0.5
 
 
 @dataclass(frozen=True)
-class Stamps:
+class TimeStamps:
     """The frames of one camera on its own clock, whose tick 0 is the first frame of its first file.
 
     Attributes
@@ -54,7 +54,9 @@ class Stamps:
         return 1.0 / self.period
 
 
-def read_stamps(times: Sequence[Floats], frame_rate: float, paths: Sequence[Path], starts: Floats) -> Stamps | None:
+def interpret_stamps(
+    times: Sequence[Floats], frame_rate: float, paths: Sequence[Path], starts: Floats
+) -> TimeStamps | None:
     """What the stamps of a camera's files say; None where there are none, or they do not rise, or leap by a day.
 
     AVI states a rate and no times: what decoders make of B-frames and empty chunks in it is no clock.
@@ -80,17 +82,17 @@ def read_stamps(times: Sequence[Floats], frame_rate: float, paths: Sequence[Path
         return None
     steps = np.concatenate([np.diff(own) for own in files])
     if not len(steps):
-        return Stamps(joined(files, 1.0, frame_rate, paths, starts), 1.0, True)
+        return TimeStamps(concatenate_files(files, 1.0, frame_rate, paths, starts), 1.0, True)
     mean = float(steps.mean())
     fuzzy = _RESOLUTION * frame_rate
     steady = all(bool((np.abs(own - mean * np.arange(len(own))) <= fuzzy).all()) for own in files)
     if not steady and any(map(_is_avi, paths)):
         return None
     period = mean if steady else float(np.median(steps))
-    return Stamps(joined(files, period, frame_rate, paths, starts), period, steady)
+    return TimeStamps(concatenate_files(files, period, frame_rate, paths, starts), period, steady)
 
 
-def are_stated(times: Sequence[Floats], paths: Sequence[Path]) -> bool:
+def have_stamps(times: Sequence[Floats], paths: Sequence[Path]) -> bool:
     """Whether a camera's files claim to say when each of their frames was taken."""
     return all(np.isfinite(own).all() for own in times) and not any(map(_is_avi, paths))
 
@@ -99,7 +101,9 @@ def _rises(steps: Floats, leap: float) -> bool:
     return bool(((steps > 0) & (steps < leap)).all())
 
 
-def joined(files: Sequence[Floats], period: float, frame_rate: float, paths: Sequence[Path], starts: Floats) -> Floats:
+def concatenate_files(
+    files: Sequence[Floats], period: float, frame_rate: float, paths: Sequence[Path], starts: Floats
+) -> Floats:
     """The frames of all files on one clock, ticks; those of each file count from its own first.
 
     Where there are no `starts` a file begins one period after the last frame of the one before; exactly as many ticks

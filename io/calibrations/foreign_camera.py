@@ -19,7 +19,7 @@ _ORTHONORMAL = 0.01  # by which printed rotations may miss
 
 
 @dataclass(frozen=True)
-class Foreign:
+class ForeignCamera:
     """A camera in a foreign world.
 
     Attributes
@@ -43,7 +43,7 @@ class Foreign:
     lens: Lens | None = None
 
 
-Reader = Callable[[Sequence[Path]], list[Foreign]]
+Reader = Callable[[Sequence[Path]], list[ForeignCamera]]
 """Reads the files that belong together."""
 
 
@@ -74,7 +74,7 @@ class ForeignTable(Table):
         return int(width), int(height)
 
 
-def of_pose(
+def camera_from_pose(
     file: Path,
     name: str,
     size: tuple[int, int] | None,
@@ -82,13 +82,13 @@ def of_pose(
     rotation: Floats,
     translation: Floats,
     distortion: Floats,
-) -> Foreign:
+) -> ForeignCamera:
     """A camera P = K [R | t], with its lens unless the distortion is zero.
 
     Parameters
     ----------
     file, name, size
-        As in `Foreign`.
+        As in `ForeignCamera`.
     matrix, rotation : float64 (3, 3)
         K, pixels, and R.
     translation : float64 (3,)
@@ -116,4 +116,4 @@ def of_pose(
     projection = matrix @ np.column_stack([rotation, translation])
     kept = distortion[: MOST_DISTORTION if distortion[5:].any() else 5]
     lens = Lens(matrix, kept) if distortion.any() else None
-    return Foreign(file, name, size, projection, lens)
+    return ForeignCamera(file, name, size, projection, lens)

@@ -12,7 +12,7 @@ from scipy.linalg import rq
 from stseg.arrays import Floats
 from stseg.errors import CalibrationError, ConfigError
 from stseg.geometry import Camera
-from stseg.io.calibrations.foreign import Foreign
+from stseg.io.calibrations.foreign_camera import ForeignCamera
 
 Up = Literal["+z", "-z", "+y", "-y", "+x", "-x"]
 UNITS = {"mm": 0.001, "cm": 0.01, "m": 1.0}
@@ -73,7 +73,7 @@ class World:
         matrix[:3, :3] = np.array(_TURNS[self.up]) / self.metres
         return matrix @ np.diag([1.0, -1.0 if self.mirrored else 1.0, 1.0, 1.0])
 
-    def camera(self, foreign: Foreign, name: str, size: tuple[int, int]) -> Camera:
+    def camera(self, foreign: ForeignCamera, name: str, size: tuple[int, int]) -> Camera:
         """The camera in metres with Z up.
 
         The matrix is scaled so that the third coordinate is the depth in metres where it is a calibrated camera's.
@@ -91,7 +91,7 @@ class World:
             raise CalibrationError(foreign.file, "projection matrix", error.found, error.expected) from error
 
 
-def guess_up(cameras: Sequence[Foreign]) -> Up:
+def guess_up(cameras: Sequence[ForeignCamera]) -> Up:
     """The axis that is upwards in most images: people hang cameras upright, or nearly so."""
     upward = np.sum([-_rotation(camera)[1] for camera in cameras], axis=0)
     axis = int(np.abs(upward).argmax())
@@ -99,7 +99,7 @@ def guess_up(cameras: Sequence[Foreign]) -> Up:
     return next(up for up in get_args(Up) if up == name)
 
 
-def guess_unit(cameras: Sequence[Foreign], up: Up, mirrored: bool = False) -> str:
+def guess_unit(cameras: Sequence[ForeignCamera], up: Up, mirrored: bool = False) -> str:
     """The unit in which the cameras hang most nearly as high as cameras do.
 
     Raises
@@ -118,7 +118,7 @@ def guess_unit(cameras: Sequence[Foreign], up: Up, mirrored: bool = False) -> st
     return min(UNITS, key=lambda unit: abs(np.log(height * UNITS[unit] / _HUNG)))
 
 
-def require_height(cameras: Sequence[Foreign], world: World) -> None:
+def require_height(cameras: Sequence[ForeignCamera], world: World) -> None:
     """Refuse a unit in which cameras hang in the clouds or lie on the floor, where another makes sense.
 
     Raises
@@ -138,14 +138,14 @@ def require_height(cameras: Sequence[Foreign], world: World) -> None:
         )
 
 
-def median_height(cameras: Sequence[Foreign], world: World) -> float:
+def median_height(cameras: Sequence[ForeignCamera], world: World) -> float:
     """How high the cameras hang in that world, metres; negative below the ground."""
     to_metres = np.linalg.inv(world.from_metres)
     heights = [float((to_metres @ _centre(camera))[2]) for camera in cameras]
     return float(np.median(heights))
 
 
-def _centre(camera: Foreign) -> Floats:
+def _centre(camera: ForeignCamera) -> Floats:
     """Homogeneous, in the foreign world, float64 (4,)."""
     projection = camera.projection
     try:
@@ -154,7 +154,7 @@ def _centre(camera: Foreign) -> Floats:
         raise CalibrationError(camera.file, "projection matrix", "a singular one", "a camera's") from error
 
 
-def _rotation(camera: Foreign) -> Floats:
+def _rotation(camera: ForeignCamera) -> Floats:
     """R of P ~ K [R | t] with a positive diagonal of K and det R = 1, float64 (3, 3)."""
     triangle, rotation = rq(camera.projection[:, :3])
     rotation = np.sign(np.diag(triangle))[:, None] * rotation

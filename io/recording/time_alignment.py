@@ -5,7 +5,7 @@ shows it in its own frame k - offset. Where its files state times, and these are
 was taken nearest to then; where there is none near, it is blind. What is believed, unless the rig says it (`clock`):
 
 1. Stamps within half a frame of the frames' numbers: there is nothing to decide.
-2. Stamps that vary come from a clock and are believed. (Those of AVI are none, see `stseg.io.recording.stamps`.)
+2. Stamps that vary come from a clock and are believed. (Those of AVI are none, see `stseg.io.recording.time_stamps`.)
 3. Stamps of one constant other rate may come from a header. They are believed where another camera keeps the rig's
    rate, by 1 or 2, but not if this camera then has as many frames as that one: it is the header that is wrong.
 4. All else is counted.
@@ -21,8 +21,8 @@ import numpy as np
 from stseg.arrays import Flags, Floats, Ints
 from stseg.errors import SourceError
 from stseg.io.recording.recording import CameraSource, Recording
-from stseg.io.recording.source_files import parts_of
-from stseg.io.recording.stamps import Stamps, are_stated, joined, read_stamps, require_starts
+from stseg.io.recording.source_files import source_parts
+from stseg.io.recording.time_stamps import TimeStamps, concatenate_files, have_stamps, interpret_stamps, require_starts
 
 _JITTER = 0.5
 """How much farther than the last frame a new one may lie and be shown instead, ticks: else a camera whose frames lie
@@ -34,7 +34,7 @@ _TOGETHER = 1.0
 
 
 @dataclass(frozen=True)
-class Clock:
+class TimeAlignment:
     """Which frame of each camera shows which tick.
 
     Attributes
@@ -56,7 +56,7 @@ class _Files:
     name: str
     source: CameraSource
     states: bool
-    stamps: Stamps | None
+    stamps: TimeStamps | None
     counted: Floats
 
     @property
@@ -70,7 +70,7 @@ class _Files:
         return self.stamps is not None and (self.regular or not self.stamps.steady)
 
 
-def clock_of(recording: Recording, times: Sequence[Sequence[Floats]]) -> Clock:
+def align_in_time(recording: Recording, times: Sequence[Sequence[Floats]]) -> TimeAlignment:
     """Place the frames of all cameras in time.
 
     Parameters
@@ -97,14 +97,14 @@ def clock_of(recording: Recording, times: Sequence[Sequence[Floats]]) -> Clock:
         if note:
             told.setdefault(note, []).append(camera.name)
         if believed is not None:
-            shown.append(nearest(believed.position, believed.period))
+            shown.append(nearest_frames(believed.position, believed.period))
         else:
-            shown.append(nearest(camera.counted, 1.0) if camera.source.source.starts else None)
+            shown.append(nearest_frames(camera.counted, 1.0) if camera.source.source.starts else None)
     notes = tuple(f"{', '.join(names)}: {note}" for note, names in told.items())
-    return Clock(_ended_together(recording, cameras, shown), notes)
+    return TimeAlignment(_ended_together(recording, cameras, shown), notes)
 
 
-def placed(recording: Recording, shown: Sequence[Ints | None]) -> Recording:
+def with_alignment(recording: Recording, shown: Sequence[Ints | None]) -> Recording:
     """The recording with its cameras' frames placed in time; as it was where nothing is said."""
     if not shown:
         return recording
@@ -112,7 +112,7 @@ def placed(recording: Recording, shown: Sequence[Ints | None]) -> Recording:
     return replace(recording, sources=tuple(replace(source, shown=own) for source, own in pairs))
 
 
-def nearest(position: Floats, period: float) -> Ints:
+def nearest_frames(position: Floats, period: float) -> Ints:
     """For each tick the frame that is shown: the nearest, none after a later one, -1 where none is near.
 
     Parameters
@@ -144,7 +144,7 @@ def nearest(position: Floats, period: float) -> Ints:
     return shown
 
 
-def seen(recording: Recording, counts: Sequence[int], length: int) -> Flags:
+def coverage(recording: Recording, counts: Sequence[int], length: int) -> Flags:
     """Which frames of the recording each camera shows, bool (camera, length).
 
     Parameters
@@ -166,14 +166,14 @@ def seen(recording: Recording, counts: Sequence[int], length: int) -> Flags:
 
 
 def _files(name: str, source: CameraSource, times: Sequence[Floats], rate: float) -> _Files:
-    paths = [part.path for part in parts_of(source.source, f"camera {name}")]
+    paths = [part.path for part in source_parts(source.source, f"camera {name}")]
     require_starts(source.source.starts, len(paths), source.source.path, f"camera {name}, source.starts")
     starts = np.array(source.source.starts, float)
-    counted = joined([np.arange(float(len(own))) for own in times], 1.0, rate, paths, starts)
-    return _Files(name, source, are_stated(times, paths), read_stamps(times, rate, paths, starts), counted)
+    counted = concatenate_files([np.arange(float(len(own))) for own in times], 1.0, rate, paths, starts)
+    return _Files(name, source, have_stamps(times, paths), interpret_stamps(times, rate, paths, starts), counted)
 
 
-def _believed(camera: _Files, others: Sequence[_Files], rate: float) -> tuple[Stamps | None, str]:
+def _believed(camera: _Files, others: Sequence[_Files], rate: float) -> tuple[TimeStamps | None, str]:
     """The stamps by which a camera goes, None where its frames are counted, and what is to be told of it."""
     stamps, source = camera.stamps, camera.source
     if source.clock == "count":
@@ -199,7 +199,7 @@ def _believed(camera: _Files, others: Sequence[_Files], rate: float) -> tuple[St
     return stamps, f'{said}; each moment is shown by the frame nearest to it (clock = "count" would count)'
 
 
-def _same_count(camera: _Files, stamps: Stamps, vouching: Sequence[_Files]) -> bool:
+def _same_count(camera: _Files, stamps: TimeStamps, vouching: Sequence[_Files]) -> bool:
     """Whether a camera has as many frames as one that keeps the rig's rate, and by its stamps would not end with it."""
     count, by_time = len(camera.counted), stamps.position[-1] + stamps.period
     ends = [_end(other) for other in vouching]

@@ -16,12 +16,12 @@ from stseg.arrays import Boxes, Bytes, Floats, Ints, Observation
 from stseg.engine.segments import find_gaps
 from stseg.errors import RigError, SourceError
 from stseg.geometry import Camera, Grid, Rig
-from stseg.io.recording.clock import Clock, clock_of, nearest, placed, seen
 from stseg.io.recording.frames import open_frames, read_camera
 from stseg.io.recording.recording import CameraSource, Recording, Source
 from stseg.io.recording.rigs import read_rig, write_rig
-from stseg.io.recording.stamps import joined, read_stamps
 from stseg.io.recording.stream_index import StreamIndex, index_streams
+from stseg.io.recording.time_alignment import TimeAlignment, align_in_time, coverage, nearest_frames, with_alignment
+from stseg.io.recording.time_stamps import concatenate_files, interpret_stamps
 from stseg.io.runfile.provenance import gather_provenance
 from stseg.io.runfile.work_folder import WorkFolder
 
@@ -40,10 +40,10 @@ def video(name: str = "a.mp4", **said: object) -> CameraSource:
     return replace(CameraSource(Source("video", Path(name))), **said)  # type: ignore[arg-type]
 
 
-def decided(*cameras: tuple[CameraSource, Floats]) -> Clock:
+def decided(*cameras: tuple[CameraSource, Floats]) -> TimeAlignment:
     """The clock of cameras of one file each, whose frames state these times, in ticks."""
     times = [[own / RATE * 1000] for _, own in cameras]
-    return clock_of(recording(*[source for source, _ in cameras]), times)
+    return align_in_time(recording(*[source for source, _ in cameras]), times)
 
 
 def every(step: float, frames: int) -> Floats:
@@ -69,7 +69,7 @@ def a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_frames_within_half_a_tick_of_their_numbers_show_them(off: list[float]) -> None:
     position = np.arange(len(off)) + np.array([0.0, *off[1:]])
     position = np.maximum.accumulate(position) + 1e-9 * np.arange(len(off))
-    shown = nearest(position, 1.0)
+    shown = nearest_frames(position, 1.0)
     assert shown[: len(off)].tolist() == list(range(len(shown[: len(off)])))
     assert len(off) - 1 <= len(shown) <= len(off) + 1
 
@@ -78,7 +78,7 @@ def test_frames_within_half_a_tick_of_their_numbers_show_them(off: list[float]) 
 @given(st.lists(st.floats(0.05, 6.0), min_size=1, max_size=60), st.floats(0.2, 4.0))
 def test_what_is_shown_is_near_and_in_order(steps: list[float], period: float) -> None:
     position = np.cumsum([0.0, *steps])
-    shown = nearest(position, period)
+    shown = nearest_frames(position, period)
     ticks = np.flatnonzero(shown >= 0)
     assert (np.diff(shown[ticks]) >= 0).all()
     away = np.abs(position[shown[ticks]] - ticks)
@@ -98,19 +98,19 @@ def test_what_is_shown_is_near_and_in_order(steps: list[float], period: float) -
     ],
 )
 def test_other_rates(step: float, expected: list[int]) -> None:
-    assert nearest(every(step, 40), step)[:6].tolist() == expected
+    assert nearest_frames(every(step, 40), step)[:6].tolist() == expected
 
 
 def test_a_frame_between_two_ticks_is_not_shown_by_turns_twice_and_never() -> None:
     """A late second frame, then frames that are a little early or late, half-way between ticks."""
     off = np.random.default_rng(3).uniform(-0.1, 0.1, 500)
     position = np.append(0.0, np.arange(1, 500) + 0.5 + off[1:])
-    shown = nearest(position, 1.0)
+    shown = nearest_frames(position, 1.0)
     assert shown[:499].tolist() in (list(range(499)), [0, *range(2, 500)])
 
 
 def test_dropped_frames_leave_holes() -> None:
-    assert nearest(np.array([0.0, 1, 2, 5, 6, 8]), 1.0).tolist() == [0, 1, 2, -1, -1, 3, 4, -1, 5]
+    assert nearest_frames(np.array([0.0, 1, 2, 5, 6, 8]), 1.0).tolist() == [0, 1, 2, -1, -1, 3, 4, -1, 5]
 
 
 # What stamps say
@@ -122,21 +122,21 @@ def test_files_join_as_if_they_were_one(rate: float, lengths: list[int]) -> None
     """Stamps in whole milliseconds, at the rig's rate or, for 29.97, that of the standard: no border leaves a trace."""
     true = 30000 / 1001 if rate == 29.97 else rate
     times = [np.round(np.arange(length) / true * 1000) for length in lengths]
-    stamps = read_stamps(times, rate, [Path("x.mkv")] * len(times), NONE)
+    stamps = interpret_stamps(times, rate, [Path("x.mkv")] * len(times), NONE)
     assert stamps is not None
     assert np.abs(stamps.position - np.arange(sum(lengths))).max() < 0.1
 
 
 def test_a_week_of_hours_does_not_drift() -> None:
     times = [np.round(every(1000 / RATE, 3600) + 0.3)] * 168
-    stamps = read_stamps(times, RATE, [Path("x.mkv")] * 168, NONE)
+    stamps = interpret_stamps(times, RATE, [Path("x.mkv")] * 168, NONE)
     assert stamps is not None
     assert stamps.fits(np.arange(3600.0 * 168))
 
 
 def test_another_rate_goes_on_over_borders() -> None:
     times = [every(40.0, 500)] * 3
-    stamps = read_stamps(times, RATE, [Path("x.mkv")] * 3, NONE)
+    stamps = interpret_stamps(times, RATE, [Path("x.mkv")] * 3, NONE)
     assert stamps is not None
     np.testing.assert_allclose(stamps.position, 0.4 * np.arange(1500), atol=1e-6)
     assert stamps.period == pytest.approx(0.4)
@@ -145,14 +145,14 @@ def test_another_rate_goes_on_over_borders() -> None:
 
 @pytest.mark.parametrize("times", [[0.0, 100, 100], [0.0, 100, 0], [np.nan] * 3, [0.0, 0.0, 0.0], [0.0, 100, 1e8]])
 def test_stamps_that_do_not_rise_are_none(times: list[float]) -> None:
-    assert read_stamps([np.array(times)], RATE, [Path("x.mkv")], NONE) is None
+    assert interpret_stamps([np.array(times)], RATE, [Path("x.mkv")], NONE) is None
 
 
 def test_starts_leave_gaps_and_cannot_overlap() -> None:
     files, paths = [every(1.0, 3), every(1.0, 2)], [Path("a"), Path("b")]
-    assert joined(files, 1.0, RATE, paths, np.array([0.0, 0.7])).tolist() == [0, 1, 2, 7, 8]
+    assert concatenate_files(files, 1.0, RATE, paths, np.array([0.0, 0.7])).tolist() == [0, 1, 2, 7, 8]
     with pytest.raises(SourceError, match=r"b: starts: found 0\.200 s, when the file before goes on until 0\.200 s"):
-        joined(files, 1.0, RATE, paths, np.array([0.0, 0.2]))
+        concatenate_files(files, 1.0, RATE, paths, np.array([0.0, 0.2]))
 
 
 # What is believed
@@ -160,7 +160,7 @@ def test_starts_leave_gaps_and_cannot_overlap() -> None:
 
 def test_stamps_at_the_rigs_rate_are_those_of_the_numbers() -> None:
     clock = decided((video(), every(1.0, 60)), (video(), every(1.0, 60) + 0.4 * (np.arange(60) % 2)))
-    assert clock == Clock((None, None), ())
+    assert clock == TimeAlignment((None, None), ())
 
 
 def test_stamps_that_vary_are_believed() -> None:
@@ -200,7 +200,7 @@ def test_clocks_that_drift_apart_are_held_together() -> None:
 
 
 def test_the_rig_may_say_what_is_believed() -> None:
-    assert decided((video(clock="count"), WAVERING)) == Clock((None,), ())
+    assert decided((video(clock="count"), WAVERING)) == TimeAlignment((None,), ())
     clock = decided((video(clock="stamps"), every(0.5, 60)))
     assert clock.shown[0] is not None
     assert clock.shown[0].tolist() == list(range(0, 60, 2))
@@ -212,12 +212,12 @@ def test_the_rig_may_say_what_is_believed() -> None:
 def test_avi_holds_no_times(tmp_path: Path) -> None:
     path = tmp_path / "a.avi"
     write_at_rate(path, [np.zeros((12, 16, 3), np.uint8)] * 3, RATE)
-    assert decided((video(str(path)), WAVERING)) == Clock((None,), ())
+    assert decided((video(str(path)), WAVERING)) == TimeAlignment((None,), ())
 
 
 def test_stamps_that_are_broken_are_told() -> None:
     clock = decided((video(), np.array([0.0, 1, 1, 2])), (video(), np.full(4, np.nan)))
-    assert clock == Clock(
+    assert clock == TimeAlignment(
         (None, None), ("cam1: the time stamps do not rise, or leap by a day; the frames are counted",)
     )
 
@@ -237,7 +237,7 @@ def test_ends_that_nearly_meet_are_made_to(blind: bool) -> None:
 def test_starts_are_one_for_each_file(starts: tuple[float, ...], said: str) -> None:
     source = CameraSource(Source("video", Path("a"), more=(Path("b"),), starts=starts))
     with pytest.raises(SourceError, match=rf"camera cam1, source.starts: found {said}"):
-        clock_of(recording(source), [[every(100.0, 3), every(100.0, 3)]])
+        align_in_time(recording(source), [[every(100.0, 3), every(100.0, 3)]])
 
 
 # Who sees when
@@ -251,7 +251,7 @@ def test_seen_is_what_is_not_blind(cameras: list[tuple[int, int, bool]]) -> None
     for count, offset, timed in cameras:
         shown = np.where(rng.random(count) < 0.7, np.arange(count), -1) if timed else None
         sources.append(video(offset=offset, shown=shown))
-    flags = seen(recording(*sources), [count for count, _, _ in cameras], length)
+    flags = coverage(recording(*sources), [count for count, _, _ in cameras], length)
     for own, source, (count, offset, _) in zip(flags, sources, cameras, strict=True):
         for frame in range(length):
             tick = frame - offset
@@ -306,7 +306,7 @@ def test_frames_are_read_where_they_were_taken(uneven: Recording) -> None:
         with open_frames(uneven, first, min(first + 2, 20), streams) as reader:
             assert [tuple(map(told, moment.views)) for moment in reader] == views[first : first + 2]
     assert [told(view) for view in read_camera(uneven, 1, [4, 6, 13], streams)] == [4, None, 10]
-    assert streams.seen(uneven).sum(axis=1).tolist() == [20, 17, 19]
+    assert streams.coverage(uneven).sum(axis=1).tolist() == [20, 17, 19]
 
 
 def test_cameras_that_do_not_end_together_by_their_stamps_are_told_what_to_do(tmp_path: Path) -> None:
@@ -328,7 +328,7 @@ def test_what_was_found_of_time_is_kept(uneven: Recording, tmp_path: Path) -> No
         assert (again.length, again.notes) == (streams.length, streams.notes)
         for one, other in zip(again.shown, streams.shown, strict=True):
             np.testing.assert_array_equal(none_as_empty(one), none_as_empty(other))
-    assert sorted(gather_provenance(placed(uneven, streams.shown), "").shown) == ["cam2", "cam3"]
+    assert sorted(gather_provenance(with_alignment(uneven, streams.shown), "").shown) == ["cam2", "cam3"]
 
 
 def none_as_empty(shown: Ints | None) -> Ints:
