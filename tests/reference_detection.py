@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
+import cv2
 import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints, Singles
 from stseg.detection.mean_shift import _REACH, _SAME, _STEPS, _STILL
 from stseg.detection.pillar_strips import Pillars
+from stseg.geometry import Camera
+
+_FINE, _BITS, _DISCS, _POINTS = 4, 6, 30, 32
+"""Image cells to a pixel and their fraction bits, discs to a pillar, points to a circle: of `drawn`."""
 
 
 def nearest(edge: float) -> int:
@@ -72,3 +78,17 @@ def mean_shift(weight: Floats, reach: float) -> tuple[Floats, Ints]:
             found.append(place)
         own.append(met[0] if met else len(found) - 1)
     return np.array(found).reshape(-1, 2), np.array(own, np.int64)
+
+
+def drawn(camera: Camera, place: Floats, height: float, width: float, pad: int) -> Floats:
+    """The image of a cylinder: how much of each pixel it covers, float64 (v, u) with a margin all around."""
+    columns, rows = camera.size
+    fine = np.zeros(((rows + 2 * pad) * _FINE, (columns + 2 * pad) * _FINE), np.uint8)
+    angle = np.linspace(0, 2 * np.pi, _POINTS, endpoint=False)
+    circle = place + 0.5 * width * np.column_stack([np.cos(angle), np.sin(angle)])
+    discs = [camera.project(circle, float(z))[0] for z in np.linspace(0.0, height, _DISCS)]
+    for lower, upper in pairwise(discs):
+        corners = np.rint(((np.concatenate([lower, upper]) + pad + 0.5) * _FINE - 0.5) * 2**_BITS).astype(np.int32)
+        cv2.fillConvexPoly(fine, cv2.convexHull(corners), (1,), shift=_BITS)
+    sums = cv2.resize(fine.astype(np.float32), None, fx=1 / _FINE, fy=1 / _FINE, interpolation=cv2.INTER_AREA)
+    return np.asarray(sums, float)

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -23,10 +21,6 @@ from stseg.errors import SourceError
 from stseg.geometry import Camera
 from stseg.geometry.planes import plane_homography
 from stseg.geometry.summed_area import TOP, fill_sums
-
-sys.path.append(str(Path(__file__).parents[1] / "tools"))
-
-import pillar_error
 
 FEW = DetectionConfig(sizes=3, spacing=0.25)
 HEIGHTS = np.array([1.5, 1.7, 1.9])
@@ -120,11 +114,11 @@ def test_strips_cover_what_the_pillar_does(view: str) -> None:
     shares = []
     for i, place in enumerate(places):
         for h, height in enumerate(HEIGHTS):
-            exact = pillar_error.drawn(camera, place, float(height), 0.3, 300)
+            exact = reference.drawn(camera, place, float(height), 0.3, 300)
             strips = reference.region(pillars, i, h, 0.3, 300, (camera.size[1], camera.size[0])).astype(float)
             shares.append(overlap(strips, exact))
     assert np.mean(shares) > floor, shares
-    one_box = [pillar_error.drawn(camera, place, 1.7, 0.3, 300) for place in places]
+    one_box = [reference.drawn(camera, place, 1.7, 0.3, 300) for place in places]
     assert np.mean(shares) > np.mean([overlap(boxed(image), image) for image in one_box])
 
 

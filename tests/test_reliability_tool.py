@@ -13,14 +13,14 @@ from stseg.geometry import Grid
 
 sys.path.append(str(Path(__file__).parents[1] / "tools"))
 
-import reliability
+from experiments import certainty
 
 
 def test_what_is_said_as_it_is_has_no_error() -> None:
     rng = np.random.default_rng(0)
     log_odds = rng.normal(0.0, 2.0, 40_000)
     truth = rng.random(len(log_odds)) < expit(log_odds)
-    calm, loud = reliability.Tally(), reliability.Tally()
+    calm, loud = certainty.Tally(), certainty.Tally()
     calm.add(log_odds, truth)
     loud.add(2 * log_odds, truth)
     assert calm.error() < 0.01
@@ -32,7 +32,7 @@ def test_what_is_said_as_it_is_has_no_error() -> None:
 
 def test_the_error_is_weighed_by_cells() -> None:
     """Three cells said to be at 0.5 of which one is, one surely empty: 3/4 of |0.5 - 1/3|."""
-    tally = reliability.Tally()
+    tally = certainty.Tally()
     tally.add(np.array([0.0, 0.0, 0.0, -40.0]), np.array([True, False, False, False]))
     assert tally.error() == pytest.approx(3 / 4 * (1 / 2 - 1 / 3))
     assert tally.score == pytest.approx(3 * np.log(2))
@@ -42,7 +42,7 @@ def test_the_error_is_weighed_by_cells() -> None:
 def test_cells_that_anybody_covers() -> None:
     grid = Grid((-1.0, 1.0), (-1.0, 1.0), 0.1, 1.8, 10)
     truth = np.array([(0.3, 0.3, 1.5), (-0.4, 0.0, 1.9)], [("x", float), ("y", float), ("height", float)])
-    both = reliability.occupied_cells(grid, truth)
-    apart = [reliability.occupied_cells(grid, truth[k : k + 1]) for k in range(2)]
+    both = certainty.occupied_cells(grid, truth)
+    apart = [certainty.occupied_cells(grid, truth[k : k + 1]) for k in range(2)]
     np.testing.assert_array_equal(both, apart[0] | apart[1])
     assert [cells.any((1, 2)).sum() for cells in apart] == [8, 10]

@@ -20,10 +20,6 @@ from stseg.io.track_csv import POSITION
 
 ROOT = Path(__file__).parents[1]
 DATA = Path(os.environ.get("STSEG_DATA", ROOT / "../shared/data"))
-PAGE = "\n".join(
-    f"before {name}\n<!-- {name}: begin, written by tools/results.py -->\nold\n<!-- {name}: end -->"
-    for name in ("table", "trackers", "peers", "commands")
-)
 
 
 @pytest.fixture
@@ -43,10 +39,10 @@ def rows(*places: tuple[int, int, float, float]) -> np.ndarray[tuple[int], np.dt
     return np.array([(*place, 0) for place in places], POSITION)
 
 
-def figure_row(name: str, way: str, scores: dict[str, Any] | None) -> dict[str, Any]:
+def figure_row(name: str, variant: str, scores: dict[str, Any] | None) -> dict[str, Any]:
     row = {
         "set": name,
-        "way": way,
+        "variant": variant,
         "frames": "0:136",
         "version": "1.2",
         "date": "2030-01-01",
@@ -63,57 +59,50 @@ def some_scores() -> dict[str, Any]:
     return evaluate(truth, rows((0, 5, 0.25, 0.0), (1, 5, 3.0, 0.0))).as_dict()
 
 
-def test_page_is_filled_and_the_text_around_stays(page_tool: ModuleType) -> None:
+def test_page_shows_the_figures(page_tool: ModuleType) -> None:
     figures = {"uu4 cut": figure_row("uu4", "cut", some_scores()), "pom cut": figure_row("pom", "cut", None)}
-    page = page_tool.rewrite(PAGE, figures)
-    assert "old" not in page
-    assert "before peers" in page
+    page = page_tool.page(figures)
     assert "| uu4 | cut | 0.0 | 50.0 | 50.0 | 50.0 |" in page
     assert "| 0.250 | 4.0 | given silhouettes (video of masks); 4 views; frames 0:136; gate 0.5 m;" in page
     assert "| pom | cut | - |" in page
     assert "2.5 people a frame |" in page
     assert "| **stseg, cut** | **0.0** |" in page
     assert "# pom, cut: stseg 1.2, 2030-01-01\npython tools/pom_rig.py" in page
-    assert page_tool.rewrite(page, figures) == page
 
 
-def test_ways_stand_side_by_side(page_tool: ModuleType) -> None:
+def test_variants_stand_side_by_side(page_tool: ModuleType) -> None:
     figures = {
         "easy belief-condensation": figure_row("easy", "belief-condensation", some_scores()),
         "easy kalman": {**figure_row("easy", "kalman", some_scores()), "frames": "0:50"},
     }
-    page = page_tool.rewrite(PAGE, figures)
-    table = page.partition("<!-- trackers: begin")[2].partition("<!-- trackers: end")[0].splitlines()
+    page = page_tool.page(figures)
+    table = page.partition("## Trackers")[2].partition("\n## ")[0].splitlines()[1:]
     assert table[3].startswith("| easy | 0:50 | kalman | 0.0 | 50.0 |")
     assert table[4].startswith("| easy | 0:136 | belief: each view by itself |")
     assert table[4].endswith("| 0.250 | 7 | 20.0 | 250.0 |")
     assert len({line.count("|") for line in table[1:]}) == 1
-    assert "kalman" not in page.partition("<!-- trackers: end")[2]
-
-
-def test_page_without_its_marks_is_refused(page_tool: ModuleType) -> None:
-    with pytest.raises(SystemExit, match="no single part marked 'table'"):
-        page_tool.rewrite("# Results\n", {})
+    assert "kalman" not in page.partition("## Peers")[2]
 
 
 def test_committed_page_says_what_the_figures_say(page_tool: ModuleType) -> None:
     text = (ROOT / "docs" / "results.json").read_text(encoding="utf-8")
-    page = (ROOT / "docs" / "results.md").read_text(encoding="utf-8")
-    assert page_tool.rewrite(page, json.loads(text)) == page
+    page = (ROOT / "docs" / "development" / "measurements.md").read_text(encoding="utf-8")
+    assert page_tool.page(json.loads(text)) == page
 
 
 def test_every_row_of_a_table_has_a_cell_for_every_heading(page_tool: ModuleType) -> None:
-    page = page_tool.rewrite(PAGE, {"cmc1 frames": figure_row("cmc1", "frames", some_scores())})
-    table = page.partition("<!-- table: begin")[2].partition("<!-- table: end")[0]
-    assert len({line.count(" | ") for line in table.splitlines()[1:]}) == 1
+    page = page_tool.page({"cmc1 frames": figure_row("cmc1", "frames", some_scores())})
+    table = page.partition("## Results")[2].partition("\n## ")[0].strip()
+    assert len({line.count(" | ") for line in table.splitlines()}) == 1
 
 
 def test_sets_are_commands_that_exist(tools: Path) -> None:
-    sets, ways = importlib.import_module("result_sets").SETS, importlib.import_module("result_ways").WAYS
-    assert [way.name for way in sets["easy"].ways] == list(ways)
-    assert [way.name for way in sets["dense_boxes"].ways] == ["cut", "frames", "kalman"]
+    sets = importlib.import_module("result_sets").SETS
+    variants = importlib.import_module("result_variants").VARIANTS
+    assert [variant.name for variant in sets["easy"].variants] == list(variants)
+    assert [variant.name for variant in sets["dense_boxes"].variants] == ["cut", "frames", "kalman"]
     for name, one in sets.items():
-        run, score = one.run_command(one.ways[-1]), one.score_command(one.ways[-1])
+        run, score = one.run_command(one.variants[-1]), one.score_command(one.variants[-1])
         film = [] if one.film is None else [one.film]
         for command in [*film, *one.prepare, run, score]:
             program, what, *rest = shlex.split(command)
@@ -130,10 +119,10 @@ def test_unknown_set_is_refused(tools: Path, capsys: pytest.CaptureFixture[str])
     assert "uu5: expected names among uu4," in capsys.readouterr().err
 
 
-def test_unknown_way_is_refused(tools: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_unknown_variant_is_refused(tools: Path, capsys: pytest.CaptureFixture[str]) -> None:
     del tools
     with pytest.raises(SystemExit) as stop:
-        importlib.import_module("results").main(["--sets", "none", "--ways", "kalman,magic"])
+        importlib.import_module("results").main(["--sets", "none", "--variants", "kalman,magic"])
     assert stop.value.code == 2
     assert "magic: expected names among cut, frames, kalman," in capsys.readouterr().err
 

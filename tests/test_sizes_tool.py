@@ -11,7 +11,7 @@ from stseg.model.tables import TRAJECTORY
 
 sys.path.append(str(Path(__file__).parents[1] / "tools"))
 
-import sizes
+from experiments import sizes
 
 TRUTH = np.dtype([("frame", "<f8"), ("id", "<f8"), ("x", "<f8"), ("y", "<f8"), ("height", "<f8")])
 

@@ -9,7 +9,7 @@ from unittest.mock import patch
 
 import numpy as np
 from result_sets import SETS
-from results import Bench
+from workbench import Bench
 
 from stseg.arrays import Floats, Singles
 from stseg.commands.main import main as stseg

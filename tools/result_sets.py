@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from result_ways import WAYS, Way
+from result_variants import VARIANTS, Variant
 
 from stseg.simulation import NAMED
 
@@ -42,7 +42,7 @@ class ResultSet:
     peer_frames
         The part of the frames that peers were measured on, where it is not all of them.
     colour
-        Whether it is followed in the ways, too, that need colour images.
+        Whether it is followed in the variants, too, that need colour images.
     """
 
     name: str
@@ -60,22 +60,22 @@ class ResultSet:
     colour: bool = False
 
     @property
-    def ways(self) -> tuple[Way, ...]:
-        """The ways that can follow here."""
-        return tuple(way for way in WAYS.values() if self.colour or not way.colour)
+    def variants(self) -> tuple[Variant, ...]:
+        """The variants that can follow here."""
+        return tuple(variant for variant in VARIANTS.values() if self.colour or not variant.colour)
 
-    def run_file(self, way: Way) -> str:
+    def run_file(self, variant: Variant) -> str:
         """Where a run goes."""
-        return f"$WORK/{self.name}_{way.name}.h5"
+        return f"$WORK/{self.name}_{variant.name}.h5"
 
-    def run_command(self, way: Way) -> str:
+    def run_command(self, variant: Variant) -> str:
         """The run that the row was measured on."""
-        return f"stseg run {self.rig} -o {self.run_file(way)} --frames {self.frames} {way.options}"
+        return f"stseg run {self.rig} -o {self.run_file(variant)} --frames {self.frames} {variant.options}"
 
-    def score_command(self, way: Way, frames: str | None = None) -> str:
+    def score_command(self, variant: Variant, frames: str | None = None) -> str:
         """How it was scored."""
         options = f" {self.scoring}" if self.scoring else ""
-        return f"stseg evaluate {self.run_file(way)} {self.truth} --frames {frames or self.frames}{options}"
+        return f"stseg evaluate {self.run_file(variant)} {self.truth} --frames {frames or self.frames}{options}"
 
 
 _ROOM = "--size 644,486 --unit mm --up=-z --area=-2.5,-4.5,2.5,1.5"

@@ -1,4 +1,4 @@
-"""How many pixels of people wear the right label, from film to label images: python tools/pixel_accuracy.py [SCENE ...]
+"""Share of pixels of people with the right label, film to label images: python tools/experiment.py pixels [SCENE ...]
 
 Simulated scenes are filmed, tracked by `stseg run` and labelled by `stseg labels`, in colour and from exact masks. The
 tracks are matched to the people one to one for the whole recording and all cameras, by the pixels that they share; so a
@@ -82,7 +82,3 @@ def _command(*arguments: object) -> None:
         status = stseg([str(argument) for argument in arguments])
     if status:
         sys.exit(status)
-
-
-if __name__ == "__main__":
-    main()

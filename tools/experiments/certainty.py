@@ -1,6 +1,6 @@
 """How far the volume's probabilities can be believed: of cells said to be occupied with 0.8, are 80 % occupied?
 
-    python tools/reliability.py SCENE=RIG... [--frames A:B] [-o docs/figures/reliability.svg]
+    python tools/experiment.py certainty SCENE=RIG... [--frames A:B] [-o docs/figures/reliability.svg]
 
 Scenes are those of `stseg simulate`: truth.csv stands beside each rig file. A cell is occupied where the pillar of
 somebody of the truth covers it. Each frame is explained once, by the first guesses and without what tracks foretell,
@@ -152,7 +152,3 @@ def main() -> None:
         show(name, scenes[name])
     if asked.output:
         draw(scenes, asked.output)
-
-
-if __name__ == "__main__":
-    main()

@@ -1,6 +1,6 @@
 """How far a rig is from the true one, whatever world it was made in.
 
-    python tools/auto_rig.py TRUE.toml MADE.toml [-o MOVED.toml] [--keep-scale]
+    python tools/experiment.py rig TRUE.toml MADE.toml [-o MOVED.toml] [--keep-scale]
 
 The made rig is moved by the similarity that brings its ground nearest to the true one (with --keep-scale, by turn and
 shift alone: what a rig with a known distance is worth). Then, for the cells of the true grid that each true camera sees
@@ -101,7 +101,3 @@ def line(row: tuple[Floats, Floats]) -> str:
     ground, head = (100 * one for one in row)
     figures = [np.nanmedian(ground), np.nanpercentile(ground, 95), np.nanmedian(head), np.nanpercentile(head, 95)]
     return "{:18.1f}{:7.1f}{:24.1f}{:7.1f}".format(*figures)
-
-
-if __name__ == "__main__":
-    main()

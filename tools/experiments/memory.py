@@ -1,7 +1,7 @@
 """Memory of `stseg run` over a long recording: a simulated scene of many frames, sampled while it runs.
 
-    python tools/memory.py --frames 100000 --size 48,36 --people 1
-    python tools/memory.py --frames 10000 --rig film/rig.toml
+    python tools/experiment.py memory --frames 100000 --size 48,36 --people 1
+    python tools/experiment.py memory --frames 10000 --rig film/rig.toml
 
 Without --rig, a small scene of two cameras is filmed first. Prints the resident memory while segments are tracked, by
 tenths of that time, while the run file is written from them, and how large the run file is.
@@ -81,7 +81,3 @@ def main() -> None:
     )
     hours = asked.frames / tomllib.loads(rig.read_text("utf-8"))["scene"]["frame_rate"] / 3600
     print(f"run file: {run.stat().st_size / 1e6:.0f} MB, {run.stat().st_size / 1e6 / hours:.0f} MB an hour")
-
-
-if __name__ == "__main__":
-    main()

@@ -1,6 +1,6 @@
 """How far off the heights of tracks are, and how steady heights and widths are along a track.
 
-    python tools/sizes.py RUN.h5 TRUTH.csv [--frames A:B] [--gate 0.5]
+    python tools/experiment.py sizes RUN.h5 TRUTH.csv [--frames A:B] [--gate 0.5]
 
 Each person of the truth is matched, frame by frame, to the nearest track within the gate, one to one. Where the truth
 has a column `height` (that of `stseg simulate` has), errors are found minus true, metres: of every frame by itself, and
@@ -73,7 +73,3 @@ def main() -> None:
             f"height error of frames: mean {every.mean():+.3f}, median absolute {np.median(np.abs(every)):.3f}; "
             f"of people: median absolute {np.median(np.abs(medians)):.3f}"
         )
-
-
-if __name__ == "__main__":
-    main()

@@ -1,0 +1,30 @@
+"""Run one experiment: python tools/experiment.py NAME [options], NAME --help for its options.
+
+ablation    what each stage is worth: threshold, per-frame detection, cut without expansion, cut; on fewer views
+certainty   calibration of stated probabilities: of cells stated as occupied with 0.8, are 80 % occupied?
+memory      resident memory of a long run, and the size of its run file
+pixels      share of pixels of people that carry the right label, from film to label images
+rig         error of a rig against the true one, on the ground and at head height
+sizes       error of heights and widths of tracks, and their spread along a track
+"""
+
+from __future__ import annotations
+
+import importlib
+import sys
+
+EXPERIMENTS = ("ablation", "certainty", "memory", "pixels", "rig", "sizes")
+"""Each is the module `experiments.NAME` with a function `main`, which reads the command line."""
+
+
+def main() -> None:
+    """Run the experiment that the command line names."""
+    if len(sys.argv) < 2 or sys.argv[1] not in EXPERIMENTS:
+        sys.exit(__doc__)
+    name = sys.argv.pop(1)
+    sys.argv[0] = f"experiment.py {name}"
+    importlib.import_module(f"experiments.{name}").main()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""Experiments on recordings with known truth; tools/experiment.py runs them."""

@@ -1,0 +1,53 @@
+"""The variants of following that docs/results.md sets side by side: the trackers, and the ablations of their papers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+__all__ = ["VARIANTS", "Variant"]
+
+
+@dataclass(frozen=True)
+class Variant:
+    """One variant.
+
+    Attributes
+    ----------
+    name
+        In the keys of docs/results.json and in the names of run files.
+    words
+        In the tables.
+    tracker
+        Of `stseg run`.
+    setting
+        The constant by which it differs from that tracker's defaults.
+    colour
+        Whether it needs colour images.
+    """
+
+    name: str
+    words: str
+    tracker: str
+    setting: str = ""
+    colour: bool = False
+
+    @property
+    def options(self) -> str:
+        """Of `stseg run`."""
+        return f"--tracker {self.tracker}" + (f" --set {self.setting}" if self.setting else "")
+
+
+VARIANTS = {
+    variant.name: variant
+    for variant in (
+        Variant("cut", "cut", "cut"),
+        Variant("frames", "frames", "frames"),
+        Variant("kalman", "kalman", "kalman"),
+        Variant("particles", "particles", "particles", colour=True),
+        Variant("particles-search", "particles: search alone", "particles", "particles.way=search", True),
+        Variant("particles-generic", "particles: generic filter", "particles", "particles.way=generic", True),
+        Variant("belief", "belief", "belief", colour=True),
+        Variant("belief-condensation", "belief: each view by itself", "belief", "belief.way=condensation", True),
+    )
+}
+"""In the order of the tables."""

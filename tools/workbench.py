@@ -1,0 +1,57 @@
+"""Where data sets lie and results go, and how the tools run commands there."""
+
+from __future__ import annotations
+
+import shlex
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+_PROGRAMS = {
+    "stseg": [sys.executable, "-c", "import sys; from stseg.commands.main import main; sys.exit(main())"],
+    "python": [sys.executable],
+}
+
+
+@dataclass(frozen=True)
+class Bench:
+    """Folders of data and of work; runs commands written with $DATA and $WORK."""
+
+    data: Path
+    work: Path
+
+    def path(self, text: str) -> Path:
+        """A path written with $DATA or $WORK."""
+        return Path(self._filled(text))
+
+    def do(self, command: str) -> str:
+        """Run a command and return what it printed; stop where it fails."""
+        print(f"$ {command}", flush=True)
+        program, *arguments = shlex.split(command)
+        words = [*_PROGRAMS[program], *(word for argument in arguments for word in self._words(argument))]
+        process = subprocess.run(words, stdout=subprocess.PIPE, text=True, cwd=ROOT, check=False)
+        if process.returncode:
+            sys.exit(f"exit status {process.returncode} of: {command}")
+        return process.stdout
+
+    def _filled(self, text: str) -> str:
+        return text.replace("$DATA", str(self.data)).replace("$WORK", str(self.work))
+
+    def _words(self, argument: str) -> list[str]:
+        """The words that a shell would make of an argument."""
+        filled = self._filled(argument)
+        if "?" not in argument:
+            return [filled]
+        return sorted(str(path) for path in Path("/").glob(filled.lstrip("/"))) or [filled]
+
+
+def commit() -> str:
+    """The commit that is checked out, `+` behind it where files differ from it."""
+    head = _git("rev-parse", "--short", "HEAD")
+    return f"{head}+" if _git("status", "--porcelain", "--untracked-files=no", "--", "stseg", "io") else head
+
+
+def _git(*words: str) -> str:
+    return subprocess.run(["git", *words], cwd=ROOT, stdout=subprocess.PIPE, text=True, check=True).stdout.strip()
