@@ -208,7 +208,7 @@ def left_to_cell(
     step = explanation.raster_step[view]
     visible, total, pixels = 0, 0.0, list(pixels_of(footprint))
     for v, u in pixels:
-        owner = int(explanation.owner[view][v // step, u // step])
+        owner = int(explanation.pixel_assignment[view][v // step, u // step])
         elsewhere = owner >= 0 and owner != near
         if elsewhere and people_away[owner] < away - SHOULDER:
             continue

@@ -10,7 +10,7 @@ import numpy as np
 
 from stseg.arrays import Floats, Ints
 from stseg.graphcut.expansion import LabelEnergy
-from stseg.model.predictions import PredictedPlaces
+from stseg.model.predicted_places import PredictedPlaces
 from stseg.segmentation.unary import BodyShape
 
 

@@ -18,8 +18,8 @@ from stseg.arrays import Boxes, Bytes, Floats, Observation, Rows, Singles
 from stseg.config import Config, GhostConfig
 from stseg.geometry import Camera, Grid, Lens, Rig
 from stseg.geometry.bodies import PROFILE, SILHOUETTE
-from stseg.model.expected import Expected, nobody
 from stseg.model.people import People
+from stseg.model.predicted_tracks import PredictedTracks, no_tracks
 from stseg.model.sizes import Sizes
 from stseg.model.tables import TRAJECTORY
 
@@ -84,11 +84,11 @@ def people(*places: Sequence[float]) -> Floats:
     return np.array([(*place, 1.7)[:3] if len(place) == 2 else place for place in places], float).reshape(-1, 3)
 
 
-def expecting(*places: Sequence[float]) -> Expected:
+def expecting(*places: Sequence[float]) -> PredictedTracks:
     """People seen in the frame before, who are expected at places of x, y (metres) and, where given, of a height."""
     standing, n = people(*places), len(places)
     covariance = np.tile(np.eye(2) * 0.2**2, (n, 1, 1))
-    return Expected(standing[:, :2], covariance, sizes_of(standing[:, 2], 0.05), np.ones(n))
+    return PredictedTracks(standing[:, :2], covariance, sizes_of(standing[:, 2], 0.05), np.ones(n))
 
 
 def sizes_of(height: Floats, spread: float) -> Sizes:
@@ -97,10 +97,10 @@ def sizes_of(height: Floats, spread: float) -> Sizes:
     return Sizes(height, variance, width, variance)
 
 
-def found(standing: Floats, expected: Expected | None = None, evidence: float = 6.0, views: int = 4) -> People:
+def found(standing: Floats, expected: PredictedTracks | None = None, evidence: float = 6.0, views: int = 4) -> People:
     """People as the pass of a frame reports them: in place, wholly visible, and whom of those expected."""
-    n, before = len(standing), expected or nobody()
-    known = before.known(standing[:, :2], standing[:, 2], CONFIG.ghosts) + CONFIG.ghosts.newcomer
+    n, before = len(standing), expected or no_tracks()
+    known = before.track_log_ratio(standing[:, :2], standing[:, 2], CONFIG.ghosts) + CONFIG.ghosts.newcomer
     walker, covariance = np.full(n, -1), np.tile(np.eye(2) * 0.01, (n, 1, 1))
     for j, k in greedy_pairs(known):
         walker[j] = k

@@ -390,7 +390,7 @@ def test_whom_it_expects() -> None:
     expected = tracker.expected(3)
     assert expected is not None
     np.testing.assert_allclose(expected.ground, [[-0.2, 0.2]], atol=0.15)
-    assert expected.odds[0] == 1.0
+    assert expected.existence[0] == 1.0
 
 
 def test_each_view_by_itself_is_worse_where_one_sees_nothing() -> None:

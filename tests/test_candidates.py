@@ -98,10 +98,10 @@ def test_the_volume_of_an_unexplained_frame_is_filled_where_people_stand() -> No
 
 def test_duplicates_are_dropped_in_order() -> None:
     known, other = pool((0.0, 0.0), (1.0, 0.0)), pool((0.1, 0.0), (0.5, 0.5), (0.55, 0.5), (1.0, 0.3))
-    merged = known.and_apart(other, 0.25)
+    merged = known.joined_apart(other, 0.25)
     np.testing.assert_array_equal(merged.ground, [[0.0, 0.0], [1.0, 0.0], [0.5, 0.5], [1.0, 0.3]])
-    assert len(pool().and_apart(known, 0.25)) == 2
-    assert len(pool((0.0, 0.0), (0.05, 0.0)).and_apart(pool(), 0.25)) == 2
+    assert len(pool().joined_apart(known, 0.25)) == 2
+    assert len(pool((0.0, 0.0), (0.05, 0.0)).joined_apart(pool(), 0.25)) == 2
 
 
 @pytest.mark.parametrize("kind", ("boxes", "pixels"))
@@ -119,7 +119,7 @@ def test_who_is_expected_comes_before_who_is_proposed_there() -> None:
     expected = expecting(*STANDING.tolist())
     proposed = pool(*(tuple(place + 0.05) for place in STANDING[:, :2]))
     found = frame_pass.explain(evidence("pixels"), expected, proposed).people
-    assert sorted(found.walker) == [0, 1, 2]
+    assert sorted(found.track_index) == [0, 1, 2]
 
 
 @pytest.mark.parametrize("asked", ("probability", "volume", "both"))

@@ -19,7 +19,7 @@ from stseg.graphcut.cut import minimum_cut
 from stseg.graphcut.energy import QUANTUM, Energy
 from stseg.graphcut.expansion import LabelEnergy, expand
 from stseg.model.blobs import UNASSIGNED
-from stseg.model.predictions import PredictedPlaces
+from stseg.model.predicted_places import PredictedPlaces
 from stseg.segmentation.energy import build_energy, neighbourhood
 from stseg.segmentation.labelling import WindowDetections, WindowLabels, label_cells
 from stseg.segmentation.motion import follow

@@ -19,7 +19,7 @@ from stseg.detection.scoring import walker_score
 from stseg.geometry import Grid, Rig
 from stseg.model.border import Border
 from stseg.model.candidates import Candidates
-from stseg.model.expected import Expected, nobody
+from stseg.model.predicted_tracks import PredictedTracks, no_tracks
 from stseg.model.sizes import Sizes
 
 CONFIG = GhostConfig()
@@ -31,10 +31,10 @@ WALKERS = st.tuples(PLACES, SPREADS, numbers(1.4, 2.0), numbers(0.03, 0.12), num
 CANDIDATES = st.tuples(PLACES, numbers(1.5, 1.9))
 
 
-def expected_of(walkers: list[tuple[tuple[float, float], Floats, float, float, float]]) -> Expected:
+def expected_of(walkers: list[tuple[tuple[float, float], Floats, float, float, float]]) -> PredictedTracks:
     place, covariance, height, sd, odds = zip(*walkers, strict=True)
     sizes = Sizes(np.array(height), np.array(sd) ** 2, np.full(len(sd), 0.42), np.array(sd) ** 2)
-    return Expected(np.array(place), np.array(covariance), sizes, np.array(odds))
+    return PredictedTracks(np.array(place), np.array(covariance), sizes, np.array(odds))
 
 
 @settings(deadline=None)
@@ -46,7 +46,7 @@ def test_what_speaks_for_a_walker_by_hand(
     """The ratio of two stories: this walker, who is there and so tall, or a newcomer, anywhere and anybody."""
     ground = np.array([place for place, _ in candidates]).reshape(-1, 2)
     height = np.array([tall for _, tall in candidates])
-    known = expected_of(walkers).known(ground, height, CONFIG)
+    known = expected_of(walkers).track_log_ratio(ground, height, CONFIG)
     assert known.shape == (len(candidates), len(walkers))
     anywhere = -math.log(2 * math.pi * 0.1**2)  # at the resolution of a frame, which is 0.1 m
     for j, (place, tall) in enumerate(candidates):
@@ -61,7 +61,7 @@ def test_what_speaks_for_a_walker_by_hand(
 def test_a_place_is_told_up_to_a_constant() -> None:
     expected = expecting((0.3, -0.4), (1.0, 1.0))
     points = np.array([[0.3, -0.4], [0.5, -0.4], [0.3, 0.2]])
-    told = expected.place(np.array([1, 0]), points[[[2, 1, 0], [0, 1, 2]]])
+    told = expected.place_log_density(np.array([1, 0]), points[[[2, 1, 0], [0, 1, 2]]])
     for k, walker in enumerate((1, 0)):
         by_hand = [reference.normal_place(p - expected.ground[walker], expected.covariance[walker]) for p in points]
         at_home = reference.normal_place(np.zeros(2), expected.covariance[walker])
@@ -72,17 +72,17 @@ def test_a_wrong_height_never_rules_a_walker_out() -> None:
     """Somebody who sits is still there; but two who stand in one place are told apart."""
     expected = expecting((0.0, 0.0, 1.9))
     height = np.array([1.9, 1.7, 1.5, 1.0])
-    known = expected.known(np.zeros((4, 2)), height, CONFIG)[:, 0]
+    known = expected.track_log_ratio(np.zeros((4, 2)), height, CONFIG)[:, 0]
     assert known[0] > known[1] + 4
     assert known[0] - known.min() < 12
     assert np.isfinite(known).all()
 
 
 def test_nobody_expected() -> None:
-    assert len(nobody()) == 0
-    assert nobody().known(np.zeros((3, 2)), np.full(3, 1.7), CONFIG).shape == (3, 0)
-    assert nobody().known(np.zeros((0, 2)), np.zeros(0), CONFIG).shape == (0, 0)
-    assert expecting((0, 0)).known(np.zeros((0, 2)), np.zeros(0), CONFIG).shape == (0, 1)
+    assert len(no_tracks()) == 0
+    assert no_tracks().track_log_ratio(np.zeros((3, 2)), np.full(3, 1.7), CONFIG).shape == (3, 0)
+    assert no_tracks().track_log_ratio(np.zeros((0, 2)), np.zeros(0), CONFIG).shape == (0, 0)
+    assert expecting((0, 0)).track_log_ratio(np.zeros((0, 2)), np.zeros(0), CONFIG).shape == (0, 1)
 
 
 # Who is whom
@@ -166,7 +166,7 @@ def test_what_no_view_sees_is_no_place_to_be_known() -> None:
 def test_a_newcomer_costs_away_from_the_border() -> None:
     border = Border.of(open_ground(Grid((-3.0, 3.0), (-3.0, 3.0), 0.1, 1.8, 2)))
     places = np.array([[-2.95, 0.0], [-2.45, 0.0], [-1.95, 0.0], [0.0, 0.0], [-3.5, 0.0]])
-    later = Prior.of(nobody(), CONFIG, border)
+    later = Prior.of(no_tracks(), CONFIG, border)
     share = np.array([0.05, 0.55, 1.0, 1.0, 0.0])
     np.testing.assert_allclose(later.newcomer(places), share * CONFIG.newcomer, atol=1e-6)
     np.testing.assert_array_equal(Prior.of(None, CONFIG, border).newcomer(places), 0.0)
@@ -185,7 +185,7 @@ def test_those_expected_are_candidates_as_tall_as_they_are() -> None:
     pool = prior.pool()
     np.testing.assert_array_equal(pool.ground, [[0.1, 0.2], [0.4, 0.5]])
     np.testing.assert_array_equal(pool.height, [1.3, 1.74])
-    assert prior.known(pool).shape == (2, 2)
-    assert prior.known(Candidates(np.zeros((0, 2)), np.zeros(0), np.zeros(0))).shape == (0, 2)
+    assert prior.track_log_ratio(pool).shape == (2, 2)
+    assert prior.track_log_ratio(Candidates(np.zeros((0, 2)), np.zeros(0), np.zeros(0))).shape == (0, 2)
     tall = [reference.normal(h - CONFIG.height_mean, CONFIG.height_spread**2) for h in (1.5, CONFIG.height_mean)]
     np.testing.assert_allclose(np.diff(prior.tall(np.array([1.5, CONFIG.height_mean]))), np.diff(tall))

@@ -38,9 +38,9 @@ from stseg.geometry import Camera, Rig
 from stseg.geometry.bodies import BodyTable
 from stseg.model.box_fit import TOLERANCE, fill_best_match, fill_cover, fill_inside, fill_match, half_square
 from stseg.model.box_noise import FIRST
-from stseg.model.expected import nobody
 from stseg.model.outlines import outlines, sums_inside
 from stseg.model.people import Explanation, ViewEvidence
+from stseg.model.predicted_tracks import no_tracks
 
 WIDTH, HEIGHT = 128.0, 96.0
 KINDS = ("pixels", "boxes")
@@ -404,8 +404,8 @@ def test_two_people_apart(kind: str) -> None:
     found = explanation.people
     np.testing.assert_allclose(found.height[who], standing[:, 2], atol=0.11)
     assert (found.evidence > 5).all()
-    assert (found.parts > 0.5).all()
-    assert found.parts.shape == found.visible.shape == (4, 2)
+    assert (found.view_evidence > 0.5).all()
+    assert found.view_evidence.shape == found.visibility.shape == (4, 2)
     spread = np.linalg.eigvalsh(found.covariance)
     assert ((spread > 0) & (spread < 0.15**2)).all()
     assert (explanation.ghosts.evidence < 0).all()
@@ -420,11 +420,11 @@ def test_who_explains_what(kind: str) -> None:
     points = body_points(np.array([-0.7, -0.7, 1.5]))
     pixel, _ = rig.cameras[0].project(points[::20, :2], points[::20, 2])
     u, v = np.rint(pixel / explanation.raster_step[0]).astype(int).T
-    owner = explanation.owner[0][v, u]
+    owner = explanation.pixel_assignment[0][v, u]
     assert (owner == near).mean() > 0.8
     assert not (owner == far).any()
-    assert set(np.unique(explanation.owner[2]).tolist()) == {-1, 0, 1}
-    for owners in explanation.box_owner:
+    assert set(np.unique(explanation.pixel_assignment[2]).tolist()) == {-1, 0, 1}
+    for owners in explanation.box_assignment:
         assert sorted(owners.tolist()) == ([near, far] if near < far else [far, near]) * (kind == "boxes")
 
 
@@ -438,9 +438,9 @@ def test_one_behind_the_other_in_a_view(kind: str) -> None:
     explanation = pass_of(kind).explain(seen, None)
     near, far = assert_found(explanation, standing)
     if kind == "boxes":
-        assert explanation.box_owner[0].tolist() == [near]
-        assert explanation.people.visible[0, far] < 0.3 < 0.9 < explanation.people.visible[0, near]
-        assert explanation.people.parts[0, far] > -1.0  # a box that nobody expects is not missed
+        assert explanation.box_assignment[0].tolist() == [near]
+        assert explanation.people.visibility[0, far] < 0.3 < 0.9 < explanation.people.visibility[0, near]
+        assert explanation.people.view_evidence[0, far] > -1.0  # a box that nobody expects is not missed
 
 
 def crossing(kind: str) -> tuple[Rig, Detector]:
@@ -464,7 +464,7 @@ def test_crossing_lines_of_sight_are_ghosts(kind: str) -> None:
         away = np.hypot(*np.moveaxis(crossings[:, None] - ghosts.ground, -1, 0)).min(1)
         assert (away < 0.6).all(), ghosts.ground
     assert (ghosts.evidence < 0).all()
-    assert ghosts.parts.shape == (2, len(ghosts))
+    assert ghosts.view_evidence.shape == (2, len(ghosts))
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -486,13 +486,13 @@ def test_an_empty_frame_holds_nobody(kind: str) -> None:
     explanation = pass_of(kind).explain(seen, None)
     assert len(explanation.people) == 0
     assert len(explanation.ghosts) == 0
-    assert all((owner == -1).all() for owner in explanation.owner)
+    assert all((owner == -1).all() for owner in explanation.pixel_assignment)
     # Whoever was there a moment ago is not there now.
     explanation = pass_of(kind).explain(seen, expecting((0.2, 0.4)))
     assert len(explanation.people) == 0
     assert len(explanation.ghosts) == 1
     assert explanation.ghosts.evidence[0] < 0
-    assert explanation.people.parts.shape == (4, 0)
+    assert explanation.people.view_evidence.shape == (4, 0)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -505,7 +505,8 @@ def test_a_track_proposes_and_the_frame_decides(kind: str) -> None:
 
 def only(explanation: Explanation) -> tuple[float, float, int]:
     """Evidence, prior and walker of the one person found."""
-    (evidence,), (prior,), (walker,) = (getattr(explanation.people, k) for k in ("evidence", "prior", "walker"))
+    names = ("evidence", "prior", "track_index")
+    (evidence,), (prior,), (walker,) = (getattr(explanation.people, name) for name in names)
     return float(evidence), float(prior), int(walker)
 
 
@@ -515,7 +516,7 @@ def test_a_newcomer_costs_inside_and_at_the_border_not(kind: str) -> None:
     newcomer = FEW_HEIGHTS.newcomer
     for place, cost in (((0.05, -0.04), newcomer), ((-1.9, 0.1), newcomer * 0.125)):  # half a cell from the edge
         seen = show(kind, room().cameras, people(place))
-        first, later = pass_of(kind).explain(seen, None), pass_of(kind).explain(seen, nobody())
+        first, later = pass_of(kind).explain(seen, None), pass_of(kind).explain(seen, no_tracks())
         assert_found(first, people(place))
         np.testing.assert_array_equal(first.people.ground, later.people.ground)
         assert only(first)[0] - only(later)[0] == pytest.approx(cost, abs=1e-6)
@@ -539,7 +540,7 @@ def test_who_is_expected_is_whom_the_frame_finds(kind: str) -> None:
     expected = expecting((0.05, 0.05, 1.6), (0.0, 0.05, 1.8))
     explanation = pass_of(kind).explain(show(kind, room().cameras, standing), expected)
     who = assert_found(explanation, standing)
-    assert explanation.people.walker[who].tolist() == [1, 0, -1]
+    assert explanation.people.track_index[who].tolist() == [1, 0, -1]
     # More speaks for whoever is known than for any stranger, and less for a stranger inside.
     first, second, stranger = explanation.people.prior[who]
     assert min(first, second) > FEW_HEIGHTS.person > stranger + 3
@@ -556,8 +557,8 @@ def test_somebody_expected_stays_though_one_view_alone_shows_them() -> None:
     known = [tuple(person) for person in nearer]
     explanation = pass_of("boxes").explain(seen, expecting((0.03, -0.02, 1.6), *known))
     who = assert_found(explanation, everybody)
-    assert explanation.people.walker[who].tolist() == [0, 1, 2, 3]
-    assert (explanation.people.visible[:, who[0]] < [0.5, 0.5, 0.5, 1.1]).all()
+    assert explanation.people.track_index[who].tolist() == [0, 1, 2, 3]
+    assert (explanation.people.visibility[:, who[0]] < [0.5, 0.5, 0.5, 1.1]).all()
     assert_found(pass_of("boxes").explain(seen, expecting(*known)), nearer)
 
 
@@ -570,11 +571,11 @@ def test_a_blind_view_says_nothing(kind: str) -> None:
     four = pass_of(kind).explain([*seen[:3], None], None)
     np.testing.assert_allclose(four.people.ground, three.people.ground, atol=1e-9)
     np.testing.assert_array_equal(four.people.height, three.people.height)
-    np.testing.assert_allclose(four.people.parts[:3], three.people.parts, atol=1e-9)
-    np.testing.assert_allclose(four.people.parts[3], 0.0, atol=0.02)
+    np.testing.assert_allclose(four.people.view_evidence[:3], three.people.view_evidence, atol=1e-9)
+    np.testing.assert_allclose(four.people.view_evidence[3], 0.0, atol=0.02)
     np.testing.assert_allclose(four.people.evidence, three.people.evidence, atol=0.02)
     if kind == "boxes":
-        assert len(four.box_owner[3]) == 0
+        assert len(four.box_assignment[3]) == 0
 
 
 def test_all_blind() -> None:
@@ -599,7 +600,7 @@ def test_parts_stand_in_the_order_of_the_rig() -> None:
     for silent, kind in enumerate(kinds):
         partly = [*seen]
         partly[silent] = show(kind, cameras[silent : silent + 1], people())[0]
-        parts = frame_pass.explain(partly, None).people.parts[:, 0]
+        parts = frame_pass.explain(partly, None).people.view_evidence[:, 0]
         assert [bool(p < 0) for p in parts] == [k == silent for k in range(4)], (silent, parts)
 
 
@@ -611,7 +612,7 @@ def test_the_same_frame_twice(kind: str) -> None:
     used = pass_of(kind)
     used.explain(show(kind, rig.cameras, second), None)
     again = used.explain(show(kind, rig.cameras, first), None)
-    for name in ("ground", "height", "covariance", "evidence", "parts", "visible", "prior", "walker"):
+    for name in ("ground", "height", "covariance", "evidence", "view_evidence", "visibility", "prior", "track_index"):
         np.testing.assert_array_equal(getattr(fresh.people, name), getattr(again.people, name))
         np.testing.assert_array_equal(getattr(fresh.ghosts, name), getattr(again.ghosts, name))
 
@@ -625,6 +626,6 @@ def test_boxes_of_things_are_nobody() -> None:
     seen[1] = together([boxes(rig.cameras[1], standing), thing])
     explanation = pass_of("boxes").explain(seen, None)
     assert_found(explanation, standing)
-    assert explanation.box_owner[1].tolist() == [0, -1]
+    assert explanation.box_assignment[1].tolist() == [0, -1]
     seen[1] = no_boxes()
     assert_found(pass_of("boxes").explain(seen, None), standing)

@@ -228,9 +228,9 @@ def test_a_blind_view_learns_nothing() -> None:
 def test_people_whom_one_view_alone_asserts_do_not_teach_it() -> None:
     running, (seen, explanation) = occupancy("pixels"), frame("pixels", 0)
     everybody = explanation.people
-    parts = np.zeros_like(everybody.parts)
+    parts = np.zeros_like(everybody.view_evidence)
     parts[0] = everybody.evidence
-    running.follow(seen, replace(explanation, people=replace(everybody, parts=parts)))
+    running.follow(seen, replace(explanation, people=replace(everybody, view_evidence=parts)))
     assert not running.level.seen[0, [MISS, BESIDE]].any()
     assert running.level.seen[1:, [MISS, BESIDE]].all()
 
@@ -239,6 +239,6 @@ def test_a_detector_is_not_blamed_for_the_hidden() -> None:
     running = occupancy("boxes")
     seen, explanation = frame("boxes", 0)
     hidden = np.array([[0.5] * len(explanation.people), *np.ones((3, len(explanation.people)))])
-    running.follow([no_boxes(), *seen[1:]], replace(explanation, people=replace(explanation.people, visible=hidden)))
+    running.follow([no_boxes(), *seen[1:]], replace(explanation, people=replace(explanation.people, visibility=hidden)))
     assert not running.level.seen[0, MISS].any()
     assert running.level.seen[1:, MISS].all()

@@ -315,7 +315,7 @@ def test_a_missing_box_says_less_of_somebody_hidden() -> None:
     rig = rig_of(corner_cameras()[:1])
     occupancy = Occupancy(rig, BOXES[:1], CONFIG, FEW_HEIGHTS)
     explanation = explained(rig, people((0.0, 0.0)))
-    half = replace(explanation.people, visible=np.array([[0.5]]))
+    half = replace(explanation.people, visibility=np.array([[0.5]]))
     whole_says = occupancy.fuse([no_boxes()], explanation)
     half_says = occupancy.fuse([no_boxes()], replace(explanation, people=half))
     near = np.hypot(*np.moveaxis(rig.grid.ground, -1, 0)) <= CONFIG.reach

@@ -15,7 +15,7 @@ from stseg.config import LevelConfig
 from stseg.detection.box_noise_calibration import BoxNoiseCalibration
 from stseg.detection.detector import Detector
 from stseg.model.box_fit import GRAIN, LATE, TOLERANCE, WIDE, half_square
-from stseg.model.box_noise import FIRST, KNOTS, LOOKS, BoxNoise
+from stseg.model.box_noise import EFFECTIVE_OBSERVATIONS, FIRST, KNOTS, BoxNoise
 
 RATE = 5.0
 CONFIG = LevelConfig(memory=1e6, weight=2.0)
@@ -34,18 +34,18 @@ def test_what_is_sharper_says_more(scores: list[float]) -> None:
     tolerance, belief = FIRST.of(score)
     sharper, more = BoxNoise(FIRST.spread / 2).of(score)
     np.testing.assert_allclose(sharper, tolerance / 2)
-    np.testing.assert_allclose(more - belief, 4 * LOOKS * np.log(2))
+    np.testing.assert_allclose(more - belief, 4 * EFFECTIVE_OBSERVATIONS * np.log(2))
 
 
 def test_nothing_seen_is_the_first_guess_and_what_is_seen_is_forgotten() -> None:
     sharpening = BoxNoiseCalibration(RATE, replace(CONFIG, memory=1.0))
-    np.testing.assert_allclose(sharpening.sharpness.spread, FIRST.spread)
+    np.testing.assert_allclose(sharpening.noise.spread, FIRST.spread)
     taught(sharpening, 0.01, 1.0, 20)
-    learned = sharpening.sharpness.spread[-1]
+    learned = sharpening.noise.spread[-1]
     assert (np.delete(learned, WIDE) < np.delete(FIRST.spread[-1], WIDE)).all()
     for _ in range(50):
         sharpening.forget_a_frame()
-    np.testing.assert_allclose(sharpening.sharpness.spread[-1], FIRST.spread[-1], rtol=1e-3)
+    np.testing.assert_allclose(sharpening.noise.spread[-1], FIRST.spread[-1], rtol=1e-3)
 
 
 def taught(sharpening: BoxNoiseCalibration, spread: float, score: float, frames: int) -> None:
@@ -56,7 +56,7 @@ def taught(sharpening: BoxNoiseCalibration, spread: float, score: float, frames:
     for _ in range(frames):
         seen = [shaken(view.table.boxes_of(*standing_of(standing)), spread, score, rng) for view in frame_pass.views]
         explained = frame_pass.explain(seen, None)
-        sharpening.learn(explained, frame_pass.views, frame_pass.sights(seen))
+        sharpening.learn(explained, frame_pass.views, frame_pass.observe(seen))
 
 
 def standing_of(standing: Floats) -> tuple[Floats, Floats]:
@@ -75,7 +75,7 @@ def shaken(bodies: Floats, spread: float, score: float, rng: np.random.Generator
 def test_the_spread_of_boxes_is_found(spread: float) -> None:
     sharpening = BoxNoiseCalibration(RATE, CONFIG)
     taught(sharpening, spread, 1.0, 60)
-    learned, loosest = sharpening.sharpness.spread, np.delete(FIRST.spread[-1], WIDE)
+    learned, loosest = sharpening.noise.spread, np.delete(FIRST.spread[-1], WIDE)
     # An edge counts as half a look, so places are less sure than such independent edges make them, and spreads wider.
     found, true = np.delete(learned[-1], WIDE), np.minimum(spread, loosest)
     assert ((found > 0.8 * true) & (found < 2.2 * true)).all()
@@ -85,7 +85,7 @@ def test_the_spread_of_boxes_is_found(spread: float) -> None:
 def test_the_width_is_not_learned_and_nothing_gets_looser() -> None:
     sharpening = BoxNoiseCalibration(RATE, CONFIG)
     taught(sharpening, 0.1, 1.0, 30)
-    learned = sharpening.sharpness.spread
+    learned = sharpening.noise.spread
     assert (learned <= FIRST.spread).all()
     np.testing.assert_array_equal(learned[:, WIDE], FIRST.spread[:, WIDE])
 
@@ -93,7 +93,7 @@ def test_the_width_is_not_learned_and_nothing_gets_looser() -> None:
 def test_only_knots_beside_a_score_learn_of_it() -> None:
     sharpening = BoxNoiseCalibration(RATE, CONFIG)
     taught(sharpening, 0.02, 0.7, 10)
-    changed = ~np.isclose(sharpening.sharpness.spread, FIRST.spread).all(1)
+    changed = ~np.isclose(sharpening.noise.spread, FIRST.spread).all(1)
     np.testing.assert_array_equal(changed, np.isin(KNOTS, (0.6, 0.8)))
 
 
@@ -109,7 +109,7 @@ def test_a_recording_begun_anew_forgets() -> None:
     standing = people((-0.8, 0.3, 1.7), (0.7, -0.6, 1.7))
     rng = np.random.default_rng(0)
     seen = [shaken(view.table.boxes_of(*standing_of(standing)), 0.02, 1.0, rng) for view in frame_pass.views]
-    frame_pass.follow(seen, None)
-    assert (frame_pass.sharpening.seen > 0).any()
-    frame_pass.forget()
-    np.testing.assert_allclose(frame_pass.sharpening.sharpness.spread, FIRST.spread)
+    frame_pass.explain_next(seen, None)
+    assert (frame_pass.box_noise_calibration.seen > 0).any()
+    frame_pass.reset()
+    np.testing.assert_allclose(frame_pass.box_noise_calibration.noise.spread, FIRST.spread)

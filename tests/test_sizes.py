@@ -60,7 +60,7 @@ def everything(view: PixelView) -> Assignment:
 @given(VALUES)
 def test_the_priors_variance_can_be_taken_out_again(values: tuple[float, float, float, float]) -> None:
     measured, prior = sizes_of(*values[:2]), sizes_of(*values[2:])
-    again = measured.with_prior(prior).told(prior)
+    again = measured.with_prior(prior).as_measurements(prior)
     np.testing.assert_allclose(again.height_variance, measured.height_variance, rtol=1e-4)
     np.testing.assert_allclose(again.width_variance, measured.width_variance, rtol=1e-4)
 
@@ -68,7 +68,7 @@ def test_the_priors_variance_can_be_taken_out_again(values: tuple[float, float, 
 def test_what_says_nothing_leaves_the_prior() -> None:
     prior = sizes_of(1.8, 0.1)
     other = sizes_of(1.6, 0.05)
-    after = prior.told(prior).with_prior(other)
+    after = prior.as_measurements(prior).with_prior(other)
     np.testing.assert_allclose([after.height, after.width], [other.height, other.width], atol=1e-5)
     np.testing.assert_allclose(after.height_variance, other.height_variance, rtol=1e-4)
 
@@ -116,7 +116,7 @@ def test_who_is_hidden_is_like_anybody() -> None:
     view = pixel_view()
     sight = view.observe(likelihoods([view.camera], people((0.3, -0.2, 1.9)))[0])
     nobodys = open_to_one(np.zeros(view.shape, bool))
-    place, width, anybody = at(np.array([[0.3, -0.2]])), np.array([0.42]), Sizes.of_anybody(1, FEW_HEIGHTS)
+    place, width, anybody = at(np.array([[0.3, -0.2]])), np.array([0.42]), Sizes.of_population(1, FEW_HEIGHTS)
     found = measure(place, width, [view], [sight], nobodys, FEW_HEIGHTS)
     np.testing.assert_allclose([found.height, found.width], [anybody.height, anybody.width])
     blind = measure(place, width, [view], [None], nobodys, FEW_HEIGHTS)
@@ -187,7 +187,7 @@ def test_who_is_known_keeps_their_height() -> None:
     expected = replace(expected, sizes=replace(expected.sizes, height_variance=np.full(1, 0.01**2)))
     seen = likelihoods(rig.cameras, standing)
     stranger, known = frame_pass.explain(seen, None).people, frame_pass.explain(seen, expected).people
-    assert known.walker.tolist() == [0]
+    assert known.track_index.tolist() == [0]
     assert known.height[0] > stranger.height[0] + 0.05
     assert known.sizes.height[0] == pytest.approx(stranger.sizes.height[0], abs=0.03)
 

@@ -97,11 +97,11 @@ def test_what_a_frame_tells_of_sizes_is_used_once() -> None:
     """The prior of a frame's posterior, anybody's size, is taken out before the person's own comes in."""
     walkers = TrackFilter(RATE, CONFIG.ghosts, IDENTITY)
     told = found(people((0.0, 0.0, 1.85)))
-    nothing = replace(told, sizes=Sizes.of_anybody(1, CONFIG.ghosts))
+    nothing = replace(told, sizes=Sizes.of_population(1, CONFIG.ghosts))
     walkers.follow(0, told, GHOSTS)
     sure = walkers.walkers[0]
     for frame in range(1, 40):
-        walkers.follow(frame, replace(nothing, walker=np.zeros(1, np.int64)), GHOSTS)
+        walkers.follow(frame, replace(nothing, track_index=np.zeros(1, np.int64)), GHOSTS)
     (walker,) = walkers.walkers
     assert walker.height == pytest.approx(sure.height, abs=1e-3)
     assert walker.height_variance > sure.height_variance
@@ -197,14 +197,14 @@ def test_odds_fall_while_out_of_sight() -> None:
     for frame in range(14, 18):
         expected = walkers.expected(frame)
         assert expected is not None
-        odds.append(float(expected.odds[0]))
+        odds.append(float(expected.existence[0]))
         spread.append(float(np.linalg.det(expected.covariance[0])))
     np.testing.assert_allclose(np.diff(odds), odds[1] - odds[0])
     assert odds[0] > odds[1]
     assert (np.diff(spread) > 0).all()
     just_seen = follow([walk(0, 0, 0.3, 0)], range(10))[1].expected(10)
     assert just_seen is not None
-    assert just_seen.odds[0] == 1.0  # at most: whoever is seen may leave all the same
+    assert just_seen.existence[0] == 1.0  # at most: whoever is seen may leave all the same
 
 
 def test_patience_ends() -> None:
@@ -256,7 +256,7 @@ def test_who_was_almost_believed_is_looked_for_once_more() -> None:
         expected = walkers.expected(1)
         assert expected is not None
         np.testing.assert_array_equal(expected.ground, [[0.5, 0.5]])
-        assert expected.odds[0] < -1.0  # a second look at the same thing is not a second witness
+        assert expected.existence[0] < -1.0  # a second look at the same thing is not a second witness
         assert walkers.issued == 0
         now = found(people((0.52, 0.5)), expected) if found_again else GHOSTS
         assert walkers.follow(1, now, GHOSTS).tolist() == [1] * found_again

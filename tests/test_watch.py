@@ -40,7 +40,7 @@ def told(rig: Rig, kind: str, standing: Floats) -> Floats:
         if kind == "pixels"
         else [boxes(camera, standing) for camera in room().cameras]
     )
-    return Detector(rig, [kind] * 4, FEW_HEIGHTS).explain(seen, None).aside
+    return Detector(rig, [kind] * 4, FEW_HEIGHTS).explain(seen, None).residual
 
 
 @pytest.mark.parametrize("kind", ["pixels", "boxes"])

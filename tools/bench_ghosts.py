@@ -125,10 +125,10 @@ def one_case(kind: str) -> Problem:
     found = frame_pass.explain(views, None)
     sights = [view.observe(shown) for view, shown in zip(frame_pass.views, views, strict=True)]
     state = FrameEvidence(
-        frame_pass.views, sights, Prior.of(None, Config().ghosts, frame_pass.border), frame_pass.terms
+        frame_pass.views, sights, Prior.of(None, Config().ghosts, frame_pass.border), frame_pass.parameters
     )
     people, ghosts = (Candidates(some.ground, some.height, some.width) for some in (found.people, found.ghosts))
-    pool = people.and_(ghosts)
+    pool = people.joined_with(ghosts)
     return MapEstimate(state, pool, np.zeros(0, np.int64)).case
 
 

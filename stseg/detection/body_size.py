@@ -55,7 +55,7 @@ def measure(
     own
         What of the frame is whose.
     """
-    found = Sizes.of_anybody(len(width), config)
+    found = Sizes.of_population(len(width), config)
     told = [
         _Told(view, sight.label_values, owner)
         for view, sight, owner in zip(views, sights, own.pixels, strict=True)

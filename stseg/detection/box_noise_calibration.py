@@ -48,7 +48,7 @@ class BoxNoiseCalibration:
         self.squares, self.seen = np.zeros_like(FIRST.spread), np.zeros(len(KNOTS))
 
     @property
-    def sharpness(self) -> BoxNoise:
+    def noise(self) -> BoxNoise:
         """By all that was seen."""
         weight, first = self.config.weight, FIRST.spread**2
         both = FIRST.spread[:, LATE] + FIRST.spread[:, EARLY]
@@ -70,9 +70,9 @@ class BoxNoiseCalibration:
         """Count one frame."""
         self.forget_a_frame()
         people = explanation.people
-        for k, (view, sight, owner) in enumerate(zip(views, sights, explanation.box_owner, strict=True)):
+        for k, (view, sight, owner) in enumerate(zip(views, sights, explanation.box_assignment, strict=True)):
             if isinstance(view, BoxView) and sight is not None and len(people):
-                trusted = people.evidence - people.parts[k] >= self.config.supported
+                trusted = people.evidence - people.view_evidence[k] >= self.config.supported
                 box = np.flatnonzero((owner >= 0) & trusted[owner] & _whole(sight.edges, view.camera.size))
                 self._count(sight.score[box], _squares(view, people, owner[box], sight.edges[box]))
 

@@ -23,8 +23,8 @@ from stseg.detection.views import BoxView, PixelView, ViewObservation
 from stseg.geometry import Rig
 from stseg.model.border import Border
 from stseg.model.candidates import Candidates
-from stseg.model.expected import Expected
 from stseg.model.people import Explanation, ViewEvidence
+from stseg.model.predicted_tracks import PredictedTracks
 
 
 class Detector:
@@ -45,7 +45,7 @@ class Detector:
     def __init__(self, rig: Rig, kinds: Sequence[str], config: GhostConfig, level: LevelConfig | None = None) -> None:
         self.config = config
         self._rate, self._level = rig.frame_rate, level or LevelConfig()
-        self.forget()
+        self.reset()
         grid = rig.grid
         x = np.arange(grid.x[0] + config.lattice / 2, grid.x[1], config.lattice)
         y = np.arange(grid.y[0] + config.lattice / 2, grid.y[1], config.lattice)
@@ -55,7 +55,7 @@ class Detector:
             BoxView(camera, grid, flat, config) if kind == "boxes" else PixelView(camera, grid, flat, config)
             for camera, kind in zip(rig.cameras, kinds, strict=True)
         ]
-        self.terms = Parameters(
+        self.parameters = Parameters(
             config.person,
             config.apart,
             config.hit,
@@ -68,25 +68,25 @@ class Detector:
         self.border = Border.of(rig)
         self._trades = 0 if "boxes" in kinds else config.trades
 
-    def forget(self) -> None:
+    def reset(self) -> None:
         """Go back to the first guess of how sharp boxes are."""
-        self.sharpening = BoxNoiseCalibration(self._rate, self._level)
+        self.box_noise_calibration = BoxNoiseCalibration(self._rate, self._level)
 
-    def follow(
-        self, seen: Sequence[ViewEvidence], expected: Expected | None, proposed: Candidates | None = None
+    def explain_next(
+        self, seen: Sequence[ViewEvidence], expected: PredictedTracks | None, proposed: Candidates | None = None
     ) -> Explanation:
         """Explain a recording's next frame, from which it is then learned how sharp boxes are."""
         explained = self.explain(seen, expected, proposed)
-        self.sharpening.learn(explained, self.views, self.sights(seen))
+        self.box_noise_calibration.learn(explained, self.views, self.observe(seen))
         return explained
 
-    def sights(self, seen: Sequence[ViewEvidence]) -> list[ViewObservation | None]:
+    def observe(self, seen: Sequence[ViewEvidence]) -> list[ViewObservation | None]:
         """What each view shows, by all that is known of how sharp boxes are; None where it is blind."""
-        sharpness = self.sharpening.sharpness
+        sharpness = self.box_noise_calibration.noise
         return [None if s is None else view.observe(s, sharpness) for view, s in zip(self.views, seen, strict=True)]
 
     def explain(
-        self, seen: Sequence[ViewEvidence], expected: Expected | None, proposed: Candidates | None = None
+        self, seen: Sequence[ViewEvidence], expected: PredictedTracks | None, proposed: Candidates | None = None
     ) -> Explanation:
         """Explain one frame.
 
@@ -99,20 +99,20 @@ class Detector:
         proposed
             Candidates from elsewhere, best first: beside those of the first round's lattice, but for duplicates.
         """
-        sights = self.sights(seen)
+        sights = self.observe(seen)
         prior = Prior.of(expected, self.config, self.border)
         expected_inside = prior.pool()
-        seen_now = FrameEvidence(self.views, sights, prior, self.terms)
+        seen_now = FrameEvidence(self.views, sights, prior, self.parameters)
         frame = MapEstimate(seen_now, expected_inside, np.arange(len(expected_inside)))
         for _ in range(self.config.rounds):
             fresh = self.fresh(frame)
             if proposed is not None:
-                fresh, proposed = fresh.and_apart(proposed, self.config.lattice), None
+                fresh, proposed = fresh.joined_apart(proposed, self.config.lattice), None
             moved = frame.refined().pool
             if not len(fresh) and not len(moved):
                 break
             known = len(frame.pool)
-            frame = MapEstimate(frame.seen, frame.pool.and_(moved).and_(fresh), frame.members)
+            frame = MapEstimate(frame.seen, frame.pool.joined_with(moved).joined_with(fresh), frame.members)
             if (frame.members < known).all():
                 break
         return explanation(_settled(frame, self._trades))
@@ -131,6 +131,6 @@ def _settled(frame: MapEstimate, trades: int) -> MapEstimate:
     """The frame searched from where its people exactly stand, which may show two to be one, then well, by places."""
     exact = frame.refined().pool
     known = len(frame.pool)
-    anew = MapEstimate(frame.seen, frame.pool.and_(exact), np.arange(known, known + len(exact)))
+    anew = MapEstimate(frame.seen, frame.pool.joined_with(exact), np.arange(known, known + len(exact)))
     places = np.concatenate([anew.members, anew.rivals()])
     return MapEstimate(anew.seen, anew.pool.at(places), np.arange(len(anew.members)), ENUMERATED, trades)

@@ -163,5 +163,5 @@ def _case(seen: FrameEvidence, pool: Candidates) -> Problem:
     boxes, pixels = box_evidence(views, sights, pool), pixel_evidence(views, sights, pool)
     owner = np.empty(max(pixels.raster[:1].size, boxes.match.shape[2], len(prior.expected), 1), np.int64)
     parts = np.zeros((len(views), len(pool) + 1))
-    own, newcomer, known = prior.tall(pool.height), prior.newcomer(pool.ground), prior.known(pool)
+    own, newcomer, known = prior.tall(pool.height), prior.newcomer(pool.ground), prior.track_log_ratio(pool)
     return Problem(boxes, pixels, own, newcomer, known, pool.ground, seen.terms, owner, parts)

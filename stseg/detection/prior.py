@@ -10,7 +10,7 @@ from stseg.arrays import Floats, Ints
 from stseg.config import GhostConfig
 from stseg.model.border import Border
 from stseg.model.candidates import Candidates
-from stseg.model.expected import Expected, nobody
+from stseg.model.predicted_tracks import PredictedTracks, no_tracks
 from stseg.model.sizes import Sizes
 
 
@@ -30,16 +30,16 @@ class Prior:
         What a newcomer far from the border costs, nats.
     """
 
-    expected: Expected
+    expected: PredictedTracks
     config: GhostConfig
     border: Border
     cost: float
 
     @classmethod
-    def of(cls, expected: Expected | None, config: GhostConfig, border: Border) -> Prior:
+    def of(cls, expected: PredictedTracks | None, config: GhostConfig, border: Border) -> Prior:
         """The prior of a frame; None expects nobody and takes nobody for a newcomer, as a first frame must."""
         if expected is None:
-            return cls(nobody(), config, border, 0.0)
+            return cls(no_tracks(), config, border, 0.0)
         return cls(expected, config, border, config.newcomer)
 
     def pool(self) -> Candidates:
@@ -56,8 +56,8 @@ class Prior:
 
         `walker` int64 (n,) says whom of those expected each is, -1 for newcomers.
         """
-        before = Sizes.of_anybody(len(walker), self.config)
-        measured, met = sizes.told(before), np.flatnonzero(walker >= 0)
+        before = Sizes.of_population(len(walker), self.config)
+        measured, met = sizes.as_measurements(before), np.flatnonzero(walker >= 0)
         before.put(met, self.expected.sizes.at(walker[met]))
         return measured.with_prior(before)
 
@@ -65,6 +65,6 @@ class Prior:
         """What a newcomer costs at ground points (n, 2), nats, float64 (n,)."""
         return self.cost * self.border.inside(ground, self.config.border)
 
-    def known(self, pool: Candidates) -> Floats:
+    def track_log_ratio(self, pool: Candidates) -> Floats:
         """What speaks for each candidate by being each walker, nats, float64 (n, walker)."""
-        return self.expected.known(pool.ground, pool.height, self.config)
+        return self.expected.track_log_ratio(pool.ground, pool.height, self.config)

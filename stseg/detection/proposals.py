@@ -59,12 +59,12 @@ class Proposals:
         found = self._pool(np.zeros((0, 2)))
         if self.config.candidates in ("volume", "both"):
             volume = self.fuse(seen, empty_explanation(self.rig, seen))
-            found = found.and_apart(
+            found = found.joined_apart(
                 self._pool(volume_modes(volume, self.rig.grid, self.config.kernel).ground), self._apart
             )
         if self.probability is not None:
             own = probability_modes(self.probability, soft_maps(self.probability, seen))
-            found = found.and_apart(self._pool(own.ground), self._apart)
+            found = found.joined_apart(self._pool(own.ground), self._apart)
         return found
 
     @property

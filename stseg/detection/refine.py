@@ -72,7 +72,7 @@ def refine(
         if sight is not None and len(pool):
             score += _patch_score(view, sight, own.box[k], own.pixels[k], patch, tried, pool.width)
     met = np.flatnonzero(walker >= 0)
-    score[met] += prior.expected.place(walker[met], patch[met])[:, None]
+    score[met] += prior.expected.place_log_density(walker[met], patch[met])[:, None]
     return _posterior(score, patch, tried)
 
 

@@ -24,8 +24,8 @@ from stseg.detection.proposals import Proposals
 from stseg.foreground.view_foreground import ViewForeground
 from stseg.geometry import Rig
 from stseg.geometry.bodies import BodyTable
-from stseg.model.expected import Expected
 from stseg.model.people import Explanation, People
+from stseg.model.predicted_tracks import PredictedTracks
 from stseg.model.tables import CANDIDATE, RATES, TIMING, Tracks
 from stseg.occupancy.rate_calibration import RateCalibration
 from stseg.occupancy.volume import Occupancy
@@ -189,7 +189,7 @@ class Session:
         self.pipeline, self.watch = pipeline, Stopwatch()
         self._tracker = pipeline.tracker(pipeline.rig, pipeline.config, first)
         self._explained: dict[int, _Explained] = {}
-        pipeline.frame_pass.forget()
+        pipeline.frame_pass.reset()
         pipeline.occupancy.forget()
 
     def add(self, moment: FrameSet) -> list[CommittedFrames]:
@@ -205,12 +205,14 @@ class Session:
             commits = self._tracker.finish()
         return [_step(commit, self._explained, self.watch) for commit in commits]
 
-    def _scene(self, moment: FrameSet, expected: Expected | None) -> tuple[FusedFrame, FrameObservations, _Explained]:
+    def _scene(
+        self, moment: FrameSet, expected: PredictedTracks | None
+    ) -> tuple[FusedFrame, FrameObservations, _Explained]:
         stages, watch = self.pipeline, self.watch
         with watch.time("foreground"):
             seen = [sight.evidence(view) for sight, view in zip(stages.sights, moment.views, strict=True)]
         with watch.time("ghosts"):
-            explanation = stages.frame_pass.follow(seen, expected, stages.candidates.of(seen))
+            explanation = stages.frame_pass.explain_next(seen, expected, stages.candidates.of(seen))
         rates = _rate_rows(moment.frame, stages.occupancy.level)
         with watch.time("occupancy"):
             log_odds = stages.occupancy.follow(seen, explanation)
@@ -233,10 +235,10 @@ def _step(commit: Commit, explained: dict[int, _Explained], watch: Stopwatch) ->
     rows, parts, aside = [], [], []
     for scene in commit.scenes:
         explanation, rates = explained.pop(scene.frame)
-        aside.append(explanation.aside)
+        aside.append(explanation.residual)
         for status, weighed in ((1, explanation.people), (0, explanation.ghosts)):
             rows.append(_candidate_rows(scene.frame, status, weighed))
-            parts.append(weighed.parts.T)
+            parts.append(weighed.view_evidence.T)
     rates["aside"] = _mean_told(np.array(aside))
     window = int(commit.windows["index"][0]) if len(commit.windows) else commit.scenes[0].frame
     return CommittedFrames(

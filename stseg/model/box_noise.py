@@ -20,7 +20,7 @@ import numpy as np
 from stseg.arrays import Floats
 from stseg.model.box_fit import EARLY, LATE, TOLERANCE
 
-LOOKS = 0.5
+EFFECTIVE_OBSERVATIONS = 0.5
 """How many independent looks at a body one edge of a box is worth: edges err together, and so do views."""
 KNOTS = np.array([0.05, 0.2, 0.4, 0.6, 0.8, 1.0])
 """Scores at which they are known; between them their logarithms are interpolated."""
@@ -37,8 +37,8 @@ class BoxNoise:
         lower, share = knots_of(score)
         logs = np.log(self.spread)
         spread = np.exp(logs[lower] * (1 - share[:, None]) + logs[lower + 1] * share[:, None])
-        tolerance = spread / np.sqrt(LOOKS)
-        return tolerance, LOOKS * np.log(_sides(TOLERANCE) / _sides(tolerance)).sum(-1)
+        tolerance = spread / np.sqrt(EFFECTIVE_OBSERVATIONS)
+        return tolerance, EFFECTIVE_OBSERVATIONS * np.log(_sides(TOLERANCE) / _sides(tolerance)).sum(-1)
 
 
 def knots_of(score: Floats) -> tuple[np.ndarray, Floats]:
@@ -54,5 +54,5 @@ def _sides(spread: Floats) -> Floats:
     return np.concatenate([spread[..., :LATE], foot[..., None]], -1)
 
 
-FIRST = BoxNoise(TOLERANCE * np.sqrt(LOOKS / KNOTS)[:, None])
+FIRST = BoxNoise(TOLERANCE * np.sqrt(EFFECTIVE_OBSERVATIONS / KNOTS)[:, None])
 """Before anything is learned."""

@@ -21,14 +21,14 @@ class Candidates:
     def __len__(self) -> int:
         return len(self.ground)
 
-    def and_(self, other: Candidates) -> Candidates:
+    def joined_with(self, other: Candidates) -> Candidates:
         """This pool's candidates, then the other's."""
         pairs = ((self.ground, other.ground), (self.height, other.height), (self.width, other.width))
         return Candidates(*map(np.concatenate, pairs))
 
-    def and_apart(self, other: Candidates, apart: float) -> Candidates:
+    def joined_apart(self, other: Candidates, apart: float) -> Candidates:
         """This pool's candidates, then those of the other that stand `apart` metres or more from all before them."""
-        every = self.and_(other)
+        every = self.joined_with(other)
         kept = list(range(len(self)))
         for i in range(len(self), len(every)):
             if not (np.hypot(*(every.ground[kept] - every.ground[i]).T) < apart).any():

@@ -30,13 +30,13 @@ class People:
         Square metres.
     evidence : float64 (n,)
         What all views and the prior say, nats.
-    parts : float64 (view, n)
+    view_evidence : float64 (view, n)
         What each view says, nats.
-    visible : float64 (view, n)
+    visibility : float64 (view, n)
         How much of each body a view can see past nearer people, 0..1.
     prior : float64 (n,)
         What of the evidence spoke before any view was asked, nats.
-    walker : int64 (n,)
+    track_index : int64 (n,)
         Whom of those expected each is, -1 for newcomers.
     sizes
         What the frame by itself says of their sizes, anybody's the prior.
@@ -47,10 +47,10 @@ class People:
     width: Floats
     covariance: Floats
     evidence: Floats
-    parts: Floats
-    visible: Floats
+    view_evidence: Floats
+    visibility: Floats
     prior: Floats
-    walker: Ints
+    track_index: Ints
     sizes: Sizes
 
     def __len__(self) -> int:
@@ -67,22 +67,22 @@ class Explanation:
         The true candidates.
     ghosts
         Candidates that were weighed and found to be nobody.
-    owner : tuple of int16 arrays (v, u)
+    pixel_assignment : tuple of int16 arrays (v, u)
         For each view the index of the person whose body is nearest at each raster pixel, -1 for nobody.
     raster_step : tuple of int
-        Image pixels to a raster pixel of `owner`, for each view.
-    box_owner : tuple of int64 arrays (box,)
+        Image pixels to a raster pixel of `pixel_assignment`, for each view.
+    box_assignment : tuple of int64 arrays (box,)
         For each view with boxes the person whom each box shows, -1 for nobody; empty for other views.
-    aside : float64 (view,)
+    residual : float64 (view,)
         How far beside their places each view sees people, metres (see `ghosts.aside`); nan where it tells nothing.
     """
 
     people: People
     ghosts: People
-    owner: tuple[NDArray[np.int16], ...]
+    pixel_assignment: tuple[NDArray[np.int16], ...]
     raster_step: tuple[int, ...]
-    box_owner: tuple[Ints, ...]
-    aside: Floats
+    box_assignment: tuple[Ints, ...]
+    residual: Floats
 
 
 def empty_explanation(rig: Rig, seen: Sequence[ViewEvidence]) -> Explanation:

@@ -21,7 +21,7 @@ class Sizes:
     width_variance: Floats
 
     @classmethod
-    def of_anybody(cls, number: int, config: GhostConfig) -> Sizes:
+    def of_population(cls, number: int, config: GhostConfig) -> Sizes:
         """Before anybody was looked at."""
         height, width = (config.height_mean, config.height_spread), (config.width_mean, config.width_spread)
         return cls(*(np.full(number, value) for mean, spread in (height, width) for value in (mean, spread**2)))
@@ -29,7 +29,7 @@ class Sizes:
     @classmethod
     def of_heights(cls, height: Floats, variance: Floats, config: GhostConfig) -> Sizes:
         """Of heights with variances, metres and square metres, each (n,); as wide as anybody."""
-        anybody = cls.of_anybody(len(height), config)
+        anybody = cls.of_population(len(height), config)
         return cls(height, variance, anybody.width, anybody.width_variance)
 
     def at(self, chosen: Sequence[int] | Ints) -> Sizes:
@@ -42,19 +42,19 @@ class Sizes:
         self.height[chosen], self.height_variance[chosen] = others.height, others.height_variance
         self.width[chosen], self.width_variance[chosen] = others.width, others.width_variance
 
-    def and_(self, others: Sizes) -> Sizes:
+    def joined_with(self, others: Sizes) -> Sizes:
         """These, then others."""
         pairs = ((getattr(self, one.name), getattr(others, one.name)) for one in fields(Sizes))
         return Sizes(*(np.concatenate(pair) for pair in pairs))
 
-    def blurred(self, noise: IdentityConfig) -> Sizes:
+    def with_noise(self, noise: IdentityConfig) -> Sizes:
         """These, one frame's measurements of them off by its noise besides."""
         return Sizes(
             self.height, self.height_variance + noise.height_noise**2,
             self.width, self.width_variance + noise.width_noise**2,
         )  # fmt: skip
 
-    def told(self, prior: Sizes) -> Sizes:
+    def as_measurements(self, prior: Sizes) -> Sizes:
         """These posteriors as measurements: the prior taken out of their variances.
 
         The means still lean to the prior as far as the frame left open what it saw. So do those of all frames of a

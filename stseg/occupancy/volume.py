@@ -105,7 +105,7 @@ class Occupancy:
             share, shared = self._share(i, owners, near)
             if isinstance(view, Boxes):
                 levels = self._levels_of_boxes(i, view, explanation, near, rates)
-                faith = _faith(near, owners.own, explanation.people.visible[i], share.shape)
+                faith = _faith(near, owners.own, explanation.people.visibility[i], share.shape)
             else:
                 levels = self._levels_of_map(i, view, owners, near, share, shared).copy()
                 faith = np.ones_like(share)
@@ -129,8 +129,8 @@ class Occupancy:
         errors, seen = np.zeros((2, len(said), 3))
         for i, (view, rates) in enumerate(zip(said, self.level.rates, strict=True)):
             if view is not None:
-                trusted = people.evidence - people.parts[i] >= self.level.config.supported
-                trusted &= people.visible[i] >= _WHOLE
+                trusted = people.evidence - people.view_evidence[i] >= self.level.config.supported
+                trusted &= people.visibility[i] >= _WHOLE
                 fill_counts(
                     *view, tally.weighted, tally.weights, tally.count, near, inside, trusted,
                     np.array(rates), self.config.looks, self.prior, errors[i], seen[i],
@@ -143,14 +143,14 @@ class Occupancy:
         self.level.learn(errors / units, seen / units, filled)
 
     def _owners(self, i: int, explanation: Explanation) -> PixelAssignment:
-        people, served = explanation.people, explanation.box_owner[i]
+        people, served = explanation.people, explanation.box_assignment[i]
         own = np.zeros(len(people) + 1, bool)
         own[served[served >= 0]] = True
         camera, step = self.rig.cameras[i], explanation.raster_step[i]
         width, height = camera.size
         away = np.hypot(*(people.ground - camera.centre[:2]).T)
         return PixelAssignment(
-            explanation.owner[i], step, np.arange(height) // step, np.arange(width) // step, away, own
+            explanation.pixel_assignment[i], step, np.arange(height) // step, np.arange(width) // step, away, own
         )
 
     def _share(self, i: int, owners: PixelAssignment, near: Ints) -> tuple[Singles, Flags]:
@@ -180,7 +180,7 @@ class Occupancy:
         belief = np.log(view.score.clip(0.05, 1.0))
         fill_match_of_planes(
             self.bodies[i], self.heights, self.height_spread, self.height_mean, explanation.people.height,
-            self.rig.grid.heights, edges, TOLERANCE, belief, explanation.box_owner[i], near, width, height, match,
+            self.rig.grid.heights, edges, TOLERANCE, belief, explanation.box_assignment[i], near, width, height, match,
         )  # fmt: skip
         levels = np.rint(likelihood_of(match, near, rates) * TOP).astype(np.int16)
         levels[self.sampling.footprint[i, ..., 2] == 0] = UNSEEN

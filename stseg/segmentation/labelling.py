@@ -19,7 +19,7 @@ from stseg.graphcut.cell_subset import CellSubset, subset_of
 from stseg.graphcut.energy import Energy
 from stseg.graphcut.expansion import expand
 from stseg.model.blobs import UNASSIGNED
-from stseg.model.predictions import PredictedPlaces
+from stseg.model.predicted_places import PredictedPlaces
 from stseg.segmentation.unary import BodyShape, label_energy, shares
 
 

@@ -24,7 +24,7 @@ from stseg.arrays import Flags, Floats, Ints, Labels
 from stseg.graphcut.cell_subset import CellSubset
 from stseg.graphcut.energy import QUANTUM
 from stseg.graphcut.expansion import LabelEnergy
-from stseg.model.predictions import PredictedPlaces
+from stseg.model.predicted_places import PredictedPlaces
 
 _GATE = 13.8
 """Squared Mahalanobis distance beyond which a cell is not of a body: one of its cells in a thousand."""

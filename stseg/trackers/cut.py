@@ -15,7 +15,7 @@ from stseg.geometry.sampling import Sampling
 from stseg.graphcut.cut import minimum_cut
 from stseg.graphcut.energy import QUANTUM, Energy
 from stseg.model.blobs import Blobs
-from stseg.model.expected import Expected
+from stseg.model.predicted_tracks import PredictedTracks
 from stseg.model.tables import WINDOW
 from stseg.segmentation.blobs import find_blobs
 from stseg.segmentation.energy import build_energy
@@ -72,7 +72,7 @@ class CutTracker:
         self.coming = windows(rig.frame_rate, config.identity, first, _ENDLESS)
         self.window = next(self.coming)
 
-    def expected(self, frame: int) -> Expected | None:
+    def expected(self, frame: int) -> PredictedTracks | None:
         """Whom the frames before lead to expect."""
         return self.walkers.expected(frame)
 

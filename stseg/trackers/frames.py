@@ -8,7 +8,7 @@ import numpy as np
 
 from stseg.config import Config
 from stseg.geometry import Rig
-from stseg.model.expected import Expected
+from stseg.model.predicted_tracks import PredictedTracks
 from stseg.trackers.framewise import EachFrame
 from stseg.trackers.protocol import Commit, FrameObservations, FusedFrame
 from stseg.tracking.track_filter import TrackFilter
@@ -23,7 +23,7 @@ class FrameTracker(EachFrame):
         super().__init__(rig, config, first)
         self.walkers = TrackFilter(rig.frame_rate, config.ghosts, config.identity)
 
-    def expected(self, frame: int) -> Expected | None:
+    def expected(self, frame: int) -> PredictedTracks | None:
         """Whom the frames before lead to expect."""
         return self.walkers.expected(frame)
 

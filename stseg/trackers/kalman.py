@@ -14,7 +14,7 @@ import numpy as np
 from stseg.arrays import Floats, Ints
 from stseg.config import Config
 from stseg.geometry import Rig
-from stseg.model.expected import Expected
+from stseg.model.predicted_tracks import PredictedTracks
 from stseg.model.sizes import Sizes
 from stseg.trackers.framewise import EachFrame
 from stseg.trackers.motion import Filters, begun, carried, corrected, surprise
@@ -31,22 +31,22 @@ class KalmanTracker(EachFrame):
     def __init__(self, rig: Rig, config: Config, first: int) -> None:
         super().__init__(rig, config, first)
         self.filters = begun(np.zeros((0, 2)), np.zeros((0, 2, 2)), config.kalman.pace)
-        self.sizes = Sizes.of_anybody(0, config.ghosts)
+        self.sizes = Sizes.of_population(0, config.ghosts)
         self.issued, self.begun = 0, False
         self.ids: Ints = np.zeros(0, np.int64)
         self.seen: Ints = np.zeros(0, np.int64)
 
-    def expected(self, frame: int) -> Expected | None:
+    def expected(self, frame: int) -> PredictedTracks | None:
         """Everybody who is followed, carried to the frame; None before the first."""
         if not self.begun:
             return None
         seconds, noise = (frame - self.frame) / self.rig.frame_rate, self.config.identity.place_noise**2 * np.eye(2)
         filters = carried(self.filters, seconds, self.config.kalman.turn)
         unseen = (frame - 1 - self.seen) / self.rig.frame_rate
-        return Expected(
+        return PredictedTracks(
             filters.state[:, :2],
             filters.covariance[:, :2, :2] + noise,
-            self.sizes.blurred(self.config.identity),
+            self.sizes.with_noise(self.config.identity),
             STAYING - FORGETTING * unseen,
         )
 
@@ -61,10 +61,10 @@ class KalmanTracker(EachFrame):
         tracks, found = self._assigned(filters, ground, noise, sizes)
         fresh = np.setdiff1d(np.arange(len(ground)), found)
         filters = corrected(filters, tracks, ground[found], noise[found])
-        self.filters = filters.and_(begun(ground[fresh], noise[fresh], config.pace))
+        self.filters = filters.joined_with(begun(ground[fresh], noise[fresh], config.pace))
         self.sizes.put(tracks, sizes.at(found).with_prior(self.sizes.at(tracks)))
-        anybody = Sizes.of_anybody(len(fresh), self.config.ghosts)
-        self.sizes = self.sizes.and_(sizes.at(fresh).with_prior(anybody))
+        anybody = Sizes.of_population(len(fresh), self.config.ghosts)
+        self.sizes = self.sizes.joined_with(sizes.at(fresh).with_prior(anybody))
         newcomers = self.issued + 1 + np.arange(len(fresh))
         self.frame, self.issued, self.begun = scene.frame, self.issued + len(fresh), True
         person = np.full(len(self.ids), -1)
@@ -76,8 +76,8 @@ class KalmanTracker(EachFrame):
 
     def _measured(self, sizes: Sizes) -> Sizes:
         """What a frame adds to what was known of people's sizes."""
-        anybody = Sizes.of_anybody(len(sizes.height), self.config.ghosts)
-        return sizes.told(anybody).blurred(self.config.identity)
+        anybody = Sizes.of_population(len(sizes.height), self.config.ghosts)
+        return sizes.as_measurements(anybody).with_noise(self.config.identity)
 
     def _assigned(self, filters: Filters, ground: Floats, noise: Floats, sizes: Sizes) -> tuple[Ints, Ints]:
         """Filters and people of a frame that are one person's, both int64: the likeliest pairs within the gates."""

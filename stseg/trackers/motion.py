@@ -34,7 +34,7 @@ class Filters(NamedTuple):
         """Some of them, bool (n,)."""
         return Filters(self.state[which], self.covariance[which])
 
-    def and_(self, others: Filters) -> Filters:
+    def joined_with(self, others: Filters) -> Filters:
         """These, then others."""
         return Filters(np.concatenate([self.state, others.state]), np.concatenate([self.covariance, others.covariance]))
 

@@ -9,8 +9,8 @@ from typing import ClassVar, Protocol
 from stseg.arrays import Labels, Observation, Rows, Singles
 from stseg.config import Config
 from stseg.geometry import Rig
-from stseg.model.expected import Expected
 from stseg.model.people import People, ViewEvidence
+from stseg.model.predicted_tracks import PredictedTracks
 
 STAYING, FORGETTING = 1.0, 4.0
 """What trackers without odds of their own expect: log-odds that somebody found in one frame is found in the next, nats,
@@ -98,5 +98,5 @@ class Tracker(Protocol):
     def finish(self) -> list[Commit]:
         """No more frames; what was still open."""
 
-    def expected(self, frame: int) -> Expected | None:
+    def expected(self, frame: int) -> PredictedTracks | None:
         """Whom the frames before lead to expect in a frame; None in the first."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from stseg.arrays import Floats, Ints
 from stseg.config import IdentityConfig
-from stseg.model.predictions import PredictedPlaces
+from stseg.model.predicted_places import PredictedPlaces
 from stseg.tracking.tracklets import Tracklet
 
 _DRIFT = 0.5

@@ -14,8 +14,8 @@ import numpy as np
 
 from stseg.arrays import Floats, Ints
 from stseg.config import GhostConfig, IdentityConfig
-from stseg.model.expected import Expected
 from stseg.model.people import People
+from stseg.model.predicted_tracks import PredictedTracks
 from stseg.model.sizes import Sizes
 from stseg.tracking.assignment import distances
 
@@ -129,12 +129,12 @@ class TrackFilter:
         self.issued = 0
         self.begun = False
 
-    def expected(self, frame: int) -> Expected | None:
+    def expected(self, frame: int) -> PredictedTracks | None:
         """Whom to expect in a frame later than those seen; None before the first."""
         if not self.begun:
             return None
         carried = [self._carried(walker, frame) for walker in self.walkers]
-        return Expected(
+        return PredictedTracks(
             np.array([w.state[:2] for w in carried]).reshape(-1, 2),
             np.array([w.covariance[:2, :2] for w in carried]).reshape(-1, 2, 2) + self._place_noise,
             Sizes(
@@ -158,7 +158,7 @@ class TrackFilter:
         heights, widths = self._measured(people)
         chains, followed = np.zeros(len(people), np.int64), []
         for j in range(len(people)):
-            known = int(people.walker[j])
+            known = int(people.track_index[j])
             before = self._carried(self.walkers[known], frame) if known >= 0 else self._newcomer(frame, people, j)
             odds = (before.odds if known >= 0 else self.ghosts.person) + people.evidence[j] - people.prior[j]
             followed.append(
@@ -171,7 +171,7 @@ class TrackFilter:
                 followed[-1] = replace(followed[-1], chain=self.issued)
             chains[j] = followed[-1].chain
         patience = round(self.config.patience * self.frame_rate)
-        hidden = np.setdiff1d(np.arange(len(self.walkers)), people.walker)
+        hidden = np.setdiff1d(np.arange(len(self.walkers)), people.track_index)
         lost = [self.walkers[k] for k in hidden if self.walkers[k].chain and frame - self.walkers[k].seen <= patience]
         self.walkers = followed + lost
         self.walkers += self._doubtful(frame, ghosts)

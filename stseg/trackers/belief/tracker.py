@@ -10,7 +10,7 @@ from stseg.arrays import Bytes, Floats, Ints
 from stseg.config import Config
 from stseg.geometry import Rig
 from stseg.model.border import Border
-from stseg.model.expected import Expected
+from stseg.model.predicted_tracks import PredictedTracks
 from stseg.model.sizes import Sizes
 from stseg.trackers.belief.condensation import condense
 from stseg.trackers.belief.particles import Motion
@@ -49,7 +49,7 @@ class BeliefTracker(EachFrame):
         self.issued = 0
         self.begun = False
 
-    def expected(self, frame: int) -> Expected | None:
+    def expected(self, frame: int) -> PredictedTracks | None:
         """Whom the frames before lead to expect."""
         del frame
         if not self.begun:
@@ -60,7 +60,7 @@ class BeliefTracker(EachFrame):
             target.star.ground.covariance + p.covariance for target, p in zip(self.targets, foretold, strict=True)
         ]
         missed = np.array([target.missed for target in self.targets]) * self.motion.seconds
-        return Expected(
+        return PredictedTracks(
             np.array([p.mean for p in foretold]).reshape(-1, 2),
             np.array(spread).reshape(-1, 2, 2) + noise * np.eye(2),
             Sizes.of_heights(

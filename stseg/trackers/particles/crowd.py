@@ -59,7 +59,7 @@ class Crowd:
             self.particles[:, which], looks,
         )  # fmt: skip
 
-    def and_(self, others: Crowd) -> Crowd:
+    def joined_with(self, others: Crowd) -> Crowd:
         """These, then others."""
         return Crowd(
             np.append(self.ids, others.ids),

@@ -18,7 +18,7 @@ from stseg.arrays import Floats, Ints
 from stseg.config import Config
 from stseg.geometry import Rig
 from stseg.model.border import Border
-from stseg.model.expected import Expected
+from stseg.model.predicted_tracks import PredictedTracks
 from stseg.model.sizes import Sizes
 from stseg.trackers.colour_views import ColourView, colour_views
 from stseg.trackers.framewise import EachFrame
@@ -58,7 +58,7 @@ class ParticleTracker(EachFrame):
         self.issued, self.begun = 0, False
         self.crowd = Crowd.nobody(1 if config.particles.way == "search" else config.particles.count)
 
-    def expected(self, frame: int) -> Expected | None:
+    def expected(self, frame: int) -> PredictedTracks | None:
         """Everybody who is followed, where the last frame left them; None before the first."""
         if not self.begun:
             return None
@@ -66,7 +66,7 @@ class ParticleTracker(EachFrame):
         drift = config.identity.place_noise**2 + self._step(frame) ** 2
         unseen = (frame - 1 - crowd.seen) / self.rig.frame_rate
         sizes = Sizes.of_heights(crowd.height, np.full(len(crowd), _HEIGHT_NOISE**2), config.ghosts)
-        return Expected(crowd.ground, crowd.covariance + drift * np.eye(2), sizes, STAYING - FORGETTING * unseen)
+        return PredictedTracks(crowd.ground, crowd.covariance + drift * np.eye(2), sizes, STAYING - FORGETTING * unseen)
 
     def add(self, scene: FusedFrame, shown: FrameObservations) -> list[Commit]:
         """The next frame, decided.
@@ -167,7 +167,7 @@ class ParticleTracker(EachFrame):
         places = people.ground[newcomers]
         particles = predicted(np.repeat(places[None], len(self.crowd.particles), 0), _FLOOR, self.rng)
         unknown = (Appearance.unknown(),) * count
-        self.crowd = self.crowd.and_(
+        self.crowd = self.crowd.joined_with(
             Crowd(
                 ids, np.full(count, scene.frame), people.height[newcomers], places, people.covariance[newcomers],
                 particles, unknown,

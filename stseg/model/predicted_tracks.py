@@ -28,7 +28,7 @@ _OUT_OF_SHAPE = -4.0
 
 
 @dataclass(frozen=True)
-class Expected:
+class PredictedTracks:
     """Walkers of earlier frames, carried to the frame.
 
     Attributes
@@ -37,19 +37,19 @@ class Expected:
         Metres, square metres; how far the frame's own place may be off is in it.
     sizes
         Heights and widths, how far the frame's own measurement may be off is in their variances.
-    odds : float64 (n,)
+    existence : float64 (n,)
         Log-odds that the walker is still there, nats.
     """
 
     ground: Floats
     covariance: Floats
     sizes: Sizes
-    odds: Floats
+    existence: Floats
 
     def __len__(self) -> int:
         return len(self.ground)
 
-    def known(self, ground: Floats, height: Floats, config: GhostConfig) -> Floats:
+    def track_log_ratio(self, ground: Floats, height: Floats, config: GhostConfig) -> Floats:
         """What speaks for candidates (n, 2), (n,) by being walkers, nats, float64 (n, walker)."""
         if not len(self):
             return np.zeros((len(ground), 0))
@@ -60,9 +60,9 @@ class Expected:
         anybody = -0.5 * ((height - config.height_mean) / config.height_spread) ** 2
         squares = _squares(ground[:, None] - self.ground, np.linalg.inv(self.covariance))
         shape = np.maximum(tall - anybody[:, None], _OUT_OF_SHAPE)
-        return np.asarray(self.odds - config.person + sharp - 0.5 * squares + shape)
+        return np.asarray(self.existence - config.person + sharp - 0.5 * squares + shape)
 
-    def place(self, walker: Ints, ground: Floats) -> Floats:
+    def place_log_density(self, walker: Ints, ground: Floats) -> Floats:
         """Log-densities of some walkers' places (n,) at points of each (n, point, 2), up to constants, nats."""
         off = ground - self.ground[walker, None]
         return -0.5 * _squares(off, np.linalg.inv(self.covariance[walker])[:, None])
@@ -75,7 +75,7 @@ def _squares(off: Floats, precision: NDArray[np.floating[Any]]) -> Floats:
     return np.asarray(precision[..., 0, 0] * x * x + both * x * y + precision[..., 1, 1] * y * y)
 
 
-def nobody() -> Expected:
+def no_tracks() -> PredictedTracks:
     """Nobody was there before."""
     none = np.zeros(0)
-    return Expected(np.zeros((0, 2)), np.zeros((0, 2, 2)), Sizes(none, none, none, none), none)
+    return PredictedTracks(np.zeros((0, 2)), np.zeros((0, 2, 2)), Sizes(none, none, none, none), none)
