@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from stseg.config import Config
 from stseg.errors import ConfigError
-from stseg.settings import Given, as_toml, build
+from stseg.io.toml.settings import Given, as_toml, build
+from stseg.io.toml.text import parse_toml
 
 _OPTION = "--set"
 
@@ -39,7 +39,7 @@ def read_config(path: Path | None, assignments: Sequence[str] = ()) -> Config:
 def parse_config(text: str, place: str, assignments: Sequence[str] = ()) -> Config:
     """The configuration that a TOML text and assignments make; the text stands at `place`. As `read_config`."""
     try:
-        given = _wrapped(tomllib.loads(text), place)
+        given = _wrapped(parse_toml(text), place)
     except ValueError as error:
         raise ConfigError(place, "", f"what is not TOML ({error})", "TOML") from error
     for assignment in assignments:
@@ -54,10 +54,10 @@ def format_config(config: Config) -> str:
 
 def _read_toml(path: Path) -> dict[str, Any]:
     try:
-        return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+        return parse_toml(path.read_bytes().decode("utf-8-sig"))
     except OSError as error:
         raise ConfigError(path, "", error.strerror or error, "a configuration file") from error
-    except (ValueError, RecursionError) as error:
+    except ValueError as error:
         raise ConfigError(path, "", f"what is not TOML ({error})", "TOML") from error
 
 
@@ -84,7 +84,7 @@ def _assign(given: dict[str, Any], assignment: str) -> None:
 def _value(text: str) -> Any:
     """A TOML value; what is none stands for itself."""
     try:
-        table = tomllib.loads(f"value = {text}")
-    except (ValueError, RecursionError):
+        table = parse_toml(f"value = {text}")
+    except ValueError:
         return text
     return table["value"] if len(table) == 1 else text

@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 from stseg.config import Config
 from stseg.errors import ConfigError
 from stseg.io.config_file import format_config, read_config
-from stseg.settings import Given, as_toml, build, require
+from stseg.io.toml.settings import Given, as_toml, build
+from stseg.settings import require
 
 TOML = """
 [ghosts]

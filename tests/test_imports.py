@@ -149,7 +149,7 @@ def test_no_drawer_for_odds_and_ends() -> None:
 def test_io_is_a_linked_folder_without_init() -> None:
     # With an __init__.py, io would hide Python's own io from type checkers and, without frozen modules, from Python.
     assert not (ROOT / "io" / "__init__.py").exists()
-    assert (ROOT / "stseg" / "io" / "toml_table.py").samefile(ROOT / "io" / "toml_table.py")
+    assert (ROOT / "stseg" / "io" / "track_csv.py").samefile(ROOT / "io" / "track_csv.py")
 
 
 def test_pyproject_lists_every_package() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import tomllib
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
@@ -14,7 +13,8 @@ from stseg.arrays import Floats
 from stseg.errors import FormatError
 from stseg.io.calibrations.foreign_camera import ForeignCamera, ForeignTable, camera_from_pose
 from stseg.io.extras import load_extra
-from stseg.io.toml_table import ANY
+from stseg.io.toml.table import ANY
+from stseg.io.toml.text import parse_toml
 
 
 def read_krt_json(files: Sequence[Path]) -> list[ForeignCamera]:
@@ -47,7 +47,7 @@ def read_pose_toml(files: Sequence[Path]) -> list[ForeignCamera]:
     FormatError
         Where a file is no such TOML, or a lens is a fisheye.
     """
-    return [camera for file in files for camera in _poses(_table(file, tomllib.loads, "TOML"))]
+    return [camera for file in files for camera in _poses(_table(file, parse_toml, "TOML"))]
 
 
 def _poses(top: ForeignTable) -> Iterator[ForeignCamera]:

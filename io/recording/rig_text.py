@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from pathlib import Path
 
@@ -11,6 +10,7 @@ import numpy as np
 from stseg.arrays import Floats
 from stseg.geometry import Camera
 from stseg.io.recording.recording import CameraSource, Recording, Source
+from stseg.io.toml.text import toml_string
 
 FORMAT = 1
 
@@ -22,7 +22,7 @@ def format_rig(recording: Recording, path: Path) -> str:
         f"format = {FORMAT}",
         "",
         "[scene]",
-        f"name = {_text(rig.name)}",
+        f"name = {toml_string(rig.name)}",
         f"frame_rate = {_number(rig.frame_rate)}  # frames per second",
         f"x = {_list(np.array(grid.x))}  # ground rectangle, metres",
         f"y = {_list(np.array(grid.y))}",
@@ -42,7 +42,7 @@ def _camera_lines(camera: Camera) -> list[str]:
     pixels = "pixels" if camera.lens is None else "undistorted pixels"
     lines = [
         "[[camera]]",
-        f"name = {_text(camera.name)}",
+        f"name = {toml_string(camera.name)}",
         f"size = [{camera.size[0]}, {camera.size[1]}]  # width, height, pixels",
         f"# homography: ground metres -> {pixels}",
         f"ground = {_rows(camera.ground)}",
@@ -62,14 +62,14 @@ def _stream_lines(streams: CameraSource, folder: Path) -> list[str]:
     if streams.background is not None:
         lines.append(f"background = {_source_text(streams.background, folder)}  # the empty scene")
     if streams.on_missing != "error":
-        lines.append(f"on_missing = {_text(streams.on_missing)}  # where the stream starts late or ends early")
+        lines.append(f"on_missing = {toml_string(streams.on_missing)}  # where the stream starts late or ends early")
     if streams.clock != "auto":
-        lines.append(f"clock = {_text(streams.clock)}  # what says when its frames were taken")
+        lines.append(f"clock = {toml_string(streams.clock)}  # what says when its frames were taken")
     return lines
 
 
 def _source_text(source: Source, folder: Path) -> str:
-    entries = [f"kind = {_text(source.kind)}", f"path = {_paths(source, folder)}"]
+    entries = [f"kind = {toml_string(source.kind)}", f"path = {_paths(source, folder)}"]
     if source.first_frame:
         entries.append(f"first_frame = {source.first_frame}")
     if source.frames is not None:
@@ -81,8 +81,8 @@ def _source_text(source: Source, folder: Path) -> str:
 
 def _paths(source: Source, folder: Path) -> str:
     if source.address:
-        return _text(source.address)
-    names = [_text(_relative(path, folder).as_posix()) for path in (source.path, *source.more)]
+        return toml_string(source.address)
+    names = [toml_string(_relative(path, folder).as_posix()) for path in (source.path, *source.more)]
     return f"[{', '.join(names)}]" if source.more else names[0]
 
 
@@ -90,11 +90,6 @@ def _relative(path: Path, folder: Path) -> Path:
     if path.is_relative_to(folder):
         return path.relative_to(folder)
     return path if path.is_absolute() else Path(os.path.relpath(path, folder))
-
-
-def _text(text: str) -> str:
-    # TOML's basic strings are JSON's, but for the delete character.
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def _number(number: float) -> str:

@@ -6,7 +6,6 @@ what was found and what was expected. Paths in the file are relative to it.
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -17,7 +16,8 @@ from stseg.errors import CalibrationError, OutputError, RigError
 from stseg.geometry import Camera, Grid, Lens, Rig
 from stseg.io.recording.recording import SOURCE_KINDS, CameraSource, ClockSource, Recording, Source, SourceKind
 from stseg.io.recording.rig_text import FORMAT, format_rig
-from stseg.io.toml_table import ANY, Table
+from stseg.io.toml.table import ANY, Table
+from stseg.io.toml.text import parse_toml
 
 _MOST_CELLS = 100_000_000  # of one frame's volume: beyond it a slip of the pen, not a scene
 _ON_MISSING: tuple[Literal["error", "blind"], ...] = ("error", "blind")
@@ -56,8 +56,8 @@ def read_rig(path: str | Path) -> Recording:
 def parse_rig(text: str, path: Path) -> Recording:
     """`read_rig` of a text that stands, or is to stand, in the file `path`."""
     try:
-        top = Table(path, "", tomllib.loads(text))
-    except (ValueError, RecursionError) as error:
+        top = Table(path, "", parse_toml(text))
+    except ValueError as error:
         raise RigError(path, "", f"what is not TOML ({error})", "TOML") from error
     if top.integer("format") != FORMAT:
         raise top.error("format", top.integer("format"), f"{FORMAT}, the format that this version reads")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import platform
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
@@ -20,6 +19,7 @@ from stseg.errors import SourceError
 from stseg.io.recording.recording import Recording, Source, mask_passwords
 from stseg.io.recording.rig_text import format_rig
 from stseg.io.recording.source_files import source_files
+from stseg.io.toml.text import parse_toml
 
 _PACKAGES = ("numpy", "scipy", "numba", "h5py", "opencv-python-headless", "PyMaxflow")
 _TEXT = h5py.string_dtype()
@@ -114,10 +114,10 @@ def read_provenance(group: h5py.Group) -> Provenance:
 
 def run_request(provenance: Provenance) -> dict[str, Any]:
     """All that decides what a run finds, as texts and numbers in nested tables; when it began is left out."""
-    rig = tomllib.loads(provenance.rig)
+    rig = parse_toml(provenance.rig)
     rig["camera"] = {camera.pop("name"): camera for camera in rig["camera"]}
     sources = {f"{_word(row['camera'])}, {_word(row['role'])}": _told(row) for row in provenance.sources}
-    config = tomllib.loads(provenance.config)
+    config = parse_toml(provenance.config)
     return {"config": config, "rig": rig, "source": sources, "version": dict(provenance.versions)}
 
 
