@@ -15,6 +15,7 @@ from stseg.accelerate import python_form
 from stseg.config import IdentityConfig
 from stseg.detection.scoring import set_score
 from stseg.engine.pipeline import Pipeline
+from stseg.engine.session import run_session
 from stseg.evaluation import evaluate
 from stseg.foreground.view_foreground import ViewForeground
 
@@ -57,9 +58,14 @@ def test_an_absence_beyond_patience_ends_a_track(plain_methods: ModuleType) -> N
 def test_two_labels_track_isolated_people(ablation: ModuleType) -> None:
     rig, truth = room(), walkers(40)
     del ablation
-    pipeline = Pipeline(rig, [ViewForeground() for _ in rig.cameras], ["boxes"] * 4, CONFIG, "two labels")
+    pipeline = Pipeline(rig, ["boxes"] * 4, CONFIG, "two labels")
     done: list[int] = []
-    commits = [step.commit for step in pipeline.steps(box_moments(rig, truth, 0, 20), 0, done.append)]
+    commits = [
+        step.commit
+        for step in run_session(
+            pipeline, [ViewForeground() for _ in rig.cameras], box_moments(rig, truth, 0, 20), 0, done.append
+        )
+    ]
     rows, events = (np.concatenate([getattr(c, name) for c in commits]) for name in ("trajectory", "events"))
     tracks, _ = pipeline.finished(rows, events)
     scores = evaluate(truth[truth["frame"] < 20], tracks.trajectory)

@@ -28,8 +28,9 @@ from scenes import (
 from stseg.arrays import Floats
 from stseg.config import DetectionConfig
 from stseg.detection.detector import Detector
-from stseg.detection.proposals import Proposals, marginal
+from stseg.detection.proposals import Fuse, Proposals, marginal
 from stseg.engine.pipeline import Pipeline
+from stseg.engine.session import run_session
 from stseg.errors import InputError
 from stseg.foreground.view_foreground import ViewForeground
 from stseg.model.candidates import Candidates
@@ -48,9 +49,11 @@ def evidence(kind: str, standing: Floats = STANDING) -> list[ViewEvidence]:
 
 
 def candidates(kind: str, asked: Asked) -> Proposals:
-    kinds = [kind] * 4
-    occupancy = Occupancy(RIG, kinds, CONFIG.occupancy, FEW_HEIGHTS)
-    return Proposals(occupancy.rig, occupancy.fuse, kinds, replace(CONFIG, detection=replace(FEW, candidates=asked)))
+    return Proposals(RIG, [kind] * 4, replace(CONFIG, detection=replace(FEW, candidates=asked)))
+
+
+def fuse(kind: str) -> Fuse:
+    return Occupancy(RIG, [kind] * 4, CONFIG.occupancy, FEW_HEIGHTS).fuse
 
 
 def pool(*places: tuple[float, float]) -> Candidates:
@@ -61,7 +64,7 @@ def pool(*places: tuple[float, float]) -> Candidates:
 @pytest.mark.parametrize("kind", ("boxes", "pixels"))
 @pytest.mark.parametrize("asked", ("probability", "volume", "both"))
 def test_each_source_finds_everybody(kind: str, asked: Asked) -> None:
-    found = candidates(kind, asked).of(evidence(kind))
+    found = candidates(kind, asked).of(evidence(kind), fuse(kind))
     assert found is not None
     away = np.hypot(*np.moveaxis(found.ground[:, None] - STANDING[:, :2], -1, 0))
     # What boxes say of a place in a volume reaches far to its sides: their modes are no better than the pass's lattice.
@@ -71,18 +74,18 @@ def test_each_source_finds_everybody(kind: str, asked: Asked) -> None:
 
 
 def test_the_lattice_alone_proposes_nothing() -> None:
-    assert candidates("pixels", "lattice").of(evidence("pixels")) is None
+    assert candidates("pixels", "lattice").of(evidence("pixels"), fuse("pixels")) is None
 
 
 @pytest.mark.parametrize("seen", ([None] * 4, [no_boxes()] * 4, [None, no_boxes(), None, no_boxes()]))
 def test_where_nothing_is_seen_nobody_is_proposed(seen: Sequence[ViewEvidence]) -> None:
-    found = candidates("boxes", "both").of(list(seen))
+    found = candidates("boxes", "both").of(list(seen), fuse("boxes"))
     assert found is not None and len(found) == 0
 
 
 def test_both_sources_have_no_duplicates_of_each_other() -> None:
     seen = evidence("pixels")
-    volume, both = (candidates("pixels", asked).of(seen) for asked in ("volume", "both"))
+    volume, both = (candidates("pixels", asked).of(seen, fuse("pixels")) for asked in ("volume", "both"))
     assert volume is not None and both is not None
     np.testing.assert_array_equal(both.ground[: len(volume)], volume.ground)
 
@@ -128,8 +131,10 @@ def test_the_pipeline_finds_the_same_people_by_any_source(kind: str, asked: Aske
     rig, truth = room(), walkers(2)
     moments = list((box_moments if kind == "boxes" else mask_moments)(rig, truth, 0, 2))
     config = replace(CONFIG, detection=replace(FEW, candidates=asked))
-    pipeline = Pipeline(rig, [ViewForeground()] * 4, [kind] * 4, config, "frames")
-    rows = np.concatenate([s.commit.trajectory for s in pipeline.steps(moments, 0, lambda _: None)])
+    pipeline = Pipeline(rig, [kind] * 4, config, "frames")
+    rows = np.concatenate(
+        [s.commit.trajectory for s in run_session(pipeline, [ViewForeground()] * 4, moments, 0, lambda _: None)]
+    )
     for frame in range(2):
         own, standing = rows[rows["frame"] == frame], standing_at(truth, frame)
         assert len(own) == len(standing)

@@ -15,6 +15,7 @@ from stseg.arrays import Bytes, Flags
 from stseg.config import Config, IdentityConfig
 from stseg.detection.scoring import set_score
 from stseg.engine.pipeline import Pipeline
+from stseg.engine.session import run_session
 from stseg.errors import ConfigError
 from stseg.evaluation import evaluate
 from stseg.foreground.view_foreground import ViewForeground
@@ -122,13 +123,15 @@ def filmed(name: str, stop: int) -> tuple[Filmed, ...]:
 def switches(name: str, kind: str, stop: int) -> int:
     """How often somebody is taken for somebody else in the first frames of a scene."""
     rig, film = Film(NAMED[name]).rig, filmed(name, stop)
-    pipeline = Pipeline(rig, [ViewForeground() for _ in rig.cameras], [kind] * len(rig.cameras), Config(), "cut")
+    pipeline = Pipeline(rig, [kind] * len(rig.cameras), Config(), "cut")
     if kind == "boxes":
         moments = [Moment(seen.frame, tuple(view.boxes for view in seen.views)) for seen in film]
     else:
         moments = [Moment(seen.frame, tuple(silhouette(view.instances > 0) for view in seen.views)) for seen in film]
     done: list[int] = []
-    commits = [step.commit for step in pipeline.steps(moments, 0, done.append)]
+    commits = [
+        step.commit for step in run_session(pipeline, [ViewForeground() for _ in rig.cameras], moments, 0, done.append)
+    ]
     rows, events = (np.concatenate([getattr(c, name) for c in commits]) for name in ("trajectory", "events"))
     tracks, _ = pipeline.finished(rows, events)
     scores = evaluate(np.concatenate([seen.truth for seen in film]), tracks.trajectory)

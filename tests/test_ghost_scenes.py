@@ -26,7 +26,9 @@ from scenes import (
 from stseg.arrays import Floats
 from stseg.detection.detector import Detector
 from stseg.detection.views import BoxView
-from stseg.engine.pipeline import CommittedFrames, Pipeline
+from stseg.engine.committed_frames import CommittedFrames
+from stseg.engine.pipeline import Pipeline
+from stseg.engine.session import run_session
 from stseg.foreground.view_foreground import ViewForeground
 from stseg.geometry import Camera, Rig
 from stseg.model.people import Explanation, ViewEvidence
@@ -130,12 +132,12 @@ class Run:
 def moving_ghosts(kind: str) -> Run:
     """The strollers, from frame 0 on, by the whole pipeline."""
     rig = facing_pair()
-    pipeline = Pipeline(rig, [ViewForeground()] * 2, [kind] * 2, CONFIG, "cut")
+    pipeline = Pipeline(rig, [kind] * 2, CONFIG, "cut")
     moments = [
         Moment(f, tuple((mask if kind == "pixels" else boxes)(camera, strollers(f)) for camera in rig.cameras))
         for f in range(FRAMES)
     ]
-    steps = list(pipeline.steps(moments, 0, lambda _: None))
+    steps = list(run_session(pipeline, [ViewForeground()] * 2, moments, 0, lambda _: None))
     rows, events = (np.concatenate([getattr(s.commit, name) for s in steps]) for name in ("trajectory", "events"))
     return Run(steps, pipeline.finished(rows, events)[0])
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
 from dataclasses import replace
 from functools import cache
 
@@ -188,57 +189,61 @@ def occupancy(kind: str) -> Occupancy:
 
 @pytest.mark.parametrize("kind", ["pixels", "boxes"])
 def test_a_frame_is_fused_by_those_before_it(kind: str) -> None:
-    running, fresh = occupancy(kind), occupancy(kind)
+    fusion = occupancy(kind)
+    running, fresh = fusion.new_calibration(), fusion.new_calibration()
     frames = [frame(kind, k) for k in range(2)]
-    np.testing.assert_array_equal(running.follow(*frames[0]), fresh.fuse(*frames[0]))
+    np.testing.assert_array_equal(fusion.follow(running, *frames[0]), fusion.fuse(*frames[0]))
     for one in frames[1:]:
-        running.follow(*one)
-    before = running.level.state()
-    running.fuse(*frames[0])
-    np.testing.assert_equal(running.level.state(), before)
-    assert running.level.rates != fresh.level.rates
-    assert fresh.level.rates == [fresh.level.rates[0]] * 4
-    assert all(r.beside > r.clutter for r in running.level.rates)
+        fusion.follow(running, *one)
+    assert running.rates != fresh.rates
+    assert fresh.rates == [fresh.rates[0]] * 4
+    assert all(r.beside > r.clutter for r in running.rates)
 
 
 def test_going_on_from_a_state_is_going_on() -> None:
     """Wherever a recording is divided, its parts in order say what the whole says."""
     frames = [frame("pixels", k) for k in range(3)]
-    whole = occupancy("pixels")
-    volumes = [whole.follow(*one) for one in frames]
+    fusion = occupancy("pixels")
+    whole = fusion.new_calibration()
+    volumes = [fusion.follow(whole, *one) for one in frames]
     for division in (1, 2):
-        part, rest = occupancy("pixels"), occupancy("pixels")
+        part = fusion.new_calibration()
         for one in frames[:division]:
-            part.follow(*one)
-        rest.level.restore(part.level.state())
+            fusion.follow(part, *one)
+        rest = deepcopy(part)
         for one, volume in zip(frames[division:], volumes[division:], strict=True):
-            np.testing.assert_array_equal(rest.follow(*one), volume)
+            np.testing.assert_array_equal(fusion.follow(rest, *one), volume)
 
 
 def test_a_blind_view_learns_nothing() -> None:
-    running = occupancy("pixels")
+    fusion = occupancy("pixels")
+    running = fusion.new_calibration()
     seen, explanation = frame("pixels", 0)
-    running.follow([None, *seen[1:]], explanation)
-    assert not running.level.seen[0].any()
-    assert running.level.seen[1:].all()
-    running.follow([None] * 4, explanation)
-    assert running.level.rates[0] == Rates(*running.level.first[0])
+    fusion.follow(running, [None, *seen[1:]], explanation)
+    assert not running.seen[0].any()
+    assert running.seen[1:].all()
+    fusion.follow(running, [None] * 4, explanation)
+    assert running.rates[0] == Rates(*running.first[0])
 
 
 def test_people_whom_one_view_alone_asserts_do_not_teach_it() -> None:
-    running, (seen, explanation) = occupancy("pixels"), frame("pixels", 0)
+    fusion, (seen, explanation) = occupancy("pixels"), frame("pixels", 0)
+    running = fusion.new_calibration()
     everybody = explanation.people
     parts = np.zeros_like(everybody.view_evidence)
     parts[0] = everybody.evidence
-    running.follow(seen, replace(explanation, people=replace(everybody, view_evidence=parts)))
-    assert not running.level.seen[0, [MISS, BESIDE]].any()
-    assert running.level.seen[1:, [MISS, BESIDE]].all()
+    fusion.follow(running, seen, replace(explanation, people=replace(everybody, view_evidence=parts)))
+    assert not running.seen[0, [MISS, BESIDE]].any()
+    assert running.seen[1:, [MISS, BESIDE]].all()
 
 
 def test_a_detector_is_not_blamed_for_the_hidden() -> None:
-    running = occupancy("boxes")
+    fusion = occupancy("boxes")
+    running = fusion.new_calibration()
     seen, explanation = frame("boxes", 0)
     hidden = np.array([[0.5] * len(explanation.people), *np.ones((3, len(explanation.people)))])
-    running.follow([no_boxes(), *seen[1:]], replace(explanation, people=replace(explanation.people, visibility=hidden)))
-    assert not running.level.seen[0, MISS].any()
-    assert running.level.seen[1:, MISS].all()
+    fusion.follow(
+        running, [no_boxes(), *seen[1:]], replace(explanation, people=replace(explanation.people, visibility=hidden))
+    )
+    assert not running.seen[0, MISS].any()
+    assert running.seen[1:, MISS].all()

@@ -13,7 +13,9 @@ from scenes import CONFIG, Moment, box_moments, mask_moments, room, walkers
 from stseg.accelerate import python_form
 from stseg.arrays import Boxes, Ints, Labels, Rows
 from stseg.detection.scoring import set_score
-from stseg.engine.pipeline import CommittedFrames, Pipeline
+from stseg.engine.committed_frames import CommittedFrames
+from stseg.engine.pipeline import Pipeline
+from stseg.engine.session import run_session
 from stseg.evaluation import evaluate
 from stseg.foreground.view_foreground import ViewForeground
 from stseg.geometry import Rig
@@ -52,10 +54,14 @@ class Run:
         return np.concatenate([step.commit.label for step in self.steps])
 
 
+def foregrounds() -> list[ViewForeground]:
+    return [ViewForeground() for _ in RIG.cameras]
+
+
 def run(kind: str, moments: Iterable[Moment], tracker: str = "cut", first: int = 0) -> Run:
-    pipeline = Pipeline(RIG, [ViewForeground() for _ in RIG.cameras], [kind] * len(RIG.cameras), CONFIG, tracker)
+    pipeline = Pipeline(RIG, [kind] * len(RIG.cameras), CONFIG, tracker)
     advanced: list[int] = []
-    steps = list(pipeline.steps(moments, first, advanced.append))
+    steps = list(run_session(pipeline, foregrounds(), moments, first, advanced.append))
     trajectory = np.concatenate([step.commit.trajectory for step in steps])
     tracks, identity = pipeline.finished(trajectory, np.concatenate([step.commit.events for step in steps]))
     return Run(steps, tracks, identity, advanced)
@@ -197,9 +203,9 @@ def test_where_a_run_began_is_soon_forgotten(first: int) -> None:
     Its first frame is explained as any first frame is, by itself.
     """
     part = run("boxes", recording("boxes", FRAMES)[first:FRAMES], "frames", first)
-    pipeline = Pipeline(RIG, [ViewForeground() for _ in RIG.cameras], ["boxes"] * 4, CONFIG, "frames")
+    pipeline = Pipeline(RIG, ["boxes"] * 4, CONFIG, "frames")
     views = recording("boxes", FRAMES)[first].views
-    alone = pipeline.frame_pass.explain([view for view in views if isinstance(view, Boxes)], None)
+    alone = pipeline.detector.explain([view for view in views if isinstance(view, Boxes)], None)
     np.testing.assert_array_equal(part.steps[0].commit.scenes[0].people.ground, alone.people.ground)
     for step, other in zip(part.steps, whole("boxes", "frames").steps[first:], strict=True):
         places, others = (np.sort(s.commit.scenes[0].people.ground, axis=0) for s in (step, other))
@@ -220,8 +226,8 @@ def test_short_recordings(frames: int) -> None:
 
 
 def test_no_moments_no_steps() -> None:
-    pipeline = Pipeline(RIG, [ViewForeground() for _ in RIG.cameras], ["boxes"] * 4, CONFIG, "cut")
-    assert list(pipeline.steps([], 0, lambda _: None)) == []
+    pipeline = Pipeline(RIG, ["boxes"] * 4, CONFIG, "cut")
+    assert list(run_session(pipeline, foregrounds(), [], 0, lambda _: None)) == []
 
 
 def test_an_empty_room() -> None:

@@ -103,13 +103,13 @@ def test_a_boxs_distance_is_measured_by_its_own_tolerance() -> None:
     assert tight == pytest.approx(4 * loose)
 
 
-def test_a_recording_begun_anew_forgets() -> None:
+def test_each_session_begins_with_the_first_guess() -> None:
     rig = rig_of(corner_cameras())
     frame_pass = Detector(rig, ["boxes"] * 4, FEW_HEIGHTS)
     standing = people((-0.8, 0.3, 1.7), (0.7, -0.6, 1.7))
     rng = np.random.default_rng(0)
     seen = [shaken(view.table.boxes_of(*standing_of(standing)), 0.02, 1.0, rng) for view in frame_pass.views]
-    frame_pass.explain_next(seen, None)
-    assert (frame_pass.box_noise_calibration.seen > 0).any()
-    frame_pass.reset()
-    np.testing.assert_allclose(frame_pass.box_noise_calibration.noise.spread, FIRST.spread)
+    calibration = frame_pass.new_calibration()
+    frame_pass.explain_next(calibration, seen, None)
+    assert (calibration.seen > 0).any()
+    np.testing.assert_allclose(frame_pass.new_calibration().noise.spread, FIRST.spread)

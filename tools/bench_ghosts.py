@@ -60,13 +60,16 @@ def positions(people: int, frames: int, kind: str, config: Config) -> tuple[floa
     """Candidates weighed and seconds, both a frame."""
     film, seen = evidence(people, frames, kind)
     kinds = [kind] * 4
-    candidates = Proposals(film.rig, Occupancy(film.rig, kinds, config.occupancy, config.ghosts).fuse, kinds, config)
+    candidates, fuse = (
+        Proposals(film.rig, kinds, config),
+        Occupancy(film.rig, kinds, config.occupancy, config.ghosts).fuse,
+    )
     frame_pass = Detector(film.rig, [kind] * 4, config.ghosts)
     follow = TrackFilter(film.rig.frame_rate, config.ghosts, config.identity)
     taken, weighed = [], []
     for frame, views in enumerate(seen):
         start = time.process_time()
-        found = frame_pass.explain(views, follow.expected(frame), candidates.of(views))
+        found = frame_pass.explain(views, follow.expected(frame), candidates.of(views, fuse))
         taken.append(time.process_time() - start)
         follow.follow(frame, found.people, found.ghosts)
         weighed.append(len(found.people) + len(found.ghosts))

@@ -14,6 +14,7 @@ from stseg.arrays import Boxes, Observation, Rows
 from stseg.config import Config
 from stseg.engine.backgrounds import make_foregrounds
 from stseg.engine.pipeline import Pipeline
+from stseg.engine.session import run_session
 from stseg.evaluation import evaluate
 from stseg.evaluation.scores import Scores
 from stseg.evaluation.sequence import Area
@@ -61,10 +62,10 @@ def track(
         pairs = zip(foregrounds, streams, strict=True)
         foregrounds = [Perturbed(whole, np.random.default_rng(stream)) for whole, stream in pairs]
     kinds = ["boxes" if source.source.kind in ("boxes", "instances") else "pixels" for source in recording.sources]
-    pipeline = Pipeline(recording.rig, foregrounds, kinds, config, tracker)
+    pipeline = Pipeline(recording.rig, kinds, config, tracker)
     done: list[int] = []
     with open_frames(recording, first, stop) as frames:
-        steps = list(pipeline.steps(frames, first, done.append))
+        steps = list(run_session(pipeline, foregrounds, frames, first, done.append))
     committed, events = (np.concatenate([getattr(s.commit, name) for s in steps]) for name in ("trajectory", "events"))
     return Outcome(committed, pipeline.finished(committed, events)[0].trajectory)
 

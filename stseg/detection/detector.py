@@ -22,6 +22,7 @@ from stseg.detection.search import ENUMERATED
 from stseg.detection.views import BoxView, PixelView, ViewObservation
 from stseg.geometry import Rig
 from stseg.model.border import Border
+from stseg.model.box_noise import BoxNoise
 from stseg.model.candidates import Candidates
 from stseg.model.people import Explanation, ViewEvidence
 from stseg.model.predicted_tracks import PredictedTracks
@@ -45,7 +46,7 @@ class Detector:
     def __init__(self, rig: Rig, kinds: Sequence[str], config: GhostConfig, level: LevelConfig | None = None) -> None:
         self.config = config
         self._rate, self._level = rig.frame_rate, level or LevelConfig()
-        self.reset()
+        self.first_noise = self.new_calibration().noise
         grid = rig.grid
         x = np.arange(grid.x[0] + config.lattice / 2, grid.x[1], config.lattice)
         y = np.arange(grid.y[0] + config.lattice / 2, grid.y[1], config.lattice)
@@ -68,25 +69,34 @@ class Detector:
         self.border = Border.of(rig)
         self._trades = 0 if "boxes" in kinds else config.trades
 
-    def reset(self) -> None:
-        """Go back to the first guess of how sharp boxes are."""
-        self.box_noise_calibration = BoxNoiseCalibration(self._rate, self._level)
+    def new_calibration(self) -> BoxNoiseCalibration:
+        """Box noise calibration of a session that begins: the first guess."""
+        return BoxNoiseCalibration(self._rate, self._level)
 
     def explain_next(
-        self, seen: Sequence[ViewEvidence], expected: PredictedTracks | None, proposed: Candidates | None = None
+        self,
+        calibration: BoxNoiseCalibration,
+        seen: Sequence[ViewEvidence],
+        expected: PredictedTracks | None,
+        proposed: Candidates | None = None,
     ) -> Explanation:
-        """Explain a recording's next frame, from which it is then learned how sharp boxes are."""
-        explained = self.explain(seen, expected, proposed)
-        self.box_noise_calibration.learn(explained, self.views, self.observe(seen))
+        """Explain a session's next frame, and update the session's box noise calibration with it."""
+        noise = calibration.noise
+        explained = self.explain(seen, expected, proposed, noise)
+        calibration.learn(explained, self.views, self.observe(seen, noise))
         return explained
 
-    def observe(self, seen: Sequence[ViewEvidence]) -> list[ViewObservation | None]:
-        """What each view shows, by all that is known of how sharp boxes are; None where it is blind."""
-        sharpness = self.box_noise_calibration.noise
-        return [None if s is None else view.observe(s, sharpness) for view, s in zip(self.views, seen, strict=True)]
+    def observe(self, seen: Sequence[ViewEvidence], noise: BoxNoise | None = None) -> list[ViewObservation | None]:
+        """What each view shows under a box noise, by default the first guess; None where the view is blind."""
+        known = noise or self.first_noise
+        return [None if s is None else view.observe(s, known) for view, s in zip(self.views, seen, strict=True)]
 
     def explain(
-        self, seen: Sequence[ViewEvidence], expected: PredictedTracks | None, proposed: Candidates | None = None
+        self,
+        seen: Sequence[ViewEvidence],
+        expected: PredictedTracks | None,
+        proposed: Candidates | None = None,
+        noise: BoxNoise | None = None,
     ) -> Explanation:
         """Explain one frame.
 
@@ -98,8 +108,10 @@ class Detector:
             Whom the frames before lead to expect; None in a first frame, in which nobody is a newcomer.
         proposed
             Candidates from elsewhere, best first: beside those of the first round's lattice, but for duplicates.
+        noise
+            Noise of boxes; by default the first guess.
         """
-        sights = self.observe(seen)
+        sights = self.observe(seen, noise)
         prior = Prior.of(expected, self.config, self.border)
         expected_inside = prior.pool()
         seen_now = FrameEvidence(self.views, sights, prior, self.parameters)

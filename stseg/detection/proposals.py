@@ -38,27 +38,33 @@ class Proposals:
     ----------
     rig
         The cameras and the grid.
-    fuse
-        The volume float32 (plane, y, x) of a frame's evidence under an explanation, nats (`stseg.occupancy`).
     kinds
         What each camera delivers: "boxes" or "pixels".
     config
         Which sources are asked; how far apart candidates are that are not one; how tall and wide people are.
     """
 
-    def __init__(self, rig: Rig, fuse: Fuse, kinds: Sequence[str], config: Config) -> None:
-        self.rig, self.fuse, self.config, self.ghosts = rig, fuse, config.detection, config.ghosts
+    def __init__(self, rig: Rig, kinds: Sequence[str], config: Config) -> None:
+        self.rig, self.config, self.ghosts = rig, config.detection, config.ghosts
         self.probability = None
         if self.config.candidates in ("probability", "both"):
             self.probability = DetectionProbability(rig, self.config, map_steps(rig, kinds))
 
-    def of(self, seen: Sequence[ViewEvidence]) -> Candidates | None:
-        """Candidates of a frame, best first by source; None where none is asked for."""
+    def of(self, seen: Sequence[ViewEvidence], fuse: Fuse) -> Candidates | None:
+        """Candidates of a frame, best first by source; None where none is asked for.
+
+        Parameters
+        ----------
+        seen
+            Evidence of each view.
+        fuse
+            The volume float32 (plane, y, x) of a frame's evidence under an explanation, nats (`stseg.occupancy`).
+        """
         if self.config.candidates == "lattice":
             return None
         found = self._pool(np.zeros((0, 2)))
         if self.config.candidates in ("volume", "both"):
-            volume = self.fuse(seen, empty_explanation(self.rig, seen))
+            volume = fuse(seen, empty_explanation(self.rig, seen))
             found = found.joined_apart(
                 self._pool(volume_modes(volume, self.rig.grid, self.config.kernel).ground), self._apart
             )

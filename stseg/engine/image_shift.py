@@ -8,7 +8,7 @@ import numpy as np
 
 from stseg.arrays import Rows
 from stseg.calibration.knock_detection import background_shift
-from stseg.engine.pipeline import FrameSet
+from stseg.engine.session import FrameSet
 from stseg.foreground.view_foreground import ViewForeground
 from stseg.model.tables import SHIFT
 

@@ -17,9 +17,9 @@ import numpy as np
 from stseg.arrays import Rows
 from stseg.engine.assembly import FinishedSegment
 from stseg.engine.blind_views import BlindViews
+from stseg.engine.committed_frames import CommittedFrames
 from stseg.engine.live_foreground import LiveForegrounds
 from stseg.engine.open_segment import OpenSegment
-from stseg.engine.pipeline import CommittedFrames
 from stseg.engine.segment import Job
 from stseg.engine.segments import Segment
 from stseg.io.live.live_frames import LiveFrameSet, now
@@ -65,8 +65,7 @@ class LiveRun:
         warm_up = round(job.config.segments.warm_up * frame_rate)
         self._names = LiveIds(table.rows, warm_up + 2 * self._window)
         self._blindness = BlindViews([camera.name for camera in job.recording.rig.cameras])
-        self._idle = [job.pipeline() for _ in range(2)]
-        self.pipeline = self._idle[0]
+        self.pipeline = job.pipeline()
         self._members: list[_Member] = []
         self._plan: Iterator[Segment] = iter(())
         self._coming: Segment | None = None
@@ -120,9 +119,8 @@ class LiveRun:
         return self.made
 
     def _open(self, segment: Segment) -> None:
-        pipeline = self._idle.pop() if self._idle else self._job.pipeline()
-        seeing = pipeline.seeing_by(self.sights.sights())
-        self._members.append(_Member(OpenSegment(self._job, segment, seeing, self._folder.draft(segment.index))))
+        draft = self._folder.draft(segment.index)
+        self._members.append(_Member(OpenSegment(self._job, segment, self.pipeline, self.sights.sights(), draft)))
 
     def _take(self, member: _Member, steps: list[CommittedFrames], stop: int) -> None:
         for step in steps:
@@ -150,7 +148,6 @@ class LiveRun:
         """The oldest segment is whole."""
         member = self._members.pop(0)
         self.made.append(FinishedSegment(*member.segment.keep(stop)))
-        self._idle.append(member.segment.pipeline)
         self._blindness.forget(min((other.segment.segment.lead for other in self._members), default=stop))
 
     def _discard(self) -> None:

@@ -9,10 +9,13 @@ from pathlib import Path
 import numpy as np
 
 from stseg.arrays import Bytes, Rows
+from stseg.engine.committed_frames import CommittedFrames
 from stseg.engine.image_shift import ImageShifts
-from stseg.engine.pipeline import CommittedFrames, Pipeline, Session
+from stseg.engine.pipeline import Pipeline
 from stseg.engine.segment import Job, write_step
 from stseg.engine.segments import Segment
+from stseg.engine.session import Session
+from stseg.foreground.view_foreground import ViewForeground
 from stseg.io.config_file import format_config
 from stseg.io.live.live_frames import LiveFrameSet
 from stseg.io.runfile.runs import RunWriter
@@ -28,16 +31,20 @@ class OpenSegment:
     job, segment
         What is run, and the segment; the last of a run may end elsewhere than it says.
     pipeline
-        The stages, with the sights of the segment; nobody else's until it is closed.
+        The stages.
+    foregrounds
+        Foreground model of each camera; the segment's own.
     draft
         Where it is written.
     """
 
-    def __init__(self, job: Job, segment: Segment, pipeline: Pipeline, draft: Path) -> None:
-        self.segment, self.pipeline = segment, pipeline
+    def __init__(
+        self, job: Job, segment: Segment, pipeline: Pipeline, foregrounds: list[ViewForeground], draft: Path
+    ) -> None:
+        self.segment = segment
         self._job, self._draft = job, draft
-        self._passage = Session(pipeline, segment.lead)
-        self._shifts = ImageShifts(pipeline.sights, job.read.factors, job.recording.rig.frame_rate)
+        self._passage = Session(pipeline, foregrounds, segment.lead)
+        self._shifts = ImageShifts(foregrounds, job.read.factors, job.recording.rig.frame_rate)
         self._beyond: list[tuple[CommittedFrames, Rows]] = []
         """Steps that go past its end: its own only if it is the last."""
         self._committed = segment.lead

@@ -14,9 +14,11 @@ import numpy as np
 from stseg.arrays import Bytes, Ints, Labels, Singles
 from stseg.config import Config
 from stseg.engine.backgrounds import BackgroundFrames, background_frames, make_foregrounds
+from stseg.engine.committed_frames import CommittedFrames
 from stseg.engine.image_shift import ImageShifts
-from stseg.engine.pipeline import CommittedFrames, Pipeline
+from stseg.engine.pipeline import Pipeline
 from stseg.engine.segments import Segment, find_gaps, longest_absence, segments
+from stseg.engine.session import run_session
 from stseg.foreground.view_foreground import ViewForeground
 from stseg.geometry.near import near_person
 from stseg.io.config_file import format_config
@@ -75,7 +77,7 @@ class Job:
         """The stages, which see nothing yet."""
         sources = [source.source.kind for source in self.recording.sources]
         kinds = ["boxes" if kind in ("boxes", "instances") else "pixels" for kind in sources]
-        return Pipeline(self.read.read_rig, [], kinds, self.config, self.tracker)
+        return Pipeline(self.read.read_rig, kinds, self.config, self.tracker)
 
 
 class SegmentWorker:
@@ -95,8 +97,8 @@ class SegmentWorker:
             advance(int(segment.first <= frame < segment.stop))
 
         views: Bytes = self.pipeline.occupancy.views
-        pipeline = self.pipeline.seeing_by(self.sights(segment))
-        shifts = ImageShifts(pipeline.sights, job.read.factors, job.recording.rig.frame_rate)
+        foregrounds = self.sights(segment)
+        shifts = ImageShifts(foregrounds, job.read.factors, job.recording.rig.frame_rate)
         end = min(end for end in self._ends if end >= segment.stop)
         with (
             open_frames(job.read, segment.lead, end, job.streams) as moments,
@@ -104,7 +106,7 @@ class SegmentWorker:
                 draft, job.recording, views, format_config(job.config), overwrite=True, kept=job.volume
             ) as writer,
         ):
-            for step in pipeline.steps(shifts.seen(moments), segment.lead, fused):
+            for step in run_session(self.pipeline, foregrounds, shifts.seen(moments), segment.lead, fused):
                 write_step(job, step, segment, writer)
                 if step.commit.scenes[-1].frame >= segment.stop - 1:
                     break

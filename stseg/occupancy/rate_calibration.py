@@ -80,14 +80,6 @@ class RateCalibration:
             total *= kept
             total += fresh / self.frame_rate
 
-    def state(self) -> dict[str, Floats]:
-        """All that was learned."""
-        return {"errors": self.errors.copy(), "seen": self.seen.copy(), "filled": self.filled.copy()}
-
-    def restore(self, state: dict[str, Floats]) -> None:
-        """Go on from what `state` gave."""
-        self.errors, self.seen, self.filled = (state[name].copy() for name in ("errors", "seen", "filled"))
-
 
 def inside_bodies(grid: Grid, near: Ints, ground: Floats, height: Floats) -> Flags:
     """Cells that the pillar of the person near them fills, bool (plane, y, x).

@@ -69,35 +69,46 @@ class Occupancy:
         ]
         self._first = [_first_rates(kind, ghosts) for kind in kinds]
         self._level_config = level or LevelConfig()
-        self.forget()
         self.prior = float(logit(config.occupied))
 
-    def forget(self) -> None:
-        """Go back to the first guess of the rates."""
-        self.level = RateCalibration(self._first, self.rig.frame_rate, self._level_config)
+    def new_calibration(self) -> RateCalibration:
+        """Error-rate calibration of a session that begins: the first guess."""
+        return RateCalibration(self._first, self.rig.frame_rate, self._level_config)
 
-    def fuse(self, seen: Sequence[ViewEvidence], explanation: Explanation) -> Singles:
-        """A frame's log-odds by the rates known so far, float32 (plane, y, x), nats; nan where no view sees the cell.
+    def fuse(
+        self, seen: Sequence[ViewEvidence], explanation: Explanation, rates: Sequence[Rates] | None = None
+    ) -> Singles:
+        """A frame's log-odds, float32 (plane, y, x), nats; nan where no view sees the cell.
 
         pi is one half within reach of a person whom the pass of the frame found, where only the cells are left to
         decide, and `occupied` elsewhere.
-        """
-        near = near_person(self.rig.grid.ground, explanation.people.ground, self.config.reach)
-        return self._total(self._tally(self._said(seen, explanation, near), near), near)
 
-    def follow(self, seen: Sequence[ViewEvidence], explanation: Explanation) -> Singles:
-        """The same of a recording's next frame, from which the rates are then learned."""
+        Parameters
+        ----------
+        seen, explanation
+            Evidence of each view, and the people that explain it.
+        rates
+            Error rates of each view; by default the first guess.
+        """
+        rates = rates or self.new_calibration().rates
         near = near_person(self.rig.grid.ground, explanation.people.ground, self.config.reach)
-        said = self._said(seen, explanation, near)
+        return self._total(self._tally(self._said(seen, explanation, near, rates), near), near)
+
+    def follow(self, calibration: RateCalibration, seen: Sequence[ViewEvidence], explanation: Explanation) -> Singles:
+        """The same of a session's next frame, with which the session's error-rate calibration is then updated."""
+        near = near_person(self.rig.grid.ground, explanation.people.ground, self.config.reach)
+        said = self._said(seen, explanation, near, calibration.rates)
         tally = self._tally(said, near)
         total = self._total(tally, near)
-        self._learn(said, tally, explanation, near)
+        self._learn(calibration, said, tally, explanation, near)
         return total
 
-    def _said(self, seen: Sequence[ViewEvidence], explanation: Explanation, near: Ints) -> list[_Said | None]:
+    def _said(
+        self, seen: Sequence[ViewEvidence], explanation: Explanation, near: Ints, all_rates: Sequence[Rates]
+    ) -> list[_Said | None]:
         weights = clutter_weights(np.array([self._clutter(i, view) for i, view in enumerate(seen)]))
         said: list[_Said | None] = []
-        for i, (view, weight, rates) in enumerate(zip(seen, weights, self.level.rates, strict=True)):
+        for i, (view, weight, rates) in enumerate(zip(seen, weights, all_rates, strict=True)):
             if view is None:
                 said.append(None)
                 continue
@@ -122,14 +133,21 @@ class Occupancy:
     def _total(self, tally: Accumulator, near: Ints) -> Singles:
         return tally.total(self.views, near, self.config.looks, (self.prior, _BESIDE))
 
-    def _learn(self, said: Sequence[_Said | None], tally: Accumulator, explanation: Explanation, near: Ints) -> None:
+    def _learn(
+        self,
+        calibration: RateCalibration,
+        said: Sequence[_Said | None],
+        tally: Accumulator,
+        explanation: Explanation,
+        near: Ints,
+    ) -> None:
         people, grid = explanation.people, self.rig.grid
         inside = inside_bodies(grid, near, people.ground, people.height)
         body, reached = cells_of_one(grid, self.height_mean, self.config.reach)
         errors, seen = np.zeros((2, len(said), 3))
-        for i, (view, rates) in enumerate(zip(said, self.level.rates, strict=True)):
+        for i, (view, rates) in enumerate(zip(said, calibration.rates, strict=True)):
             if view is not None:
-                trusted = people.evidence - people.view_evidence[i] >= self.level.config.supported
+                trusted = people.evidence - people.view_evidence[i] >= calibration.config.supported
                 trusted &= people.visibility[i] >= _WHOLE
                 fill_counts(
                     *view, tally.weighted, tally.weights, tally.count, near, inside, trusted,
@@ -137,10 +155,10 @@ class Occupancy:
                 )  # fmt: skip
         everywhere = np.maximum((self.sampling.footprint[..., 2] > 0).sum((1, 2, 3)), 1)
         units = np.column_stack([np.full(len(said), body), everywhere, np.full(len(said), reached - body)])
-        sure = np.append(people.evidence >= self.level.config.supported, False)[near]
+        sure = np.append(people.evidence >= calibration.config.supported, False)[near]
         counted = (self.views > 0) & sure
         filled = np.array([inside[counted].sum(), counted.sum()]) / reached
-        self.level.learn(errors / units, seen / units, filled)
+        calibration.learn(errors / units, seen / units, filled)
 
     def _owners(self, i: int, explanation: Explanation) -> PixelAssignment:
         people, served = explanation.people, explanation.box_assignment[i]

@@ -87,11 +87,12 @@ def measure(rig: Path, frames: slice) -> dict[str, Tally]:
     kinds = ["boxes" if s.source.kind in ("boxes", "instances") else "pixels" for s in recording.sources]
     constant = Occupancy(recording.rig, kinds, still.occupancy, still.ghosts, still.level)
     learned = Occupancy(recording.rig, kinds, config.occupancy, config.ghosts, config.level)
+    rates = learned.new_calibration()
     tallies = {form: Tally() for form in FORMS}
     for frame, seen, explanation in _explained(rig, kinds, frames, config):
         near = near_person(recording.rig.grid.ground, explanation.people.ground, config.occupancy.reach) >= 0
-        share = float(logit(learned.level.filled_share))
-        forms = {"constants": constant.fuse(seen, explanation), "learned": learned.follow(seen, explanation)}
+        share = float(logit(rates.filled_share))
+        forms = {"constants": constant.fuse(seen, explanation), "learned": learned.follow(rates, seen, explanation)}
         forms["without"] = forms["learned"] + np.where(near, share, 0.0)
         doubt = np.min([np.abs(u) for u in forms.values()], axis=0) < DOUBT
         doubt = (doubt | near) & (learned.views > 0)

@@ -1,0 +1,110 @@
+"""Results of frames on which the tracker has decided: labels, track rows, candidates, error rates, timings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from stseg.arrays import Flags, Floats, Ints, Rows
+from stseg.engine.stopwatch import Stopwatch
+from stseg.model.people import Explanation, People
+from stseg.model.tables import CANDIDATE, RATES
+from stseg.occupancy.rate_calibration import RateCalibration
+from stseg.trackers import Commit
+
+
+@dataclass(frozen=True)
+class CommittedFrames:
+    """Frames on which the tracker has decided, with their candidates and the work that they took.
+
+    Attributes
+    ----------
+    commit
+        Volume, labels, trajectory, events, windows.
+    candidates : CANDIDATE (n,), parts : float32 (n, view)
+        Every candidate of the frames, true or ghost, and the evidence of each view for it, nats.
+    rates : RATES (view,)
+        Error rates by which the last of the frames was fused; `aside` is a mean over all of them.
+    timings : TIMING (k,)
+    """
+
+    commit: Commit
+    candidates: Rows
+    parts: Floats
+    rates: Rows
+    timings: Rows
+
+    def within(self, first: int, stop: int) -> CommittedFrames:
+        """The results of frames first .. stop - 1; timings are kept whole."""
+        commit, candidates = self.commit, self.candidates
+        kept = np.array([first <= scene.frame < stop for scene in commit.scenes], bool)
+        candidate = _inside(candidates["frame"], first, stop)
+        return CommittedFrames(
+            Commit(
+                [commit.scenes[k] for k in np.flatnonzero(kept).tolist()],
+                commit.label[kept],
+                commit.trajectory[_inside(commit.trajectory["frame"], first, stop)],
+                commit.events[_inside(commit.events["frame"], first, stop)],
+                commit.windows[_inside(commit.windows["commit_stop"] - 1, first, stop)],
+            ),
+            candidates[candidate],
+            self.parts[candidate],
+            self.rates[_inside(self.rates["frame"], first, stop)],
+            self.timings,
+        )
+
+
+class FrameRecord(NamedTuple):
+    """A frame's explanation, and the RATES (view,) by which it was fused: kept until the frame is committed."""
+
+    explanation: Explanation
+    rates: Rows
+
+
+def committed_frames(commit: Commit, records: dict[int, FrameRecord], watch: Stopwatch) -> CommittedFrames:
+    """The results of a tracker's commit; takes its frames out of `records` and their time out of `watch`."""
+    rows, parts, residuals = [], [], []
+    for scene in commit.scenes:
+        explanation, rates = records.pop(scene.frame)
+        residuals.append(explanation.residual)
+        for status, candidates in ((1, explanation.people), (0, explanation.ghosts)):
+            rows.append(_candidate_rows(scene.frame, status, candidates))
+            parts.append(candidates.view_evidence.T)
+    rates["aside"] = _finite_mean(np.array(residuals))
+    window = int(commit.windows["index"][0]) if len(commit.windows) else commit.scenes[0].frame
+    return CommittedFrames(
+        commit, np.concatenate(rows), np.concatenate(parts).astype(np.float32), rates, watch.take(window)
+    )
+
+
+def rate_rows(frame: int, calibration: RateCalibration) -> Rows:
+    """RATES (view,) of a frame, by the error rates known before it."""
+    rows = np.zeros(len(calibration.rates), RATES)
+    rows["frame"], rows["view"], rows["filled"] = frame, np.arange(len(rows)), calibration.filled_share
+    rows["aside"] = np.nan
+    rows["miss"], rows["clutter"], rows["beside"] = np.array(calibration.rates).T
+    return rows
+
+
+def _inside(frame: Ints, first: int, stop: int) -> Flags:
+    return np.asarray((first <= frame) & (frame < stop))
+
+
+def _finite_mean(values: Floats) -> Floats:
+    """Mean over frames of the finite values (frame, view); nan for a view without any."""
+    finite = np.isfinite(values)
+    return np.where(finite.any(0), np.where(finite, values, 0).sum(0) / np.maximum(finite.sum(0), 1), np.nan)
+
+
+def _candidate_rows(frame: int, status: int, people: People) -> Rows:
+    rows = np.zeros(len(people), CANDIDATE)
+    rows["frame"], rows["status"], rows["height"], rows["evidence"] = frame, status, people.height, people.evidence
+    rows["x"], rows["y"] = people.ground[:, 0], people.ground[:, 1]
+    rows["xx"], rows["xy"], rows["yy"] = (
+        people.covariance[:, 0, 0],
+        people.covariance[:, 0, 1],
+        people.covariance[:, 1, 1],
+    )
+    return rows
