@@ -35,6 +35,7 @@ BESIDE = {
 AT_HOME = {
     "h5py": ("stseg.io",),
     "cv2": ("stseg.io", "stseg.report", "stseg.simulation", "stseg.calibration"),
+    "PIL": ("stseg.io",),
     "numba": ("stseg.accelerate",),
     "cyclopts": ("stseg.commands",),
     "rich": ("stseg.commands",),

@@ -93,7 +93,7 @@ def test_every_format_is_written_by_its_name_and_twice_the_same(run: Run, tmp_pa
 
 @pytest.mark.parametrize("name", FORMATS)
 def test_every_format_takes_a_run_without_tracks(empty_run: Run, path: Path, name: str) -> None:
-    FORMATS[name](path, empty_run)
+    FORMATS[name].write(path, empty_run)
     assert path.exists()
 
 
@@ -117,7 +117,7 @@ def test_tracks_with_gaps_come_back_place_by_place(
     table["x"], table["y"] = np.random.default_rng(seed).uniform(0, 0.4, (2, len(table))).round(4)
     run = run_of(folder / "run.h5", table)
     for name in ("movement", "jupedsim", "mf-json"):
-        FORMATS[name](folder / name, run)
+        FORMATS[name].write(folder / name, run)
     expected = in_order_of_ids(table)[["id", "frame", "x", "y"]].tolist()
     with closing(sqlite3.connect(folder / "jupedsim")) as database:
         rows = database.execute("SELECT id, frame, pos_x, pos_y FROM trajectory_data ORDER BY id, frame").fetchall()
@@ -155,7 +155,7 @@ def test_a_library_that_is_missing_is_asked_for_in_one_line(
 
 
 def test_parquet_holds_all_columns_and_their_units(run: Run, path: Path) -> None:
-    FORMATS["parquet"](path, run)
+    FORMATS["parquet"].write(path, run)
     table = pyarrow.parquet.read_table(path)
     assert table.column_names == [*(TRAJECTORY.names or ()), "time"]
     for name in TRAJECTORY.names or ():
@@ -168,7 +168,7 @@ def test_parquet_holds_all_columns_and_their_units(run: Run, path: Path) -> None
 
 
 def test_napari_tracks_are_sorted_by_particle_then_frame(run: Run, path: Path) -> None:
-    FORMATS["napari"](path, run)
+    FORMATS["napari"].write(path, run)
     with path.open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     assert list(rows[0]) == ["particle", "frame", "z", "y", "x", "score", "height"]
@@ -191,13 +191,13 @@ def same_for_pedpy(data: pedpy.TrajectoryData) -> None:
 
 
 def test_pedpy_reads_its_text(run: Run, path: Path) -> None:
-    FORMATS["pedpy"](path.with_suffix(".txt"), run)
+    FORMATS["pedpy"].write(path.with_suffix(".txt"), run)
     same_for_pedpy(pedpy.load_trajectory(trajectory_file=path.with_suffix(".txt")))
 
 
 def test_pedpy_reads_jupedsim_s_database_with_the_area(run: Run, path: Path) -> None:
     path.write_text("left behind by a run that was killed")
-    FORMATS["jupedsim"](path, run)
+    FORMATS["jupedsim"].write(path, run)
     same_for_pedpy(pedpy.load_trajectory_from_jupedsim_sqlite(trajectory_file=path))
     area = pedpy.load_walkable_area_from_jupedsim_sqlite(trajectory_file=path)
     assert area.polygon.equals(shapely.box(0, 0, 0.6, 0.4))
@@ -208,7 +208,7 @@ def test_pedpy_reads_jupedsim_s_database_with_the_area(run: Run, path: Path) -> 
 
 def test_jupedsim_replays_its_database(run: Run, path: Path) -> None:
     recording = pytest.importorskip("jupedsim.recording", reason="jupedsim is not installed")
-    FORMATS["jupedsim"](path, run)
+    FORMATS["jupedsim"].write(path, run)
     found = recording.Recording(str(path))
     assert (found.num_frames, found.fps, found.bounds().xmax) == (len(FRAMES), 5.0, 0.6)
     here = run.trajectory[run.trajectory["frame"] == FRAMES[-1]]
@@ -229,7 +229,7 @@ def test_people_look_where_they_go() -> None:
 
 
 def test_mot_boxes_are_one_file_a_camera_that_reads_as_boxes(run: Run, path: Path) -> None:
-    FORMATS["mot-boxes"](path, run)
+    FORMATS["mot-boxes"].write(path, run)
     with ZipFile(path) as archive:
         assert archive.namelist() == ["left.txt", "right.txt"]
         assert archive.read("left.txt").decode() == "11,1,1.00,2.00,3.00,4.00,1,-1,-1,-1\n"
@@ -247,7 +247,7 @@ def wildtrack_files(path: Path) -> tuple[dict[str, Any], dict[int, list[dict[str
 
 
 def test_wildtrack_has_a_file_a_frame_and_says_its_grid(run: Run, path: Path) -> None:
-    FORMATS["wildtrack"](path, run)
+    FORMATS["wildtrack"].write(path, run)
     grid, people = wildtrack_files(path)
     assert grid == {"x": 0, "y": 0, "step": 0.025, "columns": 24, "rows": 16}
     assert list(people) == FRAMES.tolist()
@@ -284,7 +284,7 @@ def test_wildtrack_s_own_files_have_the_same_members(run: Run, path: Path) -> No
     theirs = next(iter(sorted(folder.glob("*.json"))), None)
     if theirs is None:
         pytest.skip("needs WILDTRACK's annotations in ../shared/data")
-    FORMATS["wildtrack"](path, run)
+    FORMATS["wildtrack"].write(path, run)
     ((person, *_), *_), (one, *_) = wildtrack_files(path)[1].values(), json.loads(theirs.read_text("utf-8"))
     assert set(person) == set(one)
     assert set(person["views"][0]) == set(one["views"][0])
@@ -295,7 +295,7 @@ def test_wildtrack_s_own_files_have_the_same_members(run: Run, path: Path) -> No
 
 
 def test_movement_s_poses_in_xarray(run: Run, path: Path) -> None:
-    FORMATS["movement"](path, run)
+    FORMATS["movement"].write(path, run)
     with xarray.open_dataset(path, engine="h5netcdf") as data:
         assert data.position.dims == ("time", "space", "keypoint", "individual")
         assert data.confidence.dims == ("time", "keypoint", "individual")
@@ -314,7 +314,7 @@ def test_movement_s_poses_in_xarray(run: Run, path: Path) -> None:
 
 
 def test_movement_s_boxes_in_xarray(run: Run, path: Path) -> None:
-    FORMATS["movement-boxes"](path, run)
+    FORMATS["movement-boxes"].write(path, run)
     with xarray.open_dataset(path, engine="h5netcdf") as data:
         assert data.position.dims == data["shape"].dims == ("view", "time", "space", "individual")
         one = data.sel(view="left", individual="id_1").isel(time=0)
@@ -327,7 +327,7 @@ def test_movement_s_boxes_in_xarray(run: Run, path: Path) -> None:
 @pytest.mark.parametrize("name", ["movement", "movement-boxes"])
 def test_movement_takes_its_datasets(run: Run, path: Path, name: str) -> None:
     datasets = pytest.importorskip("movement.validators.datasets", reason="movement is not installed")
-    FORMATS[name](path, run)
+    FORMATS[name].write(path, run)
     validators = {"poses": datasets.ValidPosesInputs, "bboxes": datasets.ValidBboxesInputs}
     with xarray.open_dataset(path, engine="h5netcdf") as data:
         validator = validators[data.attrs["ds_type"]]
@@ -343,7 +343,7 @@ def test_movement_takes_its_datasets(run: Run, path: Path, name: str) -> None:
 @pytest.mark.filterwarnings("ignore:The inplace keyword")  # of pandas, to movingpandas
 @pytest.mark.filterwarnings("ignore:Time zone information dropped")  # by movingpandas: it has none
 def test_movingpandas_reads_moving_features(run: Run, path: Path) -> None:
-    FORMATS["mf-json"](path, run)
+    FORMATS["mf-json"].write(path, run)
     collection = movingpandas.read_mf_json(path, traj_id_property="id")
     assert [trajectory.id for trajectory in collection.trajectories] == [1, 2]
     second = collection.trajectories[1].df
@@ -354,7 +354,7 @@ def test_movingpandas_reads_moving_features(run: Run, path: Path) -> None:
 
 
 def test_moving_features_say_what_they_are_by(run: Run, path: Path) -> None:
-    FORMATS["mf-json"](path, run)
+    FORMATS["mf-json"].write(path, run)
     text = json.loads(path.read_text("utf-8"))
     assert text["type"] == "FeatureCollection"
     system = pyproj.CRS.from_user_input(text["crs"]["properties"]["name"])
@@ -368,7 +368,7 @@ def test_moving_features_say_what_they_are_by(run: Run, path: Path) -> None:
 
 
 def test_geojson_lines_are_features_of_geopandas(run: Run, path: Path) -> None:
-    FORMATS["geojson"](path.with_suffix(".geojsonl"), run)
+    FORMATS["geojson"].write(path.with_suffix(".geojsonl"), run)
     features = [json.loads(line) for line in path.with_suffix(".geojsonl").read_text("utf-8").splitlines()]
     shapes = [shapely.geometry.shape(feature["geometry"]) for feature in features]
     assert [(shape.geom_type, len(shape.coords)) for shape in shapes] == [("LineString", 6), ("LineString", 3)]
@@ -384,7 +384,7 @@ def test_one_place_is_a_point_and_no_number_is_null(tmp_path: Path) -> None:
     table["id"], table["frame"], table["score"], table["height"] = 7, 12, np.inf, np.nan
     run = run_of(tmp_path / "one.h5", table)
     for name in ("geojson", "mf-json"):
-        FORMATS[name](tmp_path / name, run)
+        FORMATS[name].write(tmp_path / name, run)
     (feature,) = (json.loads(line) for line in (tmp_path / "geojson").read_text("utf-8").splitlines())
     assert feature["geometry"] == {"type": "Point", "coordinates": [0.0, 0.0]}
     (moving,) = json.loads((tmp_path / "mf-json").read_text("utf-8"))["features"]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -41,10 +40,6 @@ class ForeignCamera:
     size: tuple[int, int] | None
     projection: Floats
     lens: Lens | None = None
-
-
-Reader = Callable[[Sequence[Path]], list[ForeignCamera]]
-"""Reads the files that belong together."""
 
 
 class ForeignTable(Table):

@@ -1,25 +1,54 @@
-"""All formats that tracks are written in; docs/file-formats.md tells what each holds."""
+"""The export formats: a new one is a writer, an entry here, and a line in docs/file-formats.md."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 from stseg.io.exports import benchmarks, geographic, movement, pedestrians, tables
 from stseg.io.runfile.run_reader import Run
 
-FORMATS: Mapping[str, Callable[[Path, Run], None]] = {
-    "csv": tables.write_csv,
-    "parquet": tables.write_parquet,
-    "mot": benchmarks.write_mot,
-    "mot-boxes": benchmarks.write_mot_boxes,
-    "wildtrack": benchmarks.write_wildtrack,
-    "pedpy": pedestrians.write_pedpy,
-    "jupedsim": pedestrians.write_jupedsim,
-    "movement": movement.write_movement,
-    "movement-boxes": movement.write_movement_boxes,
-    "mf-json": geographic.write_moving_features,
-    "geojson": geographic.write_geojson_lines,
-    "napari": tables.write_napari_tracks,
+
+@dataclass(frozen=True, slots=True)
+class ExportFormat:
+    """One format of tracks.
+
+    Attributes
+    ----------
+    write
+        Writes a run's tracks to a path.
+    about
+        What it is, for `stseg export --help`.
+    """
+
+    write: Callable[[Path, Run], None]
+    about: str
+
+
+FORMATS: Mapping[str, ExportFormat] = {
+    "csv": ExportFormat(
+        tables.write_csv, "frame, id, x, y, height, score, covariance and views, with a header; metres"
+    ),
+    "parquet": ExportFormat(tables.write_parquet, "every column of the trajectory, and the time"),
+    "mot": ExportFormat(benchmarks.write_mot, "3-D MOTChallenge lines; frames count from 1 there"),
+    "mot-boxes": ExportFormat(benchmarks.write_mot_boxes, "a zip of 2-D MOTChallenge lines, one file a camera"),
+    "wildtrack": ExportFormat(
+        benchmarks.write_wildtrack, "a zip of WILDTRACK's annotations_positions, and the grid that they use"
+    ),
+    "pedpy": ExportFormat(
+        pedestrians.write_pedpy, "the text of PedPy and JuPedSim (PedPy reads the run file itself, too)"
+    ),
+    "jupedsim": ExportFormat(pedestrians.write_jupedsim, "JuPedSim's SQLite trajectory"),
+    "movement": ExportFormat(movement.write_movement, "netCDF of the package movement, places on the ground"),
+    "movement-boxes": ExportFormat(movement.write_movement_boxes, "the same of the boxes in all views"),
+    "mf-json": ExportFormat(geographic.write_moving_features, "OGC Moving Features JSON"),
+    "geojson": ExportFormat(geographic.write_geojson_lines, "GeoJSON, one track a line"),
+    "napari": ExportFormat(tables.write_napari_tracks, "the CSV of napari-tracks"),
 }
-"""What writes a run's tracks to a path, by the name that `stseg export --to` takes."""
+"""By the name that `stseg export --to` takes."""
+
+
+def help_text() -> str:
+    """The formats as paragraphs of a command's help."""
+    return "\n\n".join(f"    **{name}**: {own.about}." for name, own in FORMATS.items()).strip()

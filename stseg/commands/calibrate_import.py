@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 from cyclopts import Parameter
 
@@ -13,36 +13,17 @@ from stseg.commands.calibrate_scene import SceneOptions, StreamOptions, size_of,
 from stseg.errors import CalibrationError, ConfigError
 from stseg.geometry import Camera, Rig
 from stseg.geometry.handedness import is_mirrored
-from stseg.io.calibrations.foreign_camera import ForeignCamera, Reader
-from stseg.io.calibrations.opencv_xml import read_opencv_xml
-from stseg.io.calibrations.pom import read_pom
-from stseg.io.calibrations.projection import read_projection
-from stseg.io.calibrations.structured import read_kalibr_yaml, read_krt_json, read_nvidia_json, read_pose_toml
-from stseg.io.calibrations.tsai import read_tsai_xml
+from stseg.io.calibrations.foreign_camera import ForeignCamera
+from stseg.io.calibrations.formats import FORMATS, ImportOptions, help_text
 from stseg.io.calibrations.world_frame import UNITS, Up, World, guess_unit, guess_up, require_height
 from stseg.io.outputs.whole_files import require_new
 from stseg.io.recording.recording import Recording
 from stseg.io.recording.rigs import write_rig
-
-_READERS: dict[str, Reader] = {
-    "opencv": read_opencv_xml,
-    "matrix": read_projection,
-    "tsai": read_tsai_xml,
-    "krt": read_krt_json,
-    "anipose": read_pose_toml,
-    "pose2sim": read_pose_toml,
-    "freemocap": read_pose_toml,
-    "caliscope": read_pose_toml,
-    "nvidia": read_nvidia_json,
-    "kalibr": read_kalibr_yaml,
-}
-Format = Literal[
-    "opencv", "matrix", "tsai", "pom", "krt", "anipose", "pose2sim", "freemocap", "caliscope", "nvidia", "kalibr"
-]
+from stseg.io.toml.text import one_of
 
 
 def import_calibration(
-    format: Format,
+    format: Annotated[str, Parameter(metavar="FORMAT")],
     /,
     *files: Annotated[str, Parameter(metavar="FILE...")],
     output: Annotated[Path, Parameter(name=["--output", "-o"], metavar="RIG.toml")],
@@ -58,20 +39,7 @@ def import_calibration(
 ) -> None:
     """Make a rig file from the calibrations of other programs.
 
-    **opencv**: one FileStorage XML a camera, or two joined with a plus sign (`intrinsic.xml+extrinsic.xml`).
-
-    **matrix**: one 3x4 projection matrix a camera, as .txt, .csv, .npy, .npz or .mat.
-
-    **tsai**: one XML a camera, as PETS 2009 has them.
-
-    **pom**: EPFL's homographies, one text a camera with that of the ground and that of the heads, or
-    `ground.txt+head.txt`; the unit is the side of the ground's cells.
-
-    **krt**: JSON with K, RT and imgSize of each camera.
-
-    **anipose**, **pose2sim**, **freemocap**, **caliscope**: their TOML. **nvidia**: calibration.json.
-
-    **kalibr**: a camera chain in YAML (needs PyYAML).
+    {formats}
 
     Four cameras with silhouettes, calibrated in millimetres with Z pointing down:
 
@@ -109,7 +77,7 @@ def import_calibration(
     """
     require_new(output, overwrite)
     shared = None if size is None else size_of(size)
-    foreign = _named(_read(format, files, shared, unit, head), files, names)
+    foreign = _named(_read(format, files, ImportOptions(shared, unit, head)), files, names)
     world = _world(foreign, unit, up, mirrored)
     cameras = tuple(world.camera(one, one.name, _size(one, shared)) for one in foreign)
     rig = Rig(scene.scene or output.stem, scene.frame_rate, scene.grid, cameras)
@@ -124,20 +92,17 @@ def import_calibration(
     print(f"wrote {output}")
 
 
-def _read(
-    format: Format, files: Sequence[str], size: tuple[int, int] | None, unit: str | None, head: float
-) -> list[ForeignCamera]:
+import_calibration.__doc__ = (import_calibration.__doc__ or "").replace("{formats}", help_text())
+
+
+def _read(format: str, files: Sequence[str], options: ImportOptions) -> list[ForeignCamera]:
     """The cameras, as their calibrations have them."""
+    if format not in FORMATS:
+        raise ConfigError("calibrate import", "FORMAT", repr(format), one_of(format, FORMATS))
     if not files:
         raise ConfigError("calibrate import", "FILE", "nothing", "one calibration a camera")
     groups = [[Path(part) for part in file.split("+")] for file in files]
-    if format != "pom":
-        reader = _READERS[format]
-        return [camera for group in groups for camera in reader(group)]
-    if size is None or unit is None:
-        missing = "--size" if size is None else "--unit"
-        raise ConfigError(missing, "", "nothing", "the images' width,height and the side of the ground's cells")
-    return [camera for group in groups for camera in read_pom(group, size, head / World(unit).metres)]
+    return [camera for group in groups for camera in FORMATS[format].read(group, options)]
 
 
 def _named(cameras: Sequence[ForeignCamera], files: Sequence[str], given: str | None) -> list[ForeignCamera]:

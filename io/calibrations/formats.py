@@ -1,0 +1,91 @@
+"""The calibration formats: a new one is a reader, an entry here, and a line in docs/file-formats.md."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from stseg.errors import ConfigError
+from stseg.io.calibrations.foreign_camera import ForeignCamera
+from stseg.io.calibrations.opencv_xml import read_opencv_xml
+from stseg.io.calibrations.pom import read_pom
+from stseg.io.calibrations.projection import read_projection
+from stseg.io.calibrations.structured import read_kalibr_yaml, read_krt_json, read_nvidia_json, read_pose_toml
+from stseg.io.calibrations.tsai import read_tsai_xml
+from stseg.io.calibrations.world_frame import World
+
+
+@dataclass(frozen=True, slots=True)
+class ImportOptions:
+    """What the command line says of calibrations that lack it.
+
+    Attributes
+    ----------
+    size
+        Width and height of the images, pixels.
+    unit
+        Unit of length, as `World` takes it.
+    head
+        Height of POM's head plane, metres.
+    """
+
+    size: tuple[int, int] | None
+    unit: str | None
+    head: float
+
+
+Reader = Callable[[Sequence[Path], ImportOptions], list[ForeignCamera]]
+"""Reads the files that belong together."""
+
+
+@dataclass(frozen=True, slots=True)
+class CalibrationFormat:
+    """One format of calibrations: its reader, and what it is, for `stseg calibrate import --help`."""
+
+    read: Reader
+    about: str
+
+
+def _without_options(read: Callable[[Sequence[Path]], list[ForeignCamera]]) -> Reader:
+    return lambda files, _: read(files)
+
+
+def _read_pom(files: Sequence[Path], options: ImportOptions) -> list[ForeignCamera]:
+    if options.size is None or options.unit is None:
+        missing = "--size" if options.size is None else "--unit"
+        raise ConfigError(missing, "", "nothing", "the images' width,height and the side of the ground's cells")
+    return read_pom(files, options.size, options.head / World(options.unit).metres)
+
+
+_POSES = CalibrationFormat(_without_options(read_pose_toml), "its TOML, a table a camera")
+
+FORMATS: Mapping[str, CalibrationFormat] = {
+    "opencv": CalibrationFormat(
+        _without_options(read_opencv_xml),
+        "one FileStorage XML a camera, or two joined with a plus sign (`intrinsic.xml+extrinsic.xml`)",
+    ),
+    "matrix": CalibrationFormat(
+        _without_options(read_projection),
+        "one 3x4 projection matrix a camera, as .txt, .csv, .npy, .npz or .mat",
+    ),
+    "tsai": CalibrationFormat(_without_options(read_tsai_xml), "one XML a camera, as PETS 2009 has them"),
+    "pom": CalibrationFormat(
+        _read_pom,
+        "EPFL's homographies, one text a camera with that of the ground and that of the heads, or "
+        "`ground.txt+head.txt`; the unit is the side of the ground's cells",
+    ),
+    "krt": CalibrationFormat(_without_options(read_krt_json), "JSON with K, RT and imgSize of each camera"),
+    "anipose": _POSES,
+    "pose2sim": _POSES,
+    "freemocap": _POSES,
+    "caliscope": _POSES,
+    "nvidia": CalibrationFormat(_without_options(read_nvidia_json), "calibration.json"),
+    "kalibr": CalibrationFormat(_without_options(read_kalibr_yaml), "a camera chain in YAML (needs PyYAML)"),
+}
+"""By the name that `stseg calibrate import` takes."""
+
+
+def help_text() -> str:
+    """The formats as paragraphs of a command's help."""
+    return "\n\n".join(f"    **{name}**: {own.about}." for name, own in FORMATS.items()).strip()
