@@ -7,10 +7,10 @@ import re
 import numpy as np
 import run_files
 
+from stseg.model.ghost_reasons import ghost_reasons
 from stseg.model.tables import EVENT, Tracks
 from stseg.report.answers import answers
 from stseg.report.charts import Span
-from stseg.report.findings import ghost_reasons
 from stseg.report.maps import Haunt
 
 

@@ -9,17 +9,11 @@ from hypothesis import strategies as st
 from numpy.typing import ArrayLike
 
 from stseg.arrays import AnyArray, Rows
+from stseg.engine.silent_views import view_warnings
 from stseg.io.runfile.layout import ghost_type
+from stseg.model.ghost_reasons import DENIED, OTHERS, TOO_LITTLE, ghost_reasons
 from stseg.model.tables import TRAJECTORY
-from stseg.report.findings import (
-    DENIED,
-    OTHERS,
-    TOO_LITTLE,
-    ghost_reasons,
-    ground_by_views,
-    people_per_minute,
-    view_warnings,
-)
+from stseg.report.findings import ground_by_views, people_per_minute
 
 FRAMES = np.arange(100, 400)
 

@@ -110,7 +110,7 @@ def allowed(part: str) -> set[str]:
     if part == "trackers":
         return {*FOUNDATION, *BESIDE[part]}
     if part == "engine":
-        return {*FOUNDATION, *STAGES, "trackers", "calibration", "io", "report", "__init__"}
+        return {*FOUNDATION, *STAGES, "trackers", "calibration", "io", "__init__"}
     if part == "commands":
         return {*FOUNDATION, *STAGES, *BESIDE, "engine", "__init__"}
     return BESIDE[part]

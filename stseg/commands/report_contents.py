@@ -12,11 +12,12 @@ from stseg.engine.warnings import run_warnings
 from stseg.evaluation import evaluate
 from stseg.geometry import Camera, Grid
 from stseg.io.runfile.runs import Run
+from stseg.model.ghost_reasons import GhostReasons, ghost_reasons, says
 from stseg.report.answers import answers
 from stseg.report.charts import Span, clock_time
 from stseg.report.embedded import embedded_json
 from stseg.report.figures import Figure, Instant, camera_figures, ground_figures, slice_figures
-from stseg.report.findings import GhostReasons, ghost_reasons, ground_by_views, says
+from stseg.report.findings import ground_by_views
 from stseg.report.maps import Bins, Haunt, blind_map, density, dwell, haunts, heat_map
 from stseg.report.page import Contents, ViewSummary
 from stseg.report.sheets import thin_sheets

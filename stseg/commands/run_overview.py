@@ -8,7 +8,8 @@ import numpy as np
 
 from stseg.engine.warnings import run_warnings
 from stseg.io.runfile.runs import Run
-from stseg.report.findings import REASONS, ghost_reasons, ground_by_views, people_per_minute
+from stseg.model.ghost_reasons import REASONS, ghost_reasons
+from stseg.report.findings import ground_by_views, people_per_minute
 
 _BLIND_SHARE = 0.05  # of the ground that no view sees, from which on it is worth a warning
 

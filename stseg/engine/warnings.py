@@ -1,4 +1,4 @@
-"""What looks wrong in a run's views: silent ones, and those that see people beside where the others put them."""
+"""Warnings about the views of a finished run: silent ones, moved ones, and those with a systematic residual."""
 
 from __future__ import annotations
 
@@ -7,31 +7,31 @@ import numpy as np
 from stseg.arrays import Floats, Ints
 from stseg.calibration.knock_detection import find_knocks
 from stseg.calibration.run_check import knocked, views_aside
+from stseg.engine.silent_views import view_warnings
 from stseg.io.runfile.runs import Run
-from stseg.report.findings import view_warnings
 
 _MOVED = 1.0
-"""Pixels by which a picture must move."""
+"""Least shift of an image that counts as a moved camera, pixels."""
 
 
 def run_warnings(run: Run) -> list[str]:
-    """A sentence for everything that a user should look at."""
+    """One sentence for everything that a user should look at."""
     return view_warnings(run.cameras, run.ghosts, run.frames, run.frame_rate) + rig_warnings(run)
 
 
 def rig_warnings(run: Run) -> list[str]:
-    """The views whose pictures moved, and when; else the one that was knocked, or those that are off by over a cell."""
-    frames, aside = _by_window(run)
+    """Cameras that moved, by their images; else by their residuals; else views with a residual above one cell."""
+    frames, residual = _residual_by_window(run)
     cell = run.recording.rig.grid.cell
     if moved := _moved(run):
         return moved
-    if (knock := knocked(aside, cell)) is not None:
+    if (knock := knocked(residual, cell)) is not None:
         name, before, after = run.cameras[knock.view], _beside(knock.before), _beside(knock.after)
         return [
             f"view {name} was moved about frame {frames[knock.frame]}: it sees people {after} where the views put "
             f"them, {before} it before"
         ]
-    if off := views_aside(aside, cell):
+    if off := views_aside(residual, cell):
         first, *others = (f"{run.cameras[one.view]} sees people {_beside(one.metres)}" for one in off)
         also = "".join(f", {other} it" for other in others)
         return [f"view {first} where the views put them{also}; see stseg calibrate check"]
@@ -39,10 +39,10 @@ def rig_warnings(run: Run) -> list[str]:
 
 
 def _moved(run: Run) -> list[str]:
-    """A sentence for each colour view whose picture moved by a pixel or more."""
-    frames, look = np.unique(run.shifts["frame"], return_inverse=True)
+    """One sentence for each colour view whose image moved by a pixel or more."""
+    frames, sample = np.unique(run.shifts["frame"], return_inverse=True)
     shift = np.full((len(frames), len(run.cameras)), np.nan)
-    shift[look, run.shifts["view"]] = np.hypot(run.shifts["u"], run.shifts["v"])
+    shift[sample, run.shifts["view"]] = np.hypot(run.shifts["u"], run.shifts["v"])
     return [
         f"view {run.cameras[knock.view]} was moved about frame {frames[knock.frame]}: its picture by "
         f"{knock.before - knock.after:.0f} pixels"
@@ -50,12 +50,12 @@ def _moved(run: Run) -> list[str]:
     ]
 
 
-def _by_window(run: Run) -> tuple[Ints, Floats]:
-    """The last frame of each window, and how far each view is aside in it (window, view), metres."""
+def _residual_by_window(run: Run) -> tuple[Ints, Floats]:
+    """Last frame of each window, and each view's mean reprojection residual in it (window, view), metres."""
     frames, window = np.unique(run.rates["frame"], return_inverse=True)
-    aside = np.full((len(frames), len(run.cameras)), np.nan)
-    aside[window, run.rates["view"]] = run.rates["aside"]
-    return frames, aside
+    residual = np.full((len(frames), len(run.cameras)), np.nan)
+    residual[window, run.rates["view"]] = run.rates["aside"]
+    return frames, residual
 
 
 def _beside(metres: float) -> str:

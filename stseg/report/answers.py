@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from stseg.arrays import Floats, Rows
+from stseg.model.ghost_reasons import REASONS, GhostReasons
 from stseg.report.charts import Span, clock_time
-from stseg.report.findings import REASONS, GhostReasons
 from stseg.report.maps import Haunt
 
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from stseg.arrays import AnyArray, Bytes, Ints, Rows
 from stseg.geometry import Camera, Rig
+from stseg.model.ghost_reasons import REASONS, ghost_reasons
 from stseg.report.colours import hex_colour, track_colour
-from stseg.report.findings import REASONS, ghost_reasons
 from stseg.report.sheets import Sheets
 
 _MOST_PLACES = 250_000  # of tracks

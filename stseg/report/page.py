@@ -13,9 +13,9 @@ from importlib.resources import files
 import numpy as np
 
 from stseg.arrays import Rows
+from stseg.model.ghost_reasons import REASONS, GhostReasons
 from stseg.report.charts import Span, lives_chart, people_chart
 from stseg.report.figures import Figure
-from stseg.report.findings import REASONS, GhostReasons
 from stseg.report.html import MOST_ROWS, bars, chart, figure, figures, note, section, swatch, table, when
 from stseg.report.style import STYLE
 
