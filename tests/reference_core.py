@@ -229,7 +229,7 @@ def neighbours(energy: Energy) -> list[Edge]:
         for (later, dz, dy, dx), capacity in zip(energy.offsets.tolist(), energy.capacity.tolist(), strict=True):
             foot = y * columns + x
             if later:
-                foot = int(energy.ahead[t, y, x]) if t + 1 < frames else -1
+                foot = int(energy.successor[t, y, x]) if t + 1 < frames else -1
             to_z, to_y, to_x = z + dz, foot // columns + dy, foot % columns + dx
             if foot >= 0 and 0 <= to_z < planes and 0 <= to_y < rows and 0 <= to_x < columns:
                 found.append((int(index[t, z, y, x]), int(index[t + later, to_z, to_y, to_x]), capacity))

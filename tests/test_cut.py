@@ -23,10 +23,10 @@ from stseg.errors import ConfigError
 from stseg.geometry import Grid
 from stseg.graphcut import cut as cut_module
 from stseg.graphcut.arcs import in_place, in_rows
-from stseg.graphcut.compact import MOST, least_cut
 from stseg.graphcut.cut import Storage, minimum_cut
 from stseg.graphcut.energy import QUANTUM, Energy
 from stseg.graphcut.reduction import OCCUPIED, OPEN, reduce
+from stseg.graphcut.sparse import MOST, sparse_cut
 from stseg.segmentation.energy import build_energy, neighbourhood
 from stseg.segmentation.motion import follow
 
@@ -43,7 +43,7 @@ PLAIN = os.environ.get("NUMBA_DISABLE_JIT") == "1"
 @pytest.fixture
 def always_two(monkeypatch: pytest.MonkeyPatch) -> None:
     """Two threads even for a handful of nodes."""
-    monkeypatch.setattr(cut_module, "WORTH_TWO", 1)
+    monkeypatch.setattr(cut_module, "TWO_THREADS", 1)
 
 
 def window(
@@ -264,7 +264,7 @@ def test_least_cut_of_any_graph(seed: int, nodes: int, edges: int) -> None:
     graph.add_grid_tedges(names, (-unary).clip(0), unary.clip(0))
     graph.add_edges(start, end, backward, forward)
     graph.maxflow()
-    occupied = least_cut(unary, start, end, forward, backward)
+    occupied = sparse_cut(unary, start, end, forward, backward)
     np.testing.assert_array_equal(occupied, graph.get_grid_segments(names))
 
 
@@ -272,12 +272,12 @@ def test_least_cut_of_extremes() -> None:
     start, end = np.array([0, 1]), np.array([1, 2])
     endless = np.array([10**15, -1, -(10**15)])
     one = np.ones(2, np.int64)
-    assert least_cut(endless, start, end, 5 * one, 5 * one).tolist() == [True, False, False]
-    assert least_cut(endless, start, end, np.array([5, 1]), one).tolist() == [True, True, False]
+    assert sparse_cut(endless, start, end, 5 * one, 5 * one).tolist() == [True, False, False]
+    assert sparse_cut(endless, start, end, np.array([5, 1]), one).tolist() == [True, True, False]
     none = np.zeros(0, np.int64)
-    assert least_cut(np.array([1, 0, -1]), none, none, none, none).tolist() == [True, False, False]
+    assert sparse_cut(np.array([1, 0, -1]), none, none, none, none).tolist() == [True, False, False]
     with pytest.raises(OverflowError, match="capacities"):
-        least_cut(endless, start, end, MOST * one, one)
+        sparse_cut(endless, start, end, MOST * one, one)
 
 
 # Threads

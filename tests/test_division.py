@@ -14,7 +14,7 @@ from strategies import numbers
 from stseg.arrays import Flags, Floats, Ints, Labels
 from stseg.config import IdentityConfig, SegmentationConfig
 from stseg.geometry import Grid
-from stseg.graphcut.cell_subset import CellSubset, subset_of
+from stseg.graphcut.cell_subset import CellSubset, subset
 from stseg.graphcut.cut import minimum_cut
 from stseg.graphcut.energy import QUANTUM, Energy
 from stseg.graphcut.expansion import LabelEnergy, expand
@@ -49,7 +49,7 @@ def random_window(seed: int, shape: tuple[int, ...]) -> Energy:
 def test_a_part_has_the_edges_of_its_window(seed: int, shape: tuple[int, ...]) -> None:
     energy = random_window(seed, shape)
     inside = np.random.default_rng(seed).random(shape) < 0.6
-    part = subset_of(energy, inside)
+    part = subset(energy, inside)
     assert part.cell.tolist() == np.flatnonzero(inside).tolist()
     within = inside.ravel()
     every = list(zip(*(side.tolist() for side in energy.edges()), strict=True))
@@ -65,14 +65,14 @@ def test_a_part_has_the_edges_of_its_window(seed: int, shape: tuple[int, ...]) -
 @pytest.mark.parametrize("seed", range(5))
 def test_whole_pieces_of_a_part(seed: int) -> None:
     energy = random_window(seed, (2, 2, 4, 5))
-    part = subset_of(energy, np.random.default_rng(seed).random((2, 2, 4, 5)) < 0.4)
+    part = subset(energy, np.random.default_rng(seed).random((2, 2, 4, 5)) < 0.4)
     piece = part.components()
     assert (piece[part.start] == piece[part.end]).all()
     kept = piece % 2 == 0
     only = part.only(kept)
     inside = np.zeros(energy.unary.size, bool)
     inside[part.cell[kept]] = True
-    same = subset_of(energy, inside.reshape(energy.unary.shape))
+    same = subset(energy, inside.reshape(energy.unary.shape))
     for one, other in zip(vars(only).values(), vars(same).values(), strict=True):
         np.testing.assert_array_equal(one, other)
 
@@ -193,7 +193,7 @@ def test_touching_people_are_cut_apart_where_the_truth_says() -> None:
     truth = bodies(tracks)
     energy = window_of(truth)
     occupied, division = divided(energy, walking(tracks))
-    assert subset_of(energy, occupied).components().max() == 0  # one piece of space and time
+    assert subset(energy, occupied).components().max() == 0  # one piece of space and time
     assert division.cells == occupied.sum()
     both = (truth > 0) & (division.label > 0)
     assert (division.label[both] == truth[both]).mean() > 0.98
@@ -256,11 +256,11 @@ def test_the_pieces_are_all_that_need_be_moved(seed: int) -> None:
     places = walking(tracks)
     energy = window_of(bodies(tracks), seed)
     occupied, division = divided(energy, places)
-    whole = subset_of(energy, np.ones_like(occupied))
+    whole = subset(energy, np.ones_like(occupied))
     frame, plane, y, x = np.unravel_index(whole.cell, occupied.shape)
     share = shares(frame, GRID.ground[y, x], GRID.heights[plane], places, PILLAR)
     problem: LabelEnergy = label_energy(energy.unary.ravel(), share, whole)
-    start: Ints = np.where(occupied.ravel(), problem.best(), 0)
+    start: Ints = np.where(occupied.ravel(), problem.cheapest_labels(), 0)
     everywhere = np.array([0, 1, 2, UNASSIGNED])[expand(problem, start)]
     outside = ~occupied.ravel()
     assert not everywhere[outside].any()

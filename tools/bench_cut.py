@@ -67,7 +67,7 @@ def by_pymaxflow(energy: Energy) -> Flags:
     size = energy.unary.size
     graph = maxflow.GraphInt(size, size * len(energy.offsets))
     nodes = graph.add_grid_nodes(energy.unary.shape)
-    for offset, capacity, (start, end) in zip(energy.offsets, energy.capacity, energy.ends(nodes), strict=True):
+    for offset, capacity, (start, end) in zip(energy.offsets, energy.capacity, energy.edge_values(nodes), strict=True):
         # Edges of a kind that the grid functions know are added by them: they are the faster way.
         if offset[0] == 0 or not _moves(energy):
             structure = np.zeros((3, 3, 3, 3))
@@ -81,8 +81,8 @@ def by_pymaxflow(energy: Energy) -> Flags:
 
 
 def _moves(energy: Energy) -> bool:
-    still = np.arange(energy.ahead[:1].size).reshape(energy.ahead.shape[1:])
-    return bool((energy.ahead != still).any())
+    still = np.arange(energy.successor[:1].size).reshape(energy.successor.shape[1:])
+    return bool((energy.successor != still).any())
 
 
 def compare(name: str, energy: Energy) -> Row:

@@ -20,7 +20,7 @@ from bench_cut import Row, print_table
 
 from stseg.accelerate import kernel
 from stseg.arrays import Floats, Ints, Labels, Singles
-from stseg.graphcut.cell_subset import subset_of
+from stseg.graphcut.cell_subset import subset
 from stseg.graphcut.cut import minimum_cut
 from stseg.graphcut.energy import Energy
 from stseg.graphcut.expansion import LabelEnergy, expand
@@ -81,7 +81,7 @@ def solve(cost: Labels) -> Ints:
     _fill_best(cost, best)
     still = follow(np.zeros((SHAPE[0] - 1, *SHAPE[2:], 2), np.int64))
     window = Energy(best, neighbourhood(8), np.full(4, WEIGHT, np.int32), still)
-    part = subset_of(window, minimum_cut(window).occupied)
+    part = subset(window, minimum_cut(window).occupied)
     own = cost.reshape(-1, cost.shape[-1])[part.cell].astype(np.int64)
     more = own[:, 1:] - own[:, :1]
     size = len(part.cell)

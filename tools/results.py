@@ -6,8 +6,8 @@
 
 Makes rig files, runs and scores, all through the command line of `stseg`. A row replaces the same row of an earlier
 run; `--all` deletes all others first, so that every figure is of one commit. `--sets none` writes the page
-from the stored figures. Variants are the trackers and the ablations of their papers (tools/result_variants.py); a set is tracked
-by those that its foreground allows. `--frames` measures a part of the frames, and the row says so.
+from the stored figures. Variants are the trackers and the ablations of their papers (tools/result_variants.py); a set
+is tracked by those that its foreground allows. `--frames` measures a part of the frames, and the row says so.
 
 Times are of the processor: those of the run file's /timings, which are of the wall, by the share of the wall time in
 which the run had a processor. With --no-times rows have none, and --jobs of them are measured at once.

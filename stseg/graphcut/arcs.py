@@ -1,7 +1,7 @@
-"""The graph of what a reduction leaves, stored in one of two ways.
+"""Residual graph of the undecided nodes of a reduction, stored in rows or in place.
 
-In rows, nodes are numbered anew and their neighbours written down: small graphs stay in the processor's cache. In
-place, nodes keep their numbers in the window and neighbours are computed: of a dense window it takes half the memory.
+In rows, nodes are renumbered and their neighbours stored: small graphs stay in the processor's cache. In place, nodes
+keep their lattice numbers and neighbours are computed: dense grids take half the memory.
 """
 
 from __future__ import annotations
@@ -17,43 +17,43 @@ from stseg.graphcut.reduction import OPEN, Reduction
 
 
 def in_rows(reduced: Reduction, middle: int) -> tuple[Graph, Bridges]:
-    """Graph of the open nodes, numbered as they follow each other; arcs across `middle` are bridges."""
+    """Graph of the undecided nodes, renumbered; arcs across lattice number `middle` are bridges."""
     size, degree = len(reduced.left), len(reduced.capacity)
     number = np.empty(len(reduced.state), np.int32)
     number[reduced.left] = np.arange(size, dtype=np.int32)
     head, residual = np.empty(size * degree, np.int32), np.empty(size * degree, np.int16)
-    bridges = _no_bridges(reduced, middle, int(np.searchsorted(reduced.left, middle)))
-    built = np.zeros(1, np.int64)
-    _write_rows(*_window(reduced), number, middle, head, residual, *bridges[1:], built)
+    bridges = _bridge_buffer(reduced, middle, int(np.searchsorted(reduced.left, middle)))
+    count = np.zeros(1, np.int64)
+    _write_rows(*_open_nodes(reduced), number, middle, head, residual, *bridges[1:], count)
     graph = Graph(residual, reduced.excess.copy(), degree, None, None, head, None)
-    return graph, _built(bridges, int(built[0]))
+    return graph, _trimmed(bridges, int(count[0]))
 
 
 def in_place(reduced: Reduction, middle: int) -> tuple[Graph, Bridges]:
-    """Graph of all nodes, in which decided ones have no arcs; arcs across `middle` are bridges."""
+    """Graph of all lattice nodes, decided ones without arcs; arcs across `middle` are bridges."""
     nodes, degree = len(reduced.state), len(reduced.capacity)
     excess, residual = np.zeros(nodes, np.int32), np.zeros(nodes * degree, np.int16)
     excess[reduced.left] = reduced.excess
-    bridges = _no_bridges(reduced, middle, middle)
-    built = np.zeros(1, np.int64)
-    _write_place(*_window(reduced), middle, residual, *bridges[1:], built)
-    return Graph(residual, excess, degree, None, None, None, reduced.lattice), _built(bridges, int(built[0]))
+    bridges = _bridge_buffer(reduced, middle, middle)
+    count = np.zeros(1, np.int64)
+    _write_place(*_open_nodes(reduced), middle, residual, *bridges[1:], count)
+    return Graph(residual, excess, degree, None, None, None, reduced.lattice), _trimmed(bridges, int(count[0]))
 
 
-def _window(reduced: Reduction) -> tuple[Labels, Bytes, Lattice, Labels]:
+def _open_nodes(reduced: Reduction) -> tuple[Labels, Bytes, Lattice, Labels]:
     return reduced.left, reduced.state, reduced.lattice, reduced.capacity
 
 
-def _no_bridges(reduced: Reduction, middle: int, number: int) -> Bridges:
-    """Room for the bridges: all arcs of the nodes that are at most a frame and its guards away."""
+def _bridge_buffer(reduced: Reduction, middle: int, number: int) -> Bridges:
+    """Buffer for the bridges: all arcs of the nodes within an edge in time of `middle`."""
     lattice = reduced.lattice
-    reach = lattice.frame + abs(lattice.ahead).max(initial=0)
+    reach = lattice.frame + abs(lattice.forward).max(initial=0)
     first, last = np.searchsorted(reduced.left, (middle - reach, middle + reach))
-    room = int(last - first) * len(reduced.capacity) if middle > 0 else 0
-    return Bridges(number, *(np.empty(room, np.int32) for _ in range(3)))
+    size = int(last - first) * len(reduced.capacity) if middle > 0 else 0
+    return Bridges(number, *(np.empty(size, np.int32) for _ in range(3)))
 
 
-def _built(bridges: Bridges, number: int) -> Bridges:
+def _trimmed(bridges: Bridges, number: int) -> Bridges:
     return Bridges(bridges.middle, bridges.tail[:number], bridges.arc[:number], bridges.capacity[:number])
 
 
@@ -69,8 +69,8 @@ def _write_rows(
     residual: AnyArray,
     tail: Labels,
     bridge: Labels,
-    carries: Labels,
-    built: Ints,
+    bridge_capacity: Labels,
+    count: Ints,
 ) -> None:
     for k, node in enumerate(left):
         for slot in range(len(capacity)):
@@ -82,8 +82,8 @@ def _write_rows(
                 if (node < middle) == (to < middle):
                     residual[arc] = capacity[slot]
                 else:
-                    tail[built[0]], bridge[built[0]], carries[built[0]] = k, arc, capacity[slot]
-                    built[0] += 1
+                    tail[count[0]], bridge[count[0]], bridge_capacity[count[0]] = k, arc, capacity[slot]
+                    count[0] += 1
 
 
 @part
@@ -96,8 +96,8 @@ def _write_place(
     residual: AnyArray,
     tail: Labels,
     bridge: Labels,
-    carries: Labels,
-    built: Ints,
+    bridge_capacity: Labels,
+    count: Ints,
 ) -> None:
     for node in left:
         for slot in range(len(capacity)):
@@ -107,5 +107,5 @@ def _write_place(
                 if (node < middle) == (to < middle):
                     residual[arc] = capacity[slot]
                 else:
-                    tail[built[0]], bridge[built[0]], carries[built[0]] = node, arc, capacity[slot]
-                    built[0] += 1
+                    tail[count[0]], bridge[count[0]], bridge_capacity[count[0]] = node, arc, capacity[slot]
+                    count[0] += 1

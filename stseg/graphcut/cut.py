@@ -1,4 +1,4 @@
-"""The exact two-label minimum cut of a window."""
+"""Exact minimum cut of the binary energy of a space-time grid."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from stseg.graphcut.lattice import cells
 from stseg.graphcut.reduction import OCCUPIED, Reduction, reduce
 
 DENSE = 0.5
-"""Share of the cells left by the reduction from which their arcs stay in place: rows would take twice the memory."""
-WORTH_TWO = 20_000
-"""Open nodes from which a second thread gains more than it costs."""
-_STRONGEST = 16383
-"""Capacity of which twice fits into 16 bits."""
+"""Share of undecided cells from which the graph is stored in place: renumbered rows would take twice the memory."""
+TWO_THREADS = 20_000
+"""Undecided nodes from which a second thread gains more time than it costs."""
+_MOST = 16383
+"""Largest capacity: twice as much fits into 16 bits."""
 
 Storage = Callable[[Reduction, int], tuple[Graph, Bridges]]
 
@@ -32,9 +32,9 @@ class Cut:
     Attributes
     ----------
     occupied : bool (time, plane, y, x)
-        True where a cell is occupied.
+        Cells with label 1.
     nodes
-        Number of cells that the reduction left to the solver.
+        Number of cells that the reduction left undecided.
     """
 
     occupied: Flags
@@ -42,30 +42,30 @@ class Cut:
 
 
 def minimum_cut(energy: Energy, threads: int = 2, storage: Storage | None = None) -> Cut:
-    """The labelling of least energy; of several, the one with the smallest object set.
+    """Labelling of least energy; of several, the one with the fewest cells of label 1.
 
     Parameters
     ----------
     energy
-        With capacities of at most 16383 quanta each, and at most 2**30 together.
+        Capacities of at most 16383 quanta each, and at most 2**30 together.
     threads
-        1 or 2; the labels are the same.
+        1 or 2. The labels do not depend on it.
     storage
-        How the arcs of what is left are stored; by its share if not given. The labels are the same.
+        Storage of the undecided graph; chosen by its size if None. The labels do not depend on it.
 
     Raises
     ------
     OverflowError
-        If a capacity is larger.
+        If a capacity is too large.
     """
-    if energy.capacity.max(initial=0) > _STRONGEST:
-        raise OverflowError(f"a capacity of {energy.capacity.max()} quanta, more than {_STRONGEST}")
+    if energy.capacity.max(initial=0) > _MOST:
+        raise OverflowError(f"a capacity of {energy.capacity.max()} quanta, more than {_MOST}")
     reduced = reduce(energy)
     nodes = len(reduced.left)
     if nodes:
         arrange = storage or (in_place if nodes > DENSE * energy.unary.size else in_rows)
         middle = int(reduced.left[nodes // 2]) // reduced.lattice.frame * reduced.lattice.frame
-        if threads == 1 or nodes < WORTH_TWO:
+        if threads == 1 or nodes < TWO_THREADS:
             graph, _ = arrange(reduced, 0)
             reached = solve(graph)
         else:

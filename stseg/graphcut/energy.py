@@ -1,9 +1,9 @@
-"""The energy of a binary labelling of a window: unary and pairwise terms in whole quanta.
+"""Energy of a binary labelling of a space-time grid: unary and pairwise terms in integer quanta.
 
     E(l) = sum_p D_p(l_p) + sum_(p,q) B_pq [l_p != l_q],   D_p(1) - D_p(0) = -u(p)
 
-Neighbours differ by one of a set of offsets in time, plane, y and x; in time they follow a map from ground cells to
-ground cells. All capacities are whole multiples of one quantum, so that energies can be compared exactly.
+Neighbours differ by one of a set of offsets (time, plane, y, x); edges in time follow a map of the cells of one frame's
+y-x plane to those of the next. All terms are integer multiples of one quantum, so that energies compare exactly.
 """
 
 from __future__ import annotations
@@ -16,70 +16,71 @@ import numpy as np
 from stseg.arrays import AnyArray, Flags, Ints, Labels
 
 QUANTUM = 1e-3
-"""Nats to one unit of capacity."""
+"""One unit of capacity, nats."""
 
 
 @dataclass(frozen=True)
 class Energy:
-    """A window's energy in quanta.
+    """Unary and pairwise terms, quanta.
 
     Attributes
     ----------
     unary : int32 (time, plane, y, x)
-        u in quanta: what is gained by calling the cell occupied; 0 where no view sees it.
+        u: gain of label 1 over label 0, quanta.
     offsets : int64 (k, 4)
-        Half of the neighbourhood, an offset (time, plane, y, x) of each opposite pair: within a frame, then ahead.
+        One offset (time, plane, y, x) of each opposite pair of neighbours: those within a frame, then those in time.
     capacity : int32 (k,)
-        What is paid for neighbours at each offset that differ.
-    ahead : int32 (time - 1, y, x)
-        The ground cell, y columns + x, where a body at the cell is in the next frame; -1 where no edge leads on. No
-        two cells lead to the same.
+        B: cost of different labels at each offset, quanta.
+    successor : int32 (time - 1, y, x)
+        Cell (y columns + x) of the next frame to which each cell's edges in time lead; -1 for none. Injective.
     """
 
     unary: Labels
     offsets: Ints
     capacity: Labels
-    ahead: Labels
+    successor: Labels
 
     def of(self, labels: Labels | Flags) -> int:
-        """Energy of a labelling, relative to everything background; labels bool or 0 / 1 (time, plane, y, x)."""
+        """Energy of a labelling (time, plane, y, x) relative to all 0; labels bool or 0 / 1."""
         occupied = labels != 0
         total = -int(self.unary[occupied].sum(dtype=np.int64))
-        for (start, end), capacity in zip(self.ends(occupied), self.capacity.tolist(), strict=True):
+        for (start, end), capacity in zip(self.edge_values(occupied), self.capacity.tolist(), strict=True):
             total += capacity * int(np.count_nonzero(start != end))
         return total
 
-    def ends(self, volume: AnyArray) -> Iterator[tuple[AnyArray, AnyArray]]:
+    def edge_values(self, volume: AnyArray) -> Iterator[tuple[AnyArray, AnyArray]]:
         """Values of a volume (time, plane, y, x) at both ends of all edges, offset by offset."""
         for time, plane, y, x in self.offsets.tolist():
-            start, end = _apart((plane, y, x))
+            start, end = _overlap((plane, y, x))
             if time == 0:
                 yield volume[:, *start], volume[:, *end]
             else:
                 below, above = volume[:-1, start[0]], volume[1:, end[0]]
-                to = _beside(self.ahead, y, x)
+                to = _shifted(self.successor, y, x)
                 frames, rows, columns = np.nonzero(to >= 0)
                 flat = above.reshape(*above.shape[:2], to.shape[1] * to.shape[2])
                 yield below[frames, :, rows, columns], flat[frames, :, to[frames, rows, columns]]
 
     def edges(self) -> tuple[Ints, Ints, Ints]:
-        """All edges: flat indices of their cells, int64 (edge,), and their capacities."""
+        """All edges: flat cell indices of both ends and capacities, int64 (edge,) each."""
         index = np.arange(self.unary.size).reshape(self.unary.shape)
-        starts, ends = zip(*((start.ravel(), end.ravel()) for start, end in self.ends(index)), strict=True)
+        starts, edge_values = zip(
+            *((start.ravel(), end.ravel()) for start, end in self.edge_values(index)), strict=True
+        )
         capacity = np.repeat(self.capacity.astype(np.int64), [len(start) for start in starts])
-        return np.concatenate(starts), np.concatenate(ends), capacity
+        return np.concatenate(starts), np.concatenate(edge_values), capacity
 
 
-def _apart(offset: tuple[int, ...]) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
-    """The parts of a frame in which the first and the second of two cells at an offset can be."""
+def _overlap(offset: tuple[int, ...]) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
+    """Slices of a frame that hold the first and the second cell of all pairs at an offset."""
     start = tuple(slice(max(-step, 0), -step if step > 0 else None) for step in offset)
     end = tuple(slice(max(step, 0), step if step < 0 else None) for step in offset)
     return start, end
 
 
-def _beside(ahead: Labels, y: int, x: int) -> Labels:
-    """The ground cells that lie so far from those that `ahead` leads to; -1 where there are none."""
-    rows, columns = ahead.shape[1:]
-    to_y, to_x = ahead // columns + y, ahead % columns + x
-    kept = (ahead >= 0) & (to_y >= 0) & (to_y < rows) & (to_x >= 0) & (to_x < columns)
+def _shifted(successor: Labels, y: int, x: int) -> Labels:
+    """Cells at an offset (y, x) from the successors; -1 for none."""
+    rows, columns = successor.shape[1:]
+    to_y, to_x = successor // columns + y, successor % columns + x
+    kept = (successor >= 0) & (to_y >= 0) & (to_y < rows) & (to_x >= 0) & (to_x < columns)
     return np.where(kept, to_y * columns + to_x, -1)

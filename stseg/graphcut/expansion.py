@@ -1,11 +1,10 @@
-"""Many labels at once by alpha-expansion (Boykov, Veksler and Zabih, TPAMI 23(11), 2001; METHODS 4).
+"""Multi-label Potts energy by expansion moves (Boykov, Veksler and Zabih, TPAMI 23(11), 2001).
 
     E(l) = sum_p D_p(l_p) + sum_(p,q) w_pq [l_p != l_q],     D_p(background) = 0
 
-One move offers a label alpha to every cell at once: each takes it or keeps its own. The best of all such moves is a
-minimum cut of two labels. Moves go through the labels in rising order, again and again, until a whole round has changed
-nothing. A move takes the smallest set of cells among the best, so none is taken that gains nothing: every change lowers
-the energy, and the end depends on nothing but the energy and the start.
+In an expansion move of label alpha every node takes alpha or keeps its label; the best such move is a minimum cut.
+Moves go through the labels in ascending order until a whole round has changed nothing. Of several best moves the one
+with the fewest changes is made, so each change lowers the energy and the result depends on energy and start alone.
 """
 
 from __future__ import annotations
@@ -15,35 +14,35 @@ from dataclasses import dataclass
 import numpy as np
 
 from stseg.arrays import Flags, Ints
-from stseg.graphcut.compact import least_cut
 from stseg.graphcut.expansion_kernels import (
     Arcs,
     Neighbours,
-    drop_hopeless,
-    drop_settled,
     fill_move,
     fill_neighbours,
+    prune_unchanged,
+    prune_unprofitable,
 )
+from stseg.graphcut.sparse import sparse_cut
 
 BACKGROUND = 0
 
 
 @dataclass(frozen=True)
 class LabelEnergy:
-    """The energy of labellings of n cells, in quanta.
+    """Unary costs and Potts weights of n nodes, quanta.
 
     Attributes
     ----------
     first : int64 (n + 1,)
-        Cell p may have the labels first[p] .. first[p + 1] - 1 of `label`, or the background, which costs nothing.
+        Node p may have label[first[p]] .. label[first[p + 1] - 1] or the background, whose cost is 0.
     label : int64 (m,)
-        1 or more; rising for each cell.
+        1 or more; ascending for each node.
     cost : int64 (m,)
         D_p of that label, relative to the background.
     start, end : int64 (edge,)
-        Two different neighbours; each pair once.
+        Ends of each edge, which differ; each pair once.
     weight : int64 (edge,)
-        What it costs that they differ, 0 or more.
+        w: cost of different labels, 0 or more.
     """
 
     first: Ints
@@ -59,47 +58,53 @@ class LabelEnergy:
         return len(self.first) - 1
 
     def of(self, labels: Ints) -> int:
-        """Energy of a labelling, int64 (n,), relative to everything background."""
+        """Energy of a labelling int64 (n,), relative to all background."""
         differ = labels[self.start] != labels[self.end]
-        return int(own_costs(self, labels).sum()) + int(self.weight[differ].sum())
+        return int(unary_costs(self, labels).sum()) + int(self.weight[differ].sum())
 
-    def best(self) -> Ints:
-        """Each cell's cheapest label by itself, int64 (n,); of several the first."""
+    def cheapest_labels(self) -> Ints:
+        """Label of least unary cost of each node, int64 (n,); of several the first."""
         cell = np.repeat(np.arange(self.cells), np.diff(self.first))
         order = np.lexsort((self.label, self.cost, cell))
-        cheapest = order[np.unique(cell[order], return_index=True)[1]]
+        first_cheapest = order[np.unique(cell[order], return_index=True)[1]]
         labels = np.full(self.cells, BACKGROUND, np.int64)
-        gains = cheapest[self.cost[cheapest] < 0]
+        gains = first_cheapest[self.cost[first_cheapest] < 0]
         labels[cell[gains]] = self.label[gains]
         return labels
 
 
-def own_costs(energy: LabelEnergy, labels: Ints) -> Ints:
-    """D_p of each cell's label, int64 (n,); every label must be one that its cell may have."""
+def unary_costs(energy: LabelEnergy, labels: Ints) -> Ints:
+    """Unary cost of each node's label, int64 (n,).
+
+    Raises
+    ------
+    ValueError
+        If a label is not admissible at its node.
+    """
     costs = np.zeros(energy.cells, np.int64)
     cell = np.repeat(np.arange(energy.cells), np.diff(energy.first))
     taken = energy.label == labels[cell]
     costs[cell[taken]] = energy.cost[taken]
     met = np.bincount(cell[taken], minlength=energy.cells) + (labels == BACKGROUND)
     if not (met == 1).all():
-        raise ValueError("a cell has a label that it may not have")
+        raise ValueError("a node has an inadmissible label")
     return costs
 
 
 def expand(energy: LabelEnergy, start: Ints) -> Ints:
-    """A labelling that no expansion move betters.
+    """Labelling that no expansion move improves.
 
     Parameters
     ----------
     energy
         In quanta.
     start : int64 (n,)
-        The labelling to begin with.
+        Initial labelling.
 
     Returns
     -------
     int64 (n,)
-        Its energy is never above that of `start`.
+        Its energy is at most that of `start`.
     """
     moves = Moves(energy, start)
     idle = 0
@@ -112,7 +117,7 @@ def expand(energy: LabelEnergy, start: Ints) -> Ints:
 
 
 class Moves:
-    """A labelling, and the moves that lower its energy.
+    """Current labelling and its expansion moves.
 
     Parameters
     ----------
@@ -122,62 +127,62 @@ class Moves:
     Attributes
     ----------
     labels : int64 (n,)
-        The labelling so far.
+        Current labelling.
     alphabet
-        All labels, the background first.
+        All labels, ascending, the background first.
     """
 
     def __init__(self, energy: LabelEnergy, start: Ints) -> None:
         self.labels = start.astype(np.int64)
-        self._cost = own_costs(energy, self.labels)
-        self._offers = _offers(energy)
-        self.alphabet = sorted(self._offers)
+        self._cost = unary_costs(energy, self.labels)
+        self._cells_by_label = _cells_by_label(energy)
+        self.alphabet = sorted(self._cells_by_label)
         cells, edges = energy.cells, len(energy.start)
-        self._near = Neighbours(
+        self._adjacency = Neighbours(
             np.zeros(cells + 1, np.int64), np.empty(2 * edges, np.int64), np.empty(2 * edges, np.int64)
         )
-        fill_neighbours(energy.start, energy.end, energy.weight, self._near)
+        fill_neighbours(energy.start, energy.end, energy.weight, self._adjacency)
         self._arcs = Arcs(*np.empty((4, edges), np.int64))
         self._node = np.full(cells, -1, np.int64)
-        self._clock, self._changed, self._asked = 0, np.zeros(cells, np.int64), dict[int, int]()
+        self._moves, self._last_changed, self._last_moved = 0, np.zeros(cells, np.int64), dict[int, int]()
 
     def move(self, alpha: int) -> int:
-        """The best expansion of one label; how many cells took it."""
+        """Make the best expansion of one label; number of nodes that changed."""
         cells, costs = self._candidates(alpha)
         if not len(cells):
             return 0
         unary = self._cost[cells] - costs
         self._node[cells] = np.arange(len(cells))
-        edges = fill_move(alpha, cells, self.labels, self._near, self._node, unary, self._arcs)
+        edges = fill_move(alpha, cells, self.labels, self._adjacency, self._node, unary, self._arcs)
         self._node[cells] = -1
-        takes = least_cut(unary, *self._arcs.only(edges))
+        takes = sparse_cut(unary, *self._arcs.only(edges))
         self.labels[cells[takes]] = alpha
         self._cost[cells[takes]] = costs[takes]
-        self._changed[cells[takes]] = self._clock
+        self._last_changed[cells[takes]] = self._moves
         return int(takes.sum())
 
     def _candidates(self, alpha: int) -> tuple[Ints, Ints]:
-        """Cells that may gain by taking the label if enough others do, and what it costs them."""
-        cells, costs = self._offers[alpha]
-        self._clock += 1
-        since, self._asked[alpha] = self._asked.get(alpha, -1), self._clock
+        """Nodes that could gain by the label if all others took it, and their costs."""
+        cells, costs = self._cells_by_label[alpha]
+        self._moves += 1
+        since, self._last_moved[alpha] = self._last_moved.get(alpha, -1), self._moves
         without: Flags = self.labels[cells] != alpha
         cells, costs = cells[without], costs[without]
         self._node[cells] = np.arange(len(cells))
-        room = np.empty_like(cells)
-        drop_settled(cells, self._near, self._changed, since, self._node, room)
-        drop_hopeless(alpha, cells, self.labels, self._near, self._node, self._cost[cells] - costs, room)
+        stack = np.empty_like(cells)
+        prune_unchanged(cells, self._adjacency, self._last_changed, since, self._node, stack)
+        prune_unprofitable(alpha, cells, self.labels, self._adjacency, self._node, self._cost[cells] - costs, stack)
         left = self._node[cells] >= 0
         self._node[cells] = -1
         return cells[left], costs[left]
 
 
-def _offers(energy: LabelEnergy) -> dict[int, tuple[Ints, Ints]]:
-    """For each label the cells that may have it, rising, and what it costs them."""
+def _cells_by_label(energy: LabelEnergy) -> dict[int, tuple[Ints, Ints]]:
+    """For each label its admissible nodes, ascending, and their costs."""
     cell = np.repeat(np.arange(energy.cells), np.diff(energy.first))
     order = np.argsort(energy.label, kind="stable")
     labels, begin = np.unique(energy.label[order], return_index=True)
-    offers = {BACKGROUND: (np.arange(energy.cells), np.zeros(energy.cells, np.int64))}
+    cells_by_label = {BACKGROUND: (np.arange(energy.cells), np.zeros(energy.cells, np.int64))}
     for label, entries in zip(labels.tolist(), np.split(order, begin[1:]), strict=bool(len(labels))):
-        offers[label] = cell[entries], energy.cost[entries]
-    return offers
+        cells_by_label[label] = cell[entries], energy.cost[entries]
+    return cells_by_label

@@ -1,4 +1,4 @@
-"""Kernels of the expansion: the two-label energy of a move, and the cells that need not be asked."""
+"""Kernels of the expansion: binary energy of a move, and nodes that cannot change in it."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from stseg.arrays import Ints
 
 
 class Neighbours(NamedTuple):
-    """The neighbours of every cell: those of cell p are first[p] .. first[p + 1] - 1.
+    """Neighbours in compressed rows: those of node p are first[p] .. first[p + 1] - 1.
 
     Attributes
     ----------
     first : int64 (n + 1,)
     cell, weight : int64 (2 edge,)
-        Which, and what it costs to differ from it, quanta.
+        Neighbour and Potts weight, quanta.
     """
 
     first: Ints
@@ -24,7 +24,7 @@ class Neighbours(NamedTuple):
 
 
 class Arcs(NamedTuple):
-    """Room for the edges of a move, int64 (edge,) each, as `least_cut` takes them."""
+    """Buffer for the edges of a move, int64 (edge,) each, as arguments of `sparse_cut`."""
 
     start: Ints
     end: Ints
@@ -32,50 +32,50 @@ class Arcs(NamedTuple):
     backward: Ints
 
     def only(self, edges: int) -> Arcs:
-        """The first edges."""
+        """View of the first edges."""
         return Arcs(self.start[:edges], self.end[:edges], self.forward[:edges], self.backward[:edges])
 
 
 @kernel
-def fill_neighbours(start: Ints, end: Ints, weight: Ints, near: Neighbours) -> None:
-    """Fill the neighbours of every cell from its edges; near.first holds zeros."""
+def fill_neighbours(start: Ints, end: Ints, weight: Ints, adjacency: Neighbours) -> None:
+    """Fill the neighbours of all nodes from the edges; adjacency.first holds zeros."""
     for e in range(len(start)):
-        near.first[start[e] + 1] += 1
-        near.first[end[e] + 1] += 1
-    for p in range(len(near.first) - 1):
-        near.first[p + 1] += near.first[p]
-    place = near.first.copy()
+        adjacency.first[start[e] + 1] += 1
+        adjacency.first[end[e] + 1] += 1
+    for p in range(len(adjacency.first) - 1):
+        adjacency.first[p + 1] += adjacency.first[p]
+    place = adjacency.first.copy()
     for e in range(len(start)):
         p, q = start[e], end[e]
-        near.cell[place[p]], near.weight[place[p]] = q, weight[e]
-        near.cell[place[q]], near.weight[place[q]] = p, weight[e]
+        adjacency.cell[place[p]], adjacency.weight[place[p]] = q, weight[e]
+        adjacency.cell[place[q]], adjacency.weight[place[q]] = p, weight[e]
         place[p] += 1
         place[q] += 1
 
 
 @kernel
-def drop_settled(cells: Ints, near: Neighbours, changed: Ints, since: int, node: Ints, stack: Ints) -> None:
-    """Set node to -1 for connected pieces of `cells` in and around which nothing changed since a move.
+def prune_unchanged(cells: Ints, adjacency: Neighbours, changed: Ints, since: int, node: Ints, stack: Ints) -> None:
+    """Set node to -1 for components of `cells` in and around which nothing changed since a move.
 
-    What the label's last move left there was the best, and still is.
+    The result of the label's last move is still optimal there.
 
     Parameters
     ----------
     cells, near, node
         As of `fill_move`.
     changed : int64 (n,)
-        The move by which each cell last changed.
+        Move in which each node last changed.
     since
-        The label's last move.
+        Last move of the label.
     stack : int64 (k,)
-        Room for cells.
+        Buffer.
     """
     high = 0
     for k in range(len(cells)):
         p = cells[k]
         moved = changed[p] > since
-        for i in range(near.first[p], near.first[p + 1]):
-            moved = moved or changed[near.cell[i]] > since
+        for i in range(adjacency.first[p], adjacency.first[p + 1]):
+            moved = moved or changed[adjacency.cell[i]] > since
         if moved:
             stack[high] = p
             high += 1
@@ -84,8 +84,8 @@ def drop_settled(cells: Ints, near: Neighbours, changed: Ints, since: int, node:
     while high > 0:
         high -= 1
         p = stack[high]
-        for i in range(near.first[p], near.first[p + 1]):
-            q = near.cell[i]
+        for i in range(adjacency.first[p], adjacency.first[p + 1]):
+            q = adjacency.cell[i]
             if node[q] <= -2:
                 node[q] = -2 - node[q]
                 stack[high] = q
@@ -96,36 +96,36 @@ def drop_settled(cells: Ints, near: Neighbours, changed: Ints, since: int, node:
 
 
 @kernel
-def drop_hopeless(
+def prune_unprofitable(
     alpha: int,
     cells: Ints,
     labels: Ints,
-    near: Neighbours,
+    adjacency: Neighbours,
     node: Ints,
     gain: Ints,
     stack: Ints,
 ) -> None:
-    """Set node to -1 for cells that gain nothing by taking alpha even if all the other cells take it.
+    """Set node to -1 for nodes that gain nothing by alpha even if all other nodes take it.
 
-    A cell gains the more, the more of its neighbours take alpha. So such cells are not in the smallest best set; and
-    once they are known to stay, others gain less.
+    The gain of a node rises with the number of neighbours that take alpha, so such nodes are not in the smallest
+    optimal set. Once they are known to stay, others gain less.
 
     Parameters
     ----------
     alpha, cells, labels, near, node
         As of `fill_move`.
     gain : int64 (k,)
-        Gain of taking alpha by the cell's own costs; used up.
+        Gain of alpha by unary costs; overwritten.
     stack : int64 (k,)
-        Room for cells.
+        Buffer.
     """
     high = 0
     for k in range(len(cells)):
         p = cells[k]
         if node[p] < 0:
             continue
-        for i in range(near.first[p], near.first[p + 1]):
-            q, w = near.cell[i], near.weight[i]
+        for i in range(adjacency.first[p], adjacency.first[p + 1]):
+            q, w = adjacency.cell[i], adjacency.weight[i]
             if node[q] >= 0 or labels[q] == alpha:
                 gain[k] += w
             elif labels[q] == labels[p]:
@@ -138,11 +138,11 @@ def drop_hopeless(
     while high > 0:
         high -= 1
         p = stack[high]
-        for i in range(near.first[p], near.first[p + 1]):
-            q = near.cell[i]
+        for i in range(adjacency.first[p], adjacency.first[p + 1]):
+            q = adjacency.cell[i]
             k = node[q]
             if k >= 0:
-                gain[k] -= near.weight[i] if labels[q] != labels[p] else 2 * near.weight[i]
+                gain[k] -= adjacency.weight[i] if labels[q] != labels[p] else 2 * adjacency.weight[i]
                 if gain[k] <= 0:
                     node[q] = -1
                     stack[high] = q
@@ -154,37 +154,37 @@ def fill_move(
     alpha: int,
     cells: Ints,
     labels: Ints,
-    near: Neighbours,
+    adjacency: Neighbours,
     node: Ints,
     unary: Ints,
     arcs: Arcs,
 ) -> int:
-    """Fill the two-label energy of a move; the number of its edges.
+    """Fill the binary energy of a move; number of its edges.
 
-    With x = 1 where a cell takes alpha, two neighbours pay w where one of them does, nothing where both do, and where
-    neither does w [l_p != l_q]. With equal labels that is an edge both ways; with different ones it is
-    w (1 - x_p) + w x_p (1 - x_q), a cost of p's own and an edge one way.
+    With x = 1 where a node takes alpha, an edge costs w for x_p != x_q, 0 for x_p = x_q = 1 and w [l_p != l_q] for
+    x_p = x_q = 0. For equal labels that is a symmetric n-link; for different ones it is
+    w (1 - x_p) + w x_p (1 - x_q), a unary term and a one-way n-link.
 
     Parameters
     ----------
     alpha
-        The label that is offered.
+        Label of the move.
     cells : int64 (k,)
-        Whom: cells that do not have it.
+        Candidate nodes, which have other labels.
     labels : int64 (n,)
-        The labelling.
+        Current labelling.
     node : int64 (n,)
-        Index of each cell in `cells`, -1 for the others.
+        Index of each node in `cells`, -1 for the others.
     unary : int64 (k,)
-        Gain of taking alpha by the cell's own costs; what fixed neighbours add is added.
+        Gain of alpha by unary costs; contributions of fixed neighbours are added.
     arcs
-        Filled with the edges between `cells`.
+        Receives the edges between `cells`.
     """
     edges = 0
     for k in range(len(cells)):
         p = cells[k]
-        for i in range(near.first[p], near.first[p + 1]):
-            q, w = near.cell[i], near.weight[i]
+        for i in range(adjacency.first[p], adjacency.first[p + 1]):
+            q, w = adjacency.cell[i], adjacency.weight[i]
             if node[q] < 0:
                 if labels[q] != labels[p]:
                     unary[k] += w

@@ -1,6 +1,6 @@
-"""Residual graphs: their arcs are listed, stand in equal rows, or are computed from the layout of a window.
+"""Residual graphs: arcs in lists, in rows of equal length, or computed from a grid.
 
-One search serves all three. Which branch a kernel takes is known when it is compiled, since None is a type of its own.
+One search serves all three. A kernel's branch is chosen when it is compiled, since None has a type of its own.
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ class Graph(NamedTuple):
     Attributes
     ----------
     residual : int16 or int32 (arc,)
-        What each arc can still carry; the arcs of a node follow each other.
+        Residual capacities (n-links); the arcs of a node are consecutive.
     excess : int32 (n,)
-        What each node can still take from the source (> 0) or give to the sink (< 0).
+        Residual capacity of each t-link: from the source (> 0) or to the sink (< 0).
     degree
-        Arcs of each node, where they stand in equal rows; they lead back in pairs 2 i, 2 i + 1.
+        Arcs of each node, where rows have equal length; slots 2 i and 2 i + 1 are opposite.
     first, sister : int32 (n + 1,), (arc,), or None
-        The first arc of each node and the arc that leads back, where there are no such rows.
+        First arc of each node and the reverse arc of each arc, where rows differ in length.
     head : int32 (arc,), or None
-        The node that an arc leads to; an arc that leads nowhere, and carries nothing, leads to its own node.
+        Node at the end of each arc; an arc off the graph has capacity 0 and ends at its own node.
     lattice
-        Where arcs lead, if it is computed.
+        Grid from which ends of arcs are computed, or None.
     """
 
     residual: AnyArray
@@ -42,7 +42,7 @@ class Graph(NamedTuple):
 
 @part
 def first_arc(node: int, first: Labels | None, degree: int) -> int:
-    """The first arc of a node; that of the next node is past its last."""
+    """First arc of a node; that of the next node is past its last."""
     if first is None:
         return node * degree
     return int(first[node])
@@ -50,7 +50,7 @@ def first_arc(node: int, first: Labels | None, degree: int) -> int:
 
 @part
 def head_of(arc: int, node: int, head: Labels | None, degree: int, lattice: Lattice | None) -> int:
-    """The node that a node's arc leads to."""
+    """Node at the end of an arc."""
     if lattice is not None:
         return neighbour(node, arc - node * degree, lattice)
     assert head is not None
@@ -59,7 +59,7 @@ def head_of(arc: int, node: int, head: Labels | None, degree: int, lattice: Latt
 
 @part
 def sister_of(arc: int, node: int, to: int, sister: Labels | None, degree: int) -> int:
-    """The arc that leads back."""
+    """Reverse arc of an arc."""
     if sister is None:
         return to * degree + ((arc - node * degree) ^ 1)
     return int(sister[arc])

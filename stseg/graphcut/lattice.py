@@ -1,4 +1,4 @@
-"""How the cells of a window are numbered, and which numbers are neighbours: nothing of it is stored per cell."""
+"""Implicit neighbourhood of a space-time grid: node numbers with guards, neighbours by addition."""
 
 from __future__ import annotations
 
@@ -12,52 +12,51 @@ from stseg.graphcut.energy import Energy
 
 
 class Lattice(NamedTuple):
-    """How nodes of a window are numbered, and where their arcs lead.
+    """Numbering of the nodes of a grid (time, plane, y, x), and the ends of their arcs.
 
-    The first plane of a frame, the first row of a plane and the first cell of a row are guards and no cells: whoever
-    steps off the grid lands on one of them, at either end.
+    The first plane of a frame, the first row of a plane and the first cell of a row are guards, not cells: an arc off
+    the grid ends at one of them.
 
     Attributes
     ----------
     steps : int32 (degree,)
-        What each arc adds to a node's number within a frame; arcs lead back in pairs 2 i, 2 i + 1.
-    ahead, behind : int32 (node,)
-        What following the body's motion adds to a node's number, to the next frame and to the one before; 0 where it
-        leads nowhere.
-    near
-        Arcs within a frame; those after it lead ahead (even) and behind (odd).
+        Difference of node numbers along each arc within a frame; slots 2 i and 2 i + 1 are opposite.
+    forward, behind : int32 (node,)
+        Difference of node numbers to the successor in the next frame and to the predecessor; 0 for none.
+    spatial
+        Number of arc slots within a frame; those after it lead to the next (even) and previous frame (odd).
     frame
-        Nodes of a frame, guards included.
+        Number of nodes of a frame, guards included.
     """
 
     steps: Labels
-    ahead: Labels
-    behind: Labels
-    near: int
+    forward: Labels
+    backward: Labels
+    spatial: int
     frame: int
 
 
-def lay_out(energy: Energy) -> Lattice:
-    """The lattice of a window."""
+def lattice_of(energy: Energy) -> Lattice:
+    """Lattice of an energy's grid."""
     frames, planes, rows, columns = energy.unary.shape
     row, plane = columns + 1, (rows + 1) * (columns + 1)
     frame = (planes + 1) * plane
     step = energy.offsets[:, 1:] @ (plane, row, 1)
-    near = int((energy.offsets[:, 0] == 0).sum())
-    time, y, x = np.nonzero(energy.ahead >= 0)
-    to_y, to_x = np.divmod(energy.ahead[time, y, x], columns)
-    leap = frame + (to_y - y) * row + to_x - x
-    there, back = (np.zeros((frames, 1, rows, columns), np.int32) for _ in range(2))
-    there[time, 0, y, x] = leap
-    back[time + 1, 0, to_y, to_x] = -leap
-    ahead, behind = (spread(np.broadcast_to(table, energy.unary.shape)) for table in (there, back))
-    return Lattice(np.stack([step, -step], 1).ravel().astype(np.int32), ahead, behind, 2 * near, frame)
+    spatial = int((energy.offsets[:, 0] == 0).sum())
+    time, y, x = np.nonzero(energy.successor >= 0)
+    to_y, to_x = np.divmod(energy.successor[time, y, x], columns)
+    step_in_time = frame + (to_y - y) * row + to_x - x
+    to_next, to_previous = (np.zeros((frames, 1, rows, columns), np.int32) for _ in range(2))
+    to_next[time, 0, y, x] = step_in_time
+    to_previous[time + 1, 0, to_y, to_x] = -step_in_time
+    forward, backward = (spread(np.broadcast_to(table, energy.unary.shape)) for table in (to_next, to_previous))
+    return Lattice(np.stack([step, -step], 1).ravel().astype(np.int32), forward, backward, 2 * spatial, frame)
 
 
 def spread(volume: AnyArray) -> AnyArray:
-    """Values of the cells (time, plane, y, x) at their nodes, and 0 at the guards; (node,)."""
+    """Values of cells (time, plane, y, x) at their nodes, 0 at guards; (node,)."""
     frames, planes, rows, columns = volume.shape
-    # Behind the last frame there are as many guards as the last cell's neighbours reach.
+    # Guards behind the last frame, as far as the last cell's neighbours reach.
     row, plane = columns + 1, (rows + 1) * (columns + 1)
     nodes = np.zeros(frames * (planes + 1) * plane + plane + row + 1, volume.dtype)
     cells(nodes, volume.shape)[:] = volume
@@ -65,7 +64,7 @@ def spread(volume: AnyArray) -> AnyArray:
 
 
 def cells(nodes: AnyArray, shape: tuple[int, ...]) -> AnyArray:
-    """Values of the nodes as a volume (time, plane, y, x), without the guards: a view."""
+    """View of node values as cells (time, plane, y, x), without guards."""
     frames, planes, rows, columns = shape
     guarded = (frames, planes + 1, rows + 1, columns + 1)
     return nodes[: np.prod(guarded)].reshape(guarded)[:, 1:, 1:, 1:]
@@ -73,12 +72,12 @@ def cells(nodes: AnyArray, shape: tuple[int, ...]) -> AnyArray:
 
 @part
 def neighbour(node: int, slot: int, lattice: Lattice) -> int:
-    """The node that an arc leads to; 0, a guard, for an arc in time that leads nowhere."""
+    """Node at the end of an arc; 0, a guard, for an arc in time without an end."""
     to = node + int(lattice.steps[slot])
-    if slot < lattice.near:
+    if slot < lattice.spatial:
         return to
     if slot & 1:
-        leap = int(lattice.behind[to])
-        return to + leap if leap != 0 else 0
-    leap = int(lattice.ahead[node])
-    return to + leap if leap != 0 else 0
+        step_in_time = int(lattice.backward[to])
+        return to + step_in_time if step_in_time != 0 else 0
+    step_in_time = int(lattice.forward[node])
+    return to + step_in_time if step_in_time != 0 else 0

@@ -1,12 +1,11 @@
-"""Cells whose label is certain before any cut.
+"""Exact reduction of a binary energy: cells whose optimal label is known before the cut.
 
-First by sets. Let every cell of a set S have u <= 0 and lose at least as much, -u, as all its capacities to cells
-outside S together. Then nothing is won by calling any part of S occupied, so all of S is background in the minimum with
-the smallest object set. The greatest such set is what remains of all cells with u <= 0 once those that do not hold are
-taken out one after the other. Its mirror image, the greatest set of cells with more than they could pay, is occupied.
+Sets: let every cell of a set S have u <= 0 and -u at least the sum of its capacities to cells outside S. Then label 1
+for any subset of S gains nothing, so all of S has label 0 in the minimum with the smallest source set. The greatest
+such set is found by removing violating cells from {u <= 0} until none is left. The mirror rule gives label 1.
 
-Then one by one (persistency): with the capacities to decided neighbours counted in, a cell that outweighs its
-capacities to those undecided is decided itself, which may decide its neighbours.
+Persistency: with the capacities to decided neighbours added to its unary term, a cell whose unary term outweighs its
+capacities to undecided neighbours is decided, which may decide its neighbours.
 """
 
 from __future__ import annotations
@@ -18,30 +17,30 @@ import numpy as np
 from stseg.accelerate import part
 from stseg.arrays import Bytes, Labels
 from stseg.graphcut.energy import Energy
-from stseg.graphcut.lattice import Lattice, lay_out, neighbour, spread
+from stseg.graphcut.lattice import Lattice, lattice_of, neighbour, spread
 
 GUARD, OPEN, OCCUPIED, EMPTY = 0, 1, 2, 3
-"""What is known of a node."""
+"""States of a node: no cell, undecided, label 1, label 0."""
 HOPELESS = 0.9
-"""Share of cells weaker than their capacities together from which too few are decided to be worth looking for."""
+"""Share of cells with weak unary terms from which too few could be decided to pay for the reduction."""
 
 
 @dataclass(frozen=True)
 class Reduction:
-    """What is left to cut.
+    """Labels known before the cut, and the problem that remains.
 
     Attributes
     ----------
     lattice
-        How nodes are numbered.
+        Numbering of the nodes.
     capacity : int32 (degree,)
-        What the arcs of a node carry.
+        Capacities of the arcs of a node, quanta.
     state : uint8 (node,)
-        What is known of each node.
+        State of each node.
     left : int32 (k,)
-        Nodes that are still to be decided, in rising order.
+        Undecided nodes, ascending.
     excess : int32 (k,)
-        Their unary with the capacities to decided neighbours added, quanta.
+        Their unary terms with the capacities to decided neighbours added, quanta.
     """
 
     lattice: Lattice
@@ -52,8 +51,8 @@ class Reduction:
 
 
 def reduce(energy: Energy) -> Reduction:
-    """Decide what can be decided without a cut."""
-    lattice, capacity = lay_out(energy), np.repeat(energy.capacity, 2)
+    """Decide cells by both rules."""
+    lattice, capacity = lattice_of(energy), np.repeat(energy.capacity, 2)
     unary = spread(energy.unary)
     weak = np.count_nonzero((energy.unary <= 0) & (energy.unary > -capacity.sum()))
     if weak > HOPELESS * energy.unary.size:
@@ -61,21 +60,21 @@ def reduce(energy: Energy) -> Reduction:
         left = np.flatnonzero(state).astype(np.int32)
         return Reduction(lattice, capacity, state, left, unary[left])
     state = spread(np.where(energy.unary > 0, np.uint8(OCCUPIED), np.uint8(EMPTY)))
-    stack, doubt = (np.empty(len(state), np.int32) for _ in range(2))
-    # Of several minima the smallest object set is wanted, so a tie holds for the background only.
+    stack, undecided = (np.empty(len(state), np.int32) for _ in range(2))
+    # Of several minima the smallest source set is wanted, so a tie decides for label 0 only.
     margin = np.where(unary > 0, unary - 1, -unary)
     _decide_sets(margin, state, lattice, capacity, stack)
     left = np.flatnonzero(state == OPEN).astype(np.int32)
-    _decide_single(left, unary, doubt, state, lattice, capacity, stack)
+    _decide_nodes(left, unary, undecided, state, lattice, capacity, stack)
     left = left[state[left] == OPEN]
     return Reduction(lattice, capacity, state, left, unary[left])
 
 
 @part
 def _decide_sets(margin: Labels, state: Bytes, lattice: Lattice, capacity: Labels, stack: Labels) -> None:
-    """From all nodes as their signs have them, open those that do not hold.
+    """Start from the sets of all nodes by sign, and remove those that violate the set rule.
 
-    `margin` is what a node has left when it has paid its capacities to those that are not of its set.
+    `margin` is a node's unary magnitude less its capacities to nodes outside its set.
     """
     for node in range(len(state)):
         if state[node] == OCCUPIED:
@@ -85,15 +84,17 @@ def _decide_sets(margin: Labels, state: Bytes, lattice: Lattice, capacity: Label
                     margin[node] -= capacity[slot]
                     margin[to] -= capacity[slot]
                     if state[to] == EMPTY and margin[to] < 0:
-                        _open(to, margin, state, lattice, capacity, stack)
+                        _remove_from_set(to, margin, state, lattice, capacity, stack)
     for node in range(len(state)):
         if state[node] == OCCUPIED and margin[node] < 0:
-            _open(node, margin, state, lattice, capacity, stack)
+            _remove_from_set(node, margin, state, lattice, capacity, stack)
 
 
 @part
-def _open(node: int, margin: Labels, state: Bytes, lattice: Lattice, capacity: Labels, stack: Labels) -> None:
-    """Take a node out of its set, and all that no longer hold without it."""
+def _remove_from_set(
+    node: int, margin: Labels, state: Bytes, lattice: Lattice, capacity: Labels, stack: Labels
+) -> None:
+    """Remove a node from its set, and all that violate the rule without it."""
     side = state[node]
     state[node] = OPEN
     stack[0] = node
@@ -112,17 +113,17 @@ def _open(node: int, margin: Labels, state: Bytes, lattice: Lattice, capacity: L
 
 
 @part
-def _decide_single(
-    left: Labels, gain: Labels, doubt: Labels, state: Bytes, lattice: Lattice, capacity: Labels, stack: Labels
+def _decide_nodes(
+    left: Labels, gain: Labels, undecided: Labels, state: Bytes, lattice: Lattice, capacity: Labels, stack: Labels
 ) -> None:
-    """Decide open nodes that outweigh what is open around them, and so on from each of them.
+    """Decide nodes by persistency, with a work list.
 
-    `gain` becomes a node's unary with its capacities to decided nodes, `doubt` is the sum of those to open ones.
+    `gain` becomes a node's unary term with its capacities to decided nodes, `undecided` the sum of those to others.
     """
     for node in left:
-        _look_around(node, gain, doubt, state, lattice, capacity)
+        _sum_neighbours(node, gain, undecided, state, lattice, capacity)
     for first in left:
-        if state[first] != OPEN or not _outweighs(first, gain, doubt):
+        if state[first] != OPEN or not _is_decided(first, gain, undecided):
             continue
         state[first] = OCCUPIED if gain[first] > 0 else EMPTY
         stack[0] = first
@@ -133,28 +134,28 @@ def _decide_single(
             for slot in range(len(capacity)):
                 to = neighbour(node, slot, lattice)
                 if state[to] == OPEN:
-                    doubt[to] -= capacity[slot]
+                    undecided[to] -= capacity[slot]
                     gain[to] += capacity[slot] if state[node] == OCCUPIED else -capacity[slot]
-                    if _outweighs(to, gain, doubt):
+                    if _is_decided(to, gain, undecided):
                         state[to] = OCCUPIED if gain[to] > 0 else EMPTY
                         stack[top] = to
                         top += 1
 
 
 @part
-def _outweighs(node: int, gain: Labels, doubt: Labels) -> bool:
-    return bool(gain[node] > doubt[node] or -gain[node] >= doubt[node])
+def _is_decided(node: int, gain: Labels, undecided: Labels) -> bool:
+    return bool(gain[node] > undecided[node] or -gain[node] >= undecided[node])
 
 
 @part
-def _look_around(
-    node: int, gain: Labels, doubt: Labels, state: Bytes, lattice: Lattice, capacity: Labels
+def _sum_neighbours(
+    node: int, gain: Labels, undecided: Labels, state: Bytes, lattice: Lattice, capacity: Labels
 ) -> None:  # fmt: skip
-    doubt[node] = 0
+    undecided[node] = 0
     for slot in range(len(capacity)):
         there = state[neighbour(node, slot, lattice)]
         if there == OPEN:
-            doubt[node] += capacity[slot]
+            undecided[node] += capacity[slot]
         elif there == OCCUPIED:
             gain[node] += capacity[slot]
         elif there == EMPTY:

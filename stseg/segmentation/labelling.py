@@ -15,7 +15,7 @@ import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints, Labels
 from stseg.geometry import Grid
-from stseg.graphcut.cell_subset import CellSubset, subset_of
+from stseg.graphcut.cell_subset import CellSubset, subset
 from stseg.graphcut.energy import Energy
 from stseg.graphcut.expansion import expand
 from stseg.model.blobs import UNASSIGNED
@@ -67,7 +67,7 @@ def label_cells(
     found
         The people of its frames; their tracks are all among the places.
     """
-    part = subset_of(energy, occupied)
+    part = subset(energy, occupied)
     if not len(part.cell):
         return WindowLabels(np.zeros(occupied.shape, np.int32), 0)
     piece = part.components()
@@ -90,7 +90,7 @@ def _divided(energy: Energy, part: CellSubset, places: PredictedPlaces, pillar: 
     share = shares(frame, grid.ground[y, x], grid.heights[plane], places, pillar)
     problem = label_energy(energy.unary.ravel()[part.cell], share, part)
     names = np.concatenate([[0], places.track, [UNASSIGNED]])
-    return np.asarray(names[expand(problem, problem.best())])
+    return np.asarray(names[expand(problem, problem.cheapest_labels())])
 
 
 def _who_stands(

@@ -1,4 +1,4 @@
-"""Minimum cut of any graph of nodes and edges; of several minima, the one with the smallest object set."""
+"""Minimum cut of an arbitrary graph given by its edges."""
 
 from __future__ import annotations
 
@@ -10,38 +10,38 @@ from stseg.graphcut.graph import Graph
 from stseg.graphcut.halves import solve
 
 MOST = 1 << 29
-"""What the capacities of one node may sum up to, quanta."""
+"""Greatest sum of the capacities of one node, quanta."""
 
 
-def least_cut(
+def sparse_cut(
     unary: Ints, start: Ints | Labels, end: Ints | Labels, forward: Ints | Labels, backward: Ints | Labels
 ) -> Flags:
-    """The labelling of least energy.
+    """Labelling of least energy; of several, the one with the fewest nodes of label 1.
 
     Parameters
     ----------
     unary : int64 (n,)
-        What is gained by calling each node occupied, quanta.
+        Gain of label 1 over label 0, quanta.
     start, end : int32 or int64 (edge,)
-        Nodes that each edge joins.
+        Ends of each edge.
     forward, backward : int64 (edge,)
-        What is paid where `start` is occupied and `end` is not, and the other way round; 0 or more, quanta.
+        Cost of `start` 1 and `end` 0, and of the reverse; 0 or more, quanta.
 
     Returns
     -------
     bool (n,)
-        True where a node is occupied: those that the source can still reach.
+        Nodes with label 1: those that residual arcs reach from the source.
 
     Raises
     ------
     OverflowError
-        If the capacities of a node sum up to more than `MOST`.
+        If the capacities of a node sum to more than `MOST`.
     """
     size, edges = len(unary), len(start)
     around = np.bincount(start, forward + backward, size) + np.bincount(end, forward + backward, size)
     if edges and around.max() > MOST:
         raise OverflowError(f"capacities of one node sum up to {around.max():.0f} quanta, more than {MOST}")
-    # More than its capacities can carry away, a node's own gain need not be.
+    # A t-link need not exceed the node's n-links.
     excess = unary.clip(-MOST - 1, MOST + 1).astype(np.int32)
     first = np.zeros(size + 1, np.int32)
     np.cumsum(np.bincount(start, minlength=size) + np.bincount(end, minlength=size), out=first[1:])
@@ -61,7 +61,7 @@ def _list_arcs(
     sister: Labels,
     residual: Labels,
 ) -> None:
-    """Fill the arcs of all nodes; `free` is the next free arc of each."""
+    """Fill the arcs of all nodes; `free` is each node's next free arc."""
     for edge in range(len(start)):
         p, q = start[edge], end[edge]
         there = free[p]
