@@ -47,3 +47,7 @@ class Boxes:
 Observation = Bytes | NDArray[np.uint16] | Boxes | None
 """What one camera delivers for one frame: a colour image uint8 (v, u, 3), a mask uint8 (v, u), an instance image
 uint16 (v, u), boxes, or None where it is blind."""
+
+ViewEvidence = Boxes | Singles | None
+"""What the foreground stage makes of an observation: boxes, a likelihood map float32 (v, u), or None where the view is
+blind."""

@@ -14,7 +14,7 @@ from stseg.detection.problem import BoxEvidence, Parameters, PixelEvidence, Prob
 from stseg.graphcut.energy import Energy
 from stseg.model.box_fit import GRAIN, TOLERANCE
 from stseg.model.people import Explanation
-from stseg.occupancy.fusion import Rates
+from stseg.occupancy.fusion import ErrorRates
 from stseg.occupancy.unexplained import SHOULDER
 
 Edge = tuple[int, int, int]
@@ -160,7 +160,7 @@ def fused(terms: Sequence[float], weights: Sequence[float], shares: Sequence[flo
     return sum(shares) * sum(part * term for part, term in zip(parts, terms, strict=True)) / sum(parts)
 
 
-def log_odds_term(likelihood: float, rates: Rates) -> float:
+def log_odds_term(likelihood: float, rates: ErrorRates) -> float:
     """What one view says of a cell (METHODS 4)."""
     body = (1 - rates.miss) * likelihood + rates.miss * (1 - likelihood)
     empty = rates.clutter * likelihood + (1 - rates.clutter) * (1 - likelihood)

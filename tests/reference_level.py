@@ -9,7 +9,7 @@ import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints, Singles
 from stseg.geometry.summed_area import TOP, Levels
-from stseg.occupancy.fusion import Rates, log_odds_terms
+from stseg.occupancy.fusion import ErrorRates, log_odds_terms
 
 
 class Shown(NamedTuple):
@@ -20,7 +20,14 @@ class Shown(NamedTuple):
 
 
 def counts(
-    shown: Shown, view: int, near: Ints, inside: Flags, trusted: Flags, rates: list[Rates], looks: float, prior: float
+    shown: Shown,
+    view: int,
+    near: Ints,
+    inside: Flags,
+    trusted: Flags,
+    rates: list[ErrorRates],
+    looks: float,
+    prior: float,
 ) -> tuple[Floats, Floats]:
     """Errors and chances of m, b and b' in cells; all views weigh the same."""
     errors, seen = np.zeros(3), np.zeros(3)

@@ -19,7 +19,7 @@ from stseg.arrays import Boxes, Bytes, Floats, Observation, Rows
 from stseg.config import BeliefConfig, Config
 from stseg.errors import CalibrationError, ConfigError, SourceError
 from stseg.geometry import Camera
-from stseg.geometry.upright import vertical_of
+from stseg.geometry.square_pixels import vertical_of_square_pixels
 from stseg.trackers import Commit, FrameObservations, FusedFrame, find_tracker
 from stseg.trackers.belief import BeliefTracker
 from stseg.trackers.belief.exclusion import exclusion
@@ -163,12 +163,12 @@ def test_a_view_shows_those_in_its_image() -> None:
 @pytest.mark.parametrize("k", range(4))
 def test_the_vertical_follows_from_the_ground_homography_alone(k: int) -> None:
     camera = corner_cameras()[k]
-    np.testing.assert_allclose(vertical_of(camera.ground, camera.size), camera.vertical, rtol=1e-6)
+    np.testing.assert_allclose(vertical_of_square_pixels(camera.ground, camera.size), camera.vertical, rtol=1e-6)
 
 
 def test_no_vertical_for_a_homography_that_no_camera_has() -> None:
     with pytest.raises(CalibrationError, match="square pixels"):
-        vertical_of(np.array([[100.0, 0, 64], [0, 300.0, 48], [0, 0, 1]]), SIZE)
+        vertical_of_square_pixels(np.array([[100.0, 0, 64], [0, 300.0, 48], [0, 0, 1]]), SIZE)
 
 
 # Colours

@@ -25,7 +25,7 @@ from scenes import (
     walkers,
 )
 
-from stseg.arrays import Floats
+from stseg.arrays import Floats, ViewEvidence
 from stseg.config import DetectionConfig
 from stseg.detection.detector import Detector
 from stseg.detection.proposals import Fuse, Proposals, marginal
@@ -34,7 +34,7 @@ from stseg.engine.session import run_session
 from stseg.errors import InputError
 from stseg.foreground.view_foreground import ViewForeground
 from stseg.model.candidates import Candidates
-from stseg.model.people import ViewEvidence, empty_explanation
+from stseg.model.people import empty_explanation
 from stseg.occupancy.volume import Occupancy
 
 Asked = Literal["lattice", "probability", "volume", "both"]

@@ -23,7 +23,7 @@ from scenes import (
     room,
 )
 
-from stseg.arrays import Floats
+from stseg.arrays import Floats, ViewEvidence
 from stseg.detection.detector import Detector
 from stseg.detection.views import BoxView
 from stseg.engine.committed_frames import CommittedFrames
@@ -31,7 +31,7 @@ from stseg.engine.pipeline import Pipeline
 from stseg.engine.session import run_session
 from stseg.foreground.view_foreground import ViewForeground
 from stseg.geometry import Camera, Rig
-from stseg.model.people import Explanation, ViewEvidence
+from stseg.model.people import Explanation
 from stseg.model.tables import Tracks
 from stseg.tracking.assignment import assign, distances
 from stseg.tracking.track_filter import TrackFilter

@@ -27,7 +27,7 @@ from scenes import (
 )
 from strategies import numbers
 
-from stseg.arrays import Floats, Ints
+from stseg.arrays import Floats, Ints, ViewEvidence
 from stseg.detection.detector import Detector
 from stseg.detection.gains import come_in, fill_owners, gain_of, leave, paired, wipe_owners
 from stseg.detection.groups import fill_groups, fill_touch
@@ -39,7 +39,7 @@ from stseg.geometry.bodies import BodyTable
 from stseg.model.box_fit import TOLERANCE, fill_best_match, fill_cover, fill_inside, fill_match, half_square
 from stseg.model.box_noise import FIRST
 from stseg.model.outlines import outlines, sums_inside
-from stseg.model.people import Explanation, ViewEvidence
+from stseg.model.people import Explanation
 from stseg.model.predicted_tracks import no_tracks
 
 WIDTH, HEIGHT = 128.0, 96.0

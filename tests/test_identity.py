@@ -17,7 +17,7 @@ from stseg.arrays import Flags, Rows
 from stseg.config import IdentityConfig
 from stseg.geometry import Grid
 from stseg.geometry.bodies import BodyTable
-from stseg.geometry.near import near_person
+from stseg.geometry.nearest_person import nearest_person
 from stseg.model.blobs import UNASSIGNED, Blobs
 from stseg.model.tables import TRAJECTORY
 from stseg.segmentation.blobs import find_blobs
@@ -124,7 +124,7 @@ def blobs_in(
     names = np.array(chain or range(1, len(paths) + 1))[[frame in path for path in paths]]
     held = np.array([path[frame] for path in paths if frame in path]).reshape(-1, 2)
     occupied = column([*map(tuple, held), *(path[frame] for path in unheld if frame in path)])
-    owner = np.append(names, UNASSIGNED)[near_person(GRID.ground, held, 0.4)]
+    owner = np.append(names, UNASSIGNED)[nearest_person(GRID.ground, held, 0.4)]
     label = np.where(occupied, owner, 0).astype(np.int32)
     log_odds = np.where(occupied, 2.0, -2.0).astype(np.float32)
     return find_blobs(label, log_odds, held, names, 0.4, GRID)

@@ -13,26 +13,26 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scenes import FEW_HEIGHTS, boxes, corner_cameras, likelihoods, no_boxes, people, rig_of
 
-from stseg.arrays import Flags, Floats, Ints
+from stseg.arrays import Flags, Floats, Ints, ViewEvidence
 from stseg.config import LevelConfig, OccupancyConfig
 from stseg.detection.detector import Detector
 from stseg.geometry import Grid
-from stseg.geometry.near import near_person
+from stseg.geometry.nearest_person import nearest_person
 from stseg.geometry.summed_area import TOP, UNSEEN, Levels
-from stseg.model.people import Explanation, ViewEvidence
-from stseg.occupancy.fusion import Accumulator, Rates, log_odds_terms
+from stseg.model.people import Explanation
+from stseg.occupancy.fusion import Accumulator, ErrorRates, log_odds_terms
 from stseg.occupancy.rate_calibration import (
-    BESIDE,
     CLUTTER,
     MISS,
+    NEAR_CLUTTER,
     RateCalibration,
-    cells_of_one,
+    cells_per_person,
     fill_counts,
     inside_bodies,
 )
 from stseg.occupancy.volume import Occupancy
 
-FIRST = Rates(0.2, 0.07, 0.07)
+FIRST = ErrorRates(0.2, 0.07, 0.07)
 CONFIG = LevelConfig(memory=30.0, weight=2.0)
 PRIOR = float(np.log(0.02 / 0.98))
 RIG = rig_of(corner_cameras(), cell=0.5, planes=3)
@@ -45,7 +45,7 @@ def one_level(views: int = 1) -> RateCalibration:
 
 
 def teach(
-    view: int, shown: reference.Shown, near: Ints, inside: Flags, trusted: Flags, rates: list[Rates], looks: float
+    view: int, shown: reference.Shown, near: Ints, inside: Flags, trusted: Flags, rates: list[ErrorRates], looks: float
 ) -> tuple[Floats, Floats]:
     """What the kernel counts of one of several views of equal weight."""
     tally = Accumulator(inside.shape)
@@ -75,7 +75,7 @@ def test_counts_by_definition(seed: int) -> None:
     share = tuple(rng.choice([0.0, 0.4, 1.0], shape).astype(np.float32) for _ in range(3))
     shown = reference.Shown(levels, share)
     near, inside = rng.integers(-1, 3, shape[1:]), rng.random(shape) < 0.4
-    trusted, rates = np.array([True, False, True]), [Rates(*rng.uniform(0.05, 0.5, 3)) for _ in range(3)]
+    trusted, rates = np.array([True, False, True]), [ErrorRates(*rng.uniform(0.05, 0.5, 3)) for _ in range(3)]
     # Of equal weights the mean over a_i times the count is their sum, as in the definition.
     for found, expected in zip(
         teach(1, shown, near, inside, trusted, rates, 0.6),
@@ -87,7 +87,7 @@ def test_counts_by_definition(seed: int) -> None:
 
 def test_rates_are_found() -> None:
     """A stream of frames of known rates; three views, of which the first errs most."""
-    true = [Rates(0.35, 0.15, 0.45), Rates(0.1, 0.02, 0.3), Rates(0.1, 0.02, 0.3)]
+    true = [ErrorRates(0.35, 0.15, 0.45), ErrorRates(0.1, 0.02, 0.3), ErrorRates(0.1, 0.02, 0.3)]
     rng, level, shape = np.random.default_rng(0), one_level(3), (2, 12, 12)
     near = np.full(shape[1:], -1)
     near[:6, :6] = 0
@@ -96,7 +96,7 @@ def test_rates_are_found() -> None:
     units = np.array([18.0, 288 - 72, 54.0])
     whole = (np.ones(shape, np.float32),) * 3
     for _ in range(300):
-        chance = [np.where(inside, 1 - r.miss, np.where(near >= 0, r.beside, r.clutter)) for r in true]
+        chance = [np.where(inside, 1 - r.miss, np.where(near >= 0, r.near_clutter, r.clutter)) for r in true]
         shown = reference.Shown(tuple(random_levels(rng, shape, c) for c in chance), whole)
         counted = [teach(i, shown, near, inside, np.array([True]), level.rates, 1.0) for i in range(3)]
         errors, seen = np.stack(counted, 1) / units
@@ -163,8 +163,8 @@ def test_memory_is_in_seconds() -> None:
 def test_pillars_on_the_grid() -> None:
     grid = Grid((-1.0, 1.0), (-1.0, 1.0), 0.05, 1.8, 10)
     ground, height = np.array([[0.2, 0.1]]), np.array([1.7])
-    inside = inside_bodies(grid, near_person(grid.ground, ground, 0.5), ground, height)
-    body, reached = cells_of_one(grid, 1.7, 0.4)
+    inside = inside_bodies(grid, nearest_person(grid.ground, ground, 0.5), ground, height)
+    body, reached = cells_per_person(grid, 1.7, 0.4)
     assert inside.sum() == pytest.approx(body, rel=0.1)
     assert reached == pytest.approx(10 * np.pi * 0.4**2 / 0.05**2)
     assert not inside[-1].any()  # the uppermost plane is above the head
@@ -192,12 +192,12 @@ def test_a_frame_is_fused_by_those_before_it(kind: str) -> None:
     fusion = occupancy(kind)
     running, fresh = fusion.new_calibration(), fusion.new_calibration()
     frames = [frame(kind, k) for k in range(2)]
-    np.testing.assert_array_equal(fusion.follow(running, *frames[0]), fusion.fuse(*frames[0]))
+    np.testing.assert_array_equal(fusion.fuse_and_learn(running, *frames[0]), fusion.fuse(*frames[0]))
     for one in frames[1:]:
-        fusion.follow(running, *one)
+        fusion.fuse_and_learn(running, *one)
     assert running.rates != fresh.rates
     assert fresh.rates == [fresh.rates[0]] * 4
-    assert all(r.beside > r.clutter for r in running.rates)
+    assert all(r.near_clutter > r.clutter for r in running.rates)
 
 
 def test_going_on_from_a_state_is_going_on() -> None:
@@ -205,25 +205,25 @@ def test_going_on_from_a_state_is_going_on() -> None:
     frames = [frame("pixels", k) for k in range(3)]
     fusion = occupancy("pixels")
     whole = fusion.new_calibration()
-    volumes = [fusion.follow(whole, *one) for one in frames]
+    volumes = [fusion.fuse_and_learn(whole, *one) for one in frames]
     for division in (1, 2):
         part = fusion.new_calibration()
         for one in frames[:division]:
-            fusion.follow(part, *one)
+            fusion.fuse_and_learn(part, *one)
         rest = deepcopy(part)
         for one, volume in zip(frames[division:], volumes[division:], strict=True):
-            np.testing.assert_array_equal(fusion.follow(rest, *one), volume)
+            np.testing.assert_array_equal(fusion.fuse_and_learn(rest, *one), volume)
 
 
 def test_a_blind_view_learns_nothing() -> None:
     fusion = occupancy("pixels")
     running = fusion.new_calibration()
     seen, explanation = frame("pixels", 0)
-    fusion.follow(running, [None, *seen[1:]], explanation)
+    fusion.fuse_and_learn(running, [None, *seen[1:]], explanation)
     assert not running.seen[0].any()
     assert running.seen[1:].all()
-    fusion.follow(running, [None] * 4, explanation)
-    assert running.rates[0] == Rates(*running.first[0])
+    fusion.fuse_and_learn(running, [None] * 4, explanation)
+    assert running.rates[0] == ErrorRates(*running.first[0])
 
 
 def test_people_whom_one_view_alone_asserts_do_not_teach_it() -> None:
@@ -232,9 +232,9 @@ def test_people_whom_one_view_alone_asserts_do_not_teach_it() -> None:
     everybody = explanation.people
     parts = np.zeros_like(everybody.view_evidence)
     parts[0] = everybody.evidence
-    fusion.follow(running, seen, replace(explanation, people=replace(everybody, view_evidence=parts)))
-    assert not running.seen[0, [MISS, BESIDE]].any()
-    assert running.seen[1:, [MISS, BESIDE]].all()
+    fusion.fuse_and_learn(running, seen, replace(explanation, people=replace(everybody, view_evidence=parts)))
+    assert not running.seen[0, [MISS, NEAR_CLUTTER]].any()
+    assert running.seen[1:, [MISS, NEAR_CLUTTER]].all()
 
 
 def test_a_detector_is_not_blamed_for_the_hidden() -> None:
@@ -242,7 +242,7 @@ def test_a_detector_is_not_blamed_for_the_hidden() -> None:
     running = fusion.new_calibration()
     seen, explanation = frame("boxes", 0)
     hidden = np.array([[0.5] * len(explanation.people), *np.ones((3, len(explanation.people)))])
-    fusion.follow(
+    fusion.fuse_and_learn(
         running, [no_boxes(), *seen[1:]], replace(explanation, people=replace(explanation.people, visibility=hidden))
     )
     assert not running.seen[0, MISS].any()

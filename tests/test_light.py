@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from stseg.arrays import Bytes, Flags, Floats, Singles
 from stseg.config import LightConfig
 from stseg.errors import ConfigError
-from stseg.foreground import Background, Chromatic, Codebook, LightChange, LightWatch, Mixture
+from stseg.foreground import Background, Chromatic, Codebook, IlluminationMonitor, LightChange, Mixture
 from stseg.foreground.gain_field import gain_field
-from stseg.foreground.illumination import still_gain
+from stseg.foreground.illumination import stationary_gain
 from stseg.foreground.view_foreground import ViewForeground
 
 SIZE = (64, 48)
@@ -46,16 +46,16 @@ def shot(light: Floats | float, people: Flags, rng: np.random.Generator) -> Byte
     return np.asarray(np.clip(np.round(image + rng.normal(0, 2, image.shape)), 0, 255), np.uint8)
 
 
-def watched(model: Callable[..., Background]) -> LightWatch:
+def watched(model: Callable[..., Background]) -> IlluminationMonitor:
     """A model that has seen the empty room."""
     rng = np.random.default_rng(1)
     learned = model(SIZE, RATE)
     for _ in range(15):
         learned.learn(shot(1.0, np.zeros(SIZE[::-1], bool), rng))
-    return LightWatch(learned, RATE)
+    return IlluminationMonitor(learned, RATE)
 
 
-def film(watch: LightWatch, light: Light, frames: int = 24) -> list[Singles | None]:
+def film(watch: IlluminationMonitor, light: Light, frames: int = 24) -> list[Singles | None]:
     """What the watch says of somebody who walks while the light changes."""
     rng = np.random.default_rng(2)
     return [watch.likelihood(shot(light(frame), body(frame), rng)) for frame in range(frames)]
@@ -170,12 +170,12 @@ def test_only_what_stands_still_in_its_own_colour_is_taken_in_a_new_light() -> N
     lit = np.where(U < 32, 1.6, 1.0)
     frames = np.stack([shot(lit, body(frame), rng) for frame in range(9)])
     everywhere = np.ones(SIZE[::-1], bool)
-    gain = still_gain(frames, scene().astype(np.float32), everywhere.astype(np.float32), everywhere)
+    gain = stationary_gain(frames, scene().astype(np.float32), everywhere.astype(np.float32), everywhere)
     apart = np.asarray((V < 8) & (np.abs(U - 32) > 2))
     np.testing.assert_allclose(gain[apart], lit[apart][:, None] * np.ones(3), rtol=0.08)
     there = body(4) & (U < 28)
     assert np.abs(np.log(gain[there] / 1.6)).mean() < 0.15  # filled in from around
-    known = still_gain(frames, scene().astype(np.float32), everywhere.astype(np.float32), ~everywhere)
+    known = stationary_gain(frames, scene().astype(np.float32), everywhere.astype(np.float32), ~everywhere)
     np.testing.assert_allclose(known[apart], 1)
 
 

@@ -19,11 +19,11 @@ from stseg.geometry import Camera, Grid, Rig
 from stseg.geometry.sampling import Sampling, SamplingKind
 from stseg.geometry.summed_area import TOP, UNSEEN, fill_means, fill_points, fill_sums, sum_of
 from stseg.model.people import Explanation
-from stseg.occupancy.fusion import Rates, log_odds_terms, synergy_terms
+from stseg.occupancy.fusion import ErrorRates, log_odds_terms, synergy_terms
 from stseg.occupancy.localisation import Localiser
 from stseg.occupancy.volume import Occupancy
 
-RATES = Rates(0.2, 0.07, 0.07)
+RATES = ErrorRates(0.2, 0.07, 0.07)
 OCCUPIED = 0.02
 KINDS: list[SamplingKind] = ["point", "footprint"]
 COARSE = rig_of(corner_cameras(), cell=0.5, planes=3)
@@ -92,7 +92,7 @@ def test_localisation_by_definition(kind: SamplingKind, blind: int | None) -> No
     maps: list[Singles | None] = [*noise(3, 3)]
     if blind is not None:
         maps[blind] = None
-    weights, rates = np.array([0.5, 1.0, 2.0]), [RATES, Rates(0.1, 0.02, 0.1), Rates(0.3, 0.2, 0.3)]
+    weights, rates = np.array([0.5, 1.0, 2.0]), [RATES, ErrorRates(0.1, 0.02, 0.1), ErrorRates(0.3, 0.2, 0.3)]
     localiser = Localiser(rig, kind)
     synergy = localiser.synergy(maps, weights, 0.05)
     log_odds = localiser.log_odds(maps, weights, rates, OCCUPIED)
@@ -124,14 +124,14 @@ def test_nobody_explained_is_the_plain_localisation() -> None:
     owner, free = (np.full((96, 128), -1, np.int16),) * 4, (np.zeros(0, np.int64),) * 4
     explanation = Explanation(nobody, nobody, owner, (1,) * 4, free, np.full(4, np.nan))
     localiser = Localiser(COARSE, "footprint")
-    rates = [Rates(FEW_HEIGHTS.pixel_miss, FEW_HEIGHTS.pixel_clutter, FEW_HEIGHTS.pixel_clutter)] * 4
+    rates = [ErrorRates(FEW_HEIGHTS.pixel_miss, FEW_HEIGHTS.pixel_clutter, FEW_HEIGHTS.pixel_clutter)] * 4
     plain = localiser.log_odds(maps, localiser.clutter_weights(maps), rates, OccupancyConfig().occupied)
     explained = Occupancy(COARSE, ["pixels"] * 4, OccupancyConfig(sampling="footprint", looks=1.0), FEW_HEIGHTS)
     np.testing.assert_array_equal(explained.fuse([*maps], explanation), plain)
 
 
 def test_terms_at_their_ends() -> None:
-    terms = log_odds_terms(Rates(0.2, 0.07, 0.4))
+    terms = log_odds_terms(ErrorRates(0.2, 0.07, 0.4))
     np.testing.assert_allclose(terms[:, 0], np.log([0.2 / 0.93, 0.2 / 0.6]), rtol=1e-5)
     np.testing.assert_allclose(terms[:, TOP], np.log([0.8 / 0.07, 0.8 / 0.4]), rtol=1e-5)
     assert (np.diff(terms) > 0).all()

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scenes import FEW_HEIGHTS, boxes, corner_cameras, found, likelihoods, looking, no_boxes, people, rig_of, room
 from strategies import numbers, rigs
 
-from stseg.arrays import Boxes, Floats, Ints, Singles
+from stseg.arrays import Boxes, Floats, Ints, Singles, ViewEvidence
 from stseg.config import OccupancyConfig
 from stseg.detection.detector import Detector
 from stseg.geometry import Grid, Rig
@@ -21,17 +21,17 @@ from stseg.geometry.bodies import BodyTable
 from stseg.geometry.sampling import Sampling, SamplingKind
 from stseg.geometry.summed_area import TOP
 from stseg.model.box_fit import TOLERANCE
-from stseg.model.people import Explanation, ViewEvidence
-from stseg.occupancy.box_planes import fill_match_of_planes, likelihood_of
+from stseg.model.people import Explanation
+from stseg.occupancy.box_planes import fill_match_of_planes, plane_likelihood
 from stseg.occupancy.clutter import clutter, clutter_weights
-from stseg.occupancy.fusion import Rates, log_odds_terms
+from stseg.occupancy.fusion import ErrorRates, log_odds_terms
 from stseg.occupancy.volume import Occupancy
 
 COARSE = rig_of(corner_cameras(), cell=0.5, planes=3)
 PIXELS, BOXES = ["pixels"] * 4, ["boxes"] * 4
 CONFIG = OccupancyConfig()
 PRIOR = float(np.log(CONFIG.occupied / (1 - CONFIG.occupied)))
-RATES = Rates(FEW_HEIGHTS.pixel_miss, FEW_HEIGHTS.pixel_clutter, FEW_HEIGHTS.pixel_clutter)
+RATES = ErrorRates(FEW_HEIGHTS.pixel_miss, FEW_HEIGHTS.pixel_clutter, FEW_HEIGHTS.pixel_clutter)
 
 
 def explained(rig: Rig, standing: Floats, owner: Sequence[Ints] | None = None, step: int = 1) -> Explanation:
@@ -191,8 +191,8 @@ def test_likelihood_per_plane_by_definition(seed: int) -> None:
 @pytest.mark.parametrize(("near", "clutter"), [(-1, 0.01), (0, 0.2)])
 def test_a_box_says_as_much_as_its_match_is_worth(near: int, clutter: float) -> None:
     """The terms of the rates by which L was made give back m + M (1 - m) / b, and an empty cell counts as M."""
-    match, rates = np.linspace(0.05, 0.9, 18).astype(np.float32).reshape(-1, 1, 1), Rates(0.15, 0.01, 0.2)
-    likelihood = likelihood_of(match, np.full((1, 1), near), rates)
+    match, rates = np.linspace(0.05, 0.9, 18).astype(np.float32).reshape(-1, 1, 1), ErrorRates(0.15, 0.01, 0.2)
+    likelihood = plane_likelihood(match, np.full((1, 1), near), rates)
     said = log_odds_terms(rates)[near + 1, np.rint(likelihood * TOP).astype(int)]
     np.testing.assert_allclose(said, np.log(0.15 + match * 0.85 / clutter), atol=0.02)
     erring = clutter * likelihood / (clutter * likelihood + (1 - clutter) * (1 - likelihood))

@@ -10,7 +10,7 @@ from strategies import numbers
 
 from stseg.arrays import Flags, Floats
 from stseg.geometry import Grid
-from stseg.geometry.near import near_person
+from stseg.geometry.nearest_person import nearest_person
 from stseg.model.blobs import UNASSIGNED, Blobs
 from stseg.segmentation.blobs import find_blobs
 from stseg.segmentation.motion import motion_field
@@ -58,7 +58,7 @@ def blobs_of(occupied: Flags, *standing: tuple[float, float], strength: Floats |
     ground = np.array(standing).reshape(-1, 2)
     log_odds = np.where(occupied, strength, -3.0).astype(np.float32)
     label = np.where(
-        occupied, np.append(np.arange(len(ground)) + 11, UNASSIGNED)[near_person(GRID.ground, ground, 0.4)], 0
+        occupied, np.append(np.arange(len(ground)) + 11, UNASSIGNED)[nearest_person(GRID.ground, ground, 0.4)], 0
     )
     return find_blobs(label.astype(np.int32), log_odds, ground, np.arange(len(ground)) + 11, 0.4, GRID)
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from stseg.arrays import Boxes
 from stseg.config import ForegroundConfig
 from stseg.foreground import make_background
-from stseg.foreground.illumination import LightWatch
+from stseg.foreground.illumination import IlluminationMonitor
 from stseg.foreground.view_foreground import ViewForeground, without_prior
 
 
@@ -50,7 +50,7 @@ def test_colour_is_judged_by_the_background_with_the_prior_taken_out(model: Any)
     frame = empty.copy()
     frame[4:8, 5:10] = (124, 116, 126)
     posterior = models[0].likelihood(frame)
-    seen = ViewForeground(LightWatch(models[1], 10.0)).evidence(frame)
+    seen = ViewForeground(IlluminationMonitor(models[1], 10.0)).evidence(frame)
     assert isinstance(seen, np.ndarray)
     np.testing.assert_array_equal(seen, without_prior(posterior, models[1].prior))
     assert (seen >= posterior).all()

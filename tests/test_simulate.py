@@ -76,7 +76,7 @@ def test_scene_refuses_what_cannot_be(key: str, value: object) -> None:
 def test_cameras_stand_where_the_scene_says_and_see_the_area(name: str) -> None:
     spec = NAMED[name]
     rig = build_rig(spec)
-    rig.require_sight()
+    rig.require_coverage()
     assert len(rig.cameras) == spec.cameras
     for camera in rig.cameras:
         assert np.hypot(*camera.centre[:2]) == pytest.approx(spec.camera_distance, rel=0.06)

@@ -12,7 +12,7 @@ from scenes import CONFIG, FRAME_RATE, found, people, room
 
 from stseg.arrays import Floats, Rows
 from stseg.errors import ConfigError
-from stseg.geometry.near import near_person
+from stseg.geometry.nearest_person import nearest_person
 from stseg.graphcut.energy import QUANTUM
 from stseg.model.tables import WINDOW
 from stseg.trackers import TRACKERS, Commit, FrameObservations, FusedFrame, Tracker, find_tracker
@@ -33,7 +33,7 @@ def scene(follow: Tracker, frame: int, *places: tuple[float, float]) -> FusedFra
     """A frame in which people stand at places, metres: cells within 0.3 m are occupied, one corner is unseen."""
     standing = people(*places)
     log_odds = np.full(RIG.grid.shape, -3.0, np.float32)
-    log_odds[:, near_person(RIG.grid.ground, standing[:, :2], 0.3) >= 0] = 3.0
+    log_odds[:, nearest_person(RIG.grid.ground, standing[:, :2], 0.3) >= 0] = 3.0
     log_odds[:, -1, -1] = np.nan
     return FusedFrame(frame, found(standing, follow.expected(frame)), found(people()), log_odds)
 
@@ -201,8 +201,8 @@ def test_an_unknown_tracker_is_refused() -> None:
 def test_nearest_person_within_reach() -> None:
     standing = np.array([[0.0, 0.0], [1.0, 0.0]])
     asked = np.array([[[0.1, 0.0], [0.6, 0.0]], [[0.5, 2.0], [1.0, 0.4]]])
-    assert near_person(asked, standing, 0.4).tolist() == [[0, 1], [-1, 1]]
-    assert near_person(asked, np.zeros((0, 2)), 0.4).tolist() == [[-1, -1], [-1, -1]]
+    assert nearest_person(asked, standing, 0.4).tolist() == [[0, 1], [-1, 1]]
+    assert nearest_person(asked, np.zeros((0, 2)), 0.4).tolist() == [[-1, -1], [-1, -1]]
 
 
 def test_rows_are_sorted_by_id() -> None:

@@ -11,7 +11,7 @@ from recordings import track, write_recording
 from scenes import FEW_HEIGHTS, boxes, likelihoods, people, room
 
 from stseg.accelerate import python_form
-from stseg.arrays import Floats
+from stseg.arrays import Floats, ViewEvidence
 from stseg.calibration.run_check import knocked, views_aside
 from stseg.commands.run_overview import look_over
 from stseg.detection.detector import Detector
@@ -19,7 +19,6 @@ from stseg.detection.scoring import set_score
 from stseg.geometry import Camera, Rig
 from stseg.io.recording.rigs import read_rig, write_rig
 from stseg.io.runfile.runs import read_run
-from stseg.model.people import ViewEvidence
 
 CELL = 0.1
 slow = pytest.mark.skipif(python_form(set_score) is set_score, reason="too slow without a compiler")

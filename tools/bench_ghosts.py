@@ -24,6 +24,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from stseg.arrays import ViewEvidence
 from stseg.config import Config
 from stseg.detection.detector import Detector
 from stseg.detection.map_estimate import FrameEvidence, MapEstimate
@@ -32,7 +33,6 @@ from stseg.detection.problem import BoxEvidence, PixelEvidence, Problem
 from stseg.detection.proposals import Proposals
 from stseg.detection.search import ENUMERATED, search
 from stseg.model.candidates import Candidates
-from stseg.model.people import ViewEvidence
 from stseg.occupancy.volume import Occupancy
 from stseg.simulation import Film, SceneSpec
 from stseg.tracking.track_filter import TrackFilter

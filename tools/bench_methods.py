@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from stseg.arrays import Bytes, Flags, Floats, Singles
-from stseg.foreground import Background, Chromatic, Codebook, LightWatch, Mixture
+from stseg.foreground import Background, Chromatic, Codebook, IlluminationMonitor, Mixture
 
 __all__ = ["HISTORY", "LEVELS", "MODELS", "Count", "Ours", "Setting", "area_under", "ours", "settings"]
 
@@ -31,7 +31,7 @@ class Ours:
     """A model of ours, its light watched; where it is blind it says nothing."""
 
     def __init__(self, model: Background, frame_rate: float) -> None:
-        self._watch = LightWatch(model, frame_rate)
+        self._watch = IlluminationMonitor(model, frame_rate)
 
     def learn(self, image: Bytes) -> None:
         self._watch.model.learn(image)

@@ -21,12 +21,11 @@ from time import perf_counter
 import cv2
 import numpy as np
 
-from stseg.arrays import Floats, Singles
+from stseg.arrays import Floats, Singles, ViewEvidence
 from stseg.config import Config
 from stseg.detection.detector import Detector
 from stseg.geometry import Rig
-from stseg.model.people import ViewEvidence
-from stseg.occupancy.fusion import Rates
+from stseg.occupancy.fusion import ErrorRates
 from stseg.occupancy.localisation import Localiser
 from stseg.occupancy.volume import Occupancy
 from stseg.simulation import Film, SceneSpec
@@ -88,7 +87,7 @@ def localisation(rounds: int) -> bool:
     """Print the times; whether the gates hold."""
     rig, maps, equal = bench_rig(), smooth_noise(), np.ones(VIEWS)
     points, footprints, peer = Localiser(rig, "point"), Localiser(rig, "footprint"), whole_warps(rig)
-    rates = [Rates(0.2, 0.07, 0.07)] * VIEWS
+    rates = [ErrorRates(0.2, 0.07, 0.07)] * VIEWS
     ways: dict[str, Callable[[], object]] = {
         "whole warps": lambda: peer(maps),
         "points": lambda: points.synergy(maps, equal, LEAST),

@@ -10,7 +10,7 @@ import numpy as np
 from result_sets import ResultSet
 from workbench import Bench
 
-from stseg.arrays import Boxes, Observation, Rows
+from stseg.arrays import Boxes, Observation, Rows, ViewEvidence
 from stseg.config import Config
 from stseg.engine.backgrounds import make_foregrounds
 from stseg.engine.pipeline import Pipeline
@@ -18,7 +18,7 @@ from stseg.engine.session import run_session
 from stseg.evaluation import evaluate
 from stseg.evaluation.scores import Scores
 from stseg.evaluation.sequence import Area
-from stseg.foreground.view_foreground import Evidence, ViewForeground
+from stseg.foreground.view_foreground import ViewForeground
 from stseg.io.recording.frames import open_frames
 from stseg.io.recording.recording import Recording
 from stseg.io.recording.rigs import read_rig
@@ -35,7 +35,7 @@ class Perturbed(ViewForeground):
         super().__init__(whole.background)
         self._rng = rng
 
-    def evidence(self, seen: Observation) -> Evidence:
+    def evidence(self, seen: Observation) -> ViewEvidence:
         """The evidence of the frame, less what is dropped."""
         evidence = super().evidence(seen)
         if isinstance(evidence, Boxes):

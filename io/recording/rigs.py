@@ -69,7 +69,7 @@ def parse_rig(text: str, path: Path) -> Recording:
     rig = Rig(scene.text("name"), scene.positive("frame_rate"), grid, cameras)
     for table, camera in zip(tables, cameras, strict=True):
         with _placed(table, "projection" in table):
-            replace(rig, cameras=(camera,)).require_sight()
+            replace(rig, cameras=(camera,)).require_coverage()
     return Recording(path, rig, tuple(_camera_source(table) for table in tables))
 
 

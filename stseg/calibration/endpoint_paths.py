@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from stseg.arrays import Floats, Ints
+from stseg.arrays import Ints
 from stseg.calibration.endpoints import Ends
 
 _STEP = 0.25
@@ -40,17 +40,3 @@ def path_of(ends: Ends, frame_rate: float) -> Ints:
                 started += 1
             open_rows.append(int(row))
     return path
-
-
-def as_signals(ground: Floats, frame: Ints, path: Ints, least: int) -> list[tuple[int, Floats]]:
-    """First frame and ground places (frames, 2) of each path of at least so many frames; nan where it has a gap."""
-    signals = []
-    for number in np.unique(path):
-        rows = np.flatnonzero((path == number) & np.isfinite(ground).all(axis=1))
-        if len(rows) < least:
-            continue
-        first = int(frame[rows[0]])
-        places = np.full((int(frame[rows[-1]]) - first + 1, 2), np.nan)
-        places[frame[rows] - first] = ground[rows]
-        signals.append((first, places))
-    return signals

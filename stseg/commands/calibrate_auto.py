@@ -169,7 +169,7 @@ def _ends(
 def _backgrounds(sights: Sequence[ViewForeground]) -> list[Bytes]:
     """The empty scene in each view; none where the streams are masks."""
     return [
-        np.clip(np.rint(sight.background.model.commonest()), 0, 255).astype(np.uint8)
+        np.clip(np.rint(sight.background.model.background_image()), 0, 255).astype(np.uint8)
         for sight in sights
         if sight.background is not None
     ]

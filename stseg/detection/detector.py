@@ -11,6 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from stseg.arrays import ViewEvidence
 from stseg.config import GhostConfig, LevelConfig
 from stseg.detection.box_noise_calibration import BoxNoiseCalibration
 from stseg.detection.evidence import peaks
@@ -24,7 +25,7 @@ from stseg.geometry import Rig
 from stseg.model.border import Border
 from stseg.model.box_noise import BoxNoise
 from stseg.model.candidates import Candidates
-from stseg.model.people import Explanation, ViewEvidence
+from stseg.model.people import Explanation
 from stseg.model.predicted_tracks import PredictedTracks
 
 

@@ -12,14 +12,14 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from stseg.arrays import Boxes, Floats, Singles
+from stseg.arrays import Boxes, Floats, Singles, ViewEvidence
 from stseg.config import Config
 from stseg.detection.detection_probability import DetectionProbability
 from stseg.detection.mean_shift import Modes, modes
 from stseg.geometry import Grid, Rig
 from stseg.model.box_likelihood import box_likelihood
 from stseg.model.candidates import Candidates
-from stseg.model.people import Explanation, ViewEvidence, empty_explanation
+from stseg.model.people import Explanation, empty_explanation
 
 Fuse = Callable[[Sequence[ViewEvidence], Explanation], Singles]
 

@@ -17,7 +17,7 @@ from stseg.config import Config, LightConfig, SegmentConfig
 from stseg.engine.segments import Segment
 from stseg.foreground import make_background
 from stseg.foreground.background import Background
-from stseg.foreground.illumination import LightWatch
+from stseg.foreground.illumination import IlluminationMonitor
 from stseg.foreground.view_foreground import ViewForeground
 from stseg.io.recording.frames import read_background, read_camera
 from stseg.io.recording.recording import Recording
@@ -119,7 +119,7 @@ class BackgroundLearner:
 
     def __init__(self, model: Background, frame_rate: float, step: int, config: LightConfig) -> None:
         self._model, self._frame_rate = model.at_rate(frame_rate / step), frame_rate
-        self._watch = LightWatch(self._model, frame_rate / step, config)
+        self._watch = IlluminationMonitor(self._model, frame_rate / step, config)
 
     def see(self, image: Bytes) -> None:
         """The next frame."""
@@ -147,7 +147,7 @@ def _sight(
         for image in _colours(recording, camera, frames, streams):
             learner.see(image)
         model = learner.learned()
-    return ViewForeground(LightWatch(model, frame_rate, config.light))
+    return ViewForeground(IlluminationMonitor(model, frame_rate, config.light))
 
 
 def _seeing(recording: Recording, camera: int, part: range, streams: StreamIndex | None) -> Sequence[int]:

@@ -52,6 +52,6 @@ class ImageShifts:
     def _look(self, moment: FrameSet) -> None:
         for view, (sight, image, factor) in enumerate(zip(self._sights, moment.views, self._factors, strict=True)):
             if sight.background is not None and isinstance(image, np.ndarray):
-                background = np.clip(sight.background.model.commonest(), 0, 255).astype(np.uint8)
+                background = np.clip(sight.background.model.background_image(), 0, 255).astype(np.uint8)
                 u, v = factor * background_shift(background, np.asarray(image, np.uint8))
                 self._rows.append((moment.frame, view, float(u), float(v)))

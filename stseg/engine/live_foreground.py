@@ -15,7 +15,7 @@ from stseg.arrays import Bytes, Observation
 from stseg.config import Config
 from stseg.engine.backgrounds import BackgroundLearner, empty_background, is_colour, part_length, sampled
 from stseg.foreground.background import Background
-from stseg.foreground.illumination import LightWatch
+from stseg.foreground.illumination import IlluminationMonitor
 from stseg.foreground.view_foreground import ViewForeground
 from stseg.io.live.live_frames import LiveFrameSet
 from stseg.io.recording.recording import Recording
@@ -84,7 +84,7 @@ class LiveForegrounds:
         frame_rate, light = self._recording.rig.frame_rate, self._config.light
         models = [self._models.get(k) for k in range(len(self._recording.sources))]
         return [
-            ViewForeground(None if model is None else LightWatch(deepcopy(model), frame_rate, light))
+            ViewForeground(None if model is None else IlluminationMonitor(deepcopy(model), frame_rate, light))
             for model in models
         ]
 

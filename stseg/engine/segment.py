@@ -20,7 +20,7 @@ from stseg.engine.pipeline import Pipeline
 from stseg.engine.segments import Segment, find_gaps, longest_absence, segments
 from stseg.engine.session import run_session
 from stseg.foreground.view_foreground import ViewForeground
-from stseg.geometry.near import near_person
+from stseg.geometry.nearest_person import nearest_person
 from stseg.io.config_file import format_config
 from stseg.io.recording.frames import open_frames
 from stseg.io.recording.recording import Recording
@@ -153,5 +153,5 @@ def _kept(job: Job, step: CommittedFrames, frames: Ints, log_odds: Singles) -> t
         ground = job.recording.rig.grid.ground
         for frame, volume in zip(frames, log_odds, strict=True):
             here = rows[rows["frame"] == frame]
-            volume[:, near_person(ground, np.column_stack([here["x"], here["y"]]), _AROUND) < 0] = np.nan
+            volume[:, nearest_person(ground, np.column_stack([here["x"], here["y"]]), _AROUND) < 0] = np.nan
     return log_odds, label

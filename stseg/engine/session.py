@@ -9,12 +9,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Protocol
 
-from stseg.arrays import Observation, Singles
+from stseg.arrays import Observation, Singles, ViewEvidence
 from stseg.engine.committed_frames import CommittedFrames, FrameRecord, committed_frames, rate_rows
 from stseg.engine.pipeline import Pipeline
 from stseg.engine.stopwatch import Stopwatch
 from stseg.foreground.view_foreground import ViewForeground
-from stseg.model.people import Explanation, ViewEvidence
+from stseg.model.people import Explanation
 from stseg.model.predicted_tracks import PredictedTracks
 from stseg.trackers import FrameObservations, FusedFrame
 
@@ -71,7 +71,7 @@ class Session:
             explanation = stages.detector.explain_next(self._box_noise, evidence, expected, proposed)
         self._records[frame_set.frame] = FrameRecord(explanation, rate_rows(frame_set.frame, self._error_rates))
         with watch.time("occupancy"):
-            log_odds = stages.occupancy.follow(self._error_rates, evidence, explanation)
+            log_odds = stages.occupancy.fuse_and_learn(self._error_rates, evidence, explanation)
         fused = FusedFrame(frame_set.frame, explanation.people, explanation.ghosts, log_odds)
         return fused, FrameObservations(frame_set.views, evidence)
 

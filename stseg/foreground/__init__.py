@@ -4,7 +4,7 @@ from stseg.config import ChromaticConfig, CodebookConfig, MixtureConfig
 from stseg.foreground.background import Background
 from stseg.foreground.chromatic import Chromatic
 from stseg.foreground.codebook import Codebook
-from stseg.foreground.illumination import LightChange, LightWatch
+from stseg.foreground.illumination import IlluminationMonitor, LightChange
 from stseg.foreground.instances import instance_boxes
 from stseg.foreground.masks import mask_likelihood
 from stseg.foreground.mixture import Mixture
@@ -17,8 +17,8 @@ __all__ = [
     "ChromaticConfig",
     "Codebook",
     "CodebookConfig",
+    "IlluminationMonitor",
     "LightChange",
-    "LightWatch",
     "Mixture",
     "MixtureConfig",
     "box_likelihood",

@@ -80,7 +80,7 @@ class Codebook(PixelModel):
             self._learn(frame, np.ones(3), index + 1, longest)
         settle(len(frames), round(self.config.recurrence * len(frames)), longest, frequency, weight, access)
 
-    def _teach(self, image: Bytes, gain: Floats) -> None:
+    def _learn_empty(self, image: Bytes, gain: Floats) -> None:
         self._learn(image, gain, 0, np.zeros(self._arrays["weight"].shape, np.int32))
 
     def _learn(self, image: Bytes, gain: Floats, now: int, longest: NDArray[np.int32]) -> None:
@@ -96,10 +96,10 @@ class Codebook(PixelModel):
             config.noise, log_odds,
         )  # fmt: skip
 
-    def _follow(self, rows: slice, image: Bytes, gain: Floats, likelihood: Singles) -> None:
+    def _update_rows(self, rows: slice, image: Bytes, gain: Floats, likelihood: Singles) -> None:
         config, turn = self.config, self._turn
         follow(
-            image[rows], gain.astype(np.float32), likelihood[rows], self._asked // TURNS + 1,
+            image[rows], gain.astype(np.float32), likelihood[rows], self._frames_evaluated // TURNS + 1,
             np.float32(config.match * config.noise), np.float32(1.0 - math.exp(-turn / config.memory)),
             math.ceil(config.absorption / turn), math.ceil(config.absence / turn),
             *(array[rows] for array in self._arrays.values()),

@@ -55,7 +55,7 @@ class LightChange:
     blind: int = 0
 
 
-class LightWatch:
+class IlluminationMonitor:
     """A background model whose light is watched.
 
     Parameters
@@ -135,7 +135,7 @@ class LightWatch:
             self.changes[-1].blind += 1
             return None
         strange = likelihood > self.model.prior
-        gain = still_gain(np.stack([*change.frames, image]), self.model.commonest(), change.empty, strange)
+        gain = stationary_gain(np.stack([*change.frames, image]), self.model.background_image(), change.empty, strange)
         if self._new_share(likelihood) <= config.rise or self._explains(gain, image, likelihood, change.empty):
             self.model.relight(gain)
             likelihood = self.model.likelihood(image)
@@ -145,7 +145,7 @@ class LightWatch:
 
     def _in_new_light(self, image: Bytes, likelihood: Singles, empty: Singles) -> Singles:
         """The likelihood with the model under a smooth field of gains, if that is what has changed."""
-        gain = gain_field(image, self.model.commonest(), empty)
+        gain = gain_field(image, self.model.background_image(), empty)
         if not _is_broad(gain) or not self._explains(gain, image, likelihood, empty):
             return likelihood
         self._note()
@@ -155,7 +155,7 @@ class LightWatch:
     def _explains(self, gain: Singles, image: Bytes, likelihood: Singles, empty: Singles) -> bool:
         """Whether gains explain most of what looks new."""
         few = np.s_[::_STEP, ::_STEP]
-        expected = np.minimum(gain[few] * self.model.commonest()[few], 255)
+        expected = np.minimum(gain[few] * self.model.background_image()[few], 255)
         near = np.abs(image[few] - expected).max(-1) <= _SAME
         new = (likelihood[few] > self.model.prior) & (empty[few] > 0.5)
         return bool(2 * np.count_nonzero(new & near) > np.count_nonzero(new))
@@ -177,7 +177,7 @@ class _Open:
     frames: list[Bytes] = field(default_factory=list)
 
 
-def still_gain(frames: Bytes, background: Singles, empty: Singles, strange: Flags) -> Singles:
+def stationary_gain(frames: Bytes, background: Singles, empty: Singles, strange: Flags) -> Singles:
     """Gains of pixels that stand still in a new light, one by one.
 
     Parameters

@@ -70,8 +70,8 @@ class Mixture(PixelModel):
         self._arrays["mean"][:, :, 0] = mean
         self._arrays["variance"][:, :, 0] = np.maximum(variance, config.minimum_sd**2)
 
-    def _teach(self, image: Bytes, gain: Floats) -> None:
-        rate = 1.0 / (self._learned + 1)
+    def _learn_empty(self, image: Bytes, gain: Floats) -> None:
+        rate = 1.0 / (self._frames_learned + 1)
         self._update(slice(None), image, gain, np.ones(image.shape[:2], np.float32), rate, rate)
 
     def _evaluate(self, image: Bytes, gain: Floats, log_odds: Singles) -> None:
@@ -80,7 +80,7 @@ class Mixture(PixelModel):
         mean, variance, weight = self._arrays.values()
         evaluate(image, gain, mean, variance, weight, *priors, log_odds)
 
-    def _follow(self, rows: slice, image: Bytes, gain: Floats, likelihood: Singles) -> None:
+    def _update_rows(self, rows: slice, image: Bytes, gain: Floats, likelihood: Singles) -> None:
         self._update(rows, image, gain, likelihood, *learning_rates(self._turn, self.config))
 
     def _update(self, rows: slice, image: Bytes, gain: Floats, likelihood: Singles, fast: float, slow: float) -> None:

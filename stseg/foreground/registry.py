@@ -1,6 +1,12 @@
-"""The background model that the configuration names."""
+"""Background models by the names that the configuration gives them.
+
+A further model is a module of this package, its constants in `stseg.config.foreground`, and one entry here.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 from stseg.config import ForegroundConfig
 from stseg.foreground.background import Background
@@ -8,24 +14,42 @@ from stseg.foreground.chromatic import Chromatic
 from stseg.foreground.codebook import Codebook
 from stseg.foreground.mixture import Mixture
 
+
+class RegisteredModel(NamedTuple):
+    """A background model.
+
+    Attributes
+    ----------
+    make
+        Called with the size of the images (width, height), the frame rate, and its constants.
+    constants
+        Finds these in the configuration.
+    """
+
+    make: Callable[[tuple[int, int], float, Any], Background]
+    constants: Callable[[ForegroundConfig], Any]
+
+
+MODELS = {
+    "mixture": RegisteredModel(Mixture, lambda config: config),
+    "chromatic": RegisteredModel(Chromatic, lambda config: config.chromatic),
+    "codebook": RegisteredModel(Codebook, lambda config: config.codebook),
+}
+"""Every model that `foreground.model` may name."""
 _AUTO = "mixture"
 
 
 def make_background(size: tuple[int, int], frame_rate: float, config: ForegroundConfig) -> Background:
-    """A background model that has learned nothing yet.
+    """An untrained background model.
 
     Parameters
     ----------
     size
         Width and height of the images, pixels.
     frame_rate
-        Frames per second at which its likelihood will be asked.
+        Frames per second at which its likelihood will be computed.
     config
-        Names it, and holds the constants of each.
+        Names the model, and holds the constants of each.
     """
-    name = _AUTO if config.model == "auto" else config.model
-    if name == "chromatic":
-        return Chromatic(size, frame_rate, config.chromatic)
-    if name == "codebook":
-        return Codebook(size, frame_rate, config.codebook)
-    return Mixture(size, frame_rate, config)
+    model = MODELS[_AUTO if config.model == "auto" else config.model]
+    return model.make(size, frame_rate, model.constants(config))

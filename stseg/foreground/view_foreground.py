@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from stseg.arrays import Boxes, Observation, Singles
-from stseg.foreground.illumination import LightChange, LightWatch
+from stseg.arrays import Boxes, Observation, Singles, ViewEvidence
+from stseg.foreground.illumination import IlluminationMonitor, LightChange
 from stseg.foreground.instances import instance_boxes
 from stseg.foreground.masks import mask_likelihood
-
-Evidence = Boxes | Singles | None
-"""One view of one frame: boxes, a likelihood map float32 (v, u), or None where the view is blind."""
 
 
 class ViewForeground:
@@ -22,7 +19,7 @@ class ViewForeground:
         The model of the empty scene of a colour camera, its light watched; None for all others.
     """
 
-    def __init__(self, background: LightWatch | None = None) -> None:
+    def __init__(self, background: IlluminationMonitor | None = None) -> None:
         self.background = background
 
     @property
@@ -30,7 +27,7 @@ class ViewForeground:
         """When the light changed at once, in frames since the first that was asked for."""
         return [] if self.background is None else self.background.changes
 
-    def evidence(self, seen: Observation) -> Evidence:
+    def evidence(self, seen: Observation) -> ViewEvidence:
         """What the frame shows; colour frames also teach the background model."""
         if seen is None and self.background is not None:
             self.background.skip()

@@ -39,7 +39,7 @@ class Rig:
         cameras = tuple(camera.reduced(factor) for camera, factor in zip(self.cameras, factors, strict=True))
         return replace(self, cameras=cameras)
 
-    def require_sight(self) -> None:
+    def require_coverage(self) -> None:
         """Raise CalibrationError for a camera that sees no cell of the area on any plane."""
         ground = self.grid.ground[self.grid.inside()]
         for camera in self.cameras:

@@ -8,12 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from stseg.arrays import Boxes, Floats, Ints, Singles
+from stseg.arrays import Boxes, Floats, Ints, ViewEvidence
 from stseg.geometry import Rig
 from stseg.model.sizes import Sizes
-
-ViewEvidence = Boxes | Singles | None
-"""One view of one frame: boxes, a likelihood map float32 (v, u), or None where the view is blind."""
 
 
 @dataclass(frozen=True)

@@ -19,10 +19,10 @@ import numpy as np
 from stseg.accelerate import kernel
 from stseg.arrays import Floats, Ints, Singles
 from stseg.model.box_fit import half_square
-from stseg.occupancy.fusion import Rates
+from stseg.occupancy.fusion import ErrorRates
 
 
-def likelihood_of(match: Singles, near: Ints, rates: Rates) -> Singles:
+def plane_likelihood(match: Singles, near: Ints, rates: ErrorRates) -> Singles:
     """L of each cell, float32 (plane, y, x), 0..1.
 
     Parameters
@@ -34,7 +34,7 @@ def likelihood_of(match: Singles, near: Ints, rates: Rates) -> Singles:
     rates
         m, b and b' by which the view is fused.
     """
-    miss, clutter = rates.miss, np.where(near >= 0, rates.beside, rates.clutter)
+    miss, clutter = rates.miss, np.where(near >= 0, rates.near_clutter, rates.clutter)
     ratio = miss + match * (1 - miss) / clutter
     likelihood = (ratio * (1 - clutter) - miss) / (1 - 2 * miss + ratio * (1 - 2 * clutter))
     return np.asarray(likelihood.clip(0.0, 1.0), np.float32)

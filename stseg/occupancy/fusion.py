@@ -31,7 +31,7 @@ from stseg.arrays import Bytes, Ints, Singles
 from stseg.geometry.summed_area import TOP, Levels
 
 
-class Rates(NamedTuple):
+class ErrorRates(NamedTuple):
     """How a view errs (METHODS 4).
 
     Attributes
@@ -40,16 +40,16 @@ class Rates(NamedTuple):
         m: how often a cell of a body is missed.
     clutter
         b: how often the ray of an empty cell meets foreground where nobody is near.
-    beside
+    near_clutter
         b of the empty cells within reach of a person.
     """
 
     miss: float
     clutter: float
-    beside: float
+    near_clutter: float
 
 
-def log_odds_terms(rates: Rates) -> Singles:
+def log_odds_terms(rates: ErrorRates) -> Singles:
     """log[ ((1 - m) L + m (1 - L)) / (b L + (1 - b)(1 - L)) ] of each level, nats.
 
     Returns
@@ -59,7 +59,7 @@ def log_odds_terms(rates: Rates) -> Singles:
     """
     likelihood = np.arange(TOP + 1) / TOP
     body = (1 - rates.miss) * likelihood + rates.miss * (1 - likelihood)
-    clutter = np.array([[rates.clutter], [rates.beside]])
+    clutter = np.array([[rates.clutter], [rates.near_clutter]])
     empty = clutter * likelihood + (1 - clutter) * (1 - likelihood)
     return np.log(body / empty).astype(np.float32)
 

@@ -16,7 +16,7 @@ from stseg.geometry import Rig
 from stseg.geometry.cell_means import CellMeans
 from stseg.geometry.sampling import Sampling, SamplingKind
 from stseg.occupancy.clutter import clutter, clutter_side, clutter_weights
-from stseg.occupancy.fusion import Accumulator, Rates, log_odds_terms, synergy_terms
+from stseg.occupancy.fusion import Accumulator, ErrorRates, log_odds_terms, synergy_terms
 
 Maps = Sequence[Singles | None]
 """The likelihood map float32 (v, u) of each view, 0..1, or None where it is blind."""
@@ -77,7 +77,7 @@ class Localiser:
         """
         return self._fuse(maps, weights, [synergy_terms(least)] * len(maps), 0.0)
 
-    def log_odds(self, maps: Maps, weights: Floats, rates: Sequence[Rates], occupied: float) -> Singles:
+    def log_odds(self, maps: Maps, weights: Floats, rates: Sequence[ErrorRates], occupied: float) -> Singles:
         """The calibrated log-odds u of all planes, nats (METHODS 4).
 
         Parameters

@@ -30,9 +30,9 @@ from stseg.config import LevelConfig
 from stseg.geometry import Grid
 from stseg.geometry.bodies import PROFILE
 from stseg.geometry.summed_area import TOP, Levels
-from stseg.occupancy.fusion import Rates
+from stseg.occupancy.fusion import ErrorRates
 
-MISS, CLUTTER, BESIDE = 0, 1, 2
+MISS, CLUTTER, NEAR_CLUTTER = 0, 1, 2
 _HALF = 0.5
 _REST = 1e-6
 
@@ -50,22 +50,22 @@ class RateCalibration:
     Attributes
     ----------
     errors, seen : float64 (view, 3)
-        Seconds that the view erred, and that it could have, of `Rates`' entries: seconds of one person for m and b',
-        of all the view's cells for b.
+        Seconds in which the view erred, and in which it could have, for each of `ErrorRates`: seconds of one person for
+        m and b', of all the view's cells for b.
     filled : float64 (2,)
         Seconds of one person's cells that the pillar fills, and of all cells within reach of the person.
     """
 
-    def __init__(self, first: Sequence[Rates], frame_rate: float, config: LevelConfig) -> None:
+    def __init__(self, first: Sequence[ErrorRates], frame_rate: float, config: LevelConfig) -> None:
         self.first = np.array(first, float).reshape(-1, 3)
         self.frame_rate, self.config = frame_rate, config
         self.errors, self.seen, self.filled = np.zeros_like(self.first), np.zeros_like(self.first), np.zeros(2)
 
     @property
-    def rates(self) -> list[Rates]:
+    def rates(self) -> list[ErrorRates]:
         """Of each view."""
         weight = self.config.weight
-        return [Rates(*row) for row in ((weight * self.first + self.errors) / (weight + self.seen)).tolist()]
+        return [ErrorRates(*row) for row in ((weight * self.first + self.errors) / (weight + self.seen)).tolist()]
 
     @property
     def filled_share(self) -> float:
@@ -100,7 +100,7 @@ def inside_bodies(grid: Grid, near: Ints, ground: Floats, height: Floats) -> Fla
     return inside
 
 
-def cells_of_one(grid: Grid, height: float, reach: float) -> tuple[float, float]:
+def cells_per_person(grid: Grid, height: float, reach: float) -> tuple[float, float]:
     """How many cells one person's pillar fills, and how many are within reach of the person."""
     radius = np.interp(grid.heights / height, PROFILE[:, 0], PROFILE[:, 1], right=0.0)
     filled = float((np.pi * radius**2).sum() / grid.cell**2)
@@ -170,6 +170,6 @@ def fill_counts(
             errors[CLUTTER] += _share(rates[CLUTTER], likelihood) * empty
             seen[CLUTTER] += empty
         elif trusted[who]:
-            kind, erring = (MISS, 1.0 - likelihood) if body[c] else (BESIDE, likelihood)
+            kind, erring = (MISS, 1.0 - likelihood) if body[c] else (NEAR_CLUTTER, likelihood)
             errors[kind] += _share(rates[kind], erring) * part[c]
             seen[kind] += part[c]

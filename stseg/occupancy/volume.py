@@ -8,21 +8,21 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import logit
 
-from stseg.arrays import Boxes, Bytes, Flags, Floats, Ints, Singles
+from stseg.arrays import Boxes, Bytes, Flags, Floats, Ints, Singles, ViewEvidence
 from stseg.config import GhostConfig, LevelConfig, OccupancyConfig
 from stseg.geometry import Rig
 from stseg.geometry.bodies import BodyTable
 from stseg.geometry.cell_means import CellMeans
-from stseg.geometry.near import near_person
+from stseg.geometry.nearest_person import nearest_person
 from stseg.geometry.sampling import Sampling
 from stseg.geometry.summed_area import TOP, UNSEEN, Levels
 from stseg.model.box_fit import TOLERANCE
 from stseg.model.box_likelihood import box_likelihood
-from stseg.model.people import Explanation, ViewEvidence
-from stseg.occupancy.box_planes import fill_match_of_planes, likelihood_of
+from stseg.model.people import Explanation
+from stseg.occupancy.box_planes import fill_match_of_planes, plane_likelihood
 from stseg.occupancy.clutter import clutter, clutter_side, clutter_weights
-from stseg.occupancy.fusion import Accumulator, Rates, log_odds_terms
-from stseg.occupancy.rate_calibration import RateCalibration, cells_of_one, fill_counts, inside_bodies
+from stseg.occupancy.fusion import Accumulator, ErrorRates, log_odds_terms
+from stseg.occupancy.rate_calibration import RateCalibration, cells_per_person, fill_counts, inside_bodies
 from stseg.occupancy.unexplained import PixelAssignment, fill_share, leave_unexplained
 
 _MAP_STEP = 8
@@ -76,7 +76,7 @@ class Occupancy:
         return RateCalibration(self._first, self.rig.frame_rate, self._level_config)
 
     def fuse(
-        self, seen: Sequence[ViewEvidence], explanation: Explanation, rates: Sequence[Rates] | None = None
+        self, seen: Sequence[ViewEvidence], explanation: Explanation, rates: Sequence[ErrorRates] | None = None
     ) -> Singles:
         """A frame's log-odds, float32 (plane, y, x), nats; nan where no view sees the cell.
 
@@ -91,12 +91,14 @@ class Occupancy:
             Error rates of each view; by default the first guess.
         """
         rates = rates or self.new_calibration().rates
-        near = near_person(self.rig.grid.ground, explanation.people.ground, self.config.reach)
+        near = nearest_person(self.rig.grid.ground, explanation.people.ground, self.config.reach)
         return self._total(self._tally(self._said(seen, explanation, near, rates), near), near)
 
-    def follow(self, calibration: RateCalibration, seen: Sequence[ViewEvidence], explanation: Explanation) -> Singles:
+    def fuse_and_learn(
+        self, calibration: RateCalibration, seen: Sequence[ViewEvidence], explanation: Explanation
+    ) -> Singles:
         """The same of a session's next frame, with which the session's error-rate calibration is then updated."""
-        near = near_person(self.rig.grid.ground, explanation.people.ground, self.config.reach)
+        near = nearest_person(self.rig.grid.ground, explanation.people.ground, self.config.reach)
         said = self._said(seen, explanation, near, calibration.rates)
         tally = self._tally(said, near)
         total = self._total(tally, near)
@@ -104,7 +106,7 @@ class Occupancy:
         return total
 
     def _said(
-        self, seen: Sequence[ViewEvidence], explanation: Explanation, near: Ints, all_rates: Sequence[Rates]
+        self, seen: Sequence[ViewEvidence], explanation: Explanation, near: Ints, all_rates: Sequence[ErrorRates]
     ) -> list[_Said | None]:
         weights = clutter_weights(np.array([self._clutter(i, view) for i, view in enumerate(seen)]))
         said: list[_Said | None] = []
@@ -143,7 +145,7 @@ class Occupancy:
     ) -> None:
         people, grid = explanation.people, self.rig.grid
         inside = inside_bodies(grid, near, people.ground, people.height)
-        body, reached = cells_of_one(grid, self.height_mean, self.config.reach)
+        body, reached = cells_per_person(grid, self.height_mean, self.config.reach)
         errors, seen = np.zeros((2, len(said), 3))
         for i, (view, rates) in enumerate(zip(said, calibration.rates, strict=True)):
             if view is not None:
@@ -189,7 +191,7 @@ class Occupancy:
         )  # fmt: skip
         return levels
 
-    def _levels_of_boxes(self, i: int, view: Boxes, explanation: Explanation, near: Ints, rates: Rates) -> Levels:
+    def _levels_of_boxes(self, i: int, view: Boxes, explanation: Explanation, near: Ints, rates: ErrorRates) -> Levels:
         """Likelihood per plane of each cell."""
         match = np.zeros(self.rig.grid.shape, np.float32)
         edges = np.concatenate([view.pixel[:, :2], view.pixel[:, :2] + view.pixel[:, 2:]], 1)
@@ -200,7 +202,7 @@ class Occupancy:
             self.bodies[i], self.heights, self.height_spread, self.height_mean, explanation.people.height,
             self.rig.grid.heights, edges, TOLERANCE, belief, explanation.box_assignment[i], near, width, height, match,
         )  # fmt: skip
-        levels = np.rint(likelihood_of(match, near, rates) * TOP).astype(np.int16)
+        levels = np.rint(plane_likelihood(match, near, rates) * TOP).astype(np.int16)
         levels[self.sampling.footprint[i, ..., 2] == 0] = UNSEEN
         return levels
 
@@ -214,12 +216,12 @@ class Occupancy:
         return clutter(view, side)
 
 
-def _first_rates(kind: str, ghosts: GhostConfig) -> Rates:
+def _first_rates(kind: str, ghosts: GhostConfig) -> ErrorRates:
     """Before anything is learned, people's surroundings count as any other place."""
     if kind == "boxes":
         clutter = (1 - ghosts.box_miss) / float(np.exp(ghosts.hit))
-        return Rates(ghosts.box_miss, clutter, clutter)
-    return Rates(ghosts.pixel_miss, ghosts.pixel_clutter, ghosts.pixel_clutter)
+        return ErrorRates(ghosts.box_miss, clutter, clutter)
+    return ErrorRates(ghosts.pixel_miss, ghosts.pixel_clutter, ghosts.pixel_clutter)
 
 
 def _faith(near: Ints, own: Flags, visible: Floats, shape: tuple[int, ...]) -> Singles:

@@ -6,7 +6,7 @@ import numpy as np
 
 from stseg.arrays import Floats, Ints, Labels
 from stseg.geometry import Grid
-from stseg.geometry.near import near_person
+from stseg.geometry.nearest_person import nearest_person
 
 
 def motion_field(
@@ -34,7 +34,7 @@ def motion_field(
         return motion
     start = ground_now[now]
     moved = np.rint((ground_next[then] - start) / grid.cell).astype(np.int64)
-    near = near_person(grid.ground, start, reach)
+    near = nearest_person(grid.ground, start, reach)
     motion[near >= 0] = moved[near[near >= 0]][:, ::-1]
     return motion
 

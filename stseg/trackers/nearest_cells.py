@@ -6,7 +6,7 @@ import numpy as np
 
 from stseg.arrays import Floats, Ints, Labels
 from stseg.geometry import Grid
-from stseg.geometry.near import near_person
+from stseg.geometry.nearest_person import nearest_person
 from stseg.trackers.protocol import FusedFrame
 
 
@@ -27,7 +27,7 @@ def reached_cells(scene: FusedFrame, ground: Floats, ids: Ints, grid: Grid, reac
     int32 (plane, y, x), float64 (n,)
         Track ids of the cells, 0 for background, and each person's ground area, square metres.
     """
-    near = near_person(grid.ground, ground, reach)
+    near = nearest_person(grid.ground, ground, reach)
     occupied = (scene.log_odds > 0) & (near >= 0)
     label = np.where(occupied, np.append(ids, 0)[near], 0).astype(np.int32)
     cells = np.bincount(near[occupied.any(0)], minlength=len(ids))[: len(ids)]

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
-from stseg.arrays import Labels, Observation, Rows, Singles
+from stseg.arrays import Labels, Observation, Rows, Singles, ViewEvidence
 from stseg.config import Config
 from stseg.geometry import Rig
-from stseg.model.people import People, ViewEvidence
+from stseg.model.people import People
 from stseg.model.predicted_tracks import PredictedTracks
 
 STAYING, FORGETTING = 1.0, 4.0

@@ -27,7 +27,7 @@ from experiments.plain_methods import threshold
 from stseg.arrays import Flags
 from stseg.config import Config
 from stseg.evaluation.scores import Scores
-from stseg.geometry.near import near_person
+from stseg.geometry.nearest_person import nearest_person
 from stseg.graphcut.energy import Energy
 from stseg.io.config_file import read_config
 from stseg.io.recording.recording import Recording
@@ -49,7 +49,7 @@ class TwoLabels(CutTracker):
         del window, energy
         label = np.zeros(occupied.shape, np.int32)
         for cells, own, linked in zip(occupied, label, held, strict=True):
-            near = near_person(self.rig.grid.ground, linked.scene.people.ground, self.config.occupancy.reach)
+            near = nearest_person(self.rig.grid.ground, linked.scene.people.ground, self.config.occupancy.reach)
             own[cells] = np.broadcast_to(np.append(linked.chains, UNASSIGNED)[near], cells.shape)[cells]
         return WindowLabels(label, 0)
 

@@ -31,7 +31,7 @@ from stseg.config import Config
 from stseg.detection.detector import Detector
 from stseg.engine.backgrounds import make_foregrounds
 from stseg.geometry import Grid
-from stseg.geometry.near import near_person
+from stseg.geometry.nearest_person import nearest_person
 from stseg.io.recording.frames import open_frames
 from stseg.io.recording.rigs import read_rig
 from stseg.io.recording.stream_index import index_streams
@@ -74,7 +74,7 @@ def occupied_cells(grid: Grid, truth: Rows) -> Flags:
     """Cells that anybody's pillar covers, bool (plane, y, x)."""
     covered = np.zeros(grid.shape, bool)
     for ground, height in zip(np.column_stack([truth["x"], truth["y"]]), truth["height"], strict=True):
-        near = near_person(grid.ground, ground[None], 1.0)
+        near = nearest_person(grid.ground, ground[None], 1.0)
         covered |= inside_bodies(grid, near, ground[None], np.array([height]))
     return covered
 
@@ -90,9 +90,12 @@ def measure(rig: Path, frames: slice) -> dict[str, Tally]:
     rates = learned.new_calibration()
     tallies = {form: Tally() for form in FORMS}
     for frame, seen, explanation in _explained(rig, kinds, frames, config):
-        near = near_person(recording.rig.grid.ground, explanation.people.ground, config.occupancy.reach) >= 0
+        near = nearest_person(recording.rig.grid.ground, explanation.people.ground, config.occupancy.reach) >= 0
         share = float(logit(rates.filled_share))
-        forms = {"constants": constant.fuse(seen, explanation), "learned": learned.follow(rates, seen, explanation)}
+        forms = {
+            "constants": constant.fuse(seen, explanation),
+            "learned": learned.fuse_and_learn(rates, seen, explanation),
+        }
         forms["without"] = forms["learned"] + np.where(near, share, 0.0)
         doubt = np.min([np.abs(u) for u in forms.values()], axis=0) < DOUBT
         doubt = (doubt | near) & (learned.views > 0)

@@ -7,7 +7,7 @@ import numpy as np
 from stseg.arrays import Floats, Ints
 
 
-def near_person(ground: Floats, people_ground: Floats, reach: float) -> Ints:
+def nearest_person(ground: Floats, people_ground: Floats, reach: float) -> Ints:
     """The person within reach of each place, the nearest of several, -1 for nobody.
 
     Parameters

@@ -8,7 +8,7 @@ from stseg.arrays import Floats
 from stseg.errors import CalibrationError
 
 
-def vertical_of(ground: Floats, size: tuple[int, int]) -> Floats:
+def vertical_of_square_pixels(ground: Floats, size: tuple[int, int]) -> Floats:
     """What one metre of height adds to the third column of a homography, if pixels are square and the axis central.
 
     The two ground axes are images of unit vectors at a right angle, which tells the focal length (Zhang, A flexible
