@@ -69,15 +69,15 @@ def _plain_move(energy: LabelEnergy, own: list[dict[int, int]], labels: Ints, al
     return np.array([alpha if graph.get_segment(p) else labels[p] for p in range(energy.cells)])
 
 
-def share(frame: int, ground: Floats, height: float, places: PredictedPlaces, pillar: BodyShape) -> Floats:
+def share(frame: int, ground: Floats, height: float, predicted: PredictedPlaces, body: BodyShape) -> Floats:
     """Of one cell, as the formula reads; nothing is out of reach."""
-    body = np.eye(2) * pillar.reach**2 / 4
+    disc = np.eye(2) * body.reach**2 / 4
     weights = []
-    for k in range(len(places.track)):
-        off, spread = ground - places.ground[frame, k], places.covariance[frame, k] + body
+    for k in range(len(predicted.track)):
+        off, spread = ground - predicted.ground[frame, k], predicted.covariance[frame, k] + disc
         density = np.exp(-0.5 * off @ np.linalg.solve(spread, off)) / np.sqrt(np.linalg.det(spread))
-        above = max(height - places.height[frame, k], 0.0)
-        weight = density * np.sqrt(np.linalg.det(body)) * np.exp(-0.5 * (above / pillar.height_spread) ** 2)
-        weights.append(weight if places.expected[frame, k] else 0.0)
-    weights.append(pillar.stranger)
+        above = max(height - predicted.height[frame, k], 0.0)
+        weight = density * np.sqrt(np.linalg.det(disc)) * np.exp(-0.5 * (above / body.height_spread) ** 2)
+        weights.append(weight if predicted.expected[frame, k] else 0.0)
+    weights.append(body.prior_share)
     return np.array(weights) / sum(weights)

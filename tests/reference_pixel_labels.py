@@ -33,8 +33,8 @@ def nearest_shares(drawn: Sequence[Flags], distance: Floats) -> Floats:
 def dense(shown: LabelLikelihood) -> Floats:
     """p_0, p_1, ... in the window, float64 (n + 1, v, u)."""
     edges, first = shown.people.edges, shown.people.first
-    shares = np.zeros((len(edges) + 1, *shown.nobody.shape))
-    shares[0] = shown.nobody
+    shares = np.zeros((len(edges) + 1, *shown.background.shape))
+    shares[0] = shown.background
     for j, (left, top, right, bottom) in enumerate(edges.tolist()):
         own = shown.people.share[first[j] : first[j + 1]].reshape(bottom - top, right - left)
         shares[j + 1, top - shown.top : bottom - shown.top, left - shown.left : right - shown.left] = own

@@ -1,4 +1,4 @@
-"""The cut: its energy by definition, its minimum by trying all and by other solvers, however it is found."""
+"""The minimum cut: its energy by definition, its minimum by enumeration and by other solvers."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from stseg.graphcut.energy import QUANTUM, Energy
 from stseg.graphcut.reduction import OCCUPIED, OPEN, reduce
 from stseg.graphcut.sparse import MOST, sparse_cut
 from stseg.segmentation.energy import build_energy, neighbourhood
-from stseg.segmentation.motion import follow
+from stseg.segmentation.motion import successor_cells
 
 ROOT = Path(__file__).parents[1]
 DATA = Path(os.environ.get("STSEG_DATA", ROOT / "../shared/data"))
@@ -54,7 +54,7 @@ def window(
     offsets = neighbourhood(neighbours)
     motion = rng.integers(-drift, drift + 1, (shape[0] - 1, *shape[2:], 2))
     values = rng.integers(-unary, unary + 1, shape, np.int32)
-    return Energy(values, offsets, rng.integers(0, capacity + 1, len(offsets), np.int32), follow(motion))
+    return Energy(values, offsets, rng.integers(0, capacity + 1, len(offsets), np.int32), successor_cells(motion))
 
 
 def smooth_window(seed: int, shape: tuple[int, ...], neighbours: int = 8, smoothness: float = 0.8) -> Energy:
@@ -88,7 +88,7 @@ def test_energy_by_definition(seed: int, shape: tuple[int, ...], neighbours: int
 
 
 def test_energy_of_log_odds() -> None:
-    """Capacities by METHODS 4 in quanta; what no view sees costs and earns nothing."""
+    """Capacities by the formula, in quanta; unseen cells have unary term 0."""
     log_odds = np.array([1.5, np.nan, -1e9, 1e9], np.float32).reshape(1, 1, 1, 4)
     config = SegmentationConfig(smoothness=0.5, spread=0.2, step=0.3)
     grid = Grid((0, 0.4), (0, 0.1), cell=0.1, top=0.6, planes=3)
@@ -113,20 +113,20 @@ def test_neighbourhoods_are_half_of_all_neighbours() -> None:
 
 @settings(deadline=None, max_examples=60)
 @given(st.integers(0, 999), st.integers(0, 3))
-def test_each_cell_leads_to_one_and_comes_from_one(seed: int, drift: int) -> None:
+def test_successors_are_injective(seed: int, drift: int) -> None:
     rng = np.random.default_rng(seed)
     motion = rng.integers(-drift, drift + 1, (2, 4, 5, 2)) * (rng.random((2, 4, 5, 1)) < 0.4)
-    ahead = follow(motion)
+    ahead = successor_cells(motion)
     np.testing.assert_array_equal(ahead, reference.lead_ahead(motion))
     for frame in ahead:
         reached = frame[frame >= 0]
         assert len(np.unique(reached)) == len(reached)
 
 
-def test_a_walker_takes_the_place_of_the_floor() -> None:
+def test_a_moving_cell_displaces_the_floor() -> None:
     motion = np.zeros((1, 1, 4, 2), np.int64)
     motion[0, 0, 0, 1] = 2
-    assert follow(motion)[0, 0].tolist() == [2, 1, -1, 3]
+    assert successor_cells(motion)[0, 0].tolist() == [2, 1, -1, 3]
 
 
 # The minimum
@@ -192,7 +192,7 @@ def test_the_cut_is_that_of_other_solvers(shape: tuple[int, ...], kind: str, nei
 
 @settings(deadline=None, max_examples=40)
 @given(st.integers(0, 999), st.integers(1, 60), st.sampled_from((8, 80)))
-def test_what_is_decided_beforehand_is_right(seed: int, strength: int, neighbours: int) -> None:
+def test_the_reduction_is_exact(seed: int, strength: int, neighbours: int) -> None:
     energy = window(seed, (3, 2, 4, 5), unary=strength, capacity=4, neighbours=neighbours)
     reduced = reduce(energy)
     np.testing.assert_array_equal(reduced.left, np.flatnonzero(reduced.state == OPEN))
@@ -202,7 +202,7 @@ def test_what_is_decided_beforehand_is_right(seed: int, strength: int, neighbour
     np.testing.assert_array_equal(state[state != OPEN] == OCCUPIED, expected[state != OPEN])
 
 
-def test_strong_evidence_leaves_nothing_to_cut() -> None:
+def test_strong_evidence_is_decided_by_the_reduction() -> None:
     energy = window(1, (3, 2, 5, 6), unary=1, capacity=1)
     strong = replace(energy, unary=np.where(energy.unary > 0, 100, -100).astype(np.int32))
     cut = minimum_cut(strong)
@@ -234,7 +234,7 @@ def test_no_other_labelling_has_less_energy(seed: int) -> None:
 
 
 def test_smoothness_bridges_a_gap_along_the_motion() -> None:
-    """A walker of two cells a frame, missed in one frame: the edges in time follow, straight ones would not."""
+    """A body moving two cells a frame is missed in one: edges along the motion bridge it, straight ones do not."""
     log_odds = np.full((5, 1, 1, 12), -2.0, np.float32)
     for t in range(5):
         log_odds[t, 0, 0, 2 * t : 2 * t + 2] = 2.0 if t != 2 else -0.2

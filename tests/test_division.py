@@ -1,4 +1,4 @@
-"""Whose each cell is: parts of windows, shares of tracks, touching people cut apart, where they are expected."""
+"""Track labels of cells: subgraphs, shares of tracks, division of touching people, predicted places."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from stseg.model.blobs import UNASSIGNED
 from stseg.model.predicted_places import PredictedPlaces
 from stseg.segmentation.energy import build_energy, neighbourhood
 from stseg.segmentation.labelling import WindowDetections, WindowLabels, label_cells
-from stseg.segmentation.motion import follow
-from stseg.segmentation.unary import BodyShape, label_energy, shares
+from stseg.segmentation.motion import successor_cells
+from stseg.segmentation.unary import BodyShape, label_energy, track_shares
 from stseg.tracking.prediction import DetectionHistory, earlier_detections, predicted_places, together
 from stseg.tracking.tracklets import Tracklet
 
 GRID = Grid((0.0, 2.4), (0.0, 1.4), cell=0.1, top=1.8, planes=4)
-PILLAR = BodyShape(reach=0.4, height_spread=0.12, stranger=0.02)
+BODY = BodyShape(reach=0.4, height_spread=0.12, prior_share=0.02)
 CONFIG = IdentityConfig()
 
 
@@ -41,37 +41,37 @@ def random_window(seed: int, shape: tuple[int, ...]) -> Energy:
     motion = rng.integers(-2, 3, (frames - 1, rows, columns, 2))
     offsets = neighbourhood(8 if seed % 2 else 80)
     capacity = rng.integers(1, 9, len(offsets)).astype(np.int32)
-    return Energy(rng.integers(-20, 21, shape).astype(np.int32), offsets, capacity, follow(motion))
+    return Energy(rng.integers(-20, 21, shape).astype(np.int32), offsets, capacity, successor_cells(motion))
 
 
 @settings(deadline=None, max_examples=25)
 @given(st.integers(0, 999), st.sampled_from([(3, 2, 3, 4), (2, 3, 4, 3), (1, 2, 3, 3), (4, 1, 1, 5)]))
-def test_a_part_has_the_edges_of_its_window(seed: int, shape: tuple[int, ...]) -> None:
+def test_a_subgraph_has_the_edges_of_its_window(seed: int, shape: tuple[int, ...]) -> None:
     energy = random_window(seed, shape)
     inside = np.random.default_rng(seed).random(shape) < 0.6
-    part = subset(energy, inside)
-    assert part.cell.tolist() == np.flatnonzero(inside).tolist()
+    subgraph = subset(energy, inside)
+    assert subgraph.cell.tolist() == np.flatnonzero(inside).tolist()
     within = inside.ravel()
     every = list(zip(*(side.tolist() for side in energy.edges()), strict=True))
-    told = sorted(zip(part.cell[part.start], part.cell[part.end], part.weight, strict=True))
-    assert told == sorted((p, q, w) for p, q, w in every if within[p] and within[q])
+    listed = sorted(zip(subgraph.cell[subgraph.start], subgraph.cell[subgraph.end], subgraph.weight, strict=True))
+    assert listed == sorted((p, q, w) for p, q, w in every if within[p] and within[q])
     border = np.zeros(within.size, np.int64)
     for p, q, w in every:
         border[p] += w * (within[p] and not within[q])
         border[q] += w * (within[q] and not within[p])
-    assert part.border.tolist() == border[within].tolist()
+    assert subgraph.border.tolist() == border[within].tolist()
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_whole_pieces_of_a_part(seed: int) -> None:
+def test_whole_components_of_a_subgraph(seed: int) -> None:
     energy = random_window(seed, (2, 2, 4, 5))
-    part = subset(energy, np.random.default_rng(seed).random((2, 2, 4, 5)) < 0.4)
-    piece = part.components()
-    assert (piece[part.start] == piece[part.end]).all()
-    kept = piece % 2 == 0
-    only = part.only(kept)
+    subgraph = subset(energy, np.random.default_rng(seed).random((2, 2, 4, 5)) < 0.4)
+    component = subgraph.components()
+    assert (component[subgraph.start] == component[subgraph.end]).all()
+    kept = component % 2 == 0
+    only = subgraph.only(kept)
     inside = np.zeros(energy.unary.size, bool)
-    inside[part.cell[kept]] = True
+    inside[subgraph.cell[kept]] = True
     same = subset(energy, inside.reshape(energy.unary.shape))
     for one, other in zip(vars(only).values(), vars(same).values(), strict=True):
         np.testing.assert_array_equal(one, other)
@@ -98,8 +98,8 @@ def test_shares_by_definition(x: float, y: float, height: float, spread: float, 
     places = places_at((0.8, 0.7), (1.1, 0.6), spread=spread)
     places.expected[0, 1] = not gone
     cell = np.array([x, y])
-    share = shares(np.zeros(1, np.int64), cell[None], np.array([height]), places, PILLAR)[0]
-    expected = reference.share(0, cell, height, places, PILLAR)
+    share = track_shares(np.zeros(1, np.int64), cell[None], np.array([height]), places, BODY)[0]
+    expected = reference.share(0, cell, height, places, BODY)
     np.testing.assert_allclose(share, expected, atol=2e-3)  # less than that is out of reach
     assert share.sum() == pytest.approx(1.0)
     assert (share[1] == 0) == gone or share[1] < 2e-3
@@ -107,17 +107,17 @@ def test_shares_by_definition(x: float, y: float, height: float, spread: float, 
 
 def share_at(places: PredictedPlaces, *cells: tuple[float, float, float], appearance: Floats | None = None) -> Floats:
     x, y, z = np.array(cells).T
-    return shares(np.zeros(len(cells), np.int64), np.column_stack([x, y]), z, places, PILLAR, appearance)
+    return track_shares(np.zeros(len(cells), np.int64), np.column_stack([x, y]), z, places, BODY, appearance)
 
 
-def test_only_who_is_within_reach_is_admissible() -> None:
+def test_tracks_beyond_the_gate_are_inadmissible() -> None:
     share = share_at(places_at((0.5, 0.7), (1.9, 0.7)), (0.5, 0.7, 1.0), (1.9, 0.8, 1.0), (1.2, 0.0, 1.0))
     assert (share > 0).tolist() == [[True, False, True], [False, True, True], [False, False, True]]
-    assert share[2, -1] == 1.0  # whose could it be
+    assert share[2, -1] == 1.0
     assert share[0, 0] > 0.95
 
 
-def test_half_way_is_half_each_and_certainty_tells() -> None:
+def test_shares_follow_distance_and_covariance() -> None:
     places = places_at((0.8, 0.7), (1.2, 0.7))
     assert np.ptp(share_at(places, (1.0, 0.7, 1.0))[0, :2]) == pytest.approx(0.0)
     places.covariance[0, 1] *= 20
@@ -125,7 +125,7 @@ def test_half_way_is_half_each_and_certainty_tells() -> None:
     assert certain > doubtful > 0
 
 
-def test_cells_above_a_head_are_of_who_is_taller() -> None:
+def test_cells_above_a_head_belong_to_the_taller() -> None:
     places = places_at((0.8, 0.7), (1.2, 0.7))
     places.height[0] = 1.4, 1.9
     below, above = share_at(places, (0.95, 0.7, 1.2), (0.95, 0.7, 1.8))
@@ -133,7 +133,7 @@ def test_cells_above_a_head_are_of_who_is_taller() -> None:
     assert above[0] < above[1]
 
 
-def test_appearance_tells_apart_who_stand_in_one_place() -> None:
+def test_appearance_separates_tracks_in_one_place() -> None:
     places = places_at((1.0, 0.7), (1.0, 0.7))
     looks = np.array([[2.0, -2.0], [-2.0, 2.0]])
     share = share_at(places, (1.0, 0.7, 1.0), (1.0, 0.7, 1.0), appearance=looks)
@@ -141,8 +141,8 @@ def test_appearance_tells_apart_who_stand_in_one_place() -> None:
 
 
 def test_costs_of_labels_in_quanta() -> None:
-    part = CellSubset(np.array([3, 5]), np.array([0]), np.array([1]), np.array([7]), np.array([2, 0]))
-    energy = label_energy(np.array([1000, -50]), np.array([[0.5, 0.0, 0.5], [0.0, 1.0, 0.0]]), part)
+    subgraph = CellSubset(np.array([3, 5]), np.array([0]), np.array([1]), np.array([7]), np.array([2, 0]))
+    energy = label_energy(np.array([1000, -50]), np.array([[0.5, 0.0, 0.5], [0.0, 1.0, 0.0]]), subgraph)
     half = round(np.log(2) / QUANTUM)
     assert (energy.first.tolist(), energy.label.tolist()) == ([0, 2, 3], [1, 3, 2])
     assert energy.cost.tolist() == [half - 998, half - 998, 50]
@@ -152,14 +152,14 @@ def test_costs_of_labels_in_quanta() -> None:
 
 
 def bodies(tracks: Floats, radius: float = 0.24) -> Labels:
-    """Whose each cell is in truth: the nearest within a radius; tracks float64 (time, k, 2), metres."""
+    """True label of each cell: the nearest track within a radius; tracks float64 (time, k, 2), metres."""
     away = np.hypot(*np.moveaxis(GRID.ground[None, :, :, None] - tracks[:, None, None], -1, 0))
     whose = np.where(away.min(3) <= radius, 1 + away.argmin(3), 0)
     return np.repeat(whose[:, None], GRID.planes, 1).astype(np.int32)
 
 
 def window_of(truth: Labels, seed: int = 1) -> Energy:
-    """A window in which what is occupied in truth mostly looks so."""
+    """A window with noisy log-odds of the truth."""
     noise = np.random.default_rng(seed).normal(0, 0.7, truth.shape)
     log_odds = (np.where(truth > 0, 2.5, -2.5) + noise).astype(np.float32)
     still = np.zeros((len(truth) - 1, *GRID.shape[1:], 2), np.int64)
@@ -167,28 +167,28 @@ def window_of(truth: Labels, seed: int = 1) -> Energy:
 
 
 def divided(energy: Energy, places: PredictedPlaces, seen: Flags | None = None) -> tuple[Flags, WindowLabels]:
-    """Cut, and divided; who is not seen in a frame is still expected there."""
+    """Cut and labels; a track not seen in a frame is still predicted there."""
     seen = places.expected if seen is None else seen
     found = WindowDetections(
         [ground[who] for ground, who in zip(places.ground, seen, strict=True)], [places.track[who] for who in seen]
     )
     occupied = minimum_cut(energy).occupied
-    return occupied, label_cells(energy, occupied, found, places, PILLAR, GRID)
+    return occupied, label_cells(energy, occupied, found, places, BODY, GRID)
 
 
 def meeting(frames: int = 5) -> Floats:
-    """Two who come as near as 0.36 m and part again, float64 (time, 2, 2)."""
+    """Two tracks that approach to 0.36 m and part again, float64 (time, 2, 2)."""
     apart = 0.36 + 0.12 * np.abs(np.arange(frames) - frames // 2)
     return np.stack([np.column_stack([1.2 + side * apart / 2, np.full(frames, 0.7)]) for side in (-1, 1)], 1)
 
 
 def walking(tracks: Floats) -> PredictedPlaces:
-    """Places of tracks that are all seen."""
+    """Places of tracks that are detected in all frames."""
     still = places_at(*tracks[0], frames=len(tracks))
     return replace(still, ground=tracks)
 
 
-def test_touching_people_are_cut_apart_where_the_truth_says() -> None:
+def test_touching_people_are_divided_as_in_the_truth() -> None:
     tracks = meeting()
     truth = bodies(tracks)
     energy = window_of(truth)
@@ -201,7 +201,7 @@ def test_touching_people_are_cut_apart_where_the_truth_says() -> None:
     assert not division.label[~occupied].any()
 
 
-def test_who_was_missed_for_some_frames_keeps_their_cells() -> None:
+def test_a_track_missed_in_some_frames_keeps_its_cells() -> None:
     tracks = meeting()
     truth = bodies(tracks)
     seen = np.ones(tracks.shape[:2], bool)
@@ -211,7 +211,7 @@ def test_who_was_missed_for_some_frames_keeps_their_cells() -> None:
     assert (division.label[2][missed] == 2).mean() > 0.9
 
 
-def test_nobody_touches_nothing_is_moved() -> None:
+def test_separate_tracks_need_no_expansion() -> None:
     tracks = meeting() + np.array([[-0.6, 0.0], [0.6, 0.0]])
     truth = bodies(tracks)
     occupied, division = divided(window_of(truth), walking(tracks))
@@ -221,7 +221,7 @@ def test_nobody_touches_nothing_is_moved() -> None:
     np.testing.assert_array_equal(division.label[both], truth[both])
 
 
-def test_what_nobody_claims_is_a_strangers() -> None:
+def test_unclaimed_cells_are_unassigned() -> None:
     three = np.concatenate([meeting(), np.tile([0.3, 0.3], (5, 1, 1))], 1)
     truth = bodies(three)
     _, division = divided(window_of(truth), walking(meeting()))
@@ -231,7 +231,7 @@ def test_what_nobody_claims_is_a_strangers() -> None:
     assert set(np.unique(alone.label[lonely])) == {UNASSIGNED}
 
 
-def test_somebody_seen_elsewhere_has_no_cells_here() -> None:
+def test_a_track_detected_elsewhere_has_no_cells_here() -> None:
     """Track 2 is expected, and found, off the grid in one frame: what stands here then is of track 1."""
     tracks = meeting()
     energy = window_of(bodies(tracks))
@@ -250,7 +250,7 @@ def test_an_empty_window() -> None:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_the_pieces_are_all_that_need_be_moved(seed: int) -> None:
+def test_only_the_components_need_expansion(seed: int) -> None:
     """The same labels as an expansion over every cell of the window, from the same start."""
     tracks = meeting(3)
     places = walking(tracks)
@@ -258,7 +258,7 @@ def test_the_pieces_are_all_that_need_be_moved(seed: int) -> None:
     occupied, division = divided(energy, places)
     whole = subset(energy, np.ones_like(occupied))
     frame, plane, y, x = np.unravel_index(whole.cell, occupied.shape)
-    share = shares(frame, GRID.ground[y, x], GRID.heights[plane], places, PILLAR)
+    share = track_shares(frame, GRID.ground[y, x], GRID.heights[plane], places, BODY)
     problem: LabelEnergy = label_energy(energy.unary.ravel(), share, whole)
     start: Ints = np.where(occupied.ravel(), problem.cheapest_labels(), 0)
     everywhere = np.array([0, 1, 2, UNASSIGNED])[expand(problem, start)]
@@ -279,7 +279,7 @@ def sightings(*seen: tuple[int, int, float, float]) -> DetectionHistory:
     return DetectionHistory(frame, chain, rows[:, 2:], np.tile(np.eye(2) * 0.01, (n, 1, 1)), np.full(n, 1.8))
 
 
-def test_places_between_and_after_sightings() -> None:
+def test_places_between_and_after_detections() -> None:
     seen = sightings((14, 7, 1.4, 0.0), (10, 7, 1.0, 0.0), (12, 3, 0.0, 5.0))
     places = predicted_places(seen, 8, 20, 8.0, CONFIG)
     assert places.track.tolist() == [3, 7]
@@ -310,7 +310,7 @@ def test_places_are_carried_from_the_window_before() -> None:
     assert (alone.height == 1.7).all()
 
 
-def test_nobody_is_expected() -> None:
+def test_no_track_is_predicted() -> None:
     places = predicted_places(together([earlier_detections([], 4, 1.7, CONFIG), sightings()]), 4, 9, 8.0, CONFIG)
     assert places.ground.shape == (5, 0, 2)
     assert places.expected.shape == (5, 0)

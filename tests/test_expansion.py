@@ -1,4 +1,4 @@
-"""Expansion: each move is the best there is, the end is that of other solvers, pruned or not."""
+"""Expansion moves: each is optimal, the result is that of other solvers, pruned or not."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def lattice(shape: tuple[int, ...]) -> tuple[Ints, Ints]:
     return start, end
 
 
-def chance(seed: int, shape: tuple[int, ...], labels: int, weight: int, admissible: float = 0.7) -> LabelEnergy:
+def random_energy(seed: int, shape: tuple[int, ...], labels: int, weight: int, admissible: float = 0.7) -> LabelEnergy:
     """A random energy in small whole numbers, so that minima tie; weights of its own for each edge."""
     rng = np.random.default_rng(seed)
     start, end = lattice(shape)
@@ -45,13 +45,13 @@ TINY = [(2, 4), (2, 2, 2), (8,), (1, 7)]
 @settings(deadline=None, max_examples=40)
 @given(st.integers(0, 999), st.sampled_from(TINY))
 def test_energy_by_definition(seed: int, shape: tuple[int, ...]) -> None:
-    energy = chance(seed, shape, 3, 5)
+    energy = random_energy(seed, shape, 3, 5)
     for labels in (some_start(energy, seed), energy.cheapest_labels()):
         assert energy.of(labels) == reference.energy_of(energy, labels)
     assert energy.of(np.zeros(energy.cells, np.int64)) == 0
 
 
-def test_a_label_that_a_cell_may_not_have_is_refused() -> None:
+def test_an_inadmissible_label_is_refused() -> None:
     energy = LabelEnergy(*(np.array(a) for a in ([0, 1, 1], [2], [-5], [0], [1], [1])))
     assert energy.of(np.array([2, 0])) == -4
     for labels in ([1, 0], [2, 2]):
@@ -61,8 +61,8 @@ def test_a_label_that_a_cell_may_not_have_is_refused() -> None:
 
 @settings(deadline=None, max_examples=40)
 @given(st.integers(0, 999), st.sampled_from(TINY), st.integers(0, 6))
-def test_each_move_is_the_best_and_smallest_of_all(seed: int, shape: tuple[int, ...], weight: int) -> None:
-    energy = chance(seed, shape, 3, weight)
+def test_each_move_is_optimal_and_smallest(seed: int, shape: tuple[int, ...], weight: int) -> None:
+    energy = random_energy(seed, shape, 3, weight)
     moves = Moves(energy, some_start(energy, seed))
     for alpha in (1, 2, 0, 3, 1, 2, 3, 0):
         if alpha not in moves.alphabet:
@@ -78,8 +78,8 @@ def test_each_move_is_the_best_and_smallest_of_all(seed: int, shape: tuple[int, 
 
 @settings(deadline=None, max_examples=30)
 @given(st.integers(0, 999), st.sampled_from(TINY))
-def test_no_expansion_betters_the_end(seed: int, shape: tuple[int, ...]) -> None:
-    energy = chance(seed, shape, 3, 4)
+def test_no_expansion_improves_the_result(seed: int, shape: tuple[int, ...]) -> None:
+    energy = random_energy(seed, shape, 3, 4)
     start = some_start(energy, seed)
     labels = expand(energy, start)
     least = reference.energy_of(energy, labels)
@@ -90,10 +90,10 @@ def test_no_expansion_betters_the_end(seed: int, shape: tuple[int, ...]) -> None
 
 @pytest.mark.parametrize("shape", [(4, 5, 3), (3, 2, 4, 3)])
 @pytest.mark.parametrize("weight", [0, 2, 6])
-def test_the_end_is_that_of_cuts_of_all_cells(shape: tuple[int, ...], weight: int) -> None:
+def test_pruning_changes_nothing(shape: tuple[int, ...], weight: int) -> None:
     """Cells dropped from a move change nothing: not the energy, not a label."""
     for seed in range(6):
-        energy = chance(seed, shape, 4, weight)
+        energy = random_energy(seed, shape, 4, weight)
         for start in (energy.cheapest_labels(), some_start(energy, seed), np.zeros(energy.cells, np.int64)):
             labels = expand(energy, start)
             np.testing.assert_array_equal(labels, reference.plain_expand(energy, start))
@@ -101,10 +101,10 @@ def test_the_end_is_that_of_cuts_of_all_cells(shape: tuple[int, ...], weight: in
 
 
 @pytest.mark.parametrize("admissible", [0.6, 1.0])
-def test_with_one_weight_the_end_is_that_of_aexpansion_grid(admissible: float) -> None:
+def test_with_one_weight_the_result_is_that_of_aexpansion_grid(admissible: float) -> None:
     shape, labels = (3, 2, 4, 5), 4
     for seed in range(25):
-        drawn = chance(seed, shape, labels, 1, admissible)
+        drawn = random_energy(seed, shape, labels, 1, admissible)
         weight = seed % 7
         energy = LabelEnergy(
             drawn.first, drawn.label, drawn.cost, drawn.start, drawn.end, np.full(len(drawn.start), weight)
@@ -123,15 +123,15 @@ def test_with_one_weight_the_end_is_that_of_aexpansion_grid(admissible: float) -
 
 def test_with_one_label_it_is_the_two_label_cut() -> None:
     for seed in range(10):
-        energy = chance(seed, (4, 6), 1, 3, admissible=1.0)
+        energy = random_energy(seed, (4, 6), 1, 3, admissible=1.0)
         cut = sparse_cut(-energy.cost, energy.start, energy.end, energy.weight, energy.weight)
         np.testing.assert_array_equal(expand(energy, np.zeros(energy.cells, np.int64)), cut)
 
 
-def test_what_the_cut_of_the_best_costs_leaves_out_no_move_takes() -> None:
-    """The cells that a window's two-label cut calls background stay so: they need not be moved."""
+def test_cells_outside_the_binary_cut_never_change() -> None:
+    """Cells with label 0 in the binary cut of the best costs stay background."""
     for seed in range(10):
-        energy = chance(seed, (5, 7), 3, 3, admissible=0.8)
+        energy = random_energy(seed, (5, 7), 3, 3, admissible=0.8)
         best = np.array([max(0, *(-cost for cost in own.values())) for own in reference.costs(energy)])
         only = np.array([min([own[k] for k in own if k] or [9]) for own in reference.costs(energy)])
         unary = np.where(best > 0, best, -only)

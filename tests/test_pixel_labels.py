@@ -19,8 +19,8 @@ from stseg.geometry.bodies import SILHOUETTE, BodyTable
 from stseg.graphcut.energy import QUANTUM
 from stseg.labels.adjacency import edge_costs
 from stseg.labels.body_masks import Patches, pillar_patches
-from stseg.labels.energy import PixelEnergy, most_likely, pixel_energy
-from stseg.labels.label_likelihood import LabelLikelihood, nearest
+from stseg.labels.energy import PixelEnergy, most_likely_labels, pixel_energy
+from stseg.labels.label_likelihood import LabelLikelihood, visible_shares
 from stseg.labels.placed_people import PlacedPeople
 from stseg.labels.views import ViewLabels, view_labels
 from stseg.model.outlines import outlines
@@ -61,7 +61,7 @@ def test_one_certain_pillar_is_the_outline() -> None:
         assert outline.sum() == outline[top:bottom, left:right].sum()
 
 
-def test_shares_fall_off_with_what_is_not_known_and_stay_in_the_middle() -> None:
+def test_coverage_falls_off_with_uncertainty() -> None:
     camera, everybody = corner_cameras()[0], people((0.3, -0.4))
     table = BodyTable.of(camera, room().grid)
     sharp, wide = (pillar_patches(table, standing(everybody, spread), FEW).share for spread in (0.0, 0.2))
@@ -72,11 +72,11 @@ def test_shares_fall_off_with_what_is_not_known_and_stay_in_the_middle() -> None
     assert wide.sum() == pytest.approx(sharp.sum(), rel=0.25)
 
 
-def test_nobody_in_sight_has_no_patch() -> None:
+def test_a_person_out_of_view_has_no_patch() -> None:
     ahead = looking("ahead", (0.0, 0.0, 1.5), target=(2.0, 0.0, 1.0))
     view = ViewLabels(ahead, BodyTable.of(ahead, room().grid), FEW)
     behind = people((-1.5, 0.0))
-    assert len(view.expected(standing(behind)).people.share) == 0
+    assert len(view.label_likelihood(standing(behind)).people.share) == 0
     bright = np.ones((96, 128), np.float32)
     assert not view.label(standing(behind), bright, None).any()
     assert not view.label(standing(behind[:0]), bright, None).any()
@@ -87,20 +87,20 @@ def test_nobody_in_sight_has_no_patch() -> None:
 
 @given(st.integers(0, 2**32 - 1), st.integers(1, 3))
 @settings(max_examples=20, deadline=None)
-def test_the_product_is_what_all_combinations_of_draws_give(seed: int, count: int) -> None:
+def test_the_product_is_the_mean_over_all_combinations_of_draws(seed: int, count: int) -> None:
     rng = np.random.default_rng(seed)
     drawn = [rng.random((3, 2, 3)) < 0.6 for _ in range(count)]
     distance = rng.random(count)
     cover = np.concatenate([own.mean(0).ravel() for own in drawn]).astype(np.float32)
     patches = Patches(np.tile([4, 7, 7, 9], (count, 1)), np.arange(count + 1) * 6, cover)
-    shown = nearest(patches, distance)
+    shown = visible_shares(patches, distance)
     assert (shown.left, shown.top) == (4, 7)
     np.testing.assert_allclose(reference.dense(shown), reference.nearest_shares(drawn, distance), atol=1e-5)
 
 
 def test_the_most_likely_label_is_the_start() -> None:
     shown = random_nearest(np.random.default_rng(3), 2, (3, 4))
-    np.testing.assert_array_equal(most_likely(shown), reference.dense(shown).argmax(0))
+    np.testing.assert_array_equal(most_likely_labels(shown), reference.dense(shown).argmax(0))
 
 
 # The adjacency
@@ -108,7 +108,7 @@ def test_the_most_likely_label_is_the_start() -> None:
 
 @given(st.integers(0, 2**32 - 1))
 @settings(max_examples=20, deadline=None)
-def test_edges_cost_what_the_sigmoid_says_and_never_less_than_nothing(seed: int) -> None:
+def test_weights_follow_the_sigmoid_and_are_not_negative(seed: int) -> None:
     image = np.random.default_rng(seed).integers(0, 60, (3, 4, 3)).astype(np.uint8)
     config = LabelConfig(adjacency=3.0, alike=40.0, slope=10.0)
     across, down = edge_costs(image, (3, 4), config)
@@ -136,7 +136,7 @@ def random_nearest(rng: np.random.Generator, count: int, shape: tuple[int, int])
     edges = np.concatenate([edges, [[0, 0, columns, rows]]])[-count:] + np.tile([5, 2], 2)
     first = np.append(0, np.cumsum((edges[:, 2] - edges[:, 0]) * (edges[:, 3] - edges[:, 1])))
     share = rng.random(first[-1]).astype(np.float32)
-    return nearest(Patches(edges, first, share), rng.random(count))
+    return visible_shares(Patches(edges, first, share), rng.random(count))
 
 
 def problem(seed: int, shape: tuple[int, int]) -> tuple[PixelEnergy, LabelLikelihood, Singles, Bytes, LabelConfig]:
@@ -145,17 +145,17 @@ def problem(seed: int, shape: tuple[int, int]) -> tuple[PixelEnergy, LabelLikeli
         detection=float(rng.uniform(0, 4)), adjacency=float(rng.uniform(0, 2)), alike=200.0, slope=60.0, outside=0.1
     )
     shown = random_nearest(rng, 2, shape)
-    foreground = rng.random(shown.nobody.shape).astype(np.float32)
-    image = rng.integers(0, 256, (*shown.nobody.shape, 3)).astype(np.uint8)
-    ours = pixel_energy(shown, foreground, *edge_costs(image, shown.nobody.shape, config), config)
+    foreground = rng.random(shown.background.shape).astype(np.float32)
+    image = rng.integers(0, 256, (*shown.background.shape, 3)).astype(np.uint8)
+    ours = pixel_energy(shown, foreground, *edge_costs(image, shown.background.shape, config), config)
     return ours, shown, foreground, image, config
 
 
 @given(st.integers(0, 2**32 - 1))
 @settings(max_examples=40, deadline=None)
-def test_the_energy_is_that_of_the_paper_and_what_is_left_out_cannot_win(seed: int) -> None:
+def test_the_energy_is_that_of_the_paper_and_pruned_labels_cannot_win(seed: int) -> None:
     ours, shown, foreground, image, config = problem(seed, (2, 3))
-    shares, shape = reference.dense(shown), shown.nobody.shape
+    shares, shape = reference.dense(shown), shown.background.shape
     empty = reference.energy(np.zeros(shape, int), foreground, image, shares, config)
     cell = np.repeat(np.arange(ours.energy.cells), np.diff(ours.energy.first))
     allowed = {(int(ours.pixel[p]), int(label)) for p, label in zip(cell, ours.energy.label, strict=True)}
@@ -205,7 +205,7 @@ def test_the_nearer_of_two_hides_the_farther() -> None:
     assert (label[behind] == 2).mean() > 0.9
 
 
-def test_what_nobody_stands_at_is_background() -> None:
+def test_foreground_without_a_person_is_background() -> None:
     camera, everybody = corner_cameras()[2], people((-0.5, -0.5))
     view = ViewLabels(camera, BodyTable.of(camera, room().grid), FEW)
     seen = likelihoods([camera], everybody)[0]
@@ -216,7 +216,7 @@ def test_what_nobody_stands_at_is_background() -> None:
     )
 
 
-def test_where_colours_are_alike_holes_are_filled_and_specks_are_not_taken() -> None:
+def test_similar_colours_fill_holes_and_reject_specks() -> None:
     camera, everybody = corner_cameras()[0], people((0.0, 0.0))
     seen = likelihoods([camera], everybody)[0]
     rows, columns = np.nonzero(seen > 0.5)

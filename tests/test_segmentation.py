@@ -1,4 +1,4 @@
-"""Where cells move, and the blobs that the cut leaves."""
+"""Motion field of cells, and blobs of labelled cells."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def test_cells_near_a_person_move_with_them() -> None:
     np.testing.assert_array_equal(motion.any(2), away <= 0.25)
 
 
-def test_whoever_is_not_found_again_stays() -> None:
+def test_a_track_not_detected_again_does_not_move() -> None:
     here = np.array([[0.55, 0.55]])
     for chains_then in ([], [9]):
         then = np.tile([[1.0, 1.0]], (len(chains_then), 1))
@@ -97,7 +97,7 @@ def test_touching_people_are_two_blobs() -> None:
     np.testing.assert_array_equal(found.cells > 0, disc(left, right).any(0))
 
 
-def test_a_piece_without_a_person_is_kept() -> None:
+def test_a_component_without_a_detection_is_kept() -> None:
     found = blobs_of(disc((0.45, 0.75), (1.55, 0.75)), (0.45, 0.75))
     assert (found.person.tolist(), found.track.tolist()) == ([0, -1], [11, UNASSIGNED])
     assert len(found.touches) == 0
@@ -114,7 +114,7 @@ def test_people_without_cells_are_no_blobs() -> None:
     assert empty.touches.shape == (0, 2)
 
 
-def test_a_track_is_one_blob_strangers_are_many() -> None:
+def test_a_track_is_one_blob_unassigned_cells_are_many() -> None:
     label = np.zeros(GRID.shape, np.int32)
     label[1, 3, 3], label[1, 3, 8] = 4, 4
     label[1, 9, 3], label[1, 9, 8] = UNASSIGNED, UNASSIGNED
@@ -124,7 +124,7 @@ def test_a_track_is_one_blob_strangers_are_many() -> None:
     np.testing.assert_allclose(found.ground[0], (GRID.ground[3, 3] + GRID.ground[3, 8]) / 2)
 
 
-def test_a_column_goes_to_who_has_most_mass_there() -> None:
+def test_a_column_belongs_to_the_label_with_most_mass() -> None:
     label = np.zeros(GRID.shape, np.int32)
     label[:3, 5, 5], label[3, 5, 5] = 2, 1
     for strength, whose in ((1.0, 2), (9.0, 1)):
@@ -137,7 +137,7 @@ def test_a_column_goes_to_who_has_most_mass_there() -> None:
         assert found.height[0] == pytest.approx(1.8 if whose == 1 else 1.2)
 
 
-def test_a_blob_holds_who_stands_in_it() -> None:
+def test_a_blob_holds_the_detection_inside_it() -> None:
     label = disc((0.45, 0.75)).astype(np.int32) * 3
     for x, held in ((0.45, 0), (0.85, 0), (0.95, -1)):  # its outermost cell is at 0.65
         found = find_blobs(label, label.astype(np.float32), np.array([[x, 0.75]]), np.array([3]), 0.4, GRID)
@@ -146,7 +146,7 @@ def test_a_blob_holds_who_stands_in_it() -> None:
 
 @settings(deadline=None, max_examples=40)
 @given(st.lists(st.tuples(numbers(0, 2), numbers(0, 1.5)), max_size=4), st.integers(0, 999))
-def test_blobs_partition_what_is_occupied(standing: list[tuple[float, float]], seed: int) -> None:
+def test_blobs_partition_the_occupied_cells(standing: list[tuple[float, float]], seed: int) -> None:
     rng = np.random.default_rng(seed)
     tracks = rng.permutation(5)[: len(standing)] + 1
     label = np.where(rng.random(GRID.shape) < 0.08, rng.choice([UNASSIGNED, 1, 2, 3], GRID.shape), 0).astype(np.int32)

@@ -25,7 +25,7 @@ from stseg.graphcut.cut import minimum_cut
 from stseg.graphcut.energy import Energy
 from stseg.graphcut.expansion import LabelEnergy, expand
 from stseg.segmentation.energy import neighbourhood
-from stseg.segmentation.motion import follow
+from stseg.segmentation.motion import successor_cells
 
 SHAPE = (15, 10, 100, 100)
 CELL, RISE, STEP = 0.10, 0.20, 1 / 15  # metres, metres, seconds
@@ -79,7 +79,7 @@ def solve(cost: Labels) -> Ints:
     """
     best = np.empty(SHAPE, np.int32)
     _fill_best(cost, best)
-    still = follow(np.zeros((SHAPE[0] - 1, *SHAPE[2:], 2), np.int64))
+    still = successor_cells(np.zeros((SHAPE[0] - 1, *SHAPE[2:], 2), np.int64))
     window = Energy(best, neighbourhood(8), np.full(4, WEIGHT, np.int32), still)
     part = subset(window, minimum_cut(window).occupied)
     own = cost.reshape(-1, cost.shape[-1])[part.cell].astype(np.int64)

@@ -24,7 +24,7 @@ from stseg.config import LabelConfig
 from stseg.graphcut.energy import QUANTUM
 from stseg.graphcut.expansion import expand
 from stseg.labels.adjacency import edge_costs
-from stseg.labels.energy import admissible, most_likely, pixel_energy
+from stseg.labels.energy import admissible, most_likely_labels, pixel_energy
 from stseg.labels.views import ViewLabels, view_labels
 from stseg.simulation import NAMED
 
@@ -55,9 +55,9 @@ def beside_peer(views: Sequence[ViewLabels], frame: TrueFrame) -> tuple[float, f
     """Seconds of both on the windows of a frame, from their costs to the labels."""
     ours = theirs = 0.0
     for view, seen in zip(views, frame.views, strict=True):
-        shown = view.expected(frame.standing)
-        shape, foreground = shown.nobody.shape, np.ascontiguousarray(seen.foreground[shown.window])
-        start = most_likely(shown)
+        shown = view.label_likelihood(frame.standing)
+        shape, foreground = shown.background.shape, np.ascontiguousarray(seen.foreground[shown.window])
+        start = most_likely_labels(shown)
         begin = process_time()
         problem = pixel_energy(shown, foreground, *edge_costs(None, shape, view.config), view.config)
         found = np.zeros(shape, np.int64)
@@ -78,10 +78,10 @@ def beside_peer(views: Sequence[ViewLabels], frame: TrueFrame) -> tuple[float, f
 
 def _dense(view: ViewLabels, frame: TrueFrame, foreground: Singles) -> Floats:
     """Costs of all labels, float64 (v, u, n + 1), quanta."""
-    shown, config = view.expected(frame.standing), view.config
+    shown, config = view.label_likelihood(frame.standing), view.config
     edges, least = shown.people.edges, config.outside / (len(frame.standing) + 1)
-    costs = np.full((*shown.nobody.shape, len(edges) + 1), _NEVER)
-    costs[..., 0] = config.detection * foreground - np.log(shown.nobody + least)
+    costs = np.full((*shown.background.shape, len(edges) + 1), _NEVER)
+    costs[..., 0] = config.detection * foreground - np.log(shown.background + least)
     for j, (left, top, right, bottom) in enumerate(edges.tolist()):
         here = np.s_[top - shown.top : bottom - shown.top, left - shown.left : right - shown.left]
         share = shown.people.share[shown.people.first[j] : shown.people.first[j + 1]].reshape(bottom - top, -1)

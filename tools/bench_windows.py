@@ -16,7 +16,7 @@ from stseg.commands.main import main as stseg
 from stseg.graphcut import cut
 from stseg.graphcut.energy import QUANTUM, Energy
 from stseg.segmentation.energy import neighbourhood
-from stseg.segmentation.motion import follow
+from stseg.segmentation.motion import successor_cells
 
 SHAPE = (15, 10, 100, 100)
 _CELL, _RISE, _FRAME = 0.1, 0.2, 1 / 15  # metres, metres, seconds
@@ -53,7 +53,7 @@ def synthetic(seed: int, level: float, total: float, neighbours: int = 8, shape:
     capacity = np.rint(weight * total / (2 * weight.sum()) / QUANTUM).astype(np.int32).clip(1)
     still = np.zeros((shape[0] - 1, *shape[2:], 2), np.int64)
     unary = np.rint((volume / cameras - level) / QUANTUM).astype(np.int32)
-    return Energy(unary, offsets, capacity, follow(still))
+    return Energy(unary, offsets, capacity, successor_cells(still))
 
 
 def _walk(rng: np.random.Generator, people: int, shape: tuple[int, ...]) -> Floats:

@@ -1,11 +1,10 @@
-"""What it costs that two neighbouring pixels have different labels: the adjacency energy of HW12 eqs 16 to 18.
+"""Potts weights of neighbouring pixels by colour contrast (Huang and Wang 2012, eqs 16 to 18).
 
     w = c2 max(g(d), 0),     g(d) = tanh((k1 - d) / (2 k2)),
 
-with d the distance of the two colours. HW12's g falls through zero at k1 and is negative beyond: a reward for labels
-that differ. An energy with rewards is not submodular, so no minimum cut solves it; here g ends at zero, and colours
-farther apart than k1 say nothing. g = 2 P(same person | d) - 1 where log-odds fall linearly in d, which is how k1 and
-k2 are learned (`tools/learn_label_weights.py`).
+with d the distance of the two colours. The paper's g is negative beyond k1, which makes the energy non-submodular; here
+it ends at zero, so colours farther apart than k1 have no weight. g = 2 P(same person | d) - 1 for log-odds linear in d,
+from which k1 and k2 were learned.
 """
 
 from __future__ import annotations
@@ -23,24 +22,24 @@ _FARTHEST = 3 * 255**2
 
 
 def adjacency(difference: Floats, config: LabelConfig) -> Floats:
-    """Costs in nats at distances of colours in grey levels, float64 of the same shape."""
+    """Weights in nats at colour distances in grey levels, float64 of the same shape."""
     return config.adjacency * np.tanh((config.alike - difference) / (2 * config.slope)).clip(0)
 
 
 def edge_costs(image: Bytes | None, shape: tuple[int, int], config: LabelConfig) -> tuple[Labels, Labels]:
-    """Costs between each pixel and the next one in its row, and between it and the one below.
+    """Weights between each pixel and the next in its row, and between it and the one below.
 
     Parameters
     ----------
     image : uint8 (v, u, 3)
-        None where there are no colours, only masks: all pairs then cost what a border costs on the average.
+        None without colours: all pairs then have the mean weight at borders.
     shape
-        Of the image, (v, u).
+        Image size (v, u).
 
     Returns
     -------
     int32 (v, u), int32 (v, u)
-        Quanta; 0 where there is no such neighbour.
+        Quanta; 0 without a neighbour.
     """
     across, down = np.zeros(shape, np.int32), np.zeros(shape, np.int32)
     if image is None:
@@ -52,7 +51,7 @@ def edge_costs(image: Bytes | None, shape: tuple[int, int], config: LabelConfig)
 
 @lru_cache(maxsize=8)
 def _table(config: LabelConfig) -> Labels:
-    """Costs by the square of the distance, quanta."""
+    """Weights by squared distance, quanta."""
     costs = adjacency(np.sqrt(np.arange(_FARTHEST + 1)), config)
     return np.asarray(np.rint(costs / QUANTUM), np.int32)
 

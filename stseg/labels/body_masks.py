@@ -1,7 +1,7 @@
-"""How likely each pixel lies inside each person's body: pillars drawn from what is known of place, height and width.
+"""Coverage: probability that each pixel lies inside each body, from pillars drawn by place, height and width.
 
-The draws are the same for everybody and every frame: points of Roberts' additive recurrence in four dimensions (the
-generalised golden ratio), turned into normal deviates. They fill the space more evenly than lots do, and repeat.
+Draws are the same for all people and frames: Roberts' additive recurrence in four dimensions (generalised golden
+ratio), transformed to normal deviates. Such quasi-random points converge faster than random ones, and repeat.
 """
 
 from __future__ import annotations
@@ -20,22 +20,22 @@ from stseg.labels.placed_people import PlacedPeople
 from stseg.model.outlines import Spans, outlines
 
 MARGIN = 0.15
-"""How far around the pillars a body's pixels may lie, as a share of the pillars' height in the image."""
+"""Margin around the pillars in which pixels of the body may lie, as a share of their height in the image."""
 _THINNEST = 0.3
-"""Widths are held above this share of the mean."""
+"""Least width, as a share of the mean."""
 _MEAN_WIDTH = 2 * float(np.trapezoid(SILHOUETTE[:, 1], SILHOUETTE[:, 0]))
-"""Of the silhouette over its height, metres."""
+"""Mean width of the silhouette over its height, metres."""
 
 
 class Patches(NamedTuple):
-    """A number for each pixel of a rectangle around each person.
+    """One value for each pixel of a rectangle around each person.
 
     Attributes
     ----------
     edges : int64 (n, 4)
-        left, top, right, bottom of the rectangles, half open; all 0 for a person whom the view does not see.
+        left, top, right, bottom, half open; all 0 for a person out of view.
     first : int64 (n + 1,)
-        Where each person's numbers begin, row by row.
+        First value of each person; values are in row order.
     share : float32 (m,)
         0..1.
     """
@@ -45,16 +45,16 @@ class Patches(NamedTuple):
     share: Singles
 
 
-def pillar_patches(table: BodyTable, standing: PlacedPeople, config: LabelConfig) -> Patches:
-    """The share of each person's drawn pillars that cover each pixel of a view."""
-    deviates, people = _deviates(config.draws), len(standing)
-    wide = np.linalg.cholesky(standing.covariance + config.place_spread**2 * np.eye(2))
-    ground = standing.ground[:, None] + np.einsum("nij,dj->ndi", wide, deviates[:, :2])
-    heights = standing.height[:, None] + config.height_spread * deviates[:, 2]
+def pillar_patches(table: BodyTable, people: PlacedPeople, config: LabelConfig) -> Patches:
+    """Share of each person's draws that cover each pixel of a view."""
+    deviates, count = _deviates(config.draws), len(people)
+    root_covariance = np.linalg.cholesky(people.covariance + config.place_spread**2 * np.eye(2))
+    ground = people.ground[:, None] + np.einsum("nij,dj->ndi", root_covariance, deviates[:, :2])
+    heights = people.height[:, None] + config.height_spread * deviates[:, 2]
     widths = (config.width + config.width_spread * deviates[:, 3]).clip(_THINNEST * config.width) / _MEAN_WIDTH
     size = table.size
-    first, spans, _ = outlines(table, ground.reshape(-1, 2), heights.ravel(), 1, size[::-1], np.tile(widths, people))
-    edges = np.zeros((people, 4), np.int64)
+    first, spans, _ = outlines(table, ground.reshape(-1, 2), heights.ravel(), 1, size[::-1], np.tile(widths, count))
+    edges = np.zeros((count, 4), np.int64)
     _fill_edges(first, spans, config.draws, MARGIN, size[0], size[1], edges)
     begin = np.append(0, np.cumsum((edges[:, 2] - edges[:, 0]) * (edges[:, 3] - edges[:, 1])))
     share = np.zeros(begin[-1], np.float32)
@@ -74,7 +74,7 @@ def _deviates(draws: int) -> Floats:
 
 @kernel
 def _fill_edges(first: Ints, spans: Spans, draws: int, margin: float, width: int, height: int, edges: Ints) -> None:
-    """Fill edges (person, 4) with the rectangles around all draws of each, and the margin around them."""
+    """Fill edges (person, 4) with the rectangles around all draws of each person, margin included."""
     for j in range(len(edges)):
         left, top, right, bottom = width, height, 0, 0
         for d in range(j * draws, (j + 1) * draws):
@@ -90,7 +90,7 @@ def _fill_edges(first: Ints, spans: Spans, draws: int, margin: float, width: int
 
 @kernel
 def _fill_shares(first: Ints, spans: Spans, draws: int, edges: Ints, begin: Ints, share: Singles) -> None:
-    """Fill share with how many of each person's draws cover each pixel of their rectangle."""
+    """Fill share with the share of each person's draws that cover each pixel of the rectangle."""
     one = np.float32(1.0 / draws)
     for j in range(len(edges)):
         left, columns = edges[j, 0], edges[j, 2] - edges[j, 0]

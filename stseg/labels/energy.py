@@ -1,10 +1,10 @@
-"""The energy of the labels of one view (HW12 eq. 22 with the statuses given), for an expansion.
+"""Energy of the pixel labels of one view (Huang and Wang 2012, eq. 22 with statuses given).
 
     E(l) = sum_p [ c1 (q_p [l_p = 0] + (1 - q_p) [l_p > 0]) - log p(l_p | S) ] + sum_(p,q) w_pq [l_p != l_q]
 
-with q the foreground's probability of a person, soft where HW12's is 0 or 1 (eqs 13 to 15). All is told relative to
-background, pixel by pixel. A label that costs a pixel more than all its edges can give back is in no minimum; so what
-is left are the pixels in and around what moves.
+q is the foreground probability of a person, where the paper has 0 or 1 (eqs 13 to 15). Costs are relative to the
+background, pixel by pixel. A label that costs a pixel more than the sum of its edges is in no minimum, so only pixels
+in and around people are nodes.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from stseg.labels.label_likelihood import LabelLikelihood
 
 @dataclass(frozen=True)
 class PixelEnergy:
-    """Pixels that may show somebody, and the energy of their labels.
+    """Pixels with admissible labels, and the energy of their labels.
 
     Attributes
     ----------
     pixel : int64 (n,)
-        Their indices in the flattened window, rising.
+        Indices in the flattened window, ascending.
     energy
         Label j + 1 is person j.
     """
@@ -38,62 +38,64 @@ class PixelEnergy:
 
 
 def pixel_energy(
-    shown: LabelLikelihood, foreground: Singles, across: Labels, down: Labels, config: LabelConfig
+    prior: LabelLikelihood, foreground: Singles, across: Labels, down: Labels, config: LabelConfig
 ) -> PixelEnergy:  # fmt: skip
-    """The energy of a window of a view.
+    """Energy of an image window.
 
     Parameters
     ----------
-    shown
-        The label likelihood, and with it the window.
+    prior
+        Label likelihood, which defines the window.
     foreground : float32 (v, u)
         q in the window.
     across, down : int32 (v, u)
-        w to the next pixel of the row and to the one below, quanta.
+        w to the next pixel in the row and in the column, quanta.
     """
-    edges = shown.people.edges - np.tile([shown.left, shown.top], 2)
-    known = (edges, shown.people.first, shown.people.share, shown.nobody)
-    around = _around(across, down)
-    cost = np.empty(len(shown.people.share), np.int64)
-    _fill_costs(*known, foreground, config.detection, config.outside / (len(edges) + 1), QUANTUM, cost)
+    edges = prior.people.edges - np.tile([prior.left, prior.top], 2)
+    patches = (edges, prior.people.first, prior.people.share, prior.background)
+    edge_sums = _edge_sums(across, down)
+    cost = np.empty(len(prior.people.share), np.int64)
+    _fill_costs(*patches, foreground, config.detection, config.outside / (len(edges) + 1), QUANTUM, cost)
     count, node = np.zeros(foreground.shape, np.int64), np.full(foreground.shape, -1, np.int64)
-    _count_labels(edges, cost, around, count)
+    _count_labels(edges, cost, edge_sums, count)
     pixel = np.flatnonzero(count)
     node.flat[pixel] = np.arange(len(pixel))
     first = np.append(0, np.cumsum(count.flat[pixel]))
     label, price = np.empty(first[-1], np.int64), np.empty(first[-1], np.int64)
     start, end, weight = (np.empty(2 * len(pixel), np.int64) for _ in range(3))
     border = np.zeros(len(pixel), np.int64)
-    joined = _fill_neighbours(node, across, down, start, end, weight, border)
-    _fill_labels(edges, cost, around, node, border, first[:-1].copy(), label, price)
-    return PixelEnergy(pixel, LabelEnergy(first, label, price, start[:joined], end[:joined], weight[:joined]))
+    edges_filled = _fill_neighbours(node, across, down, start, end, weight, border)
+    _fill_labels(edges, cost, edge_sums, node, border, first[:-1].copy(), label, price)
+    return PixelEnergy(
+        pixel, LabelEnergy(first, label, price, start[:edges_filled], end[:edges_filled], weight[:edges_filled])
+    )
 
 
-def most_likely(shown: LabelLikelihood) -> Ints:
-    """The label of greatest likelihood at each pixel of the window (HW12 eq. 24), int64 (v, u)."""
-    best, label = shown.nobody.copy(), np.zeros(shown.nobody.shape, np.int64)
-    for j, (left, top, right, bottom) in enumerate(shown.people.edges.tolist()):
-        here = np.s_[top - shown.top : bottom - shown.top, left - shown.left : right - shown.left]
-        share = shown.people.share[shown.people.first[j] : shown.people.first[j + 1]].reshape(best[here].shape)
+def most_likely_labels(prior: LabelLikelihood) -> Ints:
+    """Label of greatest likelihood at each pixel of the window (eq. 24), int64 (v, u)."""
+    best, label = prior.background.copy(), np.zeros(prior.background.shape, np.int64)
+    for j, (left, top, right, bottom) in enumerate(prior.people.edges.tolist()):
+        here = np.s_[top - prior.top : bottom - prior.top, left - prior.left : right - prior.left]
+        share = prior.people.share[prior.people.first[j] : prior.people.first[j + 1]].reshape(best[here].shape)
         label[here][share > best[here]] = j + 1
         np.maximum(best[here], share, out=best[here])
     return label
 
 
 def admissible(energy: LabelEnergy, labels: Ints) -> Ints:
-    """Labels of cells, int64 (n,), background where a cell may not have its own."""
+    """Labels int64 (n,), replaced by the background where inadmissible."""
     cell = np.repeat(np.arange(energy.cells), np.diff(energy.first))
     allowed = np.zeros(energy.cells, bool)
     allowed[cell[energy.label == labels[cell]]] = True
     return np.where(allowed, labels, BACKGROUND)
 
 
-def _around(across: Labels, down: Labels) -> Labels:
+def _edge_sums(across: Labels, down: Labels) -> Labels:
     """Sum of each pixel's edges, quanta."""
-    around = across + down
-    around[:, 1:] += across[:, :-1]
-    around[1:] += down[:-1]
-    return around
+    edge_sums = across + down
+    edge_sums[:, 1:] += across[:, :-1]
+    edge_sums[1:] += down[:-1]
+    return edge_sums
 
 
 @kernel
@@ -101,45 +103,45 @@ def _fill_costs(
     edges: Ints,
     first: Ints,
     share: Singles,
-    nobody: Singles,
+    background: Singles,
     foreground: Singles,
     detection: float,
-    least: float,
+    outlier_share: float,
     quantum: float,
     cost: Ints,
 ) -> None:
-    """Fill cost with that of each person at each pixel of their rectangle, relative to background, quanta."""
+    """Fill the cost of each person at each pixel of the rectangle, relative to the background, quanta."""
     for j in range(len(edges)):
         i = first[j]
         for v in range(edges[j, 1], edges[j, 3]):
             for u in range(edges[j, 0], edges[j, 2]):
-                likelihood = np.log((nobody[v, u] + least) / (share[i] + least))
+                likelihood = np.log((background[v, u] + outlier_share) / (share[i] + outlier_share))
                 cost[i] = round((detection * (1.0 - 2.0 * foreground[v, u]) + likelihood) / quantum)
                 i += 1
 
 
 @kernel
-def _count_labels(edges: Ints, cost: Ints, around: Labels, count: Ints) -> None:
-    """Fill count (v, u) with how many people each pixel may show."""
+def _count_labels(edges: Ints, cost: Ints, edge_sums: Labels, count: Ints) -> None:
+    """Fill the number of admissible people at each pixel (v, u)."""
     i = 0
     for j in range(len(edges)):
         for v in range(edges[j, 1], edges[j, 3]):
             for u in range(edges[j, 0], edges[j, 2]):
-                if cost[i] < around[v, u]:
+                if cost[i] < edge_sums[v, u]:
                     count[v, u] += 1
                 i += 1
 
 
 @kernel
 def _fill_labels(
-    edges: Ints, cost: Ints, around: Labels, node: Ints, border: Ints, free: Ints, label: Ints, price: Ints
+    edges: Ints, cost: Ints, edge_sums: Labels, node: Ints, border: Ints, free: Ints, label: Ints, price: Ints
 ) -> None:  # fmt: skip
-    """Fill the labels that each pixel may have, rising, and what they cost; `free` is each pixel's next free place."""
+    """Fill the admissible labels of each pixel, ascending, and costs; `free` is each pixel's next free entry."""
     i = 0
     for j in range(len(edges)):
         for v in range(edges[j, 1], edges[j, 3]):
             for u in range(edges[j, 0], edges[j, 2]):
-                if cost[i] < around[v, u]:
+                if cost[i] < edge_sums[v, u]:
                     p = node[v, u]
                     label[free[p]], price[free[p]] = j + 1, cost[i] + border[p]
                     free[p] += 1
@@ -150,23 +152,23 @@ def _fill_labels(
 def _fill_neighbours(
     node: Ints, across: Labels, down: Labels, start: Ints, end: Ints, weight: Ints, border: Ints
 ) -> int:  # fmt: skip
-    """Fill the edges between pixels that may show somebody, and what those to all others cost; how many there are."""
-    joined = 0
+    """Fill the edges between nodes and the weights of edges to other pixels; number of edges."""
+    edges_filled = 0
     rows, columns = node.shape
     for v in range(rows):
         for u in range(columns):
-            for way in range(2):
-                to_v, to_u = v + way, u + 1 - way
+            for axis in range(2):
+                to_v, to_u = v + axis, u + 1 - axis
                 if to_v == rows or to_u == columns:
                     continue
                 p, q = node[v, u], node[to_v, to_u]
-                w = down[v, u] if way == 1 else across[v, u]
+                w = down[v, u] if axis == 1 else across[v, u]
                 if p >= 0 and q >= 0:
                     if w > 0:
-                        start[joined], end[joined], weight[joined] = p, q, w
-                        joined += 1
+                        start[edges_filled], end[edges_filled], weight[edges_filled] = p, q, w
+                        edges_filled += 1
                 elif p >= 0:
                     border[p] += w
                 elif q >= 0:
                     border[q] += w
-    return joined
+    return edges_filled

@@ -1,4 +1,4 @@
-"""Who stands where in one frame, as the labels of its pixels are told."""
+"""Places and heights of the people of one frame."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from stseg.arrays import Floats
 
 @dataclass(frozen=True)
 class PlacedPeople:
-    """People of one frame.
+    """People of one frame, in the order of their labels.
 
     Attributes
     ----------
     ground : float64 (n, 2)
         Metres.
     covariance : float64 (n, 2, 2)
-        How far each place may be off, square metres.
+        Covariance of each place, square metres.
     height : float64 (n,)
         Metres.
     """

@@ -1,4 +1,4 @@
-"""Whom each pixel of each view shows, frame by frame (METHODS 7, HW12 section IV-B)."""
+"""Pixel labels of each view, frame by frame (Huang and Wang, TCSVT 22(11), 2012, section IV-B)."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from stseg.geometry.bodies import BodyTable
 from stseg.graphcut.expansion import expand
 from stseg.labels.adjacency import edge_costs
 from stseg.labels.body_masks import pillar_patches
-from stseg.labels.energy import admissible, most_likely, pixel_energy
-from stseg.labels.label_likelihood import LabelLikelihood, nearest
+from stseg.labels.energy import admissible, most_likely_labels, pixel_energy
+from stseg.labels.label_likelihood import LabelLikelihood, visible_shares
 from stseg.labels.placed_people import PlacedPeople
 
 
@@ -34,17 +34,17 @@ class ViewLabels:
     def __init__(self, camera: Camera, table: BodyTable, config: LabelConfig) -> None:
         self.camera, self.table, self.config = camera, table, config
 
-    def label(self, standing: PlacedPeople, foreground: Singles, image: Bytes | None) -> Labels:
-        """Whom each pixel shows.
+    def label(self, people: PlacedPeople, foreground: Singles, image: Bytes | None) -> Labels:
+        """Person visible at each pixel.
 
         Parameters
         ----------
-        standing
-            Who is there.
+        people
+            Places and heights of the frame's people.
         foreground : float32 (v, u)
-            Probability that a pixel shows a person, by the view alone, 0..1.
+            Probability of a person by the view's foreground, 0..1.
         image : uint8 (v, u, 3)
-            Its colours; None where there are none.
+            Colours, or None.
 
         Returns
         -------
@@ -52,18 +52,20 @@ class ViewLabels:
             1 + the index of the person, 0 for background.
         """
         labels = np.zeros(foreground.shape, np.int32)
-        shown = self.expected(standing)
-        colours = None if image is None else np.ascontiguousarray(image[shown.window])
-        across, down = edge_costs(colours, shown.nobody.shape, self.config)
-        problem = pixel_energy(shown, np.ascontiguousarray(foreground[shown.window]), across, down, self.config)
-        start = most_likely(shown).flat[problem.pixel]
-        labels[shown.window].flat[problem.pixel] = expand(problem.energy, admissible(problem.energy, start))
+        likelihood = self.label_likelihood(people)
+        colours = None if image is None else np.ascontiguousarray(image[likelihood.window])
+        across, down = edge_costs(colours, likelihood.background.shape, self.config)
+        problem = pixel_energy(
+            likelihood, np.ascontiguousarray(foreground[likelihood.window]), across, down, self.config
+        )
+        start = most_likely_labels(likelihood).flat[problem.pixel]
+        labels[likelihood.window].flat[problem.pixel] = expand(problem.energy, admissible(problem.energy, start))
         return labels
 
-    def expected(self, standing: PlacedPeople) -> LabelLikelihood:
-        """Whom each pixel around the people shows, before it is looked at."""
-        patches = pillar_patches(self.table, standing, self.config)
-        return nearest(patches, np.hypot(*(standing.ground - self.camera.centre[:2]).T))
+    def label_likelihood(self, people: PlacedPeople) -> LabelLikelihood:
+        """Prior shares of labels around the people, from their places and heights."""
+        patches = pillar_patches(self.table, people, self.config)
+        return visible_shares(patches, np.hypot(*(people.ground - self.camera.centre[:2]).T))
 
 
 def view_labels(rig: Rig, config: LabelConfig) -> Sequence[ViewLabels]:

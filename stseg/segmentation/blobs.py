@@ -1,4 +1,4 @@
-"""Whose the occupied cells are, frame by frame: one blob a track, measured."""
+"""Blobs: ground regions of each track in each frame, with centroid, covariance, extent and height."""
 
 from __future__ import annotations
 
@@ -19,50 +19,50 @@ def find_blobs(
 ) -> Blobs:
     """Blobs of one frame.
 
-    The cells of one track are one blob; those of strangers one for each connected piece of ground. A ground cell above
-    which several have cells goes to the one with the most mass there.
+    The cells of a track form one blob; unassigned cells one blob for each connected component on the ground. A ground
+    cell below cells of several labels goes to the one with the most mass above it.
 
     Parameters
     ----------
     label : int32 (plane, y, x)
-        Whose each cell is: a track, UNASSIGNED, or 0 for background.
+        Track of each cell, UNASSIGNED, or 0 for background.
     log_odds : float32 (plane, y, x)
         u, nats.
     people_ground, people_track : float64 (n, 2), int64 (n,)
-        People of the frame's pass, metres, and their tracks.
+        Detections of the frame, metres, and their tracks.
     reach
-        How far from a person's place their cells reach, metres. A blob holds the person of its track who stands in it:
-        who has a cell of it within half a reach.
+        Reach of a body's cells around its place, metres. A blob holds the detection of its track if one of its cells is
+        within half a reach of it.
     """
-    owner = _owner(label, log_odds)
-    strange, number = connected(owner == UNASSIGNED, _EIGHT)
-    known = np.unique(owner[owner > 0])
-    cells = np.where(owner > 0, 1 + np.searchsorted(known, owner), 0).astype(np.int32)
-    cells[strange > 0] = len(known) + strange[strange > 0]
+    ground_label = _ground_labels(label, log_odds)
+    unassigned_component, number = connected(ground_label == UNASSIGNED, _EIGHT)
+    known = np.unique(ground_label[ground_label > 0])
+    cells = np.where(ground_label > 0, 1 + np.searchsorted(known, ground_label), 0).astype(np.int32)
+    cells[unassigned_component > 0] = len(known) + unassigned_component[unassigned_component > 0]
     track = np.concatenate([known, np.full(number, UNASSIGNED)]).astype(np.int64)
     person = np.full(len(track), -1, np.int64)
     ground = grid.ground
-    for j, (place, name) in enumerate(zip(people_ground, people_track, strict=True)):
-        away = np.hypot(*(ground[owner == name] - place).T)
-        if away.min(initial=np.inf) <= reach / 2:
-            person[known.searchsorted(name)] = j
+    for j, (position, track_id) in enumerate(zip(people_ground, people_track, strict=True)):
+        distance = np.hypot(*(ground[ground_label == track_id] - position).T)
+        if distance.min(initial=np.inf) <= reach / 2:
+            person[known.searchsorted(track_id)] = j
     return _measure(cells, track, person, label, log_odds, grid)
 
 
-def _owner(label: Labels, log_odds: Singles) -> Labels:
-    """The label that has the most mass above each ground cell, int32 (y, x); 0 where none has any."""
-    names = np.unique(label[label != 0])
-    owner, most = np.zeros(label.shape[1:], np.int32), np.zeros(label.shape[1:])
+def _ground_labels(label: Labels, log_odds: Singles) -> Labels:
+    """Label with the most mass above each ground cell, int32 (y, x); 0 for none."""
+    labels = np.unique(label[label != 0])
+    ground_label, most = np.zeros(label.shape[1:], np.int32), np.zeros(label.shape[1:])
     strength = np.nan_to_num(log_odds).clip(0) + _FAINT
-    for name in names:
-        mass = np.where(label == name, strength, 0.0).sum(0)
-        owner[mass > most] = name
+    for track_id in labels:
+        mass = np.where(label == track_id, strength, 0.0).sum(0)
+        ground_label[mass > most] = track_id
         np.maximum(most, mass, out=most)
-    return owner
+    return ground_label
 
 
 def _measure(cells: Labels, track: Ints, person: Ints, label: Labels, log_odds: Singles, grid: Grid) -> Blobs:
-    n, everywhere = len(track), grid.ground
+    n, cell_ground = len(track), grid.ground
     occupied = label == np.append(0, track)[cells]
     occupied &= label != 0
     strength = np.where(occupied, np.nan_to_num(log_odds), 0.0)
@@ -72,9 +72,9 @@ def _measure(cells: Labels, track: Ints, person: Ints, label: Labels, log_odds: 
     for b in range(n):
         inside = cells == b + 1
         share = weight[inside] / weight[inside].sum()
-        places = everywhere[inside]
-        ground[b] = share @ places
-        spread = places - ground[b]
+        blob_ground = cell_ground[inside]
+        ground[b] = share @ blob_ground
+        spread = blob_ground - ground[b]
         covariance[b] = (spread * share[:, None]).T @ spread / max(inside.sum(), 1) + np.eye(2) * grid.cell**2 / 12
         extent[b] = inside.sum() * grid.cell**2
         planes = occupied[:, inside].any(1)
@@ -84,8 +84,8 @@ def _measure(cells: Labels, track: Ints, person: Ints, label: Labels, log_odds: 
 
 
 def _touches(cells: Labels) -> Ints:
-    """Pairs of blobs, counted from 0, that share one connected piece of ground, int64 (k, 2)."""
-    piece = connected(cells > 0, _EIGHT)[0]
-    members = np.unique(np.stack([piece[cells > 0], cells[cells > 0] - 1]), axis=1).T
+    """Pairs of blobs, from 0, in one connected component of the ground, int64 (k, 2)."""
+    component = connected(cells > 0, _EIGHT)[0]
+    members = np.unique(np.stack([component[cells > 0], cells[cells > 0] - 1]), axis=1).T
     pairs = {(int(a), int(b)) for i, a in members for j, b in members if i == j and a < b}
     return np.array(sorted(pairs), np.int64).reshape(-1, 2)

@@ -1,9 +1,9 @@
-"""Whose each occupied cell of a window is.
+"""Track labels of the occupied cells of a window.
 
-A connected piece of the cut's object in which one person stands is theirs. A piece in which several stand, at whatever
-frame, is divided by an expansion over the background, the tracks that are expected in this window, and a stranger. What
-the two-label cut calls background stays background, exactly: no label of a cell is worth more than u, and the smallest
-object of the greater gains holds every object of the smaller ones. So the pieces are all that need be moved.
+A connected component of the minimum cut with one detected track gets that track's label. A component with several, in
+whatever frames, is divided by expansion moves over the background, the tracks predicted in the window, and UNASSIGNED.
+Cells that the binary cut leaves empty stay empty, exactly: no label of a cell gains more than u, and the smallest
+source set of the greater gains contains those of smaller ones. So only the components need be expanded.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ from stseg.graphcut.energy import Energy
 from stseg.graphcut.expansion import expand
 from stseg.model.blobs import UNASSIGNED
 from stseg.model.predicted_places import PredictedPlaces
-from stseg.segmentation.unary import BodyShape, label_energy, shares
+from stseg.segmentation.unary import BodyShape, label_energy, track_shares
 
 
 @dataclass(frozen=True)
 class WindowDetections:
-    """Whom the passes of a window's frames found.
+    """Per-frame detections of a window.
 
     Attributes
     ----------
     ground : float64 (n, 2) for each frame
         Metres.
     track : int64 (n,) for each frame
-        Who they are.
+        Track of each detection.
     """
 
     ground: Sequence[Floats]
@@ -46,9 +46,9 @@ class WindowLabels:
     Attributes
     ----------
     label : int32 (time, plane, y, x)
-        Track of each cell, UNASSIGNED where it is nobody's known, 0 for background.
+        Track of each cell, UNASSIGNED without one, 0 for background.
     cells
-        Number of cells that were divided by an expansion; 0 where nobody touches.
+        Number of cells divided by expansion moves; 0 where no two tracks touch.
     """
 
     label: Labels
@@ -56,73 +56,82 @@ class WindowLabels:
 
 
 def label_cells(
-    energy: Energy, occupied: Flags, found: WindowDetections, places: PredictedPlaces, pillar: BodyShape, grid: Grid
+    energy: Energy,
+    occupied: Flags,
+    detections: WindowDetections,
+    predicted: PredictedPlaces,
+    body: BodyShape,
+    grid: Grid,
 ) -> WindowLabels:
-    """Give every occupied cell to a track or to a stranger.
+    """Label every occupied cell by a track or as UNASSIGNED.
 
     Parameters
     ----------
     energy, occupied
-        Of the window, and its minimum cut, bool (time, plane, y, x).
-    found
-        The people of its frames; their tracks are all among the places.
+        Energy of the window and its minimum cut, bool (time, plane, y, x).
+    detections
+        Of its frames; their tracks are all among those predicted.
+    predicted
+        Places of tracks in its frames.
+    body
+        Extent of a body.
     """
-    part = subset(energy, occupied)
-    if not len(part.cell):
+    subgraph = subset(energy, occupied)
+    if not len(subgraph.cell):
         return WindowLabels(np.zeros(occupied.shape, np.int32), 0)
-    piece = part.components()
-    stands, elsewhere = _who_stands(part, piece, occupied, found, places, pillar.reach, grid)
-    number = stands.sum(1)
-    names = np.append(places.track, UNASSIGNED)
-    labels = names[np.where(number == 1, np.argmax(np.column_stack([stands, number != 1]), 1), -1)][piece]
-    touching = number[piece] > 1
+    component = subgraph.components()
+    occupied_by, displaced = _occupants(subgraph, component, occupied, detections, predicted, body.reach, grid)
+    count = occupied_by.sum(1)
+    track_ids = np.append(predicted.track, UNASSIGNED)
+    labels = track_ids[np.where(count == 1, np.argmax(np.column_stack([occupied_by, count != 1]), 1), -1)][component]
+    touching = count[component] > 1
     if touching.any():
-        here = replace(places, expected=places.expected & ~elsewhere)
-        labels[touching] = _divided(energy, part.only(touching), here, pillar, grid)
+        present = replace(predicted, expected=predicted.expected & ~displaced)
+        labels[touching] = _expanded(energy, subgraph.only(touching), present, body, grid)
     label = np.zeros(occupied.shape, np.int32)
-    label.flat[part.cell] = labels
+    label.flat[subgraph.cell] = labels
     return WindowLabels(label, int(touching.sum()))
 
 
-def _divided(energy: Energy, part: CellSubset, places: PredictedPlaces, pillar: BodyShape, grid: Grid) -> Ints:
-    """The track of each of a part's cells, UNASSIGNED or 0, int64 (n,)."""
-    frame, plane, y, x = np.unravel_index(part.cell, energy.unary.shape)
-    share = shares(frame, grid.ground[y, x], grid.heights[plane], places, pillar)
-    problem = label_energy(energy.unary.ravel()[part.cell], share, part)
-    names = np.concatenate([[0], places.track, [UNASSIGNED]])
-    return np.asarray(names[expand(problem, problem.cheapest_labels())])
+def _expanded(energy: Energy, subgraph: CellSubset, predicted: PredictedPlaces, body: BodyShape, grid: Grid) -> Ints:
+    """Track of each cell of a subgraph, UNASSIGNED or 0, by expansion moves, int64 (n,)."""
+    frame, plane, y, x = np.unravel_index(subgraph.cell, energy.unary.shape)
+    share = track_shares(frame, grid.ground[y, x], grid.heights[plane], predicted, body)
+    problem = label_energy(energy.unary.ravel()[subgraph.cell], share, subgraph)
+    track_ids = np.concatenate([[0], predicted.track, [UNASSIGNED]])
+    return np.asarray(track_ids[expand(problem, problem.cheapest_labels())])
 
 
-def _who_stands(
-    part: CellSubset,
-    piece: Ints,
+def _occupants(
+    subgraph: CellSubset,
+    component: Ints,
     occupied: Flags,
-    found: WindowDetections,
-    places: PredictedPlaces,
+    detections: WindowDetections,
+    predicted: PredictedPlaces,
     reach: float,
     grid: Grid,
 ) -> tuple[Flags, Flags]:
-    """Which tracks stand in which connected piece at some frame, and which were seen off all of them.
+    """Tracks detected in each component, and tracks detected outside all components in a frame.
 
-    Somebody stands in what is occupied above the nearest occupied ground cell within half a reach.
+    A detection is in the components above the nearest occupied ground cell within half a reach.
 
     Returns
     -------
-    bool (piece, k), bool (time, k)
+    bool (component, k), bool (time, k)
     """
-    stands = np.zeros((int(piece.max()) + 1, len(places.track)), bool)
-    elsewhere = np.zeros_like(places.expected)
+    occupied_by = np.zeros((int(component.max()) + 1, len(predicted.track)), bool)
+    displaced = np.zeros_like(predicted.expected)
     volume = np.full(occupied.shape, -1, np.int64)
-    volume.flat[part.cell] = piece
-    everywhere = grid.ground
-    for t, (ground, track) in enumerate(zip(found.ground, found.track, strict=True)):
+    volume.flat[subgraph.cell] = component
+    cell_ground = grid.ground
+    for t, (ground, track) in enumerate(zip(detections.ground, detections.track, strict=True)):
         rows, columns = np.nonzero(occupied[t].any(0))
-        cells_ground = everywhere[rows, columns]
-        for place, k in zip(ground, np.searchsorted(places.track, track), strict=True):
-            away = np.hypot(*(cells_ground - place).T)
-            if away.min(initial=np.inf) > reach / 2:
-                elsewhere[t, k] = True
+        cells_ground = cell_ground[rows, columns]
+        for detection_ground, k in zip(ground, np.searchsorted(predicted.track, track), strict=True):
+            distance = np.hypot(*(cells_ground - detection_ground).T)
+            if distance.min(initial=np.inf) > reach / 2:
+                displaced[t, k] = True
                 continue
-            above = volume[t, :, rows[away.argmin()], columns[away.argmin()]]
-            stands[above[above >= 0], k] = True
-    return stands, elsewhere
+            above = volume[t, :, rows[distance.argmin()], columns[distance.argmin()]]
+            occupied_by[above[above >= 0], k] = True
+    return occupied_by, displaced

@@ -1,15 +1,15 @@
-"""What it costs to say whose a cell is: the labels of an expansion (METHODS 4).
+"""Unary terms of track labels (docs/how-it-works.md, Energy).
 
     D_p(k) = -u(p) - log share_p(k),     sum_k share_p(k) = 1
 
-u says whether there is a body at the cell, the share says whose it is. So dividing cells costs nothing where only one
-body is near, and the labels together are worth what the two-label cut's object was worth.
+u decides whether the cell is occupied, the share by which track. Where one body is near its share is 1: division costs
+nothing, and the labels have the energy of the binary cut.
 
     share_p(k)  ~  N(p; m_k, S_k + R^2/4) / N(0; 0, R^2/4)  *  exp(-(z_p - h_k)^2 / (2 s^2)) above the head
 
-m_k and S_k are where the body of track k is expected in the cell's frame and how surely; R^2/4 is the variance of a
-disc of radius R, the reach of a body's cells around its place. A stranger, whom no track tells of, may be anywhere: of
-every cell their share is as pi, the share of cells that a body fills where nobody is known.
+m_k and S_k are predicted place and covariance of track k in the cell's frame; R^2/4 is the variance of a disc of radius
+R, the reach of a body's cells around its place. An unknown body may be anywhere: UNASSIGNED weighs pi at every cell,
+the prior share of occupied cells.
 """
 
 from __future__ import annotations
@@ -27,109 +27,109 @@ from stseg.graphcut.expansion import LabelEnergy
 from stseg.model.predicted_places import PredictedPlaces
 
 _GATE = 13.8
-"""Squared Mahalanobis distance beyond which a cell is not of a body: one of its cells in a thousand."""
+"""Gate: squared Mahalanobis distance that one cell of a body in a thousand exceeds."""
 
 
 @dataclass(frozen=True)
 class BodyShape:
-    """What is known of every body.
+    """Extent of every body.
 
     Attributes
     ----------
     reach
-        R: how far from a person's place their cells reach, metres.
+        R: reach of a body's cells around its place, metres.
     height_spread
-        s: how far off the height of a head is, metres (standard deviation).
-    stranger
-        pi: share of cells that a body fills where nobody is known, 0..1.
+        s: standard deviation of a head's height, metres.
+    prior_share
+        pi: prior share of occupied cells, 0..1.
     """
 
     reach: float
     height_spread: float
-    stranger: float
+    prior_share: float
 
 
-def shares(
+def track_shares(
     frame: Ints,
     ground: Floats,
     height: Floats,
-    places: PredictedPlaces,
-    pillar: BodyShape,
+    predicted: PredictedPlaces,
+    body: BodyShape,
     appearance: Floats | None = None,
 ) -> Floats:
-    """Whose body each cell is of, if it is of a body at all.
+    """Share of each track in each cell, given that the cell is occupied.
 
     Parameters
     ----------
     frame : int64 (n,)
         Frame of each cell, counted from the window's first.
     ground, height : float64 (n, 2), (n,)
-        Of the cells, metres.
+        Places and heights of the cells, metres.
     appearance : float64 (n, k), optional
-        How much likelier what is seen at a cell is on each track's body than on anybody's, nats.
+        Log-likelihood ratio of a cell's appearance under each track against any body, nats.
 
     Returns
     -------
     float64 (n, k + 1)
-        Of each track and, last, of a stranger; 0 where a body is out of reach. Rows sum to one.
+        Of each track and, last, of UNASSIGNED; 0 outside the gate. Rows sum to one.
     """
-    body = pillar.reach**2 / 4
-    spread = places.covariance + body * np.eye(2)
-    wide = 0.5 * np.log(np.linalg.det(spread)) - math.log(body)
-    weight = np.zeros((len(frame), len(places.track) + 1)) if appearance is None else _with_stranger(appearance)
+    disc = body.reach**2 / 4
+    spread = predicted.covariance + disc * np.eye(2)
+    log_volume = 0.5 * np.log(np.linalg.det(spread)) - math.log(disc)
+    weight = np.zeros((len(frame), len(predicted.track) + 1)) if appearance is None else _with_unassigned(appearance)
     precision: Floats = np.asarray(np.linalg.inv(spread), float)
-    _fill_weights(
-        frame, ground, height, places.expected, places.ground, precision, wide, places.height,
-        pillar.height_spread, weight,
+    _fill_log_weights(
+        frame, ground, height, predicted.expected, predicted.ground, precision, log_volume, predicted.height,
+        body.height_spread, weight,
     )  # fmt: skip
-    weight[:, -1] = math.log(pillar.stranger)
+    weight[:, -1] = math.log(body.prior_share)
     share = np.exp(weight - weight.max(1, keepdims=True))
     return np.asarray(share / share.sum(1, keepdims=True))
 
 
-def label_energy(unary: Ints | Labels, share: Floats, part: CellSubset) -> LabelEnergy:
-    """The energy of dividing a part of a window.
+def label_energy(unary: Ints | Labels, share: Floats, subgraph: CellSubset) -> LabelEnergy:
+    """Energy of the division of a subgraph.
 
     Parameters
     ----------
     unary : int32 or int64 (n,)
-        u of the part's cells, quanta.
+        u of its cells, quanta.
     share : float64 (n, k + 1)
-        As `shares` returns; label j + 1 has column j. Labels without a share are not admissible.
+        As `track_shares` returns; column j has label j + 1. Labels with share 0 are inadmissible.
     """
     cell, column = np.nonzero(share)
     penalty = np.rint(-np.log(share[cell, column]) / QUANTUM).astype(np.int64)
     first = np.append(0, np.cumsum(np.bincount(cell, minlength=len(unary))))
-    cost = penalty - unary[cell] + part.border[cell]
-    return LabelEnergy(first, column + 1, cost, part.start, part.end, part.weight)
+    cost = penalty - unary[cell] + subgraph.border[cell]
+    return LabelEnergy(first, column + 1, cost, subgraph.start, subgraph.end, subgraph.weight)
 
 
-def _with_stranger(appearance: Floats) -> Floats:
+def _with_unassigned(appearance: Floats) -> Floats:
     return np.column_stack([appearance, np.zeros(len(appearance))])
 
 
 @kernel
-def _fill_weights(
+def _fill_log_weights(
     frame: Ints,
     ground: Floats,
     height: Floats,
     expected: Flags,
-    place: Floats,
+    predicted_ground: Floats,
     precision: Floats,
-    wide: Floats,
-    head: Floats,
+    log_volume: Floats,
+    head_height: Floats,
     height_spread: float,
     weight: Floats,
 ) -> None:
-    """Add the logarithms of the tracks' weights to weight (n, k + 1), nats; -inf where a body is out of reach."""
+    """Add the tracks' log-weights to weight (n, k + 1), nats; -inf outside the gate."""
     for i in range(len(frame)):
         t = frame[i]
-        for k in range(place.shape[1]):
-            dx, dy = ground[i, 0] - place[t, k, 0], ground[i, 1] - place[t, k, 1]
-            way = precision[t, k]
-            square = way[0, 0] * dx * dx + (way[0, 1] + way[1, 0]) * dx * dy + way[1, 1] * dy * dy
+        for k in range(predicted_ground.shape[1]):
+            dx, dy = ground[i, 0] - predicted_ground[t, k, 0], ground[i, 1] - predicted_ground[t, k, 1]
+            inverse = precision[t, k]
+            square = inverse[0, 0] * dx * dx + (inverse[0, 1] + inverse[1, 0]) * dx * dy + inverse[1, 1] * dy * dy
             if not expected[t, k] or square > _GATE:
                 weight[i, k] = -np.inf
                 continue
-            above = max(height[i] - head[t, k], 0.0) / height_spread
-            weight[i, k] -= 0.5 * square + wide[t, k] + 0.5 * above * above
+            above = max(height[i] - head_height[t, k], 0.0) / height_spread
+            weight[i, k] -= 0.5 * square + log_volume[t, k] + 0.5 * above * above
