@@ -16,7 +16,7 @@ from stseg.io.recording.recording import CameraSource, Recording, Source
 from stseg.io.recording.rig_text import format_rig
 
 FRAMES = 40
-OPTIONS = ("--set", "segments.length=1", "--set", "segments.warm_up=1", "--set", "ghosts.lattice=0.25")
+OPTIONS = ("--set", "segments.length=1", "--set", "segments.warm_up=1", "--set", "detection.lattice_spacing=0.25")
 """Segments of six frames."""
 ENVIRONMENT = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
 

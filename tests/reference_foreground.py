@@ -31,19 +31,19 @@ def log_odds(
     out = np.empty(image.shape[:2])
     for v, u in np.ndindex(*out.shape):
         lit, dimmed = 0.0, 0.0
-        for k in np.flatnonzero(weight[v, u] >= config.share):
+        for k in np.flatnonzero(weight[v, u] >= config.background_weight):
             mu = np.minimum(gain * mean[v, u, k].astype(float), 255.0)
-            n, d = mode_densities(image[v, u].astype(float), mu, float(variance[v, u, k]), config.darkest)
+            n, d = mode_densities(image[v, u].astype(float), mu, float(variance[v, u, k]), config.darkest_shadow)
             lit, dimmed = lit + float(weight[v, u, k]) * n, dimmed + float(weight[v, u, k]) * d
-        out[v, u] = posterior((1 - config.shadow) * lit + config.shadow * dimmed, dimmed, config)
+        out[v, u] = posterior((1 - config.shadow_prior) * lit + config.shadow_prior * dimmed, dimmed, config)
     return out
 
 
 def posterior(explained: float, dimmed: float, config: BackgroundConfig) -> float:
     """Log-odds of a person, within 5 nats."""
-    scene = (1 - config.unexplained) * explained + config.unexplained * UNIFORM
-    person = (1 - config.mimicry) * UNIFORM + config.mimicry * dimmed
-    odds = config.foreground * person / ((1 - config.foreground) * scene)
+    scene = (1 - config.outlier_rate) * explained + config.outlier_rate * UNIFORM
+    person = (1 - config.shadow_confusion) * UNIFORM + config.shadow_confusion * dimmed
+    odds = config.foreground_prior * person / ((1 - config.foreground_prior) * scene)
     return float(np.clip(math.log(odds), -5, 5))
 
 
@@ -63,15 +63,15 @@ def updated(
         residual = x - np.minimum(gain * mean[v, u], 255.0)
         mahalanobis = np.where(w > 0, (residual**2).sum(-1) / variance[v, u], np.inf)
         k = int(mahalanobis.argmin())
-        if mahalanobis[k] <= config.match**2:
-            rate = slow if w[k] < config.share else slow * likelihood[v, u] + fast * (1 - likelihood[v, u])
+        if mahalanobis[k] <= config.match_distance**2:
+            rate = slow if w[k] < config.background_weight else slow * likelihood[v, u] + fast * (1 - likelihood[v, u])
             w *= 1 - rate
             w[k] += rate
             step = min(rate / w[k], 1)
             mean[v, u, k] += step * residual[k] / gain
             variance[v, u, k] += step * ((residual[k] ** 2).mean() - variance[v, u, k])
             variance[v, u, k] = max(variance[v, u, k], config.minimum_sd**2)
-        elif likelihood[v, u] >= 0.5 and w.min() < config.share:
+        elif likelihood[v, u] >= 0.5 and w.min() < config.background_weight:
             k = int(w.argmin())
             w *= 1 - slow
             w[k], variance[v, u, k], mean[v, u, k] = slow, config.initial_sd**2, x / gain
@@ -106,12 +106,12 @@ def chromatic_log_odds(
     out = np.empty(image.shape[:2])
     for v, u in np.ndindex(*out.shape):
         lit, dimmed = 0.0, 0.0
-        for k in np.flatnonzero(weight[v, u] >= config.share):
+        for k in np.flatnonzero(weight[v, u] >= config.background_weight):
             mu = np.minimum(gain * mean[v, u, k].astype(float), 255.0)
             across, along = variance[v, u, k].astype(float)
-            n, d = chromatic_densities(image[v, u].astype(float), mu, across, along, config.darkest)
+            n, d = chromatic_densities(image[v, u].astype(float), mu, across, along, config.darkest_shadow)
             lit, dimmed = lit + float(weight[v, u, k]) * n, dimmed + float(weight[v, u, k]) * d
-        out[v, u] = posterior((1 - config.shadow) * lit + config.shadow * dimmed, dimmed, config)
+        out[v, u] = posterior((1 - config.shadow_prior) * lit + config.shadow_prior * dimmed, dimmed, config)
     return out
 
 
@@ -135,15 +135,15 @@ def chromatic_updated(
             squares[k] = off**2, ((ratio - 1) * length) ** 2
         mahalanobis = np.where(w > 0, (squares / variance[v, u]).sum(-1), np.inf)
         k = int(mahalanobis.argmin())
-        if mahalanobis[k] <= config.match**2:
-            rate = slow if w[k] < config.share else slow * likelihood[v, u] + fast * (1 - likelihood[v, u])
+        if mahalanobis[k] <= config.match_distance**2:
+            rate = slow if w[k] < config.background_weight else slow * likelihood[v, u] + fast * (1 - likelihood[v, u])
             w *= 1 - rate
             w[k] += rate
             step = min(rate / w[k], 1)
             mean[v, u, k] += step * (x - np.minimum(gain * mean[v, u, k], 255.0)) / gain
             variance[v, u, k] += step * (squares[k] / (2, 1) - variance[v, u, k])
             variance[v, u, k] = np.maximum(variance[v, u, k], least)
-        elif likelihood[v, u] >= 0.5 and w.min() < config.share:
+        elif likelihood[v, u] >= 0.5 and w.min() < config.background_weight:
             k = int(w.argmin())
             w *= 1 - slow
             w[k], variance[v, u, k], mean[v, u, k] = slow, config.initial_sd**2, x / gain
@@ -155,13 +155,15 @@ def codeword_densities(
 ) -> tuple[float, float, float]:
     """Densities of a codeword as it was seen, in shadow and in highlight, of `stseg.foreground.codebook`."""
     ratio, off, length = polar(x, mu)
-    var, span = config.noise**2, math.sqrt(2 * math.pi) * config.noise
+    var, span = config.channel_sd**2, math.sqrt(2 * math.pi) * config.channel_sd
     disc = gaussian(off, var) / (2 * math.pi * var)
     lit = gaussian(max(low - ratio, ratio - high, 0) * length, var) / ((high - low) * length + span)
-    t = float(np.clip((ratio / low - config.darkest) / (1 - config.darkest), 0, 1))
-    shadow = 2 * t * gaussian(max(ratio - low, 0) * length, var) / ((1 - config.darkest) * low * length + span)
-    t = float(np.clip((config.brightest - ratio / high) / (config.brightest - 1), 0, 1))
-    bright = 2 * t * gaussian(max(high - ratio, 0) * length, var) / ((config.brightest - 1) * high * length + span)
+    t = float(np.clip((ratio / low - config.darkest_shadow) / (1 - config.darkest_shadow), 0, 1))
+    shadow = 2 * t * gaussian(max(ratio - low, 0) * length, var) / ((1 - config.darkest_shadow) * low * length + span)
+    t = float(np.clip((config.brightest_highlight - ratio / high) / (config.brightest_highlight - 1), 0, 1))
+    bright = (
+        2 * t * gaussian(max(high - ratio, 0) * length, var) / ((config.brightest_highlight - 1) * high * length + span)
+    )
     return disc * lit, disc * shadow, disc * bright
 
 
@@ -177,7 +179,9 @@ def codebook_log_odds(
             low, high = bounds[v, u, k].astype(float)
             own = codeword_densities(image[v, u].astype(float), mu, low, high, config)
             parts += weight[v, u, k] / weight[v, u].sum() * np.array(own)
-        priors = np.array([1 - config.shadow - config.highlight, config.shadow, config.highlight])
+        priors = np.array(
+            [1 - config.shadow_prior - config.highlight_prior, config.shadow_prior, config.highlight_prior]
+        )
         out[v, u] = posterior(float(parts @ priors), float(parts[1]), config)
     return out
 

@@ -44,17 +44,17 @@ def dense(shown: LabelLikelihood) -> Floats:
 def adjacency(one: Bytes, other: Bytes, config: LabelConfig) -> float:
     """c2 max(g, 0) of two colours, nats."""
     difference = float(np.linalg.norm(one.astype(float) - other.astype(float)))
-    sigmoid = 1 / (1 + np.exp((difference - config.alike) / config.slope))
-    return config.adjacency * max(2 * float(sigmoid) - 1, 0.0)
+    sigmoid = 1 / (1 + np.exp((difference - config.contrast_limit) / config.contrast_slope))
+    return config.boundary_weight * max(2 * float(sigmoid) - 1, 0.0)
 
 
 def energy(label: Ints, foreground: Singles, image: Bytes, shares: Floats, config: LabelConfig) -> float:
     """E of a labelling (v, u) of a window, nats."""
-    total, least = 0.0, config.outside / len(shares)
+    total, least = 0.0, config.outlier_rate / len(shares)
     rows, columns = label.shape
     for v, u in product(range(rows), range(columns)):
         q, own = foreground[v, u], label[v, u]
-        total += config.detection * (q if own == 0 else 1 - q) - np.log(shares[own, v, u] + least)
+        total += config.foreground_weight * (q if own == 0 else 1 - q) - np.log(shares[own, v, u] + least)
         for to_v, to_u in ((v, u + 1), (v + 1, u)):
             if to_v < rows and to_u < columns and label[to_v, to_u] != own:
                 total += adjacency(image[v, u], image[to_v, to_u], config)

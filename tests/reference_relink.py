@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from stseg.config import GhostConfig, IdentityConfig
+from stseg.config import DetectionConfig, TrackingConfig
 from stseg.tracking.isolated_tracklets import IsolatedTracklet
 
 TURN, STAYS, PARTED = 0.8, 3.0, 6.0
@@ -22,15 +22,15 @@ def gain(
     b: IsolatedTracklet,
     inside: float,
     frame_rate: float,
-    config: IdentityConfig,
-    people: GhostConfig,
+    config: TrackingConfig,
+    people: DetectionConfig,
 ) -> float:
     """What speaks for one person in both, nats; `inside` is the mean of how far inside they part."""
     seconds = (b.start.frame - a.end.frame) / frame_rate
-    if seconds <= 0 or seconds > config.reunion:
+    if seconds <= 0 or seconds > config.maximum_gap:
         return -np.inf
     speeds = a.end.velocity_variance + b.start.velocity_variance
-    variance = 2 * config.place_noise**2 + seconds**2 * speeds / 4 + TURN**2 * seconds**3 / 12
+    variance = 2 * config.position_noise**2 + seconds**2 * speeds / 4 + TURN**2 * seconds**3 / 12
     total = PARTED * inside + (STAYS if a.track == b.track else 0.0)
     for axis in range(2):
         walked = seconds * (a.end.velocity[axis] + b.start.velocity[axis]) / 2

@@ -14,7 +14,7 @@ from stseg.io.runfile.runs import RunWriter
 from stseg.model.tables import BOX, EVENT, RATES, TIMING, TRAJECTORY, WINDOW, Tracks
 
 FRAMES = np.arange(10, 16)
-CONFIG = "[ghosts]\nperson = -3.0\n"
+CONFIG = "[detection]\nprior_log_odds = -3.0\n"
 _ABOVE = np.array([[10.0, 0.0, -8.0, 34.0], [0.0, -10.0, -6.0, 34.0], [0.0, 0.0, -1.0, 5.0]])
 
 

@@ -9,13 +9,13 @@ from hypothesis import strategies as st
 from strategies import numbers
 
 from stseg.arrays import Rows
-from stseg.config import GhostConfig, IdentityConfig
+from stseg.config import DetectionConfig, TrackingConfig
 from stseg.geometry import Grid
 from stseg.model.border import Border
 from stseg.model.tables import TRAJECTORY
 
 RATE = 8.0
-CONFIG, PEOPLE = IdentityConfig(), GhostConfig()
+CONFIG, PEOPLE = TrackingConfig(), DetectionConfig()
 GRID = Grid((-6.0, 6.0), (-6.0, 6.0), cell=0.25, planes=2)
 Path = Callable[[float], tuple[float, float]]
 """Where somebody is at a time in seconds, metres."""

@@ -12,7 +12,7 @@ import pytest
 from scenes import CONFIG, box_moments, room, walkers
 
 from stseg.accelerate import python_form
-from stseg.config import IdentityConfig
+from stseg.config import TrackingConfig
 from stseg.detection.scoring import set_score
 from stseg.engine.pipeline import Pipeline
 from stseg.engine.session import run_session
@@ -40,18 +40,18 @@ def test_components_are_linked_within_walking_distance(plain_methods: ModuleType
     found = [np.array([[0.1 * t, 0.0], [1.0 - 0.1 * t, 0.8]]) for t in range(8)]
     found[3] = found[3][1:]
     found[5] = np.concatenate([found[5][::-1], [[3.0, 3.0]]])
-    table = plain_methods.link(found, 10, replace(room(), frame_rate=8.0), IdentityConfig())
+    table = plain_methods.link(found, 10, replace(room(), frame_rate=8.0), TrackingConfig())
     assert table["frame"].tolist() == sorted(10 + t for t in range(8) for _ in found[t])
     assert table["id"].tolist() == [1, 2, 1, 2, 1, 2, 2, 1, 2, 2, 1, 3, 1, 2, 1, 2]
 
 
 def test_an_absence_beyond_patience_ends_a_track(plain_methods: ModuleType) -> None:
     nothing, here = np.zeros((0, 2)), np.zeros((1, 2))
-    patience = IdentityConfig().patience
+    patience = TrackingConfig().patience
     for away, names in ((int(8 * patience) - 1, [1, 1]), (int(8 * patience) + 1, [1, 2])):
         found = [here, *[nothing] * away, here]
-        assert plain_methods.link(found, 0, room(), IdentityConfig())["id"].tolist() == names
-    assert len(plain_methods.link([nothing, nothing], 0, room(), IdentityConfig())) == 0
+        assert plain_methods.link(found, 0, room(), TrackingConfig())["id"].tolist() == names
+    assert len(plain_methods.link([nothing, nothing], 0, room(), TrackingConfig())) == 0
 
 
 @pytest.mark.skipif(INTERPRETED, reason="a whole run needs the compiler")

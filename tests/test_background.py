@@ -72,7 +72,7 @@ def in_shadow(share: float) -> tuple[float, float, float]:
 
 @every_model
 def test_the_likelihood_is_a_posterior_with_the_prior_that_is_told(kind: type[PixelModel]) -> None:
-    model: Background = taught(kind, foreground=0.2)
+    model: Background = taught(kind, foreground_prior=0.2)
     assert model.prior == 0.2
     likelihood = model.likelihood(with_person(room()))
     assert likelihood.dtype == np.float32
@@ -114,7 +114,7 @@ def test_a_part_of_the_scene_may_change_slowly(kind: type[PixelModel]) -> None:
 
 @every_model
 def test_a_chair_that_moved_in_becomes_background_after_the_absorption(kind: type[PixelModel]) -> None:
-    model, rng = taught(kind, absorption=20.0, radius=0), np.random.default_rng(6)
+    model, rng = taught(kind, absorption_time=20.0, smoothing_radius=0), np.random.default_rng(6)
     chair = with_person(room())
     answers = [float(model.likelihood(noisy(chair, rng))[MIDDLE]) for _ in range(int(24 * RATE))]
     assert min(answers[: int(19 * RATE)]) > 0.9
@@ -183,7 +183,7 @@ def test_black_and_white_scenes_are_scenes_too(kind: type[PixelModel], level: in
 def test_a_copy_goes_on_bit_for_bit_and_by_itself(kind: type[PixelModel]) -> None:
     rng = np.random.default_rng(7)
     frames = [noisy(with_person(room()) if k % 3 else room(), rng, 4.0) for k in range(24)]
-    whole, first = taught(kind, absorption=3.0), taught(kind, absorption=3.0)
+    whole, first = taught(kind, absorption_time=3.0), taught(kind, absorption_time=3.0)
     expected = [whole.likelihood(frame) for frame in frames]
     for frame in frames[:9]:
         first.likelihood(frame)
@@ -212,7 +212,7 @@ def test_every_registered_model_can_be_configured() -> None:
 
 
 def test_the_configuration_names_the_model() -> None:
-    config = ForegroundConfig(codebook=CodebookConfig(noise=7.0), memory=9.0)
+    config = ForegroundConfig(codebook=CodebookConfig(channel_sd=7.0), memory=9.0)
     kinds = {name: type(make_background(SIZE, RATE, replace(config, model=name))) for name in ("chromatic", "codebook")}
     assert kinds == {"chromatic": Chromatic, "codebook": Codebook}
     mixture = make_background(SIZE, RATE, replace(config, model="mixture"))
@@ -220,7 +220,7 @@ def test_the_configuration_names_the_model() -> None:
     assert mixture.config.memory == 9.0
     codebook = make_background(SIZE, RATE, replace(config, model="codebook"))
     assert isinstance(codebook, Codebook)
-    assert codebook.config.noise == 7.0
+    assert codebook.config.channel_sd == 7.0
     assert isinstance(make_background(SIZE, RATE, config), PixelModel)
 
 
@@ -229,10 +229,10 @@ def test_the_configuration_names_the_model() -> None:
     [
         (ChromaticConfig, "chromatic_sd", 0.0),
         (CodebookConfig, "codewords", 0),
-        (CodebookConfig, "brightest", 1.0),
+        (CodebookConfig, "brightest_highlight", 1.0),
         (CodebookConfig, "recurrence", 1.0),
         (CodebookConfig, "absence", 0.0),
-        (CodebookConfig, "noise", 0.0),
+        (CodebookConfig, "channel_sd", 0.0),
         (CodebookConfig, "memory", 0.0),
     ],
 )
@@ -257,7 +257,7 @@ def test_the_distance_from_the_ray_is_the_mahalanobis_distance_in_the_chromatic_
 
 def test_where_light_flickers_a_person_as_bright_as_the_wall_is_found_by_colour() -> None:
     rng = np.random.default_rng(9)
-    models = [new(Mixture, radius=0), new(Chromatic, radius=0)]
+    models = [new(Mixture, smoothing_radius=0), new(Chromatic, smoothing_radius=0)]
     for _ in range(40):
         light = np.clip(rng.normal(1, 0.1), 0.8, 1.2)
         flickering = np.where(np.indices((SIZE[1], SIZE[0]))[1][..., None] < 4, light, 1.0)  # no gain of the whole view
@@ -295,7 +295,14 @@ def test_the_chromatic_log_odds_are_their_formula(seed: int, modes: int) -> None
     rng = np.random.default_rng(seed)
     state, config = random_modes(rng, modes), ChromaticConfig()
     image, gain = near_modes(rng, state[0]), rng.uniform(0.8, 1.25, 3)
-    priors = config.share, config.foreground, config.unexplained, config.shadow, config.darkest, config.mimicry
+    priors = (
+        config.background_weight,
+        config.foreground_prior,
+        config.outlier_rate,
+        config.shadow_prior,
+        config.darkest_shadow,
+        config.shadow_confusion,
+    )
     expected = reference.chromatic_log_odds(image, gain, *state, config)
     log_odds = np.empty(image.shape[:2], np.float32)
     for function in (chromatic_kernels.evaluate, python_form(chromatic_kernels.evaluate)):
@@ -314,8 +321,8 @@ def test_the_chromatic_modes_learn_by_their_rules(seed: int, modes: int) -> None
     for function in (chromatic_kernels.update, python_form(chromatic_kernels.update)):
         found = state[0].copy(), state[1].copy(), state[2].copy()
         function(
-            image, gain, likelihood, np.float32(0.05), np.float32(0.001), np.float32(config.share),
-            np.float32(config.match), np.float32(config.chromatic_sd), np.float32(config.minimum_sd),
+            image, gain, likelihood, np.float32(0.05), np.float32(0.001), np.float32(config.background_weight),
+            np.float32(config.match_distance), np.float32(config.chromatic_sd), np.float32(config.minimum_sd),
             np.float32(config.initial_sd), *found,
         )  # fmt: skip
         for one, other in zip(found, expected, strict=True):
@@ -342,7 +349,7 @@ def test_brightness_between_the_bounds_is_background() -> None:
 
 
 def test_somebody_who_comes_and_goes_is_never_absorbed() -> None:
-    model, rng = taught(Codebook, absorption=20.0, absence=3.0), np.random.default_rng(10)
+    model, rng = taught(Codebook, absorption_time=20.0, absence=3.0), np.random.default_rng(10)
     for second in range(80):  # there for ten seconds, away for five
         seen = with_person(room()) if second % 15 < 10 else room()
         for _ in range(int(RATE)):
@@ -351,7 +358,7 @@ def test_somebody_who_comes_and_goes_is_never_absorbed() -> None:
 
 
 def test_what_was_learned_first_is_never_forgotten() -> None:
-    model = taught(Codebook, absorption=5.0, memory=5.0, radius=0)
+    model = taught(Codebook, absorption_time=5.0, memory=5.0, smoothing_radius=0)
     for _ in range(int(60 * RATE)):
         model.likelihood(with_person(room()))
     assert model.likelihood(with_person(room()))[MIDDLE] < 0.05  # the chair
@@ -420,8 +427,9 @@ def test_the_codebooks_log_odds_are_their_formula(seed: int, words: int) -> None
     log_odds = np.empty(image.shape[:2], np.float32)
     for function in (codebook_kernels.evaluate, python_form(codebook_kernels.evaluate)):
         function(
-            image, gain, mean, bounds, weight, config.foreground, config.unexplained, config.shadow, config.highlight,
-            config.darkest, config.brightest, config.mimicry, config.noise, log_odds,
+            image, gain, mean, bounds, weight, config.foreground_prior, config.outlier_rate, config.shadow_prior,
+            config.highlight_prior, config.darkest_shadow, config.brightest_highlight, config.shadow_confusion,
+            config.channel_sd, log_odds,
         )  # fmt: skip
         np.testing.assert_allclose(log_odds, expected, atol=5e-3)
 

@@ -35,7 +35,7 @@ RIG = room()
 VIEWS = [StarView.of(camera, RIG.grid) for camera in RIG.cameras]
 INTERPRETED = python_form(fill_origin) is fill_origin
 MOTION = Motion(1 / FRAME_RATE, 0.5, 0.8)
-FEW = BeliefConfig(count=30)
+FEW = BeliefConfig(particles=30)
 SHIRTS = ((40, 40, 200), (200, 60, 40), (50, 170, 60))
 """BGR of the clothes of three people."""
 FLOOR = (120, 128, 134)
@@ -397,7 +397,7 @@ def test_each_view_by_itself_is_worse_where_one_sees_nothing() -> None:
     """The ablation: a view whose picture is blank takes its fused place along; messages do not."""
     away = {}
     for way in ("messages", "condensation"):
-        config = replace(FEW, way=way)
+        config = replace(FEW, method=way)
         tracker = BeliefTracker(RIG, replace(CONFIG, belief=config), 0)
         for frame in range(5 if INTERPRETED else 10):
             standing = people((-0.8 + 0.12 * frame, 0.2))
@@ -419,6 +419,13 @@ def test_without_colour_it_says_what_it_lacks(observation: Observation) -> None:
 
 
 def test_constants_out_of_range_are_refused() -> None:
-    for wrong in ({"count": 1}, {"rounds": 0}, {"outlier": 1.0}, {"doubt": 0.0}, {"sharpness": 0.0}, {"seed": -1}):
+    for wrong in (
+        {"particles": 1},
+        {"iterations": 0},
+        {"outlier_rate": 1.0},
+        {"neutral_distance": 0.0},
+        {"colour_weight": 0.0},
+        {"seed": -1},
+    ):
         with pytest.raises(ConfigError):
             BeliefConfig(**wrong)

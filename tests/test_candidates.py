@@ -26,7 +26,7 @@ from scenes import (
 )
 
 from stseg.arrays import Floats, ViewEvidence
-from stseg.config import DetectionConfig
+from stseg.config import ProposalConfig
 from stseg.detection.detector import Detector
 from stseg.detection.proposals import Fuse, Proposals, marginal
 from stseg.engine.pipeline import Pipeline
@@ -41,7 +41,7 @@ Asked = Literal["lattice", "probability", "volume", "both"]
 VIEWS = corner_cameras()
 RIG = rig_of(VIEWS, cell=0.2, planes=5)
 STANDING = people((-1.0, -0.6), (0.9, 0.7), (1.0, -1.1))
-FEW = DetectionConfig(sizes=3, spacing=0.25)
+FEW = ProposalConfig(body_sizes=3, lattice_spacing=0.25)
 
 
 def evidence(kind: str, standing: Floats = STANDING) -> list[ViewEvidence]:
@@ -49,7 +49,7 @@ def evidence(kind: str, standing: Floats = STANDING) -> list[ViewEvidence]:
 
 
 def candidates(kind: str, asked: Asked) -> Proposals:
-    return Proposals(RIG, [kind] * 4, replace(CONFIG, detection=replace(FEW, candidates=asked)))
+    return Proposals(RIG, [kind] * 4, replace(CONFIG, proposals=replace(FEW, source=asked)))
 
 
 def fuse(kind: str) -> Fuse:
@@ -70,7 +70,7 @@ def test_each_source_finds_everybody(kind: str, asked: Asked) -> None:
     # What boxes say of a place in a volume reaches far to its sides: their modes are no better than the pass's lattice.
     assert (away.min(0) < (0.5 if kind == "boxes" and asked == "volume" else 0.25)).all()
     apart = np.hypot(*np.moveaxis(found.ground[:, None] - found.ground, -1, 0))
-    assert (apart[np.triu_indices(len(found), 1)] >= FEW_HEIGHTS.lattice).all()
+    assert (apart[np.triu_indices(len(found), 1)] >= FEW_HEIGHTS.lattice_spacing).all()
 
 
 def test_the_lattice_alone_proposes_nothing() -> None:
@@ -130,7 +130,7 @@ def test_who_is_expected_comes_before_who_is_proposed_there() -> None:
 def test_the_pipeline_finds_the_same_people_by_any_source(kind: str, asked: Asked) -> None:
     rig, truth = room(), walkers(2)
     moments = list((box_moments if kind == "boxes" else mask_moments)(rig, truth, 0, 2))
-    config = replace(CONFIG, detection=replace(FEW, candidates=asked))
+    config = replace(CONFIG, proposals=replace(FEW, source=asked))
     pipeline = Pipeline(rig, [kind] * 4, config, "frames")
     rows = np.concatenate(
         [s.commit.trajectory for s in run_session(pipeline, [ViewForeground()] * 4, moments, 0, lambda _: None)]
@@ -143,8 +143,8 @@ def test_the_pipeline_finds_the_same_people_by_any_source(kind: str, asked: Aske
 
 
 @pytest.mark.parametrize(
-    "wrong", ({"outside": 0.0}, {"sizes": 1}, {"width_mean": 0.1}, {"kernel": 0.0}, {"level": 1.0})
+    "wrong", ({"unseen_rate": 0.0}, {"body_sizes": 1}, {"width_mean": 0.1}, {"kernel_radius": 0.0})
 )
 def test_constants_without_meaning_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(InputError):
-        DetectionConfig(**wrong)  # type: ignore[arg-type]
+        ProposalConfig(**wrong)  # type: ignore[arg-type]

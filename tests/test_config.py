@@ -12,16 +12,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from stseg.config import Config
+from stseg.config.renamed import RENAMED
 from stseg.errors import ConfigError
-from stseg.io.config_file import format_config, read_config
+from stseg.io.config_file import format_config, parse_config, read_config
 from stseg.io.toml.settings import Given, as_toml, build
 from stseg.settings import require
 
 TOML = """
-[ghosts]
-person = -2    # a whole number is a number
+[detection]
+prior_log_odds = -2    # a whole number is a number
 heights = [1.5, 1.75]
-rounds = 3
+search_rounds = 3
 """
 
 
@@ -60,14 +61,20 @@ def test_nothing_given_is_the_default() -> None:
 
 
 def test_a_file_and_assignments_say_what_differs(tmp_path: Path) -> None:
-    config = read(tmp_path / "c.toml", TOML, "ghosts.person=-1.5", "ghosts.rounds = 5", "ghosts.rounds=6")
-    expected = replace(Config().ghosts, person=-1.5, heights=(1.5, 1.75), rounds=6)
-    assert config == replace(Config(), ghosts=expected)
-    assert isinstance(read(tmp_path / "c.toml", TOML).ghosts.person, float)
+    config = read(
+        tmp_path / "c.toml",
+        TOML,
+        "detection.prior_log_odds=-1.5",
+        "detection.search_rounds = 5",
+        "detection.search_rounds=6",
+    )
+    expected = replace(Config().detection, prior_log_odds=-1.5, heights=(1.5, 1.75), search_rounds=6)
+    assert config == replace(Config(), detection=expected)
+    assert isinstance(read(tmp_path / "c.toml", TOML).detection.prior_log_odds, float)
 
 
 def test_the_resolved_text_reads_back_equal(tmp_path: Path) -> None:
-    config = read_config(None, ["ghosts.person=-1e-3", "ghosts.heights=[1, 1.25]"])
+    config = read_config(None, ["detection.prior_log_odds=-1e-3", "detection.heights=[1, 1.25]"])
     text = format_config(config)
     assert read(tmp_path / "c.toml", text) == config
     table = tomllib.loads(text)
@@ -128,15 +135,18 @@ def test_wrong_values_are_named_with_what_was_expected(table: dict[str, Any], to
 @pytest.mark.parametrize(
     ("assignment", "told"),
     [
-        ("ghosts.persn=1", "--set: ghosts.persn: found an unknown key"),
-        ("ghost.person=1", "did you mean ghosts?"),
-        ("ghosts.person", "--set: found 'ghosts.person', expected stage.key=value"),
-        ("person=1", "expected stage.key=value"),
-        ("ghosts.=1", "expected stage.key=value"),
-        ("ghosts.person=high", "--set: ghosts.person: found 'high', expected a finite number"),
-        ("ghosts.person=1\nx=2", "--set: ghosts.person: found '1\\nx=2', expected a finite number"),
-        ("ghosts.person.x=1", "--set: ghosts.person: found a table"),
-        ("ghosts.person=nan", "--set: ghosts.person: found nan"),
+        ("detection.persn=1", "--set: detection.persn: found an unknown key"),
+        ("detectoin.prior_log_odds=1", "did you mean detection?"),
+        ("detection.prior_log_odds", "--set: found 'detection.prior_log_odds', expected stage.key=value"),
+        ("prior_log_odds=1", "expected stage.key=value"),
+        ("detection.=1", "expected stage.key=value"),
+        ("detection.prior_log_odds=high", "--set: detection.prior_log_odds: found 'high', expected a finite number"),
+        (
+            "detection.prior_log_odds=1\nx=2",
+            "--set: detection.prior_log_odds: found '1\\nx=2', expected a finite number",
+        ),
+        ("detection.prior_log_odds.x=1", "--set: detection.prior_log_odds: found a table"),
+        ("detection.prior_log_odds=nan", "--set: detection.prior_log_odds: found nan"),
     ],
 )
 def test_wrong_assignments_name_the_option(tmp_path: Path, assignment: str, told: str) -> None:
@@ -147,15 +157,38 @@ def test_wrong_assignments_name_the_option(tmp_path: Path, assignment: str, told
 
 def test_a_fault_is_laid_where_the_value_was_given(tmp_path: Path) -> None:
     path = tmp_path / "c.toml"
-    with pytest.raises(ConfigError, match=r"c\.toml: ghosts\.rounds: found 'x'"):
-        read(path, "[ghosts]\nrounds = 'x'", "ghosts.person=1")
+    with pytest.raises(ConfigError, match=r"c\.toml: detection\.search_rounds: found 'x'"):
+        read(path, "[detection]\nsearch_rounds = 'x'", "detection.prior_log_odds=1")
     with pytest.raises(ConfigError, match=r"c\.toml: found what is not TOML"):
-        read(path, "[ghosts\n")
+        read(path, "[detection\n")
     with pytest.raises(ConfigError, match=r"c\.toml: found what is not TOML"):
         path.write_bytes(b"# \xff")
         read_config(path)
     with pytest.raises(ConfigError, match=r"none\.toml: found No such file"):
         read_config(tmp_path / "none.toml")
+
+
+@pytest.mark.parametrize(
+    ("former", "present"),
+    [("ghosts.person=1", "detection.prior_log_odds"), ("light.rise=1", "illumination.changed_share")],
+)
+def test_a_former_name_is_answered_with_the_present_one(tmp_path: Path, former: str, present: str) -> None:
+    with pytest.raises(
+        ConfigError, match=f"--set: {former.partition('=')[0]}: found a former name, expected {present}"
+    ):
+        read(tmp_path / "c.toml", TOML, former)
+
+
+def test_every_former_name_leads_to_a_present_key() -> None:
+    present = tomllib.loads(format_config(Config()))
+    for name in RENAMED.values():
+        table = present
+        for part in name.split("."):
+            table = table[part]
+
+
+def test_the_configuration_of_an_older_run_file_is_read_by_its_present_names() -> None:
+    assert parse_config("[ghosts]\nperson = -3.0\n", "run.h5").detection.prior_log_odds == -3.0
 
 
 def test_a_text_needs_no_quotes_in_an_assignment() -> None:

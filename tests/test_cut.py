@@ -90,7 +90,7 @@ def test_energy_by_definition(seed: int, shape: tuple[int, ...], neighbours: int
 def test_energy_of_log_odds() -> None:
     """Capacities by the formula, in quanta; unseen cells have unary term 0."""
     log_odds = np.array([1.5, np.nan, -1e9, 1e9], np.float32).reshape(1, 1, 1, 4)
-    config = SegmentationConfig(smoothness=0.5, spread=0.2, step=0.3)
+    config = SegmentationConfig(smoothness=0.5, distance_scale=0.2, time_distance=0.3)
     grid = Grid((0, 0.4), (0, 0.1), cell=0.1, top=0.6, planes=3)
     energy = build_energy(log_odds, np.zeros((0, 1, 4, 2), np.int64), grid, config)
     assert energy.unary.ravel().tolist()[:2] == [1500, 0]

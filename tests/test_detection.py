@@ -13,7 +13,7 @@ from scenes import corner_cameras, likelihoods, looking, people, rig_of
 from strategies import BARREL, cameras, numbers
 
 from stseg.arrays import Floats, Singles
-from stseg.config import DetectionConfig
+from stseg.config import ProposalConfig
 from stseg.detection.detection_probability import DetectionProbability, fill_chance
 from stseg.detection.mean_shift import fill_modes, modes
 from stseg.detection.pillar_strips import Pillars
@@ -22,12 +22,12 @@ from stseg.geometry import Camera
 from stseg.geometry.planes import plane_homography
 from stseg.geometry.summed_area import TOP, fill_sums
 
-FEW = DetectionConfig(sizes=3, spacing=0.25)
+FEW = ProposalConfig(body_sizes=3, lattice_spacing=0.25)
 HEIGHTS = np.array([1.5, 1.7, 1.9])
 PAD = 60
 
 
-def probability(views: tuple[Camera, ...] = corner_cameras(), config: DetectionConfig = FEW) -> DetectionProbability:
+def probability(views: tuple[Camera, ...] = corner_cameras(), config: ProposalConfig = FEW) -> DetectionProbability:
     return DetectionProbability(rig_of(views), config)
 
 
@@ -142,8 +142,8 @@ def test_a_map_all_foreground_fills_every_pillar_that_it_holds() -> None:
     chance = asked.chance(asked.pillars[0], full[0])
     centre = np.hypot(*asked.ground.reshape(-1, 2).T) < 0.5
     np.testing.assert_allclose(chance[centre], 1.0, atol=1e-6)
-    assert np.nanmin(chance) >= asked.config.outside - 1e-9
-    expected = 4 * np.log(1 / asked.config.level)
+    assert np.nanmin(chance) >= asked.config.unseen_rate - 1e-9
+    expected = 4 * np.log(1 / asked.config.covered_share)
     np.testing.assert_allclose(asked.log_ratio(full).reshape(-1)[centre], expected, atol=1e-5)
 
 
@@ -164,10 +164,10 @@ def test_no_view_has_a_veto_alone() -> None:
     views = corner_cameras()
     maps = list(likelihoods(views, people((0.25, -0.25))))
     maps[0][:] = 0.0
-    asked = probability(views, replace(FEW, spacing=0.5))
+    asked = probability(views, replace(FEW, lattice_spacing=0.5))
     place = np.unravel_index(asked.log_ratio(maps).argmax(), asked.ground.shape[:2])
     assert np.hypot(*(asked.ground[place] - [0.25, -0.25])) < 0.3
-    least = np.log(FEW.least / FEW.level)
+    least = np.log(FEW.view_miss_rate / FEW.covered_share)
     assert (asked.log_ratio([np.zeros_like(m) for m in maps]) >= 4 * least - 1e-9).all()
 
 
@@ -191,7 +191,7 @@ def test_it_is_highest_where_somebody_stands_through_a_lens_and_a_roll(camera: i
         ),
     )[camera]
     standing = people((0.4, -0.3))
-    asked = probability(views, replace(FEW, spacing=0.2))
+    asked = probability(views, replace(FEW, lattice_spacing=0.2))
     said = asked.log_ratio(likelihoods(views, standing))
     weight = np.where(said > 0, np.exp(said), 0.0)
     found = modes(weight, asked.ground, asked.spacing, 0.4)

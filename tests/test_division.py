@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from strategies import numbers
 
 from stseg.arrays import Flags, Floats, Ints, Labels
-from stseg.config import IdentityConfig, SegmentationConfig
+from stseg.config import SegmentationConfig, TrackingConfig
 from stseg.geometry import Grid
 from stseg.graphcut.cell_subset import CellSubset, subset
 from stseg.graphcut.cut import minimum_cut
@@ -29,7 +29,7 @@ from stseg.tracking.tracklets import Tracklet
 
 GRID = Grid((0.0, 2.4), (0.0, 1.4), cell=0.1, top=1.8, planes=4)
 BODY = BodyShape(reach=0.4, height_spread=0.12, prior_share=0.02)
-CONFIG = IdentityConfig()
+CONFIG = TrackingConfig()
 
 
 # Parts
@@ -284,7 +284,7 @@ def test_places_between_and_after_detections() -> None:
     places = predicted_places(seen, 8, 20, 8.0, CONFIG)
     assert places.track.tolist() == [3, 7]
     # From the first sighting on, for as long as a walker can be foreseen.
-    ahead = int(CONFIG.foresight * 8.0)
+    ahead = int(CONFIG.prediction_horizon * 8.0)
     frames = np.arange(8, 20)
     assert frames[places.expected[:, 1]].tolist() == list(range(10, 14 + ahead + 1))
     assert frames[places.expected[:, 0]].tolist() == list(range(12, 12 + ahead + 1))

@@ -12,7 +12,7 @@ from scenes import Moment
 
 from stseg.accelerate import python_form
 from stseg.arrays import Bytes, Flags
-from stseg.config import Config, IdentityConfig
+from stseg.config import Config, TrackingConfig
 from stseg.detection.scoring import set_score
 from stseg.engine.pipeline import Pipeline
 from stseg.engine.session import run_session
@@ -98,7 +98,7 @@ def test_two_stand_together_for_ten_seconds_and_part(name: str) -> None:
 
 def test_things_happen_where_windows_end() -> None:
     spec = NAMED["border"]
-    solved = list(windows(spec.frame_rate, IdentityConfig(), 0, spec.frames))
+    solved = list(windows(spec.frame_rate, TrackingConfig(), 0, spec.frames))
     ends = {window.commit_stop for window in solved}
     shared = {f for a, b in pairwise(solved) for f in range(b.solve_first, a.solve_stop)}
     distance = apart(spec, 1, 2)

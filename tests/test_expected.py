@@ -13,7 +13,7 @@ from scenes import AREA, corner_cameras, expecting, looking, rig_of
 from strategies import numbers
 
 from stseg.arrays import Floats
-from stseg.config import GhostConfig
+from stseg.config import DetectionConfig
 from stseg.detection.prior import Prior
 from stseg.detection.scoring import walker_score
 from stseg.geometry import Grid, Rig
@@ -22,7 +22,7 @@ from stseg.model.candidates import Candidates
 from stseg.model.predicted_tracks import PredictedTracks, no_tracks
 from stseg.model.sizes import Sizes
 
-CONFIG = GhostConfig()
+CONFIG = DetectionConfig()
 PLACES = st.tuples(numbers(-2, 2), numbers(-2, 2))
 SPREADS = st.tuples(numbers(0.05, 0.6), numbers(0.05, 0.6), numbers(-0.9, 0.9)).map(
     lambda s: np.array([[s[0] ** 2, s[0] * s[1] * s[2]], [s[0] * s[1] * s[2], s[1] ** 2]])
@@ -50,7 +50,9 @@ def test_what_speaks_for_a_walker_by_hand(
     assert known.shape == (len(candidates), len(walkers))
     anywhere = -math.log(2 * math.pi * 0.1**2)  # at the resolution of a frame, which is 0.1 m
     for j, (place, tall) in enumerate(candidates):
-        newcomer = CONFIG.person + anywhere + reference.normal(tall - CONFIG.height_mean, CONFIG.height_spread**2)
+        newcomer = (
+            CONFIG.prior_log_odds + anywhere + reference.normal(tall - CONFIG.height_mean, CONFIG.height_spread**2)
+        )
         for k, (at, covariance, height_k, sd, odds) in enumerate(walkers):
             shape = reference.normal(tall - height_k, sd**2)
             least = reference.normal(tall - CONFIG.height_mean, CONFIG.height_spread**2) - 4.0  # people stoop and sit
@@ -168,7 +170,7 @@ def test_a_newcomer_costs_away_from_the_border() -> None:
     places = np.array([[-2.95, 0.0], [-2.45, 0.0], [-1.95, 0.0], [0.0, 0.0], [-3.5, 0.0]])
     later = Prior.of(no_tracks(), CONFIG, border)
     share = np.array([0.05, 0.55, 1.0, 1.0, 0.0])
-    np.testing.assert_allclose(later.newcomer(places), share * CONFIG.newcomer, atol=1e-6)
+    np.testing.assert_allclose(later.newcomer(places), share * CONFIG.birth_cost, atol=1e-6)
     np.testing.assert_array_equal(Prior.of(None, CONFIG, border).newcomer(places), 0.0)
 
 

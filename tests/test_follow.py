@@ -41,8 +41,19 @@ sys.exit(main())
 OPTIONS = tuple(
     word
     for constant in (
-        *("segments.length=1.5", "segments.warm_up=0.5", "segments.background=2", "segments.samples=4"),
-        *("ghosts.lattice=0.25", "live.settled=0.3", "live.learning=1", "live.pause=0.1", "live.silence=1"),
+        *(
+            "segments.length=1.5",
+            "segments.warm_up=0.5",
+            "segments.background_period=2",
+            "segments.background_samples=4",
+        ),
+        *(
+            "detection.lattice_spacing=0.25",
+            "live.file_quiet_time=0.3",
+            "live.background_time=1",
+            "live.reconnect_wait=0.1",
+            "live.stream_timeout=1",
+        ),
     )
     for word in ("--set", constant)
 )
@@ -189,7 +200,7 @@ def test_without_an_empty_scene_it_learns_first_and_loses_nothing(
 ) -> None:
     rig, output = write_pieces(tmp_path, empty=False), tmp_path / "run.h5"
     arrive(tmp_path, 1, 2, 3, 4)
-    assert track(rig, output, "--follow", "--frames", f":{FRAMES}", "--set", "live.learning=5") == 0
+    assert track(rig, output, "--follow", "--frames", f":{FRAMES}", "--set", "live.background_time=5") == 0
     assert "no empty scene of west, east, north: learning from 5 s before the run begins" in capsys.readouterr().err
     run = read_run(output)
     assert run.frames.tolist() == list(range(FRAMES))
@@ -278,7 +289,7 @@ def test_a_real_rtsp_server_whose_streams_end_is_followed(
     cameras_rig: Path, server: dict[str, str], tmp_path: Path
 ) -> None:
     rig = _as_live(cameras_rig.with_name("rig.toml"), cameras_rig.with_name("served.toml"), server)
-    running = process(rig, tmp_path / "run.h5", "--set", "segments.length=5", "--set", "live.silence=3")
+    running = process(rig, tmp_path / "run.h5", "--set", "segments.length=5", "--set", "live.stream_timeout=3")
     wait_for_frame(tmp_path / "run.h5", 100, running)
     running.terminate()
     said, told = running.communicate(timeout=60)

@@ -109,7 +109,7 @@ def test_single_noisy_pixels_are_outvoted_by_their_neighbours() -> None:
     image = room()
     image[6, 6] = SHIRT
     assert taught().likelihood(image)[6, 6] < 0.1
-    assert taught(MixtureConfig(radius=0)).likelihood(image)[6, 6] > 0.9
+    assert taught(MixtureConfig(smoothing_radius=0)).likelihood(image)[6, 6] > 0.9
 
 
 # What is learned
@@ -190,7 +190,14 @@ def test_evaluate_is_its_formula(seed: int, modes: int) -> None:
     mean, variance, weight = random_modes(rng, modes)
     image, gain, config = near_modes(rng, mean), rng.uniform(0.8, 1.25, 3), MixtureConfig()
     log_odds = np.empty(image.shape[:2], np.float32)
-    arguments = (config.share, config.foreground, config.unexplained, config.shadow, config.darkest, config.mimicry)
+    arguments = (
+        config.background_weight,
+        config.foreground_prior,
+        config.outlier_rate,
+        config.shadow_prior,
+        config.darkest_shadow,
+        config.shadow_confusion,
+    )
     expected = reference.log_odds(image, gain, mean, variance, weight, config)
     for function in (evaluate, python_form(evaluate)):
         function(image, gain, mean, variance, weight, *arguments, log_odds)
@@ -209,8 +216,8 @@ def test_update_is_its_rules(seed: int, modes: int) -> None:
     for function in (update, python_form(update)):
         found = state[0].copy(), state[1].copy(), state[2].copy()
         function(
-            image, gain, likelihood, np.float32(0.05), np.float32(0.001), np.float32(config.share),
-            np.float32(config.match), np.float32(config.minimum_sd), np.float32(config.initial_sd), *found,
+            image, gain, likelihood, np.float32(0.05), np.float32(0.001), np.float32(config.background_weight),
+            np.float32(config.match_distance), np.float32(config.minimum_sd), np.float32(config.initial_sd), *found,
         )  # fmt: skip
         for one, other in zip(found, expected, strict=True):
             np.testing.assert_allclose(one, other, rtol=1e-4, atol=1e-5)
@@ -246,7 +253,14 @@ def test_images_of_another_size_or_kind_are_refused() -> None:
 
 
 @pytest.mark.parametrize(
-    ("key", "value"), [("modes", 0), ("radius", -1), ("memory", 0.0), ("shadow", 1.0), ("share", float("nan"))]
+    ("key", "value"),
+    [
+        ("modes", 0),
+        ("smoothing_radius", -1),
+        ("memory", 0.0),
+        ("shadow_prior", 1.0),
+        ("background_weight", float("nan")),
+    ],
 )
 def test_parameters_out_of_range_are_named(key: str, value: float) -> None:
     with pytest.raises(StsegError, match=key):

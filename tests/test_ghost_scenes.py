@@ -165,7 +165,7 @@ def test_the_moving_ghost_is_borne_out_by_both_views() -> None:
             assert not isinstance(view, BoxView)
             said += view.lattice_score(view.observe(shown), np.ones(view.shape, bool))[1]
         here = distances(ground, crossings(strollers(frame), rig)).min(1) < 0.3
-        worth += said[here].max() > -FEW_HEIGHTS.person
+        worth += said[here].max() > -FEW_HEIGHTS.prior_log_odds
     assert worth > 0.8 * FRAMES
 
 
@@ -184,7 +184,7 @@ def test_a_ghost_is_not_picked_up_by_the_cut_in_later_frames() -> None:
 @pytest.mark.parametrize("kind", KINDS)
 def test_somebody_hidden_from_all_views_but_one_stays(kind: str) -> None:
     """Seen by all at first; then three taller people step between them and three of the cameras, and stand there."""
-    rig, follow = room(), TrackFilter(8.0, CONFIG.ghosts, CONFIG.identity)
+    rig, follow = room(), TrackFilter(8.0, CONFIG.detection, CONFIG.tracking)
     hidden, who = people((0.0, 0.0, 1.6)), set[int]()
     for frame in range(FRAMES):
         side = max(1.2 - 0.1 * frame, 0.0)

@@ -513,7 +513,7 @@ def only(explanation: Explanation) -> tuple[float, float, int]:
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_newcomer_costs_inside_and_at_the_border_not(kind: str) -> None:
     """What the views say of somebody stays the same; what spoke before they were asked does not."""
-    newcomer = FEW_HEIGHTS.newcomer
+    newcomer = FEW_HEIGHTS.birth_cost
     for place, cost in (((0.05, -0.04), newcomer), ((-1.9, 0.1), newcomer * 0.125)):  # half a cell from the edge
         seen = show(kind, room().cameras, people(place))
         first, later = pass_of(kind).explain(seen, None), pass_of(kind).explain(seen, no_tracks())
@@ -529,8 +529,10 @@ def test_the_first_frame_costs_nobody_anything(kind: str) -> None:
     standing = people((-0.83, 0.31), (0.9, -0.62), (0.1, 1.2, 1.6))
     found = pass_of(kind).explain(show(kind, room().cameras, standing), None).people
     tall = -0.5 * ((found.height - FEW_HEIGHTS.height_mean) / FEW_HEIGHTS.height_spread) ** 2
-    np.testing.assert_allclose(found.prior, FEW_HEIGHTS.person + tall, atol=0.4)  # of the candidate, not yet refined
-    assert (found.prior <= FEW_HEIGHTS.person).all()
+    np.testing.assert_allclose(
+        found.prior, FEW_HEIGHTS.prior_log_odds + tall, atol=0.4
+    )  # of the candidate, not yet refined
+    assert (found.prior <= FEW_HEIGHTS.prior_log_odds).all()
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -543,7 +545,7 @@ def test_who_is_expected_is_whom_the_frame_finds(kind: str) -> None:
     assert explanation.people.track_index[who].tolist() == [1, 0, -1]
     # More speaks for whoever is known than for any stranger, and less for a stranger inside.
     first, second, stranger = explanation.people.prior[who]
-    assert min(first, second) > FEW_HEIGHTS.person > stranger + 3
+    assert min(first, second) > FEW_HEIGHTS.prior_log_odds > stranger + 3
 
 
 def test_somebody_expected_stays_though_one_view_alone_shows_them() -> None:

@@ -14,7 +14,7 @@ from scenes import corner_cameras
 from strategies import numbers
 
 from stseg.arrays import Flags, Rows
-from stseg.config import IdentityConfig
+from stseg.config import TrackingConfig
 from stseg.geometry import Grid
 from stseg.geometry.bodies import BodyTable
 from stseg.geometry.nearest_person import nearest_person
@@ -29,7 +29,7 @@ from stseg.tracking.window_association import TrackAssociation, WindowAssignment
 from stseg.tracking.windows import LONGEST, SHORTEST, Window, window_length, windows
 
 RATE = 8.0
-CONFIG = IdentityConfig()
+CONFIG = TrackingConfig()
 GRID = Grid((-4.0, 4.0), (-4.0, 4.0), cell=0.2, planes=2)
 Path = dict[int, tuple[float, float]]
 """Where somebody is in each frame, metres; frames that it leaves out did not see them."""
@@ -44,7 +44,7 @@ RUNS = st.tuples(st.integers(0, 200), st.integers(1, 150)).map(lambda run: (run[
 @given(RUNS, numbers(0.5, 60), numbers(0.1, 4))
 def test_windows_partition_any_run(run: tuple[int, int], rate: float, seconds: float) -> None:
     first, stop = run
-    config = IdentityConfig(window=seconds)
+    config = TrackingConfig(window=seconds)
     length, shared = window_length(rate, config)
     assert SHORTEST <= length <= LONGEST
     assert 1 <= shared < length
@@ -359,7 +359,7 @@ def rows_of(paths: dict[int, Path]) -> Rows:
 
 
 def test_short_tracks_go_with_an_event() -> None:
-    least = round(CONFIG.shortest * RATE)
+    least = round(CONFIG.minimum_duration * RATE)
     rows = rows_of({1: walk((0, 0), (0, 0), range(5, 5 + least)), 2: walk((2, 0), (0, 0), range(7, 6 + least))})
     kept, events = drop_short(rows, RATE, CONFIG)
     assert np.unique(kept["id"]).tolist() == [1]
@@ -372,7 +372,7 @@ def test_short_tracks_go_with_an_event() -> None:
 
 def test_tracks_that_most_frames_doubt_go_with_an_event() -> None:
     """A frame of a short gap says ghost; of a long one nobody knows, so it says nothing."""
-    long = round(CONFIG.bridge * RATE) + 1
+    long = round(CONFIG.interpolation_gap * RATE) + 1
     seen = {1: [0, 1, 4, 6, 9, 10], 2: [0, 3, 6, 9], 3: [*range(4), *range(4 + long, 8 + long)]}
     rows = rows_of({i: {f: (float(i), 0.0) for f in frames} for i, frames in seen.items()})
     kept, events = drop_ghosts(rows[::-1], RATE, CONFIG)
@@ -392,7 +392,7 @@ def test_short_gaps_are_filled_on_straight_lines(first: set[int], second: set[in
     for i, frames in ((4, first), (2, second)):
         own = filled[filled["id"] == i]
         gaps = [range(a + 1, b) for a, b in pairwise(sorted(frames))]
-        short = [f for gap in gaps if len(gap) <= CONFIG.bridge * RATE for f in gap]
+        short = [f for gap in gaps if len(gap) <= CONFIG.interpolation_gap * RATE for f in gap]
         assert own["frame"].tolist() == sorted([*frames, *short])
         for x, y in (("x", "y"), ("raw_x", "raw_y")):
             np.testing.assert_allclose(

@@ -171,17 +171,17 @@ def test_what_the_user_can_mend_is_said(tmp_path: Path, capsys: pytest.CaptureFi
     assert "found boxes alone, expected a camera that delivers pixels" in capsys.readouterr().err
     assert main(["labels", str(run_path), "-o", str(tmp_path / "out"), "--frames", "3:9"]) == 2
     assert "--frames" in capsys.readouterr().err
-    assert main(["labels", str(run_path), "-o", str(tmp_path / "out"), "--set", "labels.draws=0"]) == 2
-    assert "labels.draws: found 0" in capsys.readouterr().err
+    assert main(["labels", str(run_path), "-o", str(tmp_path / "out"), "--set", "labels.samples=0"]) == 2
+    assert "labels.samples: found 0" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
 
 
 def test_the_constants_are_those_of_the_run_but_for_what_is_set(tmp_path: Path) -> None:
     moments = list(mask_moments(two_cameras(), walkers(FRAMES), 0, FRAMES))
     sources = mask_sources(tmp_path, moments)
-    wide = write_run(tmp_path / "wide.h5", sources, walkers(FRAMES), "[labels]\nplace_spread = 0.5\n")
+    wide = write_run(tmp_path / "wide.h5", sources, walkers(FRAMES), "[labels]\nposition_noise = 0.5\n")
     plain = write_run(tmp_path / "plain.h5", sources, walkers(FRAMES))
-    narrow = ("--set", f"labels.place_spread={LabelConfig().place_spread}")
+    narrow = ("--set", f"labels.position_noise={LabelConfig().position_noise}")
     for path, options in ((wide, ()), (wide, narrow), (plain, ())):
         out = str(tmp_path / f"{path.stem}{len(options)}")
         assert main(["labels", str(path), "-o", out, "--frames", "0:1", *options]) == 0

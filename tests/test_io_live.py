@@ -30,7 +30,9 @@ from stseg.io.recording.stream_index import count_frames
 from stseg.io.recording.video_stream import VideoStream
 from stseg.io.runfile.provenance import gather_provenance
 
-QUICK = LiveConfig(settled=0.3, silence=0.5, pause=0.02, longest_pause=1.0, stale=0.1)
+QUICK = LiveConfig(
+    file_quiet_time=0.3, stream_timeout=0.5, reconnect_wait=0.02, longest_reconnect_wait=1.0, frame_tolerance=0.1
+)
 
 
 @pytest.fixture(scope="module")
@@ -238,7 +240,7 @@ def test_a_broken_stream_is_asked_again_with_growing_pauses_and_its_view_is_blin
 
 
 def test_what_cannot_be_worked_on_in_time_loses_its_oldest_moments_and_says_so() -> None:
-    small = replace(QUICK, pictures=5 * 2 * 128 * 96 * 3 / 2**20)
+    small = replace(QUICK, buffer_memory=5 * 2 * 128 * 96 * 3 / 2**20)
     cameras, halt, said = (StandIn(numbered(0), 0.05), StandIn(numbered(1), 0.05)), Event(), list[str]()
     with FollowedCameras(live(), small, None, halt, said.append, opening(*cameras)) as moments:
         first = next(moments)

@@ -24,7 +24,7 @@ from stseg.io.runfile.runs import Run, read_run
 
 pytestmark = pytest.mark.skipif(python_form(set_score) is set_score, reason="too slow without a compiler")
 
-QUICK = ("--set", "ghosts.lattice=0.25", "--set", "ghosts.heights=[1.6,1.7,1.8]")
+QUICK = ("--set", "detection.lattice_spacing=0.25", "--set", "detection.heights=[1.6,1.7,1.8]")
 SHORT = ("--set", "segments.length=3", "--set", "segments.warm_up=1")
 FRAMES = 60
 CAMERAS = 3
@@ -134,7 +134,7 @@ def test_a_camera_learns_its_background_where_it_sees(tmp_path: Path) -> None:
     eye = Camera("late", (16, 12), np.eye(3), np.array([0.0, 0.0, -1.0]))
     source = CameraSource(Source("video", tmp_path / "a.avi"), None, 40, "blind")
     late = Recording(tmp_path / "rig.toml", Rig("late", FRAME_RATE, Grid((0, 1), (0, 1)), (eye,)), (source,))
-    config = Config(segments=SegmentConfig(background=2.0))
+    config = Config(segments=SegmentConfig(background_period=2.0))
     for streams in (None, index_streams(late)):
         (sight,) = make_foregrounds(late, config, 0, 100, streams=streams)
         assert sight.evidence(None) is None

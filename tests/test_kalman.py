@@ -44,9 +44,9 @@ def plain(places: Floats, noise: float, seconds: float, config: KalmanConfig) ->
     brownian = np.array([[seconds**3 / 3, 0, seconds**2 / 2, 0], [0, seconds**3 / 3, 0, seconds**2 / 2],
                          [seconds**2 / 2, 0, seconds, 0], [0, seconds**2 / 2, 0, seconds]])  # fmt: skip
     state = np.append(places[0], [0, 0])
-    covariance = np.diag([noise, noise, config.pace**2, config.pace**2])
+    covariance = np.diag([noise, noise, config.speed_spread**2, config.speed_spread**2])
     for place in places[1:]:
-        state, covariance = motion @ state, motion @ covariance @ motion.T + config.turn**2 * brownian
+        state, covariance = motion @ state, motion @ covariance @ motion.T + config.velocity_noise**2 * brownian
         gain = covariance @ see.T @ np.linalg.inv(see @ covariance @ see.T + noise * np.eye(2))
         state, covariance = state + gain @ (place - see @ state), (np.eye(4) - gain @ see) @ covariance
     return state, covariance
@@ -58,9 +58,9 @@ def test_filters_side_by_side_are_each_a_plain_one(seed: int, length: int, secon
     config, noise = KalmanConfig(), 0.03
     paths = np.random.default_rng(seed).normal(0.0, 1.0, (3, length, 2))
     error = np.tile(noise * np.eye(2), (3, 1, 1))
-    filters = begun(paths[:, 0], error, config.pace)
+    filters = begun(paths[:, 0], error, config.speed_spread)
     for step in range(1, length):
-        filters = corrected(carried(filters, seconds, config.turn), np.arange(3), paths[:, step], error)
+        filters = corrected(carried(filters, seconds, config.velocity_noise), np.arange(3), paths[:, step], error)
     for path, state, covariance in zip(paths, *filters, strict=True):
         expected = plain(path, noise, seconds, config)
         np.testing.assert_allclose(state, expected[0], atol=1e-9)
@@ -91,7 +91,7 @@ def test_two_who_cross_keep_their_names() -> None:
 def test_a_place_beyond_the_gate_is_somebody_new() -> None:
     rows, events = follow([[(0.0, 0.0)]] * 8 + [[(1.2, 0.0)]])
     assert rows["id"].tolist() == [1] * 8 + [2]
-    wide = replace(CONFIG, kalman=KalmanConfig(gate=1 - 1e-12))
+    wide = replace(CONFIG, kalman=KalmanConfig(gate_probability=1 - 1e-12))
     rows, events = follow([[(0.0, 0.0)]] * 8 + [[(0.8, 0.0)]], wide)
     assert rows["id"].tolist() == [1] * 9
     assert len(events) == 1
@@ -118,7 +118,7 @@ def test_identities_stand_short_tracks_go_and_gaps_are_filled() -> None:
     places = [[(-1.0, 0.0)]] * 8 + [[]] * 2 + [[(-1.0, 0.0)]] * 8
     places[3] = [(-1.0, 0.0), (1.5, 1.5)]
     rows, events = follow(places)
-    whole = committed_tracks(rows, events, FRAME_RATE, CONFIG.identity)
+    whole = committed_tracks(rows, events, FRAME_RATE, CONFIG.tracking)
     assert whole.trajectory["id"].tolist() == [1] * 18
     assert whole.trajectory["frame"].tolist() == list(range(18))
     assert sorted(set(whole.identity.tolist())) == [0, 1]

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from scenes import FEW_HEIGHTS, boxes, corner_cameras, likelihoods, no_boxes, people, rig_of
 
 from stseg.arrays import Flags, Floats, Ints, ViewEvidence
-from stseg.config import LevelConfig, OccupancyConfig
+from stseg.config import ErrorRateConfig, OccupancyConfig
 from stseg.detection.detector import Detector
 from stseg.geometry import Grid
 from stseg.geometry.nearest_person import nearest_person
@@ -33,7 +33,7 @@ from stseg.occupancy.rate_calibration import (
 from stseg.occupancy.volume import Occupancy
 
 FIRST = ErrorRates(0.2, 0.07, 0.07)
-CONFIG = LevelConfig(memory=30.0, weight=2.0)
+CONFIG = ErrorRateConfig(memory=30.0, prior_weight=2.0)
 PRIOR = float(np.log(0.02 / 0.98))
 RIG = rig_of(corner_cameras(), cell=0.5, planes=3)
 STANDING = people((-0.75, 0.25), (0.75, -0.75))
@@ -101,7 +101,7 @@ def test_rates_are_found() -> None:
         counted = [teach(i, shown, near, inside, np.array([True]), level.rates, 1.0) for i in range(3)]
         errors, seen = np.stack(counted, 1) / units
         level.learn(errors, seen, np.array([0.25, 1.0]))
-    first = CONFIG.weight / (CONFIG.weight + level.seen)
+    first = CONFIG.prior_weight / (CONFIG.prior_weight + level.seen)
     expected = first * FIRST + (1 - first) * np.array(true)
     np.testing.assert_allclose(np.array(level.rates), expected, atol=0.02)
     assert abs(level.filled_share - 0.25) < 0.03

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from stseg.arrays import Bytes, Flags, Floats, Singles
-from stseg.config import LightConfig
+from stseg.config import IlluminationConfig
 from stseg.errors import ConfigError
 from stseg.foreground import Background, Chromatic, Codebook, IlluminationMonitor, LightChange, Mixture
 from stseg.foreground.gain_field import gain_field
@@ -179,7 +179,7 @@ def test_only_what_stands_still_in_its_own_colour_is_taken_in_a_new_light() -> N
     np.testing.assert_allclose(known[apart], 1)
 
 
-@pytest.mark.parametrize(("key", "value"), [("rise", 1.0), ("within", 0.0), ("blindness", -1.0)])
+@pytest.mark.parametrize(("key", "value"), [("changed_share", 1.0), ("change_time", 0.0), ("blind_time", -1.0)])
 def test_what_is_out_of_range_is_named(key: str, value: float) -> None:
     with pytest.raises(ConfigError, match=key):
-        LightConfig(**{key: value})
+        IlluminationConfig(**{key: value})

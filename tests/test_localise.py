@@ -124,9 +124,13 @@ def test_nobody_explained_is_the_plain_localisation() -> None:
     owner, free = (np.full((96, 128), -1, np.int16),) * 4, (np.zeros(0, np.int64),) * 4
     explanation = Explanation(nobody, nobody, owner, (1,) * 4, free, np.full(4, np.nan))
     localiser = Localiser(COARSE, "footprint")
-    rates = [ErrorRates(FEW_HEIGHTS.pixel_miss, FEW_HEIGHTS.pixel_clutter, FEW_HEIGHTS.pixel_clutter)] * 4
-    plain = localiser.log_odds(maps, localiser.clutter_weights(maps), rates, OccupancyConfig().occupied)
-    explained = Occupancy(COARSE, ["pixels"] * 4, OccupancyConfig(sampling="footprint", looks=1.0), FEW_HEIGHTS)
+    rates = [
+        ErrorRates(FEW_HEIGHTS.pixel_miss_rate, FEW_HEIGHTS.pixel_clutter_rate, FEW_HEIGHTS.pixel_clutter_rate)
+    ] * 4
+    plain = localiser.log_odds(maps, localiser.clutter_weights(maps), rates, OccupancyConfig().occupied_share)
+    explained = Occupancy(
+        COARSE, ["pixels"] * 4, OccupancyConfig(sampling="footprint", effective_observations=1.0), FEW_HEIGHTS
+    )
     np.testing.assert_array_equal(explained.fuse([*maps], explanation), plain)
 
 

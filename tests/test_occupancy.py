@@ -30,8 +30,8 @@ from stseg.occupancy.volume import Occupancy
 COARSE = rig_of(corner_cameras(), cell=0.5, planes=3)
 PIXELS, BOXES = ["pixels"] * 4, ["boxes"] * 4
 CONFIG = OccupancyConfig()
-PRIOR = float(np.log(CONFIG.occupied / (1 - CONFIG.occupied)))
-RATES = ErrorRates(FEW_HEIGHTS.pixel_miss, FEW_HEIGHTS.pixel_clutter, FEW_HEIGHTS.pixel_clutter)
+PRIOR = float(np.log(CONFIG.occupied_share / (1 - CONFIG.occupied_share)))
+RATES = ErrorRates(FEW_HEIGHTS.pixel_miss_rate, FEW_HEIGHTS.pixel_clutter_rate, FEW_HEIGHTS.pixel_clutter_rate)
 
 
 def explained(rig: Rig, standing: Floats, owner: Sequence[Ints] | None = None, step: int = 1) -> Explanation:
@@ -226,7 +226,7 @@ def volume_by_definition(
         if (footprints[:, 2] == 0).all():
             continue
         reached = np.hypot(*(people_at - place).T)
-        near = int(reached.argmin()) if len(people_at) and reached.min() <= CONFIG.reach else -1
+        near = int(reached.argmin()) if len(people_at) and reached.min() <= CONFIG.person_radius else -1
         terms, shares, speaking = [], [], []
         for i, (centre, shown) in enumerate(zip(centres, maps, strict=True)):
             if shown is None or footprints[i, 2] == 0:
@@ -240,7 +240,7 @@ def volume_by_definition(
                 speaking.append(weights[i])
         volume[z, y, x] = PRIOR if near < 0 else 0.0
         if terms:
-            volume[z, y, x] += CONFIG.looks * reference.fused(terms, speaking, shares)
+            volume[z, y, x] += CONFIG.effective_observations * reference.fused(terms, speaking, shares)
     return volume
 
 
@@ -270,7 +270,9 @@ def test_more_views_are_sharper_evidence(value: float) -> None:
     one = np.log(((1 - miss) * value + miss * (1 - value)) / (false * value + (1 - false) * (1 - value)))
     views = Sampling.of(rig, "point").views()
     assert set(np.unique(views).tolist()) >= {0, 1, 2, 3}
-    np.testing.assert_allclose(fused[views > 0], CONFIG.looks * views[views > 0] * one + PRIOR, atol=LEVEL)
+    np.testing.assert_allclose(
+        fused[views > 0], CONFIG.effective_observations * views[views > 0] * one + PRIOR, atol=LEVEL
+    )
     assert np.isnan(fused[views == 0]).all()
 
 
@@ -318,8 +320,8 @@ def test_a_missing_box_says_less_of_somebody_hidden() -> None:
     half = replace(explanation.people, visibility=np.array([[0.5]]))
     whole_says = occupancy.fuse([no_boxes()], explanation)
     half_says = occupancy.fuse([no_boxes()], replace(explanation, people=half))
-    near = np.hypot(*np.moveaxis(rig.grid.ground, -1, 0)) <= CONFIG.reach
-    assert (whole_says[0][near] < -CONFIG.looks).all()
+    near = np.hypot(*np.moveaxis(rig.grid.ground, -1, 0)) <= CONFIG.person_radius
+    assert (whole_says[0][near] < -CONFIG.effective_observations).all()
     np.testing.assert_allclose(half_says[0][near], whole_says[0][near] / 2, rtol=1e-5)
     np.testing.assert_array_equal(half_says[0][~near], whole_says[0][~near])
 

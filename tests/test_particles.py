@@ -295,7 +295,7 @@ def follow(frames: int, config: Config = CONFIG, shirts: tuple[tuple[int, int, i
     return commits + tracker.finish()
 
 
-QUICK = replace(CONFIG, particles=ParticleConfig(count=6, columns=64, patience=10.0))
+QUICK = replace(CONFIG, particles=ParticleConfig(particles=6, raster_columns=64, patience=10.0))
 FRAMES = 6 if INTERPRETED else 16
 
 

@@ -217,7 +217,7 @@ def test_short_recordings(frames: int) -> None:
     done = run("boxes", recording("boxes", FRAMES)[:frames])
     assert [s.frame for step in done.steps for s in step.commit.scenes] == list(range(frames))
     assert len(done.trajectory) == 3 * frames
-    shortest = round(CONFIG.identity.shortest * RIG.frame_rate)
+    shortest = round(CONFIG.tracking.minimum_duration * RIG.frame_rate)
     assert len(done.tracks.trajectory) == (3 * frames if frames >= shortest else 0)
     kinds = done.tracks.events["kind"].tolist()
     assert kinds.count(b"birth") == 3

@@ -26,9 +26,9 @@ from stseg.labels.views import ViewLabels, view_labels
 from stseg.model.outlines import outlines
 
 SILHOUETTE_WIDTH = 2 * float(np.trapezoid(SILHOUETTE[:, 1], SILHOUETTE[:, 0]))
-EXACT = LabelConfig(draws=1, place_spread=1e-3, height_spread=0.0, width=SILHOUETTE_WIDTH, width_spread=0.0)
+EXACT = LabelConfig(samples=1, position_noise=1e-3, height_noise=0.0, width=SILHOUETTE_WIDTH, width_spread=0.0)
 """One pillar a person, just as the micro-scenes draw them."""
-FEW = LabelConfig(draws=8, place_spread=0.03, height_spread=0.03, width=SILHOUETTE_WIDTH, width_spread=0.02)
+FEW = LabelConfig(samples=8, position_noise=0.03, height_noise=0.03, width=SILHOUETTE_WIDTH, width_spread=0.02)
 """Almost certain ones: the people of the micro-scenes have no arms and legs."""
 
 
@@ -110,7 +110,7 @@ def test_the_most_likely_label_is_the_start() -> None:
 @settings(max_examples=20, deadline=None)
 def test_weights_follow_the_sigmoid_and_are_not_negative(seed: int) -> None:
     image = np.random.default_rng(seed).integers(0, 60, (3, 4, 3)).astype(np.uint8)
-    config = LabelConfig(adjacency=3.0, alike=40.0, slope=10.0)
+    config = LabelConfig(boundary_weight=3.0, contrast_limit=40.0, contrast_slope=10.0)
     across, down = edge_costs(image, (3, 4), config)
     assert min(across.min(), down.min()) >= 0
     assert not across[:, -1].any() and not down[-1].any()
@@ -120,7 +120,7 @@ def test_weights_follow_the_sigmoid_and_are_not_negative(seed: int) -> None:
 
 
 def test_without_colours_all_pairs_cost_the_same() -> None:
-    across, down = edge_costs(None, (3, 4), LabelConfig(adjacency=3.0, colourless=0.5))
+    across, down = edge_costs(None, (3, 4), LabelConfig(boundary_weight=3.0, colourless_factor=0.5))
     np.testing.assert_array_equal(across * QUANTUM, np.tile([1.5, 1.5, 1.5, 0.0], (3, 1)))
     np.testing.assert_array_equal(down * QUANTUM, np.repeat([[1.5], [1.5], [0.0]], 4, 1))
 
@@ -142,7 +142,11 @@ def random_nearest(rng: np.random.Generator, count: int, shape: tuple[int, int])
 def problem(seed: int, shape: tuple[int, int]) -> tuple[PixelEnergy, LabelLikelihood, Singles, Bytes, LabelConfig]:
     rng = np.random.default_rng(seed)
     config = LabelConfig(
-        detection=float(rng.uniform(0, 4)), adjacency=float(rng.uniform(0, 2)), alike=200.0, slope=60.0, outside=0.1
+        foreground_weight=float(rng.uniform(0, 4)),
+        boundary_weight=float(rng.uniform(0, 2)),
+        contrast_limit=200.0,
+        contrast_slope=60.0,
+        outlier_rate=0.1,
     )
     shown = random_nearest(rng, 2, shape)
     foreground = rng.random(shown.background.shape).astype(np.float32)
@@ -246,7 +250,9 @@ def test_the_same_again() -> None:
     np.testing.assert_array_equal(labels_in(camera, everybody), labels_in(camera, everybody))
 
 
-@pytest.mark.parametrize("change", [{"slope": 0.0}, {"place_spread": 0.0}, {"draws": 0}, {"outside": 1.0}])
+@pytest.mark.parametrize(
+    "change", [{"contrast_slope": 0.0}, {"position_noise": 0.0}, {"samples": 0}, {"outlier_rate": 1.0}]
+)
 def test_constants_out_of_range(change: dict[str, float]) -> None:
     with pytest.raises(ConfigError, match=next(iter(change))):
         LabelConfig(**change)  # type: ignore[arg-type]  # each value has its field's type

@@ -81,7 +81,7 @@ def test_somebody_lost_inside_the_area_is_the_same_afterwards() -> None:
 
 
 def test_too_long_is_somebody_else() -> None:
-    rows = gone(CONFIG.reunion + 0.25)
+    rows = gone(CONFIG.maximum_gap + 0.25)
     np.testing.assert_array_equal(relinked(rows).identity, rows["id"])
 
 
@@ -139,7 +139,7 @@ def test_no_other_links_have_a_greater_sum(rows: Rows) -> None:
     found = relinked(rows)
 
     def inside(ground: Floats) -> float:
-        return float(BORDER.inside(ground[None], PEOPLE.border)[0])
+        return float(BORDER.inside(ground[None], PEOPLE.border_width)[0])
 
     gains = [
         [gain(a, b, (inside(a.end.ground) + inside(b.start.ground)) / 2, RATE, CONFIG, PEOPLE) for b in parts]

@@ -167,7 +167,7 @@ def test_a_half_written_segment_is_nothing(rig_path: Path, undisturbed: Path, ha
 @pytest.mark.parametrize(
     ("more", "said"),
     [
-        (("--set", "ghosts.person=-3"), "config.ghosts.person: found -3.0, where .* has -4.0"),
+        (("--set", "detection.prior_log_odds=-3"), "config.detection.prior_log_odds: found -3.0, where .* has -4.0"),
         (("--tracker", "frames"), "--tracker: found frames, where .* has cut"),
         (("--frames", "0:30"), "--frames: found 0:30, where .* has all"),
         (("--volume", "none"), "--volume: found none, where .* has all"),

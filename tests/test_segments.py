@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from stseg.arrays import Rows
-from stseg.config import Config, IdentityConfig, SegmentConfig
+from stseg.config import Config, SegmentConfig, TrackingConfig
 from stseg.engine.segments import segments
 from stseg.errors import ConfigError
 from stseg.model.tables import EVENT, TRAJECTORY
@@ -52,7 +52,7 @@ def test_segments_partition_the_run(rate: float, first: int, length: int, second
 def test_windows_end_where_segments_do(rate: float, first: int, length: int) -> None:
     config = Config(segments=SegmentConfig(length=10.0, warm_up=2.0))
     for part in segments(rate, config, first, first + length):
-        commits = list(windows(rate, IdentityConfig(), part.lead, first + length))
+        commits = list(windows(rate, TrackingConfig(), part.lead, first + length))
         ends = {window.commit_stop for window in commits}
         assert part.stop in ends
         assert part.first == part.lead or part.first in ends
@@ -141,4 +141,4 @@ def test_segments_take_time() -> None:
     with pytest.raises(ConfigError, match="length"):
         SegmentConfig(length=0.0)
     with pytest.raises(ConfigError, match="background"):
-        SegmentConfig(background=0.0)
+        SegmentConfig(background_period=0.0)

@@ -11,14 +11,14 @@ from hypothesis import strategies as st
 from scenes import FEW_HEIGHTS, corner_cameras, people, rig_of
 
 from stseg.arrays import Boxes, Floats
-from stseg.config import LevelConfig
+from stseg.config import ErrorRateConfig
 from stseg.detection.box_noise_calibration import BoxNoiseCalibration
 from stseg.detection.detector import Detector
 from stseg.model.box_fit import GRAIN, LATE, TOLERANCE, WIDE, half_square
 from stseg.model.box_noise import EFFECTIVE_OBSERVATIONS, FIRST, KNOTS, BoxNoise
 
 RATE = 5.0
-CONFIG = LevelConfig(memory=1e6, weight=2.0)
+CONFIG = ErrorRateConfig(memory=1e6, prior_weight=2.0)
 
 
 def test_a_sure_box_has_the_first_tolerance_and_others_the_logarithm_of_their_score() -> None:

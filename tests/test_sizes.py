@@ -88,7 +88,7 @@ def by_definition(view: PixelView, raster: Singles, open_pixels: Flags, fits: Ca
     for v, u in np.argwhere(union & open_pixels):
         within = OWN * own[v, u] + BACKGROUND * (1 - own[v, u])
         score += np.where(inside[:, v, u], within, -OWN * own[v, u]) / area.mean()
-    return view.config.body_weight * score
+    return view.config.effective_observations * score
 
 
 @pytest.mark.parametrize("hidden", [0.0, 0.5])

@@ -24,7 +24,7 @@ COLOURLESS = sorted(set(TRACKERS) - {"particles", "belief"})
 """Trackers that need no colour; the others have tests of their own."""
 UNSEEN = FrameObservations((None,) * 4, (None,) * 4)
 """What the cameras showed, for trackers that do not ask."""
-LENGTH, SHARED = window_length(FRAME_RATE, CONFIG.identity)
+LENGTH, SHARED = window_length(FRAME_RATE, CONFIG.tracking)
 ENDS = LENGTH + LENGTH - SHARED
 """A run of so many frames ends exactly where its second window ends."""
 
@@ -79,7 +79,7 @@ def test_every_frame_is_committed_once(tracker: str, frames: int, first: int) ->
 def test_windows_are_those_of_the_run(first: int, frames: int) -> None:
     rows = np.concatenate([commit.windows for commit in run("cut", first, first + frames)])
     assert rows.dtype == WINDOW
-    expected = windows(FRAME_RATE, CONFIG.identity, first, first + frames)
+    expected = windows(FRAME_RATE, CONFIG.tracking, first, first + frames)
     ranges = [(w.index, w.solve_first, w.solve_stop, w.commit_first, w.commit_stop) for w in expected]
     told = rows[["index", "solve_first", "solve_stop", "commit_first", "commit_stop"]].tolist()
     assert told == ranges

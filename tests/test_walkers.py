@@ -19,7 +19,7 @@ from stseg.model.sizes import Sizes
 from stseg.tracking.track_filter import Measurement, TrackFilter, TrackState
 
 RATE = 8.0
-IDENTITY = CONFIG.identity
+IDENTITY = CONFIG.tracking
 GHOSTS = found(people())
 """Nobody."""
 NOTHING = Measurement(1.0, np.inf)
@@ -95,9 +95,9 @@ def test_sizes_converge() -> None:
 
 def test_what_a_frame_tells_of_sizes_is_used_once() -> None:
     """The prior of a frame's posterior, anybody's size, is taken out before the person's own comes in."""
-    walkers = TrackFilter(RATE, CONFIG.ghosts, IDENTITY)
+    walkers = TrackFilter(RATE, CONFIG.detection, IDENTITY)
     told = found(people((0.0, 0.0, 1.85)))
-    nothing = replace(told, sizes=Sizes.of_population(1, CONFIG.ghosts))
+    nothing = replace(told, sizes=Sizes.of_population(1, CONFIG.detection))
     walkers.follow(0, told, GHOSTS)
     sure = walkers.walkers[0]
     for frame in range(1, 40):
@@ -112,7 +112,7 @@ def test_what_a_frame_tells_of_sizes_is_used_once() -> None:
 
 def follow(ways: list[Way], frames: range, order: int | None = None) -> tuple[list[list[int]], TrackFilter]:
     """The chains that these people get, one for each frame that sees them, and who is followed in the end."""
-    walkers = TrackFilter(RATE, CONFIG.ghosts, IDENTITY)
+    walkers = TrackFilter(RATE, CONFIG.detection, IDENTITY)
     chains: list[list[int]] = [[] for _ in ways]
     rng = np.random.default_rng(order)
     for frame in frames:
@@ -222,7 +222,7 @@ def test_far_away_is_somebody_new() -> None:
 
 
 def test_before_the_first_frame_nothing_is_known_and_after_an_empty_one_that_nobody_is_there() -> None:
-    walkers = TrackFilter(RATE, CONFIG.ghosts, IDENTITY)
+    walkers = TrackFilter(RATE, CONFIG.detection, IDENTITY)
     assert walkers.expected(0) is None
     assert walkers.follow(0, GHOSTS, GHOSTS).shape == (0,)
     expected = walkers.expected(1)
@@ -251,7 +251,7 @@ def doubted(*places: tuple[float, float], evidence: float) -> People:
 def test_who_was_almost_believed_is_looked_for_once_more() -> None:
     """They have no number before they are found, and are forgotten if the next frame does not find them."""
     for found_again in (True, False):
-        walkers = TrackFilter(RATE, CONFIG.ghosts, IDENTITY)
+        walkers = TrackFilter(RATE, CONFIG.detection, IDENTITY)
         assert walkers.follow(0, GHOSTS, doubted((0.5, 0.5), evidence=-1.0)).shape == (0,)
         expected = walkers.expected(1)
         assert expected is not None
@@ -266,7 +266,7 @@ def test_who_was_almost_believed_is_looked_for_once_more() -> None:
 @pytest.mark.parametrize(("evidence", "place", "looked_for"), [(-1, 2, 2), (-5, 2, 1), (-1, 0.3, 1)])
 def test_who_is_not_looked_for_again(evidence: float, place: float, looked_for: int) -> None:
     """Who was hardly believed at all, and whoever stands beside somebody who is followed: it may be the same."""
-    walkers = TrackFilter(RATE, CONFIG.ghosts, IDENTITY)
+    walkers = TrackFilter(RATE, CONFIG.detection, IDENTITY)
     walkers.follow(0, found(people((0, 0))), doubted((place, 0.0), evidence=evidence))
     assert len(walkers.expected(1) or ()) == looked_for
     assert [walker.chain for walker in walkers.walkers] == [1, 0][:looked_for]

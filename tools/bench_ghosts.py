@@ -5,7 +5,7 @@
 Positions and statuses: simulated people seen by four cameras a quarter turn apart, as silhouettes and as a detector's
 boxes; each frame is expected from those before, as in a run. A candidate is a place that the settled search weighed,
 person or ghost; `--candidates` says from where they come beside tracks, which takes its own time
-(`detection.candidates`).
+(`proposals.source`).
 Gate: 20 frames/s where ten are weighed.
 
 Groups: one frame's candidates so many times over, in rooms whose evidence does not touch. Gate: a group of many takes
@@ -62,10 +62,10 @@ def positions(people: int, frames: int, kind: str, config: Config) -> tuple[floa
     kinds = [kind] * 4
     candidates, fuse = (
         Proposals(film.rig, kinds, config),
-        Occupancy(film.rig, kinds, config.occupancy, config.ghosts).fuse,
+        Occupancy(film.rig, kinds, config.occupancy, config.detection).fuse,
     )
-    frame_pass = Detector(film.rig, [kind] * 4, config.ghosts)
-    follow = TrackFilter(film.rig.frame_rate, config.ghosts, config.identity)
+    frame_pass = Detector(film.rig, [kind] * 4, config.detection)
+    follow = TrackFilter(film.rig.frame_rate, config.detection, config.tracking)
     taken, weighed = [], []
     for frame, views in enumerate(seen):
         start = time.process_time()
@@ -124,11 +124,11 @@ def search_seconds(case: Problem) -> float:
 def one_case(kind: str) -> Problem:
     """All that is known of the candidates of one frame, five people in view."""
     film, seen = evidence(5, 1, kind)
-    frame_pass, views = Detector(film.rig, [kind] * 4, Config().ghosts), seen[-1]
+    frame_pass, views = Detector(film.rig, [kind] * 4, Config().detection), seen[-1]
     found = frame_pass.explain(views, None)
     sights = [view.observe(shown) for view, shown in zip(frame_pass.views, views, strict=True)]
     state = FrameEvidence(
-        frame_pass.views, sights, Prior.of(None, Config().ghosts, frame_pass.border), frame_pass.parameters
+        frame_pass.views, sights, Prior.of(None, Config().detection, frame_pass.border), frame_pass.parameters
     )
     people, ghosts = (Candidates(some.ground, some.height, some.width) for some in (found.people, found.ghosts))
     pool = people.joined_with(ghosts)
@@ -142,9 +142,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--people", type=lambda text: [int(n) for n in text.split(",")], default=[3, 5, 7, 9])
     parser.add_argument("--groups", type=lambda text: [int(n) for n in text.split(",")], default=[1, 2, 4, 8])
     sources = ("lattice", "probability", "volume", "both")
-    parser.add_argument("--candidates", choices=sources, default=Config().detection.candidates)
+    parser.add_argument("--candidates", choices=sources, default=Config().proposals.source)
     asked = parser.parse_args(arguments)
-    config = replace(Config(), detection=replace(Config().detection, candidates=asked.candidates))
+    config = replace(Config(), proposals=replace(Config().proposals, source=asked.candidates))
     met = True
     print("| evidence | people | candidates weighed | ms a frame | frames/s |\n| --- | --: | --: | --: | --: |")
     for kind in ("pixels", "boxes"):

@@ -79,13 +79,13 @@ def beside_peer(views: Sequence[ViewLabels], frame: TrueFrame) -> tuple[float, f
 def _dense(view: ViewLabels, frame: TrueFrame, foreground: Singles) -> Floats:
     """Costs of all labels, float64 (v, u, n + 1), quanta."""
     shown, config = view.label_likelihood(frame.standing), view.config
-    edges, least = shown.people.edges, config.outside / (len(frame.standing) + 1)
+    edges, least = shown.people.edges, config.outlier_rate / (len(frame.standing) + 1)
     costs = np.full((*shown.background.shape, len(edges) + 1), _NEVER)
-    costs[..., 0] = config.detection * foreground - np.log(shown.background + least)
+    costs[..., 0] = config.foreground_weight * foreground - np.log(shown.background + least)
     for j, (left, top, right, bottom) in enumerate(edges.tolist()):
         here = np.s_[top - shown.top : bottom - shown.top, left - shown.left : right - shown.left]
         share = shown.people.share[shown.people.first[j] : shown.people.first[j + 1]].reshape(bottom - top, -1)
-        costs[(*here, j + 1)] = config.detection * (1 - foreground[here]) - np.log(share + least)
+        costs[(*here, j + 1)] = config.foreground_weight * (1 - foreground[here]) - np.log(share + least)
     return np.where(costs < _NEVER, np.rint(costs / QUANTUM), _NEVER)
 
 

@@ -54,7 +54,7 @@ def film_frames(spec: SceneSpec, every: int, seed: int = 0) -> tuple[Rig, list[T
     for images in film.empty():
         for model, image in zip(models, images, strict=True):
             model.learn(image)
-    sights = [ViewForeground(IlluminationMonitor(model, spec.frame_rate, config.light)) for model in models]
+    sights = [ViewForeground(IlluminationMonitor(model, spec.frame_rate, config.illumination)) for model in models]
     rng, frames = np.random.default_rng(seed), []
     for moment in film.moments():
         seen = [sight.evidence(view.image) for sight, view in zip(sights, moment.views, strict=True)]

@@ -44,10 +44,10 @@ VARIANTS = {
         Variant("frames", "frames", "frames"),
         Variant("kalman", "kalman", "kalman"),
         Variant("particles", "particles", "particles", colour=True),
-        Variant("particles-search", "particles: search alone", "particles", "particles.way=search", True),
-        Variant("particles-generic", "particles: generic filter", "particles", "particles.way=generic", True),
+        Variant("particles-search", "particles: search alone", "particles", "particles.method=search", True),
+        Variant("particles-generic", "particles: generic filter", "particles", "particles.method=generic", True),
         Variant("belief", "belief", "belief", colour=True),
-        Variant("belief-condensation", "belief: each view by itself", "belief", "belief.way=condensation", True),
+        Variant("belief-condensation", "belief: each view by itself", "belief", "belief.method=condensation", True),
     )
 }
 """In the order of the tables."""

@@ -183,7 +183,10 @@ class ArrivingVideos:
         if size != self._size:
             found = f"{size} bytes, of which only the first {self._size} were there when it was read"
             raise SourceError(
-                self._path, f"camera {self._camera.name}", found, "live.settled above the pauses of the recorder"
+                self._path,
+                f"camera {self._camera.name}",
+                found,
+                "live.file_quiet_time above the pauses of the recorder",
             )
 
     def _end(self) -> None:

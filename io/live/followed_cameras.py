@@ -81,7 +81,7 @@ class FollowedCameras:
         self.start, self.dropped = start, 0
         self._halt, self._say, self._config = halt, say, config
         self._period = 1 / rig.frame_rate
-        self._stale = max(config.stale, 0.75 * self._period)
+        self._stale = max(config.frame_tolerance, 0.75 * self._period)
         self._offsets = [source.offset for source in recording.sources]
         spread = (max(self._offsets) - min(self._offsets)) * self._period
         kept = spread + 2 * self._stale + _SLACK
@@ -163,7 +163,7 @@ class FollowedCameras:
         with self._came:
             while not self._stopped():
                 begun = [stream.pictures[0].at for stream in self._streams if stream.pictures]
-                if len(begun) == len(self._streams) or (begun and now() > min(begun) + self._config.silence):
+                if len(begun) == len(self._streams) or (begun and now() > min(begun) + self._config.stream_timeout):
                     return True
                 self._came.wait(_POLL)
         return False
@@ -214,4 +214,4 @@ class FollowedCameras:
 def _most_waiting(recording: Recording, config: LiveConfig) -> int:
     """How many moments may wait with their views."""
     bytes_of_one = sum(3 * camera.size[0] * camera.size[1] for camera in recording.read_rig.cameras)
-    return max(2, int(min(config.waiting * recording.rig.frame_rate, config.pictures * _MEBI / bytes_of_one)))
+    return max(2, int(min(config.buffer_time * recording.rig.frame_rate, config.buffer_memory * _MEBI / bytes_of_one)))

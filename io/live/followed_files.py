@@ -66,7 +66,7 @@ class FollowedFiles:
         self._feeds: list[_AlignedFiles] = []
         cameras = zip(recording.rig.cameras, recording.sources, recording.factors, strict=True)
         for camera, source, factor in cameras:
-            files = ArrivingFiles(source.source.path, config.settled, self._over, say)
+            files = ArrivingFiles(source.source.path, config.file_quiet_time, self._over, say)
             self._feeds.append(
                 _AlignedFiles(camera, source, ArrivingVideos(source.source, camera, files, notes), factor)
             )
@@ -111,7 +111,7 @@ class FollowedFiles:
             if not missing:
                 return True
             waited += _POLL if some else 0.0
-            if not said and waited > self._config.settled + self._config.silence:
+            if not said and waited > self._config.file_quiet_time + self._config.stream_timeout:
                 names = [
                     feed.camera.name for feed, view in zip(self._feeds, self._ahead, strict=True) if not view.done()
                 ]

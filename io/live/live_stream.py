@@ -116,17 +116,17 @@ class LiveStream(Thread):
 
     def run(self) -> None:
         """Read until `close`, over all breaks."""
-        pause, broken = self._config.pause, False
+        pause, broken = self._config.reconnect_wait, False
         while not self._over.is_set():
             if self._read_on(broken):
-                pause, broken = self._config.pause, False
+                pause, broken = self._config.reconnect_wait, False
             if self.failure is not None:
                 return
             if not broken and not self._over.is_set():
                 self._tell(f"nothing comes from {mask_passwords(self._source.address)}; it is blind until it does")
                 broken = True
             self._over.wait(pause)
-            pause = min(2 * pause, self._config.longest_pause)
+            pause = min(2 * pause, self._config.longest_reconnect_wait)
 
     def close(self) -> None:
         """Read no more; the thread ends when it has noticed."""
@@ -135,7 +135,7 @@ class LiveStream(Thread):
     def _read_on(self, broken: bool) -> bool:
         """Read until the stream breaks; whether anything came."""
         try:
-            capture = self._opening(self._source.address, self._config.silence)
+            capture = self._opening(self._source.address, self._config.stream_timeout)
         except OSError:
             return False
         came = False
@@ -161,7 +161,7 @@ class LiveStream(Thread):
             picture = capture.read()
             if picture is None:
                 return
-            present = present or now() - asked > self._period / 4 or now() - opened > self._config.silence
+            present = present or now() - asked > self._period / 4 or now() - opened > self._config.stream_timeout
             if present:
                 yield picture
 

@@ -52,7 +52,7 @@ def labels(
     frames
         Part of the run, half open.
     set_
-        One constant other than those of the run, for example --set labels.draws=32; may be given several times.
+        One constant other than those of the run, for example --set labels.samples=32; may be given several times.
     overwrite
         Write into a folder that is not empty.
     """

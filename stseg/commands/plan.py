@@ -134,7 +134,7 @@ def forecast(job: Job, counting: float, workers: int) -> Forecast:
     # A segment looks on until its last window is solved, which is much of a short part and little of a long one.
     beyond = (fused.calls - tried) / len(parts)
     looked_at = sum(segment.stop - segment.lead + beyond for segment in cuts)
-    learned = -(-frames // round(job.config.segments.background * job.recording.rig.frame_rate))
+    learned = -(-frames // round(job.config.segments.background_period * job.recording.rig.frame_rate))
     return Forecast(
         frames, len(cuts), workers, counting, max(learning) * learned, tracking / fused.calls * looked_at,
         joining / tried * frames, round(size / tried * frames),

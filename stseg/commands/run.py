@@ -71,7 +71,7 @@ def run(
     config
         A TOML file with constants of the stages, one table a stage.
     set_
-        One constant, for example --set ghosts.person=-2; may be given several times.
+        One constant, for example --set detection.prior_log_odds=-2; may be given several times.
     tracker
         cut: graph cuts of windows of the volume. frames: the people of each frame as they come, without a cut.
         kalman: a filter for each of them (HW12). particles: followed by the colours of their clothes (KD06).

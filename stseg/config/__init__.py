@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from stseg.config.detection import DetectionConfig, ErrorRateConfig, LabelConfig, OccupancyConfig, ProposalConfig
 from stseg.config.foreground import (
     BackgroundConfig,
     ChromaticConfig,
     CodebookConfig,
     ForegroundConfig,
-    LightConfig,
+    IlluminationConfig,
     MixtureConfig,
 )
-from stseg.config.people import DetectionConfig, GhostConfig, LabelConfig, LevelConfig, OccupancyConfig
 from stseg.config.trackers import BeliefConfig, KalmanConfig, ParticleConfig
-from stseg.config.tracks import IdentityConfig, LiveConfig, SegmentationConfig, SegmentConfig
+from stseg.config.tracking import LiveConfig, SegmentationConfig, SegmentConfig, TrackingConfig
 
 __all__ = [
     "BackgroundConfig",
@@ -23,19 +23,19 @@ __all__ = [
     "CodebookConfig",
     "Config",
     "DetectionConfig",
+    "ErrorRateConfig",
     "ForegroundConfig",
-    "GhostConfig",
-    "IdentityConfig",
+    "IlluminationConfig",
     "KalmanConfig",
     "LabelConfig",
-    "LevelConfig",
-    "LightConfig",
     "LiveConfig",
     "MixtureConfig",
     "OccupancyConfig",
     "ParticleConfig",
+    "ProposalConfig",
     "SegmentConfig",
     "SegmentationConfig",
+    "TrackingConfig",
 ]
 
 
@@ -44,13 +44,13 @@ class Config:
     """All stages."""
 
     foreground: ForegroundConfig = field(default_factory=ForegroundConfig)
-    light: LightConfig = field(default_factory=LightConfig)
+    illumination: IlluminationConfig = field(default_factory=IlluminationConfig)
     occupancy: OccupancyConfig = field(default_factory=OccupancyConfig)
-    level: LevelConfig = field(default_factory=LevelConfig)
+    error_rates: ErrorRateConfig = field(default_factory=ErrorRateConfig)
     segmentation: SegmentationConfig = field(default_factory=SegmentationConfig)
-    identity: IdentityConfig = field(default_factory=IdentityConfig)
-    ghosts: GhostConfig = field(default_factory=GhostConfig)
+    tracking: TrackingConfig = field(default_factory=TrackingConfig)
     detection: DetectionConfig = field(default_factory=DetectionConfig)
+    proposals: ProposalConfig = field(default_factory=ProposalConfig)
     segments: SegmentConfig = field(default_factory=SegmentConfig)
     live: LiveConfig = field(default_factory=LiveConfig)
     kalman: KalmanConfig = field(default_factory=KalmanConfig)

@@ -25,7 +25,7 @@ from typing import NamedTuple
 import numpy as np
 
 from stseg.arrays import Floats, Ints, Singles
-from stseg.config import GhostConfig
+from stseg.config import DetectionConfig
 from stseg.detection.assignment import Assignment
 from stseg.detection.refine import RefinedPlaces
 from stseg.detection.views import PixelView, View, ViewObservation
@@ -42,7 +42,7 @@ def measure(
     views: Sequence[View],
     sights: Sequence[ViewObservation | None],
     own: Assignment,
-    config: GhostConfig,
+    config: DetectionConfig,
 ) -> Sizes:
     """The E step: posteriors of people's sizes after one frame, anybody's sizes the prior.
 

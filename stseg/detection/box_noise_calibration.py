@@ -19,7 +19,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints
-from stseg.config import LevelConfig
+from stseg.config import ErrorRateConfig
 from stseg.detection.views import BoxView, View, ViewObservation
 from stseg.model.box_fit import EARLY, LATE, TOLERANCE, WIDE, fill_offsets
 from stseg.model.box_noise import FIRST, KNOTS, BoxNoise, knots_of
@@ -43,14 +43,14 @@ class BoxNoiseCalibration:
         Squared offsets, of the lower edge on either side of the feet, and boxes; both times seconds.
     """
 
-    def __init__(self, frame_rate: float, config: LevelConfig) -> None:
+    def __init__(self, frame_rate: float, config: ErrorRateConfig) -> None:
         self.frame_rate, self.config = frame_rate, config
         self.squares, self.seen = np.zeros_like(FIRST.spread), np.zeros(len(KNOTS))
 
     @property
     def noise(self) -> BoxNoise:
         """By all that was seen."""
-        weight, first = self.config.weight, FIRST.spread**2
+        weight, first = self.config.prior_weight, FIRST.spread**2
         both = FIRST.spread[:, LATE] + FIRST.spread[:, EARLY]
         first[:, LATE:] *= FIRST.spread[:, LATE:] / both[:, None]
         squares, count = weight * first + self.squares, (weight + self.seen)[:, None]
@@ -72,7 +72,7 @@ class BoxNoiseCalibration:
         people = explanation.people
         for k, (view, sight, owner) in enumerate(zip(views, sights, explanation.box_assignment, strict=True)):
             if isinstance(view, BoxView) and sight is not None and len(people):
-                trusted = people.evidence - people.view_evidence[k] >= self.config.supported
+                trusted = people.evidence - people.view_evidence[k] >= self.config.minimum_evidence
                 box = np.flatnonzero((owner >= 0) & trusted[owner] & _whole(sight.edges, view.camera.size))
                 self._count(sight.score[box], _squares(view, people, owner[box], sight.edges[box]))
 

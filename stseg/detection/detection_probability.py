@@ -21,7 +21,7 @@ import numpy as np
 
 from stseg.accelerate import kernel
 from stseg.arrays import Flags, Floats, Singles
-from stseg.config import DetectionConfig
+from stseg.config import ProposalConfig
 from stseg.detection.pillar_strips import Pillars
 from stseg.errors import SourceError
 from stseg.geometry import Rig
@@ -52,15 +52,15 @@ class DetectionProbability:
         The lattice, metres, `spacing` apart.
     """
 
-    def __init__(self, rig: Rig, config: DetectionConfig, steps: Sequence[int] | None = None) -> None:
-        self.rig, self.config, self.spacing = rig, config, config.spacing
+    def __init__(self, rig: Rig, config: ProposalConfig, steps: Sequence[int] | None = None) -> None:
+        self.rig, self.config, self.spacing = rig, config, config.lattice_spacing
         grid = rig.grid
-        x, y = (np.arange(a + config.spacing / 2, b, config.spacing) for a, b in (grid.x, grid.y))
+        x, y = (np.arange(a + config.lattice_spacing / 2, b, config.lattice_spacing) for a, b in (grid.x, grid.y))
         self.ground = np.stack(np.meshgrid(x, y), -1)
         flat = self.ground.reshape(-1, 2)
         self.inside = np.ones(len(flat), bool) if grid.polygon is None else inside_polygon(flat, grid.polygon)
-        self.heights, self.height_share = _lattice(config.height_mean, config.height_spread, config.sizes)
-        self.widths, self.width_share = _lattice(config.width_mean, config.width_spread, config.sizes)
+        self.heights, self.height_share = _lattice(config.height_mean, config.height_spread, config.body_sizes)
+        self.widths, self.width_share = _lattice(config.width_mean, config.width_spread, config.body_sizes)
         self.steps = list(steps or [1] * len(rig.cameras))
         self.pillars = [
             Pillars.of(camera, flat, self.heights, config.width_mean, step)
@@ -99,14 +99,14 @@ class DetectionProbability:
         chance = np.empty(len(pillars.edge))
         fill_chance(
             sums, pillars.upright, pillars.edge, pillars.middle, pillars.half, pillars.base, self.widths,
-            self.height_share, self.width_share, self.config.outside, chance,
+            self.height_share, self.width_share, self.config.unseen_rate, chance,
         )  # fmt: skip
         return chance
 
     def said(self, chance: Floats) -> Floats:
         """What a view's p(F_i | X) adds to it, nats; 0 where it does not see the pillar."""
         config = self.config
-        return np.where(np.isnan(chance), 0.0, np.log(np.fmax(chance, config.least) / config.level))
+        return np.where(np.isnan(chance), 0.0, np.log(np.fmax(chance, config.view_miss_rate) / config.covered_share))
 
     def _require(self, maps: Sequence[Singles | None]) -> None:
         cameras = self.rig.cameras

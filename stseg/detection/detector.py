@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from stseg.arrays import ViewEvidence
-from stseg.config import GhostConfig, LevelConfig
+from stseg.config import DetectionConfig, ErrorRateConfig
 from stseg.detection.box_noise_calibration import BoxNoiseCalibration
 from stseg.detection.evidence import peaks
 from stseg.detection.map_estimate import FrameEvidence, MapEstimate
@@ -44,13 +44,15 @@ class Detector:
         How fast it learns how sharp boxes are.
     """
 
-    def __init__(self, rig: Rig, kinds: Sequence[str], config: GhostConfig, level: LevelConfig | None = None) -> None:
+    def __init__(
+        self, rig: Rig, kinds: Sequence[str], config: DetectionConfig, level: ErrorRateConfig | None = None
+    ) -> None:
         self.config = config
-        self._rate, self._level = rig.frame_rate, level or LevelConfig()
+        self._rate, self._level = rig.frame_rate, level or ErrorRateConfig()
         self.first_noise = self.new_calibration().noise
         grid = rig.grid
-        x = np.arange(grid.x[0] + config.lattice / 2, grid.x[1], config.lattice)
-        y = np.arange(grid.y[0] + config.lattice / 2, grid.y[1], config.lattice)
+        x = np.arange(grid.x[0] + config.lattice_spacing / 2, grid.x[1], config.lattice_spacing)
+        y = np.arange(grid.y[0] + config.lattice_spacing / 2, grid.y[1], config.lattice_spacing)
         self.lattice_ground = np.stack(np.meshgrid(x, y), -1)
         flat = self.lattice_ground.reshape(-1, 2)
         self.views: list[BoxView | PixelView] = [
@@ -58,17 +60,17 @@ class Detector:
             for camera, kind in zip(rig.cameras, kinds, strict=True)
         ]
         self.parameters = Parameters(
-            config.person,
-            config.apart,
-            config.hit,
-            config.box_miss,
-            config.hidden_below,
-            config.whole_above,
-            config.least,
-            config.body_weight,
+            config.prior_log_odds,
+            config.minimum_distance,
+            config.box_log_ratio,
+            config.box_miss_rate,
+            config.hidden_visibility,
+            config.full_visibility,
+            config.hidden_detection_rate,
+            config.effective_observations,
         )
         self.border = Border.of(rig)
-        self._trades = 0 if "boxes" in kinds else config.trades
+        self._trades = 0 if "boxes" in kinds else config.swap_moves
 
     def new_calibration(self) -> BoxNoiseCalibration:
         """Box noise calibration of a session that begins: the first guess."""
@@ -117,10 +119,10 @@ class Detector:
         expected_inside = prior.pool()
         seen_now = FrameEvidence(self.views, sights, prior, self.parameters)
         frame = MapEstimate(seen_now, expected_inside, np.arange(len(expected_inside)))
-        for _ in range(self.config.rounds):
+        for _ in range(self.config.search_rounds):
             fresh = self.fresh(frame)
             if proposed is not None:
-                fresh, proposed = fresh.joined_apart(proposed, self.config.lattice), None
+                fresh, proposed = fresh.joined_apart(proposed, self.config.lattice_spacing), None
             moved = frame.refined().pool
             if not len(fresh) and not len(moved):
                 break

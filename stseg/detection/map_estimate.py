@@ -90,7 +90,7 @@ class MapEstimate:
 
     def rivals(self) -> Ints:
         """Candidates outside the set, the best of each place, best first: int64 (n,)."""
-        apart = 2 * self.seen.prior.config.lattice
+        apart = 2 * self.seen.prior.config.lattice_spacing
         others = np.setdiff1d(np.arange(len(self.pool)), self.members)
         gain = np.array([self.score(np.append(self.members, i)) - self.total for i in others])
         standing, kept = self.pool.ground[self.members], []

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stseg.arrays import Floats, Ints
-from stseg.config import GhostConfig
+from stseg.config import DetectionConfig
 from stseg.model.border import Border
 from stseg.model.candidates import Candidates
 from stseg.model.predicted_tracks import PredictedTracks, no_tracks
@@ -31,16 +31,16 @@ class Prior:
     """
 
     expected: PredictedTracks
-    config: GhostConfig
+    config: DetectionConfig
     border: Border
     cost: float
 
     @classmethod
-    def of(cls, expected: PredictedTracks | None, config: GhostConfig, border: Border) -> Prior:
+    def of(cls, expected: PredictedTracks | None, config: DetectionConfig, border: Border) -> Prior:
         """The prior of a frame; None expects nobody and takes nobody for a newcomer, as a first frame must."""
         if expected is None:
             return cls(no_tracks(), config, border, 0.0)
-        return cls(expected, config, border, config.newcomer)
+        return cls(expected, config, border, config.birth_cost)
 
     def pool(self) -> Candidates:
         """Those expected inside the border, as candidates: who leaves the area is not followed out of it."""
@@ -63,7 +63,7 @@ class Prior:
 
     def newcomer(self, ground: Floats) -> Floats:
         """What a newcomer costs at ground points (n, 2), nats, float64 (n,)."""
-        return self.cost * self.border.inside(ground, self.config.border)
+        return self.cost * self.border.inside(ground, self.config.border_width)
 
     def track_log_ratio(self, pool: Candidates) -> Floats:
         """What speaks for each candidate by being each walker, nats, float64 (n, walker)."""

@@ -19,7 +19,7 @@ Owners = NDArray[np.int16]
 
 
 class Parameters(NamedTuple):
-    """The constants of the pass; see `stseg.config.GhostConfig` for their meaning. Nats and shares."""
+    """The constants of the pass; see `stseg.config.DetectionConfig` for their meaning. Nats and shares."""
 
     person: float
     apart: float

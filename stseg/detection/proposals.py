@@ -2,7 +2,7 @@
 
 The order is that of METHODS 7: whom earlier frames lead to expect come first, in the pass itself; then modes of the
 volume that all evidence together makes, then modes of the detection probability. Who stands where another stands
-already is a duplicate. Which of these sources a run asks is `detection.candidates`; docs/localisation.md says what each
+already is a duplicate. Which of these sources a run asks is `proposals.source`; docs/localisation.md says what each
 is worth.
 """
 
@@ -45,9 +45,9 @@ class Proposals:
     """
 
     def __init__(self, rig: Rig, kinds: Sequence[str], config: Config) -> None:
-        self.rig, self.config, self.ghosts = rig, config.detection, config.ghosts
+        self.rig, self.config, self.ghosts = rig, config.proposals, config.detection
         self.probability = None
-        if self.config.candidates in ("probability", "both"):
+        if self.config.source in ("probability", "both"):
             self.probability = DetectionProbability(rig, self.config, map_steps(rig, kinds))
 
     def of(self, seen: Sequence[ViewEvidence], fuse: Fuse) -> Candidates | None:
@@ -60,13 +60,13 @@ class Proposals:
         fuse
             The volume float32 (plane, y, x) of a frame's evidence under an explanation, nats (`stseg.occupancy`).
         """
-        if self.config.candidates == "lattice":
+        if self.config.source == "lattice":
             return None
         found = self._pool(np.zeros((0, 2)))
-        if self.config.candidates in ("volume", "both"):
+        if self.config.source in ("volume", "both"):
             volume = fuse(seen, empty_explanation(self.rig, seen))
             found = found.joined_apart(
-                self._pool(volume_modes(volume, self.rig.grid, self.config.kernel).ground), self._apart
+                self._pool(volume_modes(volume, self.rig.grid, self.config.kernel_radius).ground), self._apart
             )
         if self.probability is not None:
             own = probability_modes(self.probability, soft_maps(self.probability, seen))
@@ -75,7 +75,7 @@ class Proposals:
 
     @property
     def _apart(self) -> float:
-        return self.ghosts.lattice
+        return self.ghosts.lattice_spacing
 
     def _pool(self, ground: Floats) -> Candidates:
         everywhere = np.ones(len(ground))
@@ -102,7 +102,7 @@ def soft_maps(probability: DetectionProbability, seen: Sequence[ViewEvidence]) -
 def probability_modes(probability: DetectionProbability, maps: Sequence[Singles | None]) -> Modes:
     """Modes of the detection probability where the views together speak for somebody (HW12 eqs 7 to 9)."""
     said = probability.log_ratio(maps)
-    return modes(weights(said), probability.ground, probability.spacing, probability.config.kernel)
+    return modes(weights(said), probability.ground, probability.spacing, probability.config.kernel_radius)
 
 
 def weights(said: Floats) -> Floats:

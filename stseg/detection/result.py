@@ -60,7 +60,7 @@ def _visible(frame: MapEstimate) -> Floats:
 
 def _ghosts(frame: MapEstimate, total: float) -> People:
     """The places that were weighed and found to be nobody's."""
-    lattice = frame.seen.prior.config.lattice
+    lattice = frame.seen.prior.config.lattice_spacing
     which = np.setdiff1d(np.arange(len(frame.pool)), frame.members)
     kept = []
     for i in which:

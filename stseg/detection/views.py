@@ -10,7 +10,7 @@ from scipy.special import expit
 
 from stseg.accelerate import kernel
 from stseg.arrays import Boxes, Flags, Floats, Ints, Singles
-from stseg.config import GhostConfig
+from stseg.config import DetectionConfig
 from stseg.geometry import Camera, Grid
 from stseg.geometry.bodies import WIDTH, BodyTable
 from stseg.model.box_fit import fill_best_match, fill_inside
@@ -57,7 +57,7 @@ class ViewObservation:
 class View:
     """Pillars of a ground lattice in one camera."""
 
-    def __init__(self, camera: Camera, grid: Grid, lattice_ground: Floats, config: GhostConfig) -> None:
+    def __init__(self, camera: Camera, grid: Grid, lattice_ground: Floats, config: DetectionConfig) -> None:
         self.camera = camera
         self.config = config
         self.centre = camera.centre[:2]
@@ -87,7 +87,7 @@ class View:
 class BoxView(View):
     """A view that delivers boxes."""
 
-    def __init__(self, camera: Camera, grid: Grid, lattice_ground: Floats, config: GhostConfig) -> None:
+    def __init__(self, camera: Camera, grid: Grid, lattice_ground: Floats, config: DetectionConfig) -> None:
         super().__init__(camera, grid, lattice_ground, config)
         width, height = map(float, camera.size)
         inside = np.zeros(self.bodies.shape[:2])
@@ -98,8 +98,8 @@ class BoxView(View):
     def found_share(self, visible: Floats) -> Floats:
         """How often a body of which so much is visible is found, relative to a whole one."""
         config = self.config
-        share = (visible - config.hidden_below) / (config.whole_above - config.hidden_below)
-        return np.asarray(share.clip(config.least, 1.0))
+        share = (visible - config.hidden_visibility) / (config.full_visibility - config.hidden_visibility)
+        return np.asarray(share.clip(config.hidden_detection_rate, 1.0))
 
     def observe(self, seen: Boxes | Singles | None, sharpness: BoxNoise = FIRST) -> ViewObservation:
         """The frame's boxes."""
@@ -114,13 +114,13 @@ class BoxView(View):
         width, height = map(float, self.camera.size)
         best = np.full(self.bodies.shape[:2], -np.inf)
         fill_best_match(self.bodies, sight.edges[free], sight.tolerance[free], sight.belief[free], width, height, best)
-        return np.where(self.found > 0, np.maximum(self.config.hit + best, -_OPTIMISM * self.found), 0.0)
+        return np.where(self.found > 0, np.maximum(self.config.box_log_ratio + best, -_OPTIMISM * self.found), 0.0)
 
 
 class PixelView(View):
     """A view that delivers a likelihood map."""
 
-    def __init__(self, camera: Camera, grid: Grid, lattice_ground: Floats, config: GhostConfig) -> None:
+    def __init__(self, camera: Camera, grid: Grid, lattice_ground: Floats, config: DetectionConfig) -> None:
         super().__init__(camera, grid, lattice_ground, config)
         heights = np.repeat(np.asarray(config.heights), len(lattice_ground))
         places = np.tile(lattice_ground, (len(config.heights), 1))
@@ -135,7 +135,7 @@ class PixelView(View):
         if isinstance(seen, np.ndarray):
             mean = np.empty(self.shape, np.float32)
             _fill_means(seen, self.step, mean)
-            miss, clutter = self.config.pixel_miss, self.config.pixel_clutter
+            miss, clutter = self.config.pixel_miss_rate, self.config.pixel_clutter_rate
             body = (1 - miss) * mean + miss * (1 - mean)
             empty = clutter * mean + (1 - clutter) * (1 - mean)
             raster = np.log(body / empty).astype(np.float32)
@@ -147,7 +147,7 @@ class PixelView(View):
         left_of, means = np.empty((self.shape[0], self.shape[1] + 1)), np.empty(len(first))
         _fill_left_of(sight.raster, free, left_of)
         _fill_span_means(left_of, first, self.lattice_rows, spans, area, means)
-        return means.reshape(len(self.config.heights), -1) * self.config.body_weight
+        return means.reshape(len(self.config.heights), -1) * self.config.effective_observations
 
     def open_sums(
         self, values: Singles, owner: Ints, ground: Floats, heights: Floats, widths: Floats
@@ -157,7 +157,7 @@ class PixelView(View):
         Both float64 (person, pillar); see `ghosts.outlines.sums_inside`, sizes in metres.
         """
         sums, area = sums_inside(self.table, ground, heights, widths / WIDTH, self.step, values, owner)
-        return sums * self.config.body_weight, self._fair(area, heights, widths)
+        return sums * self.config.effective_observations, self._fair(area, heights, widths)
 
 
 @kernel

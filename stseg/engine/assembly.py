@@ -40,7 +40,7 @@ class _Named(NamedTuple):
 
 def assemble(job: Job, pipeline: Pipeline, made: Sequence[FinishedSegment], output: Path, overwrite: bool) -> Tracks:
     """Write the run file of a job from its segments, in their order; the pipeline is the job's."""
-    seams = Stitcher(round(job.config.identity.patience * job.recording.rig.frame_rate))
+    seams = Stitcher(round(job.config.tracking.patience * job.recording.rig.frame_rate))
     before = made[0].segment.first if made else 0
     for segment, path in made:
         run = read_run(path)

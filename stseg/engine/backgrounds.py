@@ -1,7 +1,7 @@
 """Each camera's foreground, its background learned before the frames that it is to judge.
 
-A background belongs to a part of the recording, `segments.background` seconds long, so that light which changes over a
-day and furniture that is moved matter little, and so that what a segment finds depends on no other segment.
+A background belongs to a part of the recording, `segments.background_period` seconds long, so that light which changes
+over a day and furniture that is moved matter little, and so that what a segment finds depends on no other segment.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import TypeVar
 import numpy as np
 
 from stseg.arrays import Bytes
-from stseg.config import Config, LightConfig, SegmentConfig
+from stseg.config import Config, IlluminationConfig, SegmentConfig
 from stseg.engine.segments import Segment
 from stseg.foreground import make_background
 from stseg.foreground.background import Background
@@ -85,7 +85,7 @@ def background_frames(
 
 def part_length(config: SegmentConfig, frame_rate: float) -> int:
     """Frames of a part of the recording whose background holds."""
-    return max(1, round(config.background * frame_rate))
+    return max(1, round(config.background_period * frame_rate))
 
 
 def is_colour(recording: Recording, camera: int) -> bool:
@@ -117,7 +117,7 @@ class BackgroundLearner:
         What is a change of light.
     """
 
-    def __init__(self, model: Background, frame_rate: float, step: int, config: LightConfig) -> None:
+    def __init__(self, model: Background, frame_rate: float, step: int, config: IlluminationConfig) -> None:
         self._model, self._frame_rate = model.at_rate(frame_rate / step), frame_rate
         self._watch = IlluminationMonitor(self._model, frame_rate / step, config)
 
@@ -143,11 +143,11 @@ def _sight(
             model.learn_from(_colours(recording, camera, shown, streams))
     elif looks.before:
         frames = sampled(looks.before, config.segments)
-        learner = BackgroundLearner(model, frame_rate, frames.step, config.light)
+        learner = BackgroundLearner(model, frame_rate, frames.step, config.illumination)
         for image in _colours(recording, camera, frames, streams):
             learner.see(image)
         model = learner.learned()
-    return ViewForeground(IlluminationMonitor(model, frame_rate, config.light))
+    return ViewForeground(IlluminationMonitor(model, frame_rate, config.illumination))
 
 
 def _seeing(recording: Recording, camera: int, part: range, streams: StreamIndex | None) -> Sequence[int]:
@@ -175,4 +175,4 @@ def _colours(recording: Recording, camera: int, frames: Sequence[int], streams: 
 
 def sampled(part: _Frames, config: SegmentConfig) -> _Frames:
     """Frames spread over a part of the recording."""
-    return part[:: max(1, len(part) // config.samples)]
+    return part[:: max(1, len(part) // config.background_samples)]

@@ -130,7 +130,7 @@ def _files(
     notes = FileNotes(folder.path / "files.json")
     if sights.unlearned:
         with FollowedFiles(recording, first, None, config.live, notes, halt, reporter.note) as moments:
-            if not _learn(sights, moments, config.live.learning, reporter):
+            if not _learn(sights, moments, config.live.background_time, reporter):
                 yield None
                 return
     stop = None if job.stop == ENDLESS else job.stop
@@ -145,7 +145,7 @@ def _cameras(
     """Live streams from now on; None where it is stopped before anything came."""
     recording, config, sights = job.read, job.config, follower.sights
     with FollowedCameras(recording, config.live, folder.clock(), halt, reporter.note) as moments:
-        if sights.unlearned and not _learn(sights, moments, config.live.learning, reporter):
+        if sights.unlearned and not _learn(sights, moments, config.live.background_time, reporter):
             yield None
             return
         begun = next(moments, None)

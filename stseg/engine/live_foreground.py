@@ -53,7 +53,7 @@ class LiveForegrounds:
 
     def learn(self, moments: Iterable[LiveFrameSet]) -> int:
         """Teach the cameras without an empty scene; how many moments there were."""
-        frames = max(1, round(self._config.live.learning * self._recording.rig.frame_rate))
+        frames = max(1, round(self._config.live.background_time * self._recording.rig.frame_rate))
         step = sampled(range(frames), self._config.segments).step
         seen: dict[int, list[Bytes]] = {k: [] for k in self._blind}
         count = 0
@@ -81,7 +81,7 @@ class LiveForegrounds:
 
     def sights(self) -> list[ViewForeground]:
         """What a segment sees by that begins to look now."""
-        frame_rate, light = self._recording.rig.frame_rate, self._config.light
+        frame_rate, light = self._recording.rig.frame_rate, self._config.illumination
         models = [self._models.get(k) for k in range(len(self._recording.sources))]
         return [
             ViewForeground(None if model is None else IlluminationMonitor(deepcopy(model), frame_rate, light))
@@ -96,7 +96,7 @@ class LiveForegrounds:
             self._learners[k] = self._learner(self._empty.get(k, learned))
 
     def _learner(self, model: Background) -> BackgroundLearner:
-        return BackgroundLearner(deepcopy(model), self._recording.rig.frame_rate, self._step, self._config.light)
+        return BackgroundLearner(deepcopy(model), self._recording.rig.frame_rate, self._step, self._config.illumination)
 
 
 def _image(view: Observation) -> list[Bytes]:

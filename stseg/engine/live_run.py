@@ -61,7 +61,7 @@ class LiveRun:
         self.sights, self.made = sights, made
         self._job, self._folder, self._table = job, folder, table
         frame_rate = job.recording.rig.frame_rate
-        self._window = window_length(frame_rate, job.config.identity)[0]
+        self._window = window_length(frame_rate, job.config.tracking)[0]
         warm_up = round(job.config.segments.warm_up * frame_rate)
         self._names = LiveIds(table.rows, warm_up + 2 * self._window)
         self._blindness = BlindViews([camera.name for camera in job.recording.rig.cameras])

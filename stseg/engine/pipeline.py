@@ -40,8 +40,8 @@ class Pipeline:
 
     def __init__(self, rig: Rig, kinds: Sequence[str], config: Config, tracker: str) -> None:
         self.rig, self.config, self.tracker = rig, config, find_tracker(tracker)
-        self.detector = Detector(rig, kinds, config.ghosts, config.level)
-        self.occupancy = Occupancy(rig, kinds, config.occupancy, config.ghosts, config.level)
+        self.detector = Detector(rig, kinds, config.detection, config.error_rates)
+        self.occupancy = Occupancy(rig, kinds, config.occupancy, config.detection, config.error_rates)
         self.proposals = Proposals(rig, kinds, config)
 
     def finished(self, committed: Rows, events: Rows, shown: Rig | None = None) -> tuple[Tracks, Ints]:
@@ -58,9 +58,9 @@ class Pipeline:
         """
         rate, config = self.rig.frame_rate, self.config
         if self.tracker.final:
-            whole = committed_tracks(committed, events, rate, config.identity)
+            whole = committed_tracks(committed, events, rate, config.tracking)
         else:
-            whole = final_tracks(committed, events, rate, self.detector.border, config.identity, config.ghosts)
+            whole = final_tracks(committed, events, rate, self.detector.border, config.tracking, config.detection)
         tables = [view.table for view in self.detector.views]
         if shown is not None:
             tables = [BodyTable.of(camera, shown.grid) for camera in shown.cameras]

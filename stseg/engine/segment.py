@@ -66,7 +66,7 @@ class Job:
 
     def gaps(self) -> list[tuple[int, int]]:
         """Frames of the run that no camera shows, for longer than anybody is waited for: half-open ranges."""
-        longest = longest_absence(self.config.identity) * self.recording.rig.frame_rate
+        longest = longest_absence(self.config.tracking) * self.recording.rig.frame_rate
         return find_gaps(self.streams.coverage(self.recording), self.first, self.stop, longest)
 
     def segments(self) -> list[Segment]:

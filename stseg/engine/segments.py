@@ -15,7 +15,7 @@ from math import ceil
 import numpy as np
 
 from stseg.arrays import Flags
-from stseg.config import Config, IdentityConfig
+from stseg.config import Config, TrackingConfig
 from stseg.tracking.windows import window_length
 
 
@@ -63,9 +63,9 @@ def segments(
     return [replace(part, index=k) for k, part in enumerate(parts)]
 
 
-def longest_absence(config: IdentityConfig) -> float:
+def longest_absence(config: TrackingConfig) -> float:
     """How long at most somebody may be unseen and still be followed, known again or filled in, seconds."""
-    return max(config.patience, config.reunion, config.bridge)
+    return max(config.patience, config.maximum_gap, config.interpolation_gap)
 
 
 def find_gaps(seen: Flags, first: int, stop: int, longest: float) -> list[tuple[int, int]]:
@@ -87,7 +87,7 @@ def _parts(frame_rate: float, config: Config, first: int, stop: int) -> list[Seg
         return []
     found: list[Segment] = []
     for segment in endless_segments(frame_rate, config, first):
-        if segment.stop >= stop - window_length(frame_rate, config.identity)[0]:
+        if segment.stop >= stop - window_length(frame_rate, config.tracking)[0]:
             return [*found, replace(segment, stop=stop)]
         found.append(segment)
     raise AssertionError("segments without an end ended")
@@ -99,7 +99,7 @@ def endless_segments(frame_rate: float, config: Config, first: int, index: int =
     One of them is to be left open until a window's frames have come after it: if they do not come it is the last, and
     what came belongs to it.
     """
-    length, shared = window_length(frame_rate, config.identity)
+    length, shared = window_length(frame_rate, config.tracking)
     stride = length - shared
     step = max(1, round(config.segments.length * frame_rate / stride)) * stride
     warm_up = ceil(config.segments.warm_up * frame_rate / stride) * stride

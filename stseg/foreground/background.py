@@ -99,7 +99,7 @@ class PixelModel(ABC):
     @property
     def prior(self) -> float:
         """Prior probability of a person at a pixel, included in the likelihood, 0..1."""
-        return self._config.foreground
+        return self._config.foreground_prior
 
     def at_rate(self, frame_rate: float) -> Self:
         """The same model for another frame rate, frames per second; shares its arrays, so use only one of the two."""
@@ -159,7 +159,7 @@ class PixelModel(ABC):
         gain = self._gain(image)
         log_odds, rows, likelihood = (np.empty(image.shape[:2], np.float32) for _ in range(3))
         self._evaluate(image, gain, log_odds)
-        pool_log_odds(log_odds, self._config.radius, rows, likelihood)
+        pool_log_odds(log_odds, self._config.smoothing_radius, rows, likelihood)
         self._update_rows(slice(self._frames_evaluated % TURNS, None, TURNS), image, gain, likelihood)
         self._frames_evaluated += 1
         return likelihood

@@ -54,7 +54,7 @@ class Chromatic(PixelModel):
 
     def _start(self, frames: NDArray[np.uint8]) -> None:
         config = self.config
-        colour, spread = commonest_colours(frames, config.match * config.minimum_sd)
+        colour, spread = commonest_colours(frames, config.match_distance * config.minimum_sd)
         mean, variance, weight = self._arrays.values()
         weight[:], weight[:, :, 0] = 0, 1
         mean[:, :, 0] = colour
@@ -70,7 +70,14 @@ class Chromatic(PixelModel):
 
     def _evaluate(self, image: Bytes, gain: Floats, log_odds: Singles) -> None:
         config = self.config
-        priors = config.share, config.foreground, config.unexplained, config.shadow, config.darkest, config.mimicry
+        priors = (
+            config.background_weight,
+            config.foreground_prior,
+            config.outlier_rate,
+            config.shadow_prior,
+            config.darkest_shadow,
+            config.shadow_confusion,
+        )
         mean, variance, weight = self._arrays.values()
         evaluate(image, gain, mean, variance, weight, *priors, log_odds)
 
@@ -81,7 +88,7 @@ class Chromatic(PixelModel):
         config = self.config
         update(
             image[rows], gain.astype(np.float32), likelihood[rows], np.float32(fast), np.float32(slow),
-            np.float32(config.share), np.float32(config.match), np.float32(config.chromatic_sd),
+            np.float32(config.background_weight), np.float32(config.match_distance), np.float32(config.chromatic_sd),
             np.float32(config.minimum_sd), np.float32(config.initial_sd),
             *(array[rows] for array in self._arrays.values()),
         )  # fmt: skip

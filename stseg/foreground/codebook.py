@@ -72,7 +72,7 @@ class Codebook(PixelModel):
         for array in self._arrays.values():
             array[:] = 0
         mean, bounds, frequency, weight, access = self._arrays.values()
-        mean[:, :, 0], _ = commonest_colours(frames, self.config.match * self.config.noise)
+        mean[:, :, 0], _ = commonest_colours(frames, self.config.match_distance * self.config.channel_sd)
         bounds[:] = 1
         frequency[:, :, 0] = weight[:, :, 0] = 1
         longest = np.zeros(weight.shape, np.int32)
@@ -84,23 +84,23 @@ class Codebook(PixelModel):
         self._learn(image, gain, 0, np.zeros(self._arrays["weight"].shape, np.int32))
 
     def _learn(self, image: Bytes, gain: Floats, now: int, longest: NDArray[np.int32]) -> None:
-        reach = np.float32(self.config.match * self.config.noise)
+        reach = np.float32(self.config.match_distance * self.config.channel_sd)
         mean, bounds, *records = self._arrays.values()
         teach(image, gain.astype(np.float32), now, reach, longest, mean, bounds, *records)
 
     def _evaluate(self, image: Bytes, gain: Floats, log_odds: Singles) -> None:
         config = self.config
         evaluate(
-            image, gain, self._arrays["mean"], self._arrays["bounds"], self._arrays["weight"], config.foreground,
-            config.unexplained, config.shadow, config.highlight, config.darkest, config.brightest, config.mimicry,
-            config.noise, log_odds,
+            image, gain, self._arrays["mean"], self._arrays["bounds"], self._arrays["weight"], config.foreground_prior,
+            config.outlier_rate, config.shadow_prior, config.highlight_prior, config.darkest_shadow,
+            config.brightest_highlight, config.shadow_confusion, config.channel_sd, log_odds,
         )  # fmt: skip
 
     def _update_rows(self, rows: slice, image: Bytes, gain: Floats, likelihood: Singles) -> None:
         config, turn = self.config, self._turn
         follow(
             image[rows], gain.astype(np.float32), likelihood[rows], self._frames_evaluated // TURNS + 1,
-            np.float32(config.match * config.noise), np.float32(1.0 - math.exp(-turn / config.memory)),
-            math.ceil(config.absorption / turn), math.ceil(config.absence / turn),
+            np.float32(config.match_distance * config.channel_sd), np.float32(1.0 - math.exp(-turn / config.memory)),
+            math.ceil(config.absorption_time / turn), math.ceil(config.absence / turn),
             *(array[rows] for array in self._arrays.values()),
         )  # fmt: skip

@@ -23,7 +23,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter, minimum_filter
 
 from stseg.arrays import Bytes, Flags, Singles
-from stseg.config import LightConfig
+from stseg.config import IlluminationConfig
 from stseg.foreground.background import Background
 from stseg.foreground.gain_field import gain_field
 
@@ -73,12 +73,12 @@ class IlluminationMonitor:
         All changes so far.
     """
 
-    def __init__(self, model: Background, frame_rate: float, config: LightConfig | None = None) -> None:
+    def __init__(self, model: Background, frame_rate: float, config: IlluminationConfig | None = None) -> None:
         self.model = model
         self.changes: list[LightChange] = []
-        self._config = LightConfig() if config is None else config
-        self._window = max(1, round(self._config.within * frame_rate))
-        self._patience = max(1, round(self._config.blindness * frame_rate))
+        self._config = IlluminationConfig() if config is None else config
+        self._window = max(1, round(self._config.change_time * frame_rate))
+        self._patience = max(1, round(self._config.blind_time * frame_rate))
         self._shares: deque[float] = deque(maxlen=self._window)
         self._asked = 0
         self._good: Singles | None = None
@@ -97,8 +97,8 @@ class IlluminationMonitor:
             The next frame.
         """
         own = self.model.likelihood(image)
-        if self._good is not None and self._new_share(own) > _FAINT * self._config.rise:
-            if self._open is None and self._new_share(own) > self._config.rise:
+        if self._good is not None and self._new_share(own) > _FAINT * self._config.changed_share:
+            if self._open is None and self._new_share(own) > self._config.changed_share:
                 self._note()
                 self._open = _Open(1 - self._good, self._asked)
             own = self._in_new_light(image, own, 1 - self._good if self._open is None else self._open.empty)
@@ -129,14 +129,14 @@ class IlluminationMonitor:
         if waited % max(1, self._patience // _KEPT) == 0:
             change.frames.append(image.copy())
         if waited < self._patience:
-            if self._new_share(likelihood) <= config.rise:
+            if self._new_share(likelihood) <= config.changed_share:
                 return likelihood
             self._note()
             self.changes[-1].blind += 1
             return None
         strange = likelihood > self.model.prior
         gain = stationary_gain(np.stack([*change.frames, image]), self.model.background_image(), change.empty, strange)
-        if self._new_share(likelihood) <= config.rise or self._explains(gain, image, likelihood, change.empty):
+        if self._new_share(likelihood) <= config.changed_share or self._explains(gain, image, likelihood, change.empty):
             self.model.relight(gain)
             likelihood = self.model.likelihood(image)
         self._open = None

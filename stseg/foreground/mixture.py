@@ -64,7 +64,7 @@ class Mixture(PixelModel):
 
     def _start(self, frames: NDArray[np.uint8]) -> None:
         config = self.config
-        mean, variance = commonest_colours(frames, config.match * config.minimum_sd)
+        mean, variance = commonest_colours(frames, config.match_distance * config.minimum_sd)
         self._arrays["weight"][:] = 0
         self._arrays["weight"][:, :, 0] = 1
         self._arrays["mean"][:, :, 0] = mean
@@ -76,7 +76,14 @@ class Mixture(PixelModel):
 
     def _evaluate(self, image: Bytes, gain: Floats, log_odds: Singles) -> None:
         config = self.config
-        priors = config.share, config.foreground, config.unexplained, config.shadow, config.darkest, config.mimicry
+        priors = (
+            config.background_weight,
+            config.foreground_prior,
+            config.outlier_rate,
+            config.shadow_prior,
+            config.darkest_shadow,
+            config.shadow_confusion,
+        )
         mean, variance, weight = self._arrays.values()
         evaluate(image, gain, mean, variance, weight, *priors, log_odds)
 
@@ -87,7 +94,7 @@ class Mixture(PixelModel):
         config = self.config
         update(
             image[rows], gain.astype(np.float32), likelihood[rows], np.float32(fast), np.float32(slow),
-            np.float32(config.share), np.float32(config.match), np.float32(config.minimum_sd),
+            np.float32(config.background_weight), np.float32(config.match_distance), np.float32(config.minimum_sd),
             np.float32(config.initial_sd), *(array[rows] for array in self._arrays.values()),
         )  # fmt: skip
 
@@ -95,4 +102,4 @@ class Mixture(PixelModel):
 def learning_rates(seconds: float, config: MixtureConfig) -> tuple[float, float]:
     """How much of a mode changes in so many seconds: of background, and of what has moved in."""
     fast = 1.0 - math.exp(-seconds / config.memory)
-    return fast, 1.0 - (1.0 - config.share) ** (seconds / config.absorption)
+    return fast, 1.0 - (1.0 - config.background_weight) ** (seconds / config.absorption_time)

@@ -23,7 +23,7 @@ _FARTHEST = 3 * 255**2
 
 def adjacency(difference: Floats, config: LabelConfig) -> Floats:
     """Weights in nats at colour distances in grey levels, float64 of the same shape."""
-    return config.adjacency * np.tanh((config.alike - difference) / (2 * config.slope)).clip(0)
+    return config.boundary_weight * np.tanh((config.contrast_limit - difference) / (2 * config.contrast_slope)).clip(0)
 
 
 def edge_costs(image: Bytes | None, shape: tuple[int, int], config: LabelConfig) -> tuple[Labels, Labels]:
@@ -43,7 +43,7 @@ def edge_costs(image: Bytes | None, shape: tuple[int, int], config: LabelConfig)
     """
     across, down = np.zeros(shape, np.int32), np.zeros(shape, np.int32)
     if image is None:
-        across[:, :-1] = down[:-1] = round(config.adjacency * config.colourless / QUANTUM)
+        across[:, :-1] = down[:-1] = round(config.boundary_weight * config.colourless_factor / QUANTUM)
     else:
         _fill_edge_costs(image, _table(config), across, down)
     return across, down

@@ -47,18 +47,18 @@ class Patches(NamedTuple):
 
 def pillar_patches(table: BodyTable, people: PlacedPeople, config: LabelConfig) -> Patches:
     """Share of each person's draws that cover each pixel of a view."""
-    deviates, count = _deviates(config.draws), len(people)
-    root_covariance = np.linalg.cholesky(people.covariance + config.place_spread**2 * np.eye(2))
+    deviates, count = _deviates(config.samples), len(people)
+    root_covariance = np.linalg.cholesky(people.covariance + config.position_noise**2 * np.eye(2))
     ground = people.ground[:, None] + np.einsum("nij,dj->ndi", root_covariance, deviates[:, :2])
-    heights = people.height[:, None] + config.height_spread * deviates[:, 2]
+    heights = people.height[:, None] + config.height_noise * deviates[:, 2]
     widths = (config.width + config.width_spread * deviates[:, 3]).clip(_THINNEST * config.width) / _MEAN_WIDTH
     size = table.size
     first, spans, _ = outlines(table, ground.reshape(-1, 2), heights.ravel(), 1, size[::-1], np.tile(widths, count))
     edges = np.zeros((count, 4), np.int64)
-    _fill_edges(first, spans, config.draws, MARGIN, size[0], size[1], edges)
+    _fill_edges(first, spans, config.samples, MARGIN, size[0], size[1], edges)
     begin = np.append(0, np.cumsum((edges[:, 2] - edges[:, 0]) * (edges[:, 3] - edges[:, 1])))
     share = np.zeros(begin[-1], np.float32)
-    _fill_shares(first, spans, config.draws, edges, begin, share)
+    _fill_shares(first, spans, config.samples, edges, begin, share)
     return Patches(edges, begin, share)
 
 

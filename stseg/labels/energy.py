@@ -55,7 +55,7 @@ def pixel_energy(
     patches = (edges, prior.people.first, prior.people.share, prior.background)
     edge_sums = _edge_sums(across, down)
     cost = np.empty(len(prior.people.share), np.int64)
-    _fill_costs(*patches, foreground, config.detection, config.outside / (len(edges) + 1), QUANTUM, cost)
+    _fill_costs(*patches, foreground, config.foreground_weight, config.outlier_rate / (len(edges) + 1), QUANTUM, cost)
     count, node = np.zeros(foreground.shape, np.int64), np.full(foreground.shape, -1, np.int64)
     _count_labels(edges, cost, edge_sums, count)
     pixel = np.flatnonzero(count)

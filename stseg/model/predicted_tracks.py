@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stseg.arrays import Floats, Ints
-from stseg.config import GhostConfig
+from stseg.config import DetectionConfig
 from stseg.model.sizes import Sizes
 
 _RESOLUTION = 0.1
@@ -49,7 +49,7 @@ class PredictedTracks:
     def __len__(self) -> int:
         return len(self.ground)
 
-    def track_log_ratio(self, ground: Floats, height: Floats, config: GhostConfig) -> Floats:
+    def track_log_ratio(self, ground: Floats, height: Floats, config: DetectionConfig) -> Floats:
         """What speaks for candidates (n, 2), (n,) by being walkers, nats, float64 (n, walker)."""
         if not len(self):
             return np.zeros((len(ground), 0))
@@ -60,7 +60,7 @@ class PredictedTracks:
         anybody = -0.5 * ((height - config.height_mean) / config.height_spread) ** 2
         squares = _squares(ground[:, None] - self.ground, np.linalg.inv(self.covariance))
         shape = np.maximum(tall - anybody[:, None], _OUT_OF_SHAPE)
-        return np.asarray(self.existence - config.person + sharp - 0.5 * squares + shape)
+        return np.asarray(self.existence - config.prior_log_odds + sharp - 0.5 * squares + shape)
 
     def place_log_density(self, walker: Ints, ground: Floats) -> Floats:
         """Log-densities of some walkers' places (n,) at points of each (n, point, 2), up to constants, nats."""

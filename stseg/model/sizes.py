@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from stseg.arrays import Floats, Ints
-from stseg.config import GhostConfig, IdentityConfig
+from stseg.config import DetectionConfig, TrackingConfig
 
 
 @dataclass(frozen=True)
@@ -21,13 +21,13 @@ class Sizes:
     width_variance: Floats
 
     @classmethod
-    def of_population(cls, number: int, config: GhostConfig) -> Sizes:
+    def of_population(cls, number: int, config: DetectionConfig) -> Sizes:
         """Before anybody was looked at."""
         height, width = (config.height_mean, config.height_spread), (config.width_mean, config.width_spread)
         return cls(*(np.full(number, value) for mean, spread in (height, width) for value in (mean, spread**2)))
 
     @classmethod
-    def of_heights(cls, height: Floats, variance: Floats, config: GhostConfig) -> Sizes:
+    def of_heights(cls, height: Floats, variance: Floats, config: DetectionConfig) -> Sizes:
         """Of heights with variances, metres and square metres, each (n,); as wide as anybody."""
         anybody = cls.of_population(len(height), config)
         return cls(height, variance, anybody.width, anybody.width_variance)
@@ -47,7 +47,7 @@ class Sizes:
         pairs = ((getattr(self, one.name), getattr(others, one.name)) for one in fields(Sizes))
         return Sizes(*(np.concatenate(pair) for pair in pairs))
 
-    def with_noise(self, noise: IdentityConfig) -> Sizes:
+    def with_noise(self, noise: TrackingConfig) -> Sizes:
         """These, one frame's measurements of them off by its noise besides."""
         return Sizes(
             self.height, self.height_variance + noise.height_noise**2,

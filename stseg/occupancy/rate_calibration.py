@@ -26,7 +26,7 @@ import numpy as np
 
 from stseg.accelerate import kernel
 from stseg.arrays import Flags, Floats, Ints, Singles
-from stseg.config import LevelConfig
+from stseg.config import ErrorRateConfig
 from stseg.geometry import Grid
 from stseg.geometry.bodies import PROFILE
 from stseg.geometry.summed_area import TOP, Levels
@@ -56,7 +56,7 @@ class RateCalibration:
         Seconds of one person's cells that the pillar fills, and of all cells within reach of the person.
     """
 
-    def __init__(self, first: Sequence[ErrorRates], frame_rate: float, config: LevelConfig) -> None:
+    def __init__(self, first: Sequence[ErrorRates], frame_rate: float, config: ErrorRateConfig) -> None:
         self.first = np.array(first, float).reshape(-1, 3)
         self.frame_rate, self.config = frame_rate, config
         self.errors, self.seen, self.filled = np.zeros_like(self.first), np.zeros_like(self.first), np.zeros(2)
@@ -64,13 +64,13 @@ class RateCalibration:
     @property
     def rates(self) -> list[ErrorRates]:
         """Of each view."""
-        weight = self.config.weight
+        weight = self.config.prior_weight
         return [ErrorRates(*row) for row in ((weight * self.first + self.errors) / (weight + self.seen)).tolist()]
 
     @property
     def filled_share(self) -> float:
         """Share of the cells within reach of a person that bodies fill; one half at first."""
-        weight = self.config.weight
+        weight = self.config.prior_weight
         return float((weight * _HALF + self.filled[0]) / (weight + self.filled[1]))
 
     def learn(self, errors: Floats, seen: Floats, filled: Floats) -> None:

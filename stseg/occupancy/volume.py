@@ -9,7 +9,7 @@ import numpy as np
 from scipy.special import logit
 
 from stseg.arrays import Boxes, Bytes, Flags, Floats, Ints, Singles, ViewEvidence
-from stseg.config import GhostConfig, LevelConfig, OccupancyConfig
+from stseg.config import DetectionConfig, ErrorRateConfig, OccupancyConfig
 from stseg.geometry import Rig
 from stseg.geometry.bodies import BodyTable
 from stseg.geometry.cell_means import CellMeans
@@ -50,8 +50,8 @@ class Occupancy:
         rig: Rig,
         kinds: Sequence[str],
         config: OccupancyConfig,
-        ghosts: GhostConfig,
-        level: LevelConfig | None = None,
+        ghosts: DetectionConfig,
+        level: ErrorRateConfig | None = None,
     ) -> None:
         self.rig, self.config = rig, config
         self.sampling = Sampling.of(rig, config.sampling)
@@ -68,8 +68,8 @@ class Occupancy:
             for camera, kind in zip(rig.cameras, kinds, strict=True)
         ]
         self._first = [_first_rates(kind, ghosts) for kind in kinds]
-        self._level_config = level or LevelConfig()
-        self.prior = float(logit(config.occupied))
+        self._level_config = level or ErrorRateConfig()
+        self.prior = float(logit(config.occupied_share))
 
     def new_calibration(self) -> RateCalibration:
         """Error-rate calibration of a session that begins: the first guess."""
@@ -91,14 +91,14 @@ class Occupancy:
             Error rates of each view; by default the first guess.
         """
         rates = rates or self.new_calibration().rates
-        near = nearest_person(self.rig.grid.ground, explanation.people.ground, self.config.reach)
+        near = nearest_person(self.rig.grid.ground, explanation.people.ground, self.config.person_radius)
         return self._total(self._tally(self._said(seen, explanation, near, rates), near), near)
 
     def fuse_and_learn(
         self, calibration: RateCalibration, seen: Sequence[ViewEvidence], explanation: Explanation
     ) -> Singles:
         """The same of a session's next frame, with which the session's error-rate calibration is then updated."""
-        near = nearest_person(self.rig.grid.ground, explanation.people.ground, self.config.reach)
+        near = nearest_person(self.rig.grid.ground, explanation.people.ground, self.config.person_radius)
         said = self._said(seen, explanation, near, calibration.rates)
         tally = self._tally(said, near)
         total = self._total(tally, near)
@@ -133,7 +133,7 @@ class Occupancy:
         return tally
 
     def _total(self, tally: Accumulator, near: Ints) -> Singles:
-        return tally.total(self.views, near, self.config.looks, (self.prior, _BESIDE))
+        return tally.total(self.views, near, self.config.effective_observations, (self.prior, _BESIDE))
 
     def _learn(
         self,
@@ -145,19 +145,19 @@ class Occupancy:
     ) -> None:
         people, grid = explanation.people, self.rig.grid
         inside = inside_bodies(grid, near, people.ground, people.height)
-        body, reached = cells_per_person(grid, self.height_mean, self.config.reach)
+        body, reached = cells_per_person(grid, self.height_mean, self.config.person_radius)
         errors, seen = np.zeros((2, len(said), 3))
         for i, (view, rates) in enumerate(zip(said, calibration.rates, strict=True)):
             if view is not None:
-                trusted = people.evidence - people.view_evidence[i] >= calibration.config.supported
+                trusted = people.evidence - people.view_evidence[i] >= calibration.config.minimum_evidence
                 trusted &= people.visibility[i] >= _WHOLE
                 fill_counts(
                     *view, tally.weighted, tally.weights, tally.count, near, inside, trusted,
-                    np.array(rates), self.config.looks, self.prior, errors[i], seen[i],
+                    np.array(rates), self.config.effective_observations, self.prior, errors[i], seen[i],
                 )  # fmt: skip
         everywhere = np.maximum((self.sampling.footprint[..., 2] > 0).sum((1, 2, 3)), 1)
         units = np.column_stack([np.full(len(said), body), everywhere, np.full(len(said), reached - body)])
-        sure = np.append(people.evidence >= calibration.config.supported, False)[near]
+        sure = np.append(people.evidence >= calibration.config.minimum_evidence, False)[near]
         counted = (self.views > 0) & sure
         filled = np.array([inside[counted].sum(), counted.sum()]) / reached
         calibration.learn(errors / units, seen / units, filled)
@@ -216,12 +216,12 @@ class Occupancy:
         return clutter(view, side)
 
 
-def _first_rates(kind: str, ghosts: GhostConfig) -> ErrorRates:
+def _first_rates(kind: str, ghosts: DetectionConfig) -> ErrorRates:
     """Before anything is learned, people's surroundings count as any other place."""
     if kind == "boxes":
-        clutter = (1 - ghosts.box_miss) / float(np.exp(ghosts.hit))
-        return ErrorRates(ghosts.box_miss, clutter, clutter)
-    return ErrorRates(ghosts.pixel_miss, ghosts.pixel_clutter, ghosts.pixel_clutter)
+        clutter = (1 - ghosts.box_miss_rate) / float(np.exp(ghosts.box_log_ratio))
+        return ErrorRates(ghosts.box_miss_rate, clutter, clutter)
+    return ErrorRates(ghosts.pixel_miss_rate, ghosts.pixel_clutter_rate, ghosts.pixel_clutter_rate)
 
 
 def _faith(near: Ints, own: Flags, visible: Floats, shape: tuple[int, ...]) -> Singles:

@@ -35,9 +35,9 @@ def build_energy(log_odds: Singles, motion: Ints, grid: Grid, config: Segmentati
     bounded = np.nan_to_num(log_odds, nan=0.0).clip(-_MOST_NATS, _MOST_NATS)
     unary = np.rint(bounded / np.float32(QUANTUM)).astype(np.int32)
     offsets = neighbourhood(config.neighbours)
-    scale = (config.step, grid.top / max(grid.planes - 1, 1), grid.cell, grid.cell)
+    scale = (config.time_distance, grid.top / max(grid.planes - 1, 1), grid.cell, grid.cell)
     distance = np.sqrt(((offsets * scale) ** 2).sum(1))
-    capacity = config.smoothness * np.exp(-0.5 * (distance / config.spread) ** 2) / QUANTUM
+    capacity = config.smoothness * np.exp(-0.5 * (distance / config.distance_scale) ** 2) / QUANTUM
     return Energy(unary, offsets, np.rint(capacity).astype(np.int32), successor_cells(motion))
 
 

@@ -63,13 +63,13 @@ class CutTracker:
     def __init__(self, rig: Rig, config: Config, first: int) -> None:
         self.rig, self.config = rig, config
         self.views = Sampling.of(rig, "point").views()
-        self.walkers = TrackFilter(rig.frame_rate, config.ghosts, config.identity)
-        self.identities = TrackAssociation(rig.frame_rate, config.identity)
-        spread, stranger = config.ghosts.height_spread, config.occupancy.occupied
-        self.pillar = BodyShape(config.occupancy.reach, spread, stranger)
+        self.walkers = TrackFilter(rig.frame_rate, config.detection, config.tracking)
+        self.identities = TrackAssociation(rig.frame_rate, config.tracking)
+        spread, stranger = config.detection.height_spread, config.occupancy.occupied_share
+        self.pillar = BodyShape(config.occupancy.person_radius, spread, stranger)
         self.held: list[_Linked] = []
         self.first = self.committed = first
-        self.coming = windows(rig.frame_rate, config.identity, first, _ENDLESS)
+        self.coming = windows(rig.frame_rate, config.tracking, first, _ENDLESS)
         self.window = next(self.coming)
 
     def expected(self, frame: int) -> PredictedTracks | None:
@@ -97,7 +97,7 @@ class CutTracker:
         if not self.held:
             return []
         stop = self.held[-1].scene.frame + 1
-        remaining = windows(self.rig.frame_rate, self.config.identity, self.first, stop)
+        remaining = windows(self.rig.frame_rate, self.config.tracking, self.first, stop)
         return [self._solve(window) for window in remaining if window.commit_stop > self.committed]
 
     def _solve(self, window: Window) -> Commit:
@@ -105,12 +105,12 @@ class CutTracker:
         energy = self._energy(held)
         cut = minimum_cut(energy)
         label = self._divide(window, held, energy, cut.occupied).label
-        reach, grid = self.config.occupancy.reach, self.rig.grid
+        reach, grid = self.config.occupancy.person_radius, self.rig.grid
         blobs = [
             find_blobs(cells, linked.scene.log_odds, linked.scene.people.ground, linked.chains, reach, grid)
             for cells, linked in zip(label, held, strict=True)
         ]
-        pieces = form_tracklets(blobs, window.solve_first, self.config.identity)
+        pieces = form_tracklets(blobs, window.solve_first, self.config.tracking)
         decision = self.identities.decide(window, blobs, pieces)
         row = np.array([(*_ranges(window), energy.of(cut.occupied), QUANTUM, cut.nodes)], WINDOW)
         self.committed = window.commit_stop
@@ -118,7 +118,7 @@ class CutTracker:
 
     def _energy(self, held: list[_Linked]) -> Energy:
         log_odds = np.stack([linked.scene.log_odds for linked in held])
-        reach, grid = self.config.occupancy.reach, self.rig.grid
+        reach, grid = self.config.occupancy.person_radius, self.rig.grid
         motion = [
             motion_field(now.scene.people.ground, then.scene.people.ground, now.chains, then.chains, reach, grid)
             for now, then in pairwise(held)
@@ -129,11 +129,11 @@ class CutTracker:
     def _divide(self, window: Window, held: list[_Linked], energy: Energy, occupied: Flags) -> WindowLabels:
         """Whose the occupied cells are: chains of this window and of tracks that live."""
         tails = [track.tail for track in self.identities.alive]
-        mean_height = self.config.ghosts.height_mean
-        seen = [earlier_detections(tails, window.solve_first, mean_height, self.config.identity)]
+        mean_height = self.config.detection.height_mean
+        seen = [earlier_detections(tails, window.solve_first, mean_height, self.config.tracking)]
         seen += [linked.sightings() for linked in held]
         places = predicted_places(
-            together(seen), window.solve_first, window.solve_stop, self.rig.frame_rate, self.config.identity
+            together(seen), window.solve_first, window.solve_stop, self.rig.frame_rate, self.config.tracking
         )
         found = WindowDetections([linked.scene.people.ground for linked in held], [linked.chains for linked in held])
         return label_cells(energy, occupied, found, places, self.pillar, self.rig.grid)
@@ -165,7 +165,7 @@ class CutTracker:
         people = scene.people if len(scene.people) else None
         ground, covariance = blobs.ground[named].copy(), blobs.covariance[named].copy()
         height, score = blobs.height[named].copy(), blobs.mass[named].copy()
-        width = np.full(len(named), self.config.ghosts.width_mean)
+        width = np.full(len(named), self.config.detection.width_mean)
         if people is not None:
             ground[held], covariance[held] = people.ground[who[held]], people.covariance[who[held]]
             height[held], score[held] = people.sizes.height[who[held]], people.evidence[who[held]]

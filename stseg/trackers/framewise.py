@@ -49,7 +49,7 @@ class EachFrame:
             Metres, metres, nats.
         """
         grid = self.rig.grid
-        label, extent = reached_cells(scene, ground, ids, grid, self.config.occupancy.reach)
+        label, extent = reached_cells(scene, ground, ids, grid, self.config.occupancy.person_radius)
         views = views_at(self.seen_by, ground, grid)
         rows = trajectory_rows(scene.frame, ids, ground, covariance, height, width, extent, score, views)
         return Commit([scene], label[None], rows, event_rows(events), np.zeros(0, WINDOW))

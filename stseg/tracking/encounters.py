@@ -2,7 +2,7 @@
 
 A window tells of each stretch of its frames in which two tracks touch; so it does not matter which windows and segments
 there were before. Cells of people who walk together come apart and touch again every few frames: stretches with less
-than `identity.parting` between them are one encounter of the whole run.
+than `tracking.separation_time` between them are one encounter of the whole run.
 """
 
 from __future__ import annotations

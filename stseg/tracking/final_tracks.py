@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stseg.arrays import Ints, Rows
-from stseg.config import GhostConfig, IdentityConfig
+from stseg.config import DetectionConfig, TrackingConfig
 from stseg.model.border import Border
 from stseg.model.tables import EVENT
 from stseg.tracking.encounters import encounters
@@ -41,7 +41,7 @@ class FinalTracks:
 
 
 def final_tracks(
-    committed: Rows, events: Rows, frame_rate: float, border: Border, config: IdentityConfig, people: GhostConfig
+    committed: Rows, events: Rows, frame_rate: float, border: Border, config: TrackingConfig, people: DetectionConfig
 ) -> FinalTracks:
     """The tracks of a run from its committed TRAJECTORY and EVENT rows."""
     relinked = associate_globally(committed, frame_rate, border, config, people)
@@ -57,7 +57,7 @@ def final_tracks(
     return FinalTracks(smoothed, story[np.argsort(story["frame"], kind="stable")], identity)
 
 
-def committed_tracks(committed: Rows, events: Rows, frame_rate: float, config: IdentityConfig) -> FinalTracks:
+def committed_tracks(committed: Rows, events: Rows, frame_rate: float, config: TrackingConfig) -> FinalTracks:
     """The tracks of a tracker whose own word stands on who is who and where: short ones go, short gaps are filled."""
     kept, dropped = drop_short(committed, frame_rate, config)
     story = np.concatenate([events, dropped])
@@ -82,7 +82,7 @@ def _retold(events: Rows, name_at: _Names, links: Sequence[Link]) -> Rows:
     return np.concatenate([told[~np.array(untrue, bool)], np.array(joined, EVENT)])
 
 
-def _met(events: Rows, name_at: _Names, frame_rate: float, config: IdentityConfig) -> Rows:
+def _met(events: Rows, name_at: _Names, frame_rate: float, config: TrackingConfig) -> Rows:
     """Who met whom of those who are somebody."""
     known = set(name_at.track.tolist())
     last = max(name_at.until.values(), default=-1)
@@ -90,7 +90,7 @@ def _met(events: Rows, name_at: _Names, frame_rate: float, config: IdentityConfi
     def name(track: int, frame: int) -> int:
         return name_at.name(track, frame) if track in known else 0
 
-    return encounters(events, name, round(config.parting * frame_rate), frame_rate, last)
+    return encounters(events, name, round(config.separation_time * frame_rate), frame_rate, last)
 
 
 class _Names:

@@ -22,7 +22,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from stseg.arrays import Floats, Ints, Rows
-from stseg.config import GhostConfig, IdentityConfig
+from stseg.config import DetectionConfig, TrackingConfig
 from stseg.model.border import Border
 from stseg.tracking.assignment import assign
 from stseg.tracking.isolated_tracklets import IsolatedTracklet, isolated_tracklets
@@ -72,7 +72,7 @@ class GlobalAssociation:
 
 
 def associate_globally(
-    trajectory: Rows, frame_rate: float, border: Border, config: IdentityConfig, people: GhostConfig
+    trajectory: Rows, frame_rate: float, border: Border, config: TrackingConfig, people: DetectionConfig
 ) -> GlobalAssociation:
     """Decide who is who from the whole run.
 
@@ -90,7 +90,7 @@ def associate_globally(
     parts = isolated_tracklets(trajectory, frame_rate, config)
     pairs = _within_reach(parts, frame_rate, config)
     ends, begins = (
-        border.inside(np.array([tip.ground for tip in tips]).reshape(-1, 2), people.border)
+        border.inside(np.array([tip.ground for tip in tips]).reshape(-1, 2), people.border_width)
         for tips in ([part.end for part in parts], [part.start for part in parts])
     )
     gain = np.array([_gain(parts[a], parts[b], frame_rate, config, people) for a, b in pairs])
@@ -132,24 +132,24 @@ def _flow(number: int, pairs: Ints, gain: Floats) -> Ints:
     return before
 
 
-def _within_reach(parts: Sequence[IsolatedTracklet], frame_rate: float, config: IdentityConfig) -> Ints:
+def _within_reach(parts: Sequence[IsolatedTracklet], frame_rate: float, config: TrackingConfig) -> Ints:
     """Pairs of a stretch and one that begins later, not too long after its end: int64 (pair, 2)."""
     begins = np.array([part.start.frame for part in parts])
     pairs = []
     for a, part in enumerate(parts):
         end = part.end.frame
-        first, stop = begins.searchsorted([end + 1, end + config.reunion * frame_rate + 1])
+        first, stop = begins.searchsorted([end + 1, end + config.maximum_gap * frame_rate + 1])
         pairs += [(a, b) for b in range(first, stop)]
     return np.array(pairs, np.int64).reshape(-1, 2)
 
 
 def _gain(
-    a: IsolatedTracklet, b: IsolatedTracklet, frame_rate: float, config: IdentityConfig, people: GhostConfig
+    a: IsolatedTracklet, b: IsolatedTracklet, frame_rate: float, config: TrackingConfig, people: DetectionConfig
 ) -> float:
     """What speaks for one person in both, parting aside, nats."""
     seconds, off = _between(a, b, frame_rate)
     velocity_variance = a.end.velocity_variance + b.start.velocity_variance
-    spread = 2 * config.place_noise**2 + seconds**2 * velocity_variance / 4 + _TURN**2 * seconds**3 / 12
+    spread = 2 * config.position_noise**2 + seconds**2 * velocity_variance / 4 + _TURN**2 * seconds**3 / 12
     place = -0.5 * float(off @ off) / spread - np.log(2 * np.pi * spread)
     known, anybody = a.height_variance + b.height_variance, 2 * people.height_spread**2
     taller = (a.height - b.height) ** 2

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stseg.arrays import Floats, Ints, Rows
-from stseg.config import IdentityConfig
+from stseg.config import TrackingConfig
 from stseg.tracking.assignment import distances
 
 NEAR = 0.6
@@ -66,7 +66,7 @@ class IsolatedTracklet:
     height_variance: float
 
 
-def isolated_tracklets(trajectory: Rows, frame_rate: float, config: IdentityConfig) -> list[IsolatedTracklet]:
+def isolated_tracklets(trajectory: Rows, frame_rate: float, config: TrackingConfig) -> list[IsolatedTracklet]:
     """Every track cut where it was out of sight, and where it came nearest to whom it met; sorted by first frame.
 
     Parameters
@@ -110,7 +110,7 @@ def _meetings(trajectory: Rows, frame_rate: float) -> tuple[Ints, Ints]:
     return np.array(track, np.int64), np.array(frame, np.int64)
 
 
-def _measured(trajectory: Rows, rows: Ints, frame_rate: float, config: IdentityConfig) -> IsolatedTracklet:
+def _measured(trajectory: Rows, rows: Ints, frame_rate: float, config: TrackingConfig) -> IsolatedTracklet:
     told = max(2, round(_TOLD * frame_rate))
     own = trajectory[rows]
     looks = max(len(rows) / _INDEPENDENT, 1.0)
@@ -124,11 +124,11 @@ def _measured(trajectory: Rows, rows: Ints, frame_rate: float, config: IdentityC
     )
 
 
-def _tip(own: Rows, at: int, frame_rate: float, config: IdentityConfig) -> TrackletEnd:
+def _tip(own: Rows, at: int, frame_rate: float, config: TrackingConfig) -> TrackletEnd:
     """An end of a stretch from the rows that tell of it: their velocity, held back by how fast people walk."""
     ground = np.column_stack([own["x"], own["y"]])
     seconds = (own["frame"] - own["frame"].mean()) / frame_rate
-    told = float((seconds**2).sum()) / config.place_noise**2
+    told = float((seconds**2).sum()) / config.position_noise**2
     variance = 1.0 / (told + 1.0 / _PACE**2)
-    velocity = variance / config.place_noise**2 * (seconds @ ground)
+    velocity = variance / config.position_noise**2 * (seconds @ ground)
     return TrackletEnd(int(own["frame"][at]), ground[at], np.asarray(velocity), variance)

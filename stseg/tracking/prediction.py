@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stseg.arrays import Floats, Ints
-from stseg.config import IdentityConfig
+from stseg.config import TrackingConfig
 from stseg.model.predicted_places import PredictedPlaces
 from stseg.tracking.tracklets import Tracklet
 
@@ -44,7 +44,7 @@ class DetectionHistory:
 
 
 def earlier_detections(
-    tails: Iterable[Tracklet], before: int, height: float, config: IdentityConfig
+    tails: Iterable[Tracklet], before: int, height: float, config: TrackingConfig
 ) -> DetectionHistory:
     """The committed ends of tracks, up to a frame, as sightings of bodies of a mean height, metres."""
     seen = [
@@ -54,7 +54,7 @@ def earlier_detections(
         if frame < before
     ]
     rows = np.array(seen, float).reshape(-1, 4)
-    covariance = np.tile(np.eye(2) * config.place_noise**2, (len(rows), 1, 1))
+    covariance = np.tile(np.eye(2) * config.position_noise**2, (len(rows), 1, 1))
     frame, chain = rows[:, :2].T.astype(np.int64)
     return DetectionHistory(frame, chain, rows[:, 2:], covariance, np.full(len(rows), height))
 
@@ -66,7 +66,7 @@ def together(parts: Iterable[DetectionHistory]) -> DetectionHistory:
 
 
 def predicted_places(
-    seen: DetectionHistory, first: int, stop: int, frame_rate: float, config: IdentityConfig
+    seen: DetectionHistory, first: int, stop: int, frame_rate: float, config: TrackingConfig
 ) -> PredictedPlaces:
     """Where each chain is expected in frames first .. stop - 1.
 
@@ -88,7 +88,7 @@ def predicted_places(
         away = np.minimum(np.abs(frames - own.frame[earlier]), np.abs(own.frame[later] - frames))
         nearest = np.where(frames - own.frame[earlier] <= np.abs(own.frame[later] - frames), earlier, later)
         ahead = frames - own.frame[-1]
-        places.expected[:, k] = (before >= 0) & (ahead <= config.foresight * frame_rate)
+        places.expected[:, k] = (before >= 0) & (ahead <= config.prediction_horizon * frame_rate)
         places.ground[:, k] = own.ground[-1] + ahead[:, None] * _velocity(own)
         inside = ahead <= 0
         places.ground[inside, k] = np.column_stack([np.interp(frames[inside], own.frame, g) for g in own.ground.T])

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from stseg.arrays import Ints, Rows
-from stseg.config import IdentityConfig
+from stseg.config import TrackingConfig
 from stseg.model.tables import EVENT, TRAJECTORY
 
 
-def drop_short(trajectory: Rows, frame_rate: float, config: IdentityConfig) -> tuple[Rows, Rows]:
+def drop_short(trajectory: Rows, frame_rate: float, config: TrackingConfig) -> tuple[Rows, Rows]:
     """Tracks of fewer frames than the shortest person is there for.
 
     Returns
@@ -20,13 +20,13 @@ def drop_short(trajectory: Rows, frame_rate: float, config: IdentityConfig) -> t
         The rows of the others, and one event for each track that goes.
     """
     ids, where, counts = np.unique(trajectory["id"], return_inverse=True, return_counts=True)
-    least = max(2, round(config.shortest * frame_rate))
+    least = max(2, round(config.minimum_duration * frame_rate))
     short = counts < least
     reasons = [f"{count} frames, shorter than {least}" for count in counts[short]]
     return trajectory[~short[where]], _dropped(trajectory, ids[short], reasons)
 
 
-def drop_ghosts(trajectory: Rows, frame_rate: float, config: IdentityConfig) -> tuple[Rows, Rows]:
+def drop_ghosts(trajectory: Rows, frame_rate: float, config: TrackingConfig) -> tuple[Rows, Rows]:
     """Tracks that more frames take for a ghost than for a person.
 
     Frames of gaps that would be filled count as such: who is followed and was not found there was weighed, and not
@@ -40,7 +40,7 @@ def drop_ghosts(trajectory: Rows, frame_rate: float, config: IdentityConfig) -> 
     order = np.lexsort((trajectory["frame"], trajectory["id"]))
     ids, where, counts = np.unique(trajectory["id"], return_inverse=True, return_counts=True)
     step, same = np.diff(trajectory["frame"][order]), np.diff(trajectory["id"][order]) == 0
-    gap = np.where(same & (step <= config.bridge * frame_rate + 1), step - 1, 0)
+    gap = np.where(same & (step <= config.interpolation_gap * frame_rate + 1), step - 1, 0)
     doubted = np.bincount(where[order][1:], gap, len(ids)).astype(int)
     ghost = doubted > counts
     reasons = [f"{no} of {no + yes} frames say ghost" for no, yes in zip(doubted[ghost], counts[ghost], strict=True)]
@@ -56,7 +56,7 @@ def _dropped(trajectory: Rows, gone: Ints, reasons: Sequence[str]) -> Rows:
     return events
 
 
-def fill_gaps(trajectory: Rows, frame_rate: float, config: IdentityConfig) -> Rows:
+def fill_gaps(trajectory: Rows, frame_rate: float, config: TrackingConfig) -> Rows:
     """Rows for frames in which a track was not seen for a moment, on a straight line between those in which it was.
 
     Their extent is 0 and their covariance grows with the distance to what was seen. Longer gaps stay, since nobody
@@ -64,7 +64,7 @@ def fill_gaps(trajectory: Rows, frame_rate: float, config: IdentityConfig) -> Ro
     """
     table = trajectory[np.lexsort((trajectory["frame"], trajectory["id"]))]
     step, same = np.diff(table["frame"]), np.diff(table["id"]) == 0
-    gaps = np.flatnonzero(same & (step > 1) & (step <= config.bridge * frame_rate + 1))
+    gaps = np.flatnonzero(same & (step > 1) & (step <= config.interpolation_gap * frame_rate + 1))
     rows = [trajectory, *(_between(table[k], table[k + 1]) for k in gaps.tolist())]
     every = np.concatenate(rows)
     return every[np.lexsort((every["id"], every["frame"]))]

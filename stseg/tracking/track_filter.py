@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from stseg.arrays import Floats, Ints
-from stseg.config import GhostConfig, IdentityConfig
+from stseg.config import DetectionConfig, TrackingConfig
 from stseg.model.people import People
 from stseg.model.predicted_tracks import PredictedTracks
 from stseg.model.sizes import Sizes
@@ -122,7 +122,7 @@ class TrackFilter:
         What people are like, and how they walk.
     """
 
-    def __init__(self, frame_rate: float, ghosts: GhostConfig, config: IdentityConfig) -> None:
+    def __init__(self, frame_rate: float, ghosts: DetectionConfig, config: TrackingConfig) -> None:
         self.frame_rate = frame_rate
         self.ghosts, self.config = ghosts, config
         self.walkers: list[TrackState] = []
@@ -160,7 +160,7 @@ class TrackFilter:
         for j in range(len(people)):
             known = int(people.track_index[j])
             before = self._carried(self.walkers[known], frame) if known >= 0 else self._newcomer(frame, people, j)
-            odds = (before.odds if known >= 0 else self.ghosts.person) + people.evidence[j] - people.prior[j]
+            odds = (before.odds if known >= 0 else self.ghosts.prior_log_odds) + people.evidence[j] - people.prior[j]
             followed.append(
                 before.found(
                     frame, people.ground[j], people.covariance[j], heights[j], widths[j], min(float(odds), _STAYING)
@@ -187,7 +187,7 @@ class TrackFilter:
 
     @property
     def _place_noise(self) -> Floats:
-        return np.eye(2) * self.config.place_noise**2
+        return np.eye(2) * self.config.position_noise**2
 
     def _carried(self, walker: TrackState, frame: int) -> TrackState:
         seconds = (frame - walker.seen) / self.frame_rate

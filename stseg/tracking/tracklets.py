@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from stseg.arrays import Floats
-from stseg.config import IdentityConfig
+from stseg.config import TrackingConfig
 from stseg.model.blobs import UNASSIGNED, Blobs
 from stseg.tracking.assignment import assign, distances
 
@@ -70,7 +70,7 @@ class Tracklet:
         return np.asarray((ground[-1] - ground[0]) / (frames[-1] - frames[0]))
 
 
-def form_tracklets(blobs: Sequence[Blobs], first: int, config: IdentityConfig) -> list[Tracklet]:
+def form_tracklets(blobs: Sequence[Blobs], first: int, config: TrackingConfig) -> list[Tracklet]:
     """The pieces of a window.
 
     Blobs that hold people of one chain are one piece. A blob that holds nobody, but is of that chain or of no known
@@ -94,7 +94,7 @@ def form_tracklets(blobs: Sequence[Blobs], first: int, config: IdentityConfig) -
     return list(pieces.values())
 
 
-def _bridge(pieces: Sequence[Tracklet], frame: int, found: Blobs, config: IdentityConfig) -> None:
+def _bridge(pieces: Sequence[Tracklet], frame: int, found: Blobs, config: TrackingConfig) -> None:
     """Give a frame's blobs that hold nobody to pieces that have a gap there."""
     open_ = [piece for piece in pieces if piece.frames[0] < frame < piece.frames[-1] and frame not in piece.frames]
     nobody = np.flatnonzero(found.person < 0)
@@ -104,6 +104,6 @@ def _bridge(pieces: Sequence[Tracklet], frame: int, found: Blobs, config: Identi
     away = distances(expected, found.ground[nobody])
     chain = np.array([piece.chain for piece in open_])
     others = (found.track[nobody] != UNASSIGNED) & (found.track[nobody] != chain[:, None])
-    for row, column in zip(*assign(np.where(others, np.inf, away), config.slack), strict=True):
+    for row, column in zip(*assign(np.where(others, np.inf, away), config.assignment_distance), strict=True):
         blob = int(nobody[column])
         open_[row].insert(frame, blob, found.ground[blob])

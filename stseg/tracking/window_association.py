@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from stseg.arrays import Ints, Labels
-from stseg.config import IdentityConfig
+from stseg.config import TrackingConfig
 from stseg.model.blobs import Blobs
 from stseg.tracking.assignment import assign
 from stseg.tracking.encounters import touches
@@ -50,7 +50,7 @@ class TrackAssociation:
     """The state that is carried from window to window."""
 
     frame_rate: float
-    config: IdentityConfig
+    config: TrackingConfig
     alive: list[ActiveTrack] = field(default_factory=list)
     issued: int = 0
     shared_cells: dict[int, Labels] = field(default_factory=dict)

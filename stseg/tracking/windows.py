@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from stseg.config import IdentityConfig
+from stseg.config import TrackingConfig
 
 SHORTEST, LONGEST = 8, 30
 
@@ -31,13 +31,13 @@ class Window:
     commit_stop: int
 
 
-def window_length(frame_rate: float, config: IdentityConfig) -> tuple[int, int]:
+def window_length(frame_rate: float, config: TrackingConfig) -> tuple[int, int]:
     """Frames of a window, and frames that it shares with the next."""
     length = min(max(round(config.window * frame_rate), SHORTEST), LONGEST)
     return length, max(2, length // 4)
 
 
-def windows(frame_rate: float, config: IdentityConfig, first: int, stop: int) -> Iterator[Window]:
+def windows(frame_rate: float, config: TrackingConfig, first: int, stop: int) -> Iterator[Window]:
     """The windows that cover frames first .. stop - 1.
 
     Half of the frames that two windows share is kept from each, so that every kept frame was solved with context on

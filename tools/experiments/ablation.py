@@ -49,7 +49,7 @@ class TwoLabels(CutTracker):
         del window, energy
         label = np.zeros(occupied.shape, np.int32)
         for cells, own, linked in zip(occupied, label, held, strict=True):
-            near = nearest_person(self.rig.grid.ground, linked.scene.people.ground, self.config.occupancy.reach)
+            near = nearest_person(self.rig.grid.ground, linked.scene.people.ground, self.config.occupancy.person_radius)
             own[cells] = np.broadcast_to(np.append(linked.chains, UNASSIGNED)[near], cells.shape)[cells]
         return WindowLabels(label, 0)
 

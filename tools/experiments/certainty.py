@@ -82,15 +82,15 @@ def occupied_cells(grid: Grid, truth: Rows) -> Flags:
 def measure(rig: Path, frames: slice) -> dict[str, Tally]:
     """The three forms on one scene."""
     config, recording = Config(), read_rig(rig)
-    still = replace(config, occupancy=replace(config.occupancy, looks=1.0))
+    still = replace(config, occupancy=replace(config.occupancy, effective_observations=1.0))
     truth = np.genfromtxt(rig.with_name("truth.csv"), delimiter=",", names=True)
     kinds = ["boxes" if s.source.kind in ("boxes", "instances") else "pixels" for s in recording.sources]
-    constant = Occupancy(recording.rig, kinds, still.occupancy, still.ghosts, still.level)
-    learned = Occupancy(recording.rig, kinds, config.occupancy, config.ghosts, config.level)
+    constant = Occupancy(recording.rig, kinds, still.occupancy, still.detection, still.error_rates)
+    learned = Occupancy(recording.rig, kinds, config.occupancy, config.detection, config.error_rates)
     rates = learned.new_calibration()
     tallies = {form: Tally() for form in FORMS}
     for frame, seen, explanation in _explained(rig, kinds, frames, config):
-        near = nearest_person(recording.rig.grid.ground, explanation.people.ground, config.occupancy.reach) >= 0
+        near = nearest_person(recording.rig.grid.ground, explanation.people.ground, config.occupancy.person_radius) >= 0
         share = float(logit(rates.filled_share))
         forms = {
             "constants": constant.fuse(seen, explanation),
@@ -110,7 +110,7 @@ def _explained(rig: Path, kinds: list[str], frames: slice, config: Config) -> It
     streams = index_streams(recording)
     first, stop, _ = frames.indices(streams.length)
     sights = make_foregrounds(recording, config, first, stop, streams=streams)
-    frame_pass = Detector(recording.rig, kinds, config.ghosts)
+    frame_pass = Detector(recording.rig, kinds, config.detection)
     with open_frames(recording, first, stop, streams) as moments:
         for moment in moments:
             seen = [sight.evidence(view) for sight, view in zip(sights, moment.views, strict=True)]

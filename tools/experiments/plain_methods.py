@@ -12,7 +12,7 @@ import numpy as np
 from scipy.ndimage import label
 
 from stseg.arrays import Boxes, Flags, Floats, Ints, Rows, Singles
-from stseg.config import Config, IdentityConfig
+from stseg.config import Config, TrackingConfig
 from stseg.engine.backgrounds import make_foregrounds
 from stseg.foreground import box_likelihood
 from stseg.geometry import Grid, Rig
@@ -33,7 +33,7 @@ SMALLEST = 0.05
 def threshold(recording: Recording, first: int, stop: int) -> dict[float, Rows]:
     """Linked components at each of the levels."""
     volume: list[Singles] = list(volumes(recording, first, stop))
-    rig, config = recording.rig, Config().identity
+    rig, config = recording.rig, Config().tracking
     return {level: link(components(volume, level, rig.grid), first, rig, config) for level in LEVELS}
 
 
@@ -66,14 +66,14 @@ def _centroids(occupied: Flags, grid: Grid) -> Floats:
     return np.array([grid.ground[c].mean(0) for c in inside if c.sum() * grid.cell**2 > SMALLEST]).reshape(-1, 2)
 
 
-def link(found: list[Floats], first: int, rig: Rig, config: IdentityConfig) -> Rows:
+def link(found: list[Floats], first: int, rig: Rig, config: TrackingConfig) -> Rows:
     """Rows of the places found in each frame, each assigned to the nearest track within walking distance."""
     names: list[Ints] = []
     last, seen = np.zeros((0, 2)), np.zeros(0, np.int64)
     for frame, places in enumerate(found):
         unseen = (frame - seen) / rig.frame_rate
         alive = unseen <= config.patience
-        cost = distances(last, places) / (config.walking_speed * unseen + config.slack)[:, None]
+        cost = distances(last, places) / (config.walking_speed * unseen + config.assignment_distance)[:, None]
         cost[~alive] = 2.0
         tracks, own = assign(cost, 1.0)
         name = np.arange(len(last), len(last) + len(places))

@@ -37,12 +37,12 @@ def _alone(
     lots: np.random.Generator,
 ) -> Star:
     foretold = Prediction.of(star.ground, np.eye(2), motion)
-    leaves = grow(star, looks, foretold, config.count)
+    leaves = grow(star, looks, foretold, config.particles)
     views: list[Particles | None] = []
     for leaf, own in zip(leaves, star.views, strict=True):
         if leaf:
             leaf.follow(lots)
-            views.append(leaf.settled(np.ones(config.count), lots))
+            views.append(leaf.settled(np.ones(config.particles), lots))
         else:
             views.append(own and _unseen(own, motion))
     seeing = [(leaf, view) for leaf, view in zip(leaves, views, strict=True) if leaf and view]

@@ -39,7 +39,7 @@ class Leaf:
         self.look, self.prior, self.count = look, prior, count
         box = look.view.boxes(place[None], look.height)[0]
         tall = box[3] - box[1]
-        self.noise = look.config.foot * float(tall if np.isfinite(tall) else look.view.camera.size[1])
+        self.noise = look.config.foot_noise * float(tall if np.isfinite(tall) else look.view.camera.size[1])
         self.place = self.mapped = np.zeros((0, 2))
         self.covariance = np.zeros((0, 2, 2))
         self.belief = self.seen = np.zeros(0)

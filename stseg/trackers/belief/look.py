@@ -47,13 +47,13 @@ class TargetLikelihood:
     @property
     def hidden(self) -> float:
         """Likelihood that the view shows the target nowhere."""
-        return float(np.exp(-self.config.sharpness * self.config.doubt))
+        return float(np.exp(-self.config.colour_weight * self.config.neutral_distance))
 
     def likelihood(self, ground: Floats) -> tuple[Floats, Floats]:
         """Likelihood of the target at ground points (n, 2), and the share of it that is in sight there; both (n,)."""
         colours, share = histograms(self.image, self.view.boxes(ground, self.height), self.nearer)
-        square = share * squares(colours, self.reference) + (1 - share) * self.config.doubt
-        return np.exp(-self.config.sharpness * square.mean(1)), share.mean(1)
+        square = share * squares(colours, self.reference) + (1 - share) * self.config.neutral_distance
+        return np.exp(-self.config.colour_weight * square.mean(1)), share.mean(1)
 
 
 def squares(colours: Floats, reference: Floats) -> Floats:

@@ -86,15 +86,15 @@ class Rounds:
     ) -> None:
         self.config, self.lots, self.done = config, lots, 0
         self.prior = Prediction.of(star.ground, np.eye(2), motion)
-        self.outlier = Outlier(config.outlier, self.prior.mean, config.outlier_spread)
-        self.leaves = grow(star, looks, self.prior, config.count)
-        self.ground = self.prior.draw(config.count, lots)
-        self.weight = np.full(config.count, 1 / config.count)
+        self.outlier = Outlier(config.outlier_rate, self.prior.mean, config.outlier_spread)
+        self.leaves = grow(star, looks, self.prior, config.particles)
+        self.ground = self.prior.draw(config.particles, lots)
+        self.weight = np.full(config.particles, 1 / config.particles)
         self.to_ground, self.to_view = self._silence(), self._silence()
         self.ties: list[Tie | None] = []
 
     def _silence(self) -> list[Floats]:
-        return [np.ones(self.config.count) for _ in self.leaves]
+        return [np.ones(self.config.particles) for _ in self.leaves]
 
     @property
     def belief(self) -> Particles:
@@ -111,7 +111,7 @@ class Rounds:
                 leaf.follow(self.lots)
         self.ground, told = self._drawn()
         self.ties = [leaf.tie(self.ground, self.outlier) if leaf else None for leaf in self.leaves]
-        alone = self._importance(told) * exclusion(self.ground, others, self.config.apart)
+        alone = self._importance(told) * exclusion(self.ground, others, self.config.minimum_distance)
         self.to_ground = [
             tie.to_ground(leaf.seen) if leaf and tie else np.full(len(self.ground), self.outlier.flat)
             for leaf, tie in zip(self.leaves, self.ties, strict=True)
@@ -123,7 +123,7 @@ class Rounds:
 
     def _drawn(self) -> tuple[Floats, int]:
         """Ground particles, the last of them where views send them, and how many those are."""
-        count, seen = self.config.count, [leaf.seen if leaf else np.zeros(0) for leaf in self.leaves]
+        count, seen = self.config.particles, [leaf.seen if leaf else np.zeros(0) for leaf in self.leaves]
         told = count // 2 if sum(float(s.sum()) for s in seen) > 0 else 0
         parts = [self.prior.draw(count - told, self.lots)]
         if told:
@@ -137,7 +137,7 @@ class Rounds:
 
     def _importance(self, told: int) -> Floats:
         """How much likelier the prior makes each ground particle than the way it was drawn, float64 (n,)."""
-        prior, share = self.prior.density(self.ground), told / self.config.count
+        prior, share = self.prior.density(self.ground), told / self.config.particles
         if not told:
             return np.ones(len(prior))
         pairs = [(tie, leaf.seen) for leaf, tie in zip(self.leaves, self.ties, strict=True) if leaf and tie]
@@ -188,11 +188,11 @@ def propagate(
     """
     targets = [Rounds(star, seen, motion, config, lot) for star, seen, lot in zip(stars, looks, lots, strict=True)]
     open_still = list(range(len(targets)))
-    for done in range(1, config.rounds + 1):
+    for done in range(1, config.iterations + 1):
         heard = [target.belief for target in targets]
         moved = [targets[k].advance([*heard[:k], *heard[k + 1 :]]) for k in open_still]
         if done >= LEAST_ROUNDS:
-            open_still = [k for k, way in zip(open_still, moved, strict=True) if way > config.settled]
+            open_still = [k for k, way in zip(open_still, moved, strict=True) if way > config.convergence_distance]
         if not open_still:
             break
     return [target.settled() for target in targets]

@@ -42,7 +42,7 @@ class BeliefTracker(EachFrame):
 
     def __init__(self, rig: Rig, config: Config, first: int) -> None:
         super().__init__(rig, config, first)
-        self.motion = Motion(1 / rig.frame_rate, config.belief.wander, config.belief.turn)
+        self.motion = Motion(1 / rig.frame_rate, config.belief.position_noise, config.belief.velocity_noise)
         self.views = [StarView.of(camera, rig.grid) for camera in rig.cameras]
         self.border = Border.of(rig)
         self.targets: list[Target] = []
@@ -55,7 +55,7 @@ class BeliefTracker(EachFrame):
         if not self.begun:
             return None
         foretold = [target.foretold(self.motion) for target in self.targets]
-        noise, height_noise = self.config.identity.place_noise**2, self.config.identity.height_noise**2
+        noise, height_noise = self.config.tracking.position_noise**2, self.config.tracking.height_noise**2
         spread = [
             target.star.ground.covariance + p.covariance for target, p in zip(self.targets, foretold, strict=True)
         ]
@@ -66,7 +66,7 @@ class BeliefTracker(EachFrame):
             Sizes.of_heights(
                 np.array([target.height for target in self.targets]),
                 np.array([height_noise * (1 + 1 / target.found) for target in self.targets]),
-                self.config.ghosts,
+                self.config.detection,
             ),
             STAYING - FORGETTING * missed,
         )
@@ -84,7 +84,7 @@ class BeliefTracker(EachFrame):
     def _follow(self, frame: int, images: list[Bytes | None]) -> None:
         seen = looks(self.targets, self.views, images, self.motion, self.config.belief)
         lots = [self._lots(frame, target.track) for target in self.targets]
-        follow = _WAYS[self.config.belief.way]
+        follow = _WAYS[self.config.belief.method]
         stars = follow([target.star for target in self.targets], seen, self.motion, self.config.belief, lots)
         for target, star in zip(self.targets, stars, strict=True):
             target.star = star
@@ -97,12 +97,12 @@ class BeliefTracker(EachFrame):
         """Confirm targets by detections; the index of each person's target, int64 (n,), -1 for nobody known."""
         people = scene.people
         ground = np.array([target.star.ground.mean for target in self.targets]).reshape(-1, 2)
-        rows, columns = assign(distances(people.ground, ground), self.config.belief.beside)
+        rows, columns = assign(distances(people.ground, ground), self.config.belief.assignment_distance)
         whose = np.full(len(people), -1, np.int64)
         whose[rows] = columns
         for target in self.targets:
             target.missed += 1
-        share = 1 - np.exp(-self.motion.seconds / self.config.belief.memory)
+        share = 1 - np.exp(-self.motion.seconds / self.config.belief.colour_memory)
         nearer = [in_front(people.ground, people.height, view) for view in self.views]
         for person, k in zip(rows.tolist(), columns.tolist(), strict=True):
             target = self.targets[k]
@@ -138,7 +138,7 @@ class BeliefTracker(EachFrame):
         for k in np.flatnonzero(whose < 0).tolist():
             self.issued += 1
             lots = self._lots(scene.frame, self.issued)
-            height, count = float(people.height[k]), self.config.belief.count
+            height, count = float(people.height[k]), self.config.belief.particles
             target = Target.at(
                 self.issued, people.ground[k], people.covariance[k], height, len(self.views), count, lots
             )
@@ -152,7 +152,7 @@ class BeliefTracker(EachFrame):
         ground = np.array([target.star.ground.mean for target in seen]).reshape(-1, 2)
         covariance: Floats = np.array([target.star.ground.covariance for target in seen]).reshape(-1, 2, 2)
         height, score = (np.array(column, float) for column in ([t.height for t in seen], self._scores(seen)))
-        width = np.full(len(seen), self.config.ghosts.width_mean)
+        width = np.full(len(seen), self.config.detection.width_mean)
         return self.commit(scene, ids, ground, covariance, height, width, score, events)
 
     @staticmethod

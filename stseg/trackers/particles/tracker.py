@@ -52,20 +52,20 @@ class ParticleTracker(EachFrame):
 
     def __init__(self, rig: Rig, config: Config, first: int) -> None:
         super().__init__(rig, config, first)
-        self.views = [ParticleView(camera, config.particles.columns) for camera in rig.cameras]
+        self.views = [ParticleView(camera, config.particles.raster_columns) for camera in rig.cameras]
         self.border = Border.of(rig)
         self.rng = np.random.default_rng(config.particles.seed)
         self.issued, self.begun = 0, False
-        self.crowd = Crowd.nobody(1 if config.particles.way == "search" else config.particles.count)
+        self.crowd = Crowd.nobody(1 if config.particles.method == "search" else config.particles.particles)
 
     def expected(self, frame: int) -> PredictedTracks | None:
         """Everybody who is followed, where the last frame left them; None before the first."""
         if not self.begun:
             return None
         crowd, config = self.crowd, self.config
-        drift = config.identity.place_noise**2 + self._step(frame) ** 2
+        drift = config.tracking.position_noise**2 + self._step(frame) ** 2
         unseen = (frame - 1 - crowd.seen) / self.rig.frame_rate
-        sizes = Sizes.of_heights(crowd.height, np.full(len(crowd), _HEIGHT_NOISE**2), config.ghosts)
+        sizes = Sizes.of_heights(crowd.height, np.full(len(crowd), _HEIGHT_NOISE**2), config.detection)
         return PredictedTracks(crowd.ground, crowd.covariance + drift * np.eye(2), sizes, STAYING - FORGETTING * unseen)
 
     def add(self, scene: FusedFrame, shown: FrameObservations) -> list[Commit]:
@@ -90,12 +90,12 @@ class ParticleTracker(EachFrame):
             self._learn(look, seconds)
         crowd, events = self.crowd, births + deaths
         nats = np.array([evidence.get(int(i), 0.0) for i in crowd.ids])
-        width = np.full(len(crowd), self.config.ghosts.width_mean)
+        width = np.full(len(crowd), self.config.detection.width_mean)
         return [self.commit(scene, crowd.ids, crowd.ground, crowd.covariance, crowd.height, width, nats, events)]
 
     def _step(self, frame: int) -> float:
         """How far a person's step to a frame may go, metres (standard deviation)."""
-        return self.config.particles.wander * (frame - self.frame) / self.rig.frame_rate
+        return self.config.particles.velocity_spread * (frame - self.frame) / self.rig.frame_rate
 
     def _propose(self, scene: FusedFrame) -> Floats:
         """Have some particles try whether who is lost is somebody found whom nobody follows.
@@ -108,13 +108,14 @@ class ParticleTracker(EachFrame):
         crowd, config, found = self.crowd, self.config, scene.people.ground
         margin = np.full(len(crowd), _MARGIN)
         away = distances(crowd.ground, found)
-        known, met = assign(away, config.particles.beside)
+        known, met = assign(away, config.particles.assignment_distance)
         lost, new = np.setdiff1d(np.arange(len(crowd)), known), np.setdiff1d(np.arange(len(found)), met)
         reach = (
-            config.particles.beside + config.identity.walking_speed * (scene.frame - crowd.seen) / self.rig.frame_rate
+            config.particles.assignment_distance
+            + config.tracking.walking_speed * (scene.frame - crowd.seen) / self.rig.frame_rate
         )
         particles = crowd.particles.copy()
-        if config.particles.way != "search":
+        if config.particles.method != "search":
             for a, b in zip(*assign(away[np.ix_(lost, new)] - reach[lost, None], 0.0), strict=True):
                 k, j = lost[a], new[b]
                 particles[::_TRYING, k] = found[j]
@@ -134,15 +135,15 @@ class ParticleTracker(EachFrame):
     def _follow(self, looks: Sequence[ParticleFrame], step: float) -> None:
         """Move the particles to the frame, weigh and draw them."""
         config, crowd = self.config.particles, self.crowd
-        moved = crowd.particles if config.way == "search" else predicted(crowd.particles, step, self.rng)
-        if config.way != "generic":
-            median = config.axis == "median"
-            moved = np.stack([search(looks, hypothesis, config.rounds, median) for hypothesis in moved])
+        moved = crowd.particles if config.method == "search" else predicted(crowd.particles, step, self.rng)
+        if config.method != "generic":
+            median = config.axis_fit == "median"
+            moved = np.stack([search(looks, hypothesis, config.iterations, median) for hypothesis in moved])
         reference, misfit = crowd.reference, np.zeros(moved.shape[:2])
         for hypothesis, own in zip(moved, misfit, strict=True):
             for look in looks:
                 look.add_misfit(hypothesis, reference, own)
-        weight = weights(misfit.sum(1), config.sharpness)
+        weight = weights(misfit.sum(1), config.colour_weight)
         ground, covariance = estimate(moved, weight)
         drawn = resampled(moved, weight, self.rng)
         covariance = covariance + _FLOOR**2 * np.eye(2)
@@ -151,7 +152,7 @@ class ParticleTracker(EachFrame):
     def _recognise(self, scene: FusedFrame) -> tuple[dict[int, float], Ints]:
         """Whom of the crowd the pass found: evidence of each track, nats, and those found whom nobody follows."""
         crowd, people = self.crowd, scene.people
-        known, found = assign(distances(crowd.ground, people.ground), self.config.particles.beside)
+        known, found = assign(distances(crowd.ground, people.ground), self.config.particles.assignment_distance)
         seen, height = crowd.seen.copy(), crowd.height.copy()
         seen[known] = scene.frame
         height[known] += _HEIGHT_RENEWAL * (people.height[found] - height[known])
@@ -180,7 +181,7 @@ class ParticleTracker(EachFrame):
         crowd, config = self.crowd, self.config
         unfound = (self.frame - crowd.seen) / self.rig.frame_rate
         left = (self.border.away(crowd.ground) == 0.0) & (unfound > 0)
-        near = distances(crowd.ground, crowd.ground) < config.ghosts.apart
+        near = distances(crowd.ground, crowd.ground) < config.detection.minimum_distance
         told: list[Event] = []
         for k, identity in enumerate(crowd.ids.tolist()):
             others = crowd.ids[near[k] & (unfound == 0)]
@@ -195,6 +196,6 @@ class ParticleTracker(EachFrame):
 
     def _learn(self, look: ParticleFrame, seconds: float) -> None:
         crowd = self.crowd
-        share = min(seconds / self.config.particles.memory, 1.0)
+        share = min(seconds / self.config.particles.colour_memory, 1.0)
         learned = look.learned(crowd.ground, crowd.appearances, share, self.rng)
         self.crowd = replace(crowd, appearances=tuple(learned))

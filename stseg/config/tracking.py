@@ -13,9 +13,9 @@ class SegmentationConfig:
 
     smoothness: float = 0.1
     """lambda: what it costs that two neighbours at no distance differ, nats."""
-    spread: float = 0.20
+    distance_scale: float = 0.20
     """s: distance over which that falls to 0.6 of it, metres."""
-    step: float = 0.15
+    time_distance: float = 0.15
     """How far apart the time neighbours of one body are once its motion is followed, metres."""
     neighbours: int = 8
     """How many neighbours a cell has: 8, one step along x, y, the planes or time, or 80, the diagonals too."""
@@ -23,43 +23,51 @@ class SegmentationConfig:
     def __post_init__(self) -> None:
         require(0 <= self.smoothness <= 16, self, "smoothness", "0 to 16 nats")
         require(self.neighbours in (8, 80), self, "neighbours", "8 or 80")
-        require(self.spread > 0, self, "spread", "a number above 0")
-        require(self.step >= 0, self, "step", "0 or more metres")
+        require(self.distance_scale > 0, self, "distance_scale", "a number above 0")
+        require(self.time_distance >= 0, self, "time_distance", "0 or more metres")
 
 
 @dataclass(frozen=True)
-class IdentityConfig:
+class TrackingConfig:
     """Windows, and tracks out of pieces (METHODS 5)."""
 
     window: float = 1.0
     """Length of a window, seconds; held between 8 and 30 frames."""
     walking_speed: float = 2.0
     """How fast people walk at most, metres per second."""
-    slack: float = 0.35
+    assignment_distance: float = 0.35
     """How far a place may be off besides, metres."""
-    place_noise: float = 0.15
+    position_noise: float = 0.15
     """How far a frame's place is off besides its own covariance, metres (standard deviation)."""
     height_noise: float = 0.035
     """How far a frame's height of a person is off where they are seen whole, metres (standard deviation)."""
     width_noise: float = 0.03
     """How far a frame's width of a person is off where they are seen whole, metres (standard deviation)."""
-    foresight: float = 0.6
+    prediction_horizon: float = 0.6
     """How far ahead a track is carried when a window's cells are divided, seconds; beyond that it may be anywhere."""
     patience: float = 2.0
     """How long somebody may be unseen and still be the same, seconds."""
-    reunion: float = 4.0
+    maximum_gap: float = 4.0
     """How long somebody may be out of sight and still be known again by motion and height, seconds."""
-    bridge: float = 1.0
+    interpolation_gap: float = 1.0
     """How long a gap is filled on a straight line; longer ones stay gaps, seconds."""
-    shortest: float = 0.8
+    minimum_duration: float = 0.8
     """Tracks shorter than this are nobody, seconds (HW12's temporal check)."""
-    parting: float = 1.0
+    separation_time: float = 1.0
     """How long the cells of two people are apart before their encounter is over, seconds."""
 
     def __post_init__(self) -> None:
-        for name in ("window", "walking_speed", "place_noise", "height_noise"):
+        for name in ("window", "walking_speed", "position_noise", "height_noise"):
             require(getattr(self, name) > 0, self, name, "a number above 0")
-        for name in ("slack", "foresight", "patience", "reunion", "bridge", "shortest", "parting"):
+        for name in (
+            "assignment_distance",
+            "prediction_horizon",
+            "patience",
+            "maximum_gap",
+            "interpolation_gap",
+            "minimum_duration",
+            "separation_time",
+        ):
             require(getattr(self, name) >= 0, self, name, "0 or more")
 
 
@@ -71,40 +79,49 @@ class SegmentConfig:
     """How much of the recording one segment holds, seconds; a killed run goes on from the last whole one."""
     warm_up: float = 6.0
     """How far before its first frame a segment begins to look, to know who is there, seconds."""
-    background: float = 300.0
+    background_period: float = 300.0
     """Where no empty scene is given, each so long part of the recording has a background of its own, seconds."""
-    samples: int = 40
+    background_samples: int = 40
     """Frames that one is learned from, spread over that part."""
 
     def __post_init__(self) -> None:
-        for name in ("length", "background"):
+        for name in ("length", "background_period"):
             require(getattr(self, name) > 0, self, name, "seconds, above 0")
         require(self.warm_up >= 0, self, "warm_up", "0 or more seconds")
-        require(self.samples >= 1, self, "samples", "1 or more")
+        require(self.background_samples >= 1, self, "background_samples", "1 or more")
 
 
 @dataclass(frozen=True)
 class LiveConfig:
     """A recording that still goes on: `stseg run --follow`."""
 
-    settled: float = 10.0
+    file_quiet_time: float = 10.0
     """A file to which nothing was added for so long is complete even if it is the last, seconds."""
-    learning: float = 60.0
+    background_time: float = 60.0
     """Where a camera has no empty scene, how long it is looked at before the run begins, seconds."""
-    stale: float = 0.3
+    frame_tolerance: float = 0.3
     """How far from a moment, in time, what a live camera shows still stands for it, seconds; three quarters of a frame
     at least."""
-    silence: float = 5.0
+    stream_timeout: float = 5.0
     """A live stream from which nothing comes for so long is broken, seconds."""
-    pause: float = 1.0
+    reconnect_wait: float = 1.0
     """How long to wait before a broken stream is asked again, seconds; each time in vain it is twice as long."""
-    longest_pause: float = 60.0
+    longest_reconnect_wait: float = 60.0
     """But no longer than this, seconds."""
-    waiting: float = 10.0
+    buffer_time: float = 10.0
     """How much of live streams may wait to be worked on, seconds; beyond that the oldest moments are dropped."""
-    pictures: float = 512.0
+    buffer_memory: float = 512.0
     """How much memory their pictures may take, MiB; beyond that, too."""
 
     def __post_init__(self) -> None:
-        for name in ("settled", "learning", "stale", "silence", "pause", "longest_pause", "waiting", "pictures"):
+        for name in (
+            "file_quiet_time",
+            "background_time",
+            "frame_tolerance",
+            "stream_timeout",
+            "reconnect_wait",
+            "longest_reconnect_wait",
+            "buffer_time",
+            "buffer_memory",
+        ):
             require(getattr(self, name) > 0, self, name, "a number above 0")
