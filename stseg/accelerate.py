@@ -1,10 +1,10 @@
-"""The one place that names numba's options.
+"""Compilation of kernels: the one module that names numba's options.
 
 A kernel keeps its signature for type checkers, fills arrays that it is given, and is cached on disk. Kernels never use
 fast-math: the same input gives the same bits. With `NUMBA_DISABLE_JIT=1` every kernel is plain Python.
 
-The cache on disk knows a kernel by its own file alone: after an edit to a kernel that kernels of other files call,
-delete theirs (`find . -name '*.nb[ci]' -delete`).
+The cache on disk checks the kernel's own file alone: after an edit to a kernel that kernels of other files call, delete
+their caches (`find . -name '*.nb[ci]' -delete`).
 """
 
 from __future__ import annotations
@@ -25,10 +25,15 @@ def kernel(function: Callable[P, R]) -> Callable[P, R]:
     return cast("Callable[P, R]", numba.njit(cache=True, nogil=True)(function))
 
 
-def part(function: Callable[P, R]) -> Callable[P, R]:
-    """A kernel for the innermost loops, copied into each kernel that calls it; it may hold no new array.
+def wide_kernel(function: Callable[P, R]) -> Callable[P, R]:
+    """A kernel whose divisions are not checked: x / 0 is inf or nan, as in NumPy, and loops become vector code."""
+    return cast("Callable[P, R]", numba.njit(cache=True, nogil=True, error_model="numpy")(function))
 
-    Nothing is spent on handing over its arguments, nor on counting who refers to them.
+
+def part(function: Callable[P, R]) -> Callable[P, R]:
+    """A kernel for innermost loops, inlined into each kernel that calls it; it may allocate no array.
+
+    Arguments are neither passed on nor reference-counted.
     """
     return cast("Callable[P, R]", numba.njit(cache=True, nogil=True, forceinline=True, **_UNCOUNTED)(function))
 

@@ -1,4 +1,4 @@
-"""Array aliases, and the few records that every stage speaks.
+"""Array aliases, and the records of observations and evidence.
 
 Volumes are always `(time, plane, y, x)`, one frame of a volume `(plane, y, x)`, images `(v, u)` with pixel centres at
 integer coordinates (u to the right, v down). Names carry the frame of reference: `ground` is metres on the ground
@@ -27,14 +27,14 @@ AnyArray = NDArray[Any]
 
 @dataclass(frozen=True, slots=True)
 class Boxes:
-    """What a detector found in one view of one frame.
+    """A detector's boxes in one view of one frame.
 
     Attributes
     ----------
     pixel : float64 (n, 4)
         left, top, width, height in pixels; edges, not pixel centres, of the distorted image.
     score : float64 (n,)
-        The detector's belief in each box, 0..1; 1 where it does not say.
+        Detection score of each box, 0..1; 1 where the detector gives none.
     """
 
     pixel: Floats

@@ -1,4 +1,4 @@
-"""Pixels to likelihood maps: what one view says of each pixel, never thresholded (METHODS 2)."""
+"""Foreground likelihood of one view: soft maps, never thresholded (docs/how-it-works.md, Foreground)."""
 
 from stseg.config import ChromaticConfig, CodebookConfig, MixtureConfig
 from stseg.foreground.background import Background

@@ -1,8 +1,8 @@
-"""Light that changes over a whole view: one gain per channel and frame.
+"""Global illumination gain: one factor per channel and frame.
 
-A lamp, a cloud or the camera's own exposure multiplies all pixels of a view. The ratio of the image to the background
-is then the same wherever the background shows, and people scatter; so the gain is the peak of the ratios' histogram,
-which holds even where people cover more than half of the view.
+A lamp, a cloud or the camera's exposure multiplies all pixels of a view. The ratio of image to background is then the
+same wherever the background shows, and scatters where people are. So the gain is the peak of the histogram of ratios;
+this holds even where people cover more than half of the view.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ _BIN = 0.01  # of the natural logarithm of the ratio
 _BINS = 221  # ratios from a third to three
 _REACH = 2  # bins on each side of the peak that belong to it
 _DARKEST, _BRIGHTEST = 24.0, 250.0  # grey levels: below, rounding spoils the ratio; above, the sensor is saturated
-_ENOUGH = 0.02  # share of the asked pixels that the peak must hold to be believed
+_ENOUGH = 0.02  # share of the sampled pixels that the peak must hold to be accepted
 _FEWEST = 16  # and no fewer than this many
 
 
 def channel_gains(image: Bytes, mean: Singles, weight: Singles) -> Floats:
-    """How much brighter the image is than the background, channel by channel.
+    """Gain of the image over the background, channel by channel.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ def channel_gains(image: Bytes, mean: Singles, weight: Singles) -> Floats:
     mean : float32 (v, u, K, 3)
         Grey levels of the background's modes in the light that they were learned in.
     weight : float32 (v, u, K)
-        Their weights; the strongest mode of each pixel is asked.
+        Weights of the modes; the strongest mode of each pixel is used.
 
     Returns
     -------

@@ -14,7 +14,7 @@ a scene keeps better than its brightness.
 
 Why d is in grey levels. The chromatic plane is x / (B + G + R). Let a sensor's noise (reading, rounding, compression)
 have the standard deviation sigma in each channel at every brightness; a chromaticity is then uncertain by about
-sigma / (B + G + R), and a dark pixel's is anybody's. The Mahalanobis distance of two chromaticities under that noise is
+sigma / (B + G + R), and a dark pixel's is unknown. The Mahalanobis distance of two chromaticities under that noise is
 exactly d / sigma: d is small in the dark, however far apart the chromaticities, and no darkness is divided by.
 """
 

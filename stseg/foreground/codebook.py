@@ -1,4 +1,4 @@
-"""Background as a codebook per pixel, foreground as what no codeword explains (Kim et al. 2005, used by KD06).
+"""Codebook background model (Kim et al. 2005, used by Kim and Davis 2006): foreground is what no codeword explains.
 
 A codeword is a colour v, the bounds [low, high] of its brightness relative to v, its frequency (turns in which it was
 seen), its longest negative run (the most turns at a stretch in which it was not: MNRL), and the turns of its first and
@@ -21,13 +21,13 @@ proportional to frequency, which stops growing once it is worth the memory.
 Learning. Frames of the empty scene make codewords of whatever they show. Among people the commonest colour of a pixel
 is one, and any other whose longest negative run, around the end, is at most the share `recurrence` of the frames.
 
-Then there are two layers (Kim et al., section 4). A colour that nobody expects, where L >= 1/2, becomes a codeword of
-the cache: it is no background, however long a person stands there. It is forgotten once it is away for `absence`, and
+Then there are two layers (Kim et al., section 4). An unexplained colour, where L >= 1/2, becomes a codeword of the
+cache: it is no background, however long a person stands there. It is forgotten once it is away for `absence`, and
 becomes background `absorption` seconds after its first access if it was seen in half of the time. Background that was
 absorbed so is forgotten when it is away for `absorption`; what was learned first stays, and the cache takes no place of
 background. Background learns with (1 - L) times the rate dt / memory; its bounds move inwards with that rate and
 outwards twenty times as fast, so that they hold most of the brightness seen, and a passing shadow hardly widens them.
-What only a shadow or a highlight explains teaches nothing.
+A colour that only a shadow or a highlight explains updates nothing.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class Codebook(PixelModel):
     State: mean float32 (v, u, K, 3), the colour v, grey levels BGR; bounds float32 (v, u, K, [low, high]), relative to
     it; frequency float32 (v, u, K), turns; weight float32 (v, u, K), the frequency of background, at most that of the
     memory, and 0 in the cache; access int32 (v, u, K, [first, last]), turns, first 0 for what was learned
-    before `likelihood` was asked. A frequency of 0 is an empty place.
+    before the first call of `likelihood`. A frequency of 0 is an empty place.
     """
 
     name: ClassVar[str] = "codebook"

@@ -1,4 +1,4 @@
-"""The passes of the codebook over a frame: what shows foreground, what the empty scene teaches, what the rest does."""
+"""Kernels of the codebook: foreground log-odds of a frame, learning of the empty scene, adaptation."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def teach(
     weight: Singles,
     access: NDArray[np.int32],
 ) -> None:
-    """Teach the codewords a frame of the empty scene, in place: what it shows is background.
+    """Update the codewords with a frame of the empty scene, in place: all of it is background.
 
     With `now` counted from 1, `longest` (v, u, K) comes to hold the longest negative runs. The first codeword of a
     pixel stays; where all places are taken what is new replaces the least frequent of the others.
@@ -149,7 +149,7 @@ def settle(
     weight: Singles,
     access: NDArray[np.int32],
 ) -> None:
-    """After so many frames among people, keep the first codewords, and those whose longest negative run is allowed.
+    """After initialisation among people, keep the first codewords and those with an allowed longest negative run.
 
     A run goes on from the last frame to the first (Kim et al. 2005, section 2.1).
     """
@@ -178,11 +178,11 @@ def follow(
     weight: Singles,
     access: NDArray[np.int32],
 ) -> None:
-    """Teach the codewords a frame that may show people, in place; `now`, `absorption` and `absence` in turns."""
+    """Update the codewords with a frame that may show people, in place; `now`, `absorption` and `absence` in turns."""
     for v in range(image.shape[0]):
         for u in range(image.shape[1]):
             x0, x1, x2 = np.float32(image[v, u, 0]), np.float32(image[v, u, 1]), np.float32(image[v, u, 2])
-            chance = likelihood[v, u]
+            foreground = likelihood[v, u]
             nearest, distance, nearest_ratio = -1, reach * reach, _ZERO
             place, oldest = -1, now
             for k in range(weight.shape[2]):
@@ -204,15 +204,15 @@ def follow(
                 if off + beyond * beyond <= distance:
                     nearest, distance, nearest_ratio = k, off + beyond * beyond, ratio
             if nearest < 0:
-                if chance >= _HALF and place >= 0:  # else a shadow, noise among background, or no place to spare
+                if foreground >= _HALF and place >= 0:  # else a shadow, noise among background, or no place to spare
                     _begin(v, u, place, now, x0 / gain[0], x1 / gain[1], x2 / gain[2], mean, bounds, frequency, access)
                 continue
             access[v, u, nearest, 1] = now
             frequency[v, u, nearest] += _ONE
             if weight[v, u, nearest] > _ZERO:
-                step = max(rate, _ONE / weight[v, u, nearest]) * (_ONE - chance)
+                step = max(rate, _ONE / weight[v, u, nearest]) * (_ONE - foreground)
                 if weight[v, u, nearest] * rate < _ONE:
-                    weight[v, u, nearest] += _ONE - chance
+                    weight[v, u, nearest] += _ONE - foreground
             else:
                 step = max(rate, _ONE / frequency[v, u, nearest])
                 age = now - access[v, u, nearest, 0]

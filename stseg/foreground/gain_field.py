@@ -1,4 +1,4 @@
-"""Light that changes in a part of a view: a smooth field of gains.
+"""Local illumination change: a smooth field of gains.
 
 A lamp lights what is near it, a cloud's shadow has borders. The logarithm of the ratio of image to background is then
 smooth over the view wherever background shows, and people scatter. So it is fitted on a coarse raster of nodes,
@@ -19,7 +19,7 @@ from scipy.linalg import solveh_banded
 from stseg.arrays import Bytes, Floats, Singles
 
 _NODES = (12, 16)  # down and across
-_ASKED = 6000  # pixels; ample for so few nodes
+_SAMPLES = 6000  # pixels; ample for so few nodes
 _SCALES = (0.8, 0.5, 0.3, 0.2, 0.12, 0.08, 0.05, 0.05)  # of the natural logarithm of the ratio
 _STIFFNESS = 0.05  # of a pair of nodes, against the pixels of one node
 _DARKEST, _BRIGHTEST = 12.0, 250.0  # grey levels: below, rounding spoils the ratio; above, the sensor is saturated
@@ -27,7 +27,7 @@ _FARTHEST = 1.1  # of that logarithm: gains beyond a third and three are no ligh
 
 
 def gain_field(image: Bytes, background: Singles, empty: Singles) -> Singles:
-    """How much brighter each pixel's background has become.
+    """Gain of the background at each pixel since it was learned.
 
     Parameters
     ----------
@@ -40,10 +40,10 @@ def gain_field(image: Bytes, background: Singles, empty: Singles) -> Singles:
     Returns
     -------
     float32 (v, u, 3)
-        Factors within 1/3..3; 1 everywhere where no pixel can be asked.
+        Factors within 1/3..3; 1 everywhere if no pixel is usable.
     """
     height, width = image.shape[:2]
-    step = max(1, round((height * width / _ASKED) ** 0.5))
+    step = max(1, round((height * width / _SAMPLES) ** 0.5))
     seen = image[::step, ::step].astype(np.float64)
     expected = background[::step, ::step].astype(np.float64)
     usable = ((np.minimum(seen, expected) >= _DARKEST) & (np.maximum(seen, expected) <= _BRIGHTEST)).all(-1)
@@ -62,7 +62,7 @@ def _fit(ratio: Floats, weight: Floats, pixels: sparse.csr_array) -> Floats:
     used = np.flatnonzero(weight > 0)
     ratio, weight, pixels = ratio[used], weight[used], pixels[used]
     smooth = _STIFFNESS * max(len(used), 1) / pixels.shape[1] * _roughness()
-    # So little that it decides only where nothing else does.
+    # Decides only where no pixel and no neighbour does.
     smooth += 1e-6 * np.eye(len(smooth))
     nodes = np.zeros((pixels.shape[1], 3))
     trust = weight
@@ -75,7 +75,7 @@ def _fit(ratio: Floats, weight: Floats, pixels: sparse.csr_array) -> Floats:
 
 
 def _solve(matrix: Floats, right: Floats) -> Floats:
-    """The solution of a positive definite system whose nodes speak with their neighbours alone."""
+    """The solution of a positive definite system that couples neighbouring nodes only (banded Cholesky)."""
     band = _NODES[1] + 2
     diagonals = [np.pad(np.diagonal(matrix, -below), (0, below)) for below in range(band)]
     return np.asarray(solveh_banded(np.stack(diagonals), right, lower=True))
@@ -88,6 +88,6 @@ def _roughness() -> Floats:
 
 
 def _tents(length: int, nodes: int) -> Floats:
-    """How much each of the nodes along a side says at each of its pixels, float64 (length, nodes)."""
+    """Linear interpolation weights of the nodes along a side at each of its pixels, float64 (length, nodes)."""
     place = np.linspace(0.0, nodes - 1.0, length)
     return np.asarray(np.maximum(0.0, 1.0 - np.abs(place[:, None] - np.arange(nodes))))

@@ -1,4 +1,4 @@
-"""Instance images, one value a person, as boxes."""
+"""Instance segmentation images, one value a person, as boxes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Masks made elsewhere, read as likelihoods (METHODS 2)."""
+"""Masks of an external segmenter as likelihood maps."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _LIKELIHOOD = np.arange(256, dtype=np.float32) / np.float32(255)
 
 
 def mask_likelihood(mask: Bytes) -> Singles:
-    """Likelihood of foreground of a mask.
+    """Foreground likelihood of a mask image.
 
     Parameters
     ----------
@@ -21,7 +21,7 @@ def mask_likelihood(mask: Bytes) -> Singles:
     Returns
     -------
     float32 (v, u)
-        mask / 255. A mask is only as sure as its maker: whoever fuses it clamps it at the maker's miss rate.
+        mask / 255. The fusion accounts for the segmenter's error rates.
 
     Raises
     ------

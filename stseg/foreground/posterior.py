@@ -1,4 +1,4 @@
-"""From densities of a colour to the log-odds of a person, the same for all models.
+"""Foreground log-odds of a colour from its densities, common to all background models.
 
 With densities per cubed grey level, `lit` of the background as it was learned, `dimmed` of it in shadow, and U of a
 colour of which nothing is known (symbols as in `stseg.foreground.mixture`),
@@ -14,7 +14,7 @@ import numpy as np
 
 from stseg.accelerate import kernel
 
-UNIFORM = 1.0 / 256.0**3  # density of a colour of which nothing is known, per cubed grey level
+UNIFORM = 1.0 / 256.0**3  # density of an unknown colour, per cubed grey level
 CERTAIN = 5.0  # nats; beyond it one pixel would outvote all its neighbours
 FAR = 50.0  # half a squared Mahalanobis distance; beyond it the density is below every constant here
 _ROUNDING = 1.001  # more than single precision loses
@@ -36,7 +36,7 @@ def bounded_log_odds(
 
 @kernel
 def doubt_of(foreground: float, unexplained: float, shadow: float) -> float:
-    """How many times the density `lit` must exceed that of people for the log-odds to be at their least."""
+    """Ratio of the densities of background and people from which on the log-odds are at their lower bound."""
     known = (1.0 - unexplained) * (1.0 - shadow)
     return _ROUNDING * foreground * math.exp(CERTAIN) / ((1.0 - foreground) * known)
 
@@ -56,9 +56,9 @@ def surely_background(
     doubt: np.float32,
     mimicry: np.float32,
 ) -> bool:
-    """Whether the log-odds are at their least where one Gaussian mode is all the background, told without exponentials.
+    """Whether one Gaussian mode alone puts the log-odds at their lower bound, found without exponentials.
 
-    Most pixels' are, and it is never true where they are not: exp(-z) >= (1 - z / 8)^8 on both sides.
+    A sufficient condition, true of most pixels: exp(-z) >= (1 - z / 8)^8 bounds both sides.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def outshines(
     doubt: np.float32,
     mimicry: np.float32,
 ) -> bool:
-    """Whether the one background there is exceeds people `doubt` times: never true where it does not.
+    """Whether a single background mode exceeds the density of people `doubt` times (a sufficient condition).
 
     Parameters
     ----------

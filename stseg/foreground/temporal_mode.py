@@ -1,7 +1,7 @@
-"""The background among walking people: the colour that a pixel shows most often.
+"""Temporal mode: the colour that a pixel shows most often, which is the background among walking people.
 
-A median needs the background in more than half of the frames; in a crowded room it is not there. People wear many
-colours and the background has one, so the colour with the most companions finds it wherever it is the commonest.
+A median needs the background in more than half of the frames, which a crowded scene does not offer. People wear many
+colours and the background has one, so the colour with the most similar ones finds it wherever it is the commonest.
 """
 
 from __future__ import annotations

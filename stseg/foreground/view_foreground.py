@@ -1,4 +1,4 @@
-"""From what a camera delivers to what the fusion asks for: a likelihood map, or boxes."""
+"""From the observation of a camera to the evidence of its view: a likelihood map, or boxes."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from stseg.foreground.masks import mask_likelihood
 
 
 class ViewForeground:
-    """One camera's way from observation to evidence.
+    """Foreground stage of one camera.
 
     Parameters
     ----------
     background
-        The model of the empty scene of a colour camera, its light watched; None for all others.
+        Background model of a colour camera; None for cameras that deliver masks, instances or boxes.
     """
 
     def __init__(self, background: IlluminationMonitor | None = None) -> None:
@@ -24,11 +24,11 @@ class ViewForeground:
 
     @property
     def light_changes(self) -> list[LightChange]:
-        """When the light changed at once, in frames since the first that was asked for."""
+        """Sudden illumination changes, in frames since the first."""
         return [] if self.background is None else self.background.changes
 
     def evidence(self, seen: Observation) -> ViewEvidence:
-        """What the frame shows; colour frames also teach the background model."""
+        """Evidence of a frame; colour frames also update the background model."""
         if seen is None and self.background is not None:
             self.background.skip()
         if seen is None or isinstance(seen, Boxes):
@@ -43,10 +43,10 @@ class ViewForeground:
         return None if posterior is None else without_prior(posterior, self.background.model.prior)
 
     def pixels(self, seen: Observation) -> Singles | None:
-        """How likely each pixel shows a person, float32 (v, u); None where the view is blind or delivers boxes.
+        """Foreground likelihood of each pixel, float32 (v, u); None where the view is blind or delivers boxes.
 
-        As `evidence`, but that the instances of an instance image are taken for certain, pixel by pixel. One of the two
-        may be asked of a frame.
+        As `evidence`, except that the pixels of an instance image have likelihood 0 or 1. Call exactly one of the two
+        for each frame.
         """
         if isinstance(seen, np.ndarray) and seen.dtype == np.uint16:
             return (seen > 0).astype(np.float32)
@@ -55,9 +55,9 @@ class ViewForeground:
 
 
 def without_prior(posterior: Singles, prior: float) -> Singles:
-    """What a posterior would be with a prior of one half: the evidence alone.
+    """The posterior under a prior of one half, which is the likelihood alone.
 
-    The fusion has a prior of its own, that of a cell being occupied; one for the pixel besides would count it twice.
+    The fusion has a prior of its own, that of a cell being occupied; the pixel's prior would count it twice.
 
     Parameters
     ----------

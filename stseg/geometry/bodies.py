@@ -1,4 +1,4 @@
-"""Where standing bodies appear in a view: boxes and outlines of pillars, from one table of projected points.
+"""Projection of standing bodies into a view: boxes and outlines of pillars, from one table of projected points.
 
 A body is a pillar of revolution: discs whose radius changes with the relative height (feet, trunk, head). A lattice of
 ground points is projected once at some levels; between them pixels are interpolated, linearly in x, y and height, so
@@ -63,9 +63,9 @@ class BodyTable:
         Parameters
         ----------
         ground : float64 (n, 2)
-            Where they stand, metres.
+            Places, metres.
         heights : float64 (h,)
-            How tall they are, metres.
+            Body heights, metres.
 
         Returns
         -------

@@ -1,4 +1,4 @@
-"""One view: a ground homography, a vertical, perhaps a lens. Never more is needed (METHODS 1)."""
+"""Camera model: a ground homography, a scaled vertical vanishing point, and an optional lens."""
 
 from __future__ import annotations
 

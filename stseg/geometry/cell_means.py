@@ -1,4 +1,4 @@
-"""From a view's map to the mean likelihood of every cell."""
+"""Mean likelihood of every cell in a view's map."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class SumTable(NamedTuple):
 
 
 class CellMeans:
-    """Means over the footprints of a rig's cells. Its room is used anew by every call: one object a thread.
+    """Means over the footprints of a rig's cells. Its buffers are used anew by every call: one object a thread.
 
     Parameters
     ----------
@@ -35,15 +35,15 @@ class CellMeans:
         largest = max(
             (rows.stop - rows.start + 1) * (columns.stop - columns.start + 1) for rows, columns in self.regions
         )
-        self._room = np.empty(largest, np.uint32)
+        self._sums = np.empty(largest, np.uint32)
         self._levels = np.empty(self.footprint.shape[1:4], np.int16)
 
     def sum_table(self, view: int, likelihood: Singles) -> SumTable:
-        """Sums over the part of a view's map (v, u) that cells ask for."""
+        """Sums over the part of a view's map (v, u) that cells cover."""
         rows, columns = self.regions[view]
         part = likelihood[rows, columns]
         shape = part.shape[0] + 1, part.shape[1] + 1
-        sums = self._room[: shape[0] * shape[1]].reshape(shape)
+        sums = self._sums[: shape[0] * shape[1]].reshape(shape)
         fill_sums(part, sums)
         return SumTable(sums, columns.start, rows.start)
 

@@ -1,4 +1,4 @@
-"""A view from points: its ground homography, and its vertical from heads, or from square pixels (METHODS 1)."""
+"""Fitting a view to points: ground homography by DLT, vertical from points above ground or from square pixels."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def focal_of_square_pixels(homography: Floats, size: tuple[int, int]) -> float |
 
     Returns
     -------
-    float, pixels, or None where the view tells none: it looks straight down, or along an axis of it.
+    float, pixels, or None where it is not determined: a view straight down, or along a ground axis.
     """
     first, second, _ = (np.linalg.inv(middle_matrix(1.0, size)) @ homography).T
     # flat / f^2 + deep = 0

@@ -1,4 +1,4 @@
-"""The cells that are asked: a rectangle of ground, and planes above it."""
+"""The occupancy grid: cells of a ground rectangle, and planes above them."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class Grid:
         return (np.asarray(ground, float) - (self.x[0], self.y[0])) / self.cell - 0.5
 
     def inside(self) -> Flags:
-        """Cells whose centre counts: inside the polygon where there is one, bool (y, x)."""
+        """Cells whose centre lies within the polygon, all without one, bool (y, x)."""
         if self.polygon is None:
             return np.ones(self.shape[1:], bool)
         return inside_polygon(self.ground, self.polygon)

@@ -1,4 +1,4 @@
-"""Mirrored calibrations: left and right exchanged, seen by what lies behind the camera."""
+"""Mirrored calibrations: detection of a left-handed world frame."""
 
 from __future__ import annotations
 

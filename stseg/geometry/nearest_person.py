@@ -1,4 +1,4 @@
-"""Which of several bodies a place on the ground belongs to."""
+"""Assignment of ground places to the nearest person."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from stseg.arrays import Floats, Ints
 
 
 def nearest_person(ground: Floats, people_ground: Floats, reach: float) -> Ints:
-    """The person within reach of each place, the nearest of several, -1 for nobody.
+    """Index of the nearest person within reach of each place, -1 if none.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""How far an image may be reduced before standing people get too small in it."""
+"""Image reduction: the factor at which standing people still span enough rows."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which pixels of each view show each cell: looked up once, so only the grid is ever sampled.
+"""Footprints: the pixels of each view that show each cell, computed once.
 
 A cell covers many pixels of a near view and a part of one of a far view. Its *footprint* is the axis-aligned box of
 pixels about its centre with the spread of its image: a square of side c that J (the Jacobian of ground metres to
@@ -36,7 +36,7 @@ class Sampling:
     Attributes
     ----------
     footprint : int16 (view, plane, y, x, 4)
-        The pixels that show each cell; of no width where the view does not see it, or the cell does not count.
+        The pixels that show each cell; width 0 where the view does not see it, or it lies outside the area.
     distance : float32 (view, y, x)
         Distance of the cell from the camera along the ground, metres.
     """
@@ -57,7 +57,7 @@ class Sampling:
         return np.asarray((self.footprint[..., 2] > 0).sum(0), np.uint8)
 
     def regions(self) -> list[tuple[slice, slice]]:
-        """Rows and columns of each view that some cell asks for; empty ones where it sees no cell."""
+        """Rows and columns of each view that footprints cover; empty slices where the view sees no cell."""
         return [(_span(boxes[..., 1], boxes[..., 3]), _span(boxes[..., 0], boxes[..., 2])) for boxes in self.footprint]
 
 

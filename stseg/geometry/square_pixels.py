@@ -1,4 +1,4 @@
-"""The vertical of a view of which nothing but its ground homography is known."""
+"""Vertical of a view from its ground homography alone, by square pixels and a central principal point."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from stseg.errors import CalibrationError
 
 
 def vertical_of_square_pixels(ground: Floats, size: tuple[int, int]) -> Floats:
-    """What one metre of height adds to the third column of a homography, if pixels are square and the axis central.
+    """The vertical a v of a camera with square pixels and a central principal point, in pixels a metre of height.
 
-    The two ground axes are images of unit vectors at a right angle, which tells the focal length (Zhang, A flexible
+    The two ground axes are images of unit vectors at a right angle, which gives the focal length (Zhang, A flexible
     new technique for camera calibration, 2000, eqs 3 and 4); the vertical is then at right angles to both.
 
     Parameters
@@ -24,7 +24,7 @@ def vertical_of_square_pixels(ground: Floats, size: tuple[int, int]) -> Floats:
     Returns
     -------
     float64 (3,)
-        a v of METHODS 1, in the scale of `ground`.
+        a v (see `stseg.geometry.planes`), in the scale of `ground`.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Means over the footprints of cells, by a summed-area table (Crow 1984): four sums a cell, however large it is.
+"""Summed-area tables (Crow 1984): means over the footprints of cells, four look-ups each.
 
 Likelihoods are taken in whole levels of 1 / TOP, so that sums are exact, and modulo 2^32, which does no harm: the sum
 over a footprint comes from four entries by differences, and is itself below 2^32.
@@ -17,7 +17,7 @@ TOP = 4095
 LARGEST_SIDE = 1024
 """Pixels; sums over larger footprints would not fit."""
 UNSEEN = -1
-"""In place of a level: the view says nothing of the cell."""
+"""In place of a level: the view does not see the cell."""
 
 Sums = NDArray[np.uint32]
 Levels = NDArray[np.int16]
@@ -26,7 +26,7 @@ Levels = NDArray[np.int16]
 
 @kernel
 def level_of(likelihood: np.float32) -> np.int32:
-    """The nearest level; what is no likelihood (below 0, above 1, not a number) becomes one."""
+    """The nearest level; values outside 0..1 are clipped, NaN counts as 0."""
     above = likelihood if likelihood > 0 else np.float32(0.0)
     within = above if above < 1 else np.float32(1.0)
     return np.int32(within * np.float32(TOP) + np.float32(0.5))

@@ -1,4 +1,4 @@
-"""How cluttered a view is, and what weight that leaves it (KS09 eqs 5 to 7; METHODS 3)."""
+"""Clutter of a view and the weight that follows from it (Khan and Shah 2009, eqs 5 to 7)."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from stseg.arrays import Floats, Singles
 
 
 def clutter(likelihood: Singles, side: int) -> float:
-    """Schmieder and Weathersby's clutter of a likelihood map (KS09 eq. 5).
+    """Schmieder and Weathersby's clutter of a likelihood map (Khan and Shah 2009, eq. 5).
 
     C = sqrt(1/N sum_k var_k) over square cells of `side` pixels, partial cells at the border included.
 
@@ -52,14 +52,14 @@ def _fill_variances(likelihood: Singles, side: int, variance: Floats) -> None:
 
 
 def clutter_weights(clutters: Floats) -> Floats:
-    """Weights 1 / C_i of the views, before they are normalised over those that see a cell (KS09 eq. 7).
+    """Weights 1 / C_i of the views, before they are normalised over those that see a cell (Khan and Shah 2009, eq. 7).
 
-    C is floored at the median over the views, so that a view that sees nothing does not silence the others.
+    C is floored at the median over the views, so that an empty map does not outweigh the others.
 
     Parameters
     ----------
     clutters : float64 (view,)
-        C of each view; nan for a blind one, whose weight is then 0.
+        C of each view; nan for a blind view, whose weight is then 0.
 
     Returns
     -------

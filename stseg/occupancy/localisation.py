@@ -1,4 +1,4 @@
-"""KS09's localisation: what all views say of each cell, nobody explained (KS09 section 4; METHODS 3, 4).
+"""Homographic occupancy without an explanation of the frame (Khan and Shah 2009, section 4).
 
 localiser = Localiser(rig, "footprint")
 volume = localiser.synergy(maps, localiser.clutter_weights(maps), least=0.05)
@@ -40,10 +40,10 @@ class Localiser:
         self._means = CellMeans(self.sampling)
         self._views = self.sampling.views()
         self._whole = np.ones(rig.grid.shape, np.float32)
-        self._nobody = np.full(rig.grid.shape[1:], -1, np.int64)
+        self._no_person = np.full(rig.grid.shape[1:], -1, np.int64)
 
     def clutter_weights(self, maps: Maps) -> Floats:
-        """1 / C_i of each view, scaled to a mean of 1, 0 where it is blind, float64 (view,) (KS09 eqs 5, 6)."""
+        """1 / C_i of each view, mean 1, 0 for blind views (Khan and Shah 2009, eqs 5, 6); float64 (view,)."""
         sides = [clutter_side(camera.size) for camera in self.rig.cameras]
         unrest = [np.nan if seen is None else clutter(seen, side) for seen, side in zip(maps, sides, strict=True)]
         return clutter_weights(np.array(unrest))
@@ -54,7 +54,7 @@ class Localiser:
         return np.asarray((self.sampling.footprint[awake][..., 2] > 0).sum(0), np.uint8)
 
     def synergy(self, maps: Maps, weights: Floats, least: float) -> Singles:
-        """The synergy maps of all planes, nats (KS09 eq. 7).
+        """The synergy maps of all planes, nats (Khan and Shah 2009, eq. 7).
 
         Parameters
         ----------
@@ -63,7 +63,7 @@ class Localiser:
         weights : float64 (view,)
             1 / C_i in any scale; all equal where clutter is not modelled.
         least
-            L_min: how often a person is missed. Smaller likelihoods are taken for it, so that no view alone has a veto.
+            L_min: the miss rate. Likelihoods are clamped to it, so that no view alone has a veto.
 
         Returns
         -------
@@ -78,7 +78,7 @@ class Localiser:
         return self._fuse(maps, weights, [synergy_terms(least)] * len(maps), 0.0)
 
     def log_odds(self, maps: Maps, weights: Floats, rates: Sequence[ErrorRates], occupied: float) -> Singles:
-        """The calibrated log-odds u of all planes, nats (METHODS 4).
+        """The calibrated log-odds u of all planes, nats (docs/how-it-works.md, Fusion).
 
         Parameters
         ----------
@@ -107,8 +107,8 @@ class Localiser:
         tally = Accumulator(self.rig.grid.shape)
         for view, (seen, weight, term) in enumerate(zip(maps, weights, terms, strict=True)):
             if seen is not None:
-                tally.add(self._means.levels(view, seen), term, weight, self._whole, self._whole, self._nobody)
-        return tally.total(self._views, self._nobody, 1.0, (prior, prior))
+                tally.add(self._means.levels(view, seen), term, weight, self._whole, self._whole, self._no_person)
+        return tally.total(self._views, self._no_person, 1.0, (prior, prior))
 
     def _require(self, maps: Maps) -> None:
         cameras = self.rig.cameras
