@@ -24,6 +24,7 @@ from stseg.arrays import Rows
 from stseg.commands.main import main
 from stseg.detection.scoring import set_score
 from stseg.engine.following import ENDLESS, last_frame
+from stseg.engine.frame_range import FrameRange
 from stseg.errors import ConfigError
 from stseg.evaluation import evaluate
 from stseg.io.live.followed_cameras import FollowedCameras
@@ -305,10 +306,10 @@ def test_a_real_rtsp_server_whose_streams_end_is_followed(
 
 
 def test_where_it_ends_by_itself() -> None:
-    assert (last_frame(None), last_frame("0:7"), last_frame(":7")) == (ENDLESS, 7, 7)
+    assert (last_frame(None), *(last_frame(FrameRange.parse(text)) for text in ("0:7", ":7"))) == (ENDLESS, 7, 7)
     for wrong in ("5:7", "7", "0:", "0:0", "0:x"):
         with pytest.raises(ConfigError, match="--frames"):
-            last_frame(wrong)
+            last_frame(FrameRange.parse(wrong))
 
 
 @pytest.mark.parametrize("more", [("--workers", "2"), ("--scheduler", "tcp://there:1")])

@@ -10,8 +10,8 @@ from recordings import FRAMES, OPTIONS, track, write_recording
 
 from stseg.accelerate import python_form
 from stseg.commands.main import main
-from stseg.commands.plan import Forecast
 from stseg.detection.scoring import set_score
+from stseg.engine.forecast import Forecast
 
 pytestmark = pytest.mark.skipif(python_form(set_score) is set_score, reason="too slow without a compiler")
 

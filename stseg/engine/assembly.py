@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from stseg.arrays import Bytes, Ints, Rows
+from stseg.engine.job import Job
 from stseg.engine.pipeline import Pipeline
-from stseg.engine.segment import Job
 from stseg.engine.segments import Segment
 from stseg.io.config_file import format_config
 from stseg.io.recording.time_alignment import with_alignment

@@ -11,7 +11,8 @@ from collections.abc import Callable, Iterator, Sequence
 from functools import lru_cache
 from pathlib import Path
 
-from stseg.engine.segment import Job, SegmentWorker
+from stseg.engine.job import Job
+from stseg.engine.segment_worker import SegmentWorker
 from stseg.engine.segments import Segment
 from stseg.errors import ConfigError, WorkerError
 

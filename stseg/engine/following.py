@@ -9,23 +9,29 @@ from itertools import chain, takewhile
 from pathlib import Path
 from threading import Event
 
-import numpy as np
-
+from stseg.config import Config
 from stseg.engine.assembly import FinishedSegment, assemble
 from stseg.engine.backgrounds import background_frames
+from stseg.engine.frame_range import FrameRange
+from stseg.engine.job import Job, VolumeKind
 from stseg.engine.live_foreground import LiveForegrounds
 from stseg.engine.live_run import LiveRun
 from stseg.engine.reporter import Reporter
-from stseg.engine.segment import Job
 from stseg.engine.segments import Segment, endless_segments
 from stseg.engine.stopping import stop_asked
+from stseg.engine.track import resumable
 from stseg.errors import ConfigError, SourceError
+from stseg.io.config_file import format_config
 from stseg.io.live.arriving_files import FileNotes
 from stseg.io.live.followed_cameras import FollowedCameras
 from stseg.io.live.followed_files import FollowedFiles
 from stseg.io.live.live_frames import LiveFrameSet, is_live
 from stseg.io.live.live_table import LiveTable
-from stseg.io.runfile.runs import read_run
+from stseg.io.outputs.whole_files import require_new
+from stseg.io.recording.recording import Recording
+from stseg.io.recording.stream_index import StreamIndex
+from stseg.io.runfile.provenance import gather_provenance, run_request
+from stseg.io.runfile.runs import Run, read_run
 from stseg.io.runfile.work_folder import WorkFolder
 
 ENDLESS = 1 << 62
@@ -34,51 +40,104 @@ ENDLESS = 1 << 62
 
 @dataclass(frozen=True)
 class _Coming:
-    """Moments that come, the segments into which they belong, and the frame from which parts of backgrounds count."""
+    """Frame sets to come, the segments of their frames, and the frame from which parts of backgrounds count."""
 
-    moments: Iterable[LiveFrameSet]
+    frame_sets: Iterable[LiveFrameSet]
     plan: Iterator[Segment]
     since: int
 
 
-def follow(job: Job, folder: WorkFolder, output: Path, overwrite: bool, reporter: Reporter) -> str:
-    """Follow a recording until the run is asked to stop, then write its run file; what there is to say of it.
+def follow_recording(
+    recording: Recording,
+    output: Path,
+    config: Config,
+    tracker: str,
+    volume: VolumeKind,
+    frames: FrameRange | None,
+    reporter: Reporter,
+    *,
+    overwrite: bool = False,
+) -> Followed | None:
+    """Follow a recording until it is asked to stop, then write its run file.
 
     Parameters
     ----------
-    job
-        What is run; its last frame is `ENDLESS` where there is none.
-    folder
-        Of the unfinished run.
-    output, overwrite
-        The run file, and whether it may replace an older one.
+    recording, config, tracker, volume
+        The input, see `stseg.engine.job.Job`.
+    output
+        The run file; tracks are added to `live_table_of(output)` while the recording goes on.
+    frames
+        0:B to end by itself; None to go on until a signal.
     reporter
         Receives notes and progress.
+    overwrite
+        Whether older files of those names may be replaced.
+
+    Returns
+    -------
+    Followed or None
+        None where nothing came, and no file was written.
     """
+    require_new(output, overwrite)
+    is_live(recording)  # or it cannot be followed
+    job = Job(recording, config, tracker, volume, 0, last_frame(frames), StreamIndex(0, ()))
+    request = run_request(gather_provenance(recording, format_config(config)))
+    request |= {"--tracker": tracker, "--volume": volume, "--follow": "yes"}
+    del request["source"]  # its files change while it goes on
+    work, table = WorkFolder(output, request), live_table_of(output)
+    if not work.begun:
+        require_new(table, overwrite)
+    with work as folder, resumable(folder, reporter):
+        try:
+            followed = _follow(job, folder, output, overwrite, reporter)
+        except BaseException:
+            if not folder.segments():  # there is nothing to continue
+                table.unlink(missing_ok=True)
+            raise
+        folder.remove()
+    return followed
+
+
+@dataclass(frozen=True)
+class Followed:
+    """A recording that was followed to its end.
+
+    Attributes
+    ----------
+    run
+        The run file.
+    delay
+        Time from the arrival of frames to their tracks in the live table, in words; empty where nothing was tracked.
+    """
+
+    run: Run
+    delay: str
+
+
+def _follow(job: Job, folder: WorkFolder, output: Path, overwrite: bool, reporter: Reporter) -> Followed | None:
     live = is_live(job.recording)
-    made = _kept(folder, live, reporter)
-    stop = made[-1].segment.stop if made else 0
+    finished = _kept(folder, live, reporter)
+    stop = finished[-1].segment.stop if finished else 0
     total = None if job.stop == ENDLESS else job.stop
     with (
         stop_asked() as halt,
         LiveTable(live_table_of(output), job.recording.rig.frame_rate, stop) as table,
         reporter.progress("following", total, stop) as advance,
     ):
-        follower = LiveRun(job, folder, table, LiveForegrounds(job.read, job.config), made)
+        follower = LiveRun(job, folder, table, LiveForegrounds(job.read, job.config), finished)
         with follower, (_cameras if live else _files)(job, folder, follower, halt, reporter) as coming:
             if coming is not None:
                 follower.begin(coming.plan, coming.since)
-                for moment in coming.moments:
-                    follower.add(moment)
+                for frame_set in coming.frame_sets:
+                    follower.add(frame_set)
                     advance(1)
-        made = follower.finish()
-    if not made:
+        finished = follower.finish()
+    if not finished:
         table.path.unlink()
-        return f"{output}: not written, since nothing came"
-    whole = replace(job, first=made[0].segment.first, stop=made[-1].segment.stop)
-    tracks = assemble(whole, follower.pipeline, made, output, overwrite)
-    people = len(np.unique(tracks.trajectory["id"]))
-    return f"{output}: {people} tracks in frames {whole.first} to {whole.stop - 1}{follower.delay}"
+        return None
+    whole = replace(job, first=finished[0].segment.first, stop=finished[-1].segment.stop)
+    assemble(whole, follower.pipeline, finished, output, overwrite)
+    return Followed(read_run(output), follower.delay)
 
 
 def live_table_of(output: Path) -> Path:
@@ -86,14 +145,13 @@ def live_table_of(output: Path) -> Path:
     return output.with_name(f"{output.name}.live.csv")
 
 
-def last_frame(frames: str | None) -> int:
-    """Where a run that follows ends by itself, from the option --frames; `ENDLESS` where it does not."""
+def last_frame(frames: FrameRange | None) -> int:
+    """The end of a run that follows, from its option --frames; `ENDLESS` without one. Raises ConfigError."""
     if frames is None:
         return ENDLESS
-    head, colon, tail = frames.partition(":")
-    if head not in ("", "0") or not colon or not tail.isdecimal() or not int(tail):
-        raise ConfigError("--frames", "", repr(frames), "0:B with --follow, which begins where the recording does")
-    return int(tail)
+    if frames.first not in (None, 0) or not frames.stop:
+        raise ConfigError("--frames", "", f"'{frames}'", "0:B with --follow, which begins where the recording does")
+    return frames.stop
 
 
 def _kept(folder: WorkFolder, live: bool, reporter: Reporter) -> list[FinishedSegment]:

@@ -34,7 +34,7 @@ class ImageShifts:
         self._every = max(1, round(_EVERY * frame_rate))
         self._rows: list[tuple[int, int, float, float]] = []
 
-    def seen(self, moments: Iterator[FrameSet]) -> Iterator[FrameSet]:
+    def watch(self, moments: Iterator[FrameSet]) -> Iterator[FrameSet]:
         """The moments, each looked at as it is handed on."""
         for moment in moments:
             self.look(moment)

@@ -18,9 +18,9 @@ from stseg.arrays import Rows
 from stseg.engine.assembly import FinishedSegment
 from stseg.engine.blind_views import BlindViews
 from stseg.engine.committed_frames import CommittedFrames
+from stseg.engine.job import Job
 from stseg.engine.live_foreground import LiveForegrounds
 from stseg.engine.open_segment import OpenSegment
-from stseg.engine.segment import Job
 from stseg.engine.segments import Segment
 from stseg.io.live.live_frames import LiveFrameSet, now
 from stseg.io.live.live_table import LiveTable

@@ -8,17 +8,16 @@ from pathlib import Path
 
 import numpy as np
 
-from stseg.arrays import Bytes, Rows
+from stseg.arrays import Rows
 from stseg.engine.committed_frames import CommittedFrames
 from stseg.engine.image_shift import ImageShifts
+from stseg.engine.job import Job
 from stseg.engine.pipeline import Pipeline
-from stseg.engine.segment import Job, write_step
+from stseg.engine.segment_file import open_segment_file, write_step
 from stseg.engine.segments import Segment
 from stseg.engine.session import Session
 from stseg.foreground.view_foreground import ViewForeground
-from stseg.io.config_file import format_config
 from stseg.io.live.live_frames import LiveFrameSet
-from stseg.io.runfile.runs import RunWriter
 from stseg.io.runfile.work_folder import keep_segment
 from stseg.model.tables import TRACK
 
@@ -49,11 +48,7 @@ class OpenSegment:
         """Steps that go past its end: its own only if it is the last."""
         self._committed = segment.lead
         self._opened = ExitStack()
-        views: Bytes = pipeline.occupancy.views
-        writer = RunWriter(
-            draft, job.recording, views, format_config(job.config), overwrite=True, kept=job.volume
-        )  # fmt: skip
-        self._writer = self._opened.enter_context(writer)
+        self._writer = self._opened.enter_context(open_segment_file(job, pipeline.occupancy.views, draft))
 
     @property
     def whole(self) -> bool:

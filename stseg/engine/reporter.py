@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from contextlib import AbstractContextManager
+import logging
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
 from typing import Protocol
+
+Progress = Callable[[str, int, int | None], None]
+"""Called with the kind of work in one word, frames done, and frames in all (None where not known)."""
 
 
 class Reporter(Protocol):
@@ -23,3 +28,27 @@ class Reporter(Protocol):
         total, done
             Frames in all, None where not known, and those finished before.
         """
+
+
+@dataclass(frozen=True)
+class LogReporter:
+    """Notes to the logger `stseg`, progress to a function, if there is one."""
+
+    function: Progress | None = None
+
+    def note(self, line: str) -> None:
+        """A line about the run."""
+        logging.getLogger("stseg").info("%s", line)
+
+    @contextmanager
+    def progress(self, work: str, total: int | None, done: int = 0) -> Iterator[Callable[[int], None]]:
+        """Progress of one kind of work (`Reporter.progress`)."""
+        count = done
+
+        def advance(more: int) -> None:
+            nonlocal count
+            count += more
+            if more and self.function is not None:
+                self.function(work, count, total)
+
+        yield advance

@@ -16,7 +16,8 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
 from pathlib import Path
 
-from stseg.engine.segment import Job, SegmentWorker
+from stseg.engine.job import Job
+from stseg.engine.segment_worker import SegmentWorker
 from stseg.engine.segments import Segment
 from stseg.errors import StsegError, WorkerError
 

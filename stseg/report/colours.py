@@ -11,7 +11,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from stseg.arrays import Floats
+from stseg.arrays import Bytes, Floats
 
 Colour = tuple[int, int, int]
 """Blue, green, red, 0..255: OpenCV's order."""
@@ -53,6 +53,11 @@ def track_colour(identity: int) -> Colour:
             break
     red, green, blue = np.rint(255 * _gamma(linear)).astype(int).tolist()
     return blue, green, red
+
+
+def track_palette() -> Bytes:
+    """Colours of track ids, uint8 (256, 3), red, green, blue; id 0, the background, is black."""
+    return np.array([(0, 0, 0), *(track_colour(identity)[::-1] for identity in range(1, 256))], np.uint8)
 
 
 def hex_colour(colour: Colour) -> str:

@@ -1,0 +1,183 @@
+"""`stseg.track`: a recording to a run file, as the command `stseg run` does it."""
+
+from __future__ import annotations
+
+import shutil
+import weakref
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import mkdtemp
+
+from stseg.config import Config
+from stseg.engine.assembly import FinishedSegment, assemble
+from stseg.engine.frame_range import FrameRange, resolve_frames
+from stseg.engine.job import Job, VolumeKind
+from stseg.engine.reporter import LogReporter, Progress, Reporter
+from stseg.engine.workforce import Workforce, all_cores
+from stseg.errors import ConfigError
+from stseg.io.config_file import format_config, read_config
+from stseg.io.outputs.whole_files import require_new
+from stseg.io.recording.recording import Recording
+from stseg.io.recording.rigs import read_rig
+from stseg.io.recording.stream_index import StreamIndex, index_streams
+from stseg.io.runfile.provenance import gather_provenance, run_request
+from stseg.io.runfile.runs import Run, read_run
+from stseg.io.runfile.work_folder import WorkFolder
+
+
+def track(
+    rig: Path | str,
+    output: Path | str | None = None,
+    *,
+    frames: tuple[int | None, int | None] | None = None,
+    tracker: str = "cut",
+    config: Config | Path | str | None = None,
+    workers: int | None = 1,
+    volume: VolumeKind = "all",
+    overwrite: bool = False,
+    progress: Progress | None = None,
+) -> Run:
+    """Track the people of a recording, as `stseg run` does.
+
+    Parameters
+    ----------
+    rig
+        The rig file (.toml): cameras, their recordings and the ground that they watch.
+    output
+        The run file to write; None for a temporary one, which is deleted with the returned run. An unfinished run of
+        the same output is continued.
+    frames
+        (first, stop), half open; None at either place for the recording's first frame and its end. None for all.
+    tracker
+        Its name: cut, frames, kalman, particles or belief.
+    config
+        A configuration, or the path of a configuration file; None for the defaults.
+    workers
+        Processes that share the work, None for one per core. The datasets are the same for any number. With several, a
+        script needs `if __name__ == "__main__":`, as for every use of `multiprocessing`.
+    volume
+        The part of the occupancy volume that is kept: "all", "tracks" for a metre around tracks, or "none".
+    overwrite
+        Whether an older file of that name may be replaced.
+    progress
+        Called with the kind of work, the frames done, and the frames in all (None where not known). Notes go to the
+        logger "stseg".
+
+    Returns
+    -------
+    Run
+        The finished run: tracks, events, detections and volume.
+
+    Raises
+    ------
+    InputError
+        As the command: one line with the file, the key, what was found and what was expected.
+    """
+    resolved = config if isinstance(config, Config) else read_config(None if config is None else Path(config))
+    force = Workforce(all_cores() if workers is None else workers)
+    chosen, reporter = None if frames is None else FrameRange(*frames), LogReporter(progress)
+    recording = read_rig(Path(rig))
+    if output is not None:
+        return track_recording(
+            recording, Path(output), resolved, tracker, volume, chosen, force, reporter, overwrite=overwrite
+        )
+    folder = Path(mkdtemp(prefix="stseg-"))
+    try:
+        run = track_recording(recording, folder / "run.h5", resolved, tracker, volume, chosen, force, reporter)
+    except BaseException:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise
+    weakref.finalize(run, shutil.rmtree, folder, ignore_errors=True)
+    return run
+
+
+def track_recording(
+    recording: Recording,
+    output: Path,
+    config: Config,
+    tracker: str,
+    volume: VolumeKind,
+    frames: FrameRange | None,
+    workforce: Workforce,
+    reporter: Reporter,
+    *,
+    overwrite: bool = False,
+) -> Run:
+    """Track a recording; segments that an unfinished run of the same output left are used.
+
+    Parameters
+    ----------
+    recording, config, tracker, volume
+        The input, see `stseg.engine.job.Job`.
+    output
+        The run file.
+    frames
+        Part of the recording; None for all of it.
+    workforce
+        The processes that make segments.
+    reporter
+        Receives notes and progress.
+    overwrite
+        Whether an older file of that name may be replaced.
+
+    Raises
+    ------
+    InputError
+        See `track`.
+    """
+    require_new(output, overwrite)
+    request = run_request(gather_provenance(recording, format_config(config)))
+    request |= {"--frames": "all" if frames is None else str(frames), "--tracker": tracker, "--volume": volume}
+    with WorkFolder(output, request) as folder, resumable(folder, reporter):
+        streams = _indexed(recording, folder, reporter)
+        first, stop = resolve_frames(frames, streams, recording)
+        job = Job(recording, config, tracker, volume, first, stop, streams)
+        assemble(job, job.pipeline(), _make_segments(job, folder, workforce, reporter), output, overwrite)
+        folder.remove()
+    return read_run(output)
+
+
+@contextmanager
+def resumable(folder: WorkFolder, reporter: Reporter) -> Iterator[None]:
+    """On an error, keep the work folder and note it where it holds segments; else remove it."""
+    try:
+        yield
+    except BaseException:
+        if number := len(folder.segments()):
+            reporter.note(f"{number} finished segments are kept in {folder.path}; the same command goes on from there")
+        else:
+            folder.remove()
+        raise
+
+
+def _indexed(recording: Recording, folder: WorkFolder, reporter: Reporter) -> StreamIndex:
+    """Lengths and frame times of all streams: every stream is decoded for them, once in an output's life."""
+    streams = folder.streams()
+    if streams is None:
+        with reporter.progress("counting", None):
+            streams = index_streams(recording)
+        folder.keep_streams(streams)
+    for note in streams.notes:
+        reporter.note(note)
+    return streams
+
+
+def _make_segments(job: Job, folder: WorkFolder, workforce: Workforce, reporter: Reporter) -> list[FinishedSegment]:
+    """All segments of a job in the order of time; the missing ones are made."""
+    plan, finished = job.segments(), folder.segments()
+    for begin, end in job.gaps():
+        reporter.note(f"no camera shows frames {begin} to {end - 1}: a gap, at which all tracks end")
+    if not plan:
+        found = f"{job.first}:{job.stop}, which no camera shows"
+        raise ConfigError("--frames", "", found, "a part that some camera shows")
+    for path in folder.broken:
+        reporter.note(f"{path}: its bytes have changed since it was written; made anew")
+    if finished:
+        reporter.note(f"{len(finished)} of {len(plan)} segments are there already")
+    missing = [segment for segment in plan if segment.index not in finished]
+    done = job.stop - job.first - sum(segment.stop - segment.first for segment in missing)
+    with reporter.progress("tracking", job.stop - job.first, done) as advance:
+        for segment, path in workforce.make(job, missing, folder.draft, advance):
+            finished[segment.index] = path
+    return [FinishedSegment(segment, finished[segment.index]) for segment in plan]

@@ -1,0 +1,63 @@
+"""The processes that make segments: this one, several of this machine, or the workers of a Dask scheduler."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from stseg.engine.cluster import make_by_cluster
+from stseg.engine.job import Job
+from stseg.engine.segment_worker import SegmentWorker
+from stseg.engine.segments import Segment
+from stseg.engine.workers import make_by_workers
+from stseg.errors import ConfigError
+
+
+@dataclass(frozen=True)
+class Workforce:
+    """Number of processes of this machine, or the address of a Dask scheduler.
+
+    Raises
+    ------
+    ConfigError
+        Where there is not one process at least.
+    """
+
+    workers: int = 1
+    scheduler: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.workers < 1:
+            raise ConfigError("--workers", "", self.workers, "1 or more processes")
+
+    def make(
+        self, job: Job, missing: Sequence[Segment], draft: Callable[[int], Path], advance: Callable[[int], None]
+    ) -> Iterator[tuple[Segment, Path]]:
+        """Segments and their files, in the order in which they are finished.
+
+        Parameters
+        ----------
+        job, missing
+            The run, and its segments that are to be made.
+        draft
+            Gives the path of a segment's unfinished file from its index.
+        advance
+            Called with the number of further frames that were fused.
+        """
+        if not missing:
+            return
+        if self.scheduler is not None:
+            yield from make_by_cluster(job, missing, draft, self.scheduler, advance)
+        elif self.workers > 1:
+            yield from make_by_workers(job, missing, draft, self.workers, advance)
+        else:
+            worker = SegmentWorker(job)
+            for segment in missing:
+                yield segment, worker.make(segment, draft(segment.index), advance)
+
+
+def all_cores() -> int:
+    """Number of processor cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
