@@ -16,6 +16,9 @@ import numba
 
 _UNCOUNTED: dict[str, Any] = {"_nrt": False}
 
+COMPILED = hasattr(numba.njit(lambda: None), "py_func")
+"""Whether kernels are compiled; else they are plain Python."""
+
 P = ParamSpec("P")
 R = TypeVar("R")
 

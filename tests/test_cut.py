@@ -8,7 +8,6 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
-import maxflow
 import numpy as np
 import pytest
 import reference_core as reference
@@ -17,14 +16,15 @@ from hypothesis import strategies as st
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import maximum_flow
 
-from stseg.arrays import Flags
 from stseg.config import SegmentationConfig
 from stseg.errors import ConfigError
 from stseg.geometry import Grid
 from stseg.graphcut import cut as cut_module
+from stseg.graphcut import pymaxflow
 from stseg.graphcut.arcs import in_place, in_rows
 from stseg.graphcut.cut import Storage, minimum_cut
 from stseg.graphcut.energy import QUANTUM, Energy
+from stseg.graphcut.pymaxflow import grid_cut
 from stseg.graphcut.reduction import OCCUPIED, OPEN, reduce
 from stseg.graphcut.sparse import MOST, sparse_cut
 from stseg.segmentation.energy import build_energy, neighbourhood
@@ -142,19 +142,7 @@ def test_the_cut_is_the_smallest_of_the_minima(shape: tuple[int, ...]) -> None:
             occupied = minimum_cut(energy, threads, storage).occupied
             assert energy.of(occupied) == least, seed
             np.testing.assert_array_equal(occupied, smallest, err_msg=f"seed {seed}")
-
-
-def by_plain_graph(energy: Energy) -> Flags:
-    """The cut of the whole grid by PyMaxflow, nothing decided beforehand; ties to the background."""
-    unary = energy.unary.ravel().astype(np.int64)
-    start, end, capacity = energy.edges()
-    graph = maxflow.GraphInt(len(unary), len(start))
-    nodes = graph.add_nodes(len(unary))
-    graph.add_grid_tedges(nodes, (-unary).clip(0), unary.clip(0))
-    graph.add_edges(start, end, capacity, capacity)
-    graph.maxflow()
-    # It counts a node that neither terminal reaches to the source, here the background: the rest reaches the object.
-    return np.asarray(graph.get_grid_segments(nodes)).reshape(energy.unary.shape)
+        np.testing.assert_array_equal(grid_cut(energy).occupied, smallest, err_msg=f"PyMaxflow, seed {seed}")
 
 
 def flow_value(energy: Energy) -> int:
@@ -180,7 +168,7 @@ def test_the_cut_is_that_of_other_solvers(shape: tuple[int, ...], kind: str, nei
         else:
             strength = {8: 0.8, 80: 0.1}[neighbours] * (3 if kind == "smooth volume" else 1)
             energy = smooth_window(seed, shape, neighbours, strength)
-        expected = by_plain_graph(energy)
+        expected = grid_cut(energy).occupied
         # Least energy, relative to all background, is the least cut less what all background loses.
         assert energy.of(expected) == flow_value(energy) - int(energy.unary.clip(0).sum())
         for storage, threads in WAYS:
@@ -196,7 +184,7 @@ def test_the_reduction_is_exact(seed: int, strength: int, neighbours: int) -> No
     energy = window(seed, (3, 2, 4, 5), unary=strength, capacity=4, neighbours=neighbours)
     reduced = reduce(energy)
     np.testing.assert_array_equal(reduced.left, np.flatnonzero(reduced.state == OPEN))
-    expected = by_plain_graph(energy)
+    expected = grid_cut(energy).occupied
     shape = (3, 3, 5, 6)
     state = reduced.state[: np.prod(shape)].reshape(shape)[:, 1:, 1:, 1:]
     np.testing.assert_array_equal(state[state != OPEN] == OCCUPIED, expected[state != OPEN])
@@ -253,22 +241,17 @@ def test_smoothness_bridges_a_gap_along_the_motion() -> None:
 
 @settings(deadline=None, max_examples=100)
 @given(st.integers(0, 9999), st.integers(1, 30), st.integers(0, 90))
-def test_least_cut_of_any_graph(seed: int, nodes: int, edges: int) -> None:
+def test_sparse_cut_of_any_graph(seed: int, nodes: int, edges: int) -> None:
     rng = np.random.default_rng(seed)
     unary = rng.integers(-9, 10, nodes)
     start, end = rng.integers(0, nodes, (2, edges))
     start, end = start[start != end], end[start != end]
     forward, backward = rng.integers(0, 6, (2, len(start)))
-    graph = maxflow.GraphInt(nodes, len(start))
-    names = graph.add_nodes(nodes)
-    graph.add_grid_tedges(names, (-unary).clip(0), unary.clip(0))
-    graph.add_edges(start, end, backward, forward)
-    graph.maxflow()
     occupied = sparse_cut(unary, start, end, forward, backward)
-    np.testing.assert_array_equal(occupied, graph.get_grid_segments(names))
+    np.testing.assert_array_equal(occupied, pymaxflow.sparse_cut(unary, start, end, forward, backward))
 
 
-def test_least_cut_of_extremes() -> None:
+def test_sparse_cut_of_extremes() -> None:
     start, end = np.array([0, 1]), np.array([1, 2])
     endless = np.array([10**15, -1, -(10**15)])
     one = np.ones(2, np.int64)
@@ -307,7 +290,7 @@ def test_real_windows(monkeypatch: pytest.MonkeyPatch) -> None:
     energies = list(importlib.import_module("bench_windows").real("uu4", "0:10", DATA))
     assert energies
     for energy in energies:
-        expected = by_plain_graph(energy)
+        expected = grid_cut(energy).occupied
         assert expected.any()
         for storage, threads in WAYS:
             np.testing.assert_array_equal(minimum_cut(energy, threads, storage).occupied, expected)

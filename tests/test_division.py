@@ -15,9 +15,9 @@ from stseg.arrays import Flags, Floats, Ints, Labels
 from stseg.config import SegmentationConfig, TrackingConfig
 from stseg.geometry import Grid
 from stseg.graphcut.cell_subset import CellSubset, subset
-from stseg.graphcut.cut import minimum_cut
 from stseg.graphcut.energy import QUANTUM, Energy
 from stseg.graphcut.expansion import LabelEnergy, expand
+from stseg.graphcut.solvers import SOLVERS
 from stseg.model.blobs import UNASSIGNED
 from stseg.model.predicted_places import PredictedPlaces
 from stseg.segmentation.energy import build_energy, neighbourhood
@@ -166,14 +166,16 @@ def window_of(truth: Labels, seed: int = 1) -> Energy:
     return build_energy(log_odds, still, GRID, SegmentationConfig())
 
 
-def divided(energy: Energy, places: PredictedPlaces, seen: Flags | None = None) -> tuple[Flags, WindowLabels]:
+def divided(
+    energy: Energy, places: PredictedPlaces, seen: Flags | None = None, solver: str = "stseg"
+) -> tuple[Flags, WindowLabels]:
     """Cut and labels; a track not seen in a frame is still predicted there."""
     seen = places.expected if seen is None else seen
     found = WindowDetections(
         [ground[who] for ground, who in zip(places.ground, seen, strict=True)], [places.track[who] for who in seen]
     )
-    occupied = minimum_cut(energy).occupied
-    return occupied, label_cells(energy, occupied, found, places, BODY, GRID)
+    occupied = SOLVERS[solver].grid(energy).occupied
+    return occupied, label_cells(energy, occupied, found, places, BODY, GRID, SOLVERS[solver])
 
 
 def meeting(frames: int = 5) -> Floats:
@@ -199,6 +201,16 @@ def test_touching_people_are_divided_as_in_the_truth() -> None:
     assert (division.label[both] == truth[both]).mean() > 0.98
     assert both.sum() > 0.98 * (truth > 0).sum()
     assert not division.label[~occupied].any()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_both_solvers_give_the_same_labels(seed: int) -> None:
+    tracks = meeting()
+    energy = window_of(bodies(tracks), seed)
+    (occupied, ours), (peer, theirs) = (divided(energy, walking(tracks), solver=name) for name in SOLVERS)
+    np.testing.assert_array_equal(occupied, peer)
+    np.testing.assert_array_equal(ours.label, theirs.label)
+    assert ours.cells == theirs.cells > 0
 
 
 def test_a_track_missed_in_some_frames_keeps_its_cells() -> None:

@@ -37,6 +37,7 @@ AT_HOME = {
     "cv2": ("stseg.io", "stseg.report", "stseg.simulation", "stseg.calibration"),
     "PIL": ("stseg.io",),
     "numba": ("stseg.accelerate",),
+    "maxflow": ("stseg.graphcut.pymaxflow",),
     "cyclopts": ("stseg.commands",),
     "rich": ("stseg.commands",),
     "distributed": ("stseg.engine.cluster",),  # imported where a scheduler is asked for

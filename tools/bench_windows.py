@@ -13,8 +13,10 @@ from workbench import Bench
 
 from stseg.arrays import Floats, Singles
 from stseg.commands.main import main as stseg
-from stseg.graphcut import cut
+from stseg.graphcut.cut import Cut, minimum_cut
 from stseg.graphcut.energy import QUANTUM, Energy
+from stseg.graphcut.solvers import Solver
+from stseg.graphcut.sparse import sparse_cut
 from stseg.segmentation.energy import neighbourhood
 from stseg.segmentation.motion import successor_cells
 
@@ -91,11 +93,12 @@ def real(name: str, frames: str, data: Path) -> Iterator[Energy]:
     """The windows that a run over these frames of a set of docs/results.md cuts."""
     windows: list[Energy] = []
 
-    def kept(energy: Energy) -> cut.Cut:
+    def kept(energy: Energy) -> Cut:
         windows.append(energy)
-        return cut.minimum_cut(energy)
+        return minimum_cut(energy)
 
-    with TemporaryDirectory() as folder, patch("stseg.trackers.cut.minimum_cut", kept):
+    solver = Solver(kept, sparse_cut)
+    with TemporaryDirectory() as folder, patch.dict("stseg.graphcut.solvers.SOLVERS", stseg=solver):
         bench = Bench(data.resolve(), Path(folder))
         for command in SETS[name].prepare:
             bench.do(command)

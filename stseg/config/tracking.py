@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 from stseg.settings import require
 
@@ -19,6 +20,8 @@ class SegmentationConfig:
     """How far apart the time neighbours of one body are once its motion is followed, metres."""
     neighbours: int = 8
     """How many neighbours a cell has: 8, one step along x, y, the planes or time, or 80, the diagonals too."""
+    solver: Literal["stseg", "pymaxflow"] = "stseg"
+    """Solver of the minimum cuts: their labels are the same, pymaxflow is slower, and taken where numba is disabled."""
 
     def __post_init__(self) -> None:
         require(0 <= self.smoothness <= 16, self, "smoothness", "0 to 16 nats")

@@ -9,6 +9,7 @@ with the fewest changes is made, so each change lowers the energy and the result
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -91,7 +92,7 @@ def unary_costs(energy: LabelEnergy, labels: Ints) -> Ints:
     return costs
 
 
-def expand(energy: LabelEnergy, start: Ints) -> Ints:
+def expand(energy: LabelEnergy, start: Ints, cut: Callable[..., Flags] = sparse_cut) -> Ints:
     """Labelling that no expansion move improves.
 
     Parameters
@@ -100,13 +101,15 @@ def expand(energy: LabelEnergy, start: Ints) -> Ints:
         In quanta.
     start : int64 (n,)
         Initial labelling.
+    cut
+        Minimum cut of a move; the labels do not depend on it.
 
     Returns
     -------
     int64 (n,)
         Its energy is at most that of `start`.
     """
-    moves = Moves(energy, start)
+    moves = Moves(energy, start, cut)
     idle = 0
     while idle < len(moves.alphabet):
         for alpha in moves.alphabet:
@@ -121,7 +124,7 @@ class Moves:
 
     Parameters
     ----------
-    energy, start
+    energy, start, cut
         As of `expand`.
 
     Attributes
@@ -132,7 +135,8 @@ class Moves:
         All labels, ascending, the background first.
     """
 
-    def __init__(self, energy: LabelEnergy, start: Ints) -> None:
+    def __init__(self, energy: LabelEnergy, start: Ints, cut: Callable[..., Flags] = sparse_cut) -> None:
+        self._cut = cut
         self.labels = start.astype(np.int64)
         self._cost = unary_costs(energy, self.labels)
         self._cells_by_label = _cells_by_label(energy)
@@ -155,7 +159,7 @@ class Moves:
         self._node[cells] = np.arange(len(cells))
         edges = fill_move(alpha, cells, self.labels, self._adjacency, self._node, unary, self._arcs)
         self._node[cells] = -1
-        takes = sparse_cut(unary, *self._arcs.only(edges))
+        takes = self._cut(unary, *self._arcs.only(edges))
         self.labels[cells[takes]] = alpha
         self._cost[cells[takes]] = costs[takes]
         self._last_changed[cells[takes]] = self._moves

@@ -18,6 +18,7 @@ from stseg.geometry import Grid
 from stseg.graphcut.cell_subset import CellSubset, subset
 from stseg.graphcut.energy import Energy
 from stseg.graphcut.expansion import expand
+from stseg.graphcut.solvers import Solver
 from stseg.model.blobs import UNASSIGNED
 from stseg.model.predicted_places import PredictedPlaces
 from stseg.segmentation.unary import BodyShape, label_energy, track_shares
@@ -62,6 +63,7 @@ def label_cells(
     predicted: PredictedPlaces,
     body: BodyShape,
     grid: Grid,
+    solver: Solver,
 ) -> WindowLabels:
     """Label every occupied cell by a track or as UNASSIGNED.
 
@@ -75,6 +77,8 @@ def label_cells(
         Places of tracks in its frames.
     body
         Extent of a body.
+    solver
+        Of the expansion moves.
     """
     subgraph = subset(energy, occupied)
     if not len(subgraph.cell):
@@ -87,19 +91,21 @@ def label_cells(
     touching = count[component] > 1
     if touching.any():
         present = replace(predicted, expected=predicted.expected & ~displaced)
-        labels[touching] = _expanded(energy, subgraph.only(touching), present, body, grid)
+        labels[touching] = _expanded(energy, subgraph.only(touching), present, body, grid, solver)
     label = np.zeros(occupied.shape, np.int32)
     label.flat[subgraph.cell] = labels
     return WindowLabels(label, int(touching.sum()))
 
 
-def _expanded(energy: Energy, subgraph: CellSubset, predicted: PredictedPlaces, body: BodyShape, grid: Grid) -> Ints:
+def _expanded(
+    energy: Energy, subgraph: CellSubset, predicted: PredictedPlaces, body: BodyShape, grid: Grid, solver: Solver
+) -> Ints:
     """Track of each cell of a subgraph, UNASSIGNED or 0, by expansion moves, int64 (n,)."""
     frame, plane, y, x = np.unravel_index(subgraph.cell, energy.unary.shape)
     share = track_shares(frame, grid.ground[y, x], grid.heights[plane], predicted, body)
     problem = label_energy(energy.unary.ravel()[subgraph.cell], share, subgraph)
     track_ids = np.concatenate([[0], predicted.track, [UNASSIGNED]])
-    return np.asarray(track_ids[expand(problem, problem.cheapest_labels())])
+    return np.asarray(track_ids[expand(problem, problem.cheapest_labels(), solver.sparse)])
 
 
 def _occupants(

@@ -12,8 +12,8 @@ from stseg.arrays import Flags, Ints, Labels, Rows
 from stseg.config import Config
 from stseg.geometry import Rig
 from stseg.geometry.sampling import Sampling
-from stseg.graphcut.cut import minimum_cut
 from stseg.graphcut.energy import QUANTUM, Energy
+from stseg.graphcut.solvers import find_solver
 from stseg.model.blobs import Blobs
 from stseg.model.predicted_tracks import PredictedTracks
 from stseg.model.tables import WINDOW
@@ -66,6 +66,7 @@ class CutTracker:
         self.walkers = TrackFilter(rig.frame_rate, config.detection, config.tracking)
         self.identities = TrackAssociation(rig.frame_rate, config.tracking)
         spread, stranger = config.detection.height_spread, config.occupancy.occupied_share
+        self.solver = find_solver(config.segmentation.solver)
         self.pillar = BodyShape(config.occupancy.person_radius, spread, stranger)
         self.held: list[_Linked] = []
         self.first = self.committed = first
@@ -103,7 +104,7 @@ class CutTracker:
     def _solve(self, window: Window) -> Commit:
         held = [linked for linked in self.held if window.solve_first <= linked.scene.frame < window.solve_stop]
         energy = self._energy(held)
-        cut = minimum_cut(energy)
+        cut = self.solver.grid(energy)
         label = self._divide(window, held, energy, cut.occupied).label
         reach, grid = self.config.occupancy.person_radius, self.rig.grid
         blobs = [
@@ -136,7 +137,7 @@ class CutTracker:
             together(seen), window.solve_first, window.solve_stop, self.rig.frame_rate, self.config.tracking
         )
         found = WindowDetections([linked.scene.people.ground for linked in held], [linked.chains for linked in held])
-        return label_cells(energy, occupied, found, places, self.pillar, self.rig.grid)
+        return label_cells(energy, occupied, found, places, self.pillar, self.rig.grid, self.solver)
 
     def _commit(
         self,
