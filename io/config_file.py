@@ -1,4 +1,4 @@
-"""The configuration: TOML with a table a stage, and assignments from the command line, which come after it."""
+"""The configuration: TOML with a table a stage, overridden by assignments from the command line."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ _OPTION = "--set"
 
 
 def read_config(path: Path | None, assignments: Sequence[str] = ()) -> Config:
-    """The configuration that a file and assignments make; defaults for all they do not say.
+    """The configuration of a file and assignments, with defaults for the rest.
 
     Parameters
     ----------
     path
-        TOML, one table a stage; None for none.
+        TOML, one table a stage; None for the defaults.
     assignments
-        `stage.key=value` each, the value as in TOML; a text needs no quotes. The last word on a key counts.
+        `stage.key=value` each, the value as in TOML; a text needs no quotes. The last assignment of a key counts.
 
     Raises
     ------
@@ -39,7 +39,7 @@ def read_config(path: Path | None, assignments: Sequence[str] = ()) -> Config:
 
 
 def parse_config(text: str, place: str, assignments: Sequence[str] = ()) -> Config:
-    """The configuration that a TOML text and assignments make; the text stands at `place`. As `read_config`.
+    """The configuration of a TOML text from `place` and assignments. As `read_config`.
 
     Former names of keys are accepted in the text, which may come from an older run file.
     """
@@ -114,7 +114,7 @@ def _assign(given: dict[str, Any], assignment: str) -> None:
 
 
 def _value(text: str) -> Any:
-    """A TOML value; what is none stands for itself."""
+    """A TOML value; any other text is taken literally."""
     try:
         table = parse_toml(f"value = {text}")
     except ValueError:

@@ -1,4 +1,4 @@
-"""Libraries that only some need: imported where they are used, and asked for in words where they are missing."""
+"""Optional libraries: imported on use, with an error that gives the command to install them."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from stseg.errors import ConfigError
 
 
 def load_extra(library: str, extra: str) -> Any:
-    """A module of one of the extras in pyproject.toml.
+    """Import a module of one of the extras in pyproject.toml.
 
     Raises
     ------
     ConfigError
-        Where it is not installed; it gives the command that installs it.
+        Where it is not installed.
     """
     try:
         return import_module(library)

@@ -12,7 +12,7 @@ from stseg.arrays import Flags, Floats, Ints, Rows
 from stseg.errors import FormatError, OutputError
 
 POSITION = np.dtype([("frame", "<i8"), ("id", "<i8"), ("x", "<f8"), ("y", "<f8"), ("flag", "<i8")])
-"""One row per person and frame: metres on the ground; a flag other than 0 marks a row not to be relied on."""
+"""One row per person and frame: metres on the ground; a flag other than 0 marks an unreliable row."""
 
 _NEEDED = ("frame", "id", "x", "y")
 _WRITTEN = {
@@ -32,7 +32,7 @@ _WRITTEN = {
 def read_tracks_csv(path: Path) -> Rows:
     """Read tracks or truth.
 
-    Further columns are passed over. Ids that are not all whole numbers are numbered from 1 in order of appearance.
+    Further columns are ignored. Ids that are not all whole numbers are numbered from 1 in order of appearance.
 
     Returns
     -------
@@ -68,7 +68,7 @@ def write_truth_csv(path: Path, truth: Rows) -> None:
 
 @dataclass(frozen=True, slots=True)
 class _Sheet:
-    """The cells of a CSV file by column, and the line that each row stands on."""
+    """The cells of a CSV file by column, and the line number of each row."""
 
     path: Path
     lines: list[int]
@@ -94,7 +94,7 @@ class _Sheet:
             values = np.array([int(cell) for cell in cells], np.int64)
         except (ValueError, OverflowError):
             values = None
-        # 07 beside 7 are two names: only plain numbers may stand for themselves
+        # 07 and 7 are two different ids: only numbers in plain form keep their value
         if values is None or [str(value) for value in values.tolist()] != cells:
             first = {cell: number for number, cell in enumerate(dict.fromkeys(cells), start=1)}
             values = np.array([first[cell] for cell in cells], np.int64)

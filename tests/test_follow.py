@@ -79,7 +79,7 @@ def lines(output: Path) -> list[str]:
 
 
 def wait_for_frame(output: Path, frame: int, running: subprocess.Popen[str]) -> None:
-    """Until somebody was told of in that frame or a later one."""
+    """Until a track was written in that frame or a later one."""
     deadline = time.monotonic() + 90
     while running.poll() is None and max([-1, *(int(line.split(",")[0]) for line in lines(output)[1:])]) < frame:
         assert time.monotonic() < deadline
@@ -124,10 +124,10 @@ def test_what_is_followed_ends_as_what_is_run_afterwards(live: Path, afterwards:
 
 @quick
 def test_tracks_are_told_window_by_window_under_lasting_names(live: Path) -> None:
-    told = read_tracks_csv(live.with_name("run.h5.live.csv"))
-    assert np.unique(told["frame"]).tolist() == list(range(FRAMES))
-    assert (np.diff(told["frame"]) >= 0).all()
-    scores = evaluate(walkers(FRAMES), told)
+    messages = read_tracks_csv(live.with_name("run.h5.live.csv"))
+    assert np.unique(messages["frame"]).tolist() == list(range(FRAMES))
+    assert (np.diff(messages["frame"]) >= 0).all()
+    scores = evaluate(walkers(FRAMES), messages)
     assert (scores.tracks, scores.switches, scores.false_alarms) == (3, 0, 0)
 
 
@@ -139,10 +139,10 @@ def test_a_signal_finishes_the_run_file(tmp_path: Path, number: signal.Signals) 
     running = process(rig, output)
     wait_for_frame(output, 9, running)
     running.send_signal(number)
-    said, told = running.communicate(timeout=60)
-    assert running.returncode == 0, told
-    assert told.splitlines()[-1] == "stseg: finishing; once more to stop at once"
-    assert re.search(r"run.h5: 3 tracks in frames 0 to \d+, told \d+.\d s after them", said)
+    reported, messages = running.communicate(timeout=60)
+    assert running.returncode == 0, messages
+    assert messages.splitlines()[-1] == "stseg: finishing; once more to stop at once"
+    assert re.search(r"run.h5: 3 tracks in frames 0 to \d+, told \d+.\d s after them", reported)
     stop = int(read_run(output).frames[-1]) + 1
     assert stop > 9
     assert track(rig, tmp_path / "afterwards.h5", "--frames", f"0:{stop}") == 0
@@ -158,9 +158,9 @@ def test_a_run_to_which_nothing_came_leaves_nothing(tmp_path: Path) -> None:
         time.sleep(0.05)
     time.sleep(0.5)
     running.terminate()
-    said, told = running.communicate(timeout=60)
-    assert (running.returncode, told) == (0, "stseg: finishing; once more to stop at once\n")
-    assert said == f"{output}: not written, since nothing came\n"
+    reported, messages = running.communicate(timeout=60)
+    assert (running.returncode, messages) == (0, "stseg: finishing; once more to stop at once\n")
+    assert reported == f"{output}: not written, since nothing came\n"
     assert list(output.parent.iterdir()) == []
 
 
@@ -173,9 +173,9 @@ def test_a_second_signal_ends_it_at_once(tmp_path: Path) -> None:
     running.terminate()
     running.terminate()
     running.send_signal(signal.SIGINT)
-    _, told = running.communicate(timeout=60)
+    _, messages = running.communicate(timeout=60)
     assert running.returncode in (130, 143)
-    assert "Traceback" not in told
+    assert "Traceback" not in messages
     assert not output.exists()
 
 
@@ -190,9 +190,9 @@ def test_a_run_that_was_killed_goes_on(rig: Path, live: Path, afterwards: Path, 
     assert 0 < len(list((tmp_path / "run.h5.segments").glob("segment-*-*.h5"))) < 3
     assert track(rig, output, "--follow", "--frames", f"0:{FRAMES}") == 0
     assert_same(output, afterwards)
-    told = read_tracks_csv(output.with_name("run.h5.live.csv"))
-    assert (np.diff(told["frame"]) >= 0).all()
-    assert (evaluate(walkers(FRAMES), told).switches, len(told)) == (0, 3 * FRAMES)
+    messages = read_tracks_csv(output.with_name("run.h5.live.csv"))
+    assert (np.diff(messages["frame"]) >= 0).all()
+    assert (evaluate(walkers(FRAMES), messages).switches, len(messages)) == (0, 3 * FRAMES)
 
 
 @quick
@@ -235,12 +235,12 @@ def test_a_camera_that_breaks_is_blind_and_the_run_says_so(
     own = {f"camera {camera.name}": StandIn(film * 9, 0.125, begun=begun)
            for camera, film in zip(filmed_rig().cameras, films(filmed_rig()), strict=True)}  # fmt: skip
     own["camera east"].breaks, own["camera east"].refused = [20], 2
-    opening = partial(FollowedCameras, opening=lambda *asked: own[threading.current_thread().name].open(*asked))
+    opening = partial(FollowedCameras, connect=lambda *asked: own[threading.current_thread().name].open(*asked))
     monkeypatch.setattr(stseg.engine.following, "FollowedCameras", opening)
     assert track(cameras_rig, tmp_path / "run.h5", "--follow", "--frames", "0:40", "--set", "segments.length=2") == 0
-    run, told = read_run(tmp_path / "run.h5"), capsys.readouterr().err
-    assert told.count("camera east: nothing comes from rtsp://there/east") == 1
-    assert told.count("camera east: it sees again") == 1
+    run, messages = read_run(tmp_path / "run.h5"), capsys.readouterr().err
+    assert messages.count("camera east: no pictures from rtsp://there/east") == 1
+    assert messages.count("camera east: the stream is back") == 1
     assert run.frames.tolist() == list(range(40))
     blind = run.events[run.events["kind"] == b"blind"]
     assert len(blind) >= 1
@@ -293,10 +293,15 @@ def test_a_real_rtsp_server_whose_streams_end_is_followed(
     running = process(rig, tmp_path / "run.h5", "--set", "segments.length=5", "--set", "live.stream_timeout=3")
     wait_for_frame(tmp_path / "run.h5", 100, running)
     running.terminate()
-    said, told = running.communicate(timeout=60)
-    assert running.returncode == 0, told
-    assert "tracks in frames 0 to" in said
-    assert 3 <= told.count("it sees again") <= told.count("nothing comes from") <= told.count("it sees again") + 3
+    reported, messages = running.communicate(timeout=60)
+    assert running.returncode == 0, messages
+    assert "tracks in frames 0 to" in reported
+    assert (
+        3
+        <= messages.count("the stream is back")
+        <= messages.count("no pictures from")
+        <= messages.count("the stream is back") + 3
+    )
     run = read_run(tmp_path / "run.h5")
     assert run.frames.tolist() == list(range(run.frames[-1] + 1))
     assert len(run.tracks) >= 3
@@ -328,10 +333,10 @@ def places(track: int, frames: range, x: float) -> Rows:
 def test_names_last_over_segments() -> None:
     names = LiveIds(np.zeros(0, TRAJECTORY), 20)
     first = names.begin(np.zeros(0, TRAJECTORY))
-    told = names.named(np.concatenate([places(4, range(10), 0.0), places(7, range(10), 3.0)]), first)
-    assert told["id"].tolist() == [1] * 10 + [2] * 10
+    messages = names.named(np.concatenate([places(4, range(10), 0.0), places(7, range(10), 3.0)]), first)
+    assert messages["id"].tolist() == [1] * 10 + [2] * 10
     second = names.begin(np.concatenate([places(1, range(5, 10), 3.1), places(2, range(5, 10), 9.0)]))
     later = np.concatenate([places(k, range(10, 12), 0.0) for k in (1, 2, 3)])
     assert names.named(later, second)["id"].tolist() == [2, 2, 3, 3, 4, 4]
-    again = LiveIds(told, 20)  # a run that goes on from what it has told
+    again = LiveIds(messages, 20)  # a run that goes on from what it has told
     assert again.named(later, again.begin(places(1, range(5, 10), 0.1)))["id"].tolist() == [1, 1, 3, 3, 4, 4]

@@ -59,7 +59,7 @@ def test_frames_says_how_many_have_nothing(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("line", "said"),
+    ("line", "reported"),
     [
         ("0,1,2,nan,4,0.5", "line 3: found width nan"),
         ("0,inf,2,3,4,0.5", "line 3: found left inf"),
@@ -75,13 +75,13 @@ def test_frames_says_how_many_have_nothing(tmp_path: Path) -> None:
         ("0,1,2,3,4,", "line 3: found ''"),
     ],
 )
-def test_bad_lines_are_named(tmp_path: Path, line: str, said: str) -> None:
-    with pytest.raises(FormatError, match=said):
+def test_bad_lines_are_named(tmp_path: Path, line: str, reported: str) -> None:
+    with pytest.raises(FormatError, match=reported):
         read(tmp_path, f"frame,left,top,width,height,score\n0,1,2,3,4,1\n{line}\n0,1,2,3,4,1\n")
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "reported"),
     [
         ("frame,left,top,w,h\n0,1,2,3,4\n", "line 1: found no column width, height"),
         ("0,10.5,20,30,40,0.9\n", "line 1: found id 10.5.*or a header"),
@@ -89,8 +89,8 @@ def test_bad_lines_are_named(tmp_path: Path, line: str, said: str) -> None:
         ("5 -1 1 2 3 4 1\n", "line 1: found frame 5, expected a frame below 3, for there are frames = 3"),
     ],
 )
-def test_files_of_another_form_are_refused(tmp_path: Path, text: str, said: str) -> None:
-    with pytest.raises(FormatError, match=said):
+def test_files_of_another_form_are_refused(tmp_path: Path, text: str, reported: str) -> None:
+    with pytest.raises(FormatError, match=reported):
         read(tmp_path, text, frames=3)
 
 

@@ -216,9 +216,9 @@ class TestTsai:
             assert seen.sum() > 100
             points = 1000.0 * np.column_stack([ground[seen], np.full(int(seen.sum()), height)])
             want = tsai_pixels(file, points)
-            told = np.isfinite(want).all(axis=1)
-            assert told.mean() > (0.8 if view == 7 else 0.999)
-            np.testing.assert_allclose(pixel[seen][told], want[told], rtol=0, atol=0.01)
+            messages = np.isfinite(want).all(axis=1)
+            assert messages.mean() > (0.8 if view == 7 else 0.999)
+            np.testing.assert_allclose(pixel[seen][messages], want[messages], rtol=0, atol=0.01)
 
     def test_refuses_and_names_the_node(self, tmp_path: Path) -> None:
         file = tmp_path / "view.xml"

@@ -64,7 +64,7 @@ def run_of(path: Path, trajectory: Rows) -> Run:
 
 @pytest.fixture(scope="module")
 def empty_run(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    """Six frames in which nobody was found."""
+    """Six frames without detections."""
     return run_of(tmp_path_factory.mktemp("run") / "empty.h5", np.zeros(0, TRAJECTORY))
 
 

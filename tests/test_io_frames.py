@@ -70,9 +70,9 @@ def number(view: Observation) -> int | None:
 
 
 def shown(rec: Recording, first: int = 0, stop: int | None = None) -> list[tuple[int | None, ...]]:
-    """Frame number and the cameras' own frame numbers of each moment."""
+    """Frame number and the cameras' own frame numbers of each frame set."""
     with open_frames(rec, first, stop) as reader:
-        return [(moment.frame, *map(number, moment.views)) for moment in reader]
+        return [(frame_set.frame, *map(number, frame_set.views)) for frame_set in reader]
 
 
 @pytest.mark.parametrize(
@@ -90,13 +90,13 @@ def test_each_kind_gives_its_array(
     path = video(tmp_path / "a.avi", 3) if kind == "video" else images(tmp_path / "a", 3)
     rec = recording(CameraSource(Source(kind, path)))
     with open_frames(rec) as reader:
-        for moment in reader:
-            (view,) = moment.views
+        for frame_set in reader:
+            (view,) = frame_set.views
             assert isinstance(view, np.ndarray)
             assert view.shape == shape
             assert view.dtype == dtype
-            assert (view == 10 * moment.frame).all()
-    assert moment.frame == 2
+            assert (view == 10 * frame_set.frame).all()
+    assert frame_set.frame == 2
     assert count_frames(rec) == 3
 
 
@@ -116,7 +116,7 @@ def test_all_kinds_together(tmp_path: Path) -> None:
 def test_mask_videos_of_lossy_codecs_are_grey(tmp_path: Path) -> None:
     rec = recording(CameraSource(Source("masks", video(tmp_path / "a.avi", 3, "MJPG"))))
     with open_frames(rec) as reader:
-        views = [np.asarray(moment.views[0]) for moment in reader]
+        views = [np.asarray(frame_set.views[0]) for frame_set in reader]
     np.testing.assert_allclose(views, [shade(frame) for frame in range(3)], atol=2)
 
 
@@ -136,7 +136,7 @@ def test_a_frame_without_boxes_is_no_blind_view(tmp_path: Path) -> None:
     path = tmp_path / "a.txt"
     path.write_text("1 -1 0 0 5 5 -1\n3 -1 0 0 5 5 -1\n")
     with open_frames(recording(CameraSource(Source("boxes", path, first_frame=1, frames=4)))) as reader:
-        views = [moment.views[0] for moment in reader]
+        views = [frame_set.views[0] for frame_set in reader]
     assert [isinstance(view, Boxes) and len(view) for view in views] == [1, 0, 1, 0]
 
 
@@ -156,17 +156,18 @@ def test_a_late_camera_is_an_error_or_blind(tmp_path: Path) -> None:
 
 def test_a_short_camera_is_an_error_or_blind(tmp_path: Path) -> None:
     whole, short = box_camera(tmp_path, 4), box_camera(tmp_path, 2)
-    said = (
-        "boxes2.csv: camera cam2: found its end at frame 2 while others go on, expected frames as long as camera cam1"
+    reported = (
+        "boxes2.csv: camera cam2: found its end at frame 2, where others continue, "
+        "expected frames as long as camera cam1"
     )
     seen: list[FrameSet] = []
-    with pytest.raises(SourceError, match=said), open_frames(recording(whole, short)) as reader:
+    with pytest.raises(SourceError, match=reported), open_frames(recording(whole, short)) as reader:
         seen.extend(reader)
-    assert [moment.frame for moment in seen] == [0, 1]
-    with pytest.raises(SourceError, match=said):
+    assert [frame_set.frame for frame_set in seen] == [0, 1]
+    with pytest.raises(SourceError, match=reported):
         count_frames(recording(whole, short))
     for stop in (None, 4):
-        with pytest.raises(SourceError, match=said):
+        with pytest.raises(SourceError, match=reported):
             shown(recording(whole, short), 3, stop)
     assert shown(recording(whole, short), 0, 2) == [(0, 0, 0), (1, 1, 1)]
     rec = recording(whole, box_camera(tmp_path, 2, blind=True))
@@ -221,14 +222,14 @@ def test_the_split_of_a_recording_does_not_matter(
 def test_skipping_in_a_video_is_exact(tmp_path: Path) -> None:
     rec = recording(CameraSource(Source("video", video(tmp_path / "a.mp4", 20, "mp4v")), offset=-3))
     with open_frames(rec, 7, 9) as reader:
-        views = [moment.views[0] for moment in reader]
+        views = [frame_set.views[0] for frame_set in reader]
     np.testing.assert_allclose([np.mean(view) for view in views if isinstance(view, np.ndarray)], [100, 110], atol=4.5)
 
 
 def test_reading_goes_on_where_it_was_left(tmp_path: Path) -> None:
     with open_frames(recording(box_camera(tmp_path, 4))) as reader:
         assert next(reader).frame == 0
-        assert [moment.frame for moment in reader] == [1, 2, 3]
+        assert [frame_set.frame for frame_set in reader] == [1, 2, 3]
         assert list(reader) == []
 
 
@@ -248,7 +249,7 @@ def test_a_broken_image_is_named(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("kind", "name", "said"),
+    ("kind", "name", "reported"),
     [
         ("video", "none.avi", "no such file"),
         ("masks", "none.avi", "no such file"),
@@ -262,13 +263,13 @@ def test_a_broken_image_is_named(tmp_path: Path) -> None:
     ],
 )
 def test_sources_that_cannot_be_read(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str], kind: SourceKind, name: str, said: str
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], kind: SourceKind, name: str, reported: str
 ) -> None:
     (tmp_path / "text.avi").write_text("no video, no boxes")
     (tmp_path / "empty.avi").touch()
     (tmp_path / "folder").mkdir()
     rec = recording(box_camera(tmp_path, 3), CameraSource(Source(kind, tmp_path / name)))
-    with pytest.raises((SourceError, FormatError), match=said) as caught:
+    with pytest.raises((SourceError, FormatError), match=reported) as caught:
         shown(rec)
     assert isinstance(caught.value, StsegError)
     assert capfd.readouterr().err == ""
@@ -295,9 +296,9 @@ def test_real_silhouettes_and_boxes() -> None:
     rec = recording(*cameras, size=(644, 486))
     assert count_frames(rec) == 272
     with open_frames(rec, 270) as reader:
-        moments = list(reader)
-    assert [moment.frame for moment in moments] == [270, 271]
-    view = moments[0].views[3]
+        frame_sets = list(reader)
+    assert [frame_set.frame for frame_set in frame_sets] == [270, 271]
+    view = frame_sets[0].views[3]
     assert isinstance(view, np.ndarray)
     assert view.shape == (486, 644)
     assert 0 < np.mean(view) < 100
@@ -310,7 +311,7 @@ def test_real_silhouettes_and_boxes() -> None:
 
 
 def long_video(path: Path, frames: range) -> Path:
-    """A video in which most frames are told by those before them; each shows its number in stripes."""
+    """A video in which most frames are coded by differences; each shows its number in stripes."""
     writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"mp4v"), 10, (64, 48))
     for frame in frames:
         bits = np.array([255 * (frame >> k & 1) for k in range(12)], np.uint8)
@@ -320,7 +321,7 @@ def long_video(path: Path, frames: range) -> Path:
     return path
 
 
-def told(view: Observation) -> int:
+def shown_number(view: Observation) -> int:
     assert isinstance(view, np.ndarray)
     return sum(int(view[24, 5 * k + 2, 1] > 127) << k for k in range(12))
 
@@ -355,21 +356,21 @@ def test_far_frames_are_sought_exactly(hour: Path, parts: str, first: int) -> No
     with open_frames(rec, first, stop, streams) as sought, open_frames(rec, first, stop) as decoded:
         for one, other in zip(sought, decoded, strict=True):
             np.testing.assert_array_equal(one.views[0], other.views[0])
-            assert told(one.views[0]) == one.frame
+            assert shown_number(one.views[0]) == one.frame
 
 
 def test_times_that_tell_nothing_are_no_harm(hour: Path) -> None:
-    """Where seeking lands cannot be told, the video is decoded from its beginning."""
+    """Where the landing frame is ambiguous, the video is decoded from its beginning."""
     rec = camera_of(hour / "whole.mp4")
     for times in (np.zeros(900), np.full(900, np.nan), np.arange(900.0)):
         with open_frames(rec, 700, 702, StreamIndex(900, ((times,),))) as reader:
-            assert [told(moment.views[0]) for moment in reader] == [700, 701]
+            assert [shown_number(frame_set.views[0]) for frame_set in reader] == [700, 701]
 
 
 def test_one_camera_by_itself(hour: Path) -> None:
     rec = camera_of(hour / "part_*.mp4")
     views = read_camera(rec, 0, range(10, 900, 290), index_streams(rec))
-    assert [told(view) for view in views] == [10, 300, 590, 880]
+    assert [shown_number(view) for view in views] == [10, 300, 590, 880]
 
 
 def test_a_pattern_of_no_videos(tmp_path: Path) -> None:

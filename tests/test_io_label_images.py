@@ -39,14 +39,14 @@ def write_run(path: Path, sources: tuple[CameraSource, ...], tracks: Rows, confi
     return path
 
 
-def mask_sources(folder: Path, moments: list[Moment], instances: bool = False) -> tuple[CameraSource, ...]:
+def mask_sources(folder: Path, frame_sets: list[Moment], instances: bool = False) -> tuple[CameraSource, ...]:
     sources = []
     for k, camera in enumerate(two_cameras().cameras):
         own = folder / f"{camera.name}_seen"
         own.mkdir()
-        for moment in moments:
-            seen = np.asarray(moment.views[k], np.uint8)
-            cv2.imwrite(str(own / f"{moment.frame:03d}.png"), seen // 100 if instances else seen)
+        for frame_set in frame_sets:
+            seen = np.asarray(frame_set.views[k], np.uint8)
+            cv2.imwrite(str(own / f"{frame_set.frame:03d}.png"), seen // 100 if instances else seen)
         sources.append(CameraSource(Source("instances" if instances else "masks", own)))
     return tuple(sources)
 
@@ -63,8 +63,8 @@ def read(folder: Path, camera: str) -> list[Bytes]:
 
 @pytest.fixture
 def run_path(tmp_path: Path) -> Path:
-    moments = list(mask_moments(two_cameras(), walkers(FRAMES), 0, FRAMES))
-    return write_run(tmp_path / "run.h5", mask_sources(tmp_path, moments), walkers(FRAMES))
+    frame_sets = list(mask_moments(two_cameras(), walkers(FRAMES), 0, FRAMES))
+    return write_run(tmp_path / "run.h5", mask_sources(tmp_path, frame_sets), walkers(FRAMES))
 
 
 # Files
@@ -130,10 +130,10 @@ def test_frames_keep_their_numbers_and_their_labels(run_path: Path, tmp_path: Pa
 
 
 def test_instances_are_taken_pixel_by_pixel(run_path: Path, tmp_path: Path) -> None:
-    moments = list(mask_moments(two_cameras(), walkers(FRAMES), 0, FRAMES))
+    frame_sets = list(mask_moments(two_cameras(), walkers(FRAMES), 0, FRAMES))
     folder = tmp_path / "instances"
     folder.mkdir()
-    path = write_run(folder / "run.h5", mask_sources(folder, moments, instances=True), walkers(FRAMES))
+    path = write_run(folder / "run.h5", mask_sources(folder, frame_sets, instances=True), walkers(FRAMES))
     for source, out in ((run_path, "masks_out"), (path, "instances_out")):
         assert main(["labels", str(source), "-o", str(tmp_path / out)]) == 0
     for ours, theirs in zip(
@@ -143,8 +143,8 @@ def test_instances_are_taken_pixel_by_pixel(run_path: Path, tmp_path: Path) -> N
 
 
 def test_a_camera_with_boxes_has_no_images_and_one_that_is_blind_shows_nobody(tmp_path: Path) -> None:
-    moments = list(mask_moments(two_cameras(), walkers(FRAMES), 0, FRAMES))
-    masks, _ = mask_sources(tmp_path, moments[:2])
+    frame_sets = list(mask_moments(two_cameras(), walkers(FRAMES), 0, FRAMES))
+    masks, _ = mask_sources(tmp_path, frame_sets[:2])
     masks = CameraSource(masks.source, on_missing="blind")
     path = write_run(tmp_path / "run.h5", (masks, box_source(tmp_path / "east.csv")), walkers(FRAMES))
     assert main(["labels", str(path), "-o", str(tmp_path / "out")]) == 0
@@ -155,10 +155,10 @@ def test_a_camera_with_boxes_has_no_images_and_one_that_is_blind_shows_nobody(tm
 
 def box_source(path: Path) -> CameraSource:
     lines = ["frame,left,top,width,height"]
-    for moment in box_moments(two_cameras(), walkers(FRAMES), 0, FRAMES):
-        found = moment.views[1]
+    for frame_set in box_moments(two_cameras(), walkers(FRAMES), 0, FRAMES):
+        found = frame_set.views[1]
         assert isinstance(found, Boxes)
-        lines += [f"{moment.frame},{','.join(map(str, box))}" for box in found.pixel.tolist()]
+        lines += [f"{frame_set.frame},{','.join(map(str, box))}" for box in found.pixel.tolist()]
     path.write_text("\n".join(lines) + "\n")
     return CameraSource(Source("boxes", path, frames=FRAMES))
 
@@ -177,8 +177,8 @@ def test_what_the_user_can_mend_is_said(tmp_path: Path, capsys: pytest.CaptureFi
 
 
 def test_the_constants_are_those_of_the_run_but_for_what_is_set(tmp_path: Path) -> None:
-    moments = list(mask_moments(two_cameras(), walkers(FRAMES), 0, FRAMES))
-    sources = mask_sources(tmp_path, moments)
+    frame_sets = list(mask_moments(two_cameras(), walkers(FRAMES), 0, FRAMES))
+    sources = mask_sources(tmp_path, frame_sets)
     wide = write_run(tmp_path / "wide.h5", sources, walkers(FRAMES), "[labels]\nposition_noise = 0.5\n")
     plain = write_run(tmp_path / "plain.h5", sources, walkers(FRAMES))
     narrow = ("--set", f"labels.position_noise={LabelConfig().position_noise}")

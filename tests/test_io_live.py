@@ -1,4 +1,4 @@
-"""Files that arrive and live streams as moments: nothing of files is lost, nothing of cameras is lost in silence."""
+"""Arriving files and live streams as frame sets: files lose no frame, cameras none without a message."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ QUICK = LiveConfig(
 
 @pytest.fixture(scope="module")
 def arriving(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A rig of whose recording everything has arrived."""
+    """A rig whose recording has arrived completely."""
     path = write_pieces(tmp_path_factory.mktemp("arriving"), empty=True)
     arrive(path.parent, 1, 2, 3, 4)
     return path
@@ -51,8 +51,8 @@ def followed(rig: Path, first: int, stop: int | None, notes: FileNotes, say: Cal
 
 
 def test_files_are_taken_in_order_once_they_are_complete(tmp_path: Path) -> None:
-    halt, said = Event(), list[str]()
-    files = ArrivingFiles(tmp_path / "cam_*.mp4", 0.3, halt, said.append)
+    halt, reported = Event(), list[str]()
+    files = ArrivingFiles(tmp_path / "cam_*.mp4", 0.3, halt, reported.append)
     for number in (9, 10, 11):
         (tmp_path / f"cam_{number}.mp4").write_bytes(b"whole")
     begun = time.monotonic()
@@ -66,7 +66,7 @@ def test_files_are_taken_in_order_once_they_are_complete(tmp_path: Path) -> None
     (tmp_path / "cam_12.mp4").write_bytes(b"")
     meanwhile(partial(_later, halt, 0.5))
     assert files.next() is None  # nothing was ever added to it
-    assert [line.split(":")[0] for line in said] == [str(tmp_path / "cam_8.mp4")]
+    assert [line.split(":")[0] for line in reported] == [str(tmp_path / "cam_8.mp4")]
 
 
 def _add(path: Path) -> None:
@@ -86,11 +86,11 @@ def test_files_that_arrive_show_what_they_show_afterwards(arriving: Path, tmp_pa
     assert count_frames(recording) == FRAMES
     for first in (0, 13):
         notes = FileNotes(tmp_path / "files.json")
-        with open_frames(recording, first) as after, followed(arriving, first, FRAMES, notes, print) as moments:
-            for expected, moment in zip(after, moments, strict=True):
-                assert moment.frame == expected.frame
-                assert now() - 60 < moment.arrived < now()
-                np.testing.assert_array_equal(np.stack(moment.views), np.stack(expected.views))  # type: ignore[arg-type]
+        with open_frames(recording, first) as after, followed(arriving, first, FRAMES, notes, print) as frame_sets:
+            for expected, frame_set in zip(after, frame_sets, strict=True):
+                assert frame_set.frame == expected.frame
+                assert now() - 60 < frame_set.arrived < now()
+                np.testing.assert_array_equal(np.stack(frame_set.views), np.stack(expected.views))  # type: ignore[arg-type]
     assert notes.read["east"] == [(f"east_{k}.avi", PIECE) for k in (1, 2, 3)]
 
 
@@ -98,18 +98,18 @@ def test_files_that_were_read_may_go(tmp_path: Path) -> None:
     rig = write_pieces(tmp_path, empty=True)
     arrive(tmp_path, 1, 2, 3)
     notes = FileNotes(tmp_path / "files.json")
-    with followed(rig, 0, 25, notes, print) as moments:
-        expected = list(moments)[22]
+    with followed(rig, 0, 25, notes, print) as frame_sets:
+        expected = list(frame_sets)[22]
     for name in PLACES:
         (tmp_path / "in" / f"{name}_1.avi").unlink()
-    with followed(rig, 22, 23, FileNotes(tmp_path / "files.json"), print) as moments:
-        (moment,) = moments
-    np.testing.assert_array_equal(np.stack(moment.views), np.stack(expected.views))  # type: ignore[arg-type]
+    with followed(rig, 22, 23, FileNotes(tmp_path / "files.json"), print) as frame_sets:
+        (frame_set,) = frame_sets
+    np.testing.assert_array_equal(np.stack(frame_set.views), np.stack(expected.views))  # type: ignore[arg-type]
     with (
-        followed(rig, 5, 23, FileNotes(tmp_path / "files.json"), print) as moments,
+        followed(rig, 5, 23, FileNotes(tmp_path / "files.json"), print) as frame_sets,
         pytest.raises(SourceError) as error,
     ):
-        next(moments)
+        next(frame_sets)
     assert error.value.expected.startswith("west_1.avi")
 
 
@@ -123,12 +123,12 @@ def test_reading_waits_for_whoever_takes_the_moments(
         return whole(stream)
 
     monkeypatch.setattr(VideoStream, "read", counted)
-    with followed(arriving, 0, FRAMES, FileNotes(tmp_path / "files.json"), print) as moments:
-        for count, moment in enumerate(moments, 1):
+    with followed(arriving, 0, FRAMES, FileNotes(tmp_path / "files.json"), print) as frame_sets:
+        for count, frame_set in enumerate(frame_sets, 1):
             if count < 4:
                 time.sleep(0.1)
                 assert len(read) <= (count + 1) * len(PLACES)
-            assert moment.frame == count - 1
+            assert frame_set.frame == count - 1
     assert count == FRAMES
 
 
@@ -137,24 +137,26 @@ def test_a_file_that_was_not_complete_is_told(tmp_path: Path) -> None:
     arrive(tmp_path, 1)
     content = (tmp_path / "pieces" / "east_1.avi").read_bytes()
     (tmp_path / "in" / "east_1.avi").write_bytes(content[: len(content) // 2])
-    with followed(rig, 0, None, FileNotes(tmp_path / "files.json"), print) as moments:
-        next(moments)
+    with followed(rig, 0, None, FileNotes(tmp_path / "files.json"), print) as frame_sets:
+        next(frame_sets)
         arrive(tmp_path, 1, 2)
         with pytest.raises(
-            SourceError, match=rf"{len(content)} bytes, of which only the first .* expected live\.settled above"
+            SourceError, match=rf"{len(content)} bytes, of which only the first .* expected live\.file_quiet_time above"
         ):
-            list(moments)
+            list(frame_sets)
 
 
 def test_who_is_waited_for_is_said(tmp_path: Path) -> None:
-    rig, said = write_pieces(tmp_path, empty=True), list[str]()
+    rig, reported = write_pieces(tmp_path, empty=True), list[str]()
     arrive(tmp_path, 1)
     (tmp_path / "in" / "east_1.avi").unlink()
     halt = Event()
     meanwhile(partial(_later, halt, 1.6))
-    with FollowedFiles(read_rig(rig), 0, None, QUICK, FileNotes(tmp_path / "files.json"), halt, said.append) as moments:
-        assert list(moments) == []
-    assert said == ["waiting for the next file of east, at frame 0"]
+    with FollowedFiles(
+        read_rig(rig), 0, None, QUICK, FileNotes(tmp_path / "files.json"), halt, reported.append
+    ) as frame_sets:
+        assert list(frame_sets) == []
+    assert reported == ["waiting for the next file of east, at frame 0"]
 
 
 @pytest.mark.parametrize(
@@ -202,19 +204,19 @@ def opening(*cameras: StandIn) -> Callable[[str, float], Capture]:
     return open_own
 
 
-def taken(moments: FollowedCameras, count: int) -> list[LiveFrameSet]:
-    return [next(moments) for _ in range(count)]
+def taken(frame_sets: FollowedCameras, count: int) -> list[LiveFrameSet]:
+    return [next(frame_sets) for _ in range(count)]
 
 
 def test_cameras_are_aligned_by_when_their_pictures_arrive() -> None:
     """The second camera shows everything five frames late, so its offset is -5, and it runs at twice the rate."""
     cameras = (StandIn(numbered(0), 0.05), StandIn(numbered(1), 0.025))
     cameras[1].begun = cameras[0].begun
-    with FollowedCameras(live((0, -5)), QUICK, None, Event(), print, opening(*cameras)) as moments:
-        some = taken(moments, 20)
-    assert [moment.frame for moment in some] == list(range(20))
-    assert moments.dropped == 0
-    shown = np.array([[int(view[0, 0, 0]) for view in moment.views if view is not None] for moment in some])  # type: ignore[index]
+    with FollowedCameras(live((0, -5)), QUICK, None, Event(), print, opening(*cameras)) as frame_sets:
+        some = taken(frame_sets, 20)
+    assert [frame_set.frame for frame_set in some] == list(range(20))
+    assert frame_sets.dropped == 0
+    shown = np.array([[int(view[0, 0, 0]) for view in frame_set.views if view is not None] for frame_set in some])  # type: ignore[index]
     assert shown.shape == (20, 2)
     # Half a frame off at most, and what a busy machine adds.
     np.testing.assert_allclose(np.median(shown[:, 1] / 2 - shown[:, 0]), 5, atol=1.1)
@@ -223,17 +225,17 @@ def test_cameras_are_aligned_by_when_their_pictures_arrive() -> None:
 
 def test_a_broken_stream_is_asked_again_with_growing_pauses_and_its_view_is_blind() -> None:
     steady, breaking = StandIn(numbered(0), 0.05), StandIn(numbered(1), 0.05, breaks=[30], refused=3)
-    said = list[str]()
-    with FollowedCameras(live(), QUICK, None, Event(), said.append, opening(steady, breaking)) as moments:
-        some = taken(moments, 50)
-    blind = [k for k, moment in enumerate(some) if moment.views[1] is None]
+    reported = list[str]()
+    with FollowedCameras(live(), QUICK, None, Event(), reported.append, opening(steady, breaking)) as frame_sets:
+        some = taken(frame_sets, 50)
+    blind = [k for k, frame_set in enumerate(some) if frame_set.views[1] is None]
     assert blind
     assert blind == list(range(blind[0], blind[-1] + 1))
     assert blind[-1] < 49
-    assert not any(moment.dropped for moment in some)
-    assert [line.split(";")[0] for line in said] == [
-        "camera east: nothing comes from rtsp://there/live",
-        "camera east: it sees again",
+    assert not any(frame_set.dropped for frame_set in some)
+    assert [line.split(";")[0] for line in reported] == [
+        "camera east: no pictures from rtsp://there/live",
+        "camera east: the stream is back",
     ]
     pauses = np.diff(breaking.opened[1:])
     assert (pauses[1:] > 1.5 * pauses[:-1]).all(), pauses
@@ -241,37 +243,37 @@ def test_a_broken_stream_is_asked_again_with_growing_pauses_and_its_view_is_blin
 
 def test_what_cannot_be_worked_on_in_time_loses_its_oldest_moments_and_says_so() -> None:
     small = replace(QUICK, buffer_memory=5 * 2 * 128 * 96 * 3 / 2**20)
-    cameras, halt, said = (StandIn(numbered(0), 0.05), StandIn(numbered(1), 0.05)), Event(), list[str]()
-    with FollowedCameras(live(), small, None, halt, said.append, opening(*cameras)) as moments:
-        first = next(moments)
+    cameras, halt, reported = (StandIn(numbered(0), 0.05), StandIn(numbered(1), 0.05)), Event(), list[str]()
+    with FollowedCameras(live(), small, None, halt, reported.append, opening(*cameras)) as frame_sets:
+        first = next(frame_sets)
         time.sleep(1.0)
         halt.set()
-        rest = list(moments)
-    assert [moment.frame for moment in (first, *rest)] == list(range(len(rest) + 1))
-    dropped = [moment.dropped for moment in rest]
+        rest = list(frame_sets)
+    assert [frame_set.frame for frame_set in (first, *rest)] == list(range(len(rest) + 1))
+    dropped = [frame_set.dropped for frame_set in rest]
     kept = dropped.count(False)
     assert dropped == [True] * (len(rest) - kept) + [False] * kept
     assert 5 <= kept <= 8  # what came while they were taken
-    assert all((view is None) == moment.dropped for moment in rest for view in moment.views)
-    assert moments.dropped == sum(dropped) > 3
-    assert len(said) == 1
-    assert said[0].startswith("work is slower than the cameras: 1 moments dropped so far")
+    assert all((view is None) == frame_set.dropped for frame_set in rest for view in frame_set.views)
+    assert frame_sets.dropped == sum(dropped) > 3
+    assert len(reported) == 1
+    assert reported[0].startswith("tracking is slower than the cameras: 1 frame sets dropped so far")
 
 
 def test_a_run_that_goes_on_keeps_its_clock() -> None:
     with FollowedCameras(
         live((0,)), QUICK, now() - 100, Event(), print, opening(StandIn(numbered(0), 0.05))
-    ) as moments:
-        assert 2000 < next(moments).frame < 2100
+    ) as frame_sets:
+        assert 2000 < next(frame_sets).frame < 2100
 
 
 def test_pictures_of_another_size_end_the_run() -> None:
     wrong = StandIn([np.zeros((10, 10, 3), np.uint8)], 0.05)
     with (
-        FollowedCameras(live((0,)), QUICK, None, Event(), print, opening(wrong)) as moments,
+        FollowedCameras(live((0,)), QUICK, None, Event(), print, opening(wrong)) as frame_sets,
         pytest.raises(SourceError, match="10x10"),
     ):
-        next(moments)
+        next(frame_sets)
 
 
 # What the rig file says of live cameras
@@ -303,8 +305,8 @@ def test_a_broken_video_among_those_that_arrive_is_told(tmp_path: Path) -> None:
     (tmp_path / "in" / "east_1.avi").write_bytes(b"no video")
     write_video(tmp_path / "in" / "east_2.avi", numbered(0, 2))
     with (
-        followed(rig, 0, None, FileNotes(tmp_path / "files.json"), print) as moments,
+        followed(rig, 0, None, FileNotes(tmp_path / "files.json"), print) as frame_sets,
         pytest.raises(SourceError) as error,
     ):
-        next(moments)
+        next(frame_sets)
     assert error.value.place.endswith("east_1.avi")

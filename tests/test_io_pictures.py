@@ -128,16 +128,16 @@ def test_images_are_blue_green_red(tmp_path: Path, channels: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("kind", "picture", "said"),
+    ("kind", "picture", "reported"),
     [
         ("masks", np.zeros((2, 3), np.uint16), "found values of type uint16, expected 8 bits"),
         ("instances", np.zeros((2, 3, 3), np.uint8), "found a picture in colours"),
         ("images", np.zeros((2, 4), np.uint8), "found an image of 4x2, expected 3x2"),
     ],
 )
-def test_pictures_of_another_kind_are_refused(tmp_path: Path, kind: SourceKind, picture: Bytes, said: str) -> None:
+def test_pictures_of_another_kind_are_refused(tmp_path: Path, kind: SourceKind, picture: Bytes, reported: str) -> None:
     cv2.imwrite(str(tmp_path / "a.png"), picture)
-    with pytest.raises(SourceError, match=f"a.png: camera a: {said}"):
+    with pytest.raises(SourceError, match=f"a.png: camera a: {reported}"):
         read_picture(tmp_path / "a.png", kind, (3, 2), "camera a")
 
 
@@ -170,7 +170,7 @@ def test_patterns_choose_files(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("files", "said"),
+    ("files", "reported"),
     [
         ((), "no images"),
         (("a1.png", "a2.png", "a4.png"), "a gap after a2.png, expected running numbers in steps of 1"),
@@ -181,9 +181,9 @@ def test_patterns_choose_files(tmp_path: Path) -> None:
         (("a.png", "b.png"), "names that differ in one running number"),
     ],
 )
-def test_folders_without_a_clear_order_are_refused(tmp_path: Path, files: tuple[str, ...], said: str) -> None:
+def test_folders_without_a_clear_order_are_refused(tmp_path: Path, files: tuple[str, ...], reported: str) -> None:
     names(tmp_path, *files)
-    with pytest.raises(SourceError, match=said):
+    with pytest.raises(SourceError, match=reported):
         image_paths(tmp_path, "camera a")
 
 

@@ -67,7 +67,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Run:
 
 
 def test_files_of_a_piece_each_make_the_same_tracks(whole: Run, tmp_path: Path) -> None:
-    """Six files a camera, whose borders are not those of segments, nor those of the other cameras."""
+    """Six files a camera, with borders at other frames than segments and other cameras."""
     borders = ((10,) * 6, (5, 20, 3, 17, 14, 1), (30, 2, 7, 7, 7, 7))
     kinds = (".mkv", ".mkv", ".avi")
     films = [Film(regular(FRAMES), files, kind) for files, kind in zip(borders, kinds, strict=True)]
@@ -79,14 +79,14 @@ def test_files_of_a_piece_each_make_the_same_tracks(whole: Run, tmp_path: Path) 
 def test_other_rates_and_dropped_frames_are_put_right(
     whole: Run, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """One camera in time, one at twice the rate, one that varies and drops frames; and for a moment none sees."""
+    """One camera in time, one at twice the rate, one that varies and drops frames; and for a while none sees."""
     lost = [44, 45]
     double = np.delete(np.arange(2 * FRAMES) * TICK / 2, np.s_[2 * 44 - 1 : 2 * 45 + 2])
     dropping = np.delete(jittered(FRAMES, 0.2), [9, 20, 21, 22, 23, *lost])
     films = [Film(np.delete(regular(FRAMES), lost)), Film(double).told(clock="stamps"), Film(dropping)]
     run = track(write_films(tmp_path, films))
-    told = capsys.readouterr().err
-    assert told.startswith("stseg: corner0, corner2: the time stamps vary; each moment is shown by the frame nearest")
+    messages = capsys.readouterr().err
+    assert messages.startswith("stseg: corner0, corner2: the time stamps vary; each tick shows the nearest frame")
     assert presence(run) == [(0, FRAMES - 1)] * 3
     assert np.median(distances_to_truth(run)) < 1.2 * np.median(distances_to_truth(whole)) + 0.01
     blind = {name: np.flatnonzero(shown < 0).tolist() for name, shown in run.provenance.shown.items()}
@@ -116,8 +116,8 @@ def gaps_of(run: Run) -> list[tuple[int, str]]:
 def test_a_gap_of_all_cameras_ends_tracks(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """What no camera has for longer than anybody is waited for. Two tell it by stamps, one by its files' starts."""
     seconds = np.delete(regular(90), np.s_[28:64])
-    told = Film(seconds, files=(28, 26), suffix=".avi", starts=(0.0, 64 * TICK))
-    rig = write_films(tmp_path, [Film(seconds), Film(seconds), told])
+    messages = Film(seconds, files=(28, 26), suffix=".avi", starts=(0.0, 64 * TICK))
+    rig = write_films(tmp_path, [Film(seconds), Film(seconds), messages])
     run = track(rig, "--workers", "2", *SHORT)
     assert "stseg: no camera shows frames 28 to 63: a gap, at which all tracks end\n" in capsys.readouterr().err
     assert run.frames.tolist() == [*range(28), *range(64, 90)]

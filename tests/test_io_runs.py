@@ -1,4 +1,4 @@
-"""Run files: what stands in them, that they appear whole or not at all, and what is said of broken ones."""
+"""Run files: contents, atomic writing, and errors for broken files."""
 
 from __future__ import annotations
 
@@ -245,23 +245,21 @@ def test_an_exception_leaves_the_old_file_and_no_part(run_path: Path, error: typ
 
 @pytest.fixture
 def interruptible() -> Iterator[None]:
-    """Interrupts as at a terminal: a process in the background of a shell may have been told to ignore them."""
+    """Interrupts as at a terminal: a process in the background of a shell may ignore them."""
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     signal.signal(signal.SIGINT, before)
 
 
 @pytest.mark.usefixtures("interruptible")
-@pytest.mark.parametrize("moment", [0, 1, 3, 10, 30, 50, 70, 90, 100, 110])
-def test_an_interrupt_inside_a_write_leaves_nothing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, moment: int
-) -> None:
-    moments = iter(range(1000))
-    patch_file(monkeypatch, lambda _: signal.raise_signal(signal.SIGINT) if next(moments) == moment else None)
+@pytest.mark.parametrize("step", [0, 1, 3, 10, 30, 50, 70, 90, 100, 110])
+def test_an_interrupt_inside_a_write_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: int) -> None:
+    steps = iter(range(1000))
+    patch_file(monkeypatch, lambda _: signal.raise_signal(signal.SIGINT) if next(steps) == step else None)
     with pytest.raises(KeyboardInterrupt), writer_at(tmp_path / "night.h5") as writer:
         fill(writer)
         writer.finish(Tracks(small_trajectory()).summary())
-    assert next(moments) > moment
+    assert next(steps) > step
     assert [file.name for file in tmp_path.iterdir()] == ["left.avi"]
     gc.collect()  # a file that HDF5 could not close would crash here
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler

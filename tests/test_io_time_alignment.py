@@ -1,4 +1,4 @@
-"""Which frame of a camera shows which moment: what stamps are believed, and what is near."""
+"""Temporal alignment of cameras: trusted stamps and nearest frames."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ def recording(*sources: CameraSource) -> Recording:
     return Recording(Path("rig.toml"), Rig("test", RATE, Grid((0, 1), (0, 1)), cameras), sources)
 
 
-def video(name: str = "a.mp4", **said: object) -> CameraSource:
-    return replace(CameraSource(Source("video", Path(name))), **said)  # type: ignore[arg-type]
+def video(name: str = "a.mp4", **reported: object) -> CameraSource:
+    return replace(CameraSource(Source("video", Path(name))), **reported)  # type: ignore[arg-type]
 
 
 def decided(*cameras: tuple[CameraSource, Floats]) -> TimeAlignment:
-    """The clock of cameras of one file each, whose frames state these times, in ticks."""
+    """The alignment of cameras of one file each with these time stamps, in ticks."""
     times = [[own / RATE * 1000] for _, own in cameras]
     return align_in_time(recording(*[source for source, _ in cameras]), times)
 
@@ -151,7 +151,7 @@ def test_stamps_that_do_not_rise_are_none(times: list[float]) -> None:
 def test_starts_leave_gaps_and_cannot_overlap() -> None:
     files, paths = [every(1.0, 3), every(1.0, 2)], [Path("a"), Path("b")]
     assert concatenate_files(files, 1.0, RATE, paths, np.array([0.0, 0.7])).tolist() == [0, 1, 2, 7, 8]
-    with pytest.raises(SourceError, match=r"b: starts: found 0\.200 s, when the file before goes on until 0\.200 s"):
+    with pytest.raises(SourceError, match=r"b: starts: found 0\.200 s, when the previous file goes on until 0\.200 s"):
         concatenate_files(files, 1.0, RATE, paths, np.array([0.0, 0.2]))
 
 
@@ -175,8 +175,8 @@ def test_stamps_that_vary_are_believed() -> None:
 def test_a_rate_of_all_headers_may_be_wrong() -> None:
     clock = decided((video(), every(0.5, 60)), (video(), every(0.5, 60)))
     assert clock.shown == (None, None)
-    said = "cam1, cam2: the time stamps say 20 frames per second, the rig 10; the frames are counted"
-    assert [note.startswith(said) for note in clock.notes] == [True]
+    reported = "cam1, cam2: the time stamps say 20 frames per second, the rig 10; the frames are counted"
+    assert [note.startswith(reported) for note in clock.notes] == [True]
 
 
 @pytest.mark.parametrize("other", [every(1.0, 60), WAVERING])
@@ -184,7 +184,7 @@ def test_another_rate_is_believed_beside_a_camera_that_keeps_the_rigs(other: Flo
     clock = decided((video(), other), (video(), every(0.5, 120)))
     assert clock.shown[1] is not None
     assert clock.shown[1][:60].tolist() == list(range(0, 120, 2))
-    assert any("20 frames per second, the rig 10; each moment is shown by the frame nearest" in n for n in clock.notes)
+    assert any("20 frames per second, the rig 10; each tick shows the nearest frame" in n for n in clock.notes)
 
 
 def test_a_camera_with_as_many_frames_has_a_header_that_is_wrong() -> None:
@@ -218,7 +218,7 @@ def test_avi_holds_no_times(tmp_path: Path) -> None:
 def test_stamps_that_are_broken_are_told() -> None:
     clock = decided((video(), np.array([0.0, 1, 1, 2])), (video(), np.full(4, np.nan)))
     assert clock == TimeAlignment(
-        (None, None), ("cam1: the time stamps do not rise, or leap by a day; the frames are counted",)
+        (None, None), ("cam1: the time stamps do not rise, or jump by a day; the frames are counted",)
     )
 
 
@@ -232,11 +232,12 @@ def test_ends_that_nearly_meet_are_made_to(blind: bool) -> None:
 
 
 @pytest.mark.parametrize(
-    ("starts", "said"), [((0.0,), "1 starts of 2 files"), ((3.0, 1.0), "starts 3, 1"), ((-1.0, 1.0), "starts -1, 1")]
+    ("starts", "reported"),
+    [((0.0,), "1 starts of 2 files"), ((3.0, 1.0), "starts 3, 1"), ((-1.0, 1.0), "starts -1, 1")],
 )
-def test_starts_are_one_for_each_file(starts: tuple[float, ...], said: str) -> None:
+def test_starts_are_one_for_each_file(starts: tuple[float, ...], reported: str) -> None:
     source = CameraSource(Source("video", Path("a"), more=(Path("b"),), starts=starts))
-    with pytest.raises(SourceError, match=rf"camera cam1, source.starts: found {said}"):
+    with pytest.raises(SourceError, match=rf"camera cam1, source.starts: found {reported}"):
         align_in_time(recording(source), [[every(100.0, 3), every(100.0, 3)]])
 
 
@@ -271,7 +272,7 @@ def test_gaps_are_what_nobody_sees_for_long() -> None:
 # Read from files
 
 
-def told(view: Observation) -> int | None:
+def shown_number(view: Observation) -> int | None:
     """The number of the frame that a view shows."""
     assert not isinstance(view, Boxes)
     return None if view is None else round(float(view[6, 8, 0]) / 8)
@@ -297,15 +298,15 @@ def test_frames_are_read_where_they_were_taken(uneven: Recording) -> None:
     streams = index_streams(uneven)
     assert streams.length == 20
     with open_frames(uneven, 0, None, streams) as reader:
-        views = [tuple(map(told, moment.views)) for moment in reader]
+        views = [tuple(map(shown_number, frame_set.views)) for frame_set in reader]
     dropped = iter(range(17))
     assert [row[0] for row in views] == list(range(20))
     assert [row[1] for row in views] == [None if k in (5, 6, 12) else next(dropped) for k in range(20)]
     assert [row[2] for row in views[::2]] == list(range(10))
     for first in range(20):
         with open_frames(uneven, first, min(first + 2, 20), streams) as reader:
-            assert [tuple(map(told, moment.views)) for moment in reader] == views[first : first + 2]
-    assert [told(view) for view in read_camera(uneven, 1, [4, 6, 13], streams)] == [4, None, 10]
+            assert [tuple(map(shown_number, frame_set.views)) for frame_set in reader] == views[first : first + 2]
+    assert [shown_number(view) for view in read_camera(uneven, 1, [4, 6, 13], streams)] == [4, None, 10]
     assert streams.coverage(uneven).sum(axis=1).tolist() == [20, 17, 19]
 
 
@@ -313,8 +314,8 @@ def test_cameras_that_do_not_end_together_by_their_stamps_are_told_what_to_do(tm
     rec = recording(
         stamped(tmp_path / "a.mkv", every(0.1, 31)), stamped(tmp_path / "b.mkv", np.delete(every(0.1, 20), 5))
     )
-    said = r'cam2: found its end at frame 20 .* or on_missing = "blind", or clock = "count" where it went by'
-    with pytest.raises(SourceError, match=said):
+    reported = r'cam2: found its end at frame 20.* or on_missing = "blind", or clock = "count" where time stamps'
+    with pytest.raises(SourceError, match=reported):
         index_streams(rec)
 
 

@@ -111,10 +111,10 @@ def test_a_signal_ends_a_run_cleanly(
     while len(segments_of(night)) < 2 and running.poll() is None:
         time.sleep(0.005)
     running.send_signal(number)
-    _, told = running.communicate(timeout=60)
+    _, messages = running.communicate(timeout=60)
     assert running.returncode == status
-    assert "the same command goes on from there" in told
-    assert "Traceback" not in told
+    assert "the same command goes on from there" in messages
+    assert "Traceback" not in messages
     kept = segments_of(night)
     assert kept
     assert not list(kept[0].parent.glob("*.part"))
@@ -150,9 +150,9 @@ def test_a_flipped_byte_is_noticed_and_its_segment_made_anew(
     content[len(content) // 2] ^= 4
     second.write_bytes(content)
     assert track(rig_path, halfway) == 0
-    told = capsys.readouterr().err
-    assert second.name in told
-    assert first.name not in told
+    messages = capsys.readouterr().err
+    assert second.name in messages
+    assert first.name not in messages
     assert_same(halfway, undisturbed)
 
 
@@ -165,7 +165,7 @@ def test_a_half_written_segment_is_nothing(rig_path: Path, undisturbed: Path, ha
 
 
 @pytest.mark.parametrize(
-    ("more", "said"),
+    ("more", "reported"),
     [
         (("--set", "detection.prior_log_odds=-3"), "config.detection.prior_log_odds: found -3.0, where .* has -4.0"),
         (("--tracker", "frames"), "--tracker: found frames, where .* has cut"),
@@ -174,13 +174,13 @@ def test_a_half_written_segment_is_nothing(rig_path: Path, undisturbed: Path, ha
     ],
 )
 def test_another_run_is_refused_and_the_difference_named(
-    rig_path: Path, halfway: Path, capsys: pytest.CaptureFixture[str], more: tuple[str, ...], said: str
+    rig_path: Path, halfway: Path, capsys: pytest.CaptureFixture[str], more: tuple[str, ...], reported: str
 ) -> None:
     kept = [path.name for path in segments_of(halfway)]
     assert track(rig_path, halfway, *more) == 2
-    told = capsys.readouterr().err
-    assert re.search(said, told), told
-    assert "delete the folder night.h5.segments" in told
+    messages = capsys.readouterr().err
+    assert re.search(reported, messages), messages
+    assert "delete the folder night.h5.segments" in messages
     assert [path.name for path in segments_of(halfway)] == kept
 
 
@@ -236,8 +236,8 @@ def test_a_full_disk_loses_no_segment(
         pytest.skip("needs leave to mount a small disk")
     try:
         assert track(rig_path, disk / "night.h5") == 2
-        told = capsys.readouterr().err
-        assert "No space left on device" in told
+        messages = capsys.readouterr().err
+        assert "No space left on device" in messages
         kept = segments_of(disk / "night.h5")
         assert kept
         assert all(checksum(path) in path.name for path in kept)

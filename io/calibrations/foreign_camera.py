@@ -1,4 +1,4 @@
-"""A camera as another program's calibration gives it: in that calibration's own world, before units and axes."""
+"""A camera of another program's calibration: in the world frame of that calibration, before units and axes."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ class ForeignCamera:
     Attributes
     ----------
     file
-        Where it comes from, for errors.
+        The calibration, for errors.
     name
-        What the calibration calls it; empty where it does not say.
+        Its name in the calibration, or empty.
     size
-        Width and height of its image, pixels; None where the calibration does not say.
+        Width and height of its image, pixels; None where the calibration lacks them.
     projection : float64 (3, 4)
         Points of the foreign world to (undistorted) pixels.
     lens
@@ -43,7 +43,7 @@ class ForeignCamera:
 
 
 class ForeignTable(Table):
-    """A table of a calibration: what is wrong in it is a wrong format, not a wrong rig."""
+    """A table of a calibration; its errors are `FormatError`."""
 
     def error(self, name: str, found: object, expected: str) -> InputError:
         """An error at the key `name`."""

@@ -1,4 +1,4 @@
-"""Measured points of a scene and where cameras show them: CSV with camera, u, v, x, y and perhaps z."""
+"""Point correspondences between images and the scene: CSV with camera, u, v, x, y and perhaps z."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ _NEEDED = ("camera", "u", "v", "x", "y")
 
 @dataclass(frozen=True)
 class PointTable:
-    """Points that one camera shows.
+    """Point correspondences of one camera.
 
     Attributes
     ----------
     file
-        Where they come from.
+        The file.
     camera
         Its name.
     pixel : float64 (n, 2)
@@ -46,7 +46,7 @@ def read_points(path: Path) -> list[PointTable]:
     ----------
     path
         CSV with a header; z, where there is such a column, may be empty for points on the ground. Further columns are
-        left alone.
+        ignored.
 
     Raises
     ------

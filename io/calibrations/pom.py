@@ -17,7 +17,7 @@ from stseg.geometry.fits import fit_vertical, homogeneous
 from stseg.io.calibrations.foreign_camera import ForeignCamera
 
 _EXPECTED = "two 3x3 matrices, image to ground plane and image to head plane, a row a line"
-_SAMPLES = 9  # pixels along each side of the image at which the head plane is asked
+_SAMPLES = 9  # pixels along each side of the image at which the head plane is sampled
 
 
 def read_pom(files: Sequence[Path], size: tuple[int, int], head: float) -> list[ForeignCamera]:
@@ -27,7 +27,7 @@ def read_pom(files: Sequence[Path], size: tuple[int, int], head: float) -> list[
     ----------
     files
         Text with the ground homography and then the head homography, or a file of each. Lines of three numbers
-        count (brackets, commas and semicolons are taken for blanks), all others are words.
+        are read (brackets, commas and semicolons count as blanks), all others ignored.
     size
         Width and height of the image, pixels.
     head

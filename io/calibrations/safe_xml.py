@@ -1,4 +1,4 @@
-"""XML of strangers, read without document types: with nothing declared there is no entity to expand."""
+"""XML from untrusted sources, read without document types, so that no entity can be declared and expanded."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def parse_xml(file: Path, expected: str) -> ElementTree.Element:
     ----------
     file
     expected
-        What kind of XML it should be, for errors.
+        The expected kind of XML, for errors.
 
     Raises
     ------

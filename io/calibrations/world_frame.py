@@ -1,4 +1,4 @@
-"""The frame that a foreign calibration measures in, and cameras carried from it to metres with Z up."""
+"""The world frame of a foreign calibration, and the transformation of its cameras to metres with Z up."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ _TURNS: dict[Up, list[list[float]]] = {
     "+x": [[0, 0, 1], [1, 0, 0], [0, 1, 0]],
     "-x": [[0, 0, -1], [0, 1, 0], [1, 0, 0]],
 }
-_HUNG = 2.5  # metres above the ground, where cameras commonly hang
-_HEIGHTS = (0.3, 60.0)  # metres, between which they hang at all
+_USUAL_HEIGHT = 2.5  # metres above the ground, of a camera
+_HEIGHTS = (0.3, 60.0)  # metres, range of camera heights
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,17 +36,17 @@ class World:
     Attributes
     ----------
     unit
-        What its lengths are measured in: mm, cm, m, or how many metres one of its units is.
+        Unit of length: mm, cm, m, or a number of metres.
     up
-        Which of its axes points away from the ground. The others follow by half or quarter turns, which keep left and
+        The axis that points away from the ground. The others follow by half or quarter turns, which keep left and
         right: with -z, X = x, Y = -y, Z = -z; with -y (a camera's own axes), X = x, Y = -z, Z = y.
     mirrored
-        It is left-handed, as grids are whose rows count downwards: our y is its other way round.
+        Whether it is left-handed, as grids whose rows count downwards: y is then reversed.
 
     Raises
     ------
     ConfigError
-        Where the unit is none.
+        Where the unit is unknown.
     """
 
     unit: str = "m"
@@ -81,7 +81,7 @@ class World:
         Raises
         ------
         CalibrationError
-            Where the matrix is no camera's.
+            Where the matrix is not that of a camera.
         """
         in_metres = foreign.projection @ self.from_metres
         depth = float(np.linalg.norm(in_metres[2, :3]))
@@ -92,7 +92,7 @@ class World:
 
 
 def guess_up(cameras: Sequence[ForeignCamera]) -> Up:
-    """The axis that is upwards in most images: people hang cameras upright, or nearly so."""
+    """The axis that points upwards in most images: cameras are mounted nearly upright."""
     upward = np.sum([-_rotation(camera)[1] for camera in cameras], axis=0)
     axis = int(np.abs(upward).argmax())
     name = f"{'+' if upward[axis] > 0 else '-'}{'xyz'[axis]}"
@@ -100,12 +100,12 @@ def guess_up(cameras: Sequence[ForeignCamera]) -> Up:
 
 
 def guess_unit(cameras: Sequence[ForeignCamera], up: Up, mirrored: bool = False) -> str:
-    """The unit in which the cameras hang most nearly as high as cameras do.
+    """The unit in which camera heights are most plausible.
 
     Raises
     ------
     CalibrationError
-        Where they hang below the ground in any unit.
+        Where the cameras are below the ground in any unit.
     """
     height = median_height(cameras, World("m", up, mirrored))
     if height <= 0:
@@ -115,11 +115,11 @@ def guess_unit(cameras: Sequence[ForeignCamera], up: Up, mirrored: bool = False)
             f"cameras below the ground with {up} upwards",
             "them above it: give --up, and --mirrored where the calibration is left-handed",
         )
-    return min(UNITS, key=lambda unit: abs(np.log(height * UNITS[unit] / _HUNG)))
+    return min(UNITS, key=lambda unit: abs(np.log(height * UNITS[unit] / _USUAL_HEIGHT)))
 
 
 def require_height(cameras: Sequence[ForeignCamera], world: World) -> None:
-    """Refuse a unit in which cameras hang in the clouds or lie on the floor, where another makes sense.
+    """Refuse a unit with implausible camera heights where another unit gives plausible ones.
 
     Raises
     ------
@@ -139,7 +139,7 @@ def require_height(cameras: Sequence[ForeignCamera], world: World) -> None:
 
 
 def median_height(cameras: Sequence[ForeignCamera], world: World) -> float:
-    """How high the cameras hang in that world, metres; negative below the ground."""
+    """Median height of the cameras in that world, metres; negative below the ground."""
     to_metres = np.linalg.inv(world.from_metres)
     heights = [float((to_metres @ _centre(camera))[2]) for camera in cameras]
     return float(np.median(heights))

@@ -40,7 +40,7 @@ def write_pedpy(path: Path, run: Run) -> None:
 
 
 def write_jupedsim(path: Path, run: Run) -> None:
-    """Write JuPedSim's SQLite trajectory: the tracks, the frame rate, and the area that counts as walkable area."""
+    """Write JuPedSim's SQLite trajectory: the tracks, the frame rate, and the walkable area."""
     grid, area = run.recording.rig.grid, layout.walkable_area(run.recording.rig.grid)
     bounds = {"xmin": grid.x[0], "xmax": grid.x[1], "ymin": grid.y[0], "ymax": grid.y[1]}
     about = {"version": _JUPEDSIM_VERSION, "fps": run.frame_rate, **bounds}
@@ -58,9 +58,9 @@ def write_jupedsim(path: Path, run: Run) -> None:
 
 
 def headings(table: Rows) -> Floats:
-    """Where each row's person is going: from their row before to their row after, float64 (n, 2) of length 1.
+    """Heading of each row's person, by central differences of positions, float64 (n, 2) of length 1.
 
-    Who stands still, or is there for one frame, looks along x: JuPedSim knows nobody without a direction.
+    People who stand still, or exist for one frame, face along x: JuPedSim requires a direction.
     """
     order = np.lexsort((table["frame"], table["id"]))
     place, track = np.stack([table["x"], table["y"]], -1)[order], table["id"][order]

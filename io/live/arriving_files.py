@@ -1,4 +1,4 @@
-"""Videos that a recorder writes into a folder, one after the other: one camera's frames as they become complete."""
+"""One camera's frames from videos that a recorder writes into a folder one after the other."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ from stseg.io.recording.source_files import numeric_order
 from stseg.io.recording.video_stream import VideoStream
 
 _POLL = 0.1
-"""How often a folder is looked at, seconds."""
+"""Interval at which a folder is listed, seconds."""
 
 
 class FileNotes:
-    """Which files of each camera were read to their ends, and how many frames they had: kept in a file.
+    """The files of each camera that were read to their ends, with their numbers of frames; kept in a file.
 
     Parameters
     ----------
     path
-        Where it is kept; what stands there is gone on from.
+        The file; its contents are continued.
     """
 
     def __init__(self, path: Path) -> None:
@@ -42,7 +42,7 @@ class FileNotes:
             }
 
     def note(self, camera: str, name: str, frames: int) -> None:
-        """A file was read to its end."""
+        """Record a file that was read to its end."""
         with self._lock:
             self.read.setdefault(camera, []).append((name, frames))
             with replacing(self._path, overwrite=True) as part:
@@ -50,54 +50,56 @@ class FileNotes:
 
 
 class ArrivingFiles:
-    """The files of a pattern in the order of time, each once it is complete.
+    """The files of a pattern in chronological order, each once it is complete.
 
-    A file is complete when there is a later one, or when nothing was added to it for some time.
+    A file is complete when a later one exists, or when it has not grown for some time.
 
     Parameters
     ----------
     pattern
         Such as `cam1_*.mp4`.
     settled
-        For how long nothing must be added to the last file, seconds.
+        Time without growth after which the last file is complete, seconds.
     halt
-        Once it is set nothing is waited for.
-    say
-        Is told, in a line, of a file that came too late to be read.
+        Ends all waiting.
+    report
+        Receives a line for each file that came too late to be read.
     """
 
-    def __init__(self, pattern: Path, settled: float, halt: Event, say: Callable[[str], None]) -> None:
-        self._pattern, self._settled, self._halt, self._say = pattern, settled, halt, say
+    def __init__(self, pattern: Path, settled: float, halt: Event, report: Callable[[str], None]) -> None:
+        self._pattern, self._settled, self._halt, self._report = pattern, settled, halt, report
         self._taken: set[str] = set()
         self._last: Path | None = None
-        self._coming: list[Path] = []
+        self._pending: list[Path] = []
         self._size, self._since = -1, 0.0
 
     def pass_over(self, name: str) -> None:
-        """Take a file for read, whether it is still there or not."""
+        """Mark a file as read, whether it still exists or not."""
         self._last = self._pattern.with_name(name)
         self._taken.add(name)
 
     def next(self) -> Path | None:
-        """The next complete file, waited for; None once `halt` is set."""
+        """Wait for the next complete file; None once `halt` is set."""
         while not self._halt.is_set():
-            if len(self._coming) < 2:
-                self._look()
-            if len(self._coming) > 1 or (self._coming and self._is_settled(self._coming[0])):
-                path = self._coming.pop(0)
+            if len(self._pending) < 2:
+                self._list_folder()
+            if len(self._pending) > 1 or (self._pending and self._is_settled(self._pending[0])):
+                path = self._pending.pop(0)
                 self.pass_over(path.name)
                 return path
             self._halt.wait(_POLL)
         return None
 
-    def _look(self) -> None:
+    def _list_folder(self) -> None:
         found = [path for path in self._pattern.parent.glob(self._pattern.name) if path.name not in self._taken]
         last = None if self._last is None else numeric_order(self._last)
-        self._coming = sorted((path for path in found if last is None or numeric_order(path) > last), key=numeric_order)
+        self._pending = sorted(
+            (path for path in found if last is None or numeric_order(path) > last), key=numeric_order
+        )
         for path in found:
-            if path not in self._coming:
+            if path not in self._pending:
                 self._taken.add(path.name)
-                self._say(f"{path}: it came after later files had been read, and is left out")
+                self._report(f"{path}: it arrived after later files had been read, and is left out")
 
     def _is_settled(self, path: Path) -> bool:
         try:
@@ -110,16 +112,16 @@ class ArrivingFiles:
 
 
 class ArrivingVideos:
-    """One camera's frames from files that arrive; reading waits for them.
+    """One camera's frames from arriving files; reading waits for them.
 
     Parameters
     ----------
     source, camera
-        Videos of colour or of masks, by a pattern.
+        A pattern of colour or mask videos.
     files
         The files of that pattern.
     notes
-        What was read before; the files in it are not opened again to be passed over.
+        Files that were read before; they are skipped unopened.
     """
 
     def __init__(self, source: Source, camera: Camera, files: ArrivingFiles, notes: FileNotes) -> None:
@@ -128,10 +130,10 @@ class ArrivingVideos:
         self._stream: VideoStream | None = None
         self._path, self._read, self._size = Path(), 0, 0
         self.arrived = 0.0
-        """When the file of the last frame was found complete, by `stseg.io.live.live_frames.now`."""
+        """When the file of the last frame became complete, by `stseg.io.live.live_frames.now`."""
 
     def skip(self, count: int) -> int:
-        """Pass over up to `count` frames; how many there were."""
+        """Skip up to `count` frames; return how many there were."""
         skipped = 0
         while self._stream is None and self._known and skipped + self._known[0][1] <= count:
             name, frames = self._known.pop(0)
@@ -145,7 +147,7 @@ class ArrivingVideos:
         return skipped
 
     def read(self) -> Observation:
-        """The next frame, waited for; None once nothing is waited for any more."""
+        """Wait for the next frame; None once waiting has ended."""
         while self._open() and self._stream is not None:
             view = self._stream.read()
             if view is not None:
@@ -155,12 +157,12 @@ class ArrivingVideos:
         return None
 
     def close(self) -> None:
-        """Let go of what is open."""
+        """Close what is open."""
         if self._stream is not None:
             self._stream.close()
 
     def _open(self) -> bool:
-        """Open the next file unless one is open; whether there is one."""
+        """Open the next file unless one is open; return whether one is."""
         if self._stream is None:
             path = self._files.next()
             if path is None:
@@ -175,7 +177,7 @@ class ArrivingVideos:
         return True
 
     def _require_unchanged(self) -> None:
-        """Notice if the file before was not complete: some of its frames were missed then."""
+        """Raise SourceError where the previous file has grown since: some of its frames were missed."""
         try:
             size = self._path.stat().st_size if self._path.name else 0
         except OSError:  # it may have been deleted since

@@ -1,7 +1,7 @@
-"""Synchronised frames of all cameras from files that are still arriving. Nothing is ever left out.
+"""Synchronised frame sets from video files that are still arriving. No frame is dropped.
 
-One frame is decoded ahead, every camera in its own thread; then reading waits for whoever takes the moments, so a slow
-run makes files wait on the disk rather than frames in memory.
+One frame set is decoded ahead, each camera in its own thread; then reading waits for the consumer. A slow run leaves
+files on the disk rather than frames in memory.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from stseg.io.recording.pictures import reduced_view
 from stseg.io.recording.recording import CameraSource, Recording
 
 _POLL = 0.2
-"""How long a wait may last before it is seen that the run was asked to stop, seconds."""
+"""Interval at which a request to stop is noticed while waiting, seconds."""
 
 
 class FollowedFiles:
@@ -36,13 +36,13 @@ class FollowedFiles:
     first, stop
         The frames to read, half open; stop None while they come.
     config
-        When a file is complete.
+        When a file counts as complete.
     notes
-        Which files were read before.
+        Files that were read before.
     halt
-        Once it is set, the moment that was given last was the last one.
-    say
-        Is told, in a line, what is waited for.
+        Ends the iteration.
+    report
+        Receives a line about files that are long awaited.
 
     Raises
     ------
@@ -58,23 +58,23 @@ class FollowedFiles:
         config: LiveConfig,
         notes: FileNotes,
         halt: Event,
-        say: Callable[[str], None],
+        report: Callable[[str], None],
     ) -> None:
-        self._frame, self._stop, self._config, self._halt, self._say = first, stop, config, halt, say
+        self._frame, self._stop, self._config, self._halt, self._report = first, stop, config, halt, report
         self._over = Event()
-        """Set for the threads that wait for files, when this is closed."""
-        self._feeds: list[_AlignedFiles] = []
+        """Ends the threads that wait for files."""
+        self._files: list[_AlignedFiles] = []
         cameras = zip(recording.rig.cameras, recording.sources, recording.factors, strict=True)
         for camera, source, factor in cameras:
-            files = ArrivingFiles(source.source.path, config.file_quiet_time, self._over, say)
-            self._feeds.append(
+            files = ArrivingFiles(source.source.path, config.file_quiet_time, self._over, report)
+            self._files.append(
                 _AlignedFiles(camera, source, ArrivingVideos(source.source, camera, files, notes), factor)
             )
-            self._feeds[-1].require_start(first)
+            self._files[-1].require_start(first)
         with ExitStack() as opened:
-            for feed in self._feeds:
+            for feed in self._files:
                 opened.callback(feed.close)
-            self._pool = opened.enter_context(ThreadPoolExecutor(len(self._feeds)))
+            self._pool = opened.enter_context(ThreadPoolExecutor(len(self._files)))
             opened.callback(self._over.set)
             self._opened = opened.pop_all()
         self._ahead = self._read_ahead()
@@ -91,49 +91,51 @@ class FollowedFiles:
         return self
 
     def __next__(self) -> LiveFrameSet:
-        if self._frame == self._stop or not self._come():
+        if self._frame == self._stop or not self._wait_for_frames():
             raise StopIteration
         views = tuple(view.result() for view in self._ahead)
-        moment = LiveFrameSet(self._frame, views, max(feed.stream.arrived for feed in self._feeds))
+        frame_set = LiveFrameSet(self._frame, views, max(feed.stream.arrived for feed in self._files))
         self._frame += 1
         self._ahead = self._read_ahead()
-        return moment
+        return frame_set
 
     def close(self) -> None:
-        """Let all files go."""
+        """Close all files."""
         self._opened.close()
 
-    def _come(self) -> bool:
-        """Wait for the next frame of every camera; False where the run is asked to stop meanwhile."""
-        waited, said = 0.0, False
+    def _wait_for_frames(self) -> bool:
+        """Wait for the next frame of every camera; False where the run is asked to stop."""
+        waited, reported = 0.0, False
         while not self._halt.is_set():
-            some, missing = wait(self._ahead, _POLL)
+            done, missing = wait(self._ahead, _POLL)
             if not missing:
                 return True
-            waited += _POLL if some else 0.0
-            if not said and waited > self._config.file_quiet_time + self._config.stream_timeout:
+            waited += _POLL if done else 0.0
+            if not reported and waited > self._config.file_quiet_time + self._config.stream_timeout:
                 names = [
-                    feed.camera.name for feed, view in zip(self._feeds, self._ahead, strict=True) if not view.done()
+                    camera_files.camera.name
+                    for camera_files, view in zip(self._files, self._ahead, strict=True)
+                    if not view.done()
                 ]
-                self._say(f"waiting for the next file of {', '.join(names)}, at frame {self._frame}")
-                said = True
+                self._report(f"waiting for the next file of {', '.join(names)}, at frame {self._frame}")
+                reported = True
         return False
 
     def _read_ahead(self) -> list[Future[Observation]]:
         if self._frame == self._stop:
             return []
-        return [self._pool.submit(feed.read, self._frame) for feed in self._feeds]
+        return [self._pool.submit(feed.read, self._frame) for feed in self._files]
 
 
 class _AlignedFiles:
-    """A stream that is asked for frames of the recording rather than its own."""
+    """One camera's arriving files, read by frames of the recording."""
 
     def __init__(self, camera: Camera, source: CameraSource, stream: ArrivingVideos, factor: int) -> None:
         self.camera, self.source, self.stream, self._factor = camera, source, stream, factor
         self._next = 0
 
     def require_start(self, first: int) -> None:
-        """Raise SourceError where the camera must show the recording's frame `first` and begins after it."""
+        """Raise SourceError where a required camera starts after frame `first` of the recording."""
         if self.source.on_missing == "error" and first < self.source.offset:
             raise SourceError(
                 self.source.source.path,
@@ -143,7 +145,7 @@ class _AlignedFiles:
             )
 
     def read(self, frame: int) -> Observation:
-        """The view at a frame not before the last one asked for; None before the stream begins."""
+        """The observation at a frame, None before the stream begins; frames are read in rising order."""
         own = frame - self.source.offset
         if own < 0:
             return None

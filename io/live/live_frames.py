@@ -1,4 +1,4 @@
-"""What a recording that still goes on delivers."""
+"""Frame sets of a recording in progress, and the clock by which they are stamped."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ _ZERO = time.time() - time.monotonic()
 
 
 def now() -> float:
-    """Seconds since 1970, by a clock that is never set while it runs."""
+    """Seconds since 1970 by a monotonic clock."""
     return _ZERO + time.monotonic()
 
 
 @dataclass(frozen=True, slots=True)
 class LiveFrameSet:
-    """What all cameras saw at one time.
+    """The observations of all cameras at one time.
 
     Attributes
     ----------
@@ -29,9 +29,9 @@ class LiveFrameSet:
     views
         One observation per camera in the rig's order, None where a camera is blind.
     arrived
-        When it could first be worked on, by `now`.
+        When all its observations had arrived, by `now`.
     dropped
-        Whether there were views that were dropped, since work is slower than the cameras.
+        Whether its observations were dropped because tracking is slower than the cameras.
     """
 
     frame: int
@@ -46,7 +46,7 @@ def is_live(recording: Recording) -> bool:
     Raises
     ------
     SourceError
-        Where its sources are neither, or some are live and others are files.
+        Where its sources are neither, or mixed.
     """
     sources = [source.source for source in recording.sources]
     live = any(source.address for source in sources)

@@ -1,4 +1,4 @@
-"""The tracks of a run that still goes on: lines of text that grow, `RUN.h5.live.csv`."""
+"""The growing table of tracks of a run in progress, `RUN.h5.live.csv`."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ _COLUMNS = ("frame", "time", "id", "x", "y", "height", "score")
 
 
 class LiveTable:
-    """A table to which each window adds its tracks, flushed at once.
+    """A CSV table to which each window appends its tracks, flushed at once.
 
     Parameters
     ----------
     path
-        Where it stands. What an unfinished run has left there is gone on from.
+        The file. Lines of an unfinished run in it are kept.
     frame_rate
         Frames per second.
     stop
-        Frames from here on are not known yet: their lines are taken out.
+        Lines of frames from `stop` on are removed.
 
     Attributes
     ----------
     rows : TRAJECTORY (n,)
-        What the lines that were kept say: frame, id, place.
+        The kept lines: frame, id, x, y.
 
     Raises
     ------
@@ -80,7 +80,7 @@ class LiveTable:
 
 
 def _lines_before(path: Path, stop: int) -> list[list[str]]:
-    """Lines of frames before `stop`; those that are no such lines, such as one half written, go."""
+    """Lines of frames before `stop`; incomplete lines are dropped."""
     try:
         with path.open(newline="", encoding="utf-8") as file:
             _, *lines = csv.reader(file)

@@ -1,4 +1,4 @@
-"""Label images: for every pixel of a camera the id of the track that it shows, 0 for nobody.
+"""Label images: the track id of every pixel of a camera, 0 for background.
 
 FOLDER/CAMERA/000123.png    one image a frame, numbered as the recording's frames
 
@@ -37,20 +37,20 @@ def require_label_folder(folder: Path, overwrite: bool) -> None:
 
 
 class LabelImages:
-    """A folder of label images, made when the first camera's is.
+    """A folder of label images, one folder a camera in it.
 
     Parameters
     ----------
     folder
-        Where to; made if it is not there.
+        The folder; made if it does not exist.
     cameras
-        The names of those of whom there will be images.
+        Names of the cameras that will have images.
     largest
         The largest id.
     palette : uint8 (256, 3)
         Red, green, blue of each id.
     overwrite
-        Write into a folder that is not empty; label images of these cameras that are there go.
+        Write into a folder that is not empty; older label images of these cameras are deleted.
 
     Raises
     ------
@@ -95,7 +95,7 @@ class LabelImages:
 
     @staticmethod
     def _clear(folder: Path) -> None:
-        """Make a camera's folder; images of a longer run that was here before must not be taken for ours."""
+        """Make a camera's folder, without the images of an earlier run."""
         folder.mkdir(parents=True, exist_ok=True)
         for file in folder.glob("[0-9]*.png"):
             file.unlink()

@@ -1,4 +1,4 @@
-"""Reports and pictures on their way to disk."""
+"""Writing of reports, pictures and folders for them."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def write_file(path: Path, data: bytes, overwrite: bool = True) -> None:
 
 
 def make_folder(path: Path) -> None:
-    """Make a folder for pictures where there is none.
+    """Make a folder unless it exists.
 
     Raises
     ------

@@ -1,11 +1,11 @@
 """A simulated scene as a folder of files: rigs, films, masks, boxes and truth, written frame by frame.
 
 rig.toml  rig_masks.toml  rig_boxes.toml  [rig_instances.toml]    one rig file for each kind of foreground
-truth.csv                                                         frame,id,x,y,height of who is in the area
+truth.csv                                                         frame,id,x,y,height of the people in the area
 cam1.avi  cam1_empty.avi                                          films in colour (Motion JPEG)
 cam1_masks.avi                                                    exact silhouettes, 0 or 255 (FFV1: lossless)
-cam1_boxes.csv                                                    what a detector would find
-cam1_instances/000000.png                                         ids, 16 bits, where asked for
+cam1_boxes.csv                                                    simulated detections
+cam1_instances/000000.png                                         ids, 16 bits, optional
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from stseg.io.recording.recording import CameraSource, Recording, Source, Source
 from stseg.io.recording.rigs import write_rig
 
 Progress = Callable[[int, int], None]
-"""Told after each frame how many are done, and of how many."""
+"""Called after each frame with the number of finished frames and of all frames."""
 
 
 class SimulatedView(Protocol):
@@ -80,22 +80,22 @@ def write_scene(
     Parameters
     ----------
     folder
-        Where to; made if it is not there.
+        The folder; made if it does not exist.
     scene
         What to film.
     instances
-        Keep the instance images too, one file a camera and frame.
+        Also write instance images, one file a camera and frame.
     overwrite
         Write into a folder that is not empty, over files of the same name.
     progress
-        Told after each frame how many are done, and of how many.
+        Called after each frame.
 
     Raises
     ------
     OutputError
         Where the folder holds something already, or cannot be written to.
     """
-    with _told_as_output_error(folder):
+    with _as_output_error(folder):
         folder.mkdir(parents=True, exist_ok=True)
         if any(folder.iterdir()) and not overwrite:
             raise OutputError(folder, "", "files in it", "an empty folder, or leave to overwrite")
@@ -106,18 +106,18 @@ def write_scene(
             films = [
                 open_files.enter_context(_CameraFiles(folder, camera, scene, instances)) for camera in scene.rig.cameras
             ]
-            for done, moment in enumerate(scene.moments(), start=1):
-                np.savetxt(truth, moment.truth, fmt="%d,%d,%.4f,%.4f,%.3f")
-                for film, view in zip(films, moment.views, strict=True):
-                    film.write(moment.frame, view)
+            for done, frame_set in enumerate(scene.moments(), start=1):
+                np.savetxt(truth, frame_set.truth, fmt="%d,%d,%.4f,%.4f,%.3f")
+                for film, view in zip(films, frame_set.views, strict=True):
+                    film.write(frame_set.frame, view)
                 if progress is not None:
                     progress(done, scene.frames)
-    # Last of all: a rig file says that what it names is there.
+    # Last: a rig file promises that its sources exist.
     _write_rigs(folder, scene, instances)
 
 
 class _Video:
-    """A video file that is written; what OpenCV would pass over in silence is an OutputError."""
+    """A video file being written; failures that OpenCV ignores raise OutputError."""
 
     def __init__(self, path: Path, camera: Camera, rate: float, quality: int | None) -> None:
         self._path, (width, height) = path, camera.size
@@ -142,7 +142,7 @@ class _Video:
 
 
 class _CameraFiles(AbstractContextManager["_CameraFiles"]):
-    """All that is written of one camera."""
+    """The output files of one camera."""
 
     def __init__(self, folder: Path, camera: Camera, scene: SimulatedScene, instances: bool) -> None:
         rate, paths = scene.rig.frame_rate, _paths(folder, camera)
@@ -210,14 +210,14 @@ def _paths(folder: Path, camera: Camera) -> dict[str, Path]:
 
 
 def _clear(folder: Path) -> None:
-    """Make a folder for frames; those of a longer recording that was here before must not be read as ours."""
+    """Make a folder for frames, without those of an earlier recording."""
     folder.mkdir(exist_ok=True)
     for file in folder.glob("[0-9]*.png"):
         file.unlink()
 
 
 @contextmanager
-def _told_as_output_error(folder: Path) -> Iterator[None]:
+def _as_output_error(folder: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:

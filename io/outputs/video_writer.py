@@ -1,4 +1,4 @@
-"""Pictures on their way to a video file."""
+"""Writing of video files."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _ENDING = ".mp4"
 
 
 def require_film_name(path: Path) -> None:
-    """Refuse a name whose ending is none of a video that is written here.
+    """Refuse a name without the ending of a video that is written here.
 
     Raises
     ------
@@ -46,7 +46,7 @@ def write_film(path: Path, pictures: Iterable[Bytes], frame_rate: float, overwri
     """
     require_film_name(path)
     with replacing(path, overwrite) as part:
-        film = part.with_name(part.name + _ENDING)  # the ending is what tells the container
+        film = part.with_name(part.name + _ENDING)  # the ending decides the container
         try:
             count = _write(film, pictures, frame_rate)
             film.replace(part)

@@ -1,4 +1,4 @@
-"""Files that appear whole or not at all: written beside their place as NAME.part, then synced and renamed."""
+"""Atomic writing of files: written as NAME.part beside their place, then synced and renamed."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from stseg.errors import OutputError
 
 
 def require_new(path: Path, overwrite: bool) -> None:
-    """Refuse an output that exists, or that cannot stand at its place, before any work is done.
+    """Refuse an output that exists or cannot be made, before any work is done.
 
     Raises
     ------
@@ -26,18 +26,18 @@ def require_new(path: Path, overwrite: bool) -> None:
 
 
 def part_path(path: Path) -> Path:
-    """Where a file stands until it is whole."""
+    """The temporary name of a file that is being written."""
     return path.with_name(f"{path.name}.part")
 
 
 def publish_part(path: Path) -> None:
-    """Rename the part of `path`, whole and synced, to its name, and sync the folder."""
+    """Rename the finished part of `path` to its name, and sync the folder."""
     part_path(path).replace(path)
     sync_folder(path.parent)
 
 
 def sync_folder(path: Path) -> None:
-    """Make sure that names given in a folder stay."""
+    """Make new names in a folder durable."""
     with suppress(OSError):  # some systems cannot open folders; the file itself is safe
         folder = os.open(path, os.O_RDONLY)
         try:
@@ -48,7 +48,7 @@ def sync_folder(path: Path) -> None:
 
 @contextmanager
 def replacing(path: Path, overwrite: bool) -> Iterator[Path]:
-    """A temporary path to write to, which takes the name `path` at the end unless something was raised.
+    """A temporary path to write to, renamed to `path` at the end unless an exception was raised.
 
     Raises
     ------
@@ -72,7 +72,7 @@ def replacing(path: Path, overwrite: bool) -> Iterator[Path]:
 
 
 def output_error(path: Path, error: OSError) -> OutputError:
-    """What the user is told when the system refuses to write."""
+    """The error for a refusal of the operating system to write."""
     if isinstance(error, BlockingIOError):
         return OutputError(path, "", "a file that another run is writing", "a name of its own for each run")
     return OutputError(path, "", error.strerror or error, "a place with room that can be written")

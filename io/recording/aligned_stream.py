@@ -1,7 +1,7 @@
-"""Cameras' streams, asked for frames of the recording: what each shows then, and where they end.
+"""Streams addressed by frames of the recording instead of their own.
 
-A camera with offset o shows frame f of the recording in its own frame f - o, or where its frames are placed in time
-(`stseg.io.recording.time_alignment`) in the one that was taken nearest to then.
+A camera with offset o shows frame f of the recording in its own frame f - o or, where its frames are aligned in time
+(`stseg.io.recording.time_alignment`), in the frame taken nearest to it.
 """
 
 from __future__ import annotations
@@ -20,21 +20,22 @@ from stseg.io.recording.streams import Stream, open_stream
 
 
 class AlignedStream:
-    """A stream that is asked for frames of the recording rather than its own."""
+    """One camera's stream, read by frames of the recording."""
 
     def __init__(self, camera: Camera, source: CameraSource, stream: Stream, factor: int) -> None:
         self.camera, self.source, self._stream, self._factor = camera, source, stream, factor
         self._next = 0
         self._last: Observation = None
         self.end = math.inf
-        """The recording's frame at which the stream ended; infinite while it goes on."""
+        """The recording's frame at which the stream ended; infinite while its end is unknown."""
 
     @property
     def required(self) -> bool:
+        """Whether the camera must show every frame."""
         return self.source.on_missing == "error"
 
     def read(self, frame: int) -> Observation:
-        """The view at a frame not before the last one asked for; None where the camera is blind."""
+        """The observation at a frame, None where the camera is blind; frames are read in rising order."""
         tick, shown = frame - self.source.offset, self.source.shown
         if tick < 0 or self.end < math.inf:
             return None
@@ -49,7 +50,7 @@ class AlignedStream:
         return None if own < 0 else self._last
 
     def _own(self, number: int) -> Observation:
-        """One of the stream's own frames, not before the last that was read."""
+        """One of the stream's own frames, in rising order."""
         self._next += self._stream.skip(number - self._next)
         view = self._stream.read() if self._next == number else None
         if view is None:
@@ -58,12 +59,12 @@ class AlignedStream:
             self._next += 1
         return reduced_view(view, self._factor)
 
-    def run_out(self) -> tuple[Floats, ...]:
-        """Pass over all frames; their times."""
+    def read_times(self) -> tuple[Floats, ...]:
+        """Skip all frames and return their time stamps, milliseconds."""
         return tuple(self._stream.times())
 
-    def place(self, source: CameraSource, frames: int) -> None:
-        """Learn which of the stream's frames shows when, and so where it ends."""
+    def align(self, source: CameraSource, frames: int) -> None:
+        """Set the alignment of the stream's frames, and so its end."""
         self.source = source
         self.end = source.offset + (frames if source.shown is None else len(source.shown))
 
@@ -74,7 +75,7 @@ class AlignedStream:
 def open_aligned_stream(
     recording: Recording, camera_index: int, times: Sequence[Floats] | None = None
 ) -> AlignedStream:
-    """One camera's stream, placed as the recording says; with the times of its frames, far ones are sought.
+    """One camera's stream, aligned as the recording says; with `times` known, distant frames are sought.
 
     Raises
     ------
@@ -89,35 +90,35 @@ def open_aligned_streams(
     recording: Recording, opened: ExitStack, times: Sequence[Sequence[Floats]] = ()
 ) -> list[AlignedStream]:
     """All cameras' streams, in the rig's order, closed with `opened`; raises as `open_aligned_stream` does."""
-    feeds = list[AlignedStream]()
+    streams = list[AlignedStream]()
     for camera_index in range(len(recording.sources)):
-        feeds.append(open_aligned_stream(recording, camera_index, times[camera_index] if times else None))
-        opened.callback(feeds[-1].close)
-    return feeds
+        streams.append(open_aligned_stream(recording, camera_index, times[camera_index] if times else None))
+        opened.callback(streams[-1].close)
+    return streams
 
 
 def decoder_threads(recording: Recording) -> int:
-    """As many threads as decode at once: one a camera, no more than there are cores."""
+    """Number of decoding threads: one a camera, at most one a core."""
     return max(1, min(len(recording.sources), os.cpu_count() or 1))
 
 
-def recording_length(feeds: list[AlignedStream]) -> float:
-    """Where the recording ends; infinite while it goes on. SourceError where required streams do not end together."""
-    required = [feed for feed in feeds if feed.required]
+def recording_length(streams: list[AlignedStream]) -> float:
+    """The end of the recording, infinite while unknown. SourceError where required streams do not end together."""
+    required = [stream for stream in streams if stream.required]
     if not required:
-        return max(feed.end for feed in feeds)
+        return max(stream.end for stream in streams)
     shortest, longest = min(required, key=_end), max(required, key=_end)
     if shortest.end < longest.end:
-        by_time = any(feed.source.shown is not None for feed in (shortest, longest))
+        by_time = any(stream.source.shown is not None for stream in (shortest, longest))
         raise SourceError(
             shortest.source.source.path,
             f"camera {shortest.camera.name}",
-            f"its end at frame {shortest.end} while others go on",
+            f"its end at frame {shortest.end}, where others continue",
             f'frames as long as camera {longest.camera.name}\'s, or on_missing = "blind"'
-            + (', or clock = "count" where it went by time stamps' if by_time else ""),
+            + (', or clock = "count" where time stamps were used' if by_time else ""),
         )
     return shortest.end
 
 
-def _end(feed: AlignedStream) -> float:
-    return feed.end
+def _end(stream: AlignedStream) -> float:
+    return stream.end

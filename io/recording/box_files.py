@@ -1,4 +1,4 @@
-"""Text files of a detector's boxes: CSV with a header, or MOTChallenge lines."""
+"""Detections of one camera as text: CSV with a header, or MOTChallenge lines."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class BoxTable:
     Attributes
     ----------
     frames
-        How many frames there are; those without boxes are frames in which nothing was found.
+        Number of frames; frames without boxes have no detections.
     frame : int64 (n,)
         The frame of each box, from 0, rising.
     pixel : float64 (n, 4)
@@ -65,7 +65,7 @@ class _Lines:
 def read_boxes(path: Path, first_frame: int = 0, frames: int | None = None) -> BoxTable:
     """Boxes of a whole file.
 
-    Two forms are told apart by the first line. CSV begins with a header that names frame, left, top, width, height
+    The first line decides between two forms. CSV begins with a header that names frame, left, top, width, height
     and, perhaps, score, in any order, among columns that are ignored. MOTChallenge lines have no header: frame, id,
     left, top, width, height, conf, ... between commas or spaces, with conf -1 where it is unknown.
 
@@ -74,9 +74,9 @@ def read_boxes(path: Path, first_frame: int = 0, frames: int | None = None) -> B
     path
         The file.
     first_frame
-        The number that the file gives to its first frame.
+        Number of the first frame in the file.
     frames
-        How many frames there are; None to end with the last one that has a box.
+        Number of frames; None to end with the last frame that has a box.
 
     Raises
     ------
@@ -98,15 +98,15 @@ def read_boxes(path: Path, first_frame: int = 0, frames: int | None = None) -> B
 
 
 def _check(lines: _Lines, first_frame: int, frames: int | None) -> None:
-    """Refuse what can be no box."""
+    """Refuse rows that are no boxes."""
     frame = lines.values[:, 0]
     for column in range(lines.values.shape[1]):
         lines.refuse(~np.isfinite(lines.values[:, column]), column, "a finite number")
     lines.refuse(frame != np.floor(frame), 0, "a whole number")
     lines.refuse(frame < first_frame, 0, f"a frame from first_frame = {first_frame} on")
     count = _MAX_FRAMES if frames is None else frames
-    said = "" if frames is None else f", for there are frames = {frames}"
-    lines.refuse(frame >= first_frame + count, 0, f"a frame below {first_frame + count}{said}")
+    reason = "" if frames is None else f", for there are frames = {frames}"
+    lines.refuse(frame >= first_frame + count, 0, f"a frame below {first_frame + count}{reason}")
     for column in (3, 4):
         lines.refuse(lines.values[:, column] < 0, column, "0 or more pixels")
     for column in range(5, lines.values.shape[1]):
@@ -114,7 +114,7 @@ def _check(lines: _Lines, first_frame: int, frames: int | None) -> None:
 
 
 def _read_lines(path: Path) -> _Lines:
-    """The numbers that matter, a MOTChallenge score of -1 made 1."""
+    """The needed columns; an unknown MOTChallenge score (-1) becomes 1."""
     rows = _fields(path)
     line, first = next(rows, (0, list(_NEEDED)))
     is_mot = _is_number(first[0])

@@ -3,11 +3,10 @@
 A recording's frames count from 0. A camera with offset o shows frame f of the recording in its own frame f - o, so a
 positive offset is a camera that started late and a negative one a camera that started early. A camera whose
 `on_missing` is "blind" sees nothing before its start and after its end; the others must be there from the first frame
-that is asked for and must end together, and there the recording ends (where all may be blind, with the longest).
+that is read and must end together, which is the end of the recording (where all may be blind, the end of the longest).
 
-That is so where a camera's frames are counted. Where their times are known, and are not those of their numbers, the
-camera shows a frame of the recording in the own frame that was taken nearest to then, and is blind where there is none
-(`stseg.io.recording.time_alignment`).
+Cameras whose frames are aligned by time stamps show the frame nearest in time instead, and are blind where there is
+none (`stseg.io.recording.time_alignment`).
 """
 
 from __future__ import annotations
@@ -36,7 +35,7 @@ from stseg.io.recording.time_alignment import with_alignment
 
 @dataclass(frozen=True, slots=True)
 class FrameSet:
-    """What all cameras saw at one time.
+    """The observations of all cameras at one time.
 
     Attributes
     ----------
@@ -51,9 +50,9 @@ class FrameSet:
 
 
 class FrameReader:
-    """Moments of a recording in order; made by `open_frames`.
+    """Frame sets of a recording in order; made by `open_frames`.
 
-    One frame is decoded ahead, every camera in its own thread, while the caller works on the last one.
+    One frame set is decoded ahead, each camera in its own thread, while the caller works on the last one.
 
     Raises
     ------
@@ -66,8 +65,8 @@ class FrameReader:
         self._recording, self._stop = recording, stop
         self._frame, self._least = first, first if stop is None else stop
         with ExitStack() as opened:
-            self._feeds = open_aligned_streams(recording, opened, streams.times if streams else ())
-            _require_start(self._feeds, first)
+            self._streams = open_aligned_streams(recording, opened, streams.times if streams else ())
+            _require_start(self._streams, first)
             self._pool = opened.enter_context(ThreadPoolExecutor(decoder_threads(recording)))
             self._opened = opened.pop_all()
         self._ahead = self._read_ahead()
@@ -87,25 +86,25 @@ class FrameReader:
         if self._frame == self._stop:
             raise StopIteration
         views = tuple(view.result() for view in self._ahead)
-        length = recording_length(self._feeds)
+        length = recording_length(self._streams)
         if length <= self._frame:
             if length < self._least:
                 found = f"a recording of {length} frames"
                 raise SourceError(self._recording.path, "frames", found, f"at least {self._least}")
             raise StopIteration
-        moment = FrameSet(self._frame, views)
+        frame_set = FrameSet(self._frame, views)
         self._frame += 1
         self._ahead = self._read_ahead()
-        return moment
+        return frame_set
 
     def close(self) -> None:
-        """Wait for the frame that is being decoded and let all streams go."""
+        """Wait for the frame that is being decoded and close all streams."""
         self._opened.close()
 
     def _read_ahead(self) -> list[Future[Observation]]:
         if self._frame == self._stop:
             return []
-        return [self._pool.submit(feed.read, self._frame) for feed in self._feeds]
+        return [self._pool.submit(stream.read, self._frame) for stream in self._streams]
 
 
 def open_frames(
@@ -120,12 +119,12 @@ def open_frames(
     first, stop
         The recording's frames to read, half open; they keep their numbers. None: to the end.
     streams
-        What `count_streams` told: frames are then placed in time, and a far first one is sought.
+        From `index_streams`: frames are then aligned in time, and a distant first one is sought.
 
     Returns
     -------
     FrameReader
-        A context manager that yields one Moment per frame.
+        A context manager that yields one `FrameSet` per frame.
 
     Raises
     ------
@@ -143,7 +142,7 @@ def open_frames(
 def read_camera(
     recording: Recording, camera_index: int, frames: Iterable[int], streams: StreamIndex | None = None
 ) -> Iterator[Observation]:
-    """What one camera shows in some frames of the recording, decoded as they are asked for; None where it is blind.
+    """Observations of one camera in some frames of the recording, decoded on demand; None where it is blind.
 
     Parameters
     ----------
@@ -154,7 +153,7 @@ def read_camera(
     frames
         Numbers of the recording's frames, rising.
     streams
-        What `count_streams` told, for frames placed in time and far ones.
+        From `index_streams`, to align frames in time and seek distant ones.
 
     Raises
     ------
@@ -165,13 +164,13 @@ def read_camera(
         recording = with_alignment(recording, streams.shown)
     with closing(
         open_aligned_stream(recording, camera_index, streams.times[camera_index] if streams else None)
-    ) as feed:
+    ) as stream:
         for frame in frames:
-            yield feed.read(frame)
+            yield stream.read(frame)
 
 
 def read_background(recording: Recording, camera_index: int) -> Iterator[Observation]:
-    """Frames of the empty scene as one camera shows it, decoded as they are asked for.
+    """One camera's frames of the empty scene, decoded on demand.
 
     Parameters
     ----------
@@ -193,12 +192,12 @@ def read_background(recording: Recording, camera_index: int) -> Iterator[Observa
             yield reduced_view(view, recording.factors[camera_index])
 
 
-def _require_start(feeds: list[AlignedStream], first: int) -> None:
-    for feed in feeds:
-        if feed.required and first < feed.source.offset:
+def _require_start(streams: list[AlignedStream], first: int) -> None:
+    for stream in streams:
+        if stream.required and first < stream.source.offset:
             raise SourceError(
-                feed.source.source.path,
-                f"camera {feed.camera.name}, frame {first}",
-                f"a stream that starts at frame {feed.source.offset}",
+                stream.source.source.path,
+                f"camera {stream.camera.name}, frame {first}",
+                f"a stream that starts at frame {stream.source.offset}",
                 'one that shows it, or on_missing = "blind"',
             )

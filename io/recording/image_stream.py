@@ -1,4 +1,4 @@
-"""A folder or pattern of image files as a stream: one running number in their names orders them."""
+"""A folder or pattern of image files as a stream, ordered by the running number in their names."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class ImageStream:
         self._next = 0
 
     def skip(self, count: int) -> int:
-        """Pass over up to `count` files; how many there were."""
+        """Skip up to `count` files; return how many there were."""
         skipped = min(count, len(self._paths) - self._next)
         self._next += skipped
         return skipped
@@ -48,7 +48,7 @@ class ImageStream:
         return read_picture(self._paths[frame], self._source.kind, self._camera.size, key)
 
     def times(self) -> list[Floats]:
-        """Image files state no time."""
+        """Image files have no time stamps."""
         return [np.full(self.skip(len(self._paths)), np.nan)]
 
     def close(self) -> None:
@@ -65,7 +65,7 @@ def is_image_source(path: Path) -> bool:
 def image_paths(path: Path, key: str) -> list[Path]:
     """The files of a folder, of a pattern such as `frame_*.png`, or of a single image, in the order of their frames.
 
-    Names may differ in one number alone; it rises in equal steps, so that a missing file shows.
+    Names may differ in one number only, which rises in equal steps, so that missing files are detected.
     """
     if path.is_file():
         return [path]
@@ -75,7 +75,7 @@ def image_paths(path: Path, key: str) -> list[Path]:
         found = list(path.parent.glob(path.name))
     else:
         raise SourceError(path, key, "no such file or folder", "a folder or pattern of images")
-    # Names that begin with a dot are the leavings of file systems.
+    # Names that begin with a dot are made by file systems.
     files = sorted(file for file in found if file.is_file() and not file.name.startswith("."))
     if not files:
         raise SourceError(path, key, "no images", "one image a frame")
@@ -102,5 +102,5 @@ def _in_order(files: list[Path], path: Path, key: str) -> list[Path]:
 
 
 def is_pattern(path: Path) -> bool:
-    """Whether a path stands for several files."""
+    """Whether a path is a pattern of several files."""
     return any(sign in path.name for sign in "*?[")

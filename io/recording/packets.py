@@ -1,4 +1,4 @@
-"""The frames of a Motion JPEG video by its packets: each is a whole picture, so counting them decodes nothing."""
+"""Time stamps of a Motion JPEG video from its packets, without decoding: each packet is a whole picture."""
 
 from __future__ import annotations
 
@@ -10,37 +10,37 @@ import numpy as np
 from stseg.arrays import Floats
 
 _RAW = -1
-"""OpenCV's word for packets as they are in the file."""
+"""Value of CAP_PROP_FORMAT at which OpenCV delivers undecoded packets."""
 _START, _END = b"\xff\xd8", b"\xff\xd9"
 _MARK, _DATA = 0xFF, 0xDA
-"""What JPEG begins and ends a picture with, what it begins every part with, and the part that its data follow."""
+"""Markers of JPEG: start and end of image; first byte of every marker; start of scan, which the data follow."""
 
 
 def packet_times(path: Path) -> Floats | None:
-    """The time that the file gives each frame, float64 (n,) milliseconds, as decoding the frames would find them.
+    """The time stamp of each frame, float64 (n,) milliseconds, equal to those found by decoding.
 
-    None where this cannot be told from packets: other codecs hold back and drop frames, and a packet that is no whole
-    picture may give none.
+    None where packets do not determine them: other codecs reorder and drop frames, and an incomplete picture may not
+    decode to a frame.
     """
     capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
     code = (int(capture.get(cv2.CAP_PROP_FOURCC)) & 0xFFFFFFFF).to_bytes(4, "little")
-    told = code.upper() == b"MJPG" and capture.set(cv2.CAP_PROP_FORMAT, _RAW)
+    countable = code.upper() == b"MJPG" and capture.set(cv2.CAP_PROP_FORMAT, _RAW)
     heads, times = set[bytes](), list[float]()
-    while told and capture.grab():
+    while countable and capture.grab():
         held, packet = capture.retrieve()
         head = _head(packet.tobytes()) if held else b""
         if head and head not in heads and cv2.imdecode(packet, cv2.IMREAD_GRAYSCALE) is not None:
             heads.add(head)
-        told = head in heads
+        countable = head in heads
         times.append(capture.get(cv2.CAP_PROP_POS_MSEC))
     capture.release()
-    return np.array(times, float) if told and times else None
+    return np.array(times, float) if countable and times else None
 
 
 def _head(packet: bytes) -> bytes:
-    """What a JPEG picture says before its data: its size and tables, on which it hangs whether it decodes.
+    """The header of a JPEG picture: its size and tables, which decide whether it decodes.
 
-    Empty where the packet is no whole picture.
+    Empty where the packet is no complete picture.
     """
     at, whole = len(_START), packet.startswith(_START) and packet.rstrip(b"\0").endswith(_END)
     while whole and at + 4 <= len(packet) and packet[at] == _MARK:

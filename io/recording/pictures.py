@@ -1,4 +1,4 @@
-"""What a decoded picture must be to count as a colour frame, a mask or an instance image."""
+"""Decoded pictures as observations: colour frames, masks and instance images."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from stseg.errors import SourceError
 from stseg.io.recording.indexed_png import decode_indexed, stores_numbers
 from stseg.io.recording.recording import SourceKind
 
-# Video codecs leave a trace of colour on grey; a picture painted in colours has far more.
+# Video codecs leave a trace of colour on grey; real colour pictures have far more.
 _GREY_SPREAD = 32
 
 
@@ -28,7 +28,7 @@ def read_picture(path: Path, kind: SourceKind, size: tuple[int, int], key: str) 
     size
         Width and height that it must have, pixels.
     key
-        What to call it in an error: the camera and frame.
+        Camera and frame, for errors.
 
     Raises
     ------
@@ -46,14 +46,14 @@ def read_picture(path: Path, kind: SourceKind, size: tuple[int, int], key: str) 
 
 
 def reduced_view(view: Observation, factor: int) -> Observation:
-    """A colour frame reduced by a whole factor, each pixel the mean of a square; what is no colour frame stays."""
+    """A colour frame reduced by a whole factor, each pixel the mean of a square; other observations unchanged."""
     if factor == 1 or not isinstance(view, np.ndarray) or view.ndim != 3:
         return view
     return np.asarray(reduced_picture(view, factor), np.uint8)
 
 
 def reduced_picture(picture: AnyArray, factor: int) -> AnyArray:
-    """A picture (v, u) or (v, u, 3) reduced by a whole factor; the rest at its right and lower edges is left out."""
+    """A picture (v, u) or (v, u, 3) reduced by a whole factor; incomplete squares at its edges are dropped."""
     if factor == 1:
         return picture
     height, width = picture.shape[0] // factor, picture.shape[1] // factor
@@ -75,7 +75,7 @@ def _decode(data: bytes, kind: SourceKind) -> AnyArray | None:
 
 
 def as_observation(picture: AnyArray, kind: SourceKind, size: tuple[int, int], place: Path, key: str) -> AnyArray:
-    """A decoded picture as the kind's array, see `read_picture`; SourceError where it cannot be."""
+    """A decoded picture as an array of its kind, see `read_picture`; SourceError where it is of another."""
     height, width = picture.shape[:2]
     if (width, height) != size:
         raise SourceError(place, key, f"an image of {width}x{height}", f"{size[0]}x{size[1]}, the size of the camera")

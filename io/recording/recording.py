@@ -1,4 +1,4 @@
-"""What a rig file describes: the rig, and where the frames of each camera come from."""
+"""A recording: the rig and the sources of its cameras' frames, as a rig file describes them."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _PASSWORD = re.compile(r"(://[^/\s:@\"]*):[^/\s\"]*@")
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """One stream of frames on disk, or a live one.
+    """One stream of frames: files, or the address of a live stream.
 
     Attributes
     ----------
@@ -31,14 +31,15 @@ class Source:
         File, folder or pattern (`frame_*.png`, `hour_*.mp4`), already relative to the rig file's folder; of a live
         stream the last part of its address.
     more
-        Not for boxes: files, folders or patterns that go on where the one before ends.
+        Further files, folders or patterns, each continuing the one before; not for boxes.
     starts
-        When each of the files begins, seconds after the camera's frame 0; empty where each begins as the one before
-        ends.
+        Start of each file, seconds after the camera's frame 0; empty where each starts as the previous one ends.
     first_frame
-        boxes only: the number that the file gives to its first frame.
+        boxes only: the number of the first frame in the file.
     frames
-        boxes only: how many frames there are, where the file's last line does not say it; None to take the last line.
+        boxes only: number of frames; None where the last frame with a box is the last frame.
+    address
+        Of a live stream (rtsp://...); empty for files.
     """
 
     kind: SourceKind
@@ -59,17 +60,17 @@ class CameraSource:
     source
         Its frames.
     background
-        The empty scene to learn from, or None.
+        Source of the empty scene, or None.
     offset
         Its frame k shows the scene at frame k + offset of the recording.
     on_missing
-        What to do where its stream starts late or ends early: an error, or a view that sees nothing there.
+        Where its stream starts late or ends early: an error, or a blind view.
     clock
-        What says when its frames were taken: the files' time stamps, their count, or what
-        `stseg.io.recording.time_alignment` finds.
+        Source of frame times: the files' time stamps, frame counts, or automatic
+        (`stseg.io.recording.time_alignment`).
     shown : int64 (tick,)
-        The camera's own frame that shows each tick of its clock, -1 where it is blind; None where frame k shows tick k,
-        or nothing is known yet.
+        The camera's own frame shown at each tick, -1 where it is blind; None where frame k is shown at tick k, or
+        before alignment.
     """
 
     source: Source
@@ -101,7 +102,7 @@ class Recording:
         return self.rig.reduced(self.reduction) if self.reduction else self.rig
 
     def reduced(self, rows: float) -> Recording:
-        """The recording with its colour frames reduced as far as standing people still span so many rows."""
+        """The recording with colour frames reduced as far as standing people still span `rows` pixels."""
         cameras = zip(self.rig.cameras, self.sources, strict=True)
         return replace(self, reduction=tuple(self._factor(camera, own, rows) for camera, own in cameras))
 
@@ -111,5 +112,5 @@ class Recording:
 
 
 def mask_passwords(text: str) -> str:
-    """A text in which the addresses of live streams (`rtsp://name:password@...`) show no password."""
+    """A text with the passwords in addresses of live streams (`rtsp://name:password@...`) masked."""
     return _PASSWORD.sub(r"\1:***@", text)

@@ -1,4 +1,4 @@
-"""The text of a rig file, laid out for people: one matrix row a line, units beside the numbers, every digit kept."""
+"""The text of a rig file: one matrix row a line, units in comments, numbers to the last digit."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ FORMAT = 1
 
 
 def format_rig(recording: Recording, path: Path) -> str:
-    """The text of the rig file that is to stand at `path`, which decides how the paths of streams are written."""
+    """The text of a rig file at `path`, to which paths of streams are relative."""
     rig, grid = recording.rig, recording.rig.grid
     lines = [
         f"format = {FORMAT}",

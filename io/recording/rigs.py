@@ -1,7 +1,7 @@
 """The rig file: the scene, the grid, the cameras and their streams, as TOML that people read and write.
 
-Everything is checked on load, so that no later stage has to: an error names the file, the key (cameras count from 0),
-what was found and what was expected. Paths in the file are relative to it.
+Everything is checked on load, and no later stage checks again. Errors name the file, the key (cameras count from 0),
+the value found and the value expected. Paths in the file are relative to it.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from stseg.io.recording.rig_text import FORMAT, format_rig
 from stseg.io.toml.table import ANY, Table
 from stseg.io.toml.text import parse_toml
 
-_MOST_CELLS = 100_000_000  # of one frame's volume: beyond it a slip of the pen, not a scene
+_MOST_CELLS = 100_000_000  # of one frame's volume: more is a typing error
 _ON_MISSING: tuple[Literal["error", "blind"], ...] = ("error", "blind")
 _CLOCKS: tuple[ClockSource, ...] = ("auto", "stamps", "count")
 _CAMERA_KEYS = (
@@ -39,7 +39,7 @@ def read_rig(path: str | Path) -> Recording:
     Raises
     ------
     RigError
-        Where the file is missing, no TOML, or says something that cannot be.
+        Where the file is missing, no TOML, or has a value out of its range.
     CalibrationError
         Where a camera's geometry is singular or sees nothing of the area.
     """
@@ -54,7 +54,7 @@ def read_rig(path: str | Path) -> Recording:
 
 
 def parse_rig(text: str, path: Path) -> Recording:
-    """`read_rig` of a text that stands, or is to stand, in the file `path`."""
+    """`read_rig` of a text that belongs to the file `path`."""
     try:
         top = Table(path, "", parse_toml(text))
     except ValueError as error:
@@ -82,7 +82,7 @@ def write_rig(path: str | Path, recording: Recording) -> None:
     Raises
     ------
     RigError, CalibrationError
-        Where the recording describes what `read_rig` would refuse; nothing is written then.
+        Where `read_rig` would refuse the file; nothing is written then.
     OutputError
         Where the file cannot be written.
     """
@@ -100,7 +100,7 @@ def write_rig(path: str | Path, recording: Recording) -> None:
 
 
 def _named(tables: tuple[Table, ...]) -> tuple[Table, ...]:
-    """The cameras' tables with their names in their places; no name twice."""
+    """The cameras' tables, with camera names in their places for errors; names are unique."""
     names = [table.text("name") for table in tables]
     for index, (table, name) in enumerate(zip(tables, names, strict=True)):
         if name in names[:index]:
@@ -165,7 +165,7 @@ def _size(table: Table) -> tuple[int, int]:
 
 @contextmanager
 def _placed(table: Table, by_projection: bool) -> Iterator[None]:
-    """Say of a calibration error which key of the file it stands in."""
+    """Add the file and key to a calibration error."""
     try:
         yield
     except CalibrationError as error:

@@ -1,4 +1,4 @@
-"""Which files a source means: one, several in a list, or those of a pattern, in the order of time."""
+"""The files of a source: one, a list, or those of a pattern, in chronological order."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ _NUMBER = re.compile(r"(\d+)")
 
 
 def source_parts(source: Source, key: str) -> list[Source]:
-    """One source for each file or folder that is a stream by itself.
+    """One source for each file or folder that is a stream of its own.
 
     Raises
     ------
     SourceError
-        Where a pattern of videos means none.
+        Where a pattern of videos matches no file.
     """
     paths = [part for path in (source.path, *source.more) for part in _expanded(path, source.kind, key)]
     return [replace(source, path=path, more=(), starts=()) for path in paths]
@@ -33,7 +33,7 @@ def source_files(source: Source) -> Iterator[Path]:
 
 
 def _expanded(path: Path, kind: str, key: str) -> list[Path]:
-    """A pattern of videos stands for its files, ordered by the numbers in their names; all else for itself."""
+    """The files of a pattern of videos, ordered by the numbers in their names; other paths unchanged."""
     videos = kind == "video" or (kind == "masks" and not is_image_source(path.with_name(path.name.replace("*", "_"))))
     if not videos or not is_pattern(path) or path.is_file():
         return [path]
@@ -44,5 +44,5 @@ def _expanded(path: Path, kind: str, key: str) -> list[Path]:
 
 
 def numeric_order(path: Path) -> list[tuple[int, str]]:
-    """The order of files in time: words of their names in alphabetical order, numbers by their value."""
+    """Sort key of file names: words in alphabetical order, numbers by value."""
     return [(int(word), "") if word.isdigit() else (-1, word) for word in _NUMBER.split(path.name)]

@@ -1,4 +1,4 @@
-"""One camera's frames in order, whatever they are stored in."""
+"""One camera's frames in order, behind one protocol for videos, images and boxes."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ from stseg.io.recording.video_stream import VideoStream
 
 
 class Stream(Protocol):
-    """Frames that are read once, from the first to the last."""
+    """Frames read once, from the first to the last."""
 
     def skip(self, count: int) -> int:
-        """Pass over up to `count` frames; how many there were."""
+        """Skip up to `count` frames; return how many there were."""
 
     def read(self) -> Observation:
         """The next frame; None after the last."""
 
     def times(self) -> list[Floats]:
-        """Pass over all that is left: the time that each frame states, milliseconds; nan where it states none.
+        """Skip the rest and return the time stamps, milliseconds, nan where there is none.
 
-        One array a file; a file's times begin anew.
+        One array a file; each file's stamps start again.
         """
 
     def close(self) -> None:
-        """Let go of what is open."""
+        """Close what is open."""
 
 
 class BoxStream:
@@ -44,7 +44,7 @@ class BoxStream:
         self._next = 0
 
     def skip(self, count: int) -> int:
-        """Pass over up to `count` frames; how many there were."""
+        """Skip up to `count` frames; return how many there were."""
         skipped = min(count, self._table.frames - self._next)
         self._next += skipped
         return skipped
@@ -57,7 +57,7 @@ class BoxStream:
         return self._table.at(self._next - 1)
 
     def times(self) -> list[Floats]:
-        """Frames of a text file state no time."""
+        """Frames of a text file have no time stamps."""
         return [np.full(self.skip(self._table.frames), np.nan)]
 
     def close(self) -> None:
@@ -65,14 +65,14 @@ class BoxStream:
 
 
 class JoinedStream:
-    """Streams of one camera that follow one another; one is open at a time.
+    """Consecutive streams of one camera; one is open at a time.
 
     Parameters
     ----------
     parts, camera
-        One source a file or folder, in the order of time.
+        One source a file or folder, in chronological order.
     times
-        Of the frames of each part, where they are known.
+        Time stamps of the frames of each part, where known.
     """
 
     def __init__(self, parts: Sequence[Source], camera: Camera, times: Sequence[Floats] | None) -> None:
@@ -81,7 +81,7 @@ class JoinedStream:
         self._stream = self._open()
 
     def skip(self, count: int) -> int:
-        """Pass over up to `count` frames; how many there were. Parts of known length are not opened to be skipped."""
+        """Skip up to `count` frames; return how many there were. Parts of known length are skipped unopened."""
         skipped = self._skip_here(count)
         while skipped < count and self._next():
             skipped += self._skip_here(count - skipped)
@@ -95,18 +95,18 @@ class JoinedStream:
         return view
 
     def times(self) -> list[Floats]:
-        """Pass over all that is left: the time that each frame states, one array a part."""
+        """Skip the rest and return the time stamps, one array a part."""
         found = self._stream.times()
         while self._next():
             found += self._stream.times()
         return found
 
     def close(self) -> None:
-        """Let go of what is open."""
+        """Close what is open."""
         self._stream.close()
 
     def _skip_here(self, count: int) -> int:
-        """In this part, and in whole parts after it whose length is known."""
+        """Skip in this part, and in following whole parts of known length."""
         skipped = self._stream.skip(count)
         while skipped < count and self._times is not None and self._at + 1 < len(self._parts) - 1:
             length = len(self._times[self._at + 1])
@@ -132,7 +132,7 @@ class JoinedStream:
 def open_stream(source: Source, camera: Camera, times: Sequence[Floats] | None = None) -> Stream:
     """The stream of a source for a camera whose image size its frames must have.
 
-    With the times of all its frames, as `Stream.times` gave them, a video need not be decoded up to a far frame.
+    With the time stamps of all frames, from `Stream.times`, a video is not decoded up to a distant frame.
 
     Raises
     ------

@@ -1,14 +1,14 @@
-"""When each camera's frames were taken, and so which of them shows which tick of the recording's clock.
+"""Temporal alignment of cameras: which frame of each camera shows which tick of the recording's clock.
 
-Frame k of the recording is the scene k / frame_rate seconds after its start. A camera of which nothing else is known
-shows it in its own frame k - offset. Where its files state times, and these are believed, it shows it in the frame that
-was taken nearest to then; where there is none near, it is blind. What is believed, unless the rig says it (`clock`):
+Frame k of the recording is the scene k / frame_rate seconds after its start. By default a camera shows it in its own
+frame k - offset. Where the time stamps of its files are trusted, it shows it in the frame taken nearest to that time,
+and is blind where there is none near. Unless the rig decides (`clock`), stamps are trusted as follows:
 
-1. Stamps within half a frame of the frames' numbers: there is nothing to decide.
-2. Stamps that vary come from a clock and are believed. (Those of AVI are none, see `stseg.io.recording.time_stamps`.)
-3. Stamps of one constant other rate may come from a header. They are believed where another camera keeps the rig's
-   rate, by 1 or 2, but not if this camera then has as many frames as that one: it is the header that is wrong.
-4. All else is counted.
+1. Stamps within half a frame of the frame numbers: both agree, frames are counted.
+2. Stamps that vary come from a clock and are trusted. (AVI has none, see `stseg.io.recording.time_stamps`.)
+3. Stamps of another constant rate may come from a header. They are trusted where another camera keeps the rig's rate
+   by rule 1 or 2, unless this camera has as many frames as that one: then its header is wrong.
+4. Otherwise frames are counted.
 """
 
 from __future__ import annotations
@@ -25,24 +25,24 @@ from stseg.io.recording.source_files import source_parts
 from stseg.io.recording.time_stamps import TimeStamps, concatenate_files, have_stamps, interpret_stamps, require_starts
 
 _JITTER = 0.5
-"""How much farther than the last frame a new one may lie and be shown instead, ticks: else a camera whose frames lie
-between two ticks would show one twice and skip the next whenever they are early or late by a little."""
+"""Hysteresis, ticks: how much farther than the last frame a new one may lie and still replace it. Without it a camera
+whose frames lie midway between ticks would repeat and skip frames at the slightest jitter."""
 _ALIKE = 0.01
-"""How far the numbers of frames of two cameras may differ and still be the same, relative."""
+"""Relative difference up to which two frame counts are equal."""
 _TOGETHER = 1.0
-"""Cameras that go by time end together where they end within so much of each other, seconds."""
+"""Cameras aligned by time end together where their ends differ by no more than this, seconds."""
 
 
 @dataclass(frozen=True)
 class TimeAlignment:
-    """Which frame of each camera shows which tick.
+    """Which frame of each camera shows which tick, for all cameras.
 
     Attributes
     ----------
     shown : int64 (tick,) or None each
         `CameraSource.shown` of each camera.
     notes
-        What a user should be told, one line each.
+        Messages for the user, one line each.
     """
 
     shown: tuple[Ints | None, ...]
@@ -50,62 +50,62 @@ class TimeAlignment:
 
 
 @dataclass(frozen=True)
-class _Files:
-    """One camera's files: whether they state times, what these say, and where the frames lie by their numbers alone."""
+class _CameraTimes:
+    """One camera's files: whether they have time stamps, the stamps, and frame positions by counting alone, ticks."""
 
     name: str
     source: CameraSource
-    states: bool
+    has_stamps: bool
     stamps: TimeStamps | None
     counted: Floats
 
     @property
     def regular(self) -> bool:
-        """Whether its stamps say no more than its frames' numbers."""
+        """Whether its stamps agree with its frame numbers."""
         return self.stamps is not None and self.stamps.fits(self.counted)
 
     @property
     def keeps_rate(self) -> bool:
-        """Whether its stamps are known to be of the clock that ticks at the rig's rate."""
+        """Whether its stamps come from a clock at the rig's rate."""
         return self.stamps is not None and (self.regular or not self.stamps.steady)
 
 
 def align_in_time(recording: Recording, times: Sequence[Sequence[Floats]]) -> TimeAlignment:
-    """Place the frames of all cameras in time.
+    """Align the frames of all cameras in time.
 
     Parameters
     ----------
     recording
         The rig and its streams.
     times : float64 (n,) each
-        Of every frame of each file of each camera, milliseconds; nan where none is stated.
+        Time stamps of all frames of each file of each camera, milliseconds; nan where there is none.
 
     Raises
     ------
     SourceError
-        Where a camera's `clock` is its stamps and it has none, or its files' `starts` are not theirs.
+        Where a camera's `clock` is "stamps" and it has none, or `starts` do not fit its files.
     """
     rate = recording.rig.frame_rate
     cameras = [
-        _files(camera.name, source, own, rate)
+        _camera_times(camera.name, source, own, rate)
         for camera, source, own in zip(recording.rig.cameras, recording.sources, times, strict=True)
     ]
-    told: dict[str, list[str]] = {}
+    notes: dict[str, list[str]] = {}
     shown: list[Ints | None] = []
     for camera in cameras:
-        believed, note = _believed(camera, [other for other in cameras if other is not camera], rate)
+        trusted, note = _trusted_stamps(camera, [other for other in cameras if other is not camera], rate)
         if note:
-            told.setdefault(note, []).append(camera.name)
-        if believed is not None:
-            shown.append(nearest_frames(believed.position, believed.period))
+            notes.setdefault(note, []).append(camera.name)
+        if trusted is not None:
+            shown.append(nearest_frames(trusted.position, trusted.period))
         else:
             shown.append(nearest_frames(camera.counted, 1.0) if camera.source.source.starts else None)
-    notes = tuple(f"{', '.join(names)}: {note}" for note, names in told.items())
-    return TimeAlignment(_ended_together(recording, cameras, shown), notes)
+    lines = tuple(f"{', '.join(names)}: {note}" for note, names in notes.items())
+    return TimeAlignment(_with_common_end(recording, cameras, shown), lines)
 
 
 def with_alignment(recording: Recording, shown: Sequence[Ints | None]) -> Recording:
-    """The recording with its cameras' frames placed in time; as it was where nothing is said."""
+    """The recording with `shown` set for each camera; unchanged where `shown` is empty."""
     if not shown:
         return recording
     pairs = zip(recording.sources, shown, strict=True)
@@ -113,19 +113,19 @@ def with_alignment(recording: Recording, shown: Sequence[Ints | None]) -> Record
 
 
 def nearest_frames(position: Floats, period: float) -> Ints:
-    """For each tick the frame that is shown: the nearest, none after a later one, -1 where none is near.
+    """For each tick the nearest frame, in non-decreasing order; -1 where none is near.
 
     Parameters
     ----------
     position : float64 (n,)
-        Where each frame lies, ticks, rising.
+        Position of each frame, ticks, rising.
     period
-        What usually lies between two of them, ticks. A slow camera's frames stand for more than one tick.
+        Usual distance of two frames, ticks. Frames of a slow camera are shown for several ticks.
 
     Returns
     -------
     int64 (tick,)
-        From tick 0 to the last that the last frame stands for.
+        Ticks 0 to the last tick at which the last frame is shown.
     """
     free = float(np.clip(1.0 - period / 2, 0.0, _JITTER))
     reach = (max(1.0, period) + free) / 2
@@ -150,7 +150,7 @@ def coverage(recording: Recording, counts: Sequence[int], length: int) -> Flags:
     Parameters
     ----------
     recording
-        The rig and its streams, placed in time.
+        The rig and its streams, aligned in time.
     counts
         Frames of each camera.
     length
@@ -165,16 +165,16 @@ def coverage(recording: Recording, counts: Sequence[int], length: int) -> Flags:
     return flags
 
 
-def _files(name: str, source: CameraSource, times: Sequence[Floats], rate: float) -> _Files:
+def _camera_times(name: str, source: CameraSource, times: Sequence[Floats], rate: float) -> _CameraTimes:
     paths = [part.path for part in source_parts(source.source, f"camera {name}")]
     require_starts(source.source.starts, len(paths), source.source.path, f"camera {name}, source.starts")
     starts = np.array(source.source.starts, float)
     counted = concatenate_files([np.arange(float(len(own))) for own in times], 1.0, rate, paths, starts)
-    return _Files(name, source, have_stamps(times, paths), interpret_stamps(times, rate, paths, starts), counted)
+    return _CameraTimes(name, source, have_stamps(times, paths), interpret_stamps(times, rate, paths, starts), counted)
 
 
-def _believed(camera: _Files, others: Sequence[_Files], rate: float) -> tuple[TimeStamps | None, str]:
-    """The stamps by which a camera goes, None where its frames are counted, and what is to be told of it."""
+def _trusted_stamps(camera: _CameraTimes, others: Sequence[_CameraTimes], rate: float) -> tuple[TimeStamps | None, str]:
+    """The stamps that place a camera's frames, None where frames are counted; and a message for the user."""
     stamps, source = camera.stamps, camera.source
     if source.clock == "count":
         return None, ""
@@ -182,7 +182,10 @@ def _believed(camera: _Files, others: Sequence[_Files], rate: float) -> tuple[Ti
         if source.clock == "stamps":
             found = "files without time stamps that rise"
             raise SourceError(source.source.path, f"camera {camera.name}, clock", found, 'some, or clock = "count"')
-        return None, "the time stamps do not rise, or leap by a day; the frames are counted" if camera.states else ""
+        return (
+            None,
+            "the time stamps do not rise, or jump by a day; the frames are counted" if camera.has_stamps else "",
+        )
     if camera.regular:
         return None, ""
     if source.clock == "stamps":
@@ -190,33 +193,33 @@ def _believed(camera: _Files, others: Sequence[_Files], rate: float) -> tuple[Ti
     if not stamps.steady:
         return (
             stamps,
-            'the time stamps vary; each moment is shown by the frame nearest to it (clock = "count" would count)',
+            'the time stamps vary; each tick shows the nearest frame (clock = "count" would count)',
         )
-    said = f"the time stamps say {stamps.rate * rate:.4g} frames per second, the rig {rate:.4g}"
-    vouching = [other for other in others if other.keeps_rate or other.source.clock == "stamps"]
-    if not vouching or _same_count(camera, stamps, vouching):
-        return None, f'{said}; the frames are counted (clock = "stamps" would go by the stamps)'
-    return stamps, f'{said}; each moment is shown by the frame nearest to it (clock = "count" would count)'
+    rates = f"the time stamps say {stamps.rate * rate:.4g} frames per second, the rig {rate:.4g}"
+    references = [other for other in others if other.keeps_rate or other.source.clock == "stamps"]
+    if not references or _same_count(camera, stamps, references):
+        return None, f'{rates}; the frames are counted (clock = "stamps" would go by the stamps)'
+    return stamps, f'{rates}; each tick shows the nearest frame (clock = "count" would count)'
 
 
-def _same_count(camera: _Files, stamps: TimeStamps, vouching: Sequence[_Files]) -> bool:
-    """Whether a camera has as many frames as one that keeps the rig's rate, and by its stamps would not end with it."""
+def _same_count(camera: _CameraTimes, stamps: TimeStamps, references: Sequence[_CameraTimes]) -> bool:
+    """Whether a camera has as many frames as a reference at the rig's rate, but by its stamps another end."""
     count, by_time = len(camera.counted), stamps.position[-1] + stamps.period
-    ends = [_end(other) for other in vouching]
+    ends = [_end(other) for other in references]
     return any(abs(count - end) <= _ALIKE * end and abs(count - end) < abs(by_time - end) for end in ends)
 
 
-def _end(camera: _Files) -> float:
-    """Ticks that a camera which goes by its stamps is there for."""
+def _end(camera: _CameraTimes) -> float:
+    """End of a camera's frames by its stamps, ticks."""
     return float(camera.stamps.position[-1] + camera.stamps.period) if camera.stamps else float(len(camera.counted))
 
 
-def _ended_together(
-    recording: Recording, cameras: Sequence[_Files], shown: Sequence[Ints | None]
+def _with_common_end(
+    recording: Recording, cameras: Sequence[_CameraTimes], shown: Sequence[Ints | None]
 ) -> tuple[Ints | None, ...]:
-    """Cameras that must end together and go by time made to, where they nearly do.
+    """Give required cameras that are aligned by time a common end, where their ends nearly agree.
 
-    The end is that of the cameras which are counted, else the last of all; who has ended before is blind until then.
+    The end is that of counted cameras, else the latest of all; cameras that end earlier are blind until then.
     """
     required = [k for k, camera in enumerate(cameras) if camera.source.on_missing == "error"]
     counted = [cameras[k].source.offset + len(cameras[k].counted) for k in required if shown[k] is None]

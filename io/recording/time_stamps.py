@@ -1,6 +1,6 @@
-"""What the time stamps of one camera's files say: where its frames lie on a clock that ticks at the rig's rate.
+"""Time stamps of one camera's files: frame positions on a clock that ticks at the rig's rate.
 
-Stamps begin anew with each file. A file follows the one before without a gap, unless the rig says when it starts.
+Stamps start again with each file. A file follows the previous one without a gap, unless the rig gives its start.
 """
 
 from __future__ import annotations
@@ -16,27 +16,27 @@ from stseg.arrays import Floats
 from stseg.errors import SourceError
 
 _RESOLUTION = 0.002
-"""How far a stamp may be off by the rounding of containers, seconds."""
+"""Rounding error of stamps in containers, seconds."""
 _ROUNDED = 1e-5
-"""How far a rate may be off by its rounding in the rig file (29.97 for 30000 / 1001), relative."""
-_LEAP = 24 * 3600.0
-"""What no two frames of one file lie apart, seconds: such stamps are broken."""
+"""Rounding error of rates in the rig file (29.97 for 30000 / 1001), relative."""
+_LONGEST_GAP = 24 * 3600.0
+"""Distance of two frames of one file from which stamps count as broken, seconds."""
 _REGULAR = 0.5
-"""How far frames may lie from the ticks of their numbers and still be theirs, ticks."""
+"""Distance between stamp and frame number up to which both agree, ticks."""
 
 
 @dataclass(frozen=True)
 class TimeStamps:
-    """The frames of one camera on its own clock, whose tick 0 is the first frame of its first file.
+    """Frame positions of one camera on its own clock; tick 0 is the first frame of its first file.
 
     Attributes
     ----------
     position : float64 (n,)
-        Where each frame lies, ticks of the rig's clock, rising.
+        Position of each frame, ticks of the rig's clock, rising.
     period
-        What usually lies between two frames, ticks.
+        Usual distance of two frames, ticks.
     steady
-        Whether it always does: then a header may have said so, where no clock did.
+        Whether all distances equal it: the stamps may then come from a header rather than a clock.
     """
 
     position: Floats
@@ -44,7 +44,7 @@ class TimeStamps:
     steady: bool
 
     def fits(self, counted: Floats) -> bool:
-        """Whether every frame lies where counting puts it, within half a tick: positions float64 (n,), ticks."""
+        """Whether all stamps agree with positions by counting, float64 (n,) ticks, within half a tick."""
         far = np.abs(self.position - counted)
         return bool((far <= _REGULAR + _ROUNDED * np.arange(len(counted))).all())
 
@@ -57,28 +57,28 @@ class TimeStamps:
 def interpret_stamps(
     times: Sequence[Floats], frame_rate: float, paths: Sequence[Path], starts: Floats
 ) -> TimeStamps | None:
-    """What the stamps of a camera's files say; None where there are none, or they do not rise, or leap by a day.
+    """Frame positions by the stamps of a camera's files; None where stamps lack, do not rise, or jump by a day.
 
-    AVI states a rate and no times: what decoders make of B-frames and empty chunks in it is no clock.
+    AVI has a rate and no stamps: the times that decoders give to its B-frames and empty chunks are no clock.
 
     Parameters
     ----------
     times : float64 (n,) each
-        Of the frames of each file, milliseconds; nan where none is stated.
+        Stamps of the frames of each file, milliseconds; nan where there is none.
     frame_rate
-        The rig's, frames per second.
+        Of the rig, frames per second.
     paths
         The files.
     starts : float64 (file,)
-        When each file begins, seconds; none where they follow one another.
+        Start of each file, seconds; empty where files follow one another.
 
     Raises
     ------
     SourceError
-        Where a file starts before the one before has ended.
+        Where a file starts before the previous one has ended.
     """
     files = [(own - own[:1]) / 1000 * frame_rate for own in times]
-    if not all(np.isfinite(own).all() and _rises(np.diff(own), _LEAP * frame_rate) for own in files):
+    if not all(np.isfinite(own).all() and _rises(np.diff(own), _LONGEST_GAP * frame_rate) for own in files):
         return None
     steps = np.concatenate([np.diff(own) for own in files])
     if not len(steps):
@@ -93,26 +93,26 @@ def interpret_stamps(
 
 
 def have_stamps(times: Sequence[Floats], paths: Sequence[Path]) -> bool:
-    """Whether a camera's files claim to say when each of their frames was taken."""
+    """Whether a camera's files have a time stamp for each frame."""
     return all(np.isfinite(own).all() for own in times) and not any(map(_is_avi, paths))
 
 
-def _rises(steps: Floats, leap: float) -> bool:
-    return bool(((steps > 0) & (steps < leap)).all())
+def _rises(steps: Floats, gap: float) -> bool:
+    return bool(((steps > 0) & (steps < gap)).all())
 
 
 def concatenate_files(
     files: Sequence[Floats], period: float, frame_rate: float, paths: Sequence[Path], starts: Floats
 ) -> Floats:
-    """The frames of all files on one clock, ticks; those of each file count from its own first.
+    """Frame positions of all files on one clock, ticks; those of each file count from its own first frame.
 
-    Where there are no `starts` a file begins one period after the last frame of the one before; exactly as many ticks
-    after its first as it has frames where that is the same but for rounding, so that the border leaves no trace.
+    Without `starts` a file begins one period after the last frame of the previous one. Where that equals its number of
+    frames up to rounding it is exactly that number, so that splitting a recording changes nothing.
 
     Raises
     ------
     SourceError
-        Where a file starts before the one before has ended.
+        Where a file starts before the previous one has ended.
     """
     begin, parts = 0.0, list[Floats]()
     for k, own in enumerate(files):
@@ -127,10 +127,10 @@ def concatenate_files(
 
 
 def _after(parts: Sequence[Floats], begin: float, frame_rate: float, path: Path) -> float:
-    """A start, which lies after all frames before it."""
+    """The start of a file, checked to lie after all frames before it."""
     last = float(parts[-1][-1]) if parts else -np.inf
     if begin <= last:
-        found = f"{begin / frame_rate:.3f} s, when the file before goes on until {last / frame_rate:.3f} s"
+        found = f"{begin / frame_rate:.3f} s, when the previous file goes on until {last / frame_rate:.3f} s"
         raise SourceError(path, "starts", found, "files that follow one another")
     return begin
 
@@ -142,7 +142,7 @@ def _is_avi(path: Path) -> bool:
 
 
 def require_starts(starts: Sequence[float], files: int, path: Path, key: str) -> None:
-    """Raise SourceError where starts are given, but not one for each file in the order of time."""
+    """Raise SourceError where `starts` are given, but not one for each file, rising."""
     if starts and len(starts) != files:
         raise SourceError(path, key, f"{len(starts)} starts of {files} files", "one for each")
     if any(after <= before for before, after in pairwise(starts)) or min(starts, default=0.0) < 0:

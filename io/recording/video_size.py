@@ -1,4 +1,4 @@
-"""How large the frames of a video are, before any rig says it."""
+"""Frame size of a video, without a rig."""
 
 from __future__ import annotations
 

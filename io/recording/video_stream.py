@@ -1,10 +1,10 @@
-"""A video file, frame after frame. Its length is what decodes, whatever its header says."""
+"""A video file read frame by frame. Its length is the number of frames that decode; headers are not trusted."""
 
 from __future__ import annotations
 
 import os
 
-# FFmpeg reads this at its first use; what goes wrong is said by a SourceError instead.
+# Silences FFmpeg, which reads this at its first use; failures raise SourceError instead.
 os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
 
 import cv2
@@ -20,9 +20,9 @@ from stseg.io.recording.recording import Source
 cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
 
 _NEAR = 250
-"""Frames that are decoded rather than sought past."""
+"""Frames that are decoded sequentially rather than skipped by seeking."""
 _BEFORE = 4
-"""Frames before the one that is sought, so that what stands where seeking lands can be told by its time."""
+"""Frames before the target at which seeking aims: seeking is inexact, and the landing frame is known by its stamp."""
 
 
 class VideoStream:
@@ -33,9 +33,8 @@ class VideoStream:
     source, camera
         The file, and the camera whose size its frames must have.
     times : float64 (n,)
-        Of all frames, milliseconds, as `times` found them by decoding; far frames are then sought. Seeking is not
-        exact, so where it lands is told by the time of the frame that is there; where that does not tell, the video is
-        decoded from its beginning.
+        Time stamps of all frames, milliseconds, from `times`; distant frames are then sought. Seeking is inexact: the
+        landing frame is identified by its stamp. Where the stamp is ambiguous the video is decoded from its beginning.
 
     Raises
     ------
@@ -51,7 +50,7 @@ class VideoStream:
         self._open()
 
     def skip(self, count: int) -> int:
-        """Drop up to `count` frames; how many there were."""
+        """Skip up to `count` frames; return how many there were."""
         before = self._frame
         if self._times is not None and count >= len(self._times) - 1 - before:
             self._frame, self._ended = len(self._times) - 1, True
@@ -62,13 +61,13 @@ class VideoStream:
         return self._frame - before
 
     def times(self) -> list[Floats]:
-        """Pass over all that is left: the time that the file gives each frame, milliseconds.
+        """Skip the rest and return the time stamp of each frame, milliseconds.
 
-        By decoding them, unless packets tell: headers of real files lie.
+        By decoding, unless packets suffice: headers of real files are often wrong.
         """
-        if self._frame < 0 and (told := packet_times(self._source.path)) is not None:
-            self._frame, self._ended = len(told) - 1, True
-            return [told]
+        if self._frame < 0 and (stamps := packet_times(self._source.path)) is not None:
+            self._frame, self._ended = len(stamps) - 1, True
+            return [stamps]
         found = []
         while self._advance():
             found.append(self._capture.get(cv2.CAP_PROP_POS_MSEC))
@@ -85,18 +84,18 @@ class VideoStream:
         return as_observation(picture, self._source.kind, self._camera.size, self._source.path, key)
 
     def close(self) -> None:
-        """Let the file go."""
+        """Close the file."""
         self._capture.release()
 
     def _open(self) -> None:
-        # FFmpeg by name: the same decoder on every system, and seeking fallbacks of other backends stay out.
+        # FFmpeg by name: the same decoder on every system, without the fallbacks of other backends.
         self._capture = cv2.VideoCapture(str(self._source.path), cv2.CAP_FFMPEG)
         if not self._capture.isOpened():
             raise self._error("a file that does not open as a video", "a video that FFmpeg decodes")
         self._frame, self._ended = -1, False
 
     def _seek(self, frame: int, times: Floats) -> None:
-        """Go to a frame not after this one, as near as the file allows; to the beginning where that cannot be told."""
+        """Go to a frame at or shortly before this one; to the beginning where the landing frame is ambiguous."""
         self._capture.set(cv2.CAP_PROP_POS_FRAMES, frame - _BEFORE)
         if self._capture.grab():
             here = np.flatnonzero(times == self._capture.get(cv2.CAP_PROP_POS_MSEC))

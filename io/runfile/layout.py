@@ -1,8 +1,7 @@
-"""The run file as a specification: names, dtypes, axes, units and attributes of everything in it.
+"""The layout of the run file: names, dtypes, axes, units and attributes of everything in it.
 
-The writer makes what stands here, the reader checks it. The NeXus attributes are those that silx, h5web and nexpy ask
-for (NXdata: signal, axes, interpretation); the dimension scales are what xarray reads, /trajectory with @fps and the
-root's @wkt_geometry what PedPy reads.
+The writer creates this layout and the reader checks it. silx, h5web and nexpy read the NeXus attributes (NXdata:
+signal, axes, interpretation), xarray the dimension scales, PedPy /trajectory with @fps and the root's @wkt_geometry.
 """
 
 from __future__ import annotations
@@ -33,11 +32,11 @@ class Field:
     name
     dtype
     axes
-        Names of the scales along it. What has a time axis grows along it, one frame a chunk.
+        Names of the scales along it. Arrays with a time axis grow along it, one frame a chunk.
     units
-        Empty where it counts or names something.
+        Empty for counts and names.
     long_name
-        What viewers write beside it, in place of the name and the units; so it ends in the units.
+        Label in viewers; it ends in the units.
     """
 
     name: str
@@ -60,33 +59,33 @@ LABEL = Field("label", np.dtype("<i4"), AXES, "", "track id; 0 is background")
 FRAME = Field("frame", np.dtype("<i8"), ("time",), "", "frame of the recording")
 VIEWS = Field("views", np.dtype("u1"), AXES[1:], "", "number of views that see the cell")
 STEP = 1 / 32
-"""Nats between two values that log_odds may have: what is finer is noise, and would make files larger."""
+"""Quantisation of log_odds, nats: finer digits are noise and would enlarge the file."""
 FIELDS = (*SCALES, LOG_ODDS, LABEL, FRAME, VIEWS)
 
 KEPT = ("all", "tracks", "none")
-"""What @kept of the occupancy says: the whole volume, what is near tracks, or nothing of it."""
+"""Values of @kept of the occupancy: the whole volume, cells near tracks, or nothing."""
 
 ABOUT = {
     "trajectory": "one row per person and frame: metres on the ground, covariance in square metres, score in nats",
     "tracks": "one row per track: first and last frame, mean score in nats, median height and width in metres",
     "boxes": "one row per person, frame and view: pixels of the real image; view counts the cameras from 0",
     "events": "birth, death, merge, split, hand-over, dropped, blind; other is the other track, 0 for none",
-    "ghosts": "one row per candidate and frame: status 1 true, 0 ghost; evidence in nats, parts what each view says",
+    "ghosts": "one row per candidate and frame: status 1 true, 0 ghost; evidence in nats, parts by view",
     "windows": "one row per window: half-open ranges of frames; energy of the cut in units of energy_quantum, nats",
-    "rates": "one row per window and view: how often the view errs, 0..1, and how far beside people it is, metres",
-    "shifts": "every other second, how far a colour view's picture has moved since its background was learned, pixels",
-    "timings": "seconds per stage and window; window -1 for work that belongs to none",
+    "rates": "one row per window and view: error rates of the view, 0..1, and its reprojection residual, metres",
+    "shifts": "every other second, image shift of each colour view since its background was learned, pixels",
+    "timings": "seconds per stage and window; window -1 for work outside windows",
 }
-"""Every table and what it holds."""
+"""Every table and its contents."""
 
 EARLIER = {LOG_ODDS.name: np.dtype("<f2")}
-"""Types that fields had in the first files of this version: readers take them, but browsers cannot show halves."""
+"""Types of fields in the first files of this version, which readers accept; browsers cannot show half precision."""
 
 ADDED = frozenset({"rates", "shifts"})
-"""Tables that the first files of this version lack: readers take them as empty."""
+"""Tables absent from the first files of this version; read as empty."""
 
 ADDED_COLUMNS = frozenset({"width", "aside"})
-"""Columns of floats that the first files of this version lack in some tables: readers take them as nan."""
+"""Columns of floats absent from the first files of this version; read as nan."""
 
 
 def table_types(views: int) -> dict[str, np.dtype[np.void]]:
@@ -105,7 +104,7 @@ def table_types(views: int) -> dict[str, np.dtype[np.void]]:
 
 
 def ghost_type(views: int) -> np.dtype[np.void]:
-    """CANDIDATE and `parts`, float32 (views,): what each view says of the candidate, nats."""
+    """CANDIDATE and `parts`, float32 (views,): evidence of each view for the candidate, nats."""
     return np.dtype([*CANDIDATE.descr, ("parts", "<f4", (views,))])
 
 
@@ -129,7 +128,7 @@ OCCUPANCY_ATTRIBUTES: Mapping[str, object] = {
 
 
 def walkable_area(grid: Grid) -> str:
-    """The area that counts as well-known text, metres."""
+    """The walkable area as well-known text, metres."""
     corners: Floats | list[tuple[float, float]] | None = grid.polygon
     if corners is None:
         (left, right), (bottom, top) = grid.x, grid.y

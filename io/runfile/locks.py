@@ -1,4 +1,4 @@
-"""One writer at a time."""
+"""File locks: one writer at a time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A run file as layers of napari: the volume, the labels, the tracks. `stseg/napari.yaml` tells napari of it."""
+"""A run file as layers of napari: the volume, the labels, the tracks. `stseg/napari.yaml` registers it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _UNITS = ("s", "m", "m", "m")
 
 
 def get_reader(path: str | list[str]) -> Callable[[str], list[Layer]] | None:
-    """What reads a path that is dropped on napari; None where it is no run file, nor a single one."""
+    """The reader of a path that is dropped on napari; None unless it is a single run file."""
     if not isinstance(path, str) or not h5py.is_hdf5(path):
         return None
     with h5py.File(path, "r") as file:
@@ -79,7 +79,7 @@ def _scale(run: Run) -> tuple[float, ...]:
 
 
 def _first_cell(run: Run) -> tuple[float, ...]:
-    """Where the centre of the first cell of the first frame is, seconds and metres."""
+    """Centre of the first cell of the first frame, seconds and metres."""
     axes = (run.frames / run.frame_rate, run.heights, run.ground_y, run.ground_x)
     return tuple(float(axis[0]) if len(axis) else 0.0 for axis in axes)
 
@@ -90,7 +90,7 @@ def _step(axis: Floats) -> float:
 
 
 def _contrast(run: Run) -> tuple[float, float]:
-    """From 0, where a person is as likely as not, to the most of the frame in the middle, nats."""
+    """From 0 (even odds) to the maximum of the middle frame, nats."""
     if not len(run.frames):
         return 0.0, 1.0
     log_odds, _ = run.read_frame(int(run.frames[len(run.frames) // 2]))

@@ -1,4 +1,4 @@
-"""The part of an output that HDF5 writes: a file object that shows HDF5 neither failures nor interrupts."""
+"""The file object that HDF5 writes to: failures and interrupts are deferred until HDF5 has returned."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ _Handler = Callable[[int, FrameType | None], object]
 class PartFile(io.RawIOBase):
     """`NAME.part` as a file object that never raises while HDF5 calls it.
 
-    HDF5 cannot close a file once a write has failed, and crashes on trying. So the first failure is kept and later
-    writes are dropped, and an interrupt (Ctrl-C) is kept as well, to be raised at the end of the step. All that HDF5
-    does, the closing of its datasets too, belongs into a `step`.
+    HDF5 cannot close a file once a write has failed, and crashes on trying. So the first failure is recorded, later
+    writes are dropped, and both failures and interrupts (Ctrl-C) are raised at the end of the step. All calls of HDF5,
+    closing of datasets included, belong into a `step`.
 
     Parameters
     ----------
@@ -55,11 +55,11 @@ class PartFile(io.RawIOBase):
 
     @contextmanager
     def step(self) -> Iterator[None]:
-        """Raise at the end what was kept: OutputError where a write has failed, or the interrupt."""
+        """A block of HDF5 calls; at its end a deferred failure is raised as OutputError, or a deferred interrupt."""
         self._in_step = True
         try:
             yield
-        except (OSError, RuntimeError):  # what HDF5 makes of reading what was never written
+        except (OSError, RuntimeError):  # HDF5 reading back what was dropped
             self._raise_failure()
             raise
         finally:
@@ -70,7 +70,7 @@ class PartFile(io.RawIOBase):
             self._handlers[number](number, None)
 
     def publish(self, overwrite: bool) -> None:
-        """Sync, and give the file its name; where that fails the part stays, for it is whole."""
+        """Sync the finished part and rename it; where that fails the part is kept."""
         kept = f"the whole result is kept in {part_path(self._path)}"
         if self._path.exists() and not overwrite:
             raise OutputError(self._path, "", "a file that has appeared meanwhile", f"none; {kept}")
@@ -80,11 +80,11 @@ class PartFile(io.RawIOBase):
                 self._file.close()
             publish_part(self._path)
         except OSError as error:
-            told = output_error(self._path, error)
-            raise OutputError(told.place, "", told.found, f"{told.expected}; {kept}") from error
+            cause = output_error(self._path, error)
+            raise OutputError(cause.place, "", cause.found, f"{cause.expected}; {kept}") from error
 
     def discard(self, close_hdf5: Callable[[], object]) -> None:
-        """Delete the part; nothing that happens on the way may hide what stopped the run."""
+        """Delete the part; errors on the way are suppressed in favour of the one that stopped the run."""
         self._in_step = True
         with suppress(OSError, RuntimeError):
             close_hdf5()
@@ -93,7 +93,7 @@ class PartFile(io.RawIOBase):
         self.close()
 
     def close(self) -> None:
-        """Let go of the file and its lock; HDF5 has closed it by then."""
+        """Close the file and its lock, after HDF5 has closed it."""
         if self.closed:
             return
         with suppress(OSError):
@@ -103,7 +103,7 @@ class PartFile(io.RawIOBase):
             signal.signal(number, before)
 
     def write(self, data: memoryview) -> int:  # type: ignore[override]  # what h5py gives
-        """All of it, or the failure is kept."""
+        """Write everything, or record the failure."""
         rest = memoryview(data)
         try:
             while self._failure is None and rest.nbytes:
@@ -113,7 +113,7 @@ class PartFile(io.RawIOBase):
         return memoryview(data).nbytes
 
     def truncate(self, size: int | None = None) -> int:
-        """Set the length, or the failure is kept."""
+        """Set the length, or record the failure."""
         try:
             if self._failure is None:
                 self._file.truncate(size)
@@ -134,14 +134,14 @@ class PartFile(io.RawIOBase):
         return self._file.tell()
 
     def flush(self) -> None:
-        """Nothing is buffered here."""
+        """No-op: writes are unbuffered."""
 
     def _raise_failure(self) -> None:
         if self._failure is not None:
             raise output_error(self._path, self._failure) from self._failure
 
     def _shield(self) -> dict[int, _Handler]:
-        """Keep interrupts and termination out of the steps; what handled them before, where they can strike."""
+        """Defer interrupts and termination to the ends of steps; return the previous handlers."""
         if threading.current_thread() is not threading.main_thread():
             return {}
 

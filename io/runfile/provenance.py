@@ -1,4 +1,4 @@
-"""What a run was made from: the resolved configuration, the rig, versions, and the files of every stream."""
+"""Provenance of a run: the resolved configuration, the rig, versions, and the files of every stream."""
 
 from __future__ import annotations
 
@@ -40,21 +40,21 @@ SOURCE = np.dtype(
 
 @dataclass(frozen=True)
 class Provenance:
-    """What a run was made from.
+    """Provenance of a run.
 
     Attributes
     ----------
     created
-        When the run began, ISO 8601, UTC.
+        Start of the run, ISO 8601, UTC.
     config
         The resolved configuration, TOML.
     rig
-        The rig file, TOML; it stood at `rig_path`.
+        The text of the rig file at `rig_path`, TOML.
     versions
-        Of this package, Python and the libraries that compute.
+        Of this package, Python and numerical libraries.
     sources : SOURCE (n,)
     shown
-        By camera, where its frames do not count themselves: `CameraSource.shown`, int64 (tick,).
+        `CameraSource.shown` by camera, int64 (tick,), of cameras aligned in time.
     """
 
     created: str
@@ -100,7 +100,7 @@ def write_provenance(group: h5py.Group, provenance: Provenance) -> None:
 
 
 def read_provenance(group: h5py.Group) -> Provenance:
-    """What `write_provenance` wrote."""
+    """Read the group /provenance."""
     return Provenance(
         group.attrs["created"],
         group["config"].asstr()[()],
@@ -113,19 +113,19 @@ def read_provenance(group: h5py.Group) -> Provenance:
 
 
 def run_request(provenance: Provenance) -> dict[str, Any]:
-    """All that decides what a run finds, as texts and numbers in nested tables; when it began is left out."""
+    """Everything that determines the result of a run, as texts and numbers in nested tables."""
     rig = parse_toml(provenance.rig)
     rig["camera"] = {camera.pop("name"): camera for camera in rig["camera"]}
-    sources = {f"{_word(row['camera'])}, {_word(row['role'])}": _told(row) for row in provenance.sources}
+    sources = {f"{_word(row['camera'])}, {_word(row['role'])}": _files_in_words(row) for row in provenance.sources}
     config = parse_toml(provenance.config)
     return {"config": config, "rig": rig, "source": sources, "version": dict(provenance.versions)}
 
 
-def _told(row: np.void) -> str:
-    """One stream's files, in words."""
+def _files_in_words(row: np.void) -> str:
+    """Description of one stream's files."""
     name = Path(_word(row["path"])).name
     if not row["files"]:
-        return f"{name}, of which there is nothing"
+        return f"{name}, which does not exist"
     written = datetime.fromtimestamp(float(row["modified"]), UTC).isoformat()
     return f"{name}, {row['files']} files, {row['size']} bytes in all, written {written}"
 
@@ -154,7 +154,7 @@ def _sources(recording: Recording) -> Rows:
 
 
 def _described(source: Source) -> tuple[bytes, str, int, int, float]:
-    """kind, path, files, size, modified. Whether a stream can be read is not for here to say."""
+    """kind, path, files, size, modified; zeros for streams that cannot be found."""
     try:
         states = [path.stat() for path in source_files(source)] if not source.address else []
     except (OSError, SourceError):

@@ -1,4 +1,4 @@
-"""Reading a run file: its layout is checked on opening, its tables are read when they are asked for."""
+"""Reader of run files: the layout is checked on opening, tables are read on demand."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Run:
-    """What is in a run file.
+    """The contents of a run file.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class Run:
     frame_rate
         Frames per second.
     cameras
-        Their names; tables count them from 0.
+        Names; tables count cameras from 0.
     frames : int64 (time,)
         Numbers of the frames in the recording.
     heights, ground_y, ground_x : float64 (plane,), (y,), (x,)
@@ -47,7 +47,7 @@ class Run:
     views : uint8 (plane, y, x)
         Number of views that see each cell.
     kept
-        What of the volume is in the file: "all", what is near "tracks", or "none".
+        Stored part of the volume: "all", cells near "tracks", or "none".
     """
 
     path: Path
@@ -108,14 +108,16 @@ class Run:
 
     @cached_property
     def provenance(self) -> Provenance:
-        """What the run was made from."""
+        """Configuration, rig, versions and sources of the run."""
         return _read(self.path, layout.PROVENANCE, lambda file: read_provenance(file[layout.PROVENANCE]))
 
     @cached_property
     def recording(self) -> Recording:
-        """The rig, with its grid, and the streams, as they were when the run began."""
-        told = self.provenance
-        return with_alignment(parse_rig(told.rig, told.rig_path), [told.shown.get(name) for name in self.cameras])
+        """The rig with its grid, and the streams, as at the start of the run."""
+        provenance = self.provenance
+        return with_alignment(
+            parse_rig(provenance.rig, provenance.rig_path), [provenance.shown.get(name) for name in self.cameras]
+        )
 
     def data_frame(self, table: str) -> DataFrame:
         """One of the tables as a data frame of pandas, with `time` in seconds where it has frames.
@@ -123,8 +125,8 @@ class Run:
         Parameters
         ----------
         table
-            trajectory, tracks, boxes, events, ghosts, windows, rates, shifts or timings. Texts are strings; what each
-            view says of a candidate is one column a view, `parts_CAMERA`.
+            trajectory, tracks, boxes, events, ghosts, windows, rates, shifts or timings. Texts are strings; the
+            evidence of each view for a candidate is one column a view, `parts_CAMERA`.
 
         Raises
         ------
@@ -157,7 +159,7 @@ class Run:
 
     def read_volumes(self, number: int) -> Iterator[tuple[Ints, Singles, Labels]]:
         """The volumes of all frames, `number` at a time: the frames, log-odds and labels as `read_frame` gives them."""
-        with _told_as_format_error(self.path, layout.OCCUPANCY), h5py.File(self.path, "r") as file:
+        with _as_format_error(self.path, layout.OCCUPANCY), h5py.File(self.path, "r") as file:
             group = file[layout.OCCUPANCY]
             for start in range(0, len(self.frames), number):
                 some = slice(start, start + number)
@@ -204,19 +206,19 @@ def read_trajectory(path: Path) -> Rows:
 
 
 def _read(path: Path, place: str, take: Callable[[h5py.File], T]) -> T:
-    with _told_as_format_error(path, place), h5py.File(path, "r") as file:
+    with _as_format_error(path, place), h5py.File(path, "r") as file:
         return take(file)
 
 
 @contextmanager
-def _told_as_format_error(path: Path, place: str) -> Iterator[None]:
+def _as_format_error(path: Path, place: str) -> Iterator[None]:
     try:
         yield
     except FileNotFoundError as error:
         raise FormatError(path, "", "no such file", "a run file") from error
     except BlockingIOError as error:
         raise FormatError(path, "", "a file that is still being written", "a finished run file") from error
-    except (OSError, RuntimeError, KeyError, TypeError, ValueError) as error:  # all that h5py makes of broken files
+    except (OSError, RuntimeError, KeyError, TypeError, ValueError) as error:  # whatever h5py raises on broken files
         if path.is_file() and not h5py.is_hdf5(path):
             raise FormatError(path, "", "something that is not HDF5", "a run file") from error
         raise FormatError(path, place, f"something that cannot be read ({error})", "a whole run file") from error

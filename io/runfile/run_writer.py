@@ -1,4 +1,4 @@
-"""Writing a run file, or that of a segment, step by step; it takes its name only once it is whole."""
+"""Incremental writer of run files and segment files; a file takes its name once it is complete."""
 
 from __future__ import annotations
 
@@ -23,17 +23,16 @@ _HELD_ROWS = 4096  # of one table, before they are written
 
 
 class RunWriter:
-    """A run file in the making: `PATH.part` beside its place until `finish`.
+    """Writes a run file as `PATH.part`, renamed by `finish`.
 
-    Use it in a `with`: whatever is raised before `finish` leaves no part behind and an older file of that name as it
-    was.
+    Use it in a `with`: an exception before `finish` removes the part and leaves an older file of that name unchanged.
 
     Parameters
     ----------
     path
-        Where the run file is to stand.
+        The run file.
     recording
-        What is run.
+        The rig and its streams.
     views : uint8 (plane, y, x)
         Number of views that see each cell.
     config_text
@@ -41,7 +40,7 @@ class RunWriter:
     overwrite
         Whether an older file of that name may be replaced, at the end.
     kept
-        One of `stseg.io.runfile.layout.KEPT`: what of the volume is appended; the rest is NaN and background.
+        One of `stseg.io.runfile.layout.KEPT`: the part of the volume that is appended; the rest is NaN and background.
 
     Raises
     ------
@@ -79,7 +78,7 @@ class RunWriter:
             self._disk.discard(self._close)
 
     def append_frames(self, frames: Ints, log_odds: Singles, label: Labels) -> None:
-        """Write the volume of the next frames.
+        """Append the volume of the next frames.
 
         Parameters
         ----------
@@ -117,7 +116,7 @@ class RunWriter:
             for table in self._tables.values():
                 table.flush()
             self._close()  # flushes
-        self._finished = True  # the part is whole: from here it is kept, whatever happens
+        self._finished = True  # the part is complete and is kept from here on
         try:
             with self._disk.step():  # an interrupt waits until the part has its name
                 self._disk.publish(self._overwrite)
@@ -155,7 +154,7 @@ class RunWriter:
 
 
 class _Table:
-    """A table that grows; rows are held until there are enough for a chunk."""
+    """A growing table; rows are buffered up to a chunk."""
 
     def __init__(self, dataset: h5py.Dataset) -> None:
         self._dataset = dataset
@@ -163,7 +162,7 @@ class _Table:
         self._count = 0
 
     def append(self, rows: Rows) -> None:
-        """Add rows (n,) of the table's dtype; they are held until there are enough to write."""
+        """Add rows (n,) of the table's dtype to the buffer."""
         if rows.dtype != self._dataset.dtype:
             raise ValueError(f"rows {rows.dtype} for the table {self._dataset.name} of {self._dataset.dtype}")
         self._held.append(rows.copy())
@@ -194,7 +193,7 @@ def _create_occupancy(file: h5py.File, rig: Rig, views: Bytes) -> h5py.Group:
 
 
 def _create_field(group: h5py.Group, field: layout.Field, lengths: Mapping[str, int]) -> None:
-    """An empty array with its attributes, tied to the scales along it, which exist by then."""
+    """An empty array with its attributes, attached to the existing scales of its axes."""
     shape = tuple(lengths[axis] for axis in field.axes)
     grows = field.axes[0] == "time"
     chunks = (1, *shape[1:]) if grows and len(shape) > 1 else (1024,) if grows else None

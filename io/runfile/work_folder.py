@@ -1,13 +1,12 @@
-"""What an unfinished run has done: the folder `RUN.h5.segments` beside its output.
+"""State of an unfinished run for resuming: the folder `RUN.h5.segments` beside its output.
 
-    begun.json                  what is run: the same command goes on from here, any other is refused
-    streams.npz                 how long the streams are and when their frames were taken, counted once
-    files.json, clock.json      of a run that follows: which files were read, and when frame 0 was
+    begun.json                  the request: the same command resumes from here, any other is refused
+    streams.npz                 the stream index, made once
+    files.json, clock.json      of a followed recording: files that were read, and the time of frame 0
     segment-00003-CHECKSUM.h5   the run file of one segment
     lock                        held by the run that writes here
 
-Every file appears whole under its name, or not at all. A segment's name says what its bytes sum up to, so a file that
-has changed since is told, and the segment made anew.
+Files are written atomically. A segment's name contains its checksum; a segment that has changed is made again.
 """
 
 from __future__ import annotations
@@ -35,14 +34,14 @@ _SEGMENT = re.compile(r"segment-(\d{5})-([0-9a-f]{32})\.h5")
 
 @dataclass(frozen=True)
 class Difference:
-    """What another run said of one thing.
+    """A difference between two requests.
 
     Attributes
     ----------
     key
-        What differs.
+        The differing key.
     now, begun
-        What is asked for now, and what the run was begun with.
+        Its value in the present request and in that of the unfinished run.
     """
 
     key: str
@@ -56,22 +55,22 @@ class WorkFolder:
     Parameters
     ----------
     output
-        The run file to be.
-    asked
-        What is run: texts by name, tables in tables. A run that was begun must have been asked for the same.
+        The future run file.
+    request
+        Everything that determines the result, in nested tables; equal to that of the unfinished run.
 
     Raises
     ------
     OutputError
-        Where another run was begun or is at work here, or nothing can be written.
+        Where a different run is unfinished or running here, or the folder cannot be written.
     """
 
-    def __init__(self, output: Path, asked: dict[str, Any]) -> None:
+    def __init__(self, output: Path, request: dict[str, Any]) -> None:
         self.output, self.path = output, output.with_name(f"{output.name}.segments")
-        self._asked = asked
+        self._request = request
         self._lock: BinaryIO | None = None
         self.broken: list[Path] = []
-        """Segments whose bytes had changed; they are deleted."""
+        """Deleted segments, whose bytes had changed."""
 
     def __enter__(self) -> Self:
         try:
@@ -94,7 +93,7 @@ class WorkFolder:
         self.close()
 
     def close(self) -> None:
-        """Let go of the lock; a folder in which nothing was done is removed."""
+        """Release the lock; an empty folder is removed."""
         if self._lock is None:
             return
         if not self.begun:
@@ -106,11 +105,11 @@ class WorkFolder:
 
     @property
     def begun(self) -> bool:
-        """Whether anything is kept here."""
+        """Whether the folder holds an unfinished run."""
         return (self.path / "begun.json").exists()
 
     def segments(self) -> dict[int, Path]:
-        """The whole segments, by their numbers; files whose bytes have changed are deleted and noted in `broken`."""
+        """The finished segments by number; files whose bytes have changed are deleted and listed in `broken`."""
         found = {}
         for path in sorted(self.path.iterdir()):
             name = _SEGMENT.fullmatch(path.name)
@@ -124,11 +123,11 @@ class WorkFolder:
         return found
 
     def draft(self, index: int) -> Path:
-        """Where a segment is to be written, before `keep_segment`."""
+        """Path at which a segment is written, before `keep_segment`."""
         return self.path / f"segment-{index:05}.h5"
 
     def streams(self) -> StreamIndex | None:
-        """What was counted before; None where nothing was, or it cannot be read."""
+        """The stored stream index; None where there is none or it cannot be read."""
         try:
             with np.load(self.path / "streams.npz") as kept:
                 files = [range(int(count)) for count in kept["files"]]
@@ -140,7 +139,7 @@ class WorkFolder:
             return None
 
     def keep_streams(self, streams: StreamIndex) -> None:
-        """Remember what was counted."""
+        """Store the stream index."""
         with replacing(self.path / "streams.npz", overwrite=True) as part, part.open("wb") as file:
             times = {f"times{k}_{j}": own for k, files in enumerate(streams.times) for j, own in enumerate(files)}
             shown = {k: own for k, own in enumerate(streams.shown) if own is not None}
@@ -155,19 +154,19 @@ class WorkFolder:
             )
 
     def clock(self) -> float | None:
-        """When frame 0 of a live recording was, seconds since 1970; None where none was kept."""
+        """Stored time of frame 0 of a live recording, seconds since 1970, or None."""
         try:
             return float(json.loads((self.path / "clock.json").read_text("utf-8")))
         except (OSError, ValueError):
             return None
 
     def keep_clock(self, start: float) -> None:
-        """Remember when frame 0 was."""
+        """Store the time of frame 0."""
         with replacing(self.path / "clock.json", overwrite=True) as part:
             part.write_text(json.dumps(start), "utf-8")
 
     def remove(self) -> None:
-        """Delete the folder, once the output stands."""
+        """Delete the folder, once the output exists."""
         shutil.rmtree(self.path, ignore_errors=True)
         if self._lock is not None:
             self._lock.close()
@@ -179,13 +178,13 @@ class WorkFolder:
             before = json.loads(path.read_text("utf-8"))
         except FileNotFoundError:
             with replacing(path, overwrite=True) as part:
-                part.write_text(json.dumps(self._asked, indent=1), "utf-8")
+                part.write_text(json.dumps(self._request, indent=1), "utf-8")
             return
         except (OSError, ValueError) as error:
             raise OutputError(
                 path, "", f"something that cannot be read ({error})", self._anew("the run's notes")
             ) from error
-        for difference in differences(self._asked, before):
+        for difference in differences(self._request, before):
             found = f"{difference.now}, where the unfinished run of {self.path.name} has {difference.begun}"
             raise OutputError(self.output, difference.key, found, self._anew("the same, to go on"))
 
@@ -194,13 +193,13 @@ class WorkFolder:
 
 
 def checksum(path: Path) -> str:
-    """Of a file's bytes, 32 hexadecimal digits."""
+    """Checksum of a file, 32 hexadecimal digits."""
     with path.open("rb") as file:
         return file_digest(file, lambda: blake2b(digest_size=16)).hexdigest()
 
 
 def keep_segment(draft: Path) -> Path:
-    """Rename a segment that was written, whole and synced, to the name that says its checksum."""
+    """Rename a complete, synced segment to the name that contains its checksum."""
     kept = draft.with_name(f"{draft.stem}-{checksum(draft)}.h5")
     draft.replace(kept)
     sync_folder(kept.parent)
@@ -208,7 +207,7 @@ def keep_segment(draft: Path) -> Path:
 
 
 def differences(now: dict[str, Any], begun: dict[str, Any], prefix: str = "") -> list[Difference]:
-    """Everything in which two nested tables differ."""
+    """All differences of two nested tables."""
     found = []
     for key in (*now, *(key for key in begun if key not in now)):
         a, b, name = now.get(key, "nothing"), begun.get(key, "nothing"), f"{prefix}{key}"

@@ -39,7 +39,7 @@ class BlindViews:
         dropped = [frame for frame in frames if frame in self._dropped]
         if dropped:
             told.append(
-                (dropped[0], f"{len(dropped)} of {len(frames)} frames dropped: work is slower than the cameras")
+                (dropped[0], f"{len(dropped)} of {len(frames)} frames dropped: tracking is slower than the cameras")
             )
         for k, name in enumerate(self._cameras):
             blind = [frame for frame in frames if k in self._missing.get(frame, ())]
