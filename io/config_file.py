@@ -96,7 +96,7 @@ def _with_present_names(given: Mapping[str, Any]) -> dict[str, Any]:
         table = renamed
         for part in tables:
             table = table.setdefault(part, {})
-        table[name] = entry
+        table.setdefault(name, entry)  # of several former keys that are one now, the detector's comes first
     return renamed
 
 

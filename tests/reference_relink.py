@@ -6,10 +6,10 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from stseg.config import DetectionConfig, TrackingConfig
+from stseg.config import Config
 from stseg.tracking.isolated_tracklets import IsolatedTracklet
 
-TURN, STAYS, PARTED = 0.8, 3.0, 6.0
+STAYS, PARTED = 3.0, 6.0
 
 
 def log_normal(off: float, variance: float) -> float:
@@ -22,21 +22,24 @@ def gain(
     b: IsolatedTracklet,
     inside: float,
     frame_rate: float,
-    config: TrackingConfig,
-    people: DetectionConfig,
+    config: Config,
 ) -> float:
     """What speaks for one person in both, nats; `inside` is the mean of how far inside they part."""
     seconds = (b.start.frame - a.end.frame) / frame_rate
-    if seconds <= 0 or seconds > config.maximum_gap:
+    if seconds <= 0 or seconds > config.tracking.maximum_gap:
         return -np.inf
     speeds = a.end.velocity_variance + b.start.velocity_variance
-    variance = 2 * config.position_noise**2 + seconds**2 * speeds / 4 + TURN**2 * seconds**3 / 12
+    variance = (
+        2 * config.motion.position_noise**2
+        + seconds**2 * speeds / 4
+        + config.motion.velocity_noise**2 * seconds**3 / 12
+    )
     total = PARTED * inside + (STAYS if a.track == b.track else 0.0)
     for axis in range(2):
         walked = seconds * (a.end.velocity[axis] + b.start.velocity[axis]) / 2
         total += log_normal(b.start.ground[axis] - a.end.ground[axis] - walked, variance)
     one = log_normal(a.height - b.height, a.height_variance + b.height_variance)
-    two = log_normal(a.height - b.height, 2 * people.height_spread**2)
+    two = log_normal(a.height - b.height, 2 * config.body.height_spread**2)
     return total + one - two
 
 

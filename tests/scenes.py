@@ -15,7 +15,7 @@ import numpy as np
 from reference_walkers import greedy_pairs
 
 from stseg.arrays import Boxes, Bytes, Floats, Observation, Rows, Singles
-from stseg.config import Config, DetectionConfig
+from stseg.config import BodyConfig, Config, DetectionConfig
 from stseg.geometry import Camera, Grid, Lens, Rig
 from stseg.geometry.bodies import PROFILE, SILHOUETTE
 from stseg.model.people import People
@@ -27,9 +27,10 @@ SIZE = (128, 96)
 FOCAL = 75.0
 AREA = (-2.0, 2.0)
 FRAME_RATE = 8.0
-FEW_HEIGHTS = DetectionConfig(heights=(1.6, 1.7, 1.8), lattice_spacing=0.25)
+FEW_HEIGHTS = DetectionConfig(lattice_spacing=0.25)
+BODY = BodyConfig(heights=(1.6, 1.7, 1.8))
 """The pass with few heights and a coarse lattice: as good on these scenes, and quick without a compiler."""
-CONFIG = Config(detection=FEW_HEIGHTS)
+CONFIG = Config(body=BODY, detection=FEW_HEIGHTS)
 _FINE = 4
 _BITS = 6
 
@@ -93,14 +94,17 @@ def expecting(*places: Sequence[float]) -> PredictedTracks:
 
 def sizes_of(height: Floats, spread: float) -> Sizes:
     """Sizes of people so tall and of mean width, as sure as `spread`, metres."""
-    variance, width = np.full(len(height), spread**2), np.full(len(height), CONFIG.detection.width_mean)
+    variance, width = np.full(len(height), spread**2), np.full(len(height), CONFIG.body.width_mean)
     return Sizes(height, variance, width, variance)
 
 
 def found(standing: Floats, expected: PredictedTracks | None = None, evidence: float = 6.0, views: int = 4) -> People:
     """People as the pass of a frame reports them: in place, wholly visible, and whom of those expected."""
     n, before = len(standing), expected or no_tracks()
-    known = before.track_log_ratio(standing[:, :2], standing[:, 2], CONFIG.detection) + CONFIG.detection.birth_cost
+    known = (
+        before.track_log_ratio(standing[:, :2], standing[:, 2], CONFIG.body, CONFIG.detection.prior_log_odds)
+        + CONFIG.detection.birth_cost
+    )
     walker, covariance = np.full(n, -1), np.tile(np.eye(2) * 0.01, (n, 1, 1))
     for j, k in greedy_pairs(known):
         walker[j] = k

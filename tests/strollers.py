@@ -9,13 +9,13 @@ from hypothesis import strategies as st
 from strategies import numbers
 
 from stseg.arrays import Rows
-from stseg.config import DetectionConfig, TrackingConfig
+from stseg.config import Config
 from stseg.geometry import Grid
 from stseg.model.border import Border
 from stseg.model.tables import TRAJECTORY
 
 RATE = 8.0
-CONFIG, PEOPLE = TrackingConfig(), DetectionConfig()
+CONFIG = Config()
 GRID = Grid((-6.0, 6.0), (-6.0, 6.0), cell=0.25, planes=2)
 Path = Callable[[float], tuple[float, float]]
 """Where somebody is at a time in seconds, metres."""
@@ -38,7 +38,7 @@ def rows_of(people: Mapping[int, tuple[Path, float, range]], noise: float = 0.02
     )
     rows = np.zeros(len(told), TRAJECTORY)
     for row, (frame, track, place, tall) in zip(rows, told, strict=True):
-        row["frame"], row["id"], row["height"] = frame, track, tall + rng.normal(0, CONFIG.height_noise)
+        row["frame"], row["id"], row["height"] = frame, track, tall + rng.normal(0, CONFIG.tracking.height_noise)
         row["x"], row["y"] = np.array(place) + rng.normal(0, noise, 2)
     return rows
 

@@ -71,7 +71,7 @@ def scene(frame: int, standing: Floats, seen: Floats | None = None) -> FusedFram
 def known(standing: Floats, count: int = 30) -> Target:
     """Somebody of SHIRTS[0] whose colours all views have learned."""
     lots = np.random.default_rng(3)
-    target = Target.at(1, standing[0, :2], np.eye(2) * 0.03**2, 1.7, 4, count, lots)
+    target = Target.at(1, standing[0, :2], np.eye(2) * 0.03**2, 1.7, 4, count, 0.8, lots)
     images = [painted(camera, standing[:1]) for camera in RIG.cameras]
     target.learn(VIEWS, images, standing[0, :2], [np.zeros((0, 4))] * 4, 1.0)
     return target

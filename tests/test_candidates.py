@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 import pytest
 from scenes import (
+    BODY,
     CONFIG,
     FEW_HEIGHTS,
     box_moments,
@@ -53,7 +54,7 @@ def candidates(kind: str, asked: Asked) -> Proposals:
 
 
 def fuse(kind: str) -> Fuse:
-    return Occupancy(RIG, [kind] * 4, CONFIG.occupancy, FEW_HEIGHTS).fuse
+    return Occupancy(RIG, [kind] * 4, CONFIG.occupancy, FEW_HEIGHTS, BODY).fuse
 
 
 def pool(*places: tuple[float, float]) -> Candidates:
@@ -91,7 +92,7 @@ def test_both_sources_have_no_duplicates_of_each_other() -> None:
 
 
 def test_the_volume_of_an_unexplained_frame_is_filled_where_people_stand() -> None:
-    occupancy = Occupancy(RIG, ["pixels"] * 4, CONFIG.occupancy, FEW_HEIGHTS)
+    occupancy = Occupancy(RIG, ["pixels"] * 4, CONFIG.occupancy, FEW_HEIGHTS, BODY)
     seen = evidence("pixels")
     filled = marginal(occupancy.fuse(seen, empty_explanation(occupancy.rig, seen)))
     away = np.hypot(*np.moveaxis(RIG.grid.ground[:, :, None] - STANDING[:, :2], -1, 0)).min(-1)
@@ -109,7 +110,7 @@ def test_duplicates_are_dropped_in_order() -> None:
 
 @pytest.mark.parametrize("kind", ("boxes", "pixels"))
 def test_the_pass_takes_what_is_proposed_and_drops_what_is_nobody(kind: str) -> None:
-    frame_pass = Detector(RIG, [kind] * 4, FEW_HEIGHTS)
+    frame_pass = Detector(RIG, [kind] * 4, FEW_HEIGHTS, BODY)
     proposed = pool(*(tuple(place) for place in STANDING[:, :2]), (-1.5, 1.5), (0.0, 1.6))
     plain, given = (frame_pass.explain(evidence(kind), None, asked).people for asked in (None, proposed))
     assert len(plain) == len(given) == len(STANDING)
@@ -118,7 +119,7 @@ def test_the_pass_takes_what_is_proposed_and_drops_what_is_nobody(kind: str) -> 
 
 
 def test_who_is_expected_comes_before_who_is_proposed_there() -> None:
-    frame_pass = Detector(RIG, ["pixels"] * 4, FEW_HEIGHTS)
+    frame_pass = Detector(RIG, ["pixels"] * 4, FEW_HEIGHTS, BODY)
     expected = expecting(*STANDING.tolist())
     proposed = pool(*(tuple(place + 0.05) for place in STANDING[:, :2]))
     found = frame_pass.explain(evidence("pixels"), expected, proposed).people

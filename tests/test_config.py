@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stseg.config import Config
+from stseg.config import BodyConfig, Config
 from stseg.config.renamed import RENAMED
 from stseg.errors import ConfigError
 from stseg.io.config_file import format_config, parse_config, read_config
@@ -21,8 +21,9 @@ from stseg.settings import require
 TOML = """
 [detection]
 prior_log_odds = -2    # a whole number is a number
-heights = [1.5, 1.75]
 search_rounds = 3
+[body]
+heights = [1.5, 1.75]
 """
 
 
@@ -68,13 +69,13 @@ def test_a_file_and_assignments_say_what_differs(tmp_path: Path) -> None:
         "detection.search_rounds = 5",
         "detection.search_rounds=6",
     )
-    expected = replace(Config().detection, prior_log_odds=-1.5, heights=(1.5, 1.75), search_rounds=6)
-    assert config == replace(Config(), detection=expected)
+    expected = replace(Config().detection, prior_log_odds=-1.5, search_rounds=6)
+    assert config == replace(Config(), body=BodyConfig(heights=(1.5, 1.75)), detection=expected)
     assert isinstance(read(tmp_path / "c.toml", TOML).detection.prior_log_odds, float)
 
 
 def test_the_resolved_text_reads_back_equal(tmp_path: Path) -> None:
-    config = read_config(None, ["detection.prior_log_odds=-1e-3", "detection.heights=[1, 1.25]"])
+    config = read_config(None, ["detection.prior_log_odds=-1e-3", "body.heights=[1, 1.25]"])
     text = format_config(config)
     assert read(tmp_path / "c.toml", text) == config
     table = tomllib.loads(text)

@@ -13,7 +13,7 @@ from scenes import corner_cameras, likelihoods, looking, people, rig_of
 from strategies import BARREL, cameras, numbers
 
 from stseg.arrays import Floats, Singles
-from stseg.config import ProposalConfig
+from stseg.config import BodyConfig, ProposalConfig
 from stseg.detection.detection_probability import DetectionProbability, fill_chance
 from stseg.detection.mean_shift import fill_modes, modes
 from stseg.detection.pillar_strips import Pillars
@@ -28,7 +28,7 @@ PAD = 60
 
 
 def probability(views: tuple[Camera, ...] = corner_cameras(), config: ProposalConfig = FEW) -> DetectionProbability:
-    return DetectionProbability(rig_of(views), config)
+    return DetectionProbability(rig_of(views), config, BodyConfig())
 
 
 def rolled(camera: Camera, angle: float) -> Camera:
@@ -174,7 +174,7 @@ def test_no_view_has_a_veto_alone() -> None:
 def test_outside_the_polygon_nobody_is() -> None:
     rig = rig_of(corner_cameras())
     triangle = np.array([[-2.0, -2.0], [2.0, -2.0], [-2.0, 2.0]])
-    asked = DetectionProbability(replace(rig, grid=replace(rig.grid, polygon=triangle)), FEW)
+    asked = DetectionProbability(replace(rig, grid=replace(rig.grid, polygon=triangle)), FEW, BodyConfig())
     said = asked.log_ratio([np.ones(camera.size[::-1], np.float32) for camera in rig.cameras])
     beyond = asked.ground.sum(-1) > 0.1
     assert np.isneginf(said[beyond]).all() and np.isfinite(said[~beyond & (asked.ground.sum(-1) < -0.1)]).all()
@@ -205,7 +205,7 @@ def test_coarser_maps_say_nearly_the_same() -> None:
     maps = list(likelihoods(views, people((0.4, -0.3), (-0.9, 0.8))))
     coarse = [m.reshape(m.shape[0] // 2, 2, m.shape[1] // 2, 2).mean((1, 3)) for m in maps]
     rig = rig_of(views)
-    fine, half = DetectionProbability(rig, FEW), DetectionProbability(rig, FEW, [2] * 4)
+    fine, half = DetectionProbability(rig, FEW, BodyConfig()), DetectionProbability(rig, FEW, BodyConfig(), [2] * 4)
     for k in range(4):
         one, other = fine.chance(fine.pillars[k], maps[k]), half.chance(half.pillars[k], coarse[k])
         seen = ~np.isnan(one) & ~np.isnan(other)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from strategies import numbers
 
 from stseg.arrays import Flags, Floats, Ints, Labels
-from stseg.config import SegmentationConfig, TrackingConfig
+from stseg.config import MotionConfig, SegmentationConfig, TrackingConfig
 from stseg.geometry import Grid
 from stseg.graphcut.cell_subset import CellSubset, subset
 from stseg.graphcut.energy import QUANTUM, Energy
@@ -313,7 +313,7 @@ def test_places_are_carried_from_the_window_before() -> None:
     tail = Tracklet(5)
     for frame in range(6, 12):
         tail.add(frame, 0, np.array([0.1 * frame, 1.0]))
-    before = earlier_detections([tail], 10, 1.7, CONFIG)
+    before = earlier_detections([tail], 10, 1.7, MotionConfig())
     assert before.frame.tolist() == [6, 7, 8, 9]
     places = predicted_places(together([before, sightings((11, 5, 1.2, 1.0))]), 10, 12, 8.0, CONFIG)
     np.testing.assert_allclose(places.ground[0, 0], [1.05, 1.0])
@@ -323,6 +323,8 @@ def test_places_are_carried_from_the_window_before() -> None:
 
 
 def test_no_track_is_predicted() -> None:
-    places = predicted_places(together([earlier_detections([], 4, 1.7, CONFIG), sightings()]), 4, 9, 8.0, CONFIG)
+    places = predicted_places(
+        together([earlier_detections([], 4, 1.7, MotionConfig()), sightings()]), 4, 9, 8.0, CONFIG
+    )
     assert places.ground.shape == (5, 0, 2)
     assert places.expected.shape == (5, 0)

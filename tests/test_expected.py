@@ -13,7 +13,7 @@ from scenes import AREA, corner_cameras, expecting, looking, rig_of
 from strategies import numbers
 
 from stseg.arrays import Floats
-from stseg.config import DetectionConfig
+from stseg.config import BodyConfig, DetectionConfig
 from stseg.detection.prior import Prior
 from stseg.detection.scoring import walker_score
 from stseg.geometry import Grid, Rig
@@ -22,7 +22,7 @@ from stseg.model.candidates import Candidates
 from stseg.model.predicted_tracks import PredictedTracks, no_tracks
 from stseg.model.sizes import Sizes
 
-CONFIG = DetectionConfig()
+CONFIG, BODY = DetectionConfig(), BodyConfig()
 PLACES = st.tuples(numbers(-2, 2), numbers(-2, 2))
 SPREADS = st.tuples(numbers(0.05, 0.6), numbers(0.05, 0.6), numbers(-0.9, 0.9)).map(
     lambda s: np.array([[s[0] ** 2, s[0] * s[1] * s[2]], [s[0] * s[1] * s[2], s[1] ** 2]])
@@ -46,16 +46,14 @@ def test_what_speaks_for_a_walker_by_hand(
     """The ratio of two stories: this walker, who is there and so tall, or a newcomer, anywhere and anybody."""
     ground = np.array([place for place, _ in candidates]).reshape(-1, 2)
     height = np.array([tall for _, tall in candidates])
-    known = expected_of(walkers).track_log_ratio(ground, height, CONFIG)
+    known = expected_of(walkers).track_log_ratio(ground, height, BODY, CONFIG.prior_log_odds)
     assert known.shape == (len(candidates), len(walkers))
     anywhere = -math.log(2 * math.pi * 0.1**2)  # at the resolution of a frame, which is 0.1 m
     for j, (place, tall) in enumerate(candidates):
-        newcomer = (
-            CONFIG.prior_log_odds + anywhere + reference.normal(tall - CONFIG.height_mean, CONFIG.height_spread**2)
-        )
+        newcomer = CONFIG.prior_log_odds + anywhere + reference.normal(tall - BODY.height_mean, BODY.height_spread**2)
         for k, (at, covariance, height_k, sd, odds) in enumerate(walkers):
             shape = reference.normal(tall - height_k, sd**2)
-            least = reference.normal(tall - CONFIG.height_mean, CONFIG.height_spread**2) - 4.0  # people stoop and sit
+            least = reference.normal(tall - BODY.height_mean, BODY.height_spread**2) - 4.0  # people stoop and sit
             walker = odds + reference.normal_place(np.subtract(place, at), covariance) + max(shape, least)
             assert known[j, k] == pytest.approx(walker - newcomer, abs=1e-6)
 
@@ -74,7 +72,7 @@ def test_a_wrong_height_never_rules_a_walker_out() -> None:
     """Somebody who sits is still there; but two who stand in one place are told apart."""
     expected = expecting((0.0, 0.0, 1.9))
     height = np.array([1.9, 1.7, 1.5, 1.0])
-    known = expected.track_log_ratio(np.zeros((4, 2)), height, CONFIG)[:, 0]
+    known = expected.track_log_ratio(np.zeros((4, 2)), height, BODY, CONFIG.prior_log_odds)[:, 0]
     assert known[0] > known[1] + 4
     assert known[0] - known.min() < 12
     assert np.isfinite(known).all()
@@ -82,9 +80,9 @@ def test_a_wrong_height_never_rules_a_walker_out() -> None:
 
 def test_nobody_expected() -> None:
     assert len(no_tracks()) == 0
-    assert no_tracks().track_log_ratio(np.zeros((3, 2)), np.full(3, 1.7), CONFIG).shape == (3, 0)
-    assert no_tracks().track_log_ratio(np.zeros((0, 2)), np.zeros(0), CONFIG).shape == (0, 0)
-    assert expecting((0, 0)).track_log_ratio(np.zeros((0, 2)), np.zeros(0), CONFIG).shape == (0, 1)
+    assert no_tracks().track_log_ratio(np.zeros((3, 2)), np.full(3, 1.7), BODY, CONFIG.prior_log_odds).shape == (3, 0)
+    assert no_tracks().track_log_ratio(np.zeros((0, 2)), np.zeros(0), BODY, CONFIG.prior_log_odds).shape == (0, 0)
+    assert expecting((0, 0)).track_log_ratio(np.zeros((0, 2)), np.zeros(0), BODY, CONFIG.prior_log_odds).shape == (0, 1)
 
 
 # Who is whom
@@ -168,26 +166,26 @@ def test_what_no_view_sees_is_no_place_to_be_known() -> None:
 def test_a_newcomer_costs_away_from_the_border() -> None:
     border = Border.of(open_ground(Grid((-3.0, 3.0), (-3.0, 3.0), 0.1, 1.8, 2)))
     places = np.array([[-2.95, 0.0], [-2.45, 0.0], [-1.95, 0.0], [0.0, 0.0], [-3.5, 0.0]])
-    later = Prior.of(no_tracks(), CONFIG, border)
+    later = Prior.of(no_tracks(), CONFIG, BODY, border)
     share = np.array([0.05, 0.55, 1.0, 1.0, 0.0])
     np.testing.assert_allclose(later.newcomer(places), share * CONFIG.birth_cost, atol=1e-6)
-    np.testing.assert_array_equal(Prior.of(None, CONFIG, border).newcomer(places), 0.0)
+    np.testing.assert_array_equal(Prior.of(None, CONFIG, BODY, border).newcomer(places), 0.0)
 
 
 def test_who_leaves_the_area_is_no_candidate() -> None:
     """They stay expected, should the frame itself find them."""
     border = Border.of(open_ground(Grid((-2.0, 2.0), (-2.0, 2.0), 0.1, 1.8, 2)))
-    prior = Prior.of(expecting((2.1, 0.0), (1.0, 0.5), (0.0, -9.0)), CONFIG, border)
+    prior = Prior.of(expecting((2.1, 0.0), (1.0, 0.5), (0.0, -9.0)), CONFIG, BODY, border)
     np.testing.assert_array_equal(prior.pool().ground, [[1.0, 0.5]])
     assert len(prior.expected) == 3
 
 
 def test_those_expected_are_candidates_as_tall_as_they_are() -> None:
-    prior = Prior.of(expecting((0.1, 0.2, 1.3), (0.4, 0.5, 1.74)), CONFIG, Border.of(rig_of(corner_cameras())))
+    prior = Prior.of(expecting((0.1, 0.2, 1.3), (0.4, 0.5, 1.74)), CONFIG, BODY, Border.of(rig_of(corner_cameras())))
     pool = prior.pool()
     np.testing.assert_array_equal(pool.ground, [[0.1, 0.2], [0.4, 0.5]])
     np.testing.assert_array_equal(pool.height, [1.3, 1.74])
     assert prior.track_log_ratio(pool).shape == (2, 2)
     assert prior.track_log_ratio(Candidates(np.zeros((0, 2)), np.zeros(0), np.zeros(0))).shape == (0, 2)
-    tall = [reference.normal(h - CONFIG.height_mean, CONFIG.height_spread**2) for h in (1.5, CONFIG.height_mean)]
-    np.testing.assert_allclose(np.diff(prior.tall(np.array([1.5, CONFIG.height_mean]))), np.diff(tall))
+    tall = [reference.normal(h - BODY.height_mean, BODY.height_spread**2) for h in (1.5, BODY.height_mean)]
+    np.testing.assert_allclose(np.diff(prior.tall(np.array([1.5, BODY.height_mean]))), np.diff(tall))

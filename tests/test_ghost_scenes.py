@@ -9,6 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 from scenes import (
+    BODY,
     CONFIG,
     FEW_HEIGHTS,
     Moment,
@@ -58,7 +59,7 @@ def facing_pair() -> Rig:
 @cache
 def pass_of(kind: str, cameras: int) -> Detector:
     """The pass under the first corner cameras."""
-    return Detector(rig_of(corner_cameras()[:cameras]), [kind] * cameras, FEW_HEIGHTS)
+    return Detector(rig_of(corner_cameras()[:cameras]), [kind] * cameras, FEW_HEIGHTS, BODY)
 
 
 def show(kind: str, cameras: Sequence[Camera], standing: Floats) -> list[ViewEvidence]:
@@ -77,7 +78,7 @@ def assert_these(explanation: Explanation, standing: Floats, within: float = 0.2
 @pytest.mark.parametrize("kind", KINDS)
 def test_figure_4(kind: str) -> None:
     rig = facing_pair()
-    explanation = Detector(rig, [kind] * 2, FEW_HEIGHTS).explain(show(kind, rig.cameras, FIGURE_4), None)
+    explanation = Detector(rig, [kind] * 2, FEW_HEIGHTS, BODY).explain(show(kind, rig.cameras, FIGURE_4), None)
     assert_these(explanation, FIGURE_4)
     if kind == "pixels":  # a box knows how far away its person is, so its lines of sight cross nowhere else
         assert len(explanation.ghosts) >= 1
@@ -157,7 +158,7 @@ def test_a_ghost_that_moves_with_its_makers(kind: str) -> None:
 def test_the_moving_ghost_is_borne_out_by_both_views() -> None:
     """It was there to be picked up: taken by itself it is worth a person, in nearly every frame."""
     rig, worth = facing_pair(), 0
-    frame_pass = Detector(rig, ["pixels"] * 2, FEW_HEIGHTS)
+    frame_pass = Detector(rig, ["pixels"] * 2, FEW_HEIGHTS, BODY)
     ground = frame_pass.lattice_ground.reshape(-1, 2)
     for frame in range(FRAMES):
         seen, said = show("pixels", rig.cameras, strollers(frame)), np.zeros(len(ground))
@@ -184,7 +185,7 @@ def test_a_ghost_is_not_picked_up_by_the_cut_in_later_frames() -> None:
 @pytest.mark.parametrize("kind", KINDS)
 def test_somebody_hidden_from_all_views_but_one_stays(kind: str) -> None:
     """Seen by all at first; then three taller people step between them and three of the cameras, and stand there."""
-    rig, follow = room(), TrackFilter(8.0, CONFIG.detection, CONFIG.tracking)
+    rig, follow = room(), TrackFilter(8.0, CONFIG)
     hidden, who = people((0.0, 0.0, 1.6)), set[int]()
     for frame in range(FRAMES):
         side = max(1.2 - 0.1 * frame, 0.0)

@@ -12,6 +12,7 @@ import reference_core as reference
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scenes import (
+    BODY,
     FEW_HEIGHTS,
     body_points,
     boxes,
@@ -375,7 +376,7 @@ def test_groups_are_decided_apart() -> None:
 
 @cache
 def pass_of(kind: str) -> Detector:
-    return Detector(room(), [kind] * 4, FEW_HEIGHTS)
+    return Detector(room(), [kind] * 4, FEW_HEIGHTS, BODY)
 
 
 def show(kind: str, cameras: Sequence[Camera], standing: Floats) -> list[ViewEvidence]:
@@ -447,7 +448,7 @@ def crossing(kind: str) -> tuple[Rig, Detector]:
     """Two cameras whose lines of sight to two people cross in four places."""
     west, south = looking("west", (-4.0, 0.0, 2.2)), looking("south", (0.0, -4.0, 2.2))
     rig = rig_of([west, south])
-    return rig, Detector(rig, [kind] * 2, FEW_HEIGHTS)
+    return rig, Detector(rig, [kind] * 2, FEW_HEIGHTS, BODY)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -528,7 +529,7 @@ def test_a_newcomer_costs_inside_and_at_the_border_not(kind: str) -> None:
 def test_the_first_frame_costs_nobody_anything(kind: str) -> None:
     standing = people((-0.83, 0.31), (0.9, -0.62), (0.1, 1.2, 1.6))
     found = pass_of(kind).explain(show(kind, room().cameras, standing), None).people
-    tall = -0.5 * ((found.height - FEW_HEIGHTS.height_mean) / FEW_HEIGHTS.height_spread) ** 2
+    tall = -0.5 * ((found.height - BODY.height_mean) / BODY.height_spread) ** 2
     np.testing.assert_allclose(
         found.prior, FEW_HEIGHTS.prior_log_odds + tall, atol=0.4
     )  # of the candidate, not yet refined
@@ -569,7 +570,7 @@ def test_a_blind_view_says_nothing(kind: str) -> None:
     standing = people((-0.83, 0.31), (0.9, -0.62))
     cameras = corner_cameras()
     seen = show(kind, cameras, standing)
-    three = Detector(rig_of(cameras[:3]), [kind] * 3, FEW_HEIGHTS).explain(seen[:3], None)
+    three = Detector(rig_of(cameras[:3]), [kind] * 3, FEW_HEIGHTS, BODY).explain(seen[:3], None)
     four = pass_of(kind).explain([*seen[:3], None], None)
     np.testing.assert_allclose(four.people.ground, three.people.ground, atol=1e-9)
     np.testing.assert_array_equal(four.people.height, three.people.height)
@@ -588,7 +589,7 @@ def test_all_blind() -> None:
 def test_nobody_is_sought_where_nothing_speaks_for_it() -> None:
     for kind in KINDS:
         assert len(pass_of(kind).explain([None] * 4, None).ghosts) == 0
-    three = Detector(rig_of(corner_cameras()[:3]), ["boxes"] * 3, FEW_HEIGHTS)
+    three = Detector(rig_of(corner_cameras()[:3]), ["boxes"] * 3, FEW_HEIGHTS, BODY)
     assert len(three.explain([no_boxes()] * 3, None).ghosts) == 0
 
 
@@ -598,7 +599,7 @@ def test_parts_stand_in_the_order_of_the_rig() -> None:
     kinds = ["pixels", "boxes", "pixels", "boxes"]
     standing = people((0.4, 0.3))
     seen: list[ViewEvidence] = [show(kind, [c], standing)[0] for kind, c in zip(kinds, cameras, strict=True)]
-    frame_pass = Detector(rig_of(cameras), kinds, FEW_HEIGHTS)
+    frame_pass = Detector(rig_of(cameras), kinds, FEW_HEIGHTS, BODY)
     for silent, kind in enumerate(kinds):
         partly = [*seen]
         partly[silent] = show(kind, cameras[silent : silent + 1], people())[0]
@@ -610,7 +611,7 @@ def test_parts_stand_in_the_order_of_the_rig() -> None:
 def test_the_same_frame_twice(kind: str) -> None:
     rig = room()
     first, second = people((-0.83, 0.31), (0.9, -0.62), (0.5, 0.1)), people((0.1, 0.1))
-    fresh = Detector(rig, [kind] * 4, FEW_HEIGHTS).explain(show(kind, rig.cameras, first), None)
+    fresh = Detector(rig, [kind] * 4, FEW_HEIGHTS, BODY).explain(show(kind, rig.cameras, first), None)
     used = pass_of(kind)
     used.explain(show(kind, rig.cameras, second), None)
     again = used.explain(show(kind, rig.cameras, first), None)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scenes import CONFIG, FRAME_RATE, found, people, room
 
 from stseg.arrays import Floats, Rows
-from stseg.config import Config, KalmanConfig
+from stseg.config import Config, KalmanConfig, MotionConfig
 from stseg.errors import ConfigError
 from stseg.trackers import FrameObservations, FusedFrame
 from stseg.trackers.kalman import KalmanTracker
@@ -37,7 +37,7 @@ def follow(frames: list[list[tuple[float, float]]], config: Config = CONFIG) -> 
     return (np.concatenate([c.trajectory for c in commits]), np.concatenate([c.events for c in commits]))
 
 
-def plain(places: Floats, noise: float, seconds: float, config: KalmanConfig) -> tuple[Floats, Floats]:
+def plain(places: Floats, noise: float, seconds: float, config: MotionConfig) -> tuple[Floats, Floats]:
     """One person's filter, in the words of a textbook."""
     motion = np.array([[1, 0, seconds, 0], [0, 1, 0, seconds], [0, 0, 1, 0], [0, 0, 0, 1]], float)
     see = np.eye(2, 4)
@@ -46,7 +46,10 @@ def plain(places: Floats, noise: float, seconds: float, config: KalmanConfig) ->
     state = np.append(places[0], [0, 0])
     covariance = np.diag([noise, noise, config.speed_spread**2, config.speed_spread**2])
     for place in places[1:]:
-        state, covariance = motion @ state, motion @ covariance @ motion.T + config.velocity_noise**2 * brownian
+        state, covariance = (
+            motion @ state,
+            motion @ covariance @ motion.T + config.velocity_noise**2 * brownian,
+        )
         gain = covariance @ see.T @ np.linalg.inv(see @ covariance @ see.T + noise * np.eye(2))
         state, covariance = state + gain @ (place - see @ state), (np.eye(4) - gain @ see) @ covariance
     return state, covariance
@@ -55,7 +58,7 @@ def plain(places: Floats, noise: float, seconds: float, config: KalmanConfig) ->
 @given(st.integers(0, 2**32 - 1), st.integers(1, 6), st.floats(0.02, 0.5))
 @settings(max_examples=30, deadline=None)
 def test_filters_side_by_side_are_each_a_plain_one(seed: int, length: int, seconds: float) -> None:
-    config, noise = KalmanConfig(), 0.03
+    config, noise = MotionConfig(), 0.03
     paths = np.random.default_rng(seed).normal(0.0, 1.0, (3, length, 2))
     error = np.tile(noise * np.eye(2), (3, 1, 1))
     filters = begun(paths[:, 0], error, config.speed_spread)

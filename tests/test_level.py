@@ -11,7 +11,7 @@ import pytest
 import reference_level as reference
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scenes import FEW_HEIGHTS, boxes, corner_cameras, likelihoods, no_boxes, people, rig_of
+from scenes import BODY, FEW_HEIGHTS, boxes, corner_cameras, likelihoods, no_boxes, people, rig_of
 
 from stseg.arrays import Flags, Floats, Ints, ViewEvidence
 from stseg.config import ErrorRateConfig, OccupancyConfig
@@ -180,11 +180,11 @@ def frame(kind: str, lots: int) -> tuple[list[ViewEvidence], Explanation]:
     if kind == "pixels":
         clean = likelihoods(RIG.cameras, STANDING)
         seen = [np.where(rng.random(m.shape) < 0.1, 1 - m, m).astype(np.float32) for m in clean]
-    return seen, Detector(RIG, [kind] * 4, FEW_HEIGHTS).explain(seen, None)
+    return seen, Detector(RIG, [kind] * 4, FEW_HEIGHTS, BODY).explain(seen, None)
 
 
 def occupancy(kind: str) -> Occupancy:
-    return Occupancy(RIG, [kind] * 4, OccupancyConfig(), FEW_HEIGHTS, CONFIG)
+    return Occupancy(RIG, [kind] * 4, OccupancyConfig(), FEW_HEIGHTS, BODY, CONFIG)
 
 
 @pytest.mark.parametrize("kind", ["pixels", "boxes"])

@@ -10,7 +10,7 @@ import pytest
 import reference_core as reference
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scenes import FEW_HEIGHTS, corner_cameras, found, likelihoods, looking, people, rig_of
+from scenes import BODY, FEW_HEIGHTS, corner_cameras, found, likelihoods, looking, people, rig_of
 
 from stseg.arrays import Floats, Singles
 from stseg.config import OccupancyConfig
@@ -129,7 +129,7 @@ def test_nobody_explained_is_the_plain_localisation() -> None:
     ] * 4
     plain = localiser.log_odds(maps, localiser.clutter_weights(maps), rates, OccupancyConfig().occupied_share)
     explained = Occupancy(
-        COARSE, ["pixels"] * 4, OccupancyConfig(sampling="footprint", effective_observations=1.0), FEW_HEIGHTS
+        COARSE, ["pixels"] * 4, OccupancyConfig(sampling="footprint", effective_observations=1.0), FEW_HEIGHTS, BODY
     )
     np.testing.assert_array_equal(explained.fuse([*maps], explanation), plain)
 

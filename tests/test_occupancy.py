@@ -10,7 +10,7 @@ import pytest
 import reference_core as reference
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scenes import FEW_HEIGHTS, boxes, corner_cameras, found, likelihoods, looking, no_boxes, people, rig_of, room
+from scenes import BODY, FEW_HEIGHTS, boxes, corner_cameras, found, likelihoods, looking, no_boxes, people, rig_of, room
 from strategies import numbers, rigs
 
 from stseg.arrays import Boxes, Floats, Ints, Singles, ViewEvidence
@@ -256,7 +256,7 @@ def test_fusion_by_definition(kind: SamplingKind, blind: int | None, step: int) 
     maps: list[Singles | None] = [*noise(step)]
     if blind is not None:
         maps[blind] = None
-    fused = Occupancy(COARSE, PIXELS, replace(CONFIG, sampling=kind), FEW_HEIGHTS).fuse(maps, explanation)
+    fused = Occupancy(COARSE, PIXELS, replace(CONFIG, sampling=kind), FEW_HEIGHTS, BODY).fuse(maps, explanation)
     assert fused.dtype == np.float32
     np.testing.assert_allclose(fused, volume_by_definition(COARSE, maps, explanation, kind), atol=LEVEL)
 
@@ -265,7 +265,7 @@ def test_fusion_by_definition(kind: SamplingKind, blind: int | None, step: int) 
 def test_more_views_are_sharper_evidence(value: float) -> None:
     """With equal weights u is the plain sum of the views' log-odds and the prior."""
     rig = rig_of([looking(f"cam{k}", (x, y, 2.6), focal=200.0) for k, (x, y) in enumerate([(-3, -3), (3, -3), (3, 3)])])
-    fused = Occupancy(rig, PIXELS[:3], CONFIG, FEW_HEIGHTS).fuse([flat(value)] * 3, explained(rig, people()))
+    fused = Occupancy(rig, PIXELS[:3], CONFIG, FEW_HEIGHTS, BODY).fuse([flat(value)] * 3, explained(rig, people()))
     miss, false, _ = RATES
     one = np.log(((1 - miss) * value + miss * (1 - value)) / (false * value + (1 - false) * (1 - value)))
     views = Sampling.of(rig, "point").views()
@@ -277,7 +277,7 @@ def test_more_views_are_sharper_evidence(value: float) -> None:
 
 
 def test_all_blind_leaves_the_prior() -> None:
-    occupancy = Occupancy(COARSE, PIXELS, CONFIG, FEW_HEIGHTS)
+    occupancy = Occupancy(COARSE, PIXELS, CONFIG, FEW_HEIGHTS, BODY)
     fused = occupancy.fuse([None] * 4, explained(COARSE, people()))
     np.testing.assert_allclose(fused[occupancy.views > 0], PRIOR, rtol=1e-6)
     assert np.isnan(fused[occupancy.views == 0]).all()
@@ -292,7 +292,7 @@ def line_of_sight() -> tuple[Rig, Explanation]:
 
 def test_explained_evidence_does_not_speak_elsewhere() -> None:
     rig, explanation = line_of_sight()
-    occupancy = Occupancy(rig, PIXELS[:1], CONFIG, FEW_HEIGHTS)
+    occupancy = Occupancy(rig, PIXELS[:1], CONFIG, FEW_HEIGHTS, BODY)
     fused = occupancy.fuse([flat(1.0)], explanation)
     nobodys = occupancy.fuse([flat(0.0)], explained(rig, people()))
     seen = occupancy.views[0] > 0
@@ -305,7 +305,7 @@ def test_explained_evidence_does_not_speak_elsewhere() -> None:
 
 def test_a_hidden_view_does_not_count() -> None:
     rig, explanation = line_of_sight()
-    occupancy = Occupancy(rig, PIXELS[:1], CONFIG, FEW_HEIGHTS)
+    occupancy = Occupancy(rig, PIXELS[:1], CONFIG, FEW_HEIGHTS, BODY)
     behind = (occupancy.views[0] > 0) & (rig.grid.ground[..., 0] > 0.6)
     assert behind.any()
     for value in (0.0, 1.0):
@@ -315,7 +315,7 @@ def test_a_hidden_view_does_not_count() -> None:
 
 def test_a_missing_box_says_less_of_somebody_hidden() -> None:
     rig = rig_of(corner_cameras()[:1])
-    occupancy = Occupancy(rig, BOXES[:1], CONFIG, FEW_HEIGHTS)
+    occupancy = Occupancy(rig, BOXES[:1], CONFIG, FEW_HEIGHTS, BODY)
     explanation = explained(rig, people((0.0, 0.0)))
     half = replace(explanation.people, visibility=np.array([[0.5]]))
     whole_says = occupancy.fuse([no_boxes()], explanation)
@@ -333,20 +333,20 @@ def test_a_person_is_a_column_of_occupied_cells(kind: str) -> None:
     seen: list[ViewEvidence] = list(likelihoods(rig.cameras, standing))
     if kind == "boxes":
         seen = [boxes(camera, standing) for camera in rig.cameras]
-    explanation = Detector(rig, [kind] * 4, FEW_HEIGHTS).explain(seen, None)
-    fused = Occupancy(rig, [kind] * 4, CONFIG, FEW_HEIGHTS).fuse(seen, explanation)
+    explanation = Detector(rig, [kind] * 4, FEW_HEIGHTS, BODY).explain(seen, None)
+    fused = Occupancy(rig, [kind] * 4, CONFIG, FEW_HEIGHTS, BODY).fuse(seen, explanation)
     away = np.hypot(*np.moveaxis(rig.grid.ground[:, :, None] - standing[:, :2], -1, 0)).min(2)
     assert fused.shape == rig.grid.shape
     assert (fused[:3, away < 0.15] > 0).all()  # the uppermost plane is above them
     assert (fused[:, away > 0.6] < 0).all()
     # A volume from nobody's evidence holds nobody.
     empty: list[ViewEvidence] = [flat(0.0)] * 4 if kind == "pixels" else [no_boxes()] * 4
-    nobody = Detector(rig, [kind] * 4, FEW_HEIGHTS).explain(empty, None)
-    assert (Occupancy(rig, [kind] * 4, CONFIG, FEW_HEIGHTS).fuse(empty, nobody) < PRIOR).all()
+    nobody = Detector(rig, [kind] * 4, FEW_HEIGHTS, BODY).explain(empty, None)
+    assert (Occupancy(rig, [kind] * 4, CONFIG, FEW_HEIGHTS, BODY).fuse(empty, nobody) < PRIOR).all()
 
 
 def test_the_same_frame_twice() -> None:
-    occupancy = Occupancy(COARSE, PIXELS, CONFIG, FEW_HEIGHTS)
+    occupancy = Occupancy(COARSE, PIXELS, CONFIG, FEW_HEIGHTS, BODY)
     explanation = explained(COARSE, people((0.2, 0.3)))
     first = occupancy.fuse(noise(1), explanation)
     occupancy.fuse(noise(2), explanation)

@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from scenes import corner_cameras, likelihoods, looking, people, room
 
 from stseg.arrays import Bytes, Floats, Labels, Singles
-from stseg.config import LabelConfig
+from stseg.config import BodyConfig, LabelConfig
 from stseg.errors import ConfigError
 from stseg.geometry import Camera
-from stseg.geometry.bodies import SILHOUETTE, BodyTable
+from stseg.geometry.bodies import WIDTH, BodyTable
 from stseg.graphcut.energy import QUANTUM
 from stseg.labels.adjacency import edge_costs
 from stseg.labels.body_masks import Patches, pillar_patches
@@ -25,11 +25,12 @@ from stseg.labels.placed_people import PlacedPeople
 from stseg.labels.views import ViewLabels, view_labels
 from stseg.model.outlines import outlines
 
-SILHOUETTE_WIDTH = 2 * float(np.trapezoid(SILHOUETTE[:, 1], SILHOUETTE[:, 0]))
-EXACT = LabelConfig(samples=1, position_noise=1e-3, height_noise=0.0, width=SILHOUETTE_WIDTH, width_spread=0.0)
+EXACT = LabelConfig(samples=1, position_noise=1e-3, height_noise=0.0)
 """One pillar a person, just as the micro-scenes draw them."""
-FEW = LabelConfig(samples=8, position_noise=0.03, height_noise=0.03, width=SILHOUETTE_WIDTH, width_spread=0.02)
+EXACT_BODY = BodyConfig(width_mean=WIDTH, width_spread=1e-9)
+FEW = LabelConfig(samples=8, position_noise=0.03, height_noise=0.03)
 """Almost certain ones: the people of the micro-scenes have no arms and legs."""
+BODY = BodyConfig(width_mean=WIDTH, width_spread=0.03)
 
 
 def standing(everybody: Floats, spread: float = 0.0) -> PlacedPeople:
@@ -39,7 +40,7 @@ def standing(everybody: Floats, spread: float = 0.0) -> PlacedPeople:
 
 def labels_in(camera: Camera, everybody: Floats, config: LabelConfig = FEW) -> Labels:
     """Labels from the exact masks."""
-    view = ViewLabels(camera, BodyTable.of(camera, room().grid), config)
+    view = ViewLabels(camera, BodyTable.of(camera, room().grid), config, BODY)
     return view.label(standing(everybody), likelihoods([camera], everybody)[0], None)
 
 
@@ -49,7 +50,7 @@ def labels_in(camera: Camera, everybody: Floats, config: LabelConfig = FEW) -> L
 def test_one_certain_pillar_is_the_outline() -> None:
     camera, everybody = corner_cameras()[0], people((0.3, -0.4), (1.2, 1.1, 1.6))
     table = BodyTable.of(camera, room().grid)
-    patches = pillar_patches(table, standing(everybody), EXACT)
+    patches = pillar_patches(table, standing(everybody), EXACT, EXACT_BODY)
     first, spans, _ = outlines(table, everybody[:, :2], everybody[:, 2], 1, (96, 128))
     for j in range(2):
         outline = np.zeros((96, 128))
@@ -64,7 +65,7 @@ def test_one_certain_pillar_is_the_outline() -> None:
 def test_coverage_falls_off_with_uncertainty() -> None:
     camera, everybody = corner_cameras()[0], people((0.3, -0.4))
     table = BodyTable.of(camera, room().grid)
-    sharp, wide = (pillar_patches(table, standing(everybody, spread), FEW).share for spread in (0.0, 0.2))
+    sharp, wide = (pillar_patches(table, standing(everybody, spread), FEW, BODY).share for spread in (0.0, 0.2))
     assert wide.min() >= 0
     assert wide.max() <= 1 + 1e-6
     assert sharp.max() == pytest.approx(1.0)
@@ -74,7 +75,7 @@ def test_coverage_falls_off_with_uncertainty() -> None:
 
 def test_a_person_out_of_view_has_no_patch() -> None:
     ahead = looking("ahead", (0.0, 0.0, 1.5), target=(2.0, 0.0, 1.0))
-    view = ViewLabels(ahead, BodyTable.of(ahead, room().grid), FEW)
+    view = ViewLabels(ahead, BodyTable.of(ahead, room().grid), FEW, BODY)
     behind = people((-1.5, 0.0))
     assert len(view.label_likelihood(standing(behind)).people.share) == 0
     bright = np.ones((96, 128), np.float32)
@@ -188,7 +189,7 @@ def test_one_person_is_their_silhouette() -> None:
 
 def test_two_people_side_by_side_are_two_and_the_same_in_every_view() -> None:
     everybody = people((-0.5, 0.3), (0.6, -0.2, 1.8))
-    views = view_labels(room(), FEW)
+    views = view_labels(room(), FEW, BODY)
     for view, seen in zip(views, likelihoods(room().cameras, everybody), strict=True):
         label = view.label(standing(everybody), seen, None)
         for j in range(2):
@@ -211,7 +212,7 @@ def test_the_nearer_of_two_hides_the_farther() -> None:
 
 def test_foreground_without_a_person_is_background() -> None:
     camera, everybody = corner_cameras()[2], people((-0.5, -0.5))
-    view = ViewLabels(camera, BodyTable.of(camera, room().grid), FEW)
+    view = ViewLabels(camera, BodyTable.of(camera, room().grid), FEW, BODY)
     seen = likelihoods([camera], everybody)[0]
     blotch = seen.copy()
     blotch[:20, :20] = 1.0
@@ -226,7 +227,7 @@ def test_similar_colours_fill_holes_and_reject_specks() -> None:
     rows, columns = np.nonzero(seen > 0.5)
     hole, speck = (round(float(rows.mean())), round(float(columns.mean()))), (int(rows.mean()), columns.max() + 3)
     seen[hole], seen[speck] = 0.0, 1.0
-    view = ViewLabels(camera, BodyTable.of(camera, room().grid), FEW)
+    view = ViewLabels(camera, BodyTable.of(camera, room().grid), FEW, BODY)
     label = view.label(standing(everybody), seen, np.full((96, 128, 3), 80, np.uint8))
     assert label[hole] == 1
     assert label[speck] == 0
@@ -238,7 +239,7 @@ def test_a_border_between_two_people_follows_the_colours() -> None:
     near, far = (likelihoods([camera], everybody[j : j + 1])[0] > 0.5 for j in range(2))
     image = np.full((96, 128, 3), 60, np.uint8)
     image[near], image[far & ~near] = 20, 200
-    view = ViewLabels(camera, BodyTable.of(camera, room().grid), FEW)
+    view = ViewLabels(camera, BodyTable.of(camera, room().grid), FEW, BODY)
     off = everybody + np.array([0.06, -0.06, 0.0])  # to the side, as the camera sees it
     truth = np.where(near, 1, np.where(far, 2, 0))
     plain, coloured = (view.label(standing(off, 0.1), seen, colours) for colours in (None, image))

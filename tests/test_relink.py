@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from reference_relink import gain, greatest_sum
-from strollers import BORDER, CONFIG, PEOPLE, RATE, gone, rows_of, runs, swapped, visit
+from strollers import BORDER, CONFIG, RATE, gone, rows_of, runs, swapped, visit
 
 from stseg.arrays import Floats, Ints, Rows
 from stseg.model.tables import EVENT, TRAJECTORY
@@ -18,7 +18,7 @@ from stseg.tracking.isolated_tracklets import isolated_tracklets
 
 
 def relinked(rows: Rows) -> GlobalAssociation:
-    return associate_globally(rows, RATE, BORDER, CONFIG, PEOPLE)
+    return associate_globally(rows, RATE, BORDER, CONFIG)
 
 
 def names(rows: Rows, identity: Ints, track: int, frames: range) -> set[int]:
@@ -60,7 +60,7 @@ def test_who_walk_straight_past_each_other_keep_their_tracks() -> None:
             2: (lambda t: (4 - t, 0.15), 1.7, range(64)),
         }
     )
-    assert len(isolated_tracklets(rows, RATE, CONFIG)) == 4
+    assert len(isolated_tracklets(rows, RATE, CONFIG.tracking, CONFIG.motion)) == 4
     found = relinked(rows)
     np.testing.assert_array_equal(found.identity, rows["id"])
     assert not found.links
@@ -81,7 +81,7 @@ def test_somebody_lost_inside_the_area_is_the_same_afterwards() -> None:
 
 
 def test_too_long_is_somebody_else() -> None:
-    rows = gone(CONFIG.maximum_gap + 0.25)
+    rows = gone(CONFIG.tracking.maximum_gap + 0.25)
     np.testing.assert_array_equal(relinked(rows).identity, rows["id"])
 
 
@@ -131,19 +131,18 @@ def test_the_order_of_rows_does_not_matter(rows: Rows, seed: int) -> None:
 @settings(max_examples=150, deadline=None)
 @given(runs(4))
 def test_no_other_links_have_a_greater_sum(rows: Rows) -> None:
-    parts = isolated_tracklets(rows, RATE, CONFIG)[:5]
+    parts = isolated_tracklets(rows, RATE, CONFIG.tracking, CONFIG.motion)[:5]
     rows = rows[np.sort(np.concatenate([np.zeros(0, np.int64), *(part.rows for part in parts)]))]
-    parts = isolated_tracklets(rows, RATE, CONFIG)
+    parts = isolated_tracklets(rows, RATE, CONFIG.tracking, CONFIG.motion)
     if len(parts) > 6:
         return
     found = relinked(rows)
 
     def inside(ground: Floats) -> float:
-        return float(BORDER.inside(ground[None], PEOPLE.border_width)[0])
+        return float(BORDER.inside(ground[None], CONFIG.detection.border_width)[0])
 
     gains = [
-        [gain(a, b, (inside(a.end.ground) + inside(b.start.ground)) / 2, RATE, CONFIG, PEOPLE) for b in parts]
-        for a in parts
+        [gain(a, b, (inside(a.end.ground) + inside(b.start.ground)) / 2, RATE, CONFIG) for b in parts] for a in parts
     ]
     identity = [int(found.identity[part.rows[0]]) for part in parts]
     total = 0.0
@@ -170,13 +169,16 @@ def test_a_track_is_cut_where_it_met_another_and_where_it_was_unseen() -> None:
         noise=0.0,
     )
     rows = rows[(rows["id"] != 1) | (rows["frame"] < 50) | (rows["frame"] >= 53)]
-    parts = [(part.track, part.start.frame, part.end.frame) for part in isolated_tracklets(rows, RATE, CONFIG)]
+    parts = [
+        (part.track, part.start.frame, part.end.frame)
+        for part in isolated_tracklets(rows, RATE, CONFIG.tracking, CONFIG.motion)
+    ]
     assert parts == [(1, 0, 31), (2, 0, 31), (1, 32, 49), (2, 32, 63), (1, 53, 63)]
 
 
 @given(runs(6))
 def test_stretches_hold_every_row_once(rows: Rows) -> None:
-    parts = isolated_tracklets(rows, RATE, CONFIG)
+    parts = isolated_tracklets(rows, RATE, CONFIG.tracking, CONFIG.motion)
     held = [row for part in parts for row in part.rows.tolist()]
     assert sorted(held) == list(range(len(rows)))
     for part in parts:
@@ -191,7 +193,10 @@ def test_a_longer_stretch_tells_more() -> None:
     def path(t: float) -> tuple[float, float]:
         return -3 + 0.6 * t, 1 - 0.3 * t
 
-    short, long = (isolated_tracklets(rows_of({1: (path, 1.7, range(n))}, 0.0), RATE, CONFIG)[0] for n in (3, 40))
+    short, long = (
+        isolated_tracklets(rows_of({1: (path, 1.7, range(n))}, 0.0), RATE, CONFIG.tracking, CONFIG.motion)[0]
+        for n in (3, 40)
+    )
     np.testing.assert_allclose(long.end.velocity, [0.6, -0.3], rtol=0.35)
     assert np.hypot(*short.end.velocity) < np.hypot(*long.end.velocity)
     assert short.end.velocity_variance > long.end.velocity_variance

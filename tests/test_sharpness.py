@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scenes import FEW_HEIGHTS, corner_cameras, people, rig_of
+from scenes import BODY, FEW_HEIGHTS, corner_cameras, people, rig_of
 
 from stseg.arrays import Boxes, Floats
 from stseg.config import ErrorRateConfig
@@ -51,7 +51,7 @@ def test_nothing_seen_is_the_first_guess_and_what_is_seen_is_forgotten() -> None
 def taught(sharpening: BoxNoiseCalibration, spread: float, score: float, frames: int) -> None:
     """Boxes of three people in four views, edges off by so much of the height; every fourth ends far above the feet."""
     rng, rig = np.random.default_rng(3), rig_of(corner_cameras())
-    frame_pass = Detector(rig, ["boxes"] * 4, FEW_HEIGHTS)
+    frame_pass = Detector(rig, ["boxes"] * 4, FEW_HEIGHTS, BODY)
     standing = people((-0.8, 0.3, 1.7), (0.7, -0.6, 1.7), (0.6, 0.8, 1.7))
     for _ in range(frames):
         seen = [shaken(view.table.boxes_of(*standing_of(standing)), spread, score, rng) for view in frame_pass.views]
@@ -105,7 +105,7 @@ def test_a_boxs_distance_is_measured_by_its_own_tolerance() -> None:
 
 def test_each_session_begins_with_the_first_guess() -> None:
     rig = rig_of(corner_cameras())
-    frame_pass = Detector(rig, ["boxes"] * 4, FEW_HEIGHTS)
+    frame_pass = Detector(rig, ["boxes"] * 4, FEW_HEIGHTS, BODY)
     standing = people((-0.8, 0.3, 1.7), (0.7, -0.6, 1.7))
     rng = np.random.default_rng(0)
     seen = [shaken(view.table.boxes_of(*standing_of(standing)), 0.02, 1.0, rng) for view in frame_pass.views]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scenes import FEW_HEIGHTS, boxes, corner_cameras, expecting, likelihoods, people, room
+from scenes import BODY, FEW_HEIGHTS, boxes, corner_cameras, expecting, likelihoods, people, room
 from scipy.special import expit
 from strategies import numbers
 
@@ -35,13 +35,13 @@ def sizes_of(mean: float, spread: float) -> Sizes:
 
 def pixel_view(few: int = 0) -> PixelView:
     rig = room()
-    return PixelView(rig.cameras[few], rig.grid, np.zeros((1, 2)), FEW_HEIGHTS)
+    return PixelView(rig.cameras[few], rig.grid, np.zeros((1, 2)), FEW_HEIGHTS, BODY)
 
 
 def at(ground: Floats) -> RefinedPlaces:
     """People whose places say nothing of their heights."""
     n = len(ground)
-    mean, variance = np.full(n, FEW_HEIGHTS.height_mean), np.full(n, FEW_HEIGHTS.height_spread**2)
+    mean, variance = np.full(n, BODY.height_mean), np.full(n, BODY.height_spread**2)
     return RefinedPlaces(ground, np.zeros((n, 2, 2)), mean, variance)
 
 
@@ -97,10 +97,10 @@ def test_the_e_step_by_definition(hidden: float) -> None:
     sight = replace(view.observe(None), raster=rng.normal(0, 2, view.shape).astype(np.float32))
     open_pixels = rng.random(view.shape) >= hidden
     place, width = np.array([[0.3, -0.2]]), np.array([0.45])
-    found = measure(at(place), width, [view], [sight], open_to_one(open_pixels), FEW_HEIGHTS)
+    found = measure(at(place), width, [view], [sight], open_to_one(open_pixels), BODY)
     everywhere, one = np.tile(place, (len(STEPS), 1)), np.ones(len(STEPS))
-    heights = FEW_HEIGHTS.height_mean + FEW_HEIGHTS.height_spread * STEPS
-    widths = FEW_HEIGHTS.width_mean + FEW_HEIGHTS.width_spread * STEPS
+    heights = BODY.height_mean + BODY.height_spread * STEPS
+    widths = BODY.width_mean + BODY.width_spread * STEPS
     for lattice, fits, mean, variance in (
         (heights, Candidates(everywhere, heights, 0.45 * one), found.height, found.height_variance),
         (widths, Candidates(everywhere, found.height * one, widths), found.width, found.width_variance),
@@ -116,10 +116,10 @@ def test_who_is_hidden_is_like_anybody() -> None:
     view = pixel_view()
     sight = view.observe(likelihoods([view.camera], people((0.3, -0.2, 1.9)))[0])
     nobodys = open_to_one(np.zeros(view.shape, bool))
-    place, width, anybody = at(np.array([[0.3, -0.2]])), np.array([0.42]), Sizes.of_population(1, FEW_HEIGHTS)
-    found = measure(place, width, [view], [sight], nobodys, FEW_HEIGHTS)
+    place, width, anybody = at(np.array([[0.3, -0.2]])), np.array([0.42]), Sizes.of_population(1, BODY)
+    found = measure(place, width, [view], [sight], nobodys, BODY)
     np.testing.assert_allclose([found.height, found.width], [anybody.height, anybody.width])
-    blind = measure(place, width, [view], [None], nobodys, FEW_HEIGHTS)
+    blind = measure(place, width, [view], [None], nobodys, BODY)
     np.testing.assert_allclose(blind.height_variance, anybody.height_variance, rtol=0.03)  # of the lattice, cut off
 
 
@@ -127,7 +127,7 @@ def test_wider_people_are_found_wider() -> None:
     """Silhouettes of a body of the profile's width, and of one a fifth slimmer."""
     rig, found = room(), []
     for wide in (0.8, 1.0):
-        views = [PixelView(camera, rig.grid, np.zeros((1, 2)), FEW_HEIGHTS) for camera in rig.cameras]
+        views = [PixelView(camera, rig.grid, np.zeros((1, 2)), FEW_HEIGHTS, BODY) for camera in rig.cameras]
         sights = []
         for view in views:
             seen = np.zeros(view.camera.size[::-1], np.float32)
@@ -138,7 +138,7 @@ def test_wider_people_are_found_wider() -> None:
                 seen[first[0] + k, start:stop] = 1.0
             sights.append(view.observe(seen))
         own = open_to_one(*(np.ones(view.shape, bool) for view in views))
-        found.append(float(measure(at(np.zeros((1, 2))), np.array([0.42]), views, sights, own, FEW_HEIGHTS).width[0]))
+        found.append(float(measure(at(np.zeros((1, 2))), np.array([0.42]), views, sights, own, BODY).width[0]))
     assert 0.8 * WIDTH - 0.03 < found[0] < found[1] - 0.04
     assert found[1] == pytest.approx(WIDTH, abs=0.04)
 
@@ -161,7 +161,7 @@ def test_the_head_closes() -> None:
 def tall_and_short(kind: str) -> tuple[Floats, Sizes]:
     standing = people((-0.9, 0.4, 1.58), (0.6, -0.5, 1.86), (0.9, 0.9, 1.7))
     rig = room()
-    frame_pass = Detector(rig, [kind] * 4, FEW_HEIGHTS)
+    frame_pass = Detector(rig, [kind] * 4, FEW_HEIGHTS, BODY)
     seen: list[Singles] | list[Boxes] = (
         likelihoods(rig.cameras, standing) if kind == "pixels" else [boxes(camera, standing) for camera in rig.cameras]
     )
@@ -182,7 +182,7 @@ def test_heights_are_found(kind: str) -> None:
 def test_who_is_known_keeps_their_height() -> None:
     """A walker's own height is the prior of the next frame's; the frame's own measurement stays free of it."""
     rig, standing = room(), people((0.2, 0.1, 1.7))
-    frame_pass = Detector(rig, ["pixels"] * 4, FEW_HEIGHTS)
+    frame_pass = Detector(rig, ["pixels"] * 4, FEW_HEIGHTS, BODY)
     expected = expecting((0.2, 0.1, 1.82))
     expected = replace(expected, sizes=replace(expected.sizes, height_variance=np.full(1, 0.01**2)))
     seen = likelihoods(rig.cameras, standing)
@@ -198,7 +198,7 @@ def test_taller_people_are_found_taller(height: float) -> None:
     view = pixel_view()
     place, width = at(np.zeros((1, 2))), np.array([WIDTH])
     found = [
-        measure(place, width, [view], [view.observe(seen)], everything(view), FEW_HEIGHTS).height[0]
+        measure(place, width, [view], [view.observe(seen)], everything(view), BODY).height[0]
         for tall in (height, height + 0.1)
         for seen in likelihoods([view.camera], people((0.0, 0.0, tall)))
     ]

@@ -9,10 +9,12 @@ from hypothesis import strategies as st
 from strategies import numbers
 
 from stseg.arrays import Floats, Ints
+from stseg.config import MotionConfig
 from stseg.model.tables import TRAJECTORY
-from stseg.tracking.smoother import TURN, smooth_places, smoothed_path
+from stseg.tracking.smoother import smooth_places, smoothed_path
 
 RATE = 8.0
+MOTION = MotionConfig()
 PACE = 0.8
 
 
@@ -24,7 +26,7 @@ def conditioned(seconds: Floats, ground: Floats, noise: Floats) -> tuple[Floats,
     """
     n, since = len(seconds), seconds - seconds[0]
     early, late = np.minimum.outer(since, since), np.maximum.outer(since, since)
-    along = TURN**2 * early**2 * (3 * late - early) / 6 + PACE**2 * np.outer(since, since)
+    along = MOTION.velocity_noise**2 * early**2 * (3 * late - early) / 6 + PACE**2 * np.outer(since, since)
     prior = np.kron(along, np.eye(2)) + np.kron(np.ones((n, n)), noise[0])
     measured = np.zeros((2 * n - 2, 2 * n))
     measured[:, 2:] = np.eye(2 * n - 2)
@@ -52,7 +54,7 @@ def measured(draw: st.DrawFn) -> tuple[Ints, Floats, Floats]:
 @given(measured())
 def test_a_path_is_what_all_its_measurements_say_at_once(path: tuple[Ints, Floats, Floats]) -> None:
     frames, ground, noise = path
-    places, spread = smoothed_path(frames / RATE, ground, noise)
+    places, spread = smoothed_path(frames / RATE, ground, noise, MOTION)
     expected, covariance = conditioned(frames / RATE, ground, noise)
     np.testing.assert_allclose(places, expected, atol=1e-9, rtol=0)
     np.testing.assert_allclose(spread, covariance, atol=1e-9, rtol=0)
@@ -62,14 +64,14 @@ def test_a_path_is_what_all_its_measurements_say_at_once(path: tuple[Ints, Float
 @given(measured())
 def test_smoothing_never_knows_less(path: tuple[Ints, Floats, Floats]) -> None:
     frames, ground, noise = path
-    _, spread = smoothed_path(frames / RATE, ground, noise)
+    _, spread = smoothed_path(frames / RATE, ground, noise, MOTION)
     assert (np.linalg.eigvalsh(spread) > 0).all()
     assert (np.linalg.eigvalsh(noise - spread) > -1e-9).all()
 
 
 def test_a_single_measurement_stays_what_it_is() -> None:
     ground, noise = np.array([[1.0, 2.0]]), np.array([[[0.02, 0.01], [0.01, 0.03]]])
-    places, spread = smoothed_path(np.array([3.0]), ground, noise)
+    places, spread = smoothed_path(np.array([3.0]), ground, noise, MOTION)
     np.testing.assert_array_equal(places, ground)
     np.testing.assert_array_equal(spread, noise)
 
@@ -89,7 +91,7 @@ def test_a_noisy_walk_gets_nearer_to_the_truth(seed: int) -> None:
     rows = rows[np.lexsort((rows["id"], rows["frame"]))]
     true = true[np.lexsort((np.repeat([4, 2], [60, 20]), np.concatenate([np.arange(60), np.arange(0, 60, 3)])))]
     before = rows.copy()
-    smoothed = smooth_places(rows, RATE)
+    smoothed = smooth_places(rows, RATE, MOTION)
     np.testing.assert_array_equal(rows, before)
     for name in ("frame", "id", "raw_x", "raw_y", "height"):
         np.testing.assert_array_equal(smoothed[name], rows[name])
@@ -104,4 +106,4 @@ def test_a_noisy_walk_gets_nearer_to_the_truth(seed: int) -> None:
 
 
 def test_nobody_at_all() -> None:
-    assert len(smooth_places(np.zeros(0, TRAJECTORY), RATE)) == 0
+    assert len(smooth_places(np.zeros(0, TRAJECTORY), RATE, MOTION)) == 0

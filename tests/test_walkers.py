@@ -40,10 +40,10 @@ def somebody(state: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0), odds: float = 1.0)
 @given(STATES, numbers(0.01, 3), numbers(0.01, 3))
 def test_constant_velocity(state: Floats, first: float, second: float) -> None:
     walker = somebody(tuple(state))
-    then = walker.carried(first)
+    then = walker.carried(first, CONFIG.motion)
     np.testing.assert_allclose(then.state, [*(state[:2] + first * state[2:]), *state[2:]])
     assert (np.linalg.eigvalsh(then.covariance - np.diag([0, 0, 0.6, 0.5])).sum()) > 0
-    at_once, in_steps = walker.carried(first + second), then.carried(second)
+    at_once, in_steps = walker.carried(first + second, CONFIG.motion), then.carried(second, CONFIG.motion)
     np.testing.assert_allclose(at_once.state, in_steps.state, atol=1e-9)
     np.testing.assert_allclose(at_once.covariance, in_steps.covariance, atol=1e-9)
     assert at_once.height_variance == pytest.approx(in_steps.height_variance)
@@ -53,7 +53,7 @@ def test_constant_velocity(state: Floats, first: float, second: float) -> None:
 @given(STATES, numbers(-1, 1), numbers(-1, 1), numbers(0.02, 0.5), numbers(-0.8, 0.8))
 def test_found_is_the_textbooks_correction(state: Floats, x: float, y: float, sd: float, slant: float) -> None:
     """The posterior of the place, whose prior is the walker's, tells all that the measurement told."""
-    walker = somebody(tuple(state)).carried(0.3)
+    walker = somebody(tuple(state)).carried(0.3, CONFIG.motion)
     noise = sd**2 * np.array([[1.0, slant], [slant, 1.0]])
     place = walker.state[:2] + np.array([x, y])
     information = np.linalg.inv(walker.covariance[:2, :2]) + np.linalg.inv(noise)
@@ -66,7 +66,7 @@ def test_found_is_the_textbooks_correction(state: Floats, x: float, y: float, sd
 
 
 def test_a_posterior_that_says_nothing_new_changes_nothing() -> None:
-    walker = somebody((1.0, 2.0, 0.3, -0.2)).carried(0.2)
+    walker = somebody((1.0, 2.0, 0.3, -0.2)).carried(0.2, CONFIG.motion)
     after = walker.found(12, walker.state[:2], walker.covariance[:2, :2], NOTHING, NOTHING, 0.5)
     np.testing.assert_allclose(after.state, walker.state)
     np.testing.assert_allclose(after.covariance, walker.covariance)
@@ -88,16 +88,16 @@ def test_sizes_converge() -> None:
     assert walker.height_variance == pytest.approx(1 / (1 / 0.12**2 + weight))
     assert walker.height == pytest.approx((1.7 / 0.12**2 + weight * seen.mean()) / (1 / 0.12**2 + weight))
     assert walker.width == pytest.approx((0.42 / 0.04**2 + weight * (seen.mean() - 1.4)) / (1 / 0.04**2 + weight))
-    later = walker.carried(4.0)  # shoes, stoop, lens, clothes
+    later = walker.carried(4.0, CONFIG.motion)  # shoes, stoop, lens, clothes
     assert later.height_variance > walker.height_variance
     assert later.width_variance > walker.width_variance
 
 
 def test_what_a_frame_tells_of_sizes_is_used_once() -> None:
     """The prior of a frame's posterior, anybody's size, is taken out before the person's own comes in."""
-    walkers = TrackFilter(RATE, CONFIG.detection, IDENTITY)
+    walkers = TrackFilter(RATE, CONFIG)
     told = found(people((0.0, 0.0, 1.85)))
-    nothing = replace(told, sizes=Sizes.of_population(1, CONFIG.detection))
+    nothing = replace(told, sizes=Sizes.of_population(1, CONFIG.body))
     walkers.follow(0, told, GHOSTS)
     sure = walkers.walkers[0]
     for frame in range(1, 40):
@@ -112,7 +112,7 @@ def test_what_a_frame_tells_of_sizes_is_used_once() -> None:
 
 def follow(ways: list[Way], frames: range, order: int | None = None) -> tuple[list[list[int]], TrackFilter]:
     """The chains that these people get, one for each frame that sees them, and who is followed in the end."""
-    walkers = TrackFilter(RATE, CONFIG.detection, IDENTITY)
+    walkers = TrackFilter(RATE, CONFIG)
     chains: list[list[int]] = [[] for _ in ways]
     rng = np.random.default_rng(order)
     for frame in frames:
@@ -222,7 +222,7 @@ def test_far_away_is_somebody_new() -> None:
 
 
 def test_before_the_first_frame_nothing_is_known_and_after_an_empty_one_that_nobody_is_there() -> None:
-    walkers = TrackFilter(RATE, CONFIG.detection, IDENTITY)
+    walkers = TrackFilter(RATE, CONFIG)
     assert walkers.expected(0) is None
     assert walkers.follow(0, GHOSTS, GHOSTS).shape == (0,)
     expected = walkers.expected(1)
@@ -251,7 +251,7 @@ def doubted(*places: tuple[float, float], evidence: float) -> People:
 def test_who_was_almost_believed_is_looked_for_once_more() -> None:
     """They have no number before they are found, and are forgotten if the next frame does not find them."""
     for found_again in (True, False):
-        walkers = TrackFilter(RATE, CONFIG.detection, IDENTITY)
+        walkers = TrackFilter(RATE, CONFIG)
         assert walkers.follow(0, GHOSTS, doubted((0.5, 0.5), evidence=-1.0)).shape == (0,)
         expected = walkers.expected(1)
         assert expected is not None
@@ -266,7 +266,7 @@ def test_who_was_almost_believed_is_looked_for_once_more() -> None:
 @pytest.mark.parametrize(("evidence", "place", "looked_for"), [(-1, 2, 2), (-5, 2, 1), (-1, 0.3, 1)])
 def test_who_is_not_looked_for_again(evidence: float, place: float, looked_for: int) -> None:
     """Who was hardly believed at all, and whoever stands beside somebody who is followed: it may be the same."""
-    walkers = TrackFilter(RATE, CONFIG.detection, IDENTITY)
+    walkers = TrackFilter(RATE, CONFIG)
     walkers.follow(0, found(people((0, 0))), doubted((place, 0.0), evidence=evidence))
     assert len(walkers.expected(1) or ()) == looked_for
     assert [walker.chain for walker in walkers.walkers] == [1, 0][:looked_for]

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from recordings import track, write_recording
-from scenes import FEW_HEIGHTS, boxes, likelihoods, people, room
+from scenes import BODY, FEW_HEIGHTS, boxes, likelihoods, people, room
 
 from stseg.accelerate import python_form
 from stseg.arrays import Floats, ViewEvidence
@@ -39,7 +39,7 @@ def told(rig: Rig, kind: str, standing: Floats) -> Floats:
         if kind == "pixels"
         else [boxes(camera, standing) for camera in room().cameras]
     )
-    return Detector(rig, [kind] * 4, FEW_HEIGHTS).explain(seen, None).residual
+    return Detector(rig, [kind] * 4, FEW_HEIGHTS, BODY).explain(seen, None).residual
 
 
 @pytest.mark.parametrize("kind", ["pixels", "boxes"])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from hypothesis import given, settings
-from strollers import BORDER, CONFIG, PEOPLE, RATE, gone, rows_of, runs, swapped, visit
+from strollers import BORDER, CONFIG, RATE, gone, rows_of, runs, swapped, visit
 
 from stseg.arrays import Rows
 from stseg.model.tables import EVENT, TRAJECTORY
@@ -33,7 +33,7 @@ def lives(rows: Rows) -> Rows:
 
 
 def whole(rows: Rows, events: Rows) -> FinalTracks:
-    return final_tracks(rows, events, RATE, BORDER, CONFIG, PEOPLE)
+    return final_tracks(rows, events, RATE, BORDER, CONFIG)
 
 
 def story(events: Rows) -> list[tuple[int, bytes, int, int]]:

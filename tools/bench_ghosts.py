@@ -62,10 +62,10 @@ def positions(people: int, frames: int, kind: str, config: Config) -> tuple[floa
     kinds = [kind] * 4
     candidates, fuse = (
         Proposals(film.rig, kinds, config),
-        Occupancy(film.rig, kinds, config.occupancy, config.detection).fuse,
+        Occupancy(film.rig, kinds, config.occupancy, config.detection, config.body).fuse,
     )
-    frame_pass = Detector(film.rig, [kind] * 4, config.detection)
-    follow = TrackFilter(film.rig.frame_rate, config.detection, config.tracking)
+    frame_pass = Detector(film.rig, [kind] * 4, config.detection, config.body)
+    follow = TrackFilter(film.rig.frame_rate, config)
     taken, weighed = [], []
     for frame, views in enumerate(seen):
         start = time.process_time()
@@ -124,11 +124,14 @@ def search_seconds(case: Problem) -> float:
 def one_case(kind: str) -> Problem:
     """All that is known of the candidates of one frame, five people in view."""
     film, seen = evidence(5, 1, kind)
-    frame_pass, views = Detector(film.rig, [kind] * 4, Config().detection), seen[-1]
+    frame_pass, views = Detector(film.rig, [kind] * 4, Config().detection, Config().body), seen[-1]
     found = frame_pass.explain(views, None)
     sights = [view.observe(shown) for view, shown in zip(frame_pass.views, views, strict=True)]
     state = FrameEvidence(
-        frame_pass.views, sights, Prior.of(None, Config().detection, frame_pass.border), frame_pass.parameters
+        frame_pass.views,
+        sights,
+        Prior.of(None, Config().detection, Config().body, frame_pass.border),
+        frame_pass.parameters,
     )
     people, ghosts = (Candidates(some.ground, some.height, some.width) for some in (found.people, found.ghosts))
     pool = people.joined_with(ghosts)

@@ -20,7 +20,7 @@ from bench_cut import Row, print_table
 from labelled_scenes import TrueFrame, film_frames, labels_of
 
 from stseg.arrays import Floats, Ints, Singles
-from stseg.config import LabelConfig
+from stseg.config import BodyConfig, LabelConfig
 from stseg.graphcut.energy import QUANTUM
 from stseg.graphcut.expansion import expand
 from stseg.labels.adjacency import edge_costs
@@ -38,7 +38,7 @@ def speed(people: int) -> Row:
     """A scene with so many people."""
     spec = replace(NAMED["easy"], people=people, seconds=10.0, size=SIZE)
     rig, frames = film_frames(spec, EVERY)
-    views = view_labels(rig, LabelConfig())
+    views = view_labels(rig, LabelConfig(), BodyConfig())
     labels_of(views, frames[0])  # compiles
     times = []
     for frame in frames:

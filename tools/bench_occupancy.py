@@ -112,8 +112,8 @@ def pipeline_fusion(frames: int) -> None:
     spec = SceneSpec(name="bench", people=6, area=(6.0, 6.0), seconds=frames / 10.0, camera_distance=6.8, seed=5)
     film, config = Film(spec), Config()
     for kind in ("pixels", "boxes"):
-        frame_pass = Detector(film.rig, [kind] * 4, config.detection)
-        occupancy = Occupancy(film.rig, [kind] * 4, config.occupancy, config.detection)
+        frame_pass = Detector(film.rig, [kind] * 4, config.detection, config.body)
+        occupancy = Occupancy(film.rig, [kind] * 4, config.occupancy, config.detection, config.body)
         taken = []
         for moment in film.moments():
             seen: list[ViewEvidence] = [

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stseg.arrays import Bytes, Ints, Labels, Singles
-from stseg.config import Config, LabelConfig
+from stseg.config import BodyConfig, Config, LabelConfig
 from stseg.foreground import make_background
 from stseg.foreground.illumination import IlluminationMonitor
 from stseg.foreground.view_foreground import ViewForeground
@@ -107,7 +107,7 @@ class Accuracy:
 
 def accuracy(rig: Rig, frames: Sequence[TrueFrame], config: LabelConfig) -> Accuracy:
     """That of our labels; pixels of people outside the area count for nothing."""
-    views = view_labels(rig, config)
+    views = view_labels(rig, config, BodyConfig())
     right = shown = given = wrong = 0
     for frame in frames:
         for label, seen in zip(labels_of(views, frame), frame.views, strict=True):

@@ -13,12 +13,14 @@ from stseg.config.foreground import (
     IlluminationConfig,
     MixtureConfig,
 )
+from stseg.config.people import BodyConfig, MotionConfig
 from stseg.config.trackers import BeliefConfig, KalmanConfig, ParticleConfig
 from stseg.config.tracking import LiveConfig, SegmentationConfig, SegmentConfig, TrackingConfig
 
 __all__ = [
     "BackgroundConfig",
     "BeliefConfig",
+    "BodyConfig",
     "ChromaticConfig",
     "CodebookConfig",
     "Config",
@@ -30,6 +32,7 @@ __all__ = [
     "LabelConfig",
     "LiveConfig",
     "MixtureConfig",
+    "MotionConfig",
     "OccupancyConfig",
     "ParticleConfig",
     "ProposalConfig",
@@ -43,6 +46,8 @@ __all__ = [
 class Config:
     """All stages."""
 
+    body: BodyConfig = field(default_factory=BodyConfig)
+    motion: MotionConfig = field(default_factory=MotionConfig)
     foreground: ForegroundConfig = field(default_factory=ForegroundConfig)
     illumination: IlluminationConfig = field(default_factory=IlluminationConfig)
     occupancy: OccupancyConfig = field(default_factory=OccupancyConfig)

@@ -12,16 +12,6 @@ from stseg.settings import require
 class DetectionConfig:
     """The pass that decides which candidates are people (METHODS 7)."""
 
-    heights: tuple[float, ...] = (1.5, 1.6, 1.7, 1.8, 1.9)
-    """Heights that are tried, metres."""
-    height_mean: float = 1.70
-    """Mean height of people, metres (HW12)."""
-    height_spread: float = 0.12
-    """Standard deviation of their heights, metres."""
-    width_mean: float = 0.42
-    """Mean width of people across shoulders and arms, metres."""
-    width_spread: float = 0.04
-    """Standard deviation of their widths, metres."""
     lattice_spacing: float = 0.20
     """Spacing of the ground lattice that is searched for candidates, metres."""
     search_rounds: int = 4
@@ -55,14 +45,7 @@ class DetectionConfig:
     all views show pixels. Boxes' scores are too rough: they rise by it, but tracks get worse (docs/ghosts.md)."""
 
     def __post_init__(self) -> None:
-        heights = self.heights
-        require(len(heights) > 0 and min(heights) > 0, self, "heights", "one or more heights above 0 m")
-        require(list(heights) == sorted(heights) and max(heights) <= 2.2, self, "heights", "rising, at most 2.2 m")
         for name in (
-            "height_mean",
-            "height_spread",
-            "width_mean",
-            "width_spread",
             "lattice_spacing",
             "minimum_distance",
             "effective_observations",
@@ -89,14 +72,6 @@ class ProposalConfig:
 
     source: Literal["lattice", "probability", "volume", "both"] = "lattice"
     """Where candidates come from beside tracks: the lattice alone, or also the probability, the volume or both."""
-    height_mean: float = 1.70
-    """Mean height of pillars, metres (HW12)."""
-    height_spread: float = 0.15
-    """Standard deviation of their heights, metres (HW12)."""
-    width_mean: float = 0.30
-    """Mean width of pillars, metres (HW12)."""
-    width_spread: float = 0.05
-    """Standard deviation of their widths, metres (HW12)."""
     body_sizes: int = 10
     """How many heights, and how many widths, are tried (HW12)."""
     unseen_rate: float = 0.08
@@ -111,13 +86,8 @@ class ProposalConfig:
     """C: kernel of the mean shift, metres; HW12's 0.80 takes two people a metre apart for one."""
 
     def __post_init__(self) -> None:
-        for name in ("height_mean", "height_spread", "width_mean", "width_spread", "lattice_spacing", "kernel_radius"):
+        for name in ("lattice_spacing", "kernel_radius"):
             require(getattr(self, name) > 0, self, name, "a number above 0")
-        for name, mean, spread in (
-            ("height_mean", self.height_mean, self.height_spread),
-            ("width_mean", self.width_mean, self.width_spread),
-        ):
-            require(mean > 2 * spread, self, name, "more than two standard deviations")
         require(self.body_sizes >= 2, self, "body_sizes", "2 or more")
         for name in ("unseen_rate", "view_miss_rate", "covered_share"):
             require(0 < getattr(self, name) < 1, self, name, "a number between 0 and 1")
@@ -178,10 +148,6 @@ class LabelConfig:
     """How many pillars are drawn for each person."""
     height_noise: float = 0.05
     """How far a person's height is off, metres (standard deviation)."""
-    width: float = 0.30
-    """Mean width of a body over its height, metres (HW12)."""
-    width_spread: float = 0.05
-    """How far the widths of bodies differ, metres (standard deviation; HW12)."""
     outlier_rate: float = 1e-3
     """Share of the pixels that show somebody, or nobody, against all the pillars that were drawn, 0..1."""
 
@@ -192,10 +158,9 @@ class LabelConfig:
             "contrast_limit",
             "colourless_factor",
             "height_noise",
-            "width_spread",
         ):
             require(getattr(self, name) >= 0, self, name, "0 or more")
-        for name in ("contrast_slope", "position_noise", "width"):
+        for name in ("contrast_slope", "position_noise"):
             require(getattr(self, name) > 0, self, name, "a number above 0")
         require(self.samples >= 1, self, "samples", "1 or more")
         require(0 < self.outlier_rate < 1, self, "outlier_rate", "a number between 0 and 1")

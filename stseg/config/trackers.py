@@ -12,18 +12,12 @@ from stseg.settings import require
 class KalmanConfig:
     """The tracker `kalman` (HW12 section V.E; METHODS 9)."""
 
-    velocity_noise: float = 0.8
-    """How people change their velocity, metres per second per square root of a second (standard deviation)."""
-    speed_spread: float = 0.8
-    """Standard deviation of the velocity of somebody new, metres per second."""
     gate_probability: float = 0.99
     """Share of a person's own places that lie within their gate, 0..1."""
     patience: float = 1.0
     """How long somebody may be unseen and still be the same, seconds."""
 
     def __post_init__(self) -> None:
-        for name in ("velocity_noise", "speed_spread"):
-            require(getattr(self, name) > 0, self, name, "a number above 0")
         require(0 < self.gate_probability < 1, self, "gate_probability", "a number between 0 and 1")
         require(self.patience >= 0, self, "patience", "0 or more seconds")
 
@@ -44,6 +38,8 @@ class ParticleConfig:
     """How often a particle is segmented and moved in a frame, at most."""
     axis_fit: Literal["squares", "median"] = "squares"
     """How a body's axis is fitted to its pixels: by least squares, or by the least median of squares."""
+    walking_speed: float = 2.0
+    """Highest speed at which a person who is not seen walks on, metres per second."""
     velocity_spread: float = 1.2
     """How fast people walk about, metres per second (standard deviation along x and along y)."""
     colour_weight: float = 20.0
@@ -58,7 +54,7 @@ class ParticleConfig:
     def __post_init__(self) -> None:
         for name in ("particles", "raster_columns", "iterations"):
             require(getattr(self, name) >= 1, self, name, "1 or more")
-        for name in ("velocity_spread", "colour_weight", "colour_memory", "assignment_distance"):
+        for name in ("walking_speed", "velocity_spread", "colour_weight", "colour_memory", "assignment_distance"):
             require(getattr(self, name) > 0, self, name, "a number above 0")
         require(self.seed >= 0, self, "seed", "0 or more")
         require(self.patience >= 0, self, "patience", "0 or more seconds")
@@ -80,8 +76,6 @@ class BeliefConfig:
     """A target's messages rest when its mean place moves by less than this in a round, metres."""
     position_noise: float = 0.5
     """How people leave a straight line, metres per square root of a second (standard deviation)."""
-    velocity_noise: float = 0.8
-    """How they change their velocity, metres per second per square root of a second (standard deviation)."""
     foot_noise: float = 0.03
     """How far a place in an image is off, share of the body's height there (standard deviation)."""
     outlier_rate: float = 0.1
@@ -111,7 +105,6 @@ class BeliefConfig:
         require(self.patience >= 0, self, "patience", "0 or more seconds")
         for name in (
             "position_noise",
-            "velocity_noise",
             "foot_noise",
             "outlier_spread",
             "colour_weight",

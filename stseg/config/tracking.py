@@ -36,12 +36,8 @@ class TrackingConfig:
 
     window: float = 1.0
     """Length of a window, seconds; held between 8 and 30 frames."""
-    walking_speed: float = 2.0
-    """How fast people walk at most, metres per second."""
     assignment_distance: float = 0.35
     """How far a place may be off besides, metres."""
-    position_noise: float = 0.15
-    """How far a frame's place is off besides its own covariance, metres (standard deviation)."""
     height_noise: float = 0.035
     """How far a frame's height of a person is off where they are seen whole, metres (standard deviation)."""
     width_noise: float = 0.03
@@ -60,7 +56,7 @@ class TrackingConfig:
     """How long the cells of two people are apart before their encounter is over, seconds."""
 
     def __post_init__(self) -> None:
-        for name in ("window", "walking_speed", "position_noise", "height_noise"):
+        for name in ("window", "height_noise", "width_noise"):
             require(getattr(self, name) > 0, self, name, "a number above 0")
         for name in (
             "assignment_distance",

@@ -25,7 +25,7 @@ from typing import NamedTuple
 import numpy as np
 
 from stseg.arrays import Floats, Ints, Singles
-from stseg.config import DetectionConfig
+from stseg.config import BodyConfig
 from stseg.detection.assignment import Assignment
 from stseg.detection.refine import RefinedPlaces
 from stseg.detection.views import PixelView, View, ViewObservation
@@ -42,7 +42,7 @@ def measure(
     views: Sequence[View],
     sights: Sequence[ViewObservation | None],
     own: Assignment,
-    config: DetectionConfig,
+    body: BodyConfig,
 ) -> Sizes:
     """The E step: posteriors of people's sizes after one frame, anybody's sizes the prior.
 
@@ -55,7 +55,7 @@ def measure(
     own
         What of the frame is whose.
     """
-    found = Sizes.of_population(len(width), config)
+    found = Sizes.of_population(len(width), body)
     told = [
         _Told(view, sight.label_values, owner)
         for view, sight, owner in zip(views, sights, own.pixels, strict=True)
@@ -64,7 +64,7 @@ def measure(
     if not told or not len(width):
         return replace(found, height=places.height, height_variance=places.height_variance)
     steps = np.linspace(-_WITHIN, _WITHIN, _STEPS)
-    heights, widths = config.height_mean + config.height_spread * steps, config.width_mean + config.width_spread * steps
+    heights, widths = body.height_mean + body.height_spread * steps, body.width_mean + body.width_spread * steps
     each, all_steps = (len(width), 1), (1, _STEPS)
     score = _score(places.ground, np.tile(heights, each), np.tile(width[:, None], all_steps), told)
     height, height_variance = _posterior(heights, score, steps)

@@ -21,7 +21,7 @@ import numpy as np
 
 from stseg.accelerate import kernel
 from stseg.arrays import Flags, Floats, Singles
-from stseg.config import ProposalConfig
+from stseg.config import BodyConfig, ProposalConfig
 from stseg.detection.pillar_strips import Pillars
 from stseg.errors import SourceError
 from stseg.geometry import Rig
@@ -41,8 +41,8 @@ class DetectionProbability:
     ----------
     rig
         The cameras and the area.
-    config
-        Sizes of people and the paper's constants.
+    config, body
+        The paper's constants; sizes of people.
     steps
         Image pixels to a map pixel, for each view; 1 where not given.
 
@@ -52,18 +52,18 @@ class DetectionProbability:
         The lattice, metres, `spacing` apart.
     """
 
-    def __init__(self, rig: Rig, config: ProposalConfig, steps: Sequence[int] | None = None) -> None:
+    def __init__(self, rig: Rig, config: ProposalConfig, body: BodyConfig, steps: Sequence[int] | None = None) -> None:
         self.rig, self.config, self.spacing = rig, config, config.lattice_spacing
         grid = rig.grid
         x, y = (np.arange(a + config.lattice_spacing / 2, b, config.lattice_spacing) for a, b in (grid.x, grid.y))
         self.ground = np.stack(np.meshgrid(x, y), -1)
         flat = self.ground.reshape(-1, 2)
         self.inside = np.ones(len(flat), bool) if grid.polygon is None else inside_polygon(flat, grid.polygon)
-        self.heights, self.height_share = _lattice(config.height_mean, config.height_spread, config.body_sizes)
-        self.widths, self.width_share = _lattice(config.width_mean, config.width_spread, config.body_sizes)
+        self.heights, self.height_share = _lattice(body.height_mean, body.height_spread, config.body_sizes)
+        self.widths, self.width_share = _lattice(body.width_mean, body.width_spread, config.body_sizes)
         self.steps = list(steps or [1] * len(rig.cameras))
         self.pillars = [
-            Pillars.of(camera, flat, self.heights, config.width_mean, step)
+            Pillars.of(camera, flat, self.heights, body.width_mean, step)
             for camera, step in zip(rig.cameras, self.steps, strict=True)
         ]
 

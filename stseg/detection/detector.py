@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from stseg.arrays import ViewEvidence
-from stseg.config import DetectionConfig, ErrorRateConfig
+from stseg.config import BodyConfig, DetectionConfig, ErrorRateConfig
 from stseg.detection.box_noise_calibration import BoxNoiseCalibration
 from stseg.detection.evidence import peaks
 from stseg.detection.map_estimate import FrameEvidence, MapEstimate
@@ -40,14 +40,21 @@ class Detector:
         What each camera delivers: "boxes" or "pixels".
     config
         The pass's constants.
+    body
+        Population prior of heights and widths.
     level
         How fast it learns how sharp boxes are.
     """
 
     def __init__(
-        self, rig: Rig, kinds: Sequence[str], config: DetectionConfig, level: ErrorRateConfig | None = None
+        self,
+        rig: Rig,
+        kinds: Sequence[str],
+        config: DetectionConfig,
+        body: BodyConfig,
+        level: ErrorRateConfig | None = None,
     ) -> None:
-        self.config = config
+        self.config, self.body = config, body
         self._rate, self._level = rig.frame_rate, level or ErrorRateConfig()
         self.first_noise = self.new_calibration().noise
         grid = rig.grid
@@ -56,7 +63,9 @@ class Detector:
         self.lattice_ground = np.stack(np.meshgrid(x, y), -1)
         flat = self.lattice_ground.reshape(-1, 2)
         self.views: list[BoxView | PixelView] = [
-            BoxView(camera, grid, flat, config) if kind == "boxes" else PixelView(camera, grid, flat, config)
+            BoxView(camera, grid, flat, config, body)
+            if kind == "boxes"
+            else PixelView(camera, grid, flat, config, body)
             for camera, kind in zip(rig.cameras, kinds, strict=True)
         ]
         self.parameters = Parameters(
@@ -115,7 +124,7 @@ class Detector:
             Noise of boxes; by default the first guess.
         """
         sights = self.observe(seen, noise)
-        prior = Prior.of(expected, self.config, self.border)
+        prior = Prior.of(expected, self.config, self.body, self.border)
         expected_inside = prior.pool()
         seen_now = FrameEvidence(self.views, sights, prior, self.parameters)
         frame = MapEstimate(seen_now, expected_inside, np.arange(len(expected_inside)))
@@ -134,12 +143,12 @@ class Detector:
 
     def fresh(self, frame: MapEstimate) -> Candidates:
         """Candidates in what nobody explains yet."""
-        heights, (rows, columns) = np.asarray(self.config.heights), self.lattice_ground.shape[:2]
+        heights, (rows, columns) = np.asarray(self.body.heights), self.lattice_ground.shape[:2]
         score = np.repeat(frame.seen.prior.tall(heights)[:, None], rows * columns, 1)
         for view, sight, free in zip(self.views, frame.seen.sights, frame.free(), strict=True):
             if sight is not None:
                 score += view.lattice_score(sight, free)
-        return peaks(score.reshape(-1, rows, columns), self.lattice_ground, heights, self.config.width_mean)
+        return peaks(score.reshape(-1, rows, columns), self.lattice_ground, heights, self.body.width_mean)
 
 
 def _settled(frame: MapEstimate, trades: int) -> MapEstimate:

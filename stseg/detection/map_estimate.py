@@ -144,7 +144,7 @@ class MapEstimate:
         views, sights, prior, pool = self.seen.views, self.seen.sights, self.seen.prior, self.pool.at(self.members)
         own = Assignment(self._boxes(), self.pixel_owner)
         places = refine(pool, views, sights, own, prior, self.walker)
-        sizes = measure(places, pool.width, views, sights, own, prior.config)
+        sizes = measure(places, pool.width, views, sights, own, prior.body)
         known = prior.known_sizes(sizes, self.walker)
         return RefinedPeople(Candidates(places.ground, sizes.height, known.width), places.covariance, sizes, known)
 

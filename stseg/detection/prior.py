@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stseg.arrays import Floats, Ints
-from stseg.config import DetectionConfig
+from stseg.config import BodyConfig, DetectionConfig
 from stseg.model.border import Border
 from stseg.model.candidates import Candidates
 from stseg.model.predicted_tracks import PredictedTracks, no_tracks
@@ -24,6 +24,8 @@ class Prior:
         Whom the frames before lead to expect.
     config
         The pass's constants.
+    body
+        Population prior of heights and widths.
     border
         Where people may come in.
     cost
@@ -32,15 +34,16 @@ class Prior:
 
     expected: PredictedTracks
     config: DetectionConfig
+    body: BodyConfig
     border: Border
     cost: float
 
     @classmethod
-    def of(cls, expected: PredictedTracks | None, config: DetectionConfig, border: Border) -> Prior:
+    def of(cls, expected: PredictedTracks | None, config: DetectionConfig, body: BodyConfig, border: Border) -> Prior:
         """The prior of a frame; None expects nobody and takes nobody for a newcomer, as a first frame must."""
         if expected is None:
-            return cls(no_tracks(), config, border, 0.0)
-        return cls(expected, config, border, config.birth_cost)
+            return cls(no_tracks(), config, body, border, 0.0)
+        return cls(expected, config, body, border, config.birth_cost)
 
     def pool(self) -> Candidates:
         """Those expected inside the border, as candidates: who leaves the area is not followed out of it."""
@@ -49,14 +52,14 @@ class Prior:
 
     def tall(self, heights: Floats) -> Floats:
         """What speaks for somebody as tall as this, metres, beyond somebody of mean height: nats, float64 (n,)."""
-        return -0.5 * ((heights - self.config.height_mean) / self.config.height_spread) ** 2
+        return -0.5 * ((heights - self.body.height_mean) / self.body.height_spread) ** 2
 
     def known_sizes(self, sizes: Sizes, walker: Ints) -> Sizes:
         """Sizes that a frame found as if of anybody, of those who are known by all that was seen of them before.
 
         `walker` int64 (n,) says whom of those expected each is, -1 for newcomers.
         """
-        before = Sizes.of_population(len(walker), self.config)
+        before = Sizes.of_population(len(walker), self.body)
         measured, met = sizes.as_measurements(before), np.flatnonzero(walker >= 0)
         before.put(met, self.expected.sizes.at(walker[met]))
         return measured.with_prior(before)
@@ -67,4 +70,4 @@ class Prior:
 
     def track_log_ratio(self, pool: Candidates) -> Floats:
         """What speaks for each candidate by being each walker, nats, float64 (n, walker)."""
-        return self.expected.track_log_ratio(pool.ground, pool.height, self.config)
+        return self.expected.track_log_ratio(pool.ground, pool.height, self.body, self.config.prior_log_odds)

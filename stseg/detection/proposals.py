@@ -46,9 +46,10 @@ class Proposals:
 
     def __init__(self, rig: Rig, kinds: Sequence[str], config: Config) -> None:
         self.rig, self.config, self.ghosts = rig, config.proposals, config.detection
+        self.body = config.body
         self.probability = None
         if self.config.source in ("probability", "both"):
-            self.probability = DetectionProbability(rig, self.config, map_steps(rig, kinds))
+            self.probability = DetectionProbability(rig, self.config, config.body, map_steps(rig, kinds))
 
     def of(self, seen: Sequence[ViewEvidence], fuse: Fuse) -> Candidates | None:
         """Candidates of a frame, best first by source; None where none is asked for.
@@ -79,7 +80,7 @@ class Proposals:
 
     def _pool(self, ground: Floats) -> Candidates:
         everywhere = np.ones(len(ground))
-        return Candidates(ground, self.ghosts.height_mean * everywhere, self.ghosts.width_mean * everywhere)
+        return Candidates(ground, self.body.height_mean * everywhere, self.body.width_mean * everywhere)
 
 
 def map_steps(rig: Rig, kinds: Sequence[str]) -> list[int]:

@@ -65,7 +65,7 @@ def refine(
         Means and variances.
     """
     axis = np.arange(-_REACH, _REACH + 1) * _SPACING
-    offset, tried = np.stack(np.meshgrid(axis, axis), -1).reshape(-1, 2), np.asarray(prior.config.heights)
+    offset, tried = np.stack(np.meshgrid(axis, axis), -1).reshape(-1, 2), np.asarray(prior.body.heights)
     patch = pool.ground[:, None] + offset
     score = np.tile(prior.tall(tried)[:, None], (len(pool), 1, len(offset)))
     for k, (view, sight) in enumerate(zip(views, sights, strict=True)):

@@ -71,7 +71,7 @@ def _ghosts(frame: MapEstimate, total: float) -> People:
     parts = np.array([p for _, p in kept]).reshape(len(kept), len(frame.seen.views)).T
     strangers = np.full(len(kept), -1, np.int64)
     prior, evidence = _prior(frame, which, strangers), np.array([gain for gain, _ in kept])
-    sizes = Sizes.of_population(len(kept), frame.seen.prior.config)
+    sizes = Sizes.of_population(len(kept), frame.seen.prior.body)
     return People(
         chosen.ground, chosen.height, chosen.width, wide, evidence, parts, np.ones_like(parts), prior, strangers, sizes
     )

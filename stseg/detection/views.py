@@ -10,7 +10,7 @@ from scipy.special import expit
 
 from stseg.accelerate import kernel
 from stseg.arrays import Boxes, Flags, Floats, Ints, Singles
-from stseg.config import DetectionConfig
+from stseg.config import BodyConfig, DetectionConfig
 from stseg.geometry import Camera, Grid
 from stseg.geometry.bodies import WIDTH, BodyTable
 from stseg.model.box_fit import fill_best_match, fill_inside
@@ -57,12 +57,14 @@ class ViewObservation:
 class View:
     """Pillars of a ground lattice in one camera."""
 
-    def __init__(self, camera: Camera, grid: Grid, lattice_ground: Floats, config: DetectionConfig) -> None:
+    def __init__(
+        self, camera: Camera, grid: Grid, lattice_ground: Floats, config: DetectionConfig, body: BodyConfig
+    ) -> None:
         self.camera = camera
-        self.config = config
+        self.config, self.body = config, body
         self.centre = camera.centre[:2]
         self.table = BodyTable.of(camera, grid)
-        self.bodies = self.table.boxes(lattice_ground, np.asarray(config.heights))
+        self.bodies = self.table.boxes(lattice_ground, np.asarray(body.heights))
         self.step = _raster_step(self.bodies, camera.size)
         width, height = camera.size
         self.shape = (-(-height // self.step), -(-width // self.step))
@@ -81,14 +83,16 @@ class View:
 
     def _fair(self, area: Floats, heights: Floats, widths: Floats) -> Floats:
         """Areas of outlines as if people were of mean size there."""
-        return area * (self.config.height_mean * self.config.width_mean / (heights * widths))
+        return area * (self.body.height_mean * self.body.width_mean / (heights * widths))
 
 
 class BoxView(View):
     """A view that delivers boxes."""
 
-    def __init__(self, camera: Camera, grid: Grid, lattice_ground: Floats, config: DetectionConfig) -> None:
-        super().__init__(camera, grid, lattice_ground, config)
+    def __init__(
+        self, camera: Camera, grid: Grid, lattice_ground: Floats, config: DetectionConfig, body: BodyConfig
+    ) -> None:
+        super().__init__(camera, grid, lattice_ground, config, body)
         width, height = map(float, camera.size)
         inside = np.zeros(self.bodies.shape[:2])
         for row, bodies in zip(inside, self.bodies, strict=True):
@@ -120,11 +124,13 @@ class BoxView(View):
 class PixelView(View):
     """A view that delivers a likelihood map."""
 
-    def __init__(self, camera: Camera, grid: Grid, lattice_ground: Floats, config: DetectionConfig) -> None:
-        super().__init__(camera, grid, lattice_ground, config)
-        heights = np.repeat(np.asarray(config.heights), len(lattice_ground))
-        places = np.tile(lattice_ground, (len(config.heights), 1))
-        self.lattice = self.outlines(places, heights, np.full(len(heights), config.width_mean))
+    def __init__(
+        self, camera: Camera, grid: Grid, lattice_ground: Floats, config: DetectionConfig, body: BodyConfig
+    ) -> None:
+        super().__init__(camera, grid, lattice_ground, config, body)
+        heights = np.repeat(np.asarray(body.heights), len(lattice_ground))
+        places = np.tile(lattice_ground, (len(body.heights), 1))
+        self.lattice = self.outlines(places, heights, np.full(len(heights), body.width_mean))
         drawn = self.lattice[1][:, ::-1, 1] > 0
         self.lattice_rows = np.where(drawn.any(1), drawn.shape[1] - drawn.argmax(1), 0)
 
@@ -147,7 +153,7 @@ class PixelView(View):
         left_of, means = np.empty((self.shape[0], self.shape[1] + 1)), np.empty(len(first))
         _fill_left_of(sight.raster, free, left_of)
         _fill_span_means(left_of, first, self.lattice_rows, spans, area, means)
-        return means.reshape(len(self.config.heights), -1) * self.config.effective_observations
+        return means.reshape(len(self.body.heights), -1) * self.config.effective_observations
 
     def open_sums(
         self, values: Singles, owner: Ints, ground: Floats, heights: Floats, widths: Floats

@@ -40,8 +40,8 @@ class Pipeline:
 
     def __init__(self, rig: Rig, kinds: Sequence[str], config: Config, tracker: str) -> None:
         self.rig, self.config, self.tracker = rig, config, find_tracker(tracker)
-        self.detector = Detector(rig, kinds, config.detection, config.error_rates)
-        self.occupancy = Occupancy(rig, kinds, config.occupancy, config.detection, config.error_rates)
+        self.detector = Detector(rig, kinds, config.detection, config.body, config.error_rates)
+        self.occupancy = Occupancy(rig, kinds, config.occupancy, config.detection, config.body, config.error_rates)
         self.proposals = Proposals(rig, kinds, config)
 
     def finished(self, committed: Rows, events: Rows, shown: Rig | None = None) -> tuple[Tracks, Ints]:
@@ -60,7 +60,7 @@ class Pipeline:
         if self.tracker.final:
             whole = committed_tracks(committed, events, rate, config.tracking)
         else:
-            whole = final_tracks(committed, events, rate, self.detector.border, config.tracking, config.detection)
+            whole = final_tracks(committed, events, rate, self.detector.border, config)
         tables = [view.table for view in self.detector.views]
         if shown is not None:
             tables = [BodyTable.of(camera, shown.grid) for camera in shown.cameras]

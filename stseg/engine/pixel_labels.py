@@ -59,7 +59,7 @@ def write_labels(
     people = _people(run.trajectory, frames)
     largest = int(run.trajectory["id"].max(initial=0))
     images = LabelImages(folder, [run.cameras[k] for k in cameras], largest, palette, overwrite)
-    views = view_labels(recording.rig, config.labels)
+    views = view_labels(recording.rig, config.labels, config.body)
     foregrounds = make_foregrounds(recording, config, int(run.frames[0]), int(run.frames[-1]) + 1)
     count = 0
     for frame_set in _frame_sets(run, frames, config.foreground.memory, reporter):

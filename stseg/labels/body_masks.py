@@ -14,8 +14,8 @@ from scipy.special import ndtri
 
 from stseg.accelerate import kernel
 from stseg.arrays import Floats, Ints, Singles
-from stseg.config import LabelConfig
-from stseg.geometry.bodies import SILHOUETTE, BodyTable
+from stseg.config import BodyConfig, LabelConfig
+from stseg.geometry.bodies import WIDTH, BodyTable
 from stseg.labels.placed_people import PlacedPeople
 from stseg.model.outlines import Spans, outlines
 
@@ -23,8 +23,6 @@ MARGIN = 0.15
 """Margin around the pillars in which pixels of the body may lie, as a share of their height in the image."""
 _THINNEST = 0.3
 """Least width, as a share of the mean."""
-_MEAN_WIDTH = 2 * float(np.trapezoid(SILHOUETTE[:, 1], SILHOUETTE[:, 0]))
-"""Mean width of the silhouette over its height, metres."""
 
 
 class Patches(NamedTuple):
@@ -45,13 +43,13 @@ class Patches(NamedTuple):
     share: Singles
 
 
-def pillar_patches(table: BodyTable, people: PlacedPeople, config: LabelConfig) -> Patches:
+def pillar_patches(table: BodyTable, people: PlacedPeople, config: LabelConfig, body: BodyConfig) -> Patches:
     """Share of each person's draws that cover each pixel of a view."""
     deviates, count = _deviates(config.samples), len(people)
     root_covariance = np.linalg.cholesky(people.covariance + config.position_noise**2 * np.eye(2))
     ground = people.ground[:, None] + np.einsum("nij,dj->ndi", root_covariance, deviates[:, :2])
     heights = people.height[:, None] + config.height_noise * deviates[:, 2]
-    widths = (config.width + config.width_spread * deviates[:, 3]).clip(_THINNEST * config.width) / _MEAN_WIDTH
+    widths = (body.width_mean + body.width_spread * deviates[:, 3]).clip(_THINNEST * body.width_mean) / WIDTH
     size = table.size
     first, spans, _ = outlines(table, ground.reshape(-1, 2), heights.ravel(), 1, size[::-1], np.tile(widths, count))
     edges = np.zeros((count, 4), np.int64)

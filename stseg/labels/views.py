@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from stseg.arrays import Bytes, Labels, Singles
-from stseg.config import LabelConfig
+from stseg.config import BodyConfig, LabelConfig
 from stseg.geometry import Camera, Rig
 from stseg.geometry.bodies import BodyTable
 from stseg.graphcut.expansion import expand
@@ -27,12 +27,12 @@ class ViewLabels:
         The view.
     table
         Its bodies.
-    config
-        The constants of the labels.
+    config, body
+        The constants of the labels; sizes of people.
     """
 
-    def __init__(self, camera: Camera, table: BodyTable, config: LabelConfig) -> None:
-        self.camera, self.table, self.config = camera, table, config
+    def __init__(self, camera: Camera, table: BodyTable, config: LabelConfig, body: BodyConfig) -> None:
+        self.camera, self.table, self.config, self.body = camera, table, config, body
 
     def label(self, people: PlacedPeople, foreground: Singles, image: Bytes | None) -> Labels:
         """Person visible at each pixel.
@@ -64,10 +64,10 @@ class ViewLabels:
 
     def label_likelihood(self, people: PlacedPeople) -> LabelLikelihood:
         """Prior shares of labels around the people, from their places and heights."""
-        patches = pillar_patches(self.table, people, self.config)
+        patches = pillar_patches(self.table, people, self.config, self.body)
         return visible_shares(patches, np.hypot(*(people.ground - self.camera.centre[:2]).T))
 
 
-def view_labels(rig: Rig, config: LabelConfig) -> Sequence[ViewLabels]:
+def view_labels(rig: Rig, config: LabelConfig, body: BodyConfig) -> Sequence[ViewLabels]:
     """The labels of all views of a rig."""
-    return [ViewLabels(camera, BodyTable.of(camera, rig.grid), config) for camera in rig.cameras]
+    return [ViewLabels(camera, BodyTable.of(camera, rig.grid), config, body) for camera in rig.cameras]

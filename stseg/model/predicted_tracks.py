@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stseg.arrays import Floats, Ints
-from stseg.config import DetectionConfig
+from stseg.config import BodyConfig
 from stseg.model.sizes import Sizes
 
 _RESOLUTION = 0.1
@@ -49,18 +49,18 @@ class PredictedTracks:
     def __len__(self) -> int:
         return len(self.ground)
 
-    def track_log_ratio(self, ground: Floats, height: Floats, config: DetectionConfig) -> Floats:
+    def track_log_ratio(self, ground: Floats, height: Floats, body: BodyConfig, birth_log_odds: float) -> Floats:
         """What speaks for candidates (n, 2), (n,) by being walkers, nats, float64 (n, walker)."""
         if not len(self):
             return np.zeros((len(ground), 0))
         sharp = np.log(_RESOLUTION**2 / np.sqrt(np.linalg.det(self.covariance)))
         variance = self.sizes.height_variance
         off = height[:, None] - self.sizes.height
-        tall = -0.5 * off**2 / variance + np.log(config.height_spread / np.sqrt(variance))
-        anybody = -0.5 * ((height - config.height_mean) / config.height_spread) ** 2
+        tall = -0.5 * off**2 / variance + np.log(body.height_spread / np.sqrt(variance))
+        anybody = -0.5 * ((height - body.height_mean) / body.height_spread) ** 2
         squares = _squares(ground[:, None] - self.ground, np.linalg.inv(self.covariance))
         shape = np.maximum(tall - anybody[:, None], _OUT_OF_SHAPE)
-        return np.asarray(self.existence - config.prior_log_odds + sharp - 0.5 * squares + shape)
+        return np.asarray(self.existence - birth_log_odds + sharp - 0.5 * squares + shape)
 
     def place_log_density(self, walker: Ints, ground: Floats) -> Floats:
         """Log-densities of some walkers' places (n,) at points of each (n, point, 2), up to constants, nats."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from stseg.arrays import Floats, Ints
-from stseg.config import DetectionConfig, TrackingConfig
+from stseg.config import BodyConfig, TrackingConfig
 
 
 @dataclass(frozen=True)
@@ -21,15 +21,15 @@ class Sizes:
     width_variance: Floats
 
     @classmethod
-    def of_population(cls, number: int, config: DetectionConfig) -> Sizes:
+    def of_population(cls, number: int, body: BodyConfig) -> Sizes:
         """Before anybody was looked at."""
-        height, width = (config.height_mean, config.height_spread), (config.width_mean, config.width_spread)
+        height, width = (body.height_mean, body.height_spread), (body.width_mean, body.width_spread)
         return cls(*(np.full(number, value) for mean, spread in (height, width) for value in (mean, spread**2)))
 
     @classmethod
-    def of_heights(cls, height: Floats, variance: Floats, config: DetectionConfig) -> Sizes:
+    def of_heights(cls, height: Floats, variance: Floats, body: BodyConfig) -> Sizes:
         """Of heights with variances, metres and square metres, each (n,); as wide as anybody."""
-        anybody = cls.of_population(len(height), config)
+        anybody = cls.of_population(len(height), body)
         return cls(height, variance, anybody.width, anybody.width_variance)
 
     def at(self, chosen: Sequence[int] | Ints) -> Sizes:

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.special import logit
 
 from stseg.arrays import Boxes, Bytes, Flags, Floats, Ints, Singles, ViewEvidence
-from stseg.config import DetectionConfig, ErrorRateConfig, OccupancyConfig
+from stseg.config import BodyConfig, DetectionConfig, ErrorRateConfig, OccupancyConfig
 from stseg.geometry import Rig
 from stseg.geometry.bodies import BodyTable
 from stseg.geometry.cell_means import CellMeans
@@ -50,15 +50,16 @@ class Occupancy:
         rig: Rig,
         kinds: Sequence[str],
         config: OccupancyConfig,
-        ghosts: DetectionConfig,
+        detection: DetectionConfig,
+        body: BodyConfig,
         level: ErrorRateConfig | None = None,
     ) -> None:
         self.rig, self.config = rig, config
         self.sampling = Sampling.of(rig, config.sampling)
         self.views: Bytes = self.sampling.views()
         self.means = CellMeans(self.sampling)
-        self.heights = np.asarray(ghosts.heights)
-        self.height_mean, self.height_spread = ghosts.height_mean, ghosts.height_spread
+        self.heights = np.asarray(body.heights)
+        self.height_mean, self.height_spread = body.height_mean, body.height_spread
         flat = rig.grid.ground.reshape(-1, 2)
         shape = (len(self.heights), *rig.grid.shape[1:], 4)
         self.bodies = [
@@ -67,7 +68,7 @@ class Occupancy:
             else np.zeros((0, 0, 0, 4), np.float32)
             for camera, kind in zip(rig.cameras, kinds, strict=True)
         ]
-        self._first = [_first_rates(kind, ghosts) for kind in kinds]
+        self._first = [_first_rates(kind, detection) for kind in kinds]
         self._level_config = level or ErrorRateConfig()
         self.prior = float(logit(config.occupied_share))
 
@@ -216,12 +217,12 @@ class Occupancy:
         return clutter(view, side)
 
 
-def _first_rates(kind: str, ghosts: DetectionConfig) -> ErrorRates:
+def _first_rates(kind: str, detection: DetectionConfig) -> ErrorRates:
     """Before anything is learned, people's surroundings count as any other place."""
     if kind == "boxes":
-        clutter = (1 - ghosts.box_miss_rate) / float(np.exp(ghosts.box_log_ratio))
-        return ErrorRates(ghosts.box_miss_rate, clutter, clutter)
-    return ErrorRates(ghosts.pixel_miss_rate, ghosts.pixel_clutter_rate, ghosts.pixel_clutter_rate)
+        clutter = (1 - detection.box_miss_rate) / float(np.exp(detection.box_log_ratio))
+        return ErrorRates(detection.box_miss_rate, clutter, clutter)
+    return ErrorRates(detection.pixel_miss_rate, detection.pixel_clutter_rate, detection.pixel_clutter_rate)
 
 
 def _faith(near: Ints, own: Flags, visible: Floats, shape: tuple[int, ...]) -> Singles:

@@ -63,9 +63,9 @@ class CutTracker:
     def __init__(self, rig: Rig, config: Config, first: int) -> None:
         self.rig, self.config = rig, config
         self.views = Sampling.of(rig, "point").views()
-        self.walkers = TrackFilter(rig.frame_rate, config.detection, config.tracking)
+        self.walkers = TrackFilter(rig.frame_rate, config)
         self.identities = TrackAssociation(rig.frame_rate, config.tracking)
-        spread, stranger = config.detection.height_spread, config.occupancy.occupied_share
+        spread, stranger = config.body.height_spread, config.occupancy.occupied_share
         self.solver = find_solver(config.segmentation.solver)
         self.pillar = BodyShape(config.occupancy.person_radius, spread, stranger)
         self.held: list[_Linked] = []
@@ -130,8 +130,8 @@ class CutTracker:
     def _divide(self, window: Window, held: list[_Linked], energy: Energy, occupied: Flags) -> WindowLabels:
         """Whose the occupied cells are: chains of this window and of tracks that live."""
         tails = [track.tail for track in self.identities.alive]
-        mean_height = self.config.detection.height_mean
-        seen = [earlier_detections(tails, window.solve_first, mean_height, self.config.tracking)]
+        mean_height = self.config.body.height_mean
+        seen = [earlier_detections(tails, window.solve_first, mean_height, self.config.motion)]
         seen += [linked.sightings() for linked in held]
         places = predicted_places(
             together(seen), window.solve_first, window.solve_stop, self.rig.frame_rate, self.config.tracking
@@ -166,7 +166,7 @@ class CutTracker:
         people = scene.people if len(scene.people) else None
         ground, covariance = blobs.ground[named].copy(), blobs.covariance[named].copy()
         height, score = blobs.height[named].copy(), blobs.mass[named].copy()
-        width = np.full(len(named), self.config.detection.width_mean)
+        width = np.full(len(named), self.config.body.width_mean)
         if people is not None:
             ground[held], covariance[held] = people.ground[who[held]], people.covariance[who[held]]
             height[held], score[held] = people.sizes.height[who[held]], people.evidence[who[held]]

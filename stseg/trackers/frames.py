@@ -21,7 +21,7 @@ class FrameTracker(EachFrame):
 
     def __init__(self, rig: Rig, config: Config, first: int) -> None:
         super().__init__(rig, config, first)
-        self.walkers = TrackFilter(rig.frame_rate, config.detection, config.tracking)
+        self.walkers = TrackFilter(rig.frame_rate, config)
 
     def expected(self, frame: int) -> PredictedTracks | None:
         """Whom the frames before lead to expect."""

@@ -30,8 +30,8 @@ class KalmanTracker(EachFrame):
 
     def __init__(self, rig: Rig, config: Config, first: int) -> None:
         super().__init__(rig, config, first)
-        self.filters = begun(np.zeros((0, 2)), np.zeros((0, 2, 2)), config.kalman.speed_spread)
-        self.sizes = Sizes.of_population(0, config.detection)
+        self.filters = begun(np.zeros((0, 2)), np.zeros((0, 2, 2)), config.motion.speed_spread)
+        self.sizes = Sizes.of_population(0, config.body)
         self.issued, self.begun = 0, False
         self.ids: Ints = np.zeros(0, np.int64)
         self.seen: Ints = np.zeros(0, np.int64)
@@ -40,8 +40,8 @@ class KalmanTracker(EachFrame):
         """Everybody who is followed, carried to the frame; None before the first."""
         if not self.begun:
             return None
-        seconds, noise = (frame - self.frame) / self.rig.frame_rate, self.config.tracking.position_noise**2 * np.eye(2)
-        filters = carried(self.filters, seconds, self.config.kalman.velocity_noise)
+        seconds, noise = (frame - self.frame) / self.rig.frame_rate, self.config.motion.position_noise**2 * np.eye(2)
+        filters = carried(self.filters, seconds, self.config.motion.velocity_noise)
         unseen = (frame - 1 - self.seen) / self.rig.frame_rate
         return PredictedTracks(
             filters.state[:, :2],
@@ -54,16 +54,16 @@ class KalmanTracker(EachFrame):
         """The next frame, decided."""
         del shown
         deaths = self._end(scene.frame)
-        ground, config = scene.people.ground, self.config.kalman
-        noise = scene.people.covariance + np.eye(2) * self.config.tracking.position_noise**2
-        filters = carried(self.filters, (scene.frame - self.frame) / self.rig.frame_rate, config.velocity_noise)
+        ground, model = scene.people.ground, self.config.motion
+        noise = scene.people.covariance + np.eye(2) * model.position_noise**2
+        filters = carried(self.filters, (scene.frame - self.frame) / self.rig.frame_rate, model.velocity_noise)
         sizes = self._measured(scene.people.sizes)
         tracks, found = self._assigned(filters, ground, noise, sizes)
         fresh = np.setdiff1d(np.arange(len(ground)), found)
         filters = corrected(filters, tracks, ground[found], noise[found])
-        self.filters = filters.joined_with(begun(ground[fresh], noise[fresh], config.speed_spread))
+        self.filters = filters.joined_with(begun(ground[fresh], noise[fresh], model.speed_spread))
         self.sizes.put(tracks, sizes.at(found).with_prior(self.sizes.at(tracks)))
-        anybody = Sizes.of_population(len(fresh), self.config.detection)
+        anybody = Sizes.of_population(len(fresh), self.config.body)
         self.sizes = self.sizes.joined_with(sizes.at(fresh).with_prior(anybody))
         newcomers = self.issued + 1 + np.arange(len(fresh))
         self.frame, self.issued, self.begun = scene.frame, self.issued + len(fresh), True
@@ -76,7 +76,7 @@ class KalmanTracker(EachFrame):
 
     def _measured(self, sizes: Sizes) -> Sizes:
         """What a frame adds to what was known of people's sizes."""
-        anybody = Sizes.of_population(len(sizes.height), self.config.detection)
+        anybody = Sizes.of_population(len(sizes.height), self.config.body)
         return sizes.as_measurements(anybody).with_noise(self.config.tracking)
 
     def _assigned(self, filters: Filters, ground: Floats, noise: Floats, sizes: Sizes) -> tuple[Ints, Ints]:

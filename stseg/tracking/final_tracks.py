@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stseg.arrays import Ints, Rows
-from stseg.config import DetectionConfig, TrackingConfig
+from stseg.config import Config, TrackingConfig
 from stseg.model.border import Border
 from stseg.model.tables import EVENT
 from stseg.tracking.encounters import encounters
@@ -40,20 +40,18 @@ class FinalTracks:
     identity: Ints
 
 
-def final_tracks(
-    committed: Rows, events: Rows, frame_rate: float, border: Border, config: TrackingConfig, people: DetectionConfig
-) -> FinalTracks:
+def final_tracks(committed: Rows, events: Rows, frame_rate: float, border: Border, config: Config) -> FinalTracks:
     """The tracks of a run from its committed TRAJECTORY and EVENT rows."""
-    relinked = associate_globally(committed, frame_rate, border, config, people)
+    relinked = associate_globally(committed, frame_rate, border, config)
     renamed = committed.copy()
     renamed["id"] = relinked.identity
-    long, short = drop_short(renamed, frame_rate, config)
-    kept, ghosts = drop_ghosts(long, frame_rate, config)
+    long, short = drop_short(renamed, frame_rate, config.tracking)
+    kept, ghosts = drop_ghosts(long, frame_rate, config.tracking)
     identity = np.where(np.isin(relinked.identity, kept["id"]), relinked.identity, 0)
     names = _Names(committed, relinked.identity)
-    met = _met(events, _Names(committed, identity), frame_rate, config)
+    met = _met(events, _Names(committed, identity), frame_rate, config.tracking)
     story = np.concatenate([_retold(events, names, relinked.links), met, short, ghosts])
-    smoothed = smooth_places(fill_gaps(kept, frame_rate, config), frame_rate)
+    smoothed = smooth_places(fill_gaps(kept, frame_rate, config.tracking), frame_rate, config.motion)
     return FinalTracks(smoothed, story[np.argsort(story["frame"], kind="stable")], identity)
 
 

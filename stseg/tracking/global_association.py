@@ -22,13 +22,11 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from stseg.arrays import Floats, Ints, Rows
-from stseg.config import DetectionConfig, TrackingConfig
+from stseg.config import Config
 from stseg.model.border import Border
 from stseg.tracking.assignment import assign
 from stseg.tracking.isolated_tracklets import IsolatedTracklet, isolated_tracklets
 
-_TURN = 0.8
-"""How people change their velocity, metres per second per square root of a second (standard deviation)."""
 _STAYS = 3.0
 """What speaks for the track that was followed through a meeting, nats."""
 _PARTED = 6.0
@@ -71,9 +69,7 @@ class GlobalAssociation:
     links: list[Link]
 
 
-def associate_globally(
-    trajectory: Rows, frame_rate: float, border: Border, config: TrackingConfig, people: DetectionConfig
-) -> GlobalAssociation:
+def associate_globally(trajectory: Rows, frame_rate: float, border: Border, config: Config) -> GlobalAssociation:
     """Decide who is who from the whole run.
 
     Parameters
@@ -87,13 +83,13 @@ def associate_globally(
     config, people
         How people walk, and how tall they are.
     """
-    parts = isolated_tracklets(trajectory, frame_rate, config)
+    parts = isolated_tracklets(trajectory, frame_rate, config.tracking, config.motion)
     pairs = _within_reach(parts, frame_rate, config)
     ends, begins = (
-        border.inside(np.array([tip.ground for tip in tips]).reshape(-1, 2), people.border_width)
+        border.inside(np.array([tip.ground for tip in tips]).reshape(-1, 2), config.detection.border_width)
         for tips in ([part.end for part in parts], [part.start for part in parts])
     )
-    gain = np.array([_gain(parts[a], parts[b], frame_rate, config, people) for a, b in pairs])
+    gain = np.array([_gain(parts[a], parts[b], frame_rate, config) for a, b in pairs])
     gain += _PARTED * (ends[pairs[:, 0]] + begins[pairs[:, 1]]) / 2
     before = _flow(len(parts), pairs[gain > 0], gain[gain > 0])
     identity, links, used = np.zeros(len(parts), np.int64), [], set[int]()
@@ -132,26 +128,28 @@ def _flow(number: int, pairs: Ints, gain: Floats) -> Ints:
     return before
 
 
-def _within_reach(parts: Sequence[IsolatedTracklet], frame_rate: float, config: TrackingConfig) -> Ints:
+def _within_reach(parts: Sequence[IsolatedTracklet], frame_rate: float, config: Config) -> Ints:
     """Pairs of a stretch and one that begins later, not too long after its end: int64 (pair, 2)."""
     begins = np.array([part.start.frame for part in parts])
     pairs = []
     for a, part in enumerate(parts):
         end = part.end.frame
-        first, stop = begins.searchsorted([end + 1, end + config.maximum_gap * frame_rate + 1])
+        first, stop = begins.searchsorted([end + 1, end + config.tracking.maximum_gap * frame_rate + 1])
         pairs += [(a, b) for b in range(first, stop)]
     return np.array(pairs, np.int64).reshape(-1, 2)
 
 
-def _gain(
-    a: IsolatedTracklet, b: IsolatedTracklet, frame_rate: float, config: TrackingConfig, people: DetectionConfig
-) -> float:
+def _gain(a: IsolatedTracklet, b: IsolatedTracklet, frame_rate: float, config: Config) -> float:
     """What speaks for one person in both, parting aside, nats."""
     seconds, off = _between(a, b, frame_rate)
     velocity_variance = a.end.velocity_variance + b.start.velocity_variance
-    spread = 2 * config.position_noise**2 + seconds**2 * velocity_variance / 4 + _TURN**2 * seconds**3 / 12
+    spread = (
+        2 * config.motion.position_noise**2
+        + seconds**2 * velocity_variance / 4
+        + config.motion.velocity_noise**2 * seconds**3 / 12
+    )
     place = -0.5 * float(off @ off) / spread - np.log(2 * np.pi * spread)
-    known, anybody = a.height_variance + b.height_variance, 2 * people.height_spread**2
+    known, anybody = a.height_variance + b.height_variance, 2 * config.body.height_spread**2
     taller = (a.height - b.height) ** 2
     height = -0.5 * taller / known + 0.5 * taller / anybody + 0.5 * np.log(anybody / known)
     return float(place + height + (_STAYS if a.track == b.track else 0.0))

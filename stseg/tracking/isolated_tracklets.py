@@ -7,15 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from stseg.arrays import Floats, Ints, Rows
-from stseg.config import TrackingConfig
+from stseg.config import MotionConfig, TrackingConfig
 from stseg.tracking.assignment import distances
 
 NEAR = 0.6
 """Distance at which two people meet, metres."""
 _TOLD = 1.0
 """How much of a stretch tells the velocity at its end, seconds."""
-_PACE = 0.8
-"""Standard deviation of people's velocity, metres per second."""
 _FIRM = 0.02
 """How far the heights of one person differ between two stretches, however long, metres (standard deviation)."""
 _INDEPENDENT = 2.0
@@ -66,7 +64,9 @@ class IsolatedTracklet:
     height_variance: float
 
 
-def isolated_tracklets(trajectory: Rows, frame_rate: float, config: TrackingConfig) -> list[IsolatedTracklet]:
+def isolated_tracklets(
+    trajectory: Rows, frame_rate: float, config: TrackingConfig, model: MotionConfig
+) -> list[IsolatedTracklet]:
     """Every track cut where it was out of sight, and where it came nearest to whom it met; sorted by first frame.
 
     Parameters
@@ -81,7 +81,7 @@ def isolated_tracklets(trajectory: Rows, frame_rate: float, config: TrackingConf
     met = np.isin(_keys(track, frame), _keys(*_meetings(trajectory, frame_rate)))
     begins = (np.diff(track, prepend=-1) != 0) | (np.diff(frame, prepend=-2) != 1) | met
     parts = np.split(order, np.flatnonzero(begins)[1:]) if len(order) else []
-    found = [_measured(trajectory, rows, frame_rate, config) for rows in parts]
+    found = [_measured(trajectory, rows, frame_rate, config, model) for rows in parts]
     return sorted(found, key=lambda stretch: (stretch.start.frame, stretch.track))
 
 
@@ -110,25 +110,27 @@ def _meetings(trajectory: Rows, frame_rate: float) -> tuple[Ints, Ints]:
     return np.array(track, np.int64), np.array(frame, np.int64)
 
 
-def _measured(trajectory: Rows, rows: Ints, frame_rate: float, config: TrackingConfig) -> IsolatedTracklet:
+def _measured(
+    trajectory: Rows, rows: Ints, frame_rate: float, config: TrackingConfig, model: MotionConfig
+) -> IsolatedTracklet:
     told = max(2, round(_TOLD * frame_rate))
     own = trajectory[rows]
     looks = max(len(rows) / _INDEPENDENT, 1.0)
     return IsolatedTracklet(
         int(own["id"][0]),
         rows,
-        _tip(own[:told], 0, frame_rate, config),
-        _tip(own[-told:], -1, frame_rate, config),
+        _tip(own[:told], 0, frame_rate, model),
+        _tip(own[-told:], -1, frame_rate, model),
         float(own["height"].mean()),
         _FIRM**2 + config.height_noise**2 / looks,
     )
 
 
-def _tip(own: Rows, at: int, frame_rate: float, config: TrackingConfig) -> TrackletEnd:
+def _tip(own: Rows, at: int, frame_rate: float, model: MotionConfig) -> TrackletEnd:
     """An end of a stretch from the rows that tell of it: their velocity, held back by how fast people walk."""
     ground = np.column_stack([own["x"], own["y"]])
     seconds = (own["frame"] - own["frame"].mean()) / frame_rate
-    told = float((seconds**2).sum()) / config.position_noise**2
-    variance = 1.0 / (told + 1.0 / _PACE**2)
-    velocity = variance / config.position_noise**2 * (seconds @ ground)
+    told = float((seconds**2).sum()) / model.position_noise**2
+    variance = 1.0 / (told + 1.0 / model.speed_spread**2)
+    velocity = variance / model.position_noise**2 * (seconds @ ground)
     return TrackletEnd(int(own["frame"][at]), ground[at], np.asarray(velocity), variance)

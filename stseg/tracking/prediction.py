@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stseg.arrays import Floats, Ints
-from stseg.config import TrackingConfig
+from stseg.config import MotionConfig, TrackingConfig
 from stseg.model.predicted_places import PredictedPlaces
 from stseg.tracking.tracklets import Tracklet
 
@@ -43,9 +43,7 @@ class DetectionHistory:
         )
 
 
-def earlier_detections(
-    tails: Iterable[Tracklet], before: int, height: float, config: TrackingConfig
-) -> DetectionHistory:
+def earlier_detections(tails: Iterable[Tracklet], before: int, height: float, model: MotionConfig) -> DetectionHistory:
     """The committed ends of tracks, up to a frame, as sightings of bodies of a mean height, metres."""
     seen = [
         (frame, tail.chain, *ground)
@@ -54,7 +52,7 @@ def earlier_detections(
         if frame < before
     ]
     rows = np.array(seen, float).reshape(-1, 4)
-    covariance = np.tile(np.eye(2) * config.position_noise**2, (len(rows), 1, 1))
+    covariance = np.tile(np.eye(2) * model.position_noise**2, (len(rows), 1, 1))
     frame, chain = rows[:, :2].T.astype(np.int64)
     return DetectionHistory(frame, chain, rows[:, 2:], covariance, np.full(len(rows), height))
 

@@ -13,16 +13,12 @@ from typing import NamedTuple
 import numpy as np
 
 from stseg.arrays import Floats, Ints
-from stseg.config import DetectionConfig, TrackingConfig
+from stseg.config import Config, MotionConfig
 from stseg.model.people import People
 from stseg.model.predicted_tracks import PredictedTracks
 from stseg.model.sizes import Sizes
 from stseg.tracking.assignment import distances
 
-_TURN = 0.8
-"""How people change their velocity, metres per second per square root of a second (standard deviation)."""
-_STILL = 0.8
-"""Standard deviation of the velocity of somebody new, metres per second."""
 _GROWTH = 0.002
 """How a person's height changes, metres per square root of a second (standard deviation): shoes, stoop, lens."""
 _STAYING = 1.0
@@ -74,11 +70,11 @@ class TrackState:
     width_variance: float
     odds: float
 
-    def carried(self, seconds: float) -> TrackState:
+    def carried(self, seconds: float, model: MotionConfig) -> TrackState:
         """Some time after they were last seen."""
         motion = np.eye(4)
         motion[:2, 2:] = seconds * np.eye(2)
-        turn = np.array([[seconds**3 / 3, seconds**2 / 2], [seconds**2 / 2, seconds]]) * _TURN**2
+        turn = np.array([[seconds**3 / 3, seconds**2 / 2], [seconds**2 / 2, seconds]]) * model.velocity_noise**2
         return replace(
             self,
             state=motion @ self.state,
@@ -118,13 +114,14 @@ class TrackFilter:
     ----------
     frame_rate
         Frames per second.
-    ghosts, config
-        What people are like, and how they walk.
+    config
+        The constants of all stages: body, motion, detection and tracking.
     """
 
-    def __init__(self, frame_rate: float, ghosts: DetectionConfig, config: TrackingConfig) -> None:
+    def __init__(self, frame_rate: float, config: Config) -> None:
         self.frame_rate = frame_rate
-        self.ghosts, self.config = ghosts, config
+        self.body, self.motion = config.body, config.motion
+        self.config, self.birth_log_odds = config.tracking, config.detection.prior_log_odds
         self.walkers: list[TrackState] = []
         self.issued = 0
         self.begun = False
@@ -160,7 +157,7 @@ class TrackFilter:
         for j in range(len(people)):
             known = int(people.track_index[j])
             before = self._carried(self.walkers[known], frame) if known >= 0 else self._newcomer(frame, people, j)
-            odds = (before.odds if known >= 0 else self.ghosts.prior_log_odds) + people.evidence[j] - people.prior[j]
+            odds = (before.odds if known >= 0 else self.birth_log_odds) + people.evidence[j] - people.prior[j]
             followed.append(
                 before.found(
                     frame, people.ground[j], people.covariance[j], heights[j], widths[j], min(float(odds), _STAYING)
@@ -179,7 +176,7 @@ class TrackFilter:
 
     def _measured(self, people: People) -> tuple[list[Measurement], list[Measurement]]:
         """Heights and widths of a frame; one that leaves a size as open as it was before has no weight."""
-        sizes, like, noise = people.sizes, self.ghosts, self.config
+        sizes, like, noise = people.sizes, self.body, self.config
         return (
             _told(sizes.height, sizes.height_variance, like.height_spread, noise.height_noise),
             _told(sizes.width, sizes.width_variance, like.width_spread, noise.width_noise),
@@ -187,12 +184,12 @@ class TrackFilter:
 
     @property
     def _place_noise(self) -> Floats:
-        return np.eye(2) * self.config.position_noise**2
+        return np.eye(2) * self.motion.position_noise**2
 
     def _carried(self, walker: TrackState, frame: int) -> TrackState:
         seconds = (frame - walker.seen) / self.frame_rate
         hidden = seconds - 1 / self.frame_rate
-        return replace(walker.carried(seconds), odds=walker.odds - _FORGETTING * hidden)
+        return replace(walker.carried(seconds, self.motion), odds=walker.odds - _FORGETTING * hidden)
 
     def _doubtful(self, frame: int, ghosts: People) -> list[TrackState]:
         """Who was not believed in this frame, but will be if the next shows them again (evidence adds up over time)."""
@@ -205,10 +202,10 @@ class TrackFilter:
 
     def _newcomer(self, frame: int, people: People, j: int) -> TrackState:
         """Somebody new: anywhere near the place, as tall as anybody, of any velocity."""
-        spread = np.diag([0.0, 0.0, _STILL**2, _STILL**2])
+        spread = np.diag([0.0, 0.0, self.motion.speed_spread**2, self.motion.speed_spread**2])
         spread[:2, :2] = people.covariance[j] + self._place_noise
         state = np.append(people.ground[j], [0.0, 0.0])
-        like = self.ghosts
+        like = self.body
         sizes = (like.height_mean, like.height_spread**2, like.width_mean, like.width_spread**2)
         return TrackState(0, frame, state, spread, *sizes, 0.0)
 

@@ -85,8 +85,8 @@ def measure(rig: Path, frames: slice) -> dict[str, Tally]:
     still = replace(config, occupancy=replace(config.occupancy, effective_observations=1.0))
     truth = np.genfromtxt(rig.with_name("truth.csv"), delimiter=",", names=True)
     kinds = ["boxes" if s.source.kind in ("boxes", "instances") else "pixels" for s in recording.sources]
-    constant = Occupancy(recording.rig, kinds, still.occupancy, still.detection, still.error_rates)
-    learned = Occupancy(recording.rig, kinds, config.occupancy, config.detection, config.error_rates)
+    constant = Occupancy(recording.rig, kinds, still.occupancy, still.detection, still.body, still.error_rates)
+    learned = Occupancy(recording.rig, kinds, config.occupancy, config.detection, config.body, config.error_rates)
     rates = learned.new_calibration()
     tallies = {form: Tally() for form in FORMS}
     for frame, seen, explanation in _explained(rig, kinds, frames, config):
@@ -110,7 +110,7 @@ def _explained(rig: Path, kinds: list[str], frames: slice, config: Config) -> It
     streams = index_streams(recording)
     first, stop, _ = frames.indices(streams.length)
     sights = make_foregrounds(recording, config, first, stop, streams=streams)
-    frame_pass = Detector(recording.rig, kinds, config.detection)
+    frame_pass = Detector(recording.rig, kinds, config.detection, config.body)
     with open_frames(recording, first, stop, streams) as moments:
         for moment in moments:
             seen = [sight.evidence(view) for sight, view in zip(sights, moment.views, strict=True)]

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.ndimage import label
 
 from stseg.arrays import Boxes, Flags, Floats, Ints, Rows, Singles
-from stseg.config import Config, TrackingConfig
+from stseg.config import Config, ParticleConfig, TrackingConfig
 from stseg.engine.backgrounds import make_foregrounds
 from stseg.foreground import box_likelihood
 from stseg.geometry import Grid, Rig
@@ -73,7 +73,7 @@ def link(found: list[Floats], first: int, rig: Rig, config: TrackingConfig) -> R
     for frame, places in enumerate(found):
         unseen = (frame - seen) / rig.frame_rate
         alive = unseen <= config.patience
-        cost = distances(last, places) / (config.walking_speed * unseen + config.assignment_distance)[:, None]
+        cost = distances(last, places) / (ParticleConfig().walking_speed * unseen + config.assignment_distance)[:, None]
         cost[~alive] = 2.0
         tracks, own = assign(cost, 1.0)
         name = np.arange(len(last), len(last) + len(places))

@@ -19,8 +19,6 @@ _WHOLE = 0.8
 """Share of a body that must be in sight for its colours to be learned."""
 _IN_SIGHT = 0.5
 """Share of a body's box that must lie within an image for the view to be asked."""
-_STILL = 0.8
-"""Standard deviation of the velocity of somebody new, metres per second."""
 
 
 @dataclass
@@ -51,11 +49,11 @@ class Target:
     @classmethod
     def at(
         cls, track: int, ground: Floats, covariance: Floats, height: float, views: int, count: int,
-        lots: np.random.Generator,
+        speed_spread: float, lots: np.random.Generator,
     ) -> Target:  # fmt: skip
         """Somebody new at a place (2,) with a covariance (2, 2), of any velocity; no view knows the colours yet."""
         place = lots.multivariate_normal(ground, covariance, count, method="cholesky")
-        velocity = _STILL * lots.standard_normal((count, 2))
+        velocity = speed_spread * lots.standard_normal((count, 2))
         believed = Particles(place, velocity, np.full(count, 1 / count))
         return cls(track, Star(believed, (None,) * views, np.zeros(views)), height, [None] * views)
 

@@ -42,7 +42,7 @@ class BeliefTracker(EachFrame):
 
     def __init__(self, rig: Rig, config: Config, first: int) -> None:
         super().__init__(rig, config, first)
-        self.motion = Motion(1 / rig.frame_rate, config.belief.position_noise, config.belief.velocity_noise)
+        self.motion = Motion(1 / rig.frame_rate, config.belief.position_noise, config.motion.velocity_noise)
         self.views = [StarView.of(camera, rig.grid) for camera in rig.cameras]
         self.border = Border.of(rig)
         self.targets: list[Target] = []
@@ -55,7 +55,7 @@ class BeliefTracker(EachFrame):
         if not self.begun:
             return None
         foretold = [target.foretold(self.motion) for target in self.targets]
-        noise, height_noise = self.config.tracking.position_noise**2, self.config.tracking.height_noise**2
+        noise, height_noise = self.config.motion.position_noise**2, self.config.tracking.height_noise**2
         spread = [
             target.star.ground.covariance + p.covariance for target, p in zip(self.targets, foretold, strict=True)
         ]
@@ -66,7 +66,7 @@ class BeliefTracker(EachFrame):
             Sizes.of_heights(
                 np.array([target.height for target in self.targets]),
                 np.array([height_noise * (1 + 1 / target.found) for target in self.targets]),
-                self.config.detection,
+                self.config.body,
             ),
             STAYING - FORGETTING * missed,
         )
@@ -140,7 +140,14 @@ class BeliefTracker(EachFrame):
             lots = self._lots(scene.frame, self.issued)
             height, count = float(people.height[k]), self.config.belief.particles
             target = Target.at(
-                self.issued, people.ground[k], people.covariance[k], height, len(self.views), count, lots
+                self.issued,
+                people.ground[k],
+                people.covariance[k],
+                height,
+                len(self.views),
+                count,
+                self.config.motion.speed_spread,
+                lots,
             )
             target.learn(self.views, images, people.ground[k], [n[k] for n in nearer], 1.0)
             self.targets.append(target)
@@ -152,7 +159,7 @@ class BeliefTracker(EachFrame):
         ground = np.array([target.star.ground.mean for target in seen]).reshape(-1, 2)
         covariance: Floats = np.array([target.star.ground.covariance for target in seen]).reshape(-1, 2, 2)
         height, score = (np.array(column, float) for column in ([t.height for t in seen], self._scores(seen)))
-        width = np.full(len(seen), self.config.detection.width_mean)
+        width = np.full(len(seen), self.config.body.width_mean)
         return self.commit(scene, ids, ground, covariance, height, width, score, events)
 
     @staticmethod

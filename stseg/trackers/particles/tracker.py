@@ -63,9 +63,9 @@ class ParticleTracker(EachFrame):
         if not self.begun:
             return None
         crowd, config = self.crowd, self.config
-        drift = config.tracking.position_noise**2 + self._step(frame) ** 2
+        drift = config.motion.position_noise**2 + self._step(frame) ** 2
         unseen = (frame - 1 - crowd.seen) / self.rig.frame_rate
-        sizes = Sizes.of_heights(crowd.height, np.full(len(crowd), _HEIGHT_NOISE**2), config.detection)
+        sizes = Sizes.of_heights(crowd.height, np.full(len(crowd), _HEIGHT_NOISE**2), config.body)
         return PredictedTracks(crowd.ground, crowd.covariance + drift * np.eye(2), sizes, STAYING - FORGETTING * unseen)
 
     def add(self, scene: FusedFrame, shown: FrameObservations) -> list[Commit]:
@@ -90,7 +90,7 @@ class ParticleTracker(EachFrame):
             self._learn(look, seconds)
         crowd, events = self.crowd, births + deaths
         nats = np.array([evidence.get(int(i), 0.0) for i in crowd.ids])
-        width = np.full(len(crowd), self.config.detection.width_mean)
+        width = np.full(len(crowd), self.config.body.width_mean)
         return [self.commit(scene, crowd.ids, crowd.ground, crowd.covariance, crowd.height, width, nats, events)]
 
     def _step(self, frame: int) -> float:
@@ -112,7 +112,7 @@ class ParticleTracker(EachFrame):
         lost, new = np.setdiff1d(np.arange(len(crowd)), known), np.setdiff1d(np.arange(len(found)), met)
         reach = (
             config.particles.assignment_distance
-            + config.tracking.walking_speed * (scene.frame - crowd.seen) / self.rig.frame_rate
+            + config.particles.walking_speed * (scene.frame - crowd.seen) / self.rig.frame_rate
         )
         particles = crowd.particles.copy()
         if config.particles.method != "search":

@@ -1,0 +1,52 @@
+"""How large people are and how they walk: one body model and one motion model for all stages."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from stseg.settings import require
+
+_TALLEST = 2.2
+"""Metres; taller pillars reach above most grids."""
+
+
+@dataclass(frozen=True)
+class BodyConfig:
+    """Population prior of body height and width. A person is a pillar: a body of revolution of that size."""
+
+    height_mean: float = 1.70
+    """Mean height of the people recorded, metres (HW12)."""
+    height_spread: float = 0.12
+    """Standard deviation of their heights, metres."""
+    width_mean: float = 0.42
+    """Mean width of a body across shoulders and arms, metres."""
+    width_spread: float = 0.04
+    """Standard deviation of these widths, metres."""
+    heights: tuple[float, ...] = (1.5, 1.6, 1.7, 1.8, 1.9)
+    """Heights that the search for candidates tries, metres, rising."""
+
+    def __post_init__(self) -> None:
+        for name in ("height_mean", "height_spread", "width_mean", "width_spread"):
+            require(getattr(self, name) > 0, self, name, "a number above 0")
+        require(self.height_mean > 2 * self.height_spread, self, "height_mean", "more than two standard deviations")
+        require(self.width_mean > 2 * self.width_spread, self, "width_mean", "more than two standard deviations")
+        heights = self.heights
+        require(len(heights) > 0 and min(heights) > 0, self, "heights", "one or more heights above 0 m")
+        in_order = list(heights) == sorted(heights) and max(heights) <= _TALLEST
+        require(in_order, self, "heights", f"rising, at most {_TALLEST} m")
+
+
+@dataclass(frozen=True)
+class MotionConfig:
+    """Nearly constant velocity: white acceleration (Bar-Shalom, Li and Kirubarajan 2001, section 6.2.2)."""
+
+    speed_spread: float = 0.8
+    """Standard deviation of walking velocity along each axis, metres per second."""
+    velocity_noise: float = 0.8
+    """Random change of velocity, metres per second per square root of a second (standard deviation)."""
+    position_noise: float = 0.15
+    """Error of one frame's position beyond its own covariance, metres (standard deviation): calibration and gait."""
+
+    def __post_init__(self) -> None:
+        for name in ("speed_spread", "velocity_noise", "position_noise"):
+            require(getattr(self, name) > 0, self, name, "a number above 0")
