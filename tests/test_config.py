@@ -195,3 +195,9 @@ def test_the_configuration_of_an_older_run_file_is_read_by_its_present_names() -
 def test_a_text_needs_no_quotes_in_an_assignment() -> None:
     given_kind = build(Outer, {"kind": Given("boxes", "--set")}, "--set")
     assert given_kind.kind == "boxes"
+
+
+@pytest.mark.parametrize("wrong", [{"width_mean": 0.05}, {"heights": (1.8, 1.7)}, {"heights": ()}])
+def test_bodies_without_meaning_are_refused(wrong: dict[str, Any]) -> None:
+    with pytest.raises(ConfigError, match=next(iter(wrong))):
+        BodyConfig(**wrong)

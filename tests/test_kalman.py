@@ -129,7 +129,7 @@ def test_identities_stand_short_tracks_go_and_gaps_are_filled() -> None:
 
 
 def test_settings_out_of_range_are_refused() -> None:
-    for bad in ({"gate": 1.0}, {"turn": 0.0}, {"patience": -1.0}):
+    for bad in ({"gate_probability": 1.0}, {"patience": -1.0}):
         with pytest.raises(ConfigError):
             KalmanConfig(**bad)
 
