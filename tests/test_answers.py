@@ -11,10 +11,10 @@ from stseg.model.ghost_reasons import ghost_reasons
 from stseg.model.tables import EVENT, Tracks
 from stseg.report.answers import answers
 from stseg.report.charts import Span
-from stseg.report.maps import Haunt
+from stseg.report.maps import DwellPlace
 
 
-def told(places: list[Haunt], shares: list[float], dropped: int = 0) -> list[str]:
+def told(places: list[DwellPlace], shares: list[float], dropped: int = 0) -> list[str]:
     """The four answers of the small run, without their tags."""
     trajectory, candidates = run_files.small_trajectory(), run_files.small_ghosts()
     events = np.zeros(dropped, EVENT)
@@ -30,11 +30,11 @@ def told(places: list[Haunt], shares: list[float], dropped: int = 0) -> list[str
 
 
 def test_the_four_questions_are_answered() -> None:
-    people, places, ghosts, blind = told([Haunt(1.0, 2.0, 0.4), Haunt(-1.0, 0.0, 0.2)], [0.1, 0.25, 0.65], 2)
+    people, places, ghosts, blind = told([DwellPlace(1.0, 2.0, 0.4), DwellPlace(-1.0, 0.0, 0.2)], [0.1, 0.25, 0.65], 2)
     assert people.startswith("1.5 at a time on average, at most 2. There are 2 tracks, half of them 0.9 s or longer")
     assert "A at (1.0, 2.0), 40 %; B at (-1.0, 0.0), 20 %" in places
     assert ghosts.startswith("1 of 3 candidates (0.2 a frame): 100 % because a view sees nobody there.")
-    assert ghosts.endswith("2 tracks too short, or too often doubted, to be somebody were dropped as well.")
+    assert ghosts.endswith("2 tracks too short or too uncertain were dropped as well.")
     assert blind.startswith("10 % of the ground is seen by no view, 25 % by one alone") and "65 % by two" in blind
 
 

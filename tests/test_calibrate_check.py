@@ -10,12 +10,12 @@ import pytest
 from walkabout import SIZE, exchanged, moved, ring, shown, walkers
 
 from stseg.arrays import Boxes, Floats
-from stseg.calibration.blunders import all_bystanders
+from stseg.calibration.blunders import match_frames
 from stseg.calibration.box_correspondence import tables_of
 from stseg.calibration.coverage import coverage
-from stseg.calibration.isolated_boxes import sightings
-from stseg.calibration.leave_one_out import place
-from stseg.calibration.rig_check import Check, check_rig, in_words
+from stseg.calibration.isolated_boxes import isolated_boxes
+from stseg.calibration.leave_one_out import locate
+from stseg.calibration.rig_check import Check, check_rig, verdict_text
 from stseg.commands.calibrate import app
 from stseg.errors import ConfigError, OutputError
 from stseg.foreground.view_foreground import ViewForeground
@@ -33,7 +33,7 @@ SHOWN = shown(RIG, WALK)
 
 def judged(rig: Rig, boxes: dict[int, list[Floats]] | None = None) -> tuple[Check, list[str]]:
     check = check_rig(rig, SHOWN if boxes is None else boxes)
-    return check, in_words(rig, check)
+    return check, verdict_text(rig, check)
 
 
 class TestSightings:
@@ -41,27 +41,27 @@ class TestSightings:
         likelihood = np.full((480, 640), 0.02, np.float32)
         likelihood[100:300, 50:110] = 0.99
         likelihood[400:403, 600:603] = 0.99
-        np.testing.assert_array_equal(sightings(likelihood, SIZE), [[49.5, 99.5, 109.5, 299.5]])
+        np.testing.assert_array_equal(isolated_boxes(likelihood, SIZE), [[49.5, 99.5, 109.5, 299.5]])
 
     def test_boxes_are_edges(self) -> None:
         boxes = Boxes(np.array([[10.0, 20.0, 30.0, 90.0]]), np.ones(1))
-        np.testing.assert_array_equal(sightings(boxes, SIZE), [[10, 20, 40, 110]])
-        assert sightings(None, SIZE).shape == (0, 4)
+        np.testing.assert_array_equal(isolated_boxes(boxes, SIZE), [[10, 20, 40, 110]])
+        assert isolated_boxes(None, SIZE).shape == (0, 4)
 
 
 class TestBystanders:
     def test_people_are_found_where_they_walk(self) -> None:
         tables = tables_of(RIG)
-        people = all_bystanders(RIG, tables, SHOWN, range(0, 40, 4))
+        people = match_frames(RIG, tables, SHOWN, range(0, 40, 4))
         assert 0.8 * 30 <= len(people) <= 33
-        placed = place(people, tables, range(4), 2)
+        placed = locate(people, tables, range(4), 2)
         true = WALK[people.frame]
         off = np.hypot(*np.moveaxis(true[..., :2] - placed.ground[:, None], -1, 0)).min(axis=1)
         assert np.median(off) < 0.03 and np.quantile(off, 0.9) < 0.1
         assert people.seen.sum(axis=1).mean() > 3
 
     def test_nobody_is_found_in_nothing(self) -> None:
-        people = all_bystanders(RIG, tables_of(RIG), {0: [np.zeros((0, 4))] * 4}, [0])
+        people = match_frames(RIG, tables_of(RIG), {0: [np.zeros((0, 4))] * 4}, [0])
         assert len(people) == 0 and people.box.shape == (0, 4, 4)
 
 
@@ -85,7 +85,7 @@ class TestVerdict:
         check, words = judged(moved(RIG, view, kind, amount))
         assert [one.view for one in check.verdict.named] == [view]
         assert words[0].startswith(f"cam{view + 1} is off: of ")
-        assert not check.late and check.swapped is None
+        assert not check.delays and check.swapped is None
 
     def test_by_how_much(self) -> None:
         check, words = judged(moved(RIG, 2, "u", 30.0))
@@ -105,7 +105,7 @@ class TestVerdict:
         boxes = {frame: views[:2] for frame, views in SHOWN.items()}
         assert judged(rig, boxes)[0].sound
         check, words = judged(moved(rig, 0, "z", 0.4), boxes)
-        assert check.verdict.quarrel is not None and not check.verdict.named
+        assert check.verdict.unresolved is not None and not check.verdict.named
         assert "two views alone do not tell" in words[0]
 
     def test_too_few_people(self) -> None:
@@ -131,7 +131,7 @@ class TestBlunders:
             for frame, views in SHOWN.items()
         }
         check, words = judged(RIG, boxes)
-        assert [(one.view, one.frames) for one in check.late] == [(view, frames)]
+        assert [(one.view, one.frames) for one in check.delays] == [(view, frames)]
         side = "late" if frames > 0 else "early"
         assert words == [f"cam{view + 1} runs {abs(frames)} frames {side}: add {-frames} to its offset in the rig file"]
 
@@ -217,7 +217,7 @@ class TestRealRigs:
         with open_frames(recording, 0, frames) as moments:
             for moment in moments:
                 maps = [ViewForeground().evidence(view) for view in moment.views]
-                boxes[moment.frame] = [sightings(one, (644, 486)) for one in maps]
+                boxes[moment.frame] = [isolated_boxes(one, (644, 486)) for one in maps]
         return recording.rig, boxes
 
     def test_uu4(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

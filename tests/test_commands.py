@@ -14,9 +14,9 @@ import pytest
 from run_files import CONFIG, small_recording, small_trajectory, write_small_run
 
 import stseg
-from stseg.commands.inspect import events_in_words
+from stseg.commands.inspect import event_counts_text
 from stseg.commands.main import COMMANDS, main
-from stseg.commands.run_overview import look_over
+from stseg.commands.run_overview import summarise_run
 from stseg.io.runfile.runs import RunWriter, read_run
 from stseg.io.track_csv import read_tracks_csv
 from stseg.model.tables import TRAJECTORY, Tracks
@@ -128,7 +128,7 @@ def test_a_reader_that_has_seen_enough_is_no_error(run_path: Path) -> None:
 
 
 def test_inspect_sums_up_a_run(run_path: Path) -> None:
-    overview = look_over(read_run(run_path))
+    overview = summarise_run(read_run(run_path))
     assert (overview.frames, overview.first_frame, overview.last_frame, overview.seconds) == (6, 10, 15, 1.2)
     assert (overview.people_mean, overview.people_most) == (1.5, 2)
     assert [track["id"] for track in overview.tracks] == [1, 2]
@@ -140,11 +140,11 @@ def test_inspect_sums_up_a_run(run_path: Path) -> None:
     assert list(overview.rates) == ["left", "right"]
     assert overview.rates["left"] == pytest.approx({"miss": 0.2, "clutter": 0.025, "beside": 0.4})
     assert overview.bytes == run_path.stat().st_size
-    assert overview.warnings == ["view right says nothing of any candidate: is it blind, or its calibration wrong?"]
+    assert overview.warnings == ["view right has no evidence on any candidate: is it blind, or its calibration wrong?"]
 
 
 def test_inspect_counts_people_by_the_minute_and_says_why_ghosts_were_dropped(run_path: Path) -> None:
-    overview = look_over(read_run(run_path))
+    overview = summarise_run(read_run(run_path))
     assert overview.people_per_minute == [1.5]
     assert overview.track_seconds == pytest.approx({"shortest": 0.6, "median": 0.9, "longest": 1.2})
     assert overview.ground_by_views == [0, 0, 1]
@@ -213,7 +213,7 @@ def test_inspect_on_a_screen(run_path: Path, capsys: pytest.CaptureFixture[str])
 
 
 def test_inspect_counts_a_merge_and_its_split_as_one_encounter() -> None:
-    assert events_in_words({"birth": 3, "merge": 2, "split": 1}) == "3 birth, 2 encounter"
+    assert event_counts_text({"birth": 3, "merge": 2, "split": 1}) == "3 birth, 2 encounter"
 
 
 def test_inspect_as_json(run_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -224,10 +224,10 @@ def test_inspect_as_json(run_path: Path, capsys: pytest.CaptureFixture[str]) -> 
 
 
 def test_inspect_warns_of_an_empty_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    overview = look_over(read_run(silent_run(tmp_path / "silent.h5")))
-    assert overview.warnings == ["nobody was found", "no view sees any cell"]
+    overview = summarise_run(read_run(silent_run(tmp_path / "silent.h5")))
+    assert overview.warnings == ["no person was found", "no view sees any cell"]
     assert main(["inspect", str(tmp_path / "silent.h5")]) == 0
-    assert "warning: nobody was found" in capsys.readouterr().out
+    assert "warning: no person was found" in capsys.readouterr().out
 
 
 # export

@@ -9,7 +9,7 @@ from stseg.arrays import Bytes, Floats
 from stseg.calibration.knock_detection import background_shift, find_knocks
 from stseg.simulation import SceneSpec
 from stseg.simulation.cameras import build_rig, pixel_rays
-from stseg.simulation.room import look
+from stseg.simulation.room import render_room
 
 
 def correlated(frames: int, views: int, seed: int, correlation: float = 0.6) -> Floats:
@@ -78,7 +78,7 @@ def test_a_step_that_harms_nobody_is_none() -> None:
 def rooms() -> list[Bytes]:
     """What three cameras see of an empty room."""
     spec = SceneSpec("knock", 1, (5.0, 5.0), 1.0, cameras=3, size=(240, 180), seed=3)
-    return [look(spec, pixel_rays(camera), camera.centre).image for camera in build_rig(spec).cameras]
+    return [render_room(spec, pixel_rays(camera), camera.centre).image for camera in build_rig(spec).cameras]
 
 
 def filmed(room: Bytes, frame: int, shift: int, lots: np.random.Generator) -> Bytes:

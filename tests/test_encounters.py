@@ -21,7 +21,7 @@ from stseg.evaluation import evaluate
 from stseg.foreground.view_foreground import ViewForeground
 from stseg.simulation import NAMED, Film, Route, SceneSpec
 from stseg.simulation.film import SimulatedFrame as Filmed
-from stseg.simulation.script import follow
+from stseg.simulation.script import walk_routes
 from stseg.tracking.windows import windows
 
 SCENES = ("crossing", "meeting", "meeting_heights", "border")
@@ -36,7 +36,7 @@ def standing(heights: tuple[float, ...] = (1.7,)) -> SceneSpec:
 def apart(spec: SceneSpec, one: int, other: int) -> dict[int, float]:
     """Metres between two people in the frames in which both are there."""
     found = {}
-    for crowd in follow(spec):
+    for crowd in walk_routes(spec):
         if {one, other} <= set(crowd.id.tolist()):
             ground = dict(zip(crowd.id.tolist(), crowd.ground, strict=True))
             found[crowd.frame] = float(np.hypot(*(ground[one] - ground[other])))
@@ -58,7 +58,7 @@ def test_every_person_of_a_told_scene_has_a_route() -> None:
 
 
 def test_who_stands_stands_and_who_walks_swings_and_looks_ahead() -> None:
-    crowds = list(follow(standing((1.6, 1.8))))
+    crowds = list(walk_routes(standing((1.6, 1.8))))
     assert [len(crowd.id) for crowd in crowds] == [2] * 21 + [0] * 9
     still, walking = crowds[4], crowds[15]
     np.testing.assert_allclose(still.ground, [[0, 0], [0, 1]], atol=1e-9)
@@ -73,7 +73,7 @@ def test_who_stands_stands_and_who_walks_swings_and_looks_ahead() -> None:
 def test_nobody_walks_through_anybody_or_faster_than_people_walk(name: str) -> None:
     spec = NAMED[name]
     before: dict[int, np.ndarray[tuple[int], np.dtype[np.float64]]] = {}
-    for crowd in follow(spec):
+    for crowd in walk_routes(spec):
         for a, b in combinations(crowd.ground, 2):
             assert np.hypot(*(a - b)) > 0.39
         now = dict(zip(crowd.id.tolist(), crowd.ground, strict=True))
@@ -106,7 +106,7 @@ def test_things_happen_where_windows_end() -> None:
     meeting = [frame for frame, metres in apart(spec, 3, 4).items() if metres < 0.52]
     assert min(abs(meeting[0] - end) for end in ends) <= 2
     assert min(abs(meeting[-1] - end) for end in ends) <= 2
-    inside: list[set[int]] = [set(crowd.truth(spec.area)["id"].tolist()) for crowd in follow(spec)]
+    inside: list[set[int]] = [set(crowd.truth(spec.area)["id"].tolist()) for crowd in walk_routes(spec)]
     changes = [frame for frame in range(1, spec.frames) if inside[frame] != inside[frame - 1]]
     assert len(changes) >= 4
     assert all({frame - 1, frame} & shared for frame in changes)
@@ -117,7 +117,7 @@ def test_things_happen_where_windows_end() -> None:
 
 @cache
 def filmed(name: str, stop: int) -> tuple[Filmed, ...]:
-    return tuple(islice(Film(NAMED[name]).moments(), stop))
+    return tuple(islice(Film(NAMED[name]).frame_sets(), stop))
 
 
 def switches(name: str, kind: str, stop: int) -> int:

@@ -16,7 +16,7 @@ from stseg.geometry import Grid
 from stseg.io.runfile.runs import Run, RunWriter, read_run
 from stseg.model.tables import TRAJECTORY, Tracks
 from stseg.simulation import NAMED
-from stseg.simulation.crowd import walk
+from stseg.simulation.crowd import walk_freely
 
 sys.path.append(str(Path(__file__).parents[1] / "docs" / "examples"))
 
@@ -27,7 +27,7 @@ import flow_and_density
 def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
     """Fourteen people who walk about 6 m x 6 m for ten seconds, as a tracker without faults would follow them."""
     folder, spec = tmp_path_factory.mktemp("run"), replace(NAMED["dense"], seconds=10.0)
-    truth = np.concatenate([crowd.truth(spec.area) for crowd in walk(spec)])
+    truth = np.concatenate([crowd.truth(spec.area) for crowd in walk_freely(spec)])
     trajectory = np.zeros(len(truth), TRAJECTORY)
     for name in ("frame", "id", "x", "y", "height"):
         trajectory[name] = truth[name]

@@ -98,10 +98,10 @@ def test_views_that_agree_cause_no_warning() -> None:
 @pytest.mark.parametrize(
     ("nats", "told"),
     [
-        (np.zeros(300), "view b says nothing of any candidate"),
-        (np.where(FRAMES < 250, 3.0, 0.0), "view b says nothing in frames 250 to 399 (30 s)"),
+        (np.zeros(300), "view b has no evidence on any candidate"),
+        (np.where(FRAMES < 250, 3.0, 0.0), "view b has no evidence in frames 250 to 399 (30 s)"),
         (np.full(300, -2.0), "view b denies most people"),
-        (np.linspace(4, 0.5, 300), "view b drifts: it says 3.4 nats of a person at first, 1.1 at the end"),
+        (np.linspace(4, 0.5, 300), "view b drifts: its evidence for a person falls from 3.4 to 1.1 nats"),
     ],
 )
 def test_a_view_that_is_wrong_is_named(nats: AnyArray, told: str) -> None:

@@ -12,19 +12,26 @@ from stseg.arrays import Bytes, Floats
 from stseg.calibration.adjusted_rig import cameras_of
 from stseg.calibration.floor_features import Marks, floor_marks
 from stseg.calibration.pinhole import CENTRE
-from stseg.calibration.solution import Solution, placed_views, refine, refine_with_marks, views_alone, walks_of
-from stseg.calibration.view_merging import align_all, assemble
+from stseg.calibration.solution import (
+    Solution,
+    placed_views,
+    refine,
+    refine_with_marks,
+    single_view_cameras,
+    view_paths,
+)
+from stseg.calibration.view_merging import align_all, merge_views
 from stseg.geometry import Camera, Grid
 from stseg.simulation import SceneSpec
 from stseg.simulation.cameras import build_rig, pixel_rays
-from stseg.simulation.room import look
+from stseg.simulation.room import render_room
 
 SPEC = SceneSpec("walking", 2, (6.0, 6.0), 40.0, 5.0, 2, seed=1, distortion=(-0.2, 0.03))
 GRID = Grid((-2.5, 2.5), (-2.5, 2.5))
 
 
 def room(camera: Camera) -> Bytes:
-    return look(SPEC, pixel_rays(camera), camera.centre).image
+    return render_room(SPEC, pixel_rays(camera), camera.centre).image
 
 
 @pytest.fixture(scope="module")
@@ -56,16 +63,16 @@ def test_a_bare_floor_has_no_marks(cameras: tuple[Camera, ...]) -> None:
 
 def test_marks_bring_cameras_nearer_to_the_truth() -> None:
     scene = walking(2, 2, 40.0, noise=2.0)
-    alone = views_alone(scene.views, lambda: None)
-    walks = walks_of(scene.views, alone)
-    assembly = assemble(walks, align_all(walks, 5.0, 0, lambda: None))
-    by_people = refine(scene.views, placed_views(alone, assembly), np.zeros(2, np.int64), lambda: None)
+    single_cameras = single_view_cameras(scene.views, lambda: None)
+    paths = view_paths(scene.views, single_cameras)
+    merged = merge_views(paths, align_all(paths, 5.0, 0, lambda: None))
+    by_people = refine(scene.views, placed_views(single_cameras, merged), np.zeros(2, np.int64), lambda: None)
     true = exact_marks(scene)
     by_both = refine_with_marks(scene.views, by_people, true)
     assert disagreement(by_both, true) < 0.5 * disagreement(by_people, true)
-    assert by_both.outcome.miss.shape == by_people.outcome.miss.shape
+    assert by_both.adjustment.residual.shape == by_people.adjustment.residual.shape
     assert refine_with_marks(scene.views, by_people, true.of(np.zeros(0, np.int64))) is by_people
-    assert np.isfinite(by_both.outcome.state.views[:, CENTRE]).all()
+    assert np.isfinite(by_both.adjustment.parameters.views[:, CENTRE]).all()
 
 
 def exact_marks(scene: Walking) -> Marks:

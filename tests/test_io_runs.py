@@ -24,7 +24,7 @@ from run_files import (
 )
 
 from stseg.arrays import Bytes
-from stseg.commands.run_overview import look_over
+from stseg.commands.run_overview import summarise_run
 from stseg.errors import FormatError, OutputError
 from stseg.geometry import Grid
 from stseg.io.outputs.whole_files import part_path, replacing
@@ -435,7 +435,7 @@ def test_the_first_files_had_no_rates(run_path: Path) -> None:
     run = read_run(run_path)
     assert (len(run.rates), run.rates.dtype) == (0, RATES)
     assert not len(run.data_frame("rates"))
-    assert (look_over(run).rates, len(run.windows)) == ({}, 2)
+    assert (summarise_run(run).rates, len(run.windows)) == ({}, 2)
 
 
 def test_a_broken_chunk_is_told_when_it_is_read(run_path: Path) -> None:

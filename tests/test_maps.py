@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from stseg.arrays import Rows
 from stseg.geometry import Grid, Rig
 from stseg.model.tables import TRAJECTORY
-from stseg.report.maps import Bins, blind_map, density, dwell, haunts, heat_map, warm_colours
+from stseg.report.maps import Bins, blind_map, density, dwell, dwell_places, heat_map, warm_colours
 from stseg.report.plan_map import PlanMap
 
 GRID = Grid((0.0, 4.0), (-1.0, 2.0), 0.5, 1.8, 3)
@@ -62,7 +62,9 @@ def test_haunts_are_where_most_time_is_spent() -> None:
     talking = rng.normal((3.0, 1.0), 0.1, (100, 2))
     passing = rng.uniform((0, -1), (4, 2), (20, 2))
     places = np.concatenate([waiting, talking, passing])
-    found = haunts(rows_of(*((k, 1, x, y) for k, (x, y) in enumerate(places.tolist()))), Bins(BINS.x, BINS.y, 0.25))
+    found = dwell_places(
+        rows_of(*((k, 1, x, y) for k, (x, y) in enumerate(places.tolist()))), Bins(BINS.x, BINS.y, 0.25)
+    )
     assert len(found) == 2
     np.testing.assert_allclose([(place.x, place.y) for place in found], [(1, 0), (3, 1)], atol=0.15)
     np.testing.assert_allclose([place.share for place in found], [300 / 420, 100 / 420], atol=0.04)
@@ -71,8 +73,8 @@ def test_haunts_are_where_most_time_is_spent() -> None:
 def test_nobody_dwells_where_all_walk_alike() -> None:
     even = np.stack(np.meshgrid(np.arange(0.05, 20, 0.25), np.arange(0.05, 20, 0.25)), -1).reshape(-1, 2)
     rows = rows_of(*((k, 1, x, y) for k, (x, y) in enumerate(even.tolist())))
-    assert haunts(rows, Bins((0.0, 20.0), (0.0, 20.0), 0.5)) == []
-    assert haunts(rows[:0], BINS) == []
+    assert dwell_places(rows, Bins((0.0, 20.0), (0.0, 20.0), 0.5)) == []
+    assert dwell_places(rows[:0], BINS) == []
 
 
 def test_a_heat_map_is_dark_where_much_is() -> None:

@@ -114,4 +114,4 @@ def test_a_run_without_frames_has_a_page_that_does_not_complain(tmp_path: Path) 
     with chromium(tmp_path / "profile") as browser:
         browser.open(tmp_path / "empty.html")
         assert browser.complaints == []
-        assert "Nobody was found" in browser.ask("document.body.innerText")
+        assert "No person was found" in browser.ask("document.body.innerText")

@@ -23,7 +23,7 @@ from stseg.io.recording.recording import CameraSource, Source
 from stseg.io.runfile.runs import RunWriter, read_run
 from stseg.model.tables import EVENT, TRACK, TRAJECTORY, Tracks
 from stseg.report import marginal_picture, overlay, plan_view, spacetime_picture, volume_picture
-from stseg.report.charts import Span, clock_time, lives_chart, people_chart
+from stseg.report.charts import Span, clock_time, people_chart, track_chart
 from stseg.report.colours import NIGHT, PAPER, track_colour
 from stseg.report.figures import backdrop
 from stseg.report.labels import place_labels
@@ -389,7 +389,7 @@ def test_bars_of_tracks_never_overlap(spans: list[tuple[int, int]]) -> None:
     tracks = np.zeros(len(spans), TRACK)
     for k, (first, length) in enumerate(spans):
         tracks["id"][k], tracks["first"][k], tracks["last"][k] = k + 1, first, first + length
-    svg = lives_chart(Span(0, 1000, 5.0), tracks)
+    svg = track_chart(Span(0, 1000, 5.0), tracks)
     bars = [tuple(map(float, bar)) for bar in re.findall(r'<rect x="([\d.]+)" y="([\d.]+)" width="([\d.]+)"', svg)]
     assert len(bars) == len(spans)
     for k, (u, v, width) in enumerate(bars):

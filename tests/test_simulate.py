@@ -27,8 +27,8 @@ from stseg.simulation import NAMED, Film, Lamp, SceneSpec
 from stseg.simulation import ray_casting as draw_module
 from stseg.simulation.body import PARTS, pose
 from stseg.simulation.cameras import build_rig, pixel_rays
-from stseg.simulation.clothes import wardrobe, worn
-from stseg.simulation.crowd import Crowd, walk
+from stseg.simulation.clothes import clothing, own_clothing
+from stseg.simulation.crowd import Crowd, walk_freely
 from stseg.simulation.detector import detect, visible_boxes
 from stseg.simulation.ray_casting import draw_bodies, pixel_boxes
 from stseg.simulation.render import LAMP, Viewer
@@ -51,8 +51,8 @@ def viewers(spec: SceneSpec) -> list[Viewer]:
 
 
 def test_people_who_dress_alike_do_so_in_tones_of_their_own() -> None:
-    dressed = [worn(5, person, 3) for person in (1, 2, 3, 4)]
-    own = [wardrobe(5, person) for person in (1, 2, 3, 4)]
+    dressed = [clothing(5, person, 3) for person in (1, 2, 3, 4)]
+    own = [own_clothing(5, person) for person in (1, 2, 3, 4)]
     np.testing.assert_array_equal(dressed[0], own[0])
     np.testing.assert_array_equal(dressed[3], own[3])
     for k in (1, 2):
@@ -90,7 +90,7 @@ def test_half_the_cameras_are_among_the_whole() -> None:
     for camera, twin in zip(few, many[::2], strict=True):
         np.testing.assert_array_equal(camera.projection, twin.projection)
     spec = replace(TINY, cameras=4, people=1)
-    whole, half = (next(Film(s).moments()) for s in (spec, replace(spec, cameras=2)))
+    whole, half = (next(Film(s).frame_sets()) for s in (spec, replace(spec, cameras=2)))
     np.testing.assert_array_equal(whole.views[2].image, half.views[1].image)
 
 
@@ -137,10 +137,10 @@ def test_limbs_swing_with_the_gait_and_come_back() -> None:
 
 
 def test_clothes_belong_to_a_person() -> None:
-    np.testing.assert_array_equal(wardrobe(5, 3), wardrobe.__wrapped__(5, 3))
-    assert not np.array_equal(wardrobe(5, 3), wardrobe(5, 4))
-    assert not np.array_equal(wardrobe(5, 3), wardrobe(6, 3))
-    assert wardrobe(5, 3).shape[0] == len(PARTS)
+    np.testing.assert_array_equal(own_clothing(5, 3), own_clothing.__wrapped__(5, 3))
+    assert not np.array_equal(own_clothing(5, 3), own_clothing(5, 4))
+    assert not np.array_equal(own_clothing(5, 3), own_clothing(6, 3))
+    assert own_clothing(5, 3).shape[0] == len(PARTS)
 
 
 # Drawing
@@ -192,7 +192,7 @@ def test_compiled_and_plain_kernels_agree(monkeypatch: pytest.MonkeyPatch) -> No
     viewer = viewers(replace(TINY, size=(24, 18)))[0]
     crowd = crowd_of(np.array([[0.2, -0.3], [0.4, 0.1]]))
     bodies, camera = pose(crowd), viewer.camera
-    paint = np.array([wardrobe(1, int(person)) for person in crowd.id])
+    paint = np.array([own_clothing(1, int(person)) for person in crowd.id])
     boxes, results = pixel_boxes(camera, bodies.corners(1.0)), []
     for form in (lambda function: function, python_form):
         for name in ("_nearest", "_paint"):
@@ -217,7 +217,7 @@ def test_masks_hold_hips_and_feet_of_those_in_full_view() -> None:
     spec = replace(TINY, people=3, area=(4.0, 4.0), camera_distance=5.0, size=(160, 120), seconds=0.2)
     parts = [k for k, part in enumerate(PARTS) if part.name == "hips" or part.name.endswith("foot")]
     looked = 0
-    for crowd in walk(spec):
+    for crowd in walk_freely(spec):
         bodies = pose(crowd)
         for viewer in viewers(spec):
             drawing = viewer.draw(crowd, bodies)
@@ -242,7 +242,7 @@ def test_crowds_keep_apart_come_and_go(name: str) -> None:
     known: set[int] = set()
     gone: set[int] = set()
     last: dict[int, tuple[Floats, float]] = {}
-    for frame, crowd in enumerate(walk(spec)):
+    for frame, crowd in enumerate(walk_freely(spec)):
         assert crowd.frame == frame
         distance = np.linalg.norm(crowd.ground[:, None] - crowd.ground[None], axis=2) + 9 * np.eye(len(crowd.id))
         assert distance.min() > 0.35
@@ -268,7 +268,7 @@ def test_crowds_keep_apart_come_and_go(name: str) -> None:
 
 def test_places_do_not_depend_on_the_views() -> None:
     spec = replace(TINY, cameras=1, noise=9.0, size=(32, 24))
-    for one, other in zip(walk(TINY), walk(spec), strict=True):
+    for one, other in zip(walk_freely(TINY), walk_freely(spec), strict=True):
         for field in fields(Crowd):
             np.testing.assert_array_equal(getattr(one, field.name), getattr(other, field.name))
 
@@ -277,7 +277,7 @@ def test_places_do_not_depend_on_the_views() -> None:
 
 
 def test_equal_scenes_are_equal_and_seeds_matter() -> None:
-    first, again, other = (list(islice(Film(spec).moments(), 2)) for spec in (TINY, TINY, replace(TINY, seed=5)))
+    first, again, other = (list(islice(Film(spec).frame_sets(), 2)) for spec in (TINY, TINY, replace(TINY, seed=5)))
     for moment, twin, stranger in zip(first, again, other, strict=True):
         np.testing.assert_array_equal(moment.truth, twin.truth)
         for view, same, else_view in zip(moment.views, twin.views, stranger.views, strict=True):
@@ -290,7 +290,7 @@ def test_equal_scenes_are_equal_and_seeds_matter() -> None:
 def test_where_nobody_stands_frames_are_those_of_the_empty_room() -> None:
     film = Film(SHARP)
     empty = next(film.empty())
-    moment = next(film.moments())
+    moment = next(film.frame_sets())
     for image, view in zip(empty, moment.views, strict=True):
         near = cv2.dilate((view.instances > 0).astype(np.uint8), np.ones((5, 5), np.uint8)) > 0  # the lens is soft
         np.testing.assert_array_equal(view.image[~near], image[~near])
@@ -299,12 +299,12 @@ def test_where_nobody_stands_frames_are_those_of_the_empty_room() -> None:
 
 def test_noise_and_light_are_as_large_as_asked_for() -> None:
     noisy, still = Film(replace(SHARP, people=0, noise=6.0)), Film(replace(SHARP, people=0))
-    rest = [view.image.astype(float) for view in next(still.moments()).views]
-    images = [view.image.astype(float) for view in next(noisy.moments()).views]
+    rest = [view.image.astype(float) for view in next(still.frame_sets()).views]
+    images = [view.image.astype(float) for view in next(noisy.frame_sets()).views]
     assert np.std(np.subtract(images, rest)) == pytest.approx(6.0, rel=0.05)
     assert abs(np.mean(np.subtract(images, rest))) < 0.3
     drifting = Film(replace(SHARP, people=0, light_drift=0.2, light_period=1.0))
-    means = np.array([[view.image.mean() for view in moment.views] for moment in drifting.moments()])
+    means = np.array([[view.image.mean() for view in moment.views] for moment in drifting.frame_sets()])
     swing = (means.max(axis=0) - means.min(axis=0)) / means.mean(axis=0) / 2
     np.testing.assert_allclose(swing, 0.2, atol=0.02)
 
@@ -312,7 +312,7 @@ def test_noise_and_light_are_as_large_as_asked_for() -> None:
 def test_lamps_are_switched_and_light_what_is_near() -> None:
     lamp = Lamp(1.5, on=0.3, off=0.6, place=(0.0, 0.0, 1.0), reach=1.0)
     film = Film(replace(SHARP, people=0, lamps=(lamp,)))
-    images = [moment.views[0].image.astype(float) for moment in film.moments()]
+    images = [moment.views[0].image.astype(float) for moment in film.frame_sets()]
     viewer = film.viewers[0]
     far = np.hypot(*np.nan_to_num(viewer.room.ground, nan=99.0).transpose(2, 0, 1))
     for frame in (0, 2, 6, 9):
@@ -324,14 +324,14 @@ def test_lamps_are_switched_and_light_what_is_near() -> None:
 
 def test_a_cloud_comes_slowly_and_is_everywhere() -> None:
     film = Film(replace(SHARP, people=0, lamps=(Lamp(-0.5, on=0.2, rise=0.4),)))
-    means = np.array([moment.views[1].image.mean() for moment in film.moments()])
+    means = np.array([moment.views[1].image.mean() for moment in film.frame_sets()])
     np.testing.assert_allclose(means[[0, 2, 4, 6, 9]] / means[0], [1, 1, 0.75, 0.5, 0.5], atol=0.02)
 
 
 def test_people_stand_in_the_light_of_lamps() -> None:
     spec = replace(SHARP, seconds=0.1, size=(160, 120))
     lit = replace(spec, lamps=(Lamp(0.4, on=0.0, place=(0.0, 0.0, 2.0), reach=2.0),))
-    dark, bright = (next(Film(one).moments()).views[0] for one in (spec, lit))
+    dark, bright = (next(Film(one).frame_sets()).views[0] for one in (spec, lit))
     person = np.asarray(dark.instances > 0)
     assert person.any()
     np.testing.assert_array_equal(dark.instances, bright.instances)
@@ -393,7 +393,7 @@ def test_a_written_scene_reads_back(tmp_path: Path) -> None:
     film, told = Film(spec), []
     write_scene(tmp_path / "a", film, instances=True, progress=lambda done, of: told.append((done, of)))
     assert told == [(k, 4) for k in range(1, 5)]
-    moments = list(film.moments())
+    moments = list(film.frame_sets())
     recordings = {kind: read_rig(tmp_path / "a" / f"rig{kind}.toml") for kind in ("", "_masks", "_boxes", "_instances")}
     readers = [open_frames(recording) for recording in recordings.values()]
     for moment, *seen in zip(moments, *readers, strict=True):

@@ -12,8 +12,8 @@ from scenes import BODY, FEW_HEIGHTS, boxes, likelihoods, people, room
 
 from stseg.accelerate import python_form
 from stseg.arrays import Floats, ViewEvidence
-from stseg.calibration.run_check import knocked, views_aside
-from stseg.commands.run_overview import look_over
+from stseg.calibration.run_check import find_residual_step, views_off
+from stseg.commands.run_overview import summarise_run
 from stseg.detection.detector import Detector
 from stseg.detection.scoring import set_score
 from stseg.geometry import Camera, Rig
@@ -72,25 +72,25 @@ def windows(seed: int, count: int = 60) -> Floats:
 
 def test_views_are_named_beyond_a_cell_alone() -> None:
     aside = windows(1)
-    assert views_aside(aside, CELL) == []
+    assert views_off(aside, CELL) == []
     aside[:, 2] -= 0.18
     aside[::3, 2] = np.nan
     aside[:, 0] += 0.06
-    (off,) = views_aside(aside, CELL)
+    (off,) = views_off(aside, CELL)
     assert off.view == 2 and off.metres == pytest.approx(-0.18, abs=0.03)
     aside[:, 1] += 0.14
-    assert [one.view for one in views_aside(aside, CELL)] == [2, 1]
+    assert [one.view for one in views_off(aside, CELL)] == [2, 1]
     aside[3:, 1:3] = np.nan
-    assert views_aside(aside, CELL) == []
-    assert views_aside(np.full((40, 3), np.nan), CELL) == []
+    assert views_off(aside, CELL) == []
+    assert views_off(np.full((40, 3), np.nan), CELL) == []
 
 
 @pytest.mark.parametrize("side", [1, -1])
 def test_a_knock_is_found_with_its_window(side: int) -> None:
     aside = windows(2)
-    assert knocked(aside, CELL) is None
+    assert find_residual_step(aside, CELL) is None
     aside[35:, 3] += side * 0.15
-    knock = knocked(aside, CELL)
+    knock = find_residual_step(aside, CELL)
     assert knock is not None and knock.view == 3
     assert abs(knock.frame - 35) <= 1
     assert knock.after - knock.before == pytest.approx(side * 0.15, abs=0.04)
@@ -106,4 +106,6 @@ def test_a_run_says_which_view_disagrees(tmp_path: Path, capsys: pytest.CaptureF
     assert track(tmp_path / "wrong.toml", tmp_path / "wrong.h5") == 0
     warned = capsys.readouterr().err
     assert "view east sees people" in warned and "to the left of where the views put them" in warned
-    assert any("view east sees people" in warning for warning in look_over(read_run(tmp_path / "wrong.h5")).warnings)
+    assert any(
+        "view east sees people" in warning for warning in summarise_run(read_run(tmp_path / "wrong.h5")).warnings
+    )

@@ -79,7 +79,7 @@ def shoot(name: str) -> Shot:
     spec, codec = FILMS[name]
     film = Film(spec)
     empty = [views[0] for views in film.empty()]
-    views = [moment.views[0] for moment in film.moments()]
+    views = [moment.views[0] for moment in film.frame_sets()]
     images, masks = [view.image for view in views], [view.instances > 0 for view in views]
     if codec:
         seen = list(_compressed(empty + images, codec, spec))

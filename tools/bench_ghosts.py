@@ -51,7 +51,7 @@ def evidence(people: int, frames: int, kind: str) -> tuple[Film, list[list[ViewE
     film = Film(spec)
     seen: list[list[ViewEvidence]] = [
         [view.boxes if kind == "boxes" else (view.instances > 0).astype(np.float32) for view in moment.views]
-        for moment in film.moments()
+        for moment in film.frame_sets()
     ]
     return film, seen
 

@@ -115,7 +115,7 @@ def pipeline_fusion(frames: int) -> None:
         frame_pass = Detector(film.rig, [kind] * 4, config.detection, config.body)
         occupancy = Occupancy(film.rig, [kind] * 4, config.occupancy, config.detection, config.body)
         taken = []
-        for moment in film.moments():
+        for moment in film.frame_sets():
             seen: list[ViewEvidence] = [
                 view.boxes if kind == "boxes" else (view.instances > 0).astype(np.float32) for view in moment.views
             ]

@@ -56,7 +56,7 @@ def film_frames(spec: SceneSpec, every: int, seed: int = 0) -> tuple[Rig, list[T
             model.learn(image)
     sights = [ViewForeground(IlluminationMonitor(model, spec.frame_rate, config.illumination)) for model in models]
     rng, frames = np.random.default_rng(seed), []
-    for moment in film.moments():
+    for moment in film.frame_sets():
         seen = [sight.evidence(view.image) for sight, view in zip(sights, moment.views, strict=True)]
         if moment.frame % every != every // 2:
             continue

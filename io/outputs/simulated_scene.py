@@ -64,7 +64,7 @@ class SimulatedScene(Protocol):
     @property
     def quality(self) -> int: ...
     def empty(self) -> Iterator[tuple[Bytes, ...]]: ...
-    def moments(self) -> Iterator[SimulatedFrame]: ...
+    def frame_sets(self) -> Iterator[SimulatedFrame]: ...
 
 
 def write_scene(
@@ -106,7 +106,7 @@ def write_scene(
             films = [
                 open_files.enter_context(_CameraFiles(folder, camera, scene, instances)) for camera in scene.rig.cameras
             ]
-            for done, frame_set in enumerate(scene.moments(), start=1):
+            for done, frame_set in enumerate(scene.frame_sets(), start=1):
                 np.savetxt(truth, frame_set.truth, fmt="%d,%d,%.4f,%.4f,%.3f")
                 for film, view in zip(films, frame_set.views, strict=True):
                     film.write(frame_set.frame, view)

@@ -1,4 +1,4 @@
-"""The rig that an adjustment amounts to, and what it says of each view."""
+"""The rig of a bundle adjustment, and the reprojection statistics of each view."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from stseg.calibration.solution import Solution
 from stseg.geometry import Camera, Grid
 
 _MARGIN = 0.5
-"""Metres of ground around where people walked."""
+"""Margin of the grid around the adjusted ground points, metres."""
 
 
 @dataclass(frozen=True)
@@ -22,23 +22,23 @@ class ViewReport:
 
     Attributes
     ----------
-    sightings
-        People and frames in which it and another view saw somebody.
+    observations
+        Number of endpoint pairs (a person in a frame) that this view shares with another.
     foot_pixels, head_pixels
-        Median distances of feet and heads from where the adjusted people have them.
+        Median reprojection errors of feet and heads.
     ground_metres
-        Median distance of its people's feet on the ground from where all views together have them.
+        Median distance on the ground between this view's feet and the adjusted points.
     head_metres
-        Median difference of its heads' heights from those that all views together have.
+        Median difference between this view's head heights and the adjusted ones.
     focal, focal_spread
-        Pixels, and standard deviation.
+        Focal length and its standard deviation, pixels.
     centre_spread
-        Standard deviation of the camera's place, metres.
+        Standard deviation of the camera centre, metres.
     clock, clock_spread
-        What is left of its delay beyond whole frames, and standard deviation, seconds.
+        Residual delay beyond whole frames, and its standard deviation, seconds.
     """
 
-    sightings: int
+    observations: int
     foot_pixels: float
     head_pixels: float
     ground_metres: float
@@ -51,90 +51,100 @@ class ViewReport:
 
 
 def scaled(solution: Solution, factor: float) -> Solution:
-    """The same with all lengths on the ground multiplied."""
-    state = solution.outcome.state
-    views = np.array([moved(view, 0.0, np.zeros(2), factor) for view in state.views])
-    state = replace(state, views=views, toe=factor * state.toe, points=factor * state.points)
-    scale = np.ones(len(solution.outcome.covariance))
+    """The solution with all lengths multiplied by a factor, covariance included."""
+    parameters = solution.adjustment.parameters
+    views = np.array([moved(view, 0.0, np.zeros(2), factor) for view in parameters.views])
+    parameters = replace(
+        parameters, views=views, toe_offset=factor * parameters.toe_offset, points=factor * parameters.points
+    )
+    scale = np.ones(len(solution.adjustment.covariance))
     for view in range(len(views)):
         scale[SIZE * view + CENTRE.start : SIZE * view + CENTRE.stop] = factor
     scale[-2:] = factor
-    covariance = scale[:, None] * solution.outcome.covariance * scale
-    seen = solution.task.seen
-    seen = replace(seen, ground=factor * seen.ground, velocity=factor * seen.velocity)
-    outcome = replace(solution.outcome, state=state, covariance=covariance)
-    return replace(solution, outcome=outcome, task=replace(solution.task, seen=seen))
+    covariance = scale[:, None] * solution.adjustment.covariance * scale
+    correspondences = solution.problem.correspondences
+    correspondences = replace(
+        correspondences, ground=factor * correspondences.ground, velocity=factor * correspondences.velocity
+    )
+    adjustment = replace(solution.adjustment, parameters=parameters, covariance=covariance)
+    return replace(solution, adjustment=adjustment, problem=replace(solution.problem, correspondences=correspondences))
 
 
 def centred(solution: Solution) -> Solution:
-    """The same on a ground whose origin is the middle of where people walked, x along the first camera's right."""
-    state = solution.outcome.state
-    middle = (state.points[:, :2].max(axis=0) + state.points[:, :2].min(axis=0)) / 2
-    toward = middle - state.views[0, CENTRE][:2]
+    """The solution with the origin in the middle of the ground points and x along the first camera's right."""
+    parameters = solution.adjustment.parameters
+    middle = (parameters.points[:, :2].max(axis=0) + parameters.points[:, :2].min(axis=0)) / 2
+    toward = middle - parameters.views[0, CENTRE][:2]
     turn = np.pi / 2 - float(np.arctan2(toward[1], toward[0]))
     about = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
-    views = np.array([moved(view, turn, -about @ middle, 1.0) for view in state.views])
-    points = np.column_stack([(state.points[:, :2] - middle) @ about.T, state.points[:, 2]])
-    state = replace(state, views=views, points=points)
-    seen = solution.task.seen
-    seen = replace(seen, ground=(seen.ground - middle) @ about.T, velocity=seen.velocity @ about.T)
-    return replace(solution, outcome=replace(solution.outcome, state=state), task=replace(solution.task, seen=seen))
+    views = np.array([moved(view, turn, -about @ middle, 1.0) for view in parameters.views])
+    points = np.column_stack([(parameters.points[:, :2] - middle) @ about.T, parameters.points[:, 2]])
+    parameters = replace(parameters, views=views, points=points)
+    correspondences = solution.problem.correspondences
+    correspondences = replace(
+        correspondences, ground=(correspondences.ground - middle) @ about.T, velocity=correspondences.velocity @ about.T
+    )
+    return replace(
+        solution,
+        adjustment=replace(solution.adjustment, parameters=parameters),
+        problem=replace(solution.problem, correspondences=correspondences),
+    )
 
 
 def distance_factor(solution: Solution, view: int, pixels: Floats, metres: float) -> float:
-    """By what all lengths grow so that two ground pixels (2, 2) of a view are so far apart; nan above the horizon."""
-    camera = solution.outcome.state.views[view]
+    """Scale factor that puts two ground pixels (2, 2) of a view `metres` apart; nan above the horizon."""
+    camera = solution.adjustment.parameters.views[view]
     ground = on_plane(camera, _size(solution, view), pixels, 0.0)
     return metres / float(np.linalg.norm(ground[1] - ground[0]))
 
 
 def cameras_of(solution: Solution, names: Sequence[str]) -> tuple[Camera, ...]:
-    """The cameras, as a rig has them."""
+    """The adjusted cameras as `Camera` objects."""
     return tuple(
         as_camera(view, name, _size(solution, k))
-        for k, (name, view) in enumerate(zip(names, solution.outcome.state.views, strict=True))
+        for k, (name, view) in enumerate(zip(names, solution.adjustment.parameters.views, strict=True))
     )
 
 
 def offsets_of(solution: Solution) -> Ints:
-    """Each stream's offset of the rig file; none is above 0, so that all are there at the recording's first frame."""
+    """Offset of each stream in the rig file; 0 or below, so that every stream covers the recording's first frame."""
     return np.asarray(solution.delay.min() - solution.delay)
 
 
 def grid_of(solution: Solution, cell: float) -> Grid:
-    """A grid over where people walked."""
-    ground = solution.outcome.state.points[:, :2]
-    low = np.floor((np.percentile(ground, 1, axis=0) - _MARGIN) / cell) * cell
+    """A grid over the adjusted ground points."""
+    ground = solution.adjustment.parameters.points[:, :2]
+    lowest = np.floor((np.percentile(ground, 1, axis=0) - _MARGIN) / cell) * cell
     high = np.ceil((np.percentile(ground, 99, axis=0) + _MARGIN) / cell) * cell
-    x, y = np.round(np.stack([low, high], 1), 6).tolist()
+    x, y = np.round(np.stack([lowest, high], 1), 6).tolist()
     return Grid((x[0], x[1]), (y[0], y[1]), cell)
 
 
 def reports_of(solution: Solution) -> list[ViewReport]:
-    """How well each view fits the others."""
+    """A report of each view."""
     return [_report(solution, view) for view in range(len(solution.delay))]
 
 
 def _report(solution: Solution, view: int) -> ViewReport:
-    outcome, seen = solution.outcome, solution.task.seen
-    state, size = outcome.state, _size(solution, view)
-    rows = np.flatnonzero(seen.view == view)
-    length = np.hypot(*(seen.foot[rows] - seen.head[rows]).T)
-    missed = np.linalg.norm(outcome.miss[rows], axis=2) * length[:, None]
-    points = state.points[seen.point[rows]]
-    camera = state.views[view]
+    adjustment, correspondences = solution.adjustment, solution.problem.correspondences
+    parameters, size = adjustment.parameters, _size(solution, view)
+    rows = np.flatnonzero(correspondences.view == view)
+    length = np.hypot(*(correspondences.foot[rows] - correspondences.head[rows]).T)
+    residual_pixels = np.linalg.norm(adjustment.residual[rows], axis=2) * length[:, None]
+    points = parameters.points[correspondences.point[rows]]
+    camera = parameters.views[view]
     toward = camera[CENTRE][:2] - points[:, :2]
-    low = points[:, :2] + state.toe[0] * toward / np.linalg.norm(toward, axis=1, keepdims=True)
-    away = np.linalg.norm(on_plane(camera, size, seen.foot[rows], 0.0) - low, axis=1)
-    tall = height_of_head(camera, size, seen.head[rows], points[:, :2])
+    lowest = points[:, :2] + parameters.toe_offset[0] * toward / np.linalg.norm(toward, axis=1, keepdims=True)
+    away = np.linalg.norm(on_plane(camera, size, correspondences.foot[rows], 0.0) - lowest, axis=1)
+    heights = height_of_head(camera, size, correspondences.head[rows], points[:, :2])
     focal = size[0] * float(np.exp(camera[FOCAL]))
-    spread = np.sqrt(np.maximum(np.diag(outcome.covariance)[SIZE * view : SIZE * (view + 1)], 0.0))
+    spread = np.sqrt(np.maximum(np.diag(adjustment.covariance)[SIZE * view : SIZE * (view + 1)], 0.0))
     return ViewReport(
-        sightings=len(rows),
-        foot_pixels=float(np.nanmedian(missed[:, 0])),
-        head_pixels=float(np.nanmedian(missed[:, 1])),
+        observations=len(rows),
+        foot_pixels=float(np.nanmedian(residual_pixels[:, 0])),
+        head_pixels=float(np.nanmedian(residual_pixels[:, 1])),
         ground_metres=float(np.nanmedian(away)),
-        head_metres=float(np.nanmedian(np.abs(tall - points[:, 2]))),
+        head_metres=float(np.nanmedian(np.abs(heights - points[:, 2]))),
         focal=focal,
         focal_spread=focal * float(spread[FOCAL]),
         centre_spread=float(np.linalg.norm(spread[CENTRE])),
@@ -144,5 +154,5 @@ def _report(solution: Solution, view: int) -> ViewReport:
 
 
 def _size(solution: Solution, view: int) -> tuple[int, int]:
-    width, height = solution.task.size[view].tolist()
+    width, height = solution.problem.size[view].tolist()
     return width, height

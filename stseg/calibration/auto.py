@@ -1,4 +1,4 @@
-"""From everybody's ends to a checked solution: the way of `stseg calibrate auto`, without files."""
+"""Calibration from upright people: endpoints in, checked solution out (the core of `stseg calibrate auto`)."""
 
 from __future__ import annotations
 
@@ -8,73 +8,73 @@ import numpy as np
 
 from stseg.arrays import Bytes
 from stseg.calibration.adjusted_rig import cameras_of, centred, grid_of
-from stseg.calibration.auto_diagnosis import require_met, require_placed, require_walkers
+from stseg.calibration.auto_diagnosis import require_correspondences, require_merged, require_people
 from stseg.calibration.floor_features import floor_marks
 from stseg.calibration.solution import (
     ROUNDS,
+    CalibrationInput,
     Solution,
-    Views,
     placed_views,
     refine,
     refine_with_marks,
-    views_alone,
-    walks_of,
+    single_view_cameras,
+    view_paths,
 )
-from stseg.calibration.view_merging import align_all, assemble
+from stseg.calibration.view_merging import align_all, merge_views
 from stseg.errors import SourceError
 
 _FLOOR_ROUNDS = 2
-"""Marks are found better once the plans fit better."""
+"""Rounds of floor features: a better rig rectifies the floor better, which finds more features."""
 _FLOOR_CELL = 0.1
-"""Metres."""
+"""Cell of the rectified floor, metres."""
 
 
 def steps_of(views: int) -> int:
-    """How often `calibrate_from_people` tells of progress."""
+    """Number of progress calls of `calibrate_from_people`."""
     return views + views * (views - 1) // 2 + ROUNDS
 
 
-def calibrate_from_people(names: Sequence[str], views: Views, progress: Callable[[], None]) -> Solution:
-    """Cameras on one ground, from people who walk there and nothing else.
+def calibrate_from_people(names: Sequence[str], views: CalibrationInput, progress: Callable[[], None]) -> Solution:
+    """Calibrate cameras from the feet and heads of walking people alone.
 
     Parameters
     ----------
     names
-        What messages call the views.
+        Names of the views in error messages.
     views
-        Ends of isolated people in every view.
+        Endpoints of isolated people in every view.
     progress
-        Told after each step.
+        Called after each step.
 
     Raises
     ------
     SourceError
-        Names the view in which too few people walk, or which does not show the same people at the same time.
+        For a view with too few people, or one that does not show the same people at the same time.
     """
-    if len(views.ends) < 2:
-        raise SourceError(names[0] if names else "videos", "", f"{len(views.ends)} views", "two or more")
-    for name, ends in zip(names, views.ends, strict=True):
-        require_walkers(name, ends)
-    alone = views_alone(views, progress)
-    walks = walks_of(views, alone)
+    if len(views.endpoints) < 2:
+        raise SourceError(names[0] if names else "videos", "", f"{len(views.endpoints)} views", "two or more")
+    for name, endpoints in zip(names, views.endpoints, strict=True):
+        require_people(name, endpoints)
+    single_cameras = single_view_cameras(views, progress)
+    paths = view_paths(views, single_cameras)
     most = round(views.most_delay * views.frame_rate)
-    assembly = assemble(walks, align_all(walks, views.frame_rate, most, progress))
-    require_placed(names, walks, assembly, views.frame_rate, most)
-    delay = np.array([assembly.placed[k].delay for k in range(len(names))], np.int64)
-    solution = refine(views, placed_views(alone, assembly), delay, progress)
-    require_met(names, solution)
+    merged = merge_views(paths, align_all(paths, views.frame_rate, most, progress))
+    require_merged(names, paths, merged, views.frame_rate, most)
+    delay = np.array([merged.placed[k].delay for k in range(len(names))], np.int64)
+    solution = refine(views, placed_views(single_cameras, merged), delay, progress)
+    require_correspondences(names, solution)
     return centred(solution)
 
 
-def sharpen_by_floor(views: Views, solution: Solution, backgrounds: Sequence[Bytes]) -> tuple[Solution, int]:
-    """The same with the help of marks on the floor, and how many there are; 0 on a bare one.
+def sharpen_by_floor(views: CalibrationInput, solution: Solution, backgrounds: Sequence[Bytes]) -> tuple[Solution, int]:
+    """Refine a solution by floor features; returns their number too, 0 on a bare floor.
 
     Parameters
     ----------
     views
-        What `solution` was made of.
+        Input of `solution`.
     solution
-        Views placed by people.
+        Cameras calibrated from people.
     backgrounds
         The empty scene in each view, uint8 (v, u, 3).
     """

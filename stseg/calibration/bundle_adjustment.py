@@ -1,9 +1,8 @@
-"""One robust adjustment of everything: cameras, clocks, and where and how tall people are (METHODS 1).
+"""Robust bundle adjustment of cameras, clock offsets, ground points and body heights.
 
-Each sighting is a foot and a head in a view. Heads are points in space; the lowest point of a silhouette is a little
-nearer to the camera than the body's axis, by a length that is adjusted too. Levenberg and Marquardt's steps, people
-eliminated first (Triggs et al., Bundle adjustment: a modern synthesis, 2000, section 6.1), weights by Geman and
-McClure.
+An observation is a foot and a head in a view. A head is a point in space. The lowest point of a silhouette is nearer to
+the camera than the body's axis, by an offset that is adjusted too. Levenberg-Marquardt steps with the points
+eliminated (Triggs et al., Bundle adjustment: a modern synthesis, 2000, section 6.1), Geman-McClure weights.
 """
 
 from __future__ import annotations
@@ -13,151 +12,155 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints
-from stseg.calibration.correspondence import Meetings
+from stseg.calibration.correspondence import Correspondences
 from stseg.calibration.pinhole import CENTRE, CLOCK, FOCAL, MIDDLE, RADIAL, SIZE, moved, project
 
 _STEPS = np.array([1e-5] * 5 + [1e-5] * 3 + [1e-4] * 3 + [1e-3])
-"""Differences by which a camera's slopes are measured."""
+"""Steps of the finite differences of a camera's parameters."""
 _PRIOR_SPREAD = np.zeros(SIZE)
 _PRIOR_SPREAD[FOCAL], _PRIOR_SPREAD[MIDDLE], _PRIOR_SPREAD[RADIAL] = 0.5, 0.01, 0.25
 _PRIOR_MEAN = np.zeros(SIZE)
 _PRIOR_MEAN[FOCAL], _PRIOR_MEAN[3] = np.log(0.85), -0.15
 _TOE_MEAN, _TOE_SPREAD = np.array([0.09, 0.08]), np.array([0.03, 0.04])
 _PACE = 1.5
-"""m/s at which steps are no longer."""
+"""Speed above which steps no longer lengthen, m/s."""
 _OUTLIER = 3.0
-"""Standard deviations at which a sighting counts a quarter."""
+"""Residual, in standard deviations, at which an observation's weight is a quarter."""
 _ITERATIONS = 40
 
 
 @dataclass(frozen=True)
-class State:
-    """What is adjusted.
+class Parameters:
+    """Parameters of the adjustment.
 
     Attributes
     ----------
     views : float64 (view, 12)
         See `stseg.calibration.pinhole`.
-    toe : float64 (2,)
-        Metres by which lowest points are nearer to the camera than axes: of one who stands or walks across, and what
-        each m/s towards or away from the camera adds, a step's half.
+    toe_offset : float64 (2,)
+        Distance from a body's axis to its lowest visible point, towards the camera: metres at rest or walking
+        across, and metres for each m/s along the line of sight (half a step).
     points : float64 (n, 3)
-        x, y of each person at each moment and the height of the head, metres.
+        x, y and head height of each person in each frame, metres.
     """
 
     views: Floats
-    toe: Floats
+    toe_offset: Floats
     points: Floats
 
 
 @dataclass(frozen=True)
-class Task:
-    """What it is adjusted to.
+class Problem:
+    """Observations of the adjustment, and their weights.
 
     Attributes
     ----------
     size : int64 (view, 2)
         Width and height of the images, pixels.
-    seen
-        People and sightings.
+    correspondences
+        Points and their observations.
     spread : float64 (m, 2, 2)
-        Standard deviation of each sighting's foot and head along and across the body, in lengths of the person.
+        Standard deviation of foot and head along and across the body, in body lengths.
     height : float64 (n,)
-        How tall each meeting's person is expected, metres.
+        Prior mean of each point's head height, metres.
     height_spread
         Its standard deviation.
-    alike
-        How many sightings say what one independent sighting would: those of one step err alike.
+    redundancy
+        Observations per independent observation: errors within one step are correlated.
     clock_spread
-        Standard deviation of the clocks' differences that are left, seconds.
+        Standard deviation of the residual clock offsets, seconds.
     body : float64 (m,)
-        1 for a sighting of a person; 0 for that of a mark on the floor, which has no toe in front of it. The head of a
-        mark has an infinite spread.
+        1 for an observation of a person, 0 for one of a floor feature: that has no toe offset, and a head of infinite
+        spread.
     """
 
     size: Ints
-    seen: Meetings
+    correspondences: Correspondences
     spread: Floats
     height: Floats
     height_spread: float
-    alike: float
+    redundancy: float
     clock_spread: float
     body: Floats
 
 
 @dataclass(frozen=True)
-class Outcome:
-    """The adjusted state, how well it is known, and what is left.
+class Adjustment:
+    """Adjusted parameters, their covariance and the residuals.
 
     Attributes
     ----------
-    state
+    parameters
     covariance : float64 (12 view + 2, 12 view + 2)
-        Of the cameras and `toe`, people's own freedom taken into account; the ground's free turn and shift are
-        shared out evenly.
-    miss : float64 (m, 2, 2)
-        Foot and head of each sighting, seen minus expected, along and across the body, in lengths of the person; nan
+        Of the cameras and `toe_offset`, marginal over the points; the gauge (turn, shift and time) is spread evenly.
+    residual : float64 (m, 2, 2)
+        Foot and head of each observation, observed minus predicted, along and across the body, in body lengths; nan
         behind a camera.
     """
 
-    state: State
+    parameters: Parameters
     covariance: Floats
-    miss: Floats
+    residual: Floats
 
 
-def adjust(state: State, task: Task) -> Outcome:
-    """The most probable state near the given one."""
-    damping, cost = 1e-3, _cost(state, task)
+def adjust(parameters: Parameters, problem: Problem) -> Adjustment:
+    """The maximum a posteriori parameters near the given ones."""
+    damping, cost = 1e-3, _cost(parameters, problem)
     for _ in range(_ITERATIONS):
-        system = _system(state, task)
+        system = _system(parameters, problem)
         for _ in range(8):
-            moved = _stepped(state, system, damping)
-            lower = _cost(moved, task)
+            moved = _stepped(parameters, system, damping)
+            lower = _cost(moved, problem)
             if lower < cost:
                 break
             damping *= 6
         else:
             break
-        gain, state, cost, damping = cost - lower, moved, lower, max(damping / 6, 1e-9)
+        gain, parameters, cost, damping = cost - lower, moved, lower, max(damping / 6, 1e-9)
         if gain < 1e-5 * cost:
             break
-    reduced, _ = _reduced(_system(state, task), 0.0)
-    return Outcome(state, _covariance(reduced, state), misses(state, task))
+    reduced, _ = _reduced(_system(parameters, problem), 0.0)
+    return Adjustment(parameters, _covariance(reduced, parameters), residuals(parameters, problem))
 
 
-def _covariance(reduced: Floats, state: State) -> Floats:
-    """Inverse of the cameras' equations where the ground's turn and shift, and the time, are shared out evenly."""
+def _covariance(reduced: Floats, parameters: Parameters) -> Floats:
+    """Inverse of the reduced camera system in the subspace orthogonal to the gauge."""
     free = np.zeros((4, len(reduced)))
-    free[3, CLOCK : SIZE * len(state.views) : SIZE] = 1.0
+    free[3, CLOCK : SIZE * len(parameters.views) : SIZE] = 1.0
     for k, (turn, shift) in enumerate(((1e-5, (0.0, 0.0)), (0.0, (1e-5, 0.0)), (0.0, (0.0, 1e-5)))):
-        changed = np.array([moved(view, turn, np.array(shift), 1.0) for view in state.views])
-        free[k, : changed.size] = (changed - state.views).ravel() / 1e-5
+        changed = np.array([moved(view, turn, np.array(shift), 1.0) for view in parameters.views])
+        free[k, : changed.size] = (changed - parameters.views).ravel() / 1e-5
     basis = np.linalg.qr(free.T)[0]
     keep = np.eye(len(reduced)) - basis @ basis.T
     stiff = float(np.abs(np.diag(reduced)).max())
     return np.asarray(keep @ np.linalg.inv(keep @ reduced @ keep + stiff * basis @ basis.T) @ keep)
 
 
-def misses(state: State, task: Task) -> Floats:
-    """What each sighting misses, see `Outcome`."""
-    return _misses(state.views[task.seen.view], state.toe, state.points[task.seen.point], task)
+def residuals(parameters: Parameters, problem: Problem) -> Floats:
+    """Residuals of all observations, see `Adjustment`."""
+    return _residuals(
+        parameters.views[problem.correspondences.view],
+        parameters.toe_offset,
+        parameters.points[problem.correspondences.point],
+        problem,
+    )
 
 
-def _misses(views: Floats, toe: Floats, points: Floats, task: Task) -> Floats:
-    seen = task.seen
-    width, height = task.size[seen.view].T.astype(float)
-    velocity = seen.velocity[seen.point]
+def _residuals(views: Floats, toe_offset: Floats, points: Floats, problem: Problem) -> Floats:
+    correspondences = problem.correspondences
+    width, height = problem.size[correspondences.view].T.astype(float)
+    velocity = correspondences.velocity[correspondences.point]
     place = points.copy()
     place[:, :2] -= views[:, CLOCK, None] * velocity
     toward = views[:, CENTRE][:, :2] - place[:, :2]
     toward /= np.maximum(np.linalg.norm(toward, axis=1, keepdims=True), 1e-6)
-    forward = toe[0] + toe[1] * np.minimum(np.abs((toward * velocity).sum(axis=1)), _PACE)
-    forward *= task.body
-    low = np.column_stack([place[:, :2] + forward[:, None] * toward, np.zeros(len(place))])
-    down = seen.foot - seen.head
+    forward = toe_offset[0] + toe_offset[1] * np.minimum(np.abs((toward * velocity).sum(axis=1)), _PACE)
+    forward *= problem.body
+    lowest = np.column_stack([place[:, :2] + forward[:, None] * toward, np.zeros(len(place))])
+    down = correspondences.foot - correspondences.head
     square = (down**2).sum(axis=1)[:, None]
-    foot = seen.foot - project(views, width, height, low)
-    head = seen.head - project(views, width, height, place)
+    foot = correspondences.foot - project(views, width, height, lowest)
+    head = correspondences.head - project(views, width, height, place)
     across = np.stack([-down[:, 1], down[:, 0]], -1)
     return np.asarray(
         np.stack([[(end * way).sum(axis=1) for way in (down, across)] for end in (foot, head)]).transpose(2, 0, 1)
@@ -165,32 +168,32 @@ def _misses(views: Floats, toe: Floats, points: Floats, task: Task) -> Floats:
     )
 
 
-def _squares(miss: Floats, task: Task) -> Floats:
-    """Squared standard deviations that each end is off, float64 (m, 2)."""
-    return np.asarray(((np.nan_to_num(miss, nan=1e3) / task.spread) ** 2).sum(axis=2))
+def _squares(residual: Floats, problem: Problem) -> Floats:
+    """Squared normalised residual of each endpoint, float64 (m, 2)."""
+    return np.asarray(((np.nan_to_num(residual, nan=1e3) / problem.spread) ** 2).sum(axis=2))
 
 
-def _cost(state: State, task: Task) -> float:
-    square = _squares(misses(state, task), task)
-    robust = (square / (1.0 + square / _OUTLIER**2)).sum() / task.alike
-    heights = (((state.points[:, 2] - task.height) / task.height_spread) ** 2).sum()
-    return float(robust + heights / task.alike + _prior(state, task)[0])
+def _cost(parameters: Parameters, problem: Problem) -> float:
+    square = _squares(residuals(parameters, problem), problem)
+    robust = (square / (1.0 + square / _OUTLIER**2)).sum() / problem.redundancy
+    heights = (((parameters.points[:, 2] - problem.height) / problem.height_spread) ** 2).sum()
+    return float(robust + heights / problem.redundancy + _prior(parameters, problem)[0])
 
 
-def _prior(state: State, task: Task) -> tuple[float, Floats, Floats]:
-    """Cost, half its gradient and half its curvature, of what cameras and feet are like."""
+def _prior(parameters: Parameters, problem: Problem) -> tuple[float, Floats, Floats]:
+    """Cost, half gradient and half Hessian of the prior on cameras and toe offset."""
     known = _PRIOR_SPREAD > 0
     weight = np.where(known, 1.0 / np.where(known, _PRIOR_SPREAD, 1.0) ** 2, 0.0)
-    weight[CLOCK] = task.clock_spread**-2
-    matrix = np.diag(np.append(np.tile(weight, len(state.views)), _TOE_SPREAD**-2))
-    off = np.append((state.views - _PRIOR_MEAN).ravel(), state.toe - _TOE_MEAN)
+    weight[CLOCK] = problem.clock_spread**-2
+    matrix = np.diag(np.append(np.tile(weight, len(parameters.views)), _TOE_SPREAD**-2))
+    off = np.append((parameters.views - _PRIOR_MEAN).ravel(), parameters.toe_offset - _TOE_MEAN)
     slope = matrix @ off
     return float(off @ slope), slope, matrix
 
 
 @dataclass(frozen=True)
 class _System:
-    """Normal equations: of cameras, of people, and between them."""
+    """Blocks of the normal equations: cameras, points, and the coupling between them."""
 
     cameras: Floats
     camera_slope: Floats
@@ -199,41 +202,47 @@ class _System:
     between: Floats
 
 
-def _system(state: State, task: Task) -> _System:
-    seen = task.seen
-    of_view, of_point = state.views[seen.view], state.points[seen.point]
-    miss = _misses(of_view, state.toe, of_point, task)
-    ahead: Flags = np.asarray(np.isfinite(miss).all(axis=(1, 2)))
-    weight = np.where(ahead[:, None], (1.0 + _squares(miss, task) / _OUTLIER**2) ** -2, 0.0)
-    root = (np.sqrt(weight / task.alike)[..., None] / task.spread).reshape(-1, 4)
+def _system(parameters: Parameters, problem: Problem) -> _System:
+    correspondences = problem.correspondences
+    of_view, of_point = parameters.views[correspondences.view], parameters.points[correspondences.point]
+    residual = _residuals(of_view, parameters.toe_offset, of_point, problem)
+    ahead: Flags = np.asarray(np.isfinite(residual).all(axis=(1, 2)))
+    weight = np.where(ahead[:, None], (1.0 + _squares(residual, problem) / _OUTLIER**2) ** -2, 0.0)
+    root = (np.sqrt(weight / problem.redundancy)[..., None] / problem.spread).reshape(-1, 4)
 
-    def slope(views: Floats, toe: Floats, points: Floats, step: float) -> Floats:
-        changed = (_misses(views, toe, points, task) - miss).reshape(-1, 4) / step
+    def slope(views: Floats, toe_offset: Floats, points: Floats, step: float) -> Floats:
+        changed = (_residuals(views, toe_offset, points, problem) - residual).reshape(-1, 4) / step
         return np.where(np.isfinite(changed), changed, 0.0) * root
 
-    by_view = np.stack([slope(of_view + h * _unit(k, SIZE), state.toe, of_point, h) for k, h in enumerate(_STEPS)], -1)
-    by_toe = np.stack([slope(of_view, state.toe + 1e-4 * _unit(k, 2), of_point, 1e-4) for k in range(2)], -1)
-    by_point = np.stack([slope(of_view, state.toe, of_point + 1e-4 * _unit(k, 3), 1e-4) for k in range(3)], -1)
-    left = np.nan_to_num(miss.reshape(-1, 4)) * root
-    rows = np.zeros((len(miss), 4, SIZE * len(state.views) + len(state.toe)))
-    columns = SIZE * seen.view[:, None] + np.arange(SIZE)
+    by_view = np.stack(
+        [slope(of_view + h * _unit(k, SIZE), parameters.toe_offset, of_point, h) for k, h in enumerate(_STEPS)], -1
+    )
+    by_toe = np.stack(
+        [slope(of_view, parameters.toe_offset + 1e-4 * _unit(k, 2), of_point, 1e-4) for k in range(2)], -1
+    )
+    by_point = np.stack(
+        [slope(of_view, parameters.toe_offset, of_point + 1e-4 * _unit(k, 3), 1e-4) for k in range(3)], -1
+    )
+    left = np.nan_to_num(residual.reshape(-1, 4)) * root
+    rows = np.zeros((len(residual), 4, SIZE * len(parameters.views) + len(parameters.toe_offset)))
+    columns = SIZE * correspondences.view[:, None] + np.arange(SIZE)
     np.put_along_axis(rows, np.repeat(columns[:, None], 4, axis=1), by_view, axis=2)
     rows[:, :, -2:] = by_toe
-    return _normal(state, task, rows, by_point, left)
+    return _normal(parameters, problem, rows, by_point, left)
 
 
-def _normal(state: State, task: Task, rows: Floats, by_point: Floats, left: Floats) -> _System:
-    """Normal equations from weighted slopes and misses; sightings of one meeting stand together."""
-    first = np.flatnonzero(np.diff(task.seen.point, prepend=-1))
+def _normal(parameters: Parameters, problem: Problem, rows: Floats, by_point: Floats, left: Floats) -> _System:
+    """Normal equations from weighted Jacobians and residuals; observations of one point are consecutive."""
+    first = np.flatnonzero(np.diff(problem.correspondences.point, prepend=-1))
     transposed = by_point.transpose(0, 2, 1)
     people = np.add.reduceat(transposed @ by_point, first)
     people_slope = np.add.reduceat((transposed @ left[..., None])[..., 0], first)
     between = np.add.reduceat(rows.transpose(0, 2, 1) @ by_point, first)
-    stiff = 1.0 / (task.height_spread**2 * task.alike)
+    stiff = 1.0 / (problem.height_spread**2 * problem.redundancy)
     people[:, 2, 2] += stiff
-    people_slope[:, 2] += stiff * (state.points[:, 2] - task.height)
+    people_slope[:, 2] += stiff * (parameters.points[:, 2] - problem.height)
     people += 1e-6 * np.eye(3)
-    _, prior_slope, prior_curvature = _prior(state, task)
+    _, prior_slope, prior_curvature = _prior(parameters, problem)
     flat = rows.reshape(-1, rows.shape[2])
     cameras = flat.T @ flat + prior_curvature
     return _System(cameras, flat.T @ left.ravel() + prior_slope, people, people_slope, between)
@@ -244,7 +253,7 @@ def _unit(k: int, size: int) -> Floats:
 
 
 def _reduced(system: _System, damping: float) -> tuple[Floats, Floats]:
-    """The cameras' equations with people eliminated (Schur's complement), and people's inverse blocks."""
+    """The reduced camera system (Schur complement of the points), and the inverse point blocks."""
     people = system.people * (1 + damping * np.eye(3))
     inverse = np.asarray(np.linalg.inv(people), float)
     cameras = system.cameras * (1 + damping * np.eye(len(system.cameras)))
@@ -255,17 +264,17 @@ def _reduced(system: _System, damping: float) -> tuple[Floats, Floats]:
     return cameras - flat_through @ flat_between.T, inverse
 
 
-def _stepped(state: State, system: _System, damping: float) -> State:
+def _stepped(parameters: Parameters, system: _System, damping: float) -> Parameters:
     reduced, inverse = _reduced(system, damping)
     by_people = np.einsum("nij,njk,nk->i", system.between, inverse, system.people_slope, optimize=True)
     # Nothing fixes the ground's turn and shift: a trace of stiffness keeps them where they are.
     stiff = reduced + 1e-9 * np.diag(np.diag(system.cameras) + 1e-9)
     step = -np.linalg.solve(stiff, system.camera_slope - by_people)
     back = system.people_slope + np.einsum("nij,i->nj", system.between, step)
-    points = state.points - np.einsum("nij,nj->ni", inverse, back)
+    points = parameters.points - np.einsum("nij,nj->ni", inverse, back)
     return replace(
-        state,
-        views=state.views + step[:-2].reshape(state.views.shape),
-        toe=state.toe + step[-2:],
+        parameters,
+        views=parameters.views + step[:-2].reshape(parameters.views.shape),
+        toe_offset=parameters.toe_offset + step[-2:],
         points=points,
     )

@@ -1,4 +1,4 @@
-"""Who is who between views that are roughly placed: one person is where the feet of several views meet."""
+"""Correspondences between roughly calibrated views: feet of several views within a gate on the ground."""
 
 from __future__ import annotations
 
@@ -8,30 +8,30 @@ from dataclasses import dataclass
 import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints
-from stseg.calibration.endpoints import Ends
+from stseg.calibration.endpoints import Endpoints
 
 _PACE = 2.5
-"""Metres per second that nobody walks faster than."""
+"""Greatest walking speed, metres per second."""
 _LINK_SECONDS = 0.5
-"""Between two meetings of one person, at most."""
+"""Longest gap between two points of one track, seconds."""
 
 
 @dataclass(frozen=True)
-class Meetings:
-    """People at moments in which several views see them, and the ends by which each does.
+class Correspondences:
+    """Points (a person in a frame) that several views observe, and the endpoints of each observation.
 
     Attributes
     ----------
     frame : int64 (n,)
-        Of the recording, for each person and moment.
+        Frame of the recording, for each point.
     ground : float64 (n, 2)
-        Roughly where, metres.
+        Approximate ground point, metres.
     velocity : float64 (n, 2)
         Metres per second; 0 where it is not known.
     person : int64 (n,)
-        Whose meetings follow each other.
+        Track that the point belongs to.
     point, view : int64 (m,)
-        For each sighting, the meeting and the view.
+        Point and view of each observation.
     foot, head : float64 (m, 2)
         Pixels.
     """
@@ -45,12 +45,12 @@ class Meetings:
     foot: Floats
     head: Floats
 
-    def of(self, points: Ints) -> Meetings:
-        """Some of the meetings, by increasing index."""
+    def of(self, points: Ints) -> Correspondences:
+        """A subset of the points, by increasing index, with their observations."""
         number = np.full(len(self.frame), -1, np.int64)
         number[points] = np.arange(len(points))
         kept = number[self.point] >= 0
-        return Meetings(
+        return Correspondences(
             self.frame[points],
             self.ground[points],
             self.velocity[points],
@@ -62,24 +62,26 @@ class Meetings:
         )
 
 
-def meetings(ends: Sequence[Ends], delay: Ints, ground: Sequence[Floats], gate: float, frame_rate: float) -> Meetings:
-    """Everybody whom two or more views see at one time and, within the gate, at one place.
+def match_endpoints(
+    endpoints: Sequence[Endpoints], delay: Ints, ground: Sequence[Floats], gate: float, frame_rate: float
+) -> Correspondences:
+    """Match endpoints of two or more views that agree in time and, within the gate, in place.
 
     Parameters
     ----------
-    ends
-        Each view's ends, by its own frames.
+    endpoints
+        Endpoints of each view, by its own frames.
     delay : int64 (view,)
         Own frame = the recording's frame + delay.
     ground
-        float64 (n, 2) a view: where its ends' feet stand, metres; nan where they stand nowhere.
+        float64 (n, 2) for each view: ground points of its feet, metres; nan above the horizon.
     gate
-        Metres between two views of one person, at most.
+        Greatest distance between two views of one person, metres.
     frame_rate
         Frames per second.
     """
-    view = np.repeat(np.arange(len(ends)), [len(one) for one in ends])
-    frame = np.concatenate([one.frame - late for one, late in zip(ends, delay, strict=True)])
+    view = np.repeat(np.arange(len(endpoints)), [len(one) for one in endpoints])
+    frame = np.concatenate([one.frame - delay_frames for one, delay_frames in zip(endpoints, delay, strict=True)])
     place = np.concatenate(ground)
     known: Flags = np.asarray(np.isfinite(place).all(axis=1))
     order = np.lexsort((view, frame))
@@ -91,12 +93,12 @@ def meetings(ends: Sequence[Ends], delay: Ints, ground: Sequence[Floats], gate: 
     at = np.array([place[group].mean(axis=0) for group in groups]).reshape(-1, 2)
     when = np.array([frame[group[0]] for group in groups], np.int64)
     person, velocity = _followed(when, at, frame_rate)
-    foot, head = (np.concatenate([getattr(one, end) for one in ends])[rows] for end in ("foot", "head"))
-    return Meetings(when, at, velocity, person, point, view[rows], foot, head)
+    foot, head = (np.concatenate([getattr(one, end) for one in endpoints])[rows] for end in ("foot", "head"))
+    return Correspondences(when, at, velocity, person, point, view[rows], foot, head)
 
 
 def _groups(rows: Ints, view: Ints, place: Floats, gate: float) -> list[list[int]]:
-    """Rows of one moment that are one person: the nearest pairs first, one row a view, all within the gate."""
+    """Agglomerative grouping of one frame's rows: nearest pairs first, one row a view, all within the gate."""
     away = np.hypot(*np.moveaxis(place[rows][:, None] - place[rows][None], -1, 0))
     first, second = np.nonzero(np.triu(away <= gate, 1))
     group = {k: [k] for k in range(len(rows))}
@@ -114,7 +116,7 @@ def _groups(rows: Ints, view: Ints, place: Floats, gate: float) -> list[list[int
 
 
 def _followed(frame: Ints, ground: Floats, frame_rate: float) -> tuple[Ints, Floats]:
-    """Number of the person of each meeting, and velocity in metres per second."""
+    """Track number of each point, and velocity in metres per second."""
     before, after = (np.full(len(frame), -1, np.int64) for _ in range(2))
     most = max(1, round(_LINK_SECONDS * frame_rate))
     for gap in range(1, most + 1):

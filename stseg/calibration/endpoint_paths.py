@@ -1,33 +1,33 @@
-"""Paths of people through one view: ends of frame after frame that nobody else could be."""
+"""Image tracks of isolated people: endpoints linked from frame to frame where only one link is possible."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from stseg.arrays import Ints
-from stseg.calibration.endpoints import Ends
+from stseg.calibration.endpoints import Endpoints
 
 _STEP = 0.25
-"""How far foot and head may move between two frames, in lengths of the person, and again for each second between."""
+"""Gate of a link: movement of foot and head in body lengths, plus as much for each second between."""
 _GAP = 0.35
-"""Seconds that a path may be without ends."""
+"""Longest gap within a path, seconds."""
 
 
-def path_of(ends: Ends, frame_rate: float) -> Ints:
-    """Number of the path that each row belongs to, int64 (n,).
+def path_of(endpoints: Endpoints, frame_rate: float) -> Ints:
+    """Path number of each row, int64 (n,).
 
-    A path goes on with the nearest ends in reach where there is no second choice on either side.
+    A path continues where the gate holds exactly one candidate on either side.
     """
-    path = np.full(len(ends), -1, np.int64)
-    places = np.stack([ends.foot, ends.head], 1)
-    length = ends.length
+    path = np.full(len(endpoints), -1, np.int64)
+    places = np.stack([endpoints.foot, endpoints.head], 1)
+    length = endpoints.length
     open_rows: list[int] = []
     started = 0
-    for frame in np.unique(ends.frame):
-        now = np.flatnonzero(ends.frame == frame)
-        open_rows = [row for row in open_rows if frame - ends.frame[row] <= max(1.0, _GAP * frame_rate)]
+    for frame in np.unique(endpoints.frame):
+        now = np.flatnonzero(endpoints.frame == frame)
+        open_rows = [row for row in open_rows if frame - endpoints.frame[row] <= max(1.0, _GAP * frame_rate)]
         before = np.array(open_rows, np.int64)
-        seconds = (frame - ends.frame[before]) / frame_rate
+        seconds = (frame - endpoints.frame[before]) / frame_rate
         away = np.abs(places[before][:, None] - places[now][None]).max(axis=(2, 3))
         near = away <= (_STEP * (1 + seconds) * length[before])[:, None]
         for k, row in enumerate(now):

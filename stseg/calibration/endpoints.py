@@ -1,7 +1,7 @@
-"""Foot and head ends of people who stand free of others in one view's foreground (METHODS 1; KS09 4.2).
+"""Feet and heads of isolated upright people in one view's foreground (Khan and Shah 2009, section 4.2).
 
-A walker's silhouette is long and thin; its principal axis points to the vertical vanishing point. What is cut by the
-image's border, broken, near to something else or not long is passed over: a recording has plenty of the others.
+A pedestrian's silhouette is elongated; its principal axis points to the vertical vanishing point. Silhouettes that the
+border cuts, that are broken, near another or not elongated are skipped: a recording has plenty of others.
 """
 
 from __future__ import annotations
@@ -14,23 +14,23 @@ import numpy as np
 from stseg.arrays import AnyArray, Bytes, Floats, Ints, Singles
 
 _SURE = 0.8
-"""Likelihood from which a pixel counts."""
+"""Foreground likelihood of a silhouette's pixels, at least."""
 _LEAST_AREA, _LEAST_LENGTH = 1.5e-3, 0.10
-"""Of a person, in shares of the image's area and height."""
+"""Least area and length of a person, shares of the image's area and height."""
 _SLIM = 2.0
-"""How much longer than wide (standard deviations) a person's silhouette is at least."""
+"""Least ratio of length to width (standard deviations) of a silhouette."""
 _HEAD, _FEET = 0.06, 0.12
-"""Shares of a silhouette's length that are its head's top and its feet."""
+"""Shares of a silhouette's length taken as the top of the head and the feet."""
 _LOST = 1.0
-"""Pixels from the centre of a silhouette's last pixel to the body's end: half a pixel, and as much that pooling over
-neighbours and a likelihood that must be sure take from a tip."""
+"""Distance from the centre of a silhouette's last pixel to the end of the body, pixels: half a pixel, and as much again
+lost to pooling over neighbours and to the high likelihood threshold."""
 _CRUMB = 0.03
-"""Share of a silhouette's area up to which what lies beside it is dirt and no part that broke off."""
+"""Greatest area of a component that counts as noise rather than a fragment, share of the silhouette's area."""
 
 
 @dataclass(frozen=True)
-class Ends:
-    """Foot and head ends of one view's isolated people, in the order of their frames.
+class Endpoints:
+    """Feet and heads of one view's isolated people, in order of frame.
 
     Attributes
     ----------
@@ -52,20 +52,20 @@ class Ends:
         """Pixels from foot to head, float64 (n,)."""
         return np.asarray(np.hypot(*(self.foot - self.head).T))
 
-    def of(self, rows: AnyArray) -> Ends:
-        """Some of them, by index or flag."""
-        return Ends(self.frame[rows], self.foot[rows], self.head[rows])
+    def of(self, rows: AnyArray) -> Endpoints:
+        """A subset, by index or mask."""
+        return Endpoints(self.frame[rows], self.foot[rows], self.head[rows])
 
 
-def join_ends(parts: list[tuple[int, Floats]]) -> Ends:
-    """Ends of a view from (frame, people_ends of it) in order."""
-    frame = np.repeat([k for k, _ in parts], [len(ends) for _, ends in parts]).astype(np.int64)
-    ends = np.concatenate([np.zeros((0, 2, 2)), *(ends for _, ends in parts)])
-    return Ends(frame, ends[:, 0], ends[:, 1])
+def concatenate_endpoints(parts: list[tuple[int, Floats]]) -> Endpoints:
+    """Endpoints of a view from (frame, `upright_endpoints` of it) in order."""
+    frame = np.repeat([k for k, _ in parts], [len(endpoints) for _, endpoints in parts]).astype(np.int64)
+    endpoints = np.concatenate([np.zeros((0, 2, 2)), *(endpoints for _, endpoints in parts)])
+    return Endpoints(frame, endpoints[:, 0], endpoints[:, 1])
 
 
-def people_ends(likelihood: Singles) -> Floats:
-    """Foot and head ends of the isolated people of one view and frame.
+def upright_endpoints(likelihood: Singles) -> Floats:
+    """Feet and heads of the isolated upright people of one view and frame.
 
     Parameters
     ----------
@@ -79,13 +79,13 @@ def people_ends(likelihood: Singles) -> Floats:
     """
     mask = cv2.medianBlur((likelihood > _SURE).astype(np.uint8), 5)
     count, label, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
-    found = [_ends(label, stats, k) for k in range(1, count) if _may_be_person(stats, k, label.shape)]
-    kept = [ends for ends in found if ends is not None]
+    found = [_endpoints(label, stats, k) for k in range(1, count) if _may_be_person(stats, k, label.shape)]
+    kept = [endpoints for endpoints in found if endpoints is not None]
     return np.array(kept).reshape(-1, 2, 2)
 
 
 def _may_be_person(stats: AnyArray, k: int, shape: tuple[int, ...]) -> bool:
-    """Whether a component is large enough, clear of the image's border, and alone."""
+    """Whether a component is large enough, clear of the border, and isolated."""
     left, top, width, height, area = stats[k]
     rows, columns = shape
     whole = left > 1 and top > 1 and left + width < columns - 1 and top + height < rows - 1
@@ -103,8 +103,8 @@ def _may_be_person(stats: AnyArray, k: int, shape: tuple[int, ...]) -> bool:
     return int(near.sum()) == 1
 
 
-def _ends(label: AnyArray, stats: AnyArray, k: int) -> Floats | None:
-    """Foot and head (2, 2) along the principal axis of component k; None where it is not slim."""
+def _endpoints(label: AnyArray, stats: AnyArray, k: int) -> Floats | None:
+    """Foot and head (2, 2) along the principal axis of component k; None where it is not elongated."""
     left, top, width, height, _ = (int(number) for number in stats[k])
     inside: Bytes = (label[top : top + height, left : left + width] == k).astype(np.uint8)
     v, u = np.nonzero(inside)
@@ -115,9 +115,9 @@ def _ends(label: AnyArray, stats: AnyArray, k: int) -> Floats | None:
     if spread[1] < _SLIM**2 * spread[0] or abs(down[1]) < 0.5:
         return None
     along, across = (pixel - centre) @ down, (pixel - centre) @ np.array([-down[1], down[0]])
-    low, high = along.max(), along.min()
-    length = low - high
-    feet, head = across[along > low - _FEET * length], across[along < high + _HEAD * length]
+    lowest, high = along.max(), along.min()
+    length = lowest - high
+    feet, head = across[along > lowest - _FEET * length], across[along < high + _HEAD * length]
     aside = np.array([(feet.max() + feet.min()) / 2, (head.max() + head.min()) / 2])
-    reach = np.array([low + _LOST, high - _LOST])
+    reach = np.array([lowest + _LOST, high - _LOST])
     return np.asarray(centre + reach[:, None] * down + aside[:, None] * np.array([-down[1], down[0]]))

@@ -1,8 +1,8 @@
-"""Marks on the floor that two views share (KS09 4.2: SIFT features and a robust homography).
+"""Floor features that two views share: SIFT and a robust homography (Khan and Shah 2009, section 4.2).
 
-The views are placed already, roughly, by the people who walk there. So every view's background is laid out on the
-ground first: there all views have one scale and one direction, and a mark is looked for near its own place alone. What
-is left between two such plans is a homography near the identity, found by MAGSAC++ (Barath et al., CVPR 2020).
+The views are roughly calibrated from people already. So each background is rectified to the ground first: there all
+views share scale and orientation, and a feature is matched near its own position only. What is left between two
+rectified plans is a homography near the identity, found by MAGSAC++ (Barath et al., CVPR 2020).
 """
 
 from __future__ import annotations
@@ -18,31 +18,31 @@ from stseg.arrays import AnyArray, Bytes, Floats, Ints
 from stseg.geometry import Camera, Grid
 
 _STEP = 0.02
-"""Metres between the points of a plan."""
+"""Resolution of a rectified plan, metres."""
 _COARSEST = 0.08
-"""Metres of ground in a pixel beyond which a place is left out."""
+"""Coarsest ground resolution of an image that is used, metres a pixel."""
 _NEAR = 0.4
-"""Metres by which a mark's place may differ between two plans."""
+"""Search radius between two plans, metres."""
 _RATIO = 0.8
-"""Of the distances of the best and the next best match nearby, at most (Lowe 2004)."""
+"""Ratio test: greatest ratio of the best to the second best descriptor distance (Lowe 2004)."""
 _EXACT = 0.06
-"""Metres within which marks follow the homography."""
+"""Inlier threshold of the homography, metres."""
 _LEAST = 25
-"""Marks that two views share, at least."""
+"""Least number of features that two views must share."""
 
 
 @dataclass(frozen=True)
 class Marks:
-    """Marks on the floor, each in two views.
+    """Floor features, each in two views.
 
     Attributes
     ----------
     view : int64 (n, 2)
-        The two views.
+        Indices of the two views.
     pixel : float64 (n, 2, 2)
-        Where each of them shows it.
+        Its pixel in each of them.
     ground : float64 (n, 2)
-        Where it roughly is, metres.
+        Approximate ground point, metres.
     """
 
     view: Ints
@@ -53,21 +53,21 @@ class Marks:
         return len(self.view)
 
     def of(self, rows: Ints) -> Marks:
-        """Some of them."""
+        """A subset, by index."""
         return Marks(self.view[rows], self.pixel[rows], self.ground[rows])
 
 
 def floor_marks(backgrounds: Sequence[Bytes], cameras: Sequence[Camera], grid: Grid) -> Marks:
-    """Marks that every two views share on the ground of the grid.
+    """Match floor features between every two views.
 
     Parameters
     ----------
     backgrounds
         The empty scene in each view, uint8 (v, u, 3).
     cameras
-        The views, roughly placed.
+        Roughly calibrated views.
     grid
-        The ground where they are looked for.
+        The ground to search.
     """
     ground = _places(grid)
     found = [_features(*pair, ground) for pair in zip(backgrounds, cameras, strict=True)]
@@ -91,7 +91,7 @@ def _places(grid: Grid) -> Floats:
 
 
 def _features(background: Bytes, camera: Camera, ground: Floats) -> tuple[Floats, AnyArray]:
-    """Ground places and descriptors of a plan's features, all upright, float64 (n, 2) and float32 (n, 128)."""
+    """Ground points and upright SIFT descriptors of a plan, float64 (n, 2) and float32 (n, 128)."""
     pixel, ahead = camera.project(ground, 0.0)
     seen = ahead & camera.inside(pixel)
     across, down = (np.linalg.norm(np.gradient(pixel, axis=axis), axis=-1) for axis in (0, 1))
@@ -110,7 +110,7 @@ def _features(background: Bytes, camera: Camera, ground: Floats) -> tuple[Floats
 
 
 def _shared(one: tuple[Floats, AnyArray], other: tuple[Floats, AnyArray]) -> Ints:
-    """Rows of the features of two plans that are one mark, int64 (n, 2)."""
+    """Matched rows of the features of two plans, int64 (n, 2)."""
     if min(len(one[0]), len(other[0])) < _LEAST:
         return np.zeros((0, 2), np.int64)
     away = np.linalg.norm(one[0][:, None] - other[0][None], axis=2)

@@ -1,4 +1,4 @@
-"""Boxes of what may be single people, from whatever a view shows: boxes, or blobs of a likelihood map."""
+"""Boxes of possible single people in one view: a detector's boxes, or bounding boxes of foreground blobs."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from scipy import ndimage
 from stseg.arrays import Boxes, Floats, Singles
 
 _FOREGROUND = 0.8
-"""Likelihood from which on a pixel belongs to a blob."""
+"""Least foreground likelihood of a blob's pixels."""
 _LEAST = 0.0006
-"""Of the image's area: smaller blobs are noise."""
+"""Least area of a blob, share of the image's area."""
 _FULL = 0.25
-"""Of its box a body's blob fills more than this."""
+"""Least share of its bounding box that a blob fills."""
 
 
-def sightings(evidence: Boxes | Singles | None, size: tuple[int, int]) -> Floats:
-    """Boxes that one view shows in one frame.
+def isolated_boxes(evidence: Boxes | Singles | None, size: tuple[int, int]) -> Floats:
+    """Boxes of one view and frame.
 
     Parameters
     ----------
@@ -37,8 +37,8 @@ def sightings(evidence: Boxes | Singles | None, size: tuple[int, int]) -> Floats
     labels, count = ndimage.label(evidence > _FOREGROUND, np.ones((3, 3)))
     found = []
     areas = np.bincount(labels.ravel(), minlength=count + 1)[1:]
-    for area, place in zip(areas.tolist(), ndimage.find_objects(labels), strict=True):
-        rows, columns = place
+    for area, window in zip(areas.tolist(), ndimage.find_objects(labels), strict=True):
+        rows, columns = window
         box = (columns.start - 0.5, rows.start - 0.5, columns.stop - 0.5, rows.stop - 0.5)
         whole = (box[2] - box[0]) * (box[3] - box[1])
         if area > _LEAST * size[0] * size[1] and area > _FULL * whole:

@@ -1,7 +1,7 @@
-"""A camera whose matrix is known, or has square pixels around the image's middle, fitted as such.
+"""Pose of a camera with known intrinsics, or with square pixels and a centred principal point.
 
-A free homography and vertical have eleven unknowns, a posed camera six, and one for the focal length where no lens says
-it. Where the points allow the simpler camera it is far better known away from them, above all above the ground.
+A free homography and vertical have eleven unknowns; a pose has six, and the focal length is a seventh where no lens is
+given. Where the points agree with the simpler camera, it extrapolates far better, above all above the ground.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from stseg.geometry.fits import focal_of_square_pixels, middle_matrix
 
 @dataclass(frozen=True)
 class Pinhole:
-    """A posed camera.
+    """A camera pose with its uncertainty.
 
     Attributes
     ----------
     parameters : float64 (12,)
         Homography row by row, then the vertical.
     slope : float64 (12, k)
-        How they move with the k unknowns.
+        Their Jacobian in the k unknowns.
     normal : float64 (k, k)
         J'J of the reprojection errors in the unknowns, 1 / square pixels.
     noise
@@ -40,11 +40,11 @@ class Pinhole:
 
     @property
     def unknowns(self) -> int:
-        """How many the fit had."""
+        """Number of unknowns of the fit."""
         return len(self.normal)
 
     def covariance(self, noise: float) -> Floats:
-        """Of the parameters, float64 (12, 12), for errors of `noise` square pixels."""
+        """Covariance of the parameters, float64 (12, 12), for a noise variance in square pixels."""
         inverse = np.asarray(np.linalg.pinv(self.normal, hermitian=True), float)
         return np.asarray(noise * self.slope @ inverse @ self.slope.T)
 
@@ -52,20 +52,20 @@ class Pinhole:
 def fit_pinhole(
     homography: Floats, size: tuple[int, int], ground: Floats, height: Floats, pixel: Floats, lens: Lens | None
 ) -> Pinhole | None:
-    """The posed camera of least squared reprojection errors, or None where the homography suggests none.
+    """Fit the pose that minimises squared reprojection errors; None where the homography allows no start.
 
     Parameters
     ----------
     homography : float64 (3, 3)
-        Where to start, signed so that the points lie ahead.
+        Start, signed so that the points lie before the camera.
     size
         Width and height of the image, pixels.
     ground : float64 (n, 2), height : float64 (n,)
         Metres.
     pixel : float64 (n, 2)
-        Of the real image.
+        Pixels of the distorted image.
     lens
-        The lens, where it is known.
+        The lens, if known.
     """
     focal = None if lens is not None else focal_of_square_pixels(homography, size)
     if lens is None and focal is None:

@@ -1,6 +1,6 @@
-"""A camera as the few numbers that an adjustment turns: focal length, middle, lens, attitude, place, clock.
+"""Pinhole camera as a parameter vector: focal length, principal point, radial lens, rotation, centre, clock offset.
 
-Square pixels and a radial lens; the axis passes near the image's middle. Points are x, y, z in metres, z up.
+Square pixels and a radial lens; the principal point is near the image's middle. Points are x, y, z in metres, z up.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ from stseg.arrays import Floats
 from stseg.geometry import Camera, Lens
 
 FOCAL, MIDDLE, RADIAL, TURN, CENTRE, CLOCK = 0, slice(1, 3), slice(3, 5), slice(5, 8), slice(8, 11), 11
-"""Places in the vector: log of the focal length over the image's width; the axis from the image's middle, in widths;
-k1, k2; rotation vector from world to camera; metres; seconds by which the stream is late."""
+"""Slices of the vector: log of focal length over image width; principal point from the image's middle, in widths;
+k1, k2; rotation vector from world to camera; centre, metres; delay of the stream, seconds."""
 SIZE = 12
 
 
 def project(views: Floats, width: Floats, height: Floats, points: Floats) -> Floats:
-    """Pixels of points, each in a view of its own.
+    """Project points, each into a view of its own.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ def project(views: Floats, width: Floats, height: Floats, points: Floats) -> Flo
     seen = Rotation.from_rotvec(views[:, TURN]).apply(points - views[:, CENTRE])
     depth = np.where(seen[:, 2] > 1e-3, seen[:, 2], np.nan)
     ray = seen[:, :2] / depth[:, None]
-    # Far outside the image the polynomial of a barrel lens turns round; there the lens is kept from bending more.
+    # Far outside the image the polynomial of a barrel lens folds back; it is held constant from there on.
     square = np.minimum((ray**2).sum(axis=1), _fold_squared(views[:, RADIAL]))
     bend = 1 + square * (views[:, 3] + square * views[:, 4])
     focal = width * np.exp(views[:, FOCAL])
@@ -46,7 +46,7 @@ def project(views: Floats, width: Floats, height: Floats, points: Floats) -> Flo
 
 
 def _fold_squared(radial: Floats) -> Floats:
-    """Squared tangents where r (1 + k1 r^2 + k2 r^4) stops rising; large where it never does, float64 (n,)."""
+    """Squared radius at which r (1 + k1 r^2 + k2 r^4) stops rising; large where it never does, float64 (n,)."""
     k1, k2 = radial.T
     inside = 9 * k1**2 - 20 * k2
     # The smaller root of 1 + 3 k1 s + 5 k2 s^2, in the form that holds as k2 goes to zero.
@@ -56,7 +56,7 @@ def _fold_squared(radial: Floats) -> Floats:
 
 
 def rays(view: Floats, size: tuple[int, int], pixel: Floats) -> Floats:
-    """Directions in the world of the pixels of one view, float64 (n, 3); nan beyond the lens's fold."""
+    """Viewing rays of pixels of one view, world directions, float64 (n, 3); nan beyond the lens's fold."""
     lens = _lens(view, size)
     ideal = lens.undistort(pixel)
     ray = (ideal - lens.matrix[:2, 2]) / lens.matrix[0, 0]
@@ -64,7 +64,7 @@ def rays(view: Floats, size: tuple[int, int], pixel: Floats) -> Floats:
 
 
 def on_plane(view: Floats, size: tuple[int, int], pixel: Floats, height: float) -> Floats:
-    """Ground metres of the points at `height` that pixels of one view show, float64 (n, 2); nan above the horizon."""
+    """Back-project pixels of one view to the plane at `height`, metres, float64 (n, 2); nan above the horizon."""
     way = rays(view, size, pixel)
     rise = height - view[CENTRE][2]
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -74,14 +74,14 @@ def on_plane(view: Floats, size: tuple[int, int], pixel: Floats, height: float) 
 
 
 def height_of_head(view: Floats, size: tuple[int, int], pixel: Floats, ground: Floats) -> Floats:
-    """Height above each ground point at which the ray of its pixel passes nearest, metres, float64 (n,)."""
+    """Height at which a pixel's ray passes nearest to the vertical over its ground point, metres, float64 (n,)."""
     way = rays(view, size, pixel)
     reach = np.linalg.norm(ground - view[CENTRE][:2], axis=1) / np.linalg.norm(way[:, :2], axis=1)
     return np.asarray(view[CENTRE][2] + reach * way[:, 2])
 
 
 def as_camera(view: Floats, name: str, size: tuple[int, int]) -> Camera:
-    """The same camera as a ground homography, a vertical and a lens."""
+    """Convert to a ground homography, a vertical and a lens."""
     lens = _lens(view, size)
     turn = Rotation.from_rotvec(view[TURN]).as_matrix()
     projection = lens.matrix @ np.column_stack([turn, -turn @ view[CENTRE]])
@@ -89,7 +89,7 @@ def as_camera(view: Floats, name: str, size: tuple[int, int]) -> Camera:
 
 
 def moved(view: Floats, turn: float, shift: Floats, scale: float) -> Floats:
-    """The same camera in a world whose points are scale * R(turn) x + shift on the ground, scale * z above it."""
+    """The camera after the similarity x -> scale * R(turn) x + shift of the ground, z -> scale * z."""
     about = Rotation.from_euler("z", turn)
     new = view.copy()
     new[TURN] = (Rotation.from_rotvec(view[TURN]) * about.inv()).as_rotvec()

@@ -1,8 +1,8 @@
-"""One camera from measured points: robust least squares over its homography and vertical (METHODS 1).
+"""One camera from measured points: robust least squares of its homography and vertical.
 
-The start is the direct linear transform, or MAGSAC++ where its points agree better (Barath et al., CVPR 2020, as OpenCV
-has it). A Cauchy loss of the reprojection errors in the real image, lens and all, finds the points that are wrong; the
-end is least squares over the others.
+The start is the direct linear transform, or MAGSAC++ where its points agree better (Barath et al., CVPR 2020, OpenCV).
+A Cauchy loss on the reprojection errors in the distorted image finds outliers; the result is least squares over the
+inliers.
 """
 
 from __future__ import annotations
@@ -28,22 +28,22 @@ from stseg.geometry.fits import (
 )
 
 VerticalFrom = Literal["points", "lens", "square pixels"]
-"""What a vertical was found from."""
+"""Source of the vertical."""
 _CLICK = 1.0
-"""Pixels: nobody clicks better than that, so no fit is believed to be better known."""
+"""Least standard deviation of a clicked pixel, pixels."""
 _MAGSAC = 3.0
-"""Pixels within which MAGSAC++ looks for a point's noise."""
+"""Greatest noise scale of MAGSAC++, pixels."""
 _OUT = 4.0
-"""Robust standard deviations beyond which a point is pointed out."""
+"""Outlier threshold, robust standard deviations."""
 _WORSE = 1.5
-"""How much more noise the points may seem to have for a posed camera to be believed."""
+"""Greatest ratio of noise variances, pose to free homography, for the pose to be preferred."""
 _FEW = 5
-"""Points of which none is left out."""
+"""Number of points up to which none is rejected."""
 
 
 @dataclass(frozen=True)
 class Points:
-    """What one camera shows of measured points.
+    """Measured points and their pixels in one camera.
 
     Attributes
     ----------
@@ -60,30 +60,30 @@ class Points:
 
     @property
     def low(self) -> Flags:
-        """Those on the ground, bool (n,)."""
+        """Points on the ground, bool (n,)."""
         return np.asarray(self.height == 0)
 
 
 @dataclass(frozen=True)
 class PointFit:
-    """A camera and how well it fits.
+    """A fitted camera with its residuals and uncertainty.
 
     Attributes
     ----------
     camera
     points
-        What it was fitted to.
+        Input of the fit.
     vertical_from
-        lens (its camera matrix), square pixels around the image's middle, where the points bear that out or there are
-        too few above the ground to say; else points above the ground.
+        "lens" (its camera matrix) or "square pixels" (centred principal point) where the points agree with it or too
+        few are above the ground; else "points" above the ground.
     off_pixel : float64 (n,)
-        How far each point is off in the image, pixels.
+        Reprojection error of each point, pixels.
     off_ground : float64 (n,)
-        The same at the point's height, metres; nan where the pixel shows nothing of it.
+        The same in the plane at the point's height, metres; nan above the horizon.
     out : bool (n,)
-        Points far worse than the others.
+        Outliers.
     parameters : float64 (k,), covariance : float64 (k, k)
-        The fit: the homography row by row, then the vertical where points fix it; in no fixed scale.
+        The homography row by row, then the vertical where points determine it; up to scale.
     """
 
     camera: Camera
@@ -96,7 +96,7 @@ class PointFit:
     covariance: Floats
 
     def ground_deviation(self, grid: Grid) -> Floats:
-        """How uncertain the ground is at each cell, by the fit's covariance.
+        """Uncertainty of each ground cell, propagated from the fit's covariance.
 
         Returns
         -------
@@ -117,29 +117,29 @@ class PointFit:
 
 
 def fit_points(name: str, size: tuple[int, int], points: Points, lens: Lens | None = None) -> PointFit:
-    """A camera from at least four points on the ground, and perhaps some above it.
+    """Fit a camera to at least four points on the ground, and optionally points above it.
 
     Parameters
     ----------
     name, size
         The camera's name, width and height of its image in pixels.
     points
-        With two or more above the ground any camera can be told; with fewer it must be one of the lens's camera matrix,
-        or of square pixels around an axis in the middle of the image.
+        Two or more above the ground determine any camera; with fewer, the camera matrix of the lens is used, or
+        square pixels and a centred principal point are assumed.
     lens
         The lens, where it is known.
 
     Raises
     ------
     CalibrationError
-        Where the points fix no camera: fewer than four on the ground, on a line, mirrored, or seen from straight above
-        with nothing above the ground.
+        Where the points determine no camera: fewer than four on the ground, collinear, mirrored, or seen from straight
+        above with no point above the ground.
     """
     require_ground(name, points.ground[points.low], points.pixel[points.low])
     ideal = points.pixel if lens is None else lens.undistort(points.pixel)
     if not np.isfinite(ideal).all():
         found = points.pixel[~np.isfinite(ideal).all(axis=1)][0].tolist()
-        raise CalibrationError(f"camera {name}", "points", f"a pixel {found} that its lens shows nothing at", "others")
+        raise CalibrationError(f"camera {name}", "points", f"a pixel {found} beyond its lens's field of view", "others")
     start = _start(points, ideal)
     high = ~points.low
     vertical_from: VerticalFrom = "points" if high.sum() > 1 else "lens" if lens is not None else "square pixels"
@@ -171,20 +171,20 @@ def fit_points(name: str, size: tuple[int, int], points: Points, lens: Lens | No
 
 
 def _fits_as_well(pinhole: Pinhole, free_miss: Floats, unknowns: int) -> bool:
-    """Whether a posed camera explains the points as well as a free one, per degree of freedom."""
+    """Whether the pose fits as well as the free homography, per degree of freedom."""
     count = len(free_miss)
     free = max(float(np.sum(free_miss**2)) / max(count - unknowns, 1), _CLICK**2)
     return pinhole.noise <= _WORSE * free
 
 
 def _out(off: Floats, used: Flags) -> Flags:
-    """Points far worse than the median of those that were used; none where a camera has few."""
+    """Outliers against the median of the points in use; none where a camera has few points."""
     limit = _OUT * max(1.4826 * float(np.median(off[used])), _CLICK)
     return np.asarray((off > limit) & (used.sum() > _FEW))
 
 
 def _start(points: Points, ideal: Floats) -> Floats:
-    """The direct linear transform, or MAGSAC++ where the median point fits that better."""
+    """Initial homography: direct linear transform, or MAGSAC++ where its median error is smaller."""
     ground, pixel = points.ground[points.low], ideal[points.low]
     starts = [fit_homography(ground, pixel)]
     if len(ground) > 4:
@@ -214,7 +214,7 @@ def _assumed_vertical(name: str, ground: Floats, size: tuple[int, int], lens: Le
         raise CalibrationError(
             f"camera {name}",
             "points",
-            "a view that does not tell its focal length, and fewer than two points above the ground",
+            "a view that leaves its focal length open, and fewer than two points above the ground",
             "two or more points with z above 0, such as the top of a door, or --lens",
         )
     return vertical_of_matrix(ground, middle_matrix(focal, size))
@@ -223,7 +223,7 @@ def _assumed_vertical(name: str, ground: Floats, size: tuple[int, int], lens: Le
 def _refined(
     start: Floats, points: Points, used: Flags, lens: Lens | None, loss: Literal["cauchy", "linear"] = "cauchy"
 ) -> OptimizeResult:
-    """The parameters of least loss over the points that are used."""
+    """Least-squares (or Cauchy) refinement over the points in use."""
     ground, height, pixel = points.ground[used], points.height[used], points.pixel[used]
 
     def miss(parameters: Floats) -> Floats:
@@ -243,7 +243,7 @@ def _project(parameters: Floats, ground: Floats, height: Floats, lens: Lens | No
 
 
 def _slope(parameters: Floats, ground: Floats, height: Floats, lens: Lens | None) -> Floats:
-    """How pixels move with the parameters, by differences, float64 (n, 2, k)."""
+    """Jacobian of pixels in the parameters by finite differences, float64 (n, 2, k)."""
     step = 1e-6 * np.maximum(np.abs(parameters), 1e-3 * np.abs(parameters).max())
     columns = []
     for k, size in enumerate(step):
@@ -255,7 +255,7 @@ def _slope(parameters: Floats, ground: Floats, height: Floats, lens: Lens | None
 
 
 def _ground_slope(camera: Camera, ground: Floats) -> Floats:
-    """How pixels move with ground points, pixels a metre, float64 (n, 2, 2)."""
+    """Jacobian of pixels in the ground point, pixels a metre, float64 (n, 2, 2)."""
     step = 1e-3
     columns = [
         (camera.project(ground + move, 0.0)[0] - camera.project(ground - move, 0.0)[0]) / (2 * step)
@@ -265,7 +265,7 @@ def _ground_slope(camera: Camera, ground: Floats) -> Floats:
 
 
 def _covariance(slope: Floats, miss: Floats, count: int) -> Floats:
-    """Of the parameters: noise times the inverse of J'J, which knows nothing of the scale that has no meaning."""
+    """Covariance of the parameters: noise variance times the pseudo-inverse of J'J (the scale is free)."""
     free = max(2 * count - (slope.shape[1] - 1), 1)
     noise = max(float(np.sum(miss**2)) / free, _CLICK**2)
     return np.asarray(noise * np.linalg.pinv(slope.T @ slope, rcond=1e-14, hermitian=True))

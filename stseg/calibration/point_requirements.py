@@ -1,4 +1,4 @@
-"""What points must be to make a camera, and what the camera must be then; what is wrong is named."""
+"""Checks of measured points, and of the camera fitted to them."""
 
 from __future__ import annotations
 
@@ -9,27 +9,27 @@ from stseg.errors import CalibrationError
 from stseg.geometry import Camera
 
 LEAST = 4
-"""Points on the ground that a homography needs."""
+"""Least number of ground points of a homography."""
 _FLAT = 0.02
-"""Width of a row of points as a share of its length, below which it counts as a line."""
+"""Ratio of width to length of a point set below which it counts as collinear."""
 HEIGHTS = (0.3, 60.0)
-"""Metres above the ground between which cameras hang."""
+"""Plausible camera heights, metres."""
 
 
 def require_ground(name: str, ground: Floats, pixel: Floats) -> None:
-    """Refuse points that fix no homography.
+    """Refuse points that determine no homography.
 
     Parameters
     ----------
     name
-        The camera's.
+        Name of the camera.
     ground, pixel : float64 (n, 2)
-        Points on the ground and where they show, metres and pixels.
+        Ground points, metres, and their pixels.
 
     Raises
     ------
     CalibrationError
-        Where there are fewer than four, or all but one of them lie on a line, on the ground or in the image.
+        Where there are fewer than four, or they are collinear on the ground or in the image.
     """
     place = f"camera {name}"
     if len(ground) < LEAST:
@@ -43,7 +43,7 @@ def require_ground(name: str, ground: Floats, pixel: Floats) -> None:
 
 
 def require_right_handed(name: str, ground: Floats, vertical: Floats) -> None:
-    """Refuse a mirrored camera: one whose points lie before it, and whose upward direction comes out of the mirror.
+    """Refuse a mirrored camera: its points lie before it, but homography and vertical are left-handed.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def require_right_handed(name: str, ground: Floats, vertical: Floats) -> None:
 
 
 def require_upright(camera: Camera) -> None:
-    """Refuse a camera below the ground: it sees the ground from behind, which is a mirrored one.
+    """Refuse a camera below the ground: it sees the ground from behind, as a mirrored one does.
 
     Raises
     ------
@@ -83,15 +83,15 @@ def mirrored(name: str) -> CalibrationError:
 
 
 def require_height(camera: Camera, unit: str, metres: dict[str, float]) -> None:
-    """Refuse a unit in which the camera hangs in the clouds or lies on the floor, where another makes sense.
+    """Refuse a unit that gives an implausible camera height where another unit gives a plausible one.
 
     Parameters
     ----------
     camera
     unit
-        The unit that was taken for its points.
+        The assumed unit of its points.
     metres
-        Metres in each unit that there is.
+        Metres in each known unit.
 
     Raises
     ------

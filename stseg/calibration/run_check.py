@@ -1,8 +1,8 @@
-"""A run's own look at its rig: which views see people beside where all views put them, and from when on.
+"""Rig check of a finished run: reprojection residuals of each view over time.
 
-What `ghosts.aside` measures of each frame, window by window. A view that is wrong draws the places of people towards
-itself, so that what is told is less than its error, and views along the same line of sight are aside too: with three
-views, or with two that face each other, places alone cannot tell which is wrong, and all that are as far off are named.
+The residuals are those of the detector (`stseg.detection.residual`), window by window. A wrong view draws detections
+towards itself: its residual understates its error, and views along the same line of sight get residuals too. With three
+views, or two that face each other, positions cannot decide which is wrong; all views as far off are reported.
 """
 
 from __future__ import annotations
@@ -15,61 +15,61 @@ from stseg.arrays import Floats
 from stseg.calibration.knock_detection import Knock, find_knocks
 
 _LEAST = 5
-"""Windows in which a view must have told of somebody."""
+"""Windows with a residual that a view needs."""
 _CLEAR = 3.0
-"""Standard errors that a view must be aside."""
+"""Least residual in standard errors."""
 _ALIKE = 0.6
-"""Share of the most that any view is aside, from which on a view is named too."""
+"""Share of the largest residual from which a view is reported too."""
 
 
 @dataclass(frozen=True)
-class Aside:
-    """A view that sees people beside their places.
+class ViewResidual:
+    """A view with a systematic residual across its line of sight.
 
     Attributes
     ----------
     view
         Its number.
     metres
-        To its right, in the median.
+        Median residual, positive to the right of the image.
     """
 
     view: int
     metres: float
 
 
-def views_aside(aside: Floats, cell: float) -> list[Aside]:
-    """The views that are aside most, if that is by more than a cell; the farthest first.
+def views_off(residuals: Floats, cell: float) -> list[ViewResidual]:
+    """Views with the largest residuals where these exceed a cell; largest first.
 
     Parameters
     ----------
-    aside : float64 (window, view)
-        Metres; nan where a view tells nothing.
+    residuals : float64 (window, view)
+        Metres; nan where a view has no measurement.
     cell
         Side of a cell, metres.
     """
-    median = np.array([_clear_median(own[np.isfinite(own)]) for own in aside.T])
+    median = np.array([_clear_median(own[np.isfinite(own)]) for own in residuals.T])
     order = np.argsort(-np.abs(median), kind="stable")
     farthest = float(np.abs(median).max(initial=0.0))
     named = [int(view) for view in order if abs(median[view]) >= _ALIKE * farthest]
-    return [Aside(view, float(median[view])) for view in named] if farthest > cell else []
+    return [ViewResidual(view, float(median[view])) for view in named] if farthest > cell else []
 
 
-def _clear_median(told: Floats) -> float:
-    """The median, 0 where too little is told or that is not clear."""
-    if len(told) < _LEAST:
+def _clear_median(residuals: Floats) -> float:
+    """The median, 0 where there are few measurements or it is not significant."""
+    if len(residuals) < _LEAST:
         return 0.0
-    median = float(np.median(told))
-    error = 1.4826 * float(np.median(np.abs(told - median))) / np.sqrt(len(told))
+    median = float(np.median(residuals))
+    error = 1.4826 * float(np.median(np.abs(residuals - median))) / np.sqrt(len(residuals))
     return median if abs(median) > _CLEAR * error else 0.0
 
 
-def knocked(aside: Floats, cell: float) -> Knock | None:
-    """The view that is aside by another half a cell or more from one window on: the one where that is clearest.
+def find_residual_step(residuals: Floats, cell: float) -> Knock | None:
+    """The largest step of a residual by half a cell or more: a knocked camera; None where there is none.
 
-    The knock's frame is the index of a window; what is before and after it is in metres.
+    The knock's `frame` is the index of a window; `before` and `after` are in metres.
     """
-    steps = [(side, knock) for side in (1.0, -1.0) for knock in find_knocks(side * aside, cell / 2)]
+    steps = [(side, knock) for side in (1.0, -1.0) for knock in find_knocks(side * residuals, cell / 2)]
     if not steps:
         return None
     side, knock = max(steps, key=lambda step: abs(step[1].before - step[1].after))

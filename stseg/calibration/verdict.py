@@ -1,10 +1,9 @@
-"""Which view disagrees with the others, and by how much.
+"""Disagreement of each view with the others, and which views are displaced.
 
-What a view shows beside what the others say (`agreement`) is smoothed over the ground: a plane for the middle, the
-heads and the feet each, so that a turned or tilted camera is told from noise as well as a shifted one. What all views
-share (a box's edges lie beyond a body's) is no disagreement and is taken off. A view is named when it is off by more
-than a cell and when, of those that are most off, taking off its disagreement makes all agree best; the rest is judged
-after that.
+Leave-one-out residuals are smoothed over the ground by a plane for the middle, the heads and the feet each, which shows
+a turned or tilted camera as well as a shifted one. A component common to all views (a box's edges lie beyond a body's)
+is removed. A view is reported when it is off by more than a cell and when correcting it, among the most displaced ones,
+makes all views agree best; the others are judged after the correction.
 """
 
 from __future__ import annotations
@@ -16,42 +15,42 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stseg.arrays import Floats
-from stseg.calibration.box_correspondence import Bystanders, whole_in
-from stseg.calibration.leave_one_out import edges, place
+from stseg.calibration.box_correspondence import BoxCorrespondences, wholly_visible
+from stseg.calibration.leave_one_out import edge_residuals, locate
 from stseg.geometry import Camera, Rig
 from stseg.geometry.bodies import BodyTable
 
 LEAST = 20
-"""People that a statement on a view needs."""
+"""Least number of people (a person in a frame counts once) for a statement on a view."""
 _ROUNDS = 15
 _FEET, _HIDDEN = 2, 0.35
-"""The column of the feet, and what a lower edge above them counts: others and furniture hide feet."""
+"""Column of the feet, and the weight of a lower edge above them: others and furniture hide feet."""
 _SUSPECTS = 3
-"""Views that are tried as the one to blame, those that are most off."""
+"""Number of the most displaced views that are tried as the cause."""
 
 
 @dataclass(frozen=True)
 class Disagreement:
-    """How one view stands to others.
+    """Disagreement of one view with the others.
 
     Attributes
     ----------
     view
-        Its place in the rig.
+        Index in the rig.
     others
-        Number of views that it was held against.
+        Number of views it was compared with.
     people
-        Number of people (a person in a frame counts once) that it was asked about.
+        Number of people compared (a person in a frame counts once).
     confirmed
-        Share of those within its image whom it shows.
+        Share of the people inside its image that it shows.
     feet, heads
         Root mean square of the smoothed disagreement across the line of sight at feet and heads, metres.
     right, down
-        Its mean at the feet: where the view shows people, seen from where the others say, metres.
+        Its mean at the feet: the view's people against the others', metres.
     scatter
-        Of single people around the smoothed disagreement, metres.
+        Robust standard deviation around the smoothed disagreement, metres.
     ground
-        How far apart on the ground the two put people's feet, root mean square, metres.
+        Root mean square distance of the feet on the ground, metres.
     pixels
         The same in the view's image.
     """
@@ -70,7 +69,7 @@ class Disagreement:
 
     @property
     def off(self) -> float:
-        """What of it is likely to be the view's own fault, the larger of feet and heads, metres.
+        """Displacement likely due to the view itself, the larger of feet and heads, metres.
 
         Where every view errs by s, one of them and the mean of m others are s sqrt(1 + 1 / m) apart.
         """
@@ -78,8 +77,8 @@ class Disagreement:
 
 
 @dataclass(frozen=True)
-class _Raw:
-    """One view's disagreement before what all share is taken off.
+class _RawDisagreement:
+    """Disagreement of one view before the common component is removed.
 
     Attributes
     ----------
@@ -107,7 +106,7 @@ class _Raw:
         return np.asarray(self.field.mean(axis=0))
 
     def without(self, shared: Floats) -> Disagreement:
-        """What is left once that is taken off which all views share, in the form and units of `field`."""
+        """The disagreement without the component common to all views (a row of `field`)."""
         field = self.field - shared
         feet = field[:, [0, 2]] * self.scale[:, None]
         moved = (self.slope @ feet[..., None])[..., 0]
@@ -127,36 +126,38 @@ class _Raw:
         )
 
 
-def _raw(
-    camera: Camera, tables: Sequence[BodyTable], people: Bystanders, view: int, others: Sequence[int]
-) -> _Raw | None:
-    placed = place(people, tables, others, min(2, len(others)))
-    miss, known, tall = edges(tables[view], placed.ground, placed.height, people.box[:, view])
+def _raw_disagreement(
+    camera: Camera, tables: Sequence[BodyTable], people: BoxCorrespondences, view: int, others: Sequence[int]
+) -> _RawDisagreement | None:
+    located = locate(people, tables, others, min(2, len(others)))
+    residual, known, pixel_height = edge_residuals(tables[view], located.ground, located.height, people.box[:, view])
     with np.errstate(invalid="ignore"):
-        across = np.where(known, miss / tall[:, None] * placed.height[:, None], np.nan)
-    inside = whole_in(tables[view], placed.ground, placed.height)
-    told = np.isfinite(across[:, 0])
-    if told.sum() < LEAST:
+        across = np.where(known, residual / pixel_height[:, None] * located.height[:, None], np.nan)
+    inside = wholly_visible(tables[view], located.ground, located.height)
+    measured = np.isfinite(across[:, 0])
+    if measured.sum() < LEAST:
         return None
     confirmed = float(people.seen[inside, view].mean()) if inside.any() else 0.0
-    ground = placed.ground[told]
-    planes = _smooth(ground, across[told])
+    ground = located.ground[measured]
+    planes = _smooth(ground, across[measured])
     field = planes.at(ground)
-    scatter = 1.4826 * float(np.nanmedian(np.abs(across[told, 0] - field[:, 0])))
+    scatter = 1.4826 * float(np.nanmedian(np.abs(across[measured, 0] - field[:, 0])))
     slope = np.asarray(np.linalg.inv(_slope(camera, ground)), float)
-    return _Raw(view, len(others), confirmed, planes, field, scatter, tall[told] / placed.height[told], slope)
+    return _RawDisagreement(
+        view, len(others), confirmed, planes, field, scatter, pixel_height[measured] / located.height[measured], slope
+    )
 
 
 @dataclass(frozen=True)
 class _Planes:
-    """Planes over the ground: value and slope at a middle for each of several columns.
+    """Planes over the ground, one for each of several columns.
 
     Attributes
     ----------
     middle : float64 (2,)
         Metres.
     found : float64 (3, column)
-        Value there, slope along x, slope along y.
+        Value at `middle`, slope along x, slope along y.
     """
 
     middle: Floats
@@ -168,15 +169,15 @@ class _Planes:
 
 
 def _smooth(ground: Floats, across: Floats) -> _Planes:
-    """Planes through middles, heads and feet (n, 3), nan where unknown: least absolute deviations, by reweighting."""
+    """Least absolute deviations planes (by reweighting) of middles, heads and feet (n, 3), nan where unknown."""
     middle = np.median(ground, axis=0)
     basis = np.column_stack([np.ones(len(ground)), ground - middle])
     found = np.zeros((3, across.shape[1]))
     for column in range(across.shape[1]):
-        told = np.isfinite(across[:, column])
-        if told.sum() < LEAST:
+        measured = np.isfinite(across[:, column])
+        if measured.sum() < LEAST:
             continue
-        own, value, weight = basis[told], across[told, column], np.ones(int(told.sum()))
+        own, value, weight = basis[measured], across[measured, column], np.ones(int(measured.sum()))
         for _ in range(_ROUNDS):
             normal = (own * weight[:, None]).T @ own + np.diag([0.0, 1e-3, 1e-3])
             found[:, column] = np.linalg.solve(normal, (own * weight[:, None]).T @ value)
@@ -187,7 +188,7 @@ def _smooth(ground: Floats, across: Floats) -> _Planes:
 
 
 def _slope(camera: Camera, ground: Floats) -> Floats:
-    """Pixels a metre of ground, float64 (n, 2, 2)."""
+    """Jacobian of pixels in the ground point, pixels a metre, float64 (n, 2, 2)."""
     step = 0.01
     columns = [
         (camera.project(ground + move, 0.0)[0] - camera.project(ground - move, 0.0)[0]) / (2 * step)
@@ -202,35 +203,35 @@ def _size(moves: Floats) -> float:
 
 @dataclass(frozen=True)
 class Verdict:
-    """What is to be said of a rig.
+    """Displaced views of a rig.
 
     Attributes
     ----------
     views
-        How each view stands to all others, in the rig's order; None of whom too little is known.
+        Disagreement of each view, in the rig's order; None where people are too few.
     named
-        Those that are off, the worst first, each beside the views that are left.
-    quarrel
-        Two views that disagree where there is no third to judge between them.
+        Displaced views, the worst first.
+    unresolved
+        Two views that disagree where there is no third to decide.
     """
 
     views: tuple[Disagreement | None, ...]
     named: tuple[Disagreement, ...]
-    quarrel: tuple[Disagreement, Disagreement] | None
+    unresolved: tuple[Disagreement, Disagreement] | None
 
 
-def judge(rig: Rig, tables: Sequence[BodyTable], people: Bystanders) -> Verdict:
-    """Name the views that are off by more than a cell."""
-    first = current = _all_raw(rig, tables, people)
+def judge(rig: Rig, tables: Sequence[BodyTable], people: BoxCorrespondences) -> Verdict:
+    """Find the views that are displaced by more than a cell."""
+    first = current = _all_raw_disagreements(rig, tables, people)
     named: list[Disagreement] = []
     while len(_known(current)) > 2 and _worst(current) > rig.grid.cell and len(named) < len(rig.cameras) - 2:
         unnamed = [one for one in _known(current) if one.view not in {other.view for other in named}]
         suspects = sorted(unnamed, key=lambda one: -one.off)[:_SUSPECTS]
         trials = []
         for suspect in suspects:
-            mended = _mended(people, tables[suspect.view], current[suspect.view])
-            after = _all_raw(rig, tables, mended)
-            trials.append((_spread(after), suspect, mended, after))
+            corrected = _corrected(people, tables[suspect.view], current[suspect.view])
+            after = _all_raw_disagreements(rig, tables, corrected)
+            trials.append((_spread(after), suspect, corrected, after))
         if not trials:
             break
         _, worst, people, current = min(trials, key=lambda trial: trial[0])
@@ -238,27 +239,30 @@ def judge(rig: Rig, tables: Sequence[BodyTable], people: Bystanders) -> Verdict:
             break
         named.append(worst)
     whole = _known(first)
-    quarrel = (whole[0], whole[1]) if len(whole) == 2 and _worst(first) > rig.grid.cell else None
-    return Verdict(tuple(_without_shared(first)), tuple(named), quarrel)
+    unresolved = (whole[0], whole[1]) if len(whole) == 2 and _worst(first) > rig.grid.cell else None
+    return Verdict(tuple(_without_shared(first)), tuple(named), unresolved)
 
 
-def _all_raw(rig: Rig, tables: Sequence[BodyTable], people: Bystanders) -> list[_Raw | None]:
+def _all_raw_disagreements(
+    rig: Rig, tables: Sequence[BodyTable], people: BoxCorrespondences
+) -> list[_RawDisagreement | None]:
     views = range(len(rig.cameras))
-    return [_raw(rig.cameras[view], tables, people, view, [o for o in views if o != view]) for view in views]
+    return [
+        _raw_disagreement(rig.cameras[view], tables, people, view, [o for o in views if o != view]) for view in views
+    ]
 
 
-def _without_shared(raw: Sequence[_Raw | None]) -> list[Disagreement | None]:
-    """Disagreements less what all views share, where there are enough of them to say."""
+def _without_shared(raw: Sequence[_RawDisagreement | None]) -> list[Disagreement | None]:
+    """Disagreements without the common component, which needs three views or more."""
     known = [one.mean for one in raw if one is not None]
     shared = _common(np.array(known)) if len(known) > 2 else np.zeros(3)
     return [None if one is None else one.without(shared) for one in raw]
 
 
 def _common(means: Floats) -> Floats:
-    """What rows (n, 3) have in common: the medians of heads and feet, which boxes and bodies make.
+    """Common component of rows (n, 3): medians of heads and feet, which differ between boxes and bodies.
 
-    To one side only the least, and where all go the same way: of two cameras that face each other both are off where
-    one is.
+    Sideways, the smallest value where all have one sign: two cameras that face each other share a displacement.
     """
     right = means[:, 0]
     shared = np.median(means, axis=0)
@@ -266,12 +270,12 @@ def _common(means: Floats) -> Floats:
     return np.asarray(shared)
 
 
-def _known(raw: Sequence[_Raw | None]) -> list[Disagreement]:
+def _known(raw: Sequence[_RawDisagreement | None]) -> list[Disagreement]:
     return [one for one in _without_shared(raw) if one is not None]
 
 
-def _mended(people: Bystanders, table: BodyTable, raw: _Raw | None) -> Bystanders:
-    """The people as the view would show them without its disagreement."""
+def _corrected(people: BoxCorrespondences, table: BodyTable, raw: _RawDisagreement | None) -> BoxCorrespondences:
+    """The correspondences with one view's disagreement removed from its boxes."""
     if raw is None:
         return people
     body = table.boxes_of(people.ground, people.height)
@@ -282,10 +286,10 @@ def _mended(people: Bystanders, table: BodyTable, raw: _Raw | None) -> Bystander
     return replace(people, box=box)
 
 
-def _worst(raw: Sequence[_Raw | None]) -> float:
+def _worst(raw: Sequence[_RawDisagreement | None]) -> float:
     return max((one.off for one in _known(raw)), default=0.0)
 
 
-def _spread(raw: Sequence[_Raw | None]) -> float:
+def _spread(raw: Sequence[_RawDisagreement | None]) -> float:
     """Root mean square over the views."""
     return float(np.sqrt(np.mean([one.off**2 for one in _known(raw)])))

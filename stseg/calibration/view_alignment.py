@@ -1,7 +1,7 @@
-"""Two views of the same people: by which turn, shift and delay the paths in one become those in the other.
+"""Alignment of two views by rotation, shift and delay of their people's paths.
 
-Who is who is not known and the clocks may differ: every path of one view is laid on every path of the other at every
-delay (all delays at once, by correlation), and the best of them are judged by everybody at all times.
+Identities and clock offsets are unknown: every path of one view is compared with every path of the other at every delay
+(all delays at once, by correlation), and the best hypotheses are verified on all people and frames.
 """
 
 from __future__ import annotations
@@ -13,33 +13,33 @@ import numpy as np
 from stseg.arrays import Complexes, Floats, Ints
 
 _LEAST_SECONDS, _LEAST_SPREAD = 1.5, 0.4
-"""Of an overlap of two paths: its time, and the standard deviation of places in it, metres."""
+"""Least overlap of two paths, seconds, and least standard deviation of positions in it, metres."""
 _NOISE = 0.15
-"""Metres by which places of one person differ between views at best."""
+"""Standard deviation between two views' positions of one person, metres."""
 _GATE = 0.7
-"""Metres within which two places may be of one person."""
+"""Agreement gate, metres."""
 _APART = 1.0
-"""Metres between the two places of a hypothesis from two moments, at least."""
-_PATHS_TRIED, _MOMENTS_TRIED = 60, 40
-"""How many of the hypotheses of each kind are judged."""
+"""Least distance of the two points of a two-point hypothesis, metres."""
+_PATHS_TRIED, _FRAME_PAIRS_TRIED = 60, 40
+"""Number of hypotheses of each kind that are verified."""
 _DRAWN, _ASKED = 1500, 300
-"""Two moments drawn at each delay, and pairs of places by which each is judged at first."""
+"""Two-point samples at each delay, and point pairs in their first scoring."""
 _ROUNDS = 4
 _KEPT = 5
 
 
 @dataclass(frozen=True)
-class Walks:
-    """The people of one view on a ground of its own.
+class ViewPaths:
+    """Ground paths of one view's people, on a ground of its own.
 
     Attributes
     ----------
     frame : int64 (n,)
-        The stream's own.
+        Frame of the stream.
     place : complex128 (n,)
-        x + iy, metres.
+        Ground point x + iy, metres.
     path : int64 (n,)
-        Who belongs together.
+        Path number.
     """
 
     frame: Ints
@@ -49,7 +49,7 @@ class Walks:
 
 @dataclass(frozen=True)
 class Alignment:
-    """Where the people of view a are in view b: b(t + delay) = factor a(t) + shift.
+    """Similarity and delay between two views: b(t + delay) = factor a(t) + shift.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ class Alignment:
     factor, shift
         Complex: rotation and scale, and metres.
     support
-        How many people and frames agree, in whole agreements.
+        Number of agreeing people and frames, weighted by closeness.
     """
 
     delay: int
@@ -68,21 +68,21 @@ class Alignment:
 
     @property
     def inverse(self) -> Alignment:
-        """From b to a."""
+        """The alignment from b to a."""
         return Alignment(-self.delay, 1 / self.factor, -self.shift / self.factor, self.support)
 
     def then(self, after: Alignment) -> Alignment:
-        """From a by b to c."""
+        """Composition: from a by b to c."""
         shift = after.factor * self.shift + after.shift
         return Alignment(self.delay + after.delay, after.factor * self.factor, shift, after.support)
 
 
 SAME = Alignment(0, 1 + 0j, 0j, 0.0)
-"""Of a view with itself."""
+"""Identity."""
 
 
-def align(a: Walks, b: Walks, frame_rate: float, most_delay: int) -> list[Alignment]:
-    """The few alignments of two views that most people agree with, the best first.
+def align(a: ViewPaths, b: ViewPaths, frame_rate: float, most_delay: int) -> list[Alignment]:
+    """The few best supported alignments of two views, the best first.
 
     Parameters
     ----------
@@ -91,9 +91,9 @@ def align(a: Walks, b: Walks, frame_rate: float, most_delay: int) -> list[Alignm
     frame_rate
         Frames per second.
     most_delay
-        Frames by which one may be late.
+        Largest delay, frames.
     """
-    tried = _from_paths(a, b, frame_rate, most_delay) + _from_moments(a, b, frame_rate, most_delay)
+    tried = _from_paths(a, b, frame_rate, most_delay) + _from_frame_pairs(a, b, frame_rate, most_delay)
     judged = sorted((_refined(a, b, one) for one in tried), key=_less_support)
     best: list[Alignment] = []
     for one in judged:
@@ -104,9 +104,9 @@ def align(a: Walks, b: Walks, frame_rate: float, most_delay: int) -> list[Alignm
     return sorted(best, key=_less_support)
 
 
-def mirrored(walks: Walks) -> Walks:
-    """The same people in a mirror."""
-    return Walks(walks.frame, np.conj(walks.place), walks.path)
+def mirrored(paths: ViewPaths) -> ViewPaths:
+    """The paths mirrored."""
+    return ViewPaths(paths.frame, np.conj(paths.place), paths.path)
 
 
 def _less_support(one: Alignment) -> float:
@@ -114,18 +114,18 @@ def _less_support(one: Alignment) -> float:
 
 
 def _differ(one: Alignment, other: Alignment, frame_rate: float) -> bool:
-    """Whether two alignments say different things, and are not one that is still to be refined."""
+    """Whether two alignments differ by more than refinement would."""
     turned = abs(np.angle(one.factor / other.factor)) > 0.3
     return bool(turned or abs(one.delay - other.delay) > frame_rate or abs(one.shift - other.shift) > 1.5)
 
 
-def _from_paths(a: Walks, b: Walks, frame_rate: float, most_delay: int) -> list[Alignment]:
-    """The alignments of single paths that explain most."""
+def _from_paths(a: ViewPaths, b: ViewPaths, frame_rate: float, most_delay: int) -> list[Alignment]:
+    """Hypotheses from pairs of paths, the best gains first."""
     least = max(4, round(_LEAST_SECONDS * frame_rate))
     first = min(int(a.frame.min(initial=0)), int(b.frame.min(initial=0)))
     span = max(int(a.frame.max(initial=0)), int(b.frame.max(initial=0))) - first + 1
     size = 1 << int(np.ceil(np.log2(span + most_delay + 1)))
-    of_a, of_b = (_spectra(walks, first, size, least) for walks in (a, b))
+    of_a, of_b = (_spectra(paths, first, size, least) for paths in (a, b))
     delays = np.arange(-most_delay, most_delay + 1)
     found: list[tuple[float, Alignment]] = []
     for one in of_a:
@@ -135,55 +135,55 @@ def _from_paths(a: Walks, b: Walks, frame_rate: float, most_delay: int) -> list[
     return [alignment for _, alignment in found[:_PATHS_TRIED]]
 
 
-def _from_moments(a: Walks, b: Walks, frame_rate: float, most_delay: int) -> list[Alignment]:
-    """The alignments by two people, each at a time of their own, that most others agree with.
+def _from_frame_pairs(a: ViewPaths, b: ViewPaths, frame_rate: float, most_delay: int) -> list[Alignment]:
+    """Hypotheses from two point pairs, each at a time of its own, the best supported first.
 
-    Delays are tried in steps of 0.3 s, in which nobody walks out of the gate.
+    Delays are tried in steps of 0.3 s, within which no person leaves the gate.
     """
     step = max(1, round(0.3 * frame_rate))
-    lots = np.random.default_rng(0)
+    rng = np.random.default_rng(0)
     found: list[Alignment] = []
     for delay in range(-(most_delay // step) * step, most_delay + 1, step):
-        found += _of_delay(a, b, delay, lots)
-    return sorted(found, key=lambda one: -one.support)[:_MOMENTS_TRIED]
+        found += _at_delay(a, b, delay, rng)
+    return sorted(found, key=lambda one: -one.support)[:_FRAME_PAIRS_TRIED]
 
 
-def _of_delay(a: Walks, b: Walks, delay: int, lots: np.random.Generator) -> list[Alignment]:
+def _at_delay(a: ViewPaths, b: ViewPaths, delay: int, rng: np.random.Generator) -> list[Alignment]:
     of_a, of_b = _same_time(a, b, delay)
     known = np.isfinite(a.place[of_a]) & np.isfinite(b.place[of_b])
     x, y = a.place[of_a[known]], b.place[of_b[known]]
     if len(x) < 4:
         return []
-    one, other = lots.integers(0, len(x), (2, 20 * _DRAWN))
+    one, other = rng.integers(0, len(x), (2, 20 * _DRAWN))
     far_x, far_y = np.abs(x[one] - x[other]), np.abs(y[one] - y[other])
-    alike = (far_x > _APART) & (np.abs(far_x - far_y) < _GATE / 2)
-    one, other = one[alike][:_DRAWN], other[alike][:_DRAWN]
+    redundancy = (far_x > _APART) & (np.abs(far_x - far_y) < _GATE / 2)
+    one, other = one[redundancy][:_DRAWN], other[redundancy][:_DRAWN]
     factor = (y[one] - y[other]) / (x[one] - x[other])
     factor /= np.abs(factor)
     shift = (y[one] + y[other] - factor * (x[one] + x[other])) / 2
-    asked = lots.permutation(len(x))[:_ASKED]
+    asked = rng.permutation(len(x))[:_ASKED]
     away = np.abs(factor[:, None] * x[asked] + shift[:, None] - y[asked])
     support = np.maximum(0.0, 1 - (away / _GATE) ** 2).sum(axis=1) * len(x) / len(asked)
     best = np.argsort(-support)[:5]
     return [Alignment(delay, complex(factor[k]), complex(shift[k]), float(support[k])) for k in best]
 
 
-def _spectra(walks: Walks, first: int, size: int, least: int) -> list[Complexes]:
-    """Fourier transforms of presence, place and squared place of each path long enough, complex (3, size) each."""
+def _spectra(paths: ViewPaths, first: int, size: int, least: int) -> list[Complexes]:
+    """Fourier transforms of presence, position and squared position of each path, complex (3, size) each."""
     spectra = []
-    for number in np.unique(walks.path):
-        rows = np.flatnonzero((walks.path == number) & np.isfinite(walks.place))
+    for number in np.unique(paths.path):
+        rows = np.flatnonzero((paths.path == number) & np.isfinite(paths.place))
         if len(rows) < least:
             continue
         signal = np.zeros((3, size), complex)
-        at = walks.frame[rows] - first
-        signal[0, at], signal[1, at], signal[2, at] = 1.0, walks.place[rows], np.abs(walks.place[rows]) ** 2
+        at = paths.frame[rows] - first
+        signal[0, at], signal[1, at], signal[2, at] = 1.0, paths.place[rows], np.abs(paths.place[rows]) ** 2
         spectra.append(np.fft.fft(signal))
     return spectra
 
 
 def _best_delays(a: Complexes, b: Complexes, delays: Ints, least: int) -> list[tuple[float, Alignment]]:
-    """Gain and alignment at the few best delays of two paths (Procrustes' solution at every delay)."""
+    """Gain and alignment at the few best delays of two paths (Procrustes solution at every delay)."""
 
     def over(x: Complexes, y: Complexes) -> Complexes:
         return np.asarray(np.fft.ifft(np.conj(x) * y)[delays])  # sum over t of conj(x(t)) y(t + delay)
@@ -209,8 +209,8 @@ def _best_delays(a: Complexes, b: Complexes, delays: Ints, least: int) -> list[t
     return found
 
 
-def _refined(a: Walks, b: Walks, one: Alignment) -> Alignment:
-    """The alignment again from everybody who agrees with it, a few times."""
+def _refined(a: ViewPaths, b: ViewPaths, one: Alignment) -> Alignment:
+    """Iteratively reweighted refinement from all agreeing pairs."""
     factor, shift = one.factor, one.shift
     rows = _same_time(a, b, one.delay)
     best = Alignment(one.delay, factor, shift, _agreement(a, b, rows, factor, shift)[0])
@@ -230,8 +230,8 @@ def _refined(a: Walks, b: Walks, one: Alignment) -> Alignment:
     return best
 
 
-def _at_best_delay(a: Walks, b: Walks, one: Alignment, most_delay: int) -> Alignment:
-    """The alignment at the delay near its own that most agree with."""
+def _at_best_delay(a: ViewPaths, b: ViewPaths, one: Alignment, most_delay: int) -> Alignment:
+    """Local search over the delay."""
     best, step = one, 8
     while step:
         near = [best.delay + off for off in (-step, step) if abs(best.delay + off) <= most_delay]
@@ -247,21 +247,23 @@ def _has_support(one: Alignment) -> float:
     return one.support
 
 
-def support(a: Walks, b: Walks, one: Alignment) -> float:
-    """How many people and frames agree with an alignment, in whole agreements."""
+def support(a: ViewPaths, b: ViewPaths, one: Alignment) -> float:
+    """Support of an alignment: number of agreeing people and frames, weighted by closeness."""
     return _agreement(a, b, _same_time(a, b, one.delay), one.factor, one.shift)[0]
 
 
-def _same_time(a: Walks, b: Walks, delay: int) -> tuple[Ints, Ints]:
-    """All pairs of rows of the two views at one time."""
+def _same_time(a: ViewPaths, b: ViewPaths, delay: int) -> tuple[Ints, Ints]:
+    """All pairs of rows of the two views in common frames."""
     begin = np.searchsorted(b.frame, a.frame + delay, "left")
     count = np.searchsorted(b.frame, a.frame + delay, "right") - begin
     of_a = np.repeat(np.arange(len(a.frame)), count)
     return of_a, np.repeat(begin - np.cumsum(count) + count, count) + np.arange(count.sum())
 
 
-def _agreement(a: Walks, b: Walks, rows: tuple[Ints, Ints], factor: complex, shift: complex) -> tuple[float, Floats]:
-    """How much of everybody agrees, each counted once in each view, and the weight of each pair of rows."""
+def _agreement(
+    a: ViewPaths, b: ViewPaths, rows: tuple[Ints, Ints], factor: complex, shift: complex
+) -> tuple[float, Floats]:
+    """Support with each row counted once (mutual best matches), and the weight of each pair of rows."""
     away = np.abs(factor * a.place[rows[0]] + shift - b.place[rows[1]])
     close = np.maximum(0.0, 1 - (np.where(np.isfinite(away), away, np.inf) / _GATE) ** 2)
     best_a, best_b = np.zeros(len(a.frame)), np.zeros(len(b.frame))

@@ -1,4 +1,4 @@
-"""`stseg calibrate`: make a rig file, and see whether one is right."""
+"""`stseg calibrate`: make a rig file, or check one."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from stseg.commands.calibrate_check import check
 from stseg.commands.calibrate_import import import_calibration
 from stseg.commands.calibrate_points import calibrate_points
 
-app = App(name="calibrate", help="Make a rig file, and see whether one is right.")
+app = App(name="calibrate", help="Make a rig file, or check one.")
 app.command(calibrate_points, name="points")
 app.command(import_calibration, name="import")
 app.command(calibrate_auto, name="auto")

@@ -24,8 +24,8 @@ from stseg.calibration.adjusted_rig import (
     scaled,
 )
 from stseg.calibration.auto import calibrate_from_people, sharpen_by_floor, steps_of
-from stseg.calibration.endpoints import Ends, join_ends, people_ends
-from stseg.calibration.solution import Solution, Views
+from stseg.calibration.endpoints import Endpoints, concatenate_endpoints, upright_endpoints
+from stseg.calibration.solution import CalibrationInput, Solution
 from stseg.commands.calibrate_scene import numbers
 from stseg.config import Config
 from stseg.engine.backgrounds import make_foregrounds
@@ -57,10 +57,9 @@ def calibrate_auto(
 ) -> None:
     """Make a rig file from the videos alone: from people who walk where several cameras see them.
 
-    Each camera learns its background and finds people who stand free of others; their feet and heads give its lens,
-    tilt and height, their ways give where the cameras stand and by how many frames their clocks differ, and one
-    adjustment of everything gives the rig, with the marks on the floor that views share, where it has any. One or two
-    people who walk all over the ground for a minute are best.
+    Each camera learns its background and finds isolated people. Their feet and heads give its lens, tilt and height;
+    their paths give the cameras' positions and delays; a bundle adjustment refines everything, with floor features that
+    views share, where there are any. One or two people who walk all over the ground for a minute are best.
 
     ```
     stseg calibrate auto cam*.avi -o room.toml --frame-rate 25 --distance cam1,120,340,410,335,2.5
@@ -69,17 +68,17 @@ def calibrate_auto(
     Parameters
     ----------
     videos
-        One a camera; their names become the cameras' names.
+        One video a camera; file names become camera names.
     output
         The rig file to write.
     frame_rate
-        Frames per second, of all.
+        Frames per second of all videos.
     person_height
-        How tall the people are on the average, metres. It fixes the scale where no distance is given.
+        Mean body height, metres. It sets the scale where no distance is given.
     distance
-        Two pixels of one camera that show ground points so many metres apart; it fixes the scale.
+        Two ground pixels of one camera and their distance in metres; it sets the scale.
     most_delay
-        Seconds by which one video may have begun before another; 0 where all are known to run together.
+        Greatest delay of one video against another, seconds; 0 where all are synchronous.
     frames
         Part of the videos, half open; without it the first 3000 frames.
     background
@@ -99,9 +98,9 @@ def calibrate_auto(
     for note in counted.notes:
         print(f"stseg: {note}", file=sys.stderr)
     first, stop = _frames(frames, counted.length)
-    sights = make_foregrounds(streams, Config(), first, stop, streams=counted)
-    views = Views(
-        _ends(streams, counted, sights, first, stop),
+    foregrounds = make_foregrounds(streams, Config(), first, stop, streams=counted)
+    views = CalibrationInput(
+        _ends(streams, counted, foregrounds, first, stop),
         tuple(camera.size for camera in streams.rig.cameras),
         frame_rate,
         person_height,
@@ -109,7 +108,7 @@ def calibrate_auto(
     )
     with _bar("calibrating", steps_of(len(names))) as (bar, task):
         solution = calibrate_from_people([str(path) for path in videos], views, lambda: bar.advance(task))
-    backgrounds = _backgrounds(sights)
+    backgrounds = _backgrounds(foregrounds)
     marks = 0
     if backgrounds:
         solution, marks = sharpen_by_floor(views, solution, backgrounds)
@@ -120,7 +119,7 @@ def calibrate_auto(
     write_rig(output, recording)
     _print(recording, solution, person_height if known is None else None)
     print(
-        f"{output}: {len(names)} cameras, from {len(solution.outcome.state.points)} people and frames"
+        f"{output}: {len(names)} cameras, from {len(solution.adjustment.parameters.points)} people and frames"
         + (f" and {marks} marks on the floor" if marks else ", the floor shows no marks that views share")
     )
 
@@ -128,7 +127,7 @@ def calibrate_auto(
 def _streams(
     videos: Sequence[Path], output: Path, frame_rate: float, background: str | None, kind: Literal["video", "masks"]
 ) -> Recording:
-    """The videos as a recording whose cameras are not known yet; each may end when it likes."""
+    """The videos as a recording with placeholder cameras; streams may end at different times."""
     names = [path.stem for path in videos]
     if len(set(names)) < len(names):
         names = [path.absolute().parent.name for path in videos]
@@ -152,26 +151,29 @@ def _streams(
 
 
 def _ends(
-    streams: Recording, counted: StreamIndex, sights: Sequence[ViewForeground], first: int, stop: int
-) -> tuple[Ends, ...]:
+    streams: Recording, counted: StreamIndex, foregrounds: Sequence[ViewForeground], first: int, stop: int
+) -> tuple[Endpoints, ...]:
     """Feet and heads of isolated people, frame by frame and view by view."""
-    found: list[list[tuple[int, Floats]]] = [[] for _ in sights]
-    with open_frames(streams, first, stop, counted) as moments, _bar("looking for people", stop - first) as (bar, task):
-        for moment in moments:
-            for sight, view, ends in zip(sights, moment.views, found, strict=True):
-                likelihood = sight.evidence(view)
+    found: list[list[tuple[int, Floats]]] = [[] for _ in foregrounds]
+    with (
+        open_frames(streams, first, stop, counted) as frame_sets,
+        _bar("looking for people", stop - first) as (bar, task),
+    ):
+        for frame_set in frame_sets:
+            for foreground, view, endpoints in zip(foregrounds, frame_set.views, found, strict=True):
+                likelihood = foreground.evidence(view)
                 if isinstance(likelihood, np.ndarray):
-                    ends.append((moment.frame, people_ends(likelihood)))
+                    endpoints.append((frame_set.frame, upright_endpoints(likelihood)))
             bar.advance(task)
-    return tuple(join_ends(parts) for parts in found)
+    return tuple(concatenate_endpoints(parts) for parts in found)
 
 
-def _backgrounds(sights: Sequence[ViewForeground]) -> list[Bytes]:
+def _backgrounds(foregrounds: Sequence[ViewForeground]) -> list[Bytes]:
     """The empty scene in each view; none where the streams are masks."""
     return [
-        np.clip(np.rint(sight.background.model.background_image()), 0, 255).astype(np.uint8)
-        for sight in sights
-        if sight.background is not None
+        np.clip(np.rint(foreground.background.model.background_image()), 0, 255).astype(np.uint8)
+        for foreground in foregrounds
+        if foreground.background is not None
     ]
 
 
@@ -196,10 +198,10 @@ def _print(recording: Recording, solution: Solution, person_height: float | None
             f"{camera.name}: at ({x:.2f}, {y:.2f}, {z:.2f}) m ± {report.centre_spread:.2f}, "
             f"focal length {report.focal:.0f} ± {report.focal_spread:.0f} px, "
             f"offset {source.offset} and {report.clock:+.3f} ± {report.clock_spread:.3f} s; "
-            f"{report.sightings} sightings: feet {report.foot_pixels:.1f} px ({100 * report.ground_metres:.0f} cm), "
+            f"{report.observations} sightings: feet {report.foot_pixels:.1f} px ({100 * report.ground_metres:.0f} cm), "
             f"heads {report.head_pixels:.1f} px ({100 * report.head_metres:.0f} cm) off"
         )
-    points = solution.outcome.state.points
+    points = solution.adjustment.parameters.points
     if person_height is None:
         print(f"scale: by the distance given; people are {np.median(points[:, 2]):.2f} m tall on the average")
     else:

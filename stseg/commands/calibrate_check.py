@@ -1,4 +1,4 @@
-"""`stseg calibrate check`: does a rig fit its recording?"""
+"""`stseg calibrate check`: check a rig against its recording."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from rich.table import Table
 
 from stseg.arrays import Floats, Observation
 from stseg.calibration.coverage import coverage
-from stseg.calibration.isolated_boxes import sightings
-from stseg.calibration.rig_check import Check, check_rig, in_words
+from stseg.calibration.isolated_boxes import isolated_boxes
+from stseg.calibration.rig_check import Check, check_rig, verdict_text
 from stseg.calibration.verdict import Disagreement
 from stseg.engine.backgrounds import make_foregrounds
 from stseg.errors import ConfigError
@@ -36,7 +36,7 @@ from stseg.report.maps import blind_map
 from stseg.report.style import STYLE
 
 _FRAMES = 300
-"""Frames that are read unless others are asked for."""
+"""Default number of frames to read."""
 _NAMES = ("camera", "people", "shown %", "feet cm", "heads cm", "right cm", "down cm", "ground cm", "px")
 
 
@@ -50,11 +50,11 @@ def check(
     as_json: Annotated[bool, Parameter(name="--json", negative="")] = False,
     overwrite: Annotated[bool, Parameter(negative="")] = False,
 ) -> None:
-    """Hold each view of a rig against the others, by the people whom the recording shows.
+    """Check each view of a rig against the others, by the people in the recording.
 
-    People who stand alone are found in the boxes or the foreground of several views. Where one view alone would put
-    them is compared with where the others do, at feet and heads, and the verdict says which camera is off and by how
-    much, which streams are swapped, and which run late.
+    Isolated people are matched between views by their boxes or foreground. Each view's feet and heads are compared with
+    their predictions from the other views; the verdict says which camera is off and by how much, which streams are
+    swapped, and which are delayed.
 
     The page (-o) and the pictures (--pictures) show each view's frame with the ground's grid and upright poles drawn
     on it, and how many views see the ground. **They hold camera pixels**: images of people, where the recording has
@@ -83,7 +83,7 @@ def check(
     first, stop = _part(frames)
     seen = _look(recording, first, stop)
     found = check_rig(recording.rig, seen.shown)
-    words = in_words(recording.rig, found)
+    words = verdict_text(recording.rig, found)
     if as_json:
         print(json.dumps(_as_json(recording.rig, found, words), indent=2))
     else:
@@ -115,20 +115,22 @@ def _part(text: str | None) -> tuple[int, int]:
 
 
 def _look(recording: Recording, first: int, stop: int) -> _Seen:
-    sights = make_foregrounds(recording, read_config(None, ()), first, stop)
+    foregrounds = make_foregrounds(recording, read_config(None, ()), first, stop)
     shown: dict[int, list[Floats]] = {}
-    kept: tuple[int, tuple[Observation, ...]] = (first, (None,) * len(sights))
+    kept: tuple[int, tuple[Observation, ...]] = (first, (None,) * len(foregrounds))
     console = Console(stderr=True)
-    with open_frames(recording, first, None) as moments:
+    with open_frames(recording, first, None) as frame_sets:
         steps: Iterator[int] = iter(
             track(range(first, stop), "looking", console=console, disable=not console.is_terminal, transient=True)
         )
-        for moment, _ in zip(moments, steps, strict=False):
-            evidence = [sight.evidence(view) for sight, view in zip(sights, moment.views, strict=True)]
+        for frame_set, _ in zip(frame_sets, steps, strict=False):
+            evidence = [
+                foreground.evidence(view) for foreground, view in zip(foregrounds, frame_set.views, strict=True)
+            ]
             sizes = [camera.size for camera in recording.rig.cameras]
-            shown[moment.frame] = [sightings(one, size) for one, size in zip(evidence, sizes, strict=True)]
-            if moment.frame <= first + (stop - first) // 2:
-                kept = (moment.frame, moment.views)
+            shown[frame_set.frame] = [isolated_boxes(one, size) for one, size in zip(evidence, sizes, strict=True)]
+            if frame_set.frame <= first + (stop - first) // 2:
+                kept = (frame_set.frame, frame_set.views)
     if not shown:
         raise ConfigError("--frames", "", f"{first}:{stop}", "a part of the recording")
     return _Seen(shown, *kept)
@@ -147,7 +149,7 @@ def _print(rig: Rig, found: Check, words: Sequence[str]) -> None:
 
 
 def _rows(rig: Rig, found: Check) -> list[list[str]]:
-    """How each view stands to the others."""
+    """Disagreement of each view with the others."""
     rows = []
     for camera, one, share in zip(rig.cameras, found.verdict.views, found.confirmed, strict=True):
         shown = "" if share != share else f"{100 * share:.0f}"
@@ -170,7 +172,7 @@ def _as_json(rig: Rig, found: Check, words: Sequence[str]) -> dict[str, object]:
         "words": list(words),
         "off": [names[one.view] for one in found.verdict.named],
         "swapped": [] if found.swapped is None else [names[view] for view in found.swapped],
-        "late": {names[one.view]: one.frames for one in found.late},
+        "late": {names[one.view]: one.frames for one in found.delays},
         "people": found.people,
         "views": dict(zip(names, views, strict=True)),
     }

@@ -1,4 +1,4 @@
-"""`stseg calibrate import`: a rig from the calibrations of other programs."""
+"""`stseg calibrate import`: a rig from another program's calibration."""
 
 from __future__ import annotations
 
@@ -52,16 +52,16 @@ def import_calibration(
     Parameters
     ----------
     format
-        What the calibrations are.
+        Format of the calibrations.
     files
         The calibrations.
     output
         The rig file to write.
     size
-        Width and height of the images, pixels; not needed where the calibrations say it.
+        Width and height of the images, pixels; not needed where the calibrations hold it.
     unit
-        Unit of length of the calibrations: mm, cm, m, or how many metres a unit is. Without it, the one in which the
-        cameras hang as high as cameras do; what was taken is shown.
+        Unit of length of the calibrations: mm, cm, m, or metres per unit. Without it, the one that gives plausible
+        camera heights; the choice is printed.
     up
         Which of their axes points away from the ground. With -z, X = x, Y = -y, Z = -z; with -y (a camera's own
         axes), X = x, Y = -z, Z = y. Without it, the one that is upwards in the images.

@@ -29,7 +29,7 @@ _SOURCES = {
     "square pixels": "square pixels, axis in the middle of the image",
 }
 _LITTLE = 0.01
-"""Of the ground that a camera sees, which may be badly known without a word."""
+"""Share of a camera's ground that may be uncertain without a warning."""
 
 
 def calibrate_points(
@@ -44,7 +44,7 @@ def calibrate_points(
     lens: Annotated[str | None, Parameter(metavar="PATTERN")] = None,
     overwrite: Annotated[bool, Parameter(negative="")] = False,
 ) -> None:
-    """Make a rig file from points of which you know where they are and where the cameras show them.
+    """Make a rig file from measured ground points and their pixels in each camera.
 
     POINTS is a CSV file with the columns camera,u,v,x,y and perhaps z: pixels (u to the right, v down), and places on
     the ground. Each camera needs four or more points on the ground, well spread over what it sees; six or more show
@@ -97,7 +97,7 @@ def _lens(pattern: str, name: str) -> Lens:
 
 
 def _show(tables: Sequence[PointTable], fits: Sequence[PointFit], grid: Grid) -> None:
-    """Every point with what it is off by, and what is to be said of each camera."""
+    """Print every point with its error, and a line and warnings of each camera."""
     console = Console(highlight=False, markup=False)
     shown = Table(box=None, padding=(0, 2, 0, 0))
     for heading in ("camera", "line", "x m", "y m", "z m", "off px", "off cm", ""):
@@ -125,7 +125,7 @@ def _line(fit: PointFit) -> str:
 
 
 def warnings(fit: PointFit, grid: Grid) -> list[str]:
-    """What is to be feared of a fit: points that leave part of the ground unknown, or a vertical that was assumed."""
+    """Warnings of a fit: badly spread points, or too few to check."""
     deviation, words = fit.ground_deviation(grid), []
     known = deviation[np.isfinite(deviation)]
     share = float(np.mean(known > grid.cell)) if len(known) else 0.0

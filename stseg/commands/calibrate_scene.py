@@ -1,4 +1,4 @@
-"""What `stseg calibrate` asks for besides the cameras: the scene, the grid and the streams."""
+"""Options of `stseg calibrate` besides the cameras: scene, grid and streams."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from stseg.io.recording.recording import CameraSource, Source, SourceKind
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
 class SceneOptions:
-    """What the rig file says of the scene and the grid."""
+    """Scene and grid of the rig file."""
 
     area: Annotated[str, Parameter(metavar="X0,Y0,X1,Y1", allow_leading_hyphen=True)]
     """Ground rectangle to watch, metres."""
@@ -51,20 +51,20 @@ class SceneOptions:
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
 class StreamOptions:
-    """What the rig file says of the frames."""
+    """Streams of the rig file."""
 
     source_pattern: Annotated[str | None, Parameter(metavar="PATTERN")] = None
     """Path of every camera's frames, `{name}` standing for the camera's name."""
     sources: Annotated[str | None, Parameter(metavar="A,B,...")] = None
     """Paths of the frames one by one, instead of a pattern."""
     source_kind: SourceKind = "video"
-    """What these frames are."""
+    """Kind of the frames."""
     first_frame: int | None = None
     """Number of the first frame in boxes files; without it, 0."""
     background: Annotated[str | None, Parameter(metavar="PATTERN")] = None
     """Path of every camera's view of the empty scene, `{name}` standing for the camera's name."""
     background_kind: Literal["video", "images"] = "video"
-    """What the views of the empty scene are."""
+    """Kind of the views of the empty scene."""
 
     def of(self, names: Sequence[str]) -> tuple[CameraSource, ...]:
         """The streams of these cameras."""
@@ -103,7 +103,7 @@ def size_of(text: str) -> tuple[int, int]:
 
 
 def words(option: str, text: str, count: int) -> list[str]:
-    """So many words between commas."""
+    """A number of words between commas."""
     found = [word.strip() for word in text.split(",")]
     if len(found) != count:
         raise ConfigError(option, "", f"{len(found)} of them", f"{count}, one a camera")

@@ -1,4 +1,4 @@
-"""`stseg demo`: the whole way on a small simulated scene."""
+"""`stseg demo`: all steps on a small simulated scene."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ def demo(
 
     Example: stseg demo
 
-    The scene is a room that four cameras watch through lenses. Its truth is exact, and the tracker is not shown it. The
-    first run on a machine takes longer: the kernels are compiled, and kept.
+    The scene is a room with four cameras. Its truth is exact, and hidden from the tracker. The first run on a machine
+    takes longer: kernels are compiled, and kept.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def _require_empty(folder: Path, overwrite: bool) -> None:
 
 
 def _draw(run_file: Path, scene: Path, folder: Path) -> None:
-    """The pictures of the frame in the middle. People are simulated, so the cameras' images may be shown."""
+    """Write the pictures of the middle frame; people are simulated, so camera images may be shown."""
     run, truth = read_run(run_file), read_tracks_csv(scene / "truth.csv")
     middle = int(run.frames[len(run.frames) // 2])
     write_pictures(folder, read_rig(scene / "rig.toml"), run, truth, middle, camera_images=True)

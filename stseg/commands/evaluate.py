@@ -34,25 +34,25 @@ def evaluate(
 
     Example: stseg evaluate night.h5 truth.csv --frames 0:136 --area=1.9,-0.3,6.2,3.5
 
-    Every frame of the truth counts, also one in which nothing was found. Percentages: MODA, MODP, precision and recall
-    judge each frame by itself; MOTA, IDF1 and HOTA judge who is who as well. HOTA asks for places within the gate, and
-    "2 gates" is HOTA within twice the gate. MT and ML are the people mostly tracked (over 80 % of their frames) and
-    mostly lost (under 20 %).
+    Every frame of the truth counts, also one without tracks. Percentages: MODA, MODP, precision and recall evaluate
+    each frame by itself; MOTA, IDF1 and HOTA evaluate identities as well. HOTA's similarity falls to 0 at the gate, and
+    at twice the gate in "2 gates". MT and ML are the people mostly tracked (over 80 % of their frames) and mostly lost
+    (under 20 %).
 
     Parameters
     ----------
     tracks
         A run file (.h5), or CSV with a header and the columns frame,id,x,y (metres).
     truth
-        CSV with the same columns; a column flag may mark rows that are not to be relied on.
+        CSV with the same columns; a column flag may mark unreliable rows.
     gate
         Metres within which a track matches a person.
     frames
-        The frames to judge, A:B without B, or a list A,B,C. By default those of the truth.
+        The frames to evaluate, A:B without B, or a list A,B,C. By default those of the truth.
     area
-        x0,y0,x1,y1 in metres: people outside, and what matches them, are not judged.
+        x0,y0,x1,y1 in metres: people outside, and tracks matched to them, are ignored.
     ignore_flagged
-        Do not judge rows of the truth whose flag is not 0, nor what matches them.
+        Ignore rows of the truth whose flag is not 0, and tracks matched to them.
     as_json
         Print one JSON object.
     """
@@ -99,7 +99,7 @@ def _area(text: str) -> Area:
 
 
 def _table(scores: Scores) -> Table:
-    """Five short rows; what the figures were taken on stands above them."""
+    """Scores in five short rows, with the settings as the title."""
     place = (
         "all the ground" if scores.area is None else "x {:g} .. {:g}, y {:g} .. {:g} m".format(*_by_axis(scores.area))
     )

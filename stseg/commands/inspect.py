@@ -1,4 +1,4 @@
-"""`stseg inspect`: what is in a run file, on one screen."""
+"""`stseg inspect`: the contents of a run file on one screen."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from cyclopts import Parameter
 from rich.console import Console
 from rich.table import Table
 
-from stseg.commands.run_overview import Overview, look_over, per
+from stseg.commands.run_overview import Overview, per, summarise_run
 from stseg.commands.run_slice import write_slice
 from stseg.errors import ConfigError
 from stseg.io.runfile.runs import read_run
@@ -29,7 +29,7 @@ def inspect(
     output: Annotated[Path | None, Parameter(name=["-o", "--output"], metavar="SLICE.png")] = None,
     overwrite: Annotated[bool, Parameter(negative="")] = False,
 ) -> None:
-    """Say what is in a run file: extent, people, tracks, events, ghosts, timings, and what looks wrong.
+    """Summarise a run file: extent, people, tracks, events, ghosts, timings and warnings.
 
     Example: stseg inspect night.h5
 
@@ -56,9 +56,9 @@ def inspect(
     if slice_ is not None and output is not None:
         print(f"wrote {output}: {write_slice(found, slice_, output, overwrite)}")
     elif as_json:
-        print(json.dumps(asdict(look_over(found)), indent=1))
+        print(json.dumps(asdict(summarise_run(found)), indent=1))
     else:
-        _show(look_over(found), Console(highlight=False, markup=False))
+        _show(summarise_run(found), Console(highlight=False, markup=False))
 
 
 def _show(overview: Overview, console: Console) -> None:
@@ -88,7 +88,7 @@ def _lines(overview: Overview) -> list[tuple[str, str]]:
         ("frames", f"{o.frames}{span}; {o.seconds:.1f} s at {o.frame_rate:g} frames/s"),
         ("people", f"{o.people_mean:.1f} a frame, at most {o.people_most}{_minutes(o.people_per_minute)}"),
         ("tracks", str(len(o.tracks)) + _lengths(o.track_seconds)),
-        ("events", events_in_words(o.events) or "none"),
+        ("events", event_counts_text(o.events) or "none"),
         ("candidates", f"{o.candidates_per_frame:.1f} a frame, {o.ghosts_per_frame:.1f} of them ghosts"),
         ("ghosts", "; ".join(_ghosts(o)) or "none"),
         ("windows", f"{o.windows}, {o.frames_per_window:.1f} frames each"),
@@ -99,7 +99,7 @@ def _lines(overview: Overview) -> list[tuple[str, str]]:
 
 
 def _seen(shares: list[float]) -> list[str]:
-    """Of the ground, the share that so many views see."""
+    """Share of the ground by number of views."""
     return [f"{views} see {100 * share:.0f} %" for views, share in enumerate(shares) if share > 0]
 
 
@@ -112,7 +112,7 @@ def _minutes(people: list[float]) -> str:
 
 
 def _ghosts(overview: Overview) -> list[str]:
-    """Why candidates were dropped, the commonest reason first."""
+    """Reasons for rejected candidates, the most frequent first."""
     ranked = sorted(overview.ghost_reasons.items(), key=lambda reason: -reason[1])
     return [f"{count} because {words}" for words, count in ranked if count]
 
@@ -121,14 +121,14 @@ def _lengths(seconds: dict[str, float]) -> str:
     return "".join(f", {name} {length:.1f} s" for name, length in seconds.items())
 
 
-def events_in_words(counts: dict[str, int]) -> str:
-    """How many of each kind; a merge and the split that ends it are one encounter."""
+def event_counts_text(counts: dict[str, int]) -> str:
+    """Counts of events by kind; a merge and the split that ends it are one encounter."""
     named = {"encounter" if kind == "merge" else kind: count for kind, count in counts.items() if kind != "split"}
     return ", ".join(f"{count} {kind}" for kind, count in named.items())
 
 
 def _views(overview: Overview) -> Table:
-    """How each view errs by the end of the run, and the ghosts that it denies."""
+    """Error rates of each view at the end of the run, and the ghosts that it denies."""
     table = Table(title="views", title_justify="left", box=None, padding=(0, 2, 0, 0))
     for heading in ("view", "misses %", "clutter %", "beside people %", "denies ghosts"):
         table.add_column(heading, justify="left" if heading == "view" else "right")

@@ -8,7 +8,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from stseg.commands.progress import TerminalReporter
-from stseg.commands.run_frames import frames_of_run
+from stseg.commands.run_frames import select_frames
 from stseg.engine.pixel_labels import write_labels
 from stseg.io.config_file import parse_config
 from stseg.io.runfile.runs import read_run
@@ -48,6 +48,6 @@ def labels(
     run = read_run(run_file)
     config = parse_config(run.provenance.config, f"{run_file}: the configuration", set_)
     count = write_labels(
-        run, config, output, frames_of_run(run, frames), track_palette(), TerminalReporter(), overwrite=overwrite
+        run, config, output, select_frames(run, frames), track_palette(), TerminalReporter(), overwrite=overwrite
     )
     print(f"{output}: {count} label images")

@@ -19,16 +19,16 @@ from stseg.errors import ConfigError, StsegError
 COMMANDS = {
     "demo": ("stseg.commands.demo:demo", "Render a small scene, track it, score it, write the report."),
     "run": ("stseg.commands.run:run", "Track the people of a recording."),
-    "inspect": ("stseg.commands.inspect:inspect", "Say what is in a run file."),
+    "inspect": ("stseg.commands.inspect:inspect", "Summarise a run file."),
     "export": ("stseg.commands.export:export", "Write the tracks of a run file in another format."),
     "evaluate": ("stseg.commands.evaluate:evaluate", "Score tracks on the ground against the truth."),
-    "report": ("stseg.commands.report:report", "Write pictures of a run file as one HTML page."),
-    "plan": ("stseg.commands.plan:plan", "Say how long a run will take and how large its file will be."),
-    "labels": ("stseg.commands.labels:labels", "Write for every pixel whom it shows."),
-    "calibrate": ("stseg.commands.calibrate:app", "Make a rig file."),
-    "simulate": ("stseg.commands.simulate:simulate", "Make a scene with truth."),
+    "report": ("stseg.commands.report:report", "Write a run file as one HTML page, as pictures or as a film."),
+    "plan": ("stseg.commands.plan:plan", "Estimate the time of a run and the size of its file."),
+    "labels": ("stseg.commands.labels:labels", "Write per-pixel track-id images."),
+    "calibrate": ("stseg.commands.calibrate:app", "Make a rig file, or check one."),
+    "simulate": ("stseg.commands.simulate:simulate", "Render a scene with ground truth."),
 }
-"""Where each command is, and the line that `stseg --help` says of it."""
+"""Location of each command, and its line in `stseg --help`."""
 
 _FLAGS = ("--help", "-h", "--version")
 _USER_ERROR = 2
@@ -36,7 +36,7 @@ _INTERRUPTED, _TERMINATED = 130, 143
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command line and return its exit status; what the user can mend is one line on standard error."""
+    """Run a command line and return its exit status; a user's error is one line on standard error."""
     tokens = list(sys.argv[1:] if arguments is None else arguments)
     termination = Termination()
     try:
@@ -57,7 +57,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 class Termination:
-    """SIGTERM does what an interrupt does: what is being written is written or withdrawn, and the command ends."""
+    """SIGTERM acts as an interrupt: output is finished or withdrawn, and the command ends."""
 
     def __init__(self) -> None:
         self.asked = False
@@ -66,7 +66,7 @@ class Termination:
             self._before = signal.signal(signal.SIGTERM, self._ask)
 
     def forget(self) -> None:
-        """Let SIGTERM do what it did before."""
+        """Restore the previous handler of SIGTERM."""
         if threading.current_thread() is threading.main_thread():
             signal.signal(signal.SIGTERM, self._before)
 
@@ -76,7 +76,7 @@ class Termination:
 
 
 def _app(tokens: Sequence[str]) -> App:
-    """The command that is asked for speaks for itself; the others have a line in the list and are not imported."""
+    """The application with the requested command imported; the others are a line in the list."""
     app = App(
         name="stseg",
         help="Tracks of people on the ground from several fixed, overlapping cameras.",
@@ -89,7 +89,7 @@ def _app(tokens: Sequence[str]) -> App:
 
 
 def _require_command(tokens: Sequence[str]) -> None:
-    """Refuse what is no command here: to suggest one, cyclopts would import them all."""
+    """Refuse an unknown command here: to suggest one, cyclopts would import them all."""
     if tokens and tokens[0] not in (*COMMANDS, *_FLAGS):
         close = get_close_matches(tokens[0], COMMANDS, 1)
         hint = f"; did you mean {close[0]}?" if close else ""

@@ -12,14 +12,14 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 
 @contextmanager
 def frame_bar(work: str, total: int | None, done: int = 0) -> Iterator[Callable[[int], None]]:
-    """A bar on standard error; what it yields is told how many more frames are done.
+    """A bar on standard error; yields a function to call with the number of frames just done.
 
     Parameters
     ----------
     work
-        What is being done, one word.
+        Name of the work, one word.
     total, done
-        Frames in all, None where nobody knows, and those that were done before.
+        Frames in all, None if unknown, and those done before.
     """
     console = Console(stderr=True)
     columns = TextColumn(work), BarColumn(), TaskProgressColumn(), TimeElapsedColumn(), TimeRemainingColumn()

@@ -25,7 +25,7 @@ from stseg.report.figures import Figure, Instant, camera_figures, ground_figures
 from stseg.report.html import png_bytes
 from stseg.report.page import report_page
 
-_MOMENTS = 3  # shown where none are asked for
+_MOMENTS = 3  # frames shown by default
 
 
 def report(
@@ -47,10 +47,10 @@ def report(
 
     Example: stseg report night.h5 --video night.mp4 --camera-images --frames 0:500
 
-    The page answers how many people there were, where they dwell, what was dropped as a ghost and why, and where the
-    rig is blind; a slider moves the plan, slices of the occupancy and the tracks in space and time. The film shows
-    every view with its people as pillars, and the plan beside. No camera image is read or shown without
-    --camera-images: the views then show the ruled ground.
+    The page shows the number of people, where they dwell, rejected ghosts with reasons, and where the rig is blind; a
+    slider moves the plan, slices of the occupancy and the tracks in space and time. The film shows every view with its
+    people as pillars, and the plan beside. No camera image is read or shown without --camera-images: the views then
+    show the ruled ground.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def report(
 def _require_outputs(
     output: Path | None, pictures: Path | None, video: Path | None, frames: str | None, overwrite: bool
 ) -> None:
-    """Refuse what cannot be written, or would be of no effect, before any work is done."""
+    """Refuse outputs that cannot be written and options without effect, before any work."""
     if output is None and video is None:
         raise ConfigError("command line", "", "nothing to write", "-o REPORT.html, or --video FILM.mp4")
     if output is None and pictures is not None:
@@ -184,8 +184,8 @@ def _read_instants(run: Run, recording: Recording, frames: Sequence[int], camera
 
 def _read_views(recording: Recording, frames: Sequence[int]) -> dict[int, tuple[Observation, ...]]:
     """What the cameras delivered at these frames, which are in order."""
-    with open_frames(recording, frames[0], frames[-1] + 1) as moments:
-        return {moment.frame: moment.views for moment in moments if moment.frame in frames}
+    with open_frames(recording, frames[0], frames[-1] + 1) as frame_sets:
+        return {frame_set.frame: frame_set.views for frame_set in frame_sets if frame_set.frame in frames}
 
 
 def _named(recording: Recording, run: Run, instants: Sequence[Instant]) -> list[Figure]:

@@ -12,13 +12,13 @@ from stseg.engine.warnings import run_warnings
 from stseg.evaluation import evaluate
 from stseg.geometry import Camera, Grid
 from stseg.io.runfile.runs import Run
-from stseg.model.ghost_reasons import GhostReasons, ghost_reasons, says
+from stseg.model.ghost_reasons import GhostReasons, ghost_reasons
 from stseg.report.answers import answers
 from stseg.report.charts import Span, clock_time
 from stseg.report.embedded import embedded_json
 from stseg.report.figures import Figure, Instant, camera_figures, ground_figures, slice_figures
 from stseg.report.findings import ground_by_views
-from stseg.report.maps import Bins, Haunt, blind_map, density, dwell, haunts, heat_map
+from stseg.report.maps import Bins, DwellPlace, blind_map, density, dwell, dwell_places, heat_map
 from stseg.report.page import Contents, ViewSummary
 from stseg.report.sheets import thin_sheets
 
@@ -43,7 +43,7 @@ def page_contents(
     """
     rig, trajectory = run.recording.rig, run.trajectory
     span, ghosts, bins = _span(run), ghost_reasons(run.ghosts), Bins.of(rig.grid)
-    places, shares = haunts(trajectory, bins), ground_by_views(run.views, rig.grid.inside(), len(run.cameras))
+    places, shares = dwell_places(trajectory, bins), ground_by_views(run.views, rig.grid.inside(), len(run.cameras))
     shown = np.array([instant.frame for instant in instants], np.int64)
     sheets = thin_sheets(run.frames, rig.grid, run.read_frame, _SHEETS, shown)
     plan, thread = ground_figures(rig, run.views, trajectory, truth)
@@ -64,10 +64,10 @@ def page_contents(
         data=embedded_json(rig, run.views, trajectory, run.ghosts, sheets),
         plan=plan,
         thread=thread,
-        haunts=_haunt_figures(run, bins, places),
+        dwell_places=_haunt_figures(run, bins, places),
         ghost_map=_ghost_figure(run, bins, ghosts),
         blind_map=Figure("blind", blind_map(rig, run.views), "Red is seen by no view, orange by one alone."),
-        sights=_sights(run, ghosts),
+        view_summaries=_view_summaries(run, ghosts),
         stages=list(seconds_by_stage(run).items()),
         slices=[figure for instant in instants for figure in slice_figures(rig, instant)] if has_slices else [],
         cameras=[figure for instant in instants for figure in camera_figures(rig, trajectory, instant)],
@@ -105,7 +105,7 @@ def _scores(trajectory: Rows, truth: Rows | None) -> list[tuple[str, str]]:
     return facts if scores.location_mean is None else [*facts, ("mean error", f"{scores.location_mean:.3f} m")]
 
 
-def _haunt_figures(run: Run, bins: Bins, places: Sequence[Haunt]) -> list[Figure]:
+def _haunt_figures(run: Run, bins: Bins, places: Sequence[DwellPlace]) -> list[Figure]:
     rig, square = run.recording.rig, f"squares of {bins.side:g} m"
     people = density(bins, run.trajectory, len(run.frames))
     stays = dwell(bins, run.trajectory, run.frame_rate)
@@ -129,15 +129,15 @@ def _ghost_figure(run: Run, bins: Bins, ghosts: GhostReasons) -> Figure:
     return Figure("ghosts", picture, f"Ghosts removed, {bins.side:g} m squares.")
 
 
-def _sights(run: Run, ghosts: GhostReasons) -> list[ViewSummary]:
+def _view_summaries(run: Run, ghosts: GhostReasons) -> list[ViewSummary]:
     rig, parts = run.recording.rig, np.nan_to_num(run.ghosts["parts"][run.ghosts["status"] == 1])
-    sights = []
+    view_summaries = []
     for view, camera in enumerate(rig.cameras):
-        own = parts[:, view][says(parts[:, view])]
+        own = parts[:, view][has_evidence(parts[:, view])]
         nats = float(np.median(own)) if len(own) else float("nan")
         denied = int(ghosts.denies[:, view].sum())
-        sights.append(ViewSummary(camera.name, _ground_seen(camera, rig.grid), denied, nats))
-    return sights
+        view_summaries.append(ViewSummary(camera.name, _ground_seen(camera, rig.grid), denied, nats))
+    return view_summaries
 
 
 def _ground_seen(camera: Camera, grid: Grid) -> float:

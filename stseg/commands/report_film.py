@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.progress import track
 
 from stseg.arrays import Bytes, Ints
-from stseg.commands.run_frames import frames_of_run
+from stseg.commands.run_frames import select_frames
 from stseg.io.outputs.video_writer import write_film
 from stseg.io.recording.frames import open_frames
 from stseg.io.runfile.runs import Run
@@ -38,7 +38,7 @@ def film(run: Run, output: Path, part: str | None, camera_images: bool, overwrit
         Where the part is none of the run.
     OutputError, SourceError
     """
-    frames = frames_of_run(run, part)
+    frames = select_frames(run, part)
     shown = Film(run.recording.rig, run.views, run.trajectory)
     return write_film(output, _pictures(run, shown, frames, camera_images), run.frame_rate, overwrite)
 
@@ -50,10 +50,10 @@ def _pictures(run: Run, film: Film, frames: Ints, camera_images: bool) -> Iterat
         for frame in steps:
             yield film.picture(frame, tuple(repeat(None, len(run.cameras))))
         return
-    with open_frames(run.recording, int(frames[0]), int(frames[-1]) + 1) as moments:
+    with open_frames(run.recording, int(frames[0]), int(frames[-1]) + 1) as frame_sets:
         wanted = iter(steps)
         frame = next(wanted, None)
-        for moment in moments:
-            if moment.frame == frame:
-                yield film.picture(moment.frame, moment.views)
+        for frame_set in frame_sets:
+            if frame_set.frame == frame:
+                yield film.picture(frame_set.frame, frame_set.views)
                 frame = next(wanted, None)

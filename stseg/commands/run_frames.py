@@ -7,13 +7,13 @@ from stseg.errors import ConfigError
 from stseg.io.runfile.runs import Run
 
 
-def frames_of_run(run: Run, text: str | None) -> Ints:
-    """Numbers of the frames that are asked for, all of them where nothing is said, int64 (n,).
+def select_frames(run: Run, text: str | None) -> Ints:
+    """Frame numbers of a range A:B, all of the run's by default, int64 (n,).
 
     Raises
     ------
     ConfigError
-        Where the run has no frames, or the text is no part of them.
+        Where the run has no frames, or the range is not within them.
     """
     frames = run.frames
     if not len(frames):

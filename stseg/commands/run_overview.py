@@ -1,4 +1,4 @@
-"""The essentials of a run file, for `stseg inspect` and the report."""
+"""Summary of a run file, for `stseg inspect` and the report."""
 
 from __future__ import annotations
 
@@ -46,19 +46,19 @@ class Overview:
     ghosts_per_frame: float
     ghost_reasons: dict[str, int]
     ghosts_denied_by: dict[str, int]
-    """For each view, the ghosts at whose place it sees nobody; several may deny one."""
+    """For each view, the number of ghosts that it denies; several may deny one."""
     windows: int
     frames_per_window: float
     rates: dict[str, dict[str, float]]
-    """How each view errs by the end of the run: `miss`, `clutter`, `beside` of /rates, 0..1."""
+    """Error rates of each view at the end of the run: `miss`, `clutter`, `beside` of /rates, 0..1."""
     seconds_by_stage: dict[str, float]
     bytes_per_frame: float
     bytes: int
     warnings: list[str]
 
 
-def look_over(run: Run) -> Overview:
-    """Sum up a run."""
+def summarise_run(run: Run) -> Overview:
+    """Summarise a run."""
     count, size, grid = len(run.frames), run.path.stat().st_size, run.recording.rig.grid
     people = np.unique(run.trajectory["frame"], return_counts=True)[1]
     ghosts, reasons = run.ghosts["status"] == 0, ghost_reasons(run.ghosts)
@@ -140,7 +140,7 @@ def _counts(kinds: np.ndarray[tuple[int, ...], np.dtype[np.bytes_]]) -> dict[str
 def _warnings(run: Run, shares: list[float]) -> list[str]:
     if not len(run.frames):
         return ["there are no frames"]
-    warnings = [] if len(run.tracks) else ["nobody was found"]
+    warnings = [] if len(run.tracks) else ["no person was found"]
     if not run.views.any():
         warnings.append("no view sees any cell")
     elif shares[0] > _BLIND_SHARE:

@@ -19,13 +19,13 @@ _WIDTH = 1000  # pixels
 
 
 def write_slice(run: Run, text: str, output: Path, overwrite: bool) -> str:
-    """Write the picture and say what it shows.
+    """Write the picture of a slice; returns its description.
 
     Parameters
     ----------
     run
     text
-        Such as t=12.4,plane=0.9 or frame=62,plane=all.
+        For example t=12.4,plane=0.9 or frame=62,plane=all.
     output
         The PNG file.
     overwrite
@@ -34,7 +34,7 @@ def write_slice(run: Run, text: str, output: Path, overwrite: bool) -> str:
     Raises
     ------
     ConfigError
-        Where the text is none of that kind, or no frame or plane of the run is near.
+        Where the text is not of that form, or the run has no such frame or plane.
     OutputError
     """
     require_new(output, overwrite)

@@ -1,4 +1,4 @@
-"""`stseg simulate`: make a scene with truth."""
+"""`stseg simulate`: render a scene with ground truth."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def simulate(
     instances: Annotated[bool, Parameter(negative="")] = False,
     overwrite: Annotated[bool, Parameter(negative="")] = False,
 ) -> None:
-    """Film a simulated scene: videos of every camera, exact masks, a detector's boxes, rig files and truth.
+    """Render a simulated scene: videos of every camera, exact masks, a detector's boxes, rig files and truth.
 
     Example: stseg simulate crowd/ --scene dense --cameras 4 --seconds 10
 
@@ -46,11 +46,10 @@ def simulate(
     scene
         easy (5 people, 4 cameras), dense (14 people on 6 m x 6 m, 8 cameras), dense4 (the same crowd, 4 of those
         cameras), similar (4 people, 3 of them dressed alike, 3 cameras), demo (small images, 8 s), tiny (a second of
-        very small images), or small images of people who walk as they are told: crossing, meeting, meeting_heights
-        (the same, 8 cm apart in height), border (people cross, meet, come and go where windows do). The other options
-        change it.
+        very small images), or small images of scripted routes: crossing, meeting, meeting_heights (the same, 8 cm apart
+        in height), border (encounters, entries and exits where windows meet). The other options change it.
     people
-        How many the area holds.
+        Number of people in the area.
     cameras
         Number of cameras around the area.
     seconds
@@ -62,13 +61,13 @@ def simulate(
     noise
         Standard deviation of the sensors' noise, grey levels.
     shadows
-        How much light the people's shadows take from the ground, 0..1.
+        Darkening of the ground by the people's shadows, 0..1.
     light_drift
         Relative amplitude of slow changes of the light, 0..1.
     seed
-        Another one makes other people, other ways, other cameras.
+        Seed of people, paths and cameras.
     instances
-        Write images of who is where, too.
+        Write images of person ids, too.
     overwrite
         Write into a folder that is not empty.
     """

@@ -6,7 +6,7 @@ import numpy as np
 
 from stseg.arrays import Floats, Ints
 from stseg.calibration.knock_detection import find_knocks
-from stseg.calibration.run_check import knocked, views_aside
+from stseg.calibration.run_check import find_residual_step, views_off
 from stseg.engine.silent_views import view_warnings
 from stseg.io.runfile.runs import Run
 
@@ -25,13 +25,13 @@ def rig_warnings(run: Run) -> list[str]:
     cell = run.recording.rig.grid.cell
     if moved := _moved(run):
         return moved
-    if (knock := knocked(residual, cell)) is not None:
+    if (knock := find_residual_step(residual, cell)) is not None:
         name, before, after = run.cameras[knock.view], _beside(knock.before), _beside(knock.after)
         return [
             f"view {name} was moved about frame {frames[knock.frame]}: it sees people {after} where the views put "
             f"them, {before} it before"
         ]
-    if off := views_aside(residual, cell):
+    if off := views_off(residual, cell):
         first, *others = (f"{run.cameras[one.view]} sees people {_beside(one.metres)}" for one in off)
         also = "".join(f", {other} it" for other in others)
         return [f"view {first} where the views put them{also}; see stseg calibrate check"]

@@ -1,8 +1,7 @@
-"""Scores of ground tracks against truth (METHODS section 10).
+"""Scores of ground tracks against truth (docs/how-it-works.md, Evaluation).
 
-Five ideas, a file each: `sequence` lines truth and tracks up frame by frame and settles who is not to be judged,
-`matching` pairs people with tracks, and from the pairs come CLEAR (`clear`), IDF1 (`identity`) and HOTA (`hota`).
-`scores` asks them all.
+`sequence` aligns truth and tracks frame by frame and excludes ignored rows, `matching` assigns people to tracks, and
+from the matches come CLEAR (`clear`), IDF1 (`identity`) and HOTA (`hota`). `scores` collects them.
 """
 
 from stseg.evaluation.scores import Scores, evaluate

@@ -1,4 +1,4 @@
-"""Matches over time, and what CLEAR reads off them.
+"""Matches over time, and the CLEAR measures.
 
 Source: Bernardin and Stiefelhagen, "Evaluating multiple object tracking performance: the CLEAR MOT metrics", 2008;
 mostly tracked, mostly lost and fragments: Li, Huang and Nevatia, CVPR 2009.
@@ -16,13 +16,13 @@ from stseg.evaluation.sequence import Sequence
 
 
 @dataclass(frozen=True, slots=True)
-class Pairs:
+class Matches:
     """Matches of a sequence, by frame.
 
     Attributes
     ----------
     frame : int64 (k,)
-        Position in the sequence's list of frames, not the frame's number.
+        Index in the sequence's list of frames, not the frame's number.
     person, track : int64 (k,)
     distance : float64 (k,)
         Metres.
@@ -37,13 +37,13 @@ class Pairs:
         return len(self.frame)
 
 
-def match_afresh(sequence: Sequence, gate: float) -> Pairs:
-    """Matches of each frame by itself, as detections are judged (MODA, MODP)."""
+def match_per_frame(sequence: Sequence, gate: float) -> Matches:
+    """Match each frame independently, as detections are evaluated (MODA, MODP)."""
     return _gather(sequence, [match(frame.distance, gate) for frame in sequence.frames])
 
 
-def match_keeping(sequence: Sequence, gate: float) -> Pairs:
-    """CLEAR's matches: the pairs of the frame before stay while they are within the gate."""
+def match_with_continuity(sequence: Sequence, gate: float) -> Matches:
+    """CLEAR's matches: pairs of the previous frame continue while they are within the gate."""
     before = np.full(sequence.people, -1, np.int64)
     matches = []
     for frame in sequence.frames:
@@ -54,43 +54,43 @@ def match_keeping(sequence: Sequence, gate: float) -> Pairs:
     return _gather(sequence, matches)
 
 
-def switches(pairs: Pairs) -> int:
-    """How often a person is matched to another track than the last time, however long ago that was."""
+def switches(pairs: Matches) -> int:
+    """Number of identity switches: a person matched to another track than last time, however long ago."""
     order, same_person = _by_person(pairs)
     track = pairs.track[order]
     return int((same_person & (track[1:] != track[:-1])).sum())
 
 
-def fragments(pairs: Pairs) -> int:
-    """How often a person is matched again after frames without a match."""
+def fragments(pairs: Matches) -> int:
+    """Number of fragments: a person matched again after frames without a match."""
     order, same_person = _by_person(pairs)
     return int((same_person & (np.diff(pairs.frame[order]) > 1)).sum())
 
 
-def matched_share(pairs: Pairs, sequence: Sequence) -> Floats:
+def matched_share(pairs: Matches, sequence: Sequence) -> Floats:
     """Share of each person's frames with a match, float64 (people,)."""
     return np.bincount(pairs.person, minlength=sequence.people) / sequence.person_frames
 
 
-def false_tracks(pairs: Pairs, sequence: Sequence) -> Flags:
+def false_tracks(pairs: Matches, sequence: Sequence) -> Flags:
     """Tracks matched in at most half of their frames, bool (tracks,)."""
     return np.asarray(np.bincount(pairs.track, minlength=sequence.tracks) <= sequence.track_frames / 2)
 
 
-def _by_person(pairs: Pairs) -> tuple[Ints, Flags]:
+def _by_person(pairs: Matches) -> tuple[Ints, Flags]:
     """Order by person, then frame (k,), and whether neighbours in that order are one person (k - 1,)."""
     order = np.argsort(pairs.person, kind="stable")
     person = pairs.person[order]
     return order, person[1:] == person[:-1]
 
 
-def _gather(sequence: Sequence, matches: list[tuple[Ints, Ints]]) -> Pairs:
+def _gather(sequence: Sequence, matches: list[tuple[Ints, Ints]]) -> Matches:
     frame = np.repeat(np.arange(len(matches)), [len(rows) for rows, _ in matches])
     found = list(zip(sequence.frames, matches, strict=True))
     person = [frame.person[rows] for frame, (rows, _) in found]
     track = [frame.track[columns] for frame, (_, columns) in found]
     distance = [frame.distance[pair] for frame, pair in found]
     none = np.zeros(0, np.int64)
-    return Pairs(
+    return Matches(
         frame, np.concatenate([none, *person]), np.concatenate([none, *track]), np.concatenate([np.zeros(0), *distance])
     )

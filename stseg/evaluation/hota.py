@@ -1,4 +1,4 @@
-"""HOTA: detection and association in equal parts, over nineteen degrees of strictness.
+"""HOTA: detection and association in equal parts, averaged over nineteen similarity thresholds.
 
 Source: Luiten et al., "HOTA: a higher order metric for evaluating multi-object tracking", IJCV 129, 2021.
 """
@@ -13,7 +13,7 @@ from stseg.evaluation.matching import similarity
 from stseg.evaluation.sequence import Sequence
 
 ALPHAS = np.arange(0.05, 0.99, 0.05)
-"""The least similarity of a match, from lenient to strict."""
+"""Similarity thresholds of a match."""
 _ROUNDING = float(np.finfo(float).eps)
 
 
@@ -24,13 +24,13 @@ def hota(sequence: Sequence, radius: float) -> float:
     """
     if not (sequence.people and sequence.tracks):
         return 0.0
-    pair, alike = _matches(sequence, radius)
-    return float(np.mean([_hota_at(alpha, sequence, pair, alike) for alpha in ALPHAS]))
+    pair, similar = _matches(sequence, radius)
+    return float(np.mean([_hota_at(alpha, sequence, pair, similar) for alpha in ALPHAS]))
 
 
-def _hota_at(alpha: float, sequence: Sequence, pair: Ints, alike: Floats) -> float:
+def _hota_at(alpha: float, sequence: Sequence, pair: Ints, similar: Floats) -> float:
     """sqrt(DetA AssA) at one alpha, from the matches' pair number and similarity."""
-    pairs, together = np.unique(pair[alike >= alpha - _ROUNDING], return_counts=True)
+    pairs, together = np.unique(pair[similar >= alpha - _ROUNDING], return_counts=True)
     hits = together.sum()
     if not hits:
         return 0.0
@@ -41,18 +41,18 @@ def _hota_at(alpha: float, sequence: Sequence, pair: Ints, alike: Floats) -> flo
 
 
 def _matches(sequence: Sequence, radius: float) -> tuple[Ints, Floats]:
-    """Pair number and similarity of every match, where matches favour pairs that agree over the whole sequence."""
-    alike = [similarity(frame.distance, radius) for frame in sequence.frames]
-    places = [np.nonzero(one) for one in alike]
+    """Pair number and similarity of every match; the assignment favours pairs that agree over the whole sequence."""
+    similar = [similarity(frame.distance, radius) for frame in sequence.frames]
+    places = [np.nonzero(one) for one in similar]
     numbers = [
         frame.person[rows] * sequence.tracks + frame.track[columns]
         for frame, (rows, columns) in zip(sequence.frames, places, strict=True)
     ]
-    shares = [_shares(one)[place] for one, place in zip(alike, places, strict=True)]
+    shares = [_shares(one)[place] for one, place in zip(similar, places, strict=True)]
     aligned = np.split(_alignment(sequence, numbers, shares), np.cumsum([len(number) for number in numbers])[:-1])
 
     pairs, similarities = [], []
-    for one, place, number, alignment in zip(alike, places, numbers, aligned, strict=True):
+    for one, place, number, alignment in zip(similar, places, numbers, aligned, strict=True):
         score, pair = np.zeros(one.shape), np.zeros(one.shape, np.int64)
         score[place], pair[place] = alignment * one[place], number
         chosen = linear_sum_assignment(-score)
@@ -62,16 +62,16 @@ def _matches(sequence: Sequence, radius: float) -> tuple[Ints, Floats]:
 
 
 def _alignment(sequence: Sequence, numbers: list[Ints], shares: list[Floats]) -> Floats:
-    """How well person and track agree over the sequence (a Jaccard index, 0..1), for every entry of `numbers`."""
+    """Global alignment score of person and track (a Jaccard index, 0..1), for every entry of `numbers`."""
     pairs, index = np.unique(np.concatenate(numbers), return_inverse=True)
     agreed = np.bincount(index, np.concatenate(shares), minlength=len(pairs))
     return np.asarray((agreed / (_frames_of(pairs, sequence) - agreed))[index])
 
 
-def _shares(alike: Floats) -> Floats:
-    """Each similarity as a share of all that its person and its track have in the frame, float64 (n, m)."""
-    rivals = alike.sum(axis=0)[None] + alike.sum(axis=1)[:, None] - alike
-    return np.asarray(np.divide(alike, rivals, out=np.zeros_like(alike), where=rivals > _ROUNDING))
+def _shares(similar: Floats) -> Floats:
+    """Each similarity as a share of the sum over its person and its track in the frame, float64 (n, m)."""
+    rivals = similar.sum(axis=0)[None] + similar.sum(axis=1)[:, None] - similar
+    return np.asarray(np.divide(similar, rivals, out=np.zeros_like(similar), where=rivals > _ROUNDING))
 
 
 def _frames_of(pairs: Ints, sequence: Sequence) -> Ints:

@@ -1,4 +1,4 @@
-"""IDF1: how much of the truth is told by one track a person.
+"""IDF1: share of the truth that one track a person covers.
 
 Source: Ristani et al., "Performance measures and a data set for multi-target, multi-camera tracking", 2016.
 """
@@ -22,7 +22,7 @@ def idf1(sequence: Sequence, gate: float) -> float:
         return 0.0
     together = np.zeros((sequence.people, sequence.tracks), np.int64)
     for frame in sequence.frames:
-        # asked this way and not as distance <= gate, so that rounding at the gate itself falls as in TrackEval
+        # not as distance <= gate, so that rounding at the gate itself agrees with TrackEval
         rows, columns = np.nonzero(similarity(frame.distance, 2 * gate) >= 0.5)
         together[frame.person[rows], frame.track[columns]] += 1
     true = int(together[linear_sum_assignment(together, maximize=True)].sum())

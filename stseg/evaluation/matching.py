@@ -1,4 +1,4 @@
-"""Who is whom in one frame."""
+"""Assignment of people to tracks in one frame."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from scipy.optimize import linear_sum_assignment
 
 from stseg.arrays import Flags, Floats, Ints
 
-_PAIR = 1e3  # metres that a pair is worth: more than the distances of a whole frame
-_KEPT = 1e6  # metres that a kept pair is worth: more than all pairs of a frame
+_PAIR = 1e3  # reward of a pair, metres: more than the distances of a whole frame
+_KEPT = 1e6  # reward of a continued pair, metres: more than all pairs of a frame
 
 
 def distances(person_ground: Floats, track_ground: Floats) -> Floats:
     """Metres between every person (n, 2) and every track (m, 2), float64 (n, m)."""
-    apart = person_ground[:, None] - track_ground[None]
-    return np.hypot(apart[..., 0], apart[..., 1])
+    distance_of_frames = person_ground[:, None] - track_ground[None]
+    return np.hypot(distance_of_frames[..., 0], distance_of_frames[..., 1])
 
 
 def similarity(distance: Floats, radius: float) -> Floats:
@@ -23,9 +23,9 @@ def similarity(distance: Floats, radius: float) -> Floats:
 
 
 def match(distance: Floats, gate: float, kept: Flags | None = None) -> tuple[Ints, Ints]:
-    """Pair people with tracks.
+    """Assign people to tracks.
 
-    As many kept pairs as can be, then as many pairs as can be, then the least sum of distances.
+    Maximises the number of continued pairs, then the number of pairs, then minimises the sum of distances.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def match(distance: Floats, gate: float, kept: Flags | None = None) -> tuple[Int
     gate
         Metres; no pair is farther apart.
     kept : bool (n, m), optional
-        Pairs to be kept while they are within the gate. No row and no column holds two.
+        Pairs that continue while they are within the gate, at most one a row and column.
 
     Returns
     -------

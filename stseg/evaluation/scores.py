@@ -1,4 +1,4 @@
-"""Every score of one run."""
+"""All scores of one run."""
 
 from __future__ import annotations
 
@@ -10,33 +10,33 @@ import numpy as np
 from stseg.arrays import Floats, Ints, Rows
 from stseg.errors import ConfigError
 from stseg.evaluation.clear import (
-    Pairs,
+    Matches,
     false_tracks,
     fragments,
-    match_afresh,
-    match_keeping,
+    match_per_frame,
+    match_with_continuity,
     matched_share,
     switches,
 )
 from stseg.evaluation.hota import hota
 from stseg.evaluation.identity import idf1
-from stseg.evaluation.sequence import Area, Sequence, line_up
+from stseg.evaluation.sequence import Area, Sequence, align_frames
 
 
 @dataclass(frozen=True, slots=True)
 class Scores:
-    """How tracks compare with the truth; None where there is nothing to divide by.
+    """Scores of tracks against the truth; None where a ratio has no denominator.
 
     Attributes
     ----------
     gate, area, frames
-        What the figures were taken on: gate in metres, ground rectangle in metres, number of frames.
+        Settings of the evaluation: gate in metres, ground rectangle in metres, number of frames.
     truths, detections
-        Rows of the truth and of the tracks that were judged.
+        Number of evaluated rows of the truth and of the tracks.
     people, tracks
-        Ids in them.
+        Number of ids in them.
     hits, false_alarms, misses
-        Matches of each frame by itself, detections and truths without one.
+        Matches of each frame independently, detections and truths without one.
     moda, modp, precision, recall
         Percent, from those matches; MODP is the mean of 1 - distance / gate.
     location_mean, location_median
@@ -48,7 +48,7 @@ class Scores:
     idf1, hota, hota_2gate
         Percent. HOTA's similarity falls to 0 at the gate; hota_2gate's at twice the gate.
     switches, fragments
-        How often a person's track changes; how often a person is found again after a gap.
+        Number of changes of a person's track; number of times a person is matched again after a gap.
     mostly_tracked, mostly_lost
         People matched in more than 80 % and in less than 20 % of their frames.
     false_tracks, false_track_frames
@@ -84,7 +84,7 @@ class Scores:
     false_track_frames: float | None
 
     def as_dict(self) -> dict[str, object]:
-        """The figures under the names that papers use, percent to two decimals and metres to four."""
+        """The figures under their names in the literature, percent to two decimals and metres to four."""
         return {
             "frames": self.frames,
             "n_truth": self.truths,
@@ -134,10 +134,10 @@ def evaluate(
     gate
         Metres within which a track matches a person.
     area
-        Lower x, lower y, upper x, upper y, metres: people outside are not judged, nor the tracks matched to them, nor
+        Lower x, lower y, upper x, upper y, metres: people outside are ignored, as are the tracks matched to them and
         unmatched tracks outside.
     frames : int64, optional
-        The frames to judge; by default those of the truth. A frame in which nothing was found counts.
+        The frames to evaluate; by default those of the truth. A frame without detections counts.
     ignore_flagged
         Treat rows of the truth whose flag is not 0 as people outside the area.
 
@@ -152,12 +152,12 @@ def evaluate(
         raise ConfigError("evaluation", "gate", gate, "metres, above 0")
     if area is not None and not (area[0] < area[2] and area[1] < area[3]):
         raise ConfigError("evaluation", "area", area, "x0, y0, x1, y1 in metres with x0 below x1 and y0 below y1")
-    sequence = line_up(truth, trajectory, gate, area, frames, ignore_flagged)
-    return _score(sequence, match_afresh(sequence, gate), match_keeping(sequence, gate), gate, area)
+    sequence = align_frames(truth, trajectory, gate, area, frames, ignore_flagged)
+    return _score(sequence, match_per_frame(sequence, gate), match_with_continuity(sequence, gate), gate, area)
 
 
-def _score(sequence: Sequence, afresh: Pairs, kept: Pairs, gate: float, area: Area | None) -> Scores:
-    truths, detections, hits, swaps = sequence.truths, sequence.detections, len(afresh), switches(kept)
+def _score(sequence: Sequence, per_frame: Matches, kept: Matches, gate: float, area: Area | None) -> Scores:
+    truths, detections, hits, swaps = sequence.truths, sequence.detections, len(per_frame), switches(kept)
     share, false = matched_share(kept, sequence), false_tracks(kept, sequence)
     return Scores(
         gate=gate,
@@ -172,11 +172,11 @@ def _score(sequence: Sequence, afresh: Pairs, kept: Pairs, gate: float, area: Ar
         misses=truths - hits,
         # 1 - (misses + false alarms) / truths = (2 hits - detections) / truths
         moda=_percent(2 * hits - detections, truths),
-        modp=_percent(float((1 - afresh.distance / gate).sum()), hits),
+        modp=_percent(float((1 - per_frame.distance / gate).sum()), hits),
         precision=_percent(hits, detections),
         recall=_percent(hits, truths),
-        location_mean=_mean(afresh.distance),
-        location_median=float(np.median(afresh.distance)) if hits else None,
+        location_mean=_mean(per_frame.distance),
+        location_median=float(np.median(per_frame.distance)) if hits else None,
         mota=_percent(2 * len(kept) - detections - swaps, truths),
         motp=_mean(kept.distance),
         idf1=100 * idf1(sequence, gate),

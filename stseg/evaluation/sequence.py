@@ -1,4 +1,4 @@
-"""Truth and tracks side by side, frame by frame, without those who are not to be judged."""
+"""Truth and tracks aligned by frame, without ignored rows."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Area = tuple[float, float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """One judged frame.
+    """One evaluated frame.
 
     Attributes
     ----------
@@ -35,14 +35,14 @@ class Frame:
 
 @dataclass(frozen=True, slots=True)
 class Sequence:
-    """All judged frames, in order; a frame may be empty.
+    """All evaluated frames, in order; a frame may be empty.
 
     Attributes
     ----------
     frames
-        One entry for each frame of the list, found or not.
+        One entry for each frame of the list, with or without tracks.
     person_frames : int64 (people,)
-        In how many frames each person is judged; never 0.
+        Number of evaluated frames of each person, above 0.
     track_frames : int64 (tracks,)
         The same for tracks.
     """
@@ -72,7 +72,7 @@ class Sequence:
         return int(self.track_frames.sum())
 
 
-def line_up(
+def align_frames(
     truth: Rows,
     trajectory: Rows,
     gate: float,
@@ -80,11 +80,11 @@ def line_up(
     frames: Ints | None = None,
     ignore_flagged: bool = False,
 ) -> Sequence:
-    """Bring truth and tracks together and leave out who is not to be judged.
+    """Align truth and tracks by frame and remove ignored rows.
 
-    Nobody cares about people outside `area`, nor about flagged rows where `ignore_flagged` says so: they leave with the
-    track matched to them. Tracks outside leave too, unless they match a person inside. The frames are those of the
-    truth or of `frames`, never those of the tracks: a frame in which nothing was found counts.
+    People outside `area`, and flagged rows with `ignore_flagged`, are removed with the track matched to them. Tracks
+    outside are removed too, unless they match a person inside. The frames are those of the truth or of `frames`, never
+    those of the tracks: a frame without detections counts.
 
     Parameters
     ----------
@@ -104,30 +104,30 @@ def line_up(
     _check(trajectory, "tracks")
     numbers = np.unique(truth["frame"] if frames is None else frames)
     truth, trajectory = _rows_of(truth, numbers), _rows_of(trajectory, numbers)
-    cared, judged = _inside(truth, area), _inside(trajectory, area)
+    relevant, evaluated = _inside(truth, area), _inside(trajectory, area)
     if ignore_flagged and "flag" in (truth.dtype.names or ()):
-        cared &= truth["flag"] == 0
+        relevant &= truth["flag"] == 0
     person_ground, track_ground = _ground(truth), _ground(trajectory)
-    apart = []
+    distance_of_frames = []
     for people, tracks in zip(_runs(truth, numbers), _runs(trajectory, numbers), strict=True):
         distance = distances(person_ground[people], track_ground[tracks])
-        if not (cared[people].all() and judged[tracks].all()):
+        if not (relevant[people].all() and evaluated[tracks].all()):
             rows, columns = match(distance, gate)
-            judged[tracks][columns] = cared[people][rows]
-            distance = distance[np.ix_(cared[people], judged[tracks])]
-        apart.append(distance)
-    return _number(apart, truth["id"][cared], trajectory["id"][judged])
+            evaluated[tracks][columns] = relevant[people][rows]
+            distance = distance[np.ix_(relevant[people], evaluated[tracks])]
+        distance_of_frames.append(distance)
+    return _number(distance_of_frames, truth["id"][relevant], trajectory["id"][evaluated])
 
 
-def _number(apart: list[Floats], person_id: Ints, track_id: Ints) -> Sequence:
+def _number(distance_of_frames: list[Floats], person_id: Ints, track_id: Ints) -> Sequence:
     """Number people and tracks from 0 and cut the columns of ids into frames."""
     _, person, person_frames = np.unique(person_id, return_inverse=True, return_counts=True)
     _, track, track_frames = np.unique(track_id, return_inverse=True, return_counts=True)
-    sizes = np.array([distance.shape for distance in apart], np.int64).reshape(-1, 2)
+    sizes = np.array([distance.shape for distance in distance_of_frames], np.int64).reshape(-1, 2)
     bounds = np.vstack([[0, 0], sizes.cumsum(axis=0)]).tolist()
     frames = tuple(
         Frame(person[p0:p1], track[t0:t1], distance)
-        for distance, (p0, t0), (p1, t1) in zip(apart, bounds[:-1], bounds[1:], strict=True)
+        for distance, (p0, t0), (p1, t1) in zip(distance_of_frames, bounds[:-1], bounds[1:], strict=True)
     )
     return Sequence(frames, person_frames, track_frames)
 
@@ -145,13 +145,13 @@ def _check(rows: Rows, name: str) -> None:
 
 
 def _rows_of(rows: Rows, numbers: Ints) -> Rows:
-    """The rows of the listed frames by frame; within a frame they keep their order, which decides between ties."""
+    """Rows of the listed frames, sorted by frame; the order within a frame is kept, as it decides ties."""
     rows = rows[np.isin(rows["frame"], numbers)]
     return rows[np.argsort(rows["frame"], kind="stable")]
 
 
 def _runs(rows: Rows, numbers: Ints) -> list[slice]:
-    """Where each listed frame lies in the sorted rows."""
+    """Slice of each listed frame in the sorted rows."""
     starts = np.searchsorted(rows["frame"], numbers, side="left").tolist()
     stops = np.searchsorted(rows["frame"], numbers, side="right").tolist()
     return [slice(start, stop) for start, stop in zip(starts, stops, strict=True)]

@@ -1,4 +1,4 @@
-"""Why a candidate is a ghost: what weighed most against it."""
+"""Reasons of ghosts: the main evidence against each rejected candidate."""
 
 from __future__ import annotations
 
@@ -16,27 +16,27 @@ REASONS = (
     "what supports it belongs to people nearby",
     "no view denies it, but too little supports it",
 )
-"""The same in words."""
+"""The reasons as text."""
 
 _AGAINST = -1.0
-"""Evidence from which on something speaks against a candidate, nats."""
+"""Greatest evidence against a candidate, nats."""
 _PRICE = -3.0
 """Prior log-odds of one more person, where a run has no people to learn it from, nats."""
 _EXPRESSIVE = 0.25
-"""Least evidence of a view that says anything, nats; of people hidden from it a detector's view says almost nothing."""
+"""Least informative evidence of a view, nats; of occluded people a detector's view has almost none."""
 
 
 @dataclass(frozen=True)
 class GhostReasons:
-    """Why candidates are ghosts.
+    """Ghosts with their reasons.
 
     Attributes
     ----------
     ghosts : rows (n,) with frame, x, y, evidence, parts
     reason : int64 (n,)
-        What weighed most against it: `DENIED`, `OTHERS` or `TOO_LITTLE`.
+        Main reason: `DENIED`, `OTHERS` or `TOO_LITTLE`.
     denies : bool (n, view)
-        Views that see nobody there, whatever weighed most.
+        Views with evidence against it, whatever the main reason.
     """
 
     ghosts: Rows
@@ -49,10 +49,10 @@ class GhostReasons:
 
 
 def ghost_reasons(candidates: Rows) -> GhostReasons:
-    """The reason of every ghost: what weighed most against it.
+    """Find the main reason against every ghost.
 
-    A ghost's evidence is the sum over views, less the price of one more person, less what the people who are there
-    already lose to it. The price is the median, over the people of the run, of the sum over views less their evidence.
+    Its evidence is the sum over the views, minus the prior cost of one more person, minus the evidence that people
+    already detected lose to it. The prior cost is the median, over the run's people, of the sum minus the evidence.
 
     Parameters
     ----------
@@ -71,6 +71,6 @@ def ghost_reasons(candidates: Rows) -> GhostReasons:
     return GhostReasons(candidates[ghost], reason, denies)
 
 
-def says(parts: AnyArray) -> Flags:
+def has_evidence(parts: AnyArray) -> Flags:
     """Where a view's evidence speaks for or against a candidate, bool of the same shape."""
     return np.asarray(np.abs(parts) >= _EXPRESSIVE)

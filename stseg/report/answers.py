@@ -1,4 +1,4 @@
-"""What somebody asks who sees a run for the first time, answered in a sentence or two each (HTML)."""
+"""Summary of a run as questions and answers of a sentence or two (HTML)."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from stseg.arrays import Floats, Rows
 from stseg.model.ghost_reasons import REASONS, GhostReasons
 from stseg.report.charts import Span, clock_time
-from stseg.report.maps import Haunt
+from stseg.report.maps import DwellPlace
 
 
 def answers(
@@ -20,7 +20,7 @@ def answers(
     events: Rows,
     candidates: int,
     reasons: GhostReasons,
-    places: Sequence[Haunt],
+    places: Sequence[DwellPlace],
     shares: Floats,
 ) -> list[tuple[str, str]]:
     """Questions and their answers.
@@ -29,15 +29,15 @@ def answers(
     ----------
     span
     frames
-        How many the run has.
+        Number of frames of the run.
     trajectory, tracks, events
         TRAJECTORY, TRACK and EVENT rows.
     candidates
-        How many were weighed, people and ghosts.
+        Number of candidates, people and ghosts.
     reasons
-        Why the ghosts among them are ghosts.
+        Reasons against the ghosts.
     places
-        Where most time is spent.
+        Places where most time is spent.
     shares : float64 (views + 1,)
         Share of the ground that 0, 1, 2, ... views see.
     """
@@ -51,19 +51,19 @@ def answers(
 
 def _people(span: Span, frames: int, trajectory: Rows, tracks: Rows) -> str:
     if not len(trajectory):
-        return "Nobody was found."
+        return "No person was found."
     counts = np.unique(trajectory["frame"], return_counts=True)[1]
     lengths = (tracks["last"] - tracks["first"] + 1) / span.frame_rate
     return (
         f"<b>{counts.sum() / max(frames, 1):.1f}</b> at a time on average, at most <b>{counts.max()}</b>. "
-        f"There are <b>{len(tracks)}</b> tracks, half of them {clock_time(float(np.median(lengths)))} or longer; who "
-        "leaves and comes back is a new track."
+        f"There are <b>{len(tracks)}</b> tracks, half of them {clock_time(float(np.median(lengths)))} or longer; a "
+        "person who leaves and comes back is a new track."
     )
 
 
-def _dwelling(places: Sequence[Haunt], rows: int) -> str:
+def _dwelling(places: Sequence[DwellPlace], rows: int) -> str:
     if not rows:
-        return "Nobody was found."
+        return "No person was found."
     if not places:
         return "Nowhere in particular: their time is spread over the ground."
     named = [
@@ -78,7 +78,7 @@ def _ghosts(frames: int, candidates: int, reasons: GhostReasons, events: Rows) -
     count = len(reasons.ghosts)
     short = int((events["kind"] == b"dropped").sum())
     were = "was" if short == 1 else "were"
-    tracks = f" {_counted(short, 'track')} too short, or too often doubted, to be somebody {were} dropped as well."
+    tracks = f" {_counted(short, 'track')} too short or too uncertain {were} dropped as well."
     if not count:
         return "No candidate was dropped." + (tracks if short else "")
     ranked = sorted(zip(reasons.counts(), REASONS, strict=True), reverse=True)

@@ -26,7 +26,7 @@ def blank(width: int, height: int, colour: Colour) -> Bytes:
 
 def stroke(canvas: Bytes, points: AnyArray, colour: Colour, width: int = 1, opacity: float = 1.0) -> None:
     """An open polyline."""
-    for run in _runs(points):
+    for run in _unbroken(points):
         if opacity >= 1:
             cv2.polylines(canvas, [_fixed(run)], False, colour, width, cv2.LINE_AA, _SHIFT)
         else:
@@ -35,7 +35,7 @@ def stroke(canvas: Bytes, points: AnyArray, colour: Colour, width: int = 1, opac
 
 def dashes(canvas: Bytes, points: AnyArray, colour: Colour, width: int = 1, on: float = 7.0, off: float = 6.0) -> None:
     """An open polyline, interrupted: `on` pixels drawn, `off` pixels left out."""
-    for run in _runs(points):
+    for run in _unbroken(points):
         for piece in _dashed(run, on, off):
             cv2.polylines(canvas, [_fixed(piece)], False, colour, width, cv2.LINE_AA, _SHIFT)
 
@@ -105,11 +105,11 @@ def text(
     Parameters
     ----------
     place
-        Where its anchor stands, pixels.
+        Position of the anchor, pixels.
     size
         Height of capitals, pixels.
     anchor
-        The part of the text that stands there: (0, 0) is its left upper corner, (1, 1) the right lower one.
+        Reference point within the text: (0, 0) is its upper left corner, (1, 1) the lower right one.
     weight
         1 plain, 2 bold.
     """
@@ -144,8 +144,8 @@ def _fixed(points: AnyArray) -> NDArray[np.int32]:
     return np.asarray(np.rint(np.asarray(points, float) * 2**_SHIFT), np.int32)
 
 
-def _runs(points: AnyArray) -> Iterator[Floats]:
-    """The stretches of a line between its nans that have any length."""
+def _unbroken(points: AnyArray) -> Iterator[Floats]:
+    """Unbroken parts of a line between its nans, of two points or more."""
     points = np.asarray(points, float)
     known = np.isfinite(points).all(axis=1)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], known, [False]]).astype(np.int8)))

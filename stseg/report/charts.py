@@ -1,4 +1,4 @@
-"""Charts over time as inline SVG: how many people, and from when to when each track was there."""
+"""Charts over time as inline SVG: number of people, and lifetimes of tracks."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def people_chart(span: Span, trajectory: Rows, truth: Rows | None) -> str:
     return "\n".join([*lines, "</svg>"])
 
 
-def lives_chart(span: Span, tracks: Rows) -> str:
+def track_chart(span: Span, tracks: Rows) -> str:
     """A bar from each track's first frame to its last, packed into lanes; beyond the last lane they are left out."""
     lanes = _lanes(tracks, max(1, (span.stop - span.first) // 150))
     count = min(max(lanes, default=0) + 1, _MOST_LANES)

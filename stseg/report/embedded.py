@@ -1,4 +1,4 @@
-"""What the page's script is given: sheets, tracks and candidates of a run as JSON, thinned to stay small."""
+"""Data of the page's script as JSON: sheets, tracks and candidates of a run, thinned to stay small."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from stseg.report.colours import hex_colour, track_colour
 from stseg.report.sheets import Sheets
 
 _MOST_PLACES = 250_000  # of tracks
-_MOST_CANDIDATES = 120  # of a moment, those with most evidence
+_MOST_CANDIDATES = 120  # of a frame, those with most evidence
 
 
 def embedded_json(rig: Rig, views: Bytes, trajectory: Rows, candidates: Rows, sheets: Sheets) -> str:
@@ -29,7 +29,7 @@ def embedded_json(rig: Rig, views: Bytes, trajectory: Rows, candidates: Rows, sh
     trajectory : TRAJECTORY (n,)
     candidates : rows (n,) with frame, x, y, status, evidence, parts
     sheets
-        Its frames are the moments that the slider stops at.
+        Its frames are those of the slider.
     """
     grid = rig.grid
     coverage = views.max(axis=0)[::-1]
@@ -40,7 +40,7 @@ def embedded_json(rig: Rig, views: Bytes, trajectory: Rows, candidates: Rows, sh
         "polygon": None if grid.polygon is None else np.asarray(grid.polygon, float).tolist(),
         "heights": np.round(grid.heights, 3).tolist(),
         "cameras": [camera.name for camera in rig.cameras],
-        "stands": [_stand(camera) for camera in rig.cameras],
+        "stands": [_ground_position(camera) for camera in rig.cameras],
         "coverage": {"shape": coverage.shape, "views": _base64(np.ascontiguousarray(coverage))},
         "frames": sheets.frames.tolist(),
         "volume": {
@@ -56,21 +56,21 @@ def embedded_json(rig: Rig, views: Bytes, trajectory: Rows, candidates: Rows, sh
     return json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
 
 
-def thin_tracks(trajectory: Rows, moments: Ints, most: int = _MOST_PLACES) -> tuple[Rows, int]:
-    """Rows for the page, sorted by id and frame, and how many frames lie between two of a track at most.
+def thin_tracks(trajectory: Rows, slider_frames: Ints, most: int = _MOST_PLACES) -> tuple[Rows, int]:
+    """Thin rows for the page, sorted by id and frame, and the stride in frames.
 
-    Kept are the ends of every track, the moments, and every so-manieth frame.
+    The ends of every track, the slider's frames and every stride-th frame are kept.
     """
     table = trajectory[np.lexsort((trajectory["frame"], trajectory["id"]))]
     stride = max(1, -(-len(table) // most))
     first = np.concatenate([[True], table["id"][1:] != table["id"][:-1]])[: len(table)]
     last = np.roll(first, -1)
-    kept = first | last | (table["frame"] % stride == 0) | np.isin(table["frame"], moments)
+    kept = first | last | (table["frame"] % stride == 0) | np.isin(table["frame"], slider_frames)
     return table[kept], stride
 
 
-def _tracks(rig: Rig, trajectory: Rows, moments: Ints) -> dict[str, object]:
-    table, stride = thin_tracks(trajectory, moments)
+def _tracks(rig: Rig, trajectory: Rows, slider_frames: Ints) -> dict[str, object]:
+    table, stride = thin_tracks(trajectory, slider_frames)
     (x0, x1), (y0, y1) = rig.grid.x, rig.grid.y
     quantum = max(0.001, max(x1 - x0, y1 - y0) / 15000)  # metres; places a little outside the ground still fit 16 bits
     x, y = (np.clip(np.rint(table[name] / quantum), -32768, 32767) for name in ("x", "y"))
@@ -87,15 +87,15 @@ def _tracks(rig: Rig, trajectory: Rows, moments: Ints) -> dict[str, object]:
     }
 
 
-def _candidates(candidates: Rows, moments: Ints) -> list[list[list[object]]]:
-    """Of each moment, candidates by evidence: x, y, evidence, reason (-1 for a person) and what each view says."""
-    shown = candidates[np.isin(candidates["frame"], moments)]
+def _candidates(candidates: Rows, slider_frames: Ints) -> list[list[list[object]]]:
+    """Candidates of each slider frame by evidence: x, y, evidence, reason (-1 for a person) and evidence by view."""
+    shown = candidates[np.isin(candidates["frame"], slider_frames)]
     found = ghost_reasons(shown)
     reason = np.full(len(shown), -1)
     reason[shown["status"] == 0] = found.reason
     order = np.lexsort((-shown["evidence"], shown["frame"]))
     shown, reason = shown[order], reason[order]
-    bounds = np.searchsorted(shown["frame"], [*moments.tolist(), np.iinfo(np.int64).max])
+    bounds = np.searchsorted(shown["frame"], [*slider_frames.tolist(), np.iinfo(np.int64).max])
     listed = []
     for start, stop in zip(bounds[:-1].tolist(), bounds[1:].tolist(), strict=True):
         part = range(start, min(stop, start + _MOST_CANDIDATES))
@@ -103,10 +103,10 @@ def _candidates(candidates: Rows, moments: Ints) -> list[list[list[object]]]:
     return listed
 
 
-def _ghost_counts(candidates: Rows, moments: Ints) -> list[int]:
-    """Ghosts of each moment, those that `_candidates` leaves out among them."""
+def _ghost_counts(candidates: Rows, slider_frames: Ints) -> list[int]:
+    """Number of ghosts of each slider frame, including those that `_candidates` omits."""
     frames = np.sort(candidates["frame"][candidates["status"] == 0])
-    counts = np.searchsorted(frames, moments, "right") - np.searchsorted(frames, moments)
+    counts = np.searchsorted(frames, slider_frames, "right") - np.searchsorted(frames, slider_frames)
     return [int(count) for count in counts]
 
 
@@ -115,7 +115,7 @@ def _candidate(row: np.void, reason: int) -> list[object]:
     return [round(float(row["x"]), 2), round(float(row["y"]), 2), round(float(row["evidence"]), 1), reason, parts]
 
 
-def _stand(camera: Camera) -> Sequence[float]:
+def _ground_position(camera: Camera) -> Sequence[float]:
     return [round(float(metres), 2) for metres in camera.centre[:2]]
 
 

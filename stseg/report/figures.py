@@ -16,7 +16,7 @@ from stseg.report.slices import marginal_picture, volume_picture
 from stseg.report.spacetime import spacetime_picture
 
 TRAIL = 5.0
-"""Seconds that the way of somebody reaches back."""
+"""Length of a trail, seconds."""
 
 
 _PLAN = (900, 1000)
@@ -30,11 +30,11 @@ class Figure:
     Attributes
     ----------
     name
-        What its file is called, without the ending.
+        File name without the suffix.
     picture : uint8 (v, u, 3)
         Blue, green, red.
     caption
-        What it shows.
+        Caption.
     """
 
     name: str
@@ -44,7 +44,7 @@ class Figure:
 
 @dataclass(frozen=True)
 class Instant:
-    """What is shown of one frame.
+    """Contents of one frame's figures.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ class Instant:
     label : int32 (plane, y, x)
         Track ids, 0 is background.
     views
-        What each camera delivered, in the rig's order; None for no camera image.
+        Observation of each camera, in the rig's order; None for no camera image.
     """
 
     frame: int
@@ -110,7 +110,7 @@ def backdrop(view: Observation, size: tuple[int, int]) -> Bytes | None:
     Parameters
     ----------
     view
-        What the camera delivered.
+        Observation of the camera.
     size
         Width and height of its image, pixels.
 
@@ -130,6 +130,6 @@ def backdrop(view: Observation, size: tuple[int, int]) -> Bytes | None:
 
 
 def _file_names(cameras: Sequence[Camera]) -> list[str]:
-    """The cameras' names, with numbers where a file could not be called so."""
+    """File names of the cameras, numbered where they would coincide."""
     plain = [re.sub(r"[^\w.-]+", "_", camera.name) for camera in cameras]
     return [name if plain.count(name) == 1 else f"{name}_{k}" for k, name in enumerate(plain)]

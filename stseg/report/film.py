@@ -54,7 +54,7 @@ class Film:
         ----------
         frame
         views
-            What each camera delivered, in the rig's order; None shows the ruled ground instead.
+            Observation of each camera, in the rig's order; None shows the ruled ground instead.
 
         Returns
         -------
@@ -81,10 +81,10 @@ class Film:
         own = recent[recent["frame"] == frame]
         places = plan.pixel(np.stack([own["x"], own["y"]], -1))
         for row, place in zip(own, places, strict=True):
-            way = recent[recent["id"] == row["id"]]
-            opacity = 1 - 0.85 * (frame - way["frame"][:-1]) / max(self._trail, 1)
+            path = recent[recent["id"] == row["id"]]
+            opacity = 1 - 0.85 * (frame - path["frame"][:-1]) / max(self._trail, 1)
             colour = track_colour(int(row["id"]))
-            fading_stroke(canvas, plan.pixel(np.stack([way["x"], way["y"]], -1)), colour, 3, opacity)
+            fading_stroke(canvas, plan.pixel(np.stack([path["x"], path["y"]], -1)), colour, 3, opacity)
             disc(canvas, place, 8, PAPER)
             disc(canvas, place, 6.5, colour)
         words = [str(int(row["id"])) for row in own]

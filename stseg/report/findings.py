@@ -32,16 +32,16 @@ def people_per_minute(frames: Ints, trajectory: Rows, frame_rate: float) -> Floa
 
 
 def ground_by_views(views: Bytes, inside: Flags, cameras: int) -> Floats:
-    """Share of the ground that counts which 0, 1, 2, ... views see at some height, float64 (cameras + 1,).
+    """Share of the area of interest that 0, 1, 2, ... views see at some height, float64 (cameras + 1,).
 
     Parameters
     ----------
     views : uint8 (plane, y, x)
         Number of views that see each cell.
     inside : bool (y, x)
-        The cells that count.
+        Cells of the area of interest.
     cameras
-        How many there are.
+        Number of cameras.
     """
     seen = views.max(axis=0)[inside]
     return np.asarray(np.bincount(seen, minlength=cameras + 1) / max(len(seen), 1), float)

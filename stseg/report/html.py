@@ -15,11 +15,11 @@ from stseg.report.colours import hex_colour, track_colour
 from stseg.report.figures import Figure
 
 MOST_ROWS = 2000
-"""Of a table; the rest is left out and said to be."""
+"""Greatest number of rows of a table; a note tells of the others."""
 
 
 _PHOTOGRAPH = 400_000
-"""Bytes from which a picture in the page is taken for a photograph, and kept as one."""
+"""Size from which a picture in the page is stored as JPEG, bytes."""
 
 
 def png_bytes(picture: Bytes) -> bytes:

@@ -1,4 +1,4 @@
-"""Where labels go, so that they cover each other and the lines' ends as little as they can."""
+"""Label placement with little overlap between labels and line ends."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ _DIRECTIONS = np.array([(1, -1), (-1, -1), (1, 1), (-1, 1), (0, -1), (1, 0), (-1
 def place_labels(
     points: AnyArray, sizes: Sequence[tuple[int, int]], bounds: tuple[float, float, float, float], gap: float = 9.0
 ) -> Floats:
-    """Centres of labels beside their points, first come first served.
+    """Place labels beside their points greedily, in the given order.
 
     Parameters
     ----------
     points : float64 (n, 2)
-        What is labelled, pixels.
+        Labelled points, pixels.
     sizes
         Width and height of each label, pixels.
     bounds

@@ -1,4 +1,4 @@
-"""Maps of the ground: where people were, how long they stayed, where ghosts stood, and what the views see."""
+"""Maps of the ground: density of people, dwell time, ghosts, and coverage by the views."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from stseg.report.plan_map import PlanMap, rule, scale_bar, sheet
 
 _BINS = 40  # along the longer side of the ground, at most
 _SIDES = (0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)  # metres
-_NEAR = 0.75  # metres around a place that count as being there
+_NEAR = 0.75  # radius of a dwell place, metres
 _WARM = np.array([(252, 251, 250), (150, 206, 254), (60, 140, 240), (38, 54, 190), (48, 18, 96)], float)
 
 
@@ -66,9 +66,9 @@ def density(bins: Bins, rows: Rows, frames: int) -> Floats:
 
 
 def dwell(bins: Bins, trajectory: Rows, frame_rate: float) -> Floats:
-    """Mean time that somebody who comes to a bin stays before leaving it, seconds, float64 (y, x); 0 where nobody came.
+    """Mean duration of a stay in each bin, seconds, float64 (y, x); 0 without stays.
 
-    A stay is a stretch of one track's rows in one bin; one that returns begins another.
+    A stay is an unbroken sequence of one track's rows in one bin; a return begins another.
     """
     table = trajectory[np.lexsort((trajectory["frame"], trajectory["id"]))]
     index = bins.index(table)
@@ -79,22 +79,22 @@ def dwell(bins: Bins, trajectory: Rows, frame_rate: float) -> Floats:
 
 
 @dataclass(frozen=True)
-class Haunt:
-    """A place where people spend their time: metres, and the share of all time that is spent near."""
+class DwellPlace:
+    """A place of long stays: position in metres, and the share of all person-time spent near it."""
 
     x: float
     y: float
     share: float
 
 
-def haunts(trajectory: Rows, bins: Bins, most: int = 3) -> list[Haunt]:
-    """Places where most time is spent, `_NEAR` around them counted, those that stand out from an even spread.
+def dwell_places(trajectory: Rows, bins: Bins, most: int = 3) -> list[DwellPlace]:
+    """Places with more person-time within `_NEAR` than an even spread would give, the longest first.
 
-    Taken greedily: the place with most time around it, then the next among the time that is left.
+    Greedy: the place with most time, then the next in the remaining time.
     """
     left = np.stack([trajectory["x"], trajectory["y"]], -1)
     even = np.pi * _NEAR**2 / ((bins.x[1] - bins.x[0]) * (bins.y[1] - bins.y[0]))
-    found: list[Haunt] = []
+    found: list[DwellPlace] = []
     total = max(len(left), 1)
     while len(left) and len(found) < most:
         place = _busiest(left, bins)
@@ -103,7 +103,7 @@ def haunts(trajectory: Rows, bins: Bins, most: int = 3) -> list[Haunt]:
         if share < max(0.02, 1.5 * even):
             break
         x, y = left[near].mean(axis=0).tolist()
-        found.append(Haunt(x, y, share))
+        found.append(DwellPlace(x, y, share))
         left = left[~near]
     return found
 
@@ -124,15 +124,15 @@ def _busiest(places: Floats, bins: Bins) -> Floats:
     return np.array([middles[0][best[0]], middles[1][best[1]]])
 
 
-def heat_map(rig: Rig, bins: Bins, values: Floats, title: str, units: str, marks: Sequence[Haunt] = ()) -> Bytes:
-    """Values of bins from above, y up, on the plan's sheet: nothing is white, much is dark.
+def heat_map(rig: Rig, bins: Bins, values: Floats, title: str, units: str, marks: Sequence[DwellPlace] = ()) -> Bytes:
+    """Heat map of bins from above, y up: white for none, dark for much.
 
     Parameters
     ----------
     rig
     bins
     values : float64 (y, x)
-        Zero or more; colours end at their 99th percentile, so that one bin does not pale all others.
+        Zero or more; the colour scale ends at their 99th percentile.
     title, units
     marks
         Places that are lettered A, B, C.
@@ -155,7 +155,7 @@ def heat_map(rig: Rig, bins: Bins, values: Floats, title: str, units: str, marks
 
 
 def blind_map(rig: Rig, views: Bytes) -> Bytes:
-    """How many views see each ground cell at some height: none is red, one is orange, more are ever lighter."""
+    """Map of the number of views that see each ground cell at some height: none red, one orange, more lighter."""
     plan = PlanMap.fit(rig.grid, np.zeros((0, 2)), 900, 900)
     canvas = sheet(plan, "Views that see the ground")
     seen = views.max(axis=0)
@@ -208,7 +208,7 @@ def _frame(canvas: Bytes, plan: PlanMap, rig: Rig) -> None:
 
 
 def _ramp(canvas: Bytes, plan: PlanMap, limit: float, units: str) -> None:
-    """Below: which colour is how much."""
+    """Colour bar below the map."""
     length, tall, u, v = 260, 16, 76, plan.size[1] - 52
     canvas[v : v + tall, u : u + length] = warm_colours(np.linspace(0, limit, length), limit)[None]
     corners = np.array([[u, v], [u + length, v], [u + length, v + tall], [u, v + tall]])

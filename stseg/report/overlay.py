@@ -1,4 +1,4 @@
-"""What the tracks look like from a camera: pillars as tall as the people, their ids, and where they came from."""
+"""Overlay of tracks on a camera's image: pillars of the people's heights, ids and trails."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from stseg.report.canvas import blank, chip, chip_size, disc, fading_stroke, fil
 from stseg.report.colours import NIGHT, PAPER, Colour, mixed, track_colour
 from stseg.report.labels import place_labels
 
-_COMMON_HEIGHT = 1.70  # metres, of a person whose height nobody knows
+_COMMON_HEIGHT = 1.70  # metres, of a person of unknown height
 _FINE = 4  # sub-pixels a pixel of a pillar's outline
 _ROUND = np.linspace(0, 2 * np.pi, 33)[:-1]
 _LINE = mixed(NIGHT, PAPER, 0.22)
@@ -136,7 +136,7 @@ def _draw_pillar(canvas: Bytes, view: OverlayView, row: np.void) -> None:
 
 
 def _draw_trail(canvas: Bytes, view: OverlayView, rows: Rows, frame: int, trail: int) -> None:
-    """The way here on the ground, fading with age."""
+    """The trail on the ground, fading with age."""
     rows = rows[np.argsort(rows["frame"], kind="stable")]
     pixel = view.pixel(np.stack([rows["x"], rows["y"]], -1), 0.0)
     colour = track_colour(int(rows["id"][0]))

@@ -14,7 +14,7 @@ import numpy as np
 
 from stseg.arrays import Rows
 from stseg.model.ghost_reasons import REASONS, GhostReasons
-from stseg.report.charts import Span, lives_chart, people_chart
+from stseg.report.charts import Span, people_chart, track_chart
 from stseg.report.figures import Figure
 from stseg.report.html import MOST_ROWS, bars, chart, figure, figures, note, section, swatch, table, when
 from stseg.report.style import STYLE
@@ -22,17 +22,17 @@ from stseg.report.style import STYLE
 
 @dataclass(frozen=True)
 class ViewSummary:
-    """What one view has to say.
+    """Summary of one view.
 
     Attributes
     ----------
     name
     ground
-        Share of the ground that it sees, 0..1.
+        Share of the ground in its view, 0..1.
     denied
-        Ghosts at whose place it sees nobody.
+        Number of ghosts that it has evidence against.
     nats
-        Median of what it says of people whom it can see; nan where it sees none.
+        Median evidence for people in its view, nats; nan without people.
     """
 
     name: str
@@ -43,7 +43,7 @@ class ViewSummary:
 
 @dataclass(frozen=True)
 class Contents:
-    """What the page tells.
+    """Contents of the page.
 
     Attributes
     ----------
@@ -53,31 +53,31 @@ class Contents:
     answers
         Questions and answers (HTML), below.
     warnings
-        What looks wrong.
+        Warnings.
     span
         The frames of the run.
     trajectory : TRAJECTORY (n,)
     tracks : TRACK (m,)
     events : EVENT (k,)
     candidates
-        How many were weighed.
+        Number of candidates.
     ghosts
-        Those of them that are nobody.
+        Rejected candidates.
     truth : (t,) with frame, or None
     kept
-        What the run kept of the volume: all, tracks or none.
+        Kept part of the volume: all, tracks or none.
     data
         JSON for the script, see `embedded`.
-    plan, thread, haunts, ghost_map, blind_map
+    plan, thread, dwell_places, ghost_map, blind_map
         Figures; the thread is shown where no script runs.
-    sights
+    view_summaries
         A row for each view.
     stages
         Seconds by stage.
     slices, cameras
         Figures of these sections; a section without figures is left out.
     has_images
-        Whether the cameras' figures show camera images: the page says so.
+        Whether the cameras' figures show camera images, of which the page warns.
     """
 
     title: str
@@ -95,10 +95,10 @@ class Contents:
     data: str
     plan: Figure
     thread: Figure
-    haunts: Sequence[Figure]
+    dwell_places: Sequence[Figure]
     ghost_map: Figure
     blind_map: Figure
-    sights: Sequence[ViewSummary]
+    view_summaries: Sequence[ViewSummary]
     stages: Sequence[tuple[str, float]]
     slices: Sequence[Figure]
     cameras: Sequence[Figure]
@@ -107,7 +107,7 @@ class Contents:
     @property
     def still(self) -> list[Figure]:
         """The figures of the ground."""
-        return [self.plan, self.thread, *self.haunts, self.ghost_map, self.blind_map]
+        return [self.plan, self.thread, *self.dwell_places, self.ghost_map, self.blind_map]
 
 
 def report_page(contents: Contents) -> str:
@@ -136,12 +136,14 @@ def _sections(contents: Contents) -> list[str]:
     return [
         section("In short", _answers(contents.answers), *(note(escape(words), "warn") for words in contents.warnings)),
         section("On the ground, and in time", _pair(figure(contents.plan), _thread(contents.thread))),
-        section("Moment by moment", _MOMENT.format(grey=_GREY[contents.kept], views=_view_heads(contents.sights))),
+        section(
+            "Moment by moment", _MOMENT.format(grey=_GREY[contents.kept], views=_view_heads(contents.view_summaries))
+        ),
         section("People over time", chart(people_chart(span, contents.trajectory, contents.truth), counted)),
-        section("Where people are", figures(contents.haunts, "pair")),
+        section("Where people are", figures(contents.dwell_places, "pair")),
         section("Ghosts removed", _GHOSTS, _pair(figure(contents.ghost_map), _reasons(contents))),
-        section("Where the rig is blind", _pair(figure(contents.blind_map), _sights(contents.sights))),
-        section("Tracks", chart(lives_chart(span, tracks), "from first frame to last"), _track_table(span, tracks)),
+        section("Where the rig is blind", _pair(figure(contents.blind_map), _view_summaries(contents.view_summaries))),
+        section("Tracks", chart(track_chart(span, tracks), "from first frame to last"), _track_table(span, tracks)),
         section("Events", _event_summary(contents), _event_table(span, contents.events)),
         section("Occupancy", figures(contents.slices, "sheets")),
         section("Cameras", _privacy(contents), figures(contents.cameras, "pair")) if contents.cameras else "",
@@ -175,8 +177,8 @@ _PAGE = """<!doctype html>
 </html>
 """
 
-_MOMENT = """<p class="note">The slider at the foot of the page chooses the moment. Left: people with the way they came
-in the last 5 seconds; crosses are candidates that were dropped as ghosts. Red ground is seen by no view, orange by one.
+_MOMENT = """<p class="note">The slider at the foot of the page chooses the moment. Left: people with their paths of
+the last 5 seconds; crosses are candidates that were dropped as ghosts. Red ground is seen by no view, orange by one.
 Right: the evidence for a person in each cell, blue against, orange for; grey cells
 {grey}.</p>
 <div class="pair live"><figure><canvas id="plan"></canvas><figcaption>the plan</figcaption></figure>
@@ -184,7 +186,7 @@ Right: the evidence for a person in each cell, blue against, orange for; grey ce
 <option value="greatest">the greatest of all planes</option></select></figcaption></figure></div>
 <div class="scroll live"><table><thead><tr><th>candidate</th><th>x, y, m</th><th>evidence, nats</th>{views}
 <th>why it was dropped</th></tr></thead><tbody id="weighed"></tbody></table></div>
-<p class="note">Each view answers whether it sees somebody at the place: <b>yes</b>, <b>no</b>, or <b>?</b> where it is
+<p class="note">Each view answers whether it sees a person at the place: <b>yes</b>, <b>no</b>, or <b>?</b> where it is
 hidden from it or out of sight. Of very many candidates the 120
 with most evidence are listed. Evidence is in nats: +3 is 20 to 1 for, -3 is 20 to 1 against.</p>"""
 
@@ -195,15 +197,14 @@ _GREY = {
 }
 
 _GHOSTS = note(
-    "A ghost is a place where views seem to agree on somebody who is not there, such as where lines of sight to two "
-    "people cross. Every frame is explained by the people who make most of what all views show; what is left over "
-    "is dropped."
+    "A ghost is a place where views seem to agree on a person who is not there, such as where lines of sight to two "
+    "people cross. Every frame is explained by the most probable set of people; candidates outside it are dropped."
 )
 
 
 _SIGHTS = note(
-    "What a view says is the median over the people whom it can see. Where it is near 0 or below, others find people "
-    "whom this view does not confirm: look at its calibration, and whether it has moved."
+    "The evidence is the median over the people in the view. Where it is near 0 or below, the others find people that "
+    "this view does not confirm: look at its calibration, and whether it has moved."
 )
 
 
@@ -224,8 +225,8 @@ def _thread(fallback: Figure) -> str:
     )
 
 
-def _view_heads(sights: Sequence[ViewSummary]) -> str:
-    return "".join(f"<th>{escape(sight.name)}</th>" for sight in sights)
+def _view_heads(view_summaries: Sequence[ViewSummary]) -> str:
+    return "".join(f"<th>{escape(summary.name)}</th>" for summary in view_summaries)
 
 
 def _privacy(contents: Contents) -> str:
@@ -239,7 +240,7 @@ def _reasons(contents: Contents) -> str:
     counts, count = contents.ghosts.counts(), len(contents.ghosts.ghosts)
     ranked = [k for k in np.argsort(-np.array(counts), kind="stable").tolist() if counts[k]]
     reasons = [(REASONS[k], float(counts[k])) for k in ranked]
-    denied = [(f"{sight.name} sees nobody there", float(sight.denied)) for sight in contents.sights]
+    denied = [(f"{summary.name} sees nobody there", float(summary.denied)) for summary in contents.view_summaries]
     parts = [note(f"ghosts removed <b>{count}</b> of {contents.candidates} candidates")]
     if count:
         parts.append(bars(reasons, count, "{:,.0f}"))
@@ -252,16 +253,16 @@ def _stages(stages: Sequence[tuple[str, float]]) -> str:
     return bars(stages, sum(seconds for _, seconds in stages), "{:,.1f} s")
 
 
-def _sights(sights: Sequence[ViewSummary]) -> str:
+def _view_summaries(view_summaries: Sequence[ViewSummary]) -> str:
     rows = [
         (
-            escape(sight.name),
-            f"{100 * sight.ground:.0f} %",
-            "sees none" if np.isnan(sight.nats) else f"{sight.nats:+.1f}",
+            escape(summary.name),
+            f"{100 * summary.ground:.0f} %",
+            "sees none" if np.isnan(summary.nats) else f"{summary.nats:+.1f}",
         )
-        for sight in sights
+        for summary in view_summaries
     ]
-    names = ("view", "of the ground it sees", "says of people, nats")
+    names = ("view", "of the ground it sees", "evidence for people, nats")
     return f"<div>{table(names, rows, len(rows))}{_SIGHTS}</div>"
 
 
@@ -281,14 +282,14 @@ def _track_table(span: Span, tracks: Rows) -> str:
 
 
 def _event_summary(contents: Contents) -> str:
-    """How often each kind of event occurred; a merge and its split are one encounter."""
-    kinds, counts = np.unique(_told(contents.events)["kind"], return_counts=True)
+    """Counts of events by kind; a merge and its split are one encounter."""
+    kinds, counts = np.unique(_without_splits(contents.events)["kind"], return_counts=True)
     words = [f"{_kind(kind)} <b>{count}</b>" for kind, count in zip(kinds, counts.tolist(), strict=True)]
     return note(" &middot; ".join(words) or "none")
 
 
-def _told(events: Rows) -> Rows:
-    """Events without splits: the merge says how long an encounter was."""
+def _without_splits(events: Rows) -> Rows:
+    """Events without splits: the merge row holds the duration of an encounter."""
     return np.asarray(events[events["kind"] != b"split"])
 
 
@@ -297,7 +298,7 @@ def _kind(kind: bytes) -> str:
 
 
 def _event_table(span: Span, events: Rows) -> str:
-    events = _told(events)
+    events = _without_splits(events)
     if not len(events):
         return ""
     rows = [

@@ -1,4 +1,4 @@
-"""The plan view: the ground from above with what the cameras see, where they stand, and where people went."""
+"""The plan view: coverage, cameras and tracks from above."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def plan_view(
 
 
 def ground_sheet(plan: PlanMap, rig: Rig, coverage: Bytes | None, title: str) -> Bytes:
-    """The ground without anybody: what is seen of it (see `plan_view`), its rules, border and cameras."""
+    """The ground without tracks: coverage (see `plan_view`), grid lines, border and cameras."""
     canvas = sheet(plan, title)
     if coverage is not None:
         _shade(canvas, plan, rig.grid, coverage)
@@ -74,14 +74,14 @@ def ground_sheet(plan: PlanMap, rig: Rig, coverage: Bytes | None, title: str) ->
 
 
 def plan_map(rig: Rig, width: int = 1400, height: int = 1500) -> PlanMap:
-    """Where `plan_view` draws the ground."""
-    near = [_stand(camera, rig.grid) for camera in rig.cameras]
+    """The map from metres to pixels of `plan_view`."""
+    near = [_ground_position(camera, rig.grid) for camera in rig.cameras]
     places = [place for place in near if place is not None]
     return PlanMap.fit(rig.grid, np.array(places).reshape(-1, 2), width, height)
 
 
-def _stand(camera: Camera, grid: Grid) -> Floats | None:
-    """Where a camera stands on the ground, metres (x, y), None where that is far away."""
+def _ground_position(camera: Camera, grid: Grid) -> Floats | None:
+    """Ground position of a camera, metres (x, y), None where that is far away."""
     place = camera.centre[:2]
     reach = _NEAR * max(grid.x[1] - grid.x[0], grid.y[1] - grid.y[0])
     low, high = np.array([grid.x[0], grid.y[0]]), np.array([grid.x[1], grid.y[1]])
@@ -90,7 +90,7 @@ def _stand(camera: Camera, grid: Grid) -> Floats | None:
 
 
 def border(grid: Grid) -> Floats:
-    """Corners of the area that counts, metres, float64 (n, 2)."""
+    """Corners of the area of interest, metres, float64 (n, 2)."""
     if grid.polygon is not None:
         return np.asarray(grid.polygon, float)
     (x0, x1), (y0, y1) = grid.x, grid.y
@@ -129,11 +129,11 @@ def _draw_camera(canvas: Bytes, plan: PlanMap, camera: Camera) -> tuple[Colour, 
 
     Returns its colour and where the middle of its name may stand.
     """
-    stand = camera.centre[:2]
-    edge = np.clip(stand, [plan.x[0], plan.y[0]], [plan.x[1], plan.y[1]])
-    place, beyond = plan.pixel(edge), bool((edge != stand).any())
+    position = camera.centre[:2]
+    edge = np.clip(position, [plan.x[0], plan.y[0]], [plan.x[1], plan.y[1]])
+    place, beyond = plan.pixel(edge), bool((edge != position).any())
     tone = QUIET if beyond else INK
-    sides = _looks(camera)
+    sides = _view_directions(camera)
     if sides is not None:
         wedge = np.concatenate([place[None], place + 46 * sides])
         fill(canvas, wedge, tone, 0.16)
@@ -141,12 +141,12 @@ def _draw_camera(canvas: Bytes, plan: PlanMap, camera: Camera) -> tuple[Colour, 
     disc(canvas, place, 6, PAPER)
     disc(canvas, place, 4.5, tone)
     back = np.array([0.0, -1.0]) if sides is None else -sides[1]
-    (wide, tall), room = text_size(camera.name, 15), np.array(plan.size)
-    u, v = np.clip(place + back * (14 + wide / 2, 22), (wide / 2 + 4, tall), room - (wide / 2 + 4, tall)).tolist()
+    (wide, tall), space = text_size(camera.name, 15), np.array(plan.size)
+    u, v = np.clip(place + back * (14 + wide / 2, 22), (wide / 2 + 4, tall), space - (wide / 2 + 4, tall)).tolist()
     return tone, (u, v)
 
 
-def _looks(camera: Camera) -> Floats | None:
+def _view_directions(camera: Camera) -> Floats | None:
     """Directions on the canvas (v down) of the left, middle and right of the view; None where it looks down.
 
     float64 (3, 2), unit length.

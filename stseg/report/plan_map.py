@@ -1,4 +1,4 @@
-"""Where the plan view's metres lie on its canvas, and the ruled sheet that they lie on."""
+"""Map from metres to pixels of the plan view, and its ruled sheet."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from stseg.geometry import Grid
 from stseg.report.canvas import blank, outline, stroke, text, text_size
 from stseg.report.colours import INK, PAPER, QUIET, RULE, Colour
 
-_LEFT, _RIGHT, _TOP, _BOTTOM = 76, 44, 104, 132  # room around the ground for title, labels and legend, pixels
+_LEFT, _RIGHT, _TOP, _BOTTOM = 76, 44, 104, 132  # margins for title, labels and legend, pixels
 _NARROWEST = 900  # pixels, for the legend
 _STEPS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)
 
@@ -42,8 +42,8 @@ class PlanMap:
     def fit(cls, grid: Grid, places: AnyArray, width: int, height: int) -> PlanMap:
         """The largest map of the grid's rectangle, and of places (n, 2) beside it, on a canvas of at most that size."""
         x, y = _bounds(grid, places)
-        room = (width - _LEFT - _RIGHT, height - _TOP - _BOTTOM)
-        scale = min(room[0] / (x[1] - x[0]), room[1] / (y[1] - y[0]))
+        space = (width - _LEFT - _RIGHT, height - _TOP - _BOTTOM)
+        scale = min(space[0] / (x[1] - x[0]), space[1] / (y[1] - y[0]))
         wide, tall = scale * (x[1] - x[0]), scale * (y[1] - y[0])
         size = (max(round(wide) + _LEFT + _RIGHT, _NARROWEST), round(tall) + _TOP + _BOTTOM)
         spare = size[0] - _LEFT - _RIGHT - wide

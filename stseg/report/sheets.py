@@ -32,7 +32,7 @@ class Sheets:
     Attributes
     ----------
     frames : int64 (n,)
-        The frames that are shown.
+        Frames of the sheets.
     shape
         (plane, y, x) of a sheet; several cells of a large ground are one, the greatest.
     limit
@@ -60,7 +60,7 @@ def thin_sheets(frames: Ints, grid: Grid, read_frame: ReadFrame, budget: int, wa
     budget
         Bytes of all sheets together; where they are more, every second frame is left out until they are not.
     wanted : int64 (n,)
-        Frames that are shown beside those that are spread.
+        Frames to include beside the evenly spread ones.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""One frame of an occupancy volume: its planes side by side, and what stands highest over each ground cell."""
+"""Pictures of one frame's occupancy volume: all planes, one plane, and the maximum over the planes."""
 
 from __future__ import annotations
 
@@ -141,8 +141,8 @@ def _arrange(count: int, shape: tuple[int, ...], width: int) -> tuple[int, int, 
 
     columns = min(range(1, count + 1), key=waste)
     rows = -(-count // columns)
-    room = (width - 2 * _MARGIN - (columns - 1) * _GAP) / columns
-    return rows, columns, max(1, int(room / wide))
+    space = (width - 2 * _MARGIN - (columns - 1) * _GAP) / columns
+    return rows, columns, max(1, int(space / wide))
 
 
 def _panel_picture(panel: _Panel, scale: int, limit: float) -> Bytes:
@@ -179,13 +179,13 @@ def _commonest(label: Labels) -> Labels:
 
 
 def colour_limit(log_odds: AnyArray) -> float:
-    """Log-odds at which colours end where nobody says: the 99th percentile of their sizes, nats."""
+    """Default end of the colour scale: 99th percentile of the absolute log-odds, nats."""
     known = np.abs(np.asarray(log_odds, np.float32)[np.isfinite(log_odds)])
     return max(float(np.percentile(known, 99)), 1e-3) if known.size else 1.0
 
 
 def _colour_bar(canvas: Bytes, limit: float) -> None:
-    """Below: which colour is which log-odds."""
+    """Colour bar of the log-odds."""
     length, tall = 220, 14
     u, v = _MARGIN, canvas.shape[0] - _MARGIN - tall - 18
     ramp = np.linspace(-limit, limit, length)

@@ -1,4 +1,4 @@
-"""The space-time picture: the ground below, time upwards, every track a thread (KS09 section 5)."""
+"""The space-time picture: the ground below, time upwards, every track a thread (Khan and Shah 2009, section 5)."""
 
 from __future__ import annotations
 
@@ -94,8 +94,8 @@ class Block:
             ]
         )
         corners = np.array([[x, y, t] for x in grid.x for y in grid.y for t in (first, last)], float) @ matrix[:2].T
-        room = np.array(size, float) - 2 * _MARGIN
-        scale = float((room / np.ptp(corners, axis=0)).min())
+        space = np.array(size, float) - 2 * _MARGIN
+        scale = float((space / np.ptp(corners, axis=0)).min())
         middle = scale * (corners.min(axis=0) + corners.max(axis=0)) / 2
         origin = np.array([size[0] / 2, size[1] / 2 + 18]) - middle
         return cls(grid.x, grid.y, (first, last), scale * matrix, origin)
@@ -126,7 +126,7 @@ def _threads(trajectory: Rows) -> list[_Thread]:
     count = len(np.unique(trajectory["id"]))
     width = 3 if count <= 12 else 2 if count <= 60 else 1
     table = trajectory[np.lexsort((trajectory["frame"], trajectory["id"]))]
-    # A picture has no room for more points than that, however long the recording.
+    # A picture shows no more points than that, however long the recording.
     stride = max(1, len(table) // (_PIECE * _MOST_PIECES))
     threads = []
     for own in np.split(table, np.flatnonzero(np.diff(table["id"])) + 1):

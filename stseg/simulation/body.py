@@ -27,7 +27,7 @@ class Part:
     Attributes
     ----------
     name
-        Which part of the body.
+        Name of the body part.
     ends
         The two joints that it lies along.
     aside, ahead
@@ -60,7 +60,7 @@ PARTS = (
 
 @dataclass(frozen=True, slots=True)
 class Bodies:
-    """Ellipsoids of everyone: the points X with |form (X - centre)| <= 1.
+    """Ellipsoids of all bodies: the points X with |form (X - centre)| <= 1.
 
     Attributes
     ----------

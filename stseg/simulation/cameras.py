@@ -1,4 +1,4 @@
-"""Cameras in a ring around the area, and the ray of light that every pixel sees."""
+"""Cameras in a ring around the area, and the viewing ray of every pixel."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from stseg.arrays import Floats, Singles
 from stseg.geometry import Camera, Grid, Lens, Rig
-from stseg.simulation.random_streams import Topic, chance
+from stseg.simulation.random_streams import Topic, random_stream
 from stseg.simulation.scene import SceneSpec
 
 _AIM = 0.6
@@ -14,7 +14,7 @@ _AIM = 0.6
 
 
 def turns(spec: SceneSpec) -> list[float]:
-    """Where the cameras stand in the ring, as shares of a full turn.
+    """Positions of the cameras in the ring, as shares of a full turn.
 
     A camera is drawn by its share alone, so that 1 of 4 is the same camera as 2 of 8.
     """
@@ -30,7 +30,7 @@ def build_rig(spec: SceneSpec) -> Rig:
 
 
 def _camera(spec: SceneSpec, name: str, turn: float) -> Camera:
-    off = chance(spec.seed, Topic.CAMERA, _code(turn)).uniform(-1.0, 1.0, 6)
+    off = random_stream(spec.seed, Topic.CAMERA, _code(turn)).uniform(-1.0, 1.0, 6)
     angle = 2 * np.pi * (turn + 0.1) + 0.12 * off[0]
     distance, height = spec.camera_distance * (1 + 0.05 * off[1]), spec.camera_height * (1 + 0.06 * off[2])
     centre = np.array([distance * np.cos(angle), distance * np.sin(angle), height])
@@ -52,16 +52,16 @@ def _code(turn: float) -> int:
 
 def light_phase(spec: SceneSpec, turn: float) -> float:
     """Share of the light's period by which a camera is ahead: exposures are regulated one by one."""
-    return float(chance(spec.seed, Topic.LIGHT, _code(turn)).uniform())
+    return float(random_stream(spec.seed, Topic.LIGHT, _code(turn)).uniform())
 
 
 def frame_seed(turn: float, frame: int) -> tuple[int, int]:
-    """What tells a camera's frame from all others when lots are drawn; frames before the first are negative."""
+    """Seed words of a camera's frame, unique to it; frames before the first are negative."""
     return _code(turn), 2 * frame if frame >= 0 else -2 * frame - 1
 
 
 def pixel_rays(camera: Camera) -> Singles:
-    """Directions that the pixels see, metres along the ground's axes, scaled to depth 1.
+    """Viewing rays of the pixels in world coordinates, scaled to depth 1.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def pixel_rays(camera: Camera) -> Singles:
     Returns
     -------
     float32 (v, u, 3)
-        From the camera's centre outwards; zero where no light comes to the pixel, in corners beyond the lens's fold.
+        From the camera's centre outwards; zero in corners beyond the lens's fold.
     """
     width, height = camera.size
     pixel = np.stack(np.meshgrid(np.arange(width, dtype=float), np.arange(height, dtype=float)), -1)

@@ -1,7 +1,7 @@
-"""A crowd: people who walk to places, stand, meet, make way for each other, come and go.
+"""Crowd simulation by social forces: pedestrians walk to goals, stand, meet, avoid each other, enter and leave.
 
-Each is driven towards the next place and pushed away by who comes near (Helbing and Molnar, Social force model for
-pedestrian dynamics, Phys. Rev. E 51, 1995, eqs 2 to 4, 10), and nobody is ever closer than two bodies are wide.
+Each is driven towards a goal and repelled by neighbours (Helbing and Molnar, Social force model for pedestrian
+dynamics, Phys. Rev. E 51, 1995, eqs 2 to 4, 10); a hard constraint keeps bodies apart.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints, Rows
 from stseg.simulation.errands import Errand, Planner
-from stseg.simulation.random_streams import Topic, chance
+from stseg.simulation.random_streams import Topic, random_stream
 from stseg.simulation.scene import SceneSpec
 
 TRUTH = np.dtype([("frame", "<i8"), ("id", "<i8"), ("x", "<f8"), ("y", "<f8"), ("height", "<f8")])
@@ -24,28 +24,28 @@ _STEP = 0.05  # seconds, at most
 _WARM_UP = 5.0  # seconds before the first frame, to forget the start
 _REACTION = 0.4  # seconds to reach the preferred velocity
 _PUSH, _REACH, _WIDTH = 2.2, 0.25, 0.55  # m/s^2, m, m: force between two, how fast it falls, where it starts to
-_BEHIND = 0.3  # share of the force of those whom one does not see
-_SWERVE = 0.35  # share of it to the right, so that two who meet head on pass
+_BEHIND = 0.3  # share of the force of pedestrians behind
+_SWERVE = 0.35  # share of it to the right, so that two head on can pass
 _CLOSEST = 0.45  # metres between two bodies' axes
 _STRIDE, _STRIDE_RISE = 0.35, 0.41  # of the body's height, for two steps: at rest, and what full swing adds
 
 
 @dataclass(frozen=True, slots=True)
 class Crowd:
-    """Everyone in the scene at one time, also those just outside the area.
+    """All pedestrians of a frame, also those just outside the area.
 
     Attributes
     ----------
     frame
-        The frame.
+        Frame number.
     id : int64 (n,)
-        From 1; nobody comes back.
+        From 1; each id enters once.
     ground : float64 (n, 2)
         Body axes, metres.
     heading, phase : float64 (n,)
-        Where the chest points, and the place in the gait's cycle, radians.
+        Direction of the chest, and phase of the gait cycle, radians.
     swing : float64 (n,)
-        How far the limbs swing, 0 for one who stands, 1 at full pace.
+        Amplitude of the limbs, 0 at rest, 1 at full pace.
     height, build : float64 (n,)
         Metres, and relative width of the body.
     """
@@ -60,7 +60,7 @@ class Crowd:
     build: Floats
 
     def truth(self, area: tuple[float, float]) -> Rows:
-        """TRUTH rows of those inside the area, sorted by id."""
+        """TRUTH rows of the pedestrians inside the area, sorted by id."""
         inside = (np.abs(self.ground) <= np.array(area) / 2).all(axis=1)
         rows = np.zeros(int(inside.sum()), TRUTH)
         rows["frame"], rows["id"], rows["height"] = self.frame, self.id[inside], self.height[inside]
@@ -70,7 +70,7 @@ class Crowd:
 
 @dataclass(slots=True)
 class Pedestrian:
-    """One person on the way."""
+    """State of one pedestrian."""
 
     id: int
     ground: Floats
@@ -84,27 +84,28 @@ class Pedestrian:
     swing: float = 0.0
 
 
-def walk(spec: SceneSpec) -> Iterator[Crowd]:
-    """The crowd at every frame of a scene, one after the other."""
-    planner = Planner(spec.area, spec.stay, chance(spec.seed, Topic.CROWD))
-    walkers: list[Pedestrian] = []
+def walk_freely(spec: SceneSpec) -> Iterator[Crowd]:
+    """Simulate the crowd of a scene, frame by frame."""
+    planner = Planner(spec.area, spec.stay, random_stream(spec.seed, Topic.CROWD))
+    pedestrians: list[Pedestrian] = []
     steps = int(np.ceil(1 / spec.frame_rate / _STEP))
     step = 1 / spec.frame_rate / steps
-    met = 0
+    spawned = 0
     for frame in range(-int(np.ceil(_WARM_UP * spec.frame_rate)), spec.frames):
         for _ in range(steps):
-            while sum(walker.errand.counts(walker.ground) for walker in walkers) < spec.people:
-                met += 1
-                walkers.append(_newcomer(spec, planner, met, np.array([w.ground for w in walkers]).reshape(-1, 2)))
-            planner.revise([(walker.ground, walker.errand) for walker in walkers], step)
-            _advance(walkers, np.array(spec.area) / 2, step)
-            walkers = [walker for walker in walkers if not walker.errand.is_over(walker.ground)]
+            while sum(pedestrian.errand.counts(pedestrian.ground) for pedestrian in pedestrians) < spec.people:
+                spawned += 1
+                others = np.array([pedestrian.ground for pedestrian in pedestrians]).reshape(-1, 2)
+                pedestrians.append(_new_pedestrian(spec, planner, spawned, others))
+            planner.revise([(pedestrian.ground, pedestrian.errand) for pedestrian in pedestrians], step)
+            _advance(pedestrians, np.array(spec.area) / 2, step)
+            pedestrians = [pedestrian for pedestrian in pedestrians if not pedestrian.errand.is_over(pedestrian.ground)]
         if frame >= 0:
-            yield _crowd(frame, walkers)
+            yield _crowd(frame, pedestrians)
 
 
-def _newcomer(spec: SceneSpec, planner: Planner, number: int, others: Floats) -> Pedestrian:
-    own = chance(spec.seed, Topic.PERSON, number)
+def _new_pedestrian(spec: SceneSpec, planner: Planner, number: int, others: Floats) -> Pedestrian:
+    own = random_stream(spec.seed, Topic.PERSON, number)
     crowded_start = number <= spec.people
     ground = planner.place_inside(others) if crowded_start else planner.door(others)
     return Pedestrian(
@@ -120,33 +121,33 @@ def _newcomer(spec: SceneSpec, planner: Planner, number: int, others: Floats) ->
     )
 
 
-def _advance(walkers: list[Pedestrian], half: Floats, step: float) -> None:
-    """Move everyone by one step of time; `half` is half the area's sides."""
-    if not walkers:
+def _advance(pedestrians: list[Pedestrian], half: Floats, step: float) -> None:
+    """Advance all pedestrians by one time step; `half` is half the area's sides."""
+    if not pedestrians:
         return
-    ground = np.stack([walker.ground for walker in walkers])
-    velocity = np.stack([walker.velocity for walker in walkers])
-    wish = np.stack([_wish(walker) for walker in walkers])
-    velocity = velocity + step * ((wish - velocity) / _REACTION + _repulsion(ground, velocity))
+    ground = np.stack([pedestrian.ground for pedestrian in pedestrians])
+    velocity = np.stack([pedestrian.velocity for pedestrian in pedestrians])
+    desired = np.stack([_desired_velocity(pedestrian) for pedestrian in pedestrians])
+    velocity = velocity + step * ((desired - velocity) / _REACTION + _repulsion(ground, velocity))
     speed = np.linalg.norm(velocity, axis=1)
-    most = np.array([1.2 * walker.pace if not walker.errand.waits else 0.35 for walker in walkers])
+    most = np.array([1.2 * pedestrian.pace if not pedestrian.errand.waits else 0.35 for pedestrian in pedestrians])
     velocity *= np.minimum(1.0, most / np.maximum(speed, 1e-9))[:, None]
-    stays = np.array([walker.errand.stays_inside for walker in walkers])
-    moved = _apart(ground + step * velocity, stays, half - 0.05)
-    for walker, place, way in zip(walkers, moved, (moved - ground) / step, strict=True):
-        _turn_and_stride(walker, way, step)
-        walker.ground, walker.velocity = place, way
+    stays = np.array([pedestrian.errand.stays_inside for pedestrian in pedestrians])
+    moved = _separated(ground + step * velocity, stays, half - 0.05)
+    for pedestrian, place, walked in zip(pedestrians, moved, (moved - ground) / step, strict=True):
+        _update_gait(pedestrian, walked, step)
+        pedestrian.ground, pedestrian.velocity = place, walked
 
 
-def _wish(walker: Pedestrian) -> Floats:
-    way = walker.errand.goal - walker.ground
-    distance = float(np.hypot(*way))
-    # Within half a metre of the goal people slow down.
-    return np.asarray(way / max(distance, 1e-9) * walker.pace * min(1.0, distance / 0.5))
+def _desired_velocity(pedestrian: Pedestrian) -> Floats:
+    displacement = pedestrian.errand.goal - pedestrian.ground
+    distance = float(np.hypot(*displacement))
+    # Pedestrians slow down within half a metre of the goal.
+    return np.asarray(displacement / max(distance, 1e-9) * pedestrian.pace * min(1.0, distance / 0.5))
 
 
 def _repulsion(ground: Floats, velocity: Floats) -> Floats:
-    """Accelerations by which people push each other away, float64 (n, 2)."""
+    """Repulsive accelerations between pedestrians, float64 (n, 2)."""
     away = ground[:, None] - ground[None]
     distance = np.linalg.norm(away, axis=2)
     away /= np.maximum(distance, 1e-9)[..., None]
@@ -159,8 +160,8 @@ def _repulsion(ground: Floats, velocity: Floats) -> Floats:
     return np.asarray((strength[..., None] * (away + _SWERVE * right)).sum(axis=1))
 
 
-def _apart(ground: Floats, stays: Flags, half: Floats) -> Floats:
-    """Places moved as little as keeps bodies apart and those who stay inside the area."""
+def _separated(ground: Floats, stays: Flags, half: Floats) -> Floats:
+    """Positions after the constraints: bodies apart, and pedestrians that stay inside the area."""
     ground = ground.copy()
     first, second = np.triu_indices(len(ground), 1)
     for _ in range(8):
@@ -177,15 +178,16 @@ def _apart(ground: Floats, stays: Flags, half: Floats) -> Floats:
     return ground
 
 
-def _turn_and_stride(walker: Pedestrian, way: Floats, step: float) -> None:
-    """Follow the way with chest and legs; one who waits faces what the errand says."""
-    speed = float(np.hypot(*way))
-    facing = walker.errand.facing(walker.ground) if speed < 0.25 else float(np.arctan2(way[1], way[0]))
+def _update_gait(pedestrian: Pedestrian, velocity: Floats, step: float) -> None:
+    """Update heading, limb amplitude and gait phase from a velocity."""
+    speed = float(np.hypot(*velocity))
+    moves = float(np.arctan2(velocity[1], velocity[0]))
+    facing = pedestrian.errand.facing(pedestrian.ground) if speed < 0.25 else moves
     if facing is not None:
-        turn = (facing - walker.heading + np.pi) % (2 * np.pi) - np.pi
-        walker.heading += turn * min(1.0, step / 0.25)
-    walker.swing += (min(1.0, speed) - walker.swing) * min(1.0, step / 0.3)
-    walker.phase += 2 * np.pi * speed * step / stride(walker.height, walker.swing)
+        turn = (facing - pedestrian.heading + np.pi) % (2 * np.pi) - np.pi
+        pedestrian.heading += turn * min(1.0, step / 0.25)
+    pedestrian.swing += (min(1.0, speed) - pedestrian.swing) * min(1.0, step / 0.3)
+    pedestrian.phase += 2 * np.pi * speed * step / stride(pedestrian.height, pedestrian.swing)
 
 
 @overload
@@ -193,15 +195,15 @@ def stride(height: float, swing: float) -> float: ...
 @overload
 def stride(height: Floats, swing: Floats) -> Floats: ...
 def stride(height: float | Floats, swing: float | Floats) -> float | Floats:
-    """Length of two steps, metres, of people so tall whose limbs swing so far."""
+    """Length of two steps, metres, for a body height and a limb amplitude."""
     return height * (_STRIDE + _STRIDE_RISE * swing)
 
 
-def _crowd(frame: int, walkers: list[Pedestrian]) -> Crowd:
+def _crowd(frame: int, pedestrians: list[Pedestrian]) -> Crowd:
     def column(name: str) -> Floats:
-        return np.array([getattr(walker, name) for walker in walkers], float)
+        return np.array([getattr(pedestrian, name) for pedestrian in pedestrians], float)
 
-    ground = np.array([walker.ground for walker in walkers]).reshape(-1, 2)
-    ids = np.array([walker.id for walker in walkers], np.int64)
+    ground = np.array([pedestrian.ground for pedestrian in pedestrians]).reshape(-1, 2)
+    ids = np.array([pedestrian.id for pedestrian in pedestrians], np.int64)
     names = ("heading", "phase", "swing", "height", "build")
     return Crowd(frame, ids, ground, *(column(name) for name in names))

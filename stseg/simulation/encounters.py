@@ -1,4 +1,4 @@
-"""Routes of people who come close: they cross, meet and part, come and go."""
+"""Scripted routes with encounters: pedestrians cross, meet and part, enter and leave."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ CROSSING = (
     # At right angles, 0.42 m from axis to axis, at 3.3 s.
     Route(1.78, ((0.0, -2.8, 1.4), (6.0, 2.8, 1.4))),
     Route(1.66, ((0.75, 0.6, 3.5), (4.0, 0.6, 0.467), (7.0, 3.3, 0.2))),
-    # One who stands is passed by another, 0.45 m away, at 9 s, and by a third from the other side at 11 s.
+    # A standing person is passed at 0.45 m by another at 9 s, and by a third from the other side at 11 s.
     Route(1.70, ((6.0, -0.2, 3.3), (8.0, 0.0, 1.0), (12.0, 0.0, 1.0), (14.0, 0.2, 3.3))),
     Route(1.74, ((6.5, -2.8, 0.55), (11.5, 2.8, 0.55))),
     Route(1.69, ((8.5, 2.8, 1.45), (13.5, -2.8, 1.45))),
 )
-"""People cross at less than half a metre; 14 seconds."""
+"""Pedestrians cross at less than half a metre; 14 seconds."""
 
 
 def meeting(heights: tuple[float, float]) -> tuple[Route, ...]:
-    """Two walk side by side, 0.5 m apart, stand still together for ten seconds from 3.3 s on, and part: 16 seconds."""
+    """Two pedestrians walk 0.5 m apart, stand together for ten seconds from 3.3 s on, and part: 16 seconds."""
     one, other = heights
     return (
         Route(one, ((0.0, -2.8, 0.25), (3.0, -0.2, 0.25), (13.6, -0.2, 0.25), (16.0, 1.8, 2.2))),
@@ -58,4 +58,4 @@ BORDER = (
     # Enters at 8.85 s, where the second left.
     Route(1.71, ((8.1, -3.3, 1.3), (8.85, -2.5, 1.3), (11.3, 0.3, 1.9), (14.0, 1.9, 1.9))),
 )
-"""What happens, happens where windows of ten frames end (frames 8 k + 1) or overlap (8 k, 8 k + 1); 14 seconds."""
+"""Encounters, entries and exits at the ends (frames 8 k + 1) and overlaps of windows of ten frames; 14 seconds."""

@@ -1,4 +1,4 @@
-"""Where people want to go: from place to place, to stand a while, to meet somebody, and out."""
+"""Goals of simulated pedestrians: walk to a place, stand there, meet another person, leave."""
 
 from __future__ import annotations
 
@@ -9,29 +9,29 @@ import numpy as np
 from stseg.arrays import Floats
 
 MARGIN = 0.9
-"""How far outside the area people appear and disappear, metres."""
+"""Distance outside the area at which pedestrians appear and disappear, metres."""
 _BORDER = 0.45  # metres that goals keep from the area's border
-_PATIENCE = 7.0  # seconds after which a place that could not be reached is given up
-_STAND, _MEET = 0.25, 0.15  # chances of standing a while, and of a meeting, on arrival
-_MEETING = 0.7  # metres between two who meet
+_PATIENCE = 7.0  # seconds after which an unreached goal is replaced
+_STAND, _MEET = 0.25, 0.15  # probabilities of standing, and of a meeting, on arrival
+_MEETING = 0.7  # metres between two people in a meeting
 
 
 @dataclass(slots=True)
 class Errand:
-    """What one person is up to.
+    """Goal and schedule of one pedestrian.
 
     Attributes
     ----------
     goal : float64 (2,)
-        Where to, metres.
+        Goal position, metres.
     stay
-        Seconds until the person wants to leave.
+        Seconds until the pedestrian leaves.
     enters, leaves
-        On the way in, or out.
+        Whether the pedestrian is entering or leaving.
     pause
         Seconds to stand at the goal.
     waits
-        Whether the person stands there now.
+        Whether the pedestrian is standing at the goal.
     spent
         Seconds since the goal was set.
     partner : float64 (2,) or None
@@ -69,11 +69,11 @@ class Errand:
         return self.leaves and bool((np.abs(ground) > self.half + MARGIN - 0.05).any())
 
     def facing(self, ground: Floats) -> float | None:
-        """Direction that one who waits looks to, radians; None to look on."""
+        """Direction a waiting pedestrian faces, radians; None for no change."""
         if self.partner is None:
             return None
-        way = self.partner - ground
-        return float(np.arctan2(way[1], way[0]))
+        displacement = self.partner - ground
+        return float(np.arctan2(displacement[1], displacement[0]))
 
     def send(self, goal: Floats, pause: float = 0.0, partner: Floats | None = None) -> None:
         """Set the next goal."""
@@ -82,7 +82,7 @@ class Errand:
 
 
 class Planner:
-    """Gives people their errands.
+    """Assigns errands to pedestrians.
 
     Parameters
     ----------
@@ -90,36 +90,36 @@ class Planner:
         Its sides, metres.
     stay
         Mean time that a person stays, seconds.
-    lots
-        Where chance comes from.
+    rng
+        Source of randomness.
     """
 
-    def __init__(self, area: tuple[float, float], stay: float, lots: np.random.Generator) -> None:
-        self._half, self._stay, self._lots = np.array(area) / 2, stay, lots
+    def __init__(self, area: tuple[float, float], stay: float, rng: np.random.Generator) -> None:
+        self._half, self._stay, self._rng = np.array(area) / 2, stay, rng
 
     def errand(self, enters: bool) -> Errand:
-        """The first errand of somebody who is there from the start or enters."""
-        return Errand(self._goal(), self._stay * self._lots.uniform(0.4, 1.6), self._half, enters)
+        """First errand of a pedestrian, inside from the start or entering."""
+        return Errand(self._goal(), self._stay * self._rng.uniform(0.4, 1.6), self._half, enters)
 
     def place_inside(self, others: Floats) -> Floats:
-        """A place in the area where one does not stand on others' feet."""
-        return self._roomiest(np.stack([self._goal() for _ in range(12)]), others)
+        """A free position inside the area."""
+        return self._farthest(np.stack([self._goal() for _ in range(12)]), others)
 
     def door(self, others: Floats) -> Floats:
-        """A place outside the area where nobody is."""
-        return self._roomiest(np.stack([self._way_out() for _ in range(6)]), others)
+        """A free position outside the area."""
+        return self._farthest(np.stack([self._exit() for _ in range(6)]), others)
 
     def revise(self, people: list[tuple[Floats, Errand]], step: float) -> None:
-        """Let `step` seconds pass, and give new errands to those who have done theirs."""
+        """Advance all errands by `step` seconds and replace those that are done."""
         for ground, errand in people:
             errand.stay -= step
             errand.spent += step
             errand.enters = errand.enters and bool((np.abs(ground) > self._half - 0.2).any())
             near = float(np.hypot(*(errand.goal - ground))) < 0.3
             if errand.leaves:
-                # Who has been pushed past the way out gives no more than a few seconds to it.
+                # A pedestrian pushed past its exit gets another one after a few seconds.
                 if errand.spent > _PATIENCE:
-                    errand.send(self._way_out())
+                    errand.send(self._exit())
             elif errand.waits or (near and errand.pause > 0):
                 errand.waits = True
                 errand.pause -= step
@@ -131,30 +131,30 @@ class Planner:
     def _next(self, errand: Errand, people: list[tuple[Floats, Errand]]) -> None:
         if errand.stay < 0 and not errand.enters:
             errand.leaves = True
-            errand.send(self._way_out())
+            errand.send(self._exit())
             return
-        lot = self._lots.uniform()
+        draw = self._rng.uniform()
         free = [other for _, other in people if other.is_free and other is not errand]
-        if lot < _MEET and free and not errand.enters:
-            self._meet(errand, free[int(self._lots.integers(len(free)))])
-        elif lot < _MEET + _STAND:
-            errand.send(self._goal(), self._lots.uniform(1.5, 5.0))
+        if draw < _MEET and free and not errand.enters:
+            self._meet(errand, free[int(self._rng.integers(len(free)))])
+        elif draw < _MEET + _STAND:
+            errand.send(self._goal(), self._rng.uniform(1.5, 5.0))
         else:
             errand.send(self._goal())
 
     def _meet(self, one: Errand, other: Errand) -> None:
-        place, angle = self._goal(), self._lots.uniform(0, np.pi)
+        place, angle = self._goal(), self._rng.uniform(0, np.pi)
         apart = _MEETING / 2 * np.array([np.cos(angle), np.sin(angle)])
-        pause = self._lots.uniform(2.5, 6.0)
+        pause = self._rng.uniform(2.5, 6.0)
         one.send(place + apart, pause, place - apart)
         other.send(place - apart, pause, place + apart)
 
     def _goal(self) -> Floats:
-        return self._lots.uniform(-1.0, 1.0, 2) * (self._half - _BORDER)
+        return self._rng.uniform(-1.0, 1.0, 2) * (self._half - _BORDER)
 
-    def _way_out(self) -> Floats:
-        """Somewhere beyond the middle of one of the sides: corners are where cameras stand."""
-        side, along = int(self._lots.integers(4)), self._lots.uniform(-0.6, 0.6)
+    def _exit(self) -> Floats:
+        """A position beyond the middle of a side; cameras stand at the corners."""
+        side, along = int(self._rng.integers(4)), self._rng.uniform(-0.6, 0.6)
         axis, sign = side % 2, 1 - 2 * (side // 2)
         place = np.empty(2)
         place[axis] = sign * (self._half[axis] + MARGIN)
@@ -162,8 +162,8 @@ class Planner:
         return place
 
     @staticmethod
-    def _roomiest(places: Floats, others: Floats) -> Floats:
+    def _farthest(places: Floats, others: Floats) -> Floats:
         if not len(others):
             return np.asarray(places[0])
-        room = np.linalg.norm(places[:, None] - others[None], axis=2).min(axis=1)
-        return np.asarray(places[int(np.argmax(room))])
+        clearance = np.linalg.norm(places[:, None] - others[None], axis=2).min(axis=1)
+        return np.asarray(places[int(np.argmax(clearance))])

@@ -1,4 +1,4 @@
-"""A scene filmed: frames of all cameras one after the other, with the truth of each."""
+"""Render a scene: frame sets of all cameras in order, with their truth."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from stseg.arrays import Bytes, Rows
 from stseg.geometry import Rig
 from stseg.simulation.body import pose
 from stseg.simulation.cameras import build_rig, turns
-from stseg.simulation.crowd import walk
+from stseg.simulation.crowd import walk_freely
 from stseg.simulation.render import RenderedView, Viewer
 from stseg.simulation.scene import SceneSpec
-from stseg.simulation.script import follow
+from stseg.simulation.script import walk_routes
 
 EMPTY_FRAMES = 40
 """Length of the films of the empty room; they end just before the first frame."""
@@ -27,7 +27,7 @@ class SimulatedFrame:
     frame
         From 0.
     truth : TRUTH (n,)
-        Who is in the area and where, see `stseg.simulation.crowd`.
+        People inside the area, see `stseg.simulation.crowd`.
     views
         One a camera, in the rig's order.
     """
@@ -38,7 +38,7 @@ class SimulatedFrame:
 
 
 class Film:
-    """A scene and its cameras; nothing of it is kept, so that it may be long.
+    """A scene and its cameras; frames are rendered on demand, so that it may be long.
 
     Parameters
     ----------
@@ -71,9 +71,9 @@ class Film:
         for frame in range(-EMPTY_FRAMES, 0):
             yield tuple(viewer.empty(frame) for viewer in self.viewers)
 
-    def moments(self) -> Iterator[SimulatedFrame]:
-        """The frames from the first to the last."""
-        for crowd in (follow if self.spec.routes else walk)(self.spec):
+    def frame_sets(self) -> Iterator[SimulatedFrame]:
+        """All frames in order, with every camera's view and the truth."""
+        for crowd in (walk_routes if self.spec.routes else walk_freely)(self.spec):
             bodies = pose(crowd)
             views = tuple(viewer.view(crowd, bodies) for viewer in self.viewers)
             yield SimulatedFrame(crowd.frame, crowd.truth(self.spec.area), views)

@@ -1,4 +1,4 @@
-"""Light that changes at once: a lamp that is switched, a cloud, a camera that sets its exposure anew."""
+"""Sudden changes of illumination: a switched lamp, a cloud, automatic exposure."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from stseg.errors import ConfigError
 
 @dataclass(frozen=True, slots=True)
 class Lamp:
-    """A change of the light from some time on.
+    """A change of the illumination.
 
     Attributes
     ----------
     brightness
-        What it adds beside itself, in units of the room's own light; negative where light goes away.
+        Added light at its place, relative to the room's own; negative to remove light.
     on, off
-        When it comes and goes, seconds from the first frame.
+        Start and end, seconds from the first frame.
     rise
-        How long coming and going take, seconds; 0 for a switch.
+        Duration of start and end, seconds; 0 for a switch.
     place
         x, y, z in metres.
     reach
-        Where half of its light is left, metres; infinite for what changes the whole view alike: a cloud, an exposure.
+        Distance of half its light, metres; infinite for a uniform change: a cloud, an exposure.
 
     Raises
     ------
@@ -53,7 +53,7 @@ class Lamp:
             raise ConfigError("lamp", "reach", self.reach, "metres, above 0")
 
     def power(self, seconds: float) -> float:
-        """The share of it that shines at a time, 0..1."""
+        """Share of its light at a time, 0..1."""
         return self._risen(seconds - self.on) - self._risen(seconds - self.off)
 
     def _risen(self, since: float) -> float:

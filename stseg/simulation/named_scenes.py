@@ -1,6 +1,6 @@
-"""Scenes with names.
+"""Named scenes.
 
-Their difficulty and their seeds were fixed before anything was tuned on them; change neither, make a new one.
+Their difficulty and seeds were fixed before anything was tuned on them: add a scene rather than change one.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _DENSE = SceneSpec(
 )
 
 
-def _told(name: str, seconds: float, routes: tuple[Route, ...], seed: int) -> SceneSpec:
+def _scripted(name: str, seconds: float, routes: tuple[Route, ...], seed: int) -> SceneSpec:
     return SceneSpec(
         name=name,
         people=len(routes),
@@ -87,9 +87,9 @@ NAMED: dict[str, SceneSpec] = {
             stay=10000.0,
             seed=605,
         ),
-        _told("crossing", 14.0, CROSSING, 91),
-        _told("meeting", 16.0, meeting((1.72, 1.72)), 92),
-        _told("meeting_heights", 16.0, meeting((1.68, 1.76)), 92),
-        _told("border", 14.0, BORDER, 93),
+        _scripted("crossing", 14.0, CROSSING, 91),
+        _scripted("meeting", 16.0, meeting((1.72, 1.72)), 92),
+        _scripted("meeting_heights", 16.0, meeting((1.68, 1.76)), 92),
+        _scripted("border", 14.0, BORDER, 93),
     )
 }

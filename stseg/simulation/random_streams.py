@@ -1,4 +1,4 @@
-"""Lots that are drawn alike wherever and whenever they are asked for."""
+"""Independent random streams by topic, equal wherever and whenever they are drawn from."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 
 class Topic(IntEnum):
-    """What a lot decides; each has its own stream."""
+    """Topic of a random stream."""
 
     CAMERA = 1
     LIGHT = 2
@@ -20,6 +20,6 @@ class Topic(IntEnum):
     DETECTOR = 8
 
 
-def chance(seed: int, topic: Topic, *which: int) -> np.random.Generator:
-    """The generator for one thing: a camera, a person, a camera's frame."""
+def random_stream(seed: int, topic: Topic, *which: int) -> np.random.Generator:
+    """Generator of one topic and item: a camera, a person, a camera's frame."""
     return np.random.default_rng([seed, int(topic), *which])

@@ -1,4 +1,4 @@
-"""Bodies by casting rays: every pixel's ray against the ellipsoids whose boxes hold the pixel."""
+"""Ray casting of bodies: each pixel's ray is intersected with the ellipsoids whose boxes contain the pixel."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from stseg.arrays import Bytes, Flags, Floats, Ints, Singles
 from stseg.geometry import Camera
 
 AMBIENT = 0.55
-"""Share of the light that comes from everywhere; the rest comes from the lamp."""
-_ROOM = 2.0  # pixels around boxes, and
+"""Share of ambient light; the rest comes from the lamp."""
+_MARGIN = 2.0  # pixels around boxes, and
 _BULGE = 0.05  # of their size: a lens bends the boxes' straight sides outwards
 
 
 def pixel_boxes(camera: Camera, corners: Floats) -> Ints:
-    """Boxes in the image around sets of points.
+    """Bounding boxes in the image of sets of points.
 
     Parameters
     ----------
@@ -35,10 +35,10 @@ def pixel_boxes(camera: Camera, corners: Floats) -> Ints:
     whole: Flags = ~np.all(ahead, axis=-1, keepdims=True)
     pixel = np.where(whole[..., None], 0.0, pixel)
     low, high = pixel.min(axis=-2), pixel.max(axis=-2)
-    room = _ROOM + _BULGE * (high - low)
+    margin = _MARGIN + _BULGE * (high - low)
     most = np.array(camera.size) - 1
-    first = np.where(whole, 0, np.clip(np.floor(low - room), 0, most + 1))
-    last = np.where(whole, most, np.clip(np.ceil(high + room), -1, most))
+    first = np.where(whole, 0, np.clip(np.floor(low - margin), 0, most + 1))
+    last = np.where(whole, most, np.clip(np.ceil(high + margin), -1, most))
     return np.stack([first[..., 0], last[..., 0], first[..., 1], last[..., 1]], -1).astype(np.int64)
 
 
@@ -57,7 +57,7 @@ def draw_bodies(
     instances: NDArray[np.uint16],
     silhouettes: Ints,
 ) -> None:
-    """Paint bodies into an image, the nearest in front.
+    """Draw bodies into an image with a depth buffer.
 
     Parameters
     ----------
@@ -74,13 +74,13 @@ def draw_bodies(
     lamp : float64 (3,)
         Unit vector towards the light.
     ids : uint16 (n,)
-        What the bodies are called in `instances`.
+        Ids of the bodies in `instances`.
     depth : float32 (v, u)
         Depth of what is in the image already, metres; changed in place, as are image and instances.
     image : uint8 (v, u, 3)
         Blue, green, red.
     instances : uint16 (v, u)
-        Whom each pixel shows, 0 for nobody.
+        Id of the person that each pixel shows, 0 for background.
     silhouettes : int64 (n, 5)
         Filled with first and last column, first and last row, and number of the pixels that each body would cover if
         it stood there alone.
@@ -110,7 +110,7 @@ def draw_bodies(
 
 @kernel
 def _nearest(ray: Singles, boxes: Ints, origin: Floats, form: Floats, u: int, v: int) -> tuple[int, float]:
-    """The part that a ray meets first and where, -1 for none; `origin` is the eye in each part's own frame."""
+    """Nearest part on a ray and its distance, -1 for none; `origin` is the eye in each part's own frame."""
     part, nearest = -1, np.inf
     x, y, z = float(ray[0]), float(ray[1]), float(ray[2])
     for k in range(len(origin)):
@@ -123,7 +123,7 @@ def _nearest(ray: Singles, boxes: Ints, origin: Floats, form: Floats, u: int, v:
         a = dx * dx + dy * dy + dz * dz
         h = o[0] * dx + o[1] * dy + o[2] * dz
         under = h * h - a * (o[0] * o[0] + o[1] * o[1] + o[2] * o[2] - 1.0)
-        # A ray of a pixel that sees nothing is zero, and so is `under`.
+        # A zero ray (no light) gives a zero `under`.
         if under > 0.0:
             distance = (-h - np.sqrt(under)) / a
             if 0.0 < distance < nearest:
@@ -135,7 +135,7 @@ def _nearest(ray: Singles, boxes: Ints, origin: Floats, form: Floats, u: int, v:
 def _paint(
     ray: Singles, distance: float, origin: Floats, form: Floats, paint: Floats, lamp: Floats, colour: Bytes
 ) -> None:
-    """The colour of a part where a ray meets it: its pattern in the light of the lamp (Lambert's law)."""
+    """Colour of a part at a ray's intersection: its pattern, shaded by Lambert's law."""
     place = np.empty(3)
     for i in range(3):
         place[i] = origin[i] + distance * (form[i, 0] * ray[0] + form[i, 1] * ray[1] + form[i, 2] * ray[2])

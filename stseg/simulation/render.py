@@ -1,4 +1,4 @@
-"""One camera's frames of a scene: the room, shadows on its floor, the people, and what the sensor makes of it."""
+"""Render one camera's frames of a scene: room, shadows, people and sensor."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from stseg.arrays import Boxes, Bytes, Floats, Ints, Singles
 from stseg.geometry import Camera
 from stseg.simulation.body import Bodies
 from stseg.simulation.cameras import frame_seed, light_phase, pixel_rays
-from stseg.simulation.clothes import worn
+from stseg.simulation.clothes import clothing
 from stseg.simulation.crowd import Crowd
 from stseg.simulation.detector import detect, visible_boxes
 from stseg.simulation.illumination import lit
-from stseg.simulation.random_streams import Topic, chance
+from stseg.simulation.random_streams import Topic, random_stream
 from stseg.simulation.ray_casting import draw_bodies, pixel_boxes
-from stseg.simulation.room import look
+from stseg.simulation.room import render_room
 from stseg.simulation.scene import SceneSpec
 from stseg.simulation.sensor import expose
 from stseg.simulation.shadows import PENUMBRA, darken
@@ -28,16 +28,16 @@ LAMP = np.array([0.5, -0.35, 1.0]) / np.linalg.norm([0.5, -0.35, 1.0])
 
 @dataclass(frozen=True, slots=True)
 class RenderedView:
-    """One camera's frame and what is known of it.
+    """One camera's rendered frame with its ground truth.
 
     Attributes
     ----------
     image : uint8 (v, u, 3)
         Blue, green, red.
     instances : uint16 (v, u)
-        The id of the person whom each pixel shows, 0 for nobody; also people just outside the area.
+        Id of the person that each pixel shows, 0 for background; also people just outside the area.
     boxes
-        What a detector would find.
+        Boxes of the simulated detector.
     """
 
     image: Bytes
@@ -47,7 +47,7 @@ class RenderedView:
 
 @dataclass(frozen=True, slots=True)
 class Drawing:
-    """The people before the sensor sees them.
+    """The rendered scene before the sensor model.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ class Drawing:
     silhouettes : int64 (n, 5)
         See `stseg.simulation.ray_casting.draw_bodies`.
     depth : float32 (v, u)
-        Of what is seen, in lengths of the pixels' rays, metres.
+        Depth in lengths of the pixels' rays, metres.
     """
 
     light: Bytes
@@ -84,7 +84,7 @@ class Viewer:
         self.camera = camera
         self._spec, self._turn, self._phase = spec, turn, light_phase(spec, turn)
         self._rays, self._eye = pixel_rays(camera), camera.centre
-        self.room = look(spec, self._rays, self._eye)
+        self.room = render_room(spec, self._rays, self._eye)
 
     def empty(self, frame: int) -> Bytes:
         """The camera's frame of the empty room, uint8 (v, u, 3)."""
@@ -97,8 +97,8 @@ class Viewer:
         row_of = np.zeros(int(crowd.id.max(initial=0)) + 1, np.int64)
         row_of[crowd.id] = np.arange(len(crowd.id))
         visible_boxes(drawing.instances, row_of, visible)
-        lots = chance(self._spec.seed, Topic.DETECTOR, *frame_seed(self._turn, crowd.frame))
-        boxes = detect(self.camera, visible, drawing.silhouettes, np.array(self._spec.area) / 2, lots)
+        rng = random_stream(self._spec.seed, Topic.DETECTOR, *frame_seed(self._turn, crowd.frame))
+        boxes = detect(self.camera, visible, drawing.silhouettes, np.array(self._spec.area) / 2, rng)
         image = self._expose(drawing.light, drawing.depth, crowd.frame)
         return RenderedView(image, drawing.instances, boxes)
 
@@ -108,7 +108,7 @@ class Viewer:
         depth = self.room.depth.copy()
         instances = np.zeros(image.shape[:2], np.uint16)
         silhouettes = np.empty((len(crowd.id), 5), np.int64)
-        paint = np.array([worn(self._spec.seed, int(person), self._spec.alike) for person in crowd.id])
+        paint = np.array([clothing(self._spec.seed, int(person), self._spec.alike) for person in crowd.id])
         if len(crowd.id):
             draw_bodies(
                 self._rays,
@@ -139,9 +139,9 @@ class Viewer:
         return image
 
     def _expose(self, light: Bytes, depth: Singles, frame: int) -> Bytes:
-        lots = chance(self._spec.seed, Topic.SENSOR, *frame_seed(self._turn, frame))
+        rng = random_stream(self._spec.seed, Topic.SENSOR, *frame_seed(self._turn, frame))
         gain: Singles | float = self._spec.gain(frame, self._phase)
         if self._spec.lamps:
             points = self._eye + depth[..., None] * self._rays
             gain = np.float32(gain) * lit(self._spec.lamps, frame / self._spec.frame_rate, points)
-        return expose(light, gain, self._spec.noise, lots)
+        return expose(light, gain, self._spec.noise, rng)

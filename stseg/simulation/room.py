@@ -1,4 +1,4 @@
-"""The empty room as each camera sees it: a tiled floor and plastered walls, once and for all frames."""
+"""The empty room in each camera: a tiled floor and plastered walls, rendered once."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from scipy import ndimage
 
 from stseg.arrays import Bytes, Floats, Singles
-from stseg.simulation.random_streams import Topic, chance
+from stseg.simulation.random_streams import Topic, random_stream
 from stseg.simulation.scene import SceneSpec
 
 _TILE, _JOINT = 0.6, 0.02  # metres
@@ -21,16 +21,16 @@ _LATTICE = 64
 
 @dataclass(frozen=True, slots=True)
 class Room:
-    """What a camera sees of the empty room.
+    """A camera's view of the empty room.
 
     Attributes
     ----------
     image : uint8 (v, u, 3)
         Blue, green, red.
     ground : float32 (v, u, 2)
-        Ground points that the pixels show, metres; nan on the walls.
+        Ground point of each pixel, metres; nan on the walls.
     depth : float32 (v, u)
-        Of what they show, in lengths of their rays, metres.
+        Depth in lengths of the pixels' rays, metres.
     """
 
     image: Bytes
@@ -38,8 +38,8 @@ class Room:
     depth: Singles
 
 
-def look(spec: SceneSpec, rays: Singles, eye: Floats) -> Room:
-    """The empty room through the given rays.
+def render_room(spec: SceneSpec, rays: Singles, eye: Floats) -> Room:
+    """Render the empty room along the given rays.
 
     Parameters
     ----------
@@ -51,11 +51,11 @@ def look(spec: SceneSpec, rays: Singles, eye: Floats) -> Room:
         The camera's centre, metres.
     """
     half = 1.25 * spec.camera_distance + 1.0
-    lattice = chance(spec.seed, Topic.ROOM).uniform(-1.0, 1.0, (_LATTICE, _LATTICE))
+    lattice = random_stream(spec.seed, Topic.ROOM).uniform(-1.0, 1.0, (_LATTICE, _LATTICE))
     seen = np.any(rays != 0, axis=-1)
     across, down = np.gradient(rays, axis=1), np.gradient(rays, axis=0)
     # Four rays a pixel, so that the joints between tiles do not flicker where they are narrow.
-    shots = [_shoot(rays + 0.25 * (i * across + j * down), eye, half, lattice) for i in (-1, 1) for j in (-1, 1)]
+    shots = [_shade_rays(rays + 0.25 * (i * across + j * down), eye, half, lattice) for i in (-1, 1) for j in (-1, 1)]
     image = np.where(seen[..., None], np.mean(shots, axis=0), 0.0)
     ground = _ground(rays, eye, half)
     down = np.where(rays[..., 2] < 0, rays[..., 2], -1.0)
@@ -64,7 +64,7 @@ def look(spec: SceneSpec, rays: Singles, eye: Floats) -> Room:
 
 
 def _ground(rays: Singles, eye: Floats, half: float) -> Singles:
-    """Where rays meet the floor within the walls, float32 (v, u, 2), else nan."""
+    """Intersections of rays with the floor within the walls, float32 (v, u, 2), else nan."""
     down = rays[..., 2] < -1e-6
     distance = -eye[2] / np.where(down, rays[..., 2], -1.0)
     ground = eye[:2] + distance[..., None] * rays[..., :2]
@@ -73,14 +73,14 @@ def _ground(rays: Singles, eye: Floats, half: float) -> Singles:
 
 
 def _to_walls(rays: Singles, eye: Floats, half: float) -> Floats:
-    """How far the walls across x and y are, in lengths of the rays, float64 (v, u, 2)."""
+    """Distances to the walls across x and y, in lengths of the rays, float64 (v, u, 2)."""
     with np.errstate(divide="ignore"):
         far = (np.where(rays[..., :2] < 0, -half, half) - eye[:2]) / np.where(rays[..., :2] == 0, 1e-9, rays[..., :2])
     return np.asarray(far, float)
 
 
-def _shoot(rays: Singles, eye: Floats, half: float, lattice: Floats) -> Floats:
-    """Colours that rays meet, float64 (v, u, 3)."""
+def _shade_rays(rays: Singles, eye: Floats, half: float, lattice: Floats) -> Floats:
+    """Colours at the intersections of rays, float64 (v, u, 3)."""
     to_walls = _to_walls(rays, eye, half)
     side = np.argmin(np.abs(to_walls), axis=-1)
     hit = eye + np.abs(to_walls).min(axis=-1)[..., None] * rays

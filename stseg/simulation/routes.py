@@ -1,4 +1,4 @@
-"""Ways that people are told to walk, where a scene is about what happens when."""
+"""Scripted routes of pedestrians, for scenes with encounters at known times."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ _EASE = 0.6
 
 @dataclass(frozen=True, slots=True)
 class Route:
-    """One person's way: straight from stop to stop, who stands still being at two stops of one place.
+    """A pedestrian's route: straight lines between timed stops; two stops at one place are a pause.
 
     Attributes
     ----------
     height
-        Of the person, metres.
+        Body height, metres.
     stops
         Seconds from the first frame, x and y in metres; the person is there from the first stop's time to the last's.
 
@@ -43,7 +43,7 @@ class Route:
         return self.stops[0][0] <= time <= self.stops[-1][0]
 
     def ground(self, time: float) -> Floats:
-        """Where the person is, metres, float64 (2,): the mean of the straight way over the time that a turn takes."""
+        """Ground position, metres, float64 (2,): the polyline smoothed over the duration of a turn."""
         times, x, y = np.array(self.stops).T
         around = np.clip(time + _EASE * np.linspace(-0.5, 0.5, 13), times[0], times[-1])
         return np.array([np.interp(around, times, x).mean(), np.interp(around, times, y).mean()])

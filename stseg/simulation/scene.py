@@ -1,4 +1,4 @@
-"""What a simulated scene is, in physical quantities."""
+"""Specification of a simulated scene in physical quantities."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class SceneSpec:
     name
         The scene's name.
     people
-        How many the area holds; now and then one leaves and another comes.
+        Number of people in the area; who leaves is replaced.
     area
         Sides of the ground rectangle along x and y, metres; its centre is the origin.
     seconds, frame_rate
@@ -39,21 +39,21 @@ class SceneSpec:
     light_drift, light_period
         Relative amplitude of the light's slow change, and its period in seconds.
     lamps
-        Light that changes at once; it adds up.
+        Sudden changes of the light; they add up.
     shadows
-        How much light the people's shadows take from the ground, 0..1.
+        Darkening of the ground by the people's shadows, 0..1.
     quality
         JPEG quality of the frames, 1..100.
     speed
         Slowest and fastest preferred walking speed, metres per second.
     alike
-        How many people, the first ones, wear clothes of similar colours.
+        Number of people (the first ones) in clothes of similar colours.
     stay
         Mean time that a person stays, seconds.
     routes
-        The ways of all people, one each; without them people go where they like.
+        Scripted routes, one a person; without them people walk freely.
     seed
-        Of everything that is drawn by lot.
+        Seed of all random streams.
 
     Raises
     ------
@@ -86,13 +86,14 @@ class SceneSpec:
 
     def __post_init__(self) -> None:
         width, depth = self.area
-        room = math.hypot(width, depth) / 2
+        radius = math.hypot(width, depth) / 2
         self._require("people", 0 <= self.people <= 2.5 * width * depth, self.people, "0 to 2.5 a square metre")
         self._require("area", min(self.area) >= 1, self.area, "sides of at least 1 metre")
         self._require("seconds", self.frames >= 1, self.seconds, "time for at least one frame")
         self._require("frame_rate", self.frame_rate > 0, self.frame_rate, "frames per second")
         self._require("cameras", self.cameras >= 1, self.cameras, "at least one")
-        self._require("camera_distance", self.camera_distance > room, self.camera_distance, f"more than {room:.1f} m")
+        away = self.camera_distance
+        self._require("camera_distance", away > radius, away, f"more than {radius:.1f} m")
         self._require("camera_height", self.camera_height > 0, self.camera_height, "metres above the ground")
         self._require("field_of_view", 0 < self.field_of_view < 150, self.field_of_view, "0 to 150 degrees")
         self._require("size", min(self.size) >= 16, self.size, "images of at least 16 pixels")
@@ -118,6 +119,6 @@ class SceneSpec:
         return round(self.seconds * self.frame_rate)
 
     def gain(self, frame: int, phase: float) -> float:
-        """The light at a frame, 1 on the average; `phase` is a camera's share of the period, 0..1."""
+        """Illumination gain at a frame, 1 on average; `phase` is a camera's share of the period, 0..1."""
         turns = frame / self.frame_rate / self.light_period + phase
         return 1.0 + self.light_drift * math.sin(2 * math.pi * turns)

@@ -1,4 +1,4 @@
-"""A crowd that walks as it is told."""
+"""A crowd on scripted routes."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ import numpy as np
 
 from stseg.arrays import Floats
 from stseg.simulation.crowd import Crowd, stride
-from stseg.simulation.random_streams import Topic, chance
+from stseg.simulation.random_streams import Topic, random_stream
 from stseg.simulation.routes import Route
 from stseg.simulation.scene import SceneSpec
 
 _INSTANT = 0.05
-"""Seconds to both sides over which velocities are measured."""
+"""Half interval of the finite differences of velocity, seconds."""
 _STANDS = 0.05
-"""Metres a second below which nobody turns."""
+"""Speed below which the heading stays, metres per second."""
 
 
-def follow(spec: SceneSpec) -> Iterator[Crowd]:
+def walk_routes(spec: SceneSpec) -> Iterator[Crowd]:
     """The crowd at every frame of a scene with routes; ids count the routes from 1."""
-    heading = np.array([_setting_out(route) for route in spec.routes])
-    phase = chance(spec.seed, Topic.CROWD).uniform(0, 2 * np.pi, len(spec.routes))
+    heading = np.array([_initial_heading(route) for route in spec.routes])
+    phase = random_stream(spec.seed, Topic.CROWD).uniform(0, 2 * np.pi, len(spec.routes))
     height = np.array([route.height for route in spec.routes])
     for frame in range(spec.frames):
         time = frame / spec.frame_rate
@@ -35,7 +35,7 @@ def follow(spec: SceneSpec) -> Iterator[Crowd]:
         yield Crowd(frame, here + 1, ground, heading[here], phase[here], swing[here], height[here], np.ones(len(here)))
 
 
-def _setting_out(route: Route) -> float:
+def _initial_heading(route: Route) -> float:
     (_, *first), (_, *second) = route.stops[:2]
     return float(np.arctan2(second[1] - first[1], second[0] - first[0]))
 

@@ -1,4 +1,4 @@
-"""From the light in front of a lens to the numbers of a sensor: softness, gain, noise."""
+"""Sensor model: lens blur, gain and noise."""
 
 from __future__ import annotations
 
@@ -11,26 +11,26 @@ _SOFTNESS = 0.6
 """Standard deviation of the lens's blur, pixels."""
 
 
-def expose(light: Bytes, gain: Singles | float, noise: float, lots: np.random.Generator) -> Bytes:
-    """The frame that a camera delivers.
+def expose(light: Bytes, gain: Singles | float, noise: float, rng: np.random.Generator) -> Bytes:
+    """Expose a frame.
 
     Parameters
     ----------
     light : uint8 (v, u, 3)
         The scene at normal light.
     gain : float32 (v, u) or float
-        Light relative to normal.
+        Illumination relative to normal.
     noise
         Standard deviation of the sensor's noise, grey levels.
-    lots
-        Where chance comes from.
+    rng
+        Source of randomness.
 
     Returns
     -------
     uint8 (v, u, 3)
     """
     soft = cv2.GaussianBlur(light, (5, 5), _SOFTNESS)
-    frame = lots.standard_normal(light.shape, np.float32)
+    frame = rng.standard_normal(light.shape, np.float32)
     frame *= noise
     frame += np.float32(gain) * soft + 0.5 if isinstance(gain, float) else gain[..., None] * soft + np.float32(0.5)
     return np.clip(frame, 0, 255, out=frame).astype(np.uint8)

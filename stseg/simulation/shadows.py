@@ -1,4 +1,4 @@
-"""Shadows that ellipsoids cast on the ground, softer at their edges: a lamp has a size."""
+"""Soft shadows of ellipsoids on the ground."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from stseg.accelerate import kernel
 from stseg.arrays import Floats, Ints, Singles
 
 PENUMBRA = 1.3
-"""Where shadows end, in half axes of their ellipsoid around its middle."""
-_UMBRA = 0.75  # where they are full
+"""Outer radius of the penumbra, in half axes of the ellipsoid."""
+_UMBRA = 0.75  # radius of full shadow
 
 
 @kernel
@@ -21,20 +21,20 @@ def darken(
     lamp: Floats,
     shade: Singles,
 ) -> None:
-    """Raise `shade`, 0..1 of every pixel's ground point, to the shadow that falls there.
+    """Raise `shade`, 0..1, of every pixel's ground point to the shadow cast there.
 
     Parameters
     ----------
     ground : float32 (v, u, 2)
-        Ground points that the pixels show, metres; nan where they show none.
+        Ground point of each pixel, metres; nan where there is none.
     boxes : int64 (n, 4)
-        Where the ellipsoids' shadows may fall, see `pixel_boxes`.
+        Image boxes that contain the shadows, see `pixel_boxes`.
     centre, form
         Of the ellipsoids, float64 (n, 3) and (n, 3, 3), see `stseg.simulation.body.Bodies`.
     lamp : float64 (3,)
         Direction towards the light.
     shade : float32 (v, u)
-        Changed in place.
+        Modified in place.
     """
     for k in range(len(centre)):
         m = form[k]
@@ -50,7 +50,7 @@ def darken(
                 py = m[1, 0] * x + m[1, 1] * y + m[1, 2] * z
                 pz = m[2, 0] * x + m[2, 1] * y + m[2, 2] * z
                 along = px * lx + py * ly + pz * lz
-                # How near the light's ray passes by the centre, in half axes.
+                # Distance of the light's ray from the centre, in half axes.
                 miss = np.sqrt(max(px * px + py * py + pz * pz - along * along / length, 0.0))
                 dark = (PENUMBRA - miss) / (PENUMBRA - _UMBRA)
                 if dark > shade[v, u]:
