@@ -12,7 +12,7 @@ from stseg.engine.warnings import run_warnings
 from stseg.evaluation import evaluate
 from stseg.geometry import Camera, Grid
 from stseg.io.runfile.runs import Run
-from stseg.model.ghost_reasons import GhostReasons, ghost_reasons
+from stseg.model.ghost_reasons import GhostReasons, ghost_reasons, has_evidence
 from stseg.report.answers import answers
 from stseg.report.charts import Span, clock_time
 from stseg.report.embedded import embedded_json
