@@ -63,32 +63,32 @@ def cover(bodies: Floats, distance: Floats, width: float, height: float, i: int,
 # The score of a set
 
 
-def set_score(members: Sequence[int], case: Problem) -> float:
+def set_score(members: Sequence[int], problem: Problem) -> float:
     """What a set of people says of a frame: each box, pixel and walker speaks for one of them."""
-    boxes, pixels, ground, terms = case.boxes, case.pixels, case.ground, case.terms
-    total = sum(terms.person + case.own[j] - case.newcomer[j] for j in members)
+    boxes, pixels, ground, parameters = problem.boxes, problem.pixels, problem.ground, problem.parameters
+    total = sum(parameters.prior_log_odds + problem.height_prior[j] - problem.birth_cost[j] for j in members)
     chosen = np.array(members, int)
-    gains = case.newcomer[chosen, None] + case.known[chosen]
+    gains = problem.birth_cost[chosen, None] + problem.track_gain[chosen]
     total += sum(gains[pair] for pair in greedy_pairs(gains))
     for i, j in combinations(members, 2):
         apart = math.dist(ground[i], ground[j])
-        if apart < terms.apart:
-            total -= 2 + 20 * (1 - apart / terms.apart)
-    total += sum(_boxes_of_view(view, members, boxes, terms) for view in range(len(boxes.boxes)))
-    total += sum(_pixels_of_view(view, members, pixels, terms) for view in range(len(pixels.raster)))
+        if apart < parameters.minimum_distance:
+            total -= 2 + 20 * (1 - apart / parameters.minimum_distance)
+    total += sum(_boxes_of_view(view, members, boxes, parameters) for view in range(len(boxes.boxes)))
+    total += sum(_pixels_of_view(view, members, pixels, parameters) for view in range(len(pixels.raster)))
     return float(total)
 
 
-def _boxes_of_view(view: int, members: Sequence[int], boxes: BoxEvidence, terms: Parameters) -> float:
+def _boxes_of_view(view: int, members: Sequence[int], boxes: BoxEvidence, parameters: Parameters) -> float:
     total = 0.0
     gains: list[tuple[float, int, int]] = []
     for j in members:
         visible = boxes.inside[view, j] * math.prod(1 - boxes.cover[view, j, k] for k in members)
-        share = (visible - terms.hidden_below) / (terms.whole_above - terms.hidden_below)
-        found = min(max(share, terms.least), 1.0)
-        missing = math.log(1 - (1 - terms.box_miss) * found)
+        share = (visible - parameters.hidden_visibility) / (parameters.full_visibility - parameters.hidden_visibility)
+        found = min(max(share, parameters.hidden_detection_rate), 1.0)
+        missing = math.log(1 - (1 - parameters.box_miss_rate) * found)
         total += missing
-        worth = terms.hit - missing
+        worth = parameters.box_log_ratio - missing
         gains += [(worth + boxes.match[view, j, b], j, b) for b in range(boxes.boxes[view])]
     served: set[int] = set()
     taken: set[int] = set()
@@ -110,24 +110,24 @@ def covered(pixels: PixelEvidence, view: int, j: int) -> Flags:
     return shown
 
 
-def _pixels_of_view(view: int, members: Sequence[int], pixels: PixelEvidence, terms: Parameters) -> float:
+def _pixels_of_view(view: int, members: Sequence[int], pixels: PixelEvidence, parameters: Parameters) -> float:
     total = 0.0
     bodies = {j: covered(pixels, view, j) for j in members}
     for v, u in np.ndindex(*pixels.raster.shape[1:]):
         there = [j for j in members if bodies[j][v, u]]
         if there:
             nearest = min(there, key=lambda j: pixels.order[view, j])
-            total += terms.body_weight * float(pixels.raster[view, v, u]) / pixels.area[view, nearest]
+            total += parameters.effective_observations * float(pixels.raster[view, v, u]) / pixels.area[view, nearest]
     return total
 
 
-def touch(i: int, j: int, case: Problem) -> bool:
+def touch(i: int, j: int, problem: Problem) -> bool:
     """Whether one of two candidates bears on what the other adds to a set."""
-    boxes, pixels, terms = case.boxes, case.pixels, case.terms
-    if math.dist(case.ground[i], case.ground[j]) < terms.apart:
+    boxes, pixels, parameters = problem.boxes, problem.pixels, problem.parameters
+    if math.dist(problem.ground[i], problem.ground[j]) < parameters.minimum_distance:
         return True
-    gains = case.newcomer[[i, j], None] + case.known[[i, j]]
-    worth = terms.hit + boxes.match[:, [i, j]] - math.log(terms.box_miss)
+    gains = problem.birth_cost[[i, j], None] + problem.track_gain[[i, j]]
+    worth = parameters.box_log_ratio + boxes.match[:, [i, j]] - math.log(parameters.box_miss_rate)
     shared = [(worth[view, :, :number] > 0).all(0).any() for view, number in enumerate(boxes.boxes)]
     hidden = (boxes.cover[:, i, j] > 0) | (boxes.cover[:, j, i] > 0)
     overlap = [(covered(pixels, view, i) & covered(pixels, view, j)).any() for view in range(len(pixels.raster))]
@@ -154,10 +154,10 @@ def clutter(likelihood: Singles, side: int) -> float:
     return math.sqrt(sum(float(np.var(cell)) for cell in cells) / len(cells))
 
 
-def fused(terms: Sequence[float], weights: Sequence[float], shares: Sequence[float]) -> float:
+def fused(parameters: Sequence[float], weights: Sequence[float], shares: Sequence[float]) -> float:
     """n_vis sum_i w_i term_i over the views that see a cell (KS09 eq. 7), each as far as it sees it."""
     parts = [weight * share for weight, share in zip(weights, shares, strict=True)]
-    return sum(shares) * sum(part * term for part, term in zip(parts, terms, strict=True)) / sum(parts)
+    return sum(shares) * sum(part * term for part, term in zip(parts, parameters, strict=True)) / sum(parts)
 
 
 def log_odds_term(likelihood: float, rates: ErrorRates) -> float:
@@ -270,9 +270,9 @@ def least_energy(energy: Energy) -> tuple[int, Flags]:
 # Assignments
 
 
-def least_assignment(cost: Floats, alone: float) -> float:
-    """Least total of a one-to-one assignment in which a pair that stays apart costs `alone`; by trying all."""
+def least_assignment(cost: Floats, restricted: float) -> float:
+    """Least total of a one-to-one assignment in which a pair that stays apart costs `restricted`; by trying all."""
     rows, columns = cost.shape
-    wide = np.minimum(cost, alone)
-    wide = np.pad(wide, ((0, max(columns - rows, 0)), (0, max(rows - columns, 0))), constant_values=alone)
+    wide = np.minimum(cost, restricted)
+    wide = np.pad(wide, ((0, max(columns - rows, 0)), (0, max(rows - columns, 0))), constant_values=restricted)
     return min(float(sum(wide[i, j] for i, j in enumerate(order))) for order in permutations(range(len(wide))))

@@ -15,7 +15,7 @@ from strategies import numbers
 from stseg.arrays import Floats
 from stseg.config import BodyConfig, DetectionConfig
 from stseg.detection.prior import Prior
-from stseg.detection.scoring import walker_score
+from stseg.detection.scoring import track_score
 from stseg.geometry import Grid, Rig
 from stseg.model.border import Border
 from stseg.model.candidates import Candidates
@@ -96,7 +96,7 @@ def test_walkers_are_shared_out_greedily(people: int, walkers: int, seed: int) -
     known, newcomer = rng.normal(-2, 4, (candidates, walkers)), rng.uniform(0, 5, candidates)
     members = rng.permutation(candidates)[:people]
     taken_by = np.full(walkers + 2, 77)
-    total = walker_score(members, people, known, newcomer, taken_by)
+    total = track_score(members, people, known, newcomer, taken_by)
     gain = (newcomer[:, None] + known)[members].reshape(people, walkers)
     pairs = reference.greedy_pairs(gain)
     assert total == pytest.approx(sum(gain[pair] for pair in pairs))
@@ -109,11 +109,11 @@ def test_walkers_are_shared_out_greedily(people: int, walkers: int, seed: int) -
 
 def test_a_walker_speaks_for_one_candidate() -> None:
     known, newcomer, taken_by = np.array([[3.0], [2.5]]), np.array([5.0, 5.0]), np.zeros(1, np.int64)
-    assert walker_score(np.array([0, 1]), 2, known, newcomer, taken_by) == 8.0
+    assert track_score(np.array([0, 1]), 2, known, newcomer, taken_by) == 8.0
     assert taken_by.tolist() == [0]
-    assert walker_score(np.array([1, 0]), 1, known, newcomer, taken_by) == 7.5
+    assert track_score(np.array([1, 0]), 1, known, newcomer, taken_by) == 7.5
     assert taken_by.tolist() == [0]
-    assert walker_score(np.array([0, 1]), 2, known - 9, newcomer, taken_by) == 0.0
+    assert track_score(np.array([0, 1]), 2, known - 9, newcomer, taken_by) == 0.0
     assert taken_by.tolist() == [-1]  # whom it does not help to be walker is a newcomer
 
 
@@ -168,8 +168,8 @@ def test_a_newcomer_costs_away_from_the_border() -> None:
     places = np.array([[-2.95, 0.0], [-2.45, 0.0], [-1.95, 0.0], [0.0, 0.0], [-3.5, 0.0]])
     later = Prior.of(no_tracks(), CONFIG, BODY, border)
     share = np.array([0.05, 0.55, 1.0, 1.0, 0.0])
-    np.testing.assert_allclose(later.newcomer(places), share * CONFIG.birth_cost, atol=1e-6)
-    np.testing.assert_array_equal(Prior.of(None, CONFIG, BODY, border).newcomer(places), 0.0)
+    np.testing.assert_allclose(later.birth_cost(places), share * CONFIG.birth_cost, atol=1e-6)
+    np.testing.assert_array_equal(Prior.of(None, CONFIG, BODY, border).birth_cost(places), 0.0)
 
 
 def test_who_leaves_the_area_is_no_candidate() -> None:
@@ -177,7 +177,7 @@ def test_who_leaves_the_area_is_no_candidate() -> None:
     border = Border.of(open_ground(Grid((-2.0, 2.0), (-2.0, 2.0), 0.1, 1.8, 2)))
     prior = Prior.of(expecting((2.1, 0.0), (1.0, 0.5), (0.0, -9.0)), CONFIG, BODY, border)
     np.testing.assert_array_equal(prior.pool().ground, [[1.0, 0.5]])
-    assert len(prior.expected) == 3
+    assert len(prior.predicted) == 3
 
 
 def test_those_expected_are_candidates_as_tall_as_they_are() -> None:
@@ -188,4 +188,4 @@ def test_those_expected_are_candidates_as_tall_as_they_are() -> None:
     assert prior.track_log_ratio(pool).shape == (2, 2)
     assert prior.track_log_ratio(Candidates(np.zeros((0, 2)), np.zeros(0), np.zeros(0))).shape == (0, 2)
     tall = [reference.normal(h - BODY.height_mean, BODY.height_spread**2) for h in (1.5, BODY.height_mean)]
-    np.testing.assert_allclose(np.diff(prior.tall(np.array([1.5, BODY.height_mean]))), np.diff(tall))
+    np.testing.assert_allclose(np.diff(prior.log_height(np.array([1.5, BODY.height_mean]))), np.diff(tall))

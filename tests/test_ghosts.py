@@ -30,8 +30,8 @@ from strategies import numbers
 
 from stseg.arrays import Floats, Ints, ViewEvidence
 from stseg.detection.detector import Detector
-from stseg.detection.gains import come_in, fill_owners, gain_of, leave, paired, wipe_owners
-from stseg.detection.groups import fill_groups, fill_touch
+from stseg.detection.gains import clear_assignment, fill_assignment, gain_of, insert, matching_score, withdraw
+from stseg.detection.groups import fill_groups, fill_interactions
 from stseg.detection.problem import BoxEvidence, Parameters, PixelEvidence, Problem
 from stseg.detection.scoring import set_score
 from stseg.detection.search import ENUMERATED, search
@@ -165,7 +165,7 @@ class CraftedFrame:
     newcomer: Floats
     known: Floats
 
-    def case(self) -> Problem:
+    def problem(self) -> Problem:
         """The frame as the kernels take it."""
         views = len(self.boxes.boxes) + len(self.pixels.raster)
         owner = np.empty(max(self.pixels.raster[0].size, self.boxes.match.shape[2], self.known.shape[1]), np.int64)
@@ -175,17 +175,17 @@ class CraftedFrame:
     def score(self, members: Sequence[int] | Ints) -> float:
         """The fast score of a set."""
         chosen = np.array(members, np.int64)
-        return set_score(chosen, len(chosen), self.case())
+        return set_score(chosen, len(chosen), self.problem())
 
     def found(self, start: Sequence[int] = (), trades: int = 4, enumerated: int = ENUMERATED) -> list[int]:
         """The set that the search ends with."""
         room = np.zeros(len(self.own) + 1, np.int64)
         room[: len(start)] = start
-        count = search(room, len(start), self.case(), enumerated, trades)
+        count = search(room, len(start), self.problem(), enumerated, trades)
         return sorted(room[:count].tolist())
 
 
-def problem(seed: int, candidates: int, walkers: int = 0) -> CraftedFrame:
+def random_frame(seed: int, candidates: int, walkers: int = 0) -> CraftedFrame:
     """Two views with boxes, two with pixels; candidates that share boxes, hide each other and crowd."""
     rng = np.random.default_rng(seed)
     views, most, rows, columns = 2, 4, 8, 10
@@ -240,21 +240,21 @@ def strangers(boxes: BoxEvidence, pixels: PixelEvidence) -> CraftedFrame:
 @pytest.mark.parametrize("walkers", [0, 3])
 @pytest.mark.parametrize("seed", range(40))
 def test_score_by_definition(seed: int, walkers: int) -> None:
-    frame = problem(seed, 6, walkers)
+    frame = random_frame(seed, 6, walkers)
     rng = np.random.default_rng(seed)
     for _ in range(3):
         members = rng.permutation(6)[: rng.integers(0, 7)].tolist()
-        expected = reference.set_score(members, frame.case())
+        expected = reference.set_score(members, frame.problem())
         assert frame.score(members) == pytest.approx(expected, abs=1e-5)
 
 
 def test_a_box_speaks_for_one_person() -> None:
-    one = problem(0, 2)
+    one = random_frame(0, 2)
     boxes_only = BoxEvidence(np.zeros((1, 2, 1)), np.array([1]), np.zeros((1, 2, 2)), np.ones((1, 2)))
     blank = one.pixels._replace(raster=np.zeros_like(one.pixels.raster))
     frame = strangers(boxes_only, blank)
-    assert frame.score([0]) - frame.score([]) == pytest.approx(TERMS.person + TERMS.hit)
-    assert frame.score([0, 1]) - frame.score([0]) == pytest.approx(TERMS.person + np.log(TERMS.box_miss))
+    assert frame.score([0]) - frame.score([]) == pytest.approx(TERMS.prior_log_odds + TERMS.box_log_ratio)
+    assert frame.score([0, 1]) - frame.score([0]) == pytest.approx(TERMS.prior_log_odds + np.log(TERMS.box_miss_rate))
 
 
 def test_a_pixel_belongs_to_the_nearest_body() -> None:
@@ -263,9 +263,11 @@ def test_a_pixel_belongs_to_the_nearest_body() -> None:
     pixels = PixelEvidence(raster, np.zeros((1, 2), np.int64), spans, np.full((1, 2), 4.0), np.array([[3.0, 2.0]]))
     none = BoxEvidence(np.zeros((0, 2, 0)), np.zeros(0, np.int64), np.zeros((0, 2, 2)), np.zeros((0, 2)))
     frame = strangers(none, pixels)
-    near = TERMS.person + TERMS.body_weight * (1 + 1 - 5 - 5) / 4
+    near = TERMS.prior_log_odds + TERMS.effective_observations * (1 + 1 - 5 - 5) / 4
     assert frame.score([1]) == pytest.approx(near)
-    assert frame.score([0, 1]) == pytest.approx(near + TERMS.person + TERMS.body_weight * (1 + 1) / 4)
+    assert frame.score([0, 1]) == pytest.approx(
+        near + TERMS.prior_log_odds + TERMS.effective_observations * (1 + 1) / 4
+    )
 
 
 # The search
@@ -274,7 +276,7 @@ def test_a_pixel_belongs_to_the_nearest_body() -> None:
 @pytest.mark.parametrize("walkers", [0, 4])
 @pytest.mark.parametrize("seed", range(40))
 def test_no_single_move_helps(seed: int, walkers: int) -> None:
-    frame = problem(seed, 10, walkers)
+    frame = random_frame(seed, 10, walkers)
     start = [] if seed % 2 else [0, 3]
     members = frame.found(start)
     assert len(set(members)) == len(members)
@@ -292,7 +294,7 @@ def test_no_single_move_helps(seed: int, walkers: int) -> None:
 @pytest.mark.parametrize("walkers", [0, 3])
 @pytest.mark.parametrize("seed", range(20))
 def test_of_few_candidates_the_best_of_all_sets_is_found(seed: int, walkers: int) -> None:
-    frame = problem(seed, 7, walkers)
+    frame = random_frame(seed, 7, walkers)
     best = max(frame.score(chosen) for chosen in reference.subsets(7))
     assert frame.score(frame.found()) == pytest.approx(best, abs=1e-6)
 
@@ -300,7 +302,7 @@ def test_of_few_candidates_the_best_of_all_sets_is_found(seed: int, walkers: int
 @pytest.mark.parametrize("walkers", [0, 4])
 def test_of_more_candidates_the_best_set_is_found_here(walkers: int) -> None:
     """Simple moves alone, which cannot trade one person for two, miss the best of some of these crafted frames."""
-    frames = [problem(seed, 10, walkers) for seed in range(20)]
+    frames = [random_frame(seed, 10, walkers) for seed in range(20)]
     best = np.array([max(f.score(s) for s in reference.subsets(10)) for f in frames])
     ways = ((0, 0), (4, ENUMERATED))
     simple, traded = (np.array([f.score(f.found((), *way)) for f in frames]) for way in ways)
@@ -312,29 +314,29 @@ def test_of_more_candidates_the_best_set_is_found_here(walkers: int) -> None:
 @pytest.mark.parametrize("walkers", [0, 3])
 @pytest.mark.parametrize("seed", range(20))
 def test_what_one_more_adds_is_the_difference_of_scores(seed: int, walkers: int) -> None:
-    frame = problem(seed, 8, walkers)
-    case, chosen = frame.case(), np.random.default_rng(seed).permutation(8)
+    frame = random_frame(seed, 8, walkers)
+    problem, chosen = frame.problem(), np.random.default_rng(seed).permutation(8)
     for count in range(7):
         members = np.append(chosen, 0)
-        owners = np.full((2, case.pixels.raster[0].size), -1, np.int16)
-        fill_owners(members, count, case.pixels, owners)
-        gain = gain_of(int(chosen[count]), members, count, paired(members, count, case), owners, case)
+        owners = np.full((2, problem.pixels.raster[0].size), -1, np.int16)
+        fill_assignment(members, count, problem.pixels, owners)
+        gain = gain_of(int(chosen[count]), members, count, matching_score(members, count, problem), owners, problem)
         assert gain == pytest.approx(frame.score(chosen[: count + 1]) - frame.score(chosen[:count]), abs=1e-5)
 
 
 @pytest.mark.parametrize("seed", range(20))
 def test_owners_after_comings_and_goings_are_those_of_the_set(seed: int) -> None:
     """Each pixel shows the nearest of the set who covers it, however the set came about; and wiped, nobody."""
-    pixels, rng = problem(seed, 8).pixels, np.random.default_rng(seed)
+    pixels, rng = random_frame(seed, 8).pixels, np.random.default_rng(seed)
     owners, inside = np.full((2, pixels.raster[0].size), -1, np.int16), list(range(4))
-    fill_owners(np.arange(4), 4, pixels, owners)
+    fill_assignment(np.arange(4), 4, pixels, owners)
     for i in rng.integers(0, 8, 12).tolist():
         if i in inside:
             inside.remove(i)
-            leave(i, np.array(inside, np.int64), len(inside), pixels, owners)
+            withdraw(i, np.array(inside, np.int64), len(inside), pixels, owners)
         else:
             inside.append(i)
-            come_in(i, pixels, owners)
+            insert(i, pixels, owners)
         for view, shown in enumerate(owners.reshape(pixels.raster.shape)):
             nearest = np.full(shown.shape, -1)
             for j in sorted(inside, key=lambda j: -pixels.order[view, j]):
@@ -343,17 +345,19 @@ def test_owners_after_comings_and_goings_are_those_of_the_set(seed: int) -> None
                     if stop > start:
                         nearest[pixels.first[view, j] + k, start:stop] = j
             np.testing.assert_array_equal(shown, nearest)
-    wipe_owners(np.array(inside, np.int64), len(inside), pixels, owners)
+    clear_assignment(np.array(inside, np.int64), len(inside), pixels, owners)
     assert (owners == -1).all()
 
 
 @pytest.mark.parametrize("seed", range(20))
 def test_groups_are_those_of_the_touching_and_their_scores_add_up(seed: int) -> None:
-    frame = apart(problem(seed, 9, 2), 3)
-    case = frame.case()
+    frame = apart(random_frame(seed, 9, 2), 3)
+    problem = frame.problem()
     touch, group = np.empty((9, 9), bool), np.empty(9, np.int64)
-    fill_touch(case, touch)
-    np.testing.assert_array_equal(touch, [[i == j or reference.touch(i, j, case) for j in range(9)] for i in range(9)])
+    fill_interactions(problem, touch)
+    np.testing.assert_array_equal(
+        touch, [[i == j or reference.touch(i, j, problem) for j in range(9)] for i in range(9)]
+    )
     number = fill_groups(touch, group)
     assert number == len(set(group.tolist())) >= 3
     assert not touch[group[:, None] != group].any()
@@ -367,7 +371,7 @@ def test_groups_are_those_of_the_touching_and_their_scores_add_up(seed: int) -> 
 def test_groups_are_decided_apart() -> None:
     """Of nine candidates in three groups the best set is found, though more than can be enumerated stand there."""
     for seed in range(10):
-        frame = apart(problem(seed, 9), 3)
+        frame = apart(random_frame(seed, 9), 3)
         assert frame.score(frame.found()) == pytest.approx(max(frame.score(s) for s in reference.subsets(9)), abs=1e-6)
 
 

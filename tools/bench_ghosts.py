@@ -76,19 +76,19 @@ def positions(people: int, frames: int, kind: str, config: Config) -> tuple[floa
     return float(np.mean(weighed[_WARM:])), float(np.mean(taken[_WARM:]))
 
 
-def rooms(case: Problem, number: int) -> Problem:
-    """A case so many times over, side by side: nothing in one room bears on another."""
-    n, room = len(case.own), np.repeat(np.arange(number), len(case.own))
+def rooms(problem: Problem, number: int) -> Problem:
+    """A problem so many times over, side by side: nothing in one room bears on another."""
+    n, room = len(problem.height_prior), np.repeat(np.arange(number), len(problem.height_prior))
     same = room[:, None] == room
-    boxes, pixels = case.boxes, case.pixels
-    rows, most, walkers = pixels.raster.shape[1], boxes.match.shape[2], case.known.shape[1]
+    boxes, pixels = problem.boxes, problem.pixels
+    rows, most, walkers = pixels.raster.shape[1], boxes.match.shape[2], problem.track_gain.shape[1]
     match = np.full((len(boxes.match), n * number, most * number), -np.inf)
     known = np.full((n * number, walkers * number), -1e3)
     for k in range(number):
         own = slice(k * n, (k + 1) * n)
         for view, count in enumerate(boxes.boxes):
             match[view, own, k * count : (k + 1) * count] = boxes.match[view, :, :count]
-        known[own, k * walkers : (k + 1) * walkers] = case.known
+        known[own, k * walkers : (k + 1) * walkers] = problem.track_gain
     first = np.tile(pixels.first, (1, number))
     more_boxes = BoxEvidence(
         match,
@@ -104,19 +104,19 @@ def rooms(case: Problem, number: int) -> Problem:
         np.tile(pixels.order, (1, number)),
     )
     return Problem(
-        more_boxes, more_pixels, np.tile(case.own, number), np.tile(case.newcomer, number), known,
-        np.tile(case.ground, (number, 1)) + 100.0 * room[:, None], case.terms,
+        more_boxes, more_pixels, np.tile(problem.height_prior, number), np.tile(problem.birth_cost, number), known,
+        np.tile(problem.ground, (number, 1)) + 100.0 * room[:, None], problem.parameters,
         np.empty(max(more_pixels.raster[:1].size, match.shape[2], known.shape[1], 1), np.int64),
-        np.zeros((len(case.parts), n * number + 1)),
+        np.zeros((len(problem.view_evidence), n * number + 1)),
     )  # fmt: skip
 
 
-def search_seconds(case: Problem) -> float:
-    """The best of some searches of a case from nobody."""
+def search_seconds(problem: Problem) -> float:
+    """The best of some searches of a problem from nobody."""
     best = np.inf
     for _ in range(_REPEATS):
         start = time.process_time()
-        search(np.zeros(len(case.own) + 1, np.int64), 0, case, ENUMERATED, 2)
+        search(np.zeros(len(problem.height_prior) + 1, np.int64), 0, problem, ENUMERATED, 2)
         best = min(best, time.process_time() - start)
     return best
 
@@ -135,7 +135,7 @@ def one_case(kind: str) -> Problem:
     )
     people, ghosts = (Candidates(some.ground, some.height, some.width) for some in (found.people, found.ghosts))
     pool = people.joined_with(ghosts)
-    return MapEstimate(state, pool, np.zeros(0, np.int64)).case
+    return MapEstimate.of_search(state, pool, np.zeros(0, np.int64)).problem
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -159,12 +159,15 @@ def main(arguments: Sequence[str] | None = None) -> None:
         print(f"gate, {kind}: {1 / enough[2]:.1f} frames/s where {enough[1]:.1f} are weighed, {GATE:g} at {WEIGHED}")
     print("\n| evidence | groups | candidates | ms a search | ms a group |\n| --- | --: | --: | --: | --: |")
     for kind in ("pixels", "boxes"):
-        case = one_case(kind)
-        search_seconds(case)
-        times = {number: search_seconds(rooms(case, number)) for number in asked.groups}
+        problem = one_case(kind)
+        search_seconds(problem)
+        times = {number: search_seconds(rooms(problem, number)) for number in asked.groups}
         for number, seconds in times.items():
             each = 1e3 * seconds / number
-            print(f"| {kind} | {number} | {number * len(case.own)} | {1e3 * seconds:.2f} | {each:.2f} |", flush=True)
+            print(
+                f"| {kind} | {number} | {number * len(problem.height_prior)} | {1e3 * seconds:.2f} | {each:.2f} |",
+                flush=True,
+            )
         few, many = min(times), max(times)
         met &= times[many] / many <= SLACK * times[few] / few
     sys.exit(0 if met else 1)

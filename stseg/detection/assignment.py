@@ -1,4 +1,4 @@
-"""What of a frame belongs to whom once people explain it."""
+"""Assignment of one frame's boxes and pixels to people."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ from dataclasses import dataclass
 from stseg.arrays import Ints
 
 WORST = -8.0
-"""A box never speaks more strongly against a place or a size than this, nats: it may not be theirs after all."""
+"""Least log-likelihood of a box in a person's posterior, nats: beyond it the assignment itself is in doubt."""
 
 
 @dataclass(frozen=True)
 class Assignment:
-    """What belongs to each of some people.
+    """What is assigned to each of some people.
 
     Attributes
     ----------
     box : int64 (view, person)
         The box of each; -1 for none, and in views with pixels.
     pixels : sequence of int64 (v, u), one a view
-        The person to whom each raster pixel belongs, -1 for nobody: those are open to everybody. Nothing reads it of a
-        view with boxes.
+        The person whom each raster pixel is assigned to, -1 for none: those are open to everybody. Not read for views
+        with boxes.
     """
 
     box: Ints

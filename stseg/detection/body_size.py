@@ -1,19 +1,19 @@
-"""How tall and how wide people are, by HW12's refinement (eqs 25 to 28; METHODS 8).
+"""Body heights and widths, by HW12's refinement (eqs 25 to 28).
 
-E step: the sizes of one person on a lattice around those of people in general, heights first, then widths. Over all
-that the lattice's pillars cover, the person's own pixels speak for a pillar inside it and against it outside,
-background speaks against it inside, other people's pixels say nothing (they may hide anything). A pixel that is
-foreground with probability o is o their own and 1 - o background. Less what is the same for all pillars R of the
-lattice, one view says of each
+E step: the sizes of one person on a lattice around the population's mean, heights first, then widths. Over all that
+the lattice's pillars cover, the person's own pixels speak for a pillar inside it and against it outside, background
+speaks against it inside, other people's pixels say nothing (they may hide anything). A pixel that is foreground with
+probability o is o own and 1 - o background. Less what is the same for all pillars R of the lattice, one view says of
+each
 
-    looks * sum_R (2 o OWN + (1 - o) BACKGROUND) / area of a body of mean size     nats,
+    observations * sum_R (2 o OWN + (1 - o) BACKGROUND) / area of a body of mean size     nats,
 
-the weights those of `ghosts.views`.
+the weights those of `stseg.detection.views`, `observations` the effective number of them in one view.
 
-HW12 averages over R, which never rewards a pillar for covering more of the person. Its weight of the background is lost
-in the scan; here it is what makes a pixel that is half foreground say nothing, so that edges lie where people's do.
-Of who is seen in boxes alone the height is found with the place (`ghosts.refine`), and no width: arms and strides are
-what a box's sides tell of. M step: the frame is searched again with the sizes found (`ghosts.explain`).
+HW12 averages over R, which never rewards a pillar for covering more of the person. Its weight of the background is
+illegible; here it makes a pixel that is half foreground say nothing, so that edges lie where people's do. Of people in
+boxes alone the height is found with the place (`stseg.detection.refine`), and no width: a box's sides show arms and
+strides. M step: the frame is searched again with the sizes found (`stseg.detection.detector`).
 """
 
 from __future__ import annotations
@@ -34,46 +34,47 @@ from stseg.model.sizes import Sizes
 _WITHIN = 3.0
 """How far the lattice goes, standard deviations of people's sizes."""
 _STEPS = 13
+"""Sizes on the lattice: half a standard deviation apart."""
 
 
 def measure(
     places: RefinedPlaces,
     width: Floats,
     views: Sequence[View],
-    sights: Sequence[ViewObservation | None],
+    observations: Sequence[ViewObservation | None],
     own: Assignment,
     body: BodyConfig,
 ) -> Sizes:
-    """The E step: posteriors of people's sizes after one frame, anybody's sizes the prior.
+    """E step: posteriors of people's sizes after one frame, under the population prior.
 
     Parameters
     ----------
     places
-        Where they stand, and the heights that hang together with it: all that is known of who is seen in boxes alone.
+        Places, and the heights found with them: all that boxes show.
     width : float64 (n,)
         So far, metres.
     own
-        What of the frame is whose.
+        Boxes and pixels assigned to each.
     """
     found = Sizes.of_population(len(width), body)
-    told = [
-        _Told(view, sight.label_values, owner)
-        for view, sight, owner in zip(views, sights, own.pixels, strict=True)
-        if isinstance(view, PixelView) and sight is not None
+    measured = [
+        _PixelLabels(view, observation.label_values, owner)
+        for view, observation, owner in zip(views, observations, own.pixels, strict=True)
+        if isinstance(view, PixelView) and observation is not None
     ]
-    if not told or not len(width):
+    if not measured or not len(width):
         return replace(found, height=places.height, height_variance=places.height_variance)
     steps = np.linspace(-_WITHIN, _WITHIN, _STEPS)
     heights, widths = body.height_mean + body.height_spread * steps, body.width_mean + body.width_spread * steps
     each, all_steps = (len(width), 1), (1, _STEPS)
-    score = _score(places.ground, np.tile(heights, each), np.tile(width[:, None], all_steps), told)
+    score = _score(places.ground, np.tile(heights, each), np.tile(width[:, None], all_steps), measured)
     height, height_variance = _posterior(heights, score, steps)
-    score = _score(places.ground, np.tile(height[:, None], all_steps), np.tile(widths, each), told)
+    score = _score(places.ground, np.tile(height[:, None], all_steps), np.tile(widths, each), measured)
     return Sizes(height, height_variance, *_posterior(widths, score, steps))
 
 
-class _Told(NamedTuple):
-    """What one view shows: the label values, and to whom pixels belong, both (v, u)."""
+class _PixelLabels(NamedTuple):
+    """Label values of one view's pixels, and their assignment, both (v, u)."""
 
     view: PixelView
     values: Singles
@@ -81,7 +82,7 @@ class _Told(NamedTuple):
 
 
 def _posterior(lattice: Floats, score: Floats, steps: Floats) -> tuple[Floats, Floats]:
-    """Mean and variance of each one's size on the lattice, from what the views say of it, nats (person, pillar)."""
+    """Mean and variance of each person's size on the lattice, from log-likelihoods (person, pillar), nats."""
     score = score - 0.5 * steps**2
     weight = np.exp(score - score.max(1, keepdims=True))
     weight /= weight.sum(1, keepdims=True)
@@ -89,10 +90,10 @@ def _posterior(lattice: Floats, score: Floats, steps: Floats) -> tuple[Floats, F
     return mean, (weight * (lattice - mean[:, None]) ** 2).sum(1)
 
 
-def _score(ground: Floats, heights: Floats, widths: Floats, told: Sequence[_Told]) -> Floats:
-    """What all views say of people's pillars at their places (person, 2), nats, float64 (person, pillar)."""
+def _score(ground: Floats, heights: Floats, widths: Floats, measured: Sequence[_PixelLabels]) -> Floats:
+    """Log-likelihood in all views of people's pillars at their places (person, 2), nats, float64 (person, pillar)."""
     score, everywhere = np.zeros(heights.shape), np.repeat(ground[:, None], _STEPS, 1)
-    for view, values, owner in told:
+    for view, values, owner in measured:
         sums, area = view.open_sums(values, owner, everywhere, heights, widths)
         score += sums / np.maximum(area.mean(1, keepdims=True), 1.0)
     return score

@@ -1,4 +1,4 @@
-"""How sharp boxes are, learned from the frames that are explained: one table for all views.
+"""Noise of boxes, learned from the frames that are explained: one table for all views.
 
 E step: the offsets of each person's own boxes, over the posterior of the person's place and height. M step: the
 standard deviations that make them most likely, `weight` seconds of one person's box at the first guess among them, and
@@ -30,7 +30,7 @@ _POINTS = np.sqrt(3.0) * np.concatenate([np.eye(3), -np.eye(3)])
 
 
 class BoxNoiseCalibration:
-    """What was seen so far of how boxes fit.
+    """Accumulated squared offsets of boxes.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ class BoxNoiseCalibration:
 
     @property
     def noise(self) -> BoxNoise:
-        """By all that was seen."""
+        """The noise by all frames so far."""
         weight, first = self.config.prior_weight, FIRST.spread**2
         both = FIRST.spread[:, LATE] + FIRST.spread[:, EARLY]
         first[:, LATE:] *= FIRST.spread[:, LATE:] / both[:, None]
@@ -61,20 +61,24 @@ class BoxNoiseCalibration:
         return BoxNoise(np.minimum(spread, FIRST.spread))
 
     def forget_a_frame(self) -> None:
-        """What was seen counts less by the time of a frame."""
+        """Let earlier frames count less, by the time of one frame."""
         kept = np.exp(-1.0 / (self.frame_rate * self.config.memory))
         self.squares *= kept
         self.seen *= kept
 
-    def learn(self, explanation: Explanation, views: Sequence[View], sights: Sequence[ViewObservation | None]) -> None:
+    def learn(
+        self, explanation: Explanation, views: Sequence[View], observations: Sequence[ViewObservation | None]
+    ) -> None:
         """Count one frame."""
         self.forget_a_frame()
         people = explanation.people
-        for k, (view, sight, owner) in enumerate(zip(views, sights, explanation.box_assignment, strict=True)):
-            if isinstance(view, BoxView) and sight is not None and len(people):
+        for k, (view, observation, owner) in enumerate(
+            zip(views, observations, explanation.box_assignment, strict=True)
+        ):
+            if isinstance(view, BoxView) and observation is not None and len(people):
                 trusted = people.evidence - people.view_evidence[k] >= self.config.minimum_evidence
-                box = np.flatnonzero((owner >= 0) & trusted[owner] & _whole(sight.edges, view.camera.size))
-                self._count(sight.score[box], _squares(view, people, owner[box], sight.edges[box]))
+                box = np.flatnonzero((owner >= 0) & trusted[owner] & _whole(observation.edges, view.camera.size))
+                self._count(observation.score[box], _squares(view, people, owner[box], observation.edges[box]))
 
     def _count(self, score: Floats, squares: Floats) -> None:
         lower, share = knots_of(score)

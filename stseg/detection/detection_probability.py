@@ -1,4 +1,4 @@
-"""Target detection probability: how well the pillar of somebody at a place agrees with what all views show.
+"""Target detection probability: agreement of a pillar at each place with the foreground of all views (HW12 eqs 1 to 6).
 
     Omega_i(X | h, r) = sum_(u,v) F_i M_i / sum_(u,v) M_i                      (HW12 eq. 5)
     p(F_i | X)        = sum over a lattice of h and r of Omega_i p(h) p(r)     (eq. 6)
@@ -7,10 +7,10 @@
 M_i is the image of the pillar of height h and width r at X (eq. 4), F_i the likelihood of foreground inside the image
 and e outside it (eq. 2): the rate at which people are out of a view. Here the product is taken over the ratios p(F_i |
 X) / level, the level being the share of a pillar that must show foreground for the view to speak for somebody. A view
-that does not see the pillar at all says 1, so places that different numbers of views see compare. (The paper has e for
+that does not see the pillar at all has ratio 1, so places in different numbers of views compare. (The paper has e for
 such a view, as if the level were e: then every place with a little foreground is a sample, and clutter makes
-candidates; docs/localisation.md.) p(F_i | X) is at least the rate at which a view misses somebody wholly (METHODS 2),
-so that one blind view has no veto. p(X) is the same all over the area.
+candidates.) p(F_i | X) is at least the rate at which a view misses a whole person, so that one blind view has no veto.
+p(X) is uniform over the area.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ from stseg.geometry.grid import inside_polygon
 from stseg.geometry.summed_area import TOP, Sums, fill_sums, sum_of
 
 _WITHIN = 2.0
-"""How far the lattice of heights and widths goes, standard deviations: the paper's range is lost in the scan."""
+"""How far the lattice of heights and widths goes, standard deviations; the paper's range is illegible."""
 _FAR = 1e6
 """Pixels; nothing farther outside an image matters."""
 
 
 class DetectionProbability:
-    """The detection probability of one rig: pillars are cut once, frames are asked one by one.
+    """The detection probability of one rig: pillars are projected once, frames are evaluated one by one.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ class DetectionProbability:
         Returns
         -------
         float64 (y, x)
-            Nats: above 0 where the views together speak for somebody; -inf outside the area.
+            Nats: above 0 where the views together speak for a person; -inf outside the area.
 
         Raises
         ------
@@ -89,7 +89,7 @@ class DetectionProbability:
         total = np.where(self.inside, 0.0, -np.inf)
         for pillars, seen in zip(self.pillars, maps, strict=True):
             if seen is not None:
-                total += self.said(self.chance(pillars, seen))
+                total += self.view_log_ratio(self.chance(pillars, seen))
         return total.reshape(self.ground.shape[:2])
 
     def chance(self, pillars: Pillars, seen: Singles) -> Floats:
@@ -103,8 +103,8 @@ class DetectionProbability:
         )  # fmt: skip
         return chance
 
-    def said(self, chance: Floats) -> Floats:
-        """What a view's p(F_i | X) adds to it, nats; 0 where it does not see the pillar."""
+    def view_log_ratio(self, chance: Floats) -> Floats:
+        """One view's log(p(F_i | X) / level), nats; 0 where it does not see the pillar."""
         config = self.config
         return np.where(np.isnan(chance), 0.0, np.log(np.fmax(chance, config.view_miss_rate) / config.covered_share))
 

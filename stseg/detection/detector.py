@@ -1,8 +1,8 @@
-"""The pass of one frame: candidates, and the set of them that best explains what all views show (METHODS 7).
+"""Per-frame MAP detection with ghost suppression: candidates, and the set of them that best explains all views.
 
-Candidates are sought on a ground lattice, in what nobody explains yet, so people behind others are found once those
-others stand. Whom the frames before led to expect are candidates too, and a newcomer away from the border costs. After
-each round the set is searched anew, until a round changes nobody.
+Candidates come from a ground lattice, scored by the evidence that is not explained yet, so that people behind others
+are found once those are. Predicted tracks are candidates too, and a birth away from the border costs. After each round
+the set is searched again, until a round changes nothing (docs/how-it-works.md, Detection).
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from stseg.model.predicted_tracks import PredictedTracks
 
 
 class Detector:
-    """The pass for one rig: lattice and tables are made once, frames are explained one by one.
+    """The detector of one rig: lattice and tables are made once, frames are explained one by one.
 
     Parameters
     ----------
@@ -39,11 +39,11 @@ class Detector:
     kinds
         What each camera delivers: "boxes" or "pixels".
     config
-        The pass's constants.
+        The detector's constants.
     body
         Population prior of heights and widths.
     level
-        How fast it learns how sharp boxes are.
+        How fast the noise of boxes is learned.
     """
 
     def __init__(
@@ -68,18 +68,9 @@ class Detector:
             else PixelView(camera, grid, flat, config, body)
             for camera, kind in zip(rig.cameras, kinds, strict=True)
         ]
-        self.parameters = Parameters(
-            config.prior_log_odds,
-            config.minimum_distance,
-            config.box_log_ratio,
-            config.box_miss_rate,
-            config.hidden_visibility,
-            config.full_visibility,
-            config.hidden_detection_rate,
-            config.effective_observations,
-        )
+        self.parameters = Parameters.of(config)
         self.border = Border.of(rig)
-        self._trades = 0 if "boxes" in kinds else config.swap_moves
+        self._swap_rounds = 0 if "boxes" in kinds else config.swap_moves
 
     def new_calibration(self) -> BoxNoiseCalibration:
         """Box noise calibration of a session that begins: the first guess."""
@@ -89,24 +80,24 @@ class Detector:
         self,
         calibration: BoxNoiseCalibration,
         seen: Sequence[ViewEvidence],
-        expected: PredictedTracks | None,
+        predicted: PredictedTracks | None,
         proposed: Candidates | None = None,
     ) -> Explanation:
         """Explain a session's next frame, and update the session's box noise calibration with it."""
         noise = calibration.noise
-        explained = self.explain(seen, expected, proposed, noise)
+        explained = self.explain(seen, predicted, proposed, noise)
         calibration.learn(explained, self.views, self.observe(seen, noise))
         return explained
 
     def observe(self, seen: Sequence[ViewEvidence], noise: BoxNoise | None = None) -> list[ViewObservation | None]:
-        """What each view shows under a box noise, by default the first guess; None where the view is blind."""
+        """Observations of the views under a box noise, by default the first guess; None where a view is blind."""
         known = noise or self.first_noise
         return [None if s is None else view.observe(s, known) for view, s in zip(self.views, seen, strict=True)]
 
     def explain(
         self,
         seen: Sequence[ViewEvidence],
-        expected: PredictedTracks | None,
+        predicted: PredictedTracks | None,
         proposed: Candidates | None = None,
         noise: BoxNoise | None = None,
     ) -> Explanation:
@@ -116,45 +107,46 @@ class Detector:
         ----------
         seen
             What each view shows.
-        expected
-            Whom the frames before lead to expect; None in a first frame, in which nobody is a newcomer.
+        predicted
+            Tracks of earlier frames; None in a first frame, where births cost nothing.
         proposed
             Candidates from elsewhere, best first: beside those of the first round's lattice, but for duplicates.
         noise
             Noise of boxes; by default the first guess.
         """
-        sights = self.observe(seen, noise)
-        prior = Prior.of(expected, self.config, self.body, self.border)
-        expected_inside = prior.pool()
-        seen_now = FrameEvidence(self.views, sights, prior, self.parameters)
-        frame = MapEstimate(seen_now, expected_inside, np.arange(len(expected_inside)))
+        prior = Prior.of(predicted, self.config, self.body, self.border)
+        evidence = FrameEvidence(self.views, self.observe(seen, noise), prior, self.parameters)
+        tracked = prior.pool()
+        estimate = MapEstimate.of_search(evidence, tracked, np.arange(len(tracked)))
         for _ in range(self.config.search_rounds):
-            fresh = self.fresh(frame)
+            fresh = self.lattice_candidates(estimate)
             if proposed is not None:
                 fresh, proposed = fresh.joined_apart(proposed, self.config.lattice_spacing), None
-            moved = frame.refined().pool
+            moved = estimate.refined().pool
             if not len(fresh) and not len(moved):
                 break
-            known = len(frame.pool)
-            frame = MapEstimate(frame.seen, frame.pool.joined_with(moved).joined_with(fresh), frame.members)
-            if (frame.members < known).all():
+            known = len(estimate.pool)
+            pool = estimate.pool.joined_with(moved).joined_with(fresh)
+            estimate = MapEstimate.of_search(evidence, pool, estimate.members)
+            if (estimate.members < known).all():
                 break
-        return explanation(_settled(frame, self._trades))
+        return explanation(_settled(estimate, self._swap_rounds))
 
-    def fresh(self, frame: MapEstimate) -> Candidates:
-        """Candidates in what nobody explains yet."""
+    def lattice_candidates(self, estimate: MapEstimate) -> Candidates:
+        """Peaks of the lattice's score by the evidence that an estimate leaves unexplained."""
+        evidence, unexplained = estimate.evidence, estimate.unexplained()
         heights, (rows, columns) = np.asarray(self.body.heights), self.lattice_ground.shape[:2]
-        score = np.repeat(frame.seen.prior.tall(heights)[:, None], rows * columns, 1)
-        for view, sight, free in zip(self.views, frame.seen.sights, frame.free(), strict=True):
-            if sight is not None:
-                score += view.lattice_score(sight, free)
+        score = np.repeat(evidence.prior.log_height(heights)[:, None], rows * columns, 1)
+        for view, observation, free in zip(self.views, evidence.observations, unexplained, strict=True):
+            if observation is not None:
+                score += view.lattice_score(observation, free)
         return peaks(score.reshape(-1, rows, columns), self.lattice_ground, heights, self.body.width_mean)
 
 
-def _settled(frame: MapEstimate, trades: int) -> MapEstimate:
-    """The frame searched from where its people exactly stand, which may show two to be one, then well, by places."""
-    exact = frame.refined().pool
-    known = len(frame.pool)
-    anew = MapEstimate(frame.seen, frame.pool.joined_with(exact), np.arange(known, known + len(exact)))
-    places = np.concatenate([anew.members, anew.rivals()])
-    return MapEstimate(anew.seen, anew.pool.at(places), np.arange(len(anew.members)), ENUMERATED, trades)
+def _settled(estimate: MapEstimate, swap_rounds: int) -> MapEstimate:
+    """The final search: from the refined places, which may show two members to be one, then thoroughly, by places."""
+    exact, known = estimate.refined().pool, len(estimate.pool)
+    start = np.arange(known, known + len(exact))
+    moved = MapEstimate.of_search(estimate.evidence, estimate.pool.joined_with(exact), start)
+    pool = moved.pool.at(np.concatenate([moved.members, moved.alternatives()]))
+    return MapEstimate.of_search(moved.evidence, pool, np.arange(len(moved.members)), ENUMERATED, swap_rounds)

@@ -1,4 +1,4 @@
-"""The candidates of a frame, and all views' evidence for them."""
+"""Evidence of all views for the candidates of a frame, and candidates from a lattice's score."""
 
 from __future__ import annotations
 
@@ -14,45 +14,55 @@ from stseg.model.box_fit import fill_cover, fill_inside, fill_match
 from stseg.model.candidates import Candidates
 
 MOST = 250
-"""Candidates that one round adds at most."""
-_WORTH = 0.0
+"""Most candidates that one round adds."""
+_LEAST_SCORE = 0.0
 """Score above which a peak of the lattice is a candidate, nats."""
 
 
 def peaks(score: Floats, lattice_ground: Floats, heights: Floats, width: float) -> Candidates:
     """Local maxima of a lattice score (height, y, x) over the ground (y, x, 2), all of one width, best first."""
     best, tallest = score.max(0), score.argmax(0)
-    rows, columns = np.nonzero((best == maximum_filter(best, 3)) & (best > _WORTH))
+    rows, columns = np.nonzero((best == maximum_filter(best, 3)) & (best > _LEAST_SCORE))
     order = np.argsort(-best[rows, columns], kind="stable")[:MOST]
     rows, columns = rows[order], columns[order]
     return Candidates(lattice_ground[rows, columns], heights[tallest[rows, columns]], np.full(len(rows), width))
 
 
-def box_evidence(views: Sequence[View], sights: Sequence[ViewObservation | None], pool: Candidates) -> BoxEvidence:
+def box_evidence(
+    views: Sequence[View], observations: Sequence[ViewObservation | None], pool: Candidates
+) -> BoxEvidence:
     """Evidence of all views that deliver boxes; a blind one (None) has the candidates outside its image."""
-    chosen = [(view, sight) for view, sight in zip(views, sights, strict=True) if isinstance(view, BoxView)]
-    most = max((len(sight.edges) for _, sight in chosen if sight), default=0)
+    chosen = [
+        (view, observation) for view, observation in zip(views, observations, strict=True) if isinstance(view, BoxView)
+    ]
+    most = max((len(observation.edges) for _, observation in chosen if observation), default=0)
     n = len(pool)
     evidence = BoxEvidence(
         np.full((len(chosen), n, most), -np.inf),
-        np.array([len(sight.edges) if sight else 0 for _, sight in chosen], np.int64),
+        np.array([len(observation.edges) if observation else 0 for _, observation in chosen], np.int64),
         np.zeros((len(chosen), n, n)),
         np.zeros((len(chosen), n)),
     )
-    for k, (view, sight) in enumerate(chosen):
-        if sight is not None:
+    for k, (view, observation) in enumerate(chosen):
+        if observation is not None:
             width, height = map(float, view.camera.size)
             bodies = view.table.boxes_of(pool.ground, pool.height)
-            match = evidence.match[k, :, : len(sight.edges)]
-            fill_match(bodies, sight.edges, sight.tolerance, sight.belief, width, height, match)
+            match = evidence.match[k, :, : len(observation.edges)]
+            fill_match(bodies, observation.edges, observation.tolerance, observation.belief, width, height, match)
             fill_inside(bodies, width, height, evidence.inside[k])
             fill_cover(bodies, view.distance(pool.ground), width, height, evidence.cover[k])
     return evidence
 
 
-def pixel_evidence(views: Sequence[View], sights: Sequence[ViewObservation | None], pool: Candidates) -> PixelEvidence:
+def pixel_evidence(
+    views: Sequence[View], observations: Sequence[ViewObservation | None], pool: Candidates
+) -> PixelEvidence:
     """Evidence of all views that deliver pixels; a blind one (None) shows log-odds of zero everywhere."""
-    chosen = [(view, sight) for view, sight in zip(views, sights, strict=True) if isinstance(view, PixelView)]
+    chosen = [
+        (view, observation)
+        for view, observation in zip(views, observations, strict=True)
+        if isinstance(view, PixelView)
+    ]
     rows = max((view.shape[0] for view, _ in chosen), default=0)
     columns = max((view.shape[1] for view, _ in chosen), default=0)
     drawn = [view.outlines(pool.ground, pool.height, pool.width) for view, _ in chosen]
@@ -65,9 +75,9 @@ def pixel_evidence(views: Sequence[View], sights: Sequence[ViewObservation | Non
         np.ones((len(chosen), n)),
         np.zeros((len(chosen), n)),
     )
-    for k, ((view, sight), (first, spans, area)) in enumerate(zip(chosen, drawn, strict=True)):
-        if sight is not None:
-            evidence.raster[k, : view.shape[0], : view.shape[1]] = sight.raster
+    for k, ((view, observation), (first, spans, area)) in enumerate(zip(chosen, drawn, strict=True)):
+        if observation is not None:
+            evidence.raster[k, : view.shape[0], : view.shape[1]] = observation.raster
         evidence.first[k], evidence.area[k], evidence.order[k] = first, area, view.distance(pool.ground)
         evidence.spans[k, :, : spans.shape[1]] = spans
     return evidence

@@ -1,69 +1,69 @@
-"""What one more person adds to a set, without scoring the set anew.
+"""Gain of one more person, without scoring the set anew.
 
-Pixels are the dear part of a score, and a newcomer changes whose they are only inside their own outline: with the
-owners of the set at hand, the gain is a sum over that outline alone.
+Pixels are the dear part of a score, and one more person changes their assignment only inside the person's outline: with
+the set's assignment at hand, the gain is a sum over that outline alone.
 """
 
 from __future__ import annotations
 
 from stseg.accelerate import kernel, part
 from stseg.arrays import Ints
-from stseg.detection.problem import Owners, Parameters, PixelEvidence, Problem
-from stseg.detection.scoring import box_score, crowd, walker_score
+from stseg.detection.problem import Parameters, PixelAssignment, PixelEvidence, Problem
+from stseg.detection.scoring import box_score, crowd, track_score
 
 
 @kernel
-def fill_owners(members: Ints, count: int, pixels: PixelEvidence, owners: Owners) -> None:
-    """Fill owners (view, v * u), -1 everywhere before, with the candidate whom each pixel shows of the set."""
+def fill_assignment(members: Ints, count: int, pixels: PixelEvidence, assigned: PixelAssignment) -> None:
+    """Fill owners (view, v * u), -1 everywhere before, with the member whom each pixel is assigned to."""
     for a in range(count):
-        come_in(members[a], pixels, owners)
+        insert(members[a], pixels, assigned)
 
 
 @kernel
-def wipe_owners(members: Ints, count: int, pixels: PixelEvidence, owners: Owners) -> None:
-    """Make a set's owners -1 everywhere again."""
+def clear_assignment(members: Ints, count: int, pixels: PixelEvidence, assigned: PixelAssignment) -> None:
+    """Make a set's assignment -1 everywhere again."""
     for a in range(count):
         for view in range(len(pixels.raster)):
             first = pixels.first[view, members[a]]
             for k in range(_rows(first, pixels)):
                 line = (first + k) * pixels.raster.shape[2]
                 for u in range(pixels.spans[view, members[a], k, 0], pixels.spans[view, members[a], k, 1]):
-                    owners[view, line + u] = -1
+                    assigned[view, line + u] = -1
 
 
 @kernel
-def come_in(i: int, pixels: PixelEvidence, owners: Owners) -> None:
-    """Candidate i comes in: theirs is what nobody nearer covers."""
+def insert(i: int, pixels: PixelEvidence, assigned: PixelAssignment) -> None:
+    """Assign to candidate i all pixels that no nearer member covers."""
     for view in range(len(pixels.raster)):
         first, away = pixels.first[view, i], pixels.order[view]
         for k in range(_rows(first, pixels)):
             line = (first + k) * pixels.raster.shape[2]
             for u in range(pixels.spans[view, i, k, 0], pixels.spans[view, i, k, 1]):
-                before = owners[view, line + u]
+                before = assigned[view, line + u]
                 if before < 0 or away[before] > away[i]:
-                    owners[view, line + u] = i
+                    assigned[view, line + u] = i
 
 
 @kernel
-def leave(i: int, members: Ints, count: int, pixels: PixelEvidence, owners: Owners) -> None:
-    """Candidate i leaves: what was theirs is that of the nearest left, the first `count` members, who covers it."""
+def withdraw(i: int, members: Ints, count: int, pixels: PixelEvidence, assigned: PixelAssignment) -> None:
+    """Reassign candidate i's pixels to the nearest of the first `count` members that covers each."""
     for view in range(len(pixels.raster)):
         first, spans, away = pixels.first[view], pixels.spans[view], pixels.order[view]
         rows = _rows(first[i], pixels)
         for k in range(rows):
             line = (first[i] + k) * pixels.raster.shape[2]
             for u in range(spans[i, k, 0], spans[i, k, 1]):
-                if owners[view, line + u] == i:
-                    owners[view, line + u] = -1
+                if assigned[view, line + u] == i:
+                    assigned[view, line + u] = -1
         for a in range(count):
             j = members[a]
             lower = first[j] - first[i]
             for k in range(max(lower, 0), min(rows, lower + spans.shape[1]) if first[j] >= 0 else 0):
                 line, below = (first[i] + k) * pixels.raster.shape[2], k - lower
                 for u in range(max(spans[i, k, 0], spans[j, below, 0]), min(spans[i, k, 1], spans[j, below, 1])):
-                    before = owners[view, line + u]
+                    before = assigned[view, line + u]
                     if before < 0 or away[before] > away[j]:
-                        owners[view, line + u] = j
+                        assigned[view, line + u] = j
 
 
 @part
@@ -73,57 +73,59 @@ def _rows(first: int, pixels: PixelEvidence) -> int:
 
 
 @kernel
-def paired(members: Ints, count: int, case: Problem) -> float:
-    """What boxes and walkers say of a set, nats: they are paired anew whenever the set changes."""
-    total = walker_score(members, count, case.known, case.newcomer, case.owner)
-    for view in range(len(case.boxes.boxes)):
-        total += box_score(view, members, count, case.boxes, case.terms, case.owner, case.parts[view])
+def matching_score(members: Ints, count: int, problem: Problem) -> float:
+    """Score of boxes and tracks, nats: both are matched anew whenever the set changes."""
+    total = track_score(members, count, problem.track_gain, problem.birth_cost, problem.assigned)
+    for view in range(len(problem.boxes.boxes)):
+        total += box_score(
+            view, members, count, problem.boxes, problem.parameters, problem.assigned, problem.view_evidence[view]
+        )
     return total
 
 
 @kernel
-def gain_of(i: int, members: Ints, count: int, pairs: float, owners: Owners, case: Problem) -> float:
-    """What candidate i adds to a set, nats.
+def gain_of(i: int, members: Ints, count: int, pairs: float, assigned: PixelAssignment, problem: Problem) -> float:
+    """Gain of candidate i, nats.
 
     Parameters
     ----------
     members : int64 (candidate + 1,)
         The first `count` are the set; the next place is scratch.
     pairs
-        The set's `paired`.
-    owners
-        The set's, from `fill_owners`.
+        The set's `matching_score`.
+    assigned
+        The set's, from `fill_assignment`.
     """
     members[count] = i
-    return unpaired_gain(i, members, count, owners, case) + paired(members, count + 1, case) - pairs
+    return unpaired_gain(i, members, count, assigned, problem) + matching_score(members, count + 1, problem) - pairs
 
 
 @kernel
-def unpaired_gain(i: int, members: Ints, count: int, owners: Owners, case: Problem) -> float:
-    """What of that neither boxes nor walkers say."""
-    gain = case.terms.person + case.own[i] - case.newcomer[i]
+def unpaired_gain(i: int, members: Ints, count: int, assigned: PixelAssignment, problem: Problem) -> float:
+    """The part of that gain that needs no matching: prior, crowding and pixels."""
+    gain = problem.parameters.prior_log_odds + problem.height_prior[i] - problem.birth_cost[i]
     for a in range(count):
-        gain -= crowd(i, members[a], case.ground, case.terms.apart)
-    return float(gain + _pixel_gain(i, case.pixels, case.terms, owners))
+        gain -= crowd(i, members[a], problem.ground, problem.parameters.minimum_distance)
+    return float(gain + _pixel_gain(i, problem.pixels, problem.parameters, assigned))
 
 
 @kernel
-def _pixel_gain(i: int, pixels: PixelEvidence, terms: Parameters, owners: Owners) -> float:
+def _pixel_gain(i: int, pixels: PixelEvidence, parameters: Parameters, assigned: PixelAssignment) -> float:
     columns = pixels.raster.shape[2]
     total = 0.0
     for view in range(len(pixels.raster)):
         first, raster, away = pixels.first[view, i], pixels.raster[view], pixels.order[view]
         if first < 0:
             continue
-        free, lost = 0.0, 0.0
+        unexplained, lost = 0.0, 0.0
         for k in range(_rows(first, pixels)):
             line = (first + k) * columns
             for u in range(pixels.spans[view, i, k, 0], pixels.spans[view, i, k, 1]):
-                before = owners[view, line + u]
+                before = assigned[view, line + u]
                 if before < 0:
-                    free += raster[first + k, u]
+                    unexplained += raster[first + k, u]
                 elif away[before] > away[i]:
-                    free += raster[first + k, u]
+                    unexplained += raster[first + k, u]
                     lost += raster[first + k, u] / pixels.area[view, before]
-        total += free / pixels.area[view, i] - lost
-    return float(terms.body_weight * total)
+        total += unexplained / pixels.area[view, i] - lost
+    return float(parameters.effective_observations * total)

@@ -1,8 +1,8 @@
-"""Candidates whose evidence touches, and the groups that this makes, which can be decided apart (HW12 section IV-B).
+"""Groups of candidates that interact, which can be decided apart (HW12 section IV-B).
 
-Two candidates touch where their projections overlap in a view with pixels, where one hides the other or both fit one
-box in a view with boxes, where both may be one walker, and where they stand too near for two bodies. The score of a set
-is the sum of the scores of its groups, exactly.
+Two candidates interact where their projections overlap in a view with pixels, where one hides the other or both fit one
+box in a view with boxes, where both may continue one track, and where they stand too near for two bodies. The score of
+a set is the sum of the scores of its groups, exactly.
 """
 
 from __future__ import annotations
@@ -15,39 +15,41 @@ from stseg.detection.problem import BoxEvidence, PixelEvidence, Problem
 
 
 @kernel
-def fill_touch(case: Problem, touch: Flags) -> None:
-    """Fill touch (candidate, candidate), symmetric: whether one of the two bears on what the other adds to a set."""
-    boxes, pixels, known = case.boxes, case.pixels, case.known
-    touch[:] = False
+def fill_interactions(problem: Problem, interacts: Flags) -> None:
+    """Fill touch (candidate, candidate), symmetric: whether the gain of one depends on the other."""
+    boxes, pixels, known = problem.boxes, problem.pixels, problem.track_gain
+    interacts[:] = False
     for k in range(known.shape[1]):
-        _touch_each_other(np.flatnonzero(case.newcomer + known[:, k] > 0), touch)
+        _join_all(np.flatnonzero(problem.birth_cost + known[:, k] > 0), interacts)
     for view in range(len(boxes.boxes)):
         for b in range(boxes.boxes[view]):
-            _touch_each_other(np.flatnonzero(_fits(boxes.match[view, :, b], case)), touch)
-    for i in range(len(touch)):
-        touch[i, i] = True
+            _join_all(np.flatnonzero(_fits(boxes.match[view, :, b], problem)), interacts)
+    for i in range(len(interacts)):
+        interacts[i, i] = True
         for j in range(i):
-            if not touch[i, j]:
-                touch[i, j] = touch[j, i] = _hides(i, j, case) or _too_near(i, j, case) or _overlap(i, j, pixels)
+            if not interacts[i, j]:
+                interacts[i, j] = interacts[j, i] = (
+                    _hides(i, j, problem) or _overlap_on_ground(i, j, problem) or _overlap(i, j, pixels)
+                )
 
 
 @kernel
-def _fits(match: Floats, case: Problem) -> Flags:
-    """Who may be better off with a box than without, from their matches (n,): bool (n,)."""
-    return np.asarray(case.terms.hit + match > np.log(case.terms.box_miss))
+def _fits(match: Floats, problem: Problem) -> Flags:
+    """Candidates that may gain by a box, from their matches (n,): bool (n,)."""
+    return np.asarray(problem.parameters.box_log_ratio + match > np.log(problem.parameters.box_miss_rate))
 
 
 @kernel
-def _touch_each_other(marked: Ints, touch: Flags) -> None:
+def _join_all(marked: Ints, interacts: Flags) -> None:
     for i in marked:
         for j in marked:
-            touch[i, j] = True
+            interacts[i, j] = True
 
 
 @kernel
-def _hides(i: int, j: int, case: Problem) -> bool:
-    """Whether one of them hides the other in a view with boxes."""
-    cover = case.boxes.cover
+def _hides(i: int, j: int, problem: Problem) -> bool:
+    """Whether one hides the other in a view with boxes."""
+    cover = problem.boxes.cover
     hidden = 0.0
     for view in range(len(cover)):
         hidden += cover[view, i, j] + cover[view, j, i]
@@ -55,14 +57,16 @@ def _hides(i: int, j: int, case: Problem) -> bool:
 
 
 @kernel
-def _too_near(i: int, j: int, case: Problem) -> bool:
-    ground = case.ground
-    return bool(np.hypot(ground[i, 0] - ground[j, 0], ground[i, 1] - ground[j, 1]) < case.terms.apart)
+def _overlap_on_ground(i: int, j: int, problem: Problem) -> bool:
+    ground = problem.ground
+    return bool(
+        np.hypot(ground[i, 0] - ground[j, 0], ground[i, 1] - ground[j, 1]) < problem.parameters.minimum_distance
+    )
 
 
 @kernel
 def _overlap(i: int, j: int, pixels: PixelEvidence) -> bool:
-    """Whether they share a pixel."""
+    """Whether their outlines share a pixel."""
     for view in range(len(pixels.raster)):
         one, other = pixels.first[view, i], pixels.first[view, j]
         if one < 0 or other < 0:
@@ -75,7 +79,7 @@ def _overlap(i: int, j: int, pixels: PixelEvidence) -> bool:
 
 
 @kernel
-def fill_groups(touch: Flags, group: Ints) -> int:
+def fill_groups(interacts: Flags, group: Ints) -> int:
     """Fill group (candidate,) with numbers from 0, in the order of their first candidates; returns how many."""
     group[:] = -1
     waiting = np.empty(len(group), np.int64)
@@ -88,7 +92,7 @@ def fill_groups(touch: Flags, group: Ints) -> int:
             left -= 1
             i = waiting[left]
             for j in range(len(group)):
-                if touch[i, j] and group[j] < 0:
+                if interacts[i, j] and group[j] < 0:
                     group[j], waiting[left] = found, j
                     left += 1
         found += 1
@@ -96,14 +100,14 @@ def fill_groups(touch: Flags, group: Ints) -> int:
 
 
 @kernel
-def alone(case: Problem, own: Ints) -> Problem:
-    """A case with the boxes and walkers alone that a group (n,) may have or be; candidates keep their numbers."""
-    boxes = case.boxes
+def restricted(problem: Problem, own: Ints) -> Problem:
+    """A problem with the boxes and tracks alone that a group (n,) may take; candidates keep their numbers."""
+    boxes = problem.boxes
     number = np.zeros(len(boxes.boxes), np.int64)
     kept = np.zeros((len(boxes.boxes), boxes.match.shape[2]), np.int64)
     for view in range(len(boxes.boxes)):
         for b in range(boxes.boxes[view]):
-            if _fits(boxes.match[view, :, b][own], case).any():
+            if _fits(boxes.match[view, :, b][own], problem).any():
                 kept[view, number[view]] = b
                 number[view] += 1
     most = number.max() if len(number) else 0
@@ -112,22 +116,32 @@ def alone(case: Problem, own: Ints) -> Problem:
         for i in own:
             for k in range(number[view]):
                 match[view, i, k] = boxes.match[view, i, kept[view, k]]
-    known = _walkers_of(case, own)
+    known = _tracks_of(problem, own)
     part = BoxEvidence(match, number, boxes.cover, boxes.inside)
-    return Problem(part, case.pixels, case.own, case.newcomer, known, case.ground, case.terms, case.owner, case.parts)
+    return Problem(
+        part,
+        problem.pixels,
+        problem.height_prior,
+        problem.birth_cost,
+        known,
+        problem.ground,
+        problem.parameters,
+        problem.assigned,
+        problem.view_evidence,
+    )
 
 
 @kernel
-def _walkers_of(case: Problem, own: Ints) -> Floats:
-    """What speaks for each candidate by being each walker that somebody of a group may be, float64 (candidate, k)."""
-    kept = np.zeros(case.known.shape[1], np.int64)
+def _tracks_of(problem: Problem, own: Ints) -> Floats:
+    """Gains of the tracks that a group may continue, float64 (candidate, k)."""
+    kept = np.zeros(problem.track_gain.shape[1], np.int64)
     count = 0
     for k in range(len(kept)):
-        if ((case.newcomer + case.known[:, k])[own] > 0).any():
+        if ((problem.birth_cost + problem.track_gain[:, k])[own] > 0).any():
             kept[count] = k
             count += 1
-    known = np.zeros((len(case.known), count))
+    known = np.zeros((len(problem.track_gain), count))
     for i in own:
         for k in range(count):
-            known[i, k] = case.known[i, kept[k]]
+            known[i, k] = problem.track_gain[i, kept[k]]
     return known

@@ -1,8 +1,8 @@
-"""Moves from one set of people to a better one, among the candidates of one group (METHODS 7).
+"""Local search among the candidates of one group: simple moves, and swap moves.
 
-Simple moves add, remove or replace one person. A trade takes more at once: somebody leaves, or somebody is let in, and
-simple moves answer before the whole is judged; so one ghost gives way to the two people whose evidence it had taken,
-and two to the one who explains both.
+Simple moves add, remove or replace one person. A swap forces one candidate out or in and lets simple moves answer
+before the whole is judged: so one ghost gives way to the two people whose evidence it had taken, and two ghosts to the
+one person who explains both.
 """
 
 from __future__ import annotations
@@ -11,20 +11,34 @@ import numpy as np
 
 from stseg.accelerate import kernel
 from stseg.arrays import Flags, Ints
-from stseg.detection.gains import come_in, fill_owners, gain_of, leave, paired, unpaired_gain, wipe_owners
-from stseg.detection.problem import Owners, Problem
+from stseg.detection.gains import (
+    clear_assignment,
+    fill_assignment,
+    gain_of,
+    insert,
+    matching_score,
+    unpaired_gain,
+    withdraw,
+)
+from stseg.detection.problem import PixelAssignment, Problem
 from stseg.detection.scoring import set_score
 
 SWEEPS = 8
+"""Sweeps of simple moves at most; two or three are usual."""
 GAINED = 1e-9
+"""Least rise of the score that counts, nats: above rounding errors."""
 _NEAR = 0.7
+"""A member is replaced by candidates this near alone, metres: more is another person."""
 _SLACK = 3.0
+"""Candidates that were this far below the best gain are not tried again in a sweep, nats."""
 _HOPELESS = -12.0
-"""A person who adds less than this is not let in on trial, nats: whoever leaves for them cannot make up for it."""
+"""Candidates with less gain are not forced in, nats: members that leave for them cannot make up for it."""
 
 
 @kernel
-def local_search(members: Ints, count: int, own: Ints, inside: Flags, owners: Owners, case: Problem) -> int:
+def local_search(
+    members: Ints, count: int, own: Ints, inside: Flags, assigned: PixelAssignment, problem: Problem
+) -> int:
     """Simple moves until none helps; returns the set's new size.
 
     Parameters
@@ -32,16 +46,16 @@ def local_search(members: Ints, count: int, own: Ints, inside: Flags, owners: Ow
     members : int64 (candidate + 1,)
         The first `count` are the set.
     own : int64 (n,)
-        The candidates who may come in.
+        The candidates of the group.
     inside : bool (candidate,)
-        Who of all is in the set.
-    owners : int16 (view, v * u)
+        Membership of all candidates.
+    assigned : int16 (view, v * u)
         Scratch, -1 everywhere before and after.
     """
     for _ in range(SWEEPS):
-        grown = _add(members, count, own, inside, owners, case)
-        shrunk = _remove(members, grown, -1, inside, inside, owners, case)
-        exchanged = _exchange(members, shrunk, own, inside, owners, case)
+        grown = _add(members, count, own, inside, assigned, problem)
+        shrunk = _remove(members, grown, -1, inside, inside, assigned, problem)
+        exchanged = _exchange(members, shrunk, own, inside, assigned, problem)
         if grown == count and shrunk == grown and not exchanged:
             break
         count = shrunk
@@ -50,24 +64,31 @@ def local_search(members: Ints, count: int, own: Ints, inside: Flags, owners: Ow
 
 @kernel
 def swap(
-    members: Ints, count: int, own: Ints, inside: Flags, touch: Flags, owners: Owners, trades: int, case: Problem
+    members: Ints,
+    count: int,
+    own: Ints,
+    inside: Flags,
+    interacts: Flags,
+    assigned: PixelAssignment,
+    trades: int,
+    problem: Problem,
 ) -> int:
-    """All trades, at most so many times, until none helps; takes what `local_search` takes, and who touches whom."""
+    """Sweeps of swap moves until none helps; arguments of `local_search`, and `interacts` (candidate, candidate)."""
     trial, trial_inside = members.copy(), inside.copy()
-    score = set_score(members, count, case)
+    score = set_score(members, count, problem)
     for _ in range(trades):
         before = score
         for i in own:
             trial[:], trial_inside[:] = members, inside
-            near = own[touch[i][own]]
+            near = own[interacts[i][own]]
             if inside[i]:
-                size = _leave(trial, count, i, near[near != i], trial_inside, owners, case)
+                size = _withdraw_and_refill(trial, count, i, near[near != i], trial_inside, assigned, problem)
             else:
-                size = _let_in(trial, count, i, trial_inside, touch, owners, case)
+                size = _insert_and_prune(trial, count, i, trial_inside, interacts, assigned, problem)
             if size < 0:
                 continue
-            size = local_search(trial, size, near, trial_inside, owners, case)
-            after = set_score(trial, size, case)
+            size = local_search(trial, size, near, trial_inside, assigned, problem)
+            after = set_score(trial, size, problem)
             if after > score + GAINED:
                 members[:], inside[:], count, score = trial, trial_inside, size, after
         if score <= before + GAINED:
@@ -76,69 +97,75 @@ def swap(
 
 
 @kernel
-def _leave(members: Ints, count: int, i: int, near: Ints, inside: Flags, owners: Owners, case: Problem) -> int:
-    """Somebody leaves, and those near come in who had been in their shade; the set's size, or -1 where nobody does."""
+def _withdraw_and_refill(
+    members: Ints, count: int, i: int, near: Ints, inside: Flags, assigned: PixelAssignment, problem: Problem
+) -> int:
+    """Force member i out and add candidates near it; the set's size, or -1 where none is added."""
     for a in range(count):
         if members[a] == i:
             members[a] = members[count - 1]
     inside[i] = False
-    size = _add(members, count - 1, near, inside, owners, case)
+    size = _add(members, count - 1, near, inside, assigned, problem)
     return size if size > count - 1 else -1
 
 
 @kernel
-def _let_in(members: Ints, count: int, i: int, inside: Flags, touch: Flags, owners: Owners, case: Problem) -> int:
-    """Somebody is let in, and those leave who are worth nothing beside them; the set's size, or -1 where nobody does.
+def _insert_and_prune(
+    members: Ints, count: int, i: int, inside: Flags, interacts: Flags, assigned: PixelAssignment, problem: Problem
+) -> int:
+    """Force candidate i in and remove members that add nothing beside it; the set's size, or -1 where none is removed.
 
-    Where one leaves to whom they stand near, that is an exchange, and was tried.
+    Where just one near member is removed, that is a simple replacement, which was tried.
     """
-    fill_owners(members, count, case.pixels, owners)
-    gain = gain_of(i, members, count, paired(members, count, case), owners, case)
-    wipe_owners(members, count, case.pixels, owners)
+    fill_assignment(members, count, problem.pixels, assigned)
+    gain = gain_of(i, members, count, matching_score(members, count, problem), assigned, problem)
+    clear_assignment(members, count, problem.pixels, assigned)
     if gain < _HOPELESS:
         return -1
     before = members[:count].copy()
     members[count], inside[i] = i, True
-    left = _remove(members, count + 1, i, touch[i], inside, owners, case)
+    left = _remove(members, count + 1, i, interacts[i], inside, assigned, problem)
     gone = before[~inside[before]]
-    if len(gone) == 0 or (len(gone) == 1 and _apart(i, gone[0], case) <= _NEAR):
+    if len(gone) == 0 or (len(gone) == 1 and _apart(i, gone[0], problem) <= _NEAR):
         return -1
     return left
 
 
 @kernel
-def _apart(i: int, j: int, case: Problem) -> float:
-    return float(np.hypot(case.ground[i, 0] - case.ground[j, 0], case.ground[i, 1] - case.ground[j, 1]))
+def _apart(i: int, j: int, problem: Problem) -> float:
+    return float(np.hypot(problem.ground[i, 0] - problem.ground[j, 0], problem.ground[i, 1] - problem.ground[j, 1]))
 
 
 @kernel
-def _add(members: Ints, count: int, own: Ints, inside: Flags, owners: Owners, case: Problem) -> int:
-    """Add the best candidate while one helps; a candidate's gain seldom rises, so hopeless ones are tried once."""
+def _add(members: Ints, count: int, own: Ints, inside: Flags, assigned: PixelAssignment, problem: Problem) -> int:
+    """Add the best candidate while one helps; gains seldom rise, so candidates far below the best are tried once."""
     gain = np.full(len(own), np.inf)
-    fill_owners(members, count, case.pixels, owners)
+    fill_assignment(members, count, problem.pixels, assigned)
     while True:
         best, best_gain = -1, GAINED
-        pairs = paired(members, count, case)
+        pairs = matching_score(members, count, problem)
         for k in range(len(own)):
             if inside[own[k]] or gain[k] < best_gain - _SLACK:
                 continue
-            gain[k] = gain_of(own[k], members, count, pairs, owners, case)
+            gain[k] = gain_of(own[k], members, count, pairs, assigned, problem)
             if gain[k] > best_gain:
                 best, best_gain = own[k], gain[k]
         if best < 0:
             break
         members[count], inside[best] = best, True
         count += 1
-        come_in(best, case.pixels, owners)
-    wipe_owners(members, count, case.pixels, owners)
+        insert(best, problem.pixels, assigned)
+    clear_assignment(members, count, problem.pixels, assigned)
     return count
 
 
 @kernel
-def _remove(members: Ints, count: int, keep: int, may: Flags, inside: Flags, owners: Owners, case: Problem) -> int:
-    """Remove each member without whom the score is higher, of those who may (candidate,) leave, but not `keep`."""
-    fill_owners(members, count, case.pixels, owners)
-    pairs = paired(members, count, case)
+def _remove(
+    members: Ints, count: int, keep: int, may: Flags, inside: Flags, assigned: PixelAssignment, problem: Problem
+) -> int:
+    """Remove each member without whom the score is higher, of those that `may` (candidate,) leave, but not `keep`."""
+    fill_assignment(members, count, problem.pixels, assigned)
+    pairs = matching_score(members, count, problem)
     a = 0
     while a < count:
         leaving = members[a]
@@ -146,42 +173,42 @@ def _remove(members: Ints, count: int, keep: int, may: Flags, inside: Flags, own
             a += 1
             continue
         members[a] = members[count - 1]
-        leave(leaving, members, count - 1, case.pixels, owners)
-        without = paired(members, count - 1, case)
-        if unpaired_gain(leaving, members, count - 1, owners, case) + pairs - without < -GAINED:
+        withdraw(leaving, members, count - 1, problem.pixels, assigned)
+        without = matching_score(members, count - 1, problem)
+        if unpaired_gain(leaving, members, count - 1, assigned, problem) + pairs - without < -GAINED:
             inside[leaving] = False
             count -= 1
             pairs = without
         else:
             members[a] = leaving
-            come_in(leaving, case.pixels, owners)
+            insert(leaving, problem.pixels, assigned)
             a += 1
-    wipe_owners(members, count, case.pixels, owners)
+    clear_assignment(members, count, problem.pixels, assigned)
     return count
 
 
 @kernel
-def _exchange(members: Ints, count: int, own: Ints, inside: Flags, owners: Owners, case: Problem) -> bool:
+def _exchange(members: Ints, count: int, own: Ints, inside: Flags, assigned: PixelAssignment, problem: Problem) -> bool:
     """Replace each member by the near candidate that raises the score most."""
     changed = False
-    fill_owners(members, count, case.pixels, owners)
+    fill_assignment(members, count, problem.pixels, assigned)
     for a in range(count):
         old = members[a]
         members[a] = members[count - 1]
-        leave(old, members, count - 1, case.pixels, owners)
-        pairs = paired(members, count - 1, case)
-        best, best_gain = old, gain_of(old, members, count - 1, pairs, owners, case) + GAINED
+        withdraw(old, members, count - 1, problem.pixels, assigned)
+        pairs = matching_score(members, count - 1, problem)
+        best, best_gain = old, gain_of(old, members, count - 1, pairs, assigned, problem) + GAINED
         for i in own:
-            if inside[i] or _apart(i, old, case) > _NEAR:
+            if inside[i] or _apart(i, old, problem) > _NEAR:
                 continue
-            gain = gain_of(i, members, count - 1, pairs, owners, case)
+            gain = gain_of(i, members, count - 1, pairs, assigned, problem)
             if gain > best_gain:
                 best, best_gain = i, gain
         members[count - 1] = members[a]
         members[a] = best
-        come_in(best, case.pixels, owners)
+        insert(best, problem.pixels, assigned)
         if best != old:
             inside[old], inside[best] = False, True
             changed = True
-    wipe_owners(members, count, case.pixels, owners)
+    clear_assignment(members, count, problem.pixels, assigned)
     return changed

@@ -1,9 +1,14 @@
-"""One frame while it is being explained: its candidates, and the set of them that explains it best so far."""
+"""MAP estimate of one frame: candidates, and the subset of them that explains all views best.
+
+The estimate is a frozen record of one search (`stseg.detection.search`): members, score, what each view says of each
+member, and the assignment of boxes and pixels. A further round makes a further estimate.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -14,7 +19,7 @@ from stseg.detection.evidence import box_evidence, pixel_evidence
 from stseg.detection.prior import Prior
 from stseg.detection.problem import Parameters, Problem
 from stseg.detection.refine import refine
-from stseg.detection.scoring import box_score, pixel_score, set_score, walker_score
+from stseg.detection.scoring import box_score, pixel_score, set_score, track_score
 from stseg.detection.search import search
 from stseg.detection.views import BoxView, PixelView, ViewObservation
 from stseg.model.candidates import Candidates
@@ -23,28 +28,28 @@ from stseg.model.sizes import Sizes
 
 @dataclass(frozen=True)
 class FrameEvidence:
-    """What stays the same while a frame is explained: the views, what each shows (None where blind), and the prior."""
+    """What stays the same in all rounds of a frame: views, their observations (None where blind), and the prior."""
 
     views: Sequence[BoxView | PixelView]
-    sights: Sequence[ViewObservation | None]
+    observations: Sequence[ViewObservation | None]
     prior: Prior
-    terms: Parameters
+    parameters: Parameters
 
 
 @dataclass(frozen=True)
 class RefinedPeople:
-    """A set's people, as exactly as the frame tells.
+    """The members of an estimate at the means of their posteriors.
 
     Attributes
     ----------
     pool
-        Where they stand, as tall as the frame by itself says: a height that was known before would confirm itself.
+        Places, heights by this frame alone (a known height would confirm itself), and widths.
     covariance : float64 (n, 2, 2)
         Of each place, square metres.
     sizes
-        What the frame by itself says of them, anybody's sizes the prior.
+        Size posteriors of this frame alone, under the population prior.
     known
-        Their sizes by all that was seen of each so far.
+        Size posteriors of all frames so far.
     """
 
     pool: Candidates
@@ -53,46 +58,71 @@ class RefinedPeople:
     known: Sizes
 
 
-class MapEstimate:
-    """Candidates, and the best set of them that a search finds.
+@dataclass(frozen=True)
+class SetScore:
+    """Score of a set of candidates, nats; and what each view says of each member, float64 (view, member), nats."""
 
-    Parameters
+    total: float
+    view_evidence: Floats
+
+
+@dataclass(frozen=True)
+class MapEstimate:
+    """Candidates, and the best set of them that a search found.
+
+    Attributes
     ----------
-    seen
+    evidence
         What the frame is judged by.
     pool
         The candidates.
+    problem
+        The same as arrays, for the kernels.
     members : int64 (n,)
-        The candidates with whom the search begins.
-    enumerated, trades
-        How well the set is searched, see `stseg.detection.search`.
+        The chosen candidates.
     """
 
-    def __init__(
-        self, seen: FrameEvidence, pool: Candidates, members: Ints, enumerated: int = 0, trades: int = 0
-    ) -> None:
-        self.seen, self.pool = seen, pool
-        self.case = _case(seen, pool)
-        # The scores' parts have the views with boxes first; `row` finds those of each view of the rig.
-        pixels_last = np.argsort([isinstance(view, PixelView) for view in seen.views], kind="stable")
-        self.row = np.argsort(pixels_last)
-        room = np.zeros(len(pool) + 1, np.int64)
-        room[: len(members)] = members
-        count = search(room, len(members), self.case, enumerated, trades)
-        self.members = room[:count].copy()
-        self.total = self.score(self.members)
-        self.box_owner, self.pixel_owner = self._owners()
-        self.walker = self._walkers()
+    evidence: FrameEvidence
+    pool: Candidates
+    problem: Problem
+    members: Ints
 
-    def score(self, members: Ints) -> float:
-        """Score of a set; the case's `parts` then holds what each view says of each member."""
-        return set_score(members, len(members), self.case)
+    @classmethod
+    def of_search(
+        cls, evidence: FrameEvidence, pool: Candidates, start: Ints, enumerated: int = 0, swap_rounds: int = 0
+    ) -> MapEstimate:
+        """Search the best set among `pool`, from the candidates `start` int64 (n,) on.
 
-    def rivals(self) -> Ints:
+        `enumerated` and `swap_rounds` are the effort, see `stseg.detection.search`.
+        """
+        problem = _problem(evidence, pool)
+        scratch = np.zeros(len(pool) + 1, np.int64)
+        scratch[: len(start)] = start
+        count = search(scratch, len(start), problem, enumerated, swap_rounds)
+        return cls(evidence, pool, problem, scratch[:count].copy())
+
+    def score(self, members: Ints) -> SetScore:
+        """Score of any set of the candidates, int64 (n,)."""
+        total = set_score(members, len(members), self.problem)
+        return SetScore(total, self.problem.view_evidence[self._row, : len(members)])
+
+    @cached_property
+    def members_score(self) -> SetScore:
+        """Score of the members."""
+        return self.score(self.members)
+
+    @cached_property
+    def _row(self) -> Ints:
+        """Row of each view of the rig in the problem's `view_evidence`, which has the views with boxes first."""
+        pixels_last = np.argsort([isinstance(view, PixelView) for view in self.evidence.views], kind="stable")
+        return np.argsort(pixels_last)
+
+    def alternatives(self) -> Ints:
         """Candidates outside the set, the best of each place, best first: int64 (n,)."""
-        apart = 2 * self.seen.prior.config.lattice_spacing
+        apart = 2 * self.evidence.prior.config.lattice_spacing
         others = np.setdiff1d(np.arange(len(self.pool)), self.members)
-        gain = np.array([self.score(np.append(self.members, i)) - self.total for i in others])
+        before = self.members_score.total
+        gain = np.array([self.score(np.append(self.members, i)).total - before for i in others])
         standing, kept = self.pool.ground[self.members], []
         for i in others[np.argsort(-gain, kind="stable")]:
             place = self.pool.ground[i]
@@ -101,67 +131,86 @@ class MapEstimate:
                 kept.append(i)
         return np.array(kept, np.int64)
 
-    def _owners(self) -> tuple[list[Ints], list[Ints]]:
-        """For each view whose boxes are whose, and whose pixels are whose; -1 for nobody."""
-        boxes, pixels = [], []
-        case, count = self.case, len(self.members)
+    @cached_property
+    def box_assignment(self) -> list[Ints]:
+        """For each view the member whom each box is assigned to, int64 (box,); -1 for none."""
+        return [boxes for boxes, _ in self._assignments]
+
+    @cached_property
+    def pixel_assignment(self) -> list[Ints]:
+        """For each view the member whom each raster pixel is assigned to, int64 (v, u); -1 for none."""
+        return [pixels for _, pixels in self._assignments]
+
+    @cached_property
+    def _assignments(self) -> list[tuple[Ints, Ints]]:
+        """Boxes and pixels of each view."""
+        assigned, problem, count = [], self.problem, len(self.members)
+        scratch, view_evidence = problem.assigned, problem.view_evidence[0]
         box_view = pixel_view = 0
-        for view, sight in zip(self.seen.views, self.seen.sights, strict=True):
-            owner = np.full(len(sight.edges) if sight else 0, -1, np.int64)
-            raster = np.full(view.shape, -1, np.int64)
+        for view, observation in zip(self.evidence.views, self.evidence.observations, strict=True):
+            boxes = np.full(len(observation.edges) if observation else 0, -1, np.int64)
+            pixels = np.full(view.shape, -1, np.int64)
             if isinstance(view, BoxView):
-                box_score(box_view, self.members, count, case.boxes, case.terms, case.owner, case.parts[0])
-                owner[:] = case.owner[: len(owner)]
+                box_score(box_view, self.members, count, problem.boxes, problem.parameters, scratch, view_evidence)
+                boxes[:] = scratch[: len(boxes)]
                 box_view += 1
             else:
-                case.owner[:] = -1
-                pixel_score(pixel_view, self.members, count, case.pixels, case.terms, case.owner, case.parts[0])
-                rows, columns = case.pixels.raster.shape[1:]
-                raster[:] = case.owner[: rows * columns].reshape(rows, columns)[: view.shape[0], : view.shape[1]]
+                scratch[:] = -1
+                pixel_score(pixel_view, self.members, count, problem.pixels, problem.parameters, scratch, view_evidence)
+                rows, columns = problem.pixels.raster.shape[1:]
+                pixels[:] = scratch[: rows * columns].reshape(rows, columns)[: view.shape[0], : view.shape[1]]
                 pixel_view += 1
-            boxes.append(owner)
-            pixels.append(raster)
-        return boxes, pixels
+            assigned.append((boxes, pixels))
+        return assigned
 
-    def _walkers(self) -> Ints:
-        """Which walker each member is, int64 (member,), -1 for newcomers."""
-        case, walker = self.case, np.full(len(self.members), -1, np.int64)
-        walker_score(self.members, len(self.members), case.known, case.newcomer, case.owner)
-        for k, place in enumerate(case.owner[: case.known.shape[1]]):
+    @cached_property
+    def track_index(self) -> Ints:
+        """The predicted track that each member continues, int64 (member,); -1 for births."""
+        problem, index = self.problem, np.full(len(self.members), -1, np.int64)
+        track_score(self.members, len(self.members), problem.track_gain, problem.birth_cost, problem.assigned)
+        for k, place in enumerate(problem.assigned[: problem.track_gain.shape[1]]):
             if place >= 0:
-                walker[place] = k
-        return walker
+                index[place] = k
+        return index
 
-    def free(self) -> list[Flags]:
-        """For each view the boxes, or the pixels, that nobody explains."""
+    def unexplained(self) -> list[Flags]:
+        """For each view the boxes, or the pixels, that are assigned to no member."""
         return [
             (pixels if isinstance(view, PixelView) else boxes) < 0
-            for view, boxes, pixels in zip(self.seen.views, self.box_owner, self.pixel_owner, strict=True)
+            for view, (boxes, pixels) in zip(self.evidence.views, self._assignments, strict=True)
         ]
 
     def refined(self) -> RefinedPeople:
-        """The set's people at the means of their posteriors."""
-        views, sights, prior, pool = self.seen.views, self.seen.sights, self.seen.prior, self.pool.at(self.members)
-        own = Assignment(self._boxes(), self.pixel_owner)
-        places = refine(pool, views, sights, own, prior, self.walker)
-        sizes = measure(places, pool.width, views, sights, own, prior.body)
-        known = prior.known_sizes(sizes, self.walker)
+        """The members at the means of their posteriors."""
+        views, observations, prior = self.evidence.views, self.evidence.observations, self.evidence.prior
+        pool = self.pool.at(self.members)
+        own = Assignment(self._box_of_each(), self.pixel_assignment)
+        places = refine(pool, views, observations, own, prior, self.track_index)
+        sizes = measure(places, pool.width, views, observations, own, prior.body)
+        known = prior.known_sizes(sizes, self.track_index)
         return RefinedPeople(Candidates(places.ground, sizes.height, known.width), places.covariance, sizes, known)
 
-    def _boxes(self) -> Ints:
+    def _box_of_each(self) -> Ints:
         """The box of each member in each view, int64 (view, member), -1 for none."""
-        box = np.full((len(self.seen.views), len(self.members)), -1, np.int64)
-        for row, owner in zip(box, self.box_owner, strict=True):
-            taken = np.flatnonzero(owner >= 0)
-            row[owner[taken]] = taken
+        box = np.full((len(self.evidence.views), len(self.members)), -1, np.int64)
+        for row, assigned in zip(box, self.box_assignment, strict=True):
+            taken = np.flatnonzero(assigned >= 0)
+            row[assigned[taken]] = taken
         return box
 
 
-def _case(seen: FrameEvidence, pool: Candidates) -> Problem:
-    """All that is known of the candidates, as the search reads it."""
-    views, sights, prior = seen.views, seen.sights, seen.prior
-    boxes, pixels = box_evidence(views, sights, pool), pixel_evidence(views, sights, pool)
-    owner = np.empty(max(pixels.raster[:1].size, boxes.match.shape[2], len(prior.expected), 1), np.int64)
-    parts = np.zeros((len(views), len(pool) + 1))
-    own, newcomer, known = prior.tall(pool.height), prior.newcomer(pool.ground), prior.track_log_ratio(pool)
-    return Problem(boxes, pixels, own, newcomer, known, pool.ground, seen.terms, owner, parts)
+def _problem(evidence: FrameEvidence, pool: Candidates) -> Problem:
+    """All that is known of the candidates, as the search kernels read it."""
+    views, observations, prior = evidence.views, evidence.observations, evidence.prior
+    boxes, pixels = box_evidence(views, observations, pool), pixel_evidence(views, observations, pool)
+    return Problem(
+        boxes=boxes,
+        pixels=pixels,
+        height_prior=prior.log_height(pool.height),
+        birth_cost=prior.birth_cost(pool.ground),
+        track_gain=prior.track_log_ratio(pool),
+        ground=pool.ground,
+        parameters=evidence.parameters,
+        assigned=np.empty(max(pixels.raster[:1].size, boxes.match.shape[2], len(prior.predicted), 1), np.int64),
+        view_evidence=np.zeros((len(views), len(pool) + 1)),
+    )

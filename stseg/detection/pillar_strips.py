@@ -1,12 +1,11 @@
-"""Pillars of HW12 as strips of the image, so that sums over them come from a summed-area table (METHODS 6).
+"""Pillars of HW12 as strips of the image, so that sums over them come from a summed-area table (HW12 eq. 5).
 
 A body is an upright cylinder: its width says how wide it is from any side. Its image is a rectangle only where camera
 and lens keep verticals upright and its round ends flat. So it is cut into strips along its axis, rows of the image
 where the axis runs down it and columns where it runs across. Each strip is one rectangle, about the place of the axis
 there and as wide as the disc's image across the axis. A tilt, a roll or a lens bends the pillar from strip to strip,
 not within one: stairs instead of a slope. The half discs that stand out at both ends are rectangles of their area. The
-discs' images are ellipses, by the derivatives of the projection. What that leaves as error is measured in
-docs/localisation.md.
+discs' images are ellipses, by the derivatives of the projection.
 
 Strips end at the heights that are tried, so the pillars of all heights and widths of a place are nested sums of the
 same few strips.

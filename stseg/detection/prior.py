@@ -1,4 +1,4 @@
-"""What is known of a frame before any view is asked: who is expected, what a newcomer costs, how tall people are."""
+"""The prior of one frame: predicted tracks, the cost of a birth, and the heights of people."""
 
 from __future__ import annotations
 
@@ -20,54 +20,54 @@ class Prior:
 
     Attributes
     ----------
-    expected
-        Whom the frames before lead to expect.
+    predicted
+        Tracks of earlier frames, predicted to this one.
     config
-        The pass's constants.
+        The detector's constants.
     body
         Population prior of heights and widths.
     border
-        Where people may come in.
+        Where people may enter.
     cost
-        What a newcomer far from the border costs, nats.
+        Cost of a birth far from the border, nats.
     """
 
-    expected: PredictedTracks
+    predicted: PredictedTracks
     config: DetectionConfig
     body: BodyConfig
     border: Border
     cost: float
 
     @classmethod
-    def of(cls, expected: PredictedTracks | None, config: DetectionConfig, body: BodyConfig, border: Border) -> Prior:
-        """The prior of a frame; None expects nobody and takes nobody for a newcomer, as a first frame must."""
-        if expected is None:
+    def of(cls, predicted: PredictedTracks | None, config: DetectionConfig, body: BodyConfig, border: Border) -> Prior:
+        """The prior of a frame; None for a first frame: no track is predicted, and births cost nothing."""
+        if predicted is None:
             return cls(no_tracks(), config, body, border, 0.0)
-        return cls(expected, config, body, border, config.birth_cost)
+        return cls(predicted, config, body, border, config.birth_cost)
 
     def pool(self) -> Candidates:
-        """Those expected inside the border, as candidates: who leaves the area is not followed out of it."""
-        inside, sizes = self.border.away(self.expected.ground) > 0, self.expected.sizes
-        return Candidates(self.expected.ground[inside], sizes.height[inside], sizes.width[inside])
+        """Predicted tracks inside the border, as candidates; tracks that leave the area are not followed further."""
+        inside, sizes = self.border.away(self.predicted.ground) > 0, self.predicted.sizes
+        return Candidates(self.predicted.ground[inside], sizes.height[inside], sizes.width[inside])
 
-    def tall(self, heights: Floats) -> Floats:
-        """What speaks for somebody as tall as this, metres, beyond somebody of mean height: nats, float64 (n,)."""
+    def log_height(self, heights: Floats) -> Floats:
+        """Log prior density of heights, metres, beside that of the mean height: nats, float64 (n,)."""
         return -0.5 * ((heights - self.body.height_mean) / self.body.height_spread) ** 2
 
-    def known_sizes(self, sizes: Sizes, walker: Ints) -> Sizes:
-        """Sizes that a frame found as if of anybody, of those who are known by all that was seen of them before.
+    def known_sizes(self, sizes: Sizes, track_index: Ints) -> Sizes:
+        """Size posteriors of one frame under the population prior, put under each track's own prior instead.
 
-        `walker` int64 (n,) says whom of those expected each is, -1 for newcomers.
+        `track_index` int64 (n,) is the predicted track of each person, -1 for births.
         """
-        before = Sizes.of_population(len(walker), self.body)
-        measured, met = sizes.as_measurements(before), np.flatnonzero(walker >= 0)
-        before.put(met, self.expected.sizes.at(walker[met]))
+        before = Sizes.of_population(len(track_index), self.body)
+        measured, tracked = sizes.as_measurements(before), np.flatnonzero(track_index >= 0)
+        before.put(tracked, self.predicted.sizes.at(track_index[tracked]))
         return measured.with_prior(before)
 
-    def newcomer(self, ground: Floats) -> Floats:
-        """What a newcomer costs at ground points (n, 2), nats, float64 (n,)."""
+    def birth_cost(self, ground: Floats) -> Floats:
+        """Cost of a birth at ground points (n, 2), nats, float64 (n,)."""
         return self.cost * self.border.inside(ground, self.config.border_width)
 
     def track_log_ratio(self, pool: Candidates) -> Floats:
-        """What speaks for each candidate by being each walker, nats, float64 (n, walker)."""
-        return self.expected.track_log_ratio(pool.ground, pool.height, self.body, self.config.prior_log_odds)
+        """Log-ratio of each candidate being each predicted track against being a birth, nats, float64 (n, track)."""
+        return self.predicted.track_log_ratio(pool.ground, pool.height, self.body, self.config.prior_log_odds)

@@ -1,7 +1,7 @@
-"""What a frame's candidates are judged by, as arrays that the search kernels read.
+"""One frame's detection problem: candidates and their evidence, as arrays that the search kernels read.
 
-Two forms of evidence stand side by side, since a rig may mix them: boxes, each of which speaks for one person at most,
-and pixels, each of which belongs to the nearest person whose body covers it. Both are used once (METHODS 7).
+Two forms of evidence stand side by side, since a rig may mix them: boxes, each assigned to one person at most, and
+pixels, each assigned to the nearest person whose body covers it. Both are used once (docs/how-it-works.md, Detection).
 """
 
 from __future__ import annotations
@@ -12,23 +12,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stseg.arrays import Floats, Ints, Singles
+from stseg.config import DetectionConfig
 from stseg.model.outlines import Spans
 
-Owners = NDArray[np.int16]
-"""int16 (view, v * u): the candidate whom each raster pixel shows, -1 for nobody. Small: it is walked all the time."""
+PixelAssignment = NDArray[np.int16]
+"""int16 (view, v * u): the candidate whom each raster pixel is assigned to, -1 for none. Small, for speed."""
 
 
 class Parameters(NamedTuple):
-    """The constants of the pass; see `stseg.config.DetectionConfig` for their meaning. Nats and shares."""
+    """Constants of the score; see `stseg.config.DetectionConfig` for their meaning. Nats, shares and metres."""
 
-    person: float
-    apart: float
-    hit: float
-    box_miss: float
-    hidden_below: float
-    whole_above: float
-    least: float
-    body_weight: float
+    prior_log_odds: float
+    minimum_distance: float
+    box_log_ratio: float
+    box_miss_rate: float
+    hidden_visibility: float
+    full_visibility: float
+    hidden_detection_rate: float
+    effective_observations: float
+
+    @classmethod
+    def of(cls, config: DetectionConfig) -> Parameters:
+        """Those of a configuration."""
+        return cls(*(getattr(config, name) for name in cls._fields))
 
 
 class BoxEvidence(NamedTuple):
@@ -41,7 +47,7 @@ class BoxEvidence(NamedTuple):
     boxes : int64 (view,)
         Number of boxes of each view.
     cover : float64 (view, candidate, candidate)
-        Share of the first's pillar that the second hides where both are there; 0 where the second is farther away.
+        Share of the first's pillar that the second hides; 0 where the second is farther away.
     inside : float64 (view, candidate)
         Share of the candidate's pillar inside the image.
     """
@@ -77,35 +83,35 @@ class PixelEvidence(NamedTuple):
 
 
 class Problem(NamedTuple):
-    """A frame's candidates and all that is known of them.
+    """The candidates of a frame and all that is known of them.
 
     Attributes
     ----------
     boxes, pixels
-        What the views say.
-    own : float64 (candidate,)
-        What speaks for each candidate by itself, nats.
-    newcomer : float64 (candidate,)
-        What it costs that nobody was expected there, nats.
-    known : float64 (candidate, walker)
-        What speaks for each candidate by being each walker, beyond a newcomer who costs nothing, nats.
+        Evidence of the views.
+    height_prior : float64 (candidate,)
+        Log prior density of each candidate's height beside the mean height's, nats.
+    birth_cost : float64 (candidate,)
+        Cost of a birth at each place, nats.
+    track_gain : float64 (candidate, track)
+        Log-ratio of each candidate being each predicted track against being a birth that costs nothing, nats.
     ground : float64 (candidate, 2)
         Metres.
-    terms
-        The pass's constants.
-    owner : int64 (at least boxes, at least v * u, at least walkers)
-        Scratch: after a view was scored, the place in the set of whoever owns each box or pixel, -1 for nobody; after
-        the walkers were, of whoever is each walker.
-    parts : float64 (view, candidate + 1)
+    parameters
+        Constants of the score.
+    assigned : int64 (at least boxes, at least v * u, at least tracks)
+        Scratch: after a view was scored, the place in the set of the member whom each box or pixel is assigned to, -1
+        for none; after the tracks were scored, of the member who continues each track.
+    view_evidence : float64 (view, candidate + 1)
         Scratch: after a set was scored, what each view says of each of its members, nats; views with boxes first.
     """
 
     boxes: BoxEvidence
     pixels: PixelEvidence
-    own: Floats
-    newcomer: Floats
-    known: Floats
+    height_prior: Floats
+    birth_cost: Floats
+    track_gain: Floats
     ground: Floats
-    terms: Parameters
-    owner: Ints
-    parts: Floats
+    parameters: Parameters
+    assigned: Ints
+    view_evidence: Floats

@@ -1,9 +1,8 @@
-"""Candidates of a frame before anybody is explained: from the volume and from the detection probability (METHODS 6, 7).
+"""Proposals: candidates of a frame from the volume and from the detection probability, beside the lattice's.
 
-The order is that of METHODS 7: whom earlier frames lead to expect come first, in the pass itself; then modes of the
-volume that all evidence together makes, then modes of the detection probability. Who stands where another stands
-already is a duplicate. Which of these sources a run asks is `proposals.source`; docs/localisation.md says what each
-is worth.
+Predicted tracks come first, in the detector itself; then modes of the volume of all evidence, then modes of the
+detection probability (HW12 section III). A proposal at the place of an earlier one is a duplicate. The sources are
+chosen by `proposals.source`.
 """
 
 from __future__ import annotations
@@ -24,15 +23,15 @@ from stseg.model.people import Explanation, empty_explanation
 Fuse = Callable[[Sequence[ViewEvidence], Explanation], Singles]
 
 _ROWS = 240
-"""A map that boxes are drawn into has some so many rows."""
+"""Rows of a map that boxes are drawn into, about."""
 _FILLED = 0.3
 """Share of a column's planes that must be filled for it to be a sample: a person of whom two thirds are missed."""
 _MOST = 30.0
-"""A place speaks no louder than this, nats: what is so sure is one person, whatever the numbers."""
+"""Largest log-ratio of a sample, nats: beyond it a place is certain, and larger weights only drown its neighbours."""
 
 
 class Proposals:
-    """Proposals for the pass of each frame.
+    """Proposals for the detector.
 
     Parameters
     ----------
@@ -41,18 +40,18 @@ class Proposals:
     kinds
         What each camera delivers: "boxes" or "pixels".
     config
-        Which sources are asked; how far apart candidates are that are not one; how tall and wide people are.
+        Sources, least distance of two candidates, sizes of people.
     """
 
     def __init__(self, rig: Rig, kinds: Sequence[str], config: Config) -> None:
-        self.rig, self.config, self.ghosts = rig, config.proposals, config.detection
+        self.rig, self.config, self.detection = rig, config.proposals, config.detection
         self.body = config.body
         self.probability = None
         if self.config.source in ("probability", "both"):
             self.probability = DetectionProbability(rig, self.config, config.body, map_steps(rig, kinds))
 
     def of(self, seen: Sequence[ViewEvidence], fuse: Fuse) -> Candidates | None:
-        """Candidates of a frame, best first by source; None where none is asked for.
+        """Candidates of a frame, best first by source; None with `proposals.source = "lattice"`.
 
         Parameters
         ----------
@@ -76,7 +75,7 @@ class Proposals:
 
     @property
     def _apart(self) -> float:
-        return self.ghosts.lattice_spacing
+        return self.detection.lattice_spacing
 
     def _pool(self, ground: Floats) -> Candidates:
         everywhere = np.ones(len(ground))
@@ -101,14 +100,14 @@ def soft_maps(probability: DetectionProbability, seen: Sequence[ViewEvidence]) -
 
 
 def probability_modes(probability: DetectionProbability, maps: Sequence[Singles | None]) -> Modes:
-    """Modes of the detection probability where the views together speak for somebody (HW12 eqs 7 to 9)."""
-    said = probability.log_ratio(maps)
-    return modes(weights(said), probability.ground, probability.spacing, probability.config.kernel_radius)
+    """Modes of the detection probability where its log-ratio is above 0 (HW12 eqs 7 to 9)."""
+    log_ratio = probability.log_ratio(maps)
+    return modes(weights(log_ratio), probability.ground, probability.spacing, probability.config.kernel_radius)
 
 
-def weights(said: Floats) -> Floats:
-    """G of the samples, from its logarithm (y, x), nats: 0 where the views do not speak for anybody."""
-    return np.where(said > 0, np.exp(np.minimum(said, _MOST)), 0.0)
+def weights(log_ratio: Floats) -> Floats:
+    """G of the samples, from its logarithm (y, x), nats: 0 where that is not above 0."""
+    return np.where(log_ratio > 0, np.exp(np.minimum(log_ratio, _MOST)), 0.0)
 
 
 def marginal(volume: Singles) -> Floats:

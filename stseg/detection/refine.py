@@ -1,6 +1,6 @@
-"""Where exactly a person stands: the posterior over a small patch of ground.
+"""Refined places: the posterior of each person over a small patch of ground.
 
-Its prior is where they were expected, if they were; its evidence is what is theirs alone.
+The prior is the predicted track, if the person continues one; the evidence is what is assigned to the person alone.
 """
 
 from __future__ import annotations
@@ -17,19 +17,22 @@ from stseg.detection.views import BoxView, PixelView, View, ViewObservation
 from stseg.model.box_fit import fill_match
 from stseg.model.candidates import Candidates
 
-_REACH, _SPACING = 2, 0.08
+_REACH = 2
+"""Half width of the patch, in its spacings."""
+_SPACING = 0.08
+"""Spacing of the patch, metres: a third of the offset of two lattice places."""
 
 
 @dataclass(frozen=True)
 class RefinedPlaces:
-    """Where people stand and how tall they are, as far as both hang together.
+    """Marginal posteriors of people's places and heights.
 
     Attributes
     ----------
     ground, covariance : float64 (n, 2), (n, 2, 2)
-        Whatever the height; metres, square metres.
+        Marginalised over height; metres, square metres.
     height, height_variance : float64 (n,)
-        Wherever near, anybody's height the prior; metres, square metres.
+        Marginalised over place, under the population prior; metres, square metres.
     """
 
     ground: Floats
@@ -41,10 +44,10 @@ class RefinedPlaces:
 def refine(
     pool: Candidates,
     views: Sequence[View],
-    sights: Sequence[ViewObservation | None],
+    observations: Sequence[ViewObservation | None],
     own: Assignment,
     prior: Prior,
-    walker: Ints,
+    track_index: Ints,
 ) -> RefinedPlaces:
     """The posterior of each person's place and height.
 
@@ -53,26 +56,26 @@ def refine(
     pool
         The people.
     own
-        What of the frame is whose.
+        Boxes and pixels assigned to each.
     prior
         The frame's prior.
-    walker : int64 (n,)
-        Whom of those expected each person is, -1 for newcomers.
+    track_index : int64 (n,)
+        The predicted track that each person continues, -1 for births.
 
     Returns
     -------
-    Places
+    RefinedPlaces
         Means and variances.
     """
     axis = np.arange(-_REACH, _REACH + 1) * _SPACING
     offset, tried = np.stack(np.meshgrid(axis, axis), -1).reshape(-1, 2), np.asarray(prior.body.heights)
     patch = pool.ground[:, None] + offset
-    score = np.tile(prior.tall(tried)[:, None], (len(pool), 1, len(offset)))
-    for k, (view, sight) in enumerate(zip(views, sights, strict=True)):
-        if sight is not None and len(pool):
-            score += _patch_score(view, sight, own.box[k], own.pixels[k], patch, tried, pool.width)
-    met = np.flatnonzero(walker >= 0)
-    score[met] += prior.expected.place_log_density(walker[met], patch[met])[:, None]
+    score = np.tile(prior.log_height(tried)[:, None], (len(pool), 1, len(offset)))
+    for k, (view, observation) in enumerate(zip(views, observations, strict=True)):
+        if observation is not None and len(pool):
+            score += _patch_score(view, observation, own.box[k], own.pixels[k], patch, tried, pool.width)
+    met = np.flatnonzero(track_index >= 0)
+    score[met] += prior.predicted.place_log_density(track_index[met], patch[met])[:, None]
     return _posterior(score, patch, tried)
 
 
@@ -88,9 +91,9 @@ def _posterior(score: Floats, patch: Floats, tried: Floats) -> RefinedPlaces:
 
 
 def _patch_score(
-    view: View, sight: ViewObservation, box: Ints, owner: Ints, patch: Floats, tried: Floats, width: Floats
+    view: View, observation: ViewObservation, box: Ints, owner: Ints, patch: Floats, tried: Floats, width: Floats
 ) -> Floats:
-    """What one view says of pillars on patches (person, place, 2), nats, float64 (person, height, place)."""
+    """Log-likelihood, in one view, of pillars on patches (person, place, 2), nats, float64 (person, height, place)."""
     people, places = patch.shape[:2]
     score = np.zeros((people, len(tried), places))
     everywhere = np.repeat(patch[:, None], len(tried), 1).reshape(people, -1, 2)
@@ -98,12 +101,14 @@ def _patch_score(
     if isinstance(view, BoxView):
         columns, rows = map(float, view.camera.size)
         for j in np.flatnonzero(box >= 0):
-            edges, tolerance, belief = (told[box[j], None] for told in (sight.edges, sight.tolerance, sight.belief))
+            edges, tolerance, belief = (
+                measured[box[j], None] for measured in (observation.edges, observation.tolerance, observation.belief)
+            )
             match = np.empty((len(tried) * places, 1))
             fill_match(view.table.boxes_of(everywhere[j], tall[j]), edges, tolerance, belief, columns, rows, match)
             score[j] = np.maximum(match, WORST).reshape(score[j].shape)
     if isinstance(view, PixelView):
         wide = np.repeat(width[:, None], len(tried) * places, 1)
-        sums, area = view.open_sums(sight.raster, owner, everywhere, tall, wide)
+        sums, area = view.open_sums(observation.raster, owner, everywhere, tall, wide)
         score = np.divide(sums, area, out=np.zeros_like(sums), where=area > 0).reshape(score.shape)
     return score

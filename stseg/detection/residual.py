@@ -1,8 +1,9 @@
-"""How far beside their places a view sees people: small for all views of a sound rig, and a knock shows in its frame.
+"""Reprojection residuals: how far beside their places each view sees people.
 
-A view tells well where somebody stands across its line of sight. Whoever stands apart from everybody else in it is
-looked for along that line, by what this view alone shows; all views together have said where they stand. The mean over
-a frame is worth little, the median over minutes a centimetre or two.
+They are small for all views of a sound rig, and a knocked camera shows in its first frame. A view measures places well
+across its line of sight. People who are apart from all others in it are located along that direction by this view alone
+and compared with their places by all views. The mean of one frame is rough, the median over minutes good to a
+centimetre or two.
 """
 
 from __future__ import annotations
@@ -16,52 +17,52 @@ from stseg.detection.views import BoxView, PixelView, View, ViewObservation
 from stseg.model.candidates import Candidates
 
 _REACH, _STEP = 0.6, 0.05
-"""How far to either side a view is asked, and in which steps, metres."""
+"""Range of the residual to either side, and its step, metres."""
 _SHIFTS = np.arange(-_REACH, _REACH + _STEP / 2, _STEP)
 
 
-def aside(
+def reprojection_residuals(
     people: Candidates,
     views: Sequence[BoxView | PixelView],
-    sights: Sequence[ViewObservation | None],
+    observations: Sequence[ViewObservation | None],
     boxes: list[Ints],
 ) -> Floats:
-    """How far beside their places each view sees people.
+    """Mean residual of each view.
 
     Parameters
     ----------
     people
-        Where they stand by all views.
+        Places by all views.
     views, sights
         The views, and what each shows; None where blind.
     boxes : int64 (box,) each
-        For each view whose boxes are whose.
+        For each view the person whom each box is assigned to, -1 for none.
 
     Returns
     -------
     float64 (view,)
-        Mean over those who stand apart, metres, positive to the right of the view; nan where nobody does.
+        Mean over people apart from all others, metres, positive to the right of the view; nan where there are none.
     """
-    told = np.full(len(views), np.nan)
-    for k, (view, sight, owner) in enumerate(zip(views, sights, boxes, strict=True)):
-        if sight is not None and len(people):
-            found = _of_view(people, view, sight, owner)
+    measured = np.full(len(views), np.nan)
+    for k, (view, observation, owner) in enumerate(zip(views, observations, boxes, strict=True)):
+        if observation is not None and len(people):
+            found = _of_view(people, view, observation, owner)
             if np.isfinite(found).any():
-                told[k] = np.nanmean(found)
-    return told
+                measured[k] = np.nanmean(found)
+    return measured
 
 
-def _of_view(people: Candidates, view: BoxView | PixelView, sight: ViewObservation, owner: Ints) -> Floats:
-    """Of each person, float64 (n,), metres; nan for those who are not apart."""
+def _of_view(people: Candidates, view: BoxView | PixelView, observation: ViewObservation, owner: Ints) -> Floats:
+    """Residual of each person, float64 (n,), metres; nan for those not apart."""
     found = np.full(len(people), np.nan)
     right = _right(people.ground, view)
     ends = [view.table.boxes_of(people.ground + shift * right, people.height) for shift in (-_REACH, 0.0, _REACH)]
     for j in np.flatnonzero(_apart(np.stack(ends), view)):
         if isinstance(view, PixelView):
-            found[j] = _by_pixels(people, int(j), right[j], view, sight)
+            found[j] = _by_pixels(people, int(j), right[j], view, observation)
         elif len(own := np.flatnonzero(owner == j)):
             middles = [float(end[j, 0] + end[j, 2]) / 2 for end in ends]
-            shown = float(sight.edges[own[0], 0] + sight.edges[own[0], 2]) / 2
+            shown = float(observation.edges[own[0], 0] + observation.edges[own[0], 2]) / 2
             found[j] = np.interp(shown, middles, (-_REACH, 0.0, _REACH))
     return found
 
@@ -84,13 +85,13 @@ def _apart(ends: Floats, view: View) -> Flags:
     return np.asarray(inside & ~meets.any(axis=1))
 
 
-def _by_pixels(people: Candidates, j: int, right: Floats, view: PixelView, sight: ViewObservation) -> float:
-    """Where the pixels see one person, metres to the right of their place."""
+def _by_pixels(people: Candidates, j: int, right: Floats, view: PixelView, observation: ViewObservation) -> float:
+    """Residual of one person by pixels, metres to the right."""
     count = len(_SHIFTS)
     places = people.ground[j] + _SHIFTS[:, None] * right
     heights, widths = np.full(count, people.height[j]), np.full(count, people.width[j])
-    nobodys = np.full(view.shape, -1, np.int64)
-    sums, area = view.open_sums(sight.raster, nobodys, places[None], heights[None], widths[None])
+    unassigned = np.full(view.shape, -1, np.int64)
+    sums, area = view.open_sums(observation.raster, unassigned, places[None], heights[None], widths[None])
     score = sums[0] / np.maximum(area[0], 1.0)
     weight = np.exp(score - score.max())
     return float(weight @ _SHIFTS / weight.sum())

@@ -1,4 +1,4 @@
-"""What a frame comes to once nothing changes any more: its people, its ghosts, and who explains what."""
+"""Build the detection result of a frame: people, rejected candidates (ghosts), assignment of boxes and pixels."""
 
 from __future__ import annotations
 
@@ -6,83 +6,84 @@ import numpy as np
 
 from stseg.arrays import Floats, Ints
 from stseg.detection.map_estimate import MapEstimate
-from stseg.detection.residual import aside
+from stseg.detection.residual import reprojection_residuals
 from stseg.detection.views import BoxView, PixelView, View
 from stseg.model.candidates import Candidates
 from stseg.model.people import Explanation, People
 from stseg.model.sizes import Sizes
 
 
-def explanation(frame: MapEstimate) -> Explanation:
-    """The result of a frame."""
-    views, members = frame.seen.views, frame.members
-    refined = frame.refined()
+def explanation(estimate: MapEstimate) -> Explanation:
+    """The result of a settled estimate."""
+    views, members, score = estimate.evidence.views, estimate.members, estimate.members_score
+    refined = estimate.refined()
     exact = Candidates(refined.pool.ground, refined.known.height, refined.known.width)
-    total = frame.score(members)  # which fills the parts
-    parts = frame.case.parts[frame.row, : len(members)]
-    without = [frame.score(np.delete(members, a)) for a in range(len(members))]
+    without = np.array([estimate.score(np.delete(members, a)).total for a in range(len(members))])
     people = People(
-        exact.ground, exact.height, exact.width, refined.covariance, total - np.array(without), parts, _visible(frame),
-        _prior(frame, members, frame.walker), frame.walker, refined.sizes,
+        exact.ground, exact.height, exact.width, refined.covariance, score.total - without, score.view_evidence,
+        _visibility(estimate), _prior(estimate, members, estimate.track_index), estimate.track_index, refined.sizes,
     )  # fmt: skip
-    painted = [
-        p if isinstance(v, PixelView) else _painted(v, exact) for v, p in zip(views, frame.pixel_owner, strict=True)
+    assigned = [
+        pixels if isinstance(view, PixelView) else _painted(view, exact)
+        for view, pixels in zip(views, estimate.pixel_assignment, strict=True)
     ]
-    owner = tuple(p.astype(np.int16) for p in painted)
-    told = aside(exact, views, frame.seen.sights, frame.box_owner)
-    return Explanation(people, _ghosts(frame, total), owner, tuple(v.step for v in views), tuple(frame.box_owner), told)
+    return Explanation(
+        people,
+        _ghosts(estimate),
+        tuple(pixels.astype(np.int16) for pixels in assigned),
+        tuple(view.step for view in views),
+        tuple(estimate.box_assignment),
+        reprojection_residuals(exact, views, estimate.evidence.observations, estimate.box_assignment),
+    )
 
 
-def _prior(frame: MapEstimate, candidates: Ints, walker: Ints) -> Floats:
-    """What speaks for candidates before any view is asked, nats, float64 (n,)."""
-    case = frame.case
-    alone = case.terms.person + case.own[candidates]
+def _prior(estimate: MapEstimate, candidates: Ints, track_index: Ints) -> Floats:
+    """Log-odds of candidates before any view is asked, nats, float64 (n,)."""
+    problem = estimate.problem
+    own = problem.parameters.prior_log_odds + problem.height_prior[candidates]
     return np.array(
         [
-            p + (case.known[i, k] if k >= 0 else -case.newcomer[i])
-            for p, i, k in zip(alone, candidates, walker, strict=True)
+            p + (problem.track_gain[i, k] if k >= 0 else -problem.birth_cost[i])
+            for p, i, k in zip(own, candidates, track_index, strict=True)
         ]
     )
 
 
-def _visible(frame: MapEstimate) -> Floats:
-    """How much of each member each view can see past the others, float64 (view, member)."""
-    members, evidence = frame.members, frame.case.boxes
-    visible = np.ones((len(frame.seen.views), len(members)))
+def _visibility(estimate: MapEstimate) -> Floats:
+    """Share of each member that each view sees past the others, float64 (view, member)."""
+    members, evidence = estimate.members, estimate.problem.boxes
+    visibility = np.ones((len(estimate.evidence.views), len(members)))
     boxes = iter(range(len(evidence.match)))
-    for row, view in zip(visible, frame.seen.views, strict=True):
+    for row, view in zip(visibility, estimate.evidence.views, strict=True):
         if isinstance(view, BoxView):
             k = next(boxes)
             cover = evidence.cover[k][np.ix_(members, members)]
             row[:] = view.found_share(evidence.inside[k][members] * np.prod(1.0 - cover, axis=1))
-    return visible
+    return visibility
 
 
-def _ghosts(frame: MapEstimate, total: float) -> People:
-    """The places that were weighed and found to be nobody's."""
-    lattice = frame.seen.prior.config.lattice_spacing
-    which = np.setdiff1d(np.arange(len(frame.pool)), frame.members)
-    kept = []
-    for i in which:
-        gain = frame.score(np.append(frame.members, i)) - total
-        kept.append((gain, frame.case.parts[frame.row, len(frame.members)]))
-    chosen = frame.pool.at(which)
-    wide = np.tile(np.eye(2) * lattice**2 / 12, (len(kept), 1, 1))
-    parts = np.array([p for _, p in kept]).reshape(len(kept), len(frame.seen.views)).T
-    strangers = np.full(len(kept), -1, np.int64)
-    prior, evidence = _prior(frame, which, strangers), np.array([gain for gain, _ in kept])
-    sizes = Sizes.of_population(len(kept), frame.seen.prior.body)
+def _ghosts(estimate: MapEstimate) -> People:
+    """The rejected candidates, each with what it would add to the set."""
+    members, views, config = estimate.members, estimate.evidence.views, estimate.evidence.prior.config
+    rejected = np.setdiff1d(np.arange(len(estimate.pool)), members)
+    scores = [estimate.score(np.append(members, i)) for i in rejected]
+    gain = np.array([score.total - estimate.members_score.total for score in scores])
+    last = [score.view_evidence[:, -1] for score in scores]
+    view_evidence = np.array(last).reshape(len(rejected), len(views)).T
+    pool, births = estimate.pool.at(rejected), np.full(len(rejected), -1, np.int64)
+    covariance = np.tile(np.eye(2) * config.lattice_spacing**2 / 12, (len(rejected), 1, 1))
     return People(
-        chosen.ground, chosen.height, chosen.width, wide, evidence, parts, np.ones_like(parts), prior, strangers, sizes
-    )
+        pool.ground, pool.height, pool.width, covariance, gain, view_evidence, np.ones_like(view_evidence),
+        _prior(estimate, rejected, births), births, Sizes.of_population(len(rejected), estimate.evidence.prior.body),
+    )  # fmt: skip
 
 
 def _painted(view: View, people: Candidates) -> Ints:
-    """Whose body is nearest at each raster pixel of a view, int64 (v, u), -1 for nobody."""
+    """The person whose body is nearest at each raster pixel of a view, int64 (v, u); -1 for none."""
     first, spans, _ = view.outlines(people.ground, people.height, people.width)
-    owner = np.full(view.shape, -1, np.int64)
+    assigned = np.full(view.shape, -1, np.int64)
     for j in np.argsort(-view.distance(people.ground), kind="stable"):
         for k in range(spans.shape[1]):
             if first[j] >= 0 and first[j] + k < view.shape[0]:
-                owner[first[j] + k, spans[j, k, 0] : spans[j, k, 1]] = j
-    return owner
+                assigned[first[j] + k, spans[j, k, 0] : spans[j, k, 1]] = j
+    return assigned

@@ -1,10 +1,10 @@
-"""How well a set of people explains a frame: log-odds against nobody at all, each piece of evidence used once.
+"""Score of a set of people: its posterior log-odds against the empty set, each piece of evidence used once.
 
-    score(S) = sum_j [person + height_j - newcomer_j] + walkers(S) + sum_views sum_j part_j(S) - crowding(S)
+    score(S) = sum_j [person + height_j - birth_j] + tracks(S) + sum_views sum_j part_j(S) - crowding(S)
 
-Members whom the frames before led to expect are no newcomers: walkers(S) = sum of newcomer_j + known_jk over the pairs
-of member j and walker k, one to one.
-In a view with boxes, part_j is the best box that nobody else in S takes, or the cost of a missing one, which is less
+Members that continue predicted tracks are no births: tracks(S) = sum of birth_j + gain_jk over the pairs of member j
+and track k, one to one.
+In a view with boxes, part_j is the best box that no other member takes, or the cost of a missing one, which is less
 the more of j is hidden by nearer members. In a view with pixels, part_j is the mean log-odds over j's outline of the
 pixels that no nearer member covers (HW12's detection energy, eqs 13 to 15, in soft form, for the labels of eq. 24).
 """
@@ -17,43 +17,45 @@ from stseg.accelerate import kernel
 from stseg.arrays import Floats, Ints
 from stseg.detection.problem import BoxEvidence, Parameters, PixelEvidence, Problem
 
-_CROWDED = 20.0
+_OVERLAP = 2.0
+"""Cost of a pair that just begins to overlap, nats."""
+_COINCIDENCE = 20.0
+"""What two bodies in one place cost beyond that, nats; it falls linearly to 0 at the distance `apart`."""
 
 
 @kernel
-def set_score(members: Ints, count: int, case: Problem) -> float:
-    """Score of the first `count` members, nats; fills `case.parts` (view, member), boxes' views first, then pixels'."""
-    total = -crowding(members, count, case.ground, case.terms.apart)
+def set_score(members: Ints, count: int, problem: Problem) -> float:
+    """Score of the first `count` members, nats; fills `problem.view_evidence`, views with boxes first."""
+    total = -crowding(members, count, problem.ground, problem.parameters.minimum_distance)
     for a in range(count):
-        total += case.terms.person + case.own[members[a]] - case.newcomer[members[a]]
-    total += walker_score(members, count, case.known, case.newcomer, case.owner)
-    box_views = case.boxes.match.shape[0]
+        total += problem.parameters.prior_log_odds + problem.height_prior[members[a]] - problem.birth_cost[members[a]]
+    total += track_score(members, count, problem.track_gain, problem.birth_cost, problem.assigned)
+    box_views = problem.boxes.match.shape[0]
     for view in range(box_views):
-        total += box_score(view, members, count, case.boxes, case.terms, case.owner, case.parts[view])
-    for view in range(case.pixels.raster.shape[0]):
-        parts = case.parts[box_views + view]
-        total += pixel_score(view, members, count, case.pixels, case.terms, case.owner, parts)
+        total += box_score(
+            view, members, count, problem.boxes, problem.parameters, problem.assigned, problem.view_evidence[view]
+        )
+    for view in range(problem.pixels.raster.shape[0]):
+        parts = problem.view_evidence[box_views + view]
+        total += pixel_score(view, members, count, problem.pixels, problem.parameters, problem.assigned, parts)
     return total
 
 
 @kernel
-def walker_score(members: Ints, count: int, known: Floats, newcomer: Floats, taken_by: Ints) -> float:
-    """Walkers go to members in falling order of what they gain; fills taken_by (walker,) with the place in `members`.
-
-    -1 is for a walker who is nobody of the set.
-    """
-    walkers = known.shape[1]
-    taken_by[:walkers] = -1
+def track_score(members: Ints, count: int, gain: Floats, birth_cost: Floats, taken_by: Ints) -> float:
+    """Assign tracks to members greedily; fills taken_by (track,) with places in `members`, -1 for none."""
+    tracks = gain.shape[1]
+    taken_by[:tracks] = -1
     served = np.zeros(count, np.bool_)
     total = 0.0
     while True:
         best, best_a, best_k = 0.0, -1, -1
         for a in range(count):
             if not served[a]:
-                for k in range(walkers):
-                    gain = newcomer[members[a]] + known[members[a], k]
-                    if gain > best and taken_by[k] < 0:
-                        best, best_a, best_k = gain, a, k
+                for k in range(tracks):
+                    saved = birth_cost[members[a]] + gain[members[a], k]
+                    if saved > best and taken_by[k] < 0:
+                        best, best_a, best_k = saved, a, k
         if best_a < 0:
             break
         served[best_a], taken_by[best_k] = True, best_a
@@ -63,7 +65,7 @@ def walker_score(members: Ints, count: int, known: Floats, newcomer: Floats, tak
 
 @kernel
 def crowding(members: Ints, count: int, ground: Floats, apart: float) -> float:
-    """What it costs that bodies cannot stand inside each other, nats."""
+    """Cost of bodies that stand inside each other, nats."""
     total = 0.0
     for a in range(count):
         for b in range(a):
@@ -73,26 +75,26 @@ def crowding(members: Ints, count: int, ground: Floats, apart: float) -> float:
 
 @kernel
 def crowd(i: int, j: int, ground: Floats, apart: float) -> float:
-    """What two of them cost, nats."""
+    """Cost of one pair, nats."""
     distance = np.hypot(ground[i, 0] - ground[j, 0], ground[i, 1] - ground[j, 1])
-    return float(2.0 + _CROWDED * (1.0 - distance / apart)) if distance < apart else 0.0
+    return float(_OVERLAP + _COINCIDENCE * (1.0 - distance / apart)) if distance < apart else 0.0
 
 
 @kernel
 def box_score(
-    view: int, members: Ints, count: int, boxes: BoxEvidence, terms: Parameters, taken_by: Ints, parts: Floats
+    view: int, members: Ints, count: int, boxes: BoxEvidence, parameters: Parameters, taken_by: Ints, parts: Floats
 ) -> float:
-    """One view of boxes; fills parts (member,) and taken_by (box,) with the place in `members`, -1 for nobody.
+    """One view of boxes; fills parts (member,) and taken_by (box,) with the place in `members`, -1 for none.
 
-    Boxes go to members in falling order of what they gain, one to one.
+    Boxes are assigned greedily, in falling order of their gain, one to one.
     """
     number = boxes.boxes[view]
     gain, pair, found = np.empty(count * number), np.empty((count * number, 2), np.int64), 0
     for a in range(count):
         i = members[a]
-        parts[a] = _missing(_visible(view, i, members, count, boxes), terms)
+        parts[a] = _missing(_visible(view, i, members, count, boxes), parameters)
         for b in range(number):
-            worth = terms.hit + boxes.match[view, i, b] - parts[a]
+            worth = parameters.box_log_ratio + boxes.match[view, i, b] - parts[a]
             if worth > 0:
                 gain[found], pair[found, 0], pair[found, 1] = worth, a, b
                 found += 1
@@ -108,7 +110,7 @@ def box_score(
 
 @kernel
 def _visible(view: int, i: int, members: Ints, count: int, boxes: BoxEvidence) -> float:
-    """How much of candidate i's box is in the image and not behind a member's, 0..1."""
+    """Share of candidate i's box in the image and not behind a member's, 0..1."""
     visible = boxes.inside[view, i]
     for b in range(count):
         visible *= 1.0 - boxes.cover[view, i, members[b]]
@@ -116,15 +118,17 @@ def _visible(view: int, i: int, members: Ints, count: int, boxes: BoxEvidence) -
 
 
 @kernel
-def _missing(visible: float, terms: Parameters) -> float:
-    """What it costs that there is no box of somebody of whom so much is visible, nats."""
-    share = (visible - terms.hidden_below) / (terms.whole_above - terms.hidden_below)
-    return float(np.log(1.0 - (1.0 - terms.box_miss) * min(max(share, terms.least), 1.0)))
+def _missing(visible: float, parameters: Parameters) -> float:
+    """Cost of a missing box of a body of which such a share is visible, nats."""
+    share = (visible - parameters.hidden_visibility) / (parameters.full_visibility - parameters.hidden_visibility)
+    return float(
+        np.log(1.0 - (1.0 - parameters.box_miss_rate) * min(max(share, parameters.hidden_detection_rate), 1.0))
+    )
 
 
 @kernel
 def pixel_score(
-    view: int, members: Ints, count: int, pixels: PixelEvidence, terms: Parameters, owner: Ints, parts: Floats
+    view: int, members: Ints, count: int, pixels: PixelEvidence, parameters: Parameters, owner: Ints, parts: Floats
 ) -> float:
     """One view of pixels; fills parts (member,) and owner (v * u,) inside outlines with the place in `members`."""
     raster = pixels.raster[view]
@@ -148,5 +152,5 @@ def pixel_score(
                 if owner[line + u] < 0:
                     owner[line + u] = a
                     total += raster[first + k, u]
-        parts[a] = terms.body_weight * total / pixels.area[view, i]
+        parts[a] = parameters.effective_observations * total / pixels.area[view, i]
     return float(parts[:count].sum())

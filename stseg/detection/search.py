@@ -1,10 +1,9 @@
-"""The set of people that explains a frame best (METHODS 7; HW12 section IV-B).
+"""Search of the best set of candidates (HW12 section IV-B; docs/how-it-works.md, Detection).
 
-Candidates fall into groups whose evidence does not touch; the score is the sum over groups, so each is decided apart,
-and the work grows with the number of groups as that does. Of a small group all sets are tried: the best is found. A
-larger one is improved by moves that only ever raise its score, until none does. The bound: no set is better that
-differs by one person more, one less or one exchanged for a near one, nor any that simple moves reach once somebody has
-left or been let in. So the best set can be missed; how often is measured in docs/ghosts.md.
+Candidates fall into groups that do not interact; the score is the sum over groups, so each is decided apart, and the
+work grows linearly with their number. Of a small group all subsets are tried: the best is found. A larger one is
+improved by local search, which only ever raises the score. The bound: no set is better that differs by one person more,
+one less or one exchanged for a near one, nor any that simple moves reach once one candidate was forced out or in.
 """
 
 from __future__ import annotations
@@ -13,17 +12,17 @@ import numpy as np
 
 from stseg.accelerate import kernel
 from stseg.arrays import Ints
-from stseg.detection.groups import alone, fill_groups, fill_touch
+from stseg.detection.groups import fill_groups, fill_interactions, restricted
 from stseg.detection.local_search import GAINED, local_search, swap
 from stseg.detection.problem import Problem
 from stseg.detection.scoring import set_score
 
 ENUMERATED = 8
-"""Of up to so many candidates all sets are tried, in a set that is not searched again."""
+"""Largest group of which all subsets are tried in the final search."""
 
 
 @kernel
-def search(members: Ints, count: int, case: Problem, enumerated: int, trades: int) -> int:
+def search(members: Ints, count: int, problem: Problem, enumerated: int, trades: int) -> int:
     """Improve the set in place, starting from its first `count` members; returns its new size.
 
     Parameters
@@ -31,28 +30,28 @@ def search(members: Ints, count: int, case: Problem, enumerated: int, trades: in
     members : int64 (candidate + 1,)
         Indices of candidates; the first `count` are the set.
     enumerated
-        Of groups of up to so many candidates all sets are tried; none is so small where the set is searched again.
+        All subsets of groups of up to so many candidates are tried; 0 for a set that is searched again.
     trades
-        How often all trades are tried at most in larger groups; 0 leaves it at simple moves.
+        Sweeps of swap moves in larger groups, at most; 0 for simple moves alone.
     """
-    candidates = len(case.own)
-    touch, group = np.empty((candidates, candidates), np.bool_), np.empty(candidates, np.int64)
-    fill_touch(case, touch)
-    views, rows, columns = case.pixels.raster.shape
-    owners, chosen = np.full((views, rows * columns), -1, np.int16), np.empty(candidates + 1, np.int64)
+    candidates = len(problem.height_prior)
+    interacts, group = np.empty((candidates, candidates), np.bool_), np.empty(candidates, np.int64)
+    fill_interactions(problem, interacts)
+    views, rows, columns = problem.pixels.raster.shape
+    assigned, chosen = np.full((views, rows * columns), -1, np.int16), np.empty(candidates + 1, np.int64)
     inside = np.zeros(candidates, np.bool_)
     inside[members[:count]] = True
-    for g in range(fill_groups(touch, group)):
+    for g in range(fill_groups(interacts, group)):
         own = np.flatnonzero(group == g)
-        part = alone(case, own)
+        part = restricted(problem, own)
         if len(own) <= enumerated:
-            size = _enumerate(chosen, own, part)
+            size = _best_of_all_subsets(chosen, own, part)
         else:
             start = own[inside[own]]
             size = len(start)
             chosen[:size] = start
-            size = local_search(chosen, size, own, inside, owners, part)
-            size = swap(chosen, size, own, inside, touch, owners, trades, part)
+            size = local_search(chosen, size, own, inside, assigned, part)
+            size = swap(chosen, size, own, inside, interacts, assigned, trades, part)
         inside[own] = False
         inside[chosen[:size]] = True
     best = np.flatnonzero(inside)
@@ -61,19 +60,19 @@ def search(members: Ints, count: int, case: Problem, enumerated: int, trades: in
 
 
 @kernel
-def _enumerate(members: Ints, own: Ints, case: Problem) -> int:
-    """The best of all sets; of several, the one that leaves out the later candidates. Bits of a number name a set."""
+def _best_of_all_subsets(members: Ints, own: Ints, problem: Problem) -> int:
+    """The best of all subsets; of equals, the one without the later candidates. Bits of a number name a subset."""
     best, best_score = 0, -np.inf
     for chosen in range(1 << len(own)):
-        score = set_score(members, _spell(chosen, own, members), case)
+        score = set_score(members, _members_of(chosen, own, members), problem)
         if score > best_score + GAINED:
             best, best_score = chosen, score
-    return _spell(best, own, members)
+    return _members_of(best, own, members)
 
 
 @kernel
-def _spell(chosen: int, own: Ints, members: Ints) -> int:
-    """Fill members with the set that the bits name; returns its size."""
+def _members_of(chosen: int, own: Ints, members: Ints) -> int:
+    """Fill members with the subset that the bits name; returns its size."""
     count = 0
     for k in range(len(own)):
         if chosen >> k & 1:

@@ -1,4 +1,4 @@
-"""One view as the pass sees it: where the lattice's pillars appear, and what a frame shows there."""
+"""One view of the detector: outlines of the lattice's pillars, and the observation of a frame."""
 
 from __future__ import annotations
 
@@ -20,14 +20,16 @@ from stseg.model.outlines import Spans, outlines, sums_inside
 OWN, BACKGROUND = 5.0, -10.0
 """Weights of a person's own pixels and of background inside their pillar (HW12 eq. 27)."""
 _BODY_ROWS = 30
+"""Rows of a body on a raster: enough for its outline, few enough for speed."""
 _LEAST_INSIDE = 0.02
+"""Share of a body's box in the image below which the view does not see it."""
 _OPTIMISM = 0.3
-"""Cost of a missing box while candidates are sought, nats: whoever hides them is not known yet."""
+"""Cost of a missing box while candidates are sought, nats: occluders are not known yet."""
 
 
 @dataclass(frozen=True)
 class ViewObservation:
-    """What one view shows in one frame: boxes clipped to the image, or a raster of log-odds; the other is empty.
+    """Observation of one view in one frame: boxes clipped to the image, or a raster of log-odds; the other is empty.
 
     Attributes
     ----------
@@ -49,7 +51,7 @@ class ViewObservation:
 
     @cached_property
     def label_values(self) -> Singles:
-        """What each pixel says of the size of a pillar that covers it, if it is open to the person: float32 (v, u)."""
+        """Log-likelihood of each pixel inside a pillar beside outside, if open to the person: float32 (v, u), nats."""
         own = expit(self.raster)
         return np.asarray(2 * OWN * own + BACKGROUND * (1 - own), np.float32)
 
@@ -74,9 +76,9 @@ class View:
         return np.asarray(np.hypot(*(ground - self.centre).T))
 
     def outlines(self, ground: Floats, heights: Floats, widths: Floats) -> tuple[Ints, Spans, Floats]:
-        """Outlines of pillars on this view's raster, sizes in metres; see `ghosts.outlines`.
+        """Outlines of pillars on this view's raster, sizes in metres; see `stseg.model.outlines`.
 
-        Areas are those of people of mean size there: a pillar that covers more of somebody must not count as less.
+        Areas are those of people of mean size there: a pillar that covers more of a body must not count as less.
         """
         first, spans, area = outlines(self.table, ground, heights, self.step, self.shape, widths / WIDTH)
         return first, spans, self._fair(area, heights, widths)
@@ -100,7 +102,7 @@ class BoxView(View):
         self.found = np.where(inside > _LEAST_INSIDE, self.found_share(inside), 0.0)
 
     def found_share(self, visible: Floats) -> Floats:
-        """How often a body of which so much is visible is found, relative to a whole one."""
+        """Detection rate of a body by its visible share, relative to that of a whole one."""
         config = self.config
         share = (visible - config.hidden_visibility) / (config.full_visibility - config.hidden_visibility)
         return np.asarray(share.clip(config.hidden_detection_rate, 1.0))
@@ -113,11 +115,19 @@ class BoxView(View):
         edges = np.concatenate([corner, corner + extent], 1).clip(0, [width - 1, height - 1] * 2)
         return ViewObservation(edges, boxes.score, *sharpness.of(boxes.score), np.zeros((0, 0), np.float32))
 
-    def lattice_score(self, sight: ViewObservation, free: Flags) -> Floats:
-        """What the free boxes say of each lattice pillar, nats, float64 (height, cell)."""
+    def lattice_score(self, observation: ViewObservation, unexplained: Flags) -> Floats:
+        """Score of each lattice pillar by the free boxes, nats, float64 (height, cell)."""
         width, height = map(float, self.camera.size)
         best = np.full(self.bodies.shape[:2], -np.inf)
-        fill_best_match(self.bodies, sight.edges[free], sight.tolerance[free], sight.belief[free], width, height, best)
+        fill_best_match(
+            self.bodies,
+            observation.edges[unexplained],
+            observation.tolerance[unexplained],
+            observation.belief[unexplained],
+            width,
+            height,
+            best,
+        )
         return np.where(self.found > 0, np.maximum(self.config.box_log_ratio + best, -_OPTIMISM * self.found), 0.0)
 
 
@@ -147,11 +157,11 @@ class PixelView(View):
             raster = np.log(body / empty).astype(np.float32)
         return ViewObservation(np.zeros((0, 4)), np.zeros(0), np.zeros((0, 5)), np.zeros(0), raster)
 
-    def lattice_score(self, sight: ViewObservation, free: Flags) -> Floats:
+    def lattice_score(self, observation: ViewObservation, unexplained: Flags) -> Floats:
         """What the free pixels (v, u) say of each lattice pillar, nats, float64 (height, cell)."""
         first, spans, area = self.lattice
         left_of, means = np.empty((self.shape[0], self.shape[1] + 1)), np.empty(len(first))
-        _fill_left_of(sight.raster, free, left_of)
+        _fill_left_of(observation.raster, unexplained, left_of)
         _fill_span_means(left_of, first, self.lattice_rows, spans, area, means)
         return means.reshape(len(self.body.heights), -1) * self.config.effective_observations
 
@@ -160,21 +170,21 @@ class PixelView(View):
     ) -> tuple[Floats, Floats]:
         """Weighted sums of the pixels open to each person inside their pillars, and the pillars' fair areas.
 
-        Both float64 (person, pillar); see `ghosts.outlines.sums_inside`, sizes in metres.
+        Both float64 (person, pillar); see `stseg.model.outlines.sums_inside`, sizes in metres.
         """
         sums, area = sums_inside(self.table, ground, heights, widths / WIDTH, self.step, values, owner)
         return sums * self.config.effective_observations, self._fair(area, heights, widths)
 
 
 @kernel
-def _fill_left_of(raster: Singles, free: Flags, left_of: Floats) -> None:
+def _fill_left_of(raster: Singles, unexplained: Flags, left_of: Floats) -> None:
     """Fill left_of (v, u + 1) with the sums of the free pixels (v, u) along rows, from the left."""
     rows, columns = raster.shape
     for v in range(rows):
         total = 0.0
         left_of[v, 0] = 0.0
         for u in range(columns):
-            total += float(raster[v, u]) if free[v, u] else 0.0
+            total += float(raster[v, u]) if unexplained[v, u] else 0.0
             left_of[v, u + 1] = total
 
 

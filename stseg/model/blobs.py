@@ -19,9 +19,9 @@ class Blobs:
     cells : int32 (y, x)
         Blob of each ground cell, counted from 1; 0 for none.
     track : int64 (n,)
-        Whose each blob is; UNASSIGNED where no track claims it.
+        The track that claims each blob; UNASSIGNED for none.
     person : int64 (n,)
-        The person of the frame's pass whom each blob holds, -1 for nobody.
+        The detected person whom each blob holds, -1 for none.
     ground : float64 (n, 2)
         Centroid of the likelihood-weighted mass, metres.
     covariance : float64 (n, 2, 2)

@@ -1,4 +1,4 @@
-"""Where people may appear: at the border of the area, and of what the views see of it (METHODS 5)."""
+"""Border over which people enter and leave: that of the area, and of what the views see of it."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from stseg.arrays import Floats
 from stseg.geometry import Grid, Rig
 
 _TRUNK = 1.0
-"""Height at which a body must be in sight, metres."""
+"""Height at which a body must be visible in a view, metres."""
 
 
 @dataclass(frozen=True)
 class Border:
-    """Distance of each ground cell from where people come in: float64 (y, x), metres."""
+    """Distance of each ground cell from the border: float64 (y, x), metres."""
 
     distance: Floats
     grid: Grid

@@ -1,8 +1,8 @@
-"""How well boxes fit pillars, and how pillars hide each other (METHODS 3 'Instances').
+"""Fit of boxes to pillars, and occlusion of pillars by each other.
 
 A box is compared with the box of the pillar, both clipped to the image: its middle, its width, its upper edge, and its
-lower edge, which is looser where the box ends early, because nearer people and furniture hide feet. How loose each is
-differs from detector to detector, and is learned (`ghosts.sharpness`).
+lower edge, whose tolerance is larger where the box ends early, because nearer people and furniture hide feet. They all
+differ from detector to detector, and are learned (`stseg.detection.box_noise_calibration`).
 """
 
 from __future__ import annotations
@@ -13,14 +13,15 @@ from stseg.accelerate import kernel
 from stseg.arrays import Floats
 
 MIDDLE, WIDE, HEAD, LATE, EARLY = range(5)
-"""What of a box is compared: middle, width, upper edge, lower edge below the feet, and above them."""
+"""Compared quantities of a box: middle, width, upper edge, lower edge below the feet, and above them."""
 TOLERANCE = np.array([0.06, 0.15, 0.045, 0.06, 0.24])
-"""How loose they are in a sure box before anything is learned: standard deviations, shares of the body's height."""
+"""Their standard deviations in a box of score 1 before learning, shares of the body's height."""
 _PIXELS = np.array([2.0, 2.0, 2.0, 2.0, 8.0])
-"""What these have besides, pixels: what a detector's grid cannot tell."""
+"""Quantisation of a detector's grid beside them, pixels."""
 GRAIN = _PIXELS / TOLERANCE
 """The same as pixels added to the height of which tolerances are shares: a sharper detector's grid is finer, too."""
 _FAR = 4.5
+"""Offsets of the middle beyond this many tolerances exclude a match."""
 
 
 @kernel

@@ -1,4 +1,4 @@
-"""A detector's boxes as a likelihood map: a soft body in each box (METHODS 2).
+"""A detector's boxes as a likelihood map: a soft body in each box.
 
 A box is not full of person: the corners are background. So each is filled with a body of two superellipses, a trunk
 with legs and a narrower head, that falls from the box's score to 0 over a soft border inside the box.
@@ -27,23 +27,23 @@ def box_likelihood(boxes: Boxes, size: tuple[int, int], step: int = 1) -> Single
     ----------
     boxes
         n boxes; pixel centres are integers, so an image of width w spans -0.5 .. w - 0.5. What lies outside the image
-        is cut off, what is empty or upside down shows nothing.
+        is cut off; empty and inverted boxes are left out.
     size
         Width and height of the image, pixels.
     step
         Pixels per map pixel along u and v. Map pixel (j, i) covers image pixels step i .. step i + step - 1 and is
-        asked at its centre, u = step i + (step - 1) / 2.
+        evaluated at its centre, u = step i + (step - 1) / 2.
 
     Returns
     -------
     float32 (ceil(height / step), ceil(width / step))
-        At each pixel the maximum over the boxes of score times body; 0 outside them. The clamp above 0 belongs to
-        whoever fuses the map (METHODS 2).
+        At each pixel the maximum over the boxes of score times body; 0 outside them. The map's
+        consumer clamps it above 0.
 
     Raises
     ------
     InputError
-        Where a box or score is no number, or a score is outside 0..1.
+        Where a box or score is not finite, or a score is outside 0..1.
     """
     if step < 1:
         raise InputError("boxes", "step", step, "1 or more pixels")
@@ -81,7 +81,7 @@ def _fill(pixel: Floats, score: Floats, step: float, likelihood: Singles) -> Non
 
 @kernel
 def body(across: float, down: float) -> float:
-    """How much of a body is at a place of its box, 0..1.
+    """Density of a body at a place of its box, 0..1.
 
     Parameters
     ----------

@@ -1,13 +1,13 @@
-"""How sharply a detector's boxes fit bodies, as far as it is known, by the boxes' scores.
+"""Noise of a detector's boxes: standard deviations of their offsets from bodies, by score.
 
-One detector draws the sides of a box within 2 % of a body's height, another within 7 %; most draw worse what they are
-less sure of. So the standard deviations of a box's offsets from its body (`ghosts.boxes`) are a table over the score.
-Edges of one box err together, and views err together where a body is no pillar, so an edge counts as half a look: its
-tolerance is wider than its standard deviation by the root of two, and a box that fits less sharply says less for the
-person whom it fits by half the logarithms of the ratios of its tolerances. By the first guess, in which standard
+One detector draws the sides of a box within 2 % of a body's height, another within 7 %; most are less exact where their
+score is lower. So the standard deviations of a box's offsets (`stseg.model.box_fit`) are a table over the score. Errors
+of the edges of one box are correlated, and so are those of the views where a body is no pillar: an edge counts as half
+an observation. Its tolerance is wider than its standard deviation by the root of two, and a noisier box says less for
+the person whom it fits, by half the logarithms of the ratios of its tolerances. By the first guess, in which standard
 deviations grow with one over the root of the score, that is the logarithm of the score.
 
-The first guess is also the loosest: what fits worse than that is no error of edges but a box of somebody else. And the
+The first guess is also the loosest: what fits worse than that is no error of edges but a box of another person. And the
 width is not learned: arms and strides change it, from frame to frame together, however sharp the detector is.
 """
 
@@ -21,9 +21,9 @@ from stseg.arrays import Floats
 from stseg.model.box_fit import EARLY, LATE, TOLERANCE
 
 EFFECTIVE_OBSERVATIONS = 0.5
-"""How many independent looks at a body one edge of a box is worth: edges err together, and so do views."""
+"""Effective number of observations of one edge of a box: errors of edges and views are correlated."""
 KNOTS = np.array([0.05, 0.2, 0.4, 0.6, 0.8, 1.0])
-"""Scores at which they are known; between them their logarithms are interpolated."""
+"""Scores of the table; between them logarithms are interpolated."""
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from stseg.arrays import Floats, Ints
 
 @dataclass(frozen=True)
 class Candidates:
-    """Places where somebody may stand: ground float64 (n, 2), height and width float64 (n,), all in metres."""
+    """Places where a person may stand: ground float64 (n, 2), height and width float64 (n,), all in metres."""
 
     ground: Floats
     height: Floats

@@ -25,15 +25,15 @@ def outlines(
     table
         The view.
     ground : float64 (n, 2)
-        Where they stand, metres.
+        Their places, metres.
     heights : float64 (n,)
-        How tall each is, metres.
+        Metres.
     step
         Image pixels to a raster pixel.
     shape
         Rows and columns of the raster.
     widths : float64 (n,), optional
-        How wide each is beside the silhouette of `geometry.bodies`; 1 if not given.
+        Relative to the silhouette of `geometry.bodies`; 1 if not given.
 
     Returns
     -------
@@ -66,13 +66,13 @@ def sums_inside(
     table, step
         As for `outlines`.
     ground : float64 (person, pillar, 2)
-        Where they stand, metres.
+        Their places, metres.
     heights, widths : float64 (person, pillar)
         Metres, and beside the silhouette of `geometry.bodies`.
     values : float32 (v, u)
         On the raster.
     owner : int64 (v, u)
-        Which person each of its pixels belongs to, -1 for nobody. What is theirs or nobody's counts for a person.
+        The person whom each pixel is assigned to, -1 for none. Own and unassigned pixels count.
 
     Returns
     -------
@@ -180,7 +180,7 @@ def _from(place: float, most: int) -> int:
 def _fill_left_of(
     values: Singles, owner: Ints, person: int, window: tuple[int, int, int, int], left_of: Floats
 ) -> None:
-    """Fill left_of (v, u + 1), inside a window, with sums along rows of what counts for a person, from its left."""
+    """Fill left_of (v, u + 1), inside a window, with cumulative sums along rows of a person's open pixels."""
     top, bottom, left, right = window
     for row in range(top, bottom):
         total = 0.0

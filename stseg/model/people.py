@@ -1,4 +1,4 @@
-"""What goes into the pass of one frame and what comes out of it: people, ghosts, and who explains what."""
+"""Input and result of per-frame detection: view evidence; people, ghosts, and the assignment of boxes and pixels."""
 
 from __future__ import annotations
 
@@ -15,28 +15,28 @@ from stseg.model.sizes import Sizes
 
 @dataclass(frozen=True)
 class People:
-    """Places of bodies.
+    """Candidates with places, sizes and evidence: people, or ghosts.
 
     Attributes
     ----------
     ground : float64 (n, 2)
         Metres.
     height, width : float64 (n,)
-        By all that is known of each, metres.
+        By all frames so far, metres.
     covariance : float64 (n, 2, 2)
         Square metres.
     evidence : float64 (n,)
-        What all views and the prior say, nats.
+        Log-odds of the person by all views and the prior, given the others, nats.
     view_evidence : float64 (view, n)
-        What each view says, nats.
+        Part of each view, nats.
     visibility : float64 (view, n)
-        How much of each body a view can see past nearer people, 0..1.
+        Share of each body that a view sees past nearer people, 0..1.
     prior : float64 (n,)
-        What of the evidence spoke before any view was asked, nats.
+        Part of the prior, nats.
     track_index : int64 (n,)
-        Whom of those expected each is, -1 for newcomers.
+        The predicted track that each continues, -1 for births.
     sizes
-        What the frame by itself says of their sizes, anybody's the prior.
+        Size posteriors of this frame alone, under the population prior.
     """
 
     ground: Floats
@@ -56,22 +56,22 @@ class People:
 
 @dataclass(frozen=True)
 class Explanation:
-    """Who is there, who is not, and who explains what.
+    """Result of per-frame detection.
 
     Attributes
     ----------
     people
-        The true candidates.
+        The accepted candidates.
     ghosts
-        Candidates that were weighed and found to be nobody.
+        The rejected candidates.
     pixel_assignment : tuple of int16 arrays (v, u)
-        For each view the index of the person whose body is nearest at each raster pixel, -1 for nobody.
+        For each view the index of the person whose body is nearest at each raster pixel, -1 for none.
     raster_step : tuple of int
         Image pixels to a raster pixel of `pixel_assignment`, for each view.
     box_assignment : tuple of int64 arrays (box,)
-        For each view with boxes the person whom each box shows, -1 for nobody; empty for other views.
+        For each view with boxes the person whom each box is assigned to, -1 for none; empty for other views.
     residual : float64 (view,)
-        How far beside their places each view sees people, metres (see `ghosts.aside`); nan where it tells nothing.
+        Reprojection residual, metres (see `stseg.detection.residual`); nan where nothing was measured.
     """
 
     people: People
@@ -89,7 +89,7 @@ def empty_explanation(rig: Rig, seen: Sequence[ViewEvidence]) -> Explanation:
         np.zeros((0, 2)), none, none, np.zeros((0, 2, 2)), none, np.zeros((views, 0)), np.zeros((views, 0)), none,
         np.zeros(0, np.int64), Sizes(none, none, none, none),
     )  # fmt: skip
-    # One raster pixel for the whole image: nobody's everywhere.
+    # One raster pixel for the whole image, unassigned.
     steps = tuple(max(camera.size) for camera in rig.cameras)
     owner = tuple(np.full((1, 1), -1, np.int16) for _ in steps)
     boxes = tuple(np.full(len(view) if isinstance(view, Boxes) else 0, -1, np.int64) for view in seen)

@@ -9,14 +9,14 @@ from stseg.arrays import Flags, Floats, Ints
 
 @dataclass(frozen=True)
 class PredictedPlaces:
-    """Where tracks are expected in the frames of a window.
+    """Predicted places of tracks in the frames of a window.
 
     Attributes
     ----------
     track : int64 (k,)
-        Their numbers, 1 or more, rising.
+        Track numbers, 1 or more, rising.
     expected : bool (time, k)
-        Whether anything is known of the track in the frame.
+        Whether the track has a prediction in the frame.
     ground, covariance : float64 (time, k, 2), (time, k, 2, 2)
         Metres, square metres.
     height : float64 (time, k)

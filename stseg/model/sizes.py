@@ -1,4 +1,4 @@
-"""Sizes of people as means and variances, and how evidence and priors of them are put together."""
+"""Body sizes as Gaussian means and variances, and products of measurements and priors."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ class Sizes:
 
     @classmethod
     def of_population(cls, number: int, body: BodyConfig) -> Sizes:
-        """Before anybody was looked at."""
+        """The population prior."""
         height, width = (body.height_mean, body.height_spread), (body.width_mean, body.width_spread)
         return cls(*(np.full(number, value) for mean, spread in (height, width) for value in (mean, spread**2)))
 
     @classmethod
     def of_heights(cls, height: Floats, variance: Floats, body: BodyConfig) -> Sizes:
-        """Of heights with variances, metres and square metres, each (n,); as wide as anybody."""
+        """Of heights with variances, metres and square metres, each (n,); widths by the population prior."""
         anybody = cls.of_population(len(height), body)
         return cls(height, variance, anybody.width, anybody.width_variance)
 
     def at(self, chosen: Sequence[int] | Ints) -> Sizes:
-        """Those of the chosen, in that order."""
+        """Sizes of the chosen, in that order."""
         index = np.asarray(chosen, int)
         return Sizes(self.height[index], self.height_variance[index], self.width[index], self.width_variance[index])
 
@@ -48,7 +48,7 @@ class Sizes:
         return Sizes(*(np.concatenate(pair) for pair in pairs))
 
     def with_noise(self, noise: TrackingConfig) -> Sizes:
-        """These, one frame's measurements of them off by its noise besides."""
+        """These, with one frame's measurement noise added."""
         return Sizes(
             self.height, self.height_variance + noise.height_noise**2,
             self.width, self.width_variance + noise.width_noise**2,
@@ -57,8 +57,8 @@ class Sizes:
     def as_measurements(self, prior: Sizes) -> Sizes:
         """These posteriors as measurements: the prior taken out of their variances.
 
-        The means still lean to the prior as far as the frame left open what it saw. So do those of all frames of a
-        person, which are compared with each other.
+        The means still lean to the prior where the frame's evidence is weak; so do those of all frames of a person,
+        which are compared with each other.
         """
         return Sizes(
             self.height, _without(self.height_variance, prior.height_variance),
@@ -73,12 +73,12 @@ class Sizes:
         )
 
 
-_NOTHING = 1e-6
-"""Precision of a measurement that was none, one over square metres."""
+_LEAST_PRECISION = 1e-6
+"""Precision of an empty measurement, one over square metres."""
 
 
 def _without(variance: Floats, prior: Floats) -> Floats:
-    return 1 / np.maximum(1 / variance - 1 / prior, _NOTHING)
+    return 1 / np.maximum(1 / variance - 1 / prior, _LEAST_PRECISION)
 
 
 def _product(mean: Floats, variance: Floats, other: Floats, other_variance: Floats) -> tuple[Floats, Floats]:

@@ -1,4 +1,4 @@
-"""The tables that every tracker returns and every writer takes.
+"""Tables of a run: what every tracker returns and every writer takes.
 
 Each is a structured array; positions are metres on the ground, boxes pixels of the real image, frames count from 0 at
 the recording's first frame, track ids from 1.
@@ -22,12 +22,12 @@ TRAJECTORY = np.dtype(
         ("xx", "<f8"),  # covariance of the position, square metres
         ("xy", "<f8"),
         ("yy", "<f8"),
-        ("height", "<f4"),  # metres, what the frame by itself said
+        ("height", "<f4"),  # metres, by the frame alone
         ("width", "<f4"),  # metres across the shoulders, likewise
         ("extent", "<f4"),  # ground area of the labelled cells, square metres
         ("score", "<f4"),  # log-odds of a person, nats
         ("views", "u1"),  # number of views that see the place
-        ("raw_x", "<f8"),  # metres, what the frame by itself said
+        ("raw_x", "<f8"),  # metres, by the frame alone
         ("raw_y", "<f8"),
     ]
 )
@@ -72,7 +72,7 @@ CANDIDATE = np.dtype(
         ("yy", "<f8"),
         ("height", "<f4"),
         ("status", "u1"),  # 1 true, 0 ghost
-        ("evidence", "<f4"),  # what all views and the prior say, nats; below 0 speaks for a ghost
+        ("evidence", "<f4"),  # log-odds by all views and the prior, nats; below 0 for a ghost
     ]
 )
 """One row per candidate and frame, true or ghost. In the run file each row also has one column a view."""
@@ -100,13 +100,13 @@ RATES = np.dtype(
         ("frame", "<i8"),
         ("view", "<i4"),
         ("miss", "<f4"),  # how often a cell of a body is missed
-        ("clutter", "<f4"),  # how often the ray of an empty cell meets foreground where nobody is near
+        ("clutter", "<f4"),  # how often the ray of an empty cell meets foreground, away from people
         ("beside", "<f4"),  # the same within reach of a person
         ("filled", "<f4"),  # share of the cells within reach of a person that bodies fill, of all views together
-        ("aside", "<f4"),  # how far to the right of where all views put people this one sees them, metres
+        ("aside", "<f4"),  # reprojection residual, metres to the right of the places by all views
     ]
 )
-"""One row per window and view: the rates by which its last frame was fused; `aside`, nan where untold, its mean."""
+"""One row per window and view: rates of its last frame; `aside` is the mean residual, nan where unmeasured."""
 
 
 SHIFT = np.dtype([("frame", "<i8"), ("view", "<i4"), ("u", "<f4"), ("v", "<f4")])
@@ -115,7 +115,7 @@ SHIFT = np.dtype([("frame", "<i8"), ("view", "<i4"), ("u", "<f4"), ("v", "<f4")]
 
 @dataclass(frozen=True)
 class Tracks:
-    """What a tracker found.
+    """Result of a tracker.
 
     Attributes
     ----------
