@@ -318,7 +318,7 @@ def follow(
     commits: list[Commit] = []
     for frame in range(frames):
         standing = people(*((x + frame * dx, y + frame * dy) for x, y, dx, dy in walks))
-        tracker.expected(frame)
+        tracker.predict(frame)
         commits += tracker.add(scene(frame, standing, None if frame < found_until else people()), shown(standing))
     return commits, tracker
 
@@ -383,11 +383,11 @@ def test_a_tracker_goes_on_after_it_was_put_aside() -> None:
 
 def test_whom_it_expects() -> None:
     tracker = BeliefTracker(RIG, QUICK, 0)
-    assert tracker.expected(0) is None
+    assert tracker.predict(0) is None
     for frame in range(3):
         standing = people((-0.5 + 0.1 * frame, 0.2))
         tracker.add(scene(frame, standing), shown(standing))
-    expected = tracker.expected(3)
+    expected = tracker.predict(3)
     assert expected is not None
     np.testing.assert_allclose(expected.ground, [[-0.2, 0.2]], atol=0.15)
     assert expected.existence[0] == 1.0

@@ -174,7 +174,7 @@ def test_a_ghost_is_not_picked_up_by_the_cut_in_later_frames() -> None:
     """Its cells hold what nobody explains of the evidence, which is nothing: they stay free."""
     rig, near = facing_pair(), 0.35
     for step in moving_ghosts("pixels").steps:
-        for scene, label in zip(step.commit.scenes, step.commit.label, strict=True):
+        for scene, label in zip(step.commit.frames, step.commit.label, strict=True):
             standing = strollers(scene.frame)
             for ghost in crossings(standing, rig):
                 cells = np.hypot(*np.moveaxis(rig.grid.ground - ghost, -1, 0)) < near
@@ -195,8 +195,8 @@ def test_somebody_hidden_from_all_views_but_one_stays(kind: str) -> None:
         seen = show(kind, rig.cameras, everybody)
         if kind == "boxes" and side < 0.2:
             seen[:3] = [boxes(camera, nearer) for camera in rig.cameras[:3]]
-        found = pass_of(kind, 4).explain(seen, follow.expected(frame))
-        chains = follow.follow(frame, found.people, found.ghosts)
+        found = pass_of(kind, 4).explain(seen, follow.predict(frame))
+        chains = follow.update(frame, found.people, found.ghosts)
         away = distances(found.people.ground, hidden[:, :2])[:, 0]
         assert away.min() < 0.25, (frame, found.people.ground)
         assert len(chains) == 4

@@ -1,4 +1,4 @@
-"""Who is who: windows that cover every frame once, assignments, pieces, and identities over windows."""
+"""Who is who: windows that cover every frame once, assignments, tracklets, and identities over windows."""
 
 from __future__ import annotations
 
@@ -130,10 +130,10 @@ def blobs_in(
     return find_blobs(label, log_odds, held, names, 0.4, GRID)
 
 
-def pieces_of(
+def tracklets_of(
     paths: Sequence[Path], frames: range, unheld: Sequence[Path] = (), chain: Sequence[int] | None = None
 ) -> tuple[list[Blobs], list[Tracklet]]:
-    """Blobs and pieces of some frames; each path is a chain of its own unless `chain` says otherwise."""
+    """Blobs and tracklets of some frames; each path is a chain of its own unless `chain` says otherwise."""
     blobs = [blobs_in(paths, frame, unheld, chain) for frame in frames]
     return blobs, form_tracklets(blobs, frames[0], CONFIG)
 
@@ -143,20 +143,20 @@ FRAMES = range(40, 52)
 
 def test_blobs_of_a_chain_are_a_piece() -> None:
     paths = [walk((-3, -1), (0.4, 0), FRAMES), walk((0, 2), (0.3, -0.1), FRAMES)]
-    blobs, pieces = pieces_of(paths, FRAMES)
-    assert sorted(piece.chain for piece in pieces) == [1, 2]
-    for piece in pieces:
-        assert piece.frames == list(FRAMES)
-        for frame, blob, ground in zip(piece.frames, piece.blobs, piece.ground, strict=True):
-            assert np.hypot(*(ground - paths[piece.chain - 1][frame])) < 0.15
+    blobs, tracklets = tracklets_of(paths, FRAMES)
+    assert sorted(tracklet.filter_track for tracklet in tracklets) == [1, 2]
+    for tracklet in tracklets:
+        assert tracklet.frames == list(FRAMES)
+        for frame, blob, ground in zip(tracklet.frames, tracklet.blobs, tracklet.ground, strict=True):
+            assert np.hypot(*(ground - paths[tracklet.filter_track - 1][frame])) < 0.15
             assert blobs[frame - FRAMES[0]].person[blob] >= 0
 
 
 def test_the_cut_bridges_what_a_frames_pass_missed() -> None:
     path = walk((-2, 0), (0.4, 0), FRAMES)
     seen = {f: p for f, p in path.items() if f not in (44, 45)}
-    _, pieces = pieces_of([seen], FRAMES, unheld=[{f: path[f] for f in (44, 45)}])
-    assert [piece.frames for piece in pieces] == [list(FRAMES)]
+    _, tracklets = tracklets_of([seen], FRAMES, unheld=[{f: path[f] for f in (44, 45)}])
+    assert [tracklet.frames for tracklet in tracklets] == [list(FRAMES)]
 
 
 def test_a_gap_is_bridged_by_cells_of_the_track_itself() -> None:
@@ -176,21 +176,21 @@ def test_no_piece_begins_or_ends_where_nobody_was_seen() -> None:
     path = walk((-2, 0), (0.4, 0), FRAMES)
     seen = {f: p for f, p in path.items() if 42 <= f < 50}
     rest = {f: p for f, p in path.items() if f not in seen}
-    _, pieces = pieces_of([seen], FRAMES, unheld=[rest, dict.fromkeys(FRAMES, (2.0, -3.0))])
-    assert [piece.frames for piece in pieces] == [list(range(42, 50))]
+    _, tracklets = tracklets_of([seen], FRAMES, unheld=[rest, dict.fromkeys(FRAMES, (2.0, -3.0))])
+    assert [tracklet.frames for tracklet in tracklets] == [list(range(42, 50))]
 
 
 def test_a_chain_is_one_piece_over_its_gap() -> None:
     path = walk((-7, 0), (1.0, 0), FRAMES)
     before = {f: p for f, p in path.items() if f < 45}
     after = {f: p for f, p in path.items() if f >= 47}
-    _, pieces = pieces_of([before, after], FRAMES, chain=[3, 3])
-    assert [(piece.chain, piece.frames) for piece in pieces] == [(3, [*range(40, 45), *range(47, 52)])]
-    _, pieces = pieces_of([before, after], FRAMES, chain=[3, 4])  # two who are followed are two
-    assert [piece.chain for piece in pieces] == [3, 4]
+    _, tracklets = tracklets_of([before, after], FRAMES, chain=[3, 3])
+    assert [(one.filter_track, one.frames) for one in tracklets] == [(3, [*range(40, 45), *range(47, 52)])]
+    _, tracklets = tracklets_of([before, after], FRAMES, chain=[3, 4])  # two who are followed are two
+    assert [tracklet.filter_track for tracklet in tracklets] == [3, 4]
 
 
-def piece(chain: int, path: Path) -> Tracklet:
+def tracklet(chain: int, path: Path) -> Tracklet:
     made = Tracklet(chain)
     for frame, place in path.items():
         made.add(frame, 0, np.array(place))
@@ -198,15 +198,15 @@ def piece(chain: int, path: Path) -> Tracklet:
 
 
 def test_velocity_is_that_of_the_end() -> None:
-    turning = piece(1, {0: (0.0, 0.0), 1: (0.1, 0.0), 3: (0.3, 0.0), 4: (0.4, 0.0), 5: (0.5, 0.0)})
+    turning = tracklet(1, {0: (0.0, 0.0), 1: (0.1, 0.0), 3: (0.3, 0.0), 4: (0.4, 0.0), 5: (0.5, 0.0)})
     for frame in range(6, 12):
         turning.add(frame, 0, np.array([0.5, 0.2 * (frame - 5)]))
     np.testing.assert_allclose(turning.velocity(), [0.0, 0.2])
-    assert not piece(1, {3: (1.0, 1.0)}).velocity().any()
+    assert not tracklet(1, {3: (1.0, 1.0)}).velocity().any()
 
 
 def test_a_gap_is_filled_in_order_and_on_the_line() -> None:
-    gappy = piece(1, {2: (0.0, 0.0), 6: (0.4, 0.8)})
+    gappy = tracklet(1, {2: (0.0, 0.0), 6: (0.4, 0.8)})
     np.testing.assert_allclose(gappy.between(3), [0.1, 0.2])
     gappy.insert(3, 7, np.array([0.1, 0.2]))
     assert (gappy.frames, gappy.blobs) == ([2, 3, 6], [0, 7, 0])
@@ -232,8 +232,8 @@ def decide(
         commit = (0 if index == 0 else start + 2, stop if last else end - 2)
         window = Window(index, start, min(end, stop), *commit)
         frames = range(window.solve_first, window.solve_stop)
-        blobs, pieces = pieces_of(paths, frames, chain=chain)
-        decision = identities.decide(window, blobs, pieces)
+        blobs, tracklets = tracklets_of(paths, frames, chain=chain)
+        decision = identities.decide(window, blobs, tracklets)
         for frame in range(*commit):
             found = blobs[frame - start]
             standing = [k for k, path in enumerate(paths) if frame in path]
@@ -277,8 +277,8 @@ def test_identities_follow_the_cells_whatever_the_chains_say() -> None:
     for index, start in enumerate(range(0, 20, 4)):
         window = Window(index, start, start + 8, start + 2 if index else 0, start + 6)
         part = range(start, start + 8)
-        blobs, pieces = pieces_of(paths, part, chain=[10 * index + 100, 10 * index + 101])
-        decision = identities.decide(window, blobs, pieces)
+        blobs, tracklets = tracklets_of(paths, part, chain=[10 * index + 100, 10 * index + 101])
+        decision = identities.decide(window, blobs, tracklets)
         found.append([int(decision.identity[3][blobs[3].person.tolist().index(k)]) for k in range(2)])
     assert all(pair == found[0] for pair in found)
     assert sorted(found[0]) == [1, 2]

@@ -15,7 +15,7 @@ from stseg.config import Config, KalmanConfig, MotionConfig
 from stseg.errors import ConfigError
 from stseg.trackers import FrameObservations, FusedFrame
 from stseg.trackers.kalman import KalmanTracker
-from stseg.trackers.motion import begun, carried, corrected, surprise
+from stseg.trackers.motion import corrected, initial, innovations, predicted
 from stseg.tracking.final_tracks import committed_tracks
 
 RIG = room()
@@ -30,7 +30,7 @@ def follow(frames: list[list[tuple[float, float]]], config: Config = CONFIG) -> 
         commit
         for frame, places in enumerate(frames)
         for commit in tracker.add(
-            FusedFrame(frame, found(people(*places), tracker.expected(frame)), found(people()), EMPTY), UNSEEN
+            FusedFrame(frame, found(people(*places), tracker.predict(frame)), found(people()), EMPTY), UNSEEN
         )
     ]
     assert tracker.finish() == []
@@ -61,19 +61,20 @@ def test_filters_side_by_side_are_each_a_plain_one(seed: int, length: int, secon
     config, noise = MotionConfig(), 0.03
     paths = np.random.default_rng(seed).normal(0.0, 1.0, (3, length, 2))
     error = np.tile(noise * np.eye(2), (3, 1, 1))
-    filters = begun(paths[:, 0], error, config.speed_spread)
+    filters = initial(paths[:, 0], error, config.speed_spread)
     for step in range(1, length):
-        filters = corrected(carried(filters, seconds, config.velocity_noise), np.arange(3), paths[:, step], error)
+        filters = corrected(predicted(filters, seconds, config), np.arange(3), paths[:, step], error)
     for path, state, covariance in zip(paths, *filters, strict=True):
         expected = plain(path, noise, seconds, config)
         np.testing.assert_allclose(state, expected[0], atol=1e-9)
         np.testing.assert_allclose(covariance, expected[1], atol=1e-9)
 
 
-def test_surprise_is_twice_the_negative_log_likelihood() -> None:
-    filters = carried(begun(np.array([[0.0, 0.0], [1.0, 2.0]]), np.tile(0.04 * np.eye(2), (2, 1, 1)), 0.8), 0.2, 0.8)
+def test_innovation_is_twice_the_negative_log_likelihood() -> None:
+    born = initial(np.array([[0.0, 0.0], [1.0, 2.0]]), np.tile(0.04 * np.eye(2), (2, 1, 1)), 0.8)
+    filters = predicted(born, 0.2, MotionConfig())
     place, noise = np.array([[0.3, -0.1]]), np.array([[[0.05, 0.01], [0.01, 0.02]]])
-    squares, cost = surprise(filters, place, noise)
+    squares, cost = innovations(filters, place, noise)
     for k in range(2):
         spread = filters.covariance[k, :2, :2] + noise[0]
         off = place[0] - filters.state[k, :2]
@@ -142,7 +143,7 @@ def test_heights_tell_apart_two_who_turn_back_where_they_meet() -> None:
     for frame in range(2 * turned):
         away = 0.05 + step * abs(frame - turned)
         standing = people((-away, 0.0, short), (away, 0.0, tall))
-        shown = found(standing, tracker.expected(frame))
+        shown = found(standing, tracker.predict(frame))
         (commit,) = tracker.add(FusedFrame(frame, shown, found(people()), EMPTY), UNSEEN)
         rows = commit.trajectory[np.argsort(commit.trajectory["raw_x"])]
         names.append(rows["id"].tolist())

@@ -86,7 +86,7 @@ def assert_equal(one: Run, other: Run) -> None:
         np.testing.assert_array_equal(a.parts, b.parts)
         np.testing.assert_array_equal(a.commit.events, b.commit.events)
         np.testing.assert_array_equal(a.commit.windows, b.commit.windows)
-        for x, y in zip(a.commit.scenes, b.commit.scenes, strict=True):
+        for x, y in zip(a.commit.frames, b.commit.frames, strict=True):
             np.testing.assert_array_equal(x.log_odds, y.log_odds)
 
 
@@ -131,7 +131,7 @@ def test_candidates_are_told_for_every_frame() -> None:
         assert step.candidates.dtype == CANDIDATE
         assert step.parts.shape == (len(step.candidates), 4)
         assert step.timings.dtype == TIMING
-        for scene in step.commit.scenes:
+        for scene in step.commit.frames:
             own = step.candidates[step.candidates["frame"] == scene.frame]
             true = own[own["status"] == 1]
             np.testing.assert_array_equal(np.column_stack([true["x"], true["y"]]), scene.people.ground)
@@ -148,7 +148,7 @@ def test_rates_are_told_for_every_window() -> None:
     done = whole("boxes", "cut")
     for step in done.steps:
         assert step.rates.dtype == RATES
-        assert step.rates["frame"].tolist() == [step.commit.scenes[-1].frame] * 4
+        assert step.rates["frame"].tolist() == [step.commit.frames[-1].frame] * 4
         assert step.rates["view"].tolist() == [0, 1, 2, 3]
     # A perfect detector: it misses less than was guessed, and people's surroundings are told apart from the rest.
     first, last = done.steps[0].rates, done.steps[-1].rates
@@ -159,7 +159,7 @@ def test_rates_are_told_for_every_window() -> None:
 def test_every_frame_is_committed_once() -> None:
     done = whole("boxes", "cut")
     assert done.advanced == list(range(FRAMES))
-    assert [s.frame for step in done.steps for s in step.commit.scenes] == list(range(FRAMES))
+    assert [s.frame for step in done.steps for s in step.commit.frames] == list(range(FRAMES))
 
 
 @pytest.mark.parametrize("tracker", ["cut", "frames"])
@@ -188,7 +188,7 @@ def test_a_part_keeps_its_frame_numbers(first: int) -> None:
     stop = min(FRAMES - 1, 17)
     part = run("boxes", recording("boxes", FRAMES)[first:stop], first=first)
     assert part.advanced == list(range(first, stop))
-    assert [s.frame for step in part.steps for s in step.commit.scenes] == part.advanced
+    assert [s.frame for step in part.steps for s in step.commit.frames] == part.advanced
     rows = part.trajectory
     assert np.unique(rows["frame"]).tolist() == part.advanced
     truth = TRUTH[(TRUTH["frame"] >= first) & (TRUTH["frame"] < stop)]
@@ -206,16 +206,16 @@ def test_where_a_run_began_is_soon_forgotten(first: int) -> None:
     pipeline = Pipeline(RIG, ["boxes"] * 4, CONFIG, "frames")
     views = recording("boxes", FRAMES)[first].views
     alone = pipeline.detector.explain([view for view in views if isinstance(view, Boxes)], None)
-    np.testing.assert_array_equal(part.steps[0].commit.scenes[0].people.ground, alone.people.ground)
+    np.testing.assert_array_equal(part.steps[0].commit.frames[0].people.ground, alone.people.ground)
     for step, other in zip(part.steps, whole("boxes", "frames").steps[first:], strict=True):
-        places, others = (np.sort(s.commit.scenes[0].people.ground, axis=0) for s in (step, other))
+        places, others = (np.sort(s.commit.frames[0].people.ground, axis=0) for s in (step, other))
         np.testing.assert_allclose(places, others, atol=0.03)
 
 
 @pytest.mark.parametrize("frames", [1, 7, 8, 9])
 def test_short_recordings(frames: int) -> None:
     done = run("boxes", recording("boxes", FRAMES)[:frames])
-    assert [s.frame for step in done.steps for s in step.commit.scenes] == list(range(frames))
+    assert [s.frame for step in done.steps for s in step.commit.frames] == list(range(frames))
     assert len(done.trajectory) == 3 * frames
     shortest = round(CONFIG.tracking.minimum_duration * RIG.frame_rate)
     assert len(done.tracks.trajectory) == (3 * frames if frames >= shortest else 0)

@@ -35,7 +35,7 @@ def scene(follow: Tracker, frame: int, *places: tuple[float, float]) -> FusedFra
     log_odds = np.full(RIG.grid.shape, -3.0, np.float32)
     log_odds[:, nearest_person(RIG.grid.ground, standing[:, :2], 0.3) >= 0] = 3.0
     log_odds[:, -1, -1] = np.nan
-    return FusedFrame(frame, found(standing, follow.expected(frame)), found(people()), log_odds)
+    return FusedFrame(frame, found(standing, follow.predict(frame)), found(people()), log_odds)
 
 
 def crossing(frame: int) -> list[tuple[float, float]]:
@@ -61,12 +61,12 @@ def rows_of(commits: Sequence[Commit]) -> Rows:
 @pytest.mark.parametrize("first", [0, 5])
 def test_every_frame_is_committed_once(tracker: str, frames: int, first: int) -> None:
     commits = run(tracker, first, first + frames)
-    told = [s.frame for commit in commits for s in commit.scenes]
+    told = [s.frame for commit in commits for s in commit.frames]
     assert told == list(range(first, first + frames))
     for commit in commits:
-        assert commit.label.shape == (len(commit.scenes), *RIG.grid.shape)
+        assert commit.label.shape == (len(commit.frames), *RIG.grid.shape)
         assert commit.label.dtype == np.int32
-        assert set(commit.trajectory["frame"]) <= {s.frame for s in commit.scenes}
+        assert set(commit.trajectory["frame"]) <= {s.frame for s in commit.frames}
     rows = rows_of(commits)
     assert len(rows) == 2 * frames
     assert len(np.unique(rows["id"])) == 2
@@ -95,7 +95,7 @@ def test_no_frames_no_commits() -> None:
 @pytest.mark.parametrize("tracker", COLOURLESS)
 def test_labels_say_who(tracker: str) -> None:
     for commit in run(tracker, 0, 20):
-        for at, label in zip(commit.scenes, commit.label, strict=True):
+        for at, label in zip(commit.frames, commit.label, strict=True):
             own = commit.trajectory[commit.trajectory["frame"] == at.frame]
             assert set(np.unique(label).tolist()) == {0, *own["id"].tolist()}
             for row in own:
@@ -156,10 +156,10 @@ def test_frames_without_people(tracker: str) -> None:
     follow = find_tracker(tracker)(RIG, CONFIG, 0)
     commits = [commit for frame in range(20) for commit in follow.add(scene(follow, frame), UNSEEN)]
     commits += follow.finish()
-    assert sum(len(commit.scenes) for commit in commits) == 20
+    assert sum(len(commit.frames) for commit in commits) == 20
     assert not any(commit.label.any() for commit in commits)
     assert len(rows_of(commits)) == 0
-    assert len(follow.expected(20) or ()) == 0
+    assert len(follow.predict(20) or ()) == 0
 
 
 def test_the_cut_does_not_make_people_of_passing_noise() -> None:
@@ -180,10 +180,10 @@ def test_the_cut_does_not_make_people_of_passing_noise() -> None:
 def test_whom_a_tracker_expects(tracker: str) -> None:
     """Everybody seen so far, where they are now: what is carried is not what was committed, but what was seen."""
     follow = find_tracker(tracker)(RIG, CONFIG, 0)
-    assert follow.expected(0) is None
+    assert follow.predict(0) is None
     for frame in range(LENGTH + 2):
         follow.add(scene(follow, frame, (-1.5 + 0.1 * frame, 0.2)), UNSEEN)
-        expected = follow.expected(frame + 1)
+        expected = follow.predict(frame + 1)
         assert expected is not None
         assert len(expected) == 1
         if frame > LENGTH:  # by then the velocity is known
@@ -234,4 +234,4 @@ def test_commits_follow_each_other() -> None:
     commits = run("cut", 3, 30)
     for before, after in pairwise(commits):
         assert before.windows["commit_stop"][0] == after.windows["commit_first"][0]
-        assert before.scenes[-1].frame + 1 == after.scenes[0].frame
+        assert before.frames[-1].frame + 1 == after.frames[0].frame

@@ -40,10 +40,10 @@ def somebody(state: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0), odds: float = 1.0)
 @given(STATES, numbers(0.01, 3), numbers(0.01, 3))
 def test_constant_velocity(state: Floats, first: float, second: float) -> None:
     walker = somebody(tuple(state))
-    then = walker.carried(first, CONFIG.motion)
+    then = walker.predicted(first, CONFIG.motion)
     np.testing.assert_allclose(then.state, [*(state[:2] + first * state[2:]), *state[2:]])
     assert (np.linalg.eigvalsh(then.covariance - np.diag([0, 0, 0.6, 0.5])).sum()) > 0
-    at_once, in_steps = walker.carried(first + second, CONFIG.motion), then.carried(second, CONFIG.motion)
+    at_once, in_steps = walker.predicted(first + second, CONFIG.motion), then.predicted(second, CONFIG.motion)
     np.testing.assert_allclose(at_once.state, in_steps.state, atol=1e-9)
     np.testing.assert_allclose(at_once.covariance, in_steps.covariance, atol=1e-9)
     assert at_once.height_variance == pytest.approx(in_steps.height_variance)
@@ -53,24 +53,24 @@ def test_constant_velocity(state: Floats, first: float, second: float) -> None:
 @given(STATES, numbers(-1, 1), numbers(-1, 1), numbers(0.02, 0.5), numbers(-0.8, 0.8))
 def test_found_is_the_textbooks_correction(state: Floats, x: float, y: float, sd: float, slant: float) -> None:
     """The posterior of the place, whose prior is the walker's, tells all that the measurement told."""
-    walker = somebody(tuple(state)).carried(0.3, CONFIG.motion)
+    walker = somebody(tuple(state)).predicted(0.3, CONFIG.motion)
     noise = sd**2 * np.array([[1.0, slant], [slant, 1.0]])
     place = walker.state[:2] + np.array([x, y])
     information = np.linalg.inv(walker.covariance[:2, :2]) + np.linalg.inv(noise)
     posterior = np.linalg.inv(information)
     mean = posterior @ (np.linalg.solve(walker.covariance[:2, :2], walker.state[:2]) + np.linalg.solve(noise, place))
-    after = walker.found(11, mean, posterior, NOTHING, NOTHING, 1.0)
+    after = walker.corrected(11, mean, posterior, NOTHING, NOTHING, 1.0)
     expected, covariance = reference.kalman(walker.state, walker.covariance, place, noise)
     np.testing.assert_allclose(after.state, expected, atol=1e-8)
     np.testing.assert_allclose(after.covariance, covariance, atol=1e-8)
 
 
 def test_a_posterior_that_says_nothing_new_changes_nothing() -> None:
-    walker = somebody((1.0, 2.0, 0.3, -0.2)).carried(0.2, CONFIG.motion)
-    after = walker.found(12, walker.state[:2], walker.covariance[:2, :2], NOTHING, NOTHING, 0.5)
+    walker = somebody((1.0, 2.0, 0.3, -0.2)).predicted(0.2, CONFIG.motion)
+    after = walker.corrected(12, walker.state[:2], walker.covariance[:2, :2], NOTHING, NOTHING, 0.5)
     np.testing.assert_allclose(after.state, walker.state)
     np.testing.assert_allclose(after.covariance, walker.covariance)
-    assert (after.chain, after.seen, after.odds) == (3, 12, 0.5)
+    assert (after.track, after.last_seen, after.odds) == (3, 12, 0.5)
     assert (after.height, after.width) == pytest.approx((walker.height, walker.width))
 
 
@@ -81,14 +81,14 @@ def test_sizes_converge() -> None:
     walker, sure = somebody(), [0.12**2]
     for height in seen:
         tall, wide = Measurement(float(height), noise**2), Measurement(float(height) - 1.4, noise**2)
-        walker = walker.found(11, walker.state[:2], walker.covariance[:2, :2], tall, wide, 1.0)
+        walker = walker.corrected(11, walker.state[:2], walker.covariance[:2, :2], tall, wide, 1.0)
         sure.append(walker.height_variance)
     assert (np.diff(sure) < 0).all()
     weight = len(seen) / noise**2
     assert walker.height_variance == pytest.approx(1 / (1 / 0.12**2 + weight))
     assert walker.height == pytest.approx((1.7 / 0.12**2 + weight * seen.mean()) / (1 / 0.12**2 + weight))
     assert walker.width == pytest.approx((0.42 / 0.04**2 + weight * (seen.mean() - 1.4)) / (1 / 0.04**2 + weight))
-    later = walker.carried(4.0, CONFIG.motion)  # shoes, stoop, lens, clothes
+    later = walker.predicted(4.0, CONFIG.motion)  # shoes, stoop, lens, clothes
     assert later.height_variance > walker.height_variance
     assert later.width_variance > walker.width_variance
 
@@ -98,11 +98,11 @@ def test_what_a_frame_tells_of_sizes_is_used_once() -> None:
     walkers = TrackFilter(RATE, CONFIG)
     told = found(people((0.0, 0.0, 1.85)))
     nothing = replace(told, sizes=Sizes.of_population(1, CONFIG.body))
-    walkers.follow(0, told, GHOSTS)
-    sure = walkers.walkers[0]
+    walkers.update(0, told, GHOSTS)
+    sure = walkers.tracks[0]
     for frame in range(1, 40):
-        walkers.follow(frame, replace(nothing, track_index=np.zeros(1, np.int64)), GHOSTS)
-    (walker,) = walkers.walkers
+        walkers.update(frame, replace(nothing, track_index=np.zeros(1, np.int64)), GHOSTS)
+    (walker,) = walkers.tracks
     assert walker.height == pytest.approx(sure.height, abs=1e-3)
     assert walker.height_variance > sure.height_variance
 
@@ -118,7 +118,7 @@ def follow(ways: list[Way], frames: range, order: int | None = None) -> tuple[li
     for frame in frames:
         turn = range(len(ways)) if order is None else rng.permutation(len(ways)).tolist()
         here = [(k, place) for k in turn if (place := ways[k](frame)) is not None]
-        told = walkers.follow(frame, found(people(*(place for _, place in here)), walkers.expected(frame)), GHOSTS)
+        told = walkers.update(frame, found(people(*(place for _, place in here)), walkers.predict(frame)), GHOSTS)
         assert len(set(told.tolist())) == len(told)  # nobody is in two places
         for (k, _), chain in zip(here, told.tolist(), strict=True):
             chains[k].append(chain)
@@ -137,11 +137,11 @@ def except_for(way: Way, unseen: range) -> Way:
 def test_who_walks_on_is_expected_where_they_will_be() -> None:
     _, walkers = follow([walk(-3, 1, 1.2, -0.4)], range(20))
     for ahead in (20, 24):
-        expected = walkers.expected(ahead)
+        expected = walkers.predict(ahead)
         assert expected is not None
         there = np.array([[-3 + 1.2 * ahead / RATE, 1 - 0.4 * ahead / RATE]])
         np.testing.assert_allclose(expected.ground, there, atol=0.03)
-    (walker,) = walkers.walkers
+    (walker,) = walkers.tracks
     np.testing.assert_allclose(walker.state[2:], [1.2, -0.4], atol=0.03)
 
 
@@ -195,14 +195,14 @@ def test_odds_fall_while_out_of_sight() -> None:
     _, walkers = follow([except_for(walk(0, 0, 0.3, 0), range(10, 99))], range(14))
     odds, spread = [], []
     for frame in range(14, 18):
-        expected = walkers.expected(frame)
+        expected = walkers.predict(frame)
         assert expected is not None
         odds.append(float(expected.existence[0]))
         spread.append(float(np.linalg.det(expected.covariance[0])))
     np.testing.assert_allclose(np.diff(odds), odds[1] - odds[0])
     assert odds[0] > odds[1]
     assert (np.diff(spread) > 0).all()
-    just_seen = follow([walk(0, 0, 0.3, 0)], range(10))[1].expected(10)
+    just_seen = follow([walk(0, 0, 0.3, 0)], range(10))[1].predict(10)
     assert just_seen is not None
     assert just_seen.existence[0] == 1.0  # at most: whoever is seen may leave all the same
 
@@ -211,7 +211,7 @@ def test_patience_ends() -> None:
     patience = round(IDENTITY.patience * RATE)
     for gone, left in ((patience, 1), (patience + 1, 0)):
         _, walkers = follow([except_for(walk(0, 0, 0, 0), range(10, 99))], range(10 + gone))
-        assert len(walkers.walkers) == left
+        assert len(walkers.tracks) == left
     (chains,), _ = follow([except_for(walk(0, 0, 0, 0), range(10, 11 + patience))], range(40))
     assert chains == [1] * 10 + [2] * (len(chains) - 10)
 
@@ -223,19 +223,19 @@ def test_far_away_is_somebody_new() -> None:
 
 def test_before_the_first_frame_nothing_is_known_and_after_an_empty_one_that_nobody_is_there() -> None:
     walkers = TrackFilter(RATE, CONFIG)
-    assert walkers.expected(0) is None
-    assert walkers.follow(0, GHOSTS, GHOSTS).shape == (0,)
-    expected = walkers.expected(1)
+    assert walkers.predict(0) is None
+    assert walkers.update(0, GHOSTS, GHOSTS).shape == (0,)
+    expected = walkers.predict(1)
     assert expected is not None
     assert len(expected) == 0
-    assert walkers.follow(1, found(people((0, 0)), expected), GHOSTS).tolist() == [1]
+    assert walkers.update(1, found(people((0, 0)), expected), GHOSTS).tolist() == [1]
 
 
 def test_the_same_people_twice() -> None:
     ways = [walk(-1.5, -0.1, 1, 0.1), walk(1.55, 0.2, -1, -0.05, 1.8), except_for(walk(0, 2, 0, -0.5), range(5, 9))]
     (one, before), (other, after) = (follow(ways, range(20), order=4) for _ in range(2))
     assert one == other
-    for a, b in zip(before.walkers, after.walkers, strict=True):
+    for a, b in zip(before.tracks, after.tracks, strict=True):
         np.testing.assert_array_equal(a.state, b.state)
         np.testing.assert_array_equal(a.covariance, b.covariance)
 
@@ -252,21 +252,21 @@ def test_who_was_almost_believed_is_looked_for_once_more() -> None:
     """They have no number before they are found, and are forgotten if the next frame does not find them."""
     for found_again in (True, False):
         walkers = TrackFilter(RATE, CONFIG)
-        assert walkers.follow(0, GHOSTS, doubted((0.5, 0.5), evidence=-1.0)).shape == (0,)
-        expected = walkers.expected(1)
+        assert walkers.update(0, GHOSTS, doubted((0.5, 0.5), evidence=-1.0)).shape == (0,)
+        expected = walkers.predict(1)
         assert expected is not None
         np.testing.assert_array_equal(expected.ground, [[0.5, 0.5]])
         assert expected.existence[0] < -1.0  # a second look at the same thing is not a second witness
         assert walkers.issued == 0
         now = found(people((0.52, 0.5)), expected) if found_again else GHOSTS
-        assert walkers.follow(1, now, GHOSTS).tolist() == [1] * found_again
-        assert walkers.issued == len(walkers.walkers) == int(found_again)
+        assert walkers.update(1, now, GHOSTS).tolist() == [1] * found_again
+        assert walkers.issued == len(walkers.tracks) == int(found_again)
 
 
 @pytest.mark.parametrize(("evidence", "place", "looked_for"), [(-1, 2, 2), (-5, 2, 1), (-1, 0.3, 1)])
 def test_who_is_not_looked_for_again(evidence: float, place: float, looked_for: int) -> None:
     """Who was hardly believed at all, and whoever stands beside somebody who is followed: it may be the same."""
     walkers = TrackFilter(RATE, CONFIG)
-    walkers.follow(0, found(people((0, 0))), doubted((place, 0.0), evidence=evidence))
-    assert len(walkers.expected(1) or ()) == looked_for
-    assert [walker.chain for walker in walkers.walkers] == [1, 0][:looked_for]
+    walkers.update(0, found(people((0, 0))), doubted((place, 0.0), evidence=evidence))
+    assert len(walkers.predict(1) or ()) == looked_for
+    assert [walker.track for walker in walkers.tracks] == [1, 0][:looked_for]

@@ -69,9 +69,9 @@ def positions(people: int, frames: int, kind: str, config: Config) -> tuple[floa
     taken, weighed = [], []
     for frame, views in enumerate(seen):
         start = time.process_time()
-        found = frame_pass.explain(views, follow.expected(frame), candidates.of(views, fuse))
+        found = frame_pass.explain(views, follow.predict(frame), candidates.of(views, fuse))
         taken.append(time.process_time() - start)
-        follow.follow(frame, found.people, found.ghosts)
+        follow.update(frame, found.people, found.ghosts)
         weighed.append(len(found.people) + len(found.ghosts))
     return float(np.mean(weighed[_WARM:])), float(np.mean(taken[_WARM:]))
 

@@ -39,11 +39,11 @@ class CommittedFrames:
     def within(self, first: int, stop: int) -> CommittedFrames:
         """The results of frames first .. stop - 1; timings are kept whole."""
         commit, candidates = self.commit, self.candidates
-        kept = np.array([first <= scene.frame < stop for scene in commit.scenes], bool)
+        kept = np.array([first <= scene.frame < stop for scene in commit.frames], bool)
         candidate = _inside(candidates["frame"], first, stop)
         return CommittedFrames(
             Commit(
-                [commit.scenes[k] for k in np.flatnonzero(kept).tolist()],
+                [commit.frames[k] for k in np.flatnonzero(kept).tolist()],
                 commit.label[kept],
                 commit.trajectory[_inside(commit.trajectory["frame"], first, stop)],
                 commit.events[_inside(commit.events["frame"], first, stop)],
@@ -66,14 +66,14 @@ class FrameRecord(NamedTuple):
 def committed_frames(commit: Commit, records: dict[int, FrameRecord], watch: Stopwatch) -> CommittedFrames:
     """The results of a tracker's commit; takes its frames out of `records` and their time out of `watch`."""
     rows, parts, residuals = [], [], []
-    for scene in commit.scenes:
+    for scene in commit.frames:
         explanation, rates = records.pop(scene.frame)
         residuals.append(explanation.residual)
         for status, candidates in ((1, explanation.people), (0, explanation.ghosts)):
             rows.append(_candidate_rows(scene.frame, status, candidates))
             parts.append(candidates.view_evidence.T)
     rates["aside"] = _finite_mean(np.array(residuals))
-    window = int(commit.windows["index"][0]) if len(commit.windows) else commit.scenes[0].frame
+    window = int(commit.windows["index"][0]) if len(commit.windows) else commit.frames[0].frame
     return CommittedFrames(
         commit, np.concatenate(rows), np.concatenate(parts).astype(np.float32), rates, watch.take(window)
     )

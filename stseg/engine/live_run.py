@@ -124,25 +124,25 @@ class LiveRun:
 
     def _take(self, member: _Member, steps: list[CommittedFrames], stop: int) -> None:
         for step in steps:
-            frames = [scene.frame for scene in step.commit.scenes]
+            frames = [scene.frame for scene in step.commit.frames]
             member.segment.write(step, self._blindness.events(frames))
             self._tell(member, step, stop)
 
     def _tell(self, member: _Member, step: CommittedFrames, stop: int) -> None:
         """Say the tracks of a step that nobody has told yet: those of the warm-up are the earlier segment's to tell."""
         segment, rows = member.segment.segment, step.commit.trajectory
-        last = step.commit.scenes[-1].frame
+        last = step.commit.frames[-1].frame
         member.lead.append(rows[rows["frame"] < segment.first])
         if last < segment.first:
             return
         if member.names is None:
             member.names = self._names.begin(np.concatenate([*member.lead, np.zeros(0, TRAJECTORY)]))
         new = step.within(max(segment.first, self._told), stop)
-        if not new.commit.scenes:
+        if not new.commit.frames:
             return
         self._table.append(self._names.named(new.commit.trajectory, member.names))
-        self._told = new.commit.scenes[-1].frame + 1
-        self._delays += [now() - self._arrived.pop(scene.frame) for scene in new.commit.scenes]
+        self._told = new.commit.frames[-1].frame + 1
+        self._delays += [now() - self._arrived.pop(scene.frame) for scene in new.commit.frames]
 
     def _keep(self, stop: int) -> None:
         """The oldest segment is whole."""

@@ -70,7 +70,7 @@ class OpenSegment:
 
     def write(self, step: CommittedFrames, events: Rows) -> None:
         """Write a step that `add` or `finish` gave, and EVENT rows of its frames besides."""
-        self._committed = step.commit.scenes[-1].frame + 1
+        self._committed = step.commit.frames[-1].frame + 1
         if self._committed > self.segment.stop:
             self._beyond.append((step, events))
         else:
@@ -80,7 +80,7 @@ class OpenSegment:
         """End it before frame `stop`, and give it its name."""
         self.segment = replace(self.segment, stop=stop)
         for step, events in self._beyond:
-            if step.commit.scenes[0].frame < stop:
+            if step.commit.frames[0].frame < stop:
                 self._write(step, events)
         self._writer.append("shifts", self._shifts.rows(self.segment.first, self.segment.stop))
         self._writer.finish(np.zeros(0, TRACK))

@@ -43,10 +43,10 @@ def write_step(job: Job, step: CommittedFrames, segment: Segment, writer: RunWri
     own = step.within(segment.first, segment.stop)
     writer.append("trajectory", step.within(segment.lead, segment.stop).commit.trajectory)
     writer.append("timings", own.timings)
-    if not own.commit.scenes:
+    if not own.commit.frames:
         return
-    frames = np.array([scene.frame for scene in own.commit.scenes])
-    log_odds = np.stack([scene.log_odds for scene in own.commit.scenes])
+    frames = np.array([scene.frame for scene in own.commit.frames])
+    log_odds = np.stack([scene.log_odds for scene in own.commit.frames])
     writer.append_frames(frames, *_kept(job, own, frames, log_odds))
     ghosts = np.zeros(len(own.candidates), ghost_type(len(job.recording.sources)))
     for name in own.candidates.dtype.names or ():

@@ -66,7 +66,7 @@ class SegmentWorker:
         ):
             for step in run_session(self.pipeline, foregrounds, shifts.watch(frame_sets), segment.lead, fused):
                 write_step(job, step, segment, writer)
-                if step.commit.scenes[-1].frame >= segment.stop - 1:
+                if step.commit.frames[-1].frame >= segment.stop - 1:
                     break
             writer.append("shifts", shifts.rows(segment.first, segment.stop))
             writer.finish(np.zeros(0, TRACK))

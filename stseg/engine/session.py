@@ -50,7 +50,7 @@ class Session:
 
     def add(self, frame_set: FrameSet) -> list[CommittedFrames]:
         """The next frame set; the results that it decides."""
-        fused, observed = self._fuse(frame_set, self._tracker.expected(frame_set.frame))
+        fused, observed = self._fuse(frame_set, self._tracker.predict(frame_set.frame))
         with self.watch.time("track"):
             commits = self._tracker.add(fused, observed)
         return [committed_frames(commit, self._records, self.watch) for commit in commits]

@@ -1,4 +1,4 @@
-"""Ways to follow people, all behind one protocol."""
+"""Trackers: multi-target tracking methods behind one protocol."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ TRACKERS: dict[str, type[Tracker]] = {
     "particles": ParticleTracker,
     "belief": BeliefTracker,
 }
-"""cut: graph cuts of windows of the volume (the default). frames: each frame by itself, linked by motion alone.
-kalman: a filter for each person over the people of each frame (HW12). particles: hypotheses of where everybody stands,
-guided by the colours of their clothes (KD06). belief: particles in every view, which tell each other by way of the
-ground (DP06)."""
+"""cut: graph cuts of windows of the volume (the default). frames: detections with their tracks, without a cut.
+kalman: a Kalman filter for each track (Hwang and Wang 2012). particles: particle filters on joint states with colour
+models (Kim and Davis 2006). belief: particle filters in every view, fused by belief propagation over the ground (Du and
+Piater 2006)."""
 
 
 def find_tracker(name: str) -> type[Tracker]:

@@ -1,4 +1,4 @@
-"""The views in which people can be known by the colours of their clothes."""
+"""The views of a frame that deliver colour images, with their foreground."""
 
 from __future__ import annotations
 
@@ -27,18 +27,19 @@ class ColourView(NamedTuple):
     likelihood: Singles
 
 
-def colour_views(shown: FrameObservations, tracker: str, frame: int) -> list[ColourView | None]:
-    """The colour views of a frame, in the rig's order; None where one is blind or delivers no colour.
+def colour_views(observed: FrameObservations, tracker: str, frame: int) -> list[ColourView | None]:
+    """The colour views of a frame, in the rig's order; None for a blind view and one without colour.
 
     Raises
     ------
     SourceError
-        Where cameras show something, but none of them in colour.
+        Where no view that delivers anything delivers colour.
     """
     views = [
-        _view(observation, evidence) for observation, evidence in zip(shown.observations, shown.evidence, strict=True)
+        _view(observation, evidence)
+        for observation, evidence in zip(observed.observations, observed.evidence, strict=True)
     ]
-    seen = [observation for observation in shown.observations if observation is not None]
+    seen = [observation for observation in observed.observations if observation is not None]
     if seen and not any(_is_colour(observation) for observation in seen):
         raise SourceError(
             f"--tracker {tracker}", f"frame {frame}", f"{_kinds(seen)} and no colour",

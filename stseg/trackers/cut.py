@@ -1,4 +1,7 @@
-"""Graph cuts of space-time windows, identities over their overlaps (KS09 section 5; METHODS 4, 5)."""
+"""Minimum cuts of space-time windows, identities over their overlaps (Khan and Shah 2009, section 5).
+
+See docs/how-it-works.md, Energy and Tracks.
+"""
 
 from __future__ import annotations
 
@@ -31,29 +34,29 @@ from stseg.tracking.window_association import TrackAssociation, WindowAssignment
 from stseg.tracking.windows import Window, windows
 
 _ENDLESS = 1 << 62
-"""A stop that is not known yet."""
+"""Stop frame of a run whose end is not known yet."""
 
 
 @dataclass(frozen=True)
-class _Linked:
-    """A frame and the chains of its people."""
+class _TrackedFrame:
+    """A frame and the filter track of each detection, int64 (n,)."""
 
-    scene: FusedFrame
-    chains: Ints
+    fused: FusedFrame
+    tracks: Ints
 
-    def sightings(self) -> DetectionHistory:
-        """Who was seen where."""
-        people, frame = self.scene.people, np.full(len(self.chains), self.scene.frame)
-        return DetectionHistory(frame, self.chains, people.ground, people.covariance, people.height)
+    def detections(self) -> DetectionHistory:
+        """Its detections."""
+        people, frame = self.fused.people, np.full(len(self.tracks), self.fused.frame)
+        return DetectionHistory(frame, self.tracks, people.ground, people.covariance, people.height)
 
 
 class CutTracker:
-    """Follows people by the minimum cut of one window after the other.
+    """Tracks by the minimum cut of overlapping windows.
 
     Parameters
     ----------
     rig, config
-        The scene, and the constants of all stages.
+        The cameras and the grid; the constants of all stages.
     first
         The run's first frame.
     """
@@ -63,117 +66,116 @@ class CutTracker:
     def __init__(self, rig: Rig, config: Config, first: int) -> None:
         self.rig, self.config = rig, config
         self.views = Sampling.of(rig, "point").views()
-        self.walkers = TrackFilter(rig.frame_rate, config)
-        self.identities = TrackAssociation(rig.frame_rate, config.tracking)
-        spread, stranger = config.body.height_spread, config.occupancy.occupied_share
+        self.filter = TrackFilter(rig.frame_rate, config)
+        self.association = TrackAssociation(rig.frame_rate, config.tracking)
+        spread, unassigned = config.body.height_spread, config.occupancy.occupied_share
         self.solver = find_solver(config.segmentation.solver)
-        self.pillar = BodyShape(config.occupancy.person_radius, spread, stranger)
-        self.held: list[_Linked] = []
+        self.pillar = BodyShape(config.occupancy.person_radius, spread, unassigned)
+        self.held: list[_TrackedFrame] = []
         self.first = self.committed = first
         self.coming = windows(rig.frame_rate, config.tracking, first, _ENDLESS)
         self.window = next(self.coming)
 
-    def expected(self, frame: int) -> PredictedTracks | None:
-        """Whom the frames before lead to expect."""
-        return self.walkers.expected(frame)
+    def predict(self, frame: int) -> PredictedTracks | None:
+        """Predictions of all tracks for a frame; None for the first."""
+        return self.filter.predict(frame)
 
-    def add(self, scene: FusedFrame, shown: FrameObservations) -> list[Commit]:
-        """The next frame; the window before it, if it is complete.
+    def add(self, fused: FusedFrame, observed: FrameObservations) -> list[Commit]:
+        """Add a frame; commit the window before it if that is complete.
 
-        A window waits for the frame after its last: only then is it known not to be the run's last one, which commits
-        to its end.
+        A window waits for the frame after its last: the run's last window commits to its end, the others do not.
         """
-        del shown
-        done = []
-        if scene.frame >= self.window.solve_stop:
-            done.append(self._solve(self.window))
+        del observed
+        commits = []
+        if fused.frame >= self.window.solve_stop:
+            commits.append(self._solve(self.window))
             self.window = next(self.coming)
-            self.held = [linked for linked in self.held if linked.scene.frame >= self.window.solve_first]
-        chains = self.walkers.follow(scene.frame, scene.people, scene.ghosts)
-        self.held.append(_Linked(scene, chains))
-        return done
+            self.held = [tracked for tracked in self.held if tracked.fused.frame >= self.window.solve_first]
+        tracks = self.filter.update(fused.frame, fused.people, fused.ghosts)
+        self.held.append(_TrackedFrame(fused, tracks))
+        return commits
 
     def finish(self) -> list[Commit]:
-        """Solve what is still open, in the windows of a run that ends here."""
+        """Solve the open windows; the run ends here."""
         if not self.held:
             return []
-        stop = self.held[-1].scene.frame + 1
+        stop = self.held[-1].fused.frame + 1
         remaining = windows(self.rig.frame_rate, self.config.tracking, self.first, stop)
         return [self._solve(window) for window in remaining if window.commit_stop > self.committed]
 
     def _solve(self, window: Window) -> Commit:
-        held = [linked for linked in self.held if window.solve_first <= linked.scene.frame < window.solve_stop]
+        held = [tracked for tracked in self.held if window.solve_first <= tracked.fused.frame < window.solve_stop]
         energy = self._energy(held)
         cut = self.solver.grid(energy)
         label = self._divide(window, held, energy, cut.occupied).label
         reach, grid = self.config.occupancy.person_radius, self.rig.grid
         blobs = [
-            find_blobs(cells, linked.scene.log_odds, linked.scene.people.ground, linked.chains, reach, grid)
-            for cells, linked in zip(label, held, strict=True)
+            find_blobs(cells, tracked.fused.log_odds, tracked.fused.people.ground, tracked.tracks, reach, grid)
+            for cells, tracked in zip(label, held, strict=True)
         ]
-        pieces = form_tracklets(blobs, window.solve_first, self.config.tracking)
-        decision = self.identities.decide(window, blobs, pieces)
+        tracklets = form_tracklets(blobs, window.solve_first, self.config.tracking)
+        decision = self.association.decide(window, blobs, tracklets)
         row = np.array([(*_ranges(window), energy.of(cut.occupied), QUANTUM, cut.nodes)], WINDOW)
         self.committed = window.commit_stop
         return self._commit(window, held, label, blobs, decision, row)
 
-    def _energy(self, held: list[_Linked]) -> Energy:
-        log_odds = np.stack([linked.scene.log_odds for linked in held])
+    def _energy(self, held: list[_TrackedFrame]) -> Energy:
+        log_odds = np.stack([tracked.fused.log_odds for tracked in held])
         reach, grid = self.config.occupancy.person_radius, self.rig.grid
         motion = [
-            motion_field(now.scene.people.ground, then.scene.people.ground, now.chains, then.chains, reach, grid)
+            motion_field(now.fused.people.ground, then.fused.people.ground, now.tracks, then.tracks, reach, grid)
             for now, then in pairwise(held)
         ]
         steps = np.array(motion, np.int64).reshape(-1, *grid.shape[1:], 2)
         return build_energy(log_odds, steps, grid, self.config.segmentation)
 
-    def _divide(self, window: Window, held: list[_Linked], energy: Energy, occupied: Flags) -> WindowLabels:
-        """Whose the occupied cells are: chains of this window and of tracks that live."""
-        tails = [track.tail for track in self.identities.alive]
+    def _divide(self, window: Window, held: list[_TrackedFrame], energy: Energy, occupied: Flags) -> WindowLabels:
+        """Label the occupied cells with the filter tracks of this window and of active tracks."""
+        tails = [track.tail for track in self.association.active]
         mean_height = self.config.body.height_mean
         seen = [earlier_detections(tails, window.solve_first, mean_height, self.config.motion)]
-        seen += [linked.sightings() for linked in held]
+        seen += [tracked.detections() for tracked in held]
         places = predicted_places(
             together(seen), window.solve_first, window.solve_stop, self.rig.frame_rate, self.config.tracking
         )
-        found = WindowDetections([linked.scene.people.ground for linked in held], [linked.chains for linked in held])
+        found = WindowDetections([one.fused.people.ground for one in held], [one.tracks for one in held])
         return label_cells(energy, occupied, found, places, self.pillar, self.rig.grid, self.solver)
 
     def _commit(
         self,
         window: Window,
-        held: list[_Linked],
+        held: list[_TrackedFrame],
         label: Labels,
         blobs: list[Blobs],
         decision: WindowAssignment,
         row: Rows,
     ) -> Commit:
-        kept = range(window.commit_first - held[0].scene.frame, window.commit_stop - held[0].scene.frame)
+        kept = range(window.commit_first - held[0].fused.frame, window.commit_stop - held[0].fused.frame)
         named = np.zeros((len(kept), *self.rig.grid.shape), np.int32)
         rows = []
         for k, cells in zip(kept, named, strict=True):
             identity = np.append(0, decision.identity[k])
             cells[:] = np.where(label[k] != 0, identity[blobs[k].cells], 0)
-            rows.append(self._rows(held[k].scene, blobs[k], decision.identity[k]))
-        scenes = [held[k].scene for k in kept]
-        return Commit(scenes, named, np.concatenate(rows), event_rows(decision.events), row)
+            rows.append(self._rows(held[k].fused, blobs[k], decision.identity[k]))
+        frames = [held[k].fused for k in kept]
+        return Commit(frames, named, np.concatenate(rows), event_rows(decision.events), row)
 
-    def _rows(self, scene: FusedFrame, blobs: Blobs, identity: Ints) -> Rows:
-        """Where a blob holds a person of the pass, the pass knows best where; else the blob's mass tells."""
+    def _rows(self, fused: FusedFrame, blobs: Blobs, identity: Ints) -> Rows:
+        """TRAJECTORY rows: the detection's place where a blob holds one, else the blob's centroid."""
         named = np.flatnonzero(identity)
         person = blobs.person[named]
-        held, who = person >= 0, person.clip(0)
-        people = scene.people if len(scene.people) else None
+        held, held_person = person >= 0, person.clip(0)
+        people = fused.people if len(fused.people) else None
         ground, covariance = blobs.ground[named].copy(), blobs.covariance[named].copy()
         height, score = blobs.height[named].copy(), blobs.mass[named].copy()
         width = np.full(len(named), self.config.body.width_mean)
         if people is not None:
-            ground[held], covariance[held] = people.ground[who[held]], people.covariance[who[held]]
-            height[held], score[held] = people.sizes.height[who[held]], people.evidence[who[held]]
-            width[held] = people.sizes.width[who[held]]
+            ground[held], covariance[held] = people.ground[held_person[held]], people.covariance[held_person[held]]
+            height[held], score[held] = people.sizes.height[held_person[held]], people.evidence[held_person[held]]
+            width[held] = people.sizes.width[held_person[held]]
         views = views_at(self.views, ground, self.rig.grid)
         return trajectory_rows(
-            scene.frame, identity[named], ground, covariance, height, width, blobs.extent[named], score, views
+            fused.frame, identity[named], ground, covariance, height, width, blobs.extent[named], score, views
         )
 
 

@@ -1,4 +1,4 @@
-"""What trackers share that decide every frame as it comes."""
+"""Base of trackers that commit every frame at once."""
 
 from __future__ import annotations
 
@@ -14,30 +14,30 @@ from stseg.trackers.protocol import Commit, FusedFrame
 from stseg.trackers.rows import Event, event_rows, trajectory_rows, views_at
 
 
-class EachFrame:
-    """Leaves nothing open, and commits a frame from where people are in it.
+class FramewiseTracker:
+    """Commits each frame from the places of its tracks.
 
     Parameters
     ----------
     rig, config
-        The scene, and the constants of all stages.
+        The cameras and the grid; the constants of all stages.
     first
         The run's first frame.
     """
 
     def __init__(self, rig: Rig, config: Config, first: int) -> None:
         self.rig, self.config, self.frame = rig, config, first
-        self.seen_by = Sampling.of(rig, "point").views()
+        self.cell_views = Sampling.of(rig, "point").views()
 
     def finish(self) -> list[Commit]:
-        """Nothing is open."""
+        """No frame is open."""
         return []
 
     def commit(
-        self, scene: FusedFrame, ids: Ints, ground: Floats, covariance: Floats, height: Floats, width: Floats,
+        self, fused: FusedFrame, ids: Ints, ground: Floats, covariance: Floats, height: Floats, width: Floats,
         score: Floats, events: list[Event],
     ) -> Commit:  # fmt: skip
-        """A frame and who is where in it.
+        """Commit a frame.
 
         Parameters
         ----------
@@ -49,7 +49,7 @@ class EachFrame:
             Metres, metres, nats.
         """
         grid = self.rig.grid
-        label, extent = reached_cells(scene, ground, ids, grid, self.config.occupancy.person_radius)
-        views = views_at(self.seen_by, ground, grid)
-        rows = trajectory_rows(scene.frame, ids, ground, covariance, height, width, extent, score, views)
-        return Commit([scene], label[None], rows, event_rows(events), np.zeros(0, WINDOW))
+        label, extent = reached_cells(fused, ground, ids, grid, self.config.occupancy.person_radius)
+        views = views_at(self.cell_views, ground, grid)
+        rows = trajectory_rows(fused.frame, ids, ground, covariance, height, width, extent, score, views)
+        return Commit([fused], label[None], rows, event_rows(events), np.zeros(0, WINDOW))

@@ -1,8 +1,7 @@
-"""Kalman filters of people who walk at constant velocity but for a white acceleration, many side by side.
+"""Constant-velocity Kalman filters, many at once (motion model: `stseg.tracking.motion_model`).
 
-x' = F x,  P' = F P F^T + Q           carried over some seconds
-K = P' H^T (H P' H^T + R)^-1          corrected by a place z with covariance R
-x = x' + K (z - H x'),  P = (I - K H) P'
+K = P H^T (H P H^T + R)^-1          correction by a place z with covariance R
+x <- x + K (z - H x),  P <- (I - K H) P
 """
 
 from __future__ import annotations
@@ -12,6 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints
+from stseg.config import MotionConfig
+from stseg.tracking.motion_model import process_noise, transition
 
 
 class Filters(NamedTuple):
@@ -35,14 +36,14 @@ class Filters(NamedTuple):
         return Filters(self.state[which], self.covariance[which])
 
     def joined_with(self, others: Filters) -> Filters:
-        """These, then others."""
+        """These, then others, concatenated."""
         return Filters(np.concatenate([self.state, others.state]), np.concatenate([self.covariance, others.covariance]))
 
 
-def begun(ground: Floats, noise: Floats, pace: float) -> Filters:
-    """Filters of people seen for the first time at places (n, 2) with covariances (n, 2, 2), metres.
+def initial(ground: Floats, noise: Floats, pace: float) -> Filters:
+    """Filters of births at places (n, 2) with covariances (n, 2, 2), metres.
 
-    Their velocity is anything with a standard deviation of `pace`, metres per second.
+    `pace`: standard deviation of their velocity, metres per second.
     """
     covariance = np.zeros((len(ground), 4, 4))
     covariance[:, :2, :2] = noise
@@ -50,17 +51,15 @@ def begun(ground: Floats, noise: Floats, pace: float) -> Filters:
     return Filters(np.concatenate([ground, np.zeros_like(ground)], 1), covariance)
 
 
-def carried(filters: Filters, seconds: float, turn: float) -> Filters:
-    """Some time later; `turn` is how the velocity changes, metres per second per square root of a second."""
-    motion = np.eye(4)
-    motion[:2, 2:] = seconds * np.eye(2)
-    drift = np.array([[seconds**3 / 3, seconds**2 / 2], [seconds**2 / 2, seconds]]) * turn**2
+def predicted(filters: Filters, seconds: float, model: MotionConfig) -> Filters:
+    """Prediction over some seconds."""
+    motion = transition(seconds)
     state, covariance = filters.state @ motion.T, motion @ filters.covariance @ motion.T
-    return Filters(state, covariance + np.kron(drift, np.eye(2)))
+    return Filters(state, covariance + process_noise(seconds, model))
 
 
-def surprise(filters: Filters, ground: Floats, noise: Floats) -> tuple[Floats, Floats]:
-    """How places (m, 2) with covariances (m, 2, 2) suit filters.
+def innovations(filters: Filters, ground: Floats, noise: Floats) -> tuple[Floats, Floats]:
+    """Innovations of places (m, 2) with covariances (m, 2, 2).
 
     Returns
     -------
@@ -75,7 +74,7 @@ def surprise(filters: Filters, ground: Floats, noise: Floats) -> tuple[Floats, F
 
 
 def corrected(filters: Filters, which: Ints, ground: Floats, noise: Floats) -> Filters:
-    """Filters of which some (k,) were seen at places (k, 2) with covariances (k, 2, 2), metres."""
+    """Filters of which some (k,) are corrected by places (k, 2) with covariances (k, 2, 2), metres."""
     state, covariance = filters.state.copy(), filters.covariance.copy()
     before = covariance[which]
     gain = before[:, :, :2] @ np.linalg.inv(before[:, :2, :2] + noise)

@@ -1,4 +1,4 @@
-"""Whose the occupied cells are where no cut says so: those of the nearest person within reach."""
+"""Labels of occupied cells without a cut: the nearest track within reach."""
 
 from __future__ import annotations
 
@@ -10,25 +10,25 @@ from stseg.geometry.nearest_person import nearest_person
 from stseg.trackers.protocol import FusedFrame
 
 
-def reached_cells(scene: FusedFrame, ground: Floats, ids: Ints, grid: Grid, reach: float) -> tuple[Labels, Floats]:
-    """Occupied cells of a frame within reach of people.
+def reached_cells(fused: FusedFrame, ground: Floats, ids: Ints, grid: Grid, reach: float) -> tuple[Labels, Floats]:
+    """Label the occupied cells of a frame with the nearest track within reach.
 
     Parameters
     ----------
     ground : float64 (n, 2)
-        Where they are, metres.
+        Places of the tracks, metres.
     ids : int64 (n,)
-        Their tracks.
+        Track numbers.
     reach
         Metres.
 
     Returns
     -------
     int32 (plane, y, x), float64 (n,)
-        Track ids of the cells, 0 for background, and each person's ground area, square metres.
+        Track ids of the cells, 0 for background; ground area of each track, square metres.
     """
     near = nearest_person(grid.ground, ground, reach)
-    occupied = (scene.log_odds > 0) & (near >= 0)
+    occupied = (fused.log_odds > 0) & (near >= 0)
     label = np.where(occupied, np.append(ids, 0)[near], 0).astype(np.int32)
     cells = np.bincount(near[occupied.any(0)], minlength=len(ids))[: len(ids)]
     return label, np.asarray(cells * grid.cell**2, float)

@@ -1,4 +1,4 @@
-"""What goes into a tracker, frame by frame, and what comes out."""
+"""The tracker protocol: fused frames in, committed frames out."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from stseg.model.people import People
 from stseg.model.predicted_tracks import PredictedTracks
 
 STAYING, FORGETTING = 1.0, 4.0
-"""What trackers without odds of their own expect: log-odds that somebody found in one frame is found in the next, nats,
-and how fast they fall after, nats per second."""
+"""Existence of a track in trackers that do not estimate it: log-odds that a track detected in one frame is detected in
+the next, nats, and their decay rate while it is undetected, nats per second."""
 
 
 @dataclass(frozen=True)
 class FusedFrame:
-    """One frame, explained and fused.
+    """One frame after detection and fusion.
 
     Attributes
     ----------
     frame
         Its number in the recording.
     people
-        Whom the pass of the frame found.
+        Its detections.
     ghosts
-        Candidates that the pass did not believe.
+        Rejected candidates.
     log_odds : float32 (plane, y, x)
         The volume, nats; nan where no view sees the cell.
     """
@@ -41,14 +41,14 @@ class FusedFrame:
 
 @dataclass(frozen=True)
 class FrameObservations:
-    """What the cameras showed in a frame, in the rig's order: there while the frame is added, held by no one after.
+    """The observations and evidence of a frame, in the rig's order; valid only while the frame is added.
 
     Attributes
     ----------
     observations
-        What each delivered; see `stseg.trackers.colour_views` for a tracker that needs colour.
+        Raw data of each camera; `stseg.trackers.colour_views` extracts colour.
     evidence
-        What the foreground made of it: boxes, a likelihood map float32 (v, u), or None where the view is blind.
+        Foreground of each view: boxes, a likelihood map float32 (v, u), or None for a blind view.
     """
 
     observations: Sequence[Observation]
@@ -57,19 +57,19 @@ class FrameObservations:
 
 @dataclass(frozen=True)
 class Commit:
-    """Frames that are decided.
+    """Committed frames and their tracks.
 
     Attributes
     ----------
-    scenes
-        The frames, in order.
+    frames
+        In order.
     label : int32 (time, plane, y, x)
         Track ids, 0 for background.
     trajectory, events, windows
         Rows of `stseg.model.tables`: TRAJECTORY, EVENT, WINDOW.
     """
 
-    scenes: list[FusedFrame]
+    frames: list[FusedFrame]
     label: Labels
     trajectory: Rows
     events: Rows
@@ -77,26 +77,26 @@ class Commit:
 
 
 class Tracker(Protocol):
-    """Takes frames in order, gives back what is decided as soon as it is.
+    """Takes frames in order, and returns committed frames as soon as they are final.
 
     Parameters
     ----------
     rig, config
-        The scene, and the constants of all stages.
+        The cameras and the grid; the constants of all stages.
     first
         The run's first frame.
     """
 
     final: ClassVar[bool]
-    """Whether who is who stands as it is committed; else it is decided again from the whole run (`identity.whole`)."""
+    """Whether committed identities are final; else global association decides them again over the whole run."""
 
     def __init__(self, rig: Rig, config: Config, first: int) -> None: ...
 
-    def add(self, scene: FusedFrame, shown: FrameObservations) -> list[Commit]:
-        """The next frame; what is decided by it."""
+    def add(self, fused: FusedFrame, observed: FrameObservations) -> list[Commit]:
+        """Add a frame; returns the frames that it completes."""
 
     def finish(self) -> list[Commit]:
-        """No more frames; what was still open."""
+        """End the run; returns the frames that were open."""
 
-    def expected(self, frame: int) -> PredictedTracks | None:
-        """Whom the frames before lead to expect in a frame; None in the first."""
+    def predict(self, frame: int) -> PredictedTracks | None:
+        """Predictions of all tracks for a frame; None for the first."""

@@ -1,4 +1,4 @@
-"""One-to-one assignments of places within reach."""
+"""One-to-one assignment of least cost (Hungarian method, SciPy)."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from stseg.arrays import Floats, Ints
 
 
 def assign(cost: Floats, alone: float) -> tuple[Ints, Ints]:
-    """Pairs of least total cost where staying alone costs `alone` a pair; rows and columns, both int64."""
+    """Pairs of least total cost, where an unassigned pair costs `alone`; rows and columns, both int64."""
     if not cost.size:
         return np.zeros(0, np.int64), np.zeros(0, np.int64)
     gain = np.minimum(cost - alone, 0.0)

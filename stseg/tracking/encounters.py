@@ -1,8 +1,8 @@
-"""Who meets whom: tracks whose cells share one piece of ground, as one merge and one split an encounter (METHODS 5).
+"""Encounters: one merge and one split event while the blobs of two tracks share a connected piece of ground.
 
-A window tells of each stretch of its frames in which two tracks touch; so it does not matter which windows and segments
-there were before. Cells of people who walk together come apart and touch again every few frames: stretches with less
-than `tracking.separation_time` between them are one encounter of the whole run.
+Each window reports its contacts, intervals of frames in which two tracks touch, so windows and segments do not matter.
+Blobs of people who walk together separate and touch again every few frames: contacts with less than
+`tracking.separation_time` between them are one encounter of the run (docs/how-it-works.md, Tracks).
 """
 
 from __future__ import annotations
@@ -20,23 +20,23 @@ _KINDS = (b"merge", b"split")
 
 
 def touches(first: int, blobs: Sequence[Blobs], identity: Sequence[Ints]) -> list[tuple[int, str, int, int, str]]:
-    """The stretches of consecutive frames in which two tracks touch: a merge at the first, a split at the last.
+    """Contacts: intervals of frames in which two tracks touch, a merge at the first frame and a split at the last.
 
     Parameters
     ----------
     first
-        The frame that `blobs` and `identity` begin with.
+        Frame of the first element of `blobs` and `identity`.
     blobs, identity
-        Of each frame; for each blob its track, 0 for none.
+        One element a frame; `identity` holds the track of each blob, 0 for none.
     """
-    told: list[tuple[int, str, int, int, str]] = []
+    events: list[tuple[int, str, int, int, str]] = []
     before: set[tuple[int, int]] = set()
     for frame, (found, names) in enumerate(zip(blobs, identity, strict=True), first):
         now = _pairs(found, names)
-        told += [(frame, "merge", a, b, "") for a, b in now - before]
-        told += [(frame - 1, "split", a, b, "") for a, b in before - now]
+        events += [(frame, "merge", a, b, "") for a, b in now - before]
+        events += [(frame - 1, "split", a, b, "") for a, b in before - now]
         before = now
-    return told + [(first + len(blobs) - 1, "split", a, b, "") for a, b in before]
+    return events + [(first + len(blobs) - 1, "split", a, b, "") for a, b in before]
 
 
 def _pairs(found: Blobs, names: Ints) -> set[tuple[int, int]]:
@@ -44,37 +44,37 @@ def _pairs(found: Blobs, names: Ints) -> set[tuple[int, int]]:
     return {(a, b) for a, b in named if 0 < a < b}
 
 
-def encounters(told: Rows, name: Callable[[int, int], int], parting: int, frame_rate: float, last: int) -> Rows:
-    """Encounters of the whole run, EVENT rows: a merge where two people meet and a split where they have parted.
+def encounters(contacts: Rows, name: Callable[[int, int], int], parting: int, frame_rate: float, last: int) -> Rows:
+    """Encounters of the whole run, EVENT rows: a merge at the first contact and a split after the last.
 
     Parameters
     ----------
-    told : EVENT (n,)
-        What windows tell, `touches`, in the order of frames; rows of other kinds are passed over.
+    contacts : EVENT (n,)
+        Of all windows, from `touches`, sorted by frame; rows of other kinds are ignored.
     name
-        Who a track is in a frame; 0 for somebody who is nobody.
+        Identity of a track in a frame; 0 for a dropped track.
     parting
-        Two who touch again after no more frames than this never parted.
+        Contacts of one pair with at most this many frames between them are one encounter.
     frame_rate
         Frames per second.
     last
-        The run's last frame. Of those who still touch there, no split is told.
+        The run's last frame; a contact that lasts to it has no split.
     """
     rows: list[tuple[int, bytes, int, int, str]] = []
-    for (a, b), stretches in _by_pair(told, name).items():
-        for begin, end in _joined(sorted(stretches), parting):
+    for (a, b), intervals in _by_pair(contacts, name).items():
+        for begin, end in _joined(sorted(intervals), parting):
             rows.append((begin, b"merge", a, b, f"their cells touch, for {(end - begin + 1) / frame_rate:.1f} s"))
             if end < last:
                 rows.append((end + 1, b"split", a, b, "their cells part"))
     return np.array(sorted(rows), EVENT)
 
 
-def _by_pair(told: Rows, name: Callable[[int, int], int]) -> dict[tuple[int, int], list[tuple[int, int]]]:
-    """First and last frames of the stretches of each two people."""
+def _by_pair(contacts: Rows, name: Callable[[int, int], int]) -> dict[tuple[int, int], list[tuple[int, int]]]:
+    """First and last frames of the contacts of each pair of identities."""
     begun: dict[tuple[int, int], int] = {}
     found: dict[tuple[int, int], list[tuple[int, int]]] = {}
-    told = told[np.isin(told["kind"], _KINDS)]
-    for frame, kind, one, other in told[["frame", "kind", "id", "other"]].tolist():
+    contacts = contacts[np.isin(contacts["kind"], _KINDS)]
+    for frame, kind, one, other in contacts[["frame", "kind", "id", "other"]].tolist():
         if kind == b"merge":
             begun[one, other] = frame
         elif (one, other) in begun:
@@ -85,8 +85,8 @@ def _by_pair(told: Rows, name: Callable[[int, int], int]) -> dict[tuple[int, int
     return found
 
 
-def _joined(stretches: Sequence[tuple[int, int]], parting: int) -> Iterator[tuple[int, int]]:
-    """Stretches, with those between which nobody parted as one."""
-    breaks = [k for k, (old, new) in enumerate(pairwise(stretches), 1) if new[0] - old[1] - 1 > parting]
-    for start, stop in pairwise([0, *breaks, len(stretches)]):
-        yield stretches[start][0], max(end for _, end in stretches[start:stop])
+def _joined(intervals: Sequence[tuple[int, int]], parting: int) -> Iterator[tuple[int, int]]:
+    """Intervals, those with at most `parting` frames between them as one."""
+    breaks = [k for k, (old, new) in enumerate(pairwise(intervals), 1) if new[0] - old[1] - 1 > parting]
+    for start, stop in pairwise([0, *breaks, len(intervals)]):
+        yield intervals[start][0], max(end for _, end in intervals[start:stop])

@@ -1,7 +1,7 @@
-"""From what was committed window by window to the tracks of the whole run (METHODS 5).
+"""From committed rows to the tracks of the whole run (docs/how-it-works.md, Tracks).
 
-committed rows -> who is who anew -> short tracks and ghosts dropped -> short gaps filled -> places smoothed
-                  (relink)           (gaps)                             (gaps)              (smoothed)
+committed rows -> global association -> short tracks and ghosts dropped -> short gaps filled -> places smoothed
+                  (global_association)  (pruning)                          (pruning)            (smoother)
 """
 
 from __future__ import annotations
@@ -42,46 +42,47 @@ class FinalTracks:
 
 def final_tracks(committed: Rows, events: Rows, frame_rate: float, border: Border, config: Config) -> FinalTracks:
     """The tracks of a run from its committed TRAJECTORY and EVENT rows."""
-    relinked = associate_globally(committed, frame_rate, border, config)
+    linked = associate_globally(committed, frame_rate, border, config)
     renamed = committed.copy()
-    renamed["id"] = relinked.identity
+    renamed["id"] = linked.identity
     long, short = drop_short(renamed, frame_rate, config.tracking)
     kept, ghosts = drop_ghosts(long, frame_rate, config.tracking)
-    identity = np.where(np.isin(relinked.identity, kept["id"]), relinked.identity, 0)
-    names = _Names(committed, relinked.identity)
+    identity = np.where(np.isin(linked.identity, kept["id"]), linked.identity, 0)
+    names = _Names(committed, linked.identity)
     met = _met(events, _Names(committed, identity), frame_rate, config.tracking)
-    story = np.concatenate([_retold(events, names, relinked.links), met, short, ghosts])
+    every_event = np.concatenate([_renamed(events, names, linked.links), met, short, ghosts])
     smoothed = smooth_places(fill_gaps(kept, frame_rate, config.tracking), frame_rate, config.motion)
-    return FinalTracks(smoothed, story[np.argsort(story["frame"], kind="stable")], identity)
+    return FinalTracks(smoothed, every_event[np.argsort(every_event["frame"], kind="stable")], identity)
 
 
 def committed_tracks(committed: Rows, events: Rows, frame_rate: float, config: TrackingConfig) -> FinalTracks:
-    """The tracks of a tracker whose own word stands on who is who and where: short ones go, short gaps are filled."""
+    """The tracks of a tracker whose identities and places are final: short ones dropped, short gaps filled."""
     kept, dropped = drop_short(committed, frame_rate, config)
-    story = np.concatenate([events, dropped])
+    every_event = np.concatenate([events, dropped])
     identity = np.where(np.isin(committed["id"], kept["id"]), committed["id"], 0)
-    return FinalTracks(fill_gaps(kept, frame_rate, config), story[np.argsort(story["frame"], kind="stable")], identity)
+    order = np.argsort(every_event["frame"], kind="stable")
+    return FinalTracks(fill_gaps(kept, frame_rate, config), every_event[order], identity)
 
 
-def _retold(events: Rows, name_at: _Names, links: Sequence[Link]) -> Rows:
-    """Lives under the new identities: where a track goes on as another, nobody was born and nobody died."""
+def _renamed(events: Rows, name_at: _Names, links: Sequence[Link]) -> Rows:
+    """Births, deaths and hand-overs under the final identities: a linked track has neither birth nor death there."""
     events = events[~np.isin(events["kind"], (b"merge", b"split"))]
-    told = events.copy()
+    named = events.copy()
     for role in ("id", "other"):
-        told[role] = [name_at.name(track, frame) for track, frame in zip(events[role], events["frame"], strict=True)]
-    begun = {(link.frame, link.track) for link in links}
-    untrue = [
-        (kind == b"birth" and (frame, track) in begun) or (kind == b"death" and name_at.last(name) > frame)
+        named[role] = [name_at.name(track, frame) for track, frame in zip(events[role], events["frame"], strict=True)]
+    linked = {(link.frame, link.track) for link in links}
+    refuted = [
+        (kind == b"birth" and (frame, track) in linked) or (kind == b"death" and name_at.last(name) > frame)
         for frame, kind, track, name in zip(
-            events["frame"].tolist(), events["kind"].tolist(), events["id"].tolist(), told["id"].tolist(), strict=True
+            events["frame"].tolist(), events["kind"].tolist(), events["id"].tolist(), named["id"].tolist(), strict=True
         )
     ]
     joined = [(link.frame, b"hand-over", link.identity, link.track, link.reason.encode()) for link in links]
-    return np.concatenate([told[~np.array(untrue, bool)], np.array(joined, EVENT)])
+    return np.concatenate([named[~np.array(refuted, bool)], np.array(joined, EVENT)])
 
 
 def _met(events: Rows, name_at: _Names, frame_rate: float, config: TrackingConfig) -> Rows:
-    """Who met whom of those who are somebody."""
+    """Encounters between retained tracks."""
     known = set(name_at.track.tolist())
     last = max(name_at.until.values(), default=-1)
 
@@ -92,7 +93,7 @@ def _met(events: Rows, name_at: _Names, frame_rate: float, config: TrackingConfi
 
 
 class _Names:
-    """Which identity a track has when, and until when an identity is seen."""
+    """The identity of a track in each frame, and the last frame of each identity."""
 
     def __init__(self, committed: Rows, identity: Ints) -> None:
         order = np.lexsort((committed["frame"], committed["id"]))
@@ -103,7 +104,7 @@ class _Names:
         self.until: dict[int, int] = dict(zip(names.tolist(), until.tolist(), strict=True))
 
     def name(self, track: int, frame: int) -> int:
-        """The identity of a track in a frame, or when it was last seen before; 0 for no track."""
+        """The identity of a track in a frame, or at its last row before; an unknown track keeps its number."""
         first, stop = self.track.searchsorted([track, track + 1])
         if first == stop:
             return int(track)
@@ -111,5 +112,5 @@ class _Names:
         return int(self.identity[first + max(row, 0)])
 
     def last(self, identity: int) -> int:
-        """The last frame in which an identity was seen; -1 for never."""
+        """The last frame of an identity; -1 if it has none."""
         return self.until.get(identity, -1)

@@ -1,4 +1,4 @@
-"""Who is who over the whole recording: a minimum-cost flow over stretches of tracks (METHODS 5).
+"""Global association: a minimum-cost flow over isolated tracklets (docs/how-it-works.md, Tracks).
 
 While people stand together who is who is a guess; once they have parted, and have been seen alone for a while, motion
 and height tell. So every track is cut where it meets another, and where it was out of sight, and the stretches are

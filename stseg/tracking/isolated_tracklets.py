@@ -1,4 +1,4 @@
-"""Stretches of tracks in which nobody else was near: what is known of one person for certain."""
+"""Isolated tracklets: parts of tracks between encounters and gaps, which belong to one person for certain."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from stseg.config import MotionConfig, TrackingConfig
 from stseg.tracking.assignment import distances
 
 NEAR = 0.6
-"""Distance at which two people meet, metres."""
-_TOLD = 1.0
-"""How much of a stretch tells the velocity at its end, seconds."""
+"""Distance of an encounter, metres."""
+_END = 1.0
+"""Length of the end of a tracklet from which its velocity is estimated, seconds."""
 _FIRM = 0.02
-"""How far the heights of one person differ between two stretches, however long, metres (standard deviation)."""
+"""Standard deviation of one person's height between two tracklets, however long, metres."""
 _INDEPENDENT = 2.0
-"""Frames to an independent look at somebody's height."""
+"""Frames to an independent observation of a height."""
 
 
 @dataclass(frozen=True)
 class TrackletEnd:
-    """One end of a stretch.
+    """One end of a tracklet.
 
     Attributes
     ----------
@@ -47,9 +47,9 @@ class IsolatedTracklet:
     Attributes
     ----------
     track
-        Whose.
+        Its number.
     rows : int64 (n,)
-        Which rows of the trajectory.
+        Indices into the trajectory.
     start, end
         Its two ends.
     height, height_variance
@@ -67,7 +67,7 @@ class IsolatedTracklet:
 def isolated_tracklets(
     trajectory: Rows, frame_rate: float, config: TrackingConfig, model: MotionConfig
 ) -> list[IsolatedTracklet]:
-    """Every track cut where it was out of sight, and where it came nearest to whom it met; sorted by first frame.
+    """Tracks cut at gaps and at the closest approach of each encounter; sorted by first frame.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def isolated_tracklets(
     begins = (np.diff(track, prepend=-1) != 0) | (np.diff(frame, prepend=-2) != 1) | met
     parts = np.split(order, np.flatnonzero(begins)[1:]) if len(order) else []
     found = [_measured(trajectory, rows, frame_rate, config, model) for rows in parts]
-    return sorted(found, key=lambda stretch: (stretch.start.frame, stretch.track))
+    return sorted(found, key=lambda tracklet: (tracklet.start.frame, tracklet.track))
 
 
 def _keys(track: Ints, frame: Ints) -> Ints:
@@ -90,7 +90,7 @@ def _keys(track: Ints, frame: Ints) -> Ints:
 
 
 def _meetings(trajectory: Rows, frame_rate: float) -> tuple[Ints, Ints]:
-    """Tracks, and the frames in which they were nearest to whom they met."""
+    """Tracks and frames of the closest approach of each encounter."""
     close: dict[tuple[int, int], list[tuple[int, float]]] = {}
     order = np.argsort(trajectory["frame"], kind="stable")
     for rows in np.split(order, np.flatnonzero(np.diff(trajectory["frame"][order])) + 1):
@@ -113,24 +113,24 @@ def _meetings(trajectory: Rows, frame_rate: float) -> tuple[Ints, Ints]:
 def _measured(
     trajectory: Rows, rows: Ints, frame_rate: float, config: TrackingConfig, model: MotionConfig
 ) -> IsolatedTracklet:
-    told = max(2, round(_TOLD * frame_rate))
+    rows_of_end = max(2, round(_END * frame_rate))
     own = trajectory[rows]
-    looks = max(len(rows) / _INDEPENDENT, 1.0)
+    effective = max(len(rows) / _INDEPENDENT, 1.0)
     return IsolatedTracklet(
         int(own["id"][0]),
         rows,
-        _tip(own[:told], 0, frame_rate, model),
-        _tip(own[-told:], -1, frame_rate, model),
+        _tip(own[:rows_of_end], 0, frame_rate, model),
+        _tip(own[-rows_of_end:], -1, frame_rate, model),
         float(own["height"].mean()),
-        _FIRM**2 + config.height_noise**2 / looks,
+        _FIRM**2 + config.height_noise**2 / effective,
     )
 
 
 def _tip(own: Rows, at: int, frame_rate: float, model: MotionConfig) -> TrackletEnd:
-    """An end of a stretch from the rows that tell of it: their velocity, held back by how fast people walk."""
+    """An end of a tracklet: velocity by regression of its rows, with the population's pace as prior."""
     ground = np.column_stack([own["x"], own["y"]])
     seconds = (own["frame"] - own["frame"].mean()) / frame_rate
-    told = float((seconds**2).sum()) / model.position_noise**2
-    variance = 1.0 / (told + 1.0 / model.speed_spread**2)
+    precision = float((seconds**2).sum()) / model.position_noise**2
+    variance = 1.0 / (precision + 1.0 / model.speed_spread**2)
     velocity = variance / model.position_noise**2 * (seconds @ ground)
     return TrackletEnd(int(own["frame"][at]), ground[at], np.asarray(velocity), variance)

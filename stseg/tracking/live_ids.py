@@ -1,7 +1,7 @@
-"""Who is who while a run still goes on: names of the run for the tracks of segments, window by window.
+"""Provisional identities of a live run: run-wide names for the tracks of segments, window by window.
 
-They are those by which the segments are joined at the end (`identity.seams`), as far as they can be known by now; the
-run file decides meetings and gaps anew with the whole run (`identity.whole`).
+They follow the stitching of segments (`stseg.tracking.stitching`) as far as it is known by now; the run file decides
+encounters and gaps again with the whole run (`stseg.tracking.final_tracks`).
 """
 
 from __future__ import annotations
@@ -12,18 +12,18 @@ from stseg.arrays import Rows
 from stseg.tracking.stitching import matches
 
 Names = dict[int, int]
-"""From a segment's own names to those of the run."""
+"""Track of a segment to track of the run."""
 
 
 class LiveIds:
-    """Names that have been given.
+    """The names given so far.
 
     Parameters
     ----------
     rows : TRAJECTORY (n,)
-        What was said before, under names of the run.
+        Rows committed before, under names of the run.
     kept
-        For how many frames back it must be known who was where.
+        Number of latest frames whose rows are kept for stitching.
     """
 
     def __init__(self, rows: Rows, kept: int) -> None:
@@ -32,22 +32,22 @@ class LiveIds:
         self._recent = self._last(rows)
 
     def begin(self, lead: Rows) -> Names:
-        """The names of a segment that begins, from the TRAJECTORY rows of its warm-up."""
+        """Names for a new segment, from the TRAJECTORY rows of its warm-up."""
         if not len(lead):
             return {}
         recent = self._recent
         return matches(recent[recent["frame"] >= lead["frame"].min()], lead)
 
     def named(self, rows: Rows, names: Names) -> Rows:
-        """Rows of a segment under names of the run; who is new gets one, in `names` too."""
+        """Rows of a segment under names of the run; `names` gains an entry for each new track."""
         for own in np.unique(rows["id"]).tolist():
             if own not in names:
                 self._issued += 1
                 names[own] = self._issued
-        told = rows.copy()
-        told["id"] = [names[own] for own in rows["id"].tolist()]
-        self._recent = self._last(np.concatenate([self._recent, told]))
-        return told
+        named = rows.copy()
+        named["id"] = [names[own] for own in rows["id"].tolist()]
+        self._recent = self._last(np.concatenate([self._recent, named]))
+        return named
 
     def _last(self, rows: Rows) -> Rows:
         return np.asarray(rows[rows["frame"] > rows["frame"].max(initial=0) - self._kept])

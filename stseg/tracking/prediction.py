@@ -1,4 +1,4 @@
-"""Where everybody is expected in each frame of a window: what the labels of its cells are made of."""
+"""Predicted places of tracks in the frames of a window, from detections before, within and after a gap."""
 
 from __future__ import annotations
 
@@ -13,72 +13,72 @@ from stseg.model.predicted_places import PredictedPlaces
 from stseg.tracking.tracklets import Tracklet
 
 _DRIFT = 0.5
-"""How fast the place of somebody out of sight becomes uncertain, metres per second (standard deviation)."""
+"""Growth of a place's standard deviation away from the nearest detection, metres per second."""
 _STEPS = 4
-"""Sightings before the last that tell a walker's velocity."""
+"""Detections before the last from which the velocity is estimated."""
 
 
 @dataclass(frozen=True)
 class DetectionHistory:
-    """Who was seen where; rows in any order, a chain at most once a frame.
+    """Detections with their filter tracks; rows in any order, a track at most once a frame.
 
     Attributes
     ----------
-    frame, chain : int64 (n,)
-        Frame of the recording, and whom.
+    frame, track : int64 (n,)
+        Frame of the recording; filter track.
     ground, covariance, height : float64 (n, 2), (n, 2, 2), (n,)
         Metres, square metres.
     """
 
     frame: Ints
-    chain: Ints
+    track: Ints
     ground: Floats
     covariance: Floats
     height: Floats
 
     def at(self, rows: Ints) -> DetectionHistory:
-        """Some of them."""
+        """The given rows."""
         return DetectionHistory(
-            self.frame[rows], self.chain[rows], self.ground[rows], self.covariance[rows], self.height[rows]
+            self.frame[rows], self.track[rows], self.ground[rows], self.covariance[rows], self.height[rows]
         )
 
 
 def earlier_detections(tails: Iterable[Tracklet], before: int, height: float, model: MotionConfig) -> DetectionHistory:
-    """The committed ends of tracks, up to a frame, as sightings of bodies of a mean height, metres."""
+    """The committed ends of tracks before a frame, as detections of bodies of mean height, metres."""
     seen = [
-        (frame, tail.chain, *ground)
+        (frame, tail.filter_track, *ground)
         for tail in tails
         for frame, ground in zip(tail.frames, tail.ground, strict=True)
         if frame < before
     ]
     rows = np.array(seen, float).reshape(-1, 4)
     covariance = np.tile(np.eye(2) * model.position_noise**2, (len(rows), 1, 1))
-    frame, chain = rows[:, :2].T.astype(np.int64)
-    return DetectionHistory(frame, chain, rows[:, 2:], covariance, np.full(len(rows), height))
+    frame, track = rows[:, :2].T.astype(np.int64)
+    return DetectionHistory(frame, track, rows[:, 2:], covariance, np.full(len(rows), height))
 
 
 def together(parts: Iterable[DetectionHistory]) -> DetectionHistory:
-    """All sightings of several."""
-    columns = zip(*((p.frame, p.chain, p.ground, p.covariance, p.height) for p in parts), strict=True)
+    """The detections of several histories."""
+    columns = zip(*((p.frame, p.track, p.ground, p.covariance, p.height) for p in parts), strict=True)
     return DetectionHistory(*(np.concatenate(column) for column in columns))
 
 
 def predicted_places(
     seen: DetectionHistory, first: int, stop: int, frame_rate: float, config: TrackingConfig
 ) -> PredictedPlaces:
-    """Where each chain is expected in frames first .. stop - 1.
+    """Predicted place of each filter track in frames first .. stop - 1.
 
-    Where it was seen there; between two sightings on a straight line; after the last at constant velocity, for as long
-    as a walker can be foreseen. Away from a sighting the place grows uncertain.
+    At a detection its place; between two on a straight line; after the last at constant velocity, for at most
+    `tracking.prediction_horizon`. The covariance grows with the time to the nearest detection.
     """
-    chains = np.unique(seen.chain)
-    size = (stop - first, len(chains))
+    tracks = np.unique(seen.track)
+    size = (stop - first, len(tracks))
     places = PredictedPlaces(
-        chains, np.zeros(size, bool), np.zeros((*size, 2)), np.zeros((*size, 2, 2)), np.zeros(size)
+        tracks, np.zeros(size, bool), np.zeros((*size, 2)), np.zeros((*size, 2, 2)), np.zeros(size)
     )
     frames = np.arange(first, stop)
-    for k, chain in enumerate(chains):
-        rows = np.flatnonzero(seen.chain == chain)
+    for k, track in enumerate(tracks):
+        rows = np.flatnonzero(seen.track == track)
         own = seen.at(rows[np.argsort(seen.frame[rows], kind="stable")])
         after = own.frame.searchsorted(frames)
         before = np.searchsorted(own.frame, frames, side="right") - 1
@@ -97,6 +97,6 @@ def predicted_places(
 
 
 def _velocity(own: DetectionHistory) -> Floats:
-    """Metres per frame over the last sightings, float64 (2,)."""
+    """Velocity over the last detections, metres per frame, float64 (2,)."""
     frame, ground = own.frame[-1 - _STEPS :], own.ground[-1 - _STEPS :]
     return np.zeros(2) if len(frame) < 2 else np.asarray((ground[-1] - ground[0]) / (frame[-1] - frame[0]))

@@ -1,6 +1,6 @@
-"""Places smoothed along each track by what came before and after (Rauch, Tung and Striebel 1965).
+"""Fixed-interval smoothing of a track's places (Rauch, Tung and Striebel 1965).
 
-A body moves at constant velocity but for a white acceleration; each row is a measurement with its own covariance.
+The motion model is that of the track filter; each row is a measurement with its own covariance.
 """
 
 from __future__ import annotations
@@ -11,10 +11,11 @@ import numpy as np
 
 from stseg.arrays import Floats, Rows
 from stseg.config import MotionConfig
+from stseg.tracking.motion_model import process_noise, transition
 
 
 def smooth_places(trajectory: Rows, frame_rate: float, model: MotionConfig) -> Rows:
-    """A copy with smoothed x, y and their covariance; raw_x and raw_y stay what each frame said.
+    """A copy with smoothed x, y and their covariance; raw_x and raw_y stay the detection's.
 
     Parameters
     ----------
@@ -39,12 +40,12 @@ def smooth_places(trajectory: Rows, frame_rate: float, model: MotionConfig) -> R
 
 
 def smoothed_path(seconds: Floats, ground: Floats, noise: Floats, model: MotionConfig) -> tuple[Floats, Floats]:
-    """One path.
+    """Smoothed places of one track.
 
     Parameters
     ----------
     seconds : float64 (n,)
-        Rising.
+        Increasing.
     ground, noise : float64 (n, 2), (n, 2, 2)
         Measured places and their covariances, metres.
     model
@@ -55,10 +56,10 @@ def smoothed_path(seconds: Floats, ground: Floats, noise: Floats, model: MotionC
     float64 (n, 2), float64 (n, 2, 2)
         Smoothed places and their covariances.
     """
-    velocity_variance = model.speed_spread**2
-    state, spread = np.append(ground[0], [0.0, 0.0]), np.diag([0.0, 0.0, velocity_variance, velocity_variance])
+    state, spread = np.append(ground[0], [0.0, 0.0]), np.diag([0.0, 0.0, model.speed_spread**2, model.speed_spread**2])
     spread[:2, :2] = noise[0]
-    filtered, steps = [(state, spread)], [_step(b - a, model) for a, b in pairwise(seconds.tolist())]
+    filtered = [(state, spread)]
+    steps = [(transition(b - a), process_noise(b - a, model)) for a, b in pairwise(seconds.tolist())]
     for (motion, turn), place, error in zip(steps, ground[1:], noise[1:], strict=True):
         state, spread = motion @ state, motion @ spread @ motion.T + turn
         gain = spread[:, :2] @ np.linalg.inv(spread[:2, :2] + error)
@@ -76,11 +77,3 @@ def smoothed_path(seconds: Floats, ground: Floats, noise: Floats, model: MotionC
     for k, (middle, covariance) in enumerate(result):
         places[k], spreads[k] = middle[:2], covariance[:2, :2]
     return places, spreads
-
-
-def _step(seconds: float, model: MotionConfig) -> tuple[Floats, Floats]:
-    """Motion over some time, and the noise that it adds, both float64 (4, 4)."""
-    motion = np.eye(4)
-    motion[:2, 2:] = seconds * np.eye(2)
-    turn = np.array([[seconds**3 / 3, seconds**2 / 2], [seconds**2 / 2, seconds]]) * model.velocity_noise**2
-    return motion, np.asarray(np.kron(turn, np.eye(2)), np.float64)

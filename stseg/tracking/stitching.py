@@ -1,9 +1,9 @@
-"""Who is who from one segment of a recording to the next (METHODS 5).
+"""Stitching: tracks of one segment of a recording become those of the next (docs/how-it-works.md, Tracks).
 
-A segment looks at the last frames of the one before as its warm-up, so both have tracks there. A track takes the name
-of the earlier track that it lies on in most of those frames, one to one; what nobody claims was born or has died at the
-seam. Meetings near a seam are decided anew with the whole run (`identity.relink`). Over a gap, which no camera saw and
-which is longer than anybody is waited for, no segment looks: all tracks end at it.
+A segment processes the last frames of the one before as its warm-up, so both have tracks there. A track takes the name
+of the earlier track with the same place in most of those frames, one to one; unmatched tracks are born or die at the
+boundary. Encounters near a boundary are decided again by global association. All tracks end at a gap of the recording
+that is longer than patience.
 """
 
 from __future__ import annotations
@@ -16,26 +16,26 @@ from stseg.arrays import Ints, Labels, Rows
 from stseg.model.tables import EVENT, TRAJECTORY
 from stseg.tracking.assignment import assign, distances
 
-_Told = tuple[int, bytes, int, int, bytes]
+_EventRow = tuple[int, bytes, int, int, bytes]
 """A row of EVENT."""
 _SAME = 0.35
-"""Two segments' places of one person differ by less, metres."""
+"""Greatest distance between two segments' places of one person, metres."""
 
 
 @dataclass(frozen=True)
 class SegmentTracks:
-    """What one segment found, under its own names.
+    """The tracks of one segment, under its own names.
 
     Attributes
     ----------
     first
-        The first frame that it commits.
+        First frame that the segment commits.
     trajectory : TRAJECTORY (n,)
-        Also of its warm-up, the frames before `first`.
+        Includes its warm-up, the frames before `first`.
     events : EVENT (m,)
         Of the frames that it commits.
     gap
-        Frames before `first` that no camera saw; 0 where it goes on from the part before.
+        Frames before `first` that no camera has; 0 where the segment continues the one before.
     """
 
     first: int
@@ -46,13 +46,13 @@ class SegmentTracks:
 
 @dataclass(frozen=True)
 class StitchedTracks:
-    """What all segments found, under names of the whole run.
+    """The tracks of all segments, under names of the run.
 
     Attributes
     ----------
     committed : TRAJECTORY (n,)
     local : int64 (n,)
-        The name that each row had in its segment.
+        Name of each row in its segment.
     events : EVENT (m,)
     """
 
@@ -62,12 +62,12 @@ class StitchedTracks:
 
 
 class Stitcher:
-    """Joins segments in their order.
+    """Stitches segments in their order.
 
     Parameters
     ----------
     patience
-        How long somebody may be unseen and still be the same, frames.
+        Longest undetected interval of a track, frames.
     """
 
     def __init__(self, patience: int = 0) -> None:
@@ -75,7 +75,7 @@ class Stitcher:
         self._joined: list[StitchedTracks] = []
 
     def add(self, part: SegmentTracks) -> None:
-        """The next segment."""
+        """Append the next segment."""
         lead = part.trajectory[part.trajectory["frame"] < part.first]
         rows = part.trajectory[part.trajectory["frame"] >= part.first]
         local = np.unique(np.concatenate([rows["id"], part.events["id"], part.events["other"]]))
@@ -93,17 +93,18 @@ class Stitcher:
         committed, events = rows.copy(), part.events.copy()
         committed["id"] = names[rows["id"]]
         events["id"], events["other"] = names[events["id"]], names[events["other"]]
-        told = [(frame, b"birth", names[i], 0, b"nobody known was near, where a segment begins") for frame, i in births]
-        told += self._deaths(before, set(committed["id"].tolist()))
+        reason = b"nobody known was near, where a segment begins"
+        added = [(frame, b"birth", names[i], 0, reason) for frame, i in births]
+        added += self._deaths(before, set(committed["id"].tolist()))
         if part.gap:
-            told += self._ended(part)
-        events = np.concatenate([events, np.array(told, EVENT)])
+            added += self._ended(part)
+        events = np.concatenate([events, np.array(added, EVENT)])
         self._joined.append(
             StitchedTracks(committed, rows["id"].copy(), events[np.argsort(events["frame"], kind="stable")])
         )
 
     def joined(self) -> StitchedTracks:
-        """All segments so far."""
+        """The segments so far."""
         parts = self._joined or [StitchedTracks(np.zeros(0, TRAJECTORY), np.zeros(0, np.int64), np.zeros(0, EVENT))]
         return StitchedTracks(
             *(np.concatenate([getattr(p, name) for p in parts]) for name in ("committed", "local", "events"))
@@ -116,16 +117,16 @@ class Stitcher:
         rows = self._joined[-1].committed
         return np.asarray(rows[rows["frame"] >= lead["frame"].min()])
 
-    def _ended(self, part: SegmentTracks) -> list[_Told]:
-        """Tracks that were still followed when the gap before a part began."""
+    def _ended(self, part: SegmentTracks) -> list[_EventRow]:
+        """Deaths of the tracks that were alive when the gap before a segment began."""
         rows = np.concatenate([one.committed for one in self._joined[-2:]] or [part.trajectory[:0]])
-        followed = rows[rows["frame"] >= part.first - part.gap - self.patience - 1]
-        said = np.concatenate([one.events for one in self._joined[-2:]] or [part.events[:0]])
+        alive = rows[rows["frame"] >= part.first - part.gap - self.patience - 1]
+        events = np.concatenate([one.events for one in self._joined[-2:]] or [part.events[:0]])
         reason = f"gap: no camera has any of the {part.gap} frames before frame {part.first}"
-        return _deaths(followed, _dead(said), reason)
+        return _deaths(alive, _dead(events), reason)
 
-    def _deaths(self, before: Rows, living: set[int]) -> list[_Told]:
-        """Tracks of the seam that do not go on and have not been said to end."""
+    def _deaths(self, before: Rows, living: set[int]) -> list[_EventRow]:
+        """Deaths at the boundary: tracks that no track of the segment continues and that have no death event yet."""
         if not len(before):
             return []
         over = living | _dead(self._joined[-1].events)
@@ -136,25 +137,25 @@ def _dead(events: Rows) -> set[int]:
     return set(events["id"][events["kind"] == b"death"].tolist())
 
 
-def _deaths(rows: Rows, others: set[int], reason: str) -> list[_Told]:
-    """An event at the end of each track of these rows but for others."""
+def _deaths(rows: Rows, others: set[int], reason: str) -> list[_EventRow]:
+    """A death event at the last row of each track but those in `others`."""
     gone = sorted(set(rows["id"].tolist()) - others)
     return [(int(rows["frame"][rows["id"] == i].max()), b"death", i, 0, reason.encode()) for i in gone]
 
 
 def rename_labels(label: Labels, frames: Ints, rows: Rows, identity: Ints) -> None:
-    """Give the tracks of a part of the volume their names in the run, in place; what has none becomes background.
+    """Rename the labels of a part of the volume to identities of the run, in place; dropped tracks become background.
 
     Parameters
     ----------
     label : int32 (time, plane, y, x)
-        Names in the segment, 0 for background.
+        Names of the segment, 0 for background.
     frames : int64 (time,)
-        Rising.
+        Increasing.
     rows : TRAJECTORY (n,)
-        Under the names in the segment.
+        Under names of the segment.
     identity : int64 (n,)
-        What each of them is called in the run, 0 for nobody.
+        Identity of each row in the run, 0 for a dropped track.
     """
     most = max(int(label.max(initial=0)), int(rows["id"].max(initial=0)))
     order = np.argsort(rows["frame"], kind="stable")
@@ -167,7 +168,7 @@ def rename_labels(label: Labels, frames: Ints, rows: Rows, identity: Ints) -> No
 
 
 def matches(before: Rows, lead: Rows) -> dict[int, int]:
-    """The earlier track that each track of a warm-up lies on."""
+    """The earlier track with the same place, for each matched track of a warm-up."""
     known, fresh = np.unique(before["id"]), np.unique(lead["id"])
     shared = np.zeros((len(known), len(fresh)))
     for frame in np.intersect1d(before["frame"], lead["frame"]).tolist():

@@ -1,4 +1,4 @@
-"""Tracks as each view sees them: the box around a body's localisation over all planes (KS09 section 5)."""
+"""Boxes of tracks in each view, around the body's localisation on all planes (Khan and Shah 2009, section 5)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from stseg.model.tables import BOX
 
 
 def box_rows(tables: Sequence[BodyTable], trajectory: Rows) -> Rows:
-    """BOX rows of a TRAJECTORY, clipped to the images; views that do not see a body have none.
+    """BOX rows of a TRAJECTORY, clipped to the images; none where a view does not see the body.
 
     Sorted by frame, then id, then view, as the trajectory is.
     """

@@ -1,4 +1,4 @@
-"""Track pieces: the blobs of one window that are one body (METHODS 5)."""
+"""Window tracklets: the blobs of one window that belong to one track."""
 
 from __future__ import annotations
 
@@ -16,54 +16,54 @@ from stseg.tracking.assignment import assign, distances
 
 @dataclass
 class Tracklet:
-    """Blobs of one body, one a frame at most: parallel lists, in the order of time.
+    """A window tracklet, at most one blob a frame: parallel lists, in the order of time.
 
     Attributes
     ----------
-    chain
-        The chain of the people whom the blobs hold, 0 where they hold nobody.
+    filter_track
+        Track of the filter (`TrackFilter`), 0 if none of the blobs holds a detection.
     frames
-        Frames of the recording.
+        Frame numbers of the recording.
     blobs
         Index of the blob in each frame.
     ground : list of float64 (2,)
         Metres.
     """
 
-    chain: int
+    filter_track: int
     frames: list[int] = field(default_factory=list)
     blobs: list[int] = field(default_factory=list)
     ground: list[Floats] = field(default_factory=list)
 
     def add(self, frame: int, blob: int, ground: Floats) -> None:
-        """Append the body's blob in a later frame."""
+        """Append a blob of a later frame."""
         self.frames.append(frame)
         self.blobs.append(blob)
         self.ground.append(ground)
 
     def insert(self, frame: int, blob: int, ground: Floats) -> None:
-        """Put the body's blob into a gap."""
+        """Insert a blob into a gap."""
         place = bisect(self.frames, frame)
         self.frames.insert(place, frame)
         self.blobs.insert(place, blob)
         self.ground.insert(place, ground)
 
     def between(self, frame: int) -> Floats:
-        """Where the body would be in a gap on a straight line, metres, float64 (2,)."""
+        """Linearly interpolated place in a gap, metres, float64 (2,)."""
         place = bisect(self.frames, frame)
         before, after = self.frames[place - 1], self.frames[place]
-        share = (frame - before) / (after - before)
-        return np.asarray(self.ground[place - 1] * (1 - share) + self.ground[place] * share)
+        fraction = (frame - before) / (after - before)
+        return np.asarray(self.ground[place - 1] * (1 - fraction) + self.ground[place] * fraction)
 
     def extend(self, later: Tracklet) -> None:
-        """Append what is the same body later."""
-        self.chain = later.chain or self.chain
+        """Append a later tracklet of the same track."""
+        self.filter_track = later.filter_track or self.filter_track
         self.frames += later.frames
         self.blobs += later.blobs
         self.ground += later.ground
 
     def velocity(self) -> Floats:
-        """Metres per frame over up to four steps at the piece's end, float64 (2,)."""
+        """Metres per frame over up to four steps at the end, float64 (2,)."""
         frames, ground = self.frames[-5:], self.ground[-5:]
         if len(frames) < 2:
             return np.zeros(2)
@@ -71,39 +71,39 @@ class Tracklet:
 
 
 def form_tracklets(blobs: Sequence[Blobs], first: int, config: TrackingConfig) -> list[Tracklet]:
-    """The pieces of a window.
+    """The tracklets of a window.
 
-    Blobs that hold people of one chain are one piece. A blob that holds nobody, but is of that chain or of no known
-    one, belongs to the piece in whose gap it lies, where the walker would be: so the cut bridges frames in which the
-    pass missed somebody, and no more.
+    Blobs that hold detections of one filter track are one tracklet. A blob without a detection joins the tracklet in
+    whose gap it lies, near the interpolated place, unless another track claims it. So the cut bridges missed
+    detections, and nothing more.
 
     Parameters
     ----------
     blobs
-        Of each frame of the window; their tracks are chains (`identity.linking`).
+        Of each frame of the window; `track` holds filter tracks.
     first
         The window's first frame.
     """
-    pieces: dict[int, Tracklet] = {}
+    tracklets: dict[int, Tracklet] = {}
     for offset, found in enumerate(blobs):
         for b in np.flatnonzero(found.person >= 0).tolist():
-            chain = int(found.track[b])
-            pieces.setdefault(chain, Tracklet(chain)).add(first + offset, b, found.ground[b])
+            track = int(found.track[b])
+            tracklets.setdefault(track, Tracklet(track)).add(first + offset, b, found.ground[b])
     for offset, found in enumerate(blobs):
-        _bridge(list(pieces.values()), first + offset, found, config)
-    return list(pieces.values())
+        _bridge(list(tracklets.values()), first + offset, found, config)
+    return list(tracklets.values())
 
 
-def _bridge(pieces: Sequence[Tracklet], frame: int, found: Blobs, config: TrackingConfig) -> None:
-    """Give a frame's blobs that hold nobody to pieces that have a gap there."""
-    open_ = [piece for piece in pieces if piece.frames[0] < frame < piece.frames[-1] and frame not in piece.frames]
-    nobody = np.flatnonzero(found.person < 0)
-    if not open_ or not len(nobody):
+def _bridge(tracklets: Sequence[Tracklet], frame: int, found: Blobs, config: TrackingConfig) -> None:
+    """Assign a frame's blobs without a detection to tracklets that have a gap there."""
+    open_ = [one for one in tracklets if one.frames[0] < frame < one.frames[-1] and frame not in one.frames]
+    unheld = np.flatnonzero(found.person < 0)
+    if not open_ or not len(unheld):
         return
-    expected = np.array([piece.between(frame) for piece in open_])
-    away = distances(expected, found.ground[nobody])
-    chain = np.array([piece.chain for piece in open_])
-    others = (found.track[nobody] != UNASSIGNED) & (found.track[nobody] != chain[:, None])
+    predicted = np.array([tracklet.between(frame) for tracklet in open_])
+    away = distances(predicted, found.ground[unheld])
+    track = np.array([tracklet.filter_track for tracklet in open_])
+    others = (found.track[unheld] != UNASSIGNED) & (found.track[unheld] != track[:, None])
     for row, column in zip(*assign(np.where(others, np.inf, away), config.assignment_distance), strict=True):
-        blob = int(nobody[column])
+        blob = int(unheld[column])
         open_[row].insert(frame, blob, found.ground[blob])

@@ -1,4 +1,4 @@
-"""Windows of frames: what is solved together, and which of it is kept (METHODS 5)."""
+"""Overlapping windows of frames: solved together, and committed in part."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ class Window:
     Attributes
     ----------
     index
-        Counted from the recording's frame 0, whatever part is run.
+        Counted from frame 0 of the recording, whatever part is run.
     solve_first, solve_stop
-        Frames that are cut together.
+        Frames of one cut.
     commit_first, commit_stop
-        Frames whose result is kept; the commit ranges of all windows partition the run.
+        Frames whose result is committed; these ranges partition the run.
     """
 
     index: int
@@ -32,7 +32,7 @@ class Window:
 
 
 def window_length(frame_rate: float, config: TrackingConfig) -> tuple[int, int]:
-    """Frames of a window, and frames that it shares with the next."""
+    """Number of frames of a window, and of its overlap with the next."""
     length = min(max(round(config.window * frame_rate), SHORTEST), LONGEST)
     return length, max(2, length // 4)
 
@@ -40,7 +40,7 @@ def window_length(frame_rate: float, config: TrackingConfig) -> tuple[int, int]:
 def windows(frame_rate: float, config: TrackingConfig, first: int, stop: int) -> Iterator[Window]:
     """The windows that cover frames first .. stop - 1.
 
-    Half of the frames that two windows share is kept from each, so that every kept frame was solved with context on
+    Each of two overlapping windows commits half of their overlap, so every committed frame was solved with context on
     both sides, except at the ends of the run.
     """
     length, shared = window_length(frame_rate, config)

@@ -34,7 +34,7 @@ from stseg.io.recording.recording import Recording
 from stseg.model.blobs import UNASSIGNED
 from stseg.segmentation.labelling import WindowLabels
 from stseg.trackers import TRACKERS
-from stseg.trackers.cut import CutTracker, _Linked
+from stseg.trackers.cut import CutTracker, _TrackedFrame
 from stseg.tracking.windows import Window
 
 METHODS = ("threshold", "frames", "two labels", "cut")
@@ -45,12 +45,14 @@ _SCORES = ("MODA", "precision", "recall", "IDF1", "IDSW", "Frag", "false_tracks"
 class TwoLabels(CutTracker):
     """The cut without the expansion."""
 
-    def _divide(self, window: Window, held: list[_Linked], energy: Energy, occupied: Flags) -> WindowLabels:
+    def _divide(self, window: Window, held: list[_TrackedFrame], energy: Energy, occupied: Flags) -> WindowLabels:
         del window, energy
         label = np.zeros(occupied.shape, np.int32)
-        for cells, own, linked in zip(occupied, label, held, strict=True):
-            near = nearest_person(self.rig.grid.ground, linked.scene.people.ground, self.config.occupancy.person_radius)
-            own[cells] = np.broadcast_to(np.append(linked.chains, UNASSIGNED)[near], cells.shape)[cells]
+        for cells, own, tracked in zip(occupied, label, held, strict=True):
+            near = nearest_person(
+                self.rig.grid.ground, tracked.fused.people.ground, self.config.occupancy.person_radius
+            )
+            own[cells] = np.broadcast_to(np.append(tracked.tracks, UNASSIGNED)[near], cells.shape)[cells]
         return WindowLabels(label, 0)
 
 

@@ -1,4 +1,6 @@
-"""The ablation of DP06 fig. 4: an independent particle filter in each view (Isard and Blake, Condensation, 1998).
+"""An independent particle filter in each view (Isard and Blake, Condensation, 1998).
+
+The ablation of Du and Piater 2006, figure 4.
 
 No message passes; a view hears of a target once, when it begins to follow it. Where somebody asks for the ground, it is
 the mean of what the views say, each as sure as its picture is fine there: the central fusion that the paper's section
@@ -25,7 +27,7 @@ def condense(
     config: BeliefConfig,
     lots: Sequence[np.random.Generator],
 ) -> list[Star]:
-    """One frame of all targets, each view for itself; takes what `propagate` takes."""
+    """One frame of all targets without messages between views; parameters of `propagate`."""
     return [_alone(star, seen, motion, config, lot) for star, seen, lot in zip(stars, looks, lots, strict=True)]
 
 
@@ -52,7 +54,7 @@ def _alone(
 
 
 def _unseen(own: Particles, motion: Motion) -> Particles:
-    """A view that cannot show the target where it believes it to be: nobody else can tell it better."""
+    """Whether a view cannot show the target at its own belief: no message corrects it here."""
     return Particles(own.place + motion.seconds * own.velocity, own.velocity, own.weight)
 
 

@@ -1,6 +1,6 @@
 """Several targets: no two bodies stand in one place.
 
-DP06 follows one target. Here the ground nodes of targets are joined in pairs by the potential
+Du and Piater 2006, follows one target. Here the ground nodes of targets are joined in pairs by the potential
 
     phi(g, h) = 1 - exp(-|g - h|^2 / (2 s^2)),
 
@@ -21,11 +21,11 @@ from stseg.arrays import Floats
 from stseg.trackers.belief.particles import Particles
 
 _FAR = 6.0
-"""Distance of two targets' means beyond which nothing is said, in s and in their own standard deviations."""
+"""Distance of two targets' means beyond which the factor is 1, in s and in their own standard deviations."""
 
 
 def exclusion(ground: Floats, others: Sequence[Particles], apart: float) -> Floats:
-    """Product of what other targets' beliefs say at ground points (n, 2), float64 (n,), 0..1; `apart` is s, metres."""
+    """Product of other targets' factors at ground points (n, 2), float64 (n,), 0..1; `apart` is s, metres."""
     message = np.ones(len(ground))
     low, high = ground.min(0) - _FAR * apart, ground.max(0) + _FAR * apart
     for other in others:

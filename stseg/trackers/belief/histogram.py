@@ -1,4 +1,4 @@
-"""Colours of clothes as HSV histograms (DP06 section 3.3; Perez et al., Color-based probabilistic tracking, 2002).
+"""Colours of clothes as HSV histograms (Du and Piater 2006, section 3.3; Perez et al. 2002).
 
 A pixel with enough saturation and brightness counts in one of 10 x 10 bins of hue and saturation, another in one of 10
 bins of its value. A body has one histogram for each of its parts, the thirds of the box around it, so that it matters
@@ -18,7 +18,7 @@ PARTS = 3
 """Thirds of a body, from the head down."""
 _STEPS = 10
 _GREY, _DARK = 0.1, 0.2  # saturation and value, 0..1, below which hue means nothing (Perez et al.)
-_LEVELS = 32  # of each channel that are told apart
+_LEVELS = 32  # of each channel of the colour table
 _LATTICE = (9, 24)  # points across and along an ellipse
 _SLIM = 0.8  # its width, of the box's
 
@@ -43,7 +43,7 @@ def hsv_bins() -> Bytes:
 
 
 def ellipse_points() -> Floats:
-    """Where a box is looked at: shares of its width and height, by rising height share, float64 (k, 2)."""
+    """Sampling points of a box: shares of its width and height, by rising height share, float64 (k, 2)."""
     across, along = ((np.arange(n) + 0.5) / n for n in _LATTICE)
     points = np.stack(np.meshgrid(across, along), -1).reshape(-1, 2)
     inside = points[((2 * points - 1) ** 2).sum(1) <= 1]
@@ -55,7 +55,7 @@ POINTS = ellipse_points()
 
 
 def histograms(image: Bytes, boxes: Floats, nearer: Floats) -> tuple[Floats, Floats]:
-    """Histograms of what is seen in boxes.
+    """Colour histograms of the parts of boxes.
 
     Parameters
     ----------

@@ -45,7 +45,7 @@ class Leaf:
         self.belief = self.seen = np.zeros(0)
 
     def follow(self, lots: np.random.Generator) -> None:
-        """Particles where the view's own past foretells them."""
+        """Particles drawn from the view's own prediction."""
         self._weigh(self.prior.draw(self.count, lots), np.ones(self.count))
 
     def follow_message(self, ground: Floats, weight: Floats, lots: np.random.Generator) -> None:
@@ -79,13 +79,13 @@ class Leaf:
         return Tie.of(ground, self.mapped, self.covariance, outlier)
 
     def draw_ground(self, chosen: Ints, lots: np.random.Generator) -> Floats:
-        """Ground points that particles of these indices (k,) send the target to, float64 (k, 2)."""
+        """Ground points of the particles of these indices (k,), float64 (k, 2)."""
         off = self.noise * lots.standard_normal((len(chosen), 2))
         slope = self.look.view.ground_slope(self.place[chosen])
         return np.asarray(self.mapped[chosen] + np.einsum("kij,kj->ki", slope, off))
 
     def settled(self, message: Floats, lots: np.random.Generator) -> Particles:
-        """The view's belief once a message (m,) from the ground has come (DP06 eq. 10)."""
+        """The belief after a message (m,) from the ground (Du and Piater 2006, equation 10)."""
         weight = self.belief * message
         return self.prior.settled(self.place, weight / weight.sum(), lots)
 

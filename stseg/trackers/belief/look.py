@@ -1,4 +1,4 @@
-"""How well a view's picture fits a target at a place (DP06 section 3.3)."""
+"""Colour likelihood of a target at a place in a view (Du and Piater 2006, section 3.3)."""
 
 from __future__ import annotations
 
@@ -46,11 +46,11 @@ class TargetLikelihood:
 
     @property
     def hidden(self) -> float:
-        """Likelihood that the view shows the target nowhere."""
+        """Likelihood of the image if the target is not visible."""
         return float(np.exp(-self.config.colour_weight * self.config.neutral_distance))
 
     def likelihood(self, ground: Floats) -> tuple[Floats, Floats]:
-        """Likelihood of the target at ground points (n, 2), and the share of it that is in sight there; both (n,)."""
+        """Likelihood of the target at ground points (n, 2), and its visible fraction there; both (n,)."""
         colours, share = histograms(self.image, self.view.boxes(ground, self.height), self.nearer)
         square = share * squares(colours, self.reference) + (1 - share) * self.config.neutral_distance
         return np.exp(-self.config.colour_weight * square.mean(1)), share.mean(1)

@@ -1,4 +1,4 @@
-"""What a node of the star knows: weighted particles, and what they foretell of the next frame (DP06 eq. 7)."""
+"""The belief of a node of the star: weighted particles, and their prediction (Du and Piater 2006, equation 7)."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Particles:
 
 @dataclass(frozen=True)
 class Motion:
-    """How people leave the line of a constant velocity within one frame.
+    """Process noise of a constant-velocity model over one frame.
 
     Attributes
     ----------
@@ -61,23 +61,23 @@ class Motion:
 
     @property
     def place_variance(self) -> float:
-        """Of the place after a frame, beyond the line, square metres."""
+        """Variance of the place after a frame, square metres."""
         return self.wander**2 * self.seconds + self.turn**2 * self.seconds**3 / 3
 
     @property
     def gain(self) -> float:
-        """How much faster somebody is who is one metre further than foretold, 1/s: covariance over variance."""
+        """Regression of the velocity on the place, 1/s: covariance over variance."""
         return self.turn**2 * self.seconds**2 / 2 / self.place_variance
 
     @property
     def velocity_variance(self) -> float:
-        """Of the velocity once the place is known, square metres per square second."""
+        """Variance of the velocity given the place, square metres per square second."""
         return self.turn**2 * self.seconds - self.gain**2 * self.place_variance
 
 
 @dataclass(frozen=True)
 class Prediction:
-    """The integrals over the last frame in DP06 eqs 8 to 11: a mixture of one Gaussian a particle.
+    """The integrals over the last frame in Du and Piater 2006, equations 8 to 11: a mixture of one Gaussian a particle.
 
     Attributes
     ----------
@@ -134,7 +134,7 @@ class Prediction:
 
 
 def systematic(weight: Floats, count: int, lot: float) -> Ints:
-    """Indices drawn by weight and one lot of 0..1, each as often as its share of `count` says; int64 (count,)."""
+    """Indices drawn by weight: systematic resampling with one random number of 0..1; int64 (count,)."""
     ladder = np.cumsum(weight)
     steps = (np.arange(count) + lot) / count * ladder[-1]
     return np.asarray(np.minimum(np.searchsorted(ladder, steps, side="right"), len(weight) - 1), np.int64)
@@ -164,9 +164,9 @@ def fill_mixture(
 def fill_origin(
     place: Floats, centre: Floats, weight: Floats, inverse: Floats, lot: Floats, origin: Ints
 ) -> None:  # fmt: skip
-    """Fill (k,) with one Gaussian each, drawn with lots (k,) by what it has to do with the place; the nearest if none.
+    """Fill (k,) with one Gaussian each, drawn by its density at the place with random numbers (k,).
 
-    The exponents are taken relative to the least, so that places far from all Gaussians are served too.
+    The exponents are taken relative to the least, so that places far from all Gaussians select the nearest.
     """
     square, ladder = np.empty(len(centre)), np.empty(len(centre))
     for i in range(len(place)):

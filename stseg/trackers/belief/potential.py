@@ -1,4 +1,4 @@
-"""The potential between the ground and a view (DP06 eq. 12), and the messages that pass through it (eqs 5, 6, 8, 9).
+"""The potential between the ground and a view (Du and Piater 2006, equation 12), and messages through it (5, 6, 8, 9).
 
 With ground particles g_n, a view's particles x_m, their places H^-1 x_m on the ground and covariances
 Gamma_m = s^2 J_m J_m^T, J_m the Jacobian of H^-1 at x_m,
@@ -21,7 +21,7 @@ from stseg.arrays import Floats
 
 @dataclass(frozen=True)
 class Outlier:
-    """The outlier term of eq. 12: a target that stands elsewhere than the view says.
+    """The outlier term of eq. 12: a target that is not where the view believes.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class Outlier:
 
     @property
     def flat(self) -> float:
-        """Density of a message that says nothing, 1/square metre: the outlier term's at its mean."""
+        """Density of an uninformative message, 1/square metre: the outlier term's at its mean."""
         return float(0.5 / np.pi / self.spread**2)
 
     def density(self, ground: Floats) -> Floats:

@@ -1,4 +1,4 @@
-"""Belief propagation on a target's star graph: the ground in the middle, a leaf for each view (DP06 section 3.1).
+"""Belief propagation on a target's star graph, the ground and a leaf for each view (Du and Piater 2006, section 3.1).
 
 The graph is a tree, on which two rounds would do; with particles a few more bring them to where the belief is. A
 round passes messages up, from the views to the ground (eq. 8), and down (eq. 9):
@@ -31,7 +31,7 @@ from stseg.trackers.belief.potential import Outlier, Tie
 from stseg.trackers.belief.view import StarView
 
 LEAST_ROUNDS = 2
-"""Rounds after which messages have gone from every node to every other."""
+"""Rounds after which every node has received messages from every other."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Star:
     sight: Floats
 
     def place(self, j: int, view: StarView, foretold: Prediction) -> Floats:
-        """Where view j itself foretells the target, else the ground does, metres, float64 (2,)."""
+        """Prediction of view j if it has one, else of the ground, metres, float64 (2,)."""
         own = self.views[j]
         if own is None:
             return foretold.mean
@@ -98,11 +98,11 @@ class Rounds:
 
     @property
     def belief(self) -> Particles:
-        """What the ground believes so far; without velocities."""
+        """The current belief of the ground, without velocities."""
         return Particles(self.ground, np.zeros_like(self.ground), self.weight)
 
     def advance(self, others: Sequence[Particles]) -> float:
-        """One round, in which other targets believe to be where their particles are; how far the mean moved, metres."""
+        """One round of messages, given the particles of other targets; returns the shift of the mean, metres."""
         before = self.belief.mean
         for leaf, rest in zip(self.leaves, self.to_view, strict=True):
             if leaf and self.done:
@@ -163,7 +163,7 @@ class Rounds:
 
 
 def grow(star: Star, looks: Sequence[TargetLikelihood | None], ground: Prediction, count: int) -> list[Leaf | None]:
-    """The leaves of the views that can show the target."""
+    """Leaves of the views in which the target can be visible."""
     leaves: list[Leaf | None] = []
     for j, (look, particles) in enumerate(zip(looks, star.views, strict=True)):
         if look is None:

@@ -1,4 +1,4 @@
-"""Who is followed: a star, the colours that each view knows it by, and how long ago it was found."""
+"""A target: a star, its colour model in each view, and the time since its last detection."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from stseg.trackers.belief.view import StarView
 _WHOLE = 0.8
 """Share of a body that must be in sight for its colours to be learned."""
 _IN_SIGHT = 0.5
-"""Share of a body's box that must lie within an image for the view to be asked."""
+"""Share of a body's box that must lie within an image for the view to be used."""
 
 
 @dataclass
 class Target:
-    """Somebody who is followed.
+    """A tracked person.
 
     Attributes
     ----------
@@ -51,21 +51,21 @@ class Target:
         cls, track: int, ground: Floats, covariance: Floats, height: float, views: int, count: int,
         speed_spread: float, lots: np.random.Generator,
     ) -> Target:  # fmt: skip
-        """Somebody new at a place (2,) with a covariance (2, 2), of any velocity; no view knows the colours yet."""
+        """A birth at a place (2,) with a covariance (2, 2), any velocity, and no colour model."""
         place = lots.multivariate_normal(ground, covariance, count, method="cholesky")
         velocity = speed_spread * lots.standard_normal((count, 2))
         believed = Particles(place, velocity, np.full(count, 1 / count))
         return cls(track, Star(believed, (None,) * views, np.zeros(views)), height, [None] * views)
 
     def foretold(self, motion: Motion) -> Prediction:
-        """What the ground foretells of the next frame."""
+        """Prediction of the ground for the next frame."""
         return Prediction.of(self.star.ground, np.eye(2), motion)
 
     def learn(
         self, views: Sequence[StarView], images: Sequence[Bytes | None], ground: Floats, nearer: Sequence[Floats],
         share: float,
     ) -> None:  # fmt: skip
-        """Learn the colours where it is known to stand (2,), from views that see it whole.
+        """Update the colour models at a known place (2,), from views with full visibility.
 
         `nearer` are, for each view, boxes of those in front of it; `share` is how much of a known colour is replaced.
         """
@@ -99,7 +99,7 @@ def looks(
     motion: Motion,
     config: BeliefConfig,
 ) -> list[list[TargetLikelihood | None]]:
-    """What each view can show of each target in the next frame, whose images these are."""
+    """Colour likelihoods of each target in each view of the next frame."""
     foretold = [target.foretold(motion) for target in targets]
     heights = np.array([target.height for target in targets])
     found: list[list[TargetLikelihood | None]] = [[] for _ in targets]

@@ -1,4 +1,4 @@
-"""Belief propagation between views as a tracker: detections begin and end tracks, colours alone lead them (DP06)."""
+"""Belief propagation between views: detections start and end tracks, colours move them (Du and Piater 2006)."""
 
 from __future__ import annotations
 
@@ -18,24 +18,24 @@ from stseg.trackers.belief.star import propagate
 from stseg.trackers.belief.target import Target, in_front, looks
 from stseg.trackers.belief.view import StarView
 from stseg.trackers.colour_views import colour_views
-from stseg.trackers.framewise import EachFrame
+from stseg.trackers.framewise import FramewiseTracker
 from stseg.trackers.protocol import FORGETTING, STAYING, Commit, FrameObservations, FusedFrame
 from stseg.trackers.rows import Event
 from stseg.tracking.assignment import assign, distances
 
 _WAYS = {"messages": propagate, "condensation": condense}
-"""How stars go from one frame to the next."""
+"""Propagation of stars from frame to frame."""
 _SEEN = 0.5
 """Probability from which a view is taken to see a target."""
 _MANY = 50
 """Frames over which a height is averaged."""
 
 
-class BeliefTracker(EachFrame):
-    """Follows people by their colours, one star graph each.
+class BeliefTracker(FramewiseTracker):
+    """Tracks by colours, one star graph a target.
 
-    A detection that is nobody known begins a track; where it was seen whole, its colours are learned. From then on
-    the colours lead, and detections that are it only confirm the track and keep its colours fresh.
+    An unassigned detection is a birth, whose colours are learned in views with full visibility. From then on colours
+    move the target; assigned detections only confirm it and update its colours.
     """
 
     final: ClassVar[bool] = True
@@ -49,8 +49,8 @@ class BeliefTracker(EachFrame):
         self.issued = 0
         self.begun = False
 
-    def expected(self, frame: int) -> PredictedTracks | None:
-        """Whom the frames before lead to expect."""
+    def predict(self, frame: int) -> PredictedTracks | None:
+        """Predictions of all targets for a frame; None for the first."""
         del frame
         if not self.begun:
             return None
@@ -72,7 +72,7 @@ class BeliefTracker(EachFrame):
         )
 
     def add(self, scene: FusedFrame, shown: FrameObservations) -> list[Commit]:
-        """The next frame, decided."""
+        """Add a frame; it is committed at once."""
         self.begun = True
         images = [view and view.image for view in colour_views(shown, "belief", scene.frame)]
         self._follow(scene.frame, images)
@@ -90,11 +90,11 @@ class BeliefTracker(EachFrame):
             target.star = star
 
     def _lots(self, frame: int, track: int) -> np.random.Generator:
-        """Of one target in one frame: nobody's chance hangs on who else is there."""
+        """Random numbers of one target in one frame, independent of the other targets."""
         return np.random.default_rng([self.config.belief.seed, track, frame])
 
     def _find(self, scene: FusedFrame, images: list[Bytes | None]) -> Ints:
-        """Confirm targets by detections; the index of each person's target, int64 (n,), -1 for nobody known."""
+        """Confirm targets by detections; the target of each detection, int64 (n,), -1 for unassigned."""
         people = scene.people
         ground = np.array([target.star.ground.mean for target in self.targets]).reshape(-1, 2)
         rows, columns = assign(distances(people.ground, ground), self.config.belief.assignment_distance)
@@ -112,7 +112,7 @@ class BeliefTracker(EachFrame):
         return whose
 
     def _end(self, frame: int) -> list[Event]:
-        """Those who have left, and those whom nothing has confirmed for longer than they were known, or patience."""
+        """Remove targets that left the area, and those unconfirmed for longer than their age or patience."""
         events: list[Event] = []
         patience = round(self.config.belief.patience * self.rig.frame_rate)
         for target in list(self.targets):
@@ -131,7 +131,7 @@ class BeliefTracker(EachFrame):
         return events
 
     def _begin(self, scene: FusedFrame, whose: Ints, images: list[Bytes | None]) -> list[Event]:
-        """A target for everybody who is nobody known."""
+        """Births: a target for each unassigned detection."""
         events: list[Event] = []
         people = scene.people
         nearer = [in_front(people.ground, people.height, view) for view in self.views]
@@ -164,6 +164,6 @@ class BeliefTracker(EachFrame):
 
     @staticmethod
     def _scores(seen: list[Target]) -> list[float]:
-        """Log-odds that some view sees each of them, nats."""
+        """Log-odds that some view sees each target, nats."""
         hidden = [float(np.prod(1 - target.star.sight).clip(1e-9, 1 - 1e-9)) for target in seen]
         return [float(np.log(1 - share) - np.log(share)) for share in hidden]

@@ -1,4 +1,4 @@
-"""A view as the star sees it: a ground homography, and the boxes of people through it."""
+"""A view of the star: its ground homography, and boxes of people."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from stseg.geometry import Camera, Grid
 from stseg.geometry.bodies import BodyTable
 
 _NOWHERE = 1e6
-"""Ground coordinates of pixels above the horizon, metres: so far off that they tell nothing."""
+"""Ground coordinates of pixels above the horizon, metres: a point far outside the area."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Guided particles: people followed by the colours of their clothes (KD06; METHODS 9)."""
+"""Guided particle filter on joint states with colour models (Kim and Davis 2006; docs/how-it-works.md, Trackers)."""
 
 from __future__ import annotations
 

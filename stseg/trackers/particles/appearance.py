@@ -1,4 +1,4 @@
-"""What a person looks like: samples of the colours of each body part (KD06 sections 2 and 3.2)."""
+"""Colour model of a person: colour samples of each body part (Kim and Davis 2006, sections 2 and 3.2)."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from stseg.trackers.particles.colours import histogram
 SAMPLES = 120
 """Colours kept of each part: N_M of eq. 1."""
 _FEW = 20
-"""A part with fewer is not known yet."""
+"""A part with fewer samples has no model yet."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Appearance:
 
     @classmethod
     def unknown(cls) -> Appearance:
-        """Of somebody never seen by themselves."""
+        """Model without samples."""
         parts = len(PARTS)
         empty = histogram(np.zeros((0, 3), np.uint8))
         return cls(np.zeros((parts, SAMPLES, 3), np.uint8), np.zeros(parts, np.int64), np.tile(empty, (parts, 1)))
@@ -47,7 +47,7 @@ class Appearance:
         return np.where(self.counts >= _FEW, self.counts, 0)
 
     def learned(self, part: int, colour: Bytes, share: float, rng: np.random.Generator) -> Appearance:
-        """With new colours, uint8 (n, 3), of a part: room is filled, then this share of the samples is renewed."""
+        """With new colours, uint8 (n, 3), of a part: fills the buffer, then renews this fraction of it."""
         samples, counts, reference = self.samples.copy(), self.counts.copy(), self.reference.copy()
         room = SAMPLES - int(counts[part])
         wanted = room if room else rng.binomial(SAMPLES, share)

@@ -1,14 +1,14 @@
-"""The central vertical axes of segmented people, and where they meet on the ground (KD06 section 3.3).
+"""The central vertical axes of segmented people, and where they meet on the ground (Kim and Davis 2006, section 3.3).
 
 A person's pixels lie on both sides of the image of the vertical through their ground point. The paper fits a free line
-to them; here the line's direction is known, for all verticals of a view meet in its vertical vanishing point (METHODS
-1), which a part of a body cannot tell. What is left is where the axis passes, from the pixels' distances from a line of
-that direction: their mean (least squares), or the middle of the shortest interval that holds half of them (the least
-median of squares of one parameter), which forgets an arm or a stranger's pixels.
+to them. Here the direction is known: all verticals of a view meet in its vertical vanishing point
+(docs/how-it-works.md, Geometry). What is left is the offset, from the distances of the pixels from a line of that
+direction: their mean (least squares), or the middle of the shortest interval that holds half of them (the least
+median of squares of one parameter), which ignores an arm or unassigned pixels.
 
 The axes of all views, brought to the ground as lines a x + b y + c = 0 with a^2 + b^2 = 1, meet at
 
-    argmin over (x, y)  sum_i  w_i^2 (a_i x + b_i y + c_i)^2                                             (KD06 eq. 5)
+    argmin over (x, y)  sum_i  w_i^2 (a_i x + b_i y + c_i)^2      (Kim and Davis 2006, equation 5)
 
 with the share of the body that was segmented, times how sure its pixels are, for w_i.
 """

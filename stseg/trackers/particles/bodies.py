@@ -1,9 +1,9 @@
-"""Where a body stands in a view, and how likely it covers a pixel (KD06 section 3.1).
+"""Projection of a body into a view, and its coverage probability of a pixel (Kim and Davis 2006, section 3.1).
 
 A body's axis runs from the pixel of its feet to that of its head. A pixel x lies at the height h along it and at the
 distance w from it, both relative to the axis's length, and is covered with
 
-    O(h, w) = P[w < W(h)] = 1 - cdf_W(h)(w),                                                             (KD06 eq. 3)
+    O(h, w) = P[w < W(h)] = 1 - cdf_W(h)(w),          (Kim and Davis 2006, equation 3)
 
 one half at the distance W(h) of the body's outline. The distance W is logistic, and above the head and below the feet
 the body ends as it does at its sides.
@@ -28,7 +28,7 @@ HALF_WIDTH = np.interp((np.arange(_LEVELS) + 0.5) / _LEVELS, PROFILE[:, 0], PROF
 LOOSENESS = 0.025
 """Scale of the logistic distribution of W: clothes, strides, and the error of a foreground's edge."""
 REACH = 6 * LOOSENESS + float(HALF_WIDTH.max())
-"""Nothing of a body is farther from its axis than this, relative to its length."""
+"""Greatest distance of a body pixel from the axis, relative to its length."""
 
 
 @part

@@ -1,10 +1,10 @@
-"""Colours that change little with the light, and their density in samples of a body part (KD06 section 2).
+"""Colours robust to illumination, and their density in samples of a body part (Kim and Davis 2006, section 2).
 
     r = R / (R + G + B),   g = G / (R + G + B),   s = (R + G + B) / 3
-    p_M(c) = 1 / N_M  sum_i  prod_j  exp(-(c_j - c_ij)^2 / sigma_j^2)                                    (KD06 eq. 1)
+    p_M(c) = 1 / N_M  sum_i  prod_j  exp(-(c_j - c_ij)^2 / sigma_j^2)      (Kim and Davis 2006, equation 1)
 
-Each channel is kept in a byte. Densities are told relative to colours that are as likely as each other, so that 1 says
-nothing; a share of strangers' colours (badges, noise, the ground between the legs) keeps one pixel from deciding alone.
+Each channel is kept in a byte. Densities are relative to the uniform distribution of colours, so 1 is uninformative;
+a share of outliers (badges, noise, the ground between the legs) bounds the effect of one pixel.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Everybody who is followed."""
+"""The tracked people and their particles."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from stseg.trackers.particles.appearance import Appearance
 
 @dataclass(frozen=True)
 class Crowd:
-    """People who are followed.
+    """Tracked people.
 
     Attributes
     ----------
@@ -38,7 +38,7 @@ class Crowd:
 
     @classmethod
     def nobody(cls, particles: int) -> Crowd:
-        """Nobody, in so many particles."""
+        """No people, in so many particles."""
         none = np.zeros(0, np.int64)
         return cls(none, none, np.zeros(0), np.zeros((0, 2)), np.zeros((0, 2, 2)), np.zeros((particles, 0, 2)), ())
 
@@ -47,12 +47,12 @@ class Crowd:
 
     @property
     def reference(self) -> Floats:
-        """q* of everybody, float64 (n, part, bin)."""
+        """q* of every person, float64 (n, part, bin)."""
         none = np.zeros((0, *Appearance.unknown().reference.shape))
         return np.concatenate([none, *(one.reference[None] for one in self.appearances)])
 
     def kept(self, which: Flags) -> Crowd:
-        """Some of them, bool (n,)."""
+        """The chosen people, bool (n,)."""
         looks = tuple(one for one, stays in zip(self.appearances, which, strict=True) if stays)
         return Crowd(
             self.ids[which], self.seen[which], self.height[which], self.ground[which], self.covariance[which],
@@ -60,7 +60,7 @@ class Crowd:
         )  # fmt: skip
 
     def joined_with(self, others: Crowd) -> Crowd:
-        """These, then others."""
+        """These, then others, concatenated."""
         return Crowd(
             np.append(self.ids, others.ids),
             np.append(self.seen, others.seen),

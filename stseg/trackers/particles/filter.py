@@ -1,4 +1,4 @@
-"""A particle filter over where everybody stands at once (KD06 section 4).
+"""A particle filter on the joint state of all places (Kim and Davis 2006, section 4).
 
 A particle is one place for every person, float64 (n, 2); particles are float64 (particle, n, 2), metres.
 """

@@ -1,4 +1,4 @@
-"""How well people's colours fit where a particle has them (KD06 section 4.2).
+"""Colour likelihood of a particle (Kim and Davis 2006, section 4.2).
 
     d^2 = 1 - sum_u sqrt(q*_r(u) q_r(u)),     log pi = sum over people, views and parts r of  -lambda d^2     (eq. 7)
 
@@ -16,7 +16,7 @@ from stseg.arrays import Floats, Ints, Labels, Singles
 from stseg.trackers.particles.bodies import occupancy, part_at, placed
 
 ORDINARY = 0.25
-"""d^2 of a part that nobody sees."""
+"""d^2 of an occluded part."""
 
 
 @kernel

@@ -1,4 +1,4 @@
-"""From a hypothesis of where people stand to a better one: segment, find the axes, let them meet, again (KD06 3.3)."""
+"""Iterated localisation: segment, find the axes, intersect them, repeat (Kim and Davis 2006, section 3.3)."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _SETTLED = 0.02
 
 
 def search(looks: Sequence[ParticleFrame], ground: Floats, rounds: int, median: bool) -> Floats:
-    """Where people end who are sought from places (n, 2) on, float64 (n, 2), metres.
+    """Converged places from start places (n, 2), float64 (n, 2), metres.
 
     Parameters
     ----------

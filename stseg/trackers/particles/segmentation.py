@@ -1,9 +1,9 @@
-"""Whose each foreground pixel of a view is, if the people stand where a hypothesis has them (KD06 section 3.1).
+"""Assignment of foreground pixels to people, given a hypothesis of their places (Kim and Davis 2006, section 3.1).
 
     P(k | x) = P(k) P(x | k) / P(x),   P(k) = O_k(x) prod over l nearer to the camera of (1 - O_l(x))   (eqs 2 and 4)
 
-P(x | k) is eq. 1 of the body part that x would be of k. What nobody covers is a stranger's, prod over all l of
-(1 - O_l(x)), whose colour may be anything; the paper leaves such pixels out by a threshold.
+P(x | k) is eq. 1 of the body part that x would be of k. An unassigned pixel has probability prod over all l of
+(1 - O_l(x)) and any colour; the paper leaves such pixels out by a threshold.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ STRANGER = -1
 
 
 class Canvas(NamedTuple):
-    """Room for the segmentation of one view; only boxes around people are kept up to date.
+    """Buffers for the segmentation of one view; only boxes around people are kept up to date.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class Canvas(NamedTuple):
 
 @kernel
 def clear(boxes: Ints, canvas: Canvas) -> None:
-    """Nobody is anywhere."""
+    """Assign every pixel to background."""
     for k in range(len(boxes)):
         for v in range(boxes[k, 0], boxes[k, 1]):
             for u in range(boxes[k, 2], boxes[k, 3]):
@@ -99,7 +99,7 @@ def fill_open(
     bodies: Floats, order: Ints, boxes: Ints, ideal: Singles, half_width: Floats, parts: Floats,
     free: Singles, owner: Labels, shown: Ints,
 ) -> None:  # fmt: skip
-    """Whose pixels are surely and wholly theirs, whatever they look like: what appearances may be learned from.
+    """Pixels of people without overlap, from which colour models may be learned.
 
     Parameters
     ----------

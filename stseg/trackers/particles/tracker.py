@@ -1,4 +1,4 @@
-"""Guided particles: a particle filter whose particles look for the people themselves (KD06 section 4.3).
+"""Guided particles: a particle filter whose particles look for the people themselves (Kim and Davis 2006, section 4.3).
 
 Each frame, every particle takes a random step and is then moved by the search, which segments all views by it and lets
 the people's axes meet; how well the colours then fit weighs it. A few particles are enough, since even one that starts
@@ -21,7 +21,7 @@ from stseg.model.border import Border
 from stseg.model.predicted_tracks import PredictedTracks
 from stseg.model.sizes import Sizes
 from stseg.trackers.colour_views import ColourView, colour_views
-from stseg.trackers.framewise import EachFrame
+from stseg.trackers.framewise import FramewiseTracker
 from stseg.trackers.particles.appearance import Appearance
 from stseg.trackers.particles.crowd import Crowd
 from stseg.trackers.particles.filter import estimate, predicted, resampled, weights
@@ -32,21 +32,21 @@ from stseg.trackers.rows import Event
 from stseg.tracking.assignment import assign, distances
 
 _FLOOR = 0.05
-"""No place is known better than this, metres (standard deviation): particles that agree may be wrong together."""
+"""Least standard deviation of a place, metres: particles have common errors."""
 _HEIGHT_NOISE = 0.06
-"""How well a person's height is known, metres (standard deviation)."""
+"""Standard deviation of a person's height, metres."""
 _MARGIN = 0.6
-"""How far from their last places people are sought in a frame, metres."""
+"""Search radius around the last places, metres."""
 _TRYING = 3
-"""Every third particle tries whether somebody lost is where somebody new was found."""
+"""One particle in this many proposes an undetected track at an unassigned detection."""
 _DOUBLED = 0.4
-"""Who stands where another was found for longer than this, seconds, and is not found themselves, is nobody."""
+"""Longest time that an undetected track may share the place of a detected one, seconds."""
 _HEIGHT_RENEWAL = 0.1
-"""Share of a person's height that a frame that finds them renews."""
+"""Weight of a detection's height in the running mean."""
 
 
-class ParticleTracker(EachFrame):
-    """Follows people by their colours."""
+class ParticleTracker(FramewiseTracker):
+    """Tracks by colours."""
 
     final: ClassVar[bool] = True
 
@@ -58,8 +58,8 @@ class ParticleTracker(EachFrame):
         self.issued, self.begun = 0, False
         self.crowd = Crowd.nobody(1 if config.particles.method == "search" else config.particles.particles)
 
-    def expected(self, frame: int) -> PredictedTracks | None:
-        """Everybody who is followed, where the last frame left them; None before the first."""
+    def predict(self, frame: int) -> PredictedTracks | None:
+        """Predictions of all tracks, at their last places; None for the first frame."""
         if not self.begun:
             return None
         crowd, config = self.crowd, self.config
@@ -69,7 +69,7 @@ class ParticleTracker(EachFrame):
         return PredictedTracks(crowd.ground, crowd.covariance + drift * np.eye(2), sizes, STAYING - FORGETTING * unseen)
 
     def add(self, scene: FusedFrame, shown: FrameObservations) -> list[Commit]:
-        """The next frame, decided.
+        """Add a frame; it is committed at once.
 
         Raises
         ------
@@ -94,16 +94,16 @@ class ParticleTracker(EachFrame):
         return [self.commit(scene, crowd.ids, crowd.ground, crowd.covariance, crowd.height, width, nats, events)]
 
     def _step(self, frame: int) -> float:
-        """How far a person's step to a frame may go, metres (standard deviation)."""
+        """Standard deviation of a person's step to a frame, metres."""
         return self.config.particles.velocity_spread * (frame - self.frame) / self.rig.frame_rate
 
     def _propose(self, scene: FusedFrame) -> Floats:
-        """Have some particles try whether who is lost is somebody found whom nobody follows.
+        """Propose undetected tracks at unassigned detections, in some particles.
 
         Returns
         -------
         float64 (n,)
-            How far from their last place everybody is to be sought, metres.
+            Search radius of each track, metres.
         """
         crowd, config, found = self.crowd, self.config, scene.people.ground
         margin = np.full(len(crowd), _MARGIN)
@@ -124,7 +124,7 @@ class ParticleTracker(EachFrame):
         return margin
 
     def _looks(self, views: Sequence[ColourView | None], margin: Floats) -> list[ParticleFrame]:
-        """What the views show of everybody, sought within margins (n,), metres."""
+        """The views prepared for a search within margins (n,), metres."""
         crowd = self.crowd
         return [
             own.look(view, crowd.ground, crowd.height, crowd.appearances, margin)
@@ -133,7 +133,7 @@ class ParticleTracker(EachFrame):
         ]
 
     def _follow(self, looks: Sequence[ParticleFrame], step: float) -> None:
-        """Move the particles to the frame, weigh and draw them."""
+        """Propagate, weight and resample the particles."""
         config, crowd = self.config.particles, self.crowd
         moved = crowd.particles if config.method == "search" else predicted(crowd.particles, step, self.rng)
         if config.method != "generic":
@@ -150,7 +150,7 @@ class ParticleTracker(EachFrame):
         self.crowd = replace(crowd, ground=ground, covariance=covariance, particles=drawn)
 
     def _recognise(self, scene: FusedFrame) -> tuple[dict[int, float], Ints]:
-        """Whom of the crowd the pass found: evidence of each track, nats, and those found whom nobody follows."""
+        """Assign detections: evidence of each track, nats, and the unassigned detections."""
         crowd, people = self.crowd, scene.people
         known, found = assign(distances(crowd.ground, people.ground), self.config.particles.assignment_distance)
         seen, height = crowd.seen.copy(), crowd.height.copy()
@@ -161,7 +161,7 @@ class ParticleTracker(EachFrame):
         return evidence, np.setdiff1d(np.arange(len(people)), found)
 
     def _begin(self, scene: FusedFrame, newcomers: Ints) -> list[Event]:
-        """Follow people of a frame whom nobody follows."""
+        """Births from unassigned detections."""
         people, count = scene.people, len(newcomers)
         ids = self.issued + 1 + np.arange(count)
         self.issued += count
@@ -177,7 +177,7 @@ class ParticleTracker(EachFrame):
         return [(scene.frame, "birth", int(i), 0, "found where nobody was followed") for i in ids]
 
     def _end(self) -> list[Event]:
-        """Follow no longer who left, who was not found for too long, and who stands where another does."""
+        """Remove tracks that left, were undetected for too long, or share the place of another."""
         crowd, config = self.crowd, self.config
         unfound = (self.frame - crowd.seen) / self.rig.frame_rate
         left = (self.border.away(crowd.ground) == 0.0) & (unfound > 0)

@@ -1,4 +1,4 @@
-"""One camera as the particles see it: a raster of its pixels, and of each frame what is asked of it many times."""
+"""A camera of the particle filter: a raster of its pixels, and cached quantities of each frame."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _AREAS = np.array(
 
 
 _OPEN = 0.8
-"""Share of a body that a view must show for somebody's colours to be learned from it."""
+"""Visible fraction of a body from which colours are learned."""
 
 
 class ParticleView:
@@ -39,7 +39,7 @@ class ParticleView:
     camera
         With its lens: the raster knows where its pixels would be without.
     columns
-        Columns of the raster at most; every so many pixels of the image are asked (KD06 section 6).
+        Columns of the raster at most; every so many pixels of the image are asked (Kim and Davis 2006, section 6).
     """
 
     def __init__(self, camera: Camera, columns: int) -> None:
@@ -56,7 +56,7 @@ class ParticleView:
         self.room: Floats = np.zeros(self.ideal.shape[0] * self.ideal.shape[1])
 
     def bodies(self, ground: Floats, height: Floats) -> Floats:
-        """Where people (n, 2) as tall as (n,) stand, `bodies.fill_bodies`."""
+        """Bodies of people at (n, 2) with heights (n,), `bodies.fill_bodies`."""
         bodies = np.zeros((len(ground), 5))
         fill_bodies(self.projection, self.centre, ground, height, bodies)
         return bodies
@@ -64,7 +64,7 @@ class ParticleView:
     def look(
         self, view: ColourView, ground: Floats, height: Floats, appearances: Sequence[Appearance], margin: Floats
     ) -> ParticleFrame:
-        """A frame, with people who will be sought within margins (n,), metres, of places (n, 2)."""
+        """Prepare a frame for a search within margins (n,), metres, of places (n, 2)."""
         colour = normalised(view.image[:: self.step, :: self.step])
         foreground = (view.likelihood[:: self.step, :: self.step] > 0.5).astype(np.uint8)
         boxes = np.zeros((len(ground), 4), np.int64)
@@ -100,7 +100,7 @@ class ParticleFrame:
     density: Singles
 
     def segment(self, ground: Floats) -> tuple[Floats, Ints]:
-        """Label the view's canvas by a hypothesis (n, 2); the bodies, and who stands before whom."""
+        """Label the view's canvas by a hypothesis (n, 2); the bodies, and their order of occlusion."""
         view, bodies = self.view, self.view.bodies(ground, self.height)
         order = np.argsort(bodies[:, 4], kind="stable")
         segment(
@@ -118,7 +118,7 @@ class ParticleFrame:
         )  # fmt: skip
 
     def add_misfit(self, ground: Floats, reference: Floats, misfit: Floats) -> None:
-        """Add how badly each person's colours fit at (n, 2), given q* (n, part, bin), to misfit (n,)."""
+        """Add the colour misfit of each person at (n, 2), given q* (n, part, bin), to misfit (n,)."""
         view, bodies = self.view, self.view.bodies(ground, self.height)
         order = np.argsort(bodies[:, 4], kind="stable")
         counts = np.zeros(reference.shape[1:])
@@ -130,7 +130,7 @@ class ParticleFrame:
     def learned(
         self, ground: Floats, appearances: Sequence[Appearance], share: float, rng: np.random.Generator
     ) -> list[Appearance]:
-        """What people at places (n, 2) look like, with what of them this view shows openly; a share of it is renewed.
+        """Update colour models of people at places (n, 2) from their visible pixels in this view.
 
         Whoever stands behind somebody teaches nothing; of whoever is known already, only pixels that fit do.
         """
