@@ -7,12 +7,17 @@ from pathlib import Path
 from typing import Any
 
 from stseg.config import Config
-from stseg.config.renamed import RENAMED
+from stseg.config.keys import describe, is_user_key, values
+from stseg.config.renamed import FORMER_VALUES, RENAMED
 from stseg.errors import ConfigError
 from stseg.io.toml.settings import Given, as_toml, build
 from stseg.io.toml.text import parse_toml
 
 _OPTION = "--set"
+_HEAD = """# Configuration of stseg. Lines may be left out: what is not given has its default.
+# Checked with every run; `stseg config --expert` prints the constants of the methods as well.
+
+"""
 
 
 def read_config(path: Path | None, assignments: Sequence[str] = ()) -> Config:
@@ -23,7 +28,7 @@ def read_config(path: Path | None, assignments: Sequence[str] = ()) -> Config:
     path
         TOML, one table a stage; None for the defaults.
     assignments
-        `stage.key=value` each, the value as in TOML; a text needs no quotes. The last assignment of a key counts.
+        `section.key=value` each, the value as in TOML; a text needs no quotes. The last assignment of a key counts.
 
     Raises
     ------
@@ -56,6 +61,25 @@ def parse_config(text: str, place: str, assignments: Sequence[str] = ()) -> Conf
 def format_config(config: Config) -> str:
     """The whole configuration as TOML; `read_config` of it gives back the same."""
     return as_toml(config)
+
+
+def describe_config(config: Config, *, expert: bool) -> str:
+    """The configuration as TOML with a comment above each key; `read_config` of it gives back the same.
+
+    Parameters
+    ----------
+    config
+        The values.
+    expert
+        Whether constants of the methods stand there as well, not only keys for users and values that were changed.
+    """
+    defaults, given, model = dict(values(Config())), dict(values(config)), config.foreground.model
+
+    def comment(key: str) -> str | None:
+        changed = given[key] != defaults[key]
+        return describe(key) if expert or changed or is_user_key(key, model) else None
+
+    return _HEAD + as_toml(config, comment=comment)
 
 
 def _read_toml(path: Path) -> dict[str, Any]:
@@ -92,6 +116,8 @@ def _refuse_former(given: Mapping[str, Any]) -> None:
 def _with_present_names(given: Mapping[str, Any]) -> dict[str, Any]:
     renamed: dict[str, Any] = {}
     for key, entry in _leaves(given):
+        if (key, entry.value) in FORMER_VALUES:
+            continue
         *tables, name = RENAMED.get(key, key).split(".")
         table = renamed
         for part in tables:
@@ -104,7 +130,7 @@ def _assign(given: dict[str, Any], assignment: str) -> None:
     key, equals, text = assignment.partition("=")
     *tables, name = key.strip().split(".")
     if not equals or not tables or not all((*tables, name)):
-        raise ConfigError(_OPTION, "", repr(assignment), "stage.key=value")
+        raise ConfigError(_OPTION, "", repr(assignment), "section.key=value")
     table = given
     for part in tables:
         if isinstance(table.setdefault(part, {}), Given):  # the file has a value where a table belongs

@@ -208,11 +208,11 @@ def test_what_a_model_cannot_take_is_refused(kind: type[PixelModel]) -> None:
 
 def test_every_registered_model_can_be_configured() -> None:
     named = get_args(get_type_hints(ForegroundConfig)["model"])
-    assert set(named) == {"auto", *MODELS_BY_NAME}
+    assert set(named) == {*MODELS_BY_NAME}
 
 
 def test_the_configuration_names_the_model() -> None:
-    config = ForegroundConfig(codebook=CodebookConfig(channel_sd=7.0), memory=9.0)
+    config = ForegroundConfig(codebook=CodebookConfig(channel_sd=7.0), mixture=MixtureConfig(memory=9.0))
     kinds = {name: type(make_background(SIZE, RATE, replace(config, model=name))) for name in ("chromatic", "codebook")}
     assert kinds == {"chromatic": Chromatic, "codebook": Codebook}
     mixture = make_background(SIZE, RATE, replace(config, model="mixture"))

@@ -12,9 +12,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from stseg.config import BodyConfig, Config
+from stseg.config.effect import require_effect
+from stseg.config.keys import USER_KEYS, describe, values
 from stseg.config.renamed import RENAMED
 from stseg.errors import ConfigError
-from stseg.io.config_file import format_config, parse_config, read_config
+from stseg.io.config_file import describe_config, format_config, parse_config, read_config
 from stseg.io.toml.settings import Given, as_toml, build
 from stseg.settings import require
 
@@ -138,9 +140,9 @@ def test_wrong_values_are_named_with_what_was_expected(table: dict[str, Any], to
     [
         ("detection.persn=1", "--set: detection.persn: found an unknown key"),
         ("detectoin.prior_log_odds=1", "did you mean detection?"),
-        ("detection.prior_log_odds", "--set: found 'detection.prior_log_odds', expected stage.key=value"),
-        ("prior_log_odds=1", "expected stage.key=value"),
-        ("detection.=1", "expected stage.key=value"),
+        ("detection.prior_log_odds", "--set: found 'detection.prior_log_odds', expected section.key=value"),
+        ("prior_log_odds=1", "expected section.key=value"),
+        ("detection.=1", "expected section.key=value"),
         ("detection.prior_log_odds=high", "--set: detection.prior_log_odds: found 'high', expected a finite number"),
         (
             "detection.prior_log_odds=1\nx=2",
@@ -201,3 +203,68 @@ def test_a_text_needs_no_quotes_in_an_assignment() -> None:
 def test_bodies_without_meaning_are_refused(wrong: dict[str, Any]) -> None:
     with pytest.raises(ConfigError, match=next(iter(wrong))):
         BodyConfig(**wrong)
+
+
+# What is printed
+
+
+@pytest.mark.parametrize("expert", [False, True])
+@pytest.mark.parametrize("assignments", [(), ("foreground.model=codebook", "body.height_mean=1.2")])
+def test_the_printed_configuration_can_be_given_back(
+    tmp_path: Path, expert: bool, assignments: tuple[str, ...]
+) -> None:
+    config = read_config(None, assignments)
+    assert read(tmp_path / "c.toml", describe_config(config, expert=expert)) == config
+
+
+def test_a_user_sees_few_keys_and_an_expert_all() -> None:
+    few, every = (tomllib.loads(describe_config(Config(), expert=expert)) for expert in (False, True))
+    assert len(USER_KEYS) <= 30
+    assert count(few) == len(USER_KEYS)
+    assert count(every) == len(dict(values(Config())))
+    chosen = tomllib.loads(describe_config(read_config(None, ["foreground.model=codebook"]), expert=False))
+    assert set(chosen["foreground"]) == {"model", "body_rows", "codebook"}
+
+
+def count(table: dict[str, Any]) -> int:
+    return sum(count(value) if isinstance(value, dict) else 1 for value in table.values())
+
+
+def test_every_key_has_a_meaning_of_one_sentence_or_more() -> None:
+    for key, _ in values(Config()):
+        assert describe(key).endswith("."), key
+
+
+# What has no effect
+
+
+@pytest.mark.parametrize(
+    ("assignments", "tracker", "found"),
+    [
+        (
+            ("kalman.patience=3",),
+            "cut",
+            "a value without effect: 3.0, expected --tracker kalman",
+        ),
+        (("foreground.codebook.memory=9",), "cut", "expected foreground.model = codebook"),
+        (("foreground.model=codebook", "foreground.mixture.memory=9"), "cut", "expected foreground.model = mixture"),
+        (("proposals.kernel_radius=1",), "cut", "expected another proposals.source"),
+        (("segmentation.smoothness=1",), "kalman", "expected --tracker cut"),
+    ],
+)
+def test_a_value_without_effect_is_refused(assignments: tuple[str, ...], tracker: str, found: str) -> None:
+    with pytest.raises(ConfigError, match=found):
+        require_effect(read_config(None, assignments), tracker)
+
+
+@pytest.mark.parametrize(
+    ("assignments", "tracker"),
+    [
+        (("kalman.patience=3",), "kalman"),
+        (("foreground.model=codebook", "foreground.codebook.memory=9"), "cut"),
+        (("proposals.source=volume", "proposals.kernel_radius=1"), "cut"),
+        (("segmentation.smoothness=1", "kalman.patience=1"), "cut"),  # the default may be given
+    ],
+)
+def test_a_value_with_effect_is_taken(assignments: tuple[str, ...], tracker: str) -> None:
+    require_effect(read_config(None, assignments), tracker)

@@ -40,7 +40,7 @@ def test_each_kind_of_observation_has_its_evidence() -> None:
     assert len(found) == 1
 
 
-@pytest.mark.parametrize("model", ["auto", "mixture", "chromatic", "codebook"])
+@pytest.mark.parametrize("model", ["mixture", "chromatic", "codebook"])
 def test_colour_is_judged_by_the_background_with_the_prior_taken_out(model: Any) -> None:
     empty = np.full((12, 16, 3), 120, np.uint8)
     models = [make_background((16, 12), 10.0, ForegroundConfig(model=model)) for _ in range(2)]

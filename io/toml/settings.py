@@ -6,8 +6,9 @@ settings, which is a table. TOML has no None: a setting that may be None must ha
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, is_dataclass
+from textwrap import wrap
 from types import NoneType, UnionType
 from typing import Any, Literal, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
@@ -16,6 +17,8 @@ from stseg.io.toml.text import finite_number, one_of, shown, toml_string
 
 T = TypeVar("T")
 
+_COMMENT = 110
+"""Width of a comment, characters."""
 _WORDS = {bool: "true or false", int: "a whole number", float: "a finite number", str: "a text"}
 
 
@@ -63,18 +66,30 @@ def build(kind: type[T], given: GivenTree, place: str, table: str = "") -> T:
         raise ConfigError(_place(given.get(error.key), place), key, error.found, error.expected) from error
 
 
-def as_toml(settings: Any, table: str = "") -> str:
-    """The TOML text of settings; `build` of it gives back the same."""
+def as_toml(settings: Any, table: str = "", comment: Callable[[str], str | None] | None = None) -> str:
+    """The TOML text of settings; `build` of it gives back the same.
+
+    Parameters
+    ----------
+    settings
+        The dataclass.
+    table
+        Full name of its table; empty at the top.
+    comment
+        Comment above a key, which is given in full; None to leave the key out.
+    """
     lines, tables = [], []
     for field in fields(settings):
-        value = getattr(settings, field.name)
+        value, key = getattr(settings, field.name), _join(table, field.name)
         if is_dataclass(value):
-            tables.append(as_toml(value, _join(table, field.name)))
+            tables.append(as_toml(value, key, comment))
         elif value is not None:
-            lines.append(f"{field.name} = {_text(value)}")
+            above = "" if comment is None else comment(key)
+            if above is not None:
+                lines += [f"# {line}" for line in wrap(above, _COMMENT)] + [f"{field.name} = {_text(value)}"]
     head = [f"[{table}]"] if table else []
     own = ["\n".join([*head, *lines]) + "\n"] if lines else []
-    return "\n".join(own + tables)
+    return "\n".join(own + [text for text in tables if text])
 
 
 def _built(hint: Any, entry: Given | GivenTree, place: str, key: str) -> Any:

@@ -21,7 +21,7 @@ def labels(
     *,
     output: Annotated[Path, Parameter(name=["--output", "-o"], metavar="FOLDER")],
     frames: Annotated[str | None, Parameter(metavar="A:B")] = None,
-    set_: Annotated[tuple[str, ...], Parameter(name="--set", metavar="STAGE.KEY=VALUE", negative="")] = (),
+    set_: Annotated[tuple[str, ...], Parameter(name="--set", metavar="SECTION.KEY=VALUE", negative="")] = (),
     overwrite: Annotated[bool, Parameter(negative="")] = False,
 ) -> None:
     """Write for every pixel of every camera which track it shows.

@@ -24,6 +24,7 @@ COMMANDS = {
     "evaluate": ("stseg.commands.evaluate:evaluate", "Score tracks on the ground against the truth."),
     "report": ("stseg.commands.report:report", "Write a run file as one HTML page, as pictures or as a film."),
     "plan": ("stseg.commands.plan:plan", "Estimate the time of a run and the size of its file."),
+    "config": ("stseg.commands.config:config", "Print the configuration with the meaning of every key."),
     "labels": ("stseg.commands.labels:labels", "Write per-pixel track-id images."),
     "calibrate": ("stseg.commands.calibrate:app", "Make a rig file, or check one."),
     "simulate": ("stseg.commands.simulate:simulate", "Render a scene with ground truth."),

@@ -11,6 +11,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from stseg.config.effect import require_effect
 from stseg.engine.forecast import Forecast, forecast
 from stseg.engine.frame_range import FrameRange, resolve_frames
 from stseg.engine.job import Job, VolumeKind
@@ -27,7 +28,7 @@ def plan(
     *,
     frames: Annotated[str | None, Parameter(metavar="A:B")] = None,
     config: Path | None = None,
-    set_: Annotated[tuple[str, ...], Parameter(name="--set", metavar="STAGE.KEY=VALUE", negative="")] = (),
+    set_: Annotated[tuple[str, ...], Parameter(name="--set", metavar="SECTION.KEY=VALUE", negative="")] = (),
     tracker: str = "cut",
     volume: VolumeKind = "all",
     workers: int = 1,
@@ -62,6 +63,7 @@ def plan(
     Workforce(workers)
     chosen = None if frames is None else FrameRange.parse(frames)
     recording, resolved = read_rig(rig), read_config(config, set_)
+    require_effect(resolved, tracker)
     start = perf_counter()
     streams = index_streams(recording)
     counting = perf_counter() - start

@@ -32,7 +32,7 @@ def run(
     output: Annotated[Path, Parameter(name=["-o", "--output"])],
     frames: Annotated[str | None, Parameter(metavar="A:B")] = None,
     config: Path | None = None,
-    set_: Annotated[tuple[str, ...], Parameter(name="--set", metavar="STAGE.KEY=VALUE", negative="")] = (),
+    set_: Annotated[tuple[str, ...], Parameter(name="--set", metavar="SECTION.KEY=VALUE", negative="")] = (),
     tracker: str = "cut",
     volume: VolumeKind = "all",
     labels: Annotated[Path | None, Parameter(metavar="FOLDER")] = None,

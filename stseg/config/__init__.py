@@ -1,4 +1,4 @@
-"""One frozen dataclass per stage. What each value means physically stands below it, in the stage's module."""
+"""Configuration: one frozen dataclass for each section; meaning and unit of a key stand below it."""
 
 from __future__ import annotations
 
@@ -44,21 +44,21 @@ __all__ = [
 
 @dataclass(frozen=True)
 class Config:
-    """All stages."""
+    """All sections, in the order of the data."""
 
     body: BodyConfig = field(default_factory=BodyConfig)
     motion: MotionConfig = field(default_factory=MotionConfig)
     foreground: ForegroundConfig = field(default_factory=ForegroundConfig)
     illumination: IlluminationConfig = field(default_factory=IlluminationConfig)
+    detection: DetectionConfig = field(default_factory=DetectionConfig)
+    proposals: ProposalConfig = field(default_factory=ProposalConfig)
     occupancy: OccupancyConfig = field(default_factory=OccupancyConfig)
     error_rates: ErrorRateConfig = field(default_factory=ErrorRateConfig)
     segmentation: SegmentationConfig = field(default_factory=SegmentationConfig)
     tracking: TrackingConfig = field(default_factory=TrackingConfig)
-    detection: DetectionConfig = field(default_factory=DetectionConfig)
-    proposals: ProposalConfig = field(default_factory=ProposalConfig)
     segments: SegmentConfig = field(default_factory=SegmentConfig)
     live: LiveConfig = field(default_factory=LiveConfig)
     kalman: KalmanConfig = field(default_factory=KalmanConfig)
     particles: ParticleConfig = field(default_factory=ParticleConfig)
-    labels: LabelConfig = field(default_factory=LabelConfig)
     belief: BeliefConfig = field(default_factory=BeliefConfig)
+    labels: LabelConfig = field(default_factory=LabelConfig)

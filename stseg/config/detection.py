@@ -1,4 +1,4 @@
-"""Constants of the people of a frame: candidates, ghosts, the volume, labels of pixels."""
+"""Constants of per-frame detection, candidate proposals, the occupancy volume and pixel labels."""
 
 from __future__ import annotations
 
@@ -10,39 +10,38 @@ from stseg.settings import require
 
 @dataclass(frozen=True)
 class DetectionConfig:
-    """The pass that decides which candidates are people (METHODS 7)."""
+    """Per-frame detection: maximum a posteriori set of people (HW12 section IV; how-it-works, Detection)."""
 
     lattice_spacing: float = 0.20
     """Spacing of the ground lattice that is searched for candidates, metres."""
     search_rounds: int = 4
-    """How often the frame is searched again for people behind those already found."""
+    """Rounds of search per frame; each looks for people behind those already found."""
     prior_log_odds: float = -4.0
-    """Log-odds of a person at a candidate's place before any view is asked, nats."""
+    """Prior log-odds of a person at a candidate position, nats; raise it against misses, lower it against ghosts."""
     birth_cost: float = 5.0
-    """What it costs that somebody stands where nobody was expected, away from the border, nats."""
+    """Cost of a detection that continues no track, away from the border, nats."""
     border_width: float = 1.0
-    """Distance from the border of area and views over which that cost rises from nothing, metres."""
+    """Width of the border strip along which the birth cost rises from nothing, metres."""
     minimum_distance: float = 0.30
-    """Distance below which two bodies would stand inside each other, metres."""
+    """Distance of two bodies below which they would overlap, metres."""
     box_log_ratio: float = 4.5
-    """Log-likelihood ratio of a perfectly fitting box, person against clutter, nats."""
+    """Log-likelihood ratio, person against clutter, of a box that fits perfectly, nats."""
     box_miss_rate: float = 0.20
-    """How often a detector misses a person it sees whole."""
+    """Probability that a detector misses a fully visible person, 0..1."""
     hidden_visibility: float = 0.20
-    """Visible share of a body below which a detector finds hardly anybody."""
+    """Visible share of a body below which a detector finds almost none, 0..1."""
     full_visibility: float = 0.90
-    """Visible share from which on a body is as good as whole."""
+    """Visible share of a body from which a detector finds it as if fully visible, 0..1."""
     hidden_detection_rate: float = 0.02
-    """Share of hidden people that are found all the same."""
+    """Share of hidden people that a detector finds all the same, 0..1."""
     effective_observations: float = 4.0
-    """How many independent looks one view's pixels of one body are worth."""
+    """Effective number of independent observations in one view's pixels of one body."""
     pixel_miss_rate: float = 0.20
-    """How often a body's pixel is missed by the foreground (m of METHODS 4); the volume's first guess."""
+    """Probability that the foreground misses a pixel of a body, 0..1 (m); the volume's first guess."""
     pixel_clutter_rate: float = 0.07
-    """How often a ray past all bodies meets foreground (b of METHODS 4); the volume's first guess."""
+    """Probability of foreground on a ray past all bodies, 0..1 (b); the volume's first guess."""
     swap_moves: int = 2
-    """How often larger groups are improved by trades, one person for two and the like, once a frame is settled, where
-    all views show pixels. Boxes' scores are too rough: they rise by it, but tracks get worse (docs/ghosts.md)."""
+    """Rounds of swap moves (one person for two, and the like) in larger groups, where all views deliver pixels."""
 
     def __post_init__(self) -> None:
         for name in (
@@ -68,22 +67,22 @@ class DetectionConfig:
 
 @dataclass(frozen=True)
 class ProposalConfig:
-    """Target detection probability, and where the candidates of a frame come from (METHODS 6, 7; HW12 section III)."""
+    """Further sources of candidates, and the target detection probability (HW12 section III, eqs 6 and 7)."""
 
     source: Literal["lattice", "probability", "volume", "both"] = "lattice"
-    """Where candidates come from beside tracks: the lattice alone, or also the probability, the volume or both."""
+    """Source of candidates beside tracks and lattice: none (lattice), the probability, modes of the volume, or both."""
     body_sizes: int = 10
-    """How many heights, and how many widths, are tried (HW12)."""
+    """Number of heights, and of widths, that the probability marginalises over (HW12)."""
     unseen_rate: float = 0.08
-    """e: what stands for foreground outside the image, the rate of people who are partly seen, 0..1 (HW12)."""
+    """e: foreground probability assumed outside the image, 0..1 (HW12)."""
     view_miss_rate: float = 0.02
-    """How often a view misses somebody wholly, 0..1."""
+    """Probability that a view misses a person completely, 0..1."""
     covered_share: float = 0.50
-    """Share of a pillar that must show foreground for a view to speak for somebody, 0..1."""
+    """Share of a pillar that must be foreground for a view to support a person, 0..1."""
     lattice_spacing: float = 0.20
-    """Spacing of the ground lattice, metres."""
+    """Spacing of the ground lattice of the probability, metres."""
     kernel_radius: float = 0.30
-    """C: kernel of the mean shift, metres; HW12's 0.80 takes two people a metre apart for one."""
+    """C: radius of the mean-shift kernel, metres; HW12's 0.80 merges two people a metre apart."""
 
     def __post_init__(self) -> None:
         for name in ("lattice_spacing", "kernel_radius"):
@@ -95,16 +94,16 @@ class ProposalConfig:
 
 @dataclass(frozen=True)
 class OccupancyConfig:
-    """Fusion of the views into the volume (METHODS 3, 4)."""
+    """Fusion of the views into the volume of log-odds (how-it-works, Fusion)."""
 
     occupied_share: float = 0.02
-    """Share of the cells that a body fills where the pass of the frame found nobody (pi of METHODS 4)."""
+    """Prior share of occupied cells where no person was detected, 0..1 (pi)."""
     person_radius: float = 0.40
-    """How far from a person's place their own cells reach, metres."""
+    """Radius around a person's position within which cells may be theirs, metres."""
     effective_observations: float = 0.6
-    """How many independent looks at a cell one view is worth, 0..1: views err together (k of METHODS 4)."""
+    """Effective number of independent observations of a cell in one view, 0..1: views err together (k)."""
     sampling: Literal["footprint", "point"] = "footprint"
-    """What of a view's map a cell sees: the mean over the pixels that it covers, or the pixel at its centre."""
+    """How a cell samples a view: mean over the pixels of its footprint, or the pixel at its centre."""
 
     def __post_init__(self) -> None:
         require(0 < self.occupied_share < 1, self, "occupied_share", "a number between 0 and 1")
@@ -114,14 +113,14 @@ class OccupancyConfig:
 
 @dataclass(frozen=True)
 class ErrorRateConfig:
-    """How each view errs, learned from the frames that are explained (METHODS 4)."""
+    """Noise calibration: learned miss and false-alarm rates of each view (how-it-works, Fusion)."""
 
     memory: float = 60.0
-    """How long the rates take to follow a change, seconds."""
+    """Time constant of the learned rates, seconds."""
     prior_weight: float = 5.0
-    """How long one person, or the empty room, must be seen to count as much as the first guess, seconds."""
+    """Weight of the first guess: seconds of one person, or of empty ground."""
     minimum_evidence: float = 3.0
-    """What the other views and the prior must say of a person for a view to be measured by them, nats."""
+    """Support of a person by the other views and the prior from which a view is measured by them, nats."""
 
     def __post_init__(self) -> None:
         require(self.memory > 0, self, "memory", "seconds, above 0")
@@ -130,26 +129,26 @@ class ErrorRateConfig:
 
 @dataclass(frozen=True)
 class LabelConfig:
-    """Which person each pixel shows (METHODS 7; HW12 eqs 13 to 20); the first six by tools/learn_label_weights.py."""
+    """Pixel labels (HW12 eqs 13 to 20). The first five weights are fitted on simulated scenes."""
 
     foreground_weight: float = 6.55
-    """c1: what a label costs that contradicts a certain foreground, nats."""
+    """c1: cost of a label that contradicts certain foreground or background, nats."""
     boundary_weight: float = 10.01
-    """c2: what it costs that neighbouring pixels of the same colour differ, nats."""
+    """c2: cost of a label boundary between neighbouring pixels of equal colour, nats."""
     contrast_limit: float = 31.0
-    """k1: difference of two colours from which differing labels cost nothing, grey levels."""
+    """k1: colour difference from which a boundary costs nothing, grey levels."""
     contrast_slope: float = 12.0
-    """k2: over which difference that cost falls, grey levels."""
+    """k2: range of colour differences over which that cost falls, grey levels."""
     colourless_factor: float = 0.08
-    """What of c2 it costs where there are no colours, in masks: the mean of g at true borders, 0..1."""
+    """Share of c2 at a boundary in masks, which have no colours, 0..1."""
     position_noise: float = 0.08
-    """How far a pillar is off besides its place's own covariance, metres (standard deviation)."""
+    """Error of a position beyond its own covariance, metres (standard deviation)."""
     samples: int = 64
-    """How many pillars are drawn for each person."""
+    """Pillars drawn for each person."""
     height_noise: float = 0.05
-    """How far a person's height is off, metres (standard deviation)."""
+    """Error of a person's height, metres (standard deviation)."""
     outlier_rate: float = 1e-3
-    """Share of the pixels that show somebody, or nobody, against all the pillars that were drawn, 0..1."""
+    """Share of pixels with a label that no drawn pillar explains, 0..1."""
 
     def __post_init__(self) -> None:
         for name in (

@@ -1,4 +1,4 @@
-"""Constants of the evidence of views."""
+"""Constants of the foreground: background models and sudden changes of light."""
 
 from __future__ import annotations
 
@@ -10,26 +10,26 @@ from stseg.settings import require
 
 @dataclass(frozen=True)
 class BackgroundConfig:
-    """What every background model assumes of scene and camera (METHODS 2); symbols as in `foreground.mixture`."""
+    """Assumptions that all background models share (how-it-works, Foreground)."""
 
     memory: float = 60.0
-    """How long background takes to follow a slow change, seconds."""
+    """Time constant with which the background follows slow changes, seconds."""
     absorption_time: float = 600.0
-    """How long a thing that moved in must stay still to become background, seconds."""
+    """How long an object that was moved in must stay still to become background, seconds."""
     foreground_prior: float = 0.1
-    """f: prior probability of a person at a pixel, 0..1; it guides learning and is taken out of the evidence."""
+    """f: prior probability of a person at a pixel, 0..1; guides learning, and is taken out of the evidence."""
     outlier_rate: float = 1e-3
-    """e: share of background colours that nothing learned explains, 0..1; keeps the likelihood below 1."""
+    """e: share of background colours that no learned mode explains, 0..1; keeps the likelihood below 1."""
     shadow_prior: float = 0.1
-    """s: prior probability that background lies in shadow, 0..1."""
+    """s: prior probability of shadow on the background, 0..1."""
     darkest_shadow: float = 0.5
-    """Brightness, relative to full light, of the deepest shadow that counts as one, 0..1."""
+    """Brightness of the deepest shadow relative to full light, 0..1."""
     shadow_confusion: float = 0.1
-    """m: share of people's colours that look like the background in shadow, 0..1."""
+    """m: share of people's colours that look like shadowed background, 0..1."""
     match_distance: float = 5.0
-    """Standard deviations within which a colour belongs to what was learned."""
+    """Distance within which a colour belongs to a learned mode, standard deviations."""
     smoothing_radius: int = 1
-    """Neighbourhood over which log-odds are averaged, pixels; 0 for none."""
+    """Radius over which log-odds are averaged, pixels; 0 for none."""
 
     def __post_init__(self) -> None:
         require(self.smoothing_radius >= 0, self, "smoothing_radius", "0 or more pixels")
@@ -41,14 +41,14 @@ class BackgroundConfig:
 
 @dataclass(frozen=True)
 class MixtureConfig(BackgroundConfig):
-    """A mixture of Gaussians per pixel."""
+    """Mixture of Gaussians per pixel (Stauffer and Grimson 1999; Zivkovic 2004)."""
 
     modes: int = 3
-    """K, modes per pixel, 1 or more; with 1 nothing that moved in is ever absorbed."""
+    """K: modes per pixel; with 1 no object is ever absorbed."""
     background_weight: float = 0.1
-    """Weight from which a mode is background: the share of time that the scene shows it, 0..1."""
+    """Weight from which a mode is background: share of time in which it is visible, 0..1."""
     minimum_sd: float = 4.0
-    """Least standard deviation of a mode, grey levels: noise of sensor and compression."""
+    """Lower bound of the standard deviation of a mode, grey levels: sensor noise and compression."""
     initial_sd: float = 12.0
     """Standard deviation of a new mode, grey levels."""
 
@@ -62,12 +62,12 @@ class MixtureConfig(BackgroundConfig):
 
 @dataclass(frozen=True)
 class ChromaticConfig(MixtureConfig):
-    """The same, judged across the ray of a colour's chromaticity and along it."""
+    """Mixture of Gaussians per pixel, in brightness and chromaticity."""
 
     minimum_sd: float = 3.0
-    """Least standard deviation of a mode's brightness, grey levels: noise of sensor and compression."""
+    """Lower bound of the standard deviation of a mode's brightness, grey levels."""
     chromatic_sd: float = 2.0
-    """Least standard deviation of a mode's colour across its ray, grey levels."""
+    """Lower bound of the standard deviation of a mode's colour across its ray, grey levels."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -76,20 +76,20 @@ class ChromaticConfig(MixtureConfig):
 
 @dataclass(frozen=True)
 class CodebookConfig(BackgroundConfig):
-    """A codebook per pixel (Kim et al. 2005); symbols as in `foreground.codebook`."""
+    """Codebook per pixel (Kim et al. 2005)."""
 
     codewords: int = 3
-    """K, codewords per pixel, 1 or more; with 1 nothing that moved in is ever absorbed."""
+    """K: codewords per pixel; with 1 no object is ever absorbed."""
     channel_sd: float = 2.5
     """sigma: standard deviation of a channel around its codeword, grey levels."""
     highlight_prior: float = 0.02
-    """h: prior probability that background is lit brighter than it was ever learned, 0..1."""
+    """h: prior probability of light brighter than any learned, 0..1."""
     brightest_highlight: float = 1.3
-    """Brightness, relative to the brightest learned, of the strongest highlight that counts as one, above 1."""
+    """Brightness of the strongest highlight relative to the brightest learned, above 1."""
     recurrence: float = 0.1
-    """Share of the frames learned among people for which background stays away at a stretch at most, 0..1."""
+    """Longest absence of background, as a share of the frames it is learned from, 0..1."""
     absence: float = 10.0
-    """How long a thing that moved in may be out of sight at a stretch before it is forgotten, seconds."""
+    """How long a new object may be out of view before it is forgotten, seconds."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -102,33 +102,39 @@ class CodebookConfig(BackgroundConfig):
 
 
 @dataclass(frozen=True)
-class ForegroundConfig(MixtureConfig):
-    """The background model of colour cameras; what stands here itself is the mixture's."""
+class ForegroundConfig:
+    """Background model of colour cameras. Only the table of the chosen model has an effect."""
 
-    model: Literal["auto", "mixture", "chromatic", "codebook"] = "auto"
-    """Which background model; auto is the one that is best where nothing is known of the scene."""
+    model: Literal["mixture", "chromatic", "codebook"] = "mixture"
+    """Background model. mixture: the best where nothing is known of the scene; see the page on configuration."""
     body_rows: float = 60.0
-    """Rows of a standing person that are enough: larger images are reduced by whole factors; 10000 for none."""
+    """Image rows of a standing person that are enough: larger images are reduced by whole factors; 10000 for none."""
+    mixture: MixtureConfig = field(default_factory=MixtureConfig)
+    """Constants of the mixture."""
     chromatic: ChromaticConfig = field(default_factory=ChromaticConfig)
     """Constants of the chromatic mixture."""
     codebook: CodebookConfig = field(default_factory=CodebookConfig)
     """Constants of the codebook."""
 
     def __post_init__(self) -> None:
-        super().__post_init__()
         require(self.body_rows > 0, self, "body_rows", "rows, above 0")
+
+    @property
+    def chosen(self) -> BackgroundConfig:
+        """Constants of the chosen model."""
+        return {"mixture": self.mixture, "chromatic": self.chromatic, "codebook": self.codebook}[self.model]
 
 
 @dataclass(frozen=True)
 class IlluminationConfig:
-    """Light that changes at once (METHODS 2)."""
+    """Sudden changes of light (how-it-works, Foreground)."""
 
     changed_share: float = 0.2
-    """Share of a view that must turn into foreground for it to be the light that changed, 0..1."""
+    """Share of a view that must turn into foreground for a change of light, 0..1."""
     change_time: float = 2.0
-    """How fast that happens, seconds."""
+    """Time within which that happens, seconds."""
     blind_time: float = 1.0
-    """How long a view may say nothing while its new light is learned, seconds."""
+    """Longest time for which a view is ignored while its new light is learned, seconds."""
 
     def __post_init__(self) -> None:
         require(0 < self.changed_share < 1, self, "changed_share", "a number between 0 and 1")

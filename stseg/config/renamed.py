@@ -5,15 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 RENAMED: Mapping[str, str] = {
-    "foreground.absorption": "foreground.absorption_time",
-    "foreground.foreground": "foreground.foreground_prior",
-    "foreground.unexplained": "foreground.outlier_rate",
-    "foreground.shadow": "foreground.shadow_prior",
-    "foreground.darkest": "foreground.darkest_shadow",
-    "foreground.mimicry": "foreground.shadow_confusion",
-    "foreground.match": "foreground.match_distance",
-    "foreground.radius": "foreground.smoothing_radius",
-    "foreground.share": "foreground.background_weight",
+    "foreground.memory": "foreground.mixture.memory",
+    "foreground.modes": "foreground.mixture.modes",
+    "foreground.minimum_sd": "foreground.mixture.minimum_sd",
+    "foreground.initial_sd": "foreground.mixture.initial_sd",
+    "foreground.absorption": "foreground.mixture.absorption_time",
+    "foreground.foreground": "foreground.mixture.foreground_prior",
+    "foreground.unexplained": "foreground.mixture.outlier_rate",
+    "foreground.shadow": "foreground.mixture.shadow_prior",
+    "foreground.darkest": "foreground.mixture.darkest_shadow",
+    "foreground.mimicry": "foreground.mixture.shadow_confusion",
+    "foreground.match": "foreground.mixture.match_distance",
+    "foreground.radius": "foreground.mixture.smoothing_radius",
+    "foreground.share": "foreground.mixture.background_weight",
     "foreground.chromatic.absorption": "foreground.chromatic.absorption_time",
     "foreground.chromatic.foreground": "foreground.chromatic.foreground_prior",
     "foreground.chromatic.unexplained": "foreground.chromatic.outlier_rate",
@@ -137,3 +141,6 @@ RENAMED: Mapping[str, str] = {
     "belief.beside": "belief.assignment_distance",
 }
 """From each former `section.key` to its present name."""
+
+FORMER_VALUES = [("foreground.model", "auto")]
+"""Values that older run files hold, and that stand for the default."""

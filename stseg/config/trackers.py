@@ -1,4 +1,4 @@
-"""Constants of the trackers beside the cut."""
+"""Constants of the alternative trackers."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from stseg.settings import require
 
 @dataclass(frozen=True)
 class KalmanConfig:
-    """The tracker `kalman` (HW12 section V.E; METHODS 9)."""
+    """The tracker `kalman` (HW12 section V.E)."""
 
     gate_probability: float = 0.99
-    """Share of a person's own places that lie within their gate, 0..1."""
+    """Probability that a detection of the tracked person lies within the gate, 0..1."""
     patience: float = 1.0
-    """How long somebody may be unseen and still be the same, seconds."""
+    """How long a person may go undetected before the track ends, seconds."""
 
     def __post_init__(self) -> None:
         require(0 < self.gate_probability < 1, self, "gate_probability", "a number between 0 and 1")
@@ -24,32 +24,32 @@ class KalmanConfig:
 
 @dataclass(frozen=True)
 class ParticleConfig:
-    """The tracker `particles` (KD06; METHODS 9)."""
+    """The tracker `particles` (Kim and Davis 2006, KD06)."""
 
     method: Literal["guided", "search", "generic"] = "guided"
-    """guided: particles that search. search: one hypothesis that does. generic: particles that do not (KD06 fig. 5)."""
+    """guided: particles with mean-shift search; search: one hypothesis; generic: no search (KD06 fig. 5)."""
     particles: int = 15
-    """Number of particles: hypotheses of where everybody stands."""
+    """Number of particles, each a joint hypothesis of all positions."""
     seed: int = 0
-    """Of the random steps."""
+    """Seed of the random steps."""
     raster_columns: int = 160
-    """Columns of the raster on which an image is looked at."""
+    """Columns to which an image is reduced."""
     iterations: int = 3
-    """How often a particle is segmented and moved in a frame, at most."""
+    """Largest number of segment-and-move iterations of a particle in a frame."""
     axis_fit: Literal["squares", "median"] = "squares"
-    """How a body's axis is fitted to its pixels: by least squares, or by the least median of squares."""
+    """Fit of a body's axis to its pixels: least squares, or least median of squares."""
     walking_speed: float = 2.0
-    """Highest speed at which a person who is not seen walks on, metres per second."""
+    """Speed with which the search radius of an undetected person grows, metres per second."""
     velocity_spread: float = 1.2
-    """How fast people walk about, metres per second (standard deviation along x and along y)."""
+    """Random walk of a person, metres per second (standard deviation along each axis)."""
     colour_weight: float = 20.0
-    """lambda: how strongly colours that do not fit speak against a particle, nats."""
+    """lambda: weight of the colour distance in the log-weight of a particle, nats."""
     colour_memory: float = 10.0
-    """How long the colours of a person take to follow a change, seconds."""
+    """Time constant of a person's colour model, seconds."""
     assignment_distance: float = 0.5
-    """How far from a followed person somebody found may be and still be the same, metres."""
+    """Largest distance between a track and a detection that continues it, metres."""
     patience: float = 1.0
-    """How long somebody may be followed whom nothing finds, seconds."""
+    """How long a person may go undetected before the track ends, seconds."""
 
     def __post_init__(self) -> None:
         for name in ("particles", "raster_columns", "iterations"):
@@ -62,38 +62,38 @@ class ParticleConfig:
 
 @dataclass(frozen=True)
 class BeliefConfig:
-    """The tracker `belief` (DP06; METHODS 9)."""
+    """The tracker `belief` (Du and Piater 2006, DP06)."""
 
     method: Literal["messages", "condensation"] = "messages"
-    """messages: the views tell each other by way of the ground. condensation: each view by itself (DP06 fig. 4)."""
+    """messages: the views exchange messages over the ground; condensation: each view alone (DP06 fig. 4)."""
     particles: int = 100
-    """Number of particles of each node: the ground and every view."""
+    """Particles of each node: the ground and every view."""
     seed: int = 0
-    """Of the random steps."""
+    """Seed of the random steps."""
     iterations: int = 5
-    """Rounds of messages in a frame at most."""
+    """Largest number of message-passing iterations in a frame."""
     convergence_distance: float = 0.03
-    """A target's messages rest when its mean place moves by less than this in a round, metres."""
+    """Change of the mean position below which message passing ends, metres."""
     position_noise: float = 0.5
-    """How people leave a straight line, metres per square root of a second (standard deviation)."""
+    """Random deviation from a straight path, metres per square root of a second (standard deviation)."""
     foot_noise: float = 0.03
-    """How far a place in an image is off, share of the body's height there (standard deviation)."""
+    """Error of a position in an image, share of the body's height there (standard deviation)."""
     outlier_rate: float = 0.1
-    """Prior probability that a view follows something else than the target (lambda of eq. 12), 0..1."""
+    """Prior probability that a view follows something other than the target, 0..1 (lambda of eq. 12)."""
     outlier_spread: float = 1.0
-    """How far off that is, metres (standard deviation)."""
+    """Spread of such outliers, metres (standard deviation)."""
     colour_weight: float = 40.0
-    """How fast the likelihood falls with the squared Bhattacharyya distance of two histograms (Perez et al. 2002)."""
+    """Decay of the likelihood with the squared Bhattacharyya distance of colour histograms (Perez et al. 2002)."""
     neutral_distance: float = 0.3
-    """Squared distance at which colours speak neither for the target nor against it, 0..1."""
+    """Squared distance at which colours neither support nor contradict a target, 0..1."""
     colour_memory: float = 5.0
-    """How long the colours of a target take to follow what a detection shows, seconds."""
+    """Time constant of a target's colour model, seconds."""
     minimum_distance: float = 0.25
-    """Distance below which two bodies would stand inside each other (s of the exclusion), metres."""
+    """Distance of two bodies below which they would overlap, metres (s of the exclusion)."""
     assignment_distance: float = 0.5
-    """How far from a followed person somebody found may be and still be the same, metres."""
+    """Largest distance between a track and a detection that continues it, metres."""
     patience: float = 2.0
-    """How long somebody may be followed whom nothing finds, seconds."""
+    """How long a person may go undetected before the track ends, seconds."""
 
     def __post_init__(self) -> None:
         require(self.particles >= 2, self, "particles", "2 or more")

@@ -1,4 +1,4 @@
-"""Constants of cuts, identities, and of recordings that are long or still go on."""
+"""Constants of segmentation, tracking, and of long and live recordings."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from stseg.settings import require
 
 @dataclass(frozen=True)
 class SegmentationConfig:
-    """The cut of a window's volume (METHODS 4)."""
+    """Minimum cut of a window's volume (how-it-works, Energy)."""
 
     smoothness: float = 0.1
-    """lambda: what it costs that two neighbours at no distance differ, nats."""
+    """lambda: cost of different labels of two adjacent cells, nats."""
     distance_scale: float = 0.20
-    """s: distance over which that falls to 0.6 of it, metres."""
+    """s: distance of two cells at which that cost has fallen to 0.6, metres."""
     time_distance: float = 0.15
-    """How far apart the time neighbours of one body are once its motion is followed, metres."""
+    """Distance assigned to neighbours in time after motion compensation, metres."""
     neighbours: int = 8
-    """How many neighbours a cell has: 8, one step along x, y, the planes or time, or 80, the diagonals too."""
+    """Neighbours of a cell: 8 (one step along x, y, plane or time) or 80 (diagonals as well)."""
     solver: Literal["stseg", "pymaxflow"] = "stseg"
     """Solver of the minimum cuts: their labels are the same, pymaxflow is slower, and taken where numba is disabled."""
 
@@ -32,28 +32,28 @@ class SegmentationConfig:
 
 @dataclass(frozen=True)
 class TrackingConfig:
-    """Windows, and tracks out of pieces (METHODS 5)."""
+    """Windows, and tracks from tracklets (how-it-works, Tracks)."""
 
     window: float = 1.0
-    """Length of a window, seconds; held between 8 and 30 frames."""
+    """Length of a window, seconds; held between 8 and 30 frames. Tracks are final one window later."""
     assignment_distance: float = 0.35
-    """How far a place may be off besides, metres."""
+    """Distance below which two observations may be the same person in adjacent frames, metres."""
     height_noise: float = 0.035
-    """How far a frame's height of a person is off where they are seen whole, metres (standard deviation)."""
+    """Error of one frame's height of a fully visible person, metres (standard deviation)."""
     width_noise: float = 0.03
-    """How far a frame's width of a person is off where they are seen whole, metres (standard deviation)."""
+    """Error of one frame's width of a fully visible person, metres (standard deviation)."""
     prediction_horizon: float = 0.6
-    """How far ahead a track is carried when a window's cells are divided, seconds; beyond that it may be anywhere."""
+    """Time for which a track is extrapolated while the cells of a window are assigned, seconds."""
     patience: float = 2.0
-    """How long somebody may be unseen and still be the same, seconds."""
+    """How long a person may go undetected before the track ends, seconds."""
     maximum_gap: float = 4.0
-    """How long somebody may be out of sight and still be known again by motion and height, seconds."""
+    """Longest gap across which two tracklets may be joined by motion and height, seconds."""
     interpolation_gap: float = 1.0
-    """How long a gap is filled on a straight line; longer ones stay gaps, seconds."""
+    """Longest gap that is filled with interpolated positions, seconds."""
     minimum_duration: float = 0.8
-    """Tracks shorter than this are nobody, seconds (HW12's temporal check)."""
+    """Tracks shorter than this are dropped, seconds (HW12's temporal check)."""
     separation_time: float = 1.0
-    """How long the cells of two people are apart before their encounter is over, seconds."""
+    """Time for which the cells of two people must stay apart to end their encounter, seconds."""
 
     def __post_init__(self) -> None:
         for name in ("window", "height_noise", "width_noise"):
@@ -72,16 +72,16 @@ class TrackingConfig:
 
 @dataclass(frozen=True)
 class SegmentConfig:
-    """Segments: what of a long recording is worked on at once, and committed to disk."""
+    """Segments: parts of a long recording that are worked on, and written to disk, one by one."""
 
     length: float = 120.0
-    """How much of the recording one segment holds, seconds; a killed run goes on from the last whole one."""
+    """Length of a segment, seconds; a run that was killed resumes after the last complete one."""
     warm_up: float = 6.0
-    """How far before its first frame a segment begins to look, to know who is there, seconds."""
+    """Time before its first frame from which a segment observes, seconds, to know who is present."""
     background_period: float = 300.0
-    """Where no empty scene is given, each so long part of the recording has a background of its own, seconds."""
+    """Without an empty scene, each such part of the recording has its own background, seconds."""
     background_samples: int = 40
-    """Frames that one is learned from, spread over that part."""
+    """Frames from which such a background is learned."""
 
     def __post_init__(self) -> None:
         for name in ("length", "background_period"):
@@ -92,25 +92,24 @@ class SegmentConfig:
 
 @dataclass(frozen=True)
 class LiveConfig:
-    """A recording that still goes on: `stseg run --follow`."""
+    """Recordings that still go on: `stseg run --follow`."""
 
     file_quiet_time: float = 10.0
-    """A file to which nothing was added for so long is complete even if it is the last, seconds."""
+    """Time without new data after which the newest file counts as complete, seconds."""
     background_time: float = 60.0
-    """Where a camera has no empty scene, how long it is looked at before the run begins, seconds."""
+    """Time for which a live camera without an empty scene is observed before the run begins, seconds."""
     frame_tolerance: float = 0.3
-    """How far from a moment, in time, what a live camera shows still stands for it, seconds; three quarters of a frame
-    at least."""
+    """Largest time difference at which a live image stands for a frame, seconds; at least 3/4 of a frame."""
     stream_timeout: float = 5.0
-    """A live stream from which nothing comes for so long is broken, seconds."""
+    """Time without data after which a live stream counts as broken, seconds."""
     reconnect_wait: float = 1.0
-    """How long to wait before a broken stream is asked again, seconds; each time in vain it is twice as long."""
+    """Wait before a broken stream is opened again, seconds; doubled after every failure."""
     longest_reconnect_wait: float = 60.0
-    """But no longer than this, seconds."""
+    """Longest such wait, seconds."""
     buffer_time: float = 10.0
-    """How much of live streams may wait to be worked on, seconds; beyond that the oldest moments are dropped."""
+    """Longest time by which work may lag behind live streams, seconds; older frames lose their images."""
     buffer_memory: float = 512.0
-    """How much memory their pictures may take, MiB; beyond that, too."""
+    """Largest memory for buffered live images, MiB; older frames lose their images."""
 
     def __post_init__(self) -> None:
         for name in (

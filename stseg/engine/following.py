@@ -10,6 +10,7 @@ from pathlib import Path
 from threading import Event
 
 from stseg.config import Config
+from stseg.config.effect import require_effect
 from stseg.engine.assembly import FinishedSegment, assemble
 from stseg.engine.backgrounds import background_frames
 from stseg.engine.frame_range import FrameRange
@@ -79,6 +80,7 @@ def follow_recording(
         None where nothing came, and no file was written.
     """
     require_new(output, overwrite)
+    require_effect(config, tracker)
     is_live(recording)  # or it cannot be followed
     job = Job(recording, config, tracker, volume, 0, last_frame(frames), StreamIndex(0, ()))
     request = run_request(gather_provenance(recording, format_config(config)))

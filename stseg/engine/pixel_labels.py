@@ -62,7 +62,7 @@ def write_labels(
     views = view_labels(recording.rig, config.labels, config.body)
     foregrounds = make_foregrounds(recording, config, int(run.frames[0]), int(run.frames[-1]) + 1)
     count = 0
-    for frame_set in _frame_sets(run, frames, config.foreground.memory, reporter):
+    for frame_set in _frame_sets(run, frames, config.foreground.chosen.memory, reporter):
         for k in cameras:
             seen = frame_set.views[k]
             pixels = foregrounds[k].pixels(seen)

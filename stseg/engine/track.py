@@ -10,6 +10,7 @@ from pathlib import Path
 from tempfile import mkdtemp
 
 from stseg.config import Config
+from stseg.config.effect import require_effect
 from stseg.engine.assembly import FinishedSegment, assemble
 from stseg.engine.frame_range import FrameRange, resolve_frames
 from stseg.engine.job import Job, VolumeKind
@@ -127,6 +128,7 @@ def track_recording(
         See `track`.
     """
     require_new(output, overwrite)
+    require_effect(config, tracker)
     request = run_request(gather_provenance(recording, format_config(config)))
     request |= {"--frames": "all" if frames is None else str(frames), "--tracker": tracker, "--volume": volume}
     with WorkFolder(output, request) as folder, resumable(folder, reporter):

@@ -31,12 +31,11 @@ class RegisteredModel(NamedTuple):
 
 
 MODELS = {
-    "mixture": RegisteredModel(Mixture, lambda config: config),
+    "mixture": RegisteredModel(Mixture, lambda config: config.mixture),
     "chromatic": RegisteredModel(Chromatic, lambda config: config.chromatic),
     "codebook": RegisteredModel(Codebook, lambda config: config.codebook),
 }
 """Every model that `foreground.model` may name."""
-_AUTO = "mixture"
 
 
 def make_background(size: tuple[int, int], frame_rate: float, config: ForegroundConfig) -> Background:
@@ -51,5 +50,5 @@ def make_background(size: tuple[int, int], frame_rate: float, config: Foreground
     config
         Names the model, and holds the constants of each.
     """
-    model = MODELS[_AUTO if config.model == "auto" else config.model]
+    model = MODELS[config.model]
     return model.make(size, frame_rate, model.constants(config))
