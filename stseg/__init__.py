@@ -3,9 +3,12 @@
 The names below are the public ones; each is imported when it is first asked for, so that `import stseg` costs nothing.
 
     import stseg
-    run = stseg.read_run("run.h5")
+    run = stseg.track("rig.toml", "run.h5")    # as `stseg run rig.toml -o run.h5`
     run.trajectory["x"], run.trajectory["y"]   # a structured array
     run.data_frame("trajectory")               # the same for pandas
+    run.volume.log_odds[100]                   # one frame, read when it is asked for
+
+Frames in memory: `stseg.Tracker(rig).add([boxes, image, None])`. See docs/python.md.
 """
 
 from __future__ import annotations
@@ -16,34 +19,42 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
+    from stseg.arrays import Boxes
     from stseg.config import Config
-    from stseg.engine.pipeline import Pipeline
+    from stseg.engine.committed_frames import CommittedFrames
+    from stseg.engine.track import track
+    from stseg.engine.tracker import Tracker
     from stseg.errors import InputError, StsegError
     from stseg.evaluation import Scores, evaluate
     from stseg.geometry import Camera, Grid, Lens, Rig
     from stseg.io.config_file import read_config
+    from stseg.io.recording.frames import FrameSet
     from stseg.io.recording.recording import Recording
     from stseg.io.recording.rigs import read_rig, write_rig
     from stseg.io.runfile.runs import Run, read_run
     from stseg.io.track_csv import read_tracks_csv
 
 __all__ = [
+    "Boxes",
     "Camera",
+    "CommittedFrames",
     "Config",
+    "FrameSet",
     "Grid",
     "InputError",
     "Lens",
-    "Pipeline",
     "Recording",
     "Rig",
     "Run",
     "Scores",
     "StsegError",
+    "Tracker",
     "evaluate",
     "read_config",
     "read_rig",
     "read_run",
     "read_tracks_csv",
+    "track",
     "write_rig",
 ]
 
@@ -57,7 +68,11 @@ _HOMES = {
     "stseg.io.recording.rigs": ("read_rig", "write_rig"),
     "stseg.io.runfile.runs": ("Run", "read_run"),
     "stseg.io.track_csv": ("read_tracks_csv",),
-    "stseg.engine.pipeline": ("Pipeline",),
+    "stseg.arrays": ("Boxes",),
+    "stseg.engine.committed_frames": ("CommittedFrames",),
+    "stseg.engine.track": ("track",),
+    "stseg.engine.tracker": ("Tracker",),
+    "stseg.io.recording.frames": ("FrameSet",),
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 

@@ -42,6 +42,7 @@ AT_HOME = {
     "rich": ("stseg.commands",),
     "distributed": ("stseg.engine.cluster",),  # imported where a scheduler is asked for
     "pandas": ("stseg.io",),  # its types; it is imported where a data frame is asked for
+    "xarray": ("stseg.io",),  # the same
     "tomllib": ("stseg.io",),
     "pathlib": ("stseg.io", "stseg.engine", "stseg.commands"),
 }
@@ -101,7 +102,7 @@ def parts_imported(module: Module) -> set[str]:
 def allowed(part: str) -> set[str]:
     """What the modules of a part may import."""
     if part == "__init__":  # the public names, for type checkers; at run time each is imported when it is asked for
-        return {"config", "errors", "evaluation", "geometry", "io", "engine"}
+        return {"arrays", "config", "errors", "evaluation", "geometry", "io", "engine"}
     if part in FOUNDATION:
         return set(FOUNDATION[: FOUNDATION.index(part)])
     if part == SOLVER:

@@ -2,29 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, cast
 
 import h5py
 import numpy as np
 
 from stseg.arrays import Bytes, Floats, Ints, Labels, Rows, Singles
 from stseg.errors import FormatError
+from stseg.io.extras import load_extra
 from stseg.io.recording.recording import Recording
 from stseg.io.recording.rigs import parse_rig
 from stseg.io.recording.time_alignment import with_alignment
 from stseg.io.runfile import layout
 from stseg.io.runfile.data_frames import to_data_frame
+from stseg.io.runfile.hdf5_reading import format_errors, read_object
 from stseg.io.runfile.provenance import Provenance, read_provenance
+from stseg.io.runfile.volume import RunVolume
 
 if TYPE_CHECKING:
     from pandas import DataFrame
-
-T = TypeVar("T")
+    from xarray import Dataset
 
 
 @dataclass(frozen=True)
@@ -109,7 +110,7 @@ class Run:
     @cached_property
     def provenance(self) -> Provenance:
         """Configuration, rig, versions and sources of the run."""
-        return _read(self.path, layout.PROVENANCE, lambda file: read_provenance(file[layout.PROVENANCE]))
+        return read_object(self.path, layout.PROVENANCE, lambda file: read_provenance(file[layout.PROVENANCE]))
 
     @cached_property
     def recording(self) -> Recording:
@@ -117,6 +118,32 @@ class Run:
         provenance = self.provenance
         return with_alignment(
             parse_rig(provenance.rig, provenance.rig_path), [provenance.shown.get(name) for name in self.cameras]
+        )
+
+    @property
+    def detections(self) -> Rows:
+        """CANDIDATE (m,) with `parts`: the detections of each frame by itself, ghosts left out."""
+        rows: Rows = self.ghosts[self.ghosts["status"] == 1]
+        return rows
+
+    @property
+    def volume(self) -> RunVolume:
+        """The volume, read as it is indexed: `run.volume.log_odds[10:20]`, `run.volume.label[0, 2]`."""
+        shape = len(self.frames), len(self.heights), len(self.ground_y), len(self.ground_x)
+        return RunVolume(self.path, shape)
+
+    def volume_dataset(self) -> Dataset:
+        """The volume as a dataset of xarray, read as it is used: log_odds and label (time, plane, y, x), views.
+
+        Raises
+        ------
+        ConfigError
+            Where xarray or h5netcdf is not installed.
+        """
+        xarray = load_extra("xarray", "xarray")
+        load_extra("h5netcdf", "xarray")
+        return cast(
+            "Dataset", xarray.open_dataset(self.path, engine="h5netcdf", group=layout.OCCUPANCY, phony_dims="access")
         )
 
     def data_frame(self, table: str) -> DataFrame:
@@ -155,11 +182,11 @@ class Run:
         index = int(np.searchsorted(self.frames, frame))
         if index == len(self.frames) or self.frames[index] != frame:
             raise ValueError(f"frame {frame} is not in {self.path}")
-        return _read(self.path, layout.OCCUPANCY, lambda file: _volume(file[layout.OCCUPANCY], index))
+        return read_object(self.path, layout.OCCUPANCY, lambda file: _volume(file[layout.OCCUPANCY], index))
 
     def read_volumes(self, number: int) -> Iterator[tuple[Ints, Singles, Labels]]:
         """The volumes of all frames, `number` at a time: the frames, log-odds and labels as `read_frame` gives them."""
-        with _as_format_error(self.path, layout.OCCUPANCY), h5py.File(self.path, "r") as file:
+        with format_errors(self.path, layout.OCCUPANCY), h5py.File(self.path, "r") as file:
             group = file[layout.OCCUPANCY]
             for start in range(0, len(self.frames), number):
                 some = slice(start, start + number)
@@ -171,7 +198,7 @@ class Run:
                 return np.zeros(0, layout.table_types(len(self.cameras))[name])
             return _with_added(np.asarray(file[name][:]), layout.table_types(len(self.cameras))[name])
 
-        return _read(self.path, f"/{name}", take)
+        return read_object(self.path, f"/{name}", take)
 
 
 def _with_added(rows: Rows, dtype: np.dtype[np.void]) -> Rows:
@@ -197,31 +224,12 @@ def read_run(path: Path | str) -> Run:
         Where it is no run file, of another version, or lacks what `stseg.io.runfile.layout` promises; it names the
         object.
     """
-    return _read(Path(path), "", lambda file: _checked_run(Path(path), file))
+    return read_object(Path(path), "", lambda file: _checked_run(Path(path), file))
 
 
 def read_trajectory(path: Path) -> Rows:
     """The TRAJECTORY table of a run file; raises as `read_run` does."""
     return read_run(path).trajectory
-
-
-def _read(path: Path, place: str, take: Callable[[h5py.File], T]) -> T:
-    with _as_format_error(path, place), h5py.File(path, "r") as file:
-        return take(file)
-
-
-@contextmanager
-def _as_format_error(path: Path, place: str) -> Iterator[None]:
-    try:
-        yield
-    except FileNotFoundError as error:
-        raise FormatError(path, "", "no such file", "a run file") from error
-    except BlockingIOError as error:
-        raise FormatError(path, "", "a file that is still being written", "a finished run file") from error
-    except (OSError, RuntimeError, KeyError, TypeError, ValueError) as error:  # whatever h5py raises on broken files
-        if path.is_file() and not h5py.is_hdf5(path):
-            raise FormatError(path, "", "something that is not HDF5", "a run file") from error
-        raise FormatError(path, place, f"something that cannot be read ({error})", "a whole run file") from error
 
 
 def _volume(group: h5py.Group, index: int) -> tuple[Singles, Labels]:

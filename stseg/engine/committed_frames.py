@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stseg.arrays import Flags, Floats, Ints, Rows
+from stseg.arrays import Flags, Floats, Ints, Labels, Rows, Singles
 from stseg.engine.stopwatch import Stopwatch
 from stseg.model.people import Explanation, People
 from stseg.model.tables import CANDIDATE, RATES
@@ -35,6 +35,37 @@ class CommittedFrames:
     parts: Floats
     rates: Rows
     timings: Rows
+
+    @property
+    def frames(self) -> Ints:
+        """Numbers of the frames, int64 (time,)."""
+        return np.array([scene.frame for scene in self.commit.scenes], np.int64)
+
+    @property
+    def trajectory(self) -> Rows:
+        """TRAJECTORY (n,): people's places; the ids are those of the tracks so far."""
+        return self.commit.trajectory
+
+    @property
+    def events(self) -> Rows:
+        """EVENT (k,)."""
+        return self.commit.events
+
+    @property
+    def detections(self) -> Rows:
+        """CANDIDATE (m,): the detections of each frame by itself."""
+        rows: Rows = self.candidates[self.candidates["status"] == 1]
+        return rows
+
+    @property
+    def log_odds(self) -> Singles:
+        """The volume, float32 (time, plane, y, x), nats; nan where no view sees the cell."""
+        return np.stack([scene.log_odds for scene in self.commit.scenes])
+
+    @property
+    def label(self) -> Labels:
+        """Track ids of the volume, int32 (time, plane, y, x), 0 for background."""
+        return self.commit.label
 
     def within(self, first: int, stop: int) -> CommittedFrames:
         """The results of frames first .. stop - 1; timings are kept whole."""

@@ -35,6 +35,8 @@ class ViewForeground:
             return seen
         if seen.dtype == np.uint16:
             return instance_boxes(np.asarray(seen, np.uint16))
+        if seen.dtype == np.float32:
+            return np.asarray(seen, np.float32)
         if seen.ndim == 2:
             return mask_likelihood(np.asarray(seen, np.uint8))
         if self.background is None:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from stseg.arrays import Floats
 from stseg.errors import CalibrationError
@@ -33,6 +34,75 @@ class Rig:
     frame_rate: float
     grid: Grid
     cameras: tuple[Camera, ...]
+
+    @classmethod
+    def from_homographies(
+        cls,
+        homographies: ArrayLike,
+        verticals: ArrayLike,
+        sizes: Sequence[tuple[int, int]],
+        grid: Grid,
+        frame_rate: float,
+        *,
+        names: Sequence[str] = (),
+        name: str = "scene",
+    ) -> Rig:
+        """A rig from ground homographies and verticals.
+
+        Parameters
+        ----------
+        homographies : (view, 3, 3)
+            From metres on the ground to pixels.
+        verticals : (view, 3)
+            What a metre of height adds to the third column of each homography: the third column of a projection
+            matrix.
+        sizes
+            Width and height of each camera's images, pixels.
+        grid
+            Ground cells and planes.
+        frame_rate
+            Frames per second.
+        names
+            Of the cameras; cam1, cam2, ... by default.
+        name
+            Of the scene.
+
+        Raises
+        ------
+        CalibrationError
+            Where the arrays are not of those shapes, or a camera's geometry is singular or sees nothing of the area.
+        """
+        ground, vertical = np.asarray(homographies, float), np.asarray(verticals, float)
+        count = len(sizes)
+        if ground.shape != (count, 3, 3) or vertical.shape != (count, 3):
+            found = f"arrays of {ground.shape} and {vertical.shape} for {count} cameras"
+            raise CalibrationError("homographies, verticals", "", found, "(view, 3, 3) and (view, 3)")
+        names = names or [f"cam{k + 1}" for k in range(count)]
+        if len(set(names)) != count:
+            raise CalibrationError("names", "", ", ".join(names), f"{count} different names")
+        views = zip(names, sizes, ground, vertical, strict=True)
+        rig = cls(name, frame_rate, grid, tuple(Camera(own, size, h, v) for own, size, h, v in views))
+        rig.require_coverage()
+        return rig
+
+    @classmethod
+    def from_projections(
+        cls,
+        projections: ArrayLike,
+        sizes: Sequence[tuple[int, int]],
+        grid: Grid,
+        frame_rate: float,
+        *,
+        names: Sequence[str] = (),
+        name: str = "scene",
+    ) -> Rig:
+        """A rig from projection matrices (view, 3, 4), metres to pixels; the rest as of `from_homographies`."""
+        matrix = np.asarray(projections, float)
+        if matrix.shape != (len(sizes), 3, 4):
+            found = f"an array of {matrix.shape} for {len(sizes)} cameras"
+            raise CalibrationError("projections", "", found, "(view, 3, 4)")
+        ground, vertical = matrix[:, :, [0, 1, 3]], matrix[:, :, 2]
+        return cls.from_homographies(ground, vertical, sizes, grid, frame_rate, names=names, name=name)
 
     def reduced(self, factors: Sequence[int]) -> Rig:
         """The rig with each camera's images reduced by a whole factor."""
