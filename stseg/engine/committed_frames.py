@@ -39,7 +39,7 @@ class CommittedFrames:
     @property
     def frames(self) -> Ints:
         """Numbers of the frames, int64 (time,)."""
-        return np.array([scene.frame for scene in self.commit.scenes], np.int64)
+        return np.array([scene.frame for scene in self.commit.frames], np.int64)
 
     @property
     def trajectory(self) -> Rows:
@@ -60,7 +60,7 @@ class CommittedFrames:
     @property
     def log_odds(self) -> Singles:
         """The volume, float32 (time, plane, y, x), nats; nan where no view sees the cell."""
-        return np.stack([scene.log_odds for scene in self.commit.scenes])
+        return np.stack([scene.log_odds for scene in self.commit.frames])
 
     @property
     def label(self) -> Labels:
