@@ -55,6 +55,13 @@ class ImageStream:
         """Nothing is held open."""
 
 
+def is_detection_file(path: Path) -> bool:
+    """Whether a path holds detections rather than images: JSON, XML, or a folder of text files."""
+    if path.is_dir():
+        return any(path.glob("*.txt")) or any(path.glob("*.json"))
+    return path.suffix.lower() in (".json", ".jsonl", ".ndjson", ".xml")
+
+
 def is_image_source(path: Path) -> bool:
     """Whether a path is an image, a folder or a pattern of images, rather than a video."""
     if path.suffix.lower() in _SUFFIXES or path.is_dir():

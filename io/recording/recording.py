@@ -26,7 +26,8 @@ class Source:
     kind
         video: colour frames of a video file. images: colour frames, a folder or pattern. masks: likelihoods 0..255, a
         video, folder or pattern. instances: indexed images, one value an instance, 0 background, a folder or pattern.
-        boxes: a text file of a detector's boxes.
+        boxes: a detector's boxes, in any format of `stseg.io.recording.detections.formats`; such files can be instances
+        too, where they hold masks.
     path
         File, folder or pattern (`frame_*.png`, `hour_*.mp4`), already relative to the rig file's folder; of a live
         stream the last part of its address.
@@ -40,6 +41,18 @@ class Source:
         boxes only: number of frames; None where the last frame with a box is the last frame.
     address
         Of a live stream (rtsp://...); empty for files.
+    classes
+        boxes only: names (or numbers) of the classes to keep; empty for all.
+    least_score
+        boxes only: detections of lower score are left out.
+    view
+        boxes only: number of the camera in files of several cameras (WILDTRACK), from 0; None where it is not given.
+    select
+        boxes only: pattern of image names in files of several cameras (COCO); empty for all.
+    image_list
+        boxes only: file with the images of COCO results.
+    columns
+        boxes only: pairs of our name and a CSV or Parquet file's name of a column.
     """
 
     kind: SourceKind
@@ -49,6 +62,12 @@ class Source:
     more: tuple[Path, ...] = ()
     starts: tuple[float, ...] = ()
     address: str = ""
+    classes: tuple[str, ...] = ()
+    least_score: float = 0.0
+    view: int | None = None
+    select: str = ""
+    image_list: Path | None = None
+    columns: tuple[tuple[str, str], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +87,8 @@ class CameraSource:
     clock
         Source of frame times: the files' time stamps, frame counts, or automatic
         (`stseg.io.recording.time_alignment`).
+    images
+        Colour frames beside boxes, for pictures and colours; None where there are none.
     shown : int64 (tick,)
         The camera's own frame shown at each tick, -1 where it is blind; None where frame k is shown at tick k, or
         before alignment.
@@ -78,6 +99,7 @@ class CameraSource:
     offset: int = 0
     on_missing: Literal["error", "blind"] = "error"
     clock: ClockSource = "auto"
+    images: Source | None = None
     shown: Ints | None = field(default=None, compare=False, repr=False)
 
 
@@ -105,6 +127,11 @@ class Recording:
         """The recording with colour frames reduced as far as standing people still span `rows` pixels."""
         cameras = zip(self.rig.cameras, self.sources, strict=True)
         return replace(self, reduction=tuple(self._factor(camera, own, rows) for camera, own in cameras))
+
+    def pictured(self) -> Recording:
+        """The recording with its cameras' colour frames in place of boxes, where `images` gives them."""
+        sources = (own if own.images is None else replace(own, source=own.images, images=None) for own in self.sources)
+        return replace(self, sources=tuple(sources))
 
     def _factor(self, camera: Camera, own: CameraSource, rows: float) -> int:
         colour = own.source.kind in ("video", "images")

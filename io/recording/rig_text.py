@@ -59,6 +59,8 @@ def _camera_lines(camera: Camera) -> list[str]:
 def _stream_lines(streams: CameraSource, folder: Path) -> list[str]:
     lines = [f"offset = {streams.offset}  # its frame k shows the scene at frame k + offset"]
     lines.append(f"source = {_source_text(streams.source, folder)}")
+    if streams.images is not None:
+        lines.append(f"images = {_source_text(streams.images, folder)}  # colour frames beside the detections")
     if streams.background is not None:
         lines.append(f"background = {_source_text(streams.background, folder)}  # the empty scene")
     if streams.on_missing != "error":
@@ -74,6 +76,19 @@ def _source_text(source: Source, folder: Path) -> str:
         entries.append(f"first_frame = {source.first_frame}")
     if source.frames is not None:
         entries.append(f"frames = {source.frames}")
+    if source.classes:
+        entries.append(f"classes = [{', '.join(map(toml_string, source.classes))}]")
+    if source.least_score:
+        entries.append(f"score = {_number(source.least_score)}")
+    if source.view is not None:
+        entries.append(f"view = {source.view}")
+    if source.select:
+        entries.append(f"select = {toml_string(source.select)}")
+    if source.image_list is not None:
+        entries.append(f"image_list = {toml_string(_relative(source.image_list, folder).as_posix())}")
+    if source.columns:
+        pairs = ", ".join(f"{toml_string(own)} = {toml_string(name)}" for own, name in source.columns)
+        entries.append(f"columns = {{ {pairs} }}")
     if source.starts:
         entries.append(f"starts = {_list(np.array(source.starts))}")
     return f"{{ {', '.join(entries)} }}"

@@ -14,6 +14,7 @@ from typing import Literal
 
 from stseg.errors import CalibrationError, OutputError, RigError
 from stseg.geometry import Camera, Grid, Lens, Rig
+from stseg.io.recording.detections.tables import COLUMNS
 from stseg.io.recording.recording import SOURCE_KINDS, CameraSource, ClockSource, Recording, Source, SourceKind
 from stseg.io.recording.rig_text import FORMAT, format_rig
 from stseg.io.toml.table import ANY, Table
@@ -24,8 +25,9 @@ _ON_MISSING: tuple[Literal["error", "blind"], ...] = ("error", "blind")
 _CLOCKS: tuple[ClockSource, ...] = ("auto", "stamps", "count")
 _CAMERA_KEYS = (
     *("name", "size", "ground", "vertical", "projection", "lens"),
-    *("offset", "source", "background", "on_missing", "clock"),
+    *("offset", "source", "images", "background", "on_missing", "clock"),
 )
+_DETECTION_KEYS = ("first_frame", "frames", "classes", "score", "view", "select", "image_list", "columns")
 
 
 def read_rig(path: str | Path) -> Recording:
@@ -191,13 +193,17 @@ def _camera_source(table: Table) -> CameraSource:
         raise table.error("background.kind", repr(background.kind), "video or images: the empty scene in colour")
     offset = table.integer("offset") if "offset" in table else 0
     clock = table.choice("clock", _CLOCKS) if "clock" in table else "auto"
-    return CameraSource(_source(table.table("source"), "starts"), background, offset, on_missing, clock)
+    source = _source(table.table("source"), "starts")
+    images = _source(table.table("images")) if "images" in table else None
+    if images is not None and (images.kind not in ("video", "images") or source.kind not in ("boxes", "instances")):
+        raise table.error("images.kind", repr(images.kind), "video or images, beside a source of boxes or instances")
+    return CameraSource(source, background, offset, on_missing, clock, images)
 
 
 def _source(table: Table, *more_keys: str) -> Source:
     kind = table.choice("kind", SOURCE_KINDS)
-    counts = ("first_frame", "frames") if kind == "boxes" else more_keys
-    table.allow("kind", "path", *counts)
+    detections = kind in ("boxes", "instances")
+    table.allow("kind", "path", *(_DETECTION_KEYS if detections else ()), *(() if kind == "boxes" else more_keys))
     if any("://" in name for name in table.texts("path")):
         return _live_source(table, kind)
     first, *more = [table.file.parent / name for name in table.texts("path")]
@@ -210,7 +216,25 @@ def _source(table: Table, *more_keys: str) -> Source:
         table.integer("frames", least=1) if "frames" in table else None,
         tuple(more),
         tuple(table.numbers("starts", ANY).tolist()) if "starts" in table else (),
+        classes=tuple(table.texts("classes")) if "classes" in table else (),
+        least_score=_share(table, "score") if "score" in table else 0.0,
+        view=table.integer("view", least=0) if "view" in table else None,
+        select=table.text("select") if "select" in table else "",
+        image_list=table.file.parent / table.text("image_list") if "image_list" in table else None,
+        columns=_columns(table.table("columns")) if "columns" in table else (),
     )
+
+
+def _share(table: Table, name: str) -> float:
+    value = float(table.numbers(name))
+    if not 0 <= value <= 1:
+        raise table.error(name, repr(value), "a number of 0..1")
+    return value
+
+
+def _columns(table: Table) -> tuple[tuple[str, str], ...]:
+    table.allow(*COLUMNS)
+    return tuple((name, table.text(name)) for name in table.values)
 
 
 def _live_source(table: Table, kind: SourceKind) -> Source:

@@ -10,8 +10,8 @@ import numpy as np
 from stseg.arrays import Boxes, Floats, Observation
 from stseg.errors import SourceError
 from stseg.geometry import Camera
-from stseg.io.recording.box_files import read_boxes
-from stseg.io.recording.image_stream import ImageStream, is_image_source
+from stseg.io.recording.detections.source_detections import instance_image, read_source
+from stseg.io.recording.image_stream import ImageStream, is_detection_file, is_image_source
 from stseg.io.recording.recording import Source, mask_passwords
 from stseg.io.recording.source_files import source_parts
 from stseg.io.recording.video_stream import VideoStream
@@ -37,10 +37,10 @@ class Stream(Protocol):
 
 
 class BoxStream:
-    """Boxes of a text file, read whole at once."""
+    """Boxes of a file or folder of detections, read whole at once."""
 
-    def __init__(self, source: Source) -> None:
-        self._table = read_boxes(source.path, source.first_frame, source.frames)
+    def __init__(self, source: Source, camera: Camera) -> None:
+        self._table = read_source(source, camera.size).table
         self._next = 0
 
     def skip(self, count: int) -> int:
@@ -59,6 +59,34 @@ class BoxStream:
     def times(self) -> list[Floats]:
         """Frames of a text file have no time stamps."""
         return [np.full(self.skip(self._table.frames), np.nan)]
+
+    def close(self) -> None:
+        """Nothing is held open."""
+
+
+class MaskStream:
+    """Instance images drawn from the masks of a file or folder of detections."""
+
+    def __init__(self, source: Source, camera: Camera) -> None:
+        self._found, self._size = read_source(source, camera.size), camera.size
+        self._next = 0
+
+    def skip(self, count: int) -> int:
+        """Skip up to `count` frames; return how many there were."""
+        skipped = min(count, self._found.frames - self._next)
+        self._next += skipped
+        return skipped
+
+    def read(self) -> Observation:
+        """The next frame's instance image; None after the last frame."""
+        if not self.skip(1):
+            return None
+        rows = np.flatnonzero(self._found.kept.frame == self._next - 1)
+        return instance_image(self._found.kept, rows.tolist(), self._size)
+
+    def times(self) -> list[Floats]:
+        """Detections have no time stamps."""
+        return [np.full(self.skip(self._found.frames), np.nan)]
 
     def close(self) -> None:
         """Nothing is held open."""
@@ -148,7 +176,9 @@ def open_stream(source: Source, camera: Camera, times: Sequence[Floats] | None =
         return JoinedStream(parts, camera, times)
     (source,) = parts
     if source.kind == "boxes":
-        return BoxStream(source)
+        return BoxStream(source, camera)
+    if source.kind == "instances" and is_detection_file(source.path):
+        return MaskStream(source, camera)
     if source.kind == "video" or (source.kind == "masks" and not is_image_source(source.path)):
         return VideoStream(source, camera, None if times is None else times[0])
     return ImageStream(source, camera)

@@ -1,4 +1,4 @@
-"""`stseg inspect`: the contents of a run file on one screen."""
+"""`stseg inspect`: the contents of a run file, or of a rig file's sources, on one screen."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from cyclopts import Parameter
 from rich.console import Console
 from rich.table import Table
 
+from stseg.commands.inspect_rig import inspect_rig
 from stseg.commands.run_overview import Overview, per, summarise_run
 from stseg.commands.run_slice import write_slice
 from stseg.errors import ConfigError
@@ -29,26 +30,36 @@ def inspect(
     output: Annotated[Path | None, Parameter(name=["-o", "--output"], metavar="SLICE.png")] = None,
     overwrite: Annotated[bool, Parameter(negative="")] = False,
 ) -> None:
-    """Summarise a run file: extent, people, tracks, events, ghosts, timings and warnings.
+    """Summarise a run file: extent, people, tracks, events, ghosts, timings and warnings; or the sources of a rig file.
 
     Example: stseg inspect night.h5
 
     Example: stseg inspect night.h5 --slice t=12.4,plane=0.9 -o slice.png
 
+    Example: stseg inspect rig.toml -o pictures/
+
+    Of a rig file it prints what each camera's source was recognised as, with the number of boxes, their heights and
+    scores (5 to 95 %), the share of feet that project into the area, and classes; -o draws a frame of each camera.
+
     Parameters
     ----------
     run
-        The run file.
+        The run file (.h5), or a rig file (.toml).
     as_json
         Print one JSON object, with every track. Its keys are those of docs/file-formats.md and stay.
     slice_
         Write one slice of the occupancy as a picture instead: t in seconds from the recording's first frame (or
         frame=NUMBER), plane in metres above the ground (or plane=all, the greatest of them); the nearest are taken.
     output
-        The picture of the slice, PNG.
+        The picture of the slice, PNG; of a rig file, a folder for the pictures.
     overwrite
         Replace the picture if it exists.
     """
+    if run.suffix.lower() == ".toml":
+        if slice_ is not None or as_json:
+            raise ConfigError("command line", "--slice" if slice_ else "--json", str(run), "a run file")
+        inspect_rig(run, output, overwrite)
+        return
     found = read_run(run)
     if (slice_ is None) != (output is None):
         given, other = ("--slice", "-o SLICE.png") if output is None else ("-o", "--slice t=SECONDS,plane=METRES")

@@ -19,7 +19,7 @@ from stseg.errors import ConfigError, StsegError
 COMMANDS = {
     "demo": ("stseg.commands.demo:demo", "Render a small scene, track it, score it, write the report."),
     "run": ("stseg.commands.run:run", "Track the people of a recording."),
-    "inspect": ("stseg.commands.inspect:inspect", "Summarise a run file."),
+    "inspect": ("stseg.commands.inspect:inspect", "Summarise a run file, or the sources of a rig file."),
     "export": ("stseg.commands.export:export", "Write the tracks of a run file in another format."),
     "evaluate": ("stseg.commands.evaluate:evaluate", "Score tracks on the ground against the truth."),
     "report": ("stseg.commands.report:report", "Write a run file as one HTML page, as pictures or as a film."),

@@ -50,7 +50,7 @@ def _pictures(run: Run, film: Film, frames: Ints, camera_images: bool) -> Iterat
         for frame in steps:
             yield film.picture(frame, tuple(repeat(None, len(run.cameras))))
         return
-    with open_frames(run.recording, int(frames[0]), int(frames[-1]) + 1) as frame_sets:
+    with open_frames(run.recording.pictured(), int(frames[0]), int(frames[-1]) + 1) as frame_sets:
         wanted = iter(steps)
         frame = next(wanted, None)
         for frame_set in frame_sets:

@@ -1,0 +1,98 @@
+"""Masks of detections: polygons, and run lengths as COCO encodes them.
+
+Source of the compressed form: the COCO API (cocodataset/cocoapi, maskApi.c): counts of alternating zeros and ones down
+the columns, from the third on as differences to the count two before, six bits a character.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from stseg.arrays import Bytes, Floats, Ints
+
+
+@dataclass(frozen=True)
+class Polygons:
+    """Outlines, each float64 (k, 2), u and v in pixels; the mask is their union."""
+
+    outlines: tuple[Floats, ...]
+
+    def draw(self, size: tuple[int, int]) -> Bytes:
+        """The mask as an image of a width and height, uint8 (v, u), 0 or 1."""
+        image = np.zeros(size[::-1], np.uint8)
+        for outline in self.outlines:
+            cv2.fillPoly(image, [np.rint(outline).astype(np.int32)], 1)
+        return image
+
+    def box(self) -> tuple[float, float, float, float]:
+        """left, top, width, height."""
+        points = np.concatenate(self.outlines)
+        low, high = points.min(axis=0), points.max(axis=0)
+        return float(low[0]), float(low[1]), float(high[0] - low[0]), float(high[1] - low[1])
+
+
+@dataclass(frozen=True)
+class RunLengths:
+    """Counts of alternating zeros and ones of an image of `size` (width, height), down its columns."""
+
+    size: tuple[int, int]
+    counts: Ints
+
+    def draw(self, size: tuple[int, int]) -> Bytes:
+        """The mask as an image, uint8 (v, u), 0 or 1, resized where it was made at another size."""
+        values = np.arange(len(self.counts)) % 2
+        image = np.repeat(values, self.counts).astype(np.uint8).reshape(self.size).T
+        if self.size == size:
+            return np.ascontiguousarray(image)
+        return np.asarray(cv2.resize(np.ascontiguousarray(image), size, interpolation=cv2.INTER_NEAREST))
+
+    def box(self) -> tuple[float, float, float, float]:
+        """left, top, width, height."""
+        v, u = np.nonzero(self.draw(self.size))
+        if not len(u):
+            return 0.0, 0.0, 0.0, 0.0
+        return float(u.min()), float(v.min()), float(np.ptp(u) + 1), float(np.ptp(v) + 1)
+
+
+Mask = Polygons | RunLengths
+
+
+def flat_polygons(flat: Sequence[Sequence[float]]) -> Polygons:
+    """Polygons from flat lists u, v, u, v, ...; raises ValueError where one is none."""
+    outlines = tuple(np.array(one, float).reshape(-1, 2) for one in flat)
+    if not outlines or any(len(outline) < 3 or not np.isfinite(outline).all() for outline in outlines):
+        raise ValueError("a polygon of fewer than 3 points")
+    return Polygons(outlines)
+
+
+def run_lengths(size: Sequence[int], counts: str | Sequence[int]) -> RunLengths:
+    """A mask from COCO's `size` (height, width) and `counts`; raises ValueError where they do not fit together."""
+    height, width = (int(side) for side in size)
+    decoded = _decoded(counts) if isinstance(counts, str) else np.array(counts, np.int64).reshape(-1)
+    if (decoded < 0).any() or int(decoded.sum()) != height * width:
+        raise ValueError(f"run lengths of {int(decoded.sum())} pixels for an image of {width} x {height}")
+    return RunLengths((width, height), decoded)
+
+
+def _decoded(text: str) -> Ints:
+    counts: list[int] = []
+    value = shift = 0
+    for character in text:
+        bits = ord(character) - 48
+        if not 0 <= bits < 64:
+            raise ValueError("run lengths that are not COCO's")
+        value |= (bits & 0x1F) << shift
+        shift += 5
+        if bits & 0x20:
+            continue
+        if bits & 0x10:
+            value |= -1 << shift
+        counts.append(value + (counts[-2] if len(counts) > 2 else 0))
+        value = shift = 0
+    if shift:
+        raise ValueError("run lengths that end within a number")
+    return np.array(counts, np.int64)

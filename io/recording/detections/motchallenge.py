@@ -1,0 +1,39 @@
+"""MOTChallenge ground truth (`gt.txt`): lines of nine numbers, with a flag, a class and a visibility."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from stseg.io.recording.detections.record import DetectionList, Detections, Request, number
+
+_CLASSES = (
+    *("", "pedestrian", "person on vehicle", "car", "bicycle", "motorbike", "vehicle", "static person", "distractor"),
+    *("occluder", "occluder on the ground", "occluder full", "reflection"),
+)
+"""By number, from MOT16 on (Milan et al., MOT16: a benchmark for multi-object tracking, 2016)."""
+
+
+def is_ground_truth(path: Path) -> bool:
+    """Whether a text file's first line has nine numbers."""
+    try:
+        with path.open(encoding="utf-8-sig") as lines:
+            fields = next(lines, "").replace(",", " ").split()
+    except (OSError, UnicodeDecodeError):
+        return False
+    return len(fields) == 9 and all(word.lstrip("-").replace(".", "", 1).isdigit() for word in fields)
+
+
+def read_ground_truth(request: Request) -> Detections:
+    """Boxes that the flag includes, with their classes."""
+    found = DetectionList(request.path)
+    for row, line in enumerate(request.path.read_text(encoding="utf-8-sig").splitlines(), 1):
+        if not line.strip():
+            continue
+        place = f"line {row}"
+        values = [number(request.path, place, "field", word) for word in line.replace(",", " ").split()]
+        if len(values) < 8 or values[6] == 0:
+            continue
+        kind = int(values[7])
+        label = _CLASSES[kind] if 0 < kind < len(_CLASSES) else str(kind)
+        found.add(place, int(values[0]), values[2:6], label=label)
+    return found.done()

@@ -1,0 +1,141 @@
+"""The detections of a camera's source: read in any known format, filtered, and counted from frame 0."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stseg.arrays import Flags, Floats
+from stseg.errors import FormatError, SourceError
+from stseg.io.recording.box_files import BoxTable, read_boxes
+from stseg.io.recording.detections.formats import read_detections
+from stseg.io.recording.detections.masks import Polygons
+from stseg.io.recording.detections.record import Detections, Request
+from stseg.io.recording.recording import Source
+
+
+@dataclass(frozen=True)
+class SourceDetections:
+    """Detections of one source.
+
+    Attributes
+    ----------
+    format
+        The recognised format.
+    read
+        All detections, frames as the source counts them.
+    kept
+        Those of the wanted classes and scores, frames counted from 0.
+    frames
+        Number of frames.
+    """
+
+    format: str
+    read: Detections
+    kept: Detections
+    frames: int
+
+    @property
+    def table(self) -> BoxTable:
+        """The kept boxes by frame."""
+        order = np.argsort(self.kept.frame, kind="stable")
+        return BoxTable(self.frames, self.kept.frame[order], self.kept.pixel[order], self.kept.score[order])
+
+
+def read_source(source: Source, size: tuple[int, int]) -> SourceDetections:
+    """Read a source of boxes, or of instances that are no images.
+
+    Parameters
+    ----------
+    source
+        Its path may be any format of `stseg.io.recording.detections.formats`.
+    size
+        Width and height of the camera's image, pixels.
+
+    Raises
+    ------
+    SourceError, FormatError
+        Where it cannot be read, or has no detections.
+    """
+    return _read(source, size, _stamp(source.path))
+
+
+def _stamp(path: Path) -> tuple[int, int]:
+    """Changes where a file does, so that nothing stale is kept."""
+    try:
+        found = [file.stat() for file in (path.iterdir() if path.is_dir() else [path])]
+    except OSError:
+        return 0, 0
+    return max((one.st_mtime_ns for one in found), default=0), sum(one.st_size for one in found)
+
+
+@lru_cache(maxsize=64)
+def _read(source: Source, size: tuple[int, int], _stamp_of_file: tuple[int, int]) -> SourceDetections:
+    request = Request(
+        source.path,
+        size,
+        source.view,
+        source.select,
+        source.image_list,
+        dict(source.columns) if source.columns else None,
+    )
+    recognised = read_detections(request)
+    if recognised is None:
+        if source.classes:
+            raise SourceError(source.path, "classes", ", ".join(source.classes), "detections that have classes")
+        table = read_boxes(source.path, source.first_frame, source.frames)
+        found = Detections(table.frame + source.first_frame, table.pixel, table.score)
+        kept = found.of(found.score >= source.least_score)
+        return SourceDetections(
+            "boxes as text", found, replace(kept, frame=kept.frame - source.first_frame), table.frames
+        )
+    name, found = recognised
+    kept = found.of(_wanted(found, source.classes, source.least_score))
+    kept = replace(kept, frame=kept.frame - source.first_frame)
+    return SourceDetections(name, found, kept, _length(source, found, kept))
+
+
+def _wanted(found: Detections, classes: Sequence[str], least_score: float) -> Flags:
+    wanted: Flags = np.asarray(found.score >= least_score)
+    if classes:
+        lower = {name.lower() for name in classes}
+        wanted &= np.array([label.lower() in lower for label in found.label] or [False] * len(found), bool)
+    return wanted
+
+
+def _length(source: Source, found: Detections, kept: Detections) -> int:
+    """Number of frames: the rig's, the source's, or up to the last frame with a detection."""
+    if len(kept) and int(kept.frame.min()) < 0:
+        found_frame = f"frame {int(kept.frame.min()) + source.first_frame}"
+        raise FormatError(source.path, "", found_frame, f"a frame from first_frame = {source.first_frame} on")
+    length = source.frames or (found.frames - source.first_frame if found.frames is not None else None)
+    if length is None:
+        if not len(kept):
+            classes = ", ".join(f"{name} ({count})" for name, count in found.classes().items())
+            wanted = f"no detections of {', '.join(source.classes)}" if source.classes else "no detections"
+            raise SourceError(source.path, "", f"{wanted}; classes are {classes or 'not given'}", "some detections")
+        return int(found.frame.max()) - source.first_frame + 1
+    if len(kept) and int(kept.frame.max()) >= length:
+        found_frame = f"frame {int(kept.frame.max()) + source.first_frame}"
+        raise FormatError(source.path, "", found_frame, f"a frame below {length + source.first_frame}")
+    return length
+
+
+def instance_image(found: Detections, rows: Sequence[int], size: tuple[int, int]) -> NDArray[np.uint16]:
+    """Masks of one frame as an instance image, the best score on top; detections without a mask are filled boxes."""
+    image = np.zeros(size[::-1], np.uint16)
+    for value, k in enumerate(sorted(rows, key=lambda row: float(found.score[row])), 1):
+        mask = found.mask[k] if found.mask else None
+        image[(mask or _box(found.pixel[k])).draw(size) > 0] = value
+    return image
+
+
+def _box(pixel: Floats) -> Polygons:
+    left, top, width, height = pixel.tolist()
+    right, bottom = left + width, top + height
+    return Polygons((np.array([[left, top], [right, top], [right, bottom], [left, bottom]]),))
