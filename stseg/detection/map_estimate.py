@@ -166,8 +166,12 @@ class MapEstimate:
     @cached_property
     def track_index(self) -> Ints:
         """The predicted track that each member continues, int64 (member,); -1 for births."""
-        problem, index = self.problem, np.full(len(self.members), -1, np.int64)
-        track_score(self.members, len(self.members), problem.track_gain, problem.birth_cost, problem.assigned)
+        return self.tracks_of(self.members)
+
+    def tracks_of(self, members: Ints) -> Ints:
+        """The same of any set of the candidates, int64 (n,)."""
+        problem, index = self.problem, np.full(len(members), -1, np.int64)
+        track_score(members, len(members), problem.track_gain, problem.birth_cost, problem.assigned)
         for k, place in enumerate(problem.assigned[: problem.track_gain.shape[1]]):
             if place >= 0:
                 index[place] = k

@@ -71,10 +71,11 @@ def _ghosts(estimate: MapEstimate) -> People:
     last = [score.view_evidence[:, -1] for score in scores]
     view_evidence = np.array(last).reshape(len(rejected), len(views)).T
     pool, births = estimate.pool.at(rejected), np.full(len(rejected), -1, np.int64)
+    tracks = np.array([estimate.tracks_of(np.append(members, i))[-1] for i in rejected], np.int64)
     covariance = np.tile(np.eye(2) * config.lattice_spacing**2 / 12, (len(rejected), 1, 1))
     return People(
         pool.ground, pool.height, pool.width, covariance, gain, view_evidence, np.ones_like(view_evidence),
-        _prior(estimate, rejected, births), births, Sizes.of_population(len(rejected), estimate.evidence.prior.body),
+        _prior(estimate, rejected, tracks), births, Sizes.of_population(len(rejected), estimate.evidence.prior.body),
     )  # fmt: skip
 
 

@@ -5,7 +5,6 @@ See docs/how-it-works.md, Energy and Tracks.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import ClassVar
 
@@ -27,7 +26,8 @@ from stseg.segmentation.motion import motion_field
 from stseg.segmentation.unary import BodyShape
 from stseg.trackers.protocol import Commit, FrameObservations, FusedFrame
 from stseg.trackers.rows import event_rows, trajectory_rows, views_at
-from stseg.tracking.prediction import DetectionHistory, earlier_detections, predicted_places, together
+from stseg.trackers.window_existence import TrackedFrame, WindowExistence
+from stseg.tracking.prediction import earlier_detections, predicted_places, together
 from stseg.tracking.track_filter import TrackFilter
 from stseg.tracking.tracklets import form_tracklets
 from stseg.tracking.window_association import TrackAssociation, WindowAssignment
@@ -35,19 +35,6 @@ from stseg.tracking.windows import Window, windows
 
 _ENDLESS = 1 << 62
 """Stop frame of a run whose end is not known yet."""
-
-
-@dataclass(frozen=True)
-class _TrackedFrame:
-    """A frame and the filter track of each detection, int64 (n,)."""
-
-    fused: FusedFrame
-    tracks: Ints
-
-    def detections(self) -> DetectionHistory:
-        """Its detections."""
-        people, frame = self.fused.people, np.full(len(self.tracks), self.fused.frame)
-        return DetectionHistory(frame, self.tracks, people.ground, people.covariance, people.height)
 
 
 class CutTracker:
@@ -70,8 +57,9 @@ class CutTracker:
         self.association = TrackAssociation(rig.frame_rate, config.tracking)
         spread, unassigned = config.body.height_spread, config.occupancy.occupied_share
         self.solver = find_solver(config.segmentation.solver)
+        self.existence = WindowExistence(rig, config, self.solver)
         self.pillar = BodyShape(config.occupancy.person_radius, spread, unassigned)
-        self.held: list[_TrackedFrame] = []
+        self.held: list[TrackedFrame] = []
         self.first = self.committed = first
         self.coming = windows(rig.frame_rate, config.tracking, first, _ENDLESS)
         self.window = next(self.coming)
@@ -92,7 +80,7 @@ class CutTracker:
             self.window = next(self.coming)
             self.held = [tracked for tracked in self.held if tracked.fused.frame >= self.window.solve_first]
         tracks = self.filter.update(fused.frame, fused.people, fused.ghosts)
-        self.held.append(_TrackedFrame(fused, tracks))
+        self.held.append(TrackedFrame(fused, tracks))
         return commits
 
     def finish(self) -> list[Commit]:
@@ -104,7 +92,8 @@ class CutTracker:
         return [self._solve(window) for window in remaining if window.commit_stop > self.committed]
 
     def _solve(self, window: Window) -> Commit:
-        held = [tracked for tracked in self.held if window.solve_first <= tracked.fused.frame < window.solve_stop]
+        inside = [tracked for tracked in self.held if window.solve_first <= tracked.fused.frame < window.solve_stop]
+        held = self.existence.revised(inside)
         energy = self._energy(held)
         cut = self.solver.grid(energy)
         label = self._divide(window, held, energy, cut.occupied).label
@@ -119,7 +108,7 @@ class CutTracker:
         self.committed = window.commit_stop
         return self._commit(window, held, label, blobs, decision, row)
 
-    def _energy(self, held: list[_TrackedFrame]) -> Energy:
+    def _energy(self, held: list[TrackedFrame]) -> Energy:
         log_odds = np.stack([tracked.fused.log_odds for tracked in held])
         reach, grid = self.config.occupancy.person_radius, self.rig.grid
         motion = [
@@ -129,7 +118,7 @@ class CutTracker:
         steps = np.array(motion, np.int64).reshape(-1, *grid.shape[1:], 2)
         return build_energy(log_odds, steps, grid, self.config.segmentation)
 
-    def _divide(self, window: Window, held: list[_TrackedFrame], energy: Energy, occupied: Flags) -> WindowLabels:
+    def _divide(self, window: Window, held: list[TrackedFrame], energy: Energy, occupied: Flags) -> WindowLabels:
         """Label the occupied cells with the filter tracks of this window and of active tracks."""
         tails = [track.tail for track in self.association.active]
         mean_height = self.config.body.height_mean
@@ -144,7 +133,7 @@ class CutTracker:
     def _commit(
         self,
         window: Window,
-        held: list[_TrackedFrame],
+        held: list[TrackedFrame],
         label: Labels,
         blobs: list[Blobs],
         decision: WindowAssignment,

@@ -34,7 +34,8 @@ from stseg.io.recording.recording import Recording
 from stseg.model.blobs import UNASSIGNED
 from stseg.segmentation.labelling import WindowLabels
 from stseg.trackers import TRACKERS
-from stseg.trackers.cut import CutTracker, _TrackedFrame
+from stseg.trackers.cut import CutTracker
+from stseg.trackers.window_existence import TrackedFrame
 from stseg.tracking.windows import Window
 
 METHODS = ("threshold", "frames", "two labels", "cut")
@@ -45,7 +46,7 @@ _SCORES = ("MODA", "precision", "recall", "IDF1", "IDSW", "Frag", "false_tracks"
 class TwoLabels(CutTracker):
     """The cut without the expansion."""
 
-    def _divide(self, window: Window, held: list[_TrackedFrame], energy: Energy, occupied: Flags) -> WindowLabels:
+    def _divide(self, window: Window, held: list[TrackedFrame], energy: Energy, occupied: Flags) -> WindowLabels:
         del window, energy
         label = np.zeros(occupied.shape, np.int32)
         for cells, own, tracked in zip(occupied, label, held, strict=True):

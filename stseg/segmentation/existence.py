@@ -1,0 +1,196 @@
+"""Existence of people over a window: which candidates of its frames are real, decided together.
+
+Candidates are all places that the detector weighed, found and rejected ones, with their evidence in nats. One binary
+variable x_i for each; a link i -> j says that candidate j of a later frame is the same body as candidate i.
+
+    -E(x) = sum_i g_i x_i + sum_links b_ij x_i x_j - sum_exclusions K x_i x_j
+    g_i   = view evidence + prior log-odds + height prior - birth cost - death cost
+    b_ij  = birth cost_j + death cost_i + log [ N(m_j - m_i; 0, S_ij) / (prior odds / s^2) ] + height ratio - absence
+
+Without links a candidate pays for its birth and its death; a link saves both, and adds how much likelier j's place is
+as the continuation of i than as a place of anybody. Birth and death cost nothing at the border of the scene and at the
+ends of the window. Links form paths: each candidate has at most one predecessor and one successor, by a minimum-cost
+flow that ignores exclusions (Zhang, Li and Nevatia, CVPR 2008). Candidates of one frame that are closer than the reach
+of a body exclude each other, since their evidence is the same. Links are submodular, exclusions are not: roof duality.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import min_weight_full_bipartite_matching
+
+from stseg.arrays import Flags, Floats, Ints
+from stseg.config import BodyConfig, DetectionConfig, MotionConfig
+from stseg.graphcut.energy import QUANTUM
+from stseg.graphcut.qpbo import QuadraticEnergy, QuadraticMinimum, minimise
+from stseg.model.border import Border
+
+_RESOLUTION = 0.1
+"""s: standard deviation of the place of a detection, to which the prior log-odds refer, metres."""
+_ABSENCE = 4.0
+"""Cost of a frame without a candidate inside a path, nats per second."""
+_GATE = 13.8
+"""Squared Mahalanobis distance of a link that one step in a thousand exceeds."""
+_OUT_OF_SHAPE = -4.0
+"""Least log-ratio of two heights, nats: people stoop and sit."""
+_EXCLUDED = 1e4
+"""K: repulsion of candidates that exclude each other, nats."""
+
+
+@dataclass(frozen=True)
+class WindowCandidates:
+    """Candidates of all frames of a window, by rising frame.
+
+    Attributes
+    ----------
+    frame : int64 (n,)
+        From the window's first.
+    ground, covariance : float64 (n, 2), (n, 2, 2)
+        Metres, square metres.
+    height : float64 (n,)
+        Metres.
+    evidence : float64 (n,)
+        Evidence of the views alone, given the detector's people of the frame, nats.
+    track : int64 (n,)
+        Track that the detector gave each person; 0 for rejected candidates.
+    """
+
+    frame: Ints
+    ground: Floats
+    covariance: Floats
+    height: Floats
+    evidence: Floats
+    track: Ints
+
+    def __len__(self) -> int:
+        return len(self.frame)
+
+
+@dataclass(frozen=True)
+class Existence:
+    """Decision over a window.
+
+    Attributes
+    ----------
+    real : bool (n,)
+        Candidates that are people.
+    successor : int64 (n,)
+        Link of each candidate, -1 for none.
+    gap
+        Bound on the distance from the least energy, given the links, nats.
+    """
+
+    real: Flags
+    successor: Ints
+    gap: float
+
+
+@dataclass(frozen=True)
+class ExistenceModel:
+    """Terms of the energy for one scene.
+
+    Attributes
+    ----------
+    frame_rate
+        Frames per second.
+    reach
+        Distance below which candidates of one frame exclude each other, metres.
+    patience
+        Longest absence inside a path, seconds.
+    """
+
+    frame_rate: float
+    reach: float
+    patience: float
+    border: Border
+    detection: DetectionConfig
+    motion: MotionConfig
+    body: BodyConfig
+
+    def decide(self, found: WindowCandidates, cut: Callable[..., Flags]) -> Existence:
+        """Candidates that are real, and the links between them."""
+        n = len(found)
+        if not n:
+            return Existence(np.zeros(0, bool), np.zeros(0, np.int64), 0.0)
+        gain, birth, death = self._gains(found)
+        start, end, bonus = self._links(found, birth, death)
+        successor = _paths(gain, start, end, bonus)
+        chosen = successor[start] == end
+        one, other = self._exclusions(found)
+        energy = QuadraticEnergy(
+            _quanta(-gain),
+            np.concatenate([start[chosen], one]),
+            np.concatenate([end[chosen], other]),
+            np.concatenate([_quanta(-bonus[chosen]), np.full(len(one), round(_EXCLUDED / QUANTUM), np.int64)]),
+        )
+        least: QuadraticMinimum = minimise(energy, cut)
+        return Existence(least.labels, successor, least.gap * QUANTUM)
+
+    def _gains(self, found: WindowCandidates) -> tuple[Floats, Floats, Floats]:
+        """g, and in it the costs of birth and death, nats, float64 (n,) each."""
+        inside = self.detection.birth_cost * self.border.inside(found.ground, self.detection.border_width)
+        birth = np.where(found.frame == 0, 0.0, inside)
+        death = np.where(found.frame == found.frame.max(), 0.0, inside)
+        tall = -0.5 * ((found.height - self.body.height_mean) / self.body.height_spread) ** 2
+        return found.evidence + self.detection.prior_log_odds + tall - birth - death, birth, death
+
+    def _links(self, found: WindowCandidates, birth: Floats, death: Floats) -> tuple[Ints, Ints, Floats]:
+        """Possible links and b; those that gain nothing are left out."""
+        span = max(1, round(self.patience * self.frame_rate))
+        steps = found.frame[None] - found.frame[:, None]
+        start, end = np.nonzero((steps > 0) & (steps <= span))
+        seconds = steps[start, end] / self.frame_rate
+        off = found.ground[end] - found.ground[start]
+        noise = 2 * self.motion.position_noise**2 + (self.motion.speed_spread * seconds) ** 2
+        spread = found.covariance[start] + found.covariance[end] + noise[:, None, None] * np.eye(2)
+        square = np.einsum("ei,eij,ej->e", off, np.linalg.inv(spread), off)
+        place = np.log(_RESOLUTION**2 / np.sqrt(np.linalg.det(spread))) - 0.5 * square
+        absence = _ABSENCE * (seconds - 1 / self.frame_rate)
+        bonus = place - self.detection.prior_log_odds + self._height_ratio(found, start, end) - absence
+        bonus = bonus + birth[end] + death[start]
+        kept = (bonus > 0) & (square < _GATE)
+        return start[kept], end[kept], bonus[kept]
+
+    def _height_ratio(self, found: WindowCandidates, start: Ints, end: Ints) -> Floats:
+        """Log-ratio of a height as the continuation of another against the population, nats."""
+        spread, error = self.body.height_spread, self.body.height_spread / 2
+        off = found.height[end] - found.height[start]
+        own = found.height[end] - self.body.height_mean
+        return np.maximum(np.log(spread / error) - 0.5 * (off / error) ** 2 + 0.5 * (own / spread) ** 2, _OUT_OF_SHAPE)
+
+    def _exclusions(self, found: WindowCandidates) -> tuple[Ints, Ints]:
+        """Pairs of one frame that share their evidence; two people of the detector do not."""
+        together = found.frame[:, None] == found.frame
+        away = np.hypot(*np.moveaxis(found.ground[:, None] - found.ground, -1, 0))
+        kept = (found.track > 0)[:, None] & (found.track > 0)
+        return np.nonzero(np.triu(together & (away < self.reach) & ~kept, 1))
+
+
+def _quanta(nats: Floats) -> Ints:
+    return np.rint(nats / QUANTUM).astype(np.int64)
+
+
+def _paths(gain: Floats, start: Ints, end: Ints, bonus: Floats) -> Ints:
+    """Successor of each candidate on the paths of greatest total gain, -1 for none, int64 (n,).
+
+    A bipartite matching: rows are the ends of candidates, columns their beginnings. A candidate that is unused is
+    matched to itself; one that is used is matched to its successor, or to an end of its own.
+    """
+    n = len(gain)
+    each = np.arange(n)
+    # Rows: n candidates as predecessors, n births. Columns: n candidates as successors, n deaths.
+    rows = np.concatenate([each, start, each, n + each, n + end])
+    columns = np.concatenate([each, end, n + each, each, n + start])
+    cost = np.concatenate([np.zeros(n), -gain[end] - bonus, np.zeros(n), -gain, np.zeros(len(start))])
+    free_rows, free_columns = n + each, n + each
+    rows, columns = np.concatenate([rows, free_rows]), np.concatenate([columns, free_columns])
+    cost = np.concatenate([cost, np.zeros(n)])
+    lift = 1.0 - cost.min()  # explicit zeros are no edges; every perfect matching has as many
+    table = coo_array((cost + lift, (rows, columns)), shape=(2 * n, 2 * n)).tocsr()
+    _, partner = min_weight_full_bipartite_matching(table)
+    successor = partner[:n].astype(np.int64)
+    return np.where((successor < n) & (successor != each), successor, -1)

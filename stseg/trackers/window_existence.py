@@ -1,0 +1,143 @@
+"""Detections of a window revised by what the whole window shows: a decision of existence put back into its frames."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.special import logit
+
+from stseg.arrays import Floats, Ints, Singles
+from stseg.config import Config
+from stseg.geometry import Rig
+from stseg.geometry.nearest_person import nearest_person
+from stseg.graphcut.solvers import Solver
+from stseg.model.border import Border
+from stseg.model.people import People
+from stseg.segmentation.existence import Existence, ExistenceModel, WindowCandidates
+from stseg.trackers.protocol import FusedFrame
+from stseg.tracking.prediction import DetectionHistory
+
+_OCCUPIED = 1.0
+"""Least log-odds of the cells inside a body that the window holds to be real, nats."""
+
+
+@dataclass(frozen=True)
+class TrackedFrame:
+    """A frame and the filter track of each detection, int64 (n,)."""
+
+    fused: FusedFrame
+    tracks: Ints
+
+    def detections(self) -> DetectionHistory:
+        """Its detections."""
+        people, frame = self.fused.people, np.full(len(self.tracks), self.fused.frame)
+        return DetectionHistory(frame, self.tracks, people.ground, people.covariance, people.height)
+
+
+class WindowExistence:
+    """Revision of the frames of a window.
+
+    Parameters
+    ----------
+    rig, config
+        The scene, and the constants of all stages.
+    solver
+        Of the minimum cuts.
+    """
+
+    def __init__(self, rig: Rig, config: Config, solver: Solver) -> None:
+        self.grid, self.solver = rig.grid, solver
+        self.radius, self.width = config.occupancy.person_radius, config.body.width_mean
+        self.prior = -float(logit(config.occupancy.occupied_share))
+        self.model = ExistenceModel(
+            rig.frame_rate, self.radius, config.tracking.interpolation_gap, Border.of(rig), config.detection,
+            config.motion, config.body,
+        )  # fmt: skip
+
+    def revised(self, frames: Sequence[TrackedFrame]) -> list[TrackedFrame]:
+        """The frames with the people that the window holds to be real."""
+        found = _candidates(frames)
+        decision = self.model.decide(found, self.solver.sparse)
+        tracks = _tracks(found, decision)
+        bounds = np.searchsorted(found.frame, np.arange(len(frames) + 1))
+        return [
+            self._frame(one, tracks[first:stop]) for one, first, stop in zip(frames, bounds, bounds[1:], strict=False)
+        ]
+
+    def _frame(self, one: TrackedFrame, tracks: Ints) -> TrackedFrame:
+        """One frame with the candidates that have a track as people, the others as ghosts."""
+        fused, number = one.fused, len(one.tracks)
+        real = tracks > 0
+        if real[:number].all() and not real[number:].any():
+            return one
+        every = _joined(fused.people, fused.ghosts)
+        people, ghosts = _at(every, np.flatnonzero(real)), _at(every, np.flatnonzero(~real))
+        log_odds = self._volume(fused, people, _at(every, number + np.flatnonzero(real[number:])))
+        return TrackedFrame(replace(fused, people=people, ghosts=ghosts, log_odds=log_odds), tracks[real])
+
+    def _volume(self, fused: FusedFrame, people: People, added: People) -> Singles:
+        """Log-odds with the prior of the revised people, and at least the odds of a body inside those added."""
+        ground = self.grid.ground
+        before = nearest_person(ground, fused.people.ground, self.radius) >= 0
+        now = nearest_person(ground, people.ground, self.radius) >= 0
+        log_odds = fused.log_odds + (self.prior * (now.astype(np.float32) - before)).astype(np.float32)
+        body = nearest_person(ground, added.ground, self.width / 2)
+        tall = np.append(added.height, -1.0)[body] >= self.grid.heights[:, None, None]
+        return np.where(tall & (body >= 0), np.fmax(log_odds, np.float32(_OCCUPIED)), log_odds)
+
+
+def _candidates(frames: Sequence[TrackedFrame]) -> WindowCandidates:
+    every = [_joined(one.fused.people, one.fused.ghosts) for one in frames]
+    tracks = [np.append(one.tracks, np.zeros(len(one.fused.ghosts), np.int64)) for one in frames]
+    frame = np.repeat(np.arange(len(frames)), [len(one) for one in every])
+
+    def joined(name: str) -> Floats:
+        return np.concatenate([getattr(one, name) for one in every])
+
+    evidence = joined("evidence") - joined("prior")
+    return WindowCandidates(
+        frame, joined("ground"), joined("covariance"), joined("height"), evidence, np.concatenate(tracks)
+    )
+
+
+def _tracks(found: WindowCandidates, decision: Existence) -> Ints:
+    """Track of each candidate that is real, 0 for the others: added ones take the track nearest along their path.
+
+    A path without any of the detector's people has no track: its candidates are the best of many places that were
+    tried, and so are their sums.
+    """
+    tracks = np.where(decision.real, found.track, 0)
+    linked = np.flatnonzero((decision.successor >= 0) & decision.real)
+    linked = linked[decision.real[decision.successor[linked]]]
+    for i in linked[::-1].tolist():
+        _take_over(tracks, i, int(decision.successor[i]), found)
+    for i in linked.tolist():
+        _take_over(tracks, int(decision.successor[i]), i, found)
+    return tracks
+
+
+def _take_over(tracks: Ints, to: int, source: int, found: WindowCandidates) -> None:
+    """Give a candidate the track of its neighbour on the path, unless another has it in that frame."""
+    if tracks[to] == 0 and tracks[source] > 0 and not (tracks[found.frame == found.frame[to]] == tracks[source]).any():
+        tracks[to] = tracks[source]
+
+
+def _joined(one: People, other: People) -> People:
+    def both(name: str, axis: int = 0) -> Floats:
+        return np.concatenate([getattr(one, name), getattr(other, name)], axis)
+
+    return People(
+        both("ground"), both("height"), both("width"), both("covariance"), both("evidence"),
+        both("view_evidence", 1), both("visibility", 1), both("prior"), both("track_index").astype(np.int64),
+        one.sizes.joined_with(other.sizes),
+    )  # fmt: skip
+
+
+def _at(people: People, chosen: Ints) -> People:
+    return People(
+        people.ground[chosen], people.height[chosen], people.width[chosen], people.covariance[chosen],
+        people.evidence[chosen], people.view_evidence[:, chosen], people.visibility[:, chosen], people.prior[chosen],
+        people.track_index[chosen], people.sizes.at(chosen),
+    )  # fmt: skip
