@@ -1,0 +1,106 @@
+"""Existence over a window: gaps are bridged, ghosts that never continue go, one body is one candidate."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scenes import room
+
+from stseg.arrays import Floats, Ints
+from stseg.config import Config
+from stseg.graphcut.sparse import sparse_cut
+from stseg.model.border import Border
+from stseg.segmentation.existence import Existence, ExistenceModel, WindowCandidates, _paths
+
+CONFIG = Config()
+RIG = room()
+MODEL = ExistenceModel(RIG.frame_rate, 0.4, 1.0, Border.of(RIG), CONFIG.detection, CONFIG.motion, CONFIG.body)
+WALK = np.column_stack([np.linspace(-0.6, 0.6, 9), np.zeros(9)])
+
+
+def candidates(*rows: tuple[int, float, float, float, int]) -> WindowCandidates:
+    """Rows of frame, x, y, evidence of the views, track."""
+    table = np.array(sorted(rows))
+    n = len(table)
+    covariance = np.tile(np.eye(2) * 0.05**2, (n, 1, 1))
+    frame, track = table[:, 0].astype(np.int64), table[:, 4].astype(np.int64)
+    return WindowCandidates(frame, table[:, 1:3], covariance, np.full(n, 1.7), table[:, 3], track)
+
+
+def decide(found: WindowCandidates) -> Existence:
+    return MODEL.decide(found, sparse_cut)
+
+
+def walk(evidence: Floats, track: int = 1, off: float = 0.0) -> list[tuple[int, float, float, float, int]]:
+    """A person who crosses the room, with the evidence of each frame; rejected where it is below 5 nats."""
+    return [(t, x, y + off, e, track * (e > 5)) for t, ((x, y), e) in enumerate(zip(WALK, evidence, strict=True))]
+
+
+def test_a_person_seen_badly_for_five_frames_stays() -> None:
+    evidence = np.array([12.0, 12.0, 1.0, 0.5, 0.2, 0.5, 1.0, 12.0, 12.0])
+    assert decide(candidates(*walk(evidence))).real.all()
+
+
+def test_strong_evidence_against_a_person_ends_them() -> None:
+    evidence = np.array([12.0, 12.0, 12.0, -15.0, -15.0, -15.0, -15.0, -15.0, -15.0])
+    assert decide(candidates(*walk(evidence))).real.tolist() == [True] * 3 + [False] * 6
+
+
+def test_a_ghost_that_never_continues_goes() -> None:
+    found = candidates(*walk(np.full(9, 12.0)), (4, 1.2, 1.2, 7.0, 2))
+    real = decide(found).real
+    assert not real[found.track == 2].any()
+    assert real[found.track == 1].all()
+
+
+def test_at_the_border_one_frame_may_be_enough() -> None:
+    x, y = RIG.grid.x[0] + 0.05, RIG.grid.y[0] + 0.05
+    assert decide(candidates(*walk(np.full(9, 12.0)), (4, x, y, 7.0, 2))).real.all()
+
+
+def test_two_candidates_of_one_body_exclude_each_other() -> None:
+    weak = np.array([12.0, 12.0, 3.0, 3.0, 3.0, 3.0, 3.0, 12.0, 12.0])
+    double = [(t, x, 0.2, 2.0, 0) for t, (x, _) in enumerate(WALK) if 2 <= t <= 6]
+    found = candidates(*walk(weak), *double)
+    decision = decide(found)
+    assert np.bincount(found.frame[decision.real]).tolist() == [1] * 9
+    assert (found.ground[decision.real, 1] == 0).all()
+    assert decision.gap == 0
+
+
+def test_no_candidates() -> None:
+    none = np.zeros(0)
+    empty = WindowCandidates(
+        np.zeros(0, np.int64), np.zeros((0, 2)), np.zeros((0, 2, 2)), none, none, np.zeros(0, np.int64)
+    )
+    assert len(decide(empty).real) == 0
+
+
+def best_paths(gain: Floats, start: Ints, end: Ints, bonus: Floats) -> float:
+    """Greatest total over all sets of links that form paths, by trying all."""
+    best = 0.0
+    for chosen in range(1 << len(start)):
+        links = [k for k in range(len(start)) if chosen >> k & 1]
+        if len({start[k] for k in links}) < len(links) or len({end[k] for k in links}) < len(links):
+            continue
+        joined = {*start[links].tolist(), *end[links].tolist()}
+        alone = sum(max(g, 0.0) for i, g in enumerate(gain.tolist()) if i not in joined)
+        best = max(best, alone + sum(gain[i] for i in joined) + float(bonus[links].sum()))
+    return best
+
+
+@settings(deadline=None, max_examples=40)
+@given(st.integers(0, 9999))
+def test_paths_are_those_of_greatest_gain(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    gain = rng.uniform(-4, 2, 6)
+    pairs = np.array([(i, j) for i in range(6) for j in range(i + 1, 6) if rng.random() < 0.5]).reshape(-1, 2)
+    start, end = pairs.astype(np.int64).T
+    bonus = rng.uniform(0, 4, len(start))
+    successor = _paths(gain, start, end, bonus)
+    chosen = successor[start] == end
+    joined = np.unique(np.concatenate([start[chosen], end[chosen]]))
+    alone = np.setdiff1d(np.arange(6), joined)
+    total = gain[joined].sum() + bonus[chosen].sum() + gain[alone].clip(0).sum()
+    np.testing.assert_allclose(total, best_paths(gain, start, end, bonus), atol=1e-9)
