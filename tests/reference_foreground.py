@@ -14,6 +14,20 @@ from stseg.config import BackgroundConfig, ChromaticConfig, CodebookConfig, Mixt
 UNIFORM = 256.0**-3
 
 
+def planes_of(mean: Singles, variance: Singles, weight: Singles) -> Singles:
+    """State float32 (v, mode, plane, u) from means (v, u, mode, 3), variances (v, u, mode, ...) and weights."""
+    spread = variance.reshape(*weight.shape, -1)
+    planes = np.concatenate([mean, spread, weight[..., None]], -1)
+    return np.ascontiguousarray(planes.transpose(0, 2, 3, 1), np.float32)
+
+
+def modes_of(planes: Singles) -> tuple[Singles, Singles, Singles]:
+    """Means, variances and weights of a state, as in `planes_of`."""
+    modes = planes.transpose(0, 3, 1, 2)
+    variance = modes[..., 3:-1] if modes.shape[-1] > 5 else modes[..., 3]
+    return modes[..., :3], variance, modes[..., -1]
+
+
 def mode_densities(x: Floats, mu: Floats, var: float, darkest: float) -> tuple[float, float]:
     """N(x; mu, var I) and D(x; mu, var) of `stseg.foreground.mixture`."""
     lit = math.exp(-((x - mu) @ (x - mu)) / (2 * var)) / (2 * math.pi * var) ** 1.5

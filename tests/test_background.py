@@ -17,7 +17,7 @@ from stseg.accelerate import python_form
 from stseg.arrays import Bytes, Singles
 from stseg.config import ChromaticConfig, CodebookConfig, ForegroundConfig, MixtureConfig
 from stseg.errors import ConfigError, SourceError
-from stseg.foreground import Chromatic, Codebook, Mixture, chromatic_kernels, codebook_kernels, make_background
+from stseg.foreground import Chromatic, Codebook, Mixture, codebook_kernels, gaussian_kernels, make_background
 from stseg.foreground.background import Background, PixelModel
 from stseg.foreground.registry import MODELS as MODELS_BY_NAME
 
@@ -295,18 +295,11 @@ def test_the_chromatic_log_odds_are_their_formula(seed: int, modes: int) -> None
     rng = np.random.default_rng(seed)
     state, config = random_modes(rng, modes), ChromaticConfig()
     image, gain = near_modes(rng, state[0]), rng.uniform(0.8, 1.25, 3)
-    priors = (
-        config.background_weight,
-        config.foreground_prior,
-        config.outlier_rate,
-        config.shadow_prior,
-        config.darkest_shadow,
-        config.shadow_confusion,
-    )
     expected = reference.chromatic_log_odds(image, gain, *state, config)
     log_odds = np.empty(image.shape[:2], np.float32)
-    for function in (chromatic_kernels.evaluate, python_form(chromatic_kernels.evaluate)):
-        function(image, gain, *state, *priors, log_odds)
+    for function in (gaussian_kernels.evaluate, python_form(gaussian_kernels.evaluate)):
+        priors = gaussian_kernels.Priors.of(config)
+        function(image, gain.astype(np.float32), reference.planes_of(*state), priors, log_odds)
         np.testing.assert_allclose(log_odds, expected, atol=2e-3)
 
 
@@ -318,14 +311,12 @@ def test_the_chromatic_modes_learn_by_their_rules(seed: int, modes: int) -> None
     image, gain = near_modes(rng, state[0]), rng.uniform(0.8, 1.25, 3).astype(np.float32)
     likelihood = rng.uniform(0, 1, image.shape[:2]).astype(np.float32)
     expected = reference.chromatic_updated(image, gain.astype(float), likelihood, 0.05, 0.001, state, config)
-    for function in (chromatic_kernels.update, python_form(chromatic_kernels.update)):
-        found = state[0].copy(), state[1].copy(), state[2].copy()
-        function(
-            image, gain, likelihood, np.float32(0.05), np.float32(0.001), np.float32(config.background_weight),
-            np.float32(config.match_distance), np.float32(config.chromatic_sd), np.float32(config.minimum_sd),
-            np.float32(config.initial_sd), *found,
-        )  # fmt: skip
-        for one, other in zip(found, expected, strict=True):
+    numbers = config.background_weight, config.match_distance, config.initial_sd, config.chromatic_sd, config.minimum_sd
+    constants = gaussian_kernels.Adaptation(*(np.float32(number) for number in numbers))
+    for function in (gaussian_kernels.update, python_form(gaussian_kernels.update)):
+        found = reference.planes_of(*state)
+        function(image, gain, likelihood, np.float32(0.05), np.float32(0.001), constants, 0, 1, found)
+        for one, other in zip(reference.modes_of(found), expected, strict=True):
             np.testing.assert_allclose(one, other, rtol=1e-3, atol=1e-3)
 
 

@@ -20,7 +20,7 @@ from stseg.arrays import Boxes, Bytes, Floats, Singles
 from stseg.errors import InputError, SourceError, StsegError
 from stseg.foreground import Mixture, MixtureConfig, box_likelihood, instance_boxes, mask_likelihood
 from stseg.foreground.channel_gain import channel_gains
-from stseg.foreground.mixture_kernels import evaluate, update
+from stseg.foreground.gaussian_kernels import Adaptation, Priors, evaluate, put_strongest_first, update
 from stseg.foreground.smoothing import pool_log_odds
 from stseg.foreground.temporal_mode import commonest_colours
 from stseg.model.box_likelihood import body
@@ -121,19 +121,18 @@ def test_learning_gives_every_empty_frame_the_same_weight() -> None:
     model = Mixture(SIZE, 10.0)
     for frame in frames:
         model.learn(frame)
-    state = model._arrays
-    np.testing.assert_allclose(state["mean"][:, :, 0], np.mean(frames, axis=0), atol=0.5)
-    np.testing.assert_allclose(state["weight"][:, :, 0], 1, atol=1e-5)
-    assert (state["variance"][:, :, 0] >= MixtureConfig().minimum_sd ** 2).all()
+    mean, variance, weight = reference.modes_of(model.modes)
+    np.testing.assert_allclose(mean[:, :, 0], np.mean(frames, axis=0), atol=0.5)
+    np.testing.assert_allclose(weight[:, :, 0], 1, atol=1e-5)
+    assert (variance[:, :, 0] >= MixtureConfig().minimum_sd ** 2).all()
 
 
 def test_a_shadow_teaches_nothing() -> None:
     model = taught()
-    before = deepcopy(model._arrays)
+    before = model.modes.copy()
     for _ in range(20):
         model.likelihood(with_person(room(), (77, 98, 42)))
-    np.testing.assert_array_equal(model._arrays["mean"][6, 6], before["mean"][6, 6])
-    np.testing.assert_array_equal(model._arrays["weight"][6, 6], before["weight"][6, 6])
+    np.testing.assert_array_equal(model.modes[6, ..., 6], before[6, ..., 6])
 
 
 def test_people_take_no_mode_from_the_background() -> None:
@@ -157,12 +156,12 @@ def test_light_that_changes_at_once_or_slowly_is_a_gain() -> None:
 
 def test_the_gain_holds_where_people_cover_more_than_half() -> None:
     rng = np.random.default_rng(6)
-    background = rng.integers(50, 150, (40, 40, 1, 3)).astype(np.float32)
-    image = np.round(background[:, :, 0] * 1.3).astype(np.uint8)
+    background = rng.integers(50, 150, (40, 40, 3)).astype(np.float32)
+    image = np.round(background * 1.3).astype(np.uint8)
     image[:24] = rng.integers(0, 256, (24, 40, 3))
-    gains = channel_gains(image, background, np.ones((40, 40, 1), np.float32))
+    gains = channel_gains(image, background)
     np.testing.assert_allclose(gains, 1.3, rtol=0.01)
-    dark = channel_gains(np.zeros_like(image), background, np.ones((40, 40, 1), np.float32))
+    dark = channel_gains(np.zeros_like(image), background)
     np.testing.assert_array_equal(dark, 1)
 
 
@@ -190,17 +189,10 @@ def test_evaluate_is_its_formula(seed: int, modes: int) -> None:
     mean, variance, weight = random_modes(rng, modes)
     image, gain, config = near_modes(rng, mean), rng.uniform(0.8, 1.25, 3), MixtureConfig()
     log_odds = np.empty(image.shape[:2], np.float32)
-    arguments = (
-        config.background_weight,
-        config.foreground_prior,
-        config.outlier_rate,
-        config.shadow_prior,
-        config.darkest_shadow,
-        config.shadow_confusion,
-    )
     expected = reference.log_odds(image, gain, mean, variance, weight, config)
     for function in (evaluate, python_form(evaluate)):
-        function(image, gain, mean, variance, weight, *arguments, log_odds)
+        state = reference.planes_of(mean, variance, weight)
+        function(image, gain.astype(np.float32), state, Priors.of(config), log_odds)
         np.testing.assert_allclose(log_odds, expected, atol=2e-3)
 
 
@@ -213,22 +205,39 @@ def test_update_is_its_rules(seed: int, modes: int) -> None:
     gain = rng.uniform(0.8, 1.25, 3).astype(np.float32)
     likelihood = rng.uniform(0, 1, image.shape[:2]).astype(np.float32)
     expected = reference.updated(image, gain.astype(float), likelihood, 0.05, 0.001, state, config)
+    numbers = config.background_weight, config.match_distance, config.initial_sd, config.minimum_sd, config.minimum_sd
+    constants = Adaptation(*(np.float32(number) for number in numbers))
     for function in (update, python_form(update)):
-        found = state[0].copy(), state[1].copy(), state[2].copy()
-        function(
-            image, gain, likelihood, np.float32(0.05), np.float32(0.001), np.float32(config.background_weight),
-            np.float32(config.match_distance), np.float32(config.minimum_sd), np.float32(config.initial_sd), *found,
-        )  # fmt: skip
-        for one, other in zip(found, expected, strict=True):
-            np.testing.assert_allclose(one, other, rtol=1e-4, atol=1e-5)
+        found = reference.planes_of(*state)
+        function(image, gain, likelihood, np.float32(0.05), np.float32(0.001), constants, 0, 1, found)
+        for one, other in zip(reference.modes_of(found), expected, strict=True):
+            np.testing.assert_allclose(one, other, rtol=1e-4, atol=1e-4)
+
+
+def test_rows_between_the_turns_stay_as_they_are() -> None:
+    rng = np.random.default_rng(4)
+    state = reference.planes_of(*random_modes(rng, 2))
+    found, constants = state.copy(), Adaptation(*(np.float32(number) for number in (0.1, 5, 12, 4, 4)))
+    image, likelihood = rng.integers(0, 256, (3, 4, 3)).astype(np.uint8), np.zeros((3, 4), np.float32)
+    update(image, np.ones(3, np.float32), likelihood, np.float32(0.05), np.float32(0.001), constants, 1, 4, found)
+    np.testing.assert_array_equal(found[[0, 2]], state[[0, 2]])
+
+
+def test_the_strongest_mode_comes_first() -> None:
+    state = reference.planes_of(*random_modes(np.random.default_rng(3), 4))
+    for function in (put_strongest_first, python_form(put_strongest_first)):
+        found = state.copy()
+        function(0, 1, found)
+        assert (found[:, :1, -1] >= found[:, :, -1]).all()
+        np.testing.assert_array_equal(np.sort(found, axis=1), np.sort(state, axis=1))
 
 
 @settings(max_examples=20, deadline=None)
 @given(seed=st.integers(0, 10**6), radius=st.integers(0, 3))
 def test_pooling_is_a_mean_over_the_pixels_that_exist(seed: int, radius: int) -> None:
     log_odds = np.random.default_rng(seed).uniform(-5, 5, (5, 7)).astype(np.float32)
-    rows, likelihood = np.empty_like(log_odds), np.empty_like(log_odds)
-    pool_log_odds(log_odds, radius, rows, likelihood)
+    likelihood = np.empty_like(log_odds)
+    pool_log_odds(log_odds, radius, likelihood)
     np.testing.assert_allclose(likelihood, reference.pooled(log_odds.astype(float), radius), rtol=1e-5)
 
 

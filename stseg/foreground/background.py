@@ -17,10 +17,10 @@ from typing import ClassVar, Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from stseg.arrays import AnyArray, Bytes, Floats, Singles
+from stseg.arrays import Bytes, Floats, Singles
 from stseg.config import BackgroundConfig
 from stseg.errors import ConfigError, SourceError
-from stseg.foreground.channel_gain import channel_gains
+from stseg.foreground.channel_gain import STRIDE, channel_gains
 from stseg.foreground.smoothing import pool_log_odds
 
 TURNS = 4
@@ -71,10 +71,6 @@ class PixelModel(ABC):
         Frames per second at which `likelihood` is called.
     config
         Assumptions about scene and camera.
-    arrays
-        The model's state, each (v, u, K, ...) for K modes a pixel, by name and in the order in which its kernels take
-        them. `mean` float32 (v, u, K, 3), grey levels BGR in the light of learning, and `weight` float32 (v, u, K) are
-        among them: the gain and the background image come from the strongest mode.
 
     Notes
     -----
@@ -84,15 +80,12 @@ class PixelModel(ABC):
     name: ClassVar[str]
     """The model's name in messages."""
 
-    def __init__(
-        self, size: tuple[int, int], frame_rate: float, config: BackgroundConfig, arrays: dict[str, AnyArray]
-    ) -> None:
+    def __init__(self, size: tuple[int, int], frame_rate: float, config: BackgroundConfig) -> None:
         if not frame_rate > 0:
             raise ConfigError(self.name, "frame_rate", frame_rate, "frames per second, above 0")
         self._shape = (size[1], size[0], 3)
         self._turn = TURNS / frame_rate
         self._config = config
-        self._arrays = arrays
         self._frames_learned = 0
         self._frames_evaluated = 0
 
@@ -157,21 +150,24 @@ class PixelModel(ABC):
         if self._frames_learned == 0:
             raise SourceError(self.name, "", "a model that has learned nothing", "frames to learn from first")
         gain = self._gain(image)
-        log_odds, rows, likelihood = (np.empty(image.shape[:2], np.float32) for _ in range(3))
+        log_odds, likelihood = (np.empty(image.shape[:2], np.float32) for _ in range(2))
         self._evaluate(image, gain, log_odds)
-        pool_log_odds(log_odds, self._config.smoothing_radius, rows, likelihood)
-        self._update_rows(slice(self._frames_evaluated % TURNS, None, TURNS), image, gain, likelihood)
+        pool_log_odds(log_odds, self._config.smoothing_radius, likelihood)
+        self._update_rows(self._frames_evaluated % TURNS, image, gain, likelihood)
         self._frames_evaluated += 1
         return likelihood
 
     def background_image(self) -> Singles:
         """Strongest background mode of each pixel, (v, u, 3), grey levels in the light that it was learned in."""
-        strongest = self._arrays["weight"].argmax(-1)[:, :, None, None]
-        return np.asarray(np.take_along_axis(self._arrays["mean"], strongest, 2)[:, :, 0])
+        return self._background_sample(1).copy()
 
+    @abstractmethod
     def relight(self, gain: Singles) -> None:
         """Multiply all that was learned by gains float32 (v, u, 3), after a change of light."""
-        self._arrays["mean"] *= gain[:, :, None]
+
+    @abstractmethod
+    def _background_sample(self, step: int) -> Singles:
+        """Mean of the strongest mode of every step-th pixel along u and v, (v, u, 3)."""
 
     @abstractmethod
     def _start(self, frames: NDArray[np.uint8]) -> None:
@@ -186,13 +182,15 @@ class PixelModel(ABC):
         """Fill in the foreground log-odds of each pixel by itself."""
 
     @abstractmethod
-    def _update_rows(self, rows: slice, image: Bytes, gain: Floats, likelihood: Singles) -> None:
-        """Learn some rows of a frame that may show people, with foreground probability `likelihood` (v, u)."""
+    def _update_rows(self, first: int, image: Bytes, gain: Floats, likelihood: Singles) -> None:
+        """Learn every `TURNS`-th row from `first` on of a frame that may show people with `likelihood` (v, u)."""
 
     def _gain(self, image: Bytes) -> Floats:
         """The frame's channel gains relative to the model."""
         return (
-            channel_gains(image, self._arrays["mean"], self._arrays["weight"]) if self._frames_learned else np.ones(3)
+            channel_gains(image[::STRIDE, ::STRIDE], self._background_sample(STRIDE))
+            if self._frames_learned
+            else np.ones(3)
         )
 
     def _check(self, image: Bytes) -> None:

@@ -1,4 +1,4 @@
-"""Background as a mixture judged in the chromatic plane, so that shadow is removed and light may flicker (HW12).
+"""Gaussian mixture in the chromatic plane, robust to shadow and flickering light (Huang and Wang 2012).
 
 The mixture of `stseg.foreground.mixture`, with the same symbols, the same posterior and the same selective learning,
 but each mode has two variances: c of a channel across the ray through 0 and mu, which is the chromaticity, and b along
@@ -22,73 +22,19 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
-from stseg.arrays import Bytes, Floats, Singles
 from stseg.config import ChromaticConfig
-from stseg.foreground.background import PixelModel
-from stseg.foreground.chromatic_kernels import evaluate, update
-from stseg.foreground.mixture import learning_rates
-from stseg.foreground.temporal_mode import commonest_colours
+from stseg.foreground.gaussian_model import GaussianModel
 
 
-class Chromatic(PixelModel):
-    """The background of one view, and the likelihood that its pixels show people.
-
-    State: mean float32 (v, u, K, 3) grey levels BGR, variance float32 (v, u, K, [across, along]) squared grey levels,
-    weight float32 (v, u, K).
-    """
+class Chromatic(GaussianModel):
+    """Chromatic Gaussian mixture of one view."""
 
     name: ClassVar[str] = "chromatic mixture"
+    variances: ClassVar[int] = 2
 
     def __init__(self, size: tuple[int, int], frame_rate: float, config: ChromaticConfig | None = None) -> None:
-        self.config = ChromaticConfig() if config is None else config
-        shape = (size[1], size[0], self.config.modes)
-        arrays = {
-            "mean": np.zeros((*shape, 3), np.float32),
-            "variance": np.full((*shape, 2), self.config.initial_sd**2, np.float32),
-            "weight": np.zeros(shape, np.float32),
-        }
-        super().__init__(size, frame_rate, self.config, arrays)
+        self._least = (ChromaticConfig() if config is None else config).chromatic_sd
+        super().__init__(size, frame_rate, ChromaticConfig() if config is None else config)
 
-    def _start(self, frames: NDArray[np.uint8]) -> None:
-        config = self.config
-        colour, spread = commonest_colours(frames, config.match_distance * config.minimum_sd)
-        mean, variance, weight = self._arrays.values()
-        weight[:], weight[:, :, 0] = 0, 1
-        mean[:, :, 0] = colour
-        variance[:, :, 0] = np.maximum(spread, config.minimum_sd**2)[:, :, None]
-        certain, rate = np.ones(weight.shape[:2], np.float32), 1.0 / len(frames)
-        for frame in frames:  # the two variances part; what else the frames teach is forgotten
-            self._update(slice(None), frame, np.ones(3), certain, rate, rate)
-        weight[:], weight[:, :, 0] = 0, 1
-
-    def _learn_empty(self, image: Bytes, gain: Floats) -> None:
-        rate = 1.0 / (self._frames_learned + 1)
-        self._update(slice(None), image, gain, np.ones(image.shape[:2], np.float32), rate, rate)
-
-    def _evaluate(self, image: Bytes, gain: Floats, log_odds: Singles) -> None:
-        config = self.config
-        priors = (
-            config.background_weight,
-            config.foreground_prior,
-            config.outlier_rate,
-            config.shadow_prior,
-            config.darkest_shadow,
-            config.shadow_confusion,
-        )
-        mean, variance, weight = self._arrays.values()
-        evaluate(image, gain, mean, variance, weight, *priors, log_odds)
-
-    def _update_rows(self, rows: slice, image: Bytes, gain: Floats, likelihood: Singles) -> None:
-        self._update(rows, image, gain, likelihood, *learning_rates(self._turn, self.config))
-
-    def _update(self, rows: slice, image: Bytes, gain: Floats, likelihood: Singles, fast: float, slow: float) -> None:
-        config = self.config
-        update(
-            image[rows], gain.astype(np.float32), likelihood[rows], np.float32(fast), np.float32(slow),
-            np.float32(config.background_weight), np.float32(config.match_distance), np.float32(config.chromatic_sd),
-            np.float32(config.minimum_sd), np.float32(config.initial_sd),
-            *(array[rows] for array in self._arrays.values()),
-        )  # fmt: skip
+    def _least_sds(self) -> tuple[float, float]:
+        return self._least, self.config.minimum_sd

@@ -66,7 +66,17 @@ class Codebook(PixelModel):
             "weight": np.zeros(shape, np.float32),
             "access": np.zeros((*shape, 2), np.int32),
         }
-        super().__init__(size, frame_rate, self.config, arrays)
+        super().__init__(size, frame_rate, self.config)
+        self._arrays = arrays
+
+    def relight(self, gain: Singles) -> None:
+        """Multiply all that was learned by gains float32 (v, u, 3), after a change of light."""
+        self._arrays["mean"] *= gain[:, :, None]
+
+    def _background_sample(self, step: int) -> Singles:
+        mean, weight = (self._arrays[name][::step, ::step] for name in ("mean", "weight"))
+        strongest = weight.argmax(-1)[:, :, None, None]
+        return np.asarray(np.take_along_axis(mean, strongest, 2)[:, :, 0])
 
     def _start(self, frames: NDArray[np.uint8]) -> None:
         for array in self._arrays.values():
@@ -96,8 +106,8 @@ class Codebook(PixelModel):
             config.brightest_highlight, config.shadow_confusion, config.channel_sd, log_odds,
         )  # fmt: skip
 
-    def _update_rows(self, rows: slice, image: Bytes, gain: Floats, likelihood: Singles) -> None:
-        config, turn = self.config, self._turn
+    def _update_rows(self, first: int, image: Bytes, gain: Floats, likelihood: Singles) -> None:
+        config, turn, rows = self.config, self._turn, slice(first, None, TURNS)
         follow(
             image[rows], gain.astype(np.float32), likelihood[rows], self._frames_evaluated // TURNS + 1,
             np.float32(config.match_distance * config.channel_sd), np.float32(1.0 - math.exp(-turn / config.memory)),

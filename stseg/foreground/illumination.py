@@ -97,8 +97,9 @@ class IlluminationMonitor:
             The next frame.
         """
         own = self.model.likelihood(image)
-        if self._good is not None and self._share_rise(own) > _FAINT * self._config.changed_share:
-            if self._open is None and self._share_rise(own) > self._config.changed_share:
+        rise = 0.0 if self._good is None else self._share_rise(own)
+        if self._good is not None and rise > _FAINT * self._config.changed_share:
+            if self._open is None and rise > self._config.changed_share:
                 self._record_change()
                 self._open = _OpenChange(1 - self._good, self._frames)
             own = self._in_new_light(image, own, 1 - self._good if self._open is None else self._open.empty)

@@ -18,8 +18,7 @@ UNIFORM = 1.0 / 256.0**3  # density of an unknown colour, per cubed grey level
 CERTAIN = 5.0  # nats; beyond it one pixel would outvote all its neighbours
 FAR = 50.0  # half a squared Mahalanobis distance; beyond it the density is below every constant here
 _ROUNDING = 1.001  # more than single precision loses
-_SHORTEST = np.float32(1 / math.sqrt(3))  # no colour is shorter than this share of the sum of its channels
-_UNIFORM, _TWO_PI, _TINY = np.float32(UNIFORM), np.float32(2 * math.pi), np.float32(1e-6)
+_UNIFORM = np.float32(UNIFORM)
 _ZERO, _ONE, _TWO, _SIXTEENTH = np.float32(0), np.float32(1), np.float32(2), np.float32(1 / 16)
 
 
@@ -39,46 +38,6 @@ def doubt_of(foreground: float, unexplained: float, shadow: float) -> float:
     """Ratio of the densities of background and people from which on the log-odds are at their lower bound."""
     known = (1.0 - unexplained) * (1.0 - shadow)
     return _ROUNDING * foreground * math.exp(CERTAIN) / ((1.0 - foreground) * known)
-
-
-@kernel
-def surely_background(
-    d0: np.float32,
-    d1: np.float32,
-    d2: np.float32,
-    m0: np.float32,
-    m1: np.float32,
-    m2: np.float32,
-    across_variance: np.float32,
-    along_variance: np.float32,
-    weight: np.float32,
-    reach: np.float32,
-    doubt: np.float32,
-    mimicry: np.float32,
-) -> bool:
-    """Whether one Gaussian mode alone puts the log-odds at their lower bound, found without exponentials.
-
-    A sufficient condition, true of most pixels: exp(-z) >= (1 - z / 8)^8 bounds both sides.
-
-    Parameters
-    ----------
-    d0, d1, d2
-        The colour less the mode's.
-    m0, m1, m2
-        The mode's colour, grey levels.
-    across_variance, along_variance
-        Of a channel, across the ray of the mode's chromaticity and along it, squared grey levels.
-    reach
-        1 - darkest.
-    doubt
-        `doubt_of` the priors.
-    """
-    inner = d0 * m0 + d1 * m1 + d2 * m2
-    along = inner * inner / (m0 * m0 + m1 * m1 + m2 * m2 + _TINY)
-    across = d0 * d0 + d1 * d1 + d2 * d2 - along
-    area, span = _TWO_PI * across_variance, np.sqrt(_TWO_PI * along_variance)
-    line = span + reach * _SHORTEST * (m0 + m1 + m2)
-    return outshines(across / across_variance, along / along_variance, area, span, line, weight, doubt, mimicry)
 
 
 @kernel

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from stseg.accelerate import wide_kernel
 from stseg.arrays import Boxes, Observation, Singles, ViewEvidence
 from stseg.foreground.illumination import IlluminationMonitor, LightChange
 from stseg.foreground.instances import instance_boxes
@@ -72,5 +73,16 @@ def without_prior(posterior: Singles, prior: float) -> Singles:
     -------
     float32 (v, u)
     """
-    body, empty = posterior * np.float32(1 - prior), (1 - posterior) * np.float32(prior)
-    return np.asarray(body / (body + empty), np.float32)
+    likelihood = np.empty_like(posterior)
+    _divide_prior_out(posterior, np.float32(prior), likelihood)
+    return likelihood
+
+
+@wide_kernel
+def _divide_prior_out(posterior: Singles, prior: np.float32, likelihood: Singles) -> None:
+    """Fill likelihood (v, u); see `without_prior`."""
+    one = np.float32(1)
+    given, filled = posterior.reshape(-1), likelihood.reshape(-1)
+    for i in range(len(given)):
+        body, empty = given[i] * (one - prior), (one - given[i]) * prior
+        filled[i] = body / (body + empty)
