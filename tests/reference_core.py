@@ -15,7 +15,7 @@ from stseg.graphcut.energy import Energy
 from stseg.model.box_fit import GRAIN, TOLERANCE
 from stseg.model.people import Explanation
 from stseg.occupancy.fusion import ErrorRates
-from stseg.occupancy.unexplained import SHOULDER
+from stseg.occupancy.visible_cells import SHOULDER
 
 Edge = tuple[int, int, int]
 """Two cells of a flattened volume, and the capacity between them."""

@@ -20,7 +20,7 @@ from stseg.geometry import Grid
 from stseg.geometry.nearest_person import nearest_person
 from stseg.geometry.summed_area import TOP, UNSEEN, Levels
 from stseg.model.people import Explanation
-from stseg.occupancy.fusion import Accumulator, ErrorRates, log_odds_terms
+from stseg.occupancy.fusion import ErrorRates, Sums, ViewTerms, add_terms, log_odds_terms
 from stseg.occupancy.rate_calibration import (
     CLUTTER,
     MISS,
@@ -48,15 +48,15 @@ def teach(
     view: int, shown: reference.Shown, near: Ints, inside: Flags, trusted: Flags, rates: list[ErrorRates], looks: float
 ) -> tuple[Floats, Floats]:
     """What the kernel counts of one of several views of equal weight."""
-    tally = Accumulator(inside.shape)
-    sure = np.ones(inside.shape, np.float32)
-    for levels, share, rate in zip(*shown, rates, strict=True):
-        tally.add(levels, log_odds_terms(rate), 1.0, share, sure, near)
+    sums, certain = Sums.zero((len(inside), *near.shape)), np.ones(near.shape, np.float32)
+    views = [
+        ViewTerms(levels, log_odds_terms(rate), np.float32(1), share, certain)
+        for levels, share, rate in zip(*shown, rates, strict=True)
+    ]
+    for terms in views:
+        add_terms(terms, near, sums)
     errors, seen = np.full(3, np.nan), np.full(3, np.nan)
-    fill_counts(
-        shown.levels[view], log_odds_terms(rates[view]), 1.0, shown.share[view], sure, tally.weighted, tally.weights,
-        tally.count, near, inside, trusted, np.array(rates[view]), looks, PRIOR, errors, seen,
-    )  # fmt: skip
+    fill_counts(views[view], sums, near, inside, trusted, np.array(rates[view]), looks, PRIOR, errors, seen)
     return errors, seen
 
 

@@ -19,10 +19,11 @@ from stseg.detection.detector import Detector
 from stseg.geometry import Grid, Rig
 from stseg.geometry.bodies import BodyTable
 from stseg.geometry.sampling import Sampling, SamplingKind
-from stseg.geometry.summed_area import TOP
+from stseg.geometry.summed_area import TOP, UNSEEN
 from stseg.model.box_fit import TOLERANCE
 from stseg.model.people import Explanation
-from stseg.occupancy.box_planes import fill_match_of_planes, plane_likelihood
+from stseg.model.pillar_index import PillarIndex
+from stseg.occupancy.box_planes import CellsByPerson, ViewBoxes, fill_fit, fill_levels, plane_likelihood
 from stseg.occupancy.clutter import clutter, clutter_weights
 from stseg.occupancy.fusion import ErrorRates, log_odds_terms
 from stseg.occupancy.volume import Occupancy
@@ -173,26 +174,33 @@ def test_likelihood_per_plane_by_definition(seed: int) -> None:
     near = rng.integers(-1, 2, (4, 4))
     edges = np.concatenate([shaken.pixel[:, :2], shaken.pixel[:, :2] + shaken.pixel[:, 2:]], 1)
     edges = edges.clip(0, [camera.size[0] - 1, camera.size[1] - 1] * 2)
-    likelihood = np.full(grid.shape, np.nan, np.float32)
-    fill_match_of_planes(
-        bodies.astype(np.float32), tried, 0.1, 1.7, np.array([1.6, 1.8]), grid.heights, edges, TOLERANCE,
-        np.log(shaken.score), box_owner, near, 128.0, 96.0, likelihood,
-    )  # fmt: skip
-    for y, x in np.ndindex(4, 4):
+    pillars, height = bodies.reshape(-1, 4).astype(np.float32), np.array([1.7, 1.6, 1.8])
+    prior = -0.5 * ((tried - height[:, None]) / 0.1) ** 2
+    tolerance = np.tile(TOLERANCE, (len(found), 1))
+    view = ViewBoxes(edges, tolerance, np.log(shaken.score), box_owner, 128.0, 96.0)
+    fit = np.empty((3, 16), np.float32)
+    index, cells = PillarIndex.of(pillars, camera.size), CellsByPerson.of(near, 2)
+    fill_fit(index, pillars, prior[0], prior[1:], view, cells, fit)
+    rates, levels = ErrorRates(0.1, 0.2, 0.3), np.empty((4, 16), np.int16)
+    footprint = np.ones((4, 16, 4), np.int16)
+    footprint[2, 5] = 0
+    fill_levels(fit, tried, grid.heights, near.reshape(-1), footprint, rates, levels)
+    for cell, (y, x) in enumerate(np.ndindex(4, 4)):
         free = [b for b in range(len(found)) if box_owner[b] in (-1, near[y, x])]
-        expected = 1.7 if near[y, x] < 0 else (1.6, 1.8)[near[y, x]]
+        clutter_rate = rates.clutter if near[y, x] < 0 else rates.near_clutter
         for z, plane in enumerate(grid.heights):
             best = reference.plane_likelihood(
-                bodies[:, y, x].astype(np.float32), tried, plane, expected, 0.1, shaken, free, camera.size
+                bodies[:, y, x].astype(np.float32), tried, plane, height[near[y, x] + 1], 0.1, shaken, free, camera.size
             )
-            assert likelihood[z, y, x] == pytest.approx(best, rel=1e-4, abs=1e-6)
+            expected = TOP * plane_likelihood(best, rates.miss, clutter_rate) if (z, cell) != (2, 5) else UNSEEN
+            assert levels[z, cell] == pytest.approx(expected, abs=0.6)
 
 
 @pytest.mark.parametrize(("near", "clutter"), [(-1, 0.01), (0, 0.2)])
 def test_a_box_says_as_much_as_its_match_is_worth(near: int, clutter: float) -> None:
     """The terms of the rates by which L was made give back m + M (1 - m) / b, and an empty cell counts as M."""
     match, rates = np.linspace(0.05, 0.9, 18).astype(np.float32).reshape(-1, 1, 1), ErrorRates(0.15, 0.01, 0.2)
-    likelihood = plane_likelihood(match, np.full((1, 1), near), rates)
+    likelihood = np.array([plane_likelihood(float(m), rates.miss, clutter) for m in match.flat]).reshape(match.shape)
     said = log_odds_terms(rates)[near + 1, np.rint(likelihood * TOP).astype(int)]
     np.testing.assert_allclose(said, np.log(0.15 + match * 0.85 / clutter), atol=0.02)
     erring = clutter * likelihood / (clutter * likelihood + (1 - clutter) * (1 - likelihood))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from stseg.accelerate import kernel
 from stseg.arrays import Floats, Ints
 
 
@@ -21,7 +22,20 @@ def nearest_person(ground: Floats, people_ground: Floats, reach: float) -> Ints:
     -------
     int64 (...)
     """
-    if not len(people_ground):
-        return np.full(ground.shape[:-1], -1, np.int64)
-    away = np.hypot(*np.moveaxis(ground[..., None, :] - people_ground, -1, 0))
-    return np.where(away.min(-1) <= reach, away.argmin(-1), -1)
+    near = np.empty(ground.shape[:-1], np.int64)
+    _fill_nearest(np.ascontiguousarray(ground.reshape(-1, 2)), people_ground, reach, near.reshape(-1))
+    return near
+
+
+@kernel
+def _fill_nearest(ground: Floats, people_ground: Floats, reach: float, near: Ints) -> None:
+    """Fill near (place,); the square of the reach is searched first."""
+    near[:] = -1
+    for c in range(len(ground)):
+        least = np.inf
+        for j in range(len(people_ground)):
+            x, y = ground[c, 0] - people_ground[j, 0], ground[c, 1] - people_ground[j, 1]
+            if abs(x) <= reach and abs(y) <= reach:
+                away = np.hypot(x, y)
+                if away <= reach and away < least:
+                    least, near[c] = away, j

@@ -20,8 +20,10 @@ _PIXELS = np.array([2.0, 2.0, 2.0, 2.0, 8.0])
 """Quantisation of a detector's grid beside them, pixels."""
 GRAIN = _PIXELS / TOLERANCE
 """The same as pixels added to the height of which tolerances are shares: a sharper detector's grid is finer, too."""
-_FAR = 4.5
+FAR = 4.5
 """Offsets of the middle beyond this many tolerances exclude a match."""
+LEAST_HEIGHT = 8.0
+"""Shares are taken of at least this height, pixels."""
 
 
 @kernel
@@ -32,7 +34,7 @@ def half_square(body: Floats, box: Floats, tolerance: Floats, width: float, heig
     """
     middle, wide, head, feet = _offsets(body, box, width, height)
     middle /= tolerance[MIDDLE]
-    if not abs(middle) <= _FAR:
+    if not abs(middle) <= FAR:
         return np.inf
     wide /= tolerance[WIDE]
     head /= tolerance[HEAD]
@@ -56,7 +58,7 @@ def _offsets(body: Floats, box: Floats, width: float, height: float) -> tuple[fl
     top, bottom = min(max(body[1], 0.0), height - 1.0), min(max(body[3], 0.0), height - 1.0)
     if right <= left or bottom <= top:
         return np.nan, np.nan, np.nan, np.nan
-    tall = max(body[3] - body[1], 8.0)
+    tall = max(body[3] - body[1], LEAST_HEIGHT)
     return (
         ((left + right) - (box[0] + box[2])) / 2.0 / (tall + GRAIN[MIDDLE]),
         ((right - left) - (box[2] - box[0])) / (tall + GRAIN[WIDE]),

@@ -1,10 +1,10 @@
-"""Likelihood per plane from boxes: each box knows its head and its feet (METHODS 3 'Instances').
+"""Likelihood per plane from boxes: each box has a head and feet (docs/how-it-works.md, Fusion).
 
     M(X, Z) = max over boxes b and heights h >= Z of N(h) / N(mean) exp(match(b, pillar(X, h)))
 
-is how well the best box fits a body there. A cell is spoken for by the box of the person near it and by boxes that
-nobody explains. The body is either missed, or shown by a box that fits that well, where there is clutter anyhow: odds
-of r = m + M (1 - m) / b. L(X, Z) is the likelihood that says as much in METHODS 4's log-odds,
+is how well the best box fits a body there. For a cell count the box of the person near it, and unassigned boxes. The
+body is either missed, or shown by a box that fits that well where clutter is likely anyhow: odds of
+r = m + M (1 - m) / b. L(X, Z) is the likelihood that gives the same in the log-odds of `stseg.occupancy.fusion`,
 
     ((1 - m) L + m (1 - L)) / (b L + (1 - b) (1 - L)) = r,
 
@@ -14,89 +14,146 @@ step of `stseg.occupancy.rate_calibration`), so b and b' become the means of M, 
 
 from __future__ import annotations
 
+from typing import NamedTuple, Self
+
 import numpy as np
 
 from stseg.accelerate import kernel
 from stseg.arrays import Floats, Ints, Singles
-from stseg.model.box_fit import half_square
+from stseg.geometry.sampling import Footprints
+from stseg.geometry.summed_area import TOP, UNSEEN, Levels
+from stseg.model.box_fit import FAR, half_square
+from stseg.model.pillar_index import PillarIndex, run_of
 from stseg.occupancy.fusion import ErrorRates
 
 
-def plane_likelihood(match: Singles, near: Ints, rates: ErrorRates) -> Singles:
-    """L of each cell, float32 (plane, y, x), 0..1.
+class ViewBoxes(NamedTuple):
+    """Boxes of one view.
 
-    Parameters
+    Attributes
     ----------
-    match : float32 (plane, y, x)
-        M.
-    near : int64 (y, x)
-        The person near each cell, -1 for nobody: their surroundings have a clutter of their own.
-    rates
-        m, b and b' by which the view is fused.
+    edges : float64 (box, 4)
+        left, top, right, bottom, pixels, within the image.
+    tolerance : float64 (box, 5), belief : float64 (box,)
+        See `stseg.model.box_noise`.
+    person : int64 (box,)
+        The person to whom each box is assigned, -1 for none.
+    width, height
+        Size of the image, pixels.
     """
-    miss, clutter = rates.miss, np.where(near >= 0, rates.near_clutter, rates.clutter)
-    ratio = miss + match * (1 - miss) / clutter
-    likelihood = (ratio * (1 - clutter) - miss) / (1 - 2 * miss + ratio * (1 - 2 * clutter))
-    return np.asarray(likelihood.clip(0.0, 1.0), np.float32)
+
+    edges: Floats
+    tolerance: Floats
+    belief: Floats
+    person: Ints
+    width: float
+    height: float
+
+
+class CellsByPerson(NamedTuple):
+    """Ground cells by the person near them.
+
+    Attributes
+    ----------
+    near : int64 (cell,)
+        The person near each cell, -1 for none.
+    cell : int64 (n,)
+        Cells near a person, in the order of persons.
+    start : int64 (person + 1,)
+        First of each person's in `cell`.
+    """
+
+    near: Ints
+    cell: Ints
+    start: Ints
+
+    @classmethod
+    def of(cls, near: Ints, people: int) -> Self:
+        """From the person near each cell, int64 (y, x), -1 for none, of so many people."""
+        flat = near.reshape(-1)
+        order = np.argsort(flat, kind="stable")
+        start = np.searchsorted(flat[order], np.arange(people + 1))
+        return cls(flat, order, start)
 
 
 @kernel
-def fill_match_of_planes(
-    bodies: Singles,
-    heights: Floats,
-    spread: float,
-    mean_height: float,
-    person_height: Floats,
-    planes: Floats,
-    boxes: Floats,
-    tolerance: Floats,
-    belief: Floats,
-    box_owner: Ints,
-    near: Ints,
-    width: float,
-    height: float,
-    match: Singles,
+def fill_fit(
+    index: PillarIndex,
+    pillars: Singles,
+    height_prior: Floats,
+    person_prior: Floats,
+    boxes: ViewBoxes,
+    cells: CellsByPerson,
+    fit: Singles,
 ) -> None:
-    """Fill match, M (plane, y, x), of one view.
+    """Fill fit (height, cell): log-likelihood of the best box that counts for each cell and height, -inf without.
 
     Parameters
     ----------
-    bodies : float32 (height, y, x, 4)
-        Box of the pillar at each cell, pixels; nan where unseen.
-    heights : float64 (height,)
-        Heights tried, metres; their standard deviation is `spread` about `mean_height`, or about the height of the
-        person near the cell: all views see that person equally tall, so it is not held against them view by view.
-    person_height : float64 (person,)
-        Metres.
-    planes : float64 (plane,)
-        Heights of the planes, metres.
-    tolerance : float64 (5,)
-        See `stseg.model.box_fit`.
-    boxes, belief, box_owner : (box, 4), (box,), (box,)
-        Edges in pixels, log-score, and the person whom each box shows, -1 for nobody.
-    near : int64 (y, x)
-        The person near each cell, -1 for nobody.
-    width, height
-        The image's size, pixels.
+    index, pillars : float32 (height * cell, 4)
+        Boxes of the pillars of each height at each cell, pixels.
+    height_prior : float64 (height,), person_prior : float64 (person, height)
+        Log-prior of the heights of cells near no person, and near each: all views see a person equally tall, so the
+        height is not held against the person view by view.
     """
-    body = np.empty(4)
-    for y in range(near.shape[0]):
-        for x in range(near.shape[1]):
-            reached = 0.0
-            expected = person_height[near[y, x]] if near[y, x] >= 0 else mean_height
-            plane = len(planes) - 1
-            for h in range(len(heights) - 1, -1, -1):
-                while plane >= 0 and planes[plane] > heights[h]:
-                    match[plane, y, x] = reached
-                    plane -= 1
-                if np.isnan(bodies[h, y, x, 0]):
-                    continue
-                body[:] = bodies[h, y, x]
-                height_prior = -0.5 * ((heights[h] - expected) / spread) ** 2
-                for b in range(len(boxes)):
-                    if box_owner[b] < 0 or box_owner[b] == near[y, x]:
-                        fit = height_prior + belief[b] - half_square(body, boxes[b], tolerance, width, height)
-                        reached = max(reached, np.exp(fit))
-            while plane >= 0:
-                match[plane, y, x] = reached
-                plane -= 1
+    ground_cells, body = fit.shape[1], np.empty(4)
+    fit[:] = -np.inf
+    for b in range(len(boxes.edges)):
+        box, tolerance, person = boxes.edges[b], boxes.tolerance[b], boxes.person[b]
+        if person >= 0:
+            for k in range(cells.start[person], cells.start[person + 1]):
+                for h in range(len(height_prior)):
+                    body[:] = pillars[h * ground_cells + cells.cell[k]]
+                    match = boxes.belief[b] - half_square(body, box, tolerance, boxes.width, boxes.height)
+                    own = np.float32(person_prior[person, h] + match)
+                    fit[h, cells.cell[k]] = max(fit[h, cells.cell[k]], own)
+            continue
+        for kind in range(len(index.tallest)):
+            first, stop = run_of(index, kind, box, tolerance, FAR)
+            for k in range(first, stop):
+                h, cell = index.order[k] // ground_cells, index.order[k] % ground_cells
+                body[:] = pillars[index.order[k]]
+                match = boxes.belief[b] - half_square(body, box, tolerance, boxes.width, boxes.height)
+                prior = height_prior[h] if cells.near[cell] < 0 else person_prior[cells.near[cell], h]
+                fit[h, cell] = max(fit[h, cell], np.float32(prior + match))
+
+
+@kernel
+def fill_levels(
+    fit: Singles, heights: Floats, planes: Floats, near: Ints, footprint: Footprints, rates: ErrorRates, levels: Levels
+) -> None:
+    """Fill levels (plane, cell) with L of each cell, UNSEEN where the view does not see it.
+
+    Parameters
+    ----------
+    fit : float32 (height, cell)
+        From `fill_fit`.
+    heights : float64 (height,), planes : float64 (plane,)
+        Metres, rising.
+    near : int64 (cell,)
+        The person near each cell, -1 for none.
+    footprint : int16 (plane, cell, 4)
+        See `stseg.geometry.sampling`.
+    """
+    for cell in range(fit.shape[1]):
+        clutter = rates.clutter if near[cell] < 0 else rates.near_clutter
+        best, h = -np.inf, len(heights) - 1
+        known = True
+        level = np.int16(0)
+        for plane in range(len(planes) - 1, -1, -1):
+            while h >= 0 and heights[h] >= planes[plane]:
+                if fit[h, cell] > best:
+                    best, known = float(fit[h, cell]), True
+                h -= 1
+            if known:
+                level = np.int16(np.rint(plane_likelihood(np.exp(best), rates.miss, clutter) * TOP))
+                known = False
+            levels[plane, cell] = level if footprint[plane, cell, 2] > 0 else UNSEEN
+
+
+@kernel
+def plane_likelihood(match: float, miss: float, clutter: float) -> float:
+    """L, 0..1, of a match M by the miss rate m and the clutter rate b of the cell."""
+    ratio = miss + match * (1.0 - miss) / clutter
+    likelihood = (ratio * (1.0 - clutter) - miss) / (1.0 - 2.0 * miss + ratio * (1.0 - 2.0 * clutter))
+    return min(max(likelihood, 0.0), 1.0)

@@ -16,7 +16,7 @@ from stseg.geometry import Rig
 from stseg.geometry.cell_means import CellMeans
 from stseg.geometry.sampling import Sampling, SamplingKind
 from stseg.occupancy.clutter import clutter, clutter_side, clutter_weights
-from stseg.occupancy.fusion import Accumulator, ErrorRates, log_odds_terms, synergy_terms
+from stseg.occupancy.fusion import ErrorRates, Sums, ViewTerms, add_terms, log_odds_terms, synergy_terms
 
 Maps = Sequence[Singles | None]
 """The likelihood map float32 (v, u) of each view, 0..1, or None where it is blind."""
@@ -39,7 +39,7 @@ class Localiser:
         self.rig, self.sampling = rig, Sampling.of(rig, sampling)
         self._means = CellMeans(self.sampling)
         self._views = self.sampling.views()
-        self._whole = np.ones(rig.grid.shape, np.float32)
+        self._whole, self._certain = np.ones(rig.grid.shape, np.float32), np.ones(rig.grid.shape[1:], np.float32)
         self._no_person = np.full(rig.grid.shape[1:], -1, np.int64)
 
     def clutter_weights(self, maps: Maps) -> Floats:
@@ -104,11 +104,13 @@ class Localiser:
 
     def _fuse(self, maps: Maps, weights: Floats, terms: Sequence[Singles], prior: float) -> Singles:
         self._require(maps)
-        tally = Accumulator(self.rig.grid.shape)
+        sums = Sums.zero(self.rig.grid.shape)
         for view, (seen, weight, term) in enumerate(zip(maps, weights, terms, strict=True)):
             if seen is not None:
-                tally.add(self._means.levels(view, seen), term, weight, self._whole, self._whole, self._no_person)
-        return tally.total(self._views, self._no_person, 1.0, (prior, prior))
+                levels = self._means.levels(view, seen)
+                own = ViewTerms(levels, term, np.float32(weight), self._whole, self._certain)
+                add_terms(own, self._no_person, sums)
+        return sums.total(self._views, self._no_person, 1.0, (prior, prior))
 
     def _require(self, maps: Maps) -> None:
         cameras = self.rig.cameras

@@ -1,9 +1,8 @@
-"""From what the views show and who explains it to the frame's volume of log-odds."""
+"""Occupancy of a frame: from the evidence of the views and its explanation to a volume of log-odds."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 from scipy.special import logit
@@ -15,31 +14,22 @@ from stseg.geometry.bodies import BodyTable
 from stseg.geometry.cell_means import CellMeans
 from stseg.geometry.nearest_person import nearest_person
 from stseg.geometry.sampling import Sampling
-from stseg.geometry.summed_area import TOP, UNSEEN, Levels
+from stseg.geometry.summed_area import UNSEEN, Levels
 from stseg.model.box_fit import TOLERANCE
 from stseg.model.box_likelihood import box_likelihood
 from stseg.model.people import Explanation
-from stseg.occupancy.box_planes import fill_match_of_planes, plane_likelihood
+from stseg.model.pillar_index import PillarIndex
+from stseg.occupancy.box_planes import CellsByPerson, ViewBoxes, fill_fit, fill_levels
 from stseg.occupancy.clutter import clutter, clutter_side, clutter_weights
-from stseg.occupancy.fusion import Accumulator, ErrorRates, log_odds_terms
+from stseg.occupancy.fusion import ErrorRates, Sums, ViewTerms, add_terms, log_odds_terms
 from stseg.occupancy.rate_calibration import RateCalibration, cells_per_person, fill_counts, inside_bodies
-from stseg.occupancy.unexplained import PixelAssignment, fill_share, leave_unexplained
+from stseg.occupancy.visible_cells import PixelAssignment, add_map, fill_occupied, fill_share
 
 _MAP_STEP = 8
-_BESIDE = 0.0
-"""Log-odds of a cell within reach of a person before any view is asked, nats."""
+_NEAR_PRIOR = 0.0
+"""Prior log-odds of a cell within reach of a person, nats."""
 _WHOLE = 0.99
-"""Share of what a view shows of an unhidden body from which on it counts as unhidden."""
-
-
-class _Said(NamedTuple):
-    """What one view gave to a frame's sums; see `stseg.occupancy.fusion.add_terms`."""
-
-    levels: Levels
-    terms: Singles
-    weight: float
-    share: Singles
-    faith: Singles
+"""Visible share of a body from which on it counts as unhidden."""
 
 
 class Occupancy:
@@ -52,37 +42,33 @@ class Occupancy:
         config: OccupancyConfig,
         detection: DetectionConfig,
         body: BodyConfig,
-        level: ErrorRateConfig | None = None,
+        rates: ErrorRateConfig | None = None,
     ) -> None:
         self.rig, self.config = rig, config
         self.sampling = Sampling.of(rig, config.sampling)
         self.views: Bytes = self.sampling.views()
-        self.means = CellMeans(self.sampling)
         self.heights = np.asarray(body.heights)
         self.height_mean, self.height_spread = body.height_mean, body.height_spread
-        flat = rig.grid.ground.reshape(-1, 2)
-        shape = (len(self.heights), *rig.grid.shape[1:], 4)
-        self.bodies = [
-            BodyTable.of(camera, rig.grid).boxes(flat, self.heights).reshape(shape).astype(np.float32)
-            if kind == "boxes"
-            else np.zeros((0, 0, 0, 4), np.float32)
-            for camera, kind in zip(rig.cameras, kinds, strict=True)
-        ]
-        self._first = [_first_rates(kind, detection) for kind in kinds]
-        self._level_config = level or ErrorRateConfig()
         self.prior = float(logit(config.occupied_share))
+        self._means = CellMeans(self.sampling)
+        self._cells = [self.sampling.seen_cells(view) for view in range(len(rig.cameras))]
+        self._pillars = [self._pillars_of(view) if kind == "boxes" else None for view, kind in enumerate(kinds)]
+        self._first_rates = [_first_rates(kind, detection) for kind in kinds]
+        self._ground = rig.grid.ground
+        self._rate_config = rates or ErrorRateConfig()
+        self._certain = np.ones(rig.grid.shape[1:], np.float32)
 
     def new_calibration(self) -> RateCalibration:
         """Error-rate calibration of a session that begins: the first guess."""
-        return RateCalibration(self._first, self.rig.frame_rate, self._level_config)
+        return RateCalibration(self._first_rates, self.rig.frame_rate, self._rate_config)
 
     def fuse(
         self, seen: Sequence[ViewEvidence], explanation: Explanation, rates: Sequence[ErrorRates] | None = None
     ) -> Singles:
         """A frame's log-odds, float32 (plane, y, x), nats; nan where no view sees the cell.
 
-        pi is one half within reach of a person whom the pass of the frame found, where only the cells are left to
-        decide, and `occupied` elsewhere.
+        The prior pi is one half within reach of a person of the explanation, where only the cells are left to decide,
+        and `occupied_share` elsewhere.
 
         Parameters
         ----------
@@ -91,121 +77,152 @@ class Occupancy:
         rates
             Error rates of each view; by default the first guess.
         """
-        rates = rates or self.new_calibration().rates
-        near = nearest_person(self.rig.grid.ground, explanation.people.ground, self.config.person_radius)
-        return self._total(self._tally(self._said(seen, explanation, near, rates), near), near)
+        near, sums = self._near(explanation), Sums.zero(self.rig.grid.shape)
+        self._add_views(seen, explanation, near, rates or self.new_calibration().rates, sums)
+        return self._total(sums, near)
 
     def fuse_and_learn(
         self, calibration: RateCalibration, seen: Sequence[ViewEvidence], explanation: Explanation
     ) -> Singles:
         """The same of a session's next frame, with which the session's error-rate calibration is then updated."""
-        near = nearest_person(self.rig.grid.ground, explanation.people.ground, self.config.person_radius)
-        said = self._said(seen, explanation, near, calibration.rates)
-        tally = self._tally(said, near)
-        total = self._total(tally, near)
-        self._learn(calibration, said, tally, explanation, near)
-        return total
+        near, sums = self._near(explanation), Sums.zero(self.rig.grid.shape)
+        views = self._add_views(seen, explanation, near, calibration.rates, sums)
+        if calibration.next_is_due():
+            self._learn(calibration, views, sums, explanation, near)
+        return self._total(sums, near)
 
-    def _said(
-        self, seen: Sequence[ViewEvidence], explanation: Explanation, near: Ints, all_rates: Sequence[ErrorRates]
-    ) -> list[_Said | None]:
+    def _near(self, explanation: Explanation) -> Ints:
+        return nearest_person(self._ground, explanation.people.ground, self.config.person_radius)
+
+    def _add_views(
+        self,
+        seen: Sequence[ViewEvidence],
+        explanation: Explanation,
+        near: Ints,
+        rates: Sequence[ErrorRates],
+        sums: Sums,
+    ) -> list[ViewTerms | None]:
+        """Add the terms of all views to the sums; None for a blind view."""
         weights = clutter_weights(np.array([self._clutter(i, view) for i, view in enumerate(seen)]))
-        said: list[_Said | None] = []
-        for i, (view, weight, rates) in enumerate(zip(seen, weights, all_rates, strict=True)):
+        added: list[ViewTerms | None] = []
+        for i, (view, weight) in enumerate(zip(seen, weights.astype(np.float32), strict=True)):
             if view is None:
-                said.append(None)
-                continue
-            owners = self._owners(i, explanation)
-            share, shared = self._share(i, owners, near)
-            if isinstance(view, Boxes):
-                levels = self._levels_of_boxes(i, view, explanation, near, rates)
-                faith = _faith(near, owners.own, explanation.people.visibility[i], share.shape)
+                added.append(None)
+            elif isinstance(view, Boxes):
+                added.append(self._add_boxes(i, view, explanation, near, rates[i], weight, sums))
             else:
-                levels = self._levels_of_map(i, view, owners, near, share, shared).copy()
-                faith = np.ones_like(share)
-            said.append(_Said(levels, log_odds_terms(rates), weight, share, faith))
-        return said
+                added.append(self._add_map(i, view, explanation, near, rates[i], weight, sums))
+        return added
 
-    def _tally(self, said: Sequence[_Said | None], near: Ints) -> Accumulator:
-        tally = Accumulator(self.rig.grid.shape)
-        for view in said:
-            if view is not None:
-                tally.add(*view, near)
-        return tally
+    def _add_map(
+        self,
+        i: int,
+        view: Singles,
+        explanation: Explanation,
+        near: Ints,
+        rates: ErrorRates,
+        weight: np.float32,
+        sums: Sums,
+    ) -> ViewTerms:
+        shape, terms = self.rig.grid.shape, log_odds_terms(rates)
+        levels, share = np.full(shape, UNSEEN, np.int16), np.empty(shape, np.float32)
+        add_map(
+            self._cells[i], self._means.sum_table(i, view), self._assignment(i, explanation), near,
+            self.sampling.distance[i], terms, weight, levels, share, sums,
+        )  # fmt: skip
+        return ViewTerms(levels, terms, weight, share, self._certain)
 
-    def _total(self, tally: Accumulator, near: Ints) -> Singles:
-        return tally.total(self.views, near, self.config.effective_observations, (self.prior, _BESIDE))
+    def _add_boxes(
+        self,
+        i: int,
+        view: Boxes,
+        explanation: Explanation,
+        near: Ints,
+        rates: ErrorRates,
+        weight: np.float32,
+        sums: Sums,
+    ) -> ViewTerms:
+        shown, share = self._assignment(i, explanation), np.empty(self.rig.grid.shape, np.float32)
+        fill_share(self._cells[i], shown, near, self.sampling.distance[i], share)
+        levels = self._levels_of_boxes(i, view, explanation, near, rates)
+        confidence = _confidence(near, shown.separate, explanation.people.visibility[i])
+        added = ViewTerms(levels, log_odds_terms(rates), weight, share, confidence)
+        add_terms(added, near, sums)
+        return added
+
+    def _total(self, sums: Sums, near: Ints) -> Singles:
+        return sums.total(self.views, near, self.config.effective_observations, (self.prior, _NEAR_PRIOR))
 
     def _learn(
         self,
         calibration: RateCalibration,
-        said: Sequence[_Said | None],
-        tally: Accumulator,
+        views: Sequence[ViewTerms | None],
+        sums: Sums,
         explanation: Explanation,
         near: Ints,
     ) -> None:
         people, grid = explanation.people, self.rig.grid
         inside = inside_bodies(grid, near, people.ground, people.height)
         body, reached = cells_per_person(grid, self.height_mean, self.config.person_radius)
-        errors, seen = np.zeros((2, len(said), 3))
-        for i, (view, rates) in enumerate(zip(said, calibration.rates, strict=True)):
+        errors, seen = np.zeros((2, len(views), 3))
+        for i, (view, rates) in enumerate(zip(views, calibration.rates, strict=True)):
             if view is not None:
                 trusted = people.evidence - people.view_evidence[i] >= calibration.config.minimum_evidence
                 trusted &= people.visibility[i] >= _WHOLE
                 fill_counts(
-                    *view, tally.weighted, tally.weights, tally.count, near, inside, trusted,
-                    np.array(rates), self.config.effective_observations, self.prior, errors[i], seen[i],
+                    view, sums, near, inside, trusted, np.array(rates), self.config.effective_observations, self.prior,
+                    errors[i], seen[i],
                 )  # fmt: skip
-        everywhere = np.maximum((self.sampling.footprint[..., 2] > 0).sum((1, 2, 3)), 1)
-        units = np.column_stack([np.full(len(said), body), everywhere, np.full(len(said), reached - body)])
+        everywhere = np.maximum([len(cells.place) for cells in self._cells], 1)
+        units = np.column_stack([np.full(len(views), body), everywhere, np.full(len(views), reached - body)])
         sure = np.append(people.evidence >= calibration.config.minimum_evidence, False)[near]
         counted = (self.views > 0) & sure
         filled = np.array([inside[counted].sum(), counted.sum()]) / reached
-        calibration.learn(errors / units, seen / units, filled)
+        calibration.learn(errors / units, seen / units, filled, calibration.interval)
 
-    def _owners(self, i: int, explanation: Explanation) -> PixelAssignment:
+    def _assignment(self, i: int, explanation: Explanation) -> PixelAssignment:
         people, served = explanation.people, explanation.box_assignment[i]
-        own = np.zeros(len(people) + 1, bool)
-        own[served[served >= 0]] = True
-        camera, step = self.rig.cameras[i], explanation.raster_step[i]
+        separate = np.zeros(len(people) + 1, bool)
+        separate[served[served >= 0]] = True
+        camera, step, raster = self.rig.cameras[i], explanation.raster_step[i], explanation.pixel_assignment[i]
         width, height = camera.size
         away = np.hypot(*(people.ground - camera.centre[:2]).T)
+        occupied = np.empty((raster.shape[0] + 1, raster.shape[1] + 1), np.int32)
+        fill_occupied(raster, occupied)
         return PixelAssignment(
-            explanation.pixel_assignment[i], step, np.arange(height) // step, np.arange(width) // step, away, own
+            raster, occupied, step, np.arange(height) // step, np.arange(width) // step, away, separate
         )
 
-    def _share(self, i: int, owners: PixelAssignment, near: Ints) -> tuple[Singles, Flags]:
-        """How much of each cell the view sees past nearer people, and whether its footprint shows anybody else."""
-        share, shared = np.empty(self.rig.grid.shape, np.float32), np.empty(self.rig.grid.shape, bool)
-        fill_share(self.sampling.footprint[i], *owners, near, self.sampling.distance[i], share, shared)
-        return share, shared
-
-    def _levels_of_map(
-        self, i: int, view: Singles, owners: PixelAssignment, near: Ints, share: Singles, shared: Flags
-    ) -> Levels:
-        """Mean likelihood that the explanation leaves each cell."""
-        table = self.means.sum_table(i, view)
-        levels = self.means.levels_from(i, table)
-        leave_unexplained(
-            self.sampling.footprint[i], table.sums, table.left, table.top, owners.raster, owners.step, owners.row,
-            owners.column, near, share, shared, levels,
-        )  # fmt: skip
-        return levels
+    def _pillars_of(self, i: int) -> tuple[Singles, PillarIndex]:
+        """Boxes of the pillars of all heights at all cells, float32 (height * cell, 4), and their index."""
+        camera, grid = self.rig.cameras[i], self.rig.grid
+        bodies = BodyTable.of(camera, grid).boxes(grid.ground.reshape(-1, 2), self.heights)
+        pillars = bodies.reshape(-1, 4).astype(np.float32)
+        return pillars, PillarIndex.of(pillars, camera.size)
 
     def _levels_of_boxes(self, i: int, view: Boxes, explanation: Explanation, near: Ints, rates: ErrorRates) -> Levels:
         """Likelihood per plane of each cell."""
-        match = np.zeros(self.rig.grid.shape, np.float32)
+        pillars = self._pillars[i]
+        assert pillars is not None, "the view was to deliver boxes"
+        people, grid, levels = explanation.people, self.rig.grid, np.empty(self.rig.grid.shape, np.int16)
         edges = np.concatenate([view.pixel[:, :2], view.pixel[:, :2] + view.pixel[:, 2:]], 1)
         width, height = map(float, self.rig.cameras[i].size)
         edges = edges.clip(0, [width - 1, height - 1] * 2)
-        belief = np.log(view.score.clip(0.05, 1.0))
-        fill_match_of_planes(
-            self.bodies[i], self.heights, self.height_spread, self.height_mean, explanation.people.height,
-            self.rig.grid.heights, edges, TOLERANCE, belief, explanation.box_assignment[i], near, width, height, match,
+        tolerance, belief = np.tile(TOLERANCE, (len(edges), 1)), np.log(view.score.clip(0.05, 1.0))
+        boxes = ViewBoxes(edges, tolerance, belief, explanation.box_assignment[i], width, height)
+        fit = np.empty((len(self.heights), near.size), np.float32)
+        fill_fit(
+            pillars[1], pillars[0], self._height_prior(np.array([self.height_mean]))[0],
+            self._height_prior(people.height), boxes, CellsByPerson.of(near, len(people)), fit,
         )  # fmt: skip
-        levels = np.rint(plane_likelihood(match, near, rates) * TOP).astype(np.int16)
-        levels[self.sampling.footprint[i, ..., 2] == 0] = UNSEEN
+        footprint = self.sampling.footprint[i].reshape(len(levels), -1, 4)
+        flat = levels.reshape(len(levels), -1)
+        fill_levels(fit, self.heights, grid.heights, near.reshape(-1), footprint, rates, flat)
         return levels
+
+    def _height_prior(self, expected: Floats) -> Floats:
+        """Log-prior of the heights that are tried, for expected heights (n,), metres; float64 (n, height)."""
+        return np.asarray(-0.5 * ((self.heights - expected[:, None]) / self.height_spread) ** 2)
 
     def _clutter(self, i: int, view: ViewEvidence) -> float:
         size = self.rig.cameras[i].size
@@ -218,14 +235,14 @@ class Occupancy:
 
 
 def _first_rates(kind: str, detection: DetectionConfig) -> ErrorRates:
-    """Before anything is learned, people's surroundings count as any other place."""
+    """First guess: the surroundings of people are like any other place."""
     if kind == "boxes":
-        clutter = (1 - detection.box_miss_rate) / float(np.exp(detection.box_log_ratio))
-        return ErrorRates(detection.box_miss_rate, clutter, clutter)
+        clutter_rate = (1 - detection.box_miss_rate) / float(np.exp(detection.box_log_ratio))
+        return ErrorRates(detection.box_miss_rate, clutter_rate, clutter_rate)
     return ErrorRates(detection.pixel_miss_rate, detection.pixel_clutter_rate, detection.pixel_clutter_rate)
 
 
-def _faith(near: Ints, own: Flags, visible: Floats, shape: tuple[int, ...]) -> Singles:
-    """How much a missing box says: as much as the view can see of the person near the cell, float32 (plane, y, x)."""
-    missing = np.where(own, 1.0, np.append(visible, 1.0))
-    return np.ascontiguousarray(np.broadcast_to(missing[near], shape), np.float32)
+def _confidence(near: Ints, separate: Flags, visibility: Floats) -> Singles:
+    """Weight of a missing box, float32 (y, x): the visibility of the person near the cell."""
+    missing = np.where(separate, 1.0, np.append(visibility, 1.0))
+    return np.asarray(missing[near], np.float32)

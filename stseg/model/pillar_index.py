@@ -1,0 +1,111 @@
+"""Pillars of a view in the order of their image columns, so that a box meets only those that it may fit.
+
+A box fits a pillar only if their middles are within `box_fit.FAR` tolerances of each other, and tolerances are shares
+of the pillar's height in the image. So pillars are sorted by classes of that height, and within a class by the column
+of their middle: the pillars that a box may fit are one run of each class.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple, Self
+
+import numpy as np
+
+from stseg.accelerate import kernel
+from stseg.arrays import Floats, Ints, Labels
+from stseg.model.box_fit import FAR, GRAIN, LEAST_HEIGHT, MIDDLE, half_square
+
+_CLASSES = 2.0
+"""Classes of height to a factor of two."""
+
+
+class PillarIndex(NamedTuple):
+    """Sorted pillars of one view; pillars outside the image are left out.
+
+    Attributes
+    ----------
+    order : int32 (k,)
+        Numbers of the pillars, by class, then by column.
+    middle : float64 (k,)
+        Column of the middle of each, clipped to the image, pixels.
+    start : int64 (class + 1,)
+        First of each class in `order`.
+    tallest : float64 (class,)
+        Height of the tallest pillar of each class, pixels.
+    """
+
+    order: Labels
+    middle: Floats
+    start: Ints
+    tallest: Floats
+
+    @classmethod
+    def of(cls, bodies: Floats, size: tuple[int, int]) -> Self:
+        """The index of pillars' boxes (n, 4), left, top, right, bottom in pixels, in images of a size."""
+        edges = np.asarray(bodies, float).reshape(-1, 4)
+        left, right = (edges[:, k].clip(0, size[0] - 1) for k in (0, 2))
+        top, bottom = (edges[:, k].clip(0, size[1] - 1) for k in (1, 3))
+        inside = (right > left) & (bottom > top)
+        tall = np.maximum(edges[:, 3] - edges[:, 1], LEAST_HEIGHT)
+        middle = (left + right) / 2
+        kind = np.floor(_CLASSES * np.log2(np.where(inside, tall, LEAST_HEIGHT)))
+        order = np.lexsort((middle, kind))
+        order = order[inside[order]]
+        starts = np.flatnonzero(np.diff(kind[order], prepend=-1.0))
+        tallest = np.maximum.reduceat(tall[order], starts) if len(order) else np.zeros(0)
+        return cls(order.astype(np.int32), middle[order], np.append(starts, len(order)).astype(np.int64), tallest)
+
+
+@kernel
+def run_of(index: PillarIndex, kind: int, box: Floats, tolerance: Floats, deviations: float) -> tuple[int, int]:
+    """First and stop in `index.order` of the pillars of a class that a box may fit within so many tolerances.
+
+    Parameters
+    ----------
+    box : float64 (4,)
+        left, top, right, bottom, pixels, within the image.
+    tolerance : float64 (5,)
+        See `stseg.model.box_fit`.
+    """
+    place = (box[0] + box[2]) / 2
+    reach = deviations * tolerance[MIDDLE] * (index.tallest[kind] + GRAIN[MIDDLE]) + 1e-3
+    middle = index.middle[index.start[kind] : index.start[kind + 1]]
+    first = np.searchsorted(middle, place - reach)
+    stop = np.searchsorted(middle, place + reach, side="right")
+    return index.start[kind] + first, index.start[kind] + stop
+
+
+@kernel
+def raise_to_best_match(
+    index: PillarIndex,
+    bodies: Floats,
+    boxes: Floats,
+    tolerance: Floats,
+    belief: Floats,
+    width: float,
+    height: float,
+    least: float,
+    best: Floats,
+) -> None:
+    """Raise best (pillar,) to the log-likelihood of the best of some boxes, where that is above `least`.
+
+    Parameters
+    ----------
+    bodies : float (pillar, 4), boxes : float64 (box, 4)
+        left, top, right, bottom, pixels.
+    tolerance : float64 (box, 5), belief : float64 (box,)
+        See `stseg.model.box_noise`.
+    """
+    for b in range(len(boxes)):
+        spare = belief[b] - least
+        if spare <= 0.0:
+            continue
+        deviations = min(FAR, math.sqrt(2.0 * spare))
+        for kind in range(len(index.tallest)):
+            first, stop = run_of(index, kind, boxes[b], tolerance[b], deviations)
+            for k in range(first, stop):
+                i = index.order[k]
+                fit = belief[b] - half_square(bodies[i], boxes[b], tolerance[b], width, height)
+                if fit > least:
+                    best[i] = max(best[i], fit)
