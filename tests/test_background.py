@@ -60,7 +60,7 @@ def taught(kind: type[PixelModel], **constants: float) -> PixelModel:
 
 
 def new(kind: type[PixelModel], **constants: float) -> PixelModel:
-    return kind(SIZE, RATE, MODELS[kind](**constants))  # type: ignore[call-arg]  # as models have it
+    return kind(SIZE, RATE, MODELS[kind](**constants))
 
 
 def in_shadow(share: float) -> tuple[float, float, float]:

@@ -190,7 +190,14 @@ def test_likelihood_per_plane_by_definition(seed: int) -> None:
         clutter_rate = rates.clutter if near[y, x] < 0 else rates.near_clutter
         for z, plane in enumerate(grid.heights):
             best = reference.plane_likelihood(
-                bodies[:, y, x].astype(np.float32), tried, plane, height[near[y, x] + 1], 0.1, shaken, free, camera.size
+                bodies[:, y, x].astype(np.float32),
+                tried,
+                plane,
+                float(height[near[y, x] + 1]),
+                0.1,
+                shaken,
+                free,
+                camera.size,
             )
             expected = TOP * plane_likelihood(best, rates.miss, clutter_rate) if (z, cell) != (2, 5) else UNSEEN
             assert levels[z, cell] == pytest.approx(expected, abs=0.6)

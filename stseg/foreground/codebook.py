@@ -38,7 +38,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from stseg.arrays import Bytes, Floats, Singles
+from stseg.arrays import AnyArray, Bytes, Floats, Singles
 from stseg.config import CodebookConfig
 from stseg.foreground.background import TURNS, PixelModel
 from stseg.foreground.codebook_kernels import evaluate, follow, settle, teach
@@ -67,7 +67,7 @@ class Codebook(PixelModel):
             "access": np.zeros((*shape, 2), np.int32),
         }
         super().__init__(size, frame_rate, self.config)
-        self._arrays = arrays
+        self._arrays: dict[str, AnyArray] = arrays
 
     def relight(self, gain: Singles) -> None:
         """Multiply all that was learned by gains float32 (v, u, 3), after a change of light."""

@@ -13,7 +13,7 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from stseg.accelerate import kernel
-from stseg.arrays import Floats, Ints, Labels
+from stseg.arrays import Floats, Ints, Labels, Singles
 from stseg.model.box_fit import FAR, GRAIN, LEAST_HEIGHT, MIDDLE, half_square
 
 _CLASSES = 2.0
@@ -41,7 +41,7 @@ class PillarIndex(NamedTuple):
     tallest: Floats
 
     @classmethod
-    def of(cls, bodies: Floats, size: tuple[int, int]) -> Self:
+    def of(cls, bodies: Floats | Singles, size: tuple[int, int]) -> Self:
         """The index of pillars' boxes (n, 4), left, top, right, bottom in pixels, in images of a size."""
         edges = np.asarray(bodies, float).reshape(-1, 4)
         left, right = (edges[:, k].clip(0, size[0] - 1) for k in (0, 2))

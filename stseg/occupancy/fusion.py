@@ -22,6 +22,7 @@ by a_i, and n_vis = sum_i a_i.
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -78,13 +79,13 @@ class Sums(NamedTuple):
 
     Attributes
     ----------
-    weighted, weights, count : float32 (plane, y, x)
+    weighted, weights, shares : float32 (plane, y, x)
         Sums of w_i a_i times term, of w_i a_i, and of a_i.
     """
 
     weighted: Singles
     weights: Singles
-    count: Singles
+    shares: Singles
 
     @classmethod
     def zero(cls, shape: tuple[int, int, int]) -> Self:
@@ -99,8 +100,9 @@ class Sums(NamedTuple):
         return total
 
 
+@lru_cache(maxsize=64)  # rates change a few times a second
 def log_odds_terms(rates: ErrorRates) -> Singles:
-    """log[ ((1 - m) L + m (1 - L)) / (b L + (1 - b)(1 - L)) ] of each level, nats.
+    """log[ ((1 - m) L + m (1 - L)) / (b L + (1 - b)(1 - L)) ] of each level, nats; not to be written to.
 
     Returns
     -------
@@ -125,7 +127,7 @@ def add_terms(view: ViewTerms, near: Ints, sums: Sums) -> None:
     """Add one view's terms to the frame's sums; near int64 (y, x) is the person near each cell, -1 for none."""
     level, seen = view.levels.reshape(-1), view.share.reshape(-1)
     confidence, person = view.confidence.reshape(-1), near.reshape(-1)
-    to_weighted, to_weights, to_count = sums.weighted.reshape(-1), sums.weights.reshape(-1), sums.count.reshape(-1)
+    to_weighted, to_weights, to_count = sums.weighted.reshape(-1), sums.weights.reshape(-1), sums.shares.reshape(-1)
     for start in range(0, len(level), len(person)):
         for place in range(len(person)):
             c = start + place
@@ -169,4 +171,4 @@ def fill_total(
                 total[z, y, x] = prior if near[y, x] < 0 else near_prior
                 weight = sums.weights[z, y, x]
                 if weight > 0:
-                    total[z, y, x] += observations * sums.count[z, y, x] * sums.weighted[z, y, x] / weight
+                    total[z, y, x] += observations * sums.shares[z, y, x] * sums.weighted[z, y, x] / weight

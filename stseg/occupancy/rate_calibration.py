@@ -157,7 +157,7 @@ def fill_counts(
     """
     errors[:], seen[:] = 0.0, 0.0
     levels, shares, body = view.levels.reshape(-1), view.share.reshape(-1), inside.reshape(-1)
-    weighted, weights, count = sums.weighted.reshape(-1), sums.weights.reshape(-1), sums.count.reshape(-1)
+    weighted, weights, count = sums.weighted.reshape(-1), sums.weights.reshape(-1), sums.shares.reshape(-1)
     confidence, person = view.confidence.reshape(-1), near.reshape(-1)
     for c in range(len(levels)):
         if levels[c] < 0 or shares[c] <= 0.0:

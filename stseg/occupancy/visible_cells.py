@@ -75,10 +75,10 @@ def _shows_a_person(shown: PixelAssignment, left: int, top: int, width: int, hei
     above, below = shown.row[top], shown.row[top + height - 1] + 1
     before, behind = shown.column[left], shown.column[left + width - 1] + 1
     table = shown.occupied
-    return table[below, behind] - table[below, before] != table[above, behind] - table[above, before]
+    return bool(table[below, behind] - table[below, before] != table[above, behind] - table[above, before])
 
 
-@kernel
+@part
 def _hidden_pixels(
     shown: PixelAssignment, left: int, top: int, width: int, height: int, person: int, distance: float
 ) -> int:
@@ -92,7 +92,7 @@ def _hidden_pixels(
     return hidden
 
 
-@kernel
+@part
 def _sum_of_others(
     shown: PixelAssignment, table: SumTable, left: int, top: int, width: int, height: int, person: int
 ) -> int:
@@ -153,7 +153,7 @@ def add_map(
     person, away = near.reshape(-1), distance.reshape(-1)
     for z in range(len(share)):
         level_of, share_of = levels[z].reshape(-1), share[z].reshape(-1)
-        weighted, weights, count = sums.weighted[z].reshape(-1), sums.weights[z].reshape(-1), sums.count[z].reshape(-1)
+        weighted, weights, count = sums.weighted[z].reshape(-1), sums.weights[z].reshape(-1), sums.shares[z].reshape(-1)
         for k in range(cells.start[z], cells.start[z + 1]):
             place = cells.place[k]
             left, top, width, height = cells.footprint[k]
