@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from stseg.arrays import Boxes
@@ -16,6 +16,7 @@ from stseg.foreground.illumination import IlluminationMonitor
 from stseg.foreground.view_foreground import ViewForeground, without_prior
 
 
+@settings(deadline=None)  # the first call compiles
 @given(st.floats(0.01, 0.99), st.floats(0.01, 0.99))
 def test_without_prior_keeps_the_likelihood_ratio(ratio_share: float, prior: float) -> None:
     ratio = ratio_share / (1 - ratio_share)
