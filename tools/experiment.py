@@ -2,6 +2,7 @@
 
 ablation    what each stage is worth: threshold, per-frame detection, cut without expansion, cut; on fewer views
 certainty   calibration of stated probabilities: of cells stated as occupied with 0.8, are 80 % occupied?
+labels      IoU of the cells of a track, and the right owner where bodies touch: cut, threshold, nearest track
 memory      resident memory of a long run, and the size of its run file
 pixels      share of pixels of people that carry the right label, from film to label images
 rig         error of a rig against the true one, on the ground and at head height
@@ -13,7 +14,7 @@ from __future__ import annotations
 import importlib
 import sys
 
-EXPERIMENTS = ("ablation", "certainty", "memory", "pixels", "rig", "sizes")
+EXPERIMENTS = ("ablation", "certainty", "labels", "memory", "pixels", "rig", "sizes")
 """Each is the module `experiments.NAME` with a function `main`, which reads the command line."""
 
 

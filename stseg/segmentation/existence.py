@@ -160,14 +160,16 @@ class ExistenceModel:
         spread, error = self.body.height_spread, self.body.height_spread / 2
         off = found.height[end] - found.height[start]
         own = found.height[end] - self.body.height_mean
-        return np.maximum(np.log(spread / error) - 0.5 * (off / error) ** 2 + 0.5 * (own / spread) ** 2, _OUT_OF_SHAPE)
+        ratio = np.log(spread / error) - 0.5 * (off / error) ** 2 + 0.5 * (own / spread) ** 2
+        return np.asarray(np.maximum(ratio, _OUT_OF_SHAPE))
 
     def _exclusions(self, found: WindowCandidates) -> tuple[Ints, Ints]:
         """Pairs of one frame that share their evidence; two people of the detector do not."""
         together = found.frame[:, None] == found.frame
         away = np.hypot(*np.moveaxis(found.ground[:, None] - found.ground, -1, 0))
         kept = (found.track > 0)[:, None] & (found.track > 0)
-        return np.nonzero(np.triu(together & (away < self.reach) & ~kept, 1))
+        one, other = np.nonzero(np.triu(together & (away < self.reach) & ~kept, 1))
+        return one.astype(np.int64), other.astype(np.int64)
 
 
 def _quanta(nats: Floats) -> Ints:
