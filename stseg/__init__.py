@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from stseg.arrays import Boxes
     from stseg.config import Config
     from stseg.engine.committed_frames import CommittedFrames
+    from stseg.engine.measure import measure
     from stseg.engine.track import track
     from stseg.engine.tracker import Tracker
     from stseg.errors import InputError, StsegError
@@ -50,6 +51,7 @@ __all__ = [
     "StsegError",
     "Tracker",
     "evaluate",
+    "measure",
     "read_config",
     "read_rig",
     "read_run",
@@ -70,6 +72,7 @@ _HOMES = {
     "stseg.io.track_csv": ("read_tracks_csv",),
     "stseg.arrays": ("Boxes",),
     "stseg.engine.committed_frames": ("CommittedFrames",),
+    "stseg.engine.measure": ("measure",),
     "stseg.engine.track": ("track",),
     "stseg.engine.tracker": ("Tracker",),
     "stseg.io.recording.frames": ("FrameSet",),

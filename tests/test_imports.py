@@ -25,6 +25,7 @@ STAGES = ("foreground", "detection", "occupancy", "segmentation", "tracking", "l
 NEAR_CLUTTER = {
     "trackers": {"segmentation", "tracking", SOLVER},
     "evaluation": {"errors", "arrays"},
+    "measures": {"errors", "arrays", "geometry"},
     "io": {"errors", "arrays", "settings", "config", "geometry", "model", "__init__"},
     "calibration": {"errors", "arrays", "geometry"},
     "report": {"errors", "arrays", "model", "geometry"},
@@ -112,7 +113,7 @@ def allowed(part: str) -> set[str]:
     if part == "trackers":
         return {*FOUNDATION, *NEAR_CLUTTER[part]}
     if part == "engine":
-        return {*FOUNDATION, *STAGES, "trackers", "calibration", "io", "__init__"}
+        return {*FOUNDATION, *STAGES, "trackers", "calibration", "measures", "io", "__init__"}
     if part == "commands":
         return {*FOUNDATION, *STAGES, *NEAR_CLUTTER, "engine", "__init__"}
     return NEAR_CLUTTER[part]

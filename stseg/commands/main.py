@@ -22,6 +22,7 @@ COMMANDS = {
     "inspect": ("stseg.commands.inspect:inspect", "Summarise a run file, or the sources of a rig file."),
     "export": ("stseg.commands.export:export", "Write the tracks of a run file in another format."),
     "evaluate": ("stseg.commands.evaluate:evaluate", "Score tracks on the ground against the truth."),
+    "measure": ("stseg.commands.measure:measure", "Measure people in zones, at lines, and over the ground."),
     "report": ("stseg.commands.report:report", "Write a run file as one HTML page, as pictures or as a film."),
     "plan": ("stseg.commands.plan:plan", "Estimate the time of a run and the size of its file."),
     "config": ("stseg.commands.config:config", "Print the configuration with the meaning of every key."),

@@ -124,6 +124,11 @@ def _busiest(places: Floats, bins: Bins) -> Floats:
     return np.array([middles[0][best[0]], middles[1][best[1]]])
 
 
+def map_of_maps(rig: Rig) -> PlanMap:
+    """The map from metres to pixels of these maps."""
+    return PlanMap.fit(rig.grid, np.zeros((0, 2)), 900, 900)
+
+
 def heat_map(rig: Rig, bins: Bins, values: Floats, title: str, units: str, marks: Sequence[DwellPlace] = ()) -> Bytes:
     """Heat map of bins from above, y up: white for none, dark for much.
 
@@ -143,7 +148,7 @@ def heat_map(rig: Rig, bins: Bins, values: Floats, title: str, units: str, marks
         Blue, green, red.
     """
     limit = float(np.percentile(values[values > 0], 99)) if (values > 0).any() else 1.0
-    plan = PlanMap.fit(rig.grid, np.zeros((0, 2)), 900, 900)
+    plan = map_of_maps(rig)
     canvas = sheet(plan, title)
     paint(canvas, plan, bins, warm_colours(values, limit))
     _frame(canvas, plan, rig)
@@ -156,7 +161,7 @@ def heat_map(rig: Rig, bins: Bins, values: Floats, title: str, units: str, marks
 
 def blind_map(rig: Rig, views: Bytes) -> Bytes:
     """Map of the number of views that see each ground cell at some height: none red, one orange, more lighter."""
-    plan = PlanMap.fit(rig.grid, np.zeros((0, 2)), 900, 900)
+    plan = map_of_maps(rig)
     canvas = sheet(plan, "Views that see the ground")
     seen = views.max(axis=0)
     most = max(len(rig.cameras), int(seen.max()))

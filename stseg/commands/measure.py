@@ -1,0 +1,87 @@
+"""`stseg measure`: numbers of a run for zones, lines and the ground."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from cyclopts import Parameter
+from rich.console import Console
+from rich.table import Table
+
+from stseg.engine.measure import measure as measure_run
+from stseg.engine.measure import read_areas
+from stseg.io.exports.measure_tables import write_tables
+from stseg.io.outputs.output_files import make_folder, write_file
+from stseg.io.runfile.runs import read_run
+from stseg.measures.measure import Measures
+from stseg.report.flow_map import flow_map
+from stseg.report.html import png_bytes
+
+
+def measure(
+    run_file: Path,
+    /,
+    *,
+    output: Annotated[Path, Parameter(name=["--output", "-o"], metavar="FOLDER")],
+    zones: Annotated[Path | None, Parameter(metavar="ZONES.geojson")] = None,
+    lines: Annotated[Path | None, Parameter(metavar="LINES.geojson")] = None,
+    format_: Annotated[Literal["csv", "parquet"], Parameter(name="--format")] = "csv",
+    overwrite: Annotated[bool, Parameter(negative="")] = False,
+) -> None:
+    """Measure a run: people in zones, crossings of lines, speeds, distances, density and flow.
+
+    Example: stseg measure night.h5 --zones zones.geojson --lines lines.geojson -o measures/
+
+    **zones**: mean and most people, entries, exits, dwell times, density of each zone; **people**: each zone in each
+    frame, with the mean and standard deviation of the count by the tracks' scores; **visits**: each stay; **lines** and
+    **crossings**: each direction (left and right as seen along the line); **tracks**: distance and speeds; **spacing**:
+    distances between people; **field**: density, speed and flow on a grid, drawn in flow.png.
+
+    The same from Python: stseg.measure(stseg.read_run("night.h5"), "zones.geojson", "lines.geojson").
+
+    Parameters
+    ----------
+    run_file
+        A run file (.h5).
+    output
+        Folder for the tables and flow.png.
+    zones
+        GeoJSON with polygons in metres on the ground; properties.name names each. Without it, the whole ground.
+    lines
+        GeoJSON with lines (LineString), likewise.
+    format_
+        csv, or parquet (needs pyarrow).
+    overwrite
+        Replace tables that exist.
+    """
+    run = read_run(run_file)
+    found = measure_run(run, zones, lines)
+    make_folder(output)
+    write_tables(output, found.tables(), format_, overwrite)
+    areas, rig = read_areas(run, zones, lines), run.recording.rig
+    picture = flow_map(
+        rig, found.field, [(z.name, z.rings) for z in areas.zones], [(one.name, one.points) for one in areas.lines]
+    )
+    write_file(output / "flow.png", png_bytes(picture), overwrite)
+    _print(found)
+    print(f"wrote {len(found.tables())} tables and flow.png to {output}")
+
+
+def _print(found: Measures) -> None:
+    console = Console(highlight=False, markup=False)
+    zones = Table(box=None, padding=(0, 2, 0, 0))
+    for name in ("zone", "people", "most", "entries", "exits", "dwell s", "per m2"):
+        zones.add_column(name, justify="left" if name == "zone" else "right")
+    for row in found.zones:
+        people = f"{row['mean_people']:.2f} ± {row['deviation']:.2f}"
+        numbers = (f"{row['median_dwell']:.1f}", f"{row['mean_density']:.3f}")
+        zones.add_row(row["zone"], people, str(row["most_people"]), str(row["entries"]), str(row["exits"]), *numbers)
+    console.print(zones)
+    if len(found.lines):
+        lines = Table(box=None, padding=(0, 2, 0, 0))
+        for name in ("line", "to left", "to right", "a minute"):
+            lines.add_column(name, justify="left" if name == "line" else "right")
+        for row in found.lines:
+            lines.add_row(row["line"], str(row["left"]), str(row["right"]), f"{row['per_minute']:.1f}")
+        console.print(lines)

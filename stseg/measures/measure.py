@@ -1,0 +1,111 @@
+"""All measures of a run's tracks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from stseg.arrays import Ints, Rows
+from stseg.geometry import Grid
+from stseg.measures.areas import Areas
+from stseg.measures.crossings import CROSSING, line_crossings
+from stseg.measures.motion import flow_field, spacings, track_measures
+from stseg.measures.zones import COUNT, VISIT, zone_counts, zone_visits
+
+ZONE = np.dtype(
+    [("zone", "O"), ("area", "<f8"), ("mean_people", "<f8"), ("deviation", "<f8"), ("most_people", "<i8"),
+     ("entries", "<i8"), ("exits", "<i8"), ("visits", "<i8"), ("mean_dwell", "<f8"), ("median_dwell", "<f8"),
+     ("mean_density", "<f8")]
+)  # fmt: skip
+"""One row per zone: square metres, people, standard deviation of the mean by the scores, seconds, people a square
+metre."""
+LINE = np.dtype([("line", "O"), ("left", "<i8"), ("right", "<i8"), ("per_minute", "<f8"), ("mean_speed", "<f8")])
+"""One row per line: crossings to each side, crossings a minute, metres a second."""
+
+
+@dataclass(frozen=True)
+class Measures:
+    """Tables of measures, see the records in `stseg.measures`."""
+
+    zones: Rows
+    people: Rows
+    visits: Rows
+    lines: Rows
+    crossings: Rows
+    tracks: Rows
+    spacing: Rows
+    field: Rows
+
+    def tables(self) -> dict[str, Rows]:
+        """The tables by name."""
+        return {name: getattr(self, name) for name in self.__dataclass_fields__}
+
+
+def measure_tracks(
+    trajectory: Rows,
+    frames: Ints,
+    frame_rate: float,
+    grid: Grid,
+    areas: Areas,
+    *,
+    patience: float = 1.0,
+    band: float = 0.2,
+    side: float = 0.5,
+) -> Measures:
+    """Measure tracks in zones, at lines and over the ground.
+
+    Parameters
+    ----------
+    trajectory : TRAJECTORY (n,)
+    frames : int64 (time,)
+        Frames of the run.
+    frame_rate
+        Frames per second.
+    grid
+        The ground.
+    areas
+        Zones and lines.
+    patience
+        Absence that does not end a visit, seconds.
+    band
+        Distance from a line within which crossing it back cancels a crossing, metres.
+    side
+        Side of a bin of density and flow, metres.
+    """
+    people = [zone_counts(zone, trajectory, frames, frame_rate) for zone in areas.zones]
+    visits = [zone_visits(zone, trajectory, frame_rate, patience) for zone in areas.zones]
+    crossings = [line_crossings(line, trajectory, frame_rate, band) for line in areas.lines]
+    zones = [_zone(z.name, z.area, own, stays) for z, own, stays in zip(areas.zones, people, visits, strict=True)]
+    minutes = max(len(frames) / frame_rate / 60, 1e-9)
+    lines = [
+        (line.name, (own["to"] == "left").sum(), (own["to"] == "right").sum(), len(own) / minutes,
+         _of(own["speed"], np.mean))
+        for line, own in zip(areas.lines, crossings, strict=True)
+    ]  # fmt: skip
+    return Measures(
+        np.array(zones, ZONE),
+        np.concatenate([np.zeros(0, COUNT), *people]),
+        np.concatenate([np.zeros(0, VISIT), *visits]),
+        np.array(lines, LINE),
+        np.concatenate([np.zeros(0, CROSSING), *crossings]),
+        track_measures(trajectory, frame_rate),
+        spacings(trajectory, frame_rate),
+        flow_field(trajectory, frames, frame_rate, grid.x, grid.y, side),
+    )
+
+
+def _zone(name: str, area: float, people: Rows, visits: Rows) -> tuple[object, ...]:
+    deviation = float(np.sqrt((people["deviation"] ** 2).sum())) / max(len(people), 1)
+    counts = (_of(people["people"], np.mean), deviation, people["people"].max(initial=0))
+    dwell = (_of(visits["dwell"], np.mean), _of(visits["dwell"], np.median))
+    return (
+        name, area, *counts, visits["entered"].sum(), visits["left"].sum(), len(visits), *dwell,
+        _of(people["density"], np.mean),
+    )  # fmt: skip
+
+
+def _of(values: Rows, statistic: Callable[..., object]) -> object:
+    """A statistic, nan of nothing."""
+    return statistic(values) if len(values) else np.nan
