@@ -99,7 +99,7 @@ VIEWS = {
     "barrel": (looking("barrel", (-3.5, -3.5, 2.6), distortion=BARREL), 0.8),
     "from above": (looking("above", (0.3, -0.5, 5.0)), 0.8),
 }
-"""Cameras, and how much of strips and pillar together both must cover; docs/localisation.md has the figures."""
+"""Cameras, and how much of strips and pillar together both must cover."""
 
 
 @pytest.mark.parametrize("view", VIEWS)

@@ -90,7 +90,7 @@ def _soft(outside: Floats) -> Floats:
 
 
 def real(name: str, frames: str, data: Path) -> Iterator[Energy]:
-    """The windows that a run over these frames of a set of docs/results.md cuts."""
+    """The windows that a run over these frames of a set of docs/development/measurements.md cuts."""
     windows: list[Energy] = []
 
     def kept(energy: Energy) -> Cut:

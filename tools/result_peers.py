@@ -1,4 +1,4 @@
-"""What other methods reach on the same frames, gate 0.5 m: measured apart from this project, see docs/results.md."""
+"""What other methods reach on the same frames, gate 0.5 m, measured apart from this project."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The sets that docs/results.md is measured on: what each is made from, and how it is scored.
+"""The sets that docs/development/measurements.md is measured on: what each is made from, and how it is scored.
 
 Commands are written as one types them; $DATA is the folder of data sets, $WORK the folder for what is made.
 """

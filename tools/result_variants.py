@@ -1,4 +1,4 @@
-"""The variants of following that docs/results.md sets side by side: the trackers, and the ablations of their papers."""
+"""The variants of tracking that the page of measurements compares: the trackers, and the ablations of their papers."""
 
 from __future__ import annotations
 

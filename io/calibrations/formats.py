@@ -1,4 +1,4 @@
-"""The calibration formats: a new one is a reader, an entry here, and a line in docs/file-formats.md."""
+"""The calibration formats: a new one is a reader, an entry here, and a line in docs/rigs.md."""
 
 from __future__ import annotations
 

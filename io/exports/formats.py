@@ -1,4 +1,4 @@
-"""The export formats: a new one is a writer, an entry here, and a line in docs/file-formats.md."""
+"""The export formats: a new one is a writer, an entry here, and a line in docs/outputs.md."""
 
 from __future__ import annotations
 

@@ -46,7 +46,7 @@ def inspect(
     run
         The run file (.h5), or a rig file (.toml).
     as_json
-        Print one JSON object, with every track. Its keys are those of docs/file-formats.md and stay.
+        Print one JSON object, with every track. Its keys are those of docs/outputs.md and stay.
     slice_
         Write one slice of the occupancy as a picture instead: t in seconds from the recording's first frame (or
         frame=NUMBER), plane in metres above the ground (or plane=all, the greatest of them); the nearest are taken.

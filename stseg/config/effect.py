@@ -35,12 +35,17 @@ def require_effect(config: Config, tracker: str) -> None:
 
 def _conditions(config: Config, tracker: str) -> Iterator[tuple[str, tuple[str, ...], str]]:
     """Prefixes of keys, those among them that are read, and what the others need."""
-    for model in ("mixture", "chromatic", "codebook"):
+    for model in _tables(config.foreground, "stseg.config.foreground"):
         chosen = (f"foreground.{config.foreground.model}.",)
         yield f"foreground.{model}.", chosen, f"foreground.model = {model} beside it, or the default"
     yield "proposals.", _PROPOSALS[config.proposals.source], "another proposals.source beside it, or the default"
-    for name in ("kalman", "particles", "belief"):
+    for name in _tables(config, "stseg.config.trackers"):
         yield f"{name}.", (f"{tracker}.",), f"--tracker {name} beside it, or the default"
     if tracker != "cut":
         for prefix in ("segmentation.", "tracking.prediction_horizon", "tracking.assignment_distance"):
             yield prefix, (), "--tracker cut beside it, or the default"
+
+
+def _tables(settings: object, module: str) -> list[str]:
+    """Tables among some settings whose constants are of a module."""
+    return [name for name, value in vars(settings).items() if type(value).__module__ == module]

@@ -122,7 +122,8 @@ class ForegroundConfig:
     @property
     def chosen(self) -> BackgroundConfig:
         """Constants of the chosen model."""
-        return {"mixture": self.mixture, "chromatic": self.chromatic, "codebook": self.codebook}[self.model]
+        chosen: BackgroundConfig = getattr(self, self.model)
+        return chosen
 
 
 @dataclass(frozen=True)
