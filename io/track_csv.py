@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import csv
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints, Rows
 from stseg.errors import FormatError, OutputError
+from stseg.io import limits
+from stseg.io.bounded_files import require_regular
+from stseg.io.numbers import parse_number
+from stseg.io.toml.text import shown
 
 POSITION = np.dtype([("frame", "<i8"), ("id", "<i8"), ("x", "<f8"), ("y", "<f8"), ("flag", "<i8")])
 """One row per person and frame: metres on the ground; a flag other than 0 marks an unreliable row."""
@@ -48,11 +53,13 @@ def read_tracks_csv(path: Path) -> Rows:
     sheet = _read_sheet(path)
     table = np.zeros(len(sheet.lines), POSITION)
     table["frame"] = sheet.whole("frame")
+    sheet.refuse(np.abs(table["frame"]) > limits.FRAMES, "frame", f"a frame up to {limits.FRAMES}")
     table["id"] = sheet.identities()
     table["x"], table["y"] = sheet.numbers("x"), sheet.numbers("y")
     if "flag" in sheet.cells:
         table["flag"] = sheet.whole("flag", empty="0")
     sheet.refuse(_repeats(table), "id", "an id once a frame", "{} again in the same frame")
+    _refuse_crowds(path, table)
     return table
 
 
@@ -76,8 +83,8 @@ class _Sheet:
 
     def numbers(self, column: str, empty: str = "") -> Floats:
         """A column of finite numbers, float64 (n,); an empty cell reads as `empty`."""
-        values = np.array([_number(cell or empty) for cell in self.cells[column]], float)
-        self.refuse(~np.isfinite(values), column, "a finite number")
+        values = np.array([parse_number(cell or empty) for cell in self.cells[column]], float)
+        self.refuse(~(np.abs(values) <= limits.NUMBER), column, "a finite number of usual size")
         return values
 
     def whole(self, column: str, empty: str = "") -> Ints:
@@ -104,22 +111,23 @@ class _Sheet:
         """Raise a FormatError that names the first wrong row, if there is one."""
         if wrong.any():
             row = int(np.argmax(wrong))
-            cell = repr(self.cells[column][row])
+            cell = shown(self.cells[column][row])
             raise FormatError(self.path, f"line {self.lines[row]}, column {column}", found.format(cell), expected)
 
 
 def _read_sheet(path: Path) -> _Sheet:
     try:
+        require_regular(Path(path))
         with Path(path).open(newline="", encoding="utf-8-sig") as file:
             reader = csv.reader(file)
             header = [name.strip() for name in next(reader, [])]
-            rows = [(reader.line_num, row) for row in reader if row]
+            rows = [(reader.line_num, row) for row in islice(reader, limits.ROWS) if row]
     except OSError as error:
         raise FormatError(path, "", error.strerror or error, "a CSV file that can be read") from error
-    except (UnicodeDecodeError, csv.Error) as error:
+    except (ValueError, csv.Error) as error:
         raise FormatError(path, "", "something that is not text", "a CSV file") from error
     if missing := [name for name in _NEEDED if name not in header]:
-        found = ",".join(header) or "nothing"
+        found = ",".join(header)[: limits.NAME] or "nothing"
         raise FormatError(path, "header", found, f"columns {','.join(_NEEDED)} (no {', '.join(missing)})")
     for line, row in rows:
         if len(row) != len(header):
@@ -129,11 +137,11 @@ def _read_sheet(path: Path) -> _Sheet:
     return _Sheet(Path(path), [line for line, _ in rows], cells)
 
 
-def _number(cell: str) -> float:
-    try:
-        return float(cell)
-    except ValueError:
-        return np.nan
+def _refuse_crowds(path: Path, table: Rows) -> None:
+    frames, counts = np.unique(table["frame"], return_counts=True)
+    if counts.max(initial=0) > limits.PEOPLE_PER_FRAME:
+        found = f"{counts.max()} rows of frame {frames[counts.argmax()]}"
+        raise FormatError(path, "", found, f"at most {limits.PEOPLE_PER_FRAME} people in a frame")
 
 
 def _repeats(table: Rows) -> Flags:

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from stseg.arrays import Floats
 from stseg.geometry import Camera, Grid, Lens, Rig
+from stseg.io.names import is_name
 from stseg.io.recording.recording import SOURCE_KINDS, CameraSource, Recording, Source
 
 BARREL = (-0.39, 0.25, 0.0008, -0.0017, -0.107)
@@ -86,7 +87,7 @@ def grids(draw: st.DrawFn) -> Grid:
     )
 
 
-_NAMES = st.text(st.characters(codec="utf-8"), min_size=1, max_size=12).filter(str.strip)
+_NAMES = st.text(st.characters(codec="utf-8"), min_size=1, max_size=12).filter(is_name)
 
 
 @st.composite

@@ -65,14 +65,14 @@ def test_frames_says_how_many_have_nothing(tmp_path: Path) -> None:
         ("0,inf,2,3,4,0.5", "line 3: found left inf"),
         ("0,1,2,-3,4,0.5", "line 3: found width -3"),
         ("0,1,2,3,-4,0.5", "line 3: found height -4"),
-        ("0,1,x,3,4,0.5", "line 3: found 'x', expected a number"),
+        ("0,1,x,3,4,0.5", "line 3: found top x, expected a finite number"),
         ("0,1,2,3,4", "line 3: found 5 fields, expected at least 6"),
         ("0.5,1,2,3,4,1", "line 3: found frame 0.5"),
         ("-1,1,2,3,4,1", "line 3: found frame -1"),
         ("1e15,1,2,3,4,1", "line 3: found frame 1e\\+15"),
         ("0,1,2,3,4,87", "line 3: found score 87, expected a score of 0..1"),
         ("0,1,2,3,4,-1", "line 3: found score -1"),
-        ("0,1,2,3,4,", "line 3: found ''"),
+        ("0,1,2,3,4,", "line 3: found score nothing"),
     ],
 )
 def test_bad_lines_are_named(tmp_path: Path, line: str, reported: str) -> None:

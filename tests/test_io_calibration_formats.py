@@ -223,7 +223,7 @@ class TestTsai:
     def test_refuses_and_names_the_node(self, tmp_path: Path) -> None:
         file = tmp_path / "view.xml"
         file.write_text("<Camera><Geometry width='768'/></Camera>")
-        with pytest.raises(FormatError, match=r"Geometry: found no number: 'height'"):
+        with pytest.raises(FormatError, match=r"Geometry: found no finite number"):
             read_tsai_xml([file])
         file.write_text("<!DOCTYPE x [<!ENTITY a 'b'>]><Camera/>")
         with pytest.raises(FormatError, match=r"a document type declaration"):

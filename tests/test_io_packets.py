@@ -77,7 +77,7 @@ def test_other_codecs_are_decoded(tmp_path: Path, codec: str, suffix: str) -> No
 
 def test_a_file_that_is_no_video_has_no_packets(tmp_path: Path) -> None:
     path = tmp_path / "film.avi"
-    path.write_bytes(b"nothing")
+    path.write_bytes(b"\0nothing")
     assert packet_times(path) is None
 
 

@@ -27,7 +27,7 @@ from stseg.arrays import Bytes
 from stseg.commands.run_overview import summarise_run
 from stseg.errors import FormatError, OutputError
 from stseg.geometry import Grid
-from stseg.io.outputs.whole_files import part_path, replacing
+from stseg.io.outputs.whole_files import create_part, parts_of, replacing
 from stseg.io.recording.rig_text import format_rig
 from stseg.io.runfile import layout, part_file
 from stseg.io.runfile.runs import RunWriter, read_run, read_trajectory
@@ -184,7 +184,7 @@ def test_a_file_with_halves_of_before_is_read(run_path: Path) -> None:
 
 def test_many_small_appends_make_one_table(tmp_path: Path) -> None:
     rows = np.zeros(10_000, TRAJECTORY)
-    rows["frame"] = np.arange(len(rows))
+    rows["frame"], rows["id"] = np.arange(len(rows)), 1
     with writer_at(tmp_path / "long.h5") as writer:
         for start in range(0, len(rows), 7):
             part = rows[start : start + 7].copy()
@@ -219,7 +219,7 @@ def test_an_existing_file_is_refused_before_any_work(run_path: Path) -> None:
     with pytest.raises(OutputError, match="exists"):
         writer_at(run_path)
     assert run_path.read_bytes() == before
-    assert not part_path(run_path).exists()
+    assert not parts_of(run_path)
 
 
 def test_overwriting_replaces_only_at_the_end(run_path: Path) -> None:
@@ -227,10 +227,10 @@ def test_overwriting_replaces_only_at_the_end(run_path: Path) -> None:
     with writer_at(run_path, overwrite=True) as writer:
         fill(writer)
         assert run_path.read_bytes() == before
-        assert part_path(run_path).exists()
+        assert parts_of(run_path)
         writer.finish(Tracks(small_trajectory()[:0]).summary())
     assert len(read_run(run_path).tracks) == 0
-    assert not part_path(run_path).exists()
+    assert not parts_of(run_path)
 
 
 @pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt])
@@ -240,7 +240,7 @@ def test_an_exception_leaves_the_old_file_and_no_part(run_path: Path, error: typ
         fill(writer)
         raise error
     assert run_path.read_bytes() == before
-    assert not part_path(run_path).exists()
+    assert not parts_of(run_path)
 
 
 @pytest.fixture
@@ -265,9 +265,13 @@ def test_an_interrupt_inside_a_write_leaves_nothing(tmp_path: Path, monkeypatch:
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
-def test_the_part_of_a_killed_run_is_written_over(tmp_path: Path) -> None:
-    part_path(tmp_path / "night.h5").write_bytes(b"half of something" * 10_000)
+def test_the_part_of_a_killed_run_is_removed_and_foreign_files_are_not(tmp_path: Path) -> None:
+    part, descriptor = create_part(tmp_path / "night.h5")
+    os.close(descriptor)
+    (tmp_path / "night.h5.part").write_text("precious")
     assert len(read_run(write_small_run(tmp_path / "night.h5")).frames) == 6
+    assert not part.exists()
+    assert (tmp_path / "night.h5.part").read_text() == "precious"
 
 
 @pytest.mark.skipif(os.name == "nt", reason="needs the locks of POSIX systems")
@@ -282,12 +286,13 @@ def test_two_runs_into_one_file_are_refused(tmp_path: Path) -> None:
 
 def test_a_file_that_appears_meanwhile_is_not_destroyed(tmp_path: Path) -> None:
     path = tmp_path / "night.h5"
-    with pytest.raises(OutputError, match=r"kept in .*night\.h5\.part"), writer_at(path) as writer:
+    with pytest.raises(OutputError, match=r"kept in .*night\.h5\..*\.part"), writer_at(path) as writer:
         fill(writer)
         path.write_text("precious")
         writer.finish(Tracks(small_trajectory()).summary())
     assert path.read_text() == "precious"
-    assert len(read_run(part_path(path)).frames) == 6
+    (part,) = parts_of(path)
+    assert len(read_run(part).frames) == 6
 
 
 @pytest.mark.parametrize(
@@ -326,7 +331,7 @@ def test_a_full_disk_is_told_and_leaves_the_old_file(
         fill(writer)
         writer.finish(Tracks(small_trajectory()).summary())
     assert path.read_text() == "old"
-    assert not part_path(path).exists()
+    assert not parts_of(path)
     gc.collect()  # a file that HDF5 could not close would crash here
 
 

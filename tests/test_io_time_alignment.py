@@ -323,7 +323,7 @@ def test_what_was_found_of_time_is_kept(uneven: Recording, tmp_path: Path) -> No
     streams = index_streams(uneven)
     with WorkFolder(tmp_path / "run.h5", {}) as folder:
         folder.keep_streams(streams)
-        kept = folder.streams()
+        kept = folder.streams(uneven)
     for again in (kept, pickle.loads(pickle.dumps(streams))):
         assert isinstance(again, StreamIndex)
         assert (again.length, again.notes) == (streams.length, streams.notes)

@@ -91,7 +91,7 @@ def test_ids_are_numbers_or_names(path: Path, ids: str, read: list[int]) -> None
         ("frame,id,x,y\n0,1,here,0\n", "line 2, column x: found 'here'"),
         ("frame,id,x,y\n0,1,,0\n", "line 2, column x: found ''"),
         ("frame,id,x,y\n0.5,1,0,0\n", "line 2, column frame: found '0.5', expected a whole number"),
-        ("frame,id,x,y\n1e300,1,0,0\n", "line 2, column frame: found '1e300', expected a whole number"),
+        ("frame,id,x,y\n1e300,1,0,0\n", "line 2, column frame: found '1e300', expected a finite number"),
         ("frame,id,x,y\n0,,0,0\n", "line 2, column id: found ''"),
         ("frame,id,x,y,flag\n0,1,0,0,bad\n", "line 2, column flag: found 'bad'"),
         ("frame,id,x,y\n0,1,0,0\n\n1,2,0,0\n0,1,2,2\n", "line 5, column id: found '1' again in the same frame"),

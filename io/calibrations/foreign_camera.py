@@ -10,6 +10,7 @@ import numpy as np
 from stseg.arrays import Floats
 from stseg.errors import CalibrationError, FormatError, InputError
 from stseg.geometry import Lens
+from stseg.io import limits
 from stseg.io.toml.table import Table
 
 MOST_DISTORTION = 8
@@ -64,7 +65,7 @@ class ForeignTable(Table):
     def image_size(self, name: str) -> tuple[int, int]:
         """Width and height, pixels."""
         width, height = self.numbers(name, 2).tolist()
-        if width != int(width) or height != int(height) or min(width, height) < 1:
+        if width != int(width) or height != int(height) or min(width, height) < 1 or width * height > limits.PIXELS:
             raise self.error(name, [width, height], "width and height in whole pixels")
         return int(width), int(height)
 
@@ -101,7 +102,7 @@ def camera_from_pose(
     key = f"camera {name}" if name else "camera"
     if min(matrix[0, 0], matrix[1, 1]) <= 0 or matrix[1, 0] != 0 or matrix[2].tolist() != [0, 0, 1]:
         raise FormatError(file, f"{key}, camera_matrix", matrix.tolist(), "[[fx, s, cx], [0, fy, cy], [0, 0, 1]]")
-    if np.abs(rotation @ rotation.T - np.eye(3)).max() > _ORTHONORMAL:
+    if not np.abs(rotation @ rotation.T - np.eye(3)).max() <= _ORTHONORMAL:
         raise FormatError(file, f"{key}, rotation", np.round(rotation, 3).tolist(), "a rotation")
     if np.linalg.det(rotation) < 0:
         raise CalibrationError(file, f"{key}, rotation", "a mirror", "a rotation, which keeps left and right")

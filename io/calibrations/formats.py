@@ -6,7 +6,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from stseg.errors import ConfigError
+import numpy as np
+
+from stseg.errors import CalibrationError, ConfigError, FormatError
+from stseg.io import limits
 from stseg.io.calibrations.foreign_camera import ForeignCamera
 from stseg.io.calibrations.opencv_xml import read_opencv_xml
 from stseg.io.calibrations.pom import read_pom
@@ -14,6 +17,8 @@ from stseg.io.calibrations.projection import read_projection
 from stseg.io.calibrations.structured import read_kalibr_yaml, read_krt_json, read_nvidia_json, read_pose_toml
 from stseg.io.calibrations.tsai import read_tsai_xml
 from stseg.io.calibrations.world_frame import World
+from stseg.io.names import EXPECTED, is_name
+from stseg.io.toml.text import shown
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +89,30 @@ FORMATS: Mapping[str, CalibrationFormat] = {
     "kalibr": CalibrationFormat(_without_options(read_kalibr_yaml), "a camera chain in YAML (needs PyYAML)"),
 }
 """By the name that `stseg calibrate import` takes."""
+
+
+def read_cameras(format: str, files: Sequence[Path], options: ImportOptions) -> list[ForeignCamera]:
+    """The cameras of files that belong together, in one of `FORMATS`.
+
+    Raises
+    ------
+    FormatError, CalibrationError, ConfigError
+        Where the files are not of that format, or their numbers make no cameras.
+    """
+    place = " + ".join(map(str, files))
+    try:
+        with np.errstate(over="raise", invalid="raise", divide="raise"):
+            cameras = FORMATS[format].read(files, options)
+    except (ArithmeticError, np.linalg.LinAlgError) as error:
+        raise CalibrationError(place, "", f"numbers that make no camera ({error})", "those of a camera") from error
+    if len(cameras) > limits.CAMERAS:
+        raise FormatError(place, "", f"{len(cameras)} cameras", f"at most {limits.CAMERAS}")
+    for camera in cameras:
+        if camera.name and not is_name(camera.name):
+            raise FormatError(place, "camera", shown(camera.name), EXPECTED)
+        if not np.isfinite(camera.projection).all():
+            raise CalibrationError(place, f"camera {camera.name}", "numbers that overflow", "those of a camera")
+    return cameras
 
 
 def help_text() -> str:

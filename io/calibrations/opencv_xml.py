@@ -14,6 +14,8 @@ from stseg.errors import FormatError
 from stseg.geometry import Lens
 from stseg.io.calibrations.foreign_camera import ForeignCamera, camera_from_pose
 from stseg.io.calibrations.safe_xml import parse_xml
+from stseg.io.names import printable
+from stseg.io.numbers import parse_numbers
 
 _MATRIX = ("camera_matrix",)
 _DISTORTION = ("distortion_coefficients",)
@@ -70,11 +72,9 @@ def _numbers(
     file, node = found[0]
     text = node.findtext("data", node.text or "")
     expected = f"{' or '.join(map(str, counts))} numbers"
-    try:
-        numbers = np.array([float(word) for word in text.split()])
-    except ValueError as error:
-        raise FormatError(file, node.tag, str(error), expected) from error
-    if len(numbers) not in counts or not np.isfinite(numbers).all():
-        shown = f"{len(numbers)} numbers: {' '.join(text.split())[:60]}"
-        raise FormatError(file, node.tag, shown, f"{expected}, all finite")
-    return file, numbers
+    words = text.split()
+    numbers = parse_numbers(words) if len(words) in counts else None
+    if numbers is None:
+        strange = f"{len(words)} numbers: {printable(' '.join(words[:20]))[:60]}"
+        raise FormatError(file, node.tag, strange, f"{expected}, all finite")
+    return file, np.array(numbers)

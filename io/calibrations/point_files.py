@@ -4,12 +4,18 @@ from __future__ import annotations
 
 import csv
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
 
 from stseg.arrays import Floats, Ints
 from stseg.errors import FormatError
+from stseg.io import limits
+from stseg.io.bounded_files import require_regular
+from stseg.io.names import EXPECTED, is_name
+from stseg.io.numbers import parse_number
+from stseg.io.toml.text import shown
 
 _NEEDED = ("camera", "u", "v", "x", "y")
 
@@ -57,8 +63,9 @@ def read_points(path: Path) -> list[PointTable]:
     for line, row in _rows(path):
         cells = [_number(path, line, name, row) for name in ("u", "v", "x", "y", "z")]
         name = (row["camera"] or "").strip()
-        if not name:
-            raise FormatError(path, f"line {line}, column camera", "nothing", "a camera's name")
+        if not is_name(name):
+            strange = shown(name) if name else "nothing"
+            raise FormatError(path, f"line {line}, column camera", strange, f"a camera's name: {EXPECTED}")
         rows.setdefault(name, []).append((line, cells))
     if not rows:
         raise FormatError(path, "", "no points", "a line a point")
@@ -72,17 +79,21 @@ def read_points(path: Path) -> list[PointTable]:
 
 def _rows(path: Path) -> list[tuple[int, dict[str, str]]]:
     try:
+        require_regular(path)
         with path.open(newline="", encoding="utf-8-sig") as file:
             reader = csv.DictReader(file, skipinitialspace=True)
             header = [name.strip() for name in reader.fieldnames or []]
             if missing := [name for name in _NEEDED if name not in header]:
-                found = ",".join(header) or "nothing"
+                found = ",".join(header)[: limits.NAME] or "nothing"
                 raise FormatError(path, "header", found, f"columns {','.join(_NEEDED)} (no {', '.join(missing)})")
             reader.fieldnames = header
-            return [(reader.line_num, row) for row in reader]
+            rows = [(reader.line_num, row) for row in islice(reader, limits.POINTS + 1)]
+            if len(rows) > limits.POINTS:
+                raise FormatError(path, "", f"more than {limits.POINTS} points", "no more")
+            return rows
     except OSError as error:
         raise FormatError(path, "", error.strerror or error, "a CSV file that can be read") from error
-    except (UnicodeDecodeError, csv.Error) as error:
+    except (ValueError, csv.Error) as error:
         raise FormatError(path, "", "something that is not text", "a CSV file") from error
 
 
@@ -90,10 +101,7 @@ def _number(path: Path, line: int, column: str, row: dict[str, str]) -> float:
     cell = (row.get(column) or "").strip()
     if column == "z" and not cell:
         return 0.0
-    try:
-        number = float(cell)
-    except ValueError:
-        number = np.nan
-    if not np.isfinite(number):
-        raise FormatError(path, f"line {line}, column {column}", repr(cell), "a finite number")
+    number = parse_number(cell)
+    if not abs(number) <= limits.NUMBER:
+        raise FormatError(path, f"line {line}, column {column}", shown(cell), "a finite number of usual size")
     return number

@@ -14,7 +14,9 @@ import numpy as np
 from stseg.arrays import Floats
 from stseg.errors import CalibrationError, FormatError
 from stseg.geometry.fits import fit_vertical, homogeneous
+from stseg.io.bounded_files import read_text
 from stseg.io.calibrations.foreign_camera import ForeignCamera
+from stseg.io.numbers import parse_numbers
 
 _EXPECTED = "two 3x3 matrices, image to ground plane and image to head plane, a row a line"
 _SAMPLES = 9  # pixels along each side of the image at which the head plane is sampled
@@ -71,18 +73,15 @@ def _seen(homography: Floats, ground: Floats) -> tuple[Floats, Floats]:
 
 def _rows(file: Path) -> list[list[float]]:
     try:
-        text = file.read_text(encoding="utf-8-sig")
+        text = read_text(file)
     except OSError as error:
         raise FormatError(file, "", error.strerror or error, _EXPECTED) from error
-    except UnicodeDecodeError as error:
+    except ValueError as error:
         raise FormatError(file, "", "what is no text", _EXPECTED) from error
     found = (_three(line) for line in text.translate(str.maketrans("[](){},;", " " * 8)).splitlines())
     return [row for row in found if row is not None]
 
 
 def _three(line: str) -> list[float] | None:
-    try:
-        row = [float(word) for word in line.split()]
-    except ValueError:
-        return None
-    return row if len(row) == 3 and np.isfinite(row).all() else None
+    words = line.split()
+    return parse_numbers(words) if len(words) == 3 else None

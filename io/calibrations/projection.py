@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-import struct
-import zipfile
-import zlib
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import h5py
 import numpy as np
-from scipy.io import loadmat
-from scipy.io.matlab import MatReadError
 
 from stseg.arrays import AnyArray, Floats
 from stseg.errors import FormatError
+from stseg.io import limits
+from stseg.io.bounded_files import read_bytes, read_text
 from stseg.io.calibrations.foreign_camera import ForeignCamera
+from stseg.io.calibrations.matlab_file import parse_mat
+from stseg.io.numbers import parse_numbers
+from stseg.io.numpy_files import read_npy, read_npz
+from stseg.io.runfile.safe_hdf5 import open_hdf5, read_whole
 
 _EXPECTED = "one 3x4 projection matrix"
 
@@ -41,58 +42,48 @@ def _read(file: Path) -> ForeignCamera:
     if reader is None:
         raise FormatError(file, "", f"the suffix {file.suffix!r}", f"one of {', '.join(_READERS)}")
     try:
-        file.stat()  # each reader has its own, unclear words for a missing file
         matrices = {key: array for key, array in reader(file).items() if array.shape == (3, 4)}
     except OSError as error:
         raise FormatError(file, "", error.strerror or error, _EXPECTED) from error
-    except (ValueError, EOFError, KeyError, RuntimeError, zipfile.BadZipFile, zlib.error) as error:
+    except ValueError as error:
         raise FormatError(file, "", f"what cannot be read ({error})", _EXPECTED) from error
     if len(matrices) != 1:
         names = f" ({', '.join(matrices)})" if matrices else ""
         raise FormatError(file, "", f"{len(matrices)} arrays of that shape{names}", _EXPECTED)
     ((key, matrix),) = matrices.items()
-    if matrix.dtype.kind not in "iuf" or not np.isfinite(matrix).all():
-        raise FormatError(file, key, "values that are not finite numbers", _EXPECTED)
+    if matrix.dtype.kind not in "iuf" or not (np.abs(matrix) <= limits.NUMBER).all():
+        raise FormatError(file, key, "values that are no finite numbers of usual size", _EXPECTED)
     return ForeignCamera(file, "", None, matrix.astype(float))
 
 
 def _read_text(file: Path) -> Mapping[str, Floats]:
-    words = file.read_text(encoding="utf-8").replace(",", " ").split()
-    numbers = np.array([float(word) for word in words])
-    return {"": numbers.reshape(3, 4)} if len(numbers) == 12 else {}
+    words = read_text(file).replace(",", " ").split()
+    if len(words) != 12:
+        return {}
+    numbers = parse_numbers(words)
+    if numbers is None:
+        raise ValueError("a word that is no finite number")
+    return {"": np.array(numbers).reshape(3, 4)}
 
 
 def _read_npy(file: Path) -> Mapping[str, AnyArray]:
-    return {"": np.asarray(np.lib.format.open_memmap(file, mode="r"))}
-
-
-def _read_npz(file: Path) -> Mapping[str, AnyArray]:
-    if not zipfile.is_zipfile(file):
-        raise ValueError("not an .npz archive")
-    with np.load(file, allow_pickle=False) as arrays:
-        return {key: np.asarray(arrays[key]) for key in arrays.files}
+    return {"": read_npy(file)}
 
 
 def _read_mat(file: Path) -> Mapping[str, AnyArray]:
-    if not h5py.is_hdf5(file):
-        return {key: array for key, array in _read_old_mat(file).items() if not key.startswith("__")}
-    with h5py.File(file, "r") as group:
+    data = read_bytes(file, limits.UNPACKED)
+    if data[:8] != b"\x89HDF\r\n\x1a\n" and data[512:520] != b"\x89HDF\r\n\x1a\n":
+        return parse_mat(data)
+    with open_hdf5(file) as group:
         stored = {key: group[key] for key in group if isinstance(group.get(key), h5py.Dataset)}
         # MATLAB writes columns first, so HDF5 sees the transpose.
-        return {key: np.asarray(array[()]).T for key, array in stored.items() if array.shape == (4, 3)}
-
-
-def _read_old_mat(file: Path) -> Mapping[str, AnyArray]:
-    try:
-        return {key: np.asarray(array) for key, array in loadmat(file).items()}
-    except (MatReadError, NotImplementedError, TypeError, struct.error) as error:
-        raise ValueError(f"no .mat file: {error}") from error
+        return {key: read_whole(array).T for key, array in stored.items() if array.shape == (4, 3)}
 
 
 _READERS: dict[str, Callable[[Path], Mapping[str, AnyArray]]] = {
     ".txt": _read_text,
     ".csv": _read_text,
     ".npy": _read_npy,
-    ".npz": _read_npz,
+    ".npz": read_npz,
     ".mat": _read_mat,
 }

@@ -6,6 +6,7 @@ import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
 from stseg.errors import FormatError
+from stseg.io.bounded_files import read_text
 
 
 def parse_xml(file: Path, expected: str) -> ElementTree.Element:
@@ -23,7 +24,7 @@ def parse_xml(file: Path, expected: str) -> ElementTree.Element:
         Where it cannot be read, is no XML, or declares a document type.
     """
     try:
-        text = file.read_bytes().decode("utf-8-sig")
+        text = read_text(file)
         # Entities are declared in a document type, which no calibration has: refusing it leaves nothing to expand.
         # The check is on decoded text and the parser gets that text, so no declared encoding can hide one.
         if "<!DOCTYPE" in text or "<!ENTITY" in text:
@@ -31,5 +32,5 @@ def parse_xml(file: Path, expected: str) -> ElementTree.Element:
         return ElementTree.fromstring(text)
     except OSError as error:
         raise FormatError(file, "", error.strerror or error, "a calibration file") from error
-    except (UnicodeDecodeError, ElementTree.ParseError, ValueError) as error:
+    except (ElementTree.ParseError, ValueError, RecursionError) as error:
         raise FormatError(file, "", f"what is not XML ({error})", expected) from error

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
@@ -11,8 +10,12 @@ from scipy.spatial.transform import Rotation
 
 from stseg.arrays import Floats
 from stseg.errors import FormatError
+from stseg.io import limits
+from stseg.io.bounded_files import parse_json, read_text
 from stseg.io.calibrations.foreign_camera import ForeignCamera, ForeignTable, camera_from_pose
 from stseg.io.extras import load_extra
+from stseg.io.names import printable
+from stseg.io.numbers import parse_whole
 from stseg.io.toml.table import ANY
 from stseg.io.toml.text import parse_toml
 
@@ -25,7 +28,7 @@ def read_krt_json(files: Sequence[Path]) -> list[ForeignCamera]:
     FormatError
         Where a file is no such JSON.
     """
-    return [camera for file in files for camera in _krt(_table(file, json.loads, "JSON"))]
+    return [camera for file in files for camera in _krt(_table(file, parse_json, "JSON"))]
 
 
 def _krt(top: ForeignTable) -> Iterator[ForeignCamera]:
@@ -81,11 +84,11 @@ def read_nvidia_json(files: Sequence[Path]) -> list[ForeignCamera]:
     FormatError
         Where a file is no such JSON, or a sensor has no camera matrix.
     """
-    return [camera for file in files for camera in _sensors(_table(file, json.loads, "JSON"))]
+    return [camera for file in files for camera in _sensors(_table(file, parse_json, "JSON"))]
 
 
 def _sensors(top: ForeignTable) -> Iterator[ForeignCamera]:
-    for sensor in top.tables("sensors"):
+    for sensor in top.tables("sensors", limits.CAMERAS):
         if "intrinsicMatrix" in sensor and "extrinsicMatrix" in sensor:
             pose = sensor.matrix("extrinsicMatrix", 3, 4)
             projection = sensor.matrix("intrinsicMatrix", 3, 3) @ pose
@@ -101,9 +104,16 @@ def _frame_size(sensor: ForeignTable) -> tuple[int, int] | None:
     """Width and height from the sensor's attributes, where it has them."""
     listed = sensor.values.get("attributes")
     rows = [row for row in listed if isinstance(row, dict)] if isinstance(listed, list) else []
-    given = {row.get("name"): str(row.get("value")) for row in rows}
-    width, height = given.get("frameWidth", ""), given.get("frameHeight", "")
-    return (int(width), int(height)) if width.isdecimal() and height.isdecimal() else None
+    given = {name: row.get("value") for row in rows if isinstance(name := row.get("name"), str)}
+    sides = [_side(given.get(key)) for key in ("frameWidth", "frameHeight")]
+    return (sides[0], sides[1]) if sides[0] is not None and sides[1] is not None else None
+
+
+def _side(value: object) -> int | None:
+    """A side of an image, pixels, which some files write as text."""
+    if isinstance(value, str):
+        return parse_whole(value, 1, limits.SIDE)
+    return value if type(value) is int and 1 <= value <= limits.SIDE else None
 
 
 def read_kalibr_yaml(files: Sequence[Path]) -> list[ForeignCamera]:
@@ -138,17 +148,18 @@ def _chain(top: ForeignTable) -> Iterator[ForeignCamera]:
 
 def _number(name: str) -> tuple[int, str]:
     digits = name.removeprefix("cam")
-    return (int(digits), "") if digits.isdecimal() else (0, name)
+    number = parse_whole(digits, 0, limits.CAMERAS)
+    return (0, name) if number is None else (number, "")
 
 
 def _table(file: Path, load: Callable[[str], object], language: str) -> ForeignTable:
     """The file's top table; what a language's own reader raises is a wrong format."""
     try:
-        top = load(file.read_bytes().decode("utf-8-sig"))
+        top = load(read_text(file))
     except OSError as error:
         raise FormatError(file, "", error.strerror or error, f"a calibration in {language}") from error
     except Exception as error:  # json, tomllib and yaml have no error in common
-        raise FormatError(file, "", f"what is not {language} ({str(error)[:120]})", language) from error
+        raise FormatError(file, "", f"what is not {language} ({printable(str(error))[:120]})", language) from error
     if not isinstance(top, dict) or not top or not all(isinstance(name, str) for name in top):
         raise FormatError(file, "", "no table of cameras", f"one, in {language}")
     return ForeignTable(file, "", top)

@@ -17,8 +17,11 @@ from scipy.spatial.transform import Rotation
 
 from stseg.arrays import Floats
 from stseg.errors import FormatError
+from stseg.io import limits
 from stseg.io.calibrations.foreign_camera import ForeignCamera, camera_from_pose
 from stseg.io.calibrations.safe_xml import parse_xml
+from stseg.io.names import printable
+from stseg.io.numbers import parse_numbers
 
 _BEFORE_TURN = 0.9
 """Share of the radius at which the cubic turns round up to which it is followed."""
@@ -43,6 +46,10 @@ def _read(file: Path) -> ForeignCamera:
     *translation, rx, ry, rz = _numbers(file, root, "Extrinsic", "tx ty tz rx ry rz")
     if min(width, height, dpx, dpy, focal, sx) <= 0:
         raise FormatError(file, "Geometry, Intrinsic", "a length that is not above 0", "lengths above 0")
+    if min(width, height) < 1 or width * height > limits.PIXELS:
+        raise FormatError(
+            file, "Geometry", f"{width:g} x {height:g} pixels", f"an image of at most {limits.PIXELS:.0e}"
+        )
     matrix = np.array([[focal * sx / dpx, 0, cx], [0, focal / dpy, cy], [0, 0, 1]])
     corners = (np.array([[0, 0], [width, 0], [0, height], [width, height]]) - (cx, cy)) / (matrix[0, 0], matrix[1, 1])
     radial = _inverse_radial(kappa * focal**2, float(np.hypot(*corners.T).max()))
@@ -77,10 +84,9 @@ def _numbers(file: Path, root: ElementTree.Element, tag: str, names: str) -> lis
     node = root.find(tag)
     if node is None:
         raise FormatError(file, tag, "no such node", f"one with {names}")
-    try:
-        numbers = [float(node.attrib[name]) for name in names.split()]
-    except (KeyError, ValueError) as error:
-        raise FormatError(file, tag, f"no number: {error}", f"numbers {names}") from error
-    if not np.isfinite(numbers).all():
-        raise FormatError(file, tag, "a number that is not finite", f"numbers {names}")
+    words = [node.attrib.get(name, "") for name in names.split()]
+    numbers = parse_numbers(words)
+    if numbers is None:
+        found = f"no finite number: {printable(' '.join(words))[:60]}"
+        raise FormatError(file, tag, found, f"numbers {names}")
     return numbers

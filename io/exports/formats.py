@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import sqlite3
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -47,6 +49,15 @@ FORMATS: Mapping[str, ExportFormat] = {
     "napari": ExportFormat(tables.write_napari_tracks, "the CSV of napari-tracks"),
 }
 """By the name that `stseg export --to` takes."""
+
+
+def write_tracks(to: str, path: Path, run: Run) -> None:
+    """Write a run's tracks in one of `FORMATS`; FormatError where its tables do not fit each other."""
+    run.require_fit()
+    try:
+        FORMATS[to].write(path, run)
+    except sqlite3.Error as error:
+        raise OSError(errno.EIO, str(error)) from error
 
 
 def help_text() -> str:

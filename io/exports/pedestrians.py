@@ -46,7 +46,7 @@ def write_jupedsim(path: Path, run: Run) -> None:
     about = {"version": _JUPEDSIM_VERSION, "fps": run.frame_rate, **bounds}
     table = run.trajectory
     columns = [table[name].tolist() for name in ("frame", "id", "x", "y")] + headings(table).T.tolist()
-    path.unlink(missing_ok=True)  # left behind by a run that was killed; SQLite would write into it
+    path.write_bytes(b"")  # SQLite would add to what is there
     with closing(sqlite3.connect(path)) as database, database:
         database.executescript(_JUPEDSIM_TABLES)
         database.executemany("INSERT INTO metadata VALUES(?, ?)", [(key, str(value)) for key, value in about.items()])

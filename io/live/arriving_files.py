@@ -13,7 +13,10 @@ from threading import Event, Lock
 from stseg.arrays import Observation
 from stseg.errors import SourceError
 from stseg.geometry import Camera
+from stseg.io import limits
+from stseg.io.bounded_files import parse_json, read_text
 from stseg.io.live.live_frames import now
+from stseg.io.names import is_file_name
 from stseg.io.outputs.whole_files import replacing
 from stseg.io.recording.recording import Source
 from stseg.io.recording.source_files import numeric_order
@@ -36,10 +39,7 @@ class FileNotes:
         self._path, self._lock = path, Lock()
         self.read: dict[str, list[tuple[str, int]]] = {}
         with suppress(OSError, ValueError):
-            self.read = {
-                camera: [(str(name), int(frames)) for name, frames in files]
-                for camera, files in json.loads(path.read_text("utf-8")).items()
-            }
+            self.read = _checked_notes(parse_json(read_text(path)))
 
     def note(self, camera: str, name: str, frames: int) -> None:
         """Record a file that was read to its end."""
@@ -47,6 +47,22 @@ class FileNotes:
             self.read.setdefault(camera, []).append((name, frames))
             with replacing(self._path, overwrite=True) as part:
                 part.write_text(json.dumps(self.read, indent=1), "utf-8")
+
+
+def _checked_notes(notes: object) -> dict[str, list[tuple[str, int]]]:
+    """Files and their numbers of frames by camera; ValueError where the notes are of another form."""
+    if not isinstance(notes, dict):
+        raise ValueError("no notes")
+    checked = {}
+    for camera, files in notes.items():
+        if not isinstance(files, list) or not all(isinstance(own, list) and len(own) == 2 for own in files):
+            raise ValueError("no list of files")
+        if not all(
+            is_file_name(name) and type(frames) is int and 0 <= frames <= limits.FRAMES for name, frames in files
+        ):
+            raise ValueError("no file and number of frames")
+        checked[str(camera)] = [(name, frames) for name, frames in files]
+    return checked
 
 
 class ArrivingFiles:

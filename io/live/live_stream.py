@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections import deque
 from collections.abc import Callable, Iterator
 from threading import Condition, Event, Thread
@@ -10,7 +11,7 @@ from typing import NamedTuple, Protocol
 
 import cv2
 
-import stseg.io.recording.video_stream  # noqa: F401  # quietens FFmpeg before its first use
+import stseg.io.recording.ffmpeg  # noqa: F401  # quietens FFmpeg before its first use
 from stseg.arrays import AnyArray
 from stseg.config import LiveConfig
 from stseg.errors import SourceError
@@ -21,6 +22,10 @@ from stseg.io.recording.recording import Source, mask_passwords
 
 _OPTIONS = "rtsp_transport;tcp|fflags;nobuffer|analyzeduration;1000000"
 """RTSP over TCP, without buffering; one second (in microseconds) to probe the format."""
+
+
+_ADDRESS = re.compile(r"(rtsps?|rtmps?|https?|srt|udp|tcp|rtp)://[^\s\x00-\x1f]+\Z", re.ASCII | re.IGNORECASE)
+"""Addresses that are opened; above all, none of files and pipes."""
 
 
 class Capture(Protocol):
@@ -52,6 +57,8 @@ class FFmpegCapture:
     """
 
     def __init__(self, address: str, silence: float) -> None:
+        if not _ADDRESS.match(address):
+            raise OSError("no address of a live stream")
         os.environ.setdefault("OPENCV_FFMPEG_CAPTURE_OPTIONS", _OPTIONS)
         limit = round(1000 * silence)
         # One thread: each of FFmpeg's frame threads delays the stream by a frame.

@@ -11,6 +11,8 @@ from typing import Self, TextIO
 import numpy as np
 
 from stseg.arrays import Rows
+from stseg.io import limits
+from stseg.io.numbers import parse_number, parse_numbers, parse_whole
 from stseg.io.outputs.whole_files import output_error, replacing
 from stseg.model.tables import TRAJECTORY
 
@@ -44,8 +46,8 @@ class LiveTable:
         self.path, self._frame_rate = path, frame_rate
         lines = _lines_before(path, stop)
         self.rows = np.zeros(len(lines), TRAJECTORY)
-        for name, kind in (("frame", int), ("id", int), ("x", float), ("y", float)):
-            self.rows[name] = [kind(line[_COLUMNS.index(name)]) for line in lines]
+        for name in ("frame", "id", "x", "y"):
+            self.rows[name] = [parse_number(line[_COLUMNS.index(name)]) for line in lines]
         with replacing(path, overwrite=True) as part, part.open("w", newline="", encoding="utf-8") as file:
             csv.writer(file).writerows([_COLUMNS, *lines])
         self._file: TextIO | None = None
@@ -84,7 +86,12 @@ def _lines_before(path: Path, stop: int) -> list[list[str]]:
     try:
         with path.open(newline="", encoding="utf-8") as file:
             _, *lines = csv.reader(file)
-    except (OSError, ValueError):
+    except (OSError, ValueError, csv.Error):
         return []
-    whole = [line for line in lines if len(line) == len(_COLUMNS) and line[0].isdecimal() and line[-1]]
-    return [line for line in whole if int(line[0]) < stop]
+    return [line for line in lines if _is_row(line) and int(line[0]) < stop]
+
+
+def _is_row(line: list[str]) -> bool:
+    if len(line) != len(_COLUMNS) or parse_numbers(line[3:]) is None:
+        return False
+    return all(parse_whole(cell, 0, most) is not None for cell, most in ((line[0], limits.FRAMES), (line[2], 1 << 31)))

@@ -16,8 +16,10 @@ import numpy as np
 
 from stseg.arrays import Bytes, Ints
 from stseg.errors import OutputError
-from stseg.io.outputs.whole_files import output_error, part_path
+from stseg.io.names import EXPECTED, is_name
+from stseg.io.outputs.whole_files import clear_frames, output_error, write_quickly
 from stseg.io.recording.indexed_png import encode_indexed
+from stseg.io.toml.text import shown
 
 _BYTE, _WORD = 255, 65535
 
@@ -78,8 +80,7 @@ class LabelImages:
         """
         path = self._folder_of(camera) / f"{frame:06d}.png"
         try:
-            part_path(path).write_bytes(self._encoded(ids))
-            part_path(path).replace(path)
+            write_quickly(path, self._encoded(ids))
         except OSError as error:
             raise output_error(path, error) from error
 
@@ -89,13 +90,11 @@ class LabelImages:
         return bytes(cv2.imencode(".png", ids.astype(np.uint16))[1])
 
     def _folder_of(self, camera: str) -> Path:
-        if Path(camera).name != camera:
-            raise OutputError(self._folder, f"camera {camera}", repr(camera), "a name that a folder can have")
+        if not is_name(camera):
+            raise OutputError(self._folder, "camera", shown(camera), EXPECTED)
         return self._folder / camera
 
     @staticmethod
     def _clear(folder: Path) -> None:
         """Make a camera's folder, without the images of an earlier run."""
-        folder.mkdir(parents=True, exist_ok=True)
-        for file in folder.glob("[0-9]*.png"):
-            file.unlink()
+        clear_frames(folder)

@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from stseg.arrays import Boxes, Bytes, Rows
 from stseg.errors import OutputError
 from stseg.geometry import Camera, Rig
+from stseg.io.outputs.whole_files import clear_frames
 from stseg.io.recording.recording import CameraSource, Recording, Source, SourceKind
 from stseg.io.recording.rigs import write_rig
 
@@ -99,6 +100,8 @@ def write_scene(
         folder.mkdir(parents=True, exist_ok=True)
         if any(folder.iterdir()) and not overwrite:
             raise OutputError(folder, "", "files in it", "an empty folder, or leave to overwrite")
+        if links := [path.name for path in folder.iterdir() if path.is_symlink()]:
+            raise OutputError(folder, "", f"{links[0]}, a link", "no links, which would be written through")
         _write_empty(folder, scene)
         with ExitStack() as open_files:
             truth = open_files.enter_context((folder / "truth.csv").open("w", encoding="utf-8"))
@@ -211,9 +214,7 @@ def _paths(folder: Path, camera: Camera) -> dict[str, Path]:
 
 def _clear(folder: Path) -> None:
     """Make a folder for frames, without those of an earlier recording."""
-    folder.mkdir(exist_ok=True)
-    for file in folder.glob("[0-9]*.png"):
-        file.unlink()
+    clear_frames(folder)
 
 
 @contextmanager

@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import csv
+import math
+from array import array
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
+from typing import TextIO
 
 import numpy as np
 
 from stseg.arrays import Boxes, Flags, Floats, Ints
 from stseg.errors import FormatError, SourceError
+from stseg.io import limits
+from stseg.io.bounded_files import require_regular
+from stseg.io.numbers import parse_number
 
 _NEEDED = ("frame", "left", "top", "width", "height")
 _MOT = (0, 2, 3, 4, 5, 6)  # frame, (id), left, top, width, height, conf
-_MAX_FRAMES = 2**31
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,6 +98,10 @@ def read_boxes(path: Path, first_frame: int = 0, frames: int | None = None) -> B
     if frames is None and not len(frame):
         raise SourceError(path, "", "no boxes", "some, or `frames` to say how many frames have none")
     order = np.argsort(frame, kind="stable")
+    crowded = np.flatnonzero(frame[order][limits.BOXES_PER_FRAME :] == frame[order][: -limits.BOXES_PER_FRAME])
+    if len(crowded):
+        found = f"more than {limits.BOXES_PER_FRAME} boxes in frame {frame[order][crowded[0]] + first_frame}"
+        raise FormatError(path, "", found, "no more")
     length = int(frame.max()) + 1 if frames is None else frames
     return BoxTable(length, frame[order], values[order, 1:5], score[order])
 
@@ -101,10 +110,10 @@ def _check(lines: _Lines, first_frame: int, frames: int | None) -> None:
     """Refuse rows that are no boxes."""
     frame = lines.values[:, 0]
     for column in range(lines.values.shape[1]):
-        lines.refuse(~np.isfinite(lines.values[:, column]), column, "a finite number")
+        lines.refuse(~(np.abs(lines.values[:, column]) <= limits.NUMBER), column, "a finite number of usual size")
     lines.refuse(frame != np.floor(frame), 0, "a whole number")
     lines.refuse(frame < first_frame, 0, f"a frame from first_frame = {first_frame} on")
-    count = _MAX_FRAMES if frames is None else frames
+    count = limits.FRAMES if frames is None else frames
     reason = "" if frames is None else f", for there are frames = {frames}"
     lines.refuse(frame >= first_frame + count, 0, f"a frame below {first_frame + count}{reason}")
     for column in (3, 4):
@@ -123,12 +132,13 @@ def _read_lines(path: Path) -> _Lines:
         rows = chain([(line, first)], rows)
     else:
         columns = _header_columns(path, line, first)
-    number: list[int] = []
-    rows_of_numbers: list[list[float]] = []
+    number, numbers = array("q"), array("d")
     for line, fields in rows:
         number.append(line)
-        rows_of_numbers.append(_numbers(path, line, fields, columns))
-    values = np.array(rows_of_numbers, float).reshape(-1, len(columns))
+        numbers.extend(_numbers(path, line, fields, columns))
+        if len(number) > limits.ROWS:
+            raise FormatError(path, "", f"more than {limits.ROWS} rows", "no more")
+    values = np.array(numbers, float).reshape(-1, len(columns))
     if is_mot:
         values[:, 5:][values[:, 5:] == -1] = 1
     return _Lines(path, np.array(number, np.int64), values)
@@ -137,26 +147,38 @@ def _read_lines(path: Path) -> _Lines:
 def _fields(path: Path) -> Iterator[tuple[int, list[str]]]:
     """Line number and fields of each line that is not blank."""
     try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
+        require_regular(path)
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            yield from _split(path, file)
     except OSError as error:
         raise SourceError(path, "", error.strerror or error, "a file of boxes") from error
     except UnicodeDecodeError as error:
         raise FormatError(path, "", "bytes that are no text", "a text file in UTF-8") from error
-    if "," not in next(filter(str.strip, lines), ""):
-        yield from ((number, line.split()) for number, line in enumerate(lines, 1) if line.strip())
+    except ValueError as error:
+        raise FormatError(path, "", error, "a file of boxes") from error
+
+
+def _split(path: Path, file: TextIO) -> Iterator[tuple[int, list[str]]]:
+    """Fields between commas where the first line has one, else between blanks."""
+    skipped = 0
+    while (first := file.readline(limits.LINE)) and not first.strip():
+        skipped += 1
+    rest = chain([first], file) if first else iter(())
+    if "," not in first:
+        yield from ((number, line.split()) for number, line in enumerate(rest, skipped + 1) if line.strip())
         return
-    reader = csv.reader(lines, skipinitialspace=True)
+    reader = csv.reader(rest, skipinitialspace=True)
     try:
-        yield from ((reader.line_num, fields) for fields in reader if any(map(str.strip, fields)))
+        yield from ((skipped + reader.line_num, own) for own in reader if any(map(str.strip, own)))
     except csv.Error as error:
-        raise FormatError(path, f"line {reader.line_num}", error, "fields between commas") from error
+        raise FormatError(path, f"line {skipped + reader.line_num}", error, "fields between commas") from error
 
 
 def _mot_columns(path: Path, line: int, first: list[str]) -> tuple[int, ...]:
     # A file of boxes that lost its header would otherwise be read one column off.
-    if len(first) > 1 and not (_is_number(first[1]) and float(first[1]).is_integer()):
+    if len(first) > 1 and not (_is_number(first[1]) and parse_number(first[1]).is_integer()):
         expected = "a whole number as in lines of MOTChallenge, or a header above"
-        raise FormatError(path, f"line {line}", f"id {first[1]}", expected)
+        raise FormatError(path, f"line {line}", f"id {first[1][: limits.NAME]}", expected)
     return tuple(column for column in _MOT if column < max(len(first), 6))
 
 
@@ -173,17 +195,13 @@ def _header_columns(path: Path, line: int, header: list[str]) -> tuple[int, ...]
 def _numbers(path: Path, line: int, fields: list[str], columns: tuple[int, ...]) -> list[float]:
     if len(fields) <= max(columns):
         raise FormatError(path, f"line {line}", f"{len(fields)} fields", f"at least {max(columns) + 1}")
-    texts = [fields[column] for column in columns]
-    try:
-        return [float(text) for text in texts]
-    except ValueError:
-        found = next(text for text in texts if not _is_number(text))
-        raise FormatError(path, f"line {line}", repr(found), "a number") from None
+    numbers = [parse_number(fields[column]) for column in columns]
+    if any(map(math.isnan, numbers)):
+        wrong = next(place for place, number in enumerate(numbers) if math.isnan(number))
+        found = f"{(*_NEEDED, 'score')[wrong]} {fields[columns[wrong]][: limits.NAME].strip() or 'nothing'}"
+        raise FormatError(path, f"line {line}", found, "a finite number")
+    return numbers
 
 
 def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
+    return not math.isnan(parse_number(text))

@@ -15,7 +15,7 @@ from stseg.io.recording.pictures import read_picture
 from stseg.io.recording.recording import Source
 
 _SUFFIXES = frozenset((".bmp", ".jpeg", ".jpg", ".pbm", ".pgm", ".png", ".pnm", ".ppm", ".tif", ".tiff", ".webp"))
-_NUMBER = re.compile(r"(\d+)")
+_NUMBER = re.compile(r"(\d+)", re.ASCII)
 
 
 class ImageStream:

@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 
 from stseg.arrays import Floats
+from stseg.io.recording.ffmpeg import open_video
 
 _RAW = -1
 """Value of CAP_PROP_FORMAT at which OpenCV delivers undecoded packets."""
@@ -22,7 +23,7 @@ def packet_times(path: Path) -> Floats | None:
     None where packets do not determine them: other codecs reorder and drop frames, and an incomplete picture may not
     decode to a frame.
     """
-    capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
+    capture = open_video(path, "")
     code = (int(capture.get(cv2.CAP_PROP_FOURCC)) & 0xFFFFFFFF).to_bytes(4, "little")
     countable = code.upper() == b"MJPG" and capture.set(cv2.CAP_PROP_FORMAT, _RAW)
     heads, times = set[bytes](), list[float]()

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+from io import BytesIO
 from pathlib import Path
 
 import cv2
 import numpy as np
+from PIL import Image
 
 from stseg.arrays import AnyArray, Observation
 from stseg.errors import SourceError
+from stseg.io.bounded_files import read_bytes
 from stseg.io.recording.indexed_png import decode_indexed, stores_numbers
 from stseg.io.recording.recording import SourceKind
 
 # Video codecs leave a trace of colour on grey; real colour pictures have far more.
 _GREY_SPREAD = 32
+_FORMATS = ("BMP", "JPEG", "PNG", "PPM", "TIFF", "WEBP")
+_MOST_BYTES = 1 << 29
+"""Bytes of an image file."""
 
 
 def read_picture(path: Path, kind: SourceKind, size: tuple[int, int], key: str) -> AnyArray:
@@ -36,13 +42,32 @@ def read_picture(path: Path, kind: SourceKind, size: tuple[int, int], key: str) 
         Where the file cannot be read or decoded, or is not of that kind or size.
     """
     try:
-        data = path.read_bytes()
+        data = read_bytes(path, _MOST_BYTES)
     except OSError as error:
         raise SourceError(path, key, error.strerror or error, "an image") from error
-    picture = _decode(data, kind)
+    except ValueError as error:
+        raise SourceError(path, key, error, "an image") from error
+    declared = declared_size(data)
+    if declared is not None and sorted(declared) != sorted(size):  # Exif may turn it
+        found, expected = f"an image of {declared[0]}x{declared[1]}", f"{size[0]}x{size[1]}, the size of the camera"
+        raise SourceError(path, key, found, expected)
+    picture = _decode(data, kind) if declared is not None else None
     if picture is None:
         raise SourceError(path, key, "a broken file", "an image that decodes")
     return as_observation(picture, kind, size, path, key)
+
+
+def declared_size(data: bytes) -> tuple[int, int] | None:
+    """Width and height in the header of an image file, before anything is decoded; None where it is no image."""
+    Image.init()
+    for name in _FORMATS:
+        read, accepts = Image.OPEN[name]
+        try:
+            if accepts is None or accepts(data[:16]) is True:
+                return read(BytesIO(data), "").size
+        except Exception:  # whatever Pillow makes of broken headers
+            continue
+    return None
 
 
 def reduced_view(view: Observation, factor: int) -> Observation:

@@ -12,15 +12,19 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
+
 from stseg.errors import CalibrationError, OutputError, RigError
 from stseg.geometry import Camera, Grid, Lens, Rig
+from stseg.io import limits
+from stseg.io.bounded_files import read_text
+from stseg.io.outputs.whole_files import replacing
 from stseg.io.recording.detections.tables import COLUMNS
 from stseg.io.recording.recording import SOURCE_KINDS, CameraSource, ClockSource, Recording, Source, SourceKind
 from stseg.io.recording.rig_text import FORMAT, format_rig
 from stseg.io.toml.table import ANY, Table
 from stseg.io.toml.text import parse_toml
 
-_MOST_CELLS = 100_000_000  # of one frame's volume: more is a typing error
 _ON_MISSING: tuple[Literal["error", "blind"], ...] = ("error", "blind")
 _CLOCKS: tuple[ClockSource, ...] = ("auto", "stamps", "count")
 _CAMERA_KEYS = (
@@ -47,11 +51,13 @@ def read_rig(path: str | Path) -> Recording:
     """
     path = Path(path)
     try:
-        text = path.read_bytes().decode("utf-8-sig")
+        text = read_text(path)
     except OSError as error:
         raise RigError(path, "", error.strerror or error, "a rig file") from error
     except UnicodeDecodeError as error:
         raise RigError(path, "", f"bytes that are not UTF-8 at {error.start}", "TOML, which is UTF-8") from error
+    except ValueError as error:
+        raise RigError(path, "", error, "a rig file") from error
     return parse_rig(text, path)
 
 
@@ -61,17 +67,18 @@ def parse_rig(text: str, path: Path) -> Recording:
         top = Table(path, "", parse_toml(text))
     except ValueError as error:
         raise RigError(path, "", f"what is not TOML ({error})", "TOML") from error
-    if top.integer("format") != FORMAT:
-        raise top.error("format", top.integer("format"), f"{FORMAT}, the format that this version reads")
+    if (found := top.integer("format", 0, 999)) != FORMAT:
+        raise top.error("format", found, f"{FORMAT}, the format that this version reads")
     top.allow("format", "scene", "grid", "camera")
-    scene, tables = top.table("scene"), _named(top.tables("camera"))
+    scene, tables = top.table("scene"), _named(top.tables("camera", limits.CAMERAS))
     scene.allow("name", "frame_rate", "x", "y", "polygon")
     grid = _grid(scene, top.table("grid"))
-    cameras = tuple(_camera(table) for table in tables)
-    rig = Rig(scene.text("name"), scene.positive("frame_rate"), grid, cameras)
-    for table, camera in zip(tables, cameras, strict=True):
-        with _placed(table, "projection" in table):
-            replace(rig, cameras=(camera,)).require_coverage()
+    with np.errstate(all="ignore"):  # what overflows fails the checks of the geometry
+        cameras = tuple(_camera(table) for table in tables)
+        rig = Rig(scene.name("name"), scene.within("frame_rate", limits.FRAME_RATE), grid, cameras)
+        for table, camera in zip(tables, cameras, strict=True):
+            with _placed(table, "projection" in table):
+                replace(rig, cameras=(camera,)).require_coverage()
     return Recording(path, rig, tuple(_camera_source(table) for table in tables))
 
 
@@ -91,19 +98,17 @@ def write_rig(path: str | Path, recording: Recording) -> None:
     path = Path(path)
     text = format_rig(recording, path)
     parse_rig(text, path)
-    part = path.with_name(f"{path.name}.part")
     try:
-        part.write_bytes(text.encode("utf-8"))
-        part.replace(path)
+        data = text.encode("utf-8")
     except UnicodeEncodeError as error:
         raise OutputError(path, "", "a name that UTF-8 cannot hold", "names of readable characters") from error
-    except OSError as error:
-        raise OutputError(path, "", error.strerror or error, "a place to write to") from error
+    with replacing(path, overwrite=True) as part:
+        part.write_bytes(data)
 
 
 def _named(tables: tuple[Table, ...]) -> tuple[Table, ...]:
     """The cameras' tables, with camera names in their places for errors; names are unique."""
-    names = [table.text("name") for table in tables]
+    names = [table.name("name") for table in tables]
     for index, (table, name) in enumerate(zip(tables, names, strict=True)):
         if name in names[:index]:
             raise table.error("name", f"{name!r}, the name of camera[{names.index(name)}] too", "a name of its own")
@@ -114,29 +119,31 @@ def _grid(scene: Table, table: Table) -> Grid:
     table.allow("cell", "top", "planes")
     polygon = None
     if "polygon" in scene:
-        polygon = scene.numbers("polygon", ANY, 2)
-        if len(polygon) < 3:
-            raise scene.error("polygon", f"{len(polygon)} corners", "at least 3")
+        polygon = scene.numbers("polygon", ANY, 2, largest=limits.METRES)
+        if not 3 <= len(polygon) <= limits.CORNERS:
+            raise scene.error("polygon", f"{len(polygon)} corners", f"3 to {limits.CORNERS}")
     grid = Grid(
         x=_bounds(scene, "x"),
         y=_bounds(scene, "y"),
-        cell=table.positive("cell"),
-        top=table.positive("top"),
-        planes=table.integer("planes", least=1),
+        cell=table.within("cell", limits.CELL),
+        top=table.within("top", limits.TOP),
+        planes=table.integer("planes", 1, limits.PLANES),
         polygon=polygon,
     )
-    cells = (grid.x[1] - grid.x[0]) / grid.cell * (grid.y[1] - grid.y[0]) / grid.cell * grid.planes
-    if not cells < _MOST_CELLS:
-        raise table.error(
-            "cell", f"{grid.cell!r}, which makes {cells:.1e} cells", f"fewer than {_MOST_CELLS:.0e} cells"
-        )
+    planes, rows, columns = grid.shape
+    if max(rows, columns) > limits.AXIS_CELLS or rows * columns > limits.GROUND_CELLS:
+        expected = f"at most {limits.AXIS_CELLS} along a side and {limits.GROUND_CELLS:.0e} in all"
+        raise table.error("cell", f"{grid.cell!r}, which makes {columns} x {rows} cells on the ground", expected)
+    if planes * rows * columns > limits.CELLS:
+        found = f"{grid.cell!r}, which makes {planes * rows * columns:.1e} cells"
+        raise table.error("cell", found, f"at most {limits.CELLS:.0e}, planes included")
     if not grid.inside().any():
         raise scene.error("polygon", "a polygon that holds no cell", "one that overlaps the rectangle x, y")
     return grid
 
 
 def _bounds(table: Table, name: str) -> tuple[float, float]:
-    low, high = table.numbers(name, 2).tolist()
+    low, high = table.numbers(name, 2, largest=limits.METRES).tolist()
     if not low < high:
         raise table.error(name, [low, high], "the lower bound, then the upper")
     return low, high
@@ -160,8 +167,9 @@ def _camera(table: Table) -> Camera:
 
 def _size(table: Table) -> tuple[int, int]:
     size = table.numbers("size", 2)
-    if (size != size.round()).any() or (size < 1).any():
-        raise table.error("size", size.tolist(), "width and height in whole pixels")
+    if (size != size.round()).any() or (size < 1).any() or size.max() > limits.SIDE or size.prod() > limits.PIXELS:
+        expected = f"width and height in whole pixels, at most {limits.SIDE} each and {limits.PIXELS:.0e} pixels"
+        raise table.error("size", size.tolist(), expected)
     return int(size[0]), int(size[1])
 
 
@@ -191,7 +199,7 @@ def _camera_source(table: Table) -> CameraSource:
     background = _source(table.table("background")) if "background" in table else None
     if background is not None and background.kind not in ("video", "images"):
         raise table.error("background.kind", repr(background.kind), "video or images: the empty scene in colour")
-    offset = table.integer("offset") if "offset" in table else 0
+    offset = table.integer("offset", -limits.FRAMES, limits.FRAMES) if "offset" in table else 0
     clock = table.choice("clock", _CLOCKS) if "clock" in table else "auto"
     source = _source(table.table("source"), "starts")
     images = _source(table.table("images")) if "images" in table else None
@@ -204,21 +212,22 @@ def _source(table: Table, *more_keys: str) -> Source:
     kind = table.choice("kind", SOURCE_KINDS)
     detections = kind in ("boxes", "instances")
     table.allow("kind", "path", *(_DETECTION_KEYS if detections else ()), *(() if kind == "boxes" else more_keys))
-    if any("://" in name for name in table.texts("path")):
+    paths = table.paths("path")
+    if any("://" in name for name in paths):
         return _live_source(table, kind)
-    first, *more = [table.file.parent / name for name in table.texts("path")]
+    first, *more = [table.file.parent / name for name in paths]
     if more and kind == "boxes":
         raise table.error("path", f"{len(more) + 1} files", "one file of boxes")
     return Source(
         kind,
         first,
-        table.integer("first_frame") if "first_frame" in table else 0,
-        table.integer("frames", least=1) if "frames" in table else None,
+        table.integer("first_frame", -limits.FRAMES, limits.FRAMES) if "first_frame" in table else 0,
+        table.integer("frames", 1, limits.FRAMES) if "frames" in table else None,
         tuple(more),
         tuple(table.numbers("starts", ANY).tolist()) if "starts" in table else (),
         classes=tuple(table.texts("classes")) if "classes" in table else (),
         least_score=_share(table, "score") if "score" in table else 0.0,
-        view=table.integer("view", least=0) if "view" in table else None,
+        view=table.integer("view", 0, limits.CAMERAS) if "view" in table else None,
         select=table.text("select") if "select" in table else "",
         image_list=table.file.parent / table.text("image_list") if "image_list" in table else None,
         columns=_columns(table.table("columns")) if "columns" in table else (),
@@ -238,7 +247,7 @@ def _columns(table: Table) -> tuple[tuple[str, str], ...]:
 
 
 def _live_source(table: Table, kind: SourceKind) -> Source:
-    address, *more = table.texts("path")
+    address, *more = table.paths("path")
     if kind != "video" or more:
         found = f"{address} of kind {kind}" if kind != "video" else f"{len(more) + 1} streams"
         raise table.error("path", found, "one address, of kind video")

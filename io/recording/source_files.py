@@ -11,7 +11,7 @@ from stseg.errors import SourceError
 from stseg.io.recording.image_stream import image_paths, is_image_source, is_pattern
 from stseg.io.recording.recording import Source
 
-_NUMBER = re.compile(r"(\d+)")
+_NUMBER = re.compile(r"(\d+)", re.ASCII)
 
 
 def source_parts(source: Source, key: str) -> list[Source]:
@@ -34,6 +34,8 @@ def source_files(source: Source) -> Iterator[Path]:
 
 def _expanded(path: Path, kind: str, key: str) -> list[Path]:
     """The files of a pattern of videos, ordered by the numbers in their names; other paths unchanged."""
+    if not path.name:  # such as /
+        return [path]
     videos = kind == "video" or (kind == "masks" and not is_image_source(path.with_name(path.name.replace("*", "_"))))
     if not videos or not is_pattern(path) or path.is_file():
         return [path]
@@ -45,4 +47,4 @@ def _expanded(path: Path, kind: str, key: str) -> list[Path]:
 
 def numeric_order(path: Path) -> list[tuple[int, str]]:
     """Sort key of file names: words in alphabetical order, numbers by value."""
-    return [(int(word), "") if word.isdigit() else (-1, word) for word in _NUMBER.split(path.name)]
+    return [(int(word), "") if part % 2 else (-1, word) for part, word in enumerate(_NUMBER.split(path.name))]

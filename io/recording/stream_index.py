@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -9,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints
-from stseg.io.recording.aligned_stream import decoder_threads, open_aligned_streams, recording_length
+from stseg.io.recording.aligned_stream import AlignedStream, decoder_threads, open_aligned_streams, recording_length
 from stseg.io.recording.recording import Recording
 from stseg.io.recording.time_alignment import align_in_time, coverage, with_alignment
 
@@ -68,8 +69,18 @@ def index_streams(recording: Recording) -> StreamIndex:
         streams = open_aligned_streams(recording, opened)
         pool = opened.enter_context(ThreadPoolExecutor(decoder_threads(recording)))
         times = tuple(counted.result() for counted in [pool.submit(stream.read_times) for stream in streams])
+        return index_from_times(recording, times, streams)
+
+
+def index_from_times(
+    recording: Recording, times: Sequence[Sequence[Floats]], streams: list[AlignedStream] | None = None
+) -> StreamIndex:
+    """The index of a recording whose time stamps are known, float64 (n,) each; raises as `index_streams` does."""
     alignment = align_in_time(recording, times)
-    aligned = with_alignment(recording, alignment.shown).sources
-    for stream, source, own in zip(streams, aligned, times, strict=True):
-        stream.align(source, sum(map(len, own)))
-    return StreamIndex(int(recording_length(streams)), times, alignment.shown, alignment.notes)
+    aligned = with_alignment(recording, alignment.shown)
+    with ExitStack() as opened:
+        streams = streams or open_aligned_streams(recording, opened)
+        for stream, source, own in zip(streams, aligned.sources, times, strict=True):
+            stream.align(source, sum(map(len, own)))
+        length = int(recording_length(streams))
+    return StreamIndex(length, tuple(map(tuple, times)), alignment.shown, alignment.notes)

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
-os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
-
-import cv2
-
 from stseg.errors import SourceError
+from stseg.io.recording.ffmpeg import open_video
 
 
 def read_video_size(path: Path) -> tuple[int, int]:
@@ -20,9 +16,7 @@ def read_video_size(path: Path) -> tuple[int, int]:
     SourceError
         Where the file is missing or nothing of it decodes.
     """
-    if not path.is_file():
-        raise SourceError(path, "", "no such file", "a video")
-    capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
+    capture = open_video(path, "")
     try:
         decoded, picture = capture.read()
     finally:

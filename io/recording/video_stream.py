@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
-import os
-
-# Silences FFmpeg, which reads this at its first use; failures raise SourceError instead.
-os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
-
 import cv2
 import numpy as np
 
 from stseg.arrays import AnyArray, Floats
 from stseg.errors import SourceError
 from stseg.geometry import Camera
+from stseg.io.recording.ffmpeg import open_video
 from stseg.io.recording.packets import packet_times
 from stseg.io.recording.pictures import as_observation
 from stseg.io.recording.recording import Source
-
-cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
 
 _NEAR = 250
 """Frames that are decoded sequentially rather than skipped by seeking."""
@@ -44,8 +38,6 @@ class VideoStream:
 
     def __init__(self, source: Source, camera: Camera, times: Floats | None = None) -> None:
         self._source, self._camera, self._times = source, camera, times
-        if not source.path.is_file():
-            raise self._error("no such file", "a video")
         self._frame, self._ended = -1, False
         self._open()
 
@@ -88,8 +80,7 @@ class VideoStream:
         self._capture.release()
 
     def _open(self) -> None:
-        # FFmpeg by name: the same decoder on every system, without the fallbacks of other backends.
-        self._capture = cv2.VideoCapture(str(self._source.path), cv2.CAP_FFMPEG)
+        self._capture = open_video(self._source.path, f"camera {self._camera.name}")
         if not self._capture.isOpened():
             raise self._error("a file that does not open as a video", "a video that FFmpeg decodes")
         self._frame, self._ended = -1, False

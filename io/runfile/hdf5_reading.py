@@ -10,13 +10,15 @@ from typing import TypeVar
 import h5py
 
 from stseg.errors import FormatError
+from stseg.io.names import printable
+from stseg.io.runfile.safe_hdf5 import open_hdf5
 
 T = TypeVar("T")
 
 
 def read_object(path: Path, place: str, take: Callable[[h5py.File], T]) -> T:
     """The value of `take` for an open file; raises FormatError with the place in the file."""
-    with format_errors(path, place), h5py.File(path, "r") as file:
+    with format_errors(path, place), open_hdf5(path) as file:
         return take(file)
 
 
@@ -32,4 +34,5 @@ def format_errors(path: Path, place: str) -> Iterator[None]:
     except (OSError, RuntimeError, KeyError, TypeError, ValueError) as error:  # whatever h5py raises on broken files
         if path.is_file() and not h5py.is_hdf5(path):
             raise FormatError(path, "", "something that is not HDF5", "a run file") from error
-        raise FormatError(path, place, f"something that cannot be read ({error})", "a whole run file") from error
+        found = f"something that cannot be read ({printable(str(error))[:200]})"
+        raise FormatError(path, place, found, "a whole run file") from error

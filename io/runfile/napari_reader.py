@@ -43,7 +43,7 @@ def read_layers(path: str) -> list[Layer]:
         Where the run file is broken.
     """
     run = read_run(path)
-    group = h5py.File(path, "r")[layout.OCCUPANCY]  # open as long as napari holds the arrays
+    group = h5py.File(path, "r")[layout.OCCUPANCY]  # checked by `read_run`; open as long as napari holds the arrays
     cells = {"scale": _scale(run), "translate": _first_cell(run), **_axes()}
     volume: Layer = (
         group[layout.LOG_ODDS.name],

@@ -12,14 +12,14 @@ from pathlib import Path
 from types import FrameType
 
 from stseg.errors import OutputError
-from stseg.io.outputs.whole_files import output_error, part_path, publish_part
+from stseg.io.outputs.whole_files import create_part, output_error, parts_of, publish_part
 from stseg.io.runfile.locks import lock
 
 _Handler = Callable[[int, FrameType | None], object]
 
 
 class PartFile(io.RawIOBase):
-    """`NAME.part` as a file object that never raises while HDF5 calls it.
+    """A part of an output as a file object that never raises while HDF5 calls it.
 
     HDF5 cannot close a file once a write has failed, and crashes on trying. So the first failure is recorded, later
     writes are dropped, and both failures and interrupts (Ctrl-C) are raised at the end of the step. All calls of HDF5,
@@ -28,12 +28,17 @@ class PartFile(io.RawIOBase):
     Parameters
     ----------
     path
-        The output whose part this is. An old part is overwritten, unless another process holds it open.
+        The output whose part this is. Parts of killed processes are deleted.
+
+    Attributes
+    ----------
+    part
+        The temporary file.
 
     Raises
     ------
     OutputError
-        Where the part cannot be made.
+        Where the part cannot be made, or another process writes one.
     """
 
     def __init__(self, path: Path) -> None:
@@ -42,12 +47,13 @@ class PartFile(io.RawIOBase):
         self._in_step = False
         self._interrupted: int | None = None
         try:
-            self._file = os.fdopen(os.open(part_path(path), os.O_RDWR | os.O_CREAT, 0o666), "r+b", buffering=0)
+            _remove_abandoned(path)
+            self.part, descriptor = create_part(path)
         except OSError as error:
             raise output_error(path, error) from error
+        self._file = os.fdopen(descriptor, "r+b", buffering=0)
         try:
             lock(self._file)
-            self._file.truncate(0)
         except OSError as error:
             self._file.close()
             raise output_error(path, error) from error
@@ -71,14 +77,12 @@ class PartFile(io.RawIOBase):
 
     def publish(self, overwrite: bool) -> None:
         """Sync the finished part and rename it; where that fails the part is kept."""
-        kept = f"the whole result is kept in {part_path(self._path)}"
-        if self._path.exists() and not overwrite:
-            raise OutputError(self._path, "", "a file that has appeared meanwhile", f"none; {kept}")
+        kept = f"the whole result is kept in {self.part}"
         try:
             os.fsync(self._file.fileno())
             if os.name == "nt":  # cannot rename what is open; elsewhere the lock is held until the name is taken
                 self._file.close()
-            publish_part(self._path)
+            publish_part(self.part, self._path, overwrite)
         except OSError as error:
             cause = output_error(self._path, error)
             raise OutputError(cause.place, "", cause.found, f"{cause.expected}; {kept}") from error
@@ -89,7 +93,7 @@ class PartFile(io.RawIOBase):
         with suppress(OSError, RuntimeError):
             close_hdf5()
         with suppress(OSError):
-            part_path(self._path).unlink(missing_ok=True)
+            self.part.unlink(missing_ok=True)
         self.close()
 
     def close(self) -> None:
@@ -158,3 +162,11 @@ class PartFile(io.RawIOBase):
                 handlers[number] = before
                 signal.signal(number, handle)
         return handlers
+
+
+def _remove_abandoned(path: Path) -> None:
+    """Delete the parts of killed processes; BlockingIOError where another process is writing one."""
+    for part in parts_of(path):
+        with part.open("rb") as file:
+            lock(file)
+            part.unlink()

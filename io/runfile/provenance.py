@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import platform
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from hashlib import blake2b
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -16,13 +18,18 @@ import numpy as np
 from stseg import __version__
 from stseg.arrays import Ints, Rows
 from stseg.errors import SourceError
+from stseg.io import limits
+from stseg.io.names import printable
 from stseg.io.recording.recording import Recording, Source, mask_passwords
 from stseg.io.recording.rig_text import format_rig
 from stseg.io.recording.source_files import source_files
+from stseg.io.runfile.safe_hdf5 import read_whole
 from stseg.io.toml.text import parse_toml
 
 _PACKAGES = ("numpy", "scipy", "numba", "h5py", "opencv-python-headless", "PyMaxflow")
 _TEXT = h5py.string_dtype()
+_SAMPLE, _SAMPLED_FILES = 1 << 16, 64
+"""Bytes of a sample, and files of a source that are sampled."""
 _VERSION = np.dtype([("name", "S32"), ("version", "S32")])
 SOURCE = np.dtype(
     [
@@ -100,25 +107,63 @@ def write_provenance(group: h5py.Group, provenance: Provenance) -> None:
 
 
 def read_provenance(group: h5py.Group) -> Provenance:
-    """Read the group /provenance."""
+    """Read the group /provenance; ValueError where its values cannot be."""
+    shown = {str(dataset.attrs["camera"]): read_whole(dataset) for dataset in group.get("shown", {}).values()}
+    for camera, own in shown.items():
+        if own.ndim != 1 or own.dtype.kind != "i" or ((own < -1) | (own > limits.FRAMES)).any():
+            raise ValueError(f"shown of camera {camera}: no frames by tick")
     return Provenance(
-        group.attrs["created"],
+        printable(str(group.attrs["created"]))[: limits.NAME],
         group["config"].asstr()[()],
         group["rig"].asstr()[()],
-        Path(group.attrs["rig_path"]),
-        {name.decode(): number.decode() for name, number in group["versions"][:].tolist()},
-        group["sources"][:],
-        {dataset.attrs["camera"]: dataset[:] for dataset in group.get("shown", {}).values()},
+        Path(str(group.attrs["rig_path"])),
+        {name.decode(): number.decode() for name, number in read_whole(group["versions"]).tolist()},
+        _checked_sources(group["sources"]),
+        shown,
     )
 
 
-def run_request(provenance: Provenance) -> dict[str, Any]:
-    """Everything that determines the result of a run, as texts and numbers in nested tables."""
+def _checked_sources(dataset: h5py.Dataset) -> Rows:
+    if dataset.dtype != SOURCE or dataset.ndim != 1 or len(dataset) > 2 * limits.CAMERAS:
+        raise ValueError("sources of another form")
+    return np.asarray(dataset[:])
+
+
+def run_request(recording: Recording, provenance: Provenance) -> dict[str, Any]:
+    """Everything that determines the result of a run, as texts and numbers in nested tables.
+
+    Files are known by size, time of change and samples of their bytes: a time can be set back.
+    """
     rig = parse_toml(provenance.rig)
     rig["camera"] = {camera.pop("name"): camera for camera in rig["camera"]}
     sources = {f"{_word(row['camera'])}, {_word(row['role'])}": _files_in_words(row) for row in provenance.sources}
     config = parse_toml(provenance.config)
-    return {"config": config, "rig": rig, "source": sources, "version": dict(provenance.versions)}
+    samples = {
+        camera.name: _samples(own.source) for camera, own in zip(recording.rig.cameras, recording.sources, strict=True)
+    }
+    return {
+        "config": config,
+        "rig": rig,
+        "source": sources,
+        "samples of source": samples,
+        "version": dict(provenance.versions),
+    }
+
+
+def _samples(source: Source) -> str:
+    """Checksum of the beginnings, middles and ends of a source's files; of many files, of some of them."""
+    digest = blake2b(digest_size=16)
+    try:
+        files = list(source_files(source)) if not source.address else []
+        for path in files[:: max(1, len(files) // _SAMPLED_FILES)]:
+            with path.open("rb") as file:
+                size = file.seek(0, os.SEEK_END)
+                for place in (0, size // 2, max(0, size - _SAMPLE)):
+                    file.seek(place)
+                    digest.update(file.read(_SAMPLE))
+    except (OSError, SourceError):
+        return "nothing"
+    return digest.hexdigest()
 
 
 def _files_in_words(row: np.void) -> str:

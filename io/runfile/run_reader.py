@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,7 +14,9 @@ import numpy as np
 
 from stseg.arrays import Bytes, Floats, Ints, Labels, Rows, Singles
 from stseg.errors import FormatError
+from stseg.io import limits
 from stseg.io.extras import load_extra
+from stseg.io.names import EXPECTED, is_name, printable
 from stseg.io.recording.recording import Recording
 from stseg.io.recording.rigs import parse_rig
 from stseg.io.recording.time_alignment import with_alignment
@@ -21,11 +24,17 @@ from stseg.io.runfile import layout
 from stseg.io.runfile.data_frames import to_data_frame
 from stseg.io.runfile.hdf5_reading import format_errors, read_object
 from stseg.io.runfile.provenance import Provenance, read_provenance
+from stseg.io.runfile.safe_hdf5 import open_hdf5, read_whole
+from stseg.io.runfile.value_checks import Bounds, require_fit, require_table
 from stseg.io.runfile.volume import RunVolume
+from stseg.io.toml.text import shown
 
 if TYPE_CHECKING:
     from pandas import DataFrame
     from xarray import Dataset
+
+_SCALES = 8 * limits.FRAMES
+"""Bytes of one scale of the volume."""
 
 
 @dataclass(frozen=True)
@@ -116,9 +125,17 @@ class Run:
     def recording(self) -> Recording:
         """The rig with its grid, and the streams, as at the start of the run."""
         provenance = self.provenance
-        return with_alignment(
-            parse_rig(provenance.rig, provenance.rig_path), [provenance.shown.get(name) for name in self.cameras]
-        )
+        recording = parse_rig(provenance.rig, provenance.rig_path)
+        cameras = tuple(camera.name for camera in recording.rig.cameras)
+        if cameras != self.cameras or recording.rig.grid.shape != self.views.shape:
+            found = f"{len(cameras)} cameras and a grid of {recording.rig.grid.shape}"
+            expected = f"the run's {len(self.cameras)} cameras and {self.views.shape}"
+            raise FormatError(self.path, f"{layout.PROVENANCE}/rig", found, expected)
+        return with_alignment(recording, [provenance.shown.get(name) for name in self.cameras])
+
+    def require_fit(self) -> None:
+        """Raise FormatError where tables of tracks do not fit each other or the frames."""
+        require_fit(self._bounds, self.trajectory, self.boxes, self.tracks)
 
     @property
     def detections(self) -> Rows:
@@ -186,7 +203,7 @@ class Run:
 
     def read_volumes(self, number: int) -> Iterator[tuple[Ints, Singles, Labels]]:
         """The volumes of all frames, `number` at a time: the frames, log-odds and labels as `read_frame` gives them."""
-        with format_errors(self.path, layout.OCCUPANCY), h5py.File(self.path, "r") as file:
+        with format_errors(self.path, layout.OCCUPANCY), open_hdf5(self.path) as file:
             group = file[layout.OCCUPANCY]
             for start in range(0, len(self.frames), number):
                 some = slice(start, start + number)
@@ -196,9 +213,14 @@ class Run:
         def take(file: h5py.File) -> Rows:
             if name in layout.ADDED and name not in file:
                 return np.zeros(0, layout.table_types(len(self.cameras))[name])
-            return _with_added(np.asarray(file[name][:]), layout.table_types(len(self.cameras))[name])
+            dtype = layout.table_types(len(self.cameras))[name]
+            return _with_added(read_whole(file[name], limits.ROWS * dtype.itemsize), dtype)
 
-        return read_object(self.path, f"/{name}", take)
+        return require_table(self._bounds, name, read_object(self.path, f"/{name}", take))
+
+    @property
+    def _bounds(self) -> Bounds:
+        return Bounds(self.path, self.frames, len(self.cameras))
 
 
 def _with_added(rows: Rows, dtype: np.dtype[np.void]) -> Rows:
@@ -232,6 +254,14 @@ def read_trajectory(path: Path) -> Rows:
     return read_run(path).trajectory
 
 
+def _require_bounded_volume(group: h5py.Group) -> None:
+    """Raise ValueError where a frame or a chunk of the volume is larger than is read."""
+    for name in (layout.LOG_ODDS.name, layout.LABEL.name):
+        array = group[name]
+        if math.prod(array.shape[1:]) > limits.CELLS or (array.chunks is not None and array.chunks[0] > 64):
+            raise ValueError(f"{array.name}: frames of {array.shape[1:]} in chunks of {array.chunks}")
+
+
 def _volume(group: h5py.Group, index: int) -> tuple[Singles, Labels]:
     return group["log_odds"][index].astype(np.float32), group["label"][index]
 
@@ -240,7 +270,7 @@ def _checked_run(path: Path, file: h5py.File) -> Run:
     checks = _Checks(path, file)
     for name in ("format", "format_version"):
         checks.require_value("/", name, layout.ROOT_ATTRIBUTES[name])
-    cameras = tuple(str(name) for name in checks.attribute("/", "cameras", "names of cameras"))
+    cameras = checks.names("/", "cameras")
     lengths: dict[str, int] = {}
     for field in layout.FIELDS:
         checks.require_field(field, lengths)
@@ -248,12 +278,18 @@ def _checked_run(path: Path, file: h5py.File) -> Run:
         if name in file or name not in layout.ADDED:
             checks.require_dataset(f"/{name}", dtype, 1)
     checks.require_provenance()
-    frame_rate = checks.attribute("/trajectory", "fps", "frames per second")
     entry, group = checks.require("/entry/title"), file[layout.OCCUPANCY]
-    frames, heights, ground_y, ground_x, views = (group[name][:] for name in ("frame", "plane", "y", "x", "views"))
-    kept = str(group.attrs.get("kept", layout.KEPT[0]))
-    title = entry.asstr()[()]
-    return Run(path, title, float(frame_rate), cameras, frames, heights, ground_y, ground_x, views, kept)
+    _require_bounded_volume(group)
+    arrays = (read_whole(group[name], _SCALES) for name in ("frame", "plane", "y", "x", "views"))
+    frames, heights, ground_y, ground_x, views = arrays
+    checks.require_rising(frames)
+    for name, axis in (("plane", heights), ("y", ground_y), ("x", ground_x)):
+        checks.require_finite(f"{layout.OCCUPANCY}/{name}", axis)
+    kept = group.attrs.get("kept", layout.KEPT[0])
+    if kept not in layout.KEPT:
+        raise FormatError(path, f"{layout.OCCUPANCY}@kept", shown(kept), f"one of {', '.join(layout.KEPT)}")
+    title = printable(str(entry.asstr()[()]))[: limits.NAME]
+    return Run(path, title, checks.frame_rate(), cameras, frames, heights, ground_y, ground_x, views, str(kept))
 
 
 @dataclass(frozen=True)
@@ -274,6 +310,32 @@ class _Checks:
         if key not in attributes:
             raise FormatError(self.path, f"{name}@{key}", "nothing", expected)
         return attributes[key]
+
+    def names(self, name: str, key: str) -> tuple[str, ...]:
+        """An attribute of several names of cameras, each once."""
+        found = np.ravel(self.attribute(name, key, "names of cameras")).tolist()[: limits.CAMERAS + 1]
+        if len(found) > limits.CAMERAS or not all(map(is_name, found)) or len(set(found)) != len(found):
+            raise FormatError(self.path, f"{name}@{key}", shown(found), f"names of cameras: {EXPECTED}")
+        return tuple(found)
+
+    def frame_rate(self) -> float:
+        """Frames per second."""
+        low, high = limits.FRAME_RATE
+        found = self.attribute("/trajectory", "fps", "frames per second")
+        if np.shape(found) or not isinstance(found, float | int | np.number) or not low <= found <= high:
+            raise FormatError(self.path, "/trajectory@fps", shown(found), f"a number from {low:g} to {high:g}")
+        return float(found)
+
+    def require_rising(self, frames: Ints) -> None:
+        """Frames of the run: numbers from 0 on, rising."""
+        name = f"{layout.OCCUPANCY}/frame"
+        if len(frames) and (frames[0] < 0 or frames[-1] > limits.FRAMES or (np.diff(frames) <= 0).any()):
+            raise FormatError(self.path, name, "numbers that do not rise from 0 on", f"at most {limits.FRAMES}, rising")
+
+    def require_finite(self, name: str, values: Floats) -> None:
+        """Coordinates: finite and of usual size."""
+        if not (np.abs(values) <= limits.METRES).all():
+            raise FormatError(self.path, name, "a coordinate that is not finite", f"metres up to {limits.METRES:g}")
 
     def require_value(self, name: str, key: str, expected: str | int) -> None:
         found = self.attribute(name, key, repr(expected))

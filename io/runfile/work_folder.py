@@ -1,35 +1,55 @@
 """State of an unfinished run for resuming: the folder `RUN.h5.segments` beside its output.
 
+    stseg-work-folder           the mark: without it the folder is not ours, and left alone
     begun.json                  the request: the same command resumes from here, any other is refused
-    streams.npz                 the stream index, made once
+    streams.npz                 time stamps of all streams, read once
     files.json, clock.json      of a followed recording: files that were read, and the time of frame 0
     segment-00003-CHECKSUM.h5   the run file of one segment
+    result.h5                   the finished run file, which the output is a second name of
     lock                        held by the run that writes here
 
-Files are written atomically. A segment's name contains its checksum; a segment that has changed is made again.
+Files are written atomically. A segment's name contains its checksum; a segment that has changed is made again. All of
+it is read as untrusted: whatever cannot be read is made again, or refused in one line.
 """
 
 from __future__ import annotations
 
 import json
+import math
+import os
 import re
-import shutil
 from contextlib import suppress
 from dataclasses import dataclass
 from hashlib import blake2b, file_digest
 from pathlib import Path
 from types import TracebackType
 from typing import Any, BinaryIO, Self
-from zipfile import BadZipFile
 
 import numpy as np
 
+from stseg.arrays import Floats
 from stseg.errors import OutputError
-from stseg.io.outputs.whole_files import output_error, replacing, sync_folder
-from stseg.io.recording.stream_index import StreamIndex
+from stseg.io import limits
+from stseg.io.bounded_files import is_regular, parse_json, read_text
+from stseg.io.names import printable
+from stseg.io.numpy_files import read_npz
+from stseg.io.outputs.whole_files import create_part, output_error, publish_part, replacing, require_new, sync_folder
+from stseg.io.recording.recording import Recording
+from stseg.io.recording.source_files import source_parts
+from stseg.io.recording.stream_index import StreamIndex, index_from_times
 from stseg.io.runfile.locks import lock
+from stseg.io.toml.text import shown
 
+_MARK = "stseg-work-folder"
+_ABOUT = "Made by stseg: it may delete the files in this folder that it made.\n"
 _SEGMENT = re.compile(r"segment-(\d{5})-([0-9a-f]{32})\.h5")
+_OWN = re.compile(
+    r"(begun\.json|streams\.npz|files\.json|clock\.json|result\.h5|segment-\d{5}(-[0-9a-f]{32})?\.h5)"
+    r"(\.[0-9a-f]{16}\.part)?"
+)
+"""Names of files in the folder that are ours."""
+_STAMPS = 1 << 32
+"""Bytes of all time stamps, unpacked."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +82,7 @@ class WorkFolder:
     Raises
     ------
     OutputError
-        Where a different run is unfinished or running here, or the folder cannot be written.
+        Where the folder is not ours, a different run is unfinished or running here, or it cannot be written.
     """
 
     def __init__(self, output: Path, request: dict[str, Any]) -> None:
@@ -74,8 +94,8 @@ class WorkFolder:
 
     def __enter__(self) -> Self:
         try:
-            self.path.mkdir(exist_ok=True)
-            self._lock = (self.path / "lock").open("ab")
+            self._make()
+            self._lock = _open_own(self.path / "lock")
             lock(self._lock)
         except OSError as error:
             self.close()
@@ -93,27 +113,71 @@ class WorkFolder:
         self.close()
 
     def close(self) -> None:
-        """Release the lock; an empty folder is removed."""
+        """Release the lock; a folder without a run in it is removed."""
         if self._lock is None:
             return
         if not self.begun:
-            with suppress(OSError):
-                (self.path / "lock").unlink()
-                self.path.rmdir()
+            self._remove_own()
         self._lock.close()
         self._lock = None
 
     @property
     def begun(self) -> bool:
-        """Whether the folder holds an unfinished run."""
-        return (self.path / "begun.json").exists()
+        """Whether the folder is ours and holds an unfinished run."""
+        return self._is_own() and is_regular(self.path / "begun.json")
+
+    @property
+    def result(self) -> Path:
+        """Path at which the finished run file is written, before `publish`."""
+        return self.path / "result.h5"
+
+    @property
+    def published(self) -> bool:
+        """Whether the output already is the finished run file: a kill came before the folder was removed."""
+        try:
+            return self.begun and is_regular(self.output) and self.output.samefile(self.result)
+        except OSError:
+            return False
+
+    def require_output(self, overwrite: bool) -> None:
+        """Refuse an output that exists, unless it is the finished run file of this folder; raises OutputError."""
+        if not self.published:
+            require_new(self.output, overwrite)
+
+    def publish(self, overwrite: bool) -> None:
+        """Give the finished run file its name; the folder keeps it too, until it is removed.
+
+        Raises
+        ------
+        OutputError
+            Where the output has appeared meanwhile, or cannot be written; the result stays in the folder.
+        """
+        try:
+            try:
+                if overwrite:
+                    part, descriptor = create_part(self.output)
+                    os.close(descriptor)
+                    part.unlink()
+                    os.link(self.result, part)
+                    publish_part(part, self.output, overwrite)
+                else:
+                    os.link(self.result, self.output)
+                    sync_folder(self.output.parent)
+            except FileExistsError:
+                raise
+            except OSError:  # a file system without links
+                publish_part(self.result, self.output, overwrite)
+        except OSError as error:
+            cause = output_error(self.output, error)
+            kept = f"{cause.expected}; the whole result is kept in {self.result}"
+            raise OutputError(cause.place, "", cause.found, kept) from error
 
     def segments(self) -> dict[int, Path]:
         """The finished segments by number; files whose bytes have changed are deleted and listed in `broken`."""
         found = {}
-        for path in sorted(self.path.iterdir()):
+        for path in sorted(self.path.iterdir()) if self._is_own() else ():
             name = _SEGMENT.fullmatch(path.name)
-            if name is None:
+            if name is None or not is_regular(path):
                 continue
             if checksum(path) == name[2]:
                 found[int(name[1])] = path
@@ -126,39 +190,30 @@ class WorkFolder:
         """Path at which a segment is written, before `keep_segment`."""
         return self.path / f"segment-{index:05}.h5"
 
-    def streams(self) -> StreamIndex | None:
-        """The stored stream index; None where there is none or it cannot be read."""
+    def streams(self, recording: Recording) -> StreamIndex | None:
+        """The stream index of the stored time stamps; None where there are none, or not of this recording."""
         try:
-            with np.load(self.path / "streams.npz") as kept:
-                files = [range(int(count)) for count in kept["files"]]
-                times = tuple(tuple(kept[f"times{k}_{j}"] for j in own) for k, own in enumerate(files))
-                placed = set(kept["placed"].tolist())
-                shown = tuple(kept[f"shown{k}"] if k in placed else None for k in range(len(files)))
-                return StreamIndex(int(kept["length"]), times, shown, tuple(kept["notes"].tolist()))
-        except (OSError, KeyError, ValueError, BadZipFile):
+            stored = read_npz(self.path / "streams.npz", _STAMPS)
+            times = tuple(tuple(_stamps(stored, k, own)) for k, own in enumerate(_counts(stored)))
+        except (OSError, ValueError):
             return None
+        expected = [len(source_parts(source.source, "")) for source in recording.sources]
+        return index_from_times(recording, times) if list(map(len, times)) == expected else None
 
     def keep_streams(self, streams: StreamIndex) -> None:
-        """Store the stream index."""
+        """Store the time stamps of all streams."""
+        times = {f"times{k}_{j}": own for k, files in enumerate(streams.times) for j, own in enumerate(files)}
+        files = np.array([len(own) for own in streams.times], np.int64)
         with replacing(self.path / "streams.npz", overwrite=True) as part, part.open("wb") as file:
-            times = {f"times{k}_{j}": own for k, files in enumerate(streams.times) for j, own in enumerate(files)}
-            shown = {k: own for k, own in enumerate(streams.shown) if own is not None}
-            np.savez_compressed(
-                file,
-                length=np.array(streams.length),
-                files=np.array([len(own) for own in streams.times]),
-                placed=np.array(list(shown), np.int64),
-                notes=np.array(streams.notes, str),
-                **times,  # type: ignore[arg-type]
-                **{f"shown{k}": own for k, own in shown.items()},  # type: ignore[arg-type]
-            )
+            np.savez_compressed(file, files=files, **times)  # type: ignore[arg-type]
 
     def clock(self) -> float | None:
         """Stored time of frame 0 of a live recording, seconds since 1970, or None."""
         try:
-            return float(json.loads((self.path / "clock.json").read_text("utf-8")))
+            start = parse_json(read_text(self.path / "clock.json", limits.LINE))
         except (OSError, ValueError):
             return None
+        return start if isinstance(start, float) and math.isfinite(start) else None
 
     def keep_clock(self, start: float) -> None:
         """Store the time of frame 0."""
@@ -166,30 +221,89 @@ class WorkFolder:
             part.write_text(json.dumps(start), "utf-8")
 
     def remove(self) -> None:
-        """Delete the folder, once the output exists."""
-        shutil.rmtree(self.path, ignore_errors=True)
+        """Delete the folder, once the output exists; files in it that are not ours stay."""
+        self._remove_own()
         if self._lock is not None:
             self._lock.close()
             self._lock = None
 
+    def _make(self) -> None:
+        """The folder with our mark; an empty one is adopted, any other without the mark refused."""
+        with suppress(FileExistsError):
+            self.path.mkdir()
+        if self.path.is_symlink() or not self.path.is_dir():
+            raise OutputError(self.path, "", "what is no folder", "none, or that of an unfinished run")
+        if self._is_own():
+            return
+        if any(self.path.iterdir()):
+            expected = "none, or that of an unfinished run; move it, or give another output"
+            raise OutputError(self.path, "", "a folder that stseg did not make", expected)
+        descriptor = os.open(self.path / _MARK, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
+        with os.fdopen(descriptor, "w") as file:
+            file.write(_ABOUT)
+
+    def _is_own(self) -> bool:
+        return not self.path.is_symlink() and is_regular(self.path / _MARK)
+
+    def _remove_own(self) -> None:
+        """Delete what we made; the mark goes last, and stays beside files that are not ours."""
+        if not self._is_own():
+            return
+        with suppress(OSError):
+            for path in self.path.iterdir():
+                if _OWN.fullmatch(path.name) and is_regular(path):
+                    path.unlink()
+            if {path.name for path in self.path.iterdir()} <= {_MARK, "lock"}:
+                (self.path / "lock").unlink(missing_ok=True)
+                (self.path / _MARK).unlink()
+                self.path.rmdir()
+
     def _begin(self) -> None:
         path = self.path / "begun.json"
         try:
-            before = json.loads(path.read_text("utf-8"))
+            before = parse_json(read_text(path))
         except FileNotFoundError:
             with replacing(path, overwrite=True) as part:
                 part.write_text(json.dumps(self._request, indent=1), "utf-8")
             return
         except (OSError, ValueError) as error:
-            raise OutputError(
-                path, "", f"something that cannot be read ({error})", self._anew("the run's notes")
-            ) from error
+            raise OutputError(path, "", f"what cannot be read ({error})", self._anew("the run's notes")) from error
+        if not isinstance(before, dict):
+            raise OutputError(path, "", f"{shown(before)}", self._anew("the run's notes"))
         for difference in differences(self._request, before):
             found = f"{difference.now}, where the unfinished run of {self.path.name} has {difference.begun}"
             raise OutputError(self.output, difference.key, found, self._anew("the same, to go on"))
 
     def _anew(self, expected: str) -> str:
         return f"{expected}; or delete the folder {self.path.name} to begin anew"
+
+
+def _value(value: object) -> str:
+    return printable(value[: limits.NAME]) if isinstance(value, str) else shown(value)
+
+
+def _open_own(path: Path) -> BinaryIO:
+    """A file of ours, made where there is none; links are not followed."""
+    flags = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0)
+    return os.fdopen(os.open(path, flags, 0o666), "r+b")
+
+
+def _counts(stored: Any) -> list[int]:
+    """Number of files of each camera; ValueError where the archive does not say it."""
+    files = stored.get("files")
+    if files is None or files.ndim != 1 or files.dtype != np.int64 or not 0 < len(files) <= limits.CAMERAS:
+        raise ValueError("no numbers of files")
+    if (files < 1).any() or files.max() > limits.MEMBERS:
+        raise ValueError("numbers of files that cannot be")
+    return [int(count) for count in files]
+
+
+def _stamps(stored: Any, camera: int, files: int) -> list[Floats]:
+    """The time stamps of one camera's files; ValueError where they are none."""
+    found = [stored.get(f"times{camera}_{file}") for file in range(files)]
+    if any(own is None or own.ndim != 1 or own.dtype != np.float64 or len(own) > limits.FRAMES for own in found):
+        raise ValueError("no time stamps")
+    return [np.array(own, float) for own in found]
 
 
 def checksum(path: Path) -> str:
@@ -214,5 +328,5 @@ def differences(now: dict[str, Any], begun: dict[str, Any], prefix: str = "") ->
         if isinstance(a, dict) and isinstance(b, dict):
             found += differences(a, b, f"{name}.")
         elif a != b:
-            found.append(Difference(name, str(a), str(b)))
+            found.append(Difference(name, _value(a), _value(b)))
     return found

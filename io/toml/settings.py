@@ -13,7 +13,8 @@ from types import NoneType, UnionType
 from typing import Any, Literal, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
 from stseg.errors import ConfigError
-from stseg.io.toml.text import finite_number, one_of, shown, toml_string
+from stseg.io.numbers import finite_number
+from stseg.io.toml.text import one_of, shown, toml_string
 
 T = TypeVar("T")
 

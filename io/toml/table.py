@@ -11,7 +11,10 @@ import numpy as np
 
 from stseg.arrays import Floats
 from stseg.errors import InputError, RigError
-from stseg.io.toml.text import finite_number, one_of, shown
+from stseg.io import limits
+from stseg.io.names import EXPECTED, is_name, is_path
+from stseg.io.numbers import finite_number
+from stseg.io.toml.text import one_of, shown
 
 ANY = -1
 """In a shape: any number of rows."""
@@ -61,6 +64,21 @@ class Table:
             raise self.error(name, shown(value), "a text")
         return value
 
+    def name(self, name: str) -> str:
+        """The name of a camera or scene, see `stseg.io.names`."""
+        value = self.text(name)
+        if not is_name(value):
+            raise self.error(name, shown(value), EXPECTED)
+        return value
+
+    def paths(self, name: str) -> list[str]:
+        """Paths or addresses: a text or a list of texts."""
+        values = self.texts(name)
+        for value in values:
+            if not is_path(value):
+                raise self.error(name, shown(value), "a path that a file system takes")
+        return values
+
     def texts(self, name: str) -> list[str]:
         """A string that is not empty, or a list of such strings."""
         value = self._get(name, "a text or a list of texts")
@@ -78,30 +96,35 @@ class Table:
                 return choice
         raise self.error(name, shown(value), one_of(value, choices))
 
-    def integer(self, name: str, least: int | None = None) -> int:
-        """A whole number, at least `least`."""
-        expected = "a whole number" if least is None else f"a whole number, at least {least}"
+    def integer(self, name: str, low: int, high: int) -> int:
+        """A whole number within [low, high]."""
+        expected = f"a whole number from {low} to {high}"
         value = self._get(name, expected)
-        if not isinstance(value, int) or isinstance(value, bool) or (least is not None and value < least):
+        if not isinstance(value, int) or isinstance(value, bool) or not low <= value <= high:
             raise self.error(name, shown(value), expected)
         return value
 
-    def positive(self, name: str) -> float:
-        """A finite number above 0."""
-        number = float(self.numbers(name))
-        if number <= 0:
-            raise self.error(name, repr(number), "a number above 0")
+    def within(self, name: str, bounds: tuple[float, float]) -> float:
+        """A finite number within bounds."""
+        number = float(self.numbers(name, largest=np.inf))
+        if not bounds[0] <= number <= bounds[1]:
+            raise self.error(name, repr(number), f"a number from {bounds[0]:g} to {bounds[1]:g}")
         return number
 
-    def numbers(self, name: str, *shape: int) -> Floats:
-        """Finite numbers in nested lists of a given shape, float64; no shape is one number, `ANY` any length."""
+    def numbers(self, name: str, *shape: int, largest: float = limits.NUMBER) -> Floats:
+        """Finite numbers in nested lists of a given shape, float64; no shape is one number, `ANY` any length.
+
+        None of them may be larger than `largest` in size.
+        """
         expected = _shape_in_words(shape)
         value = self._get(name, expected)
         if not _has_shape(value, shape):
             raise self.error(name, shown(value), expected)
         array = np.array(value, float)
-        if not np.isfinite(array).all():
-            raise self.error(name, f"{array[~np.isfinite(array)][0]} in it", f"{expected}, all finite")
+        wrong = ~(np.abs(array) <= largest) | ~np.isfinite(array)
+        if wrong.any():
+            bound = "" if np.isinf(largest) else f" and at most {largest:g} in size"
+            raise self.error(name, f"{array[wrong][0]} in it", f"{expected}, all finite{bound}")
         return array
 
     def table(self, name: str) -> Self:
@@ -111,12 +134,14 @@ class Table:
             raise self.error(name, shown(value), "a table")
         return type(self)(self.file, self.key(name), value)
 
-    def tables(self, name: str) -> tuple[Self, ...]:
-        """The tables of an array of tables, at least one, counted from 0."""
-        expected = f"at least one [[{name}]]"
+    def tables(self, name: str, most: int) -> tuple[Self, ...]:
+        """The tables of an array of tables, one to `most`, counted from 0."""
+        expected = f"one [[{name}]] or more"
         value = self._get(name, expected)
         if not isinstance(value, list) or not value or not all(isinstance(row, dict) for row in value):
             raise self.error(name, shown(value), expected)
+        if len(value) > most:
+            raise self.error(name, f"{len(value)} of them", f"at most {most}")
         return tuple(type(self)(self.file, f"{self.key(name)}[{index}]", row) for index, row in enumerate(value))
 
     def _get(self, name: str, expected: str) -> object:

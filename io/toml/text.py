@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import json
-import math
 import re
 import tomllib
 from collections.abc import Iterable
 from difflib import get_close_matches
+from reprlib import Repr
 from typing import Any
 
-LONGEST_TEXT = 1 << 24
-"""Characters of a TOML file; a rig of a thousand cameras has a million."""
-DEEPEST_KEY = 32
-"""Parts of a dotted key: tomllib needs a time that grows with the square of their number."""
+from stseg.io import limits
+
 _SHOWN = 60
+_REPR = Repr()
+_REPR.maxlevel, _REPR.maxlist, _REPR.maxdict, _REPR.maxstring, _REPR.maxother = 2, 8, 4, _SHOWN, _SHOWN
 _DOTTED = re.compile(
-    rf"""(?<![\w"'-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){{{DEEPEST_KEY}}}""", re.ASCII
+    rf"""(?<![\w"'-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){{{limits.DOTTED_KEY}}}""", re.ASCII
 )
 
 
@@ -28,10 +28,10 @@ def parse_toml(text: str) -> dict[str, Any]:
     ValueError
         Where it is no TOML, too long or nested too deeply; its message is one line.
     """
-    if len(text) > LONGEST_TEXT:
-        raise ValueError(f"{len(text)} characters, more than {LONGEST_TEXT}")
+    if len(text) > limits.TEXT_FILE:
+        raise ValueError(f"{len(text)} characters, more than {limits.TEXT_FILE}")
     if _DOTTED.search(text):
-        raise ValueError(f"a dotted key of more than {DEEPEST_KEY} parts")
+        raise ValueError(f"a dotted key of more than {limits.DOTTED_KEY} parts")
     try:
         return tomllib.loads(text)
     except RecursionError as error:
@@ -44,17 +44,6 @@ def toml_string(text: str) -> str:
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
-def finite_number(value: object) -> float | None:
-    """An int or a float as a finite float; None for anything else."""
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return None
-    try:
-        number = float(value)
-    except OverflowError:  # an int beyond the floats
-        return None
-    return number if math.isfinite(number) else None
-
-
 def one_of(name: object, names: Iterable[str]) -> str:
     """What an error expects in place of an unknown name: the known ones, and the one most like it."""
     names = tuple(names)
@@ -63,9 +52,9 @@ def one_of(name: object, names: Iterable[str]) -> str:
 
 
 def shown(value: object) -> str:
-    """A value as an error shows it: what Python writes, cut to one line."""
+    """A value as an error shows it: what Python writes, cut to one line; nested values are never written out."""
     try:
-        text = repr(value)
+        text = _REPR.repr(value)
     except ValueError:  # an int of more digits than Python converts
         return "a number of thousands of digits"
     return text if len(text) <= _SHOWN else f"{text[: _SHOWN - 3]}..."

@@ -29,6 +29,7 @@ from stseg.calibration.solution import CalibrationInput, Solution
 from stseg.commands.calibrate_scene import numbers
 from stseg.config import Config
 from stseg.engine.backgrounds import make_foregrounds
+from stseg.engine.frame_range import FrameRange
 from stseg.errors import ConfigError
 from stseg.foreground.view_foreground import ViewForeground
 from stseg.geometry import Camera, Grid, Rig
@@ -226,10 +227,8 @@ def _factor(factor: float) -> float:
 
 
 def _frames(text: str | None, length: int) -> tuple[int, int]:
-    head, colon, tail = (text or f"0:{min(length, _MOST_FRAMES)}").partition(":")
-    if not colon or not all(part == "" or part.isdecimal() for part in (head, tail)):
-        raise ConfigError("--frames", "", repr(text), "A:B, two whole numbers, half open")
-    first, stop = int(head or 0), min(int(tail or length), length)
+    given = FrameRange.parse(text or f"0:{min(length, _MOST_FRAMES)}")
+    first, stop = given.first or 0, length if given.stop is None else min(given.stop, length)
     if not first < stop:
         raise ConfigError("--frames", "", repr(text), f"a part of the videos' frames, 0:{length}")
     return first, stop

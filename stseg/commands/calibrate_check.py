@@ -21,6 +21,7 @@ from stseg.calibration.isolated_boxes import isolated_boxes
 from stseg.calibration.rig_check import Check, check_rig, verdict_text
 from stseg.calibration.verdict import Disagreement
 from stseg.engine.backgrounds import make_foregrounds
+from stseg.engine.frame_range import FrameRange
 from stseg.errors import ConfigError
 from stseg.geometry import Rig
 from stseg.io.config_file import read_config
@@ -104,11 +105,9 @@ class _Seen:
 def _part(text: str | None) -> tuple[int, int]:
     if text is None:
         return 0, _FRAMES
-    head, colon, tail = text.partition(":")
-    if not colon or not all(part == "" or part.isdecimal() for part in (head, tail)):
-        raise ConfigError("--frames", "", repr(text), "A:B, two whole numbers, half open")
-    first = int(head or 0)
-    stop = int(tail) if tail else first + _FRAMES
+    given = FrameRange.parse(text)
+    first = given.first or 0
+    stop = first + _FRAMES if given.stop is None else given.stop
     if stop <= first:
         raise ConfigError("--frames", "", repr(text), "A:B with A before B")
     return first, stop

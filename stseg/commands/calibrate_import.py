@@ -14,7 +14,7 @@ from stseg.errors import CalibrationError, ConfigError
 from stseg.geometry import Camera, Rig
 from stseg.geometry.handedness import is_mirrored
 from stseg.io.calibrations.foreign_camera import ForeignCamera
-from stseg.io.calibrations.formats import FORMATS, ImportOptions, help_text
+from stseg.io.calibrations.formats import FORMATS, ImportOptions, help_text, read_cameras
 from stseg.io.calibrations.world_frame import UNITS, Up, World, guess_unit, guess_up, require_height
 from stseg.io.outputs.whole_files import require_new
 from stseg.io.recording.recording import Recording
@@ -102,7 +102,7 @@ def _read(format: str, files: Sequence[str], options: ImportOptions) -> list[For
     if not files:
         raise ConfigError("calibrate import", "FILE", "nothing", "one calibration a camera")
     groups = [[Path(part) for part in file.split("+")] for file in files]
-    return [camera for group in groups for camera in FORMATS[format].read(group, options)]
+    return [camera for group in groups for camera in read_cameras(format, group, options)]
 
 
 def _named(cameras: Sequence[ForeignCamera], files: Sequence[str], given: str | None) -> list[ForeignCamera]:
@@ -112,6 +112,9 @@ def _named(cameras: Sequence[ForeignCamera], files: Sequence[str], given: str | 
         names = [camera.name for camera in cameras]
     else:
         names = _file_names([Path(file.partition("+")[0]) for file in files])
+        if len(names) != len(cameras):
+            found = f"{len(cameras)} cameras in {len(names)} files, not all with a name"
+            raise ConfigError("--names", "", found, "a name for each camera")
     return [replace(camera, name=name) for camera, name in zip(cameras, names, strict=True)]
 
 

@@ -12,7 +12,10 @@ from cyclopts import Parameter
 
 from stseg.errors import ConfigError
 from stseg.geometry import Grid
+from stseg.io import limits
+from stseg.io.numbers import parse_numbers
 from stseg.io.recording.recording import CameraSource, Source, SourceKind
+from stseg.io.toml.text import shown
 
 
 @Parameter(name="*")
@@ -97,8 +100,10 @@ def _filled(pattern: str, name: str) -> Path:
 def size_of(text: str) -> tuple[int, int]:
     """Width and height from the command line."""
     width, height = numbers("--size", text, "width,height in whole pixels", 2)
-    if width != int(width) or height != int(height) or min(width, height) < 1:
-        raise ConfigError("--size", "", repr(text), "width,height in whole pixels")
+    if width != int(width) or height != int(height) or min(width, height) < 1 or width * height > limits.PIXELS:
+        raise ConfigError(
+            "--size", "", shown(text), f"width,height in whole pixels, at most {limits.PIXELS:.0e} in all"
+        )
     return int(width), int(height)
 
 
@@ -112,10 +117,7 @@ def words(option: str, text: str, count: int) -> list[str]:
 
 def numbers(option: str, text: str, expected: str, count: int | None = None) -> list[float]:
     """Finite numbers between commas."""
-    try:
-        found = [float(word) for word in text.split(",")]
-    except ValueError as error:
-        raise ConfigError(option, "", repr(text), expected) from error
-    if (count is not None and len(found) != count) or not np.isfinite(found).all():
-        raise ConfigError(option, "", repr(text), expected)
+    found = parse_numbers(text.split(","))
+    if found is None or (count is not None and len(found) != count):
+        raise ConfigError(option, "", shown(text), expected)
     return found

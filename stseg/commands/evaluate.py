@@ -16,6 +16,9 @@ from stseg.errors import ConfigError
 from stseg.evaluation import Scores
 from stseg.evaluation import evaluate as score
 from stseg.evaluation.sequence import Area
+from stseg.io import limits
+from stseg.io.numbers import parse_numbers, parse_whole
+from stseg.io.toml.text import shown
 from stseg.io.track_csv import read_tracks_csv
 
 
@@ -74,25 +77,25 @@ def _read(tracks: Path) -> Rows:
 
 
 def _frames(text: str) -> Ints:
-    try:
-        if ":" in text:
-            first, end = (int(part) for part in text.split(":"))
-            numbers = np.arange(first, end)
-        else:
-            numbers = np.array([int(part) for part in text.split(",")])
-    except ValueError:
-        numbers = np.zeros(0, int)
-    if not len(numbers):
-        raise ConfigError("command line", "--frames", repr(text), "A:B with B above A, or a list A,B,C")
-    return numbers.astype(np.int64)
+    given = [parse_whole(part, -limits.FRAMES, limits.FRAMES) for part in text.replace(":", ",").split(",")]
+    numbers = [number for number in given if number is not None]
+    whole = len(numbers) == len(given)
+    if ":" in text:
+        frames = np.arange(*numbers) if whole and len(numbers) == 2 else np.zeros(0, np.int64)
+    else:
+        frames = np.array(numbers if whole else [], np.int64)
+    if not len(frames):
+        expected = f"A:B with B above A, or a list A,B,C; numbers up to {limits.FRAMES}"
+        raise ConfigError("command line", "--frames", shown(text), expected)
+    return frames.astype(np.int64)
 
 
 def _area(text: str) -> Area:
     expected = "x0,y0,x1,y1 in metres with x0 below x1 and y0 below y1"
-    try:
-        x0, y0, x1, y1 = (float(part) for part in text.split(","))
-    except ValueError as error:
-        raise ConfigError("command line", "--area", repr(text), expected) from error
+    found = parse_numbers(text.split(","), limits.METRES)
+    if found is None or len(found) != 4:
+        raise ConfigError("command line", "--area", shown(text), expected)
+    x0, y0, x1, y1 = found
     if not (x0 < x1 and y0 < y1):
         raise ConfigError("command line", "--area", repr(text), expected)
     return x0, y0, x1, y1

@@ -8,7 +8,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from stseg.errors import ConfigError
-from stseg.io.exports.formats import FORMATS, help_text
+from stseg.io.exports.formats import FORMATS, help_text, write_tracks
 from stseg.io.outputs.whole_files import replacing, require_new
 from stseg.io.runfile.runs import read_run
 
@@ -45,7 +45,7 @@ def export(
         raise ConfigError("command line", "--output", "the run file itself", "another file")
     contents = read_run(run)
     with replacing(output, overwrite) as part:
-        FORMATS[to].write(part, contents)
+        write_tracks(to, part, contents)
     print(f"wrote {len(contents.trajectory)} rows of {len(contents.tracks)} tracks to {output}")
 
 

@@ -7,7 +7,9 @@ import signal
 import sys
 import threading
 from collections.abc import Sequence
+from contextlib import suppress
 from difflib import get_close_matches
+from io import TextIOWrapper
 from types import FrameType
 from typing import Any
 
@@ -15,6 +17,7 @@ from cyclopts import App, CycloptsError
 
 from stseg import __version__
 from stseg.errors import ConfigError, StsegError
+from stseg.io.names import printable
 
 COMMANDS = {
     "demo": ("stseg.commands.demo:demo", "Render a small scene, track it, score it, write the report."),
@@ -41,21 +44,47 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command line and return its exit status; a user's error is one line on standard error."""
     tokens = list(sys.argv[1:] if arguments is None else arguments)
     termination = Termination()
+    _require_streams()
     try:
         _require_command(tokens)
         _app(tokens)(tokens, exit_on_error=False, print_error=False, result_action="return_value")
         sys.stdout.flush()
     except (StsegError, CycloptsError) as error:
-        print(f"stseg: error: {' '.join(str(error).split())}", file=sys.stderr)
-        return _USER_ERROR
+        return _fail(str(error))
+    except MemoryError:
+        return _fail("this needs more memory than there is")
     except KeyboardInterrupt:
         print(f"stseg: {'terminated' if termination.asked else 'interrupted'}", file=sys.stderr)
         return _TERMINATED if termination.asked else _INTERRUPTED
     except BrokenPipeError:  # the reader of our output, such as head, has seen enough
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _drop_output()
+    except OSError as error:
+        _drop_output()  # or Python would try once more to write it
+        return _fail(f"{error.filename or 'standard output'}: {error.strerror or error}")
     finally:
         termination.forget()
     return 0
+
+
+def _fail(message: str) -> int:
+    """The error line of a command, and its exit status."""
+    with suppress(OSError):
+        print(f"stseg: error: {printable(' '.join(message.split()))}", file=sys.stderr)
+    return _USER_ERROR
+
+
+def _require_streams() -> None:
+    """Make standard output and error take any text, also where they are closed or of another encoding."""
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, "w"))  # noqa: SIM115, PTH123  # for the life of the process
+        elif isinstance(stream := getattr(sys, name), TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+
+
+def _drop_output() -> None:
+    with suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 class Termination:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from stseg.arrays import Ints
+from stseg.engine.frame_range import FrameRange
 from stseg.errors import ConfigError
 from stseg.io.runfile.runs import Run
 
@@ -20,11 +21,10 @@ def select_frames(run: Run, text: str | None) -> Ints:
         raise ConfigError(run.path, "", "a run without frames", "one that has some")
     if text is None:
         return frames
-    head, colon, tail = text.partition(":")
+    given = FrameRange.parse(text)
     some = f"A:B, half open, of the run's frames {frames[0]}:{frames[-1] + 1}"
-    if not colon or not all(part == "" or part.isdecimal() for part in (head, tail)):
-        raise ConfigError("command line", "--frames", repr(text), some)
-    first, stop = int(head or frames[0]), int(tail or frames[-1] + 1)
+    first = int(frames[0]) if given.first is None else given.first
+    stop = int(frames[-1]) + 1 if given.stop is None else given.stop
     if not frames[0] <= first < stop <= frames[-1] + 1:
         raise ConfigError("command line", "--frames", repr(text), some)
     return frames[(frames >= first) & (frames < stop)]

@@ -12,7 +12,10 @@ from rich.console import Console
 from rich.progress import Progress
 
 from stseg.errors import ConfigError
+from stseg.io import limits
+from stseg.io.numbers import parse_whole
 from stseg.io.outputs.simulated_scene import write_scene
+from stseg.io.toml.text import shown
 from stseg.simulation import NAMED, Film, SceneSpec
 
 
@@ -71,6 +74,7 @@ def simulate(
     overwrite
         Write into a folder that is not empty.
     """
+    _require_bounded(seconds, frame_rate)
     changes = {
         "people": people,
         "cameras": cameras,
@@ -105,9 +109,18 @@ def _named(name: str) -> SceneSpec:
     raise ConfigError("command line", "--scene", repr(name), f"one of {', '.join(NAMED)}{suggestion}")
 
 
+def _require_bounded(seconds: float | None, frame_rate: float | None) -> None:
+    for option, value, low, high in (
+        ("--seconds", seconds, 0.0, 86_400.0),
+        ("--frame-rate", frame_rate, *limits.FRAME_RATE),
+    ):
+        if value is not None and not low <= value <= high:
+            raise ConfigError("command line", option, repr(value), f"a number from {low:g} to {high:g}")
+
+
 def _size(text: str) -> tuple[int, int]:
-    try:
-        width, height = (int(part) for part in text.split(","))
-    except ValueError as error:
-        raise ConfigError("command line", "--size", repr(text), "width,height in whole pixels") from error
-    return width, height
+    sides = [parse_whole(part, 1, limits.SIDE) for part in text.split(",")]
+    if len(sides) != 2 or sides[0] is None or sides[1] is None or sides[0] * sides[1] > limits.PIXELS:
+        expected = f"width,height in whole pixels, at most {limits.PIXELS:.0e} in all"
+        raise ConfigError("command line", "--size", shown(text), expected)
+    return sides[0], sides[1]

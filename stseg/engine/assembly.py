@@ -38,7 +38,7 @@ class _Named(NamedTuple):
     identity: Ints
 
 
-def assemble(job: Job, pipeline: Pipeline, made: Sequence[FinishedSegment], output: Path, overwrite: bool) -> Tracks:
+def assemble(job: Job, pipeline: Pipeline, made: Sequence[FinishedSegment], output: Path) -> Tracks:
     """Write the run file of a job from its segments, in their order; the pipeline is the job's."""
     seams = Stitcher(round(job.config.tracking.patience * job.recording.rig.frame_rate))
     before = made[0].segment.first if made else 0
@@ -51,7 +51,7 @@ def assemble(job: Job, pipeline: Pipeline, made: Sequence[FinishedSegment], outp
     views: Bytes = pipeline.occupancy.views
     config = format_config(job.config)
     recording = with_alignment(job.recording, job.streams.shown)
-    with RunWriter(output, recording, views, config, overwrite=overwrite, kept=job.volume) as writer:
+    with RunWriter(output, recording, views, config, overwrite=True, kept=job.volume) as writer:
         for named in _named(made, joined.committed, joined.local, identity):
             _copy(named, writer)
         writer.append("trajectory", tracks.trajectory)

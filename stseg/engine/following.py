@@ -79,14 +79,14 @@ def follow_recording(
     Followed or None
         None where nothing came, and no file was written.
     """
-    require_new(output, overwrite)
     require_effect(config, tracker)
     is_live(recording)  # or it cannot be followed
     job = Job(recording, config, tracker, volume, 0, last_frame(frames), StreamIndex(0, ()))
-    request = run_request(gather_provenance(recording, format_config(config)))
+    request = run_request(recording, gather_provenance(recording, format_config(config)))
     request |= {"--tracker": tracker, "--volume": volume, "--follow": "yes"}
-    del request["source"]  # its files change while it goes on
+    del request["source"], request["samples of source"]  # its files change while it goes on
     work, table = WorkFolder(output, request), live_table_of(output)
+    work.require_output(overwrite)
     if not work.begun:
         require_new(table, overwrite)
     with work as folder, resumable(folder, reporter):
@@ -138,7 +138,8 @@ def _follow(job: Job, folder: WorkFolder, output: Path, overwrite: bool, reporte
         table.path.unlink()
         return None
     whole = replace(job, first=finished[0].segment.first, stop=finished[-1].segment.stop)
-    assemble(whole, follower.pipeline, finished, output, overwrite)
+    assemble(whole, follower.pipeline, finished, folder.result)
+    folder.publish(overwrite)
     return Followed(read_run(output), follower.delay)
 
 

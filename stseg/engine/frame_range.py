@@ -5,8 +5,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from stseg.errors import ConfigError
+from stseg.io import limits
+from stseg.io.numbers import parse_whole
 from stseg.io.recording.recording import Recording
 from stseg.io.recording.stream_index import StreamIndex
+from stseg.io.toml.text import shown
 
 
 class FrameRange(NamedTuple):
@@ -22,9 +25,10 @@ class FrameRange(NamedTuple):
     def parse(cls, text: str) -> FrameRange:
         """The range of a text A:B; raises ConfigError."""
         head, colon, tail = text.partition(":")
-        if not colon or not all(part == "" or part.isdecimal() for part in (head, tail)):
-            raise ConfigError("--frames", "", repr(text), "A:B, two whole numbers, half open")
-        return cls(int(head) if head else None, int(tail) if tail else None)
+        first, stop = (parse_whole(part, 0, limits.FRAMES) for part in (head, tail))
+        if not colon or (head and first is None) or (tail and stop is None):
+            raise ConfigError("--frames", "", shown(text), f"A:B, whole numbers up to {limits.FRAMES}, half open")
+        return cls(first, stop)
 
 
 def resolve_frames(frames: FrameRange | None, streams: StreamIndex, recording: Recording) -> tuple[int, int]:

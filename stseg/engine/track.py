@@ -18,7 +18,6 @@ from stseg.engine.reporter import LogReporter, Progress, Reporter
 from stseg.engine.workforce import Workforce, all_cores
 from stseg.errors import ConfigError
 from stseg.io.config_file import format_config, read_config
-from stseg.io.outputs.whole_files import require_new
 from stseg.io.recording.recording import Recording
 from stseg.io.recording.rigs import read_rig
 from stseg.io.recording.stream_index import StreamIndex, index_streams
@@ -127,15 +126,18 @@ def track_recording(
     InputError
         See `track`.
     """
-    require_new(output, overwrite)
     require_effect(config, tracker)
-    request = run_request(gather_provenance(recording, format_config(config)))
+    request = run_request(recording, gather_provenance(recording, format_config(config)))
     request |= {"--frames": "all" if frames is None else str(frames), "--tracker": tracker, "--volume": volume}
-    with WorkFolder(output, request) as folder, resumable(folder, reporter):
-        streams = _indexed(recording, folder, reporter)
-        first, stop = resolve_frames(frames, streams, recording)
-        job = Job(recording, config, tracker, volume, first, stop, streams)
-        assemble(job, job.pipeline(), _make_segments(job, folder, workforce, reporter), output, overwrite)
+    work = WorkFolder(output, request)
+    work.require_output(overwrite)
+    with work as folder, resumable(folder, reporter):
+        if not folder.published:
+            streams = _indexed(recording, folder, reporter)
+            first, stop = resolve_frames(frames, streams, recording)
+            job = Job(recording, config, tracker, volume, first, stop, streams)
+            assemble(job, job.pipeline(), _make_segments(job, folder, workforce, reporter), folder.result)
+            folder.publish(overwrite)
         folder.remove()
     return read_run(output)
 
@@ -155,7 +157,7 @@ def resumable(folder: WorkFolder, reporter: Reporter) -> Iterator[None]:
 
 def _indexed(recording: Recording, folder: WorkFolder, reporter: Reporter) -> StreamIndex:
     """Lengths and frame times of all streams: every stream is decoded for them, once in an output's life."""
-    streams = folder.streams()
+    streams = folder.streams(recording)
     if streams is None:
         with reporter.progress("counting", None):
             streams = index_streams(recording)

@@ -67,7 +67,13 @@ class Grid:
         """Cells whose centre lies within the polygon, all without one, bool (y, x)."""
         if self.polygon is None:
             return np.ones(self.shape[1:], bool)
-        return inside_polygon(self.ground, self.polygon)
+        within = np.zeros(self.shape[1:], bool)
+        x, y = self.ground_x, self.ground_y
+        for (x0, y0), (x1, y1) in zip(self.polygon, np.roll(self.polygon, -1, axis=0), strict=True):
+            rows = np.flatnonzero((y0 > y) != (y1 > y))
+            if len(rows):  # most edges of a fine polygon cross few rows
+                within[rows] ^= x < ((x1 - x0) * (y[rows] - y0) / (y1 - y0) + x0)[:, None]
+        return within
 
 
 def inside_polygon(ground: Floats, polygon: Floats) -> Flags:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from stseg.errors import FormatError, SourceError
+from stseg.io import limits
+from stseg.io.bounded_files import require_regular
+from stseg.io.names import printable
 from stseg.io.recording.detections import annotation_tools, coco, mmdetection, motchallenge, tables, wildtrack, yolo
 from stseg.io.recording.detections.json_files import read_json
 from stseg.io.recording.detections.record import Detections, Request
@@ -46,8 +50,26 @@ def read_detections(request: Request) -> tuple[str, Detections] | None:
         Where it cannot be read or is of no known format; names the place.
     """
     path = request.path
+    with _of_form(path, "detections"):
+        return _read(request, path)
+
+
+@contextmanager
+def _of_form(path: Path, name: str) -> Iterator[None]:
+    """Raise what a value of another type than its format has comes to as FormatError."""
+    try:
+        yield
+    except OSError as error:
+        raise SourceError(path, "", error.strerror or error, "detections") from error
+    except (TypeError, LookupError, AttributeError, ValueError, ArithmeticError, RecursionError) as error:
+        found = f"a value of another type or size ({printable(str(error))[:80]})"
+        raise FormatError(path, "", found, f"{name}, as its format has it") from error
+
+
+def _read(request: Request, path: Path) -> tuple[str, Detections] | None:
     if path.is_dir():
         return _read_folder(request)
+    require_regular(path)
     suffix = path.suffix.lower()
     if suffix in (".json", ".jsonl", ".ndjson"):
         return _read_json(request, read_json(path))
@@ -65,7 +87,8 @@ def read_detections(request: Request) -> tuple[str, Detections] | None:
 def _read_json(request: Request, data: Any) -> tuple[str, Detections]:
     for own in JSON_FORMATS:
         if own.recognises(data):
-            return own.name, own.read(request, data)
+            with _of_form(request.path, own.name):
+                return own.name, own.read(request, data)
     raise FormatError(request.path, "", "JSON of no known detections", f"one of {', '.join(NAMES)}")
 
 
@@ -90,7 +113,7 @@ def _needs_mapping(path: Path) -> bool:
     """Whether a text file has a header with columns of other names than `read_boxes` reads, or with classes."""
     try:
         with path.open(encoding="utf-8-sig") as lines:
-            header = [word.strip() for word in next(lines, "").split(",")]
+            header = [word.strip() for word in lines.readline(limits.LINE).split(",")]
     except (OSError, UnicodeDecodeError):
         return False
     lower = {name.lower() for name in header}

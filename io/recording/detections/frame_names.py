@@ -16,7 +16,7 @@ _DIGITS = re.compile(r"(\d+)(?!.*\d)")
 def last_numbers(names: Sequence[str]) -> Ints | None:
     """The last number in each name, int64 (n,); None where a name has none or two share one."""
     found = [_DIGITS.search(PurePath(name).stem) for name in names]
-    numbers = [int(match[1]) for match in found if match]
+    numbers = [int(match[1][-15:]) for match in found if match]
     return None if len(set(numbers)) < len(names) else np.array(numbers, np.int64)
 
 

@@ -7,6 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from stseg.errors import FormatError, SourceError
+from stseg.io import limits
+from stseg.io.bounded_files import parse_json, read_text
 
 
 def read_json(path: Path) -> Any:
@@ -18,13 +20,15 @@ def read_json(path: Path) -> Any:
         Where the file cannot be read, or is no JSON: names the line.
     """
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        text = read_text(path, limits.DETECTIONS_FILE)
     except OSError as error:
         raise SourceError(path, "", error.strerror or error, "a file of detections") from error
     except UnicodeDecodeError as error:
         raise FormatError(path, "", "bytes that are no text", "JSON in UTF-8") from error
+    except ValueError as error:
+        raise FormatError(path, "", error, "a file of detections") from error
     try:
-        return json.loads(text)
+        return parse_json(text)
     except ValueError as whole:
         lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip()]
         if len(lines) < 2 or not _is_json(lines[0][1]):
@@ -35,14 +39,14 @@ def read_json(path: Path) -> Any:
 
 def _line(path: Path, number: int, line: str) -> Any:
     try:
-        return json.loads(line)
+        return parse_json(line)
     except ValueError as error:
         raise FormatError(path, f"line {number}", f"no JSON ({error})"[:100], "JSON, one value a line") from error
 
 
 def _is_json(text: str) -> bool:
     try:
-        json.loads(text)
+        parse_json(text)
     except ValueError:
         return False
     return True

@@ -13,6 +13,10 @@ import cv2
 import numpy as np
 
 from stseg.arrays import Bytes, Floats, Ints
+from stseg.io import limits
+
+_LONGEST_SHIFT = 40
+"""Bits of a run length."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +68,7 @@ Mask = Polygons | RunLengths
 def flat_polygons(flat: Sequence[Sequence[float]]) -> Polygons:
     """Polygons from flat lists u, v, u, v, ...; raises ValueError where one is none."""
     outlines = tuple(np.array(one, float).reshape(-1, 2) for one in flat)
-    if not outlines or any(len(outline) < 3 or not np.isfinite(outline).all() for outline in outlines):
+    if not outlines or any(len(outline) < 3 or not (np.abs(outline) <= limits.SIDE * 4).all() for outline in outlines):
         raise ValueError("a polygon of fewer than 3 points")
     return Polygons(outlines)
 
@@ -72,6 +76,8 @@ def flat_polygons(flat: Sequence[Sequence[float]]) -> Polygons:
 def run_lengths(size: Sequence[int], counts: str | Sequence[int]) -> RunLengths:
     """A mask from COCO's `size` (height, width) and `counts`; raises ValueError where they do not fit together."""
     height, width = (int(side) for side in size)
+    if not (0 < height <= limits.SIDE and 0 < width <= limits.SIDE and height * width <= limits.PIXELS):
+        raise ValueError(f"run lengths of an image of {width} x {height}")
     decoded = _decoded(counts) if isinstance(counts, str) else np.array(counts, np.int64).reshape(-1)
     if (decoded < 0).any() or int(decoded.sum()) != height * width:
         raise ValueError(f"run lengths of {int(decoded.sum())} pixels for an image of {width} x {height}")
@@ -85,6 +91,8 @@ def _decoded(text: str) -> Ints:
         bits = ord(character) - 48
         if not 0 <= bits < 64:
             raise ValueError("run lengths that are not COCO's")
+        if shift > _LONGEST_SHIFT:
+            raise ValueError("a run length of more digits than an image has pixels")
         value |= (bits & 0x1F) << shift
         shift += 5
         if bits & 0x20:

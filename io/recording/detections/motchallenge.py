@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
+from stseg.io import limits
+from stseg.io.bounded_files import read_text
+from stseg.io.numbers import parse_number
 from stseg.io.recording.detections.record import DetectionList, Detections, Request, number
 
 _CLASSES = (
@@ -17,16 +21,16 @@ def is_ground_truth(path: Path) -> bool:
     """Whether a text file's first line has nine numbers."""
     try:
         with path.open(encoding="utf-8-sig") as lines:
-            fields = next(lines, "").replace(",", " ").split()
+            fields = lines.readline(limits.LINE).replace(",", " ").split()
     except (OSError, UnicodeDecodeError):
         return False
-    return len(fields) == 9 and all(word.lstrip("-").replace(".", "", 1).isdigit() for word in fields)
+    return len(fields) == 9 and all(not math.isnan(parse_number(word)) for word in fields)
 
 
 def read_ground_truth(request: Request) -> Detections:
     """Boxes that the flag includes, with their classes."""
     found = DetectionList(request.path)
-    for row, line in enumerate(request.path.read_text(encoding="utf-8-sig").splitlines(), 1):
+    for row, line in enumerate(read_text(request.path, limits.DETECTIONS_FILE).splitlines(), 1):
         if not line.strip():
             continue
         place = f"line {row}"

@@ -10,7 +10,10 @@ import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints
 from stseg.errors import FormatError
+from stseg.io import limits
+from stseg.io.numbers import finite_number, parse_number
 from stseg.io.recording.detections.masks import Mask
+from stseg.io.toml.text import shown
 
 LEAST_NUMBERS = ("frame", "left", "top", "width", "height", "score")
 
@@ -119,6 +122,9 @@ class DetectionList:
             raise FormatError(self._path, place, f"a box of {len(row) - 2} numbers", "4 numbers")
         if row[3] < 0 or row[4] < 0:
             raise FormatError(self._path, place, f"a box {row[3]:g} by {row[4]:g} pixels", "0 or more pixels")
+        if abs(frame) > limits.FRAMES or len(self._numbers) >= limits.ROWS:
+            found = f"frame {frame:.0f}, row {len(self._numbers) + 1}"
+            raise FormatError(self._path, place, found, f"at most {limits.FRAMES} frames and {limits.ROWS} rows")
         if not 0 <= row[5] <= 1:
             raise FormatError(self._path, place, f"score {row[5]:g}", "a score of 0..1")
         self._numbers.append(row)
@@ -138,6 +144,11 @@ class DetectionList:
     def done(self, frames: int | None = None) -> Detections:
         """All that were added."""
         values = np.array(self._numbers, float).reshape(-1, len(LEAST_NUMBERS))
+        if frames is not None and not 0 <= frames <= limits.FRAMES:
+            raise FormatError(self._path, "", f"{frames:.3g} frames", f"at most {limits.FRAMES}")
+        _, crowds = np.unique(values[:, 0], return_counts=True)
+        if crowds.max(initial=0) > limits.BOXES_PER_FRAME:
+            raise FormatError(self._path, "", f"{crowds.max()} boxes in a frame", f"at most {limits.BOXES_PER_FRAME}")
         label = tuple(self._label) if any(self._label) else ()
         mask = tuple(self._mask) if any(one is not None for one in self._mask) else ()
         return Detections(values[:, 0].astype(np.int64), values[:, 1:5], values[:, 5], label, mask, frames)
@@ -145,12 +156,9 @@ class DetectionList:
 
 def number(path: Path, place: str, name: str, value: object) -> float:
     """A finite number, or a FormatError."""
-    if isinstance(value, (int, float, np.number)) and not isinstance(value, bool) and np.isfinite(value):
-        return float(value)
-    try:
-        found = float(value) if isinstance(value, str) else np.nan
-    except ValueError:
-        found = np.nan
-    if not np.isfinite(found):
-        raise FormatError(path, place, f"{name} {value!r}"[:80], "a finite number")
+    if isinstance(value, np.generic):
+        value = value.item()
+    found = parse_number(value) if isinstance(value, str) else finite_number(value)
+    if found is None or not abs(found) <= limits.NUMBER:
+        raise FormatError(path, place, f"{name} {shown(value)}", "a finite number of usual size")
     return found

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Mapping, Sequence
+from itertools import islice
 from typing import Any
 
 from stseg.errors import FormatError, SourceError
+from stseg.io import limits
 from stseg.io.extras import load_extra
 from stseg.io.recording.detections.record import DetectionList, Detections, Request, number
 from stseg.io.toml.text import one_of
@@ -34,7 +36,7 @@ def read_csv(request: Request) -> Detections:
     """Boxes of a CSV file with a header."""
     try:
         with request.path.open(encoding="utf-8-sig", newline="") as lines:
-            rows = list(csv.reader(lines, skipinitialspace=True))
+            rows = list(islice(csv.reader(lines, skipinitialspace=True), limits.ROWS))
     except OSError as error:
         raise SourceError(request.path, "", error.strerror or error, "a file of boxes") from error
     except (UnicodeDecodeError, csv.Error) as error:

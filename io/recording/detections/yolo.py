@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 
 from stseg.errors import FormatError, SourceError
+from stseg.io import limits
+from stseg.io.bounded_files import read_text
 from stseg.io.recording.detections.frame_names import last_numbers
 from stseg.io.recording.detections.json_files import require
 from stseg.io.recording.detections.masks import Mask, Polygons, flat_polygons
@@ -119,7 +121,7 @@ def _yaml_names(text: str) -> dict[int, str]:
 
 def _text(path: Path) -> str:
     try:
-        return path.read_text(encoding="utf-8-sig")
+        return read_text(path, limits.DETECTIONS_FILE)
     except (OSError, UnicodeDecodeError) as error:
         raise SourceError(path, "", error, "a text file") from error
 
