@@ -161,7 +161,7 @@ def fused(parameters: Sequence[float], weights: Sequence[float], shares: Sequenc
 
 
 def log_odds_term(likelihood: float, rates: ErrorRates) -> float:
-    """What one view says of a cell (METHODS 4)."""
+    """What one view says of a cell (docs/how-it-works.md, Fusion)."""
     body = (1 - rates.miss) * likelihood + rates.miss * (1 - likelihood)
     empty = rates.clutter * likelihood + (1 - rates.clutter) * (1 - likelihood)
     return math.log(body / empty)

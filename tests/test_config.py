@@ -109,7 +109,7 @@ def test_any_settings_read_back_equal_from_their_text(settings: Outer) -> None:
 
 
 @pytest.mark.parametrize(
-    ("table", "told"),
+    ("table", "message"),
     [
         ({"kind": "maps"}, "kind: found 'maps', expected one of masks, boxes"),
         ({"quick": 1}, "quick: found 1, expected true or false"),
@@ -128,15 +128,15 @@ def test_any_settings_read_back_equal_from_their_text(settings: Outer) -> None:
         ({"inner": {"zzz": 3}}, "inner.zzz: found an unknown key, expected one of share, pair, names, limit"),
     ],
 )
-def test_wrong_values_are_named_with_what_was_expected(table: dict[str, Any], told: str) -> None:
+def test_wrong_values_are_named_with_what_was_expected(table: dict[str, Any], message: str) -> None:
     with pytest.raises(ConfigError) as caught:
         build(Outer, wrapped(table), "file.toml")
     assert str(caught.value).startswith("file.toml: ")
-    assert str(caught.value).endswith(told)
+    assert str(caught.value).endswith(message)
 
 
 @pytest.mark.parametrize(
-    ("assignment", "told"),
+    ("assignment", "message"),
     [
         ("detection.persn=1", "--set: detection.persn: found an unknown key"),
         ("detectoin.prior_log_odds=1", "did you mean detection?"),
@@ -152,10 +152,10 @@ def test_wrong_values_are_named_with_what_was_expected(table: dict[str, Any], to
         ("detection.prior_log_odds=nan", "--set: detection.prior_log_odds: found nan"),
     ],
 )
-def test_wrong_assignments_name_the_option(tmp_path: Path, assignment: str, told: str) -> None:
+def test_wrong_assignments_name_the_option(tmp_path: Path, assignment: str, message: str) -> None:
     with pytest.raises(ConfigError) as caught:
         read(tmp_path / "c.toml", TOML, assignment)
-    assert told in str(caught.value)
+    assert message in str(caught.value)
 
 
 def test_a_fault_is_laid_where_the_value_was_given(tmp_path: Path) -> None:

@@ -71,6 +71,12 @@ def test_configuration_keys_named_exist(page: Path) -> None:
         assert key in KEYS or any(known.startswith(f"{key}.") for known in KEYS), key
 
 
+def test_the_drawing_of_rooms_shows_all_of_them() -> None:
+    page = (DOCS / "development" / "architecture.md").read_text("utf-8")
+    rooms = {folder.name for folder in (ROOT / "stseg").iterdir() if (folder / "__init__.py").exists()}
+    assert {*rooms, "io"} <= set(re.findall(r"\w+", page.partition("```text")[2].partition("```")[0]))
+
+
 def test_every_page_is_reached_from_the_readme() -> None:
     reached, waiting = set[Path](), [ROOT / "README.md"]
     while waiting:

@@ -22,7 +22,7 @@ SOLVER = "graphcut"
 STAGES = ("foreground", "detection", "occupancy", "segmentation", "tracking", "labels")
 """In the order of the data. No stage imports another: what two of them share is a record of `model`."""
 
-NEAR_CLUTTER = {
+BESIDE = {
     "trackers": {"segmentation", "tracking", SOLVER},
     "evaluation": {"errors", "arrays"},
     "measures": {"errors", "arrays", "geometry"},
@@ -92,7 +92,7 @@ MODULES = modules()
 
 def parts_imported(module: Module) -> set[str]:
     """Parts of the package that a module imports, its own left out; `stseg` itself is `__init__`."""
-    parts = {*FOUNDATION, SOLVER, *STAGES, *NEAR_CLUTTER, "engine", "commands"}
+    parts = {*FOUNDATION, SOLVER, *STAGES, *BESIDE, "engine", "commands"}
     taken = {name.split(".")[1] for name in module.imports() if name.startswith("stseg.")}
     if any(name == "stseg.__version__" for name in module.imports()):
         taken = (taken - {"__version__"}) | {"__init__"}
@@ -111,12 +111,12 @@ def allowed(part: str) -> set[str]:
     if part in STAGES:
         return {*FOUNDATION, SOLVER}
     if part == "trackers":
-        return {*FOUNDATION, *NEAR_CLUTTER[part]}
+        return {*FOUNDATION, *BESIDE[part]}
     if part == "engine":
         return {*FOUNDATION, *STAGES, "trackers", "calibration", "measures", "io", "__init__"}
     if part == "commands":
-        return {*FOUNDATION, *STAGES, *NEAR_CLUTTER, "engine", "__init__"}
-    return NEAR_CLUTTER[part]
+        return {*FOUNDATION, *STAGES, *BESIDE, "engine", "__init__"}
+    return BESIDE[part]
 
 
 @pytest.mark.parametrize("module", MODULES, ids=lambda module: module.name)
