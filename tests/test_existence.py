@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -11,7 +13,7 @@ from stseg.arrays import Floats, Ints
 from stseg.config import Config
 from stseg.graphcut.sparse import sparse_cut
 from stseg.model.border import Border
-from stseg.segmentation.existence import Existence, ExistenceModel, WindowCandidates, _paths
+from stseg.segmentation.existence import Existence, ExistenceModel, WindowCandidates, _marginals, _paths
 
 CONFIG = Config()
 RIG = room()
@@ -104,3 +106,15 @@ def test_paths_are_those_of_greatest_gain(seed: int) -> None:
     alone = np.setdiff1d(np.arange(6), joined)
     total = gain[joined].sum() + bonus[chosen].sum() + gain[alone].clip(0).sum()
     np.testing.assert_allclose(total, best_paths(gain, start, end, bonus), atol=1e-9)
+
+
+@settings(deadline=None, max_examples=30)
+@given(st.integers(0, 9999))
+def test_marginals_are_those_of_all_labellings(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    gain, bonus = rng.uniform(-3, 3, 5), rng.uniform(0, 3, 3)
+    start, end = np.array([0, 1, 3]), np.array([1, 2, 4])  # two paths
+    choices = np.array(list(product((0, 1), repeat=5)))
+    weight = np.exp(choices @ gain + (choices[:, start] * choices[:, end]) @ bonus)
+    share = (weight[:, None] * choices).sum(0) / weight.sum()
+    np.testing.assert_allclose(_marginals(gain, start, end, bonus), np.log(share / (1 - share)), atol=1e-9)

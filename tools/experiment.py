@@ -5,6 +5,7 @@ certainty   calibration of stated probabilities: of cells stated as occupied wit
 labels      IoU of the cells of a track, and the right owner where bodies touch: cut, threshold, nearest track
 memory      resident memory of a long run, and the size of its run file
 pixels      share of pixels of people that carry the right label, from film to label images
+points      calibration of the probability of track points
 rig         error of a rig against the true one, on the ground and at head height
 sizes       error of heights and widths of tracks, and their spread along a track
 """
@@ -14,7 +15,7 @@ from __future__ import annotations
 import importlib
 import sys
 
-EXPERIMENTS = ("ablation", "certainty", "labels", "memory", "pixels", "rig", "sizes")
+EXPERIMENTS = ("ablation", "certainty", "labels", "memory", "pixels", "points", "rig", "sizes")
 """Each is the module `experiments.NAME` with a function `main`, which reads the command line."""
 
 

@@ -80,12 +80,15 @@ class Existence:
         Candidates that are people.
     successor : int64 (n,)
         Link of each candidate, -1 for none.
+    log_odds : float64 (n,)
+        Marginal log-odds of each candidate along its path, nats.
     gap
         Bound on the distance from the least energy, given the links, nats.
     """
 
     real: Flags
     successor: Ints
+    log_odds: Floats
     gap: float
 
 
@@ -115,7 +118,7 @@ class ExistenceModel:
         """Candidates that are real, and the links between them."""
         n = len(found)
         if not n:
-            return Existence(np.zeros(0, bool), np.zeros(0, np.int64), 0.0)
+            return Existence(np.zeros(0, bool), np.zeros(0, np.int64), np.zeros(0), 0.0)
         gain, birth, death = self._gains(found)
         start, end, bonus = self._links(found, birth, death)
         successor = _paths(gain, start, end, bonus)
@@ -128,7 +131,8 @@ class ExistenceModel:
             np.concatenate([_quanta(-bonus[chosen]), np.full(len(one), round(_EXCLUDED / QUANTUM), np.int64)]),
         )
         least: QuadraticMinimum = minimise(energy, cut)
-        return Existence(least.labels, successor, least.gap * QUANTUM)
+        log_odds = _marginals(gain, start[chosen], end[chosen], bonus[chosen])
+        return Existence(least.labels, successor, log_odds, least.gap * QUANTUM)
 
     def _gains(self, found: WindowCandidates) -> tuple[Floats, Floats, Floats]:
         """g, and in it the costs of birth and death, nats, float64 (n,) each."""
@@ -174,6 +178,21 @@ class ExistenceModel:
 
 def _quanta(nats: Floats) -> Ints:
     return np.rint(nats / QUANTUM).astype(np.int64)
+
+
+def _marginals(gain: Floats, start: Ints, end: Ints, bonus: Floats) -> Floats:
+    """Marginal log-odds of each candidate on its path by messages both ways, nats; links in order of time."""
+    forward, backward = gain.copy(), np.zeros(len(gain))
+    for i, j, b in zip(start.tolist(), end.tolist(), bonus.tolist(), strict=True):
+        forward[j] += _message(forward[i], b)
+    for i, j, b in zip(start[::-1].tolist(), end[::-1].tolist(), bonus[::-1].tolist(), strict=True):
+        backward[i] += _message(gain[j] + backward[j], b)
+    return forward + backward
+
+
+def _message(log_odds: float, bonus: float) -> float:
+    """Log-odds that a neighbour with these log-odds lends across a link."""
+    return float(np.logaddexp(0.0, log_odds + bonus) - np.logaddexp(0.0, log_odds))
 
 
 def _paths(gain: Floats, start: Ints, end: Ints, bonus: Floats) -> Ints:

@@ -63,19 +63,20 @@ class WindowExistence:
         tracks = _tracks(found, decision)
         bounds = np.searchsorted(found.frame, np.arange(len(frames) + 1))
         return [
-            self._frame(one, tracks[first:stop]) for one, first, stop in zip(frames, bounds, bounds[1:], strict=False)
+            self._frame(one, tracks[first:stop], decision.log_odds[first:stop])
+            for one, first, stop in zip(frames, bounds, bounds[1:], strict=False)
         ]
 
-    def _frame(self, one: TrackedFrame, tracks: Ints) -> TrackedFrame:
-        """One frame with the candidates that have a track as people, the others as ghosts."""
+    def _frame(self, one: TrackedFrame, tracks: Ints, log_odds: Floats) -> TrackedFrame:
+        """One frame with the candidates that have a track as people, the others as ghosts; evidence of the window."""
         fused, number = one.fused, len(one.tracks)
         real = tracks > 0
-        if real[:number].all() and not real[number:].any():
-            return one
-        every = _joined(fused.people, fused.ghosts)
+        every = replace(_joined(fused.people, fused.ghosts), evidence=log_odds)
         people, ghosts = _at(every, np.flatnonzero(real)), _at(every, np.flatnonzero(~real))
-        log_odds = self._volume(fused, people, _at(every, number + np.flatnonzero(real[number:])))
-        return TrackedFrame(replace(fused, people=people, ghosts=ghosts, log_odds=log_odds), tracks[real])
+        if not real[:number].all() or real[number:].any():
+            volume = self._volume(fused, people, _at(every, number + np.flatnonzero(real[number:])))
+            fused = replace(fused, log_odds=volume)
+        return TrackedFrame(replace(fused, people=people, ghosts=ghosts), tracks[real])
 
     def _volume(self, fused: FusedFrame, people: People, added: People) -> Singles:
         """Log-odds with the prior of the revised people, and at least the odds of a body inside those added."""
