@@ -12,9 +12,9 @@ import argparse
 from pathlib import Path
 
 import numpy as np
-from experiments.certainty import Tally
 from scipy.optimize import linear_sum_assignment
 
+from experiments.certainty import Tally
 from stseg.arrays import Flags, Rows
 from stseg.io.runfile.runs import read_run
 from stseg.io.track_csv import read_tracks_csv
