@@ -140,7 +140,7 @@ def test_who_touches_is_cut_apart() -> None:
         x = -1.0 + 0.1 * frame
         both = scene(follow, frame, (x, -0.25), (x, 0.3))
         seen = both if frame not in (4, 5, 6) else scene(follow, frame, (x, -0.25))
-        commits += follow.add(replace(seen, log_odds=both.log_odds), UNSEEN)
+        commits += follow.add(replace(seen, volume=both.log_odds), UNSEEN)
     commits += follow.finish()
     rows, labels = rows_of(commits), np.concatenate([commit.label for commit in commits])
     assert np.unique(rows["id"]).tolist() == [1, 2]

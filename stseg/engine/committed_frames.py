@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import Future
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -87,18 +88,26 @@ class CommittedFrames:
         )
 
 
+class FusedEvidence(NamedTuple):
+    """A frame's volume, float32 (plane, y, x), nats, and the RATES (view,) by which it was fused."""
+
+    log_odds: Singles
+    rates: Rows
+
+
 class FrameRecord(NamedTuple):
-    """A frame's explanation, and the RATES (view,) by which it was fused: kept until the frame is committed."""
+    """A frame's explanation and its fusion, which may still be at work: kept until the frame is committed."""
 
     explanation: Explanation
-    rates: Rows
+    fusion: Future[FusedEvidence]
 
 
 def committed_frames(commit: Commit, records: dict[int, FrameRecord], watch: Stopwatch) -> CommittedFrames:
     """The results of a tracker's commit; takes its frames out of `records` and their time out of `watch`."""
     rows, parts, residuals = [], [], []
     for scene in commit.frames:
-        explanation, rates = records.pop(scene.frame)
+        explanation, fusion = records.pop(scene.frame)
+        rates = fusion.result().rates
         residuals.append(explanation.residual)
         for status, candidates in ((1, explanation.people), (0, explanation.ghosts)):
             rows.append(_candidate_rows(scene.frame, status, candidates))

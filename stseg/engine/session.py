@@ -2,21 +2,32 @@
 
 All that is learned from the frames belongs to the session: the foreground models, the noise of boxes, the error rates
 of the views, and the tracker's tracks. Sessions of one pipeline know nothing of each other.
+
+Detection needs the tracks of the frame before, so it goes frame by frame. The foreground of the next frames needs
+nothing of it, and nothing waits for a frame's volume before its window is cut: `run_session` gives each a thread of its
+own. Every stage still takes the frames in their order, so the results are the same, bit for bit.
 """
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import Protocol
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from contextlib import ExitStack
+from typing import NamedTuple, Protocol
 
 from stseg.arrays import Observation, Singles, ViewEvidence
-from stseg.engine.committed_frames import CommittedFrames, FrameRecord, committed_frames, rate_rows
+from stseg.engine.committed_frames import CommittedFrames, FrameRecord, FusedEvidence, committed_frames, rate_rows
 from stseg.engine.pipeline import Pipeline
 from stseg.engine.stopwatch import Stopwatch
 from stseg.foreground.view_foreground import ViewForeground
 from stseg.model.people import Explanation
-from stseg.model.predicted_tracks import PredictedTracks
 from stseg.trackers import FrameObservations, FusedFrame
+
+_AHEAD = 2
+"""Frames whose foreground is made before their detection."""
+_BEHIND = 4
+"""Frames whose fusion may be open while detection goes on."""
 
 
 class FrameSet(Protocol):
@@ -39,20 +50,51 @@ class Session:
         Foreground model of each camera, in the rig's order; they learn from the frames.
     first
         Number of the first frame.
+    fusion
+        One thread that fuses evidence while detection goes on; None to fuse in the caller's.
     """
 
-    def __init__(self, pipeline: Pipeline, foregrounds: Sequence[ViewForeground], first: int) -> None:
+    def __init__(
+        self,
+        pipeline: Pipeline,
+        foregrounds: Sequence[ViewForeground],
+        first: int,
+        fusion: Executor | None = None,
+    ) -> None:
         self.pipeline, self.foregrounds, self.watch = pipeline, foregrounds, Stopwatch()
         self._tracker = pipeline.tracker(pipeline.rig, pipeline.config, first)
         self._box_noise = pipeline.detector.new_calibration()
         self._error_rates = pipeline.occupancy.new_calibration()
         self._records: dict[int, FrameRecord] = {}
+        self._executor = fusion
+        self._open: deque[Future[FusedEvidence]] = deque()
 
-    def add(self, frame_set: FrameSet) -> list[CommittedFrames]:
-        """The next frame set; the results that it decides."""
-        fused, observed = self._fuse(frame_set, self._tracker.predict(frame_set.frame))
+    def evidence(self, frame_set: FrameSet) -> list[ViewEvidence]:
+        """The foreground of all views; to be asked once for each frame set, in the order of time."""
+        with self.watch.time("foreground"):
+            views = zip(self.foregrounds, frame_set.views, strict=True)
+            return [foreground.evidence(view) for foreground, view in views]
+
+    def add(self, frame_set: FrameSet, evidence: list[ViewEvidence] | None = None) -> list[CommittedFrames]:
+        """The next frame set; the results that it decides.
+
+        Parameters
+        ----------
+        frame_set
+            The observations.
+        evidence
+            What `evidence` gave for them, where it was asked before.
+        """
+        evidence = self.evidence(frame_set) if evidence is None else evidence
+        frame, predicted = frame_set.frame, self._tracker.predict(frame_set.frame)
+        with self.watch.time("ghosts"):
+            proposed = self.pipeline.proposals.of(evidence, self._fuse_with_current_rates)
+            explanation = self.pipeline.detector.explain_next(self._box_noise, evidence, predicted, proposed)
+        fusion = self._submit(frame, evidence, explanation)
+        self._records[frame] = FrameRecord(explanation, fusion)
+        fused = FusedFrame(frame, explanation.people, explanation.ghosts, lambda: fusion.result().log_odds)
         with self.watch.time("track"):
-            commits = self._tracker.add(fused, observed)
+            commits = self._tracker.add(fused, FrameObservations(frame_set.views, evidence))
         return [committed_frames(commit, self._records, self.watch) for commit in commits]
 
     def finish(self) -> list[CommittedFrames]:
@@ -61,22 +103,33 @@ class Session:
             commits = self._tracker.finish()
         return [committed_frames(commit, self._records, self.watch) for commit in commits]
 
-    def _fuse(self, frame_set: FrameSet, expected: PredictedTracks | None) -> tuple[FusedFrame, FrameObservations]:
-        stages, watch = self.pipeline, self.watch
-        with watch.time("foreground"):
-            views = zip(self.foregrounds, frame_set.views, strict=True)
-            evidence = [foreground.evidence(view) for foreground, view in views]
-        with watch.time("ghosts"):
-            proposed = stages.proposals.of(evidence, self._fuse_with_current_rates)
-            explanation = stages.detector.explain_next(self._box_noise, evidence, expected, proposed)
-        self._records[frame_set.frame] = FrameRecord(explanation, rate_rows(frame_set.frame, self._error_rates))
-        with watch.time("occupancy"):
-            log_odds = stages.occupancy.fuse_and_learn(self._error_rates, evidence, explanation)
-        fused = FusedFrame(frame_set.frame, explanation.people, explanation.ghosts, log_odds)
-        return fused, FrameObservations(frame_set.views, evidence)
+    def _submit(self, frame: int, evidence: Sequence[ViewEvidence], explanation: Explanation) -> Future[FusedEvidence]:
+        if self._executor is None:
+            done = Future[FusedEvidence]()
+            done.set_result(self._fuse(frame, evidence, explanation))
+            return done
+        if len(self._open) == _BEHIND:
+            self._open.popleft().result()
+        self._open.append(self._executor.submit(self._fuse, frame, evidence, explanation))
+        return self._open[-1]
+
+    def _fuse(self, frame: int, evidence: Sequence[ViewEvidence], explanation: Explanation) -> FusedEvidence:
+        rates = rate_rows(frame, self._error_rates)
+        with self.watch.time("occupancy"):
+            log_odds = self.pipeline.occupancy.fuse_and_learn(self._error_rates, evidence, explanation)
+        return FusedEvidence(log_odds, rates)
 
     def _fuse_with_current_rates(self, evidence: Sequence[ViewEvidence], explanation: Explanation) -> Singles:
+        while self._open:
+            self._open.popleft().result()
         return self.pipeline.occupancy.fuse(evidence, explanation, self._error_rates.rates)
+
+
+class _Prepared(NamedTuple):
+    """A frame set and its evidence."""
+
+    frame_set: FrameSet
+    evidence: list[ViewEvidence]
 
 
 def run_session(
@@ -93,17 +146,33 @@ def run_session(
     pipeline, foregrounds, first
         As of `Session`.
     frame_sets
-        In the order of time.
+        In the order of time; they are read in a thread.
     advance
-        Called with the number of each frame that was fused.
+        Called with the number of each frame that went through detection.
     """
-    session = Session(pipeline, foregrounds, first)
+    with ExitStack() as threads:
+        ahead, behind = (threads.enter_context(ThreadPoolExecutor(1, name)) for name in ("foreground", "fusion"))
+        session = Session(pipeline, foregrounds, first, behind)
+        for frame_set, evidence in _prepared(session, frame_sets, ahead):
+            yield from session.add(frame_set, evidence)
+            advance(frame_set.frame)
+        yield from session.finish()
+
+
+def _prepared(session: Session, frame_sets: Iterable[FrameSet], executor: Executor) -> Iterator[_Prepared]:
+    """Frame sets with their evidence, of which some are made in a thread while the caller works on the last."""
     coming = iter(frame_sets)
-    while True:
+
+    def prepare() -> _Prepared | None:
         with session.watch.time("read"):
             frame_set = next(coming, None)
-        if frame_set is None:
-            break
-        yield from session.add(frame_set)
-        advance(frame_set.frame)
-    yield from session.finish()
+        return None if frame_set is None else _Prepared(frame_set, session.evidence(frame_set))
+
+    waiting = deque(executor.submit(prepare) for _ in range(_AHEAD))
+    try:
+        while (prepared := waiting.popleft().result()) is not None:
+            waiting.append(executor.submit(prepare))
+            yield prepared
+    finally:
+        for future in waiting:
+            future.cancel()

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from threading import Lock
 from time import perf_counter
 
 import numpy as np
@@ -15,9 +16,10 @@ from stseg.model.tables import TIMING
 
 @dataclass
 class Stopwatch:
-    """Seconds of each stage since the last call of `take`."""
+    """Seconds of each stage since the last call of `take`; stages may run in threads of their own."""
 
     seconds: dict[str, float] = field(default_factory=dict)
+    _lock: Lock = field(default_factory=Lock)
 
     @contextmanager
     def time(self, stage: str) -> Iterator[None]:
@@ -26,10 +28,11 @@ class Stopwatch:
         try:
             yield
         finally:
-            self.seconds[stage] = self.seconds.get(stage, 0.0) + perf_counter() - start
+            with self._lock:
+                self.seconds[stage] = self.seconds.get(stage, 0.0) + perf_counter() - start
 
     def take(self, window: int) -> Rows:
         """TIMING rows of all stages under the number of a window; the sums start anew."""
-        rows = np.array([(stage.encode(), window, s) for stage, s in self.seconds.items()], TIMING)
-        self.seconds = {}
-        return rows
+        with self._lock:
+            taken, self.seconds = self.seconds, {}
+        return np.array([(stage.encode(), window, s) for stage, s in taken.items()], TIMING)

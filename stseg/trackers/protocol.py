@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
@@ -29,14 +29,19 @@ class FusedFrame:
         Its detections.
     ghosts
         Rejected candidates.
-    log_odds : float32 (plane, y, x)
-        The volume, nats; nan where no view sees the cell.
+    volume : float32 (plane, y, x), or a function that gives it
+        See `log_odds`; a function where the fusion may still be at work.
     """
 
     frame: int
     people: People
     ghosts: People
-    log_odds: Singles
+    volume: Singles | Callable[[], Singles]
+
+    @property
+    def log_odds(self) -> Singles:
+        """The volume, float32 (plane, y, x), nats; nan where no view sees the cell."""
+        return self.volume() if callable(self.volume) else self.volume
 
 
 @dataclass(frozen=True)
