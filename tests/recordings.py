@@ -18,6 +18,8 @@ from stseg.io.recording.rig_text import format_rig
 FRAMES = 40
 OPTIONS = ("--set", "segments.length=1", "--set", "segments.warm_up=1", "--set", "detection.lattice_spacing=0.25")
 """Segments of six frames."""
+ALONE = ("--workers", "1")
+"""In this process alone."""
 ENVIRONMENT = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
 
 
@@ -40,7 +42,7 @@ def write_recording(folder: Path) -> Path:
 
 def track(rig: Path, output: Path, *more: str) -> int:
     """The exit status of a run in short segments."""
-    return main(["run", str(rig), "-o", str(output), *OPTIONS, *more])
+    return main(["run", str(rig), "-o", str(output), *OPTIONS, *(more if "--workers" in more else (*ALONE, *more))])
 
 
 def assert_same(one: Path, other: Path) -> None:

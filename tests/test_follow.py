@@ -63,7 +63,7 @@ quick = pytest.mark.skipif(python_form(set_score) is set_score, reason="too slow
 
 
 def track(rig: Path, output: Path, *more: str) -> int:
-    return main(["run", str(rig), "-o", str(output), *OPTIONS, *more])
+    return main(["run", str(rig), "-o", str(output), "--workers", "1", *OPTIONS, *more])
 
 
 def process(rig: Path, output: Path, *more: str) -> subprocess.Popen[str]:

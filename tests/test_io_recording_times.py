@@ -24,7 +24,7 @@ from stseg.io.runfile.runs import Run, read_run
 
 pytestmark = pytest.mark.skipif(python_form(set_score) is set_score, reason="too slow without a compiler")
 
-QUICK = ("--set", "detection.lattice_spacing=0.25", "--set", "body.heights=[1.6,1.7,1.8]")
+QUICK = ("--workers", "1", "--set", "detection.lattice_spacing=0.25", "--set", "body.heights=[1.6,1.7,1.8]")
 SHORT = ("--set", "segments.length=3", "--set", "segments.warm_up=1")
 FRAMES = 60
 CAMERAS = 3

@@ -24,7 +24,7 @@ def rig_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_the_file_becomes_as_large_as_planned(
     rig_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["plan", str(rig_path), *OPTIONS, "--json"]) == 0
+    assert main(["plan", str(rig_path), *OPTIONS, "--workers", "1", "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert (told["frames"], told["segments"], told["workers"]) == (FRAMES, 6, 1)
     assert told["seconds"] == pytest.approx(sum(told[k] for k in ("counting", "learning", "tracking", "joining")))

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from recordings import ENVIRONMENT, FRAMES, OPTIONS, assert_same, track, write_recording
+from recordings import ALONE, ENVIRONMENT, FRAMES, OPTIONS, assert_same, track, write_recording
 from scenes import walkers
 
 from stseg.accelerate import python_form
@@ -49,7 +49,7 @@ def night(tmp_path: Path) -> Path:
 
 
 def process(rig: Path, output: Path) -> subprocess.Popen[str]:
-    arguments = [sys.executable, "-c", PROGRAM, "run", str(rig), "-o", str(output), *OPTIONS]
+    arguments = [sys.executable, "-c", PROGRAM, "run", str(rig), "-o", str(output), *OPTIONS, *ALONE]
     return subprocess.Popen(
         arguments, env=ENVIRONMENT, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     )  # fmt: skip
@@ -96,7 +96,7 @@ while True:
         os.remove({str(night)!r})
 print(kills)
 """
-    arguments = [sys.executable, "-c", driver, "run", str(rig_path), "-o", str(night), *OPTIONS]
+    arguments = [sys.executable, "-c", driver, "run", str(rig_path), "-o", str(night), *OPTIONS, *ALONE]
     done = subprocess.run(arguments, env=ENVIRONMENT, capture_output=True, text=True, check=False)
     assert done.stdout.strip().endswith("20"), done.stderr
     assert_same(night, undisturbed)

@@ -31,7 +31,7 @@ def plan(
     set_: Annotated[tuple[str, ...], Parameter(name="--set", metavar="SECTION.KEY=VALUE", negative="")] = (),
     tracker: str = "cut",
     volume: VolumeKind = "all",
-    workers: int = 1,
+    workers: int | None = None,
     as_json: Annotated[bool, Parameter(name="--json", negative="")] = False,
 ) -> None:
     """Say how long a run will take and how large its file will be, from ten seconds of this recording.
@@ -56,11 +56,11 @@ def plan(
     volume
         What of the volume is kept: all, tracks or none.
     workers
-        Processes that will share the work.
+        Processes that will share the work, by default one per core as far as memory allows.
     as_json
         Print numbers for a program: seconds and bytes.
     """
-    Workforce(workers)
+    workforce = Workforce(workers)
     chosen = None if frames is None else FrameRange.parse(frames)
     recording, resolved = read_rig(rig), read_config(config, set_)
     require_effect(resolved, tracker)
@@ -71,7 +71,7 @@ def plan(
         print(f"stseg: {note}", file=sys.stderr)
     first, stop = resolve_frames(chosen, streams, recording)
     job = Job(recording, resolved, tracker, volume, first, stop, streams)
-    told = forecast(job, counting, workers)
+    told = forecast(job, counting, workforce.processes)
     print(json.dumps(asdict(told) | {"seconds": told.seconds}, indent=1) if as_json else _text(told, recording))
 
 

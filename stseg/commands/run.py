@@ -36,7 +36,7 @@ def run(
     tracker: str = "cut",
     volume: VolumeKind = "all",
     labels: Annotated[Path | None, Parameter(metavar="FOLDER")] = None,
-    workers: int = 1,
+    workers: int | None = None,
     scheduler: str | None = None,
     follow: Annotated[bool, Parameter(negative="")] = False,
     overwrite: Annotated[bool, Parameter(negative="")] = False,
@@ -71,7 +71,8 @@ def run(
     labels
         Write afterwards for every pixel of every camera whom it shows, as stseg labels does, to this folder.
     workers
-        Processes that share the work on this machine; the result is the same for any number.
+        Processes that share the work on this machine, by default one per core as far as memory allows; the result is
+        the same for any number.
     scheduler
         Address of a Dask scheduler whose workers share the work instead, such as tcp://10.0.0.5:8786.
     follow
@@ -105,8 +106,12 @@ def run(
         print(f"{labels}: {count} label images")
 
 
-def _require_alone(workers: int, scheduler: str | None, labels: Path | None) -> None:
-    for name, given in (("--workers", workers > 1), ("--scheduler", scheduler), ("--labels", labels)):
+def _require_alone(workers: int | None, scheduler: str | None, labels: Path | None) -> None:
+    for name, given in (
+        ("--workers", workers is not None and workers > 1),
+        ("--scheduler", scheduler),
+        ("--labels", labels),
+    ):
         if given:
             raise ConfigError(name, "", "that beside --follow", "one of them: a recording that goes on has one worker")
 

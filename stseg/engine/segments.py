@@ -11,12 +11,16 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import count
 from math import ceil
+from typing import NamedTuple
 
 import numpy as np
 
 from stseg.arrays import Flags
 from stseg.config import Config, TrackingConfig
 from stseg.tracking.windows import window_length
+
+_SHORTEST = 3
+"""A half of a short recording is no shorter than a segment divided by this: its warm-up would cost too much."""
 
 
 @dataclass(frozen=True)
@@ -44,8 +48,9 @@ def segments(
 ) -> list[Segment]:
     """The segments that cover frames first .. stop - 1 but for gaps; they begin where commit ranges of windows do.
 
-    What is left at the end, and before a gap, belongs to the last one if it is no longer than a window. After a gap all
-    begins anew, as at the beginning of a run: neither a segment nor its warm-up reaches over one.
+    Frames left at the end, and before a gap, belong to the last segment if they are no more than a window. Less than
+    two segments are halved if each half is a third of a segment at least. After a gap all begins anew, as at the
+    beginning of a run: neither a segment nor its warm-up reaches over one.
 
     Parameters
     ----------
@@ -85,6 +90,9 @@ def _parts(frame_rate: float, config: Config, first: int, stop: int) -> list[Seg
     """The segments of frames in which no gap lies; none of none."""
     if first == stop:
         return []
+    if (middle := _middle(frame_rate, config, first, stop)) is not None:
+        lead = max(first, middle - _lengths(frame_rate, config).warm_up)
+        return [Segment(0, first, first, middle), Segment(1, lead, middle, stop)]
     found: list[Segment] = []
     for segment in endless_segments(frame_rate, config, first):
         if segment.stop >= stop - window_length(frame_rate, config.tracking)[0]:
@@ -93,18 +101,43 @@ def _parts(frame_rate: float, config: Config, first: int, stop: int) -> list[Seg
     raise AssertionError("segments without an end ended")
 
 
+class _Lengths(NamedTuple):
+    """Frames between commits of windows, of a segment, and of its warm-up; and the first commit after frame 0."""
+
+    stride: int
+    segment: int
+    warm_up: int
+    offset: int
+
+
+def _lengths(frame_rate: float, config: Config) -> _Lengths:
+    length, shared = window_length(frame_rate, config.tracking)
+    stride = length - shared
+    segment = max(1, round(config.segments.length * frame_rate / stride)) * stride
+    return _Lengths(stride, segment, ceil(config.segments.warm_up * frame_rate / stride) * stride, shared // 2)
+
+
+def _middle(frame_rate: float, config: Config, first: int, stop: int) -> int | None:
+    """Where frames that are fewer than two segments are divided; None where the halves would be too short.
+
+    Two segments of one length keep two processes busy, for as many frames of warm-up as any other division.
+    """
+    lengths, half = _lengths(frame_rate, config), (stop - first) // 2
+    least = max(lengths.segment // _SHORTEST, 2 * window_length(frame_rate, config.tracking)[0])
+    if half < least or half >= lengths.segment:
+        return None
+    return (first + half - lengths.offset) // lengths.stride * lengths.stride + lengths.offset
+
+
 def endless_segments(frame_rate: float, config: Config, first: int, index: int = 0) -> Iterator[Segment]:
     """The segments of a run whose end nobody knows yet, numbered from `index`.
 
     One of them is to be left open until a window's frames have come after it: if they do not come it is the last, and
     what came belongs to it.
     """
-    length, shared = window_length(frame_rate, config.tracking)
-    stride = length - shared
-    step = max(1, round(config.segments.length * frame_rate / stride)) * stride
-    warm_up = ceil(config.segments.warm_up * frame_rate / stride) * stride
+    lengths = _lengths(frame_rate, config)
     begin = lead = first
-    for bound in count(step + shared // 2, step):
+    for bound in count(lengths.segment + lengths.offset, lengths.segment):
         if bound > begin:
             yield Segment(index, lead, begin, bound)
-            index, begin, lead = index + 1, bound, max(first, bound - warm_up)
+            index, begin, lead = index + 1, bound, max(first, bound - lengths.warm_up)

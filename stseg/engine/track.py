@@ -15,7 +15,7 @@ from stseg.engine.assembly import FinishedSegment, assemble
 from stseg.engine.frame_range import FrameRange, resolve_frames
 from stseg.engine.job import Job, VolumeKind
 from stseg.engine.reporter import LogReporter, Progress, Reporter
-from stseg.engine.workforce import Workforce, all_cores
+from stseg.engine.workforce import Workforce
 from stseg.errors import ConfigError
 from stseg.io.config_file import format_config, read_config
 from stseg.io.recording.recording import Recording
@@ -54,8 +54,8 @@ def track(
     config
         A configuration, or the path of a configuration file; None for the defaults.
     workers
-        Processes that share the work, None for one per core. The datasets are the same for any number. With several, a
-        script needs `if __name__ == "__main__":`, as for every use of `multiprocessing`.
+        Processes that share the work, None for one per core as far as memory allows. The datasets are the same for any
+        number. With several, a script needs `if __name__ == "__main__":`, as for every use of `multiprocessing`.
     volume
         The part of the occupancy volume that is kept: "all", "tracks" for a metre around tracks, or "none".
     overwrite
@@ -75,7 +75,7 @@ def track(
         As the command: one line with the file, the key, what was found and what was expected.
     """
     resolved = config if isinstance(config, Config) else read_config(None if config is None else Path(config))
-    force = Workforce(all_cores() if workers is None else workers)
+    force = Workforce(workers)
     chosen, reporter = None if frames is None else FrameRange(*frames), LogReporter(progress)
     recording = read_rig(Path(rig))
     if output is not None:

@@ -13,11 +13,15 @@ from stseg.engine.segment_worker import SegmentWorker
 from stseg.engine.segments import Segment
 from stseg.engine.workers import make_by_workers
 from stseg.errors import ConfigError
+from stseg.io.machine import free_memory
+
+_MEMORY = 700 * 2**20
+"""Memory that a process of a run is taken to need, bytes."""
 
 
 @dataclass(frozen=True)
 class Workforce:
-    """Number of processes of this machine, or the address of a Dask scheduler.
+    """Number of processes of this machine, None for as many as it has room for; or the address of a Dask scheduler.
 
     Raises
     ------
@@ -25,12 +29,17 @@ class Workforce:
         Where there is not one process at least.
     """
 
-    workers: int = 1
+    workers: int | None = None
     scheduler: str | None = None
 
     def __post_init__(self) -> None:
-        if self.workers < 1:
+        if self.workers is not None and self.workers < 1:
             raise ConfigError("--workers", "", self.workers, "1 or more processes")
+
+    @property
+    def processes(self) -> int:
+        """Number of processes of this machine."""
+        return processes_that_fit() if self.workers is None else self.workers
 
     def make(
         self, job: Job, missing: Sequence[Segment], draft: Callable[[int], Path], advance: Callable[[int], None]
@@ -48,16 +57,18 @@ class Workforce:
         """
         if not missing:
             return
+        workers = min(len(missing), self.processes)
         if self.scheduler is not None:
             yield from make_by_cluster(job, missing, draft, self.scheduler, advance)
-        elif self.workers > 1:
-            yield from make_by_workers(job, missing, draft, self.workers, advance)
+        elif workers > 1:
+            yield from make_by_workers(job, missing, draft, workers, advance)
         else:
             worker = SegmentWorker(job)
             for segment in missing:
                 yield segment, worker.make(segment, draft(segment.index), advance)
 
 
-def all_cores() -> int:
-    """Number of processor cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+def processes_that_fit() -> int:
+    """Number of processes of a run for which this machine has cores and free memory, 1 at least."""
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return max(1, min(cores, free_memory() // _MEMORY))

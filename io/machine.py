@@ -1,0 +1,33 @@
+"""Limits of the machine: memory that is free for this process."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+_ENDLESS = 1 << 62
+
+
+def free_memory() -> int:
+    """Bytes that this process and its children may still use; by the kernel, and by the limits of a container."""
+    return min(_available(), _left_in_group())
+
+
+def _available() -> int:
+    try:
+        lines = Path("/proc/meminfo").read_text("ascii").splitlines()
+        return next(1024 * int(line.split()[1]) for line in lines if line.startswith("MemAvailable:"))
+    except (OSError, ValueError, StopIteration):  # no Linux
+        return _ENDLESS
+
+
+def _left_in_group() -> int:
+    """Bytes that a control group leaves, of version 2 or 1: containers have one. Files in memory do not count."""
+    for folder, limit, used in (("", "memory.max", "anon"), ("memory/", "memory.limit_in_bytes", "total_rss")):
+        group = Path("/sys/fs/cgroup") / folder
+        try:
+            most = int((group / limit).read_text("ascii"))
+            counts = dict(line.split() for line in (group / "memory.stat").read_text("ascii").splitlines())
+            return max(0, most - int(counts[used]))
+        except (OSError, ValueError, KeyError):  # no such group, or no limit
+            continue
+    return _ENDLESS
