@@ -75,7 +75,7 @@ class WindowExistence:
         people, ghosts = _at(every, np.flatnonzero(real)), _at(every, np.flatnonzero(~real))
         if not real[:number].all() or real[number:].any():
             volume = self._volume(fused, people, _at(every, number + np.flatnonzero(real[number:])))
-            fused = replace(fused, log_odds=volume)
+            fused = replace(fused, volume=volume)
         return TrackedFrame(replace(fused, people=people, ghosts=ghosts), tracks[real])
 
     def _volume(self, fused: FusedFrame, people: People, added: People) -> Singles:
