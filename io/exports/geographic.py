@@ -34,7 +34,7 @@ def write_moving_features(path: Path, run: Run) -> None:
         "type": "FeatureCollection",
         "crs": {"type": "Name", "properties": {"name": GROUND}},
         "trs": {"type": "Name", "properties": {"name": _ISO_8601}},
-        "features": [_moving_point(track, own, run.frame_rate) for track, own in _by_track(run)],
+        "features": [_moving_point(run, track, own) for track, own in _by_track(run)],
     }
     with path.open("w", newline="\n", encoding="utf-8") as file:
         json.dump(collection, file, allow_nan=False)
@@ -49,7 +49,7 @@ def write_geojson_lines(path: Path, run: Run) -> None:
             if len(places) == 1:
                 geometry = {"type": "Point", "coordinates": places[0]}
             properties = {
-                **_properties(track),
+                **_properties(run, track),
                 "first": int(track["first"]),
                 "last": int(track["last"]),
                 "start": round(int(track["first"]) / run.frame_rate, 6),
@@ -69,22 +69,24 @@ def _by_track(run: Run) -> Iterator[tuple[np.void, Rows]]:
             yield track, table[start:stop]
 
 
-def _moving_point(track: np.void, own: Rows, frame_rate: float) -> dict[str, object]:
-    times = [_time_of(frame / frame_rate) for frame in own["frame"].tolist()]
+def _moving_point(run: Run, track: np.void, own: Rows) -> dict[str, object]:
+    times = [_time_of(frame / run.frame_rate) for frame in own["frame"].tolist()]
     score = {"type": "Measure", "values": [_finite(value) for value in own["score"].tolist()]}
     point = {"type": "MovingPoint", "datetimes": times, "coordinates": _places(own), "interpolation": "Linear"}
     return {
         "type": "Feature",
         "id": int(track["id"]),
-        "properties": _properties(track),
+        "properties": _properties(run, track),
         "time": [times[0], times[-1]],
         "temporalGeometry": point,
         "temporalProperties": [{"datetimes": times, "score": score}],
     }
 
 
-def _properties(track: np.void) -> dict[str, object]:
-    return {"id": int(track["id"]), "height": _finite(float(track["height"])), "score": _finite(float(track["score"]))}
+def _properties(run: Run, track: np.void) -> dict[str, object]:
+    identity = int(track["id"])
+    named = {"name": run.names[identity]} if identity in run.names else {}
+    return {"id": identity, **named, "height": _finite(float(track["height"])), "score": _finite(float(track["score"]))}
 
 
 def _places(own: Rows) -> list[list[float]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 from pathlib import Path
 
@@ -26,8 +27,15 @@ _UNITS = {
 
 
 def write_csv(path: Path, run: Run) -> None:
-    """Write frame, id, x, y, height, score, xx, xy, yy, views; positions to 0.1 mm."""
+    """Write frame, id, x, y, height, score, xx, xy, yy, views; positions to 0.1 mm; name where tracks have one."""
     write_tracks_csv(path, run.trajectory)
+    if run.names:
+        header, *lines = path.read_text(encoding="utf-8").splitlines()
+        names = [run.names.get(int(identity), "") for identity in run.trajectory["id"]]
+        with path.open("w", newline="", encoding="utf-8") as file:
+            csv.writer(file, lineterminator="\n").writerows(
+                [*line.split(","), name] for line, name in zip((header, *lines), ("name", *names), strict=True)
+            )
 
 
 def write_parquet(path: Path, run: Run) -> None:
@@ -42,9 +50,12 @@ def write_parquet(path: Path, run: Run) -> None:
         arrow.field(name, arrow.from_numpy_dtype(column.dtype), False, {"units": _UNITS.get(name, "")})
         for name, column in columns.items()
     ]
+    arrays = [arrow.array(np.ascontiguousarray(column)) for column in columns.values()]
+    if run.names:
+        fields.append(arrow.field("name", arrow.string()))
+        arrays.append(arrow.array([run.names.get(int(one)) for one in run.trajectory["id"]], arrow.string()))
     about = {"scene": run.scene, "frame_rate": run.frame_rate, "cameras": list(run.cameras)}
     schema = arrow.schema(fields, {"stseg": json.dumps(about)})
-    arrays = [np.ascontiguousarray(column) for column in columns.values()]
     parquet.write_table(arrow.table(arrays, schema=schema), path)
 
 

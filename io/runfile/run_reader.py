@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
@@ -58,6 +58,8 @@ class Run:
         Number of views that see each cell.
     kept
         Stored part of the volume: "all", cells near "tracks", or "none".
+    given_names
+        Names of tracks in place of the file's own.
     """
 
     path: Path
@@ -70,6 +72,7 @@ class Run:
     ground_x: Floats
     views: Bytes
     kept: str = "all"
+    given_names: tuple[tuple[int, str], ...] | None = None
 
     @cached_property
     def trajectory(self) -> Rows:
@@ -115,6 +118,17 @@ class Run:
     def timings(self) -> Rows:
         """TIMING (n,)."""
         return self._table("timings")
+
+    @cached_property
+    def names(self) -> dict[int, str]:
+        """Names of tracks by id, where they were given (`stseg correct`, or `with_names`)."""
+        if self.given_names is not None:
+            return dict(self.given_names)
+        return read_object(self.path, layout.PROVENANCE, lambda file: _names(file[layout.PROVENANCE]))
+
+    def with_names(self, names: Mapping[int, str]) -> Run:
+        """The run with other names of its tracks."""
+        return replace(self, given_names=tuple(names.items()))
 
     @cached_property
     def provenance(self) -> Provenance:
@@ -260,6 +274,13 @@ def _require_bounded_volume(group: h5py.Group) -> None:
         array = group[name]
         if math.prod(array.shape[1:]) > limits.CELLS or (array.chunks is not None and array.chunks[0] > 64):
             raise ValueError(f"{array.name}: frames of {array.shape[1:]} in chunks of {array.chunks}")
+
+
+def _names(group: h5py.Group) -> dict[int, str]:
+    if "names" not in group:
+        return {}
+    pairs = (text.partition(",") for text in group["names"].asstr()[()])
+    return {int(identity): name for identity, _, name in pairs}
 
 
 def _volume(group: h5py.Group, index: int) -> tuple[Singles, Labels]:

@@ -14,6 +14,7 @@ from stseg.arrays import Observation, Rows
 from stseg.commands.report_contents import page_contents
 from stseg.commands.report_film import film
 from stseg.errors import ConfigError
+from stseg.io.answers import read_names
 from stseg.io.outputs.output_files import make_folder, write_file, write_page
 from stseg.io.outputs.video_writer import require_film_name
 from stseg.io.outputs.whole_files import require_new
@@ -39,6 +40,7 @@ def report(
     video: Annotated[Path | None, Parameter(metavar="FILM.mp4")] = None,
     frames: Annotated[str | None, Parameter(metavar="A:B")] = None,
     camera_images: Annotated[bool, Parameter(negative="")] = False,
+    names: Annotated[Path | None, Parameter(metavar="NAMES.csv")] = None,
     overwrite: Annotated[bool, Parameter(negative="")] = False,
 ) -> None:
     """Make an HTML page of a run that needs no other file and loads nothing, or a film of it.
@@ -73,11 +75,15 @@ def report(
         Part of the run that the film shows, half open.
     camera_images
         Show the cameras' frames under the tracks. Page, pictures and film then hold images of people.
+    names
+        CSV with the columns id,name: names of tracks in the page's tables.
     overwrite
         Replace the page, the pictures and the film if they exist.
     """
     _require_outputs(output, pictures, video, frames, overwrite)
     run = read_run(run_file)
+    if names is not None:
+        run = run.with_names(read_names(names))
     if output is not None:
         _write_page(run, output, truth, frame, pictures, camera_images, overwrite)
     if video is not None:

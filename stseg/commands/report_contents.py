@@ -72,6 +72,7 @@ def page_contents(
         slices=[figure for instant in instants for figure in slice_figures(rig, instant)] if has_slices else [],
         cameras=[figure for instant in instants for figure in camera_figures(rig, trajectory, instant)],
         has_images=has_images,
+        names=run.names,
     )
 
 

@@ -94,9 +94,10 @@ def bars(amounts: Sequence[tuple[str, float]], total: float, form: str) -> str:
     return f'<dl class="bars">{"".join(rows)}</dl>'
 
 
-def swatch(identity: int) -> str:
-    """A track's colour and id."""
-    return f'<i style="background:{hex_colour(track_colour(identity))}"></i>{identity}'
+def swatch(identity: int, name: str = "") -> str:
+    """A track's colour and id, and its name if it has one."""
+    named = f" {escape(name)}" if name else ""
+    return f'<i style="background:{hex_colour(track_colour(identity))}"></i>{identity}{named}'
 
 
 def when(span: Span, frame: int) -> str:

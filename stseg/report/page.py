@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from html import escape
@@ -78,6 +78,8 @@ class Contents:
         Figures of these sections; a section without figures is left out.
     has_images
         Whether the cameras' figures show camera images, of which the page warns.
+    names
+        Names of tracks by id.
     """
 
     title: str
@@ -103,6 +105,7 @@ class Contents:
     slices: Sequence[Figure]
     cameras: Sequence[Figure]
     has_images: bool
+    names: Mapping[int, str]
 
     @property
     def still(self) -> list[Figure]:
@@ -143,7 +146,11 @@ def _sections(contents: Contents) -> list[str]:
         section("Where people are", figures(contents.dwell_places, "pair")),
         section("Ghosts removed", _GHOSTS, _pair(figure(contents.ghost_map), _reasons(contents))),
         section("Where the rig is blind", _pair(figure(contents.blind_map), _view_summaries(contents.view_summaries))),
-        section("Tracks", chart(track_chart(span, tracks), "from first frame to last"), _track_table(span, tracks)),
+        section(
+            "Tracks",
+            chart(track_chart(span, tracks), "from first frame to last"),
+            _track_table(span, tracks, contents.names),
+        ),
         section("Events", _event_summary(contents), _event_table(span, contents.events)),
         section("Occupancy", figures(contents.slices, "sheets")),
         section("Cameras", _privacy(contents), figures(contents.cameras, "pair")) if contents.cameras else "",
@@ -266,10 +273,10 @@ def _view_summaries(view_summaries: Sequence[ViewSummary]) -> str:
     return f"<div>{table(names, rows, len(rows))}{_SIGHTS}</div>"
 
 
-def _track_table(span: Span, tracks: Rows) -> str:
+def _track_table(span: Span, tracks: Rows, names: Mapping[int, str]) -> str:
     rows = [
         (
-            swatch(int(row["id"])),
+            swatch(int(row["id"]), names.get(int(row["id"]), "")),
             when(span, int(row["first"])),
             when(span, int(row["last"])),
             f"{row['frames']}",

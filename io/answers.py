@@ -1,0 +1,82 @@
+"""Answers and names as CSV: what a person says of a run's identities."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from pathlib import Path
+
+from stseg.errors import FormatError
+from stseg.io.toml.text import one_of
+
+COLUMNS = ("action", "frame", "id", "other", "name")
+
+
+@dataclass(frozen=True)
+class AnswerRow:
+    """A line of an answers file; 0 and "" where it is empty, None for no frame."""
+
+    place: str
+    action: str
+    track: int
+    other: int
+    frame: int | None
+    name: str
+
+
+def read_answers(path: Path, actions: tuple[str, ...]) -> list[AnswerRow]:
+    """Answers of a CSV file with the columns action, frame, id, other, name, in any order.
+
+    Raises
+    ------
+    FormatError
+        Where the file is none; names the line.
+    """
+    found = []
+    for line, cells in _lines(path, ("action", "id")):
+        place = f"{path}: line {line}"
+        action = cells.get("action", "")
+        if action not in actions:
+            raise FormatError(path, f"line {line}", f"action {action!r}", one_of(action, actions))
+        track, other, frame = (_whole(path, line, name, cells.get(name, "")) for name in ("id", "other", "frame"))
+        if track is None:
+            raise FormatError(path, f"line {line}", "no id", "the id of a track")
+        found.append(AnswerRow(place, action, track, other or 0, frame, cells.get("name", "")))
+    return found
+
+
+def read_names(path: Path) -> dict[int, str]:
+    """Names of tracks of a CSV file with the columns id and name."""
+    names: dict[int, str] = {}
+    for line, cells in _lines(path, ("id", "name")):
+        identity = _whole(path, line, "id", cells["id"])
+        if identity is None or not cells["name"]:
+            raise FormatError(path, f"line {line}", "no id or no name", "id,name")
+        if identity in names:
+            raise FormatError(path, f"line {line}", f"id {identity} twice", "a name once a track")
+        names[identity] = cells["name"]
+    return names
+
+
+def _lines(path: Path, needed: tuple[str, ...]) -> list[tuple[int, dict[str, str]]]:
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            reader = csv.reader(file, skipinitialspace=True)
+            header = [name.strip().lower() for name in next(reader, [])]
+            rows = [(reader.line_num, row) for row in reader if any(map(str.strip, row))]
+    except OSError as error:
+        raise FormatError(path, "", error.strerror or error, "a CSV file") from error
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise FormatError(path, "", "what is no text", "CSV in UTF-8") from error
+    if missing := [name for name in needed if name not in header]:
+        raise FormatError(path, "header", ",".join(header) or "nothing", f"the columns {','.join(missing)}")
+    return [(line, {k: v.strip() for k, v in zip(header, row, strict=False)}) for line, row in rows]
+
+
+def _whole(path: Path, line: int, name: str, text: str) -> int | None:
+    if not text:
+        return None
+    try:
+        return int(text)
+    except ValueError as error:
+        raise FormatError(path, f"line {line}", f"{name} {text!r}", "a whole number") from error
