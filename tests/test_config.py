@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from stseg.commands.main import main
 from stseg.config import BodyConfig, Config
 from stseg.config.effect import require_effect
 from stseg.config.keys import USER_KEYS, describe, values
@@ -268,3 +269,11 @@ def test_a_value_without_effect_is_refused(assignments: tuple[str, ...], tracker
 )
 def test_a_value_with_effect_is_taken(assignments: tuple[str, ...], tracker: str) -> None:
     require_effect(read_config(None, assignments), tracker)
+
+
+def test_the_command_prints_a_file_that_a_run_takes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["config", "--set", "body.height_mean=1.2", "--expert"]) == 0
+    printed = capsys.readouterr().out
+    assert read(tmp_path / "c.toml", printed) == read_config(None, ["body.height_mean=1.2"])
+    assert main(["config", "--set", "body.height=1"]) == 2
+    assert "did you mean heights?" in capsys.readouterr().err
