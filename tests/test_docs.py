@@ -109,6 +109,23 @@ def test_the_rig_file_shown_is_one() -> None:
     assert {"x", "y", "polygon", "frame_rate"} <= set(scene)
 
 
+@pytest.mark.parametrize("page", PAGES, ids=NAMES)
+def test_cameras_shown_are_as_rig_files_have_them(page: Path) -> None:
+    whole = re.findall(r"```toml\n(format.*?)```", INPUTS, re.DOTALL)[0]
+    head, camera = whole.partition("[[camera]]")[0], whole.rpartition("[[camera]]")[2]
+    for block in re.findall(r"```toml\n(source.*?)```", page.read_text("utf-8"), re.DOTALL):
+        text = f"{head}[[camera]]{camera.partition('source =')[0]}{block}"
+        (source,) = parse_rig(text, ROOT / "room.toml").sources
+        assert source.source.kind in SOURCE_KINDS
+
+
+@pytest.mark.parametrize("page", PAGES, ids=NAMES)
+def test_keys_of_the_rig_file_named_exist(page: Path) -> None:
+    readers = "".join(path.read_text("utf-8") for path in (ROOT / "io" / "recording").rglob("*.py"))
+    known = {*re.findall(r'"(\w+)"', readers), *(key.rpartition(".")[2] for key in KEYS)}
+    assert set(re.findall(r"`(\w+) = ", page.read_text("utf-8"))) <= known
+
+
 def test_every_array_and_column_of_the_run_file_is_described() -> None:
     for field in layout.FIELDS:
         assert re.search(rf"^ +.*\b{field.name}\b", OUTPUTS, re.MULTILINE)
