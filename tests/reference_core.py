@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from itertools import combinations, permutations
 
 import numpy as np
-from reference_walkers import greedy_pairs
+from reference_walkers import best_pairs
 
 from stseg.arrays import Boxes, Flags, Floats, Ints, Labels, Singles
 from stseg.detection.problem import BoxEvidence, Parameters, PixelEvidence, Problem
@@ -69,7 +69,7 @@ def set_score(members: Sequence[int], problem: Problem) -> float:
     total = sum(parameters.prior_log_odds + problem.height_prior[j] - problem.birth_cost[j] for j in members)
     chosen = np.array(members, int)
     gains = problem.birth_cost[chosen, None] + problem.track_gain[chosen]
-    total += sum(gains[pair] for pair in greedy_pairs(gains))
+    total += sum(gains[pair] for pair in best_pairs(gains))
     for i, j in combinations(members, 2):
         apart = math.dist(ground[i], ground[j])
         if apart < parameters.minimum_distance:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator
 
 import numpy as np
+from scipy.optimize import linear_sum_assignment
 
 from stseg.arrays import Flags, Floats
 
@@ -23,13 +24,10 @@ def normal_place(off: Floats, covariance: Floats) -> float:
     return float(-0.5 * square - math.log(2 * math.pi) - 0.5 * math.log(area))
 
 
-def greedy_pairs(gain: Floats) -> list[tuple[int, int]]:
-    """Pairs of row and column, one to one, in falling order of what they gain; none that gains nothing."""
-    pairs: list[tuple[int, int]] = []
-    for j, k in sorted(np.ndindex(*gain.shape), key=lambda pair: -gain[pair]):
-        if gain[j, k] > 0 and all(j != row and k != column for row, column in pairs):
-            pairs.append((j, k))
-    return pairs
+def best_pairs(gain: Floats) -> list[tuple[int, int]]:
+    """Pairs of row and column, one to one, of the greatest sum; none that gains nothing."""
+    rows, columns = linear_sum_assignment(np.minimum(-gain, 0.0))
+    return [(j, k) for j, k in zip(rows.tolist(), columns.tolist(), strict=True) if gain[j, k] > 0]
 
 
 def most_of_pairs(gain: Floats, row: int = 0, free: frozenset[int] | None = None) -> float:

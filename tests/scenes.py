@@ -12,7 +12,7 @@ from itertools import pairwise
 
 import cv2
 import numpy as np
-from reference_walkers import greedy_pairs
+from reference_walkers import best_pairs
 
 from stseg.arrays import Boxes, Bytes, Floats, Observation, Rows, Singles
 from stseg.config import BodyConfig, Config, DetectionConfig
@@ -106,7 +106,7 @@ def found(standing: Floats, expected: PredictedTracks | None = None, evidence: f
         + CONFIG.detection.birth_cost
     )
     walker, covariance = np.full(n, -1), np.tile(np.eye(2) * 0.01, (n, 1, 1))
-    for j, k in greedy_pairs(known):
+    for j, k in best_pairs(known):
         walker[j] = k
         covariance[j] = np.linalg.inv(np.linalg.inv(covariance[j]) + np.linalg.inv(before.covariance[k]))
     ones, nats = np.ones((views, n)), np.full(n, evidence)

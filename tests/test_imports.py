@@ -13,7 +13,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 
-FOUNDATION = ("errors", "arrays", "accelerate", "settings", "config", "geometry", "model")
+FOUNDATION = ("errors", "arrays", "accelerate", "linear_assignment", "settings", "config", "geometry", "model")
 """Records, the body model and geometry. Each may import those before it; everything below may import all of them."""
 
 SOLVER = "graphcut"

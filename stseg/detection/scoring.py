@@ -3,7 +3,7 @@
     score(S) = sum_j [person + height_j - birth_j] + tracks(S) + sum_views sum_j part_j(S) - crowding(S)
 
 Members that continue predicted tracks are no births: tracks(S) = sum of birth_j + gain_jk over the pairs of member j
-and track k, one to one.
+and track k, one to one, that is greatest.
 In a view with boxes, part_j is the best box that no other member takes, or the cost of a missing one, which is less
 the more of j is hidden by nearer members. In a view with pixels, part_j is the mean log-odds over j's outline of the
 pixels that no nearer member covers (HW12's detection energy, eqs 13 to 15, in soft form, for the labels of eq. 24).
@@ -16,6 +16,7 @@ import numpy as np
 from stseg.accelerate import kernel
 from stseg.arrays import Floats, Ints
 from stseg.detection.problem import BoxEvidence, Parameters, PixelEvidence, Problem
+from stseg.linear_assignment import fill_assignment_of_least_cost
 
 _OVERLAP = 2.0
 """Cost of a pair that just begins to overlap, nats."""
@@ -43,23 +44,26 @@ def set_score(members: Ints, count: int, problem: Problem) -> float:
 
 @kernel
 def track_score(members: Ints, count: int, gain: Floats, birth_cost: Floats, taken_by: Ints) -> float:
-    """Assign tracks to members greedily; fills taken_by (track,) with places in `members`, -1 for none."""
+    """Assign tracks to members, one to one, at the greatest sum; fills taken_by (track,) with places in `members`.
+
+    Tracks without a member get -1. A greedy assignment swaps people who pass each other more often.
+    """
     tracks = gain.shape[1]
     taken_by[:tracks] = -1
-    served = np.zeros(count, np.bool_)
+    if tracks == 0:
+        return 0.0
+    cost = np.zeros((count, max(tracks, count)))
+    for a in range(count):
+        for k in range(tracks):
+            cost[a, k] = -max(birth_cost[members[a]] + gain[members[a], k], 0.0)
+    column_of = np.zeros(count, np.int64)
+    fill_assignment_of_least_cost(cost, column_of)
     total = 0.0
-    while True:
-        best, best_a, best_k = 0.0, -1, -1
-        for a in range(count):
-            if not served[a]:
-                for k in range(tracks):
-                    saved = birth_cost[members[a]] + gain[members[a], k]
-                    if saved > best and taken_by[k] < 0:
-                        best, best_a, best_k = saved, a, k
-        if best_a < 0:
-            break
-        served[best_a], taken_by[best_k] = True, best_a
-        total += best
+    for a in range(count):
+        k = column_of[a]
+        if cost[a, k] < 0:
+            taken_by[k] = a
+            total -= cost[a, k]
     return total
 
 
