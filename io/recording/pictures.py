@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from PIL import Image
 
-from stseg.arrays import AnyArray, Observation
+from stseg.arrays import AnyArray, Bytes, Observation
 from stseg.errors import SourceError
 from stseg.io.bounded_files import read_bytes
 from stseg.io.recording.indexed_png import decode_indexed, stores_numbers
@@ -68,6 +68,15 @@ def declared_size(data: bytes) -> tuple[int, int] | None:
         except Exception:  # whatever Pillow makes of broken headers
             continue
     return None
+
+
+def read_colour(path: Path) -> Bytes:
+    """One image file in colour, uint8 (v, u, 3); raises as `read_picture` does."""
+    try:
+        size = declared_size(read_bytes(path, _MOST_BYTES))
+    except (OSError, ValueError) as error:
+        raise SourceError(path, "", error, "an image") from error
+    return np.asarray(read_picture(path, "images", size or (0, 0), ""), np.uint8)
 
 
 def reduced_view(view: Observation, factor: int) -> Observation:
