@@ -106,7 +106,7 @@ class ForegroundConfig:
     """Background model of colour cameras. Only the table of the chosen model has an effect."""
 
     model: Literal["mixture", "chromatic", "codebook"] = "mixture"
-    """Background model. mixture: the best where nothing is known of the scene; see the page on configuration."""
+    """Background model; docs/configuration.md says where another than the mixture is better."""
     body_rows: float = 60.0
     """Image rows of a standing person that are enough: larger images are reduced by whole factors; 10000 for none."""
     mixture: MixtureConfig = field(default_factory=MixtureConfig)
