@@ -101,7 +101,7 @@ def test_every_format_takes_a_run_without_tracks(empty_run: Run, path: Path, nam
 def test_help_and_pages_name_every_format(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["export", "--help"]) == 0
     assert re.search(rf"(^|\s){name}:", capsys.readouterr().out, re.MULTILINE)
-    page = (Path(__file__).parents[1] / "docs" / "file-formats.md").read_text("utf-8")
+    page = (Path(__file__).parents[1] / "docs" / "outputs.md").read_text("utf-8")
     assert re.search(rf"^\| `{name}` \|", page, re.MULTILINE)
 
 
