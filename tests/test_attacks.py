@@ -47,8 +47,8 @@ planes = 4
 [[camera]]
 name = "cam1"
 size = [64, 48]
-ground = [[32.0, 0.0, 64.0], [0.0, 4.0, 60.0], [0.0, 0.0, 4.0]]
-vertical = [0.0, -20.0, 0.0]
+ground = [[60.0, 32.0, 192.0], [0.0, 24.0, 324.0], [0.0, 1.0, 6.0]]
+vertical = [0.0, -60.0, 0.0]
 source = { kind = "boxes", path = "boxes.csv" }
 """
 
@@ -465,18 +465,18 @@ def test_links_out_of_a_run_file_are_refused(
 # F10: recordings with a colon; F13: paths that are no UTF-8
 
 
-def film(path: Path | bytes) -> None:
-    plain = Path(os.fsdecode(path)).with_name("plain.avi")
+def film(path: Path, plain: Path) -> None:
+    """A film of three frames; OpenCV writes it under a plain name."""
     writer = cv2.VideoWriter(str(plain), cv2.VideoWriter.fourcc(*"MJPG"), 10, (64, 48))
     for _ in range(3):
         writer.write(np.zeros((48, 64, 3), np.uint8))
     writer.release()
-    plain.rename(os.fsdecode(path))
+    plain.rename(path)
 
 
 @pytest.mark.parametrize("name", ["2026-01-01T10:30:00.avi", "http:127.0.0.1:9701", "concat:a", "-", "a%03d.avi"])
 def test_any_name_of_a_file_is_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
-    film(tmp_path / name)
+    film(tmp_path / name, tmp_path / "plain.avi")
     monkeypatch.chdir(tmp_path)
     assert read_video_size(Path(name)) == (64, 48)
 
@@ -485,7 +485,7 @@ def test_any_name_of_a_file_is_a_file(tmp_path: Path, monkeypatch: pytest.Monkey
 def test_paths_that_are_no_utf8_work(tmp_path: Path) -> None:
     folder = Path(os.fsdecode(os.fsencode(tmp_path) + b"/\xff\xfe"))
     folder.mkdir()
-    film(os.fsencode(folder) + b"/a.avi")
+    film(folder / "a.avi", tmp_path / "plain.avi")
     assert read_video_size(folder / "a.avi") == (64, 48)
     assert read_rig(write_rig(folder)).rig.name == "yard"
 

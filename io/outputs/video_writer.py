@@ -45,6 +45,7 @@ def write_film(path: Path, pictures: Iterable[Bytes], frame_rate: float, overwri
         Where the file cannot be written.
     """
     require_film_name(path)
+    require_utf8(path)
     with replacing(path, overwrite) as part:
         film = part.with_name(part.name + _ENDING)  # the ending decides the container
         try:
@@ -53,6 +54,14 @@ def write_film(path: Path, pictures: Iterable[Bytes], frame_rate: float, overwri
         finally:
             film.unlink(missing_ok=True)
     return count
+
+
+def require_utf8(path: Path) -> None:
+    """Refuse a path that is no UTF-8, on which OpenCV's writer crashes; raises OutputError."""
+    try:
+        str(path.absolute()).encode("utf-8")
+    except UnicodeEncodeError as error:
+        raise OutputError(path, "", "a path that is no UTF-8", "one that is, for a video") from error
 
 
 def _write(film: Path, pictures: Iterable[Bytes], frame_rate: float) -> int:

@@ -17,6 +17,7 @@ from h5py import h5z
 
 from stseg.arrays import AnyArray
 from stseg.io import limits
+from stseg.io.names import printable
 
 _FILTERS = frozenset((h5z.FILTER_DEFLATE, h5z.FILTER_SHUFFLE, h5z.FILTER_FLETCHER32, h5z.FILTER_SCALEOFFSET))
 """Filters of HDF5 itself; any other would be loaded as a library from a folder of plug-ins."""
@@ -40,9 +41,12 @@ def open_hdf5(path: Path) -> Iterator[h5py.File]:
     """
     if not path.is_file():
         raise FileNotFoundError(2, "no such file", str(path))
-    with h5py.File(path, "r") as file:
-        _require_own(file)
-        yield file
+    try:
+        with h5py.File(path, "r") as file:
+            _require_own(file)
+            yield file
+    except (RuntimeError, KeyError, TypeError, AttributeError, OverflowError) as error:  # h5py, of broken files
+        raise ValueError(printable(str(error))[:200]) from error
 
 
 def read_whole(dataset: h5py.Dataset, most: int = limits.UNPACKED) -> AnyArray:

@@ -1,0 +1,135 @@
+"""Valid files to mutate: one small example of everything that is read."""
+
+from __future__ import annotations
+
+import json
+import struct
+from io import BytesIO
+from pathlib import Path
+
+import cv2
+import h5py
+import numpy as np
+
+from stseg.io.outputs.whole_files import replacing
+from stseg.io.recording.indexed_png import encode_indexed
+
+RIG = b"""format = 1
+[scene]
+name = "yard"
+frame_rate = 10.0
+x = [-2.0, 2.0]
+y = [-2.0, 2.0]
+polygon = [[-2.0, -2.0], [2.0, -2.0], [0.0, 2.0]]
+[grid]
+cell = 0.2
+top = 1.8
+planes = 4
+[[camera]]
+name = "cam1"
+size = [64, 48]
+ground = [[60.0, 32.0, 192.0], [0.0, 24.0, 324.0], [0.0, 1.0, 6.0]]
+vertical = [0.0, -60.0, 0.0]
+lens = { matrix = [[50.0, 0.0, 32.0], [0.0, 50.0, 24.0], [0.0, 0.0, 1.0]], distortion = [0.1, 0.0] }
+offset = 0
+on_missing = "blind"
+source = { kind = "boxes", path = "boxes.csv", first_frame = 0, frames = 9 }
+"""
+CONFIG = b"[tracking]\npatience = 2.0\n[segments]\nlength = 60.0\n"
+BOXES = b"frame,left,top,width,height,score\n0,10.5,10,5,20,0.9\n3,11,10,5,20,1\n"
+MOT = b"1,-1,10.5,10,5,20,0.9,-1,-1,-1\n3,-1,11,10,5,20,1,-1,-1,-1\n"
+TRACKS = b"frame,id,x,y,flag\n0,1,0.5,-0.5,0\n1,1,0.6,-0.5,0\n1,b,1,1,1\n"
+POINTS = b"camera,u,v,x,y,z\ncam1,1.5,2,3,4,0\ncam1,5,6,7,8,\ncam2,5,6,7,8,1.7\n"
+COCO = json.dumps([{"image_id": 1, "category_id": 1, "bbox": [1, 2, 3, 4], "score": 0.5}] * 2).encode()
+COCO_DATA = json.dumps(
+    {
+        "images": [{"id": 1, "file_name": "a_0001.png", "width": 64, "height": 48}],
+        "categories": [{"id": 1, "name": "person"}],
+        "annotations": [
+            {"image_id": 1, "category_id": 1, "bbox": [1, 2, 3, 4], "segmentation": [[1, 1, 5, 1, 5, 9]]},
+            {"image_id": 1, "category_id": 1, "segmentation": {"size": [48, 64], "counts": [3, 10, 3059]}},
+        ],
+    }
+).encode()
+CVAT = b"""<annotations><meta><task><size>9</size></task></meta><track id="0" label="person">
+<box frame="0" outside="0" xtl="1" ytl="2" xbr="9" ybr="20"/><polygon frame="1" outside="0" points="1,1;5,1;5,9"/>
+</track></annotations>"""
+NUMBERS = " ".join(map(str, np.arange(12.0))).encode()
+OPENCV = b"""<?xml version="1.0"?><opencv_storage>
+<camera_matrix type_id="opencv-matrix"><rows>3</rows><cols>3</cols><dt>d</dt><data>500. 0. 320. 0. 510. 240. 0. 0. 1.
+</data></camera_matrix><distortion_coefficients><data>0.1 0. 0. 0.</data></distortion_coefficients>
+<rvec><data>1.5 0.1 0.2</data></rvec><tvec><data>1. 2. 3.</data></tvec></opencv_storage>"""
+TSAI = b"""<Camera name="View_001"><Geometry width="768" height="576" dpx="0.0048" dpy="0.0046"/>
+<Intrinsic focal="5.5" kappa1="0.0051" cx="324.2" cy="282.6" sx="1"/>
+<Extrinsic tx="-4.8" ty="5570" tz="36000" rx="1.6" ry="0.9" rz="-0.5"/></Camera>"""
+KRT = json.dumps({"c1": {"K": [500, 0, 320, 0, 500, 240, 0, 0, 1], "RT": np.eye(3, 4).tolist(), "imgSize": [64, 48]}})
+POSES = b"""[cam_0]
+name = "a"
+size = [64, 48]
+matrix = [[500.0, 0.0, 32.0], [0.0, 500.0, 24.0], [0.0, 0.0, 1.0]]
+distortions = [0.1, 0.0, 0.0, 0.0, 0.0]
+rotation = [1.5, 0.1, 0.2]
+translation = [1.0, 2.0, 3.0]
+[metadata]
+"""
+NVIDIA = json.dumps({"sensors": [{"id": "c", "cameraMatrix": np.eye(3, 4).tolist(), "attributes": [
+    {"name": "frameWidth", "value": "64"}, {"name": "frameHeight", "value": "48"}]}]}).encode()  # fmt: skip
+KALIBR = b"""cam0:
+  camera_model: pinhole
+  distortion_model: radtan
+  distortion_coeffs: [0.1, 0.0, 0.0, 0.0]
+  intrinsics: [500.0, 500.0, 32.0, 24.0]
+  resolution: [64, 48]
+"""
+POM = b"1.0 0.1 5.0\n0.0 1.2 3.0\n0.0 0.01 1.0\n1.0 0.1 4.0\n0.0 1.1 2.0\n0.0 0.01 1.0\n"
+BEGUN = json.dumps({"config": {"a": 1}, "rig": {"b": "c"}}).encode()
+NOTES = json.dumps({"cam1": [["a.avi", 9], ["b.avi", 3]]}).encode()
+LIVE_TABLE = b"frame,time,id,x,y,height,score\n0,0.000,1,0.500,0.500,1.700,3.000\n"
+
+
+def mat() -> bytes:
+    """A MATLAB file of version 5 with a 3x4 matrix."""
+    values = np.arange(12, dtype="<f8").tobytes()
+    body = (
+        struct.pack("<IIII", 6, 8, 6, 0)
+        + struct.pack("<IIii", 5, 8, 3, 4)
+        + struct.pack("<HH4s", 1, 1, b"P\0\0\0")
+        + struct.pack("<II", 9, len(values))
+        + values
+    )
+    return b"MATLAB".ljust(124) + b"\0\1IM" + struct.pack("<II", 14, len(body)) + body
+
+
+def npy() -> bytes:
+    file = BytesIO()
+    np.save(file, np.arange(12.0).reshape(3, 4))
+    return file.getvalue()
+
+
+def npz() -> bytes:
+    file = BytesIO()
+    matrix = np.arange(12.0).reshape(3, 4)
+    np.savez_compressed(file, files=np.array([1], np.int64), times0_0=np.arange(9.0), P=matrix)
+    return file.getvalue()
+
+
+def matlab_hdf5(folder: Path) -> bytes:
+    with replacing(folder / "p.mat", overwrite=True) as part, h5py.File(part, "w") as file:
+        file["P"] = np.arange(12.0).reshape(4, 3)
+    return (folder / "p.mat").read_bytes()
+
+
+def png(indexed: bool) -> bytes:
+    numbers = np.arange(64 * 48, dtype=np.uint8).reshape(48, 64) % 7
+    if indexed:
+        return encode_indexed(numbers, np.zeros((256, 3), np.uint8))
+    return bytes(cv2.imencode(".png", numbers.astype(np.uint16))[1])
+
+
+def video(folder: Path, suffix: str, codec: str) -> bytes:
+    path = folder / f"film{suffix}"
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*codec), 10, (64, 48))  # type: ignore[call-arg]
+    for frame in range(4):
+        writer.write(np.full((48, 64, 3), 20 * frame, np.uint8))
+    writer.release()
+    return path.read_bytes()

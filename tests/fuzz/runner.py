@@ -1,0 +1,144 @@
+"""Runs targets on mutated files, each target in a process of its own that may crash, hang or grow.
+
+`python -m tests.fuzz --minutes 60` fuzzes all targets for an hour in all; `--target run.h5` one of them. What fails is
+printed with its seed, and kept in the folder `fuzz-failures`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import mmap
+import os
+import resource
+import signal
+import struct
+import sys
+import tempfile
+import time
+import traceback
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from fuzz.mutations import mutated
+from fuzz.targets import TARGETS, Target, answer
+
+SECONDS = 10.0
+"""Longest time that one file may take."""
+MEBI = 2048
+"""Most memory that a process may hold."""
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A file that a target did not answer rightly."""
+
+    target: str
+    seed: int
+    reason: str
+
+
+def content(target: Target, valid: bytes, seed: int) -> bytes:
+    """The mutated file of a seed."""
+    return mutated(valid, np.random.default_rng((seed, len(target.name), *target.name.encode())))
+
+
+def fuzz(target: Target, first: int, until: float, most: int) -> tuple[int, list[Failure]]:
+    """Seeds from `first` on, until a time or number; how many, and what failed."""
+    failures: list[Failure] = []
+    seed, stop = first, first + most
+    while seed < stop and time.monotonic() < until:
+        seed, failure = _until_failure(target, seed, until, stop)
+        if failure is not None:
+            failures.append(failure)
+            seed += 1
+    return seed - first, failures
+
+
+def _until_failure(target: Target, first: int, until: float, stop: int) -> tuple[int, Failure | None]:
+    """A child process works on seeds until one fails; the seed that it came to."""
+    shared = mmap.mmap(-1, 4096)
+    shared[:16] = struct.pack("<qd", first, time.monotonic())
+    child = os.fork()
+    if child == 0:
+        os._exit(_work(target, first, until, stop, shared))
+    while True:
+        done, status = os.waitpid(child, os.WNOHANG)
+        seed, since = struct.unpack("<qd", shared[:16])
+        if done:
+            if os.WIFSIGNALED(status):
+                return seed, Failure(target.name, seed, f"signal {os.WTERMSIG(status)}")
+            if os.WEXITSTATUS(status):
+                return seed, Failure(target.name, seed, bytes(shared[16:]).rstrip(b"\0").decode(errors="replace"))
+            return seed, None
+        if time.monotonic() - since > SECONDS:
+            os.kill(child, signal.SIGKILL)
+            os.waitpid(child, 0)
+            return seed, Failure(target.name, seed, f"more than {SECONDS:g} s")
+        time.sleep(0.01)
+
+
+def _work(target: Target, first: int, until: float, stop: int, shared: mmap.mmap) -> int:
+    """What the child does; its status."""
+    try:
+        with tempfile.TemporaryDirectory() as name:
+            valid = target.valid(Path(name))
+            for seed in range(first, stop):
+                shared[:16] = struct.pack("<qd", seed, time.monotonic())
+                if time.monotonic() > until:
+                    return 0
+                _one(target, Path(name) / f"fuzzed{target.suffix}", content(target, valid, seed))
+            shared[:8] = struct.pack("<q", stop)
+    except BaseException as error:
+        place = traceback.extract_tb(error.__traceback__)[-1]
+        text = f"{type(error).__name__}: {str(error)[:300]} at {place.filename}:{place.lineno}"
+        shared[16 : 16 + len(text.encode())] = text.encode()
+        return 1
+    return 0
+
+
+def _one(target: Target, path: Path, data: bytes) -> None:
+    path.write_bytes(data)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        answer(target, path)
+    held = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
+    if held > MEBI:
+        raise AssertionError(f"{held} MiB of memory")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """The command line; status 1 where something failed."""
+    parser = argparse.ArgumentParser(prog="python -m tests.fuzz")
+    parser.add_argument("--minutes", type=float, default=60.0)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--target", action="append", help="only this one; may be given several times")
+    given = parser.parse_args(arguments)
+    targets = [target for target in TARGETS if not given.target or target.name in given.target]
+    failed = 0
+    for target in targets:
+        until = time.monotonic() + 60 * given.minutes / len(targets)
+        count, failures = fuzz(target, given.seed, until, sys.maxsize - given.seed)
+        failed += len(failures)
+        _say(f"{target.name:20} {count:8} files, {len(failures)} failures")
+        for reason in dict.fromkeys(failure.reason for failure in failures):
+            seeds = [failure.seed for failure in failures if failure.reason == reason]
+            _say(f"    {reason}: seeds {seeds[:5]}{' ...' if len(seeds) > 5 else ''}")
+            _keep(target, seeds[0])
+    return 1 if failed else 0
+
+
+def _say(line: str) -> None:
+    sys.stdout.write(line + "\n")
+    sys.stdout.flush()
+
+
+def _keep(target: Target, seed: int) -> None:
+    folder = Path("fuzz-failures")
+    folder.mkdir(exist_ok=True)
+    with tempfile.TemporaryDirectory() as name:
+        data = content(target, target.valid(Path(name)), seed)
+    (folder / f"{Path(target.name).stem}-{seed}{target.suffix}").write_bytes(data)
