@@ -27,6 +27,7 @@ COMMANDS = {
     "evaluate": ("stseg.commands.evaluate:evaluate", "Score tracks on the ground against the truth."),
     "measure": ("stseg.commands.measure:measure", "Measure people in zones, at lines, and over the ground."),
     "report": ("stseg.commands.report:report", "Write a run file as one HTML page, as pictures or as a film."),
+    "review": ("stseg.commands.review:review", "Ask about the identities of which a run is least sure."),
     "correct": ("stseg.commands.correct:correct", "Correct the identities of a run."),
     "plan": ("stseg.commands.plan:plan", "Estimate the time of a run and the size of its file."),
     "config": ("stseg.commands.config:config", "Print the configuration with the meaning of every key."),
