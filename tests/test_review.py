@@ -13,7 +13,7 @@ from stseg.arrays import Rows
 from stseg.commands.correct import correct
 from stseg.commands.review import review
 from stseg.io.runfile.runs import read_run
-from stseg.model.tables import EVENT, TRAJECTORY, Tracks
+from stseg.model.tables import TRAJECTORY, Tracks
 from stseg.tracking.doubts import find_doubts
 
 BORDER = np.array([[-5.0, -5.0], [5.0, 5.0]])
@@ -30,30 +30,28 @@ def line(start: float, stop: float, count: int) -> list[float]:
     return np.linspace(start, stop, count).tolist()
 
 
-def encounter(heights: tuple[float, float]) -> tuple[Rows, Rows]:
+def encounter(heights: tuple[float, float]) -> Rows:
     """Two who walk through each other at frame 50."""
-    rows = np.concatenate(
+    return np.concatenate(
         [walk(1, 0, line(-4, 4, 101), 0.0, heights[0]), walk(2, 0, line(4, -4, 101), 0.2, heights[1])]
     )
-    events = np.array([(48, b"merge", 1, 2, b""), (52, b"split", 1, 2, b"")], EVENT)
-    return rows, events
 
 
 def test_alike_people_are_more_doubtful_than_different_ones() -> None:
     margins = []
     for heights in ((1.6, 1.9), (1.75, 1.75)):
-        rows, events = encounter(heights)
-        (doubt,) = find_doubts(rows, Tracks(rows).summary(), events, 10.0, BORDER)
-        assert (doubt.question, doubt.track, doubt.other, doubt.first, doubt.last) == ("encounter", 1, 2, 48, 52)
+        rows = encounter(heights)
+        (doubt,) = find_doubts(rows, Tracks(rows).summary(), 10.0, BORDER)
+        assert (doubt.question, doubt.track, doubt.other, doubt.first, doubt.last) == ("encounter", 1, 2, 46, 54)
         margins.append(doubt.margin)
     assert margins[0] > margins[1] > 0
 
 
 def test_a_swap_that_motion_denies_comes_first() -> None:
-    rows, events = encounter((1.75, 1.75))
+    rows = encounter((1.75, 1.75))
     later = rows["frame"] > 50
     rows["id"][later] = 3 - rows["id"][later]
-    (doubt,) = find_doubts(rows, Tracks(rows).summary(), events, 10.0, BORDER)
+    (doubt,) = find_doubts(rows, Tracks(rows).summary(), 10.0, BORDER)
     assert doubt.margin < 0
 
 
@@ -62,19 +60,13 @@ def test_gaps_and_weak_tracks_are_asked_about() -> None:
         [walk(1, 0, line(-4.8, 0, 61), 0.0, 1.7), walk(2, 70, line(0.7, 4.8, 61), 0.0, 1.7),
          walk(3, 20, line(2, 2.2, 10), 3.0, 1.7, 0.5)]
     )  # fmt: skip
-    doubts = find_doubts(rows, Tracks(rows).summary(), np.zeros(0, EVENT), 10.0, BORDER)
+    doubts = find_doubts(rows, Tracks(rows).summary(), 10.0, BORDER)
     assert {(one.question, one.track, one.other) for one in doubts} >= {("gap", 1, 2), ("false", 3, 0)}
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium (.ci/run installs it where it may)")
 def test_one_key_answers_and_the_answers_correct_the_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    import h5py
-
     run = write_small_run(tmp_path / "run.h5")
-    with h5py.File(run, "r+") as file:
-        events = np.array([(13, b"merge", 1, 2, b""), (14, b"split", 1, 2, b"")], EVENT)
-        file["events"].resize((2,))
-        file["events"][:] = events
     review(run, output=tmp_path / "review.html")
     assert "1 questions" in capsys.readouterr().out
     with chromium(tmp_path / "profile") as page:

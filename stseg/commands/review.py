@@ -66,7 +66,7 @@ def doubts_of(run: Run) -> list[Doubt]:
     border = np.array([[grid.x[0], grid.y[0]], [grid.x[1], grid.y[1]]])
     if not len(run.trajectory):
         return []
-    return find_doubts(run.trajectory, run.tracks, run.events, run.frame_rate, border)
+    return find_doubts(run.trajectory, run.tracks, run.frame_rate, border)
 
 
 def _moments(run: Run, doubt: Doubt) -> tuple[tuple[str, int], ...]:

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
 from stseg.arrays import Floats, Rows
 
+_NEAR = 0.7
+"""Distance of an encounter, metres."""
 _AROUND = 2.0
 """Time before and after an encounter in which heights are compared, seconds."""
 _HEIGHT = 0.05
@@ -48,12 +51,12 @@ class Doubt:
     margin: float
 
 
-def find_doubts(trajectory: Rows, tracks: Rows, events: Rows, frame_rate: float, border: Floats) -> list[Doubt]:
+def find_doubts(trajectory: Rows, tracks: Rows, frame_rate: float, border: Floats) -> list[Doubt]:
     """Doubtful decisions, the most doubtful first.
 
     Parameters
     ----------
-    trajectory, tracks, events
+    trajectory, tracks
         Of a run.
     frame_rate
         Frames per second.
@@ -62,22 +65,24 @@ def find_doubts(trajectory: Rows, tracks: Rows, events: Rows, frame_rate: float,
     """
     ordered = trajectory[np.argsort(trajectory["frame"], kind="stable")]
     rows = {int(identity): ordered[ordered["id"] == identity] for identity in tracks["id"]}
-    found = [*_encounters(rows, events, frame_rate), *_gaps(rows, frame_rate), *_weak(rows, frame_rate, border)]
+    found = [*_encounters(rows, frame_rate), *_gaps(rows, frame_rate), *_weak(rows, frame_rate, border)]
     return sorted(found, key=lambda one: (one.margin, one.first, one.track))
 
 
-def _encounters(rows: dict[int, Rows], events: Rows, frame_rate: float) -> list[Doubt]:
-    found, ends = [], {}
-    for row in events[events["kind"] == b"split"]:
-        ends.setdefault((int(row["id"]), int(row["other"])), []).append(int(row["frame"]))
-    for row in events[events["kind"] == b"merge"]:
-        a, b, first = int(row["id"]), int(row["other"]), int(row["frame"])
-        if a not in rows or b not in rows:
+def _encounters(rows: dict[int, Rows], frame_rate: float) -> list[Doubt]:
+    """Times in which two tracks were near each other, and births beside a track that was there before."""
+    found = []
+    for a, b in combinations(sorted(rows), 2):
+        common, in_a, in_b = np.intersect1d(rows[a]["frame"], rows[b]["frame"], return_indices=True)
+        if not len(common):
             continue
-        later = [frame for pair in ((a, b), (b, a)) for frame in ends.get(pair, []) if frame >= first]
-        last = min(later, default=first)
-        if rows[a]["frame"].max() > last and rows[b]["frame"].max() > last:
-            found.append(Doubt("encounter", a, b, first, last, _swap_margin(rows[a], rows[b], first, last, frame_rate)))
+        apart = np.hypot(rows[a]["x"][in_a] - rows[b]["x"][in_b], rows[a]["y"][in_a] - rows[b]["y"][in_b])
+        near = common[apart < _NEAR]
+        for part in np.split(near, np.flatnonzero(np.diff(near) > frame_rate) + 1):
+            if len(part):
+                first, last = int(part[0]), int(part[-1])
+                margin = _swap_margin(rows[a], rows[b], first, last, frame_rate)
+                found.append(Doubt("encounter", a, b, first, last, margin))
     return found
 
 
