@@ -37,10 +37,11 @@ from stseg.detection.scoring import set_score
 from stseg.detection.search import ENUMERATED, search
 from stseg.geometry import Camera, Rig
 from stseg.geometry.bodies import BodyTable
-from stseg.model.box_fit import TOLERANCE, fill_best_match, fill_cover, fill_inside, fill_match, half_square
+from stseg.model.box_fit import TOLERANCE, fill_cover, fill_inside, fill_match, half_square
 from stseg.model.box_noise import FIRST
 from stseg.model.outlines import outlines, sums_inside
 from stseg.model.people import Explanation
+from stseg.model.pillar_index import PillarIndex, raise_to_best_match
 from stseg.model.predicted_tracks import no_tracks
 
 WIDTH, HEIGHT = 128.0, 96.0
@@ -75,16 +76,18 @@ def test_matches_by_definition(bodies: Floats, found: list[Floats], seed: int) -
     bodies[seed % len(bodies)] = np.nan if seed % 3 == 0 else bodies[0]
     edges = np.array(found).reshape(-1, 4)
     tolerance, belief = FIRST.of(np.random.default_rng(seed).uniform(0.1, 1, len(edges)))
-    match, best = np.empty((len(bodies), len(edges))), np.empty((1, len(bodies)))
+    match, best = np.empty((len(bodies), len(edges))), np.full(len(bodies), -np.inf)
     fill_match(bodies, edges, tolerance, belief, WIDTH, HEIGHT, match)
-    fill_best_match(bodies[None], edges, tolerance, belief, WIDTH, HEIGHT, best)
+    index = PillarIndex.of(bodies, (int(WIDTH), int(HEIGHT)))
+    raise_to_best_match(index, bodies, edges, tolerance, belief, WIDTH, HEIGHT, -30.0, best)
     for i, body in enumerate(bodies):
         costs = [
             np.inf if np.isnan(body).any() else reference.half_square(body, *one, WIDTH, HEIGHT)
             for one in zip(edges, tolerance, strict=True)
         ]
         np.testing.assert_allclose(match[i], belief - np.array(costs).reshape(-1), rtol=1e-9)
-    np.testing.assert_array_equal(best[0], match.max(1, initial=-np.inf))
+    expected = match.max(1, initial=-np.inf)
+    np.testing.assert_array_equal(best, np.where(expected > -30.0, expected, -np.inf))
 
 
 @settings(deadline=None)

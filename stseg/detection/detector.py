@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from stseg.arrays import ViewEvidence
+from stseg.arrays import Floats, Ints, ViewEvidence
 from stseg.config import BodyConfig, DetectionConfig, ErrorRateConfig
 from stseg.detection.box_noise_calibration import BoxNoiseCalibration
 from stseg.detection.evidence import peaks
@@ -27,6 +27,9 @@ from stseg.model.box_noise import BoxNoise
 from stseg.model.candidates import Candidates
 from stseg.model.people import Explanation
 from stseg.model.predicted_tracks import PredictedTracks
+
+_HOPELESS = -4.0
+"""Where the middle height is worth less, no other height makes a candidate, nats."""
 
 
 class Detector:
@@ -70,7 +73,8 @@ class Detector:
         ]
         self.parameters = Parameters.of(config)
         self.border = Border.of(rig)
-        self._swap_rounds = 0 if "boxes" in kinds else config.swap_moves
+        self._has_boxes = "boxes" in kinds
+        self._swap_rounds = 0 if self._has_boxes else config.swap_moves
 
     def new_calibration(self) -> BoxNoiseCalibration:
         """Box noise calibration of a session that begins: the first guess."""
@@ -84,9 +88,10 @@ class Detector:
         proposed: Candidates | None = None,
     ) -> Explanation:
         """Explain a session's next frame, and update the session's box noise calibration with it."""
-        noise = calibration.noise
-        explained = self.explain(seen, predicted, proposed, noise)
-        calibration.learn(explained, self.views, self.observe(seen, noise))
+        observations = self.observe(seen, calibration.noise)
+        explained = self._explain(observations, predicted, proposed)
+        if self._has_boxes:
+            calibration.learn(explained, self.views, observations)
         return explained
 
     def observe(self, seen: Sequence[ViewEvidence], noise: BoxNoise | None = None) -> list[ViewObservation | None]:
@@ -114,33 +119,85 @@ class Detector:
         noise
             Noise of boxes; by default the first guess.
         """
+        return self._explain(self.observe(seen, noise), predicted, proposed)
+
+    def _explain(
+        self,
+        observations: Sequence[ViewObservation | None],
+        predicted: PredictedTracks | None,
+        proposed: Candidates | None,
+    ) -> Explanation:
         prior = Prior.of(predicted, self.config, self.body, self.border)
-        evidence = FrameEvidence(self.views, self.observe(seen, noise), prior, self.parameters)
+        evidence = FrameEvidence(self.views, observations, prior, self.parameters)
         tracked = prior.pool()
         estimate = MapEstimate.of_search(evidence, tracked, np.arange(len(tracked)))
         for _ in range(self.config.search_rounds):
             fresh = self.lattice_candidates(estimate)
             if proposed is not None:
                 fresh, proposed = fresh.joined_apart(proposed, self.config.lattice_spacing), None
-            moved = estimate.refined().pool
+            moved = self._moved(estimate)
             if not len(fresh) and not len(moved):
                 break
-            known = len(estimate.pool)
+            known, before = len(estimate.pool), estimate.members
             pool = estimate.pool.joined_with(moved).joined_with(fresh)
-            estimate = MapEstimate.of_search(evidence, pool, estimate.members)
+            estimate = MapEstimate.of_search(evidence, pool, before)
             if (estimate.members < known).all():
+                break
+            if not self._has_boxes and _same_people(estimate.members, before, known):
                 break
         return explanation(_settled(estimate, self._swap_rounds))
 
+    def _moved(self, estimate: MapEstimate) -> Candidates:
+        """The members nearer to where they stand: a step between two searches.
+
+        Where all views show pixels and all members continue tracks, their heights are known well enough for it.
+        """
+        if self._has_boxes or (estimate.track_index < 0).any():
+            return estimate.refined().pool
+        return estimate.moved()
+
     def lattice_candidates(self, estimate: MapEstimate) -> Candidates:
-        """Peaks of the lattice's score by the evidence that an estimate leaves unexplained."""
+        """Peaks of the lattice's score by the evidence that an estimate leaves unexplained.
+
+        Pixels are summed at the middle height first, and at the others only where that is not hopeless.
+        """
         evidence, unexplained = estimate.evidence, estimate.unexplained()
         heights, (rows, columns) = np.asarray(self.body.heights), self.lattice_ground.shape[:2]
         score = np.repeat(evidence.prior.log_height(heights)[:, None], rows * columns, 1)
+        shown: list[tuple[PixelView, Floats]] = []
         for view, observation, free in zip(self.views, evidence.observations, unexplained, strict=True):
-            if observation is not None:
+            if observation is None:
+                continue
+            if isinstance(view, BoxView):
                 score += view.lattice_score(observation, free)
+            else:
+                shown.append((view, view.row_sums(observation, free)))
+        if shown:
+            _add_pixels(shown, score)
         return peaks(score.reshape(-1, rows, columns), self.lattice_ground, heights, self.body.width_mean)
+
+
+def _add_pixels(shown: Sequence[tuple[PixelView, Floats]], score: Floats) -> None:
+    """Add what pixels say of the lattice's pillars to score (height, cell); -inf where a height is not worth a look."""
+    middle = len(score) // 2
+    for view, row_sums in shown:
+        view.add_lattice_score(row_sums, middle, view.lattice_cells, score[middle])
+    worth = np.flatnonzero(score[middle] > _HOPELESS)
+    for height in range(len(score)):
+        if height != middle:
+            others = np.full(len(score[height]), -np.inf)
+            others[worth] = score[height, worth]
+            for view, row_sums in shown:
+                view.add_lattice_score(row_sums, height, worth, others)
+            score[height] = others
+
+
+def _same_people(members: Ints, before: Ints, known: int) -> bool:
+    """Whether a search among `known` candidates, those that `before` moved to, and others kept exactly these people."""
+    moved = (members >= known) & (members < known + len(before))
+    origin = members.copy()
+    origin[moved] = before[members[moved] - known]
+    return np.array_equal(np.sort(origin), np.sort(before))
 
 
 def _settled(estimate: MapEstimate, swap_rounds: int) -> MapEstimate:

@@ -18,8 +18,15 @@ from stseg.detection.body_size import measure
 from stseg.detection.evidence import box_evidence, pixel_evidence
 from stseg.detection.prior import Prior
 from stseg.detection.problem import Parameters, Problem
-from stseg.detection.refine import refine
-from stseg.detection.scoring import box_score, pixel_score, set_score, track_score
+from stseg.detection.refine import refine, refine_places
+from stseg.detection.scoring import (
+    box_score,
+    fill_scores_with,
+    fill_scores_without,
+    pixel_score,
+    set_score,
+    track_score,
+)
 from stseg.detection.search import search
 from stseg.detection.views import BoxView, PixelView, ViewObservation
 from stseg.model.candidates import Candidates
@@ -64,6 +71,25 @@ class SetScore:
 
     total: float
     view_evidence: Floats
+
+
+@dataclass(frozen=True)
+class Additions:
+    """Candidates outside a set, each as a further member.
+
+    Attributes
+    ----------
+    gain : float64 (m,)
+        Change of the score, nats.
+    view_evidence : float64 (view, m)
+        What each view says of the candidate, nats.
+    track_index : int64 (m,)
+        The predicted track that it would continue, -1 for births.
+    """
+
+    gain: Floats
+    view_evidence: Floats
+    track_index: Ints
 
 
 @dataclass(frozen=True)
@@ -117,12 +143,24 @@ class MapEstimate:
         pixels_last = np.argsort([isinstance(view, PixelView) for view in self.evidence.views], kind="stable")
         return np.argsort(pixels_last)
 
+    def additions(self, others: Ints) -> Additions:
+        """What each of some candidates outside the set, int64 (m,), would add to it."""
+        before, totals, tracks = self.members_score.total, np.empty(len(others)), np.empty(len(others), np.int64)
+        view_evidence = np.empty((len(self.evidence.views), len(others)))
+        fill_scores_with(self.members, others, self.problem, totals, view_evidence, tracks)
+        return Additions(totals - before, view_evidence[self._row], tracks)
+
+    def losses(self) -> Floats:
+        """What the score loses without each member, nats, float64 (n,)."""
+        without = np.empty(len(self.members))
+        fill_scores_without(self.members, self.problem, without)
+        return self.members_score.total - without
+
     def alternatives(self) -> Ints:
         """Candidates outside the set, the best of each place, best first: int64 (n,)."""
         apart = 2 * self.evidence.prior.config.lattice_spacing
         others = np.setdiff1d(np.arange(len(self.pool)), self.members)
-        before = self.members_score.total
-        gain = np.array([self.score(np.append(self.members, i)).total - before for i in others])
+        gain = self.additions(others).gain
         standing, kept = self.pool.ground[self.members], []
         for i in others[np.argsort(-gain, kind="stable")]:
             place = self.pool.ground[i]
@@ -166,12 +204,8 @@ class MapEstimate:
     @cached_property
     def track_index(self) -> Ints:
         """The predicted track that each member continues, int64 (member,); -1 for births."""
-        return self.tracks_of(self.members)
-
-    def tracks_of(self, members: Ints) -> Ints:
-        """The same of any set of the candidates, int64 (n,)."""
-        problem, index = self.problem, np.full(len(members), -1, np.int64)
-        track_score(members, len(members), problem.track_gain, problem.birth_cost, problem.assigned)
+        problem, index = self.problem, np.full(len(self.members), -1, np.int64)
+        track_score(self.members, len(self.members), problem.track_gain, problem.birth_cost, problem.assigned)
         for k, place in enumerate(problem.assigned[: problem.track_gain.shape[1]]):
             if place >= 0:
                 index[place] = k
@@ -183,6 +217,13 @@ class MapEstimate:
             (pixels if isinstance(view, PixelView) else boxes) < 0
             for view, (boxes, pixels) in zip(self.evidence.views, self._assignments, strict=True)
         ]
+
+    def moved(self) -> Candidates:
+        """The members at the means of their places, each at the size that it has."""
+        evidence, pool = self.evidence, self.pool.at(self.members)
+        own = Assignment(self._box_of_each(), self.pixel_assignment)
+        ground = refine_places(pool, evidence.views, evidence.observations, own, evidence.prior, self.track_index)
+        return Candidates(ground, pool.height, pool.width)
 
     def refined(self) -> RefinedPeople:
         """The members at the means of their posteriors."""

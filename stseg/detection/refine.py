@@ -14,13 +14,17 @@ from stseg.arrays import Floats, Ints
 from stseg.detection.assignment import WORST, Assignment
 from stseg.detection.prior import Prior
 from stseg.detection.views import BoxView, PixelView, View, ViewObservation
-from stseg.model.box_fit import fill_match
+from stseg.model.box_fit import fill_own_match
 from stseg.model.candidates import Candidates
 
 _REACH = 2
 """Half width of the patch, in its spacings."""
 _SPACING = 0.08
 """Spacing of the patch, metres: a third of the offset of two lattice places."""
+_AXIS = np.arange(-_REACH, _REACH + 1) * _SPACING
+_PATCH = np.stack(np.meshgrid(_AXIS, _AXIS), -1).reshape(-1, 2)
+_FEW_HEIGHTS = 4
+"""Where pixels tell the height afterwards (`stseg.detection.body_size`), every other of more heights is enough here."""
 
 
 @dataclass(frozen=True)
@@ -67,8 +71,9 @@ def refine(
     RefinedPlaces
         Means and variances.
     """
-    axis = np.arange(-_REACH, _REACH + 1) * _SPACING
-    offset, tried = np.stack(np.meshgrid(axis, axis), -1).reshape(-1, 2), np.asarray(prior.body.heights)
+    offset, tried = _PATCH, np.asarray(prior.body.heights)
+    if len(tried) > _FEW_HEIGHTS and not any(isinstance(view, BoxView) for view in views):
+        tried = tried[::2]
     patch = pool.ground[:, None] + offset
     score = np.tile(prior.log_height(tried)[:, None], (len(pool), 1, len(offset)))
     for k, (view, observation) in enumerate(zip(views, observations, strict=True)):
@@ -77,6 +82,29 @@ def refine(
     met = np.flatnonzero(track_index >= 0)
     score[met] += prior.predicted.place_log_density(track_index[met], patch[met])[:, None]
     return _posterior(score, patch, tried)
+
+
+def refine_places(
+    pool: Candidates,
+    views: Sequence[View],
+    observations: Sequence[ViewObservation | None],
+    own: Assignment,
+    prior: Prior,
+    track_index: Ints,
+) -> Floats:
+    """Means of the places alone, by pixels, each person at its height in the pool; float64 (n, 2), metres."""
+    patch = pool.ground[:, None] + _PATCH
+    score = np.zeros(patch.shape[:2])
+    tall, wide = (np.repeat(size[:, None], len(_PATCH), 1) for size in (pool.height, pool.width))
+    for k, (view, observation) in enumerate(zip(views, observations, strict=True)):
+        if isinstance(view, PixelView) and observation is not None and len(pool):
+            sums, area = view.open_sums(observation.raster, own.pixels[k], patch, tall, wide)
+            score += np.divide(sums, area, out=np.zeros_like(sums), where=area > 0)
+    met = np.flatnonzero(track_index >= 0)
+    score[met] += prior.predicted.place_log_density(track_index[met], patch[met])
+    weight = np.exp(score - score.max(1, keepdims=True))
+    weight /= weight.sum(1, keepdims=True)
+    return np.asarray(np.matmul(weight[:, None], patch)[:, 0])
 
 
 def _posterior(score: Floats, patch: Floats, tried: Floats) -> RefinedPlaces:
@@ -100,13 +128,15 @@ def _patch_score(
     tall = np.tile(np.repeat(tried, places), (people, 1))
     if isinstance(view, BoxView):
         columns, rows = map(float, view.camera.size)
-        for j in np.flatnonzero(box >= 0):
-            edges, tolerance, belief = (
-                measured[box[j], None] for measured in (observation.edges, observation.tolerance, observation.belief)
-            )
-            match = np.empty((len(tried) * places, 1))
-            fill_match(view.table.boxes_of(everywhere[j], tall[j]), edges, tolerance, belief, columns, rows, match)
-            score[j] = np.maximum(match, WORST).reshape(score[j].shape)
+        shown = np.flatnonzero(box >= 0)
+        bodies = view.table.boxes_of(everywhere[shown].reshape(-1, 2), tall[shown].reshape(-1))
+        match = np.empty((len(shown), len(tried) * places))
+        own = box[shown]
+        fill_own_match(
+            bodies.reshape(*match.shape, 4), observation.edges[own], observation.tolerance[own],
+            observation.belief[own], columns, rows, match,
+        )  # fmt: skip
+        score[shown] = np.maximum(match, WORST).reshape(len(shown), *score.shape[1:])
     if isinstance(view, PixelView):
         wide = np.repeat(width[:, None], len(tried) * places, 1)
         sums, area = view.open_sums(observation.raster, owner, everywhere, tall, wide)

@@ -9,6 +9,7 @@ from stseg.detection.map_estimate import MapEstimate
 from stseg.detection.residual import reprojection_residuals
 from stseg.detection.views import BoxView, PixelView, View
 from stseg.model.candidates import Candidates
+from stseg.model.outlines import paint
 from stseg.model.people import Explanation, People
 from stseg.model.sizes import Sizes
 
@@ -18,9 +19,8 @@ def explanation(estimate: MapEstimate) -> Explanation:
     views, members, score = estimate.evidence.views, estimate.members, estimate.members_score
     refined = estimate.refined()
     exact = Candidates(refined.pool.ground, refined.known.height, refined.known.width)
-    without = np.array([estimate.score(np.delete(members, a)).total for a in range(len(members))])
     people = People(
-        exact.ground, exact.height, exact.width, refined.covariance, score.total - without, score.view_evidence,
+        exact.ground, exact.height, exact.width, refined.covariance, estimate.losses(), score.view_evidence,
         _visibility(estimate), _prior(estimate, members, estimate.track_index), estimate.track_index, refined.sizes,
     )  # fmt: skip
     assigned = [
@@ -64,18 +64,15 @@ def _visibility(estimate: MapEstimate) -> Floats:
 
 def _ghosts(estimate: MapEstimate) -> People:
     """The rejected candidates, each with what it would add to the set."""
-    members, views, config = estimate.members, estimate.evidence.views, estimate.evidence.prior.config
-    rejected = np.setdiff1d(np.arange(len(estimate.pool)), members)
-    scores = [estimate.score(np.append(members, i)) for i in rejected]
-    gain = np.array([score.total - estimate.members_score.total for score in scores])
-    last = [score.view_evidence[:, -1] for score in scores]
-    view_evidence = np.array(last).reshape(len(rejected), len(views)).T
+    config, body = estimate.evidence.prior.config, estimate.evidence.prior.body
+    rejected = np.setdiff1d(np.arange(len(estimate.pool)), estimate.members)
+    added = estimate.additions(rejected)
     pool, births = estimate.pool.at(rejected), np.full(len(rejected), -1, np.int64)
-    tracks = np.array([estimate.tracks_of(np.append(members, i))[-1] for i in rejected], np.int64)
     covariance = np.tile(np.eye(2) * config.lattice_spacing**2 / 12, (len(rejected), 1, 1))
+    prior, sizes = _prior(estimate, rejected, added.track_index), Sizes.of_population(len(rejected), body)
     return People(
-        pool.ground, pool.height, pool.width, covariance, gain, view_evidence, np.ones_like(view_evidence),
-        _prior(estimate, rejected, tracks), births, Sizes.of_population(len(rejected), estimate.evidence.prior.body),
+        pool.ground, pool.height, pool.width, covariance, added.gain, added.view_evidence,
+        np.ones_like(added.view_evidence), prior, births, sizes,
     )  # fmt: skip
 
 
@@ -83,8 +80,5 @@ def _painted(view: View, people: Candidates) -> Ints:
     """The person whose body is nearest at each raster pixel of a view, int64 (v, u); -1 for none."""
     first, spans, _ = view.outlines(people.ground, people.height, people.width)
     assigned = np.full(view.shape, -1, np.int64)
-    for j in np.argsort(-view.distance(people.ground), kind="stable"):
-        for k in range(spans.shape[1]):
-            if first[j] >= 0 and first[j] + k < view.shape[0]:
-                assigned[first[j] + k, spans[j, k, 0] : spans[j, k, 1]] = j
+    paint(np.argsort(-view.distance(people.ground), kind="stable"), first, spans, assigned)
     return assigned

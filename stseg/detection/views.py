@@ -13,9 +13,10 @@ from stseg.arrays import Boxes, Flags, Floats, Ints, Singles
 from stseg.config import BodyConfig, DetectionConfig
 from stseg.geometry import Camera, Grid
 from stseg.geometry.bodies import WIDTH, BodyTable
-from stseg.model.box_fit import fill_best_match, fill_inside
+from stseg.model.box_fit import fill_inside
 from stseg.model.box_noise import FIRST, BoxNoise
 from stseg.model.outlines import Spans, outlines, sums_inside
+from stseg.model.pillar_index import PillarIndex, raise_to_best_match
 
 OWN, BACKGROUND = 5.0, -10.0
 """Weights of a person's own pixels and of background inside their pillar (HW12 eq. 27)."""
@@ -99,6 +100,7 @@ class BoxView(View):
         inside = np.zeros(self.bodies.shape[:2])
         for row, bodies in zip(inside, self.bodies, strict=True):
             fill_inside(bodies, width, height, row)
+        self.index = PillarIndex.of(self.bodies, camera.size)
         self.found = np.where(inside > _LEAST_INSIDE, self.found_share(inside), 0.0)
 
     def found_share(self, visible: Floats) -> Floats:
@@ -119,15 +121,10 @@ class BoxView(View):
         """Score of each lattice pillar by the free boxes, nats, float64 (height, cell)."""
         width, height = map(float, self.camera.size)
         best = np.full(self.bodies.shape[:2], -np.inf)
-        fill_best_match(
-            self.bodies,
-            observation.edges[unexplained],
-            observation.tolerance[unexplained],
-            observation.belief[unexplained],
-            width,
-            height,
-            best,
-        )
+        raise_to_best_match(
+            self.index, self.bodies.reshape(-1, 4), observation.edges[unexplained], observation.tolerance[unexplained],
+            observation.belief[unexplained], width, height, -self.config.box_log_ratio - _OPTIMISM, best.reshape(-1),
+        )  # fmt: skip
         return np.where(self.found > 0, np.maximum(self.config.box_log_ratio + best, -_OPTIMISM * self.found), 0.0)
 
 
@@ -142,6 +139,7 @@ class PixelView(View):
         places = np.tile(lattice_ground, (len(body.heights), 1))
         self.lattice = self.outlines(places, heights, np.full(len(heights), body.width_mean))
         drawn = self.lattice[1][:, ::-1, 1] > 0
+        self.lattice_cells = np.arange(len(lattice_ground))
         self.lattice_rows = np.where(drawn.any(1), drawn.shape[1] - drawn.argmax(1), 0)
 
     def observe(self, seen: Boxes | Singles | None, sharpness: BoxNoise = FIRST) -> ViewObservation:
@@ -152,18 +150,20 @@ class PixelView(View):
             mean = np.empty(self.shape, np.float32)
             _fill_means(seen, self.step, mean)
             miss, clutter = self.config.pixel_miss_rate, self.config.pixel_clutter_rate
-            body = (1 - miss) * mean + miss * (1 - mean)
-            empty = clutter * mean + (1 - clutter) * (1 - mean)
-            raster = np.log(body / empty).astype(np.float32)
+            _fill_log_odds(mean, np.float32(miss), np.float32(clutter), raster)
         return ViewObservation(np.zeros((0, 4)), np.zeros(0), np.zeros((0, 5)), np.zeros(0), raster)
 
-    def lattice_score(self, observation: ViewObservation, unexplained: Flags) -> Floats:
-        """What the free pixels (v, u) say of each lattice pillar, nats, float64 (height, cell)."""
+    def row_sums(self, observation: ViewObservation, unexplained: Flags) -> Floats:
+        """Cumulative sums along rows of the unexplained pixels' log-odds, float64 (v, u + 1)."""
+        sums = np.empty((self.shape[0], self.shape[1] + 1))
+        _fill_left_of(observation.raster, unexplained, sums)
+        return sums
+
+    def add_lattice_score(self, row_sums: Floats, height: int, cells: Ints, score: Floats) -> None:
+        """Add the unexplained pixels' score of the pillars of a height at some cells to score (cell,), nats."""
         first, spans, area = self.lattice
-        left_of, means = np.empty((self.shape[0], self.shape[1] + 1)), np.empty(len(first))
-        _fill_left_of(observation.raster, unexplained, left_of)
-        _fill_span_means(left_of, first, self.lattice_rows, spans, area, means)
-        return means.reshape(len(self.body.heights), -1) * self.config.effective_observations
+        start, weight = height * len(score), self.config.effective_observations
+        _add_span_means(row_sums, first, self.lattice_rows, spans, area, start, cells, weight, score)
 
     def open_sums(
         self, values: Singles, owner: Ints, ground: Floats, heights: Floats, widths: Floats
@@ -189,13 +189,38 @@ def _fill_left_of(raster: Singles, unexplained: Flags, left_of: Floats) -> None:
 
 
 @kernel
-def _fill_span_means(left_of: Floats, first: Ints, rows: Ints, spans: Spans, area: Floats, means: Floats) -> None:
-    """Fill means (pillar,) with sums over outlines of so many rows, by their areas, from sums along rows (v, u + 1)."""
-    for i in range(len(first)):
-        total = 0.0
+def _add_span_means(
+    row_sums: Floats,
+    first: Ints,
+    rows: Ints,
+    spans: Spans,
+    area: Floats,
+    start: int,
+    cells: Ints,
+    weight: float,
+    score: Floats,
+) -> None:
+    """Add to score (cell,) the weighted means over outlines `start + cell`, of so many rows each, for some cells."""
+    for cell in cells:
+        i, total = start + cell, 0.0
         for k in range(rows[i]):
-            total += left_of[first[i] + k, spans[i, k, 1]] - left_of[first[i] + k, spans[i, k, 0]]
-        means[i] = total / area[i] if rows[i] > 0 else 0.0
+            total += row_sums[first[i] + k, spans[i, k, 1]] - row_sums[first[i] + k, spans[i, k, 0]]
+        if rows[i] > 0:
+            score[cell] += weight * total / area[i]
+
+
+@kernel
+def _fill_log_odds(mean: Singles, miss: np.float32, clutter: np.float32, raster: Singles) -> None:
+    """Fill raster (v, u) with log((1 - m) L + m (1 - L)) - log(b L + (1 - b)(1 - L)); most L are the same."""
+    one, last, value = np.float32(1), np.float32(-1), np.float32(0)
+    for v in range(mean.shape[0]):
+        for u in range(mean.shape[1]):
+            share = mean[v, u]
+            if share != last:
+                body = (one - miss) * share + miss * (one - share)
+                empty = clutter * share + (one - clutter) * (one - share)
+                last, value = share, np.float32(np.log(body / empty))
+            raster[v, u] = value
 
 
 @kernel

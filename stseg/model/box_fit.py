@@ -80,17 +80,15 @@ def fill_match(
 
 
 @kernel
-def fill_best_match(
-    bodies: Floats, boxes: Floats, tolerance: Floats, belief: Floats, width: float, height: float, best: Floats
+def fill_own_match(
+    bodies: Floats, boxes: Floats, tolerance: Floats, belief: Floats, width: float, height: float, match: Floats
 ) -> None:
-    """Fill best (height, cell) with the best log-likelihood over all boxes; -inf where none fits."""
-    for h in range(bodies.shape[0]):
+    """Fill match (n, pillar): log-likelihood of each box (n, 4) given each of its own pillars' boxes (n, pillar, 4)."""
+    for j in range(len(boxes)):
         for i in range(bodies.shape[1]):
-            best[h, i] = -np.inf
-            if not np.isnan(bodies[h, i, 0]):
-                for b in range(len(boxes)):
-                    fit = belief[b] - half_square(bodies[h, i], boxes[b], tolerance[b], width, height)
-                    best[h, i] = max(best[h, i], fit)
+            match[j, i] = -np.inf
+            if not np.isnan(bodies[j, i, 0]):
+                match[j, i] = belief[j] - half_square(bodies[j, i], boxes[j], tolerance[j], width, height)
 
 
 @kernel

@@ -56,6 +56,15 @@ def outlines(
     return first, spans[:, : max(int(count.max(initial=0)), 1)].copy(), area
 
 
+@kernel
+def paint(order: Ints, first: Ints, spans: Spans, assigned: Ints) -> None:
+    """Write the numbers of outlines into assigned (v, u), one after the other in an order: the last one shows."""
+    for j in order:
+        if first[j] >= 0:
+            for k in range(min(spans.shape[1], assigned.shape[0] - first[j])):
+                assigned[first[j] + k, spans[j, k, 0] : spans[j, k, 1]] = j
+
+
 def sums_inside(
     table: BodyTable, ground: Floats, heights: Floats, widths: Floats, step: int, values: Singles, owner: Ints
 ) -> tuple[Floats, Floats]:
