@@ -1,0 +1,179 @@
+"""CPU time of fixed workloads, for this checkout and another one side by side.
+
+    python tools/bench.py --work FOLDER                      all workloads, one row each
+    python tools/bench.py --work FOLDER --base OTHER         the same for another checkout, in turns with this one
+    python tools/bench.py --work FOLDER --record             append the rows to docs/development/speed.csv
+    python tools/bench.py --work FOLDER --check              the smallest workload against the stored ratio (CI)
+
+A workload is `stseg run` with one worker on a simulated recording. Its cost is the CPU time of the process and its
+children, so other load on the machine matters little; what starting costs is measured by a run of fewer frames and
+taken off. Figures are milliseconds a frame set, and the same beside the time of a fixed calibration kernel, which
+makes machines comparable. The least of some repetitions counts. `start` is the CPU time until the first frames are out.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from workbench import ROOT, commit
+
+from stseg.io.outputs.simulated_scene import write_scene
+from stseg.simulation import NAMED, Film, SceneSpec
+
+TABLE = ROOT / "docs" / "development" / "speed.csv"
+_ALLOWED = 1.25
+"""How many times the stored ratio a check may come to."""
+_RUN = "import sys; from stseg.commands.main import main; sys.exit(main())"
+
+
+@dataclass(frozen=True)
+class Workload:
+    """A recording, and the frames of it that are measured.
+
+    Attributes
+    ----------
+    name
+    scene
+        What is simulated.
+    rig
+        The rig file: video, masks or boxes.
+    few, many
+        Frames of the two runs whose difference is the cost; without `many` the cost is that of the first.
+    """
+
+    name: str
+    scene: SceneSpec
+    rig: str
+    few: int
+    many: int | None
+
+
+def workloads() -> list[Workload]:
+    """All workloads, the smallest first."""
+    small = replace(NAMED["easy"], seconds=4.0, size=(360, 288), cameras=2, people=2, seed=7)
+    video = replace(NAMED["easy"], seconds=6.0, frame_rate=15.0, size=(720, 576))
+    crowd = replace(NAMED["dense"], seconds=4.0, frame_rate=7.5)
+    plaza = replace(NAMED["easy"], area=(20.0, 20.0), camera_distance=16.0, cameras=7, people=10, seconds=6.0, seed=8)
+    return [
+        Workload("small", small, "rig.toml", 10, 40),
+        Workload("video", video, "rig.toml", 30, 90),
+        Workload("boxes", crowd, "rig_boxes.toml", 10, 30),
+        Workload("masks", crowd, "rig_masks.toml", 10, 30),
+        Workload("plaza", plaza, "rig_masks.toml", 20, 50),
+        Workload("start", small, "rig.toml", 2, None),
+    ]
+
+
+def calibration_seconds() -> float:
+    """CPU time of a fixed kernel: sorting, sums along rows and products, the least of five."""
+    numbers = np.random.default_rng(0).random((1000, 1000))
+
+    def kernel() -> None:
+        np.sort(numbers, axis=1)
+        np.cumsum(numbers, axis=1)
+        np.exp(-numbers) @ numbers[:, :50]
+
+    return min(_cpu_of(kernel) for _ in range(5))
+
+
+def _cpu_of(call: Callable[[], None]) -> float:
+    start = time.process_time()
+    call()
+    return time.process_time() - start
+
+
+def cpu_of_run(checkout: Path, rig: Path, output: Path, frames: int) -> float:
+    """CPU seconds of `stseg run` of the first frames, by the code of a checkout."""
+    words = ["run", str(rig), "-o", str(output), "--frames", f"0:{frames}", "--overwrite", "--workers", "1"]
+    environment = os.environ | {"PYTHONPATH": str(checkout)}
+    process = subprocess.Popen(
+        [sys.executable, "-c", _RUN, *words], env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
+    )
+    assert process.stderr is not None
+    messages = process.stderr.read().decode()
+    _, status, usage = os.wait4(process.pid, 0)
+    if status:
+        sys.exit(f"stseg {' '.join(words)} by {checkout}:\n{messages}")
+    return usage.ru_utime + usage.ru_stime
+
+
+def milliseconds(workload: Workload, checkout: Path, work: Path) -> float:
+    """CPU milliseconds a frame set; of `start`, of the whole run."""
+    rig, output = work / workload.name / workload.rig, work / f"{workload.name}.h5"
+    few = cpu_of_run(checkout, rig, output, workload.few)
+    if workload.many is None:
+        return 1000 * few
+    return 1000 * (cpu_of_run(checkout, rig, output, workload.many) - few) / (workload.many - workload.few)
+
+
+def measure(workload: Workload, checkouts: Sequence[Path], work: Path, rounds: int) -> list[float]:
+    """Least cost by each checkout; they take turns."""
+    folder = work / workload.name
+    if not (folder / workload.rig).exists():
+        write_scene(folder, Film(workload.scene), overwrite=True)
+    for checkout in checkouts:  # compiles what is not in the cache
+        cpu_of_run(checkout, folder / workload.rig, work / f"{workload.name}.h5", workload.few)
+    taken = [[milliseconds(workload, checkout, work) for checkout in checkouts] for _ in range(rounds)]
+    return np.min(taken, axis=0).tolist()
+
+
+def stored_ratio(name: str) -> float:
+    """The last ratio that the table holds of a workload."""
+    with TABLE.open(newline="") as file:
+        rows = [row for row in csv.DictReader(file) if row["workload"] == name]
+    return float(rows[-1]["ratio"])
+
+
+def record(rows: Sequence[tuple[str, float, float]]) -> None:
+    """Append name, milliseconds and ratio of workloads to the table, under this commit."""
+    new = not TABLE.exists()
+    with TABLE.open("a", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        if new:
+            writer.writerow(["commit", "workload", "milliseconds", "ratio"])
+        writer.writerows([commit(), name, f"{taken:.1f}", f"{ratio:.3f}"] for name, taken, ratio in rows)
+
+
+def main() -> None:
+    """Measure, print, and record or check."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--work", type=Path, required=True, help="folder for recordings and run files")
+    parser.add_argument("--base", type=Path, help="another checkout to compare with")
+    parser.add_argument("--workloads", default="", help="names, by comma; all if not given")
+    parser.add_argument("--rounds", type=int, default=3, help="repetitions, of which the least counts")
+    parser.add_argument("--record", action="store_true", help="append the rows to the table")
+    parser.add_argument("--check", action="store_true", help="fail where the smallest workload lost more than 25 %%")
+    asked = parser.parse_args()
+    asked.work.mkdir(parents=True, exist_ok=True)
+    names = ["small"] if asked.check else [name for name in asked.workloads.split(",") if name]
+    checkouts = [ROOT] if asked.base is None else [ROOT, asked.base.resolve()]
+    rows = []
+    print(
+        f"{'workload':10} {'ms/frame set':>12} {'ratio':>8}"
+        + ("" if asked.base is None else f" {'base':>8} {'gain':>6}")
+    )
+    for workload in workloads():
+        if names and workload.name not in names:
+            continue
+        taken = measure(workload, checkouts, asked.work, asked.rounds)
+        ratio = taken[0] / (1000 * calibration_seconds())
+        rows.append((workload.name, taken[0], ratio))
+        beside = "" if asked.base is None else f" {taken[1]:8.1f} {taken[1] / taken[0]:6.2f}"
+        print(f"{workload.name:10} {taken[0]:12.1f} {ratio:8.3f}{beside}", flush=True)
+    if asked.record:
+        record(rows)
+    if asked.check and rows[0][2] > _ALLOWED * stored_ratio("small"):
+        sys.exit(f"small: ratio {rows[0][2]:.3f}, more than {_ALLOWED} times the stored {stored_ratio('small'):.3f}")
+
+
+if __name__ == "__main__":
+    main()
