@@ -123,7 +123,7 @@ def measure(workload: Workload, checkouts: Sequence[Path], work: Path, rounds: i
     for checkout in checkouts:  # compiles what is not in the cache
         cpu_of_run(checkout, folder / workload.rig, work / f"{workload.name}.h5", workload.few)
     taken = [[milliseconds(workload, checkout, work) for checkout in checkouts] for _ in range(rounds)]
-    return np.min(taken, axis=0).tolist()
+    return [float(least) for least in np.min(taken, axis=0)]
 
 
 def stored_ratio(name: str) -> float:
