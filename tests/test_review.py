@@ -27,7 +27,7 @@ def walk(identity: int, first: int, x: list[float], y: float, height: float, sco
 
 
 def line(start: float, stop: float, count: int) -> list[float]:
-    return np.linspace(start, stop, count).tolist()
+    return [float(x) for x in np.linspace(start, stop, count)]
 
 
 def encounter(heights: tuple[float, float]) -> Rows:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -9,15 +10,16 @@ from cyclopts import Parameter
 
 from stseg.errors import ConfigError
 from stseg.io.answers import read_names
+from stseg.io.exports.archive import ARCHIVES
 from stseg.io.exports.formats import FORMATS, help_text, write_tracks
 from stseg.io.outputs.whole_files import replacing, require_new
-from stseg.io.runfile.runs import read_run
+from stseg.io.runfile.runs import Run, read_run
 
 
 def export(
     run: Path,
     /,
-    *,
+    *more: Path,
     to: Annotated[str, Parameter(metavar="FORMAT")],
     output: Annotated[Path, Parameter(name=["--output", "-o"], metavar="FILE")],
     names: Annotated[Path | None, Parameter(metavar="NAMES.csv")] = None,
@@ -27,12 +29,18 @@ def export(
 
     Example: stseg export night.h5 --to csv -o night.csv
 
+    Example: stseg export week/*.h5 --to duckdb -o week.duckdb
+
     {formats}
+
+    **sqlite**, **duckdb**: a database of one run or many: recordings, tracks, events and trajectory.
 
     Parameters
     ----------
     run
         The run file.
+    more
+        Further run files, of a database.
     to
         One of those above.
     output
@@ -42,17 +50,31 @@ def export(
     overwrite
         Replace the file if it exists.
     """
-    if to not in FORMATS:
-        raise ConfigError("command line", "--to", repr(to), f"one of {', '.join(FORMATS)}")
+    if to not in (*FORMATS, *ARCHIVES):
+        raise ConfigError("command line", "--to", repr(to), f"one of {', '.join((*FORMATS, *ARCHIVES))}")
+    if more and to not in ARCHIVES:
+        raise ConfigError("command line", "RUN", f"{1 + len(more)} run files", f"one, or --to {' or '.join(ARCHIVES)}")
     require_new(output, overwrite)
-    if output.exists() and run.exists() and output.samefile(run):
+    if output.exists() and any(one.exists() and output.samefile(one) for one in (run, *more)):
         raise ConfigError("command line", "--output", "the run file itself", "another file")
     contents = read_run(run)
     if names is not None:
         contents = contents.with_names(read_names(names))
+    if to in ARCHIVES:
+        _archive(to, output, [contents, *map(read_run, more)], overwrite)
+        return
     with replacing(output, overwrite) as part:
         write_tracks(to, part, contents)
     print(f"wrote {len(contents.trajectory)} rows of {len(contents.tracks)} tracks to {output}")
+
+
+def _archive(to: str, output: Path, runs: Sequence[Run], overwrite: bool) -> None:
+    stems = [run.path.stem for run in runs]
+    if len(set(stems)) < len(stems):
+        raise ConfigError("command line", "RUN", f"{max(stems, key=stems.count)} twice", "files of different names")
+    with replacing(output, overwrite) as part:
+        ARCHIVES[to](part, runs)
+    print(f"wrote {len(runs)} recordings to {output}")
 
 
 export.__doc__ = (export.__doc__ or "").replace("{formats}", help_text())

@@ -9,6 +9,7 @@ import threading
 from collections.abc import Sequence
 from contextlib import suppress
 from difflib import get_close_matches
+from importlib import import_module
 from io import TextIOWrapper
 from types import FrameType
 from typing import Any
@@ -33,6 +34,7 @@ COMMANDS = {
     "config": ("stseg.commands.config:config", "Print the configuration with the meaning of every key."),
     "labels": ("stseg.commands.labels:labels", "Write per-pixel track-id images."),
     "calibrate": ("stseg.commands.calibrate:app", "Make a rig file, or check one."),
+    "completion": ("stseg.commands.completion:completion", "Print the completion script of a shell."),
     "simulate": ("stseg.commands.simulate:simulate", "Render a scene with ground truth."),
 }
 """Location of each command, and its line in `stseg --help`."""
@@ -106,6 +108,19 @@ class Termination:
     def _ask(self, _number: int, _frame: FrameType | None) -> None:
         self.asked = True
         raise KeyboardInterrupt
+
+
+def application() -> App:
+    """The application with all commands imported, as shell completion needs it."""
+    app = App(name="stseg", version=__version__)
+    for name, (path, summary) in COMMANDS.items():
+        module, _, attribute = path.partition(":")
+        found = getattr(import_module(module), attribute)
+        if isinstance(found, App):
+            app.command(found)
+        else:
+            app.command(found, name=name, help=summary)
+    return app
 
 
 def _app(tokens: Sequence[str]) -> App:

@@ -1,0 +1,102 @@
+"""An archive of many runs as one SQLite or DuckDB database: tables recordings, tracks, events and trajectory."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from stseg.arrays import Rows
+from stseg.io.extras import load_extra
+from stseg.io.runfile.run_reader import Run
+
+_TABLES: Mapping[str, tuple[tuple[str, str], ...]] = {
+    "recordings": (
+        ("recording", "TEXT"), ("file", "TEXT"), ("created", "TEXT"), ("frame_rate", "DOUBLE"), ("frames", "BIGINT"),
+        ("seconds", "DOUBLE"), ("cameras", "TEXT"), ("x0", "DOUBLE"), ("y0", "DOUBLE"), ("x1", "DOUBLE"),
+        ("y1", "DOUBLE"), ("tracks", "BIGINT"), ("people_mean", "DOUBLE"),
+    ),
+    "tracks": (
+        ("recording", "TEXT"), ("id", "BIGINT"), ("name", "TEXT"), ("first", "BIGINT"), ("last", "BIGINT"),
+        ("start", "DOUBLE"), ("seconds", "DOUBLE"), ("frames", "BIGINT"), ("height", "DOUBLE"), ("score", "DOUBLE"),
+        ("distance", "DOUBLE"),
+    ),
+    "events": (
+        ("recording", "TEXT"), ("frame", "BIGINT"), ("time", "DOUBLE"), ("kind", "TEXT"), ("id", "BIGINT"),
+        ("other", "BIGINT"), ("reason", "TEXT"),
+    ),
+    "trajectory": (
+        ("recording", "TEXT"), ("frame", "BIGINT"), ("time", "DOUBLE"), ("id", "BIGINT"), ("x", "DOUBLE"),
+        ("y", "DOUBLE"), ("height", "DOUBLE"), ("score", "DOUBLE"),
+    ),
+}  # fmt: skip
+"""Columns of the tables; metres, seconds, nats. `recording` is the run file's name without its suffix."""
+
+
+def write_sqlite(path: Path, runs: Sequence[Run]) -> None:
+    """Write an SQLite database."""
+    path.unlink(missing_ok=True)
+    connection = sqlite3.connect(path)
+    try:
+        with connection:
+            _fill(connection, runs)
+    finally:
+        connection.close()
+
+
+def write_duckdb(path: Path, runs: Sequence[Run]) -> None:
+    """Write a DuckDB database (needs duckdb)."""
+    duckdb = load_extra("duckdb", "duckdb")
+    path.unlink(missing_ok=True)
+    with duckdb.connect(str(path)) as connection:
+        connection.execute("BEGIN")
+        _fill(connection, runs)
+        connection.execute("COMMIT")
+
+
+ARCHIVES: Mapping[str, Callable[[Path, Sequence[Run]], None]] = {"sqlite": write_sqlite, "duckdb": write_duckdb}
+"""By the name that `stseg export --to` takes."""
+
+
+def _fill(connection: Any, runs: Sequence[Run]) -> None:
+    for table, columns in _TABLES.items():
+        connection.execute(f"CREATE TABLE {table} ({', '.join(f'{name} {kind}' for name, kind in columns)})")
+    for run in runs:
+        for table, rows in _rows(run):
+            places = ", ".join("?" * len(_TABLES[table]))
+            if values := list(rows):
+                connection.executemany(f"INSERT INTO {table} VALUES ({places})", values)
+
+
+def _rows(run: Run) -> Iterator[tuple[str, Iterable[tuple[object, ...]]]]:
+    name, rate, grid = run.path.stem, run.frame_rate, run.recording.rig.grid
+    seconds, people = len(run.frames) / rate, len(run.trajectory) / max(len(run.frames), 1)
+    about = (name, str(run.path), run.provenance.created, rate, len(run.frames), seconds, ",".join(run.cameras))
+    yield "recordings", [(*about, grid.x[0], grid.y[0], grid.x[1], grid.y[1], len(run.tracks), people)]
+    yield "tracks", (_track(run, name, row) for row in run.tracks)
+    yield "events", (
+        (name, int(e["frame"]), int(e["frame"]) / rate, e["kind"].decode(), int(e["id"]), int(e["other"]),
+         e["reason"].decode(errors="replace"))
+        for e in run.events
+    )  # fmt: skip
+    yield "trajectory", (
+        (name, int(r["frame"]), int(r["frame"]) / rate, int(r["id"]), float(r["x"]), float(r["y"]),
+         _finite(r["height"]), _finite(r["score"]))
+        for r in run.trajectory
+    )  # fmt: skip
+
+
+def _track(run: Run, recording: str, row: np.void) -> tuple[object, ...]:
+    identity, rate = int(row["id"]), run.frame_rate
+    own: Rows = run.trajectory[run.trajectory["id"] == identity]
+    distance = float(np.hypot(np.diff(own["x"]), np.diff(own["y"])).sum())
+    first, last = int(row["first"]), int(row["last"])
+    spans = (first, last, first / rate, (last - first + 1) / rate, int(row["frames"]))
+    return recording, identity, run.names.get(identity), *spans, _finite(row["height"]), _finite(row["score"]), distance
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
