@@ -16,7 +16,7 @@ import cv2
 import h5py
 import numpy as np
 import pytest
-from test_io_runs import write_small_run
+from run_files import write_small_run
 
 from stseg.commands.main import main
 from stseg.errors import InputError

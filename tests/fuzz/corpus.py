@@ -128,7 +128,7 @@ def png(indexed: bool) -> bytes:
 
 def video(folder: Path, suffix: str, codec: str) -> bytes:
     path = folder / f"film{suffix}"
-    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*codec), 10, (64, 48))  # type: ignore[call-arg]
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*codec), 10, (64, 48))
     for frame in range(4):
         writer.write(np.full((48, 64, 3), 20 * frame, np.uint8))
     writer.release()

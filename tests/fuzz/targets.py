@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from test_io_runs import write_small_run
+from run_files import write_small_run
 
 from fuzz import corpus
 from stseg.errors import StsegError
