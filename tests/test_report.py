@@ -453,7 +453,7 @@ def test_the_same_run_gives_the_same_page(run_file: Path, tmp_path: Path) -> Non
 
 def test_names_from_the_run_cannot_write_html(tmp_path: Path) -> None:
     recording = run_files.small_recording(tmp_path)
-    evil = replace(recording, rig=replace(recording.rig, name="<script>alert(1)</script>"))
+    evil = replace(recording, rig=replace(recording.rig, name="<script>alert(1)"))
     path = tmp_path / "evil.h5"
     with RunWriter(path, evil, np.ones(evil.rig.grid.shape, np.uint8), run_files.CONFIG, overwrite=False) as writer:
         writer.finish(np.zeros(0, TRACK))

@@ -35,7 +35,9 @@ def test_every_module_is_in_the_wheel(wheel: Path) -> None:
     own = {path.relative_to(ROOT).as_posix() for path in (ROOT / "stseg").rglob("*.py")}
     behind_the_link = {f"stseg/{path.relative_to(ROOT).as_posix()}" for path in (ROOT / "io").rglob("*.py")}
     assert {"stseg/io/track_csv.py", "stseg/io/calibrations/opencv_xml.py"} <= behind_the_link
-    assert names == own | behind_the_link | {"stseg/py.typed", "stseg/napari.yaml", "stseg/report/page.js"}
+    scripts = {path.relative_to(ROOT).as_posix() for path in (ROOT / "stseg").rglob("*.js")}
+    assert "stseg/report/page.js" in scripts
+    assert names == own | behind_the_link | scripts | {"stseg/py.typed", "stseg/napari.yaml"}
 
 
 def test_the_wheel_works_away_from_its_sources(wheel: Path, tmp_path: Path) -> None:

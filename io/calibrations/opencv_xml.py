@@ -16,6 +16,7 @@ from stseg.io.calibrations.foreign_camera import ForeignCamera, camera_from_pose
 from stseg.io.calibrations.safe_xml import parse_xml
 from stseg.io.names import printable
 from stseg.io.numbers import parse_numbers
+from stseg.io.outputs.whole_files import replacing
 
 _MATRIX = ("camera_matrix",)
 _DISTORTION = ("distortion_coefficients",)
@@ -59,6 +60,17 @@ def read_opencv_lens(file: Path) -> Lens:
     _, distortion = _numbers(roots, _DISTORTION, (4, 5, 8, 12, 14))
     alone = camera_from_pose(file, "", None, matrix.reshape(3, 3), np.eye(3), np.zeros(3), distortion)
     return alone.lens or Lens(matrix.reshape(3, 3), np.zeros(5))
+
+
+def write_opencv_lens(path: Path, matrix: Floats, distortion: Floats, overwrite: bool) -> None:
+    """Write `camera_matrix` and `distortion_coefficients` as OpenCV's FileStorage does; `read_opencv_lens` reads it."""
+    nodes = "\n".join(
+        f'<{name} type_id="opencv-matrix">\n  <rows>{rows.shape[0]}</rows>\n  <cols>{rows.shape[1]}</cols>\n'
+        f"  <dt>d</dt>\n  <data>{' '.join(map(repr, rows.ravel().tolist()))}</data>\n</{name}>"
+        for name, rows in ((_MATRIX[0], matrix), (_DISTORTION[0], distortion.reshape(-1, 1)))
+    )
+    with replacing(path, overwrite) as part:
+        part.write_text(f'<?xml version="1.0"?>\n<opencv_storage>\n{nodes}\n</opencv_storage>\n', encoding="utf-8")
 
 
 def _numbers(

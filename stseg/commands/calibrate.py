@@ -7,10 +7,12 @@ from cyclopts import App
 from stseg.commands.calibrate_auto import calibrate_auto
 from stseg.commands.calibrate_check import check
 from stseg.commands.calibrate_import import import_calibration
+from stseg.commands.calibrate_lens import calibrate_lens
 from stseg.commands.calibrate_page import calibrate_page
 from stseg.commands.calibrate_points import calibrate_points
 
 app = App(name="calibrate", help="Make a rig file, or check one.")
+app.command(calibrate_lens, name="lens")
 app.command(calibrate_page, name="page")
 app.command(calibrate_points, name="points")
 app.command(import_calibration, name="import")
