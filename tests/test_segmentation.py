@@ -105,11 +105,14 @@ def test_a_component_without_a_detection_is_kept() -> None:
     np.testing.assert_allclose(found.ground[unknown], (1.55, 0.75), atol=1e-9)
 
 
-def test_people_without_cells_are_no_blobs() -> None:
+def test_a_detection_without_cells_is_a_blob_without_extent() -> None:
     found = blobs_of(disc((0.45, 0.75)), (0.45, 0.75), (1.8, 0.2))
-    assert found.person.tolist() == [0]
+    assert found.person.tolist() == [0, 1]
+    assert found.track.tolist() == [11, 12]
+    assert found.ground[1].tolist() == [1.8, 0.2]
+    assert found.extent[0] > found.extent[1] == 0
     empty = blobs_of(np.zeros(GRID.shape, bool), (0.45, 0.75))
-    assert len(empty.person) == len(empty.ground) == 0
+    assert empty.person.tolist() == [0]
     assert not empty.cells.any()
     assert empty.touches.shape == (0, 2)
 
@@ -131,17 +134,17 @@ def test_a_column_belongs_to_the_label_with_most_mass() -> None:
         log_odds = np.ones(GRID.shape, np.float32)
         log_odds[3] = strength
         found = find_blobs(label, log_odds, GRID.ground[5, 5][None], np.array([1]), 0.4, GRID)
-        assert found.track.tolist() == [whose]
-        assert found.person.tolist() == [0 if whose == 1 else -1]
+        assert found.track.tolist() == ([1] if whose == 1 else [2, 1])  # a detection without cells comes last
+        assert found.person.tolist() == ([0] if whose == 1 else [-1, 0])
         assert found.mass[0] == pytest.approx(strength if whose == 1 else 1.0)
         assert found.height[0] == pytest.approx(1.8 if whose == 1 else 1.2)
 
 
 def test_a_blob_holds_the_detection_inside_it() -> None:
     label = disc((0.45, 0.75)).astype(np.int32) * 3
-    for x, held in ((0.45, 0), (0.85, 0), (0.95, -1)):  # its outermost cell is at 0.65
+    for x, held in ((0.45, [0]), (0.85, [0]), (0.95, [-1, 0])):  # its outermost cell is at 0.65
         found = find_blobs(label, label.astype(np.float32), np.array([[x, 0.75]]), np.array([3]), 0.4, GRID)
-        assert found.person.tolist() == [held]
+        assert found.person.tolist() == held
 
 
 @settings(deadline=None, max_examples=40)
@@ -153,14 +156,15 @@ def test_blobs_partition_the_occupied_cells(standing: list[tuple[float, float]],
     log_odds = rng.normal(0, 2, GRID.shape).astype(np.float32)
     log_odds[rng.random(GRID.shape) < 0.1] = np.nan
     found = find_blobs(label, log_odds, np.array(standing).reshape(-1, 2), tracks, 0.4, GRID)
-    number = len(found.track)
+    number = int((found.extent > 0).sum())
     np.testing.assert_array_equal(found.cells > 0, (label != 0).any(0))
     assert np.unique(found.cells[found.cells > 0]).tolist() == list(range(1, number + 1))
     for blob in range(number):
         assert (label[:, found.cells == blob + 1] == found.track[blob]).any(0).all()
-    known = found.track[found.track != UNASSIGNED]
+    known = found.track[:number][found.track[:number] != UNASSIGNED]
     assert len(np.unique(known)) == len(known)
     held = found.person >= 0
+    assert sorted(found.person[held].tolist()) == list(range(len(standing)))
     np.testing.assert_array_equal(found.track[held], tracks[found.person[held]])
     assert np.isfinite(found.ground).all()
     assert (np.linalg.eigvalsh(found.covariance) > 0).all()

@@ -104,7 +104,8 @@ def test_labels_say_who(tracker: str) -> None:
                 assert away.max() < 0.45
                 assert row["extent"] == pytest.approx(len(cells) * RIG.grid.cell**2)
             np.testing.assert_allclose(np.sort(own["y"]), [-0.5, 0.4])
-            assert (own["score"] == 6.0).all()
+            # The cut states the log-odds by the whole window, the others those of the frame alone.
+            assert (own["score"] > 6.0).all() if tracker == "cut" else (own["score"] == 6.0).all()
             np.testing.assert_allclose(own["height"], 1.7)
             assert (own["views"] == 4).all()
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.ndimage import label as connected
 
@@ -20,7 +22,8 @@ def find_blobs(
     """Blobs of one frame.
 
     The cells of a track form one blob; unassigned cells one blob for each connected component on the ground. A ground
-    cell below cells of several labels goes to the one with the most mass above it.
+    cell below cells of several labels goes to the one with the most mass above it. A detection without cells of its own
+    is a blob without extent: whether it exists was decided before, and the cut only gives cells to it.
 
     Parameters
     ----------
@@ -46,7 +49,24 @@ def find_blobs(
         distance = np.hypot(*(ground[ground_label == track_id] - position).T)
         if distance.min(initial=np.inf) <= reach / 2:
             person[known.searchsorted(track_id)] = j
-    return _measure(cells, track, person, label, log_odds, grid)
+    blobs = _measure(cells, track, person, label, log_odds, grid)
+    without = np.setdiff1d(np.arange(len(people_track)), person)
+    return _joined(blobs, without, people_ground[without], people_track[without], grid)
+
+
+def _joined(blobs: Blobs, person: Ints, ground: Floats, track: Ints, grid: Grid) -> Blobs:
+    """Blobs, and behind them detections (n,) as blobs without cells."""
+    none, spread = np.zeros(len(person)), np.tile(np.eye(2) * grid.cell**2 / 12, (len(person), 1, 1))
+    return replace(
+        blobs,
+        track=np.append(blobs.track, track),
+        person=np.append(blobs.person, person),
+        ground=np.concatenate([blobs.ground, ground]),
+        covariance=np.concatenate([blobs.covariance, spread]),
+        extent=np.append(blobs.extent, none),
+        height=np.append(blobs.height, none),
+        mass=np.append(blobs.mass, none),
+    )
 
 
 def _ground_labels(label: Labels, log_odds: Singles) -> Labels:
