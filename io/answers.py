@@ -7,6 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from stseg.errors import FormatError
+from stseg.io import limits
+from stseg.io.bounded_files import read_text
+from stseg.io.numbers import parse_whole
 from stseg.io.toml.text import one_of
 
 COLUMNS = ("action", "frame", "id", "other", "name")
@@ -60,14 +63,15 @@ def read_names(path: Path) -> dict[int, str]:
 
 def _lines(path: Path, needed: tuple[str, ...]) -> list[tuple[int, dict[str, str]]]:
     try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            reader = csv.reader(file, skipinitialspace=True)
-            header = [name.strip().lower() for name in next(reader, [])]
-            rows = [(reader.line_num, row) for row in reader if any(map(str.strip, row))]
+        reader = csv.reader(read_text(path).splitlines(), skipinitialspace=True)
+        header = [name.strip().lower() for name in next(reader, [])]
+        rows = [(reader.line_num, row) for row in reader if any(map(str.strip, row))]
     except OSError as error:
         raise FormatError(path, "", error.strerror or error, "a CSV file") from error
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise FormatError(path, "", "what is no text", "CSV in UTF-8") from error
+    except (ValueError, csv.Error) as error:
+        raise FormatError(
+            path, "", "what is no text" if isinstance(error, UnicodeDecodeError) else error, "CSV"
+        ) from error
     if missing := [name for name in needed if name not in header]:
         raise FormatError(path, "header", ",".join(header) or "nothing", f"the columns {','.join(missing)}")
     return [(line, {k: v.strip() for k, v in zip(header, row, strict=False)}) for line, row in rows]
@@ -76,7 +80,7 @@ def _lines(path: Path, needed: tuple[str, ...]) -> list[tuple[int, dict[str, str
 def _whole(path: Path, line: int, name: str, text: str) -> int | None:
     if not text:
         return None
-    try:
-        return int(text)
-    except ValueError as error:
-        raise FormatError(path, f"line {line}", f"{name} {text!r}", "a whole number") from error
+    number = parse_whole(text, 0, limits.FRAMES)
+    if number is None:
+        raise FormatError(path, f"line {line}", f"{name} {text!r}"[:80], "a whole number")
+    return number

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -11,6 +10,7 @@ import numpy as np
 
 from stseg.arrays import Floats
 from stseg.errors import FormatError
+from stseg.io.bounded_files import parse_json, read_text
 
 Named = tuple[str, tuple[Floats, ...]]
 """A feature's name and its rings or lines, float64 (k, 2) each."""
@@ -35,7 +35,7 @@ def read_lines(path: Path) -> list[Named]:
 def _features(path: Path, kinds: dict[str, Callable[[Any], Any]], noun: str) -> list[tuple[str, Any]]:
     """Name and coordinates of each feature of some kinds; others are passed over."""
     try:
-        data = json.loads(path.read_text(encoding="utf-8-sig"))
+        data: Any = parse_json(read_text(path))
     except OSError as error:
         raise FormatError(path, "", error.strerror or error, "a GeoJSON file") from error
     except ValueError as error:

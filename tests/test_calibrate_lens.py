@@ -28,9 +28,9 @@ def view(turn: np.ndarray[tuple[int, ...], np.dtype[np.float64]], shift: tuple[f
     ray = cv2.undistortPoints(pixel, MATRIX, DISTORTION).reshape(-1, 2)
     rotation = cv2.Rodrigues(turn)[0]
     plane = np.linalg.inv(np.column_stack([rotation[:, :2], shift]))
-    place = np.column_stack([ray, np.ones(len(ray))]) @ plane.T
-    place = (place[:, :2] / place[:, 2:] + [4, 3]) * 50 + 50 - 0.5
-    maps = place.reshape(*SIZE[::-1], 2).astype(np.float32)
+    on_board = np.column_stack([ray, np.ones(len(ray))]) @ plane.T
+    texel = (on_board[:, :2] / on_board[:, 2:] + [4, 3]) * 50 + 50 - 0.5
+    maps = texel.reshape(*SIZE[::-1], 2).astype(np.float32)
     grey = cv2.remap(texture, maps[..., 0], maps[..., 1], cv2.INTER_LINEAR, borderValue=140)
     return np.asarray(cv2.cvtColor(cv2.GaussianBlur(grey, (3, 3), 0.7), cv2.COLOR_GRAY2BGR), np.uint8)
 

@@ -335,3 +335,37 @@ images = {{ kind = "video", path = "x.mp4" }}
         path.write_text(text.replace("SOURCE", wrong))
         with pytest.raises(RigError, match=message):
             read_rig(path)
+
+
+def test_inspect_says_what_a_rig_delivers_and_draws_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from stseg.commands.inspect import inspect
+
+    monkeypatch.setenv("COLUMNS", "200")
+    yolo_text(tmp_path)
+    rig = tmp_path / "rig.toml"
+    rig.write_text("""format = 1
+[scene]
+name = "s"
+frame_rate = 5.0
+x = [-1.0, 1.0]
+y = [-1.0, 1.0]
+[grid]
+cell = 0.1
+top = 1.8
+planes = 3
+[[camera]]
+name = "a"
+size = [80, 60]
+projection = [[40.0, 0, -39.5, 200], [0, -40.0, -29.5, 150], [0, 0, -1.0, 5]]
+source = { kind = "boxes", path = "labels" }
+""")
+    inspect(rig, output=tmp_path / "pictures")
+    printed = capsys.readouterr().out
+    assert "Ultralytics text" in printed and "person 3, car 2" in printed
+    assert "do its frames count from 1? (first_frame = 1)" in printed
+    assert (tmp_path / "pictures" / "a.png").stat().st_size > 1000
+    (tmp_path / "labels" / "walk_1.txt").write_text("0 0.5\n")
+    with pytest.raises(FormatError, match=r"walk_1\.txt, line 1"):
+        inspect(rig)

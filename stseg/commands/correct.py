@@ -9,6 +9,7 @@ from cyclopts import Parameter
 
 from stseg.errors import ConfigError
 from stseg.io.answers import read_answers
+from stseg.io.bounded_files import read_text
 from stseg.io.outputs.whole_files import require_new
 from stseg.io.runfile.corrected import write_corrected
 from stseg.io.runfile.runs import read_run
@@ -54,6 +55,6 @@ def correct(
     run, rows = read_run(run_file), read_answers(answers, ACTIONS)
     solved = solve_corrections(run.tracks, [Answer(r.place, r.action, r.track, r.other, r.frame, r.name) for r in rows])
     names = run.names | solved.names
-    write_corrected(run_file, output, solved.map, names, answers.read_text(encoding="utf-8-sig"), overwrite)
+    write_corrected(run_file, output, solved.map, names, read_text(answers), overwrite)
     changed = sum(row.action != "keep" for row in rows)
     print(f"wrote {output}: {len(rows)} answers, {changed} changes; {len(read_run(output).tracks)} tracks")
