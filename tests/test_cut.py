@@ -26,6 +26,7 @@ from stseg.graphcut.cut import Storage, minimum_cut
 from stseg.graphcut.energy import QUANTUM, Energy
 from stseg.graphcut.pymaxflow import grid_cut
 from stseg.graphcut.reduction import OCCUPIED, OPEN, reduce
+from stseg.graphcut.solvers import SOLVERS, find_solver
 from stseg.graphcut.sparse import MOST, sparse_cut
 from stseg.segmentation.energy import build_energy, neighbourhood
 from stseg.segmentation.motion import successor_cells
@@ -294,3 +295,8 @@ def test_real_windows(monkeypatch: pytest.MonkeyPatch) -> None:
         assert expected.any()
         for storage, threads in WAYS:
             np.testing.assert_array_equal(minimum_cut(energy, threads, storage).occupied, expected)
+
+
+def test_pymaxflow_is_taken_where_kernels_are_not_compiled() -> None:
+    assert find_solver("stseg") is SOLVERS["pymaxflow" if PLAIN else "stseg"]
+    assert find_solver("pymaxflow") is SOLVERS["pymaxflow"]
