@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from itertools import combinations, permutations
 
 import numpy as np
-from reference_walkers import best_pairs
+from reference_track_filter import best_pairs
 
 from stseg.arrays import Boxes, Flags, Floats, Ints, Labels, Singles
 from stseg.detection.problem import BoxEvidence, Parameters, PixelEvidence, Problem

@@ -12,7 +12,7 @@ from itertools import pairwise
 
 import cv2
 import numpy as np
-from reference_walkers import best_pairs
+from reference_track_filter import best_pairs
 
 from stseg.arrays import Boxes, Bytes, Floats, Observation, Rows, Singles
 from stseg.config import BodyConfig, Config, DetectionConfig

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-import reference_walkers as reference
+import reference_track_filter as reference
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scenes import AREA, corner_cameras, expecting, looking, rig_of

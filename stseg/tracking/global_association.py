@@ -1,15 +1,14 @@
 """Global association: a minimum-cost flow over isolated tracklets (docs/how-it-works.md, Tracks).
 
-While people stand together who is who is a guess; once they have parted, and have been seen alone for a while, motion
-and height tell. So every track is cut where it meets another, and where it was out of sight, and the stretches are
-linked anew: each end to at most one later beginning, such that the sum over all links of
+Identity is uncertain in an encounter; afterwards motion and height decide. So every track is cut at its encounters and
+gaps, and the tracklets are linked anew: each end to at most one later beginning, such that the sum over all links of
 
     log N(d; 0, s^2 I) + log N(h_a - h_b; 0, v_a + v_b) - log N(h_a - h_b; 0, 2 spread^2) + parted + [same] stays,
     d = x_b - x_a - t (v_a + v_b) / 2,   s^2 = 2 noise^2 + t^2 (var v_a + var v_b) / 4 + turn^2 t^3 / 12,
 
-is greatest: what speaks for one person, beyond one who ends here and another, of any height, who begins there. Parting
-costs inside the area alone: at its border people come and go. A flow of one unit through each stretch is an assignment
-of ends to beginnings, so SciPy's exact solver finds it.
+is greatest: the log-likelihood ratio of one person against two, one who ends here and one of any height who begins
+there. An end and a beginning cost inside the area alone: people come and go at its border. A flow of one unit through
+each tracklet is an assignment of ends to beginnings, so SciPy's exact solver finds it.
 """
 
 from __future__ import annotations
@@ -28,21 +27,21 @@ from stseg.tracking.assignment import assign
 from stseg.tracking.isolated_tracklets import IsolatedTracklet, isolated_tracklets
 
 _STAYS = 3.0
-"""What speaks for the track that was followed through a meeting, nats."""
+"""Log-likelihood ratio of the filter track, nats: it was followed through the encounter."""
 _PARTED = 6.0
-"""What it costs that one person ends and another begins, both inside the area, nats per square metre."""
+"""Cost of one end and one beginning, both inside the area, nats per square metre."""
 
 
 @dataclass(frozen=True)
 class Link:
-    """A track that goes on under the identity of another.
+    """A track that continues under the identity of another.
 
     Attributes
     ----------
     frame
-        The first under the other's identity.
+        First frame under that identity.
     identity, track
-        The identity that it takes, and the one that it had.
+        The identity that it takes, and its own number.
     reason
         In words.
     """
@@ -62,7 +61,7 @@ class GlobalAssociation:
     identity : int64 (row,)
         Of each row of the trajectory.
     links
-        Where they differ from the tracks that were followed.
+        Where they differ from the filter tracks.
     """
 
     identity: Ints
@@ -70,7 +69,7 @@ class GlobalAssociation:
 
 
 def associate_globally(trajectory: Rows, frame_rate: float, border: Border, config: Config) -> GlobalAssociation:
-    """Decide who is who from the whole run.
+    """Identities from the whole run.
 
     Parameters
     ----------
@@ -80,8 +79,8 @@ def associate_globally(trajectory: Rows, frame_rate: float, border: Border, conf
         Frames per second.
     border
         Where people come and go.
-    config, people
-        How people walk, and how tall they are.
+    config
+        The constants of all stages: body, motion, detection and tracking.
     """
     parts = isolated_tracklets(trajectory, frame_rate, config.tracking, config.motion)
     pairs = _within_reach(parts, frame_rate, config)
@@ -112,7 +111,7 @@ def associate_globally(trajectory: Rows, frame_rate: float, border: Border, conf
 
 
 def _flow(number: int, pairs: Ints, gain: Floats) -> Ints:
-    """The stretch that each one continues, int64 (number,), -1 for none: the pairs of greatest sum, group by group."""
+    """The tracklet that each one continues, int64 (number,), -1 for none: the pairs of greatest sum, group by group."""
     before = np.full(number, -1, np.int64)
     shape = (2 * number, 2 * number)
     joined = coo_array((np.ones(len(pairs)), (pairs[:, 0], number + pairs[:, 1])), shape=shape)
@@ -129,7 +128,7 @@ def _flow(number: int, pairs: Ints, gain: Floats) -> Ints:
 
 
 def _within_reach(parts: Sequence[IsolatedTracklet], frame_rate: float, config: Config) -> Ints:
-    """Pairs of a stretch and one that begins later, not too long after its end: int64 (pair, 2)."""
+    """Pairs of a tracklet and one that begins later, within `tracking.maximum_gap` of its end: int64 (pair, 2)."""
     begins = np.array([part.start.frame for part in parts])
     pairs = []
     for a, part in enumerate(parts):
@@ -140,7 +139,7 @@ def _within_reach(parts: Sequence[IsolatedTracklet], frame_rate: float, config: 
 
 
 def _gain(a: IsolatedTracklet, b: IsolatedTracklet, frame_rate: float, config: Config) -> float:
-    """What speaks for one person in both, parting aside, nats."""
+    """Log-likelihood ratio of one person in both, without the cost of an end and a beginning, nats."""
     seconds, off = _between(a, b, frame_rate)
     velocity_variance = a.end.velocity_variance + b.start.velocity_variance
     spread = (
@@ -156,7 +155,7 @@ def _gain(a: IsolatedTracklet, b: IsolatedTracklet, frame_rate: float, config: C
 
 
 def _between(a: IsolatedTracklet, b: IsolatedTracklet, frame_rate: float) -> tuple[float, Floats]:
-    """Seconds from the end of one to the start of another, and how far that is from where both lead, metres (2,)."""
+    """Seconds from the end of one to the start of another, and the distance from the extrapolation of both, (2,)."""
     seconds = (b.start.frame - a.end.frame) / frame_rate
     return seconds, b.start.ground - a.end.ground - seconds * (a.end.velocity + b.start.velocity) / 2
 

@@ -1,4 +1,4 @@
-"""Plain twin of the linking of stretches: every one-to-one choice is tried, and what speaks for each is written out."""
+"""Plain twin of global association: every one-to-one choice of links, each gain written out."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def gain(
     frame_rate: float,
     config: Config,
 ) -> float:
-    """What speaks for one person in both, nats; `inside` is the mean of how far inside they part."""
+    """Log-likelihood ratio of one person in both, nats; `inside` is the mean of how far inside they part."""
     seconds = (b.start.frame - a.end.frame) / frame_rate
     if seconds <= 0 or seconds > config.tracking.maximum_gap:
         return -np.inf
@@ -44,7 +44,7 @@ def gain(
 
 
 def choices(number: int, first: int = 0, taken: frozenset[int] = frozenset()) -> Iterator[list[tuple[int, int]]]:
-    """Every set of links from earlier to later stretches in which none has two before it or two after it."""
+    """Every set of links from earlier to later tracklets in which none has two before it or two after it."""
     if first == number:
         yield []
         return
@@ -57,5 +57,5 @@ def choices(number: int, first: int = 0, taken: frozenset[int] = frozenset()) ->
 
 
 def greatest_sum(gains: Sequence[Sequence[float]]) -> float:
-    """The most that any one-to-one choice of links gains."""
+    """Greatest gain of any one-to-one choice of links."""
     return max(sum(gains[a][b] for a, b in chosen) for chosen in choices(len(gains)))

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import reference_walkers as reference
+import reference_track_filter as reference
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scenes import CONFIG, found, people
