@@ -25,12 +25,12 @@ R = TypeVar("R")
 
 def kernel(function: Callable[P, R]) -> Callable[P, R]:
     """Compile `function` without the interpreter, releasing its lock."""
-    return cast("Callable[P, R]", numba.njit(cache=True, nogil=True)(function))
+    return _compiled(function)
 
 
 def wide_kernel(function: Callable[P, R]) -> Callable[P, R]:
     """A kernel whose divisions are not checked: x / 0 is inf or nan, as in NumPy, and loops become vector code."""
-    return cast("Callable[P, R]", numba.njit(cache=True, nogil=True, error_model="numpy")(function))
+    return _compiled(function, error_model="numpy")
 
 
 def part(function: Callable[P, R]) -> Callable[P, R]:
@@ -38,7 +38,14 @@ def part(function: Callable[P, R]) -> Callable[P, R]:
 
     Arguments are neither passed on nor reference-counted.
     """
-    return cast("Callable[P, R]", numba.njit(cache=True, nogil=True, forceinline=True, **_UNCOUNTED)(function))
+    return _compiled(function, forceinline=True, **_UNCOUNTED)
+
+
+def _compiled(function: Callable[P, R], **options: Any) -> Callable[P, R]:
+    try:
+        return cast("Callable[P, R]", numba.njit(cache=True, nogil=True, **options)(function))
+    except RuntimeError:  # neither the package's folder nor the home can be written: compiled in each process
+        return cast("Callable[P, R]", numba.njit(nogil=True, **options)(function))
 
 
 def python_form(compiled: Callable[P, R]) -> Callable[P, R]:

@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 from run_files import write_small_run
 
+from stseg.accelerate import COMPILED, kernel
 from stseg.commands.main import main
 from stseg.errors import InputError
 from stseg.io.calibrations.matlab_file import parse_mat
@@ -546,6 +547,21 @@ def test_a_recording_that_changed_in_place_is_noticed(tmp_path: Path) -> None:
     path.write_text(path.read_text().replace("3,11", "3,12"))
     os.utime(path, ns=(state.st_atime_ns, state.st_mtime_ns))
     assert run_request(recording, gather_provenance(recording, "")) != before
+
+
+# A home and a package that cannot be written
+
+
+@pytest.mark.skipif(not COMPILED, reason="nothing is compiled")
+def test_kernels_compile_without_a_place_for_their_cache(monkeypatch: pytest.MonkeyPatch) -> None:
+    import numba.core.caching
+
+    monkeypatch.setattr(numba.core.caching.CompileResultCacheImpl, "_locator_classes", [])
+    assert kernel(_double)(2.0) == 4.0
+
+
+def _double(value: float) -> float:
+    return 2 * value
 
 
 # Numbers

@@ -19,6 +19,9 @@ from stseg.io.numbers import parse_whole
 from stseg.io.toml.table import ANY
 from stseg.io.toml.text import parse_toml
 
+_LONGEST_YAML, _DEEPEST_YAML = 1 << 18, 50
+"""Characters, and nested brackets: PyYAML needs a time that grows with the square of these."""
+
 
 def read_krt_json(files: Sequence[Path]) -> list[ForeignCamera]:
     """Cameras by name, each with `K` (9 numbers), `RT` (12) and `imgSize`: `shelf` and `campus`.
@@ -127,7 +130,19 @@ def read_kalibr_yaml(files: Sequence[Path]) -> list[ForeignCamera]:
         Where PyYAML is not installed.
     """
     load: Callable[[str], object] = load_extra("yaml", "kalibr").safe_load
-    return [camera for file in files for camera in _chain(_table(file, load, "YAML"))]
+
+    def load_flat(text: str) -> object:
+        if len(text) > _LONGEST_YAML or _depth(text) > _DEEPEST_YAML:
+            raise ValueError(f"more than {_LONGEST_YAML} characters, or {_DEEPEST_YAML} nested brackets")
+        return load(text)
+
+    return [camera for file in files for camera in _chain(_table(file, load_flat, "YAML"))]
+
+
+def _depth(text: str) -> int:
+    """Most brackets that are open at once."""
+    steps = np.array([(c in "[{") - (c in "]}") for c in text], np.int64)
+    return int(np.cumsum(steps).max(initial=0))
 
 
 def _chain(top: ForeignTable) -> Iterator[ForeignCamera]:

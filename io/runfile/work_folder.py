@@ -18,6 +18,7 @@ import json
 import math
 import os
 import re
+import secrets
 from contextlib import suppress
 from dataclasses import dataclass
 from hashlib import blake2b, file_digest
@@ -48,6 +49,8 @@ _OWN = re.compile(
     r"(\.[0-9a-f]{16}\.part)?"
 )
 """Names of files in the folder that are ours."""
+_LAST = frozenset((_MARK, "lock", "begun.json", "result.h5"))
+"""Files by which a published run is known, until the folder is gone."""
 _STAMPS = 1 << 32
 """Bytes of all time stamps, unpacked."""
 
@@ -141,6 +144,7 @@ class WorkFolder:
 
     def require_output(self, overwrite: bool) -> None:
         """Refuse an output that exists, unless it is the finished run file of this folder; raises OutputError."""
+        self._finish_removals()
         if not self.published:
             require_new(self.output, overwrite)
 
@@ -246,17 +250,30 @@ class WorkFolder:
         return not self.path.is_symlink() and is_regular(self.path / _MARK)
 
     def _remove_own(self) -> None:
-        """Delete what we made; the mark goes last, and stays beside files that are not ours."""
+        """Delete what we made; the mark stays beside files that are not ours.
+
+        Until the folder is renamed, by which it is gone, `published` holds: a run that is killed on the way is finished
+        by the same command.
+        """
         if not self._is_own():
             return
         with suppress(OSError):
             for path in self.path.iterdir():
-                if _OWN.fullmatch(path.name) and is_regular(path):
+                if _OWN.fullmatch(path.name) and path.name not in _LAST and is_regular(path):
                     path.unlink()
-            if {path.name for path in self.path.iterdir()} <= {_MARK, "lock"}:
-                (self.path / "lock").unlink(missing_ok=True)
-                (self.path / _MARK).unlink()
-                self.path.rmdir()
+            if {path.name for path in self.path.iterdir()} <= _LAST:
+                _delete(self.path.rename(self.path.with_name(f"{self.path.name}.{secrets.token_hex(8)}.removed")))
+            else:
+                for name in ("result.h5", "begun.json"):
+                    (self.path / name).unlink(missing_ok=True)
+
+    def _finish_removals(self) -> None:
+        """Delete the folders of runs of this output that were killed while they deleted them."""
+        name = re.compile(rf"{re.escape(self.path.name)}\.[0-9a-f]{{16}}\.removed")
+        with suppress(OSError):
+            for path in self.path.parent.iterdir():
+                if name.fullmatch(path.name) and not path.is_symlink():
+                    _delete(path)
 
     def _begin(self) -> None:
         path = self.path / "begun.json"
@@ -276,6 +293,14 @@ class WorkFolder:
 
     def _anew(self, expected: str) -> str:
         return f"{expected}; or delete the folder {self.path.name} to begin anew"
+
+
+def _delete(folder: Path) -> None:
+    """Delete a folder that was renamed to be deleted; the mark goes last."""
+    for name in sorted(_LAST - {_MARK}):
+        (folder / name).unlink(missing_ok=True)
+    (folder / _MARK).unlink(missing_ok=True)
+    folder.rmdir()
 
 
 def _value(value: object) -> str:
