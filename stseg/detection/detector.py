@@ -145,7 +145,7 @@ class Detector:
                 break
             if not self._has_boxes and _same_people(estimate.members, before, known):
                 break
-        return explanation(_settled(estimate, self._swap_rounds))
+        return explanation(self._settled(estimate))
 
     def _moved(self, estimate: MapEstimate) -> Candidates:
         """The members nearer to where they stand: a step between two searches.
@@ -155,6 +155,14 @@ class Detector:
         if self._has_boxes or (estimate.track_index < 0).any():
             return estimate.refined().pool
         return estimate.moved()
+
+    def _settled(self, estimate: MapEstimate) -> MapEstimate:
+        """The final search: from the refined places, which may show two members to be one, then thoroughly."""
+        exact, known = self._moved(estimate), len(estimate.pool)
+        start = np.arange(known, known + len(exact))
+        moved = MapEstimate.of_search(estimate.evidence, estimate.pool.joined_with(exact), start)
+        pool = moved.pool.at(np.concatenate([moved.members, moved.alternatives()]))
+        return MapEstimate.of_search(moved.evidence, pool, np.arange(len(moved.members)), ENUMERATED, self._swap_rounds)
 
     def lattice_candidates(self, estimate: MapEstimate) -> Candidates:
         """Peaks of the lattice's score by the evidence that an estimate leaves unexplained.
@@ -198,12 +206,3 @@ def _same_people(members: Ints, before: Ints, known: int) -> bool:
     origin = members.copy()
     origin[moved] = before[members[moved] - known]
     return np.array_equal(np.sort(origin), np.sort(before))
-
-
-def _settled(estimate: MapEstimate, swap_rounds: int) -> MapEstimate:
-    """The final search: from the refined places, which may show two members to be one, then thoroughly, by places."""
-    exact, known = estimate.refined().pool, len(estimate.pool)
-    start = np.arange(known, known + len(exact))
-    moved = MapEstimate.of_search(estimate.evidence, estimate.pool.joined_with(exact), start)
-    pool = moved.pool.at(np.concatenate([moved.members, moved.alternatives()]))
-    return MapEstimate.of_search(moved.evidence, pool, np.arange(len(moved.members)), ENUMERATED, swap_rounds)
