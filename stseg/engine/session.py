@@ -21,6 +21,7 @@ from stseg.engine.committed_frames import CommittedFrames, FrameRecord, FusedEvi
 from stseg.engine.pipeline import Pipeline
 from stseg.engine.stopwatch import Stopwatch
 from stseg.foreground.view_foreground import ViewForeground
+from stseg.model.box_noise import BoxNoise
 from stseg.model.people import Explanation
 from stseg.trackers import FrameObservations, FusedFrame
 
@@ -86,11 +87,12 @@ class Session:
             What `evidence` gave for them, where it was asked before.
         """
         evidence = self.evidence(frame_set) if evidence is None else evidence
+        noise = self._box_noise.noise
         frame, predicted = frame_set.frame, self._tracker.predict(frame_set.frame)
         with self.watch.time("ghosts"):
             proposed = self.pipeline.proposals.of(evidence, self._fuse_with_current_rates)
             explanation = self.pipeline.detector.explain_next(self._box_noise, evidence, predicted, proposed)
-        fusion = self._submit(frame, evidence, explanation)
+        fusion = self._submit(frame, evidence, explanation, noise)
         self._records[frame] = FrameRecord(explanation, fusion)
         fused = FusedFrame(frame, explanation.people, explanation.ghosts, lambda: fusion.result().log_odds)
         with self.watch.time("track"):
@@ -103,26 +105,30 @@ class Session:
             commits = self._tracker.finish()
         return [committed_frames(commit, self._records, self.watch) for commit in commits]
 
-    def _submit(self, frame: int, evidence: Sequence[ViewEvidence], explanation: Explanation) -> Future[FusedEvidence]:
+    def _submit(
+        self, frame: int, evidence: Sequence[ViewEvidence], explanation: Explanation, noise: BoxNoise
+    ) -> Future[FusedEvidence]:
         if self._executor is None:
             done = Future[FusedEvidence]()
-            done.set_result(self._fuse(frame, evidence, explanation))
+            done.set_result(self._fuse(frame, evidence, explanation, noise))
             return done
         if len(self._open) == _BEHIND:
             self._open.popleft().result()
-        self._open.append(self._executor.submit(self._fuse, frame, evidence, explanation))
+        self._open.append(self._executor.submit(self._fuse, frame, evidence, explanation, noise))
         return self._open[-1]
 
-    def _fuse(self, frame: int, evidence: Sequence[ViewEvidence], explanation: Explanation) -> FusedEvidence:
+    def _fuse(
+        self, frame: int, evidence: Sequence[ViewEvidence], explanation: Explanation, noise: BoxNoise
+    ) -> FusedEvidence:
         rates = rate_rows(frame, self._error_rates)
         with self.watch.time("occupancy"):
-            log_odds = self.pipeline.occupancy.fuse_and_learn(self._error_rates, evidence, explanation)
+            log_odds = self.pipeline.occupancy.fuse_and_learn(self._error_rates, evidence, explanation, noise)
         return FusedEvidence(log_odds, rates)
 
     def _fuse_with_current_rates(self, evidence: Sequence[ViewEvidence], explanation: Explanation) -> Singles:
         while self._open:
             self._open.popleft().result()
-        return self.pipeline.occupancy.fuse(evidence, explanation, self._error_rates.rates)
+        return self.pipeline.occupancy.fuse(evidence, explanation, self._error_rates.rates, self._box_noise.noise)
 
 
 class _Prepared(NamedTuple):

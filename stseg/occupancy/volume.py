@@ -15,8 +15,8 @@ from stseg.geometry.cell_means import CellMeans
 from stseg.geometry.nearest_person import nearest_person
 from stseg.geometry.sampling import Sampling
 from stseg.geometry.summed_area import UNSEEN, Levels
-from stseg.model.box_fit import TOLERANCE
 from stseg.model.box_likelihood import box_likelihood
+from stseg.model.box_noise import FIRST, BoxNoise
 from stseg.model.people import Explanation
 from stseg.model.pillar_index import PillarIndex
 from stseg.occupancy.box_planes import CellsByPerson, ViewBoxes, fill_fit, fill_levels
@@ -63,7 +63,11 @@ class Occupancy:
         return RateCalibration(self._first_rates, self.rig.frame_rate, self._rate_config)
 
     def fuse(
-        self, seen: Sequence[ViewEvidence], explanation: Explanation, rates: Sequence[ErrorRates] | None = None
+        self,
+        seen: Sequence[ViewEvidence],
+        explanation: Explanation,
+        rates: Sequence[ErrorRates] | None = None,
+        noise: BoxNoise = FIRST,
     ) -> Singles:
         """A frame's log-odds, float32 (plane, y, x), nats; nan where no view sees the cell.
 
@@ -76,17 +80,23 @@ class Occupancy:
             Evidence of each view, and the people that explain it.
         rates
             Error rates of each view; by default the first guess.
+        noise
+            Noise of boxes; by default the first guess.
         """
         near, sums = self._near(explanation), Sums.zero(self.rig.grid.shape)
-        self._add_views(seen, explanation, near, rates or self.new_calibration().rates, sums)
+        self._add_views(seen, explanation, near, rates or self.new_calibration().rates, noise, sums)
         return self._total(sums, near)
 
     def fuse_and_learn(
-        self, calibration: RateCalibration, seen: Sequence[ViewEvidence], explanation: Explanation
+        self,
+        calibration: RateCalibration,
+        seen: Sequence[ViewEvidence],
+        explanation: Explanation,
+        noise: BoxNoise = FIRST,
     ) -> Singles:
         """The same of a session's next frame, with which the session's error-rate calibration is then updated."""
         near, sums = self._near(explanation), Sums.zero(self.rig.grid.shape)
-        views = self._add_views(seen, explanation, near, calibration.rates, sums)
+        views = self._add_views(seen, explanation, near, calibration.rates, noise, sums)
         if calibration.next_is_due():
             self._learn(calibration, views, sums, explanation, near)
         return self._total(sums, near)
@@ -100,6 +110,7 @@ class Occupancy:
         explanation: Explanation,
         near: Ints,
         rates: Sequence[ErrorRates],
+        noise: BoxNoise,
         sums: Sums,
     ) -> list[ViewTerms | None]:
         """Add the terms of all views to the sums; None for a blind view."""
@@ -109,7 +120,7 @@ class Occupancy:
             if view is None:
                 added.append(None)
             elif isinstance(view, Boxes):
-                added.append(self._add_boxes(i, view, explanation, near, rates[i], weight, sums))
+                added.append(self._add_boxes(i, view, explanation, near, rates[i], noise, weight, sums))
             else:
                 added.append(self._add_map(i, view, explanation, near, rates[i], weight, sums))
         return added
@@ -139,12 +150,13 @@ class Occupancy:
         explanation: Explanation,
         near: Ints,
         rates: ErrorRates,
+        noise: BoxNoise,
         weight: np.float32,
         sums: Sums,
     ) -> ViewTerms:
         shown, share = self._assignment(i, explanation), np.empty(self.rig.grid.shape, np.float32)
         fill_share(self._cells[i], shown, near, self.sampling.distance[i], share)
-        levels = self._levels_of_boxes(i, view, explanation, near, rates)
+        levels = self._levels_of_boxes(i, view, explanation, near, rates, noise)
         confidence = _confidence(near, shown.separate, explanation.people.visibility[i])
         added = ViewTerms(levels, log_odds_terms(rates), weight, share, confidence)
         add_terms(added, near, sums)
@@ -200,7 +212,9 @@ class Occupancy:
         pillars = bodies.reshape(-1, 4).astype(np.float32)
         return pillars, PillarIndex.of(pillars, camera.size)
 
-    def _levels_of_boxes(self, i: int, view: Boxes, explanation: Explanation, near: Ints, rates: ErrorRates) -> Levels:
+    def _levels_of_boxes(
+        self, i: int, view: Boxes, explanation: Explanation, near: Ints, rates: ErrorRates, noise: BoxNoise
+    ) -> Levels:
         """Likelihood per plane of each cell."""
         pillars = self._pillars[i]
         assert pillars is not None, "the view was to deliver boxes"
@@ -208,8 +222,7 @@ class Occupancy:
         edges = np.concatenate([view.pixel[:, :2], view.pixel[:, :2] + view.pixel[:, 2:]], 1)
         width, height = map(float, self.rig.cameras[i].size)
         edges = edges.clip(0, [width - 1, height - 1] * 2)
-        tolerance, belief = np.tile(TOLERANCE, (len(edges), 1)), np.log(view.score.clip(0.05, 1.0))
-        boxes = ViewBoxes(edges, tolerance, belief, explanation.box_assignment[i], width, height)
+        boxes = ViewBoxes(edges, *noise.of(view.score), explanation.box_assignment[i], width, height)
         fit = np.empty((len(self.heights), near.size), np.float32)
         fill_fit(
             pillars[1], pillars[0], self._height_prior(np.array([self.height_mean]))[0],
