@@ -1,15 +1,16 @@
 """Likelihood per plane from boxes: each box has a head and feet (docs/how-it-works.md, Fusion).
 
-    M(X, Z) = max over boxes b and heights h >= Z of N(h) / N(mean) exp(match(b, pillar(X, h)))
+    M(X, Z) = max over boxes j and heights h >= Z of N(h) / N(mean) exp(match(j, pillar(X, h)))
 
-is how well the best box fits a body there. For a cell count the box of the person near it, and unassigned boxes. The
-body is either missed, or shown by a box that fits that well where clutter is likely anyhow: odds of
-r = m + M (1 - m) / b. L(X, Z) is the likelihood that gives the same in the log-odds of `stseg.occupancy.fusion`,
+is how well the best box fits a body there. The boxes of a cell are that of the person near it, and the unassigned ones.
+A body is missed with probability m, or has a box that fits that well; an empty cell has such a box with probability b.
+The likelihood ratio is r = m + M (1 - m) / b. L(X, Z) is the likelihood that gives the same ratio in the log-odds of
+`stseg.occupancy.fusion`,
 
     ((1 - m) L + m (1 - L)) / (b L + (1 - b) (1 - L)) = r,
 
-with b' for b within reach of a person. An empty cell's ray then met foreground with a probability of about M (the E
-step of `stseg.occupancy.rate_calibration`), so b and b' become the means of M, whatever they were before.
+with b' for b within reach of a person. The ray of an empty cell then meets foreground with a probability of about M
+(the E step of `stseg.occupancy.rate_calibration`), so b and b' converge to the means of M from any first guess.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ class ViewBoxes(NamedTuple):
     tolerance : float64 (box, 5), belief : float64 (box,)
         See `stseg.model.box_noise`.
     person : int64 (box,)
-        The person to whom each box is assigned, -1 for none.
+        The person that each box is assigned to, -1 for none.
     width, height
         Size of the image, pixels.
     """
@@ -60,7 +61,7 @@ class CellsByPerson(NamedTuple):
     cell : int64 (n,)
         Cells near a person, in the order of persons.
     start : int64 (person + 1,)
-        First of each person's in `cell`.
+        Index in `cell` of each person's first cell.
     """
 
     near: Ints
@@ -69,7 +70,7 @@ class CellsByPerson(NamedTuple):
 
     @classmethod
     def of(cls, near: Ints, people: int) -> Self:
-        """From the person near each cell, int64 (y, x), -1 for none, of so many people."""
+        """From the person near each cell, int64 (y, x), -1 for none, and the number of people."""
         flat = near.reshape(-1)
         order = np.argsort(flat, kind="stable")
         start = np.searchsorted(flat[order], np.arange(people + 1))
@@ -86,15 +87,15 @@ def fill_fit(
     cells: CellsByPerson,
     fit: Singles,
 ) -> None:
-    """Fill fit (height, cell): log-likelihood of the best box that counts for each cell and height, -inf without.
+    """Fill fit (height, cell): log-likelihood of the best box of each cell and height, -inf where there is none.
 
     Parameters
     ----------
     index, pillars : float32 (height * cell, 4)
         Boxes of the pillars of each height at each cell, pixels.
     height_prior : float64 (height,), person_prior : float64 (person, height)
-        Log-prior of the heights of cells near no person, and near each: all views see a person equally tall, so the
-        height is not held against the person view by view.
+        Log-prior of the height at cells near no person, and near each person. The second is centred on the person's
+        estimated height, so that an unusual height costs nothing again in every view.
     """
     ground_cells, body = fit.shape[1], np.empty(4)
     fit[:] = -np.inf
@@ -105,8 +106,8 @@ def fill_fit(
                 for h in range(len(height_prior)):
                     body[:] = pillars[h * ground_cells + cells.cell[k]]
                     match = boxes.belief[b] - half_square(body, box, tolerance, boxes.width, boxes.height)
-                    own = np.float32(person_prior[person, h] + match)
-                    fit[h, cells.cell[k]] = max(fit[h, cells.cell[k]], own)
+                    log_fit = np.float32(person_prior[person, h] + match)
+                    fit[h, cells.cell[k]] = max(fit[h, cells.cell[k]], log_fit)
             continue
         for kind in range(len(index.tallest)):
             first, stop = run_of(index, kind, box, tolerance, FAR)
@@ -138,16 +139,16 @@ def fill_levels(
     for cell in range(fit.shape[1]):
         clutter = rates.clutter if near[cell] < 0 else rates.near_clutter
         best, h = -np.inf, len(heights) - 1
-        known = True
+        changed = True
         level = np.int16(0)
         for plane in range(len(planes) - 1, -1, -1):
             while h >= 0 and heights[h] >= planes[plane]:
                 if fit[h, cell] > best:
-                    best, known = float(fit[h, cell]), True
+                    best, changed = float(fit[h, cell]), True
                 h -= 1
-            if known:
+            if changed:
                 level = np.int16(np.rint(plane_likelihood(np.exp(best), rates.miss, clutter) * TOP))
-                known = False
+                changed = False
             levels[plane, cell] = level if footprint[plane, cell, 2] > 0 else UNSEEN
 
 

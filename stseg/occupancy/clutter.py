@@ -26,9 +26,10 @@ def clutter(likelihood: Singles, side: int) -> float:
     return float(np.sqrt(cells.mean()))
 
 
-def clutter_side(size: tuple[int, int], least: int = 8) -> int:
-    """Side of a cell for images of a size, pixels: a quarter, since near people are taller than half of that."""
-    return max(min(size) // 4, least)
+def clutter_side(size: tuple[int, int], minimum: int = 8) -> int:
+    """Side of a cell for images of a size, pixels: a quarter of the shorter side. People near the camera
+    are taller than half of that, so eq. 5's cell of twice a target's height would exceed its own upper limit."""
+    return max(min(size) // 4, minimum)
 
 
 @kernel
@@ -67,9 +68,9 @@ def clutter_weights(clutters: Floats) -> Floats:
         Scaled to a mean of 1 over the views that are not blind.
     """
     weights = np.zeros(len(clutters))
-    awake = ~np.isnan(clutters)
-    if awake.any():
-        floor = max(float(np.median(clutters[awake])), 1e-6)
-        weights[awake] = 1.0 / np.maximum(clutters[awake], floor)
-        weights /= weights[awake].mean()
+    sighted = ~np.isnan(clutters)
+    if sighted.any():
+        floor = max(float(np.median(clutters[sighted])), 1e-6)
+        weights[sighted] = 1.0 / np.maximum(clutters[sighted], floor)
+        weights /= weights[sighted].mean()
     return weights

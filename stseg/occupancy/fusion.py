@@ -5,8 +5,8 @@ cluttered they are (eqs 5, 6), and only views that see the cell count (eq. 7):
 
     log P(X | x_1..x_n) = n_vis sum_i w_i log L_i,    w_i = (1 / C_i) / sum over the views that see the cell of 1 / C_k
 
-This is the *synergy map*. It leaves the level from which a cell is occupied open, and that level depends on how many
-views see the cell. The calibrated form is the log-odds
+This is the *synergy map*. It has no threshold of its own, and a suitable one depends on how many views see the cell.
+The calibrated form is the log-odds
 
     u = k n_vis sum_i w_i log[ ((1 - m) L_i + m (1 - L_i)) / (b L_i + (1 - b)(1 - L_i)) ] + log(pi / (1 - pi))
 
@@ -62,7 +62,7 @@ class ViewTerms(NamedTuple):
     weight : float
         1 / C_i, in any scale.
     share : float32 (plane, y, x)
-        a_i, 0..1; undefined where the level is UNSEEN.
+        a_i, 0..1: visible share of the footprint; undefined where the level is UNSEEN.
     confidence : float32 (y, x)
         Further factor of the terms, 0..1, which does not reduce the view's count.
     """
@@ -116,27 +116,27 @@ def log_odds_terms(rates: ErrorRates) -> Singles:
     return np.log(body / empty).astype(np.float32)
 
 
-def synergy_terms(least: float) -> Singles:
-    """log L of each level, L clamped to at least `least`, nats, float32 (2, TOP + 1): the same near people."""
+def synergy_terms(floor: float) -> Singles:
+    """log max(L, floor) of each level, nats, float32 (2, TOP + 1): the same near people."""
     likelihood = np.arange(TOP + 1) / TOP
-    return np.tile(np.log(np.maximum(likelihood, least)).astype(np.float32), (2, 1))
+    return np.tile(np.log(np.maximum(likelihood, floor)).astype(np.float32), (2, 1))
 
 
 @kernel
 def add_terms(view: ViewTerms, near: Ints, sums: Sums) -> None:
     """Add one view's terms to the frame's sums; near int64 (y, x) is the person near each cell, -1 for none."""
-    level, seen = view.levels.reshape(-1), view.share.reshape(-1)
+    level, share = view.levels.reshape(-1), view.share.reshape(-1)
     confidence, person = view.confidence.reshape(-1), near.reshape(-1)
-    to_weighted, to_weights, to_count = sums.weighted.reshape(-1), sums.weights.reshape(-1), sums.shares.reshape(-1)
+    weighted, weights, count = sums.weighted.reshape(-1), sums.weights.reshape(-1), sums.shares.reshape(-1)
     for start in range(0, len(level), len(person)):
         for place in range(len(person)):
             c = start + place
             if level[c] >= 0:
-                part = view.weight * seen[c]
-                beside = 1 if person[place] >= 0 else 0
-                to_weighted[c] += part * confidence[place] * view.terms[beside, level[c]]
-                to_weights[c] += part
-                to_count[c] += seen[c]
+                weight = view.weight * share[c]
+                near_person = 1 if person[place] >= 0 else 0
+                weighted[c] += weight * confidence[place] * view.terms[near_person, level[c]]
+                weights[c] += weight
+                count[c] += share[c]
 
 
 @kernel

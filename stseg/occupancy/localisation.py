@@ -25,7 +25,7 @@ Maps = Sequence[Singles | None]
 class Localiser:
     """Fusion of one rig's maps: tables are made once, frames are fused one by one.
 
-    The reference plane may be any: nothing here knows which way is up.
+    The reference plane may be any plane, not the ground alone.
 
     Parameters
     ----------
@@ -45,13 +45,13 @@ class Localiser:
     def clutter_weights(self, maps: Maps) -> Floats:
         """1 / C_i of each view, mean 1, 0 for blind views (Khan and Shah 2009, eqs 5, 6); float64 (view,)."""
         sides = [clutter_side(camera.size) for camera in self.rig.cameras]
-        unrest = [np.nan if seen is None else clutter(seen, side) for seen, side in zip(maps, sides, strict=True)]
-        return clutter_weights(np.array(unrest))
+        values = [np.nan if view is None else clutter(view, side) for view, side in zip(maps, sides, strict=True)]
+        return clutter_weights(np.array(values))
 
     def views(self, maps: Maps) -> Bytes:
         """n_vis: how many of the views that are not blind see each cell, uint8 (plane, y, x)."""
-        awake = [seen is not None for seen in maps]
-        return np.asarray((self.sampling.footprint[awake][..., 2] > 0).sum(0), np.uint8)
+        sighted = [view is not None for view in maps]
+        return np.asarray((self.sampling.footprint[sighted][..., 2] > 0).sum(0), np.uint8)
 
     def synergy(self, maps: Maps, weights: Floats, least: float) -> Singles:
         """The synergy maps of all planes, nats (Khan and Shah 2009, eq. 7).
@@ -59,11 +59,11 @@ class Localiser:
         Parameters
         ----------
         maps
-            One a view.
+            Likelihood map of each view.
         weights : float64 (view,)
             1 / C_i in any scale; all equal where clutter is not modelled.
         least
-            L_min: the miss rate. Likelihoods are clamped to it, so that no view alone has a veto.
+            Lower bound of the likelihoods, such as the miss rate: no view alone has a veto.
 
         Returns
         -------
@@ -85,7 +85,7 @@ class Localiser:
         maps, weights
             As in `synergy`.
         rates
-            How each view errs.
+            Error rates of each view.
         occupied
             pi, the share of cells that bodies fill.
 
@@ -105,17 +105,17 @@ class Localiser:
     def _fuse(self, maps: Maps, weights: Floats, terms: Sequence[Singles], prior: float) -> Singles:
         self._require(maps)
         sums = Sums.zero(self.rig.grid.shape)
-        for view, (seen, weight, term) in enumerate(zip(maps, weights, terms, strict=True)):
-            if seen is not None:
-                levels = self._means.levels(view, seen)
-                own = ViewTerms(levels, term, np.float32(weight), self._whole, self._certain)
-                add_terms(own, self._no_person, sums)
+        for i, (view, weight, term) in enumerate(zip(maps, weights, terms, strict=True)):
+            if view is not None:
+                levels = self._means.levels(i, view)
+                added = ViewTerms(levels, term, np.float32(weight), self._whole, self._certain)
+                add_terms(added, self._no_person, sums)
         return sums.total(self._views, self._no_person, 1.0, (prior, prior))
 
     def _require(self, maps: Maps) -> None:
         cameras = self.rig.cameras
         if len(maps) != len(cameras):
             raise SourceError("maps", "number", len(maps), f"{len(cameras)}, one a camera")
-        for camera, seen in zip(cameras, maps, strict=True):
-            if seen is not None and seen.shape != camera.size[::-1]:
-                raise SourceError(f"camera {camera.name}", "shape of the map", seen.shape, f"{camera.size[::-1]}")
+        for camera, view in zip(cameras, maps, strict=True):
+            if view is not None and view.shape != camera.size[::-1]:
+                raise SourceError(f"camera {camera.name}", "shape of the map", view.shape, f"{camera.size[::-1]}")

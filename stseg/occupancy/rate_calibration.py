@@ -1,21 +1,21 @@
-"""Error rates of the views: how often each misses bodies and shows what is not there, learned as a recording runs.
+"""Online estimation of the views' error rates: misses, and false alarms (clutter).
 
-Each frame is explained before it is counted, so the person of each cell is known:
+A frame is counted after its detection, so the person of each cell is known:
 
-    m   misses among the cells of a person's pillar, of persons that the *other* views support,
-    b   foreground on the rays of cells near no person, where no person explains it,
+    m   misses among the cells in the pillars of persons that the *other* views support,
+    b   foreground on the rays of cells near no person that is assigned to no person,
     b'  foreground on the rays of the cells within reach of such a person and outside the pillar,
     pi' the share of the cells within reach of a person that the pillar fills.
 
 A likelihood L is a probability itself, so a cell counts with the probability that its ray met foreground given what it
 is, (1 - m) L / ((1 - m) L + m (1 - L)) in a pillar and b L / (b L + (1 - b)(1 - L)) outside; for maps of 0 and 1 that
-is L. These are the E steps of the rates that make all L most likely.
+is L. This is the E step of the maximum-likelihood estimate of the rates.
 
-A rate is the mean of a beta posterior: `prior_weight` seconds of the first guess, and what was seen since, which decays
-with exp(-t / memory). What a view alone asserts does not count for that view, or it would confirm itself: persons count
-where the rest of the evidence supports them, and a cell near no person counts as empty with the probability that the
-other views give it, so that a missed person is no clutter. This is one round of Dawid and Skene's estimate of
-observers' error rates (Applied Statistics 28, 1979) a frame, each observer's own vote left out.
+A rate is the mean of a beta posterior: `prior_weight` seconds of the first guess, and the counts since, which decay
+with exp(-t / memory). A view's own evidence is left out of its counts, or it would confirm itself: persons count where
+the rest of the evidence supports them, and a cell near no person counts as empty with the probability that the other
+views give it, so that a missed person is no clutter. This is one round of Dawid and Skene's estimate of
+observers' error rates (Applied Statistics 28, 1979) per frame, each observer's own vote left out.
 """
 
 from __future__ import annotations
@@ -33,14 +33,16 @@ from stseg.geometry.summed_area import TOP
 from stseg.occupancy.fusion import ErrorRates, Sums, ViewTerms
 
 MISS, CLUTTER, NEAR_CLUTTER = 0, 1, 2
-_HALF = 0.5
-_REST = 1e-6
+_FIRST_FILLED = 0.5
+"""First guess of pi'."""
+_LEAST_WEIGHT = 1e-6
+"""Weight of the other views, relative to the view's own, below which they count as blind."""
 _INTERVAL = 0.25
-"""Seconds from one frame that is learned to the next: rates have a memory of minutes."""
+"""Seconds from one counted frame to the next: rates have a memory of minutes."""
 
 
 class RateCalibration:
-    """Error rates of all views as far as they are known; state of one session.
+    """Current estimate of all views' error rates; state of one session.
 
     Parameters
     ----------
@@ -52,12 +54,12 @@ class RateCalibration:
     Attributes
     ----------
     errors, seen : float64 (view, 3)
-        Seconds in which the view erred, and in which it could have, for each of `ErrorRates`: seconds of one person for
-        m and b', of all the view's cells for b.
+        Decayed errors and trials of each rate in `ErrorRates`, in seconds: of one person's cells for m and b', of all
+        the view's cells for b.
     filled : float64 (2,)
         Seconds of one person's cells that the pillar fills, and of all cells within reach of the person.
     interval : int
-        Frames from one that is learned to the next.
+        Frames from one counted frame to the next.
     """
 
     def __init__(self, first: Sequence[ErrorRates], frame_rate: float, config: ErrorRateConfig) -> None:
@@ -69,7 +71,7 @@ class RateCalibration:
 
     @property
     def rates(self) -> list[ErrorRates]:
-        """Of each view."""
+        """Estimate for each view."""
         weight = self.config.prior_weight
         return [ErrorRates(*row) for row in ((weight * self.first + self.errors) / (weight + self.seen)).tolist()]
 
@@ -77,19 +79,19 @@ class RateCalibration:
     def filled_share(self) -> float:
         """Share of the cells within reach of a person that bodies fill; one half at first."""
         weight = self.config.prior_weight
-        return float((weight * _HALF + self.filled[0]) / (weight + self.filled[1]))
+        return float((weight * _FIRST_FILLED + self.filled[0]) / (weight + self.filled[1]))
 
     def next_is_due(self) -> bool:
-        """Count a frame; whether it is one to learn from, which stands for those up to the next."""
+        """Advance by one frame; whether its counts are to be learned, for all frames until the next such one."""
         self._frames += 1
         return (self._frames - 1) % self.interval == 0
 
     def learn(self, errors: Floats, seen: Floats, filled: Floats, frames: int = 1) -> None:
-        """Add a frame that stands for some, in frames of what the attributes hold in seconds; 0 for a blind view."""
-        kept = np.exp(-frames / (self.frame_rate * self.config.memory))
-        for total, fresh in ((self.errors, errors), (self.seen, seen), (self.filled, filled)):
-            total *= kept
-            total += frames * fresh / self.frame_rate
+        """Add the counts of one frame, 0 for a blind view, as many times as the `frames` that it represents."""
+        decay = np.exp(-frames / (self.frame_rate * self.config.memory))
+        for total, count in ((self.errors, errors), (self.seen, seen), (self.filled, filled)):
+            total *= decay
+            total += frames * count / self.frame_rate
 
 
 def inside_bodies(grid: Grid, near: Ints, ground: Floats, height: Floats) -> Flags:
@@ -103,11 +105,11 @@ def inside_bodies(grid: Grid, near: Ints, ground: Floats, height: Floats) -> Fla
         Metres.
     """
     inside = np.zeros(grid.shape, bool)
-    here = near >= 0
-    person = near[here]
-    away = np.hypot(*(grid.ground[here] - ground[person]).T)
+    within_reach = near >= 0
+    person = near[within_reach]
+    distance = np.hypot(*(grid.ground[within_reach] - ground[person]).T)
     for plane, above in zip(inside, grid.heights, strict=True):
-        plane[here] = away <= np.interp(above / height[person], PROFILE[:, 0], PROFILE[:, 1], right=-1.0)
+        plane[within_reach] = distance <= np.interp(above / height[person], PROFILE[:, 0], PROFILE[:, 1], right=-1.0)
     return inside
 
 
@@ -119,10 +121,10 @@ def cells_per_person(grid: Grid, height: float, reach: float) -> tuple[float, fl
 
 
 @kernel
-def _share(rate: float, likelihood: float) -> float:
-    """Probability of an error that is as frequent as `rate` and as likely by itself as `likelihood`."""
-    erring = rate * likelihood
-    return erring / (erring + (1.0 - rate) * (1.0 - likelihood))
+def _error_posterior(rate: float, likelihood: float) -> float:
+    """Posterior probability of an error of prior `rate`, given its likelihood: the E step."""
+    error = rate * likelihood
+    return error / (error + (1.0 - rate) * (1.0 - likelihood))
 
 
 @kernel
@@ -138,12 +140,12 @@ def fill_counts(
     errors: Floats,
     seen: Floats,
 ) -> None:
-    """Fill errors and seen (3,) with one view's counts of m, b and b' in a frame, in cells.
+    """Fill errors and seen (3,) with one view's errors and trials of m, b and b' in a frame, in cells.
 
     Parameters
     ----------
     view, sums
-        What the view added to the sums over all views, and these.
+        The view's terms, and the sums over all views that contain them.
     near : int64 (y, x), inside : bool (plane, y, x)
         The person near each cell, -1 for none, and whether the pillar fills the cell.
     trusted : bool (person,)
@@ -166,13 +168,13 @@ def fill_counts(
         nearest = person[place]
         if nearest < 0:
             rest, others = weights[c] - view.weight * shares[c], prior
-            if rest > _REST * view.weight:
+            if rest > _LEAST_WEIGHT * view.weight:
                 own = view.weight * shares[c] * confidence[place] * view.terms[0, levels[c]]
                 others += observations * (count[c] - shares[c]) * (weighted[c] - own) / rest
             empty = shares[c] / (1.0 + np.exp(min(max(others, -30.0), 30.0)))
-            errors[CLUTTER] += _share(rates[CLUTTER], likelihood) * empty
+            errors[CLUTTER] += _error_posterior(rates[CLUTTER], likelihood) * empty
             seen[CLUTTER] += empty
         elif trusted[nearest]:
-            kind, erring = (MISS, 1.0 - likelihood) if body[c] else (NEAR_CLUTTER, likelihood)
-            errors[kind] += _share(rates[kind], erring) * shares[c]
-            seen[kind] += shares[c]
+            rate, error_likelihood = (MISS, 1.0 - likelihood) if body[c] else (NEAR_CLUTTER, likelihood)
+            errors[rate] += _error_posterior(rates[rate], error_likelihood) * shares[c]
+            seen[rate] += shares[c]

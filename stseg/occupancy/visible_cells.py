@@ -1,7 +1,7 @@
-"""What a frame's explanation leaves of one view's evidence at each cell: every pixel counts once.
+"""Occlusion handling per cell: the part of a view's evidence that belongs to the cell, so that every pixel counts once.
 
 Pixels of a cell's footprint that show another person are no evidence of the cell. Where that person stands nearer to
-the camera they hide it, and the view sees a share of the cell alone; otherwise the pixels count, and count as empty.
+the camera they hide the cell, and the view sees only a share of it; otherwise the pixels count as background.
 Which person a pixel shows is known on a raster, some thirty rows to a body, so a footprint meets few raster pixels
 whatever the image's resolution. Most footprints show no person at all; a summed-area table finds them.
 """
@@ -40,7 +40,7 @@ class PixelAssignment(NamedTuple):
     distance : float64 (person,)
         From the camera along the ground, metres.
     separate : bool (person,)
-        Whether a box of this view is assigned to the person: then no other hides them.
+        Whether a box of this view is assigned to the person: the cells near such a person count as unoccluded.
     """
 
     raster: NDArray[np.int16]
@@ -73,16 +73,16 @@ def _overlap(first: int, extent: int, step: int, k: int) -> int:
 @part
 def _shows_a_person(shown: PixelAssignment, left: int, top: int, width: int, height: int) -> bool:
     above, below = shown.row[top], shown.row[top + height - 1] + 1
-    before, behind = shown.column[left], shown.column[left + width - 1] + 1
+    first, stop = shown.column[left], shown.column[left + width - 1] + 1
     table = shown.occupied
-    return bool(table[below, behind] - table[below, before] != table[above, behind] - table[above, before])
+    return bool(table[below, stop] - table[below, first] != table[above, stop] - table[above, first])
 
 
 @part
 def _hidden_pixels(
     shown: PixelAssignment, left: int, top: int, width: int, height: int, person: int, distance: float
 ) -> int:
-    """Pixels of a footprint that show another than `person`, who stands nearer than a cell at `distance`."""
+    """Pixels of a footprint that show a person other than `person`, nearer than a cell at `distance`."""
     hidden = 0
     for j in range(shown.row[top], shown.row[top + height - 1] + 1):
         for i in range(shown.column[left], shown.column[left + width - 1] + 1):
@@ -96,8 +96,8 @@ def _hidden_pixels(
 def _sum_of_others(
     shown: PixelAssignment, table: SumTable, left: int, top: int, width: int, height: int, person: int
 ) -> int:
-    """Sum of the likelihood levels of a footprint's pixels that show another than `person`."""
-    taken = 0
+    """Sum of the likelihood levels of a footprint's pixels that show a person other than `person`."""
+    total = 0
     for j in range(shown.row[top], shown.row[top + height - 1] + 1):
         for i in range(shown.column[left], shown.column[left + width - 1] + 1):
             other = shown.raster[j, i]
@@ -105,8 +105,8 @@ def _sum_of_others(
                 v, u = max(top, j * shown.step), max(left, i * shown.step)
                 down = v + _overlap(top, height, shown.step, j) - table.top
                 right = u + _overlap(left, width, shown.step, i) - table.left
-                taken += int(sum_of(table.sums, u - table.left, v - table.top, right, down))
-    return taken
+                total += int(sum_of(table.sums, u - table.left, v - table.top, right, down))
+    return total
 
 
 @kernel
@@ -120,15 +120,15 @@ def fill_share(cells: SeenCells, shown: PixelAssignment, near: Ints, distance: S
     distance : float32 (y, x)
         From the camera along the ground, metres.
     """
-    person, away = near.reshape(-1), distance.reshape(-1)
+    person, cell_distance = near.reshape(-1), distance.reshape(-1)
     for z in range(len(share)):
         plane = share[z].reshape(-1)
         for k in range(cells.start[z], cells.start[z + 1]):
             place, whole = cells.place[k], np.float32(1)
             left, top, width, height = cells.footprint[k]
-            mine = person[place]
-            if _shows_a_person(shown, left, top, width, height) and not (mine >= 0 and shown.separate[mine]):
-                hidden = _hidden_pixels(shown, left, top, width, height, mine, away[place])
+            nearest = person[place]
+            if _shows_a_person(shown, left, top, width, height) and not (nearest >= 0 and shown.separate[nearest]):
+                hidden = _hidden_pixels(shown, left, top, width, height, nearest, cell_distance[place])
                 whole -= np.float32(hidden) / np.float32(np.int32(width) * np.int32(height))
             plane[place] = whole
 
@@ -146,11 +146,11 @@ def add_map(
     share: Singles,
     sums: Sums,
 ) -> None:
-    """Fill levels and share (plane, y, x) of the cells that a view's map shows, and add its terms to the sums.
+    """Fill levels and share (plane, y, x) of the cells that a view sees by its likelihood map, and add its terms to sums.
 
-    The level is the mean over the visible pixels of the footprint, those of other persons counted as empty.
+    The level is the mean over the visible pixels of the footprint, those of other persons counted as background.
     """
-    person, away = near.reshape(-1), distance.reshape(-1)
+    person, cell_distance = near.reshape(-1), distance.reshape(-1)
     for z in range(len(share)):
         level_of, share_of = levels[z].reshape(-1), share[z].reshape(-1)
         weighted, weights, count = sums.weighted[z].reshape(-1), sums.weights[z].reshape(-1), sums.shares[z].reshape(-1)
@@ -159,16 +159,16 @@ def add_map(
             left, top, width, height = cells.footprint[k]
             u, v = left - table.left, top - table.top
             total, pixels = int(sum_of(table.sums, u, v, u + width, v + height)), np.int32(width) * np.int32(height)
-            mine, visible = person[place], np.float32(1)
-            if _shows_a_person(shown, left, top, width, height) and not (mine >= 0 and shown.separate[mine]):
-                hidden = _hidden_pixels(shown, left, top, width, height, mine, away[place])
+            nearest, visible = person[place], np.float32(1)
+            if _shows_a_person(shown, left, top, width, height) and not (nearest >= 0 and shown.separate[nearest]):
+                hidden = _hidden_pixels(shown, left, top, width, height, nearest, cell_distance[place])
                 visible -= np.float32(hidden) / np.float32(pixels)
                 if visible > 0:
-                    total -= _sum_of_others(shown, table, left, top, width, height, mine)
+                    total -= _sum_of_others(shown, table, left, top, width, height, nearest)
             mean = np.float32(total) / (np.float32(pixels) * (visible if visible > 0 else np.float32(1)))
             level = min(int(mean + np.float32(0.5)), TOP)
             level_of[place], share_of[place] = level, visible
             seen = weight * visible
-            weighted[place] += seen * terms[1 if mine >= 0 else 0, level]
+            weighted[place] += seen * terms[1 if nearest >= 0 else 0, level]
             weights[place] += seen
             count[place] += visible

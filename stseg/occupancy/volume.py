@@ -28,8 +28,8 @@ from stseg.occupancy.visible_cells import PixelAssignment, add_map, fill_occupie
 _MAP_STEP = 8
 _NEAR_PRIOR = 0.0
 """Prior log-odds of a cell within reach of a person, nats."""
-_WHOLE = 0.99
-"""Visible share of a body from which on it counts as unhidden."""
+_UNOCCLUDED = 0.99
+"""Least visible share of a body that counts as unoccluded."""
 
 
 class Occupancy:
@@ -59,7 +59,7 @@ class Occupancy:
         self._certain = np.ones(rig.grid.shape[1:], np.float32)
 
     def new_calibration(self) -> RateCalibration:
-        """Error-rate calibration of a session that begins: the first guess."""
+        """Error-rate calibration of a new session, at the first guess."""
         return RateCalibration(self._first_rates, self.rig.frame_rate, self._rate_config)
 
     def fuse(
@@ -71,8 +71,8 @@ class Occupancy:
     ) -> Singles:
         """A frame's log-odds, float32 (plane, y, x), nats; nan where no view sees the cell.
 
-        The prior pi is one half within reach of a person of the explanation, where only the cells are left to decide,
-        and `occupied_share` elsewhere.
+        The prior pi is one half within reach of a person of the explanation, whose existence is already
+        decided, and `occupied_share` elsewhere.
 
         Parameters
         ----------
@@ -94,7 +94,7 @@ class Occupancy:
         explanation: Explanation,
         noise: BoxNoise = FIRST,
     ) -> Singles:
-        """The same of a session's next frame, with which the session's error-rate calibration is then updated."""
+        """`fuse` of a session's next frame, followed by the update of the session's error rates."""
         near, sums = self._near(explanation), Sums.zero(self.rig.grid.shape)
         views = self._add_views(seen, explanation, near, calibration.rates, noise, sums)
         if calibration.next_is_due():
@@ -180,29 +180,29 @@ class Occupancy:
         for i, (view, rates) in enumerate(zip(views, calibration.rates, strict=True)):
             if view is not None:
                 trusted = people.evidence - people.view_evidence[i] >= calibration.config.minimum_evidence
-                trusted &= people.visibility[i] >= _WHOLE
+                trusted &= people.visibility[i] >= _UNOCCLUDED
                 fill_counts(
                     view, sums, near, inside, trusted, np.array(rates), self.config.effective_observations, self.prior,
                     errors[i], seen[i],
                 )  # fmt: skip
-        everywhere = np.maximum([len(cells.place) for cells in self._cells], 1)
-        units = np.column_stack([np.full(len(views), body), everywhere, np.full(len(views), reached - body)])
-        sure = np.append(people.evidence >= calibration.config.minimum_evidence, False)[near]
-        counted = (self.views > 0) & sure
+        seen_cells = np.maximum([len(cells.place) for cells in self._cells], 1)
+        units = np.column_stack([np.full(len(views), body), seen_cells, np.full(len(views), reached - body)])
+        supported = np.append(people.evidence >= calibration.config.minimum_evidence, False)[near]
+        counted = (self.views > 0) & supported
         filled = np.array([inside[counted].sum(), counted.sum()]) / reached
         calibration.learn(errors / units, seen / units, filled, calibration.interval)
 
     def _assignment(self, i: int, explanation: Explanation) -> PixelAssignment:
-        people, served = explanation.people, explanation.box_assignment[i]
+        people, assigned = explanation.people, explanation.box_assignment[i]
         separate = np.zeros(len(people) + 1, bool)
-        separate[served[served >= 0]] = True
+        separate[assigned[assigned >= 0]] = True
         camera, step, raster = self.rig.cameras[i], explanation.raster_step[i], explanation.pixel_assignment[i]
         width, height = camera.size
-        away = np.hypot(*(people.ground - camera.centre[:2]).T)
+        distance = np.hypot(*(people.ground - camera.centre[:2]).T)
         occupied = np.empty((raster.shape[0] + 1, raster.shape[1] + 1), np.int32)
         fill_occupied(raster, occupied)
         return PixelAssignment(
-            raster, occupied, step, np.arange(height) // step, np.arange(width) // step, away, separate
+            raster, occupied, step, np.arange(height) // step, np.arange(width) // step, distance, separate
         )
 
     def _pillars_of(self, i: int) -> tuple[Singles, PillarIndex]:
@@ -234,7 +234,7 @@ class Occupancy:
         return levels
 
     def _height_prior(self, expected: Floats) -> Floats:
-        """Log-prior of the heights that are tried, for expected heights (n,), metres; float64 (n, height)."""
+        """Log-prior of `self.heights` around expected heights (n,), metres; float64 (n, height)."""
         return np.asarray(-0.5 * ((self.heights - expected[:, None]) / self.height_spread) ** 2)
 
     def _clutter(self, i: int, view: ViewEvidence) -> float:
@@ -248,7 +248,7 @@ class Occupancy:
 
 
 def _first_rates(kind: str, detection: DetectionConfig) -> ErrorRates:
-    """First guess: the surroundings of people are like any other place."""
+    """First guess: the same clutter near people as elsewhere."""
     if kind == "boxes":
         clutter_rate = (1 - detection.box_miss_rate) / float(np.exp(detection.box_log_ratio))
         return ErrorRates(detection.box_miss_rate, clutter_rate, clutter_rate)
@@ -256,6 +256,6 @@ def _first_rates(kind: str, detection: DetectionConfig) -> ErrorRates:
 
 
 def _confidence(near: Ints, separate: Flags, visibility: Floats) -> Singles:
-    """Weight of a missing box, float32 (y, x): the visibility of the person near the cell."""
+    """Confidence of a view with boxes, float32 (y, x): 1, but near a person without a box the person's visibility."""
     missing = np.where(separate, 1.0, np.append(visibility, 1.0))
     return np.asarray(missing[near], np.float32)
