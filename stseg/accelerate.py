@@ -1,20 +1,25 @@
 """Compilation of kernels: the one module that names numba's options.
 
-A kernel keeps its signature for type checkers, fills arrays that it is given, and is cached on disk. Kernels never use
-fast-math: the same input gives the same bits. With `NUMBA_DISABLE_JIT=1` every kernel is plain Python.
-
-The cache on disk checks the kernel's own file alone: after an edit to a kernel that kernels of other files call, delete
-their caches (`find . -name '*.nb[ci]' -delete`).
+A kernel keeps its signature for type checkers, fills arrays that it is given, and is cached on disk
+(`stseg.kernel_cache`). Kernels never use fast-math: the same input gives the same bits. With `NUMBA_DISABLE_JIT=1`
+every kernel is plain Python.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from time import monotonic
 from typing import Any, ParamSpec, TypeVar, cast
 
 import numba
+from numba.core import event
 
 _UNCOUNTED: dict[str, Any] = {"_nrt": False}
+"""No reference is counted for the arguments of an inlined kernel: an option that numba does not document."""
+_LOCATOR = "stseg.kernel_cache.KernelCache"
+_PAUSE = 10.0
+"""Seconds between notes on compilation."""
 
 COMPILED = hasattr(numba.njit(lambda: None), "py_func")
 """Whether kernels are compiled; else they are plain Python."""
@@ -41,13 +46,47 @@ def part(function: Callable[P, R]) -> Callable[P, R]:
     return _compiled(function, forceinline=True, **_UNCOUNTED)
 
 
-def _compiled(function: Callable[P, R], **options: Any) -> Callable[P, R]:
-    try:
-        return cast("Callable[P, R]", numba.njit(cache=True, nogil=True, **options)(function))
-    except RuntimeError:  # neither the package's folder nor the home can be written: compiled in each process
-        return cast("Callable[P, R]", numba.njit(nogil=True, **options)(function))
-
-
 def python_form(compiled: Callable[P, R]) -> Callable[P, R]:
     """The kernel as plain Python, for tests that compare the two."""
     return cast("Callable[P, R]", getattr(compiled, "py_func", compiled))
+
+
+@contextmanager
+def compilation_noted(note: Callable[[str], None]) -> Iterator[None]:
+    """Call `note` with a line where a kernel is compiled within the body, and then every ten seconds."""
+    listener = _Notes(note)
+    with event.install_listener("numba:compile", listener):
+        yield
+
+
+class _Notes(event.Listener):
+    """Counts kernels that are compiled."""
+
+    def __init__(self, note: Callable[[str], None]) -> None:
+        self._note, self._number, self._last = note, 0, -_PAUSE
+
+    def on_start(self, event: Any) -> None:
+        """A kernel is to be compiled."""
+        del event
+        if monotonic() - self._last >= _PAUSE:
+            self._last = monotonic()
+            so_far = f"; {self._number} are done" if self._number else ", about a minute of work"
+            self._note(f"compiling kernels, once on this machine{so_far}")
+
+    def on_end(self, event: Any) -> None:
+        """A kernel is compiled."""
+        del event
+        self._number += 1
+
+
+def _compiled(function: Callable[P, R], **options: Any) -> Callable[P, R]:
+    """The kernel, cached by our locator; the option is the process's, so it is put back."""
+    config: Any = numba.config
+    before = config.CACHE_LOCATOR_CLASSES
+    config.CACHE_LOCATOR_CLASSES = _LOCATOR
+    try:
+        return cast("Callable[P, R]", numba.njit(cache=True, nogil=True, **options)(function))
+    except RuntimeError:  # no folder can be written to: compiled in each process
+        return cast("Callable[P, R]", numba.njit(nogil=True, **options)(function))
+    finally:
+        config.CACHE_LOCATOR_CLASSES = before

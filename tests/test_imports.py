@@ -13,7 +13,17 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 
-FOUNDATION = ("errors", "arrays", "accelerate", "linear_assignment", "settings", "config", "geometry", "model")
+FOUNDATION = (
+    "errors",
+    "arrays",
+    "kernel_cache",
+    "accelerate",
+    "linear_assignment",
+    "settings",
+    "config",
+    "geometry",
+    "model",
+)
 """Records, the body model and geometry. Each may import those before it; everything below may import all of them."""
 
 SOLVER = "graphcut"
@@ -45,7 +55,7 @@ AT_HOME = {
     "pandas": ("stseg.io",),  # its types; it is imported where a data frame is asked for
     "xarray": ("stseg.io",),  # the same
     "tomllib": ("stseg.io",),
-    "pathlib": ("stseg.io", "stseg.engine", "stseg.commands"),
+    "pathlib": ("stseg.kernel_cache", "stseg.io", "stseg.engine", "stseg.commands"),
 }
 """Libraries, and the only modules that know them."""
 

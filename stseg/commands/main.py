@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import os
-import signal
 import sys
-import threading
 from collections.abc import Sequence
 from contextlib import suppress
 from difflib import get_close_matches
 from importlib import import_module
 from io import TextIOWrapper
-from types import FrameType
-from typing import Any
 
 from cyclopts import App, CycloptsError
 
 from stseg import __version__
+from stseg.commands.termination import Termination
 from stseg.errors import ConfigError, StsegError
 from stseg.io.names import printable
 
@@ -41,7 +38,6 @@ COMMANDS = {
 
 _FLAGS = ("--help", "-h", "--version")
 _USER_ERROR = 2
-_INTERRUPTED, _TERMINATED = 130, 143
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -58,8 +54,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except MemoryError:
         return _fail("this needs more memory than there is")
     except KeyboardInterrupt:
-        print(f"stseg: {'terminated' if termination.asked else 'interrupted'}", file=sys.stderr)
-        return _TERMINATED if termination.asked else _INTERRUPTED
+        print(termination.line, file=sys.stderr)
+        return termination.status
     except BrokenPipeError:  # the reader of our output, such as head, has seen enough
         _drop_output()
     except OSError as error:
@@ -89,25 +85,6 @@ def _require_streams() -> None:
 def _drop_output() -> None:
     with suppress(OSError, ValueError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-
-
-class Termination:
-    """SIGTERM acts as an interrupt: output is finished or withdrawn, and the command ends."""
-
-    def __init__(self) -> None:
-        self.asked = False
-        self._before: Any = signal.SIG_DFL
-        if threading.current_thread() is threading.main_thread():
-            self._before = signal.signal(signal.SIGTERM, self._ask)
-
-    def forget(self) -> None:
-        """Restore the previous handler of SIGTERM."""
-        if threading.current_thread() is threading.main_thread():
-            signal.signal(signal.SIGTERM, self._before)
-
-    def _ask(self, _number: int, _frame: FrameType | None) -> None:
-        self.asked = True
-        raise KeyboardInterrupt
 
 
 def application() -> App:

@@ -9,6 +9,7 @@ from itertools import chain, takewhile
 from pathlib import Path
 from threading import Event
 
+from stseg.accelerate import compilation_noted
 from stseg.config import Config
 from stseg.config.effect import require_effect
 from stseg.engine.assembly import FinishedSegment, assemble
@@ -89,7 +90,7 @@ def follow_recording(
     work.require_output(overwrite)
     if not work.begun:
         require_new(table, overwrite)
-    with work as folder, resumable(folder, reporter):
+    with work as folder, resumable(folder, reporter), compilation_noted(reporter.note):
         try:
             followed = _follow(job, folder, output, overwrite, reporter)
         except BaseException:

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from tempfile import mkdtemp
 
+from stseg.accelerate import compilation_noted
 from stseg.config import Config
 from stseg.config.effect import require_effect
 from stseg.engine.assembly import FinishedSegment, assemble
@@ -131,7 +132,7 @@ def track_recording(
     request |= {"--frames": "all" if frames is None else str(frames), "--tracker": tracker, "--volume": volume}
     work = WorkFolder(output, request)
     work.require_output(overwrite)
-    with work as folder, resumable(folder, reporter):
+    with work as folder, resumable(folder, reporter), compilation_noted(reporter.note):
         if not folder.published:
             streams = _indexed(recording, folder, reporter)
             first, stop = resolve_frames(frames, streams, recording)
@@ -182,6 +183,6 @@ def _make_segments(job: Job, folder: WorkFolder, workforce: Workforce, reporter:
     missing = [segment for segment in plan if segment.index not in finished]
     done = job.stop - job.first - sum(segment.stop - segment.first for segment in missing)
     with reporter.progress("tracking", job.stop - job.first, done) as advance:
-        for segment, path in workforce.make(job, missing, folder.draft, advance):
+        for segment, path in workforce.make(job, missing, folder.draft, advance, reporter.note):
             finished[segment.index] = path
     return [FinishedSegment(segment, finished[segment.index]) for segment in plan]

@@ -16,6 +16,7 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
 from pathlib import Path
 
+from stseg.accelerate import compilation_noted
 from stseg.engine.job import Job
 from stseg.engine.segment_worker import SegmentWorker
 from stseg.engine.segments import Segment
@@ -41,6 +42,7 @@ def make_by_workers(
     draft: Callable[[int], Path],
     workers: int,
     advance: Callable[[int], None],
+    note: Callable[[str], None],
 ) -> Iterator[tuple[Segment, Path]]:
     """Segments and their files, as they are done.
 
@@ -53,14 +55,16 @@ def make_by_workers(
     workers
         Number of processes.
     advance
-        Is told how many more frames were fused.
+        Called with the number of further frames that were fused.
+    note
+        Called with lines about the work, each once.
 
     Raises
     ------
     StsegError
         What a worker raised; WorkerError where a segment's workers die again and again.
     """
-    todo, tries = list(missing)[::-1], Counter[int]()
+    todo, tries, notes = list(missing)[::-1], Counter[int](), set[str]()
     with _pool(job, min(workers, len(missing))) as pool:
         while todo or any(worker.segment for worker in pool):
             for worker in pool:
@@ -73,6 +77,10 @@ def make_by_workers(
                 segment = worker.segment
                 if isinstance(told, int):
                     advance(told)
+                elif isinstance(told, str):
+                    if told not in notes:
+                        note(told)
+                    notes.add(told)
                 elif isinstance(told, Path) and segment is not None:
                     worker.segment = None
                     yield segment, told
@@ -139,7 +147,8 @@ def _work(job: Job, pipe: Connection) -> None:
         while True:
             segment, draft = pipe.recv()
             try:
-                work = work or SegmentWorker(job)
-                pipe.send(work.make(segment, draft, pipe.send))
+                with compilation_noted(pipe.send):
+                    work = work or SegmentWorker(job)
+                    pipe.send(work.make(segment, draft, pipe.send))
             except StsegError as error:
                 pipe.send(error)

@@ -42,7 +42,12 @@ class Workforce:
         return processes_that_fit() if self.workers is None else self.workers
 
     def make(
-        self, job: Job, missing: Sequence[Segment], draft: Callable[[int], Path], advance: Callable[[int], None]
+        self,
+        job: Job,
+        missing: Sequence[Segment],
+        draft: Callable[[int], Path],
+        advance: Callable[[int], None],
+        note: Callable[[str], None],
     ) -> Iterator[tuple[Segment, Path]]:
         """Segments and their files, in the order in which they are finished.
 
@@ -54,6 +59,8 @@ class Workforce:
             Gives the path of a segment's unfinished file from its index.
         advance
             Called with the number of further frames that were fused.
+        note
+            Called with lines about the work.
         """
         if not missing:
             return
@@ -61,7 +68,7 @@ class Workforce:
         if self.scheduler is not None:
             yield from make_by_cluster(job, missing, draft, self.scheduler, advance)
         elif workers > 1:
-            yield from make_by_workers(job, missing, draft, workers, advance)
+            yield from make_by_workers(job, missing, draft, workers, advance, note)
         else:
             worker = SegmentWorker(job)
             for segment in missing:

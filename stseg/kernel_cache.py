@@ -1,0 +1,132 @@
+"""Where compiled kernels are kept, and when they are stale.
+
+Kernels are kept in the user's cache folder, so that they outlive an installation and need no writable one. A kernel is
+stale when its file changes, or a file of kernels or constants that its file imports: numba copies both into it.
+"""
+
+from __future__ import annotations
+
+import atexit
+import os
+import re
+import shutil
+import sys
+import tempfile
+from collections.abc import Callable
+from functools import cache
+from hashlib import blake2b
+from pathlib import Path
+from typing import Any, Self
+
+_PACKAGE = Path(__file__).parent
+_IMPORTED = re.compile(rb"^from (stseg[\w.]*) import |^import (stseg[\w.]*)", re.MULTILINE)
+_KERNELS = b"from stseg.accelerate import"
+
+
+class KernelCache:
+    """Locator of a kernel's files, as numba asks for one (`NUMBA_CACHE_LOCATOR_CLASSES`).
+
+    Parameters
+    ----------
+    function, source
+        The kernel as plain Python, and its file.
+    """
+
+    def __init__(self, function: Callable[..., Any], source: str) -> None:
+        self._line = function.__code__.co_firstlineno
+        self._stamp = source_stamp(Path(source))
+        self._path = folder() / function.__module__ / self._stamp
+
+    @classmethod
+    def from_function(cls, function: Callable[..., Any], source: str) -> Self | None:
+        """The locator of a kernel; None where no folder can be written to."""
+        try:
+            return cls(function, source)
+        except OSError:
+            return None
+
+    def ensure_cache_path(self) -> None:
+        """Make the folder."""
+        self._path.mkdir(parents=True, exist_ok=True)
+
+    def get_cache_path(self) -> str:
+        """The folder of the kernel's files."""
+        return str(self._path)
+
+    def get_source_stamp(self) -> str:
+        """Changes with the sources."""
+        return self._stamp
+
+    def get_disambiguator(self) -> str:
+        """Tells kernels of one name and file apart."""
+        return str(self._line)
+
+
+@cache
+def folder() -> Path:
+    """The folder of all kernels: the first that can be written to; else one of this process alone."""
+    for place in (_asked(), _of_user()):
+        if place is not None and _writable(place):
+            return place
+    own = Path(tempfile.mkdtemp(prefix="stseg-kernels-"))
+    atexit.register(shutil.rmtree, own, ignore_errors=True)
+    return own
+
+
+@cache
+def source_stamp(path: Path) -> str:
+    """Digest of a file and of all files whose kernels or constants are compiled into its kernels."""
+    seen, waiting = set[Path](), [path]
+    while waiting:
+        one = waiting.pop()
+        if one not in seen:
+            seen.add(one)
+            if one == path or _KERNELS in _bytes(one):
+                waiting += _imported(one)
+    digest = blake2b(digest_size=12)
+    for one in sorted(seen, key=lambda file: file.as_posix()):
+        digest.update(_bytes(one) + b"\0")
+    return digest.hexdigest()
+
+
+@cache
+def _bytes(path: Path) -> bytes:
+    return path.read_bytes()
+
+
+def _imported(path: Path) -> list[Path]:
+    """Files of this package that a file imports."""
+    found = []
+    for names in _IMPORTED.findall(_bytes(path)):
+        own = _PACKAGE.joinpath(*(names[0] or names[1]).decode().split(".")[1:])
+        found += [file for file in (own.with_suffix(".py"), own / "__init__.py") if file.is_file()]
+    return found
+
+
+def _asked() -> Path | None:
+    asked = os.environ.get("NUMBA_CACHE_DIR")
+    return Path(asked) / "stseg" if asked else None
+
+
+def _of_user() -> Path | None:
+    """The user's cache folder, by the custom of each system."""
+    try:
+        home = Path.home()
+    except RuntimeError:  # a user without one
+        return None
+    if sys.platform == "win32":
+        base = os.environ.get("LOCALAPPDATA") or home / "AppData" / "Local"
+    elif sys.platform == "darwin":
+        base = home / "Library" / "Caches"
+    else:
+        base = os.environ.get("XDG_CACHE_HOME") or home / ".cache"
+    return Path(base) / "stseg" / "kernels"
+
+
+def _writable(place: Path) -> bool:
+    try:
+        place.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=place):
+            return True
+    except OSError:
+        return False
