@@ -48,8 +48,9 @@ def simulate(
         Where to write; it must be empty or not there yet.
     scene
         easy (5 people, 4 cameras), dense (14 people on 6 m x 6 m, 8 cameras), dense4 (the same crowd, 4 of those
-        cameras), similar (4 people, 3 of them dressed alike, 3 cameras), demo (small images, 8 s), tiny (a second of
-        very small images), or small images of scripted routes: crossing, meeting, meeting_heights (the same, 8 cm apart
+        cameras), similar (4 people, 3 of them dressed alike, 3 cameras), plaza (7 upright cylinders on 20 m x 20 m, 7
+        cameras), school (adults and children), demo (small images, 8 s), tiny (a second of very small images), or small
+        images of scripted routes: crossing, meeting, meeting_heights (the same, 8 cm apart
         in height), border (encounters, entries and exits where windows meet). The other options change it.
     people
         Number of people in the area.

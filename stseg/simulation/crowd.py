@@ -113,12 +113,19 @@ def _new_pedestrian(spec: SceneSpec, planner: Planner, number: int, others: Floa
         ground,
         planner.errand(enters=not crowded_start),
         pace=own.uniform(*spec.speed),
-        height=float(np.clip(own.normal(1.70, 0.10), 1.45, 1.98)),
+        height=_height(spec, own),
         build=float(np.clip(own.normal(1.0, 0.09), 0.8, 1.25)),
         velocity=np.zeros(2),
         heading=own.uniform(-np.pi, np.pi),
         phase=own.uniform(0, 2 * np.pi),
     )
+
+
+def _height(spec: SceneSpec, own: np.random.Generator) -> float:
+    """Height of one person, metres."""
+    if spec.heights:
+        return float(own.uniform(*spec.heights))
+    return float(np.clip(own.normal(1.70, 0.10), 1.45, 1.98))
 
 
 def _advance(pedestrians: list[Pedestrian], half: Floats, step: float) -> None:

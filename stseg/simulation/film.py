@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from stseg.arrays import Bytes, Rows
 from stseg.geometry import Rig
-from stseg.simulation.body import pose
+from stseg.simulation.body import pose, upright_cylinders
 from stseg.simulation.cameras import build_rig, turns
 from stseg.simulation.crowd import walk_freely
 from stseg.simulation.render import RenderedView, Viewer
@@ -74,6 +74,7 @@ class Film:
     def frame_sets(self) -> Iterator[SimulatedFrame]:
         """All frames in order, with every camera's view and the truth."""
         for crowd in (walk_routes if self.spec.routes else walk_freely)(self.spec):
-            bodies = pose(crowd)
+            wide = self.spec.cylinder
+            bodies = upright_cylinders(crowd, wide) if wide else pose(crowd)
             views = tuple(viewer.view(crowd, bodies) for viewer in self.viewers)
             yield SimulatedFrame(crowd.frame, crowd.truth(self.spec.area), views)

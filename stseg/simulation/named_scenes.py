@@ -26,6 +26,24 @@ _DENSE = SceneSpec(
     seed=1402,
 )
 
+_PLAZA = SceneSpec(
+    name="plaza",
+    people=7,
+    area=(20.0, 20.0),
+    seconds=40.0,
+    frame_rate=5.0,
+    cameras=7,
+    camera_distance=16.0,
+    camera_height=3.6,
+    field_of_view=60.0,
+    size=(384, 288),
+    distortion=(),
+    stay=30.0,
+    heights=(1.75, 1.75),
+    cylinder=0.5,
+    seed=1706,
+)
+
 
 def _scripted(name: str, seconds: float, routes: tuple[Route, ...], seed: int) -> SceneSpec:
     return SceneSpec(
@@ -86,6 +104,17 @@ NAMED: dict[str, SceneSpec] = {
             alike=3,
             stay=10000.0,
             seed=605,
+        ),
+        _PLAZA,
+        SceneSpec(
+            name="school",
+            people=6,
+            area=(6.0, 6.0),
+            seconds=25.0,
+            cameras=4,
+            camera_distance=6.8,
+            heights=(1.0, 1.9),
+            seed=818,
         ),
         _scripted("crossing", 14.0, CROSSING, 91),
         _scripted("meeting", 16.0, meeting((1.72, 1.72)), 92),

@@ -50,6 +50,10 @@ class SceneSpec:
         Number of people (the first ones) in clothes of similar colours.
     stay
         Mean time that a person stays, seconds.
+    heights
+        Shortest and tallest person, metres, uniformly between; empty for adults.
+    cylinder
+        Width of upright cylinders that stand for bodies, metres; 0 for bodies that walk.
     routes
         Scripted routes, one a person; without them people walk freely.
     seed
@@ -81,6 +85,8 @@ class SceneSpec:
     speed: tuple[float, float] = (0.6, 1.5)
     alike: int = 0
     stay: float = 15.0
+    heights: tuple[float, ...] = ()
+    cylinder: float = 0.0
     routes: tuple[Route, ...] = ()
     seed: int = 1
 
@@ -105,6 +111,9 @@ class SceneSpec:
         self._require("speed", 0 < self.speed[0] <= self.speed[1], self.speed, "the slowest, then the fastest, m/s")
         self._require("alike", self.alike >= 0, self.alike, "a number of people")
         self._require("stay", self.stay > 0, self.stay, "seconds")
+        holds = self.heights == () or (len(self.heights) == 2 and 0 < self.heights[0] <= self.heights[1])
+        self._require("heights", holds, self.heights, "none, or the shortest, then the tallest, metres")
+        self._require("cylinder", 0 <= self.cylinder <= 2, self.cylinder, "0 to 2 metres")
         routes = len(self.routes)
         self._require("routes", routes in (0, self.people), routes, f"none, or {self.people}, one a person")
         self._require("seed", self.seed >= 0, self.seed, "a whole number from 0")
