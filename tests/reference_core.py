@@ -24,6 +24,14 @@ Edge = tuple[int, int, int]
 # Boxes and pillars
 
 
+def repulsion(distance: float, parameters: Parameters) -> float:
+    """Cost of a pair: excluded within the hard core, linear up to the distance at which bodies touch."""
+    if distance < parameters.hard_core:
+        return 1e4
+    apart = parameters.minimum_distance
+    return 2 + 20 * (1 - distance / apart) if distance < apart else 0.0
+
+
 def half_square(body: Floats, box: Floats, tolerance: Floats, width: float, height: float) -> float:
     """Half the squared distance of a box from a pillar's box in units of its tolerances; infinite far to the side."""
     left, right = np.clip(body[[0, 2]], 0, width - 1)
@@ -66,14 +74,13 @@ def cover(bodies: Floats, distance: Floats, width: float, height: float, i: int,
 def set_score(members: Sequence[int], problem: Problem) -> float:
     """What a set of people says of a frame: each box, pixel and walker speaks for one of them."""
     boxes, pixels, ground, parameters = problem.boxes, problem.pixels, problem.ground, problem.parameters
-    total = sum(parameters.prior_log_odds + problem.height_prior[j] - problem.birth_cost[j] for j in members)
+    total = sum(parameters.prior_log_odds + problem.size_prior[j] - problem.birth_cost[j] for j in members)
     chosen = np.array(members, int)
     gains = problem.birth_cost[chosen, None] + problem.track_gain[chosen]
     total += sum(gains[pair] for pair in best_pairs(gains))
     for i, j in combinations(members, 2):
         apart = math.dist(ground[i], ground[j])
-        if apart < parameters.minimum_distance:
-            total -= 2 + 20 * (1 - apart / parameters.minimum_distance)
+        total -= repulsion(apart, parameters)
     total += sum(_boxes_of_view(view, members, boxes, parameters) for view in range(len(boxes.boxes)))
     total += sum(_pixels_of_view(view, members, pixels, parameters) for view in range(len(pixels.raster)))
     return float(total)

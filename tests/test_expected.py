@@ -31,6 +31,13 @@ WALKERS = st.tuples(PLACES, SPREADS, numbers(1.4, 2.0), numbers(0.03, 0.12), num
 CANDIDATES = st.tuples(PLACES, numbers(1.5, 1.9))
 
 
+def population(height: float) -> float:
+    """Log density of a height in the population: Gaussian within two spreads, a power law of exponent 4 beyond."""
+    deviation = abs(height - BODY.height_mean) / BODY.height_spread
+    peak = reference.normal(0.0, BODY.height_spread**2)
+    return peak - (deviation**2 / 2 if deviation < 2 else 2 + 4 * math.log(deviation / 2))
+
+
 def expected_of(walkers: list[tuple[tuple[float, float], Floats, float, float, float]]) -> PredictedTracks:
     place, covariance, height, sd, odds = zip(*walkers, strict=True)
     sizes = Sizes(np.array(height), np.array(sd) ** 2, np.full(len(sd), 0.42), np.array(sd) ** 2)
@@ -50,10 +57,10 @@ def test_what_speaks_for_a_walker_by_hand(
     assert known.shape == (len(candidates), len(walkers))
     anywhere = -math.log(2 * math.pi * 0.1**2)  # at the resolution of a frame, which is 0.1 m
     for j, (place, tall) in enumerate(candidates):
-        newcomer = CONFIG.prior_log_odds + anywhere + reference.normal(tall - BODY.height_mean, BODY.height_spread**2)
+        newcomer = CONFIG.prior_log_odds + anywhere + population(tall)
         for k, (at, covariance, height_k, sd, odds) in enumerate(walkers):
             shape = reference.normal(tall - height_k, sd**2)
-            least = reference.normal(tall - BODY.height_mean, BODY.height_spread**2) - 4.0  # people stoop and sit
+            least = population(tall) - 4.0  # people stoop and sit
             walker = odds + reference.normal_place(np.subtract(place, at), covariance) + max(shape, least)
             assert known[j, k] == pytest.approx(walker - newcomer, abs=1e-6)
 
@@ -185,5 +192,5 @@ def test_those_expected_are_candidates_as_tall_as_they_are() -> None:
     np.testing.assert_array_equal(pool.height, [1.3, 1.74])
     assert prior.track_log_ratio(pool).shape == (2, 2)
     assert prior.track_log_ratio(Candidates(np.zeros((0, 2)), np.zeros(0), np.zeros(0))).shape == (0, 2)
-    tall = [reference.normal(h - BODY.height_mean, BODY.height_spread**2) for h in (1.5, BODY.height_mean)]
+    tall = [population(h) for h in (1.5, BODY.height_mean)]
     np.testing.assert_allclose(np.diff(prior.log_height(np.array([1.5, BODY.height_mean]))), np.diff(tall))

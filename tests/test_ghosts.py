@@ -46,7 +46,7 @@ from stseg.model.predicted_tracks import no_tracks
 
 WIDTH, HEIGHT = 128.0, 96.0
 KINDS = ("pixels", "boxes")
-TERMS = Parameters(-3.0, 0.3, 3.0, 0.2, 0.2, 0.9, 0.02, 2.0)
+TERMS = Parameters(-3.0, 0.3, 0.25, 3.0, 0.2, 0.2, 0.9, 0.02, 2.0)
 EDGES = st.tuples(numbers(-60, 150), numbers(-80, 100), numbers(1, 60), numbers(2, 150)).map(
     lambda b: np.array([b[0], b[1], b[0] + b[2], b[1] + b[3]])
 )
@@ -536,10 +536,15 @@ def test_a_newcomer_costs_inside_and_at_the_border_not(kind: str) -> None:
 def test_the_first_frame_costs_nobody_anything(kind: str) -> None:
     standing = people((-0.83, 0.31), (0.9, -0.62), (0.1, 1.2, 1.6))
     found = pass_of(kind).explain(show(kind, room().cameras, standing), None).people
-    tall = -0.5 * ((found.height - BODY.height_mean) / BODY.height_spread) ** 2
-    np.testing.assert_allclose(
-        found.prior, FEW_HEIGHTS.prior_log_odds + tall, atol=0.4
-    )  # of the candidate, not yet refined
+    size = np.zeros(len(found))
+    for spread, off in (
+        (BODY.height_spread, found.height - BODY.height_mean),
+        (BODY.width_spread, found.width - BODY.width_mean),
+    ):
+        z = np.abs(off / spread)
+        size -= np.where(z < 2, z**2 / 2, 2 + 4 * np.log(np.maximum(z, 2) / 2))
+    # Of the candidate, not yet refined.
+    np.testing.assert_allclose(found.prior, FEW_HEIGHTS.prior_log_odds + size, atol=0.4)
     assert (found.prior <= FEW_HEIGHTS.prior_log_odds).all()
 
 

@@ -23,7 +23,6 @@ from stseg.model.candidates import Candidates
 from stseg.model.outlines import outlines
 from stseg.model.sizes import Sizes
 
-STEPS = np.linspace(-3.0, 3.0, 13)
 """The lattice, in standard deviations."""
 VALUES = st.tuples(numbers(1.4, 2.0), numbers(0.01, 0.2), numbers(1.4, 2.0), numbers(0.03, 0.3))
 
@@ -98,14 +97,16 @@ def test_the_e_step_by_definition(hidden: float) -> None:
     open_pixels = rng.random(view.shape) >= hidden
     place, width = np.array([[0.3, -0.2]]), np.array([0.45])
     found = measure(at(place), width, [view], [sight], open_to_one(open_pixels), BODY)
-    everywhere, one = np.tile(place, (len(STEPS), 1)), np.ones(len(STEPS))
-    heights = BODY.height_mean + BODY.height_spread * STEPS
-    widths = BODY.width_mean + BODY.width_spread * STEPS
-    for lattice, fits, mean, variance in (
-        (heights, Candidates(everywhere, heights, 0.45 * one), found.height, found.height_variance),
-        (widths, Candidates(everywhere, found.height * one, widths), found.width, found.width_variance),
-    ):
-        score = by_definition(view, sight.raster, open_pixels, fits) - 0.5 * STEPS**2
+    everywhere, one = np.tile(place, (25, 1)), np.ones(25)
+    heights, widths = np.linspace(0.75, 2.19, 25), np.linspace(0.26, 0.86, 25)
+    for lattice, off, fits, mean, variance in (
+        (heights, (heights - BODY.height_mean) / BODY.height_spread, Candidates(everywhere, heights, 0.45 * one),
+         found.height, found.height_variance),
+        (widths, (widths - BODY.width_mean) / BODY.width_spread, Candidates(everywhere, found.height * one, widths),
+         found.width, found.width_variance),
+    ):  # fmt: skip
+        tail = np.where(abs(off) < 2, off**2 / 2, 2 + 4 * np.log(np.maximum(abs(off), 2) / 2))
+        score = by_definition(view, sight.raster, open_pixels, fits) - tail
         weight = np.exp(score - score.max())
         weight /= weight.sum()
         assert mean[0] == pytest.approx(weight @ lattice, abs=1e-6)

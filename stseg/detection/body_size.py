@@ -29,12 +29,14 @@ from stseg.config import BodyConfig
 from stseg.detection.assignment import Assignment
 from stseg.detection.refine import RefinedPlaces
 from stseg.detection.views import PixelView, View, ViewObservation
-from stseg.model.sizes import Sizes
+from stseg.model.sizes import Sizes, log_heavy_tailed
 
-_WITHIN = 3.0
-"""How far the lattice goes, standard deviations of people's sizes."""
-_STEPS = 13
-"""Sizes on the lattice: half a standard deviation apart."""
+_STEPS = 25
+"""Sizes on the lattice."""
+_HEIGHTS = np.linspace(0.75, 2.19, _STEPS)
+"""Heights of the lattice, metres: children to the tallest."""
+_WIDTHS = np.linspace(0.26, 0.86, _STEPS)
+"""Widths of the lattice, metres: the slim to coats, bags and prams."""
 
 
 def measure(
@@ -64,13 +66,11 @@ def measure(
     ]
     if not measured or not len(width):
         return replace(found, height=places.height, height_variance=places.height_variance)
-    steps = np.linspace(-_WITHIN, _WITHIN, _STEPS)
-    heights, widths = body.height_mean + body.height_spread * steps, body.width_mean + body.width_spread * steps
     each, all_steps = (len(width), 1), (1, _STEPS)
-    score = _score(places.ground, np.tile(heights, each), np.tile(width[:, None], all_steps), measured)
-    height, height_variance = _posterior(heights, score, steps)
-    score = _score(places.ground, np.tile(height[:, None], all_steps), np.tile(widths, each), measured)
-    return Sizes(height, height_variance, *_posterior(widths, score, steps))
+    score = _score(places.ground, np.tile(_HEIGHTS, each), np.tile(width[:, None], all_steps), measured)
+    height, height_variance = _posterior(_HEIGHTS, score, body.height_mean, body.height_spread)
+    score = _score(places.ground, np.tile(height[:, None], all_steps), np.tile(_WIDTHS, each), measured)
+    return Sizes(height, height_variance, *_posterior(_WIDTHS, score, body.width_mean, body.width_spread))
 
 
 class _PixelLabels(NamedTuple):
@@ -81,13 +81,18 @@ class _PixelLabels(NamedTuple):
     owner: Ints
 
 
-def _posterior(lattice: Floats, score: Floats, steps: Floats) -> tuple[Floats, Floats]:
-    """Mean and variance of each person's size on the lattice, from log-likelihoods (person, pillar), nats."""
-    score = score - 0.5 * steps**2
+def _posterior(lattice: Floats, score: Floats, mean: float, spread: float) -> tuple[Floats, Floats]:
+    """Mean and variance of each person's size on the lattice, from log-likelihoods (person, pillar), nats.
+
+    Those of the population, `mean` and `spread` squared, where all sizes are as likely.
+    """
+    seen = np.ptp(score, axis=1) > 0
+    score = score + log_heavy_tailed((lattice - mean) / spread)
     weight = np.exp(score - score.max(1, keepdims=True))
     weight /= weight.sum(1, keepdims=True)
-    mean = weight @ lattice
-    return mean, (weight * (lattice - mean[:, None]) ** 2).sum(1)
+    size = weight @ lattice
+    variance = (weight * (lattice - size[:, None]) ** 2).sum(1)
+    return np.where(seen, size, mean), np.where(seen, variance, spread**2)
 
 
 def _score(ground: Floats, heights: Floats, widths: Floats, measured: Sequence[_PixelLabels]) -> Floats:

@@ -16,8 +16,10 @@ from stseg.config import BodyConfig, DetectionConfig, ErrorRateConfig
 from stseg.detection.box_noise_calibration import BoxNoiseCalibration
 from stseg.detection.evidence import peaks
 from stseg.detection.map_estimate import FrameEvidence, MapEstimate
+from stseg.detection.merging import merged
 from stseg.detection.prior import Prior
 from stseg.detection.problem import Parameters
+from stseg.detection.repulsion import CORE
 from stseg.detection.result import explanation
 from stseg.detection.search import ENUMERATED
 from stseg.detection.views import BoxView, PixelView, ViewObservation
@@ -71,7 +73,8 @@ class Detector:
             else PixelView(camera, grid, flat, config, body)
             for camera, kind in zip(rig.cameras, kinds, strict=True)
         ]
-        self.parameters = Parameters.of(config)
+        core = config.minimum_distance - CORE if "pixels" in kinds else 0.0
+        self.parameters = Parameters.of(config, core)
         self.border = Border.of(rig)
         self._has_boxes = "boxes" in kinds
         self._swap_rounds = 0 if self._has_boxes else config.swap_moves
@@ -140,10 +143,12 @@ class Detector:
                 break
             known, before = len(estimate.pool), estimate.members
             pool = estimate.pool.joined_with(moved).joined_with(fresh)
-            estimate = MapEstimate.of_search(evidence, pool, before)
-            if (estimate.members < known).all():
+            searched = MapEstimate.of_search(evidence, pool, before)
+            estimate = merged(searched)
+            if (searched.members < known).all():
                 break
-            if not self._has_boxes and _same_people(estimate.members, before, known):
+            settled = len(estimate.members) == len(searched.members)
+            if settled and not self._has_boxes and _same_people(estimate.members, before, known):
                 break
         return explanation(self._settled(estimate))
 
@@ -162,7 +167,8 @@ class Detector:
         start = np.arange(known, known + len(exact))
         moved = MapEstimate.of_search(estimate.evidence, estimate.pool.joined_with(exact), start)
         pool = moved.pool.at(np.concatenate([moved.members, moved.alternatives()]))
-        return MapEstimate.of_search(moved.evidence, pool, np.arange(len(moved.members)), ENUMERATED, self._swap_rounds)
+        start = np.arange(len(moved.members))
+        return merged(MapEstimate.of_search(moved.evidence, pool, start, ENUMERATED, self._swap_rounds))
 
     def lattice_candidates(self, estimate: MapEstimate) -> Candidates:
         """Peaks of the lattice's score by the evidence that an estimate leaves unexplained.

@@ -103,9 +103,9 @@ def gain_of(i: int, members: Ints, count: int, pairs: float, assigned: PixelAssi
 @kernel
 def unpaired_gain(i: int, members: Ints, count: int, assigned: PixelAssignment, problem: Problem) -> float:
     """The part of that gain that needs no matching: prior, crowding and pixels."""
-    gain = problem.parameters.prior_log_odds + problem.height_prior[i] - problem.birth_cost[i]
+    gain = problem.parameters.prior_log_odds + problem.size_prior[i] - problem.birth_cost[i]
     for a in range(count):
-        gain -= crowd(i, members[a], problem.ground, problem.parameters.minimum_distance)
+        gain -= crowd(i, members[a], problem.ground, problem.parameters)
     return float(gain + _pixel_gain(i, problem.pixels, problem.parameters, assigned))
 
 

@@ -59,9 +59,8 @@ def _hides(i: int, j: int, problem: Problem) -> bool:
 @kernel
 def _overlap_on_ground(i: int, j: int, problem: Problem) -> bool:
     ground = problem.ground
-    return bool(
-        np.hypot(ground[i, 0] - ground[j, 0], ground[i, 1] - ground[j, 1]) < problem.parameters.minimum_distance
-    )
+    distance = np.hypot(ground[i, 0] - ground[j, 0], ground[i, 1] - ground[j, 1])
+    return bool(distance < problem.parameters.minimum_distance)
 
 
 @kernel
@@ -121,7 +120,7 @@ def restricted(problem: Problem, own: Ints) -> Problem:
     return Problem(
         part,
         problem.pixels,
-        problem.height_prior,
+        problem.size_prior,
         problem.birth_cost,
         known,
         problem.ground,

@@ -127,6 +127,14 @@ class MapEstimate:
         count = search(scratch, len(start), problem, enumerated, swap_rounds)
         return cls(evidence, pool, problem, scratch[:count].copy())
 
+    def with_members(self, members: Ints) -> MapEstimate:
+        """The same candidates with other members, int64 (n,)."""
+        return MapEstimate(self.evidence, self.pool, self.problem, members)
+
+    def with_pool(self, pool: Candidates) -> MapEstimate:
+        """The same members among more candidates, which come after those of this estimate."""
+        return MapEstimate(self.evidence, pool, _problem(self.evidence, pool), self.members)
+
     def score(self, members: Ints) -> SetScore:
         """Score of any set of the candidates, int64 (n,)."""
         total = set_score(members, len(members), self.problem)
@@ -251,7 +259,7 @@ def _problem(evidence: FrameEvidence, pool: Candidates) -> Problem:
     return Problem(
         boxes=boxes,
         pixels=pixels,
-        height_prior=prior.log_height(pool.height),
+        size_prior=prior.log_size(pool.height, pool.width),
         birth_cost=prior.birth_cost(pool.ground),
         track_gain=prior.track_log_ratio(pool),
         ground=pool.ground,

@@ -11,7 +11,7 @@ from stseg.config import BodyConfig, DetectionConfig
 from stseg.model.border import Border
 from stseg.model.candidates import Candidates
 from stseg.model.predicted_tracks import PredictedTracks, no_tracks
-from stseg.model.sizes import Sizes
+from stseg.model.sizes import Sizes, log_heavy_tailed
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,12 @@ class Prior:
 
     def log_height(self, heights: Floats) -> Floats:
         """Log prior density of heights, metres, beside that of the mean height: nats, float64 (n,)."""
-        return -0.5 * ((heights - self.body.height_mean) / self.body.height_spread) ** 2
+        return log_heavy_tailed((heights - self.body.height_mean) / self.body.height_spread)
+
+    def log_size(self, heights: Floats, widths: Floats) -> Floats:
+        """Log prior density of heights and widths, metres, beside that of the means: nats, float64 (n,)."""
+        wide = log_heavy_tailed((widths - self.body.width_mean) / self.body.width_spread)
+        return self.log_height(heights) + wide
 
     def known_sizes(self, sizes: Sizes, track_index: Ints) -> Sizes:
         """Size posteriors of one frame under the population prior, put under each track's own prior instead.

@@ -24,6 +24,7 @@ class Parameters(NamedTuple):
 
     prior_log_odds: float
     minimum_distance: float
+    hard_core: float
     box_log_ratio: float
     box_miss_rate: float
     hidden_visibility: float
@@ -32,9 +33,10 @@ class Parameters(NamedTuple):
     effective_observations: float
 
     @classmethod
-    def of(cls, config: DetectionConfig) -> Parameters:
-        """Those of a configuration."""
-        return cls(*(getattr(config, name) for name in cls._fields))
+    def of(cls, config: DetectionConfig, hard_core: float) -> Parameters:
+        """Those of a configuration; the hard core between bodies, metres, depends on what the views deliver."""
+        same = {name: getattr(config, name) for name in cls._fields if name != "hard_core"}
+        return cls(**same, hard_core=hard_core)
 
 
 class BoxEvidence(NamedTuple):
@@ -89,8 +91,8 @@ class Problem(NamedTuple):
     ----------
     boxes, pixels
         Evidence of the views.
-    height_prior : float64 (candidate,)
-        Log prior density of each candidate's height beside the mean height's, nats.
+    size_prior : float64 (candidate,)
+        Log prior density of each candidate's height and width beside that of the means, nats.
     birth_cost : float64 (candidate,)
         Cost of a birth at each place, nats.
     track_gain : float64 (candidate, track)
@@ -108,7 +110,7 @@ class Problem(NamedTuple):
 
     boxes: BoxEvidence
     pixels: PixelEvidence
-    height_prior: Floats
+    size_prior: Floats
     birth_cost: Floats
     track_gain: Floats
     ground: Floats

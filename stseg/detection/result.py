@@ -40,7 +40,7 @@ def explanation(estimate: MapEstimate) -> Explanation:
 def _prior(estimate: MapEstimate, candidates: Ints, track_index: Ints) -> Floats:
     """Log-odds of candidates before any view is asked, nats, float64 (n,)."""
     problem = estimate.problem
-    own = problem.parameters.prior_log_odds + problem.height_prior[candidates]
+    own = problem.parameters.prior_log_odds + problem.size_prior[candidates]
     return np.array(
         [
             p + (problem.track_gain[i, k] if k >= 0 else -problem.birth_cost[i])

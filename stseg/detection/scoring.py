@@ -16,20 +16,16 @@ import numpy as np
 from stseg.accelerate import kernel
 from stseg.arrays import Floats, Ints
 from stseg.detection.problem import BoxEvidence, Parameters, PixelEvidence, Problem
+from stseg.detection.repulsion import pair_cost
 from stseg.linear_assignment import fill_assignment_of_least_cost
-
-_OVERLAP = 2.0
-"""Cost of a pair that just begins to overlap, nats."""
-_COINCIDENCE = 20.0
-"""What two bodies in one place cost beyond that, nats; it falls linearly to 0 at the distance `apart`."""
 
 
 @kernel
 def set_score(members: Ints, count: int, problem: Problem) -> float:
     """Score of the first `count` members, nats; fills `problem.view_evidence`, views with boxes first."""
-    total = -crowding(members, count, problem.ground, problem.parameters.minimum_distance)
+    total = -crowding(members, count, problem.ground, problem.parameters)
     for a in range(count):
-        total += problem.parameters.prior_log_odds + problem.height_prior[members[a]] - problem.birth_cost[members[a]]
+        total += problem.parameters.prior_log_odds + problem.size_prior[members[a]] - problem.birth_cost[members[a]]
     total += track_score(members, count, problem.track_gain, problem.birth_cost, problem.assigned)
     box_views = problem.boxes.match.shape[0]
     for view in range(box_views):
@@ -99,20 +95,20 @@ def track_score(members: Ints, count: int, gain: Floats, birth_cost: Floats, tak
 
 
 @kernel
-def crowding(members: Ints, count: int, ground: Floats, apart: float) -> float:
-    """Cost of bodies that stand inside each other, nats."""
+def crowding(members: Ints, count: int, ground: Floats, parameters: Parameters) -> float:
+    """Cost of all pairs of bodies, nats; see `stseg.detection.repulsion`."""
     total = 0.0
     for a in range(count):
         for b in range(a):
-            total += crowd(members[a], members[b], ground, apart)
+            total += crowd(members[a], members[b], ground, parameters)
     return total
 
 
 @kernel
-def crowd(i: int, j: int, ground: Floats, apart: float) -> float:
+def crowd(i: int, j: int, ground: Floats, parameters: Parameters) -> float:
     """Cost of one pair, nats."""
     distance = np.hypot(ground[i, 0] - ground[j, 0], ground[i, 1] - ground[j, 1])
-    return float(_OVERLAP + _COINCIDENCE * (1.0 - distance / apart)) if distance < apart else 0.0
+    return float(pair_cost(distance, parameters.minimum_distance, parameters.hard_core))
 
 
 @kernel

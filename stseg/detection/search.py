@@ -34,7 +34,7 @@ def search(members: Ints, count: int, problem: Problem, enumerated: int, trades:
     trades
         Sweeps of swap moves in larger groups, at most; 0 for simple moves alone.
     """
-    candidates = len(problem.height_prior)
+    candidates = len(problem.size_prior)
     interacts, group = np.empty((candidates, candidates), np.bool_), np.empty(candidates, np.int64)
     fill_interactions(problem, interacts)
     views, rows, columns = problem.pixels.raster.shape

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from stseg.arrays import Floats, Ints
 from stseg.config import BodyConfig
-from stseg.model.sizes import Sizes
+from stseg.model.sizes import Sizes, log_heavy_tailed
 
 _RESOLUTION = 0.1
 """s: how finely one frame tells places apart, metres (standard deviation)."""
@@ -57,7 +57,7 @@ class PredictedTracks:
         variance = self.sizes.height_variance
         off = height[:, None] - self.sizes.height
         tall = -0.5 * off**2 / variance + np.log(body.height_spread / np.sqrt(variance))
-        anybody = -0.5 * ((height - body.height_mean) / body.height_spread) ** 2
+        anybody = log_heavy_tailed((height - body.height_mean) / body.height_spread)
         squares = _squares(ground[:, None] - self.ground, np.linalg.inv(self.covariance))
         shape = np.maximum(tall - anybody[:, None], _WORST_HEIGHT)
         return np.asarray(self.existence - birth_log_odds + sharp - 0.5 * squares + shape)

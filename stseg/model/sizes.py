@@ -73,6 +73,20 @@ class Sizes:
         )
 
 
+_TAIL = 2.0
+"""Spreads at which the prior's tails begin."""
+
+
+def log_heavy_tailed(deviation: Floats) -> Floats:
+    """Log density of sizes at a deviation from the mean, in spreads, beside that of the mean: nats.
+
+    A Gaussian, with tails of a power law (its exponent, 4, makes the density smooth): coats, prams and children are far
+    out more often than a Gaussian allows. Ten spreads cost 8 nats, not 50.
+    """
+    tail = 0.5 * _TAIL**2 + _TAIL**2 * np.log(np.maximum(np.abs(deviation), _TAIL) / _TAIL)
+    return np.where(np.abs(deviation) < _TAIL, -0.5 * deviation**2, -tail)
+
+
 _LEAST_PRECISION = 1e-6
 """Precision of an empty measurement, one over square metres."""
 

@@ -124,7 +124,7 @@ def _new_pedestrian(spec: SceneSpec, planner: Planner, number: int, others: Floa
 def _height(spec: SceneSpec, own: np.random.Generator) -> float:
     """Height of one person, metres."""
     if spec.heights:
-        return float(own.uniform(*spec.heights))
+        return float(own.uniform(spec.heights[0], spec.heights[-1]))
     return float(np.clip(own.normal(1.70, 0.10), 1.45, 1.98))
 
 
