@@ -146,7 +146,7 @@ def add_map(
     share: Singles,
     sums: Sums,
 ) -> None:
-    """Fill levels and share (plane, y, x) of the cells that a view sees by its likelihood map, and add its terms to sums.
+    """Fill levels and share (plane, y, x) of the cells seen by a view with a likelihood map; add its terms to the sums.
 
     The level is the mean over the visible pixels of the footprint, those of other persons counted as background.
     """
