@@ -26,7 +26,7 @@ from stseg.trackers.belief.exclusion import exclusion
 from stseg.trackers.belief.histogram import BINS, HSV_BINS, PARTS, POINTS, histograms
 from stseg.trackers.belief.look import TargetLikelihood, squares
 from stseg.trackers.belief.particles import Motion, Particles, Prediction, fill_origin, systematic
-from stseg.trackers.belief.potential import Outlier, Tie
+from stseg.trackers.belief.potential import Outlier, Potential
 from stseg.trackers.belief.star import Rounds, Star, propagate
 from stseg.trackers.belief.target import Target, in_front, looks
 from stseg.trackers.belief.view import StarView
@@ -70,8 +70,8 @@ def scene(frame: int, standing: Floats, seen: Floats | None = None) -> FusedFram
 
 def known(standing: Floats, count: int = 30) -> Target:
     """Somebody of SHIRTS[0] whose colours all views have learned."""
-    lots = np.random.default_rng(3)
-    target = Target.at(1, standing[0, :2], np.eye(2) * 0.03**2, 1.7, 4, count, 0.8, lots)
+    rng = np.random.default_rng(3)
+    target = Target.at(1, standing[0, :2], np.eye(2) * 0.03**2, 1.7, 4, count, 0.8, rng)
     images = [painted(camera, standing[:1]) for camera in RIG.cameras]
     target.learn(VIEWS, images, standing[0, :2], [np.zeros((0, 4))] * 4, 1.0)
     return target
@@ -92,27 +92,27 @@ def test_a_prediction_is_a_mixture(data: st.DataObject) -> None:
     centre, place = spots(data, n), spots(data, k)
     weight = np.arange(1.0, n + 1) / (n * (n + 1) / 2)
     axes = np.array([[30.0, 4.0], [-3.0, 12.0]])
-    foretold = Prediction(100 * centre, np.zeros_like(centre), weight, axes, MOTION)
+    prediction = Prediction(100 * centre, np.zeros_like(centre), weight, axes, MOTION)
     covariance = MOTION.place_variance * axes @ axes.T
     expected = plain.mixture(100 * place, 100 * centre, weight, covariance)
-    np.testing.assert_allclose(foretold.density(100 * place), expected, rtol=1e-9, atol=1e-300)
+    np.testing.assert_allclose(prediction.density(100 * place), expected, rtol=1e-9, atol=1e-300)
 
 
 def test_a_prediction_goes_on_at_constant_velocity() -> None:
     walking = Particles(np.array([[1.0, 2.0]]), np.array([[0.8, -0.4]]), np.ones(1))
-    foretold = Prediction.of(walking, np.eye(2), MOTION)
-    np.testing.assert_allclose(foretold.mean, [1.1, 1.95])
-    drawn = foretold.draw(4000, np.random.default_rng(1))
+    prediction = Prediction.of(walking, np.eye(2), MOTION)
+    np.testing.assert_allclose(prediction.mean, [1.1, 1.95])
+    drawn = prediction.draw(4000, np.random.default_rng(1))
     np.testing.assert_allclose(drawn.mean(0), [1.1, 1.95], atol=0.02)
-    np.testing.assert_allclose(np.cov(drawn.T), foretold.covariance, atol=0.003)
+    np.testing.assert_allclose(np.cov(drawn.T), prediction.covariance, atol=0.003)
 
 
 def test_who_is_ahead_of_what_was_foretold_is_faster() -> None:
     """The velocity follows the place as the covariance of a random walk of the velocity says."""
     still = Particles(np.zeros((1, 2)), np.zeros((1, 2)), np.ones(1))
-    foretold = Prediction.of(still, np.eye(2), MOTION)
+    prediction = Prediction.of(still, np.eye(2), MOTION)
     place = np.tile([0.2, 0.0], (4000, 1))
-    settled = foretold.settled(place, np.full(4000, 1 / 4000), np.random.default_rng(2))
+    settled = prediction.settled(place, np.full(4000, 1 / 4000), np.random.default_rng(2))
     np.testing.assert_allclose(settled.velocity.mean(0), [MOTION.gain * 0.2, 0.0], atol=0.02)
     assert settled.velocity[:, 1].var() == pytest.approx(MOTION.velocity_variance, rel=0.1)
 
@@ -242,7 +242,7 @@ def test_messages_are_sums_over_the_potential(data: st.DataObject) -> None:
     slope: Floats = np.array([[0.3, 0.1], [0.0, 0.2]]) * (1 + np.arange(4))[:, None, None]
     covariance: Floats = slope @ slope.transpose(0, 2, 1)
     outlier = Outlier(0.2, np.array([0.3, -0.1]), 1.5)
-    tie = Tie.of(ground, mapped, covariance, outlier)
+    potential = Potential.of(ground, mapped, covariance, outlier)
     psi = np.array(
         [
             [plain.potential(g, m, c, 0.2, outlier.mean, 1.5) for m, c in zip(mapped, covariance, strict=True)]
@@ -250,14 +250,14 @@ def test_messages_are_sums_over_the_potential(data: st.DataObject) -> None:
         ]
     )
     seen, weight = np.array([0.1, 0.3, 0.0, 0.2]), np.array([0.5, 0.2, 0.3])
-    np.testing.assert_allclose(tie.to_ground(seen), psi @ seen + 0.4 * outlier.flat)
-    np.testing.assert_allclose(tie.to_view(weight), weight @ psi)
+    np.testing.assert_allclose(potential.to_ground(seen), psi @ seen + 0.4 * outlier.flat)
+    np.testing.assert_allclose(potential.to_view(weight), weight @ psi)
 
 
 def test_a_view_that_sees_nothing_sends_a_flat_message() -> None:
     ground = np.random.default_rng(0).normal(size=(20, 2))
-    tie = Tie.of(ground, ground[:5], np.tile(np.eye(2), (5, 1, 1)), Outlier(0.1, np.zeros(2), 1.0))
-    assert np.ptp(tie.to_ground(np.zeros(5))) == 0.0
+    potential = Potential.of(ground, ground[:5], np.tile(np.eye(2), (5, 1, 1)), Outlier(0.1, np.zeros(2), 1.0))
+    assert np.ptp(potential.to_ground(np.zeros(5))) == 0.0
 
 
 @settings(deadline=None, max_examples=15)
@@ -276,7 +276,7 @@ def test_a_round_brings_the_ground_to_what_the_views_see() -> None:
     seen = looks([target], VIEWS, images_of(standing), MOTION, FEW)
     star = propagate([target.star], seen, MOTION, FEW, [np.random.default_rng(1)])[0]
     np.testing.assert_allclose(star.ground.mean, [0.25, -0.15], atol=0.08)
-    assert (star.sight > 0.9).all()
+    assert (star.visibility > 0.9).all()
     for view, own in zip(VIEWS, star.views, strict=True):
         assert own is not None
         np.testing.assert_allclose(view.to_ground(own.mean[None])[0], [0.25, -0.15], atol=0.15)
@@ -292,7 +292,7 @@ def test_who_is_hidden_in_one_view_is_led_there_by_the_others() -> None:
     star = propagate([target.star], seen, MOTION, FEW, [np.random.default_rng(1)])[0]
     hidden = star.views[0]
     assert hidden is not None
-    assert star.sight[0] < 0.2
+    assert star.visibility[0] < 0.2
     np.testing.assert_allclose(VIEWS[0].to_ground(hidden.mean[None])[0], [0.2, 0.2], atol=0.15)
     np.testing.assert_allclose(star.ground.mean, [0.2, 0.2], atol=0.1)
 

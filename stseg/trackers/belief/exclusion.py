@@ -1,13 +1,13 @@
-"""Several targets: no two bodies stand in one place.
+"""Mutual exclusion of targets on the ground.
 
-Du and Piater 2006, follows one target. Here the ground nodes of targets are joined in pairs by the potential
+Du and Piater 2006 follow one target. Here the ground nodes of targets are joined in pairs by the potential
 
     phi(g, h) = 1 - exp(-|g - h|^2 / (2 s^2)),
 
-with s the distance below which two bodies would stand inside each other, after the targets that repel each other of
-Khan, Balch and Dellaert (MCMC-based particle filtering for tracking a variable number of interacting targets, 2005,
-section III). So a target's ground hears from each other one e(g) = sum_n b_n phi(g, h_n), with b_n and h_n the other's
-belief. In the views people exclude each other by hiding: see `Look.nearer`.
+with s the distance below which two bodies would overlap, after the interaction potential of Khan, Balch and Dellaert
+(MCMC-based particle filtering for tracking a variable number of interacting targets, 2005, section III). So every other
+target sends a target's ground the message e(g) = sum_n b_n phi(g, h_n), with b_n and h_n the other's weights and
+particles. In the views occlusion keeps targets apart: see `TargetLikelihood.nearer`.
 """
 
 from __future__ import annotations
@@ -37,10 +37,10 @@ def exclusion(ground: Floats, others: Sequence[Particles], apart: float) -> Floa
 
 @kernel
 def fill_exclusion(ground: Floats, place: Floats, weight: Floats, apart: float, message: Floats) -> None:
-    """Multiply the message (n,) by what particles at places (m, 2) of one other target say at ground (n, 2)."""
+    """Multiply the message (n,) by that of one other target, with particles at places (m, 2), at ground (n, 2)."""
     for n in range(len(ground)):
-        met = 0.0
+        overlap = 0.0
         for m in range(len(place)):
             x, y = ground[n, 0] - place[m, 0], ground[n, 1] - place[m, 1]
-            met += weight[m] * np.exp(-0.5 * (x * x + y * y) / apart**2)
-        message[n] *= max(1.0 - met, 0.0)
+            overlap += weight[m] * np.exp(-0.5 * (x * x + y * y) / apart**2)
+        message[n] *= max(1.0 - overlap, 0.0)

@@ -2,7 +2,7 @@
 
 A pixel with enough saturation and brightness counts in one of 10 x 10 bins of hue and saturation, another in one of 10
 bins of its value. A body has one histogram for each of its parts, the thirds of the box around it, so that it matters
-where a colour is. Of the box an ellipse along its middle is looked at, at a lattice of points.
+where a colour is. Colours are sampled at a lattice of points in an ellipse inside the box.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _STEPS = 10
 _GREY, _DARK = 0.1, 0.2  # saturation and value, 0..1, below which hue means nothing (Perez et al.)
 _LEVELS = 32  # of each channel of the colour table
 _LATTICE = (9, 24)  # points across and along an ellipse
-_SLIM = 0.8  # its width, of the box's
+_ELLIPSE_WIDTH = 0.8  # relative to the box
 
 
 def hsv_bins() -> Bytes:
@@ -47,7 +47,7 @@ def ellipse_points() -> Floats:
     across, along = ((np.arange(n) + 0.5) / n for n in _LATTICE)
     points = np.stack(np.meshgrid(across, along), -1).reshape(-1, 2)
     inside = points[((2 * points - 1) ** 2).sum(1) <= 1]
-    return np.asarray(0.5 + (inside - 0.5) * (_SLIM, 1.0))
+    return np.asarray(0.5 + (inside - 0.5) * (_ELLIPSE_WIDTH, 1.0))
 
 
 HSV_BINS = hsv_bins()
@@ -64,7 +64,7 @@ def histograms(image: Bytes, boxes: Floats, nearer: Floats) -> tuple[Floats, Flo
     boxes : float64 (n, 4)
         left, top, right, bottom, pixels; nan where there is none.
     nearer : float64 (k, 4)
-        Boxes of bodies that stand in front of them all.
+        Boxes of bodies in front of all of these.
 
     Returns
     -------
@@ -83,9 +83,9 @@ def fill_histograms(
     """Fill colours (n, part, bin), which are zero, and share (n, part); see `histograms`."""
     rows, columns = image.shape[:2]
     parts = colours.shape[1]
-    asked = np.zeros(parts)
+    points_of_part = np.zeros(parts)
     for k in range(len(points)):
-        asked[int(points[k, 1] * parts)] += 1.0
+        points_of_part[int(points[k, 1] * parts)] += 1.0
     for i in range(len(boxes)):
         left, top = boxes[i, 0], boxes[i, 1]
         wide, tall = boxes[i, 2] - left, boxes[i, 3] - top
@@ -103,7 +103,7 @@ def fill_histograms(
         for part in range(parts):
             for b in range(colours.shape[2]):
                 colours[i, part, b] /= max(share[i, part], 1.0)
-            share[i, part] /= asked[part]
+            share[i, part] /= points_of_part[part]
 
 
 @kernel

@@ -7,7 +7,7 @@ import numpy as np
 from stseg.arrays import Floats, Ints
 from stseg.trackers.belief.look import TargetLikelihood
 from stseg.trackers.belief.particles import Motion, Particles, Prediction, systematic
-from stseg.trackers.belief.potential import Outlier, Tie
+from stseg.trackers.belief.potential import Outlier, Potential
 from stseg.trackers.belief.view import StarView
 
 
@@ -17,11 +17,11 @@ class Leaf:
     Parameters
     ----------
     look
-        What the view shows.
+        Colour likelihood of the target in the view.
     prior
-        What the view's own particles of the frame before foretell, ideal pixels.
+        Prediction from the view's own particles of the frame before, ideal pixels.
     place : float64 (2,)
-        Where on the ground the target is about, metres.
+        Predicted ground point of the target, metres: the scale of its foot noise in pixels follows from it.
     count
         Number of particles.
 
@@ -32,7 +32,7 @@ class Leaf:
     mapped, covariance : float64 (m, 2), (m, 2, 2)
         The same on the ground, metres, square metres.
     belief, seen : float64 (m,)
-        Weights of the belief before any message, whose sum is 1; and the part of each in which the view sees it.
+        Weights of the belief before any message, whose sum is 1; and the part of each for a visible target.
     """
 
     def __init__(self, look: TargetLikelihood, prior: Prediction, place: Floats, count: int) -> None:
@@ -44,24 +44,24 @@ class Leaf:
         self.covariance = np.zeros((0, 2, 2))
         self.belief = self.seen = np.zeros(0)
 
-    def follow(self, lots: np.random.Generator) -> None:
-        """Particles drawn from the view's own prediction."""
-        self._weigh(self.prior.draw(self.count, lots), np.ones(self.count))
+    def follow(self, rng: np.random.Generator) -> None:
+        """Draw the particles from the view's own prediction."""
+        self._weigh(self.prior.draw(self.count, rng), np.ones(self.count))
 
-    def follow_message(self, ground: Floats, weight: Floats, lots: np.random.Generator) -> None:
-        """Half of the particles there, half where the ground's message sends them: its particles (n, 2) and weights.
+    def follow_message(self, ground: Floats, weight: Floats, rng: np.random.Generator) -> None:
+        """Draw half of the particles from the prediction, half from the message of the ground.
 
-        Each then counts by how much likelier the prior makes it than this way to draw it did.
+        The ground has particles (n, 2) with weights (n,). Importance weights are prior over proposal density.
         """
-        told = self.count // 2
+        proposed = self.count // 2
         pixel = self.look.view.to_pixel(ground)
-        chosen = systematic(weight, told, lots.random())
-        sent = pixel[chosen] + self.noise * lots.standard_normal((told, 2))
-        place = np.concatenate([self.prior.draw(self.count - told, lots), sent])
+        chosen = systematic(weight, proposed, rng.random())
+        drawn = pixel[chosen] + self.noise * rng.standard_normal((proposed, 2))
+        place = np.concatenate([self.prior.draw(self.count - proposed, rng), drawn])
         still = Motion(1.0, self.noise, 0.0)
         message = Prediction(pixel, np.zeros_like(pixel), weight / weight.sum(), np.eye(2), still).density(place)
         prior = self.prior.density(place)
-        share = told / self.count
+        share = proposed / self.count
         self._weigh(place, prior / ((1 - share) * prior + share * message))
 
     def _weigh(self, place: Floats, importance: Floats) -> None:
@@ -74,26 +74,26 @@ class Leaf:
         self.belief = importance * (likelihood + self.look.hidden) / total
         self.seen = importance * likelihood * share / total
 
-    def tie(self, ground: Floats, outlier: Outlier) -> Tie:
-        """Its potential with ground particles (n, 2)."""
-        return Tie.of(ground, self.mapped, self.covariance, outlier)
+    def potential(self, ground: Floats, outlier: Outlier) -> Potential:
+        """The potential between ground particles (n, 2) and this view's."""
+        return Potential.of(ground, self.mapped, self.covariance, outlier)
 
-    def draw_ground(self, chosen: Ints, lots: np.random.Generator) -> Floats:
-        """Ground points of the particles of these indices (k,), float64 (k, 2)."""
-        off = self.noise * lots.standard_normal((len(chosen), 2))
+    def draw_ground(self, chosen: Ints, rng: np.random.Generator) -> Floats:
+        """Ground points drawn around the particles of these indices (k,), float64 (k, 2)."""
+        deviation = self.noise * rng.standard_normal((len(chosen), 2))
         slope = self.look.view.ground_slope(self.place[chosen])
-        return np.asarray(self.mapped[chosen] + np.einsum("kij,kj->ki", slope, off))
+        return np.asarray(self.mapped[chosen] + np.einsum("kij,kj->ki", slope, deviation))
 
-    def settled(self, message: Floats, lots: np.random.Generator) -> Particles:
+    def settled(self, message: Floats, rng: np.random.Generator) -> Particles:
         """The belief after a message (m,) from the ground (Du and Piater 2006, equation 10)."""
         weight = self.belief * message
-        return self.prior.settled(self.place, weight / weight.sum(), lots)
+        return self.prior.settled(self.place, weight / weight.sum(), rng)
 
 
 def arrival(view: StarView, ground: Prediction) -> Particles:
-    """Particles in a view that did not follow the target until now, from what the ground foretells.
+    """Particles in a view that begins to follow the target, from the ground's prediction.
 
-    They stand a frame earlier, as those of other views do.
+    They are of the frame before, as those of other views are.
     """
     earlier = ground.centre - ground.motion.seconds * ground.velocity
     slope = view.pixel_slope(ground.mean)

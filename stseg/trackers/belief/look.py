@@ -16,10 +16,10 @@ from stseg.trackers.belief.view import StarView
 class TargetLikelihood:
     """One target in one view of one frame.
 
-    The likelihood of a place is exp(-k D^2) with D^2 = 1 - sum sqrt(p q), Bhattacharyya's coefficient of the histogram
-    there and the one that was learned, the mean over the parts of the body. What is hidden by somebody nearer, or lies
-    beyond the image, says neither yes nor no: it counts as a distance of `doubt`. Beside all places stands one more
-    case, that the view does not see the target at all, which is as likely as a distance of `doubt`.
+    The likelihood of a place is exp(-k D^2) with D^2 = 1 - sum sqrt(p q), p and q the histogram there
+    and the learned one (the sum is their Bhattacharyya coefficient), averaged over the parts of the body. What a nearer
+    person hides, or lies beyond the image, is uninformative: its D^2 is `belief.neutral_distance`. A target that is not
+    visible at all is a case of its own, of the same D^2.
 
     Attributes
     ----------
@@ -30,11 +30,11 @@ class TargetLikelihood:
     reference : float64 (part, bin)
         The target's colours.
     height
-        The target's, metres.
+        The target's height, metres.
     nearer : float64 (k, 4)
-        Boxes of those who stand in front of the target.
+        Boxes of people in front of the target.
     config
-        What the colours are worth.
+        The constants.
     """
 
     view: StarView

@@ -37,8 +37,8 @@ class Particles:
     @property
     def covariance(self) -> Floats:
         """Covariance of the place, float64 (2, 2)."""
-        off = self.place - self.mean
-        return np.asarray((self.weight * off.T) @ off)
+        deviation = self.place - self.mean
+        return np.asarray((self.weight * deviation.T) @ deviation)
 
 
 @dataclass(frozen=True)
@@ -49,30 +49,30 @@ class Motion:
     ----------
     seconds
         Length of a frame.
-    wander
+    position_noise
         Standard deviation of the place, metres per square root of a second.
-    turn
+    velocity_noise
         Standard deviation of the velocity, metres per second per square root of a second.
     """
 
     seconds: float
-    wander: float
-    turn: float
+    position_noise: float
+    velocity_noise: float
 
     @property
     def place_variance(self) -> float:
         """Variance of the place after a frame, square metres."""
-        return self.wander**2 * self.seconds + self.turn**2 * self.seconds**3 / 3
+        return self.position_noise**2 * self.seconds + self.velocity_noise**2 * self.seconds**3 / 3
 
     @property
     def gain(self) -> float:
         """Regression of the velocity on the place, 1/s: covariance over variance."""
-        return self.turn**2 * self.seconds**2 / 2 / self.place_variance
+        return self.velocity_noise**2 * self.seconds**2 / 2 / self.place_variance
 
     @property
     def velocity_variance(self) -> float:
         """Variance of the velocity given the place, square metres per square second."""
-        return self.turn**2 * self.seconds - self.gain**2 * self.place_variance
+        return self.velocity_noise**2 * self.seconds - self.gain**2 * self.place_variance
 
 
 @dataclass(frozen=True)
@@ -82,11 +82,11 @@ class Prediction:
     Attributes
     ----------
     centre, velocity : float64 (n, 2), weight : float64 (n,)
-        Where the particles' lines lead.
+        Predicted places, velocities and weights of the particles: the Gaussians' centres.
     axes : float64 (2, 2)
-        What a metre along either axis of the ground is in the node's own units; the unit matrix on the ground.
+        Jacobian from ground metres to the node's own units; the unit matrix on the ground.
     motion
-        How far people are off those lines.
+        Process noise: the Gaussians' spread.
     """
 
     centre: Floats
@@ -111,11 +111,11 @@ class Prediction:
         """Mean place, float64 (2,)."""
         return np.asarray(self.weight @ self.centre)
 
-    def draw(self, count: int, lots: np.random.Generator) -> Floats:
+    def draw(self, count: int, rng: np.random.Generator) -> Floats:
         """Places drawn from the mixture, float64 (count, 2)."""
-        chosen = systematic(self.weight, count, lots.random())
-        off = lots.standard_normal((count, 2)) @ self.axes.T
-        return np.asarray(self.centre[chosen] + self.motion.place_variance**0.5 * off)
+        chosen = systematic(self.weight, count, rng.random())
+        deviation = rng.standard_normal((count, 2)) @ self.axes.T
+        return np.asarray(self.centre[chosen] + self.motion.place_variance**0.5 * deviation)
 
     def density(self, place: Floats) -> Floats:
         """Density of the mixture at places (k, 2), float64 (k,)."""
@@ -123,28 +123,28 @@ class Prediction:
         fill_mixture(place, self.centre, self.weight, inverse, scale, filled)
         return filled
 
-    def settled(self, place: Floats, weight: Floats, lots: np.random.Generator) -> Particles:
-        """Particles at places (k, 2) of weights (k,): each goes on from the particle that it most likely came from."""
+    def settled(self, place: Floats, weight: Floats, rng: np.random.Generator) -> Particles:
+        """Particles at places (k, 2) of weights (k,), with velocities drawn given the particles that they came from."""
         inverse, _ = _gaussian(self.covariance)
         origin = np.empty(len(place), np.int64)
-        fill_origin(place, self.centre, self.weight, inverse, lots.random(len(place)), origin)
-        off = lots.standard_normal((len(place), 2)) @ self.axes.T
-        faster = self.motion.gain * (place - self.centre[origin]) + self.motion.velocity_variance**0.5 * off
-        return Particles(place, self.velocity[origin] + faster, weight)
+        fill_origin(place, self.centre, self.weight, inverse, rng.random(len(place)), origin)
+        deviation = rng.standard_normal((len(place), 2)) @ self.axes.T
+        change = self.motion.gain * (place - self.centre[origin]) + self.motion.velocity_variance**0.5 * deviation
+        return Particles(place, self.velocity[origin] + change, weight)
 
 
-def systematic(weight: Floats, count: int, lot: float) -> Ints:
-    """Indices drawn by weight: systematic resampling with one random number of 0..1; int64 (count,)."""
-    ladder = np.cumsum(weight)
-    steps = (np.arange(count) + lot) / count * ladder[-1]
-    return np.asarray(np.minimum(np.searchsorted(ladder, steps, side="right"), len(weight) - 1), np.int64)
+def systematic(weight: Floats, count: int, offset: float) -> Ints:
+    """Indices drawn by weight: systematic resampling with one random offset, 0..1; int64 (count,)."""
+    cumulative = np.cumsum(weight)
+    steps = (np.arange(count) + offset) / count * cumulative[-1]
+    return np.asarray(np.minimum(np.searchsorted(cumulative, steps, side="right"), len(weight) - 1), np.int64)
 
 
 def _gaussian(covariance: Floats) -> tuple[Floats, float]:
     """xx, xy, yy of the inverse, float64 (3,), and the density at the centre."""
     (a, b), (_, d) = covariance
-    area = a * d - b * b
-    return np.array([d, -b, a]) / area, float(0.5 / np.pi / np.sqrt(area))
+    determinant = a * d - b * b
+    return np.array([d, -b, a]) / determinant, float(0.5 / np.pi / np.sqrt(determinant))
 
 
 @kernel
@@ -162,13 +162,13 @@ def fill_mixture(
 
 @kernel
 def fill_origin(
-    place: Floats, centre: Floats, weight: Floats, inverse: Floats, lot: Floats, origin: Ints
+    place: Floats, centre: Floats, weight: Floats, inverse: Floats, uniform: Floats, origin: Ints
 ) -> None:  # fmt: skip
     """Fill (k,) with one Gaussian each, drawn by its density at the place with random numbers (k,).
 
     The exponents are taken relative to the least, so that places far from all Gaussians select the nearest.
     """
-    square, ladder = np.empty(len(centre)), np.empty(len(centre))
+    square, cumulative = np.empty(len(centre)), np.empty(len(centre))
     for i in range(len(place)):
         least, total = np.inf, 0.0
         for r in range(len(centre)):
@@ -178,7 +178,7 @@ def fill_origin(
                 least = min(least, square[r])
         for r in range(len(centre)):
             total += weight[r] * np.exp(-0.5 * (square[r] - least)) if weight[r] > 0.0 else 0.0
-            ladder[r] = total
+            cumulative[r] = total
         origin[i] = 0
-        while origin[i] < len(centre) - 1 and ladder[origin[i]] <= lot[i] * total:
+        while origin[i] < len(centre) - 1 and cumulative[origin[i]] <= uniform[i] * total:
             origin[i] += 1

@@ -5,8 +5,8 @@ Gamma_m = s^2 J_m J_m^T, J_m the Jacobian of H^-1 at x_m,
 
     psi_nm = (1 - lambda) N(g_n; H^-1 x_m, Gamma_m) + lambda N(g_n; mu, Lambda)
 
-A view's weights a_m tell how far it sees the target at x_m; what is left of 1 is that it does not see it at all. That
-part says nothing of where the target is: it is flat. So a view that sees nothing sends a flat message.
+A view's weights a_m are the probabilities that it sees the target at x_m; the remainder to 1 is the probability that it
+does not see the target at all. That part of the message is flat. So a view that sees nothing sends a flat message.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from stseg.arrays import Floats
 
 @dataclass(frozen=True)
 class Outlier:
-    """The outlier term of eq. 12: a target that is not where the view believes.
+    """The outlier term of eq. 12: the target is not where the view's belief is.
 
     Attributes
     ----------
@@ -49,8 +49,8 @@ class Outlier:
 
 
 @dataclass(frozen=True)
-class Tie:
-    """All pairs of a ground particle and a view's particle.
+class Potential:
+    """The potential psi between ground particles and a view's particles.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class Tie:
     stray : float64 (n,)
         The outlier term's density at each ground particle.
     outlier
-        That term.
+        The outlier term.
     """
 
     inlier: Floats
@@ -67,7 +67,7 @@ class Tie:
     outlier: Outlier
 
     @classmethod
-    def of(cls, ground: Floats, mapped: Floats, covariance: Floats, outlier: Outlier) -> Tie:
+    def of(cls, ground: Floats, mapped: Floats, covariance: Floats, outlier: Outlier) -> Potential:
         """Between ground particles (n, 2) and those of a view, mapped (m, 2), with covariances (m, 2, 2), metres."""
         inlier = np.empty((len(ground), len(mapped)))
         fill_inlier(ground, mapped, covariance, inlier)
@@ -75,9 +75,9 @@ class Tie:
 
     def to_ground(self, seen: Floats) -> Floats:
         """Message from the view to each ground particle, float64 (n,); seen (m,) are its weights a."""
-        share, through = self.outlier.share, float(seen.sum())
-        told = (1 - share) * (self.inlier @ seen) + share * through * self.stray
-        return np.asarray(told + (1 - through) * self.outlier.flat)
+        share, visible = self.outlier.share, float(seen.sum())
+        message = (1 - share) * (self.inlier @ seen) + share * visible * self.stray
+        return np.asarray(message + (1 - visible) * self.outlier.flat)
 
     def to_view(self, weight: Floats) -> Floats:
         """Message from the ground, whose particles weigh (n,), to each particle of the view, float64 (m,)."""
@@ -90,8 +90,8 @@ def fill_inlier(ground: Floats, mapped: Floats, covariance: Floats, inlier: Floa
     """Fill (n, m) with the density at ground (n, 2) of Gaussians at mapped (m, 2) with covariance (m, 2, 2)."""
     for m in range(len(mapped)):
         a, b, d = covariance[m, 0, 0], covariance[m, 0, 1], covariance[m, 1, 1]
-        area = a * d - b * b
-        scale = 0.5 / np.pi / np.sqrt(area)
+        determinant = a * d - b * b
+        scale = 0.5 / np.pi / np.sqrt(determinant)
         for n in range(len(ground)):
             x, y = ground[n, 0] - mapped[m, 0], ground[n, 1] - mapped[m, 1]
-            inlier[n, m] = scale * np.exp(-0.5 * (d * x * x - 2.0 * b * x * y + a * y * y) / area)
+            inlier[n, m] = scale * np.exp(-0.5 * (d * x * x - 2.0 * b * x * y + a * y * y) / determinant)

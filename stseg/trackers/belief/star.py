@@ -1,13 +1,13 @@
 """Belief propagation on a target's star graph, the ground and a leaf for each view (Du and Piater 2006, section 3.1).
 
-The graph is a tree, on which two rounds would do; with particles a few more bring them to where the belief is. A
+The graph is a tree, on which two rounds would do; further rounds move the particles to where the belief is. A
 round passes messages up, from the views to the ground (eq. 8), and down (eq. 9):
 
     m_0j(g) = sum_m a_jm psi_j(g, x_jm)                  a_jm ~ p_j(z | x_jm) prior_j(x_jm) / q_j(x_jm)
     m_j0(x) = sum_n c_jn psi_j(g_n, x)                   c_jn ~ prior_0(g_n) / q_0(g_n) e(g_n) prod_(l != j) m_0l(g_n)
 
-with q the density that particles were drawn from, half from their own prior and half from the other side's messages of
-the round before, and e the messages of other targets (`exclusion`). Beliefs are (eqs 10, 11)
+with q the proposal density, half the node's own prior and half the messages from the other side in the round before,
+and e the messages of other targets (`exclusion`). Beliefs are (eqs 10, 11)
 
     b_j(x_jm) ~ a_jm m_j0(x_jm)                          b_0(g_n) ~ prior_0(g_n) / q_0(g_n) e(g_n) prod_l m_0l(g_n)
 
@@ -27,7 +27,7 @@ from stseg.trackers.belief.exclusion import exclusion
 from stseg.trackers.belief.leaf import Leaf, arrival
 from stseg.trackers.belief.look import TargetLikelihood
 from stseg.trackers.belief.particles import Motion, Particles, Prediction, systematic
-from stseg.trackers.belief.potential import Outlier, Tie
+from stseg.trackers.belief.potential import Outlier, Potential
 from stseg.trackers.belief.view import StarView
 
 LEAST_ROUNDS = 2
@@ -44,20 +44,20 @@ class Star:
         Metres.
     views
         Ideal pixels; None where a view does not follow the target.
-    sight : float64 (view,)
-        How surely each view sees it, 0..1.
+    visibility : float64 (view,)
+        Probability that each view sees it.
     """
 
     ground: Particles
     views: tuple[Particles | None, ...]
-    sight: Floats
+    visibility: Floats
 
-    def place(self, j: int, view: StarView, foretold: Prediction) -> Floats:
-        """Prediction of view j if it has one, else of the ground, metres, float64 (2,)."""
+    def place(self, j: int, view: StarView, prediction: Prediction) -> Floats:
+        """Place predicted by view j if it follows the target, else by the ground, metres, float64 (2,)."""
         own = self.views[j]
         if own is None:
-            return foretold.mean
-        next_pixel = own.mean + foretold.motion.seconds * own.weight @ own.velocity
+            return prediction.mean
+        next_pixel = own.mean + prediction.motion.seconds * own.weight @ own.velocity
         return np.asarray(view.to_ground(next_pixel[None])[0])
 
 
@@ -67,13 +67,13 @@ class Rounds:
     Parameters
     ----------
     star
-        The frame before.
+        Beliefs of the frame before.
     looks
-        What each view shows; None where it cannot show the target, which is a flat message.
+        Colour likelihood in each view; None where it cannot show the target, which is a flat message.
     motion, config
-        How people walk, and the constants.
-    lots
-        Where chance comes from.
+        Motion model, and the constants.
+    rng
+        Random numbers.
     """
 
     def __init__(
@@ -82,18 +82,18 @@ class Rounds:
         looks: Sequence[TargetLikelihood | None],
         motion: Motion,
         config: BeliefConfig,
-        lots: np.random.Generator,
+        rng: np.random.Generator,
     ) -> None:
-        self.config, self.lots, self.done = config, lots, 0
+        self.config, self.rng, self.done = config, rng, 0
         self.prior = Prediction.of(star.ground, np.eye(2), motion)
         self.outlier = Outlier(config.outlier_rate, self.prior.mean, config.outlier_spread)
         self.leaves = grow(star, looks, self.prior, config.particles)
-        self.ground = self.prior.draw(config.particles, lots)
+        self.ground = self.prior.draw(config.particles, rng)
         self.weight = np.full(config.particles, 1 / config.particles)
-        self.to_ground, self.to_view = self._silence(), self._silence()
-        self.ties: list[Tie | None] = []
+        self.to_ground, self.to_view = self._flat_messages(), self._flat_messages()
+        self.potentials: list[Potential | None] = []
 
-    def _silence(self) -> list[Floats]:
+    def _flat_messages(self) -> list[Floats]:
         return [np.ones(self.config.particles) for _ in self.leaves]
 
     @property
@@ -106,15 +106,15 @@ class Rounds:
         before = self.belief.mean
         for leaf, rest in zip(self.leaves, self.to_view, strict=True):
             if leaf and self.done:
-                leaf.follow_message(self.ground, rest, self.lots)
+                leaf.follow_message(self.ground, rest, self.rng)
             elif leaf:
-                leaf.follow(self.lots)
-        self.ground, told = self._drawn()
-        self.ties = [leaf.tie(self.ground, self.outlier) if leaf else None for leaf in self.leaves]
-        alone = self._importance(told) * exclusion(self.ground, others, self.config.minimum_distance)
+                leaf.follow(self.rng)
+        self.ground, proposed = self._drawn()
+        self.potentials = [leaf.potential(self.ground, self.outlier) if leaf else None for leaf in self.leaves]
+        alone = self._importance(proposed) * exclusion(self.ground, others, self.config.minimum_distance)
         self.to_ground = [
-            tie.to_ground(leaf.seen) if leaf and tie else np.full(len(self.ground), self.outlier.flat)
-            for leaf, tie in zip(self.leaves, self.ties, strict=True)
+            potential.to_ground(leaf.seen) if leaf and potential else np.full(len(self.ground), self.outlier.flat)
+            for leaf, potential in zip(self.leaves, self.potentials, strict=True)
         ]
         self.to_view = [self._product(alone, j) for j in range(len(self.leaves))]
         self.weight = self._product(alone, -1)
@@ -122,30 +122,30 @@ class Rounds:
         return float(np.hypot(*(self.belief.mean - before)))
 
     def _drawn(self) -> tuple[Floats, int]:
-        """Ground particles, the last of them where views send them, and how many those are."""
+        """Ground particles, the last of them drawn from the views' messages, and the number of those."""
         count, seen = self.config.particles, [leaf.seen if leaf else np.zeros(0) for leaf in self.leaves]
-        told = count // 2 if sum(float(s.sum()) for s in seen) > 0 else 0
-        parts = [self.prior.draw(count - told, self.lots)]
-        if told:
-            chosen = systematic(np.concatenate(seen), told, self.lots.random())
+        proposed = count // 2 if sum(float(s.sum()) for s in seen) > 0 else 0
+        parts = [self.prior.draw(count - proposed, self.rng)]
+        if proposed:
+            chosen = systematic(np.concatenate(seen), proposed, self.rng.random())
             starts = np.cumsum([0, *(len(s) for s in seen)])
             for leaf, start, stop in zip(self.leaves, starts[:-1], starts[1:], strict=True):
                 own = chosen[(chosen >= start) & (chosen < stop)] - start
                 if leaf and len(own):
-                    parts.append(leaf.draw_ground(own, self.lots))
-        return np.concatenate(parts), told
+                    parts.append(leaf.draw_ground(own, self.rng))
+        return np.concatenate(parts), proposed
 
-    def _importance(self, told: int) -> Floats:
-        """How much likelier the prior makes each ground particle than the way it was drawn, float64 (n,)."""
-        prior, share = self.prior.density(self.ground), told / self.config.particles
-        if not told:
+    def _importance(self, proposed: int) -> Floats:
+        """Importance weight of each ground particle: prior over proposal density, float64 (n,)."""
+        prior, share = self.prior.density(self.ground), proposed / self.config.particles
+        if not proposed:
             return np.ones(len(prior))
-        pairs = [(tie, leaf.seen) for leaf, tie in zip(self.leaves, self.ties, strict=True) if leaf and tie]
-        sent = sum(tie.inlier @ seen for tie, seen in pairs) / sum(float(seen.sum()) for _, seen in pairs)
-        return np.asarray(prior / ((1 - share) * prior + share * sent))
+        pairs = [(psi, leaf.seen) for leaf, psi in zip(self.leaves, self.potentials, strict=True) if leaf and psi]
+        message = sum(psi.inlier @ seen for psi, seen in pairs) / sum(float(seen.sum()) for _, seen in pairs)
+        return np.asarray(prior / ((1 - share) * prior + share * message))
 
     def _product(self, alone: Floats, without: int) -> Floats:
-        """Weights of the ground's particles by all messages but one view's; their sum is 1."""
+        """Weights of the ground particles by all messages but that of view `without` (-1: by all); their sum is 1."""
         kept = [message for j, message in enumerate(self.to_ground) if j != without]
         log = np.log(np.maximum(alone, 1e-300)) + sum(np.log(message) for message in kept)
         weight = np.exp(log - log.max())
@@ -153,13 +153,13 @@ class Rounds:
 
     def settled(self) -> Star:
         """The beliefs of the frame."""
-        views, sight = [], np.zeros(len(self.leaves))
-        for j, (leaf, tie, rest) in enumerate(zip(self.leaves, self.ties, self.to_view, strict=True)):
-            views.append(leaf.settled(tie.to_view(rest), self.lots) if leaf and tie else None)
-            if leaf and tie:
-                through = (1 - self.outlier.share) * (self.weight @ (tie.inlier @ leaf.seen))
-                sight[j] = through / (self.weight @ self.to_ground[j])
-        return Star(self.prior.settled(self.ground, self.weight, self.lots), tuple(views), sight)
+        views, visibility = [], np.zeros(len(self.leaves))
+        for j, (leaf, potential, rest) in enumerate(zip(self.leaves, self.potentials, self.to_view, strict=True)):
+            views.append(leaf.settled(potential.to_view(rest), self.rng) if leaf and potential else None)
+            if leaf and potential:
+                visible = (1 - self.outlier.share) * (self.weight @ (potential.inlier @ leaf.seen))
+                visibility[j] = visible / (self.weight @ self.to_ground[j])
+        return Star(self.prior.settled(self.ground, self.weight, self.rng), tuple(views), visibility)
 
 
 def grow(star: Star, looks: Sequence[TargetLikelihood | None], ground: Prediction, count: int) -> list[Leaf | None]:
@@ -180,19 +180,21 @@ def propagate(
     looks: Sequence[Sequence[TargetLikelihood | None]],
     motion: Motion,
     config: BeliefConfig,
-    lots: Sequence[np.random.Generator],
+    rngs: Sequence[np.random.Generator],
 ) -> list[Star]:
-    """One frame of all targets: rounds until each one's ground moves by less than `config.settled`.
+    """One frame of all targets: rounds until the mean of each moves by less than `config.convergence_distance`.
 
-    In a round every target hears where the others believed to be in the round before, so their order does not matter.
+    A round uses the other targets' beliefs of the round before, so the order of targets does not matter.
     """
-    targets = [Rounds(star, seen, motion, config, lot) for star, seen, lot in zip(stars, looks, lots, strict=True)]
-    open_still = list(range(len(targets)))
+    targets = [Rounds(star, seen, motion, config, rng) for star, seen, rng in zip(stars, looks, rngs, strict=True)]
+    unconverged = list(range(len(targets)))
     for done in range(1, config.iterations + 1):
-        heard = [target.belief for target in targets]
-        moved = [targets[k].advance([*heard[:k], *heard[k + 1 :]]) for k in open_still]
+        beliefs = [target.belief for target in targets]
+        shifts = [targets[k].advance([*beliefs[:k], *beliefs[k + 1 :]]) for k in unconverged]
         if done >= LEAST_ROUNDS:
-            open_still = [k for k, way in zip(open_still, moved, strict=True) if way > config.convergence_distance]
-        if not open_still:
+            unconverged = [
+                k for k, shift in zip(unconverged, shifts, strict=True) if shift > config.convergence_distance
+            ]
+        if not unconverged:
             break
     return [target.settled() for target in targets]

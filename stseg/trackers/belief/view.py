@@ -18,24 +18,24 @@ _NOWHERE = 1e6
 class StarView:
     """One view.
 
-    States in it are pixels of the ideal image, in which the homography is exact; boxes are pixels of the real one.
+    Particles in it are pixels of the ideal image, in which the homography is exact; boxes are pixels of the real one.
 
     Attributes
     ----------
     camera
         The view.
     table
-        Its boxes of people.
+        Boxes of people in it.
     inverse : float64 (3, 3)
         Homography from ideal pixels to the ground.
-    eye : float64 (2,)
-        The camera's place over the ground, metres.
+    centre : float64 (2,)
+        Ground point below the camera, metres.
     """
 
     camera: Camera
     table: BodyTable
     inverse: Floats
-    eye: Floats
+    centre: Floats
 
     @classmethod
     def of(cls, camera: Camera, grid: Grid) -> StarView:
@@ -72,7 +72,7 @@ class StarView:
         return self.table.boxes_of(ground, np.full(len(ground), height))
 
     def shows(self, ground: Floats, height: float, share: float) -> bool:
-        """Whether at least a share of the box of somebody at one ground point (2,) lies within the image."""
+        """Whether at least a share of the box of a person at one ground point (2,) lies within the image."""
         left, top, right, bottom = self.boxes(ground[None], height)[0]
         width, tall = self.camera.size
         wide, high = min(right, width) - max(left, 0.0), min(bottom, tall) - max(top, 0.0)
