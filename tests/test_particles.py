@@ -20,13 +20,13 @@ from stseg.trackers import Commit, FrameObservations, FusedFrame
 from stseg.trackers.colour_views import colour_views
 from stseg.trackers.particles import ParticleTracker
 from stseg.trackers.particles.appearance import SAMPLES, Appearance
-from stseg.trackers.particles.axes import HELD, _middle_of_shortest_half, fill_axes, meet
+from stseg.trackers.particles.axes import HYPOTHESIS_WEIGHT, _middle_of_shortest_half, fill_axes, intersect_axes
 from stseg.trackers.particles.bodies import HALF_WIDTH, PARTS, fill_bodies, fill_boxes
 from stseg.trackers.particles.colours import BINS, FALL, bins_of, fill_density, histogram, normalised
 from stseg.trackers.particles.filter import estimate, resampled, weights
-from stseg.trackers.particles.likelihood import ORDINARY, add_misfit
+from stseg.trackers.particles.likelihood import NEUTRAL, add_misfit
 from stseg.trackers.particles.search import search
-from stseg.trackers.particles.segmentation import STRANGER, Canvas, fill_open, segment
+from stseg.trackers.particles.segmentation import UNASSIGNED, Canvas, fill_unoccluded, segment
 from stseg.trackers.particles.views import ParticleView
 
 RIG = room()
@@ -138,7 +138,7 @@ def test_segmentation_is_equations_2_to_4(standing: Floats) -> None:
         assert canvas.label[v, u] == label or share == pytest.approx(0.5, abs=0.05)
         if label >= 0:
             assert canvas.best[v, u] / (canvas.total[v, u] + canvas.free[v, u]) == pytest.approx(share, abs=1e-3)
-    assert (canvas.label[foreground == 0] == STRANGER).all()
+    assert (canvas.label[foreground == 0] == UNASSIGNED).all()
 
 
 def test_boxes_hold_all_that_a_body_may_cover() -> None:
@@ -167,13 +167,13 @@ def test_what_is_open_is_in_front() -> None:
     ideal = raster(CAMERA, 2)
     bodies, shape = bodies_of(CAMERA, standing), ideal.shape[:2]
     owner, lone, free = (
-        np.full(shape, STRANGER, np.int32),
-        np.full(shape, STRANGER, np.int32),
+        np.full(shape, UNASSIGNED, np.int32),
+        np.full(shape, UNASSIGNED, np.int32),
         np.zeros(shape, np.float32),
     )
     seen, alone, boxes = np.zeros(2, np.int64), np.zeros(1, np.int64), plain.boxes_everywhere(2, shape)
-    fill_open(bodies, np.array([0, 1]), boxes, ideal, HALF_WIDTH, PARTS, free, owner, seen)
-    fill_open(bodies[1:], np.array([0]), boxes[:1], ideal, HALF_WIDTH, PARTS, free, lone, alone)
+    fill_unoccluded(bodies, np.array([0, 1]), boxes, ideal, HALF_WIDTH, PARTS, free, owner, seen)
+    fill_unoccluded(bodies[1:], np.array([0]), boxes[:1], ideal, HALF_WIDTH, PARTS, free, lone, alone)
     assert seen[1] < 0.6 * alone[0]
     behind = owner // len(PARTS) == 1
     assert behind.sum() < (lone >= 0).sum()
@@ -225,9 +225,9 @@ def test_axes_meet_as_equation_5_says(seed: int, views: int) -> None:
     axes = np.stack([np.cos(angle), np.sin(angle), rng.normal(0, 1, (views, 2)), rng.uniform(0, 1, (views, 2))], -1)
     before = rng.normal(0, 1, (2, 2))
     ground = before.copy()
-    farthest = meet(axes, HELD, ground)
+    farthest = intersect_axes(axes, HYPOTHESIS_WEIGHT, ground)
     for k in range(2):
-        np.testing.assert_allclose(ground[k], plain.meeting(axes[:, k], HELD, before[k]), atol=1e-9)
+        np.testing.assert_allclose(ground[k], plain.meeting(axes[:, k], HYPOTHESIS_WEIGHT, before[k]), atol=1e-9)
     assert farthest == pytest.approx(np.hypot(*(ground - before).T).max())
 
 
@@ -247,7 +247,7 @@ def test_misfit_is_equations_6_and_7(standing: Floats) -> None:
         bodies, np.argsort(bodies[:, 4]), plain.boxes_everywhere(3, shape), ideal, bins, reference, areas, HALF_WIDTH,
         PARTS, np.zeros(shape, np.float32), counts, misfit,
     )  # fmt: skip
-    expected = plain.misfit(CAMERA, standing[:, :2], standing[:, 2], ideal, bins, reference, areas, ORDINARY)
+    expected = plain.misfit(CAMERA, standing[:, :2], standing[:, 2], ideal, bins, reference, areas, NEUTRAL)
     np.testing.assert_allclose(misfit, expected, atol=1e-6)
 
 
@@ -326,18 +326,18 @@ def test_the_search_goes_to_the_person_from_beside() -> None:
     for part in range(len(PARTS)):
         appearance = appearance.learned(part, shirt, 0.0, rng)
     beside = standing[:, :2] + np.array([[0.25, -0.15]])
-    looks = [
-        view.look(seen, beside, standing[:, 2], [appearance], np.array([0.6]))
+    frames = [
+        view.prepare(seen, beside, standing[:, 2], [appearance], np.array([0.6]))
         for view, seen in zip(views, colour, strict=True)
         if seen is not None
     ]
     for median in (False, True):
-        reached = search(looks, beside, 5, median)
+        reached = search(frames, beside, 5, median)
         assert np.hypot(*(reached - standing[:, :2]).T).max() < 0.06
     wrong, right = np.zeros(1), np.zeros(1)
-    for look in looks:
-        look.add_misfit(beside, appearance.reference[None], wrong)
-        look.add_misfit(standing[:, :2], appearance.reference[None], right)
+    for frame in frames:
+        frame.add_misfit(beside, appearance.reference[None], wrong)
+        frame.add_misfit(standing[:, :2], appearance.reference[None], right)
     assert right[0] < wrong[0]
 
 
@@ -392,7 +392,7 @@ def test_one_camera_in_colour_is_enough_and_blind_frames_are_borne() -> None:
 
 
 def test_settings_out_of_range_are_refused() -> None:
-    for bad in ({"count": 0}, {"wander": 0.0}, {"seed": -1}, {"patience": -1.0}):
+    for bad in ({"particles": 0}, {"velocity_spread": 0.0}, {"seed": -1}, {"patience": -1.0}):
         with pytest.raises(ConfigError):
             ParticleConfig(**bad)
 
@@ -404,10 +404,10 @@ def test_a_lens_bends_the_raster_not_the_people() -> None:
     silhouette = (mask(camera, standing) / np.float32(255)).astype(np.float32)
     seen = colour_views(FrameObservations([painted(camera, standing)], [silhouette]), "particles", 0)[0]
     assert seen is not None
-    look, axes = (
-        view.look(seen, standing[:, :2], standing[:, 2], [Appearance.unknown()], np.array([0.3])),
+    frame, axes = (
+        view.prepare(seen, standing[:, :2], standing[:, 2], [Appearance.unknown()], np.array([0.3])),
         np.zeros((1, 4)),
     )
-    look.fill_axes(standing[:, :2], True, axes)
+    frame.fill_axes(standing[:, :2], True, axes)
     assert abs(axes[0, :3] @ np.append(standing[0, :2], 1.0)) < 0.05
     assert axes[0, 3] > 0.5

@@ -12,7 +12,7 @@ from stseg.trackers.particles.colours import histogram
 
 SAMPLES = 120
 """Colours kept of each part: N_M of eq. 1."""
-_FEW = 20
+_FEWEST = 20
 """A part with fewer samples has no model yet."""
 
 
@@ -23,11 +23,11 @@ class Appearance:
     Attributes
     ----------
     samples : uint8 (part, SAMPLES, 3)
-        As `colours.normalised` has them.
+        As `colours.normalised` returns them.
     counts : int64 (part,)
-        How many of them there are.
+        Number of valid samples of each part.
     reference : float64 (part, bin)
-        q* of eq. 7: their histograms; 0 where too few are known.
+        q* of eq. 7: their histograms; 0 where there are too few samples.
     """
 
     samples: Bytes
@@ -43,11 +43,11 @@ class Appearance:
 
     @property
     def known(self) -> Ints:
-        """How many samples of each part may be used, int64 (part,)."""
-        return np.where(self.counts >= _FEW, self.counts, 0)
+        """Number of usable samples of each part, int64 (part,); 0 for a part without a model."""
+        return np.where(self.counts >= _FEWEST, self.counts, 0)
 
     def learned(self, part: int, colour: Bytes, share: float, rng: np.random.Generator) -> Appearance:
-        """With new colours, uint8 (n, 3), of a part: fills the buffer, then renews this fraction of it."""
+        """With new colours, uint8 (n, 3), of a part: they fill the buffer, and replace a share of a full one."""
         samples, counts, reference = self.samples.copy(), self.counts.copy(), self.reference.copy()
         room = SAMPLES - int(counts[part])
         wanted = room if room else rng.binomial(SAMPLES, share)
@@ -55,5 +55,5 @@ class Appearance:
         where = counts[part] + np.arange(len(fresh)) if room else rng.permutation(SAMPLES)[: len(fresh)]
         samples[part, where] = fresh
         counts[part] += len(fresh) if room else 0
-        reference[part] = histogram(samples[part, : counts[part]] if counts[part] >= _FEW else fresh[:0])
+        reference[part] = histogram(samples[part, : counts[part]] if counts[part] >= _FEWEST else fresh[:0])
         return Appearance(samples, counts, reference)

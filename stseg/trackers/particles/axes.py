@@ -1,4 +1,4 @@
-"""The central vertical axes of segmented people, and where they meet on the ground (Kim and Davis 2006, section 3.3).
+"""Central vertical axes of segmented people, and their intersection on the ground (Kim and Davis 2006, section 3.3).
 
 A person's pixels lie on both sides of the image of the vertical through their ground point. The paper fits a free line
 to them. Here the direction is known: all verticals of a view meet in its vertical vanishing point
@@ -6,11 +6,11 @@ to them. Here the direction is known: all verticals of a view meet in its vertic
 direction: their mean (least squares), or the middle of the shortest interval that holds half of them (the least
 median of squares of one parameter), which ignores an arm or unassigned pixels.
 
-The axes of all views, brought to the ground as lines a x + b y + c = 0 with a^2 + b^2 = 1, meet at
+The axes of all views, mapped to the ground as lines a x + b y + c = 0 with a^2 + b^2 = 1, intersect at
 
     argmin over (x, y)  sum_i  w_i^2 (a_i x + b_i y + c_i)^2      (Kim and Davis 2006, equation 5)
 
-with the share of the body that was segmented, times how sure its pixels are, for w_i.
+with w_i the sum of the posterior probabilities of the segmented pixels, relative to the body's area.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from stseg.accelerate import kernel
 from stseg.arrays import Floats, Ints, Singles
 from stseg.trackers.particles.segmentation import Canvas
 
-HELD = 0.15
-"""Weight w of the hypothesis itself in eq. 5: it decides where nothing is segmented, and along parallel axes."""
+HYPOTHESIS_WEIGHT = 0.15
+"""Weight w of the hypothesis itself in eq. 5: a prior where nothing is segmented, and along parallel axes."""
 
 
 @kernel
@@ -37,17 +37,17 @@ def fill_axes(
     Parameters
     ----------
     bodies, boxes, ideal, canvas
-        As `segmentation.segment` took and left them.
+        Arguments of `segmentation.segment`, after the call.
     step
         Pixels of the image to a pixel of the raster.
     widths
         Mean width of a body, relative to its length.
     ground, vertical
-        The camera's.
+        The camera's homography and vertical.
     median
         Least median of squares; else least squares.
     distances : float64 (v * u,)
-        Room.
+        Scratch buffer.
     axes : float64 (n, 4)
         Filled with a, b and c of the axis on the ground, and w; all 0 where nothing is segmented.
     """
@@ -57,30 +57,30 @@ def fill_axes(
         for v in range(boxes[k, 0], boxes[k, 1]):
             for u in range(boxes[k, 2], boxes[k, 3]):
                 if canvas.label[v, u] == k:
-                    sure = canvas.best[v, u] / (canvas.total[v, u] + canvas.free[v, u])
-                    mass += sure
-                    mean_u += sure * ideal[v, u, 0]
-                    mean_v += sure * ideal[v, u, 1]
+                    probability = canvas.best[v, u] / (canvas.total[v, u] + canvas.free[v, u])
+                    mass += probability
+                    mean_u += probability * ideal[v, u, 0]
+                    mean_v += probability * ideal[v, u, 1]
                     count += 1
         if count < 3:
             continue
         mean_u, mean_v = mean_u / mass, mean_v / mass
-        way_u, way_v = vertical[0] - vertical[2] * mean_u, vertical[1] - vertical[2] * mean_v
-        length = math.hypot(way_u, way_v)
+        direction_u, direction_v = vertical[0] - vertical[2] * mean_u, vertical[1] - vertical[2] * mean_v
+        length = math.hypot(direction_u, direction_v)
         if length == 0.0:
             continue
-        way_u, way_v = way_u / length, way_v / length
+        direction_u, direction_v = direction_u / length, direction_v / length
         if median:
             n = 0
             for v in range(boxes[k, 0], boxes[k, 1]):
                 for u in range(boxes[k, 2], boxes[k, 3]):
                     if canvas.label[v, u] == k:
-                        distances[n] = (ideal[v, u, 0] - mean_u) * way_v - (ideal[v, u, 1] - mean_v) * way_u
+                        distances[n] = (ideal[v, u, 0] - mean_u) * direction_v - (ideal[v, u, 1] - mean_v) * direction_u
                         n += 1
             shift = _middle_of_shortest_half(distances[:n])
-            mean_u, mean_v = mean_u + shift * way_v, mean_v - shift * way_u
-        # The image line through the place and along the way, and what it is on the ground.
-        line_a, line_b = way_v, -way_u
+            mean_u, mean_v = mean_u + shift * direction_v, mean_v - shift * direction_u
+        # The image line through the mean along the vertical, mapped to the ground by the transposed homography.
+        line_a, line_b = direction_v, -direction_u
         line_c = -(line_a * mean_u + line_b * mean_v)
         a = ground[0, 0] * line_a + ground[1, 0] * line_b + ground[2, 0] * line_c
         b = ground[0, 1] * line_a + ground[1, 1] * line_b + ground[2, 1] * line_c
@@ -107,11 +107,11 @@ def _middle_of_shortest_half(distances: Floats) -> float:
 
 
 @kernel
-def meet(axes: Floats, held: float, ground: Floats) -> float:
-    """Move people (n, 2) to where their axes (view, n, 4) meet; how far the farthest moved, metres."""
+def intersect_axes(axes: Floats, hypothesis_weight: float, ground: Floats) -> float:
+    """Move people (n, 2) to the intersection of their axes (view, n, 4); returns the largest shift, metres."""
     farthest = 0.0
     for k in range(len(ground)):
-        xx, xy, yy = held * held, 0.0, held * held
+        xx, xy, yy = hypothesis_weight * hypothesis_weight, 0.0, hypothesis_weight * hypothesis_weight
         x, y = xx * ground[k, 0], yy * ground[k, 1]
         for view in range(len(axes)):
             a, b, c, w = axes[view, k, 0], axes[view, k, 1], axes[view, k, 2], axes[view, k, 3]

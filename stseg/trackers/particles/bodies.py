@@ -24,7 +24,7 @@ PARTS = np.array([0.47, 0.84, 10.0])
 _ADULT = 1.70
 _LEVELS = 32
 HALF_WIDTH = np.interp((np.arange(_LEVELS) + 0.5) / _LEVELS, PROFILE[:, 0], PROFILE[:, 1] / _ADULT)
-"""W by the relative height, float64 (level,)."""
+"""W by relative height, float64 (level,)."""
 LOOSENESS = 0.025
 """Scale of the logistic distribution of W: clothes, strides, and the error of a foreground's edge."""
 REACH = 6 * LOOSENESS + float(HALF_WIDTH.max())
@@ -33,11 +33,11 @@ REACH = 6 * LOOSENESS + float(HALF_WIDTH.max())
 
 @part
 def placed(body: Floats, u: float, v: float) -> tuple[float, float]:
-    """h and w of a pixel."""
-    away_u, away_v = u - body[0], v - body[1]
+    """h and w of a pixel in the body's frame."""
+    offset_u, offset_v = u - body[0], v - body[1]
     length = body[2] * body[2] + body[3] * body[3]
-    along = (away_u * body[2] + away_v * body[3]) / length
-    return along, abs(away_u * body[3] - away_v * body[2]) / length
+    along = (offset_u * body[2] + offset_v * body[3]) / length
+    return along, abs(offset_u * body[3] - offset_v * body[2]) / length
 
 
 @part
@@ -61,9 +61,9 @@ def part_at(along: float, parts: Floats) -> int:
 
 @kernel
 def fill_bodies(projection: Floats, centre: Floats, ground: Floats, height: Floats, bodies: Floats) -> None:
-    """Fill bodies (n, 5): u and v of the feet, the way to the head, pixels without lens, and the distance, metres.
+    """Fill bodies (n, 5): u and v of the feet, the vector to the head, undistorted pixels, and the distance, metres.
 
-    Who is behind the camera has a distance of inf and is nowhere.
+    A person behind the camera has a distance of inf and no extent.
     """
     for k in range(len(ground)):
         x, y = ground[k, 0], ground[k, 1]
@@ -83,9 +83,9 @@ def fill_boxes(ideal: Singles, bodies: Floats, margin: Floats, boxes: Ints) -> N
     Parameters
     ----------
     ideal : float32 (v, u, 2)
-        Where each pixel of the raster would be without lens.
+        Undistorted coordinates of each pixel of the raster.
     margin : float64 (n,)
-        How much farther than REACH, relative to the body's length: how far the body may yet move.
+        Search margin beyond REACH, relative to the body's length.
     """
     for k in range(len(bodies)):
         boxes[k, 0], boxes[k, 1], boxes[k, 2], boxes[k, 3] = ideal.shape[0], 0, ideal.shape[1], 0

@@ -15,13 +15,13 @@ from stseg.accelerate import kernel
 from stseg.arrays import Bytes, Floats, Ints, Singles
 
 CHROMA_FIRST, CHROMA_SPAN = 0.13, 0.41
-"""The part of 0..1 in which r and g of clothes lie; what is beyond is clipped."""
+"""Range of r and g of clothes within 0..1; values beyond are clipped."""
 SPREAD = np.array([0.02, 0.02, 30.0])
-"""sigma of r, g and s: a wide one for the lightness, as in the paper, for shadows and lamps change it."""
+"""sigma of r, g and s: wide for the lightness, as in the paper, since it changes with the illumination."""
 BINS = (10, 10, 5)
 """Of the histograms of eq. 6, along r, g and s."""
-_STRANGE = 0.05
-"""Share of a body part's pixels whose colour may be anything."""
+_OUTLIERS = 0.05
+"""Share of outliers among a body part's pixels."""
 
 
 def normalised(image: Bytes) -> Bytes:
@@ -35,7 +35,7 @@ def normalised(image: Bytes) -> Bytes:
     Returns
     -------
     uint8 (v, u, 3)
-        r and g from CHROMA_FIRST on, s in grey levels.
+        r and g in bytes over the range CHROMA_FIRST .. CHROMA_FIRST + CHROMA_SPAN, s in grey levels.
     """
     total = np.maximum(image.sum(2, dtype=np.float32), 1.0)[:, :, None]
     chroma = (image[:, :, 2:0:-1] / total - CHROMA_FIRST) * (255 / CHROMA_SPAN)
@@ -49,7 +49,7 @@ def bins_of(colour: Bytes) -> Ints:
 
 
 def _fall() -> Singles:
-    """Of each channel the kernel by the distance in bytes, relative to a channel evenly spread, float32 (3, 256)."""
+    """Kernel of each channel by the distance in bytes, relative to the uniform density, float32 (3, 256)."""
     span = np.array([CHROMA_SPAN, CHROMA_SPAN, 255.0])[:, None]
     distance = np.arange(256) / 255 * span
     peak = span / (np.sqrt(np.pi) * SPREAD[:, None])
@@ -70,11 +70,11 @@ def fill_density(
     colour : uint8 (v, u, 3)
         Of each pixel.
     wanted : uint8 (v, u)
-        Pixels to ask, not 0.
+        Not 0 for pixels whose density is wanted.
     box : int64 (4,)
         First and last row (exclusive), first and last column (exclusive).
     samples : uint8 (part, n, 3), counts : int64 (part,)
-        Colours of the person's parts; of each the first so many count, and a part with none says nothing.
+        Colours of the person's parts, and the number of valid ones of each; a part with none has density 1.
     fall
         FALL.
     density : float32 (part, v, u)
@@ -98,7 +98,7 @@ def fill_density(
                         * fall[1, abs(g - np.int64(samples[part, i, 1]))]
                         * fall[2, abs(s - np.int64(samples[part, i, 2]))]
                     )
-                density[part, v, u] = (1.0 - _STRANGE) * total / n + _STRANGE
+                density[part, v, u] = (1.0 - _OUTLIERS) * total / n + _OUTLIERS
 
 
 def histogram(colour: Bytes) -> Floats:

@@ -17,15 +17,15 @@ class Crowd:
     Attributes
     ----------
     ids, seen : int64 (n,)
-        Their tracks, and the last frames whose pass found them.
+        Track ids, and the last frame in which each was detected.
     height : float64 (n,)
         Metres.
     ground, covariance : float64 (n, 2), (n, 2, 2)
-        Where the last frame left them, metres.
+        Estimate of the last frame, metres.
     particles : float64 (particle, n, 2)
-        Hypotheses of where all of them stand, metres.
+        Joint hypotheses of all places, metres.
     appearances
-        What each looks like.
+        Colour model of each person.
     """
 
     ids: Ints
@@ -37,8 +37,8 @@ class Crowd:
     appearances: tuple[Appearance, ...]
 
     @classmethod
-    def nobody(cls, particles: int) -> Crowd:
-        """No people, in so many particles."""
+    def empty(cls, particles: int) -> Crowd:
+        """No people, with a number of particles."""
         none = np.zeros(0, np.int64)
         return cls(none, none, np.zeros(0), np.zeros((0, 2)), np.zeros((0, 2, 2)), np.zeros((particles, 0, 2)), ())
 
@@ -53,10 +53,10 @@ class Crowd:
 
     def kept(self, which: Flags) -> Crowd:
         """The chosen people, bool (n,)."""
-        looks = tuple(one for one, stays in zip(self.appearances, which, strict=True) if stays)
+        appearances = tuple(one for one, stays in zip(self.appearances, which, strict=True) if stays)
         return Crowd(
             self.ids[which], self.seen[which], self.height[which], self.ground[which], self.covariance[which],
-            self.particles[:, which], looks,
+            self.particles[:, which], appearances,
         )  # fmt: skip
 
     def joined_with(self, others: Crowd) -> Crowd:

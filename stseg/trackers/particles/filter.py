@@ -1,6 +1,6 @@
 """A particle filter on the joint state of all places (Kim and Davis 2006, section 4).
 
-A particle is one place for every person, float64 (n, 2); particles are float64 (particle, n, 2), metres.
+A particle is the places of all people, float64 (n, 2); particles are float64 (particle, n, 2), metres.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ def weights(misfit: Floats, sharpness: float) -> Floats:
 
 
 def resampled(particles: Floats, weight: Floats, rng: np.random.Generator) -> Floats:
-    """As many particles, drawn by weight at evenly spaced quantiles from a random first one."""
+    """Systematic resampling: as many particles, drawn at evenly spaced quantiles from a random first one."""
     count = len(particles)
     quantile = (np.arange(count) + rng.random()) / count
     drawn = np.searchsorted(np.cumsum(weight), quantile).clip(0, count - 1)
@@ -32,5 +32,5 @@ def resampled(particles: Floats, weight: Floats, rng: np.random.Generator) -> Fl
 def estimate(particles: Floats, weight: Floats) -> tuple[Floats, Floats]:
     """The mean place of each person and the particles' covariance about it, float64 (n, 2), (n, 2, 2)."""
     mean = np.einsum("p,pkc->kc", weight, particles)
-    off = particles - mean
-    return mean, np.asarray(np.einsum("p,pkc,pkd->kcd", weight, off, off))
+    deviation = particles - mean
+    return mean, np.asarray(np.einsum("p,pkc,pkd->kcd", weight, deviation, deviation))

@@ -2,9 +2,10 @@
 
     d^2 = 1 - sum_u sqrt(q*_r(u) q_r(u)),     log pi = sum over people, views and parts r of  -lambda d^2     (eq. 7)
 
-q_r is the histogram (eq. 6) of the pixels that the part covers and nobody nearer does, P(k) > 1/2: what is ground there
-fits badly, so a particle beside the person weighs little. A part that is hidden or outside the image has no histogram.
-The paper leaves it out, so that a particle gains by hiding; here what is hidden counts as people differ ordinarily.
+q_r is the histogram (eq. 6) of the pixels that the part covers and no nearer person does, P(k) > 1/2: ground pixels
+among them fit badly, so a particle beside the person weighs little. A part that is occluded or outside the image has no
+histogram. The paper leaves it out, which favours particles in which a person is occluded; here its d^2 is NEUTRAL, a
+typical distance between different people.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from stseg.accelerate import kernel
 from stseg.arrays import Floats, Ints, Labels, Singles
 from stseg.trackers.particles.bodies import occupancy, part_at, placed
 
-ORDINARY = 0.25
+NEUTRAL = 0.25
 """d^2 of an occluded part."""
 
 
@@ -33,13 +34,13 @@ def add_misfit(
     bins : int32 (v, u)
         The histogram bin of each pixel.
     reference : float64 (n, part, bin)
-        q*; all 0 for a part of which nothing is known.
+        q*; all 0 for a part without a colour model.
     areas : float64 (part,)
         Pixels of the raster that each part covers, relative to the square of the body's length in pixels.
     half_width, parts
         HALF_WIDTH and PARTS.
     free : float32 (v, u), counts : float64 (part, bin)
-        Room.
+        Scratch buffers.
     """
     for k in order:
         for v in range(boxes[k, 0], boxes[k, 1]):
@@ -56,13 +57,13 @@ def add_misfit(
                 free[v, u] *= 1.0 - covered
         length = bodies[k, 2] ** 2 + bodies[k, 3] ** 2
         for r in range(len(areas)):
-            seen, alike, known = 0.0, 0.0, 0.0
+            seen, coefficient, known = 0.0, 0.0, 0.0
             for b in range(counts.shape[1]):
                 seen += counts[r, b]
                 known += reference[k, r, b]
-                alike += math.sqrt(counts[r, b] * reference[k, r, b])
+                coefficient += math.sqrt(counts[r, b] * reference[k, r, b])
             share = 0.0
             if seen > 0.0 and known > 0.0:
-                alike /= math.sqrt(seen)
+                coefficient /= math.sqrt(seen)
                 share = min(seen / max(areas[r] * length, 1.0), 1.0)
-            misfit[k] += share * (1.0 - alike) + (1.0 - share) * ORDINARY
+            misfit[k] += share * (1.0 - coefficient) + (1.0 - share) * NEUTRAL

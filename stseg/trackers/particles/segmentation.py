@@ -3,7 +3,7 @@
     P(k | x) = P(k) P(x | k) / P(x),   P(k) = O_k(x) prod over l nearer to the camera of (1 - O_l(x))   (eqs 2 and 4)
 
 P(x | k) is eq. 1 of the body part that x would be of k. An unassigned pixel has probability prod over all l of
-(1 - O_l(x)) and any colour; the paper leaves such pixels out by a threshold.
+(1 - O_l(x)) and any colour; the paper excludes such pixels by a threshold.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from stseg.accelerate import kernel
 from stseg.arrays import Bytes, Floats, Ints, Labels, Singles
 from stseg.trackers.particles.bodies import occupancy, part_at, placed
 
-STRANGER = -1
+UNASSIGNED = -1
 
 
 class Canvas(NamedTuple):
@@ -25,11 +25,11 @@ class Canvas(NamedTuple):
     Attributes
     ----------
     label : int32 (v, u)
-        The likeliest person, STRANGER for nobody known.
+        The likeliest person, UNASSIGNED for none.
     best, total : float32 (v, u)
         P(k) P(x | k) of that person, and the sum over all people.
     free : float32 (v, u)
-        How likely nobody so far covers the pixel, 0..1.
+        Probability that no person processed so far covers the pixel.
     """
 
     label: Labels
@@ -39,9 +39,9 @@ class Canvas(NamedTuple):
 
     @classmethod
     def of(cls, rows: int, columns: int) -> Canvas:
-        """An empty one."""
+        """An empty canvas."""
         shape = rows, columns
-        return cls(np.full(shape, STRANGER, np.int32), *(np.zeros(shape, np.float32) for _ in range(3)))
+        return cls(np.full(shape, UNASSIGNED, np.int32), *(np.zeros(shape, np.float32) for _ in range(3)))
 
 
 @kernel
@@ -50,7 +50,7 @@ def clear(boxes: Ints, canvas: Canvas) -> None:
     for k in range(len(boxes)):
         for v in range(boxes[k, 0], boxes[k, 1]):
             for u in range(boxes[k, 2], boxes[k, 3]):
-                canvas.label[v, u], canvas.best[v, u], canvas.total[v, u], canvas.free[v, u] = STRANGER, 0.0, 0.0, 1.0
+                canvas.label[v, u], canvas.best[v, u], canvas.total[v, u], canvas.free[v, u] = UNASSIGNED, 0.0, 0.0, 1.0
 
 
 @kernel
@@ -63,13 +63,13 @@ def segment(
     Parameters
     ----------
     bodies : float64 (n, 5), order : int64 (n,)
-        `bodies.fill_bodies`, and the people from the nearest to the farthest.
+        See `bodies.fill_bodies`; and the people from the nearest to the farthest.
     boxes : int64 (n, 4)
-        The pixels to ask of each, `bodies.fill_boxes`.
+        Pixels that each person may cover, see `bodies.fill_boxes`.
     ideal : float32 (v, u, 2)
-        Where each pixel would be without lens.
+        Undistorted coordinates of each pixel.
     foreground : uint8 (v, u)
-        Not 0 where the view shows somebody.
+        Not 0 for foreground.
     density : float32 (n, part, v, u)
         Eq. 1 of each person's parts.
     half_width, parts
@@ -91,29 +91,29 @@ def segment(
         for v in range(boxes[k, 0], boxes[k, 1]):
             for u in range(boxes[k, 2], boxes[k, 3]):
                 if canvas.free[v, u] > canvas.best[v, u]:
-                    canvas.label[v, u] = STRANGER
+                    canvas.label[v, u] = UNASSIGNED
 
 
 @kernel
-def fill_open(
+def fill_unoccluded(
     bodies: Floats, order: Ints, boxes: Ints, ideal: Singles, half_width: Floats, parts: Floats,
     free: Singles, owner: Labels, shown: Ints,
 ) -> None:  # fmt: skip
-    """Pixels of people without overlap, from which colour models may be learned.
+    """Mark the unoccluded pixels of people, from which colour models may be learned.
 
     Parameters
     ----------
     free : float32 (v, u)
-        Room.
+        Scratch buffer.
     owner : int32 (v, u)
-        Filled within the boxes with the number of parts times the person, plus the part, or STRANGER.
+        Filled within the boxes with the number of parts times the person, plus the part, or UNASSIGNED.
     shown : int64 (n,)
-        Filled with the number of pixels that each person covers and nobody nearer does.
+        Filled with the number of pixels that each person covers and no nearer person does.
     """
     for k in range(len(boxes)):
         for v in range(boxes[k, 0], boxes[k, 1]):
             for u in range(boxes[k, 2], boxes[k, 3]):
-                free[v, u], owner[v, u] = 1.0, STRANGER
+                free[v, u], owner[v, u] = 1.0, UNASSIGNED
     for k in order:
         shown[k] = 0
         for v in range(boxes[k, 0], boxes[k, 1]):

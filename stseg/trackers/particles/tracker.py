@@ -1,9 +1,9 @@
-"""Guided particles: a particle filter whose particles look for the people themselves (Kim and Davis 2006, section 4.3).
+"""Guided particle filter: particles move to the people by iterated localisation (Kim and Davis 2006, section 4.3).
 
-Each frame, every particle takes a random step and is then moved by the search, which segments all views by it and lets
-the people's axes meet; how well the colours then fit weighs it. A few particles are enough, since even one that starts
-beside a person ends on them. The paper starts tracks by hand or from blobs that stand apart; here those whom a frame's
-pass found, and nobody follows, are new.
+Each frame, every particle takes a random step and is then moved by the search, which segments all views by it and
+intersects the people's axes; its weight is its colour likelihood there. A few particles are enough, since even one that
+starts beside a person converges to the person. The paper starts tracks by hand or from isolated blobs; here unassigned
+detections start them.
 """
 
 from __future__ import annotations
@@ -32,14 +32,14 @@ from stseg.trackers.rows import Event
 from stseg.tracking.assignment import assign, distances
 
 _FLOOR = 0.05
-"""Least standard deviation of a place, metres: particles have common errors."""
+"""Least standard deviation of a place, metres: particles share errors."""
 _HEIGHT_NOISE = 0.06
 """Standard deviation of a person's height, metres."""
 _MARGIN = 0.6
 """Search radius around the last places, metres."""
-_TRYING = 3
+_PROPOSAL_PERIOD = 3
 """One particle in this many proposes an undetected track at an unassigned detection."""
-_DOUBLED = 0.4
+_DUPLICATE_TIME = 0.4
 """Longest time that an undetected track may share the place of a detected one, seconds."""
 _HEIGHT_RENEWAL = 0.1
 """Weight of a detection's height in the running mean."""
@@ -56,7 +56,7 @@ class ParticleTracker(FramewiseTracker):
         self.border = Border.of(rig)
         self.rng = np.random.default_rng(config.particles.seed)
         self.issued, self.begun = 0, False
-        self.crowd = Crowd.nobody(1 if config.particles.method == "search" else config.particles.particles)
+        self.crowd = Crowd.empty(1 if config.particles.method == "search" else config.particles.particles)
 
     def predict(self, frame: int) -> PredictedTracks | None:
         """Predictions of all tracks, at their last places; None for the first frame."""
@@ -68,7 +68,7 @@ class ParticleTracker(FramewiseTracker):
         sizes = Sizes.of_heights(crowd.height, np.full(len(crowd), _HEIGHT_NOISE**2), config.body)
         return PredictedTracks(crowd.ground, crowd.covariance + drift * np.eye(2), sizes, STAYING - FORGETTING * unseen)
 
-    def add(self, scene: FusedFrame, shown: FrameObservations) -> list[Commit]:
+    def add(self, fused: FusedFrame, observed: FrameObservations) -> list[Commit]:
         """Add a frame; it is committed at once.
 
         Raises
@@ -76,28 +76,28 @@ class ParticleTracker(FramewiseTracker):
         SourceError
             Where no camera delivers colour.
         """
-        views = colour_views(shown, "particles", scene.frame)
-        looks = self._looks(views, self._propose(scene))
-        self._follow(looks, self._step(scene.frame))
-        seconds = (scene.frame - self.frame) / self.rig.frame_rate
-        self.frame, self.begun = scene.frame, True
-        evidence, newcomers = self._recognise(scene)
+        views = colour_views(observed, "particles", fused.frame)
+        view_frames = self._view_frames(views, self._propose(fused))
+        self._follow(view_frames, self._step(fused.frame))
+        seconds = (fused.frame - self.frame) / self.rig.frame_rate
+        self.frame, self.begun = fused.frame, True
+        evidence, unassigned = self._recognise(fused)
         deaths = self._end()
-        births = self._begin(scene, newcomers)
+        births = self._begin(fused, unassigned)
         if births or deaths:
-            looks = self._looks(views, np.full(len(self.crowd), _MARGIN))
-        for look in looks:
-            self._learn(look, seconds)
+            view_frames = self._view_frames(views, np.full(len(self.crowd), _MARGIN))
+        for view_frame in view_frames:
+            self._learn(view_frame, seconds)
         crowd, events = self.crowd, births + deaths
         nats = np.array([evidence.get(int(i), 0.0) for i in crowd.ids])
         width = np.full(len(crowd), self.config.body.width_mean)
-        return [self.commit(scene, crowd.ids, crowd.ground, crowd.covariance, crowd.height, width, nats, events)]
+        return [self.commit(fused, crowd.ids, crowd.ground, crowd.covariance, crowd.height, width, nats, events)]
 
     def _step(self, frame: int) -> float:
         """Standard deviation of a person's step to a frame, metres."""
         return self.config.particles.velocity_spread * (frame - self.frame) / self.rig.frame_rate
 
-    def _propose(self, scene: FusedFrame) -> Floats:
+    def _propose(self, fused: FusedFrame) -> Floats:
         """Propose undetected tracks at unassigned detections, in some particles.
 
         Returns
@@ -105,97 +105,97 @@ class ParticleTracker(FramewiseTracker):
         float64 (n,)
             Search radius of each track, metres.
         """
-        crowd, config, found = self.crowd, self.config, scene.people.ground
+        crowd, config, found = self.crowd, self.config, fused.people.ground
         margin = np.full(len(crowd), _MARGIN)
-        away = distances(crowd.ground, found)
-        known, met = assign(away, config.particles.assignment_distance)
-        lost, new = np.setdiff1d(np.arange(len(crowd)), known), np.setdiff1d(np.arange(len(found)), met)
+        distance = distances(crowd.ground, found)
+        detected, assigned = assign(distance, config.particles.assignment_distance)
+        lost, new = np.setdiff1d(np.arange(len(crowd)), detected), np.setdiff1d(np.arange(len(found)), assigned)
         reach = (
             config.particles.assignment_distance
-            + config.particles.walking_speed * (scene.frame - crowd.seen) / self.rig.frame_rate
+            + config.particles.walking_speed * (fused.frame - crowd.seen) / self.rig.frame_rate
         )
         particles = crowd.particles.copy()
         if config.particles.method != "search":
-            for a, b in zip(*assign(away[np.ix_(lost, new)] - reach[lost, None], 0.0), strict=True):
+            for a, b in zip(*assign(distance[np.ix_(lost, new)] - reach[lost, None], 0.0), strict=True):
                 k, j = lost[a], new[b]
-                particles[::_TRYING, k] = found[j]
-                margin[k] += away[k, j]
+                particles[::_PROPOSAL_PERIOD, k] = found[j]
+                margin[k] += distance[k, j]
         self.crowd = replace(crowd, particles=particles)
         return margin
 
-    def _looks(self, views: Sequence[ColourView | None], margin: Floats) -> list[ParticleFrame]:
+    def _view_frames(self, views: Sequence[ColourView | None], margin: Floats) -> list[ParticleFrame]:
         """The views prepared for a search within margins (n,), metres."""
         crowd = self.crowd
         return [
-            own.look(view, crowd.ground, crowd.height, crowd.appearances, margin)
-            for own, view in zip(self.views, views, strict=True)
+            particle_view.prepare(view, crowd.ground, crowd.height, crowd.appearances, margin)
+            for particle_view, view in zip(self.views, views, strict=True)
             if view is not None
         ]
 
-    def _follow(self, looks: Sequence[ParticleFrame], step: float) -> None:
+    def _follow(self, frames: Sequence[ParticleFrame], step: float) -> None:
         """Propagate, weight and resample the particles."""
         config, crowd = self.config.particles, self.crowd
         moved = crowd.particles if config.method == "search" else predicted(crowd.particles, step, self.rng)
         if config.method != "generic":
             median = config.axis_fit == "median"
-            moved = np.stack([search(looks, hypothesis, config.iterations, median) for hypothesis in moved])
+            moved = np.stack([search(frames, hypothesis, config.iterations, median) for hypothesis in moved])
         reference, misfit = crowd.reference, np.zeros(moved.shape[:2])
-        for hypothesis, own in zip(moved, misfit, strict=True):
-            for look in looks:
-                look.add_misfit(hypothesis, reference, own)
+        for hypothesis, row in zip(moved, misfit, strict=True):
+            for frame in frames:
+                frame.add_misfit(hypothesis, reference, row)
         weight = weights(misfit.sum(1), config.colour_weight)
         ground, covariance = estimate(moved, weight)
         drawn = resampled(moved, weight, self.rng)
         covariance = covariance + _FLOOR**2 * np.eye(2)
         self.crowd = replace(crowd, ground=ground, covariance=covariance, particles=drawn)
 
-    def _recognise(self, scene: FusedFrame) -> tuple[dict[int, float], Ints]:
+    def _recognise(self, fused: FusedFrame) -> tuple[dict[int, float], Ints]:
         """Assign detections: evidence of each track, nats, and the unassigned detections."""
-        crowd, people = self.crowd, scene.people
+        crowd, people = self.crowd, fused.people
         known, found = assign(distances(crowd.ground, people.ground), self.config.particles.assignment_distance)
         seen, height = crowd.seen.copy(), crowd.height.copy()
-        seen[known] = scene.frame
+        seen[known] = fused.frame
         height[known] += _HEIGHT_RENEWAL * (people.height[found] - height[known])
         self.crowd = replace(crowd, seen=seen, height=height)
         evidence = {int(i): float(nats) for i, nats in zip(crowd.ids[known], people.evidence[found], strict=True)}
         return evidence, np.setdiff1d(np.arange(len(people)), found)
 
-    def _begin(self, scene: FusedFrame, newcomers: Ints) -> list[Event]:
+    def _begin(self, fused: FusedFrame, unassigned: Ints) -> list[Event]:
         """Births from unassigned detections."""
-        people, count = scene.people, len(newcomers)
+        people, count = fused.people, len(unassigned)
         ids = self.issued + 1 + np.arange(count)
         self.issued += count
-        places = people.ground[newcomers]
+        places = people.ground[unassigned]
         particles = predicted(np.repeat(places[None], len(self.crowd.particles), 0), _FLOOR, self.rng)
         unknown = (Appearance.unknown(),) * count
         self.crowd = self.crowd.joined_with(
             Crowd(
-                ids, np.full(count, scene.frame), people.height[newcomers], places, people.covariance[newcomers],
+                ids, np.full(count, fused.frame), people.height[unassigned], places, people.covariance[unassigned],
                 particles, unknown,
             )
         )  # fmt: skip
-        return [(scene.frame, "birth", int(i), 0, "found where nobody was followed") for i in ids]
+        return [(fused.frame, "birth", int(i), 0, "found where nobody was followed") for i in ids]
 
     def _end(self) -> list[Event]:
         """Remove tracks that left, were undetected for too long, or share the place of another."""
         crowd, config = self.crowd, self.config
-        unfound = (self.frame - crowd.seen) / self.rig.frame_rate
-        left = (self.border.away(crowd.ground) == 0.0) & (unfound > 0)
+        undetected = (self.frame - crowd.seen) / self.rig.frame_rate
+        left = (self.border.away(crowd.ground) == 0.0) & (undetected > 0)
         near = distances(crowd.ground, crowd.ground) < config.detection.minimum_distance
-        told: list[Event] = []
+        deaths: list[Event] = []
         for k, identity in enumerate(crowd.ids.tolist()):
-            others = crowd.ids[near[k] & (unfound == 0)]
+            others = crowd.ids[near[k] & (undetected == 0)]
             if left[k]:
-                told.append((self.frame, "death", identity, 0, "left the area"))
-            elif unfound[k] > config.particles.patience:
-                told.append((self.frame, "death", identity, 0, f"not found for {config.particles.patience:g} s"))
-            elif unfound[k] > _DOUBLED and len(others):
-                told.append((self.frame, "death", identity, int(others[0]), "stands where another was found"))
-        self.crowd = crowd.kept(~np.isin(crowd.ids, [event[2] for event in told]))
-        return told
+                deaths.append((self.frame, "death", identity, 0, "left the area"))
+            elif undetected[k] > config.particles.patience:
+                deaths.append((self.frame, "death", identity, 0, f"not found for {config.particles.patience:g} s"))
+            elif undetected[k] > _DUPLICATE_TIME and len(others):
+                deaths.append((self.frame, "death", identity, int(others[0]), "stands where another was found"))
+        self.crowd = crowd.kept(~np.isin(crowd.ids, [event[2] for event in deaths]))
+        return deaths
 
-    def _learn(self, look: ParticleFrame, seconds: float) -> None:
+    def _learn(self, frame: ParticleFrame, seconds: float) -> None:
         crowd = self.crowd
         share = min(seconds / self.config.particles.colour_memory, 1.0)
-        learned = look.learned(crowd.ground, crowd.appearances, share, self.rng)
+        learned = frame.learned(crowd.ground, crowd.appearances, share, self.rng)
         self.crowd = replace(crowd, appearances=tuple(learned))

@@ -16,7 +16,7 @@ from stseg.trackers.particles.axes import fill_axes
 from stseg.trackers.particles.bodies import HALF_WIDTH, PARTS, fill_bodies, fill_boxes
 from stseg.trackers.particles.colours import FALL, bins_of, fill_density, normalised
 from stseg.trackers.particles.likelihood import add_misfit
-from stseg.trackers.particles.segmentation import STRANGER, Canvas, fill_open, segment
+from stseg.trackers.particles.segmentation import UNASSIGNED, Canvas, fill_unoccluded, segment
 
 _WIDTHS = 2 * float(HALF_WIDTH.mean())
 _BOUNDS = np.concatenate([[0.0], PARTS[:-1], [1.0]])
@@ -27,8 +27,8 @@ _AREAS = np.array(
 """Area of each part relative to the square of the body's length."""
 
 
-_OPEN = 0.8
-"""Visible fraction of a body from which colours are learned."""
+_VISIBLE = 0.8
+"""Least visible fraction of a body for its colours to be learned."""
 
 
 class ParticleView:
@@ -37,9 +37,9 @@ class ParticleView:
     Parameters
     ----------
     camera
-        With its lens: the raster knows where its pixels would be without.
+        With its lens: the raster stores undistorted coordinates of its pixels.
     columns
-        Columns of the raster at most; every so many pixels of the image are asked (Kim and Davis 2006, section 6).
+        Most columns of the raster, which subsamples the image (Kim and Davis 2006, section 6).
     """
 
     def __init__(self, camera: Camera, columns: int) -> None:
@@ -52,16 +52,16 @@ class ParticleView:
         self.ideal: Singles = np.nan_to_num(ideal, nan=-1e6).astype(np.float32)
         self.canvas = Canvas.of(*self.ideal.shape[:2])
         self.areas = _AREAS / self.step**2
-        self.room_of_pixels: Singles = np.zeros(self.ideal.shape[:2], np.float32)
-        self.room: Floats = np.zeros(self.ideal.shape[0] * self.ideal.shape[1])
+        self.pixel_buffer: Singles = np.zeros(self.ideal.shape[:2], np.float32)
+        self.distance_buffer: Floats = np.zeros(self.ideal.shape[0] * self.ideal.shape[1])
 
     def bodies(self, ground: Floats, height: Floats) -> Floats:
-        """Bodies of people at (n, 2) with heights (n,), `bodies.fill_bodies`."""
+        """Bodies of people at (n, 2) with heights (n,), see `bodies.fill_bodies`."""
         bodies = np.zeros((len(ground), 5))
         fill_bodies(self.projection, self.centre, ground, height, bodies)
         return bodies
 
-    def look(
+    def prepare(
         self, view: ColourView, ground: Floats, height: Floats, appearances: Sequence[Appearance], margin: Floats
     ) -> ParticleFrame:
         """Prepare a frame for a search within margins (n,), metres, of places (n, 2)."""
@@ -70,8 +70,8 @@ class ParticleView:
         boxes = np.zeros((len(ground), 4), np.int64)
         fill_boxes(self.ideal, self.bodies(ground, height), margin / height, boxes)
         density = np.zeros((len(ground), len(PARTS), *foreground.shape), np.float32)
-        for box, own, seen in zip(boxes, appearances, density, strict=True):
-            fill_density(colour, foreground, box, own.samples, own.known, FALL, seen)
+        for box, appearance, person_density in zip(boxes, appearances, density, strict=True):
+            fill_density(colour, foreground, box, appearance.samples, appearance.known, FALL, person_density)
         return ParticleFrame(self, height, colour, bins_of(colour).astype(np.int32), foreground, boxes, density)
 
 
@@ -82,11 +82,11 @@ class ParticleFrame:
     Attributes
     ----------
     height : float64 (n,)
-        Of the people, metres.
+        Heights of the people, metres.
     colour : uint8 (v, u, 3), bins : int32 (v, u), foreground : uint8 (v, u)
-        Of each pixel of the raster.
+        Normalised colour, histogram bin and foreground of each pixel of the raster.
     boxes : int64 (n, 4)
-        Where each person is sought.
+        Search region of each person, see `bodies.fill_boxes`.
     density : float32 (n, part, v, u)
         Eq. 1 of each person's parts.
     """
@@ -114,7 +114,7 @@ class ParticleFrame:
         camera = view.camera
         fill_axes(
             bodies, self.boxes, view.ideal, view.canvas, float(view.step), _WIDTHS, camera.ground, camera.vertical,
-            median, view.room, axes,
+            median, view.distance_buffer, axes,
         )  # fmt: skip
 
     def add_misfit(self, ground: Floats, reference: Floats, misfit: Floats) -> None:
@@ -132,13 +132,13 @@ class ParticleFrame:
     ) -> list[Appearance]:
         """Update colour models of people at places (n, 2) from their visible pixels in this view.
 
-        Whoever stands behind somebody teaches nothing; of whoever is known already, only pixels that fit do.
+        Occluded people are not updated; a part that has a model is updated only from pixels segmented as the person.
         """
         view, (bodies, order) = self.view, self.segment(ground)
-        owner = np.full(self.foreground.shape, STRANGER, np.int32)
+        owner = np.full(self.foreground.shape, UNASSIGNED, np.int32)
         shown = np.zeros(len(ground), np.int64)
-        fill_open(bodies, order, self.boxes, view.ideal, HALF_WIDTH, PARTS, view.room_of_pixels, owner, shown)
-        whole = shown >= _OPEN * view.areas.sum() * (bodies[:, 2:4] ** 2).sum(1)
+        fill_unoccluded(bodies, order, self.boxes, view.ideal, HALF_WIDTH, PARTS, view.pixel_buffer, owner, shown)
+        whole = shown >= _VISIBLE * view.areas.sum() * (bodies[:, 2:4] ** 2).sum(1)
         result = list(appearances)
         for k in np.flatnonzero(whole & (shown > 0)).tolist():
             rows, columns = slice(*self.boxes[k, :2]), slice(*self.boxes[k, 2:])
