@@ -27,7 +27,7 @@ class ParticleConfig:
     """The tracker `particles` (Kim and Davis 2006, KD06)."""
 
     method: Literal["guided", "search", "generic"] = "guided"
-    """guided: particles with mean-shift search; search: one hypothesis; generic: no search (KD06 fig. 5)."""
+    """guided: particles with iterated localisation; search: one hypothesis; generic: no search (KD06 fig. 5)."""
     particles: int = 15
     """Number of particles, each a joint hypothesis of all positions."""
     seed: int = 0

@@ -1,4 +1,4 @@
-"""From the files of all segments to the run file: what only the whole run tells, and the volume under final names."""
+"""From the files of all segments to the run file: tracks of the whole run, and the volume with their ids."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class FinishedSegment(NamedTuple):
 
 
 class _Named(NamedTuple):
-    """A segment's file, its committed rows, and what each of them is called in the run, 0 for nobody."""
+    """A segment's file, its committed rows, and the run's track id of each of them, 0 for none."""
 
     run: Run
     rows: Rows
@@ -40,13 +40,13 @@ class _Named(NamedTuple):
 
 def assemble(job: Job, pipeline: Pipeline, made: Sequence[FinishedSegment], output: Path) -> Tracks:
     """Write the run file of a job from its segments, in their order; the pipeline is the job's."""
-    seams = Stitcher(round(job.config.tracking.patience * job.recording.rig.frame_rate))
+    stitcher = Stitcher(round(job.config.tracking.patience * job.recording.rig.frame_rate))
     before = made[0].segment.first if made else 0
     for segment, path in made:
         run = read_run(path)
-        seams.add(SegmentTracks(segment.first, run.trajectory, run.events, segment.first - before))
+        stitcher.add(SegmentTracks(segment.first, run.trajectory, run.events, segment.first - before))
         before = segment.stop
-    joined = seams.joined()
+    joined = stitcher.joined()
     tracks, identity = pipeline.finished(joined.committed, joined.events, job.recording.rig)
     views: Bytes = pipeline.occupancy.views
     config = format_config(job.config)

@@ -1,4 +1,4 @@
-"""Each camera's foreground, its background learned before the frames that it is to judge.
+"""Foreground of each camera for a segment, from a background learned beforehand.
 
 A background belongs to a part of the recording, `segments.background_period` seconds long, so that light which changes
 over a day and furniture that is moved matter little, and so that what a segment finds depends on no other segment.
@@ -28,7 +28,7 @@ _Frames = TypeVar("_Frames", range, Sequence[int])
 
 @dataclass(frozen=True)
 class BackgroundFrames:
-    """What of a run teaches the backgrounds of a segment.
+    """Training frames of the backgrounds of a segment.
 
     Attributes
     ----------
@@ -54,8 +54,8 @@ def make_foregrounds(
     """The foreground of every camera, in the rig's order, for the frames of a segment.
 
     A colour camera learns its background from frames of the part of the run in which the segment lies, and where it is
-    blind there, from the nearest in which it sees; one that sees nowhere learns nothing and is not asked. Where it has
-    empty frames it learns those, and what has changed since from the part before.
+    blind there, from the nearest in which it is not; one that is blind throughout has an untrained model, never used.
+    A camera with an empty scene learns that, and the changes since then from the part before.
 
     Parameters
     ----------
@@ -64,19 +64,19 @@ def make_foregrounds(
     first, stop
         The frames of the run.
     segment
-        Whose frames will be asked for; by default they begin with the run's.
+        The segment that is processed; by default it begins with the run.
     streams
-        What `count_streams` told, for far frames.
+        From `stseg.io.recording.stream_index.index_streams`, to seek distant frames.
     """
     segment = Segment(0, first, first, stop) if segment is None else segment
-    looks = background_frames(segment, config.segments, recording.rig.frame_rate, first, stop)
-    return [_sight(recording, k, config, looks, streams) for k in range(len(recording.sources))]
+    training = background_frames(segment, config.segments, recording.rig.frame_rate, first, stop)
+    return [_view_foreground(recording, k, config, training, streams) for k in range(len(recording.sources))]
 
 
 def background_frames(
     segment: Segment, config: SegmentConfig, frame_rate: float, first: int, stop: int
 ) -> BackgroundFrames:
-    """What teaches the backgrounds of a segment of a run of frames first .. stop - 1."""
+    """Training frames of the backgrounds of a segment, in a run of frames first .. stop - 1."""
     length = part_length(config, frame_rate)
     begin = max(first, min(first + (segment.first - first) // length * length, stop - length))
     seen = first + (segment.lead - first) // length * length
@@ -89,7 +89,7 @@ def part_length(config: SegmentConfig, frame_rate: float) -> int:
 
 
 def is_colour(recording: Recording, camera: int) -> bool:
-    """Whether a camera's foreground is told by a background."""
+    """Whether a camera delivers colour, whose foreground needs a background model."""
     return recording.sources[camera].source.kind in ("video", "images")
 
 
@@ -103,18 +103,18 @@ def empty_background(recording: Recording, camera: int, config: Config) -> Backg
 
 
 class BackgroundLearner:
-    """A background that sees frames now and then, a step apart, to know what has changed.
+    """A background that is updated by every `step`-th frame.
 
     Parameters
     ----------
     model
-        The background; it is not to be asked any more.
+        The background; not to be used by the caller afterwards.
     frame_rate
         Of the recording, frames per second.
     step
-        Frames from one that it sees to the next.
+        Frames from one update to the next.
     config
-        What is a change of light.
+        Constants of the detection of light changes.
     """
 
     def __init__(self, model: Background, frame_rate: float, step: int, config: IlluminationConfig) -> None:
@@ -122,27 +122,27 @@ class BackgroundLearner:
         self._watch = IlluminationMonitor(self._model, frame_rate / step, config)
 
     def see(self, image: Bytes) -> None:
-        """The next frame."""
+        """Update by the next frame."""
         self._watch.likelihood(image)
 
     def learned(self) -> Background:
-        """The background for every frame of the recording; this one is not to be asked any more."""
+        """The background at the recording's frame rate; this learner is not to be used afterwards."""
         return self._model.at_rate(self._frame_rate)
 
 
-def _sight(
-    recording: Recording, camera: int, config: Config, looks: BackgroundFrames, streams: StreamIndex | None
+def _view_foreground(
+    recording: Recording, camera: int, config: Config, training: BackgroundFrames, streams: StreamIndex | None
 ) -> ViewForeground:
     if not is_colour(recording, camera):
         return ViewForeground()
     frame_rate = recording.rig.frame_rate
     model = empty_background(recording, camera, config)
     if recording.sources[camera].background is None:
-        shown = sampled(_seeing(recording, camera, looks.part, streams), config.segments)
+        shown = sampled(_sighted_frames(recording, camera, training.part, streams), config.segments)
         if len(shown):
             model.learn_from(_colours(recording, camera, shown, streams))
-    elif looks.before:
-        frames = sampled(looks.before, config.segments)
+    elif training.before:
+        frames = sampled(training.before, config.segments)
         learner = BackgroundLearner(model, frame_rate, frames.step, config.illumination)
         for image in _colours(recording, camera, frames, streams):
             learner.see(image)
@@ -150,10 +150,10 @@ def _sight(
     return ViewForeground(IlluminationMonitor(model, frame_rate, config.illumination))
 
 
-def _seeing(recording: Recording, camera: int, part: range, streams: StreamIndex | None) -> Sequence[int]:
-    """As many frames as a part has in which the camera sees: those of the part, then those nearest to it.
+def _sighted_frames(recording: Recording, camera: int, part: range, streams: StreamIndex | None) -> Sequence[int]:
+    """As many frames as a part has in which the camera is not blind: those of the part, then those nearest to it.
 
-    Where nothing was counted, it is taken to see from its offset on.
+    Without a stream index, every frame from the camera's offset on.
     """
     if streams is None:
         late = max(0, recording.sources[camera].offset - part.start)
@@ -167,7 +167,7 @@ def _seeing(recording: Recording, camera: int, part: range, streams: StreamIndex
 
 
 def _colours(recording: Recording, camera: int, frames: Sequence[int], streams: StreamIndex | None) -> Iterator[Bytes]:
-    """What a colour camera shows in some frames, where it sees."""
+    """Images of a colour camera in some frames, without those in which it is blind."""
     for image in read_camera(recording, camera, frames, streams):
         if image is not None:
             yield np.asarray(image, np.uint8)

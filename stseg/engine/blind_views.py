@@ -1,4 +1,4 @@
-"""What live cameras did not show, as events of the run: nothing is left out without a word."""
+"""Missing views and dropped frames of live cameras, as events of the run."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from stseg.model.tables import EVENT
 
 
 class BlindViews:
-    """Remembers which views were missing until the frames are decided.
+    """Missing views of the frames that are not committed yet.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ class BlindViews:
         self._missing: dict[int, list[int]] = {}
 
     def note(self, moment: LiveFrameSet) -> None:
-        """A moment, whose views may be missing."""
+        """Note the missing views of a frame set."""
         missing = [k for k, view in enumerate(moment.views) if view is None]
         if moment.dropped:
             self._dropped.add(moment.frame)
@@ -34,20 +34,20 @@ class BlindViews:
             self._missing[moment.frame] = missing
 
     def events(self, frames: Sequence[int]) -> Rows:
-        """EVENT rows of decided frames: one of how many were dropped, and one of each camera that was blind."""
-        told = []
+        """EVENT rows of committed frames: one with the number of dropped frames, and one for each blind camera."""
+        found = []
         dropped = [frame for frame in frames if frame in self._dropped]
         if dropped:
-            told.append(
+            found.append(
                 (dropped[0], f"{len(dropped)} of {len(frames)} frames dropped: tracking is slower than the cameras")
             )
         for k, name in enumerate(self._cameras):
             blind = [frame for frame in frames if k in self._missing.get(frame, ())]
             if blind:
-                told.append((blind[0], f"camera {name} showed nothing in {len(blind)} of {len(frames)} frames"))
-        return np.array([(frame, b"blind", 0, 0, text.encode()) for frame, text in told], EVENT)
+                found.append((blind[0], f"camera {name} showed nothing in {len(blind)} of {len(frames)} frames"))
+        return np.array([(frame, b"blind", 0, 0, text.encode()) for frame, text in found], EVENT)
 
     def forget(self, before: int) -> None:
-        """Frames before one will not be asked for again."""
+        """Discard the notes of frames before one."""
         self._dropped = {frame for frame in self._dropped if frame >= before}
         self._missing = {frame: missing for frame, missing in self._missing.items() if frame >= before}

@@ -33,7 +33,7 @@ def make_by_cluster(
     address
         Of the scheduler, such as tcp://10.0.0.5:8786.
     advance
-        Is told how many more frames were fused.
+        Called with the number of frames fused since the last call.
 
     Raises
     ------

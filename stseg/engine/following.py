@@ -37,12 +37,12 @@ from stseg.io.runfile.runs import Run, read_run
 from stseg.io.runfile.work_folder import WorkFolder
 
 ENDLESS = 1 << 62
-"""The end of a run that nobody knows yet."""
+"""Stop frame of a run whose end is not known yet."""
 
 
 @dataclass(frozen=True)
 class _Coming:
-    """Frame sets to come, the segments of their frames, and the frame from which parts of backgrounds count."""
+    """Frame sets to come, the segments of their frames, and the first frame of the first background period."""
 
     frame_sets: Iterable[LiveFrameSet]
     plan: Iterator[Segment]
@@ -145,7 +145,7 @@ def _follow(job: Job, folder: WorkFolder, output: Path, overwrite: bool, reporte
 
 
 def live_table_of(output: Path) -> Path:
-    """Where the tracks of a run are told while it goes on."""
+    """Path of the live table: the tracks of a run while it goes on."""
     return output.with_name(f"{output.name}.live.csv")
 
 

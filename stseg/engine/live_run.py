@@ -1,7 +1,7 @@
-"""The work of a run that follows a recording: moments in, segments and lines of tracks out.
+"""The work of a run that follows a recording: frame sets in, segments and rows of tracks out.
 
-Every moment goes to the segment that is open, and around its end to the next one as well, which looks at the frames
-before its own to know who is there. So frames are read once, and none is kept.
+Every frame set (moment) goes to the open segment, and around its end to the next one as well, as its warm-up. So frames
+are read once, and none is kept.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from stseg.tracking.windows import window_length
 
 @dataclass
 class _Member:
-    """An open segment, and who is who in it."""
+    """An open segment, the rows of its warm-up, and the run's names of its tracks."""
 
     segment: OpenSegment
     lead: list[Rows] = field(default_factory=list)
@@ -46,11 +46,11 @@ class LiveRun:
     Parameters
     ----------
     job, folder
-        What is run, and where its segments are kept.
+        The job, and the folder of its segments.
     table
-        To which tracks are told.
+        The live table, to which tracks are added.
     sights
-        What the cameras see by.
+        Foreground models of the cameras.
     made
         The segments of an unfinished run; those that become whole are added.
     """
@@ -69,7 +69,7 @@ class LiveRun:
         self._members: list[_Member] = []
         self._plan: Iterator[Segment] = iter(())
         self._coming: Segment | None = None
-        self._since, self._stop, self._told = 0, 0, 0
+        self._since, self._stop, self._published = 0, 0, 0
         self._arrived: dict[int, float] = {}
         self._delays: list[float] = []
 
@@ -84,15 +84,15 @@ class LiveRun:
 
     @property
     def delay(self) -> str:
-        """How long after frames their tracks were told, in words; nothing where none was."""
+        """Time from frames to their tracks in the live table, in words; empty where there were none."""
         if not self._delays:
             return ""
         return f", told {median(self._delays):.1f} s after them (median; at most {max(self._delays):.1f} s)"
 
     def begin(self, plan: Iterator[Segment], since: int) -> None:
-        """The segments to come, and the frame from which the parts of backgrounds count."""
+        """Begin with the segments to come, and the first frame of the first background period."""
         self._plan, self._coming, self._since = plan, next(plan), since
-        self._told = self._coming.first
+        self._published = self._coming.first
 
     def add(self, moment: LiveFrameSet) -> None:
         """The next moment."""
@@ -126,10 +126,10 @@ class LiveRun:
         for step in steps:
             frames = [scene.frame for scene in step.commit.frames]
             member.segment.write(step, self._blindness.events(frames))
-            self._tell(member, step, stop)
+            self._publish(member, step, stop)
 
-    def _tell(self, member: _Member, step: CommittedFrames, stop: int) -> None:
-        """Say the tracks of a step that nobody has told yet: those of the warm-up are the earlier segment's to tell."""
+    def _publish(self, member: _Member, step: CommittedFrames, stop: int) -> None:
+        """Publish the new tracks of a step in the live table; those of the warm-up are the earlier segment's."""
         segment, rows = member.segment.segment, step.commit.trajectory
         last = step.commit.frames[-1].frame
         member.lead.append(rows[rows["frame"] < segment.first])
@@ -137,15 +137,15 @@ class LiveRun:
             return
         if member.names is None:
             member.names = self._names.begin(np.concatenate([*member.lead, np.zeros(0, TRAJECTORY)]))
-        new = step.within(max(segment.first, self._told), stop)
+        new = step.within(max(segment.first, self._published), stop)
         if not new.commit.frames:
             return
         self._table.append(self._names.named(new.commit.trajectory, member.names))
-        self._told = new.commit.frames[-1].frame + 1
+        self._published = new.commit.frames[-1].frame + 1
         self._delays += [now() - self._arrived.pop(scene.frame) for scene in new.commit.frames]
 
     def _keep(self, stop: int) -> None:
-        """The oldest segment is whole."""
+        """Finish the oldest segment before frame `stop`."""
         member = self._members.pop(0)
         self.made.append(FinishedSegment(*member.segment.keep(stop)))
         self._blindness.forget(min((other.segment.segment.lead for other in self._members), default=stop))

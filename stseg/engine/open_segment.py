@@ -1,4 +1,4 @@
-"""A segment of a run that still goes on: moments come in, and its file grows until it is known where it ends."""
+"""A segment of a run that still goes on: frame sets in, and a file that grows until the end is known."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ class OpenSegment:
     Parameters
     ----------
     job, segment
-        What is run, and the segment; the last of a run may end elsewhere than it says.
+        The job, and the segment; the last of a run may end at another frame than planned.
     pipeline
         The stages.
     foregrounds
         Foreground model of each camera; the segment's own.
     draft
-        Where it is written.
+        Path that it is written to.
     """
 
     def __init__(
@@ -42,7 +42,7 @@ class OpenSegment:
     ) -> None:
         self.segment = segment
         self._job, self._draft = job, draft
-        self._passage = Session(pipeline, foregrounds, segment.lead)
+        self._session = Session(pipeline, foregrounds, segment.lead)
         self._shifts = ImageShifts(foregrounds, job.read.factors, job.recording.rig.frame_rate)
         self._beyond: list[tuple[CommittedFrames, Rows]] = []
         """Steps that go past its end: its own only if it is the last."""
@@ -62,11 +62,11 @@ class OpenSegment:
     def add(self, moment: LiveFrameSet) -> list[CommittedFrames]:
         """The next moment; what is decided by it."""
         self._shifts.look(moment)
-        return self._passage.add(moment)
+        return self._session.add(moment)
 
     def finish(self) -> list[CommittedFrames]:
         """No more moments will come; what was still open."""
-        return self._passage.finish()
+        return self._session.finish()
 
     def write(self, step: CommittedFrames, events: Rows) -> None:
         """Write a step that `add` or `finish` gave, and EVENT rows of its frames besides."""

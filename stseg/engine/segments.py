@@ -1,8 +1,8 @@
-"""Segments: the parts of a long recording that are worked on apart, and committed to disk one by one.
+"""Segments: the parts of a long recording that are processed independently, and committed to disk one by one.
 
-A segment is a whole number of windows. It begins to look a little before its first frame, so that it knows by then who
-is there, and looks on until its last window is solved; what it finds depends on the recording and the configuration
-alone. So a segment is the same whoever makes it and when: after a killed run, by another process, on another machine.
+A segment is a whole number of windows. It has a warm-up before its first frame, so that its tracks exist by then, and
+processes frames until its last window is solved. Its result depends on the recording and the configuration alone, so it
+is the same after a killed run, from another process, and on another machine.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class Segment:
     index
         Counted from 0 at the run's first.
     lead
-        The first frame that is looked at; the frames from there to `first` are the warm-up.
+        The first frame that is processed; the frames from there to `first` are the warm-up.
     first, stop
         The frames that are committed, half open; those of all segments partition the run, but for its gaps.
     """
@@ -69,7 +69,7 @@ def segments(
 
 
 def longest_absence(config: TrackingConfig) -> float:
-    """How long at most somebody may be unseen and still be followed, known again or filled in, seconds."""
+    """Longest time without detections over which a track is continued, linked or interpolated, seconds."""
     return max(config.patience, config.maximum_gap, config.interpolation_gap)
 
 

@@ -71,7 +71,7 @@ class Session:
         self._open: deque[Future[FusedEvidence]] = deque()
 
     def evidence(self, frame_set: FrameSet) -> list[ViewEvidence]:
-        """The foreground of all views; to be asked once for each frame set, in the order of time."""
+        """The foreground of all views; to be called once for each frame set, in the order of time."""
         with self.watch.time("foreground"):
             views = zip(self.foregrounds, frame_set.views, strict=True)
             return [foreground.evidence(view) for foreground, view in views]
@@ -84,7 +84,7 @@ class Session:
         frame_set
             The observations.
         evidence
-            What `evidence` gave for them, where it was asked before.
+            The result of `evidence` for them, if it was called before.
         """
         evidence = self.evidence(frame_set) if evidence is None else evidence
         noise = self._box_noise.noise

@@ -73,19 +73,19 @@ def make_by_workers(
                     with suppress(OSError):  # it has died; seen below
                         worker.pipe.send((worker.segment, draft(worker.segment.index)))
             for worker in _heard(pool):
-                told = _receive(worker)
+                message = _receive(worker)
                 segment = worker.segment
-                if isinstance(told, int):
-                    advance(told)
-                elif isinstance(told, str):
-                    if told not in notes:
-                        note(told)
-                    notes.add(told)
-                elif isinstance(told, Path) and segment is not None:
+                if isinstance(message, int):
+                    advance(message)
+                elif isinstance(message, str):
+                    if message not in notes:
+                        note(message)
+                    notes.add(message)
+                elif isinstance(message, Path) and segment is not None:
                     worker.segment = None
-                    yield segment, told
-                elif isinstance(told, BaseException):
-                    raise told
+                    yield segment, message
+                elif isinstance(message, BaseException):
+                    raise message
                 else:
                     pool[pool.index(worker)] = _hired(job)
                     if segment is not None:
