@@ -63,7 +63,8 @@ quick = pytest.mark.skipif(python_form(set_score) is set_score, reason="too slow
 
 
 def track(rig: Path, output: Path, *more: str) -> int:
-    return main(["run", str(rig), "-o", str(output), "--workers", "1", *OPTIONS, *more])
+    alone = () if "--workers" in more else ("--workers", "1")
+    return main(["run", str(rig), "-o", str(output), *alone, *OPTIONS, *more])
 
 
 def process(rig: Path, output: Path, *more: str) -> subprocess.Popen[str]:
