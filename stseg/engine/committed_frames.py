@@ -18,7 +18,7 @@ from stseg.trackers import Commit
 
 @dataclass(frozen=True)
 class CommittedFrames:
-    """Frames on which the tracker has decided, with their candidates and the work that they took.
+    """Committed frames of a tracker, with their candidates, error rates and processing times.
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ class CommittedFrames:
     @property
     def frames(self) -> Ints:
         """Numbers of the frames, int64 (time,)."""
-        return np.array([scene.frame for scene in self.commit.frames], np.int64)
+        return np.array([fused.frame for fused in self.commit.frames], np.int64)
 
     @property
     def trajectory(self) -> Rows:
@@ -61,7 +61,7 @@ class CommittedFrames:
     @property
     def log_odds(self) -> Singles:
         """The volume, float32 (time, plane, y, x), nats; nan where no view sees the cell."""
-        return np.stack([scene.log_odds for scene in self.commit.frames])
+        return np.stack([fused.log_odds for fused in self.commit.frames])
 
     @property
     def label(self) -> Labels:
@@ -71,7 +71,7 @@ class CommittedFrames:
     def within(self, first: int, stop: int) -> CommittedFrames:
         """The results of frames first .. stop - 1; timings are kept whole."""
         commit, candidates = self.commit, self.candidates
-        kept = np.array([first <= scene.frame < stop for scene in commit.frames], bool)
+        kept = np.array([first <= fused.frame < stop for fused in commit.frames], bool)
         candidate = _inside(candidates["frame"], first, stop)
         return CommittedFrames(
             Commit(
@@ -105,12 +105,12 @@ class FrameRecord(NamedTuple):
 def committed_frames(commit: Commit, records: dict[int, FrameRecord], watch: Stopwatch) -> CommittedFrames:
     """The results of a tracker's commit; takes its frames out of `records` and their time out of `watch`."""
     rows, parts, residuals = [], [], []
-    for scene in commit.frames:
-        explanation, fusion = records.pop(scene.frame)
+    for fused in commit.frames:
+        explanation, fusion = records.pop(fused.frame)
         rates = fusion.result().rates
         residuals.append(explanation.residual)
         for status, candidates in ((1, explanation.people), (0, explanation.ghosts)):
-            rows.append(_candidate_rows(scene.frame, status, candidates))
+            rows.append(_candidate_rows(fused.frame, status, candidates))
             parts.append(candidates.view_evidence.T)
     rates["aside"] = _finite_mean(np.array(residuals))
     window = int(commit.windows["index"][0]) if len(commit.windows) else commit.frames[0].frame

@@ -124,7 +124,7 @@ class LiveRun:
 
     def _take(self, member: _Member, steps: list[CommittedFrames], stop: int) -> None:
         for step in steps:
-            frames = [scene.frame for scene in step.commit.frames]
+            frames = [fused.frame for fused in step.commit.frames]
             member.segment.write(step, self._blindness.events(frames))
             self._publish(member, step, stop)
 
@@ -142,7 +142,7 @@ class LiveRun:
             return
         self._table.append(self._names.named(new.commit.trajectory, member.names))
         self._published = new.commit.frames[-1].frame + 1
-        self._delays += [now() - self._arrived.pop(scene.frame) for scene in new.commit.frames]
+        self._delays += [now() - self._arrived.pop(fused.frame) for fused in new.commit.frames]
 
     def _keep(self, stop: int) -> None:
         """Finish the oldest segment before frame `stop`."""

@@ -21,7 +21,7 @@ class Blobs:
     track : int64 (n,)
         The track that claims each blob; UNASSIGNED for none.
     person : int64 (n,)
-        The detected person whom each blob holds, -1 for none.
+        The detected person that each blob holds, -1 for none.
     ground : float64 (n, 2)
         Centroid of the likelihood-weighted mass, metres.
     covariance : float64 (n, 2, 2)

@@ -4,7 +4,7 @@ One detector draws the sides of a box within 2 % of a body's height, another wit
 score is lower. So the standard deviations of a box's offsets (`stseg.model.box_fit`) are a table over the score. Errors
 of the edges of one box are correlated, and so are those of the views where a body is no pillar: an edge counts as half
 an observation. Its tolerance is wider than its standard deviation by the root of two, and a noisier box says less for
-the person whom it fits, by half the logarithms of the ratios of its tolerances. By the first guess, in which standard
+the person that it fits, by half the logarithms of the ratios of its tolerances. By the first guess, in which standard
 deviations grow with one over the root of the score, that is the logarithm of the score.
 
 The first guess is also the loosest: what fits worse than that is no error of edges but a box of another person. And the

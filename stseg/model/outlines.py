@@ -81,7 +81,7 @@ def sums_inside(
     values : float32 (v, u)
         On the raster.
     owner : int64 (v, u)
-        The person whom each pixel is assigned to, -1 for none. Own and unassigned pixels count.
+        The person that each pixel is assigned to, -1 for none. Own and unassigned pixels count.
 
     Returns
     -------

@@ -69,7 +69,7 @@ class Explanation:
     raster_step : tuple of int
         Image pixels to a raster pixel of `pixel_assignment`, for each view.
     box_assignment : tuple of int64 arrays (box,)
-        For each view with boxes the person whom each box is assigned to, -1 for none; empty for other views.
+        For each view with boxes the person that each box is assigned to, -1 for none; empty for other views.
     residual : float64 (view,)
         Reprojection residual, metres (see `stseg.detection.residual`); nan where nothing was measured.
     """

@@ -22,7 +22,7 @@ from stseg.config import BodyConfig
 from stseg.model.sizes import Sizes, log_heavy_tailed
 
 _RESOLUTION = 0.1
-"""s: how finely one frame tells places apart, metres (standard deviation)."""
+"""s: resolution of places in one frame, metres (standard deviation)."""
 _WORST_HEIGHT = -4.0
 """Least log-ratio of a height, nats: people stoop and sit."""
 

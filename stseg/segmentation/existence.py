@@ -1,6 +1,6 @@
 """Existence of people over a window: which candidates of its frames are real, decided together.
 
-Candidates are all places that the detector weighed, found and rejected ones, with their evidence in nats. One binary
+Candidates are the detector's detections and ghosts (rejected candidates), with their evidence in nats. One binary
 variable x_i for each; a link i -> j says that candidate j of a later frame is the same body as candidate i.
 
     -E(x) = sum_i g_i x_i + sum_links b_ij x_i x_j - sum_exclusions K x_i x_j
@@ -8,10 +8,11 @@ variable x_i for each; a link i -> j says that candidate j of a later frame is t
     b_ij  = birth cost_j + death cost_i + log [ N(m_j - m_i; 0, S_ij) / (prior odds / s^2) ] + height ratio - absence
 
 Without links a candidate pays for its birth and its death; a link saves both, and adds how much likelier j's place is
-as the continuation of i than as a place of anybody. Birth and death cost nothing at the border of the scene and at the
-ends of the window. Links form paths: each candidate has at most one predecessor and one successor, by a minimum-cost
-flow that ignores exclusions (Zhang, Li and Nevatia, CVPR 2008). Candidates of one frame that are closer than the reach
-of a body exclude each other, since their evidence is the same. Links are submodular, exclusions are not: roof duality.
+as the continuation of i than as the place of any other person. Birth and death cost nothing at the border of the scene
+and at the ends of the window. Links form paths: each candidate has at most one predecessor and one successor, by a
+minimum-cost flow that ignores exclusions (Zhang, Li and Nevatia, CVPR 2008). Candidates of one frame that are closer
+than the reach of a body exclude each other, since their evidence is the same. Links are submodular, exclusions are not:
+roof duality.
 """
 
 from __future__ import annotations
@@ -170,9 +171,9 @@ class ExistenceModel:
     def _exclusions(self, found: WindowCandidates) -> tuple[Ints, Ints]:
         """Pairs of one frame that share their evidence; two people of the detector do not."""
         together = found.frame[:, None] == found.frame
-        away = np.hypot(*np.moveaxis(found.ground[:, None] - found.ground, -1, 0))
+        distance = np.hypot(*np.moveaxis(found.ground[:, None] - found.ground, -1, 0))
         kept = (found.track > 0)[:, None] & (found.track > 0)
-        one, other = np.nonzero(np.triu(together & (away < self.reach) & ~kept, 1))
+        one, other = np.nonzero(np.triu(together & (distance < self.reach) & ~kept, 1))
         return one.astype(np.int64), other.astype(np.int64)
 
 
@@ -191,7 +192,7 @@ def _marginals(gain: Floats, start: Ints, end: Ints, bonus: Floats) -> Floats:
 
 
 def _message(log_odds: float, bonus: float) -> float:
-    """Log-odds that a neighbour with these log-odds lends across a link."""
+    """Message of a neighbour with these log-odds across a link, nats."""
     return float(np.logaddexp(0.0, log_odds + bonus) - np.logaddexp(0.0, log_odds))
 
 

@@ -63,8 +63,8 @@ class KalmanTracker(FramewiseTracker):
         filters = corrected(filters, tracks, ground[found], noise[found])
         self.filters = filters.joined_with(initial(ground[unassigned], noise[unassigned], model.speed_spread))
         self.sizes.put(tracks, sizes.at(found).with_prior(self.sizes.at(tracks)))
-        anybody = Sizes.of_population(len(unassigned), self.config.body)
-        self.sizes = self.sizes.joined_with(sizes.at(unassigned).with_prior(anybody))
+        population = Sizes.of_population(len(unassigned), self.config.body)
+        self.sizes = self.sizes.joined_with(sizes.at(unassigned).with_prior(population))
         births = self.issued + 1 + np.arange(len(unassigned))
         self.frame, self.issued, self.begun = fused.frame, self.issued + len(unassigned), True
         person = np.full(len(self.ids), -1)
@@ -76,8 +76,8 @@ class KalmanTracker(FramewiseTracker):
 
     def _measured(self, sizes: Sizes) -> Sizes:
         """Sizes as measurements: the population prior taken out, the frame's noise added."""
-        anybody = Sizes.of_population(len(sizes.height), self.config.body)
-        return sizes.as_measurements(anybody).with_noise(self.config.tracking)
+        population = Sizes.of_population(len(sizes.height), self.config.body)
+        return sizes.as_measurements(population).with_noise(self.config.tracking)
 
     def _assigned(self, filters: Filters, ground: Floats, noise: Floats, sizes: Sizes) -> tuple[Ints, Ints]:
         """Pairs of filters and detections, both int64: the most likely assignment within the gates."""

@@ -1,4 +1,4 @@
-"""Detections of a window revised by what the whole window shows: a decision of existence put back into its frames."""
+"""Revision of the detections of a window's frames by a decision of existence over the whole window."""
 
 from __future__ import annotations
 
