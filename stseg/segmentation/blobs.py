@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.ndimage import label as connected
 
-from stseg.arrays import Floats, Ints, Labels, Singles
+from stseg.arrays import Flags, Floats, Ints, Labels, Singles
 from stseg.geometry import Grid
 from stseg.model.blobs import UNASSIGNED, Blobs
 
@@ -23,7 +23,8 @@ def find_blobs(
 
     The cells of a track form one blob; unassigned cells one blob for each connected component on the ground. A ground
     cell below cells of several labels goes to the one with the most mass above it. A detection without cells of its own
-    is a blob without extent: whether it exists was decided before, and the cut only gives cells to it.
+    is a blob without extent: whether it exists was decided before, and the cut only gives cells to it. Beyond the area,
+    where there are no cells to give, it is no blob.
 
     Parameters
     ----------
@@ -50,8 +51,17 @@ def find_blobs(
         if distance.min(initial=np.inf) <= reach / 2:
             person[known.searchsorted(track_id)] = j
     blobs = _measure(cells, track, person, label, log_odds, grid)
-    without = np.setdiff1d(np.arange(len(people_track)), person)
+    without = np.setdiff1d(np.flatnonzero(_in_volume(people_ground, log_odds, grid)), person)
     return _joined(blobs, without, people_ground[without], people_track[without], grid)
+
+
+def _in_volume(ground: Floats, log_odds: Singles, grid: Grid) -> Flags:
+    """Places (n, 2) above which the volume has a cell that some view sees, bool (n,)."""
+    column, row = np.rint(grid.cell_of(ground)).astype(np.int64).T
+    rows, columns = log_odds.shape[1:]
+    inside = (column >= 0) & (column < columns) & (row >= 0) & (row < rows)
+    seen = np.isfinite(log_odds).any(0)[row.clip(0, rows - 1), column.clip(0, columns - 1)]
+    return np.asarray(inside & seen)
 
 
 def _joined(blobs: Blobs, person: Ints, ground: Floats, track: Ints, grid: Grid) -> Blobs:
