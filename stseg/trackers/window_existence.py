@@ -104,19 +104,20 @@ def _candidates(frames: Sequence[TrackedFrame]) -> WindowCandidates:
 
 
 def _tracks(found: WindowCandidates, decision: Existence) -> Ints:
-    """Track of each candidate that is real, 0 for the others: added ones take the track nearest along their path.
+    """Track of each candidate that is real, 0 for the others: added ones take that of the next detection on their path.
 
-    A path without any of the detector's people has no track: its candidates are the best of many places that were
-    tried, and so are their sums.
+    Only between two of the detector's people is a candidate added. Elsewhere candidates are the best of many places
+    that were tried, and so are their sums; and what prolongs a track at the border of the area costs nothing.
     """
-    tracks = np.where(decision.real, found.track, 0)
+    own = np.where(decision.real, found.track, 0)
     linked = np.flatnonzero((decision.successor >= 0) & decision.real)
     linked = linked[decision.real[decision.successor[linked]]]
-    for i in linked[::-1].tolist():
-        _take_over(tracks, i, int(decision.successor[i]), found)
+    earlier, later = own.copy(), own.copy()
     for i in linked.tolist():
-        _take_over(tracks, int(decision.successor[i]), i, found)
-    return tracks
+        _take_over(earlier, int(decision.successor[i]), i, found)
+    for i in linked[::-1].tolist():
+        _take_over(later, i, int(decision.successor[i]), found)
+    return np.where(earlier > 0, later, 0)
 
 
 def _take_over(tracks: Ints, to: int, source: int, found: WindowCandidates) -> None:
