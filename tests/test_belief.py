@@ -24,11 +24,11 @@ from stseg.trackers import Commit, FrameObservations, FusedFrame, find_tracker
 from stseg.trackers.belief import BeliefTracker
 from stseg.trackers.belief.exclusion import exclusion
 from stseg.trackers.belief.histogram import BINS, HSV_BINS, PARTS, POINTS, histograms
-from stseg.trackers.belief.look import TargetLikelihood, squares
 from stseg.trackers.belief.particles import Motion, Particles, Prediction, fill_origin, systematic
 from stseg.trackers.belief.potential import Outlier, Potential
 from stseg.trackers.belief.star import Rounds, Star, propagate
 from stseg.trackers.belief.target import Target, in_front, looks
+from stseg.trackers.belief.target_likelihood import TargetLikelihood, squares
 from stseg.trackers.belief.view import StarView
 
 RIG = room()

@@ -28,8 +28,8 @@ from stseg.graphcut.pymaxflow import grid_cut
 from stseg.graphcut.reduction import OCCUPIED, OPEN, reduce
 from stseg.graphcut.solvers import SOLVERS, find_solver
 from stseg.graphcut.sparse import MOST, sparse_cut
+from stseg.segmentation.cell_motion import successor_cells
 from stseg.segmentation.energy import build_energy, neighbourhood
-from stseg.segmentation.motion import successor_cells
 
 ROOT = Path(__file__).parents[1]
 DATA = Path(os.environ.get("STSEG_DATA", ROOT / "../shared/data"))

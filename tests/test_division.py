@@ -20,9 +20,9 @@ from stseg.graphcut.expansion import LabelEnergy, expand
 from stseg.graphcut.solvers import SOLVERS
 from stseg.model.blobs import UNASSIGNED
 from stseg.model.predicted_places import PredictedPlaces
+from stseg.segmentation.cell_motion import successor_cells
 from stseg.segmentation.energy import build_energy, neighbourhood
 from stseg.segmentation.labelling import WindowDetections, WindowLabels, label_cells
-from stseg.segmentation.motion import successor_cells
 from stseg.segmentation.unary import BodyShape, label_energy, track_shares
 from stseg.tracking.prediction import DetectionHistory, earlier_detections, predicted_places, together
 from stseg.tracking.tracklets import Tracklet

@@ -15,7 +15,7 @@ from stseg.config import Config, KalmanConfig, MotionConfig
 from stseg.errors import ConfigError
 from stseg.trackers import FrameObservations, FusedFrame
 from stseg.trackers.kalman import KalmanTracker
-from stseg.trackers.motion import corrected, initial, innovations, predicted
+from stseg.trackers.kalman_filters import corrected, initial, innovations, predicted
 from stseg.tracking.final_tracks import committed_tracks
 
 RIG = room()

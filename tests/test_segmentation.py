@@ -13,7 +13,7 @@ from stseg.geometry import Grid
 from stseg.geometry.nearest_person import nearest_person
 from stseg.model.blobs import UNASSIGNED, Blobs
 from stseg.segmentation.blobs import find_blobs
-from stseg.segmentation.motion import motion_field
+from stseg.segmentation.cell_motion import motion_field
 
 GRID = Grid((0.0, 2.0), (0.0, 1.5), cell=0.1, top=1.8, planes=4)
 

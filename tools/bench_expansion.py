@@ -24,8 +24,8 @@ from stseg.graphcut.cell_subset import subset
 from stseg.graphcut.cut import minimum_cut
 from stseg.graphcut.energy import Energy
 from stseg.graphcut.expansion import LabelEnergy, expand
+from stseg.segmentation.cell_motion import successor_cells
 from stseg.segmentation.energy import neighbourhood
-from stseg.segmentation.motion import successor_cells
 
 SHAPE = (15, 10, 100, 100)
 CELL, RISE, STEP = 0.10, 0.20, 1 / 15  # metres, metres, seconds

@@ -11,8 +11,8 @@ import numpy as np
 from stseg.accelerate import part
 from stseg.arrays import AnyArray, Bytes, Ints, Labels
 from stseg.graphcut.graph import Graph
-from stseg.graphcut.halves import Bridges
 from stseg.graphcut.lattice import Lattice, neighbour
+from stseg.graphcut.parallel_max_flow import Bridges
 from stseg.graphcut.reduction import OPEN, Reduction
 
 

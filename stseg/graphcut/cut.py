@@ -11,8 +11,8 @@ from stseg.arrays import Flags
 from stseg.graphcut.arcs import in_place, in_rows
 from stseg.graphcut.energy import Energy
 from stseg.graphcut.graph import Graph
-from stseg.graphcut.halves import Bridges, solve, solve_halves
 from stseg.graphcut.lattice import cells
+from stseg.graphcut.parallel_max_flow import Bridges, solve, solve_halves
 from stseg.graphcut.reduction import OCCUPIED, Reduction, reduce
 
 DENSE = 0.5

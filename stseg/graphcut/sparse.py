@@ -7,7 +7,7 @@ import numpy as np
 from stseg.accelerate import kernel
 from stseg.arrays import Flags, Ints, Labels
 from stseg.graphcut.graph import Graph
-from stseg.graphcut.halves import solve
+from stseg.graphcut.parallel_max_flow import solve
 
 MOST = 1 << 29
 """Greatest sum of the capacities of one node, quanta."""

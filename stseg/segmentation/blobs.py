@@ -60,7 +60,7 @@ def _in_volume(ground: Floats, log_odds: Singles, grid: Grid) -> Flags:
     column, row = np.rint(grid.cell_of(ground)).astype(np.int64).T
     rows, columns = log_odds.shape[1:]
     inside = (column >= 0) & (column < columns) & (row >= 0) & (row < rows)
-    seen = np.isfinite(log_odds).any(0)[row.clip(0, rows - 1), column.clip(0, columns - 1)]
+    seen = np.isfinite(log_odds[:, row.clip(0, rows - 1), column.clip(0, columns - 1)]).any(0)
     return np.asarray(inside & seen)
 
 

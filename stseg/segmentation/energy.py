@@ -17,7 +17,7 @@ from stseg.arrays import Ints, Singles
 from stseg.config import SegmentationConfig
 from stseg.geometry import Grid
 from stseg.graphcut.energy import QUANTUM, Energy
-from stseg.segmentation.motion import successor_cells
+from stseg.segmentation.cell_motion import successor_cells
 
 _MOST_NATS = 30.0
 

@@ -20,9 +20,9 @@ from stseg.model.blobs import Blobs
 from stseg.model.predicted_tracks import PredictedTracks
 from stseg.model.tables import WINDOW
 from stseg.segmentation.blobs import find_blobs
+from stseg.segmentation.cell_motion import motion_field
 from stseg.segmentation.energy import build_energy
 from stseg.segmentation.labelling import WindowDetections, WindowLabels, label_cells
-from stseg.segmentation.motion import motion_field
 from stseg.segmentation.unary import BodyShape
 from stseg.trackers.protocol import Commit, FrameObservations, FusedFrame
 from stseg.trackers.rows import event_rows, trajectory_rows, views_at

@@ -17,7 +17,7 @@ from stseg.geometry import Rig
 from stseg.model.predicted_tracks import PredictedTracks
 from stseg.model.sizes import Sizes
 from stseg.trackers.framewise import FramewiseTracker
-from stseg.trackers.motion import Filters, corrected, initial, innovations, predicted
+from stseg.trackers.kalman_filters import Filters, corrected, initial, innovations, predicted
 from stseg.trackers.protocol import FORGETTING, STAYING, Commit, FrameObservations, FusedFrame
 from stseg.trackers.rows import Event
 from stseg.tracking.assignment import assign

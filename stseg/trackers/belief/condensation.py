@@ -15,9 +15,9 @@ import numpy as np
 
 from stseg.config import BeliefConfig
 from stseg.trackers.belief.leaf import Leaf
-from stseg.trackers.belief.look import TargetLikelihood
 from stseg.trackers.belief.particles import Motion, Particles, Prediction
 from stseg.trackers.belief.star import Star, grow
+from stseg.trackers.belief.target_likelihood import TargetLikelihood
 
 
 def condense(

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from stseg.arrays import Floats, Ints
-from stseg.trackers.belief.look import TargetLikelihood
 from stseg.trackers.belief.particles import Motion, Particles, Prediction, systematic
 from stseg.trackers.belief.potential import Outlier, Potential
+from stseg.trackers.belief.target_likelihood import TargetLikelihood
 from stseg.trackers.belief.view import StarView
 
 

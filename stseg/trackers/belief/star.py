@@ -25,9 +25,9 @@ from stseg.arrays import Floats
 from stseg.config import BeliefConfig
 from stseg.trackers.belief.exclusion import exclusion
 from stseg.trackers.belief.leaf import Leaf, arrival
-from stseg.trackers.belief.look import TargetLikelihood
 from stseg.trackers.belief.particles import Motion, Particles, Prediction, systematic
 from stseg.trackers.belief.potential import Outlier, Potential
+from stseg.trackers.belief.target_likelihood import TargetLikelihood
 from stseg.trackers.belief.view import StarView
 
 LEAST_ROUNDS = 2

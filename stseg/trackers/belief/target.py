@@ -10,9 +10,9 @@ import numpy as np
 from stseg.arrays import Bytes, Floats
 from stseg.config import BeliefConfig
 from stseg.trackers.belief.histogram import histograms
-from stseg.trackers.belief.look import TargetLikelihood
 from stseg.trackers.belief.particles import Motion, Particles, Prediction
 from stseg.trackers.belief.star import Star
+from stseg.trackers.belief.target_likelihood import TargetLikelihood
 from stseg.trackers.belief.view import StarView
 
 _VISIBLE = 0.8

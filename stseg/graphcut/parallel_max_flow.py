@@ -10,7 +10,7 @@ import numpy as np
 from stseg.accelerate import part
 from stseg.arrays import Flags, Labels
 from stseg.graphcut.graph import Graph
-from stseg.graphcut.search import (
+from stseg.graphcut.max_flow import (
     NO_ARC,
     SOURCE,
     Queue,
