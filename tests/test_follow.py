@@ -143,7 +143,7 @@ def test_a_signal_finishes_the_run_file(tmp_path: Path, number: signal.Signals) 
     reported, messages = running.communicate(timeout=60)
     assert running.returncode == 0, messages
     assert messages.splitlines()[-1] == "stseg: finishing; once more to stop at once"
-    assert re.search(r"run.h5: 3 tracks in frames 0 to \d+, told \d+.\d s after them", reported)
+    assert re.search(r"run.h5: 3 tracks in frames 0 to \d+, published \d+.\d s after arrival", reported)
     stop = int(read_run(output).frames[-1]) + 1
     assert stop > 9
     assert track(rig, tmp_path / "afterwards.h5", "--frames", f"0:{stop}") == 0

@@ -1,7 +1,8 @@
-"""Foreground of each camera for a segment, from a background learned beforehand.
+"""Background training: the foreground model of each camera for a segment of the recording.
 
-A background belongs to a part of the recording, `segments.background_period` seconds long, so that light which changes
-over a day and furniture that is moved matter little, and so that what a segment finds depends on no other segment.
+The recording is divided into background periods of `segments.background_period` seconds, each with a background of its
+own. Changes of daylight and moved furniture thus have little effect, and the result of a segment depends on no other
+segment.
 """
 
 from __future__ import annotations
@@ -33,10 +34,9 @@ class BackgroundFrames:
     Attributes
     ----------
     part
-        Frames from which a camera without an empty scene learns.
+        Background period of the segment, from which a camera without an empty scene is trained.
     before
-        Frames of which a camera with an empty scene learns what has changed since; they end before the segment begins
-        to look.
+        Period before the segment's warm-up, by which the background of a camera with an empty scene is updated.
     """
 
     part: range
@@ -51,22 +51,27 @@ def make_foregrounds(
     segment: Segment | None = None,
     streams: StreamIndex | None = None,
 ) -> list[ViewForeground]:
-    """The foreground of every camera, in the rig's order, for the frames of a segment.
+    """Foreground models of all cameras for the frames of a segment.
 
-    A colour camera learns its background from frames of the part of the run in which the segment lies, and where it is
-    blind there, from the nearest in which it is not; one that is blind throughout has an untrained model, never used.
-    A camera with an empty scene learns that, and the changes since then from the part before.
+    The background of a colour camera is trained on the background period of the segment; frames in which the camera is
+    blind are replaced by the nearest in which it is not. A camera that is blind throughout keeps an untrained model,
+    which is never used. With an empty scene, the background is trained on that and updated by the period before.
 
     Parameters
     ----------
     recording, config
         The streams, and the constants of all stages.
     first, stop
-        The frames of the run.
+        The frames of the run, half open.
     segment
-        The segment that is processed; by default it begins with the run.
+        The segment to process; by default all frames of the run, without a warm-up.
     streams
         From `stseg.io.recording.stream_index.index_streams`, to seek distant frames.
+
+    Returns
+    -------
+    list of ViewForeground
+        One per camera, in the rig's order.
     """
     segment = Segment(0, first, first, stop) if segment is None else segment
     training = background_frames(segment, config.segments, recording.rig.frame_rate, first, stop)
@@ -79,22 +84,22 @@ def background_frames(
     """Training frames of the backgrounds of a segment, in a run of frames first .. stop - 1."""
     length = part_length(config, frame_rate)
     begin = max(first, min(first + (segment.first - first) // length * length, stop - length))
-    seen = first + (segment.lead - first) // length * length
-    return BackgroundFrames(range(begin, min(begin + length, stop)), range(max(first, seen - length), seen))
+    lead = first + (segment.lead - first) // length * length
+    return BackgroundFrames(range(begin, min(begin + length, stop)), range(max(first, lead - length), lead))
 
 
 def part_length(config: SegmentConfig, frame_rate: float) -> int:
-    """Frames of a part of the recording whose background holds."""
+    """Length of a background period, frames."""
     return max(1, round(config.background_period * frame_rate))
 
 
 def is_colour(recording: Recording, camera: int) -> bool:
-    """Whether a camera delivers colour, whose foreground needs a background model."""
+    """Whether a camera delivers colour images, whose foreground needs a background model."""
     return recording.sources[camera].source.kind in ("video", "images")
 
 
 def empty_background(recording: Recording, camera: int, config: Config) -> Background:
-    """A background that has learned the camera's empty scene, if it has one; else nothing."""
+    """A background trained on the camera's empty scene; untrained if the camera has none."""
     model = make_background(recording.read_rig.cameras[camera].size, recording.rig.frame_rate, config.foreground)
     if recording.sources[camera].background is not None:
         for empty in read_background(recording, camera):
@@ -103,30 +108,30 @@ def empty_background(recording: Recording, camera: int, config: Config) -> Backg
 
 
 class BackgroundLearner:
-    """A background that is updated by every `step`-th frame.
+    """Recursive update of a background by every `step`-th frame.
 
     Parameters
     ----------
     model
-        The background; not to be used by the caller afterwards.
+        The background; owned by the learner afterwards.
     frame_rate
-        Of the recording, frames per second.
+        Frame rate of the recording, frames per second.
     step
-        Frames from one update to the next.
+        Interval between updates, frames.
     config
-        Constants of the detection of light changes.
+        Constants of the detection of illumination changes.
     """
 
     def __init__(self, model: Background, frame_rate: float, step: int, config: IlluminationConfig) -> None:
         self._model, self._frame_rate = model.at_rate(frame_rate / step), frame_rate
-        self._watch = IlluminationMonitor(self._model, frame_rate / step, config)
+        self._monitor = IlluminationMonitor(self._model, frame_rate / step, config)
 
-    def see(self, image: Bytes) -> None:
-        """Update by the next frame."""
-        self._watch.likelihood(image)
+    def update(self, image: Bytes) -> None:
+        """Update the background by the next training frame, uint8 (v, u, channel)."""
+        self._monitor.likelihood(image)
 
     def learned(self) -> Background:
-        """The background at the recording's frame rate; this learner is not to be used afterwards."""
+        """The updated background at the recording's frame rate; ends the use of this learner."""
         return self._model.at_rate(self._frame_rate)
 
 
@@ -138,26 +143,26 @@ def _view_foreground(
     frame_rate = recording.rig.frame_rate
     model = empty_background(recording, camera, config)
     if recording.sources[camera].background is None:
-        shown = sampled(_sighted_frames(recording, camera, training.part, streams), config.segments)
-        if len(shown):
-            model.learn_from(_colours(recording, camera, shown, streams))
+        covered = sampled(_covered_frames(recording, camera, training.part, streams), config.segments)
+        if len(covered):
+            model.learn_from(_images(recording, camera, covered, streams))
     elif training.before:
         frames = sampled(training.before, config.segments)
         learner = BackgroundLearner(model, frame_rate, frames.step, config.illumination)
-        for image in _colours(recording, camera, frames, streams):
-            learner.see(image)
+        for image in _images(recording, camera, frames, streams):
+            learner.update(image)
         model = learner.learned()
     return ViewForeground(IlluminationMonitor(model, frame_rate, config.illumination))
 
 
-def _sighted_frames(recording: Recording, camera: int, part: range, streams: StreamIndex | None) -> Sequence[int]:
-    """As many frames as a part has in which the camera is not blind: those of the part, then those nearest to it.
+def _covered_frames(recording: Recording, camera: int, part: range, streams: StreamIndex | None) -> Sequence[int]:
+    """Frames in which the camera is not blind, as many as the period has: its own, then the nearest to it.
 
-    Without a stream index, every frame from the camera's offset on.
+    Without a stream index, all frames from the camera's offset on.
     """
     if streams is None:
-        late = max(0, recording.sources[camera].offset - part.start)
-        return range(part.start + late, part.stop + late)
+        delay = max(0, recording.sources[camera].offset - part.start)
+        return range(part.start + delay, part.stop + delay)
     frames = np.flatnonzero(streams.coverage(recording)[camera])
     begin, end = frames.searchsorted([part.start, part.stop]).tolist()
     lacking = len(part) - (end - begin)
@@ -166,13 +171,13 @@ def _sighted_frames(recording: Recording, camera: int, part: range, streams: Str
     return nearest
 
 
-def _colours(recording: Recording, camera: int, frames: Sequence[int], streams: StreamIndex | None) -> Iterator[Bytes]:
-    """Images of a colour camera in some frames, without those in which it is blind."""
+def _images(recording: Recording, camera: int, frames: Sequence[int], streams: StreamIndex | None) -> Iterator[Bytes]:
+    """Images of a colour camera, uint8 (v, u, channel), in the given frames except those in which it is blind."""
     for image in read_camera(recording, camera, frames, streams):
         if image is not None:
             yield np.asarray(image, np.uint8)
 
 
 def sampled(part: _Frames, config: SegmentConfig) -> _Frames:
-    """Frames spread over a part of the recording."""
+    """Training frames of a period at equal intervals, at least `background_samples` if it has as many."""
     return part[:: max(1, len(part) // config.background_samples)]

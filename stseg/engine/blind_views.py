@@ -12,12 +12,12 @@ from stseg.model.tables import EVENT
 
 
 class BlindViews:
-    """Missing views of the frames that are not committed yet.
+    """Record of missing views and dropped frames until their frames are committed.
 
     Parameters
     ----------
     cameras
-        Their names, in the rig's order.
+        Names of the cameras, in the rig's order.
     """
 
     def __init__(self, cameras: Sequence[str]) -> None:
@@ -25,29 +25,29 @@ class BlindViews:
         self._dropped: set[int] = set()
         self._missing: dict[int, list[int]] = {}
 
-    def note(self, moment: LiveFrameSet) -> None:
-        """Note the missing views of a frame set."""
-        missing = [k for k, view in enumerate(moment.views) if view is None]
-        if moment.dropped:
-            self._dropped.add(moment.frame)
+    def note(self, frame_set: LiveFrameSet) -> None:
+        """Record the missing views of a frame set."""
+        missing = [k for k, view in enumerate(frame_set.views) if view is None]
+        if frame_set.dropped:
+            self._dropped.add(frame_set.frame)
         elif missing:
-            self._missing[moment.frame] = missing
+            self._missing[frame_set.frame] = missing
 
     def events(self, frames: Sequence[int]) -> Rows:
-        """EVENT rows of committed frames: one with the number of dropped frames, and one for each blind camera."""
-        found = []
+        """EVENT rows of committed frames: one for the number of dropped frames, and one per blind camera."""
+        events = []
         dropped = [frame for frame in frames if frame in self._dropped]
         if dropped:
-            found.append(
+            events.append(
                 (dropped[0], f"{len(dropped)} of {len(frames)} frames dropped: tracking is slower than the cameras")
             )
         for k, name in enumerate(self._cameras):
             blind = [frame for frame in frames if k in self._missing.get(frame, ())]
             if blind:
-                found.append((blind[0], f"camera {name} showed nothing in {len(blind)} of {len(frames)} frames"))
-        return np.array([(frame, b"blind", 0, 0, text.encode()) for frame, text in found], EVENT)
+                events.append((blind[0], f"camera {name} showed nothing in {len(blind)} of {len(frames)} frames"))
+        return np.array([(frame, b"blind", 0, 0, text.encode()) for frame, text in events], EVENT)
 
     def forget(self, before: int) -> None:
-        """Discard the notes of frames before one."""
+        """Discard the records of frames before frame `before`."""
         self._dropped = {frame for frame in self._dropped if frame >= before}
         self._missing = {frame: missing for frame, missing in self._missing.items() if frame >= before}

@@ -1,4 +1,4 @@
-"""`stseg run --follow`: a recording that still goes on, in folders into which files arrive or as live streams."""
+"""Online tracking of a recording in progress (`stseg run --follow`): files that arrive in folders, or live streams."""
 
 from __future__ import annotations
 
@@ -37,12 +37,12 @@ from stseg.io.runfile.runs import Run, read_run
 from stseg.io.runfile.work_folder import WorkFolder
 
 ENDLESS = 1 << 62
-"""Stop frame of a run whose end is not known yet."""
+"""Stop frame of a run of unknown length."""
 
 
 @dataclass(frozen=True)
 class _Coming:
-    """Frame sets to come, the segments of their frames, and the first frame of the first background period."""
+    """Future frame sets, the segments of their frames, and the first frame of the first background period."""
 
     frame_sets: Iterable[LiveFrameSet]
     plan: Iterator[Segment]
@@ -60,32 +60,37 @@ def follow_recording(
     *,
     overwrite: bool = False,
 ) -> Followed | None:
-    """Follow a recording until it is asked to stop, then write its run file.
+    """Track a recording in progress until a stop is requested, then write its run file.
 
     Parameters
     ----------
     recording, config, tracker, volume
         The input, see `stseg.engine.job.Job`.
     output
-        The run file; tracks are added to `live_table_of(output)` while the recording goes on.
+        Path of the run file; tracks are appended to `live_table_of(output)` during the run.
     frames
-        0:B to end by itself; None to go on until a signal.
+        0:B to stop before frame B; None to run until a signal.
     reporter
         Receives notes and progress.
     overwrite
-        Whether older files of those names may be replaced.
+        Whether existing files of those names may be replaced.
 
     Returns
     -------
     Followed or None
-        None where nothing came, and no file was written.
+        None where no frame arrived, and no file was written.
+
+    Raises
+    ------
+    SourceError
+        Where the sources cannot be followed, or a camera to be trained delivers no images.
     """
     require_effect(config, tracker)
-    is_live(recording)  # or it cannot be followed
+    is_live(recording)  # raises where the sources cannot be followed
     job = Job(recording, config, tracker, volume, 0, last_frame(frames), StreamIndex(0, ()))
     request = run_request(recording, gather_provenance(recording, format_config(config)))
     request |= {"--tracker": tracker, "--volume": volume, "--follow": "yes"}
-    del request["source"], request["samples of source"]  # its files change while it goes on
+    del request["source"], request["samples of source"]  # the files change during the run
     work, table = WorkFolder(output, request), live_table_of(output)
     work.require_output(overwrite)
     if not work.begun:
@@ -94,7 +99,7 @@ def follow_recording(
         try:
             followed = _follow(job, folder, output, overwrite, reporter)
         except BaseException:
-            if not folder.segments():  # there is nothing to continue
+            if not folder.segments():  # nothing to resume
                 table.unlink(missing_ok=True)
             raise
         folder.remove()
@@ -103,14 +108,14 @@ def follow_recording(
 
 @dataclass(frozen=True)
 class Followed:
-    """A recording that was followed to its end.
+    """Result of a finished online run.
 
     Attributes
     ----------
     run
         The run file.
     delay
-        Time from the arrival of frames to their tracks in the live table, in words; empty where nothing was tracked.
+        Latency from the arrival of frames to their tracks in the live table, in words; empty without any tracks.
     """
 
     run: Run
@@ -145,12 +150,12 @@ def _follow(job: Job, folder: WorkFolder, output: Path, overwrite: bool, reporte
 
 
 def live_table_of(output: Path) -> Path:
-    """Path of the live table: the tracks of a run while it goes on."""
+    """Path of the live table, the tracks of a run in progress."""
     return output.with_name(f"{output.name}.live.csv")
 
 
 def last_frame(frames: FrameRange | None) -> int:
-    """The end of a run that follows, from its option --frames; `ENDLESS` without one. Raises ConfigError."""
+    """Stop frame of an online run from its option --frames; `ENDLESS` without one. Raises ConfigError."""
     if frames is None:
         return ENDLESS
     if frames.first not in (None, 0) or not frames.stop:
@@ -159,77 +164,81 @@ def last_frame(frames: FrameRange | None) -> int:
 
 
 def _kept(folder: WorkFolder, live: bool, reporter: Reporter) -> list[FinishedSegment]:
-    """The segments of an unfinished run. What is missing between those of files is made anew, with all after it."""
-    found, made = folder.segments(), list[FinishedSegment]()
+    """Finished segments of an interrupted run. Of files, those after a missing one are removed, to be made anew."""
+    paths, finished = folder.segments(), list[FinishedSegment]()
     for path in folder.broken:
         reporter.note(f"{path}: its bytes have changed since it was written; {'left out' if live else 'made anew'}")
-    for index in sorted(found):
-        if not live and index != len(made):
-            found[index].unlink()
+    for index in sorted(paths):
+        if not live and index != len(finished):
+            paths[index].unlink()
             continue
-        frames = read_run(found[index]).frames
+        frames = read_run(paths[index]).frames
         first, stop = int(frames[0]), int(frames[-1]) + 1
-        made.append(FinishedSegment(Segment(index, first, first, stop), found[index]))
-    if made:
-        reporter.note(f"{len(made)} segments are there already, up to frame {made[-1].segment.stop - 1}")
-    return made
+        finished.append(FinishedSegment(Segment(index, first, first, stop), paths[index]))
+    if finished:
+        reporter.note(f"{len(finished)} segments are there already, up to frame {finished[-1].segment.stop - 1}")
+    return finished
 
 
 @contextmanager
 def _files(
     job: Job, folder: WorkFolder, follower: LiveRun, halt: Event, reporter: Reporter
 ) -> Iterator[_Coming | None]:
-    """Files that arrive, from where an unfinished run stopped; None where it is stopped before anything came."""
-    recording, config, sights = job.read, job.config, follower.sights
-    frame_rate, made = recording.rig.frame_rate, follower.made
+    """Frame sets of arriving files, from the end of an interrupted run on; None if stopped before any frame arrived."""
+    recording, config, foregrounds = job.read, job.config, follower.foregrounds
+    frame_rate, finished = recording.rig.frame_rate, follower.finished
     plan = endless_segments(frame_rate, config, 0)
-    coming = [next(plan) for _ in range(len(made) + 1)][-1]
-    if made and coming.first != made[-1].segment.stop:  # the last one was to be the end
-        plan = endless_segments(frame_rate, config, made[-1].segment.stop, len(made))
+    coming = [next(plan) for _ in range(len(finished) + 1)][-1]
+    if finished and coming.first != finished[-1].segment.stop:  # the interrupted run had ended there
+        plan = endless_segments(frame_rate, config, finished[-1].segment.stop, len(finished))
         coming = next(plan)
     before = background_frames(coming, config.segments, frame_rate, 0, ENDLESS).before
-    first = before.start if sights.learns else coming.lead
+    first = before.start if foregrounds.has_backgrounds else coming.lead
     notes = FileNotes(folder.path / "files.json")
-    if sights.unlearned:
-        with FollowedFiles(recording, first, None, config.live, notes, halt, reporter.note) as moments:
-            if not _learn(sights, moments, config.live.background_time, reporter):
+    if foregrounds.untrained:
+        with FollowedFiles(recording, first, None, config.live, notes, halt, reporter.note) as frame_sets:
+            if not _learn(foregrounds, frame_sets, config.live.background_time, reporter):
                 yield None
                 return
     stop = None if job.stop == ENDLESS else job.stop
-    with FollowedFiles(recording, first, stop, config.live, notes, halt, reporter.note) as moments:
-        yield _Coming(moments, chain([coming], plan), 0)
+    with FollowedFiles(recording, first, stop, config.live, notes, halt, reporter.note) as frame_sets:
+        yield _Coming(frame_sets, chain([coming], plan), 0)
 
 
 @contextmanager
 def _cameras(
     job: Job, folder: WorkFolder, follower: LiveRun, halt: Event, reporter: Reporter
 ) -> Iterator[_Coming | None]:
-    """Live streams from now on; None where it is stopped before anything came."""
-    recording, config, sights = job.read, job.config, follower.sights
-    with FollowedCameras(recording, config.live, folder.clock(), halt, reporter.note) as moments:
-        if sights.unlearned and not _learn(sights, moments, config.live.background_time, reporter):
+    """Frame sets of live streams from now on; None if stopped before any frame arrived."""
+    recording, config, foregrounds = job.read, job.config, follower.foregrounds
+    with FollowedCameras(recording, config.live, folder.clock(), halt, reporter.note) as frame_sets:
+        if foregrounds.untrained and not _learn(foregrounds, frame_sets, config.live.background_time, reporter):
             yield None
             return
-        begun = next(moments, None)
-        if begun is None or moments.start is None:
+        begun = next(frame_sets, None)
+        if begun is None or frame_sets.start is None:
             yield None
             return
-        folder.keep_clock(moments.start)
-        index = follower.made[-1].segment.index + 1 if follower.made else 0
+        folder.keep_clock(frame_sets.start)
+        index = follower.finished[-1].segment.index + 1 if follower.finished else 0
         plan = endless_segments(recording.rig.frame_rate, config, begun.frame, index)
-        until = takewhile(lambda moment: moment.frame < job.stop, chain([begun], moments))
+        until = takewhile(lambda frame_set: frame_set.frame < job.stop, chain([begun], frame_sets))
         yield _Coming(until, plan, begun.frame)
-        if moments.dropped:
-            reporter.note(f"{moments.dropped} moments were dropped in all; /events says which")
+        if frame_sets.dropped:
+            reporter.note(f"{frame_sets.dropped} frame sets were dropped in all: see /events")
 
 
-def _learn(sights: LiveForegrounds, moments: Iterable[LiveFrameSet], seconds: float, reporter: Reporter) -> bool:
+def _learn(
+    foregrounds: LiveForegrounds, frame_sets: Iterable[LiveFrameSet], seconds: float, reporter: Reporter
+) -> bool:
     """Teach the cameras that have no empty scene; False where the run is stopped before anything came."""
-    reporter.note(f"no empty scene of {', '.join(sights.unlearned)}: learning from {seconds:g} s before the run begins")
-    count = sights.learn(moments)
-    if count and sights.unlearned:
+    reporter.note(
+        f"no empty scene of {', '.join(foregrounds.untrained)}: learning from {seconds:g} s before the run begins"
+    )
+    count = foregrounds.learn(frame_sets)
+    if count and foregrounds.untrained:
         found = f"nothing in the first {count} frames"
         raise SourceError(
-            f"camera {sights.unlearned[0]}", "", found, "a camera that shows something, or its empty scene"
+            f"camera {foregrounds.untrained[0]}", "", found, "a camera that shows something, or its empty scene"
         )
     return count > 0

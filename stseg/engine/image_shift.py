@@ -1,4 +1,4 @@
-"""How far the pictures of colour cameras have moved since their backgrounds were learned: a knock of a pixel shows."""
+"""Image registration of colour cameras to their backgrounds: a shift of one pixel reveals a knocked camera."""
 
 from __future__ import annotations
 
@@ -12,46 +12,48 @@ from stseg.engine.session import FrameSet
 from stseg.foreground.view_foreground import ViewForeground
 from stseg.model.tables import SHIFT
 
-_EVERY = 2.0
-"""Seconds from one look to the next."""
+_PERIOD = 2.0
+"""Time between measurements, seconds."""
 
 
 class ImageShifts:
-    """Looks at moments while they are handed on.
+    """Shifts of the cameras' images relative to their background images, measured at fixed intervals.
 
     Parameters
     ----------
-    sights
-        Each camera's way from observation to evidence; only those with a background are looked at.
+    foregrounds
+        Foreground model of each camera; cameras without a background are not measured.
     factors
-        How far each camera's frames are reduced.
+        Reduction factor of each camera's images.
     frame_rate
         Frames per second.
     """
 
-    def __init__(self, sights: Sequence[ViewForeground], factors: Sequence[int], frame_rate: float) -> None:
-        self._sights, self._factors = sights, factors
-        self._every = max(1, round(_EVERY * frame_rate))
+    def __init__(self, foregrounds: Sequence[ViewForeground], factors: Sequence[int], frame_rate: float) -> None:
+        self._foregrounds, self._factors = foregrounds, factors
+        self._period = max(1, round(_PERIOD * frame_rate))
         self._rows: list[tuple[int, int, float, float]] = []
 
-    def watch(self, moments: Iterator[FrameSet]) -> Iterator[FrameSet]:
-        """The moments, each looked at as it is handed on."""
-        for moment in moments:
-            self.look(moment)
-            yield moment
+    def measured(self, frame_sets: Iterator[FrameSet]) -> Iterator[FrameSet]:
+        """Pass frame sets through, and measure the shifts on the way."""
+        for frame_set in frame_sets:
+            self.measure(frame_set)
+            yield frame_set
 
-    def look(self, moment: FrameSet) -> None:
-        """Look at a moment, if it is time."""
-        if moment.frame % self._every == 0:
-            self._look(moment)
+    def measure(self, frame_set: FrameSet) -> None:
+        """Measure the shifts of a frame set, if a measurement is due."""
+        if frame_set.frame % self._period == 0:
+            self._measure(frame_set)
 
     def rows(self, first: int, stop: int) -> Rows:
-        """SHIFT rows of frames first .. stop - 1."""
+        """SHIFT rows of frames first .. stop - 1, pixels of the full-size image."""
         return np.array([row for row in self._rows if first <= row[0] < stop], SHIFT)
 
-    def _look(self, moment: FrameSet) -> None:
-        for view, (sight, image, factor) in enumerate(zip(self._sights, moment.views, self._factors, strict=True)):
-            if sight.background is not None and isinstance(image, np.ndarray):
-                background = np.clip(sight.background.model.background_image(), 0, 255).astype(np.uint8)
+    def _measure(self, frame_set: FrameSet) -> None:
+        for view, (foreground, image, factor) in enumerate(
+            zip(self._foregrounds, frame_set.views, self._factors, strict=True)
+        ):
+            if foreground.background is not None and isinstance(image, np.ndarray):
+                background = np.clip(foreground.background.model.background_image(), 0, 255).astype(np.uint8)
                 u, v = factor * background_shift(background, np.asarray(image, np.uint8))
-                self._rows.append((moment.frame, view, float(u), float(v)))
+                self._rows.append((frame_set.frame, view, float(u), float(v)))

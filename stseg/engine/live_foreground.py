@@ -1,7 +1,7 @@
-"""Each camera's foreground while the recording goes on: backgrounds know what has been seen, nothing of what will be.
+"""Causal background models: foreground of each camera of a recording in progress, learned from past frames only.
 
-A camera with an empty scene sees by the very background of a run of the whole recording
-(`stseg.engine.backgrounds`). One without learns from the beginning of what is followed, and then goes on learning.
+A camera with an empty scene uses the same background as in a run over the whole recording
+(`stseg.engine.backgrounds`). A camera without one learns from the first frames received, and is then updated.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from stseg.io.recording.recording import Recording
 
 
 class LiveForegrounds:
-    """The foreground of every camera of a recording that goes on.
+    """Background models and foreground of every camera of a recording in progress.
 
     Parameters
     ----------
@@ -38,58 +38,77 @@ class LiveForegrounds:
         colour = [k for k in range(len(recording.sources)) if is_colour(recording, k)]
         self._models = {k: empty_background(recording, k, config) for k in colour}
         self._empty = {k: self._models[k] for k in colour if recording.sources[k].background is not None}
-        self._blind = {k for k in colour if k not in self._empty}
+        self._untrained = {k for k in colour if k not in self._empty}
         self._learners: dict[int, BackgroundLearner] = {}
 
     @property
-    def learns(self) -> bool:
-        """Whether there are backgrounds at all."""
+    def has_backgrounds(self) -> bool:
+        """Whether any camera has a background model."""
         return bool(self._models)
 
     @property
-    def unlearned(self) -> list[str]:
-        """Cameras whose background is to be learned first, by name."""
-        return [self._recording.rig.cameras[k].name for k in sorted(self._blind)]
+    def untrained(self) -> list[str]:
+        """Names of the cameras whose background is not trained yet."""
+        return [self._recording.rig.cameras[k].name for k in sorted(self._untrained)]
 
-    def learn(self, moments: Iterable[LiveFrameSet]) -> int:
-        """Teach the cameras without an empty scene; how many moments there were."""
+    def learn(self, frame_sets: Iterable[LiveFrameSet]) -> int:
+        """Train the backgrounds of the cameras without an empty scene.
+
+        Parameters
+        ----------
+        frame_sets
+            The first frame sets, of which at most `live.background_time` seconds are consumed.
+
+        Returns
+        -------
+        int
+            Number of frame sets consumed.
+        """
         frames = max(1, round(self._config.live.background_time * self._recording.rig.frame_rate))
         step = sampled(range(frames), self._config.segments).step
-        seen: dict[int, list[Bytes]] = {k: [] for k in self._blind}
+        samples: dict[int, list[Bytes]] = {k: [] for k in self._untrained}
         count = 0
-        for count, moment in enumerate(moments, 1):
+        for count, frame_set in enumerate(frame_sets, 1):
             if (count - 1) % step == 0:
-                for k, images in seen.items():
-                    images += _image(moment.views[k])
+                for k, images in samples.items():
+                    images += _image(frame_set.views[k])
             if count == frames:
                 break
-        for k, images in seen.items():
+        for k, images in samples.items():
             if images:
                 self._models[k].learn_from(images)
-                self._blind.discard(k)
+                self._untrained.discard(k)
         return count
 
-    def see(self, moment: LiveFrameSet, since: int) -> None:
-        """The next moment, of the frames that are followed since a frame: some of them teach the backgrounds."""
-        own = (moment.frame - since) % self._part
-        if own == 0:
-            self._begin_part()
-        if own % self._step == 0:
-            for k, learner in self._learners.items():
-                for image in _image(moment.views[k]):
-                    learner.see(image)
+    def update(self, frame_set: LiveFrameSet, since: int) -> None:
+        """Update the backgrounds by the next frame set, where it is one of the training frames.
 
-    def sights(self) -> list[ViewForeground]:
-        """What a segment sees by that begins to look now."""
-        frame_rate, light = self._recording.rig.frame_rate, self._config.illumination
+        Parameters
+        ----------
+        frame_set
+            The next frame set.
+        since
+            First frame of the first background period.
+        """
+        offset = (frame_set.frame - since) % self._part
+        if offset == 0:
+            self._begin_part()
+        if offset % self._step == 0:
+            for k, learner in self._learners.items():
+                for image in _image(frame_set.views[k]):
+                    learner.update(image)
+
+    def snapshot(self) -> list[ViewForeground]:
+        """Foreground models for a segment whose warm-up begins now: copies of the current backgrounds."""
+        frame_rate, illumination = self._recording.rig.frame_rate, self._config.illumination
         models = [self._models.get(k) for k in range(len(self._recording.sources))]
         return [
-            ViewForeground(None if model is None else IlluminationMonitor(deepcopy(model), frame_rate, light))
+            ViewForeground(None if model is None else IlluminationMonitor(deepcopy(model), frame_rate, illumination))
             for model in models
         ]
 
     def _begin_part(self) -> None:
-        """What was learned in the part before holds for this one; an empty scene is begun with anew each time."""
+        """Begin a background period: use the model of the last one, and restart learning from an empty scene."""
         for k, model in self._models.items():
             learned = self._learners[k].learned() if k in self._learners else model
             self._models[k] = learned
@@ -100,4 +119,5 @@ class LiveForegrounds:
 
 
 def _image(view: Observation) -> list[Bytes]:
+    """The image of a view as a list of one; empty for a missing view."""
     return [] if view is None else [np.asarray(view, np.uint8)]

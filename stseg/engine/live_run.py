@@ -1,7 +1,7 @@
-"""The work of a run that follows a recording: frame sets in, segments and rows of tracks out.
+"""Online processing of a recording in progress: frame sets in, finished segments and rows of the live table out.
 
-Every frame set (moment) goes to the open segment, and around its end to the next one as well, as its warm-up. So frames
-are read once, and none is kept.
+Every frame set goes to the open segment, and near the end of that segment also to the next one, as its warm-up. Thus
+each frame is read once, and no frame is stored.
 """
 
 from __future__ import annotations
@@ -32,39 +32,51 @@ from stseg.tracking.windows import window_length
 
 @dataclass
 class _Member:
-    """An open segment, the rows of its warm-up, and the run's names of its tracks."""
+    """An open segment, the trajectory rows of its warm-up, and the run's ids of its tracks."""
 
     segment: OpenSegment
     lead: list[Rows] = field(default_factory=list)
     names: Names | None = None
-    """None while it is in its warm-up."""
+    """None during the warm-up."""
 
 
 class LiveRun:
-    """Hands moments to the segments that are open. Use it in a `with`: what was not finished is discarded.
+    """Online run: distributes frame sets to the open segments and publishes their tracks.
+
+    A context manager: after an error the open segments are discarded.
 
     Parameters
     ----------
     job, folder
         The job, and the folder of its segments.
     table
-        The live table, to which tracks are added.
-    sights
+        The live table, to which committed track rows are appended.
+    foregrounds
         Foreground models of the cameras.
-    made
-        The segments of an unfinished run; those that become whole are added.
+    finished
+        Finished segments of an interrupted run; those of this run are appended.
+
+    Attributes
+    ----------
+    pipeline
+        The stages, shared by all segments.
     """
 
     def __init__(
-        self, job: Job, folder: WorkFolder, table: LiveTable, sights: LiveForegrounds, made: list[FinishedSegment]
+        self,
+        job: Job,
+        folder: WorkFolder,
+        table: LiveTable,
+        foregrounds: LiveForegrounds,
+        finished: list[FinishedSegment],
     ) -> None:
-        self.sights, self.made = sights, made
+        self.foregrounds, self.finished = foregrounds, finished
         self._job, self._folder, self._table = job, folder, table
         frame_rate = job.recording.rig.frame_rate
         self._window = window_length(frame_rate, job.config.tracking)[0]
         warm_up = round(job.config.segments.warm_up * frame_rate)
         self._names = LiveIds(table.rows, warm_up + 2 * self._window)
-        self._blindness = BlindViews([camera.name for camera in job.recording.rig.cameras])
+        self._blind_views = BlindViews([camera.name for camera in job.recording.rig.cameras])
         self.pipeline = job.pipeline()
         self._members: list[_Member] = []
         self._plan: Iterator[Segment] = iter(())
@@ -84,52 +96,62 @@ class LiveRun:
 
     @property
     def delay(self) -> str:
-        """Time from frames to their tracks in the live table, in words; empty where there were none."""
+        """Latency from the arrival of frames to their tracks in the live table, in words; empty without any tracks."""
         if not self._delays:
             return ""
-        return f", told {median(self._delays):.1f} s after them (median; at most {max(self._delays):.1f} s)"
+        return f", published {median(self._delays):.1f} s after arrival (median; at most {max(self._delays):.1f} s)"
 
     def begin(self, plan: Iterator[Segment], since: int) -> None:
-        """Begin with the segments to come, and the first frame of the first background period."""
+        """Set the plan of segments.
+
+        Parameters
+        ----------
+        plan
+            The segments in their order; the first begins with the first frame set.
+        since
+            First frame of the first background period.
+        """
         self._plan, self._coming, self._since = plan, next(plan), since
         self._published = self._coming.first
 
-    def add(self, moment: LiveFrameSet) -> None:
-        """The next moment."""
-        self.sights.see(moment, self._since)
-        self._blindness.note(moment)
-        self._arrived[moment.frame] = moment.arrived
-        self._stop = moment.frame + 1
-        while self._coming is not None and moment.frame >= self._coming.lead:
+    def add(self, frame_set: LiveFrameSet) -> None:
+        """Process the next frame set."""
+        self.foregrounds.update(frame_set, self._since)
+        self._blind_views.note(frame_set)
+        self._arrived[frame_set.frame] = frame_set.arrived
+        self._stop = frame_set.frame + 1
+        while self._coming is not None and frame_set.frame >= self._coming.lead:
             self._open(self._coming)
             self._coming = next(self._plan, None)
         for member in self._members:
-            self._take(member, member.segment.add(moment), member.segment.segment.stop)
+            self._take(member, member.segment.add(frame_set), member.segment.segment.stop)
         if self._members:
             oldest = self._members[0].segment
-            if oldest.whole and moment.frame >= oldest.segment.stop + self._window:
+            if oldest.complete and frame_set.frame >= oldest.segment.stop + self._window:
                 self._keep(oldest.segment.stop)
 
     def finish(self) -> list[FinishedSegment]:
-        """No more moments come; all segments of the run."""
+        """Close the run after its last frame set; all finished segments."""
         if self._members and self._members[0].segment.segment.first < self._stop:
             self._take(self._members[0], self._members[0].segment.finish(), self._stop)
             self._keep(self._stop)
         self._discard()
-        return self.made
+        return self.finished
 
     def _open(self, segment: Segment) -> None:
         draft = self._folder.draft(segment.index)
-        self._members.append(_Member(OpenSegment(self._job, segment, self.pipeline, self.sights.sights(), draft)))
+        self._members.append(
+            _Member(OpenSegment(self._job, segment, self.pipeline, self.foregrounds.snapshot(), draft))
+        )
 
     def _take(self, member: _Member, steps: list[CommittedFrames], stop: int) -> None:
         for step in steps:
             frames = [fused.frame for fused in step.commit.frames]
-            member.segment.write(step, self._blindness.events(frames))
+            member.segment.write(step, self._blind_views.events(frames))
             self._publish(member, step, stop)
 
     def _publish(self, member: _Member, step: CommittedFrames, stop: int) -> None:
-        """Publish the new tracks of a step in the live table; those of the warm-up are the earlier segment's."""
+        """Append newly committed track rows to the live table; the warm-up belongs to the segment before."""
         segment, rows = member.segment.segment, step.commit.trajectory
         last = step.commit.frames[-1].frame
         member.lead.append(rows[rows["frame"] < segment.first])
@@ -147,8 +169,8 @@ class LiveRun:
     def _keep(self, stop: int) -> None:
         """Finish the oldest segment before frame `stop`."""
         member = self._members.pop(0)
-        self.made.append(FinishedSegment(*member.segment.keep(stop)))
-        self._blindness.forget(min((other.segment.segment.lead for other in self._members), default=stop))
+        self.finished.append(FinishedSegment(*member.segment.keep(stop)))
+        self._blind_views.forget(min((other.segment.segment.lead for other in self._members), default=stop))
 
     def _discard(self) -> None:
         for member in self._members:

@@ -1,4 +1,4 @@
-"""A segment of a run that still goes on: frame sets in, and a file that grows until the end is known."""
+"""Online processing of one segment: frame sets in, committed results appended to the segment's file."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ from stseg.model.tables import TRACK
 
 
 class OpenSegment:
-    """One segment. Use it in a `with`: unless it was kept, nothing is left of it.
+    """A segment in progress and its unfinished file, which `keep` completes and `close` discards.
 
     Parameters
     ----------
     job, segment
-        The job, and the segment; the last of a run may end at another frame than planned.
+        The job, and the segment; the last segment of a run may end earlier or later than planned.
     pipeline
         The stages.
     foregrounds
-        Foreground model of each camera; the segment's own.
+        Foreground model of each camera, owned by this segment.
     draft
-        Path that it is written to.
+        Path of the unfinished file.
     """
 
     def __init__(
@@ -45,31 +45,31 @@ class OpenSegment:
         self._session = Session(pipeline, foregrounds, segment.lead)
         self._shifts = ImageShifts(foregrounds, job.read.factors, job.recording.rig.frame_rate)
         self._beyond: list[tuple[CommittedFrames, Rows]] = []
-        """Steps that go past its end: its own only if it is the last."""
+        """Steps beyond the planned end; part of this segment only if it is the last of the run."""
         self._committed = segment.lead
         self._opened = ExitStack()
         self._writer = self._opened.enter_context(open_segment_file(job, pipeline.occupancy.views, draft))
 
     @property
-    def whole(self) -> bool:
-        """Whether all its frames are decided."""
+    def complete(self) -> bool:
+        """Whether all frames of the segment are committed."""
         return self._committed >= self.segment.stop
 
     def close(self) -> None:
-        """Discard it unless it was kept."""
+        """Close the writer; a file that was not kept is discarded."""
         self._opened.close()
 
-    def add(self, moment: LiveFrameSet) -> list[CommittedFrames]:
-        """The next moment; what is decided by it."""
-        self._shifts.look(moment)
-        return self._session.add(moment)
+    def add(self, frame_set: LiveFrameSet) -> list[CommittedFrames]:
+        """Process the next frame set; the frames that it commits."""
+        self._shifts.measure(frame_set)
+        return self._session.add(frame_set)
 
     def finish(self) -> list[CommittedFrames]:
-        """No more moments will come; what was still open."""
+        """Commit the frames that are still open, after the last frame set."""
         return self._session.finish()
 
     def write(self, step: CommittedFrames, events: Rows) -> None:
-        """Write a step that `add` or `finish` gave, and EVENT rows of its frames besides."""
+        """Append a step from `add` or `finish` to the file, with further EVENT rows of its frames."""
         self._committed = step.commit.frames[-1].frame + 1
         if self._committed > self.segment.stop:
             self._beyond.append((step, events))
@@ -77,7 +77,18 @@ class OpenSegment:
             self._write(step, events)
 
     def keep(self, stop: int) -> tuple[Segment, Path]:
-        """End it before frame `stop`, and give it its name."""
+        """Finish the segment's file.
+
+        Parameters
+        ----------
+        stop
+            The frame after the last of the segment.
+
+        Returns
+        -------
+        tuple of Segment and Path
+            The segment with its final end, and the path of its file.
+        """
         self.segment = replace(self.segment, stop=stop)
         for step, events in self._beyond:
             if step.commit.frames[0].frame < stop:

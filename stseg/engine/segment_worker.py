@@ -64,7 +64,7 @@ class SegmentWorker:
             open_frames(job.read, segment.lead, end, job.streams) as frame_sets,
             open_segment_file(job, self.pipeline.occupancy.views, draft) as writer,
         ):
-            for step in run_session(self.pipeline, foregrounds, shifts.watch(frame_sets), segment.lead, fused):
+            for step in run_session(self.pipeline, foregrounds, shifts.measured(frame_sets), segment.lead, fused):
                 write_step(job, step, segment, writer)
                 if step.commit.frames[-1].frame >= segment.stop - 1:
                     break
