@@ -268,7 +268,7 @@ def test_people_who_stay_and_people_who_are_few_are_named(scene: Walking) -> Non
     still = Endpoints(endpoints.frame, 0 * endpoints.foot + [200, 300], 0 * endpoints.head + [200, 200])
     with pytest.raises(SourceError, match=r"^a: .* stay in one place"):
         calibrate_from_people(NAMES, changed(scene, 0, still).views, lambda: None)
-    with pytest.raises(SourceError, match=r"^a: found 10 people"):
+    with pytest.raises(SourceError, match=r"^a: found 10 isolated people"):
         calibrate_from_people(NAMES, changed(scene, 0, endpoints.of(np.arange(10))).views, lambda: None)
 
 

@@ -255,7 +255,7 @@ def test_a_broken_image_is_named(tmp_path: Path) -> None:
         ("masks", "none.avi", "no such file"),
         ("masks", "none", "no such file or folder"),
         ("video", "text.avi", "found a text, such as a playlist"),
-        ("video", "empty.avi", "found a text, such as a playlist"),
+        ("video", "empty.avi", "found a file that does not open as a video"),
         ("images", "folder", "no images"),
         ("instances", "text.avi", "a broken file"),
         ("boxes", "none.csv", "No such file"),

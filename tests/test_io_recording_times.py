@@ -24,15 +24,15 @@ from stseg.io.runfile.runs import Run, read_run
 
 pytestmark = pytest.mark.skipif(python_form(set_score) is set_score, reason="too slow without a compiler")
 
-QUICK = ("--workers", "1", "--set", "detection.lattice_spacing=0.25", "--set", "body.heights=[1.6,1.7,1.8]")
+QUICK = ("--set", "detection.lattice_spacing=0.25", "--set", "body.heights=[1.6,1.7,1.8]")
 SHORT = ("--set", "segments.length=3", "--set", "segments.warm_up=1")
 FRAMES = 60
 CAMERAS = 3
 
 
-def track(rig: Path, *more: str) -> Run:
+def track(rig: Path, *more: str, workers: int = 1) -> Run:
     output = rig.with_name("run.h5")
-    assert main(["run", str(rig), "-o", str(output), *QUICK, *more]) == 0
+    assert main(["run", str(rig), "-o", str(output), "--workers", str(workers), *QUICK, *more]) == 0
     return read_run(output)
 
 
@@ -118,7 +118,7 @@ def test_a_gap_of_all_cameras_ends_tracks(tmp_path: Path, capsys: pytest.Capture
     seconds = np.delete(regular(90), np.s_[28:64])
     messages = Film(seconds, files=(28, 26), suffix=".avi", starts=(0.0, 64 * TICK))
     rig = write_films(tmp_path, [Film(seconds), Film(seconds), messages])
-    run = track(rig, "--workers", "2", *SHORT)
+    run = track(rig, *SHORT, workers=2)
     assert "stseg: no camera shows frames 28 to 63: a gap, at which all tracks end\n" in capsys.readouterr().err
     assert run.frames.tolist() == [*range(28), *range(64, 90)]
     assert presence(run) == [(0, 27)] * 3 + [(64, 89)] * 3
