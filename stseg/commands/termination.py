@@ -14,7 +14,9 @@ INTERRUPTED, TERMINATED = 130, 143
 """Exit status after SIGINT and SIGTERM."""
 
 _PATIENCE = 1.5
-"""Time for an orderly end, seconds."""
+"""Time in which Python must come to its handlers, seconds."""
+_ORDERLY = 10.0
+"""Time for an orderly end once it has, seconds: output is withdrawn, workers are ended."""
 
 
 class Termination:
@@ -28,11 +30,14 @@ class Termination:
 
     def __init__(self) -> None:
         self.asked = False
+        self._answered = threading.Event()
         self._watch: _Watch | None = None
-        self._before: Any = signal.SIG_DFL
+        self._before: dict[int, Any] = {}
         if threading.current_thread() is threading.main_thread():
-            self._before = signal.signal(signal.SIGTERM, self._ask)
-            self._watch = _Watch((self._ask, signal.default_int_handler))
+            self._before[signal.SIGTERM] = signal.signal(signal.SIGTERM, self._ask)
+            if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+                self._before[signal.SIGINT] = signal.signal(signal.SIGINT, self._interrupt)
+            self._watch = _Watch((self._ask, self._interrupt, signal.default_int_handler), self._answered)
 
     @property
     def line(self) -> str:
@@ -45,14 +50,19 @@ class Termination:
         return TERMINATED if self.asked else INTERRUPTED
 
     def forget(self) -> None:
-        """Restore the previous handler of SIGTERM."""
+        """Restore the previous handlers."""
         if self._watch is not None:
             self._watch.close()
             self._watch = None
-            signal.signal(signal.SIGTERM, self._before)
+            for number, handler in self._before.items():
+                signal.signal(number, handler)
 
-    def _ask(self, _number: int, _frame: FrameType | None) -> None:
+    def _ask(self, number: int, frame: FrameType | None) -> None:
         self.asked = True
+        self._interrupt(number, frame)
+
+    def _interrupt(self, _number: int, _frame: FrameType | None) -> None:
+        self._answered.set()
         raise KeyboardInterrupt
 
 
@@ -63,10 +73,12 @@ class _Watch:
     ----------
     orderly
         Handlers that end the command.
+    answered
+        Set by these handlers.
     """
 
-    def __init__(self, orderly: tuple[Any, ...]) -> None:
-        self._orderly, self._ended = orderly, threading.Event()
+    def __init__(self, orderly: tuple[Any, ...], answered: threading.Event) -> None:
+        self._orderly, self._answered, self._ended = orderly, answered, threading.Event()
         self._reader, self._writer = os.pipe()
         os.set_blocking(self._writer, False)
         self._before = signal.set_wakeup_fd(self._writer, warn_on_full_buffer=False)
@@ -89,8 +101,11 @@ class _Watch:
                     continue
                 if signal.getsignal(number) not in self._orderly and not left_alone:
                     left_alone = True
-                elif not self._ended.wait(_PATIENCE):
+                elif not self._ended_in_time():
                     _end(number)
+
+    def _ended_in_time(self) -> bool:
+        return self._ended.wait(_PATIENCE) or (self._answered.is_set() and self._ended.wait(_ORDERLY))
 
 
 def _end(number: int) -> None:
