@@ -1,4 +1,4 @@
-"""From the files of all segments to the run file: tracks of the whole run, and the volume with their ids."""
+"""Assembly of the run file from the segment files: stitched tracks of the whole run, and the volume with their ids."""
 
 from __future__ import annotations
 
@@ -18,31 +18,47 @@ from stseg.io.runfile.runs import Run, RunWriter, read_run
 from stseg.model.tables import Tracks
 from stseg.tracking.stitching import SegmentTracks, Stitcher, rename_labels
 
-_FRAMES = 64
-"""Frames of the volume in memory at a time."""
+_BLOCK = 64
+"""Frames of the volume read at a time."""
 _COPIED = ("ghosts", "windows", "rates", "shifts", "timings")
+"""Tables of the segments that the run file takes unchanged."""
 
 
 class FinishedSegment(NamedTuple):
-    """A segment and the file that holds it."""
+    """A segment and its file."""
 
     segment: Segment
     path: Path
 
 
-class _Named(NamedTuple):
-    """A segment's file, its committed rows, and the run's track id of each of them, 0 for none."""
+class _SegmentRows(NamedTuple):
+    """A segment's file, its committed rows, and the run's track id of each row, 0 for none."""
 
     run: Run
     rows: Rows
     identity: Ints
 
 
-def assemble(job: Job, pipeline: Pipeline, made: Sequence[FinishedSegment], output: Path) -> Tracks:
-    """Write the run file of a job from its segments, in their order; the pipeline is the job's."""
+def assemble(job: Job, pipeline: Pipeline, finished: Sequence[FinishedSegment], output: Path) -> Tracks:
+    """Write the run file of a job from its finished segments.
+
+    Parameters
+    ----------
+    job, pipeline
+        The run, and its stages.
+    finished
+        All segments of the run, in their order.
+    output
+        Path of the run file; an existing file is replaced.
+
+    Returns
+    -------
+    Tracks
+        The tracks of the whole run.
+    """
     stitcher = Stitcher(round(job.config.tracking.patience * job.recording.rig.frame_rate))
-    before = made[0].segment.first if made else 0
-    for segment, path in made:
+    before = finished[0].segment.first if finished else 0
+    for segment, path in finished:
         run = read_run(path)
         stitcher.add(SegmentTracks(segment.first, run.trajectory, run.events, segment.first - before))
         before = segment.stop
@@ -52,8 +68,8 @@ def assemble(job: Job, pipeline: Pipeline, made: Sequence[FinishedSegment], outp
     config = format_config(job.config)
     recording = with_alignment(job.recording, job.streams.shown)
     with RunWriter(output, recording, views, config, overwrite=True, kept=job.volume) as writer:
-        for named in _named(made, joined.committed, joined.local, identity):
-            _copy(named, writer)
+        for part in _segment_rows(finished, joined.committed, joined.local, identity):
+            _copy(part, writer)
         writer.append("trajectory", tracks.trajectory)
         writer.append("boxes", tracks.boxes)
         writer.append("events", tracks.events)
@@ -61,21 +77,24 @@ def assemble(job: Job, pipeline: Pipeline, made: Sequence[FinishedSegment], outp
     return tracks
 
 
-def _named(made: Sequence[FinishedSegment], committed: Rows, local: Ints, identity: Ints) -> Iterator[_Named]:
-    """Segment by segment; rows of the run stand in their order."""
-    row = 0
-    for segment, path in made:
+def _segment_rows(
+    finished: Sequence[FinishedSegment], committed: Rows, local: Ints, identity: Ints
+) -> Iterator[_SegmentRows]:
+    """Divide the committed rows and their ids, which are in the order of the segments, among the segments."""
+    first = 0
+    for segment, path in finished:
         run = read_run(path)
-        stop = row + int((run.trajectory["frame"] >= segment.first).sum())
-        rows = committed[row:stop].copy()
-        rows["id"] = local[row:stop]
-        yield _Named(run, rows, identity[row:stop])
-        row = stop
+        stop = first + int((run.trajectory["frame"] >= segment.first).sum())
+        rows = committed[first:stop].copy()
+        rows["id"] = local[first:stop]
+        yield _SegmentRows(run, rows, identity[first:stop])
+        first = stop
 
 
-def _copy(named: _Named, writer: RunWriter) -> None:
-    for frames, log_odds, label in named.run.read_volumes(_FRAMES):
-        rename_labels(label, frames, named.rows, named.identity)
+def _copy(part: _SegmentRows, writer: RunWriter) -> None:
+    """Append a segment's volume, with the run's track ids, and its tables to the run file."""
+    for frames, log_odds, label in part.run.read_volumes(_BLOCK):
+        rename_labels(label, frames, part.rows, part.identity)
         writer.append_frames(frames, log_odds, label)
     for table in _COPIED:
-        writer.append(table, np.asarray(getattr(named.run, table)))
+        writer.append(table, np.asarray(getattr(part.run, table)))

@@ -1,7 +1,7 @@
-"""Segments made by the workers of a Dask scheduler, on any number of machines that share a folder.
+"""Distributed processing of segments by the workers of a Dask scheduler, on machines with a shared file system.
 
-The recording, the rig and the output stand under the same paths on all of them. A worker writes its segment into the
-work folder itself and sends back the name, so what travels is small; a segment whose worker dies is given to another.
+Recording, rig and output have the same paths on all machines. A worker writes its segment file into the work folder and
+returns only the path; the segment of a worker that dies is assigned to another.
 """
 
 from __future__ import annotations
@@ -16,29 +16,36 @@ from stseg.engine.segment_worker import SegmentWorker
 from stseg.engine.segments import Segment
 from stseg.errors import ConfigError, WorkerError
 
-_TRIES = 3
-
 
 def make_by_cluster(
     job: Job, missing: Sequence[Segment], draft: Callable[[int], Path], address: str, advance: Callable[[int], None]
 ) -> Iterator[tuple[Segment, Path]]:
-    """Segments and their files, as they are done.
+    """Process segments by the workers of a scheduler, in the order in which they finish.
 
     Parameters
     ----------
     job, missing
-        What is run, and the segments that are to be made.
+        The run, and its segments that are not finished.
     draft
-        Where a segment is to be written: in a folder that all workers share.
+        Path of a segment's unfinished file, by segment index; in a folder shared by all workers.
     address
-        Of the scheduler, such as tcp://10.0.0.5:8786.
+        Address of the scheduler, such as tcp://10.0.0.5:8786.
     advance
         Called with the number of frames fused since the last call.
 
+    Yields
+    ------
+    tuple of Segment and Path
+        A finished segment and its file.
+
     Raises
     ------
+    ConfigError
+        Where the package `distributed` or the scheduler is missing.
+    WorkerError
+        Where the workers of a segment die repeatedly.
     StsegError
-        What a worker raised; ConfigError where there is no scheduler, WorkerError where a segment's workers die.
+        An error raised by a worker.
     """
     try:
         from distributed import Client, KilledWorker, as_completed
@@ -59,26 +66,27 @@ def make_by_cluster(
             for segment in missing
         }  # fmt: skip
         for future in as_completed(futures):
-            segment = futures.pop(future)  # its file stands: who made it may die, and nobody makes it again
+            segment = futures.pop(future)  # released: its file exists, so it is not recomputed if its worker dies
             try:
                 path = future.result()
             except KilledWorker as error:
                 frames = f"segment {segment.index}, frames {segment.first} to {segment.stop - 1}"
-                raise WorkerError("--scheduler", frames, str(error), "workers that live") from error
+                raise WorkerError("--scheduler", frames, str(error), "workers that stay alive") from error
             advance(segment.stop - segment.first)
             yield segment, path
 
 
 def make_segment(job: bytes, segment: Segment, draft: Path) -> Path:
-    """What a worker does: a segment's file, by its name."""
-    return _work(job).make(segment, draft, lambda _: None)
+    """Task of a worker: process a segment of a pickled job; the path of its file."""
+    return _worker(job).make(segment, draft, lambda _: None)
 
 
 @lru_cache(1)
-def _work(job: bytes) -> SegmentWorker:
+def _worker(job: bytes) -> SegmentWorker:
+    """The worker of a job, kept between its segments."""
     return SegmentWorker(pickle.loads(job))
 
 
 def _key(job: Job, segment: Segment) -> str:
-    """What the scheduler's dashboard calls it: the name before the first dash is the stage."""
+    """Key of a segment's task; the scheduler's dashboard shows the part before the first dash as the stage."""
     return f"segment-{job.recording.rig.name}-{segment.index:05}"

@@ -1,8 +1,8 @@
-"""Segments: the parts of a long recording that are processed independently, and committed to disk one by one.
+"""Segmentation of a long recording in time, into parts that are processed independently and written one by one.
 
-A segment is a whole number of windows. It has a warm-up before its first frame, so that its tracks exist by then, and
-processes frames until its last window is solved. Its result depends on the recording and the configuration alone, so it
-is the same after a killed run, from another process, and on another machine.
+A segment is a whole number of windows. Processing begins with a warm-up before its first frame, to initialise the
+tracks, and continues until its last window is solved. The result depends only on the recording and the configuration;
+it is the same after an interrupted run, in another process, and on another machine.
 """
 
 from __future__ import annotations
@@ -20,21 +20,21 @@ from stseg.config import Config, TrackingConfig
 from stseg.tracking.windows import window_length
 
 _SHORTEST = 3
-"""A half of a short recording is no shorter than a segment divided by this: its warm-up would cost too much."""
+"""Smallest half of a short recording, as a fraction 1 / 3 of a segment: the warm-up of a shorter one costs too much."""
 
 
 @dataclass(frozen=True)
 class Segment:
-    """Frames of the recording.
+    """A range of frames of the recording with its warm-up.
 
     Attributes
     ----------
     index
-        Counted from 0 at the run's first.
+        Number of the segment in the run, from 0.
     lead
-        The first frame that is processed; the frames from there to `first` are the warm-up.
+        First processed frame; frames lead .. first - 1 are the warm-up.
     first, stop
-        The frames that are committed, half open; those of all segments partition the run, but for its gaps.
+        Committed frames, half open; those of all segments partition the run except for its gaps.
     """
 
     index: int
@@ -46,22 +46,22 @@ class Segment:
 def segments(
     frame_rate: float, config: Config, first: int, stop: int, gaps: Sequence[tuple[int, int]] = ()
 ) -> list[Segment]:
-    """The segments that cover frames first .. stop - 1 but for gaps; they begin where commit ranges of windows do.
+    """Segments that cover frames first .. stop - 1 except for gaps, aligned to the commit ranges of windows.
 
-    Frames left at the end, and before a gap, belong to the last segment if they are no more than a window. Less than
-    two segments are halved if each half is a third of a segment at least. After a gap all begins anew, as at the
-    beginning of a run: neither a segment nor its warm-up reaches over one.
+    A remainder at the end, or before a gap, of at most a window is added to the last segment. A range shorter than two
+    segments is halved if each half has at least a third of a segment. Each gap is a new beginning, as that of a run:
+    neither a segment nor its warm-up extends across a gap.
 
     Parameters
     ----------
     frame_rate
         Frames per second.
     config
-        How long segments and windows are.
+        Lengths of segments and windows.
     first, stop
         The frames of the run, half open.
     gaps
-        Frames that no camera shows, half open, in their order, within the run (`find_gaps`).
+        Ranges without any image, half open, in ascending order, within the run (`find_gaps`).
     """
     begins, ends = [first, *(end for _, end in gaps)], [*(begin for begin, _ in gaps), stop]
     parts = [part for begin, end in zip(begins, ends, strict=True) for part in _parts(frame_rate, config, begin, end)]
@@ -74,12 +74,16 @@ def longest_absence(config: TrackingConfig) -> float:
 
 
 def find_gaps(seen: Flags, first: int, stop: int, longest: float) -> list[tuple[int, int]]:
-    """Where no camera shows anything for longer than so many frames: half-open ranges of frames first .. stop - 1.
+    """Gaps of a recording: half-open ranges of frames in which all cameras are blind for long.
 
     Parameters
     ----------
     seen : bool (camera, frame)
-        Which frames each camera shows.
+        Frames in which each camera has an image.
+    first, stop
+        The frames of the run, half open.
+    longest
+        Greatest length of an interruption that is not a gap, frames.
     """
     blind = np.concatenate([[False], ~seen[:, first:stop].any(axis=0), [False]])
     edges = first + np.flatnonzero(np.diff(blind.astype(np.int8)))
@@ -87,17 +91,17 @@ def find_gaps(seen: Flags, first: int, stop: int, longest: float) -> list[tuple[
 
 
 def _parts(frame_rate: float, config: Config, first: int, stop: int) -> list[Segment]:
-    """The segments of frames in which no gap lies; none of none."""
+    """The segments of a range of frames without gaps; empty for an empty range."""
     if first == stop:
         return []
     if (middle := _middle(frame_rate, config, first, stop)) is not None:
         lead = max(first, middle - _lengths(frame_rate, config).warm_up)
         return [Segment(0, first, first, middle), Segment(1, lead, middle, stop)]
-    found: list[Segment] = []
+    parts: list[Segment] = []
     for segment in endless_segments(frame_rate, config, first):
         if segment.stop >= stop - window_length(frame_rate, config.tracking)[0]:
-            return [*found, replace(segment, stop=stop)]
-        found.append(segment)
+            return [*parts, replace(segment, stop=stop)]
+        parts.append(segment)
     raise AssertionError("segments without an end ended")
 
 
@@ -118,9 +122,9 @@ def _lengths(frame_rate: float, config: Config) -> _Lengths:
 
 
 def _middle(frame_rate: float, config: Config, first: int, stop: int) -> int | None:
-    """Where frames that are fewer than two segments are divided; None where the halves would be too short.
+    """Division of a range shorter than two segments; None where the halves would be too short.
 
-    Two segments of one length keep two processes busy, for as many frames of warm-up as any other division.
+    Halves balance the load of two processes, at the same cost of warm-up as any other division.
     """
     lengths, half = _lengths(frame_rate, config), (stop - first) // 2
     least = max(lengths.segment // _SHORTEST, 2 * window_length(frame_rate, config.tracking)[0])
@@ -130,14 +134,23 @@ def _middle(frame_rate: float, config: Config, first: int, stop: int) -> int | N
 
 
 def endless_segments(frame_rate: float, config: Config, first: int, index: int = 0) -> Iterator[Segment]:
-    """The segments of a run whose end nobody knows yet, numbered from `index`.
+    """Segments of a run of unknown length.
 
-    One of them is to be left open until a window's frames have come after it: if they do not come it is the last, and
-    what came belongs to it.
+    A segment stays open until the frames of a window have followed it. If the run ends before, it is the last segment,
+    and includes the frames that have followed.
+
+    Parameters
+    ----------
+    frame_rate, config
+        As of `segments`.
+    first
+        First frame of the run.
+    index
+        Number of the first segment.
     """
     lengths = _lengths(frame_rate, config)
     begin = lead = first
-    for bound in count(lengths.segment + lengths.offset, lengths.segment):
-        if bound > begin:
-            yield Segment(index, lead, begin, bound)
-            index, begin, lead = index + 1, bound, max(first, bound - lengths.warm_up)
+    for stop in count(lengths.segment + lengths.offset, lengths.segment):
+        if stop > begin:
+            yield Segment(index, lead, begin, stop)
+            index, begin, lead = index + 1, stop, max(first, stop - lengths.warm_up)

@@ -1,7 +1,7 @@
-"""Segments made by several processes of this machine; what they write is the same as if one had made them all.
+"""Parallel processing of segments by worker processes of this machine, with the same results as by one process.
 
-Each worker has a pipe of its own and one segment at a time, so a worker that dies takes nothing with it but that
-segment, which is given to another.
+Each worker has a pipe of its own and one segment at a time. Thus a worker that dies loses only that segment, which is
+assigned to another.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from stseg.engine.segments import Segment
 from stseg.errors import StsegError, WorkerError
 
 _TRIES = 3
-"""How often a segment is given to a worker before it is taken to be what kills them."""
+"""Number of workers lost by the same segment at which the run fails."""
 _SPAWN = get_context("spawn")
 
 
 @dataclass
 class _Worker:
-    """A process, and the segment that it is at."""
+    """A worker process, its pipe, and its current segment."""
 
     process: SpawnProcess
     pipe: Connection
@@ -44,35 +44,42 @@ def make_by_workers(
     advance: Callable[[int], None],
     note: Callable[[str], None],
 ) -> Iterator[tuple[Segment, Path]]:
-    """Segments and their files, as they are done.
+    """Process segments by worker processes, in the order in which they finish.
 
     Parameters
     ----------
     job, missing
-        What is run, and the segments that are to be made.
+        The run, and its segments that are not finished.
     draft
-        Where a segment is to be written.
+        Path of a segment's unfinished file, by segment index.
     workers
         Number of processes.
     advance
         Called with the number of further frames that were fused.
     note
-        Called with lines about the work, each once.
+        Called with messages about the work, each once.
+
+    Yields
+    ------
+    tuple of Segment and Path
+        A finished segment and its file.
 
     Raises
     ------
+    WorkerError
+        Where the workers of a segment die repeatedly.
     StsegError
-        What a worker raised; WorkerError where a segment's workers die again and again.
+        An error raised by a worker.
     """
-    todo, tries, notes = list(missing)[::-1], Counter[int](), set[str]()
+    pending, tries, notes = list(missing)[::-1], Counter[int](), set[str]()
     with _pool(job, min(workers, len(missing))) as pool:
-        while todo or any(worker.segment for worker in pool):
+        while pending or any(worker.segment for worker in pool):
             for worker in pool:
-                if worker.segment is None and todo:
-                    worker.segment = todo.pop()
-                    with suppress(OSError):  # it has died; seen below
+                if worker.segment is None and pending:
+                    worker.segment = pending.pop()
+                    with suppress(OSError):  # a dead worker is replaced below
                         worker.pipe.send((worker.segment, draft(worker.segment.index)))
-            for worker in _heard(pool):
+            for worker in _ready(pool):
                 message = _receive(worker)
                 segment = worker.segment
                 if isinstance(message, int):
@@ -87,21 +94,21 @@ def make_by_workers(
                 elif isinstance(message, BaseException):
                     raise message
                 else:
-                    pool[pool.index(worker)] = _hired(job)
+                    pool[pool.index(worker)] = _start(job)
                     if segment is not None:
                         tries[segment.index] += 1
-                        _require_life(segment, tries[segment.index], worker.process)
-                        todo.append(segment)
+                        _limit_tries(segment, tries[segment.index], worker.process)
+                        pending.append(segment)
 
 
-def _heard(pool: list[_Worker]) -> list[_Worker]:
-    """Workers that have something to say, or have died."""
+def _ready(pool: list[_Worker]) -> list[_Worker]:
+    """Wait for messages; workers that have sent one, or have died."""
     ready = wait([worker.pipe for worker in pool])
     return [worker for worker in pool if worker.pipe in ready]
 
 
 def _receive(worker: _Worker) -> object:
-    """Frames done, the file of a segment, or an error; None from a worker that has died."""
+    """Number of fused frames, a note, the file of a segment, or an error; None from a worker that has died."""
     try:
         return worker.pipe.recv()
     except (EOFError, OSError):
@@ -109,19 +116,20 @@ def _receive(worker: _Worker) -> object:
         return None
 
 
-def _require_life(segment: Segment, tries: int, process: SpawnProcess) -> None:
+def _limit_tries(segment: Segment, tries: int, process: SpawnProcess) -> None:
+    """Raise WorkerError where a segment has lost as many workers as are allowed."""
     if tries == _TRIES:
         frames = f"segment {segment.index}, frames {segment.first} to {segment.stop - 1}"
-        found = f"{tries} workers that died of it, the last with status {process.exitcode}"
-        raise WorkerError("--workers", frames, found, "memory enough for each of them, or fewer workers")
+        found = f"{tries} workers died while processing it, the last with status {process.exitcode}"
+        raise WorkerError("--workers", frames, found, "enough memory for each worker, or fewer workers")
 
 
 @contextmanager
 def _pool(job: Job, number: int) -> Iterator[list[_Worker]]:
-    """Processes that wait for segments; none is left at the end."""
+    """Worker processes waiting for segments; killed on exit."""
     pool: list[_Worker] = []
     try:
-        pool += [_hired(job) for _ in range(number)]
+        pool += [_start(job) for _ in range(number)]
         yield pool
     finally:
         for worker in pool:
@@ -131,24 +139,25 @@ def _pool(job: Job, number: int) -> Iterator[list[_Worker]]:
             worker.pipe.close()
 
 
-def _hired(job: Job) -> _Worker:
+def _start(job: Job) -> _Worker:
+    """Start a worker process."""
     own, other = _SPAWN.Pipe()
-    process = _SPAWN.Process(target=_work, args=(job, other), daemon=True)
+    process = _SPAWN.Process(target=_main, args=(job, other), daemon=True)
     process.start()
     other.close()
     return _Worker(process, own)
 
 
-def _work(job: Job, pipe: Connection) -> None:
-    """What a worker process does; the process that hired it decides when it ends."""
+def _main(job: Job, pipe: Connection) -> None:
+    """Main loop of a worker process, which ends when its parent closes the pipe or kills it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    work: SegmentWorker | None = None
-    with suppress(EOFError, BrokenPipeError):  # nobody is there any more
+    worker: SegmentWorker | None = None
+    with suppress(EOFError, BrokenPipeError):  # the parent process has ended
         while True:
             segment, draft = pipe.recv()
             try:
                 with compilation_noted(pipe.send):
-                    work = work or SegmentWorker(job)
-                    pipe.send(work.make(segment, draft, pipe.send))
+                    worker = worker or SegmentWorker(job)
+                    pipe.send(worker.make(segment, draft, pipe.send))
             except StsegError as error:
                 pipe.send(error)
