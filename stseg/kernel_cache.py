@@ -58,7 +58,7 @@ class KernelCache:
         return self._stamp
 
     def get_disambiguator(self) -> str:
-        """Tells kernels of one name and file apart."""
+        """Identifier that distinguishes kernels of one name and file."""
         return str(self._line)
 
 

@@ -27,7 +27,7 @@ from stseg.trackers.belief.histogram import BINS, HSV_BINS, PARTS, POINTS, histo
 from stseg.trackers.belief.particles import Motion, Particles, Prediction, fill_origin, systematic
 from stseg.trackers.belief.potential import Outlier, Potential
 from stseg.trackers.belief.star import Rounds, Star, propagate
-from stseg.trackers.belief.target import Target, in_front, looks
+from stseg.trackers.belief.target import Target, in_front, target_likelihoods
 from stseg.trackers.belief.target_likelihood import TargetLikelihood, squares
 from stseg.trackers.belief.view import StarView
 
@@ -273,7 +273,7 @@ def test_targets_exclude_each_other(data: st.DataObject) -> None:
 def test_a_round_brings_the_ground_to_what_the_views_see() -> None:
     """The target has gone a step further than it should have; all views see it."""
     target, standing = known(people((0.0, 0.0))), people((0.25, -0.15))
-    seen = looks([target], VIEWS, images_of(standing), MOTION, FEW)
+    seen = target_likelihoods([target], VIEWS, images_of(standing), MOTION, FEW)
     star = propagate([target.star], seen, MOTION, FEW, [np.random.default_rng(1)])[0]
     np.testing.assert_allclose(star.ground.mean, [0.25, -0.15], atol=0.08)
     assert (star.visibility > 0.9).all()
@@ -288,7 +288,7 @@ def test_who_is_hidden_in_one_view_is_led_there_by_the_others() -> None:
     target, standing = known(people((0.0, 0.0))), people((0.2, 0.2))
     images = images_of(standing)
     images[0] = np.full((*SIZE[::-1], 3), FLOOR, np.uint8)
-    seen = looks([target], VIEWS, images, MOTION, FEW)
+    seen = target_likelihoods([target], VIEWS, images, MOTION, FEW)
     star = propagate([target.star], seen, MOTION, FEW, [np.random.default_rng(1)])[0]
     hidden = star.views[0]
     assert hidden is not None
@@ -364,7 +364,7 @@ def test_the_same_seed_makes_the_same_tracks() -> None:
 def test_the_order_of_targets_does_not_matter() -> None:
     standing = people((0.0, 0.0), (0.5, 0.2))
     targets = [known(standing), known(standing[::-1])]
-    asked = looks(targets, VIEWS, images_of(standing), MOTION, FEW)
+    asked = target_likelihoods(targets, VIEWS, images_of(standing), MOTION, FEW)
     there = propagate([t.star for t in targets], asked, MOTION, FEW, [np.random.default_rng(k) for k in (1, 2)])
     stars = [t.star for t in targets[::-1]]
     back = propagate(stars, asked[::-1], MOTION, FEW, [np.random.default_rng(k) for k in (2, 1)])

@@ -29,7 +29,7 @@ def labels(
     Example: stseg labels night.h5 -o night_labels/
 
     The cameras' streams are read again, where the run file says they are. FOLDER/CAMERA/000123.png is the image of
-    frame 123, as large as the camera's: ids of tracks, 0 for nobody; indexed, in the tracks' colours, or grey of 16
+    frame 123, as large as the camera's: ids of tracks, 0 for background; indexed, in the tracks' colours, or grey of 16
     bits where an id is above 255. Cameras that deliver boxes have no pixels, and no images.
 
     Parameters

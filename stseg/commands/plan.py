@@ -71,19 +71,25 @@ def plan(
         print(f"stseg: {note}", file=sys.stderr)
     first, stop = resolve_frames(chosen, streams, recording)
     job = Job(recording, resolved, tracker, volume, first, stop, streams)
-    told = forecast(job, counting, workforce.processes)
-    print(json.dumps(asdict(told) | {"seconds": told.seconds}, indent=1) if as_json else _text(told, recording))
+    estimate = forecast(job, counting, workforce.processes)
+    print(
+        json.dumps(asdict(estimate) | {"seconds": estimate.seconds}, indent=1)
+        if as_json
+        else _text(estimate, recording)
+    )
 
 
-def _text(told: Forecast, recording: Recording) -> str:
-    hours = told.frames / recording.rig.frame_rate / 3600
-    shares = ("counting", told.counting), ("backgrounds", told.learning), ("tracking", told.tracking)
-    parts = ", ".join(f"{name} {_span(seconds)}" for name, seconds in (*shares, ("writing the run file", told.joining)))
-    size = told.file_bytes / 2**20
+def _text(estimate: Forecast, recording: Recording) -> str:
+    hours = estimate.frames / recording.rig.frame_rate / 3600
+    shares = ("counting", estimate.counting), ("backgrounds", estimate.learning), ("tracking", estimate.tracking)
+    parts = ", ".join(
+        f"{name} {_span(seconds)}" for name, seconds in (*shares, ("writing the run file", estimate.joining))
+    )
+    size = estimate.file_bytes / 2**20
     return "\n".join(
         [
-            f"recording   {told.frames} frames, {_span(hours * 3600)}, in {told.segments} segments",
-            f"run         {_span(told.seconds)} with {told.workers} workers, a core each",
+            f"recording   {estimate.frames} frames, {_span(hours * 3600)}, in {estimate.segments} segments",
+            f"run         {_span(estimate.seconds)} with {estimate.workers} workers, a core each",
             f"work        {parts}",
             f"run file    {size:.0f} MiB, {size / hours:.0f} MiB an hour; as much again beside it until it stands",
         ]

@@ -1,4 +1,4 @@
-"""From a run file to what the report's page tells."""
+"""Contents of the report's page, gathered from a run file."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _SHEETS = 8_000_000  # bytes of all slices, a third more as text
 def page_contents(
     run: Run, truth: Rows | None, instants: Sequence[Instant], has_slices: bool, has_images: bool
 ) -> Contents:
-    """Gather what the page tells.
+    """Gather the contents of the page.
 
     Parameters
     ----------

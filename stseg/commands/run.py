@@ -69,7 +69,7 @@ def run(
     volume
         What of the occupancy volume is kept: all of it, what is within a metre of tracks, or none.
     labels
-        Write afterwards for every pixel of every camera whom it shows, as stseg labels does, to this folder.
+        After the run, write the track id of every pixel of every camera to this folder, as stseg labels does.
     workers
         Processes that share the work on this machine, by default one per core as far as memory allows; the result is
         the same for any number.

@@ -15,7 +15,7 @@ class DetectionConfig:
     lattice_spacing: float = 0.20
     """Spacing of the ground lattice that is searched for candidates, metres."""
     search_rounds: int = 4
-    """Rounds of search per frame; each looks for people behind those already found."""
+    """Rounds of search per frame; each searches for people hidden by those already found."""
     prior_log_odds: float = -4.0
     """Prior log-odds of a person at a candidate position, nats; raise it against misses, lower it against ghosts."""
     birth_cost: float = 5.0

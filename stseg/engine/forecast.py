@@ -69,12 +69,12 @@ def forecast(job: Job, counting: float, workers: int) -> Forecast:
         watch = _Clock()
         assemble(job, work.pipeline, made, folder / "run.h5")
         joining, size = watch.lap(), (folder / "run.h5").stat().st_size
-    # A segment looks on until its last window is solved, which is much of a short part and little of a long one.
+    # A segment is processed until its last window is solved: much of a short part, and little of a long one.
     beyond = (fused.calls - tried) / len(parts)
-    looked_at = sum(segment.stop - segment.lead + beyond for segment in cuts)
+    processed = sum(segment.stop - segment.lead + beyond for segment in cuts)
     learned = -(-frames // round(job.config.segments.background_period * job.recording.rig.frame_rate))
     return Forecast(
-        frames, len(cuts), workers, counting, max(learning) * learned, tracking / fused.calls * looked_at,
+        frames, len(cuts), workers, counting, max(learning) * learned, tracking / fused.calls * processed,
         joining / tried * frames, round(size / tried * frames),
     )  # fmt: skip
 

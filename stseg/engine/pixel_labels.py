@@ -98,7 +98,7 @@ def _frame_sets(run: Run, frames: Ints, memory: float, reporter: Reporter) -> It
 
 
 def _ids(view: ViewLabels, people: Rows, pixels: Singles | None, seen: Observation) -> Ints:
-    """Ids of the tracks that a view shows, int64 (v, u); a view that is blind shows nobody."""
+    """Ids of the tracks that a view shows, int64 (v, u); all 0 for a blind view."""
     if pixels is None:
         return np.zeros(view.camera.size[::-1], np.int64)
     covariance = np.stack([people[name] for name in ("xx", "xy", "xy", "yy")], -1).reshape(-1, 2, 2)

@@ -20,7 +20,7 @@ from stseg.config import Config, TrackingConfig
 from stseg.tracking.windows import window_length
 
 _SHORTEST = 3
-"""Smallest half of a short recording, as a fraction 1 / 3 of a segment: the warm-up of a shorter one costs too much."""
+"""Length of a segment over that of the least half of a short recording: a shorter one costs too much warm-up."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ def longest_absence(config: TrackingConfig) -> float:
 
 
 def find_gaps(seen: Flags, first: int, stop: int, longest: float) -> list[tuple[int, int]]:
-    """Gaps of a recording: half-open ranges of frames in which all cameras are blind for long.
+    """Gaps of a recording: half-open ranges of frames in which all cameras are blind.
 
     Parameters
     ----------

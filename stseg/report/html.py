@@ -15,7 +15,7 @@ from stseg.report.colours import hex_colour, track_colour
 from stseg.report.figures import Figure
 
 MOST_ROWS = 2000
-"""Greatest number of rows of a table; a note tells of the others."""
+"""Greatest number of rows of a table; a note counts the others."""
 
 
 _PHOTOGRAPH = 400_000

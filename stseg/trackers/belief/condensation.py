@@ -22,24 +22,24 @@ from stseg.trackers.belief.target_likelihood import TargetLikelihood
 
 def condense(
     stars: Sequence[Star],
-    looks: Sequence[Sequence[TargetLikelihood | None]],
+    likelihoods: Sequence[Sequence[TargetLikelihood | None]],
     motion: Motion,
     config: BeliefConfig,
     rngs: Sequence[np.random.Generator],
 ) -> list[Star]:
     """One frame of all targets without messages between views; parameters of `propagate`."""
-    return [_alone(star, seen, motion, config, rng) for star, seen, rng in zip(stars, looks, rngs, strict=True)]
+    return [_alone(star, seen, motion, config, rng) for star, seen, rng in zip(stars, likelihoods, rngs, strict=True)]
 
 
 def _alone(
     star: Star,
-    looks: Sequence[TargetLikelihood | None],
+    likelihoods: Sequence[TargetLikelihood | None],
     motion: Motion,
     config: BeliefConfig,
     rng: np.random.Generator,
 ) -> Star:
     prediction = Prediction.of(star.ground, np.eye(2), motion)
-    leaves = grow(star, looks, prediction, config.particles)
+    leaves = grow(star, likelihoods, prediction, config.particles)
     views: list[Particles | None] = []
     for leaf, own in zip(leaves, star.views, strict=True):
         if leaf:
@@ -62,7 +62,7 @@ def _fused(seeing: Sequence[tuple[Leaf, Particles]]) -> Particles:
     """All views' particles on the ground, each view weighted by the inverse of the ground area of a pixel."""
     place = np.concatenate([leaf.mapped for leaf, _ in seeing])
     velocity = np.concatenate(
-        [np.einsum("nij,nj->ni", leaf.look.view.ground_slope(own.place), own.velocity) for leaf, own in seeing]
+        [np.einsum("nij,nj->ni", leaf.likelihood.view.ground_slope(own.place), own.velocity) for leaf, own in seeing]
     )
     resolution = [1 / np.sqrt(np.linalg.det(leaf.covariance).mean()) for leaf, _ in seeing]
     weight = np.concatenate([share * own.weight for share, (_, own) in zip(resolution, seeing, strict=True)])

@@ -16,7 +16,7 @@ class Leaf:
 
     Parameters
     ----------
-    look
+    likelihood
         Colour likelihood of the target in the view.
     prior
         Prediction from the view's own particles of the frame before, ideal pixels.
@@ -35,11 +35,11 @@ class Leaf:
         Weights of the belief before any message, whose sum is 1; and the part of each for a visible target.
     """
 
-    def __init__(self, look: TargetLikelihood, prior: Prediction, place: Floats, count: int) -> None:
-        self.look, self.prior, self.count = look, prior, count
-        box = look.view.boxes(place[None], look.height)[0]
+    def __init__(self, likelihood: TargetLikelihood, prior: Prediction, place: Floats, count: int) -> None:
+        self.likelihood, self.prior, self.count = likelihood, prior, count
+        box = likelihood.view.boxes(place[None], likelihood.height)[0]
         tall = box[3] - box[1]
-        self.noise = look.config.foot_noise * float(tall if np.isfinite(tall) else look.view.camera.size[1])
+        self.noise = likelihood.config.foot_noise * float(tall if np.isfinite(tall) else likelihood.view.camera.size[1])
         self.place = self.mapped = np.zeros((0, 2))
         self.covariance = np.zeros((0, 2, 2))
         self.belief = self.seen = np.zeros(0)
@@ -54,7 +54,7 @@ class Leaf:
         The ground has particles (n, 2) with weights (n,). Importance weights are prior over proposal density.
         """
         proposed = self.count // 2
-        pixel = self.look.view.to_pixel(ground)
+        pixel = self.likelihood.view.to_pixel(ground)
         chosen = systematic(weight, proposed, rng.random())
         drawn = pixel[chosen] + self.noise * rng.standard_normal((proposed, 2))
         place = np.concatenate([self.prior.draw(self.count - proposed, rng), drawn])
@@ -65,14 +65,14 @@ class Leaf:
         self._weigh(place, prior / ((1 - share) * prior + share * message))
 
     def _weigh(self, place: Floats, importance: Floats) -> None:
-        view = self.look.view
+        view = self.likelihood.view
         self.place, self.mapped = place, view.to_ground(place)
         slope = self.noise * view.ground_slope(place)
         self.covariance = slope @ slope.transpose(0, 2, 1)
-        likelihood, share = self.look.likelihood(self.mapped)
-        total = float(importance @ (likelihood + self.look.hidden))
-        self.belief = importance * (likelihood + self.look.hidden) / total
-        self.seen = importance * likelihood * share / total
+        visible, share = self.likelihood.likelihood(self.mapped)
+        total = float(importance @ (visible + self.likelihood.hidden))
+        self.belief = importance * (visible + self.likelihood.hidden) / total
+        self.seen = importance * visible * share / total
 
     def potential(self, ground: Floats, outlier: Outlier) -> Potential:
         """The potential between ground particles (n, 2) and this view's."""
@@ -81,7 +81,7 @@ class Leaf:
     def draw_ground(self, chosen: Ints, rng: np.random.Generator) -> Floats:
         """Ground points drawn around the particles of these indices (k,), float64 (k, 2)."""
         deviation = self.noise * rng.standard_normal((len(chosen), 2))
-        slope = self.look.view.ground_slope(self.place[chosen])
+        slope = self.likelihood.view.ground_slope(self.place[chosen])
         return np.asarray(self.mapped[chosen] + np.einsum("kij,kj->ki", slope, deviation))
 
     def settled(self, message: Floats, rng: np.random.Generator) -> Particles:

@@ -68,7 +68,7 @@ class Rounds:
     ----------
     star
         Beliefs of the frame before.
-    looks
+    likelihoods
         Colour likelihood in each view; None where it cannot show the target, which is a flat message.
     motion, config
         Motion model, and the constants.
@@ -79,7 +79,7 @@ class Rounds:
     def __init__(
         self,
         star: Star,
-        looks: Sequence[TargetLikelihood | None],
+        likelihoods: Sequence[TargetLikelihood | None],
         motion: Motion,
         config: BeliefConfig,
         rng: np.random.Generator,
@@ -87,7 +87,7 @@ class Rounds:
         self.config, self.rng, self.done = config, rng, 0
         self.prior = Prediction.of(star.ground, np.eye(2), motion)
         self.outlier = Outlier(config.outlier_rate, self.prior.mean, config.outlier_spread)
-        self.leaves = grow(star, looks, self.prior, config.particles)
+        self.leaves = grow(star, likelihoods, self.prior, config.particles)
         self.ground = self.prior.draw(config.particles, rng)
         self.weight = np.full(config.particles, 1 / config.particles)
         self.to_ground, self.to_view = self._flat_messages(), self._flat_messages()
@@ -162,22 +162,26 @@ class Rounds:
         return Star(self.prior.settled(self.ground, self.weight, self.rng), tuple(views), visibility)
 
 
-def grow(star: Star, looks: Sequence[TargetLikelihood | None], ground: Prediction, count: int) -> list[Leaf | None]:
+def grow(
+    star: Star, likelihoods: Sequence[TargetLikelihood | None], ground: Prediction, count: int
+) -> list[Leaf | None]:
     """Leaves of the views in which the target can be visible."""
     leaves: list[Leaf | None] = []
-    for j, (look, particles) in enumerate(zip(looks, star.views, strict=True)):
-        if look is None:
+    for j, (likelihood, particles) in enumerate(zip(likelihoods, star.views, strict=True)):
+        if likelihood is None:
             leaves.append(None)
             continue
-        place = star.place(j, look.view, ground)
-        prior = Prediction.of(particles or arrival(look.view, ground), look.view.pixel_slope(place), ground.motion)
-        leaves.append(Leaf(look, prior, place, count))
+        place = star.place(j, likelihood.view, ground)
+        prior = Prediction.of(
+            particles or arrival(likelihood.view, ground), likelihood.view.pixel_slope(place), ground.motion
+        )
+        leaves.append(Leaf(likelihood, prior, place, count))
     return leaves
 
 
 def propagate(
     stars: Sequence[Star],
-    looks: Sequence[Sequence[TargetLikelihood | None]],
+    likelihoods: Sequence[Sequence[TargetLikelihood | None]],
     motion: Motion,
     config: BeliefConfig,
     rngs: Sequence[np.random.Generator],
@@ -186,7 +190,9 @@ def propagate(
 
     A round uses the other targets' beliefs of the round before, so the order of targets does not matter.
     """
-    targets = [Rounds(star, seen, motion, config, rng) for star, seen, rng in zip(stars, looks, rngs, strict=True)]
+    targets = [
+        Rounds(star, seen, motion, config, rng) for star, seen, rng in zip(stars, likelihoods, rngs, strict=True)
+    ]
     unconverged = list(range(len(targets)))
     for done in range(1, config.iterations + 1):
         beliefs = [target.belief for target in targets]

@@ -92,7 +92,7 @@ def in_front(targets: Floats, heights: Floats, view: StarView) -> list[Floats]:
     return [boxes[overlap[k] & (distance < distance[k])] for k in range(len(targets))]
 
 
-def looks(
+def target_likelihoods(
     targets: Sequence[Target],
     views: Sequence[StarView],
     images: Sequence[Bytes | None],

@@ -15,7 +15,7 @@ from stseg.model.sizes import Sizes
 from stseg.trackers.belief.condensation import condense
 from stseg.trackers.belief.particles import Motion
 from stseg.trackers.belief.star import propagate
-from stseg.trackers.belief.target import Target, in_front, looks
+from stseg.trackers.belief.target import Target, in_front, target_likelihoods
 from stseg.trackers.belief.view import StarView
 from stseg.trackers.colour_views import colour_views
 from stseg.trackers.framewise import FramewiseTracker
@@ -82,7 +82,7 @@ class BeliefTracker(FramewiseTracker):
         return [self._commit(fused, seen, events)]
 
     def _follow(self, frame: int, images: list[Bytes | None]) -> None:
-        seen = looks(self.targets, self.views, images, self.motion, self.config.belief)
+        seen = target_likelihoods(self.targets, self.views, images, self.motion, self.config.belief)
         rngs = [self._rng(frame, target.track) for target in self.targets]
         follow = _METHODS[self.config.belief.method]
         stars = follow([target.star for target in self.targets], seen, self.motion, self.config.belief, rngs)
