@@ -419,6 +419,14 @@ def test_two_people_apart(kind: str) -> None:
     assert (explanation.ghosts.evidence < 0).all()
 
 
+@pytest.mark.parametrize("place", [(0.0, 0.0), (-0.5, 0.2), (0.3, -0.4)])
+def test_a_child_is_found_though_its_height_is_not_tried(place: tuple[float, float]) -> None:
+    standing = people((*place, 1.0))
+    explanation = pass_of("pixels").explain(show("pixels", room().cameras, standing), None)
+    assert_found(explanation, standing)
+    np.testing.assert_allclose(explanation.people.height, 1.0, atol=0.11)
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_who_explains_what(kind: str) -> None:
     rig = room()

@@ -2,7 +2,8 @@
 
 Candidates come from a ground lattice, scored by the evidence that is not explained yet, so that people behind others
 are found once those are. Predicted tracks are candidates too, and a birth away from the border costs. After each round
-the set is searched again, until a round changes nothing (docs/how-it-works.md, Detection).
+the set is searched again, until a round changes nothing. Before the final search, rejected candidates that were nearly
+accepted are fitted to their pixels (docs/how-it-works.md, Detection).
 """
 
 from __future__ import annotations
@@ -32,6 +33,10 @@ from stseg.model.predicted_tracks import PredictedTracks
 
 _HOPELESS = -4.0
 """Where the middle height is worth less, no other height makes a candidate, nats."""
+_NEARLY = -15.0
+"""Gain above which an alternative is fitted to its pixels, nats: what the right place and size may add."""
+_SEEN = 2.0
+"""Evidence of all views above which it is, nats: less is no foreground left over."""
 
 
 class Detector:
@@ -166,7 +171,10 @@ class Detector:
         exact, known = self._moved(estimate), len(estimate.pool)
         start = np.arange(known, known + len(exact))
         moved = MapEstimate.of_search(estimate.evidence, estimate.pool.joined_with(exact), start)
-        pool = moved.pool.at(np.concatenate([moved.members, moved.alternatives()]))
+        alternatives = moved.alternatives()
+        pool = moved.pool.at(np.concatenate([moved.members, alternatives]))
+        if not self._has_boxes:
+            pool = pool.joined_with(_fitted(moved, alternatives))
         start = np.arange(len(moved.members))
         return merged(MapEstimate.of_search(moved.evidence, pool, start, ENUMERATED, self._swap_rounds))
 
@@ -189,6 +197,19 @@ class Detector:
         if shown:
             _add_pixels(shown, score)
         return peaks(score.reshape(-1, rows, columns), self.lattice_ground, heights, self.body.width_mean)
+
+
+def _fitted(estimate: MapEstimate, alternatives: Ints) -> Candidates:
+    """Alternatives that are nearly worth a member, at the places and sizes that their own pixels show.
+
+    The lattice tries few heights and one width: a child is worth less than nothing at the size of an adult.
+    """
+    additions = estimate.additions(alternatives)
+    nearly = alternatives[(additions.gain > _NEARLY) & (additions.view_evidence.sum(0) > _SEEN)]
+    if not len(nearly):
+        return estimate.pool.at(nearly)
+    together = estimate.with_members(np.concatenate([estimate.members, nearly]))
+    return together.refined().pool.at(np.arange(len(estimate.members), len(together.members)))
 
 
 def _add_pixels(shown: Sequence[tuple[PixelView, Floats]], score: Floats) -> None:
