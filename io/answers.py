@@ -9,8 +9,9 @@ from pathlib import Path
 from stseg.errors import FormatError
 from stseg.io import limits
 from stseg.io.bounded_files import read_text
+from stseg.io.names import EXPECTED_TITLE, is_title
 from stseg.io.numbers import parse_whole
-from stseg.io.toml.text import one_of
+from stseg.io.toml.text import one_of, shown
 
 COLUMNS = ("action", "frame", "id", "other", "name")
 
@@ -44,7 +45,8 @@ def read_answers(path: Path, actions: tuple[str, ...]) -> list[AnswerRow]:
         track, other, frame = (_whole(path, line, name, cells.get(name, "")) for name in ("id", "other", "frame"))
         if track is None:
             raise FormatError(path, f"line {line}", "no id", "the id of a track")
-        found.append(AnswerRow(place, action, track, other or 0, frame, cells.get("name", "")))
+        name = _title(path, line, cells.get("name", "")) if action == "name" else ""
+        found.append(AnswerRow(place, action, track, other or 0, frame, name))
     return found
 
 
@@ -52,12 +54,12 @@ def read_names(path: Path) -> dict[int, str]:
     """Names of tracks of a CSV file with the columns id and name."""
     names: dict[int, str] = {}
     for line, cells in _lines(path, ("id", "name")):
-        identity = _whole(path, line, "id", cells["id"])
-        if identity is None or not cells["name"]:
-            raise FormatError(path, f"line {line}", "no id or no name", "id,name")
+        identity = _whole(path, line, "id", cells.get("id", ""))
+        if identity is None:
+            raise FormatError(path, f"line {line}", "no id", "id,name")
         if identity in names:
             raise FormatError(path, f"line {line}", f"id {identity} twice", "a name once a track")
-        names[identity] = cells["name"]
+        names[identity] = _title(path, line, cells.get("name", ""))
     return names
 
 
@@ -75,6 +77,12 @@ def _lines(path: Path, needed: tuple[str, ...]) -> list[tuple[int, dict[str, str
     if missing := [name for name in needed if name not in header]:
         raise FormatError(path, "header", ",".join(header) or "nothing", f"the columns {','.join(missing)}")
     return [(line, {k: v.strip() for k, v in zip(header, row, strict=False)}) for line, row in rows]
+
+
+def _title(path: Path, line: int, text: str) -> str:
+    if not is_title(text):
+        raise FormatError(path, f"line {line}", f"name {shown(text)}", EXPECTED_TITLE)
+    return text
 
 
 def _whole(path: Path, line: int, name: str, text: str) -> int | None:

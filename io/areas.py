@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +10,11 @@ import numpy as np
 
 from stseg.arrays import Floats
 from stseg.errors import FormatError
+from stseg.io import limits
 from stseg.io.bounded_files import parse_json, read_text
+from stseg.io.names import EXPECTED_TITLE, is_title
+from stseg.io.numbers import finite_number
+from stseg.io.toml.text import shown
 
 Named = tuple[str, tuple[Floats, ...]]
 """A feature's name and its rings or lines, float64 (k, 2) each."""
@@ -19,16 +23,27 @@ Named = tuple[str, tuple[Floats, ...]]
 def read_polygons(path: Path) -> list[Named]:
     """Polygons of a GeoJSON file: name, and rings in metres."""
     return [
-        (name, tuple(_points(path, name, ring, 3)[:-1] for polygon in polygons for ring in polygon))
-        for name, polygons in _features(path, {"Polygon": lambda c: [c], "MultiPolygon": list}, "zone")
+        (name, tuple(_rings(path, name, own)))
+        for name, own in _features(path, {"Polygon": lambda rings: [rings], "MultiPolygon": lambda own: own}, "zone")
     ]
+
+
+def _rings(path: Path, name: str, polygons: Any) -> Iterator[Floats]:
+    corners = 0
+    for polygon in _listed(path, name, polygons):
+        for ring in _listed(path, name, polygon):
+            points = _points(path, name, ring, 3)
+            yield points[:-1] if (points[0] == points[-1]).all() else points
+            corners += len(points)
+            if corners > limits.CORNERS:
+                raise FormatError(path, name, f"{corners} corners or more", f"at most {limits.CORNERS}")
 
 
 def read_lines(path: Path) -> list[Named]:
     """Lines of a GeoJSON file: name, and points in metres."""
     return [
-        (name, tuple(_points(path, name, line, 2) for line in lines))
-        for name, lines in _features(path, {"LineString": lambda c: [c]}, "line")
+        (name, (_points(path, name, line, 2),))
+        for name, line in _features(path, {"LineString": lambda points: points}, "line")
     ]
 
 
@@ -42,25 +57,43 @@ def _features(path: Path, kinds: dict[str, Callable[[Any], Any]], noun: str) -> 
         raise FormatError(path, "", f"no JSON ({error})"[:100], "GeoJSON") from error
     features = data.get("features", [data]) if isinstance(data, dict) else []
     found = []
-    for index, feature in enumerate(features):
+    for index, feature in enumerate(features if isinstance(features, list) else []):
         shape = feature.get("geometry", feature) if isinstance(feature, dict) else {}
-        if isinstance(shape, dict) and shape.get("type") in kinds:
-            properties = feature.get("properties") or {}
-            name = str(properties.get("name", feature.get("id", f"{noun} {index + 1}")))
-            found.append((name, kinds[str(shape["type"])](shape.get("coordinates"))))
-    if not found:
-        raise FormatError(path, "", f"no {' or '.join(kinds)}", f"GeoJSON with a feature a {noun}, in metres")
+        if isinstance(shape, dict) and (kind := kinds.get(str(shape.get("type")))):
+            found.append((_name(path, feature, f"{noun} {index + 1}"), kind(shape.get("coordinates"))))
+    if not 0 < len(found) <= limits.AREAS:
+        number = len(found) or "no"
+        expected = f"GeoJSON with a feature a {noun}, in metres, at most {limits.AREAS}"
+        raise FormatError(path, "", f"{number} {' or '.join(kinds)}", expected)
     names = [name for name, _ in found]
     if len(set(names)) < len(names):
         raise FormatError(path, "name", f"{max(names, key=names.count)!r} twice", f"a name of its own for each {noun}")
     return found
 
 
+def _name(path: Path, feature: dict[str, Any], default: str) -> str:
+    properties = feature.get("properties")
+    given = properties.get("name") if isinstance(properties, dict) else None
+    name = next((str(one) for one in (given, feature.get("id")) if isinstance(one, str | int)), default)
+    if not is_title(name):
+        raise FormatError(path, "name", shown(name), EXPECTED_TITLE)
+    return name
+
+
+def _listed(path: Path, name: str, values: Any) -> list[Any]:
+    """A list, of as many values as an area may have points."""
+    if not isinstance(values, list):
+        raise FormatError(path, name, "coordinates that are no points", "lists of [x, y] in metres")
+    if len(values) > limits.CORNERS:
+        raise FormatError(path, name, f"{len(values)} points", f"at most {limits.CORNERS}")
+    return values
+
+
 def _points(path: Path, name: str, points: Any, least: int) -> Floats:
-    try:
-        array = np.array([point[:2] for point in points], float)
-    except (TypeError, ValueError) as error:
-        raise FormatError(path, name, "coordinates that are no points", "[x, y] in metres") from error
-    if array.ndim != 2 or len(array) < least or not np.isfinite(array).all():
-        raise FormatError(path, name, f"{len(array)} points", f"{least} or more, all finite")
-    return array
+    pairs = [_listed(path, name, point)[:2] for point in _listed(path, name, points)]
+    if len(pairs) < least:
+        raise FormatError(path, name, f"{len(pairs)} points", f"{least} or more, [x, y] in metres")
+    numbers = [[finite_number(value, limits.METRES) for value in pair] for pair in pairs]
+    if any(len(pair) != 2 or None in pair for pair in numbers):
+        raise FormatError(path, name, "coordinates that are no points", f"[x, y] in metres, up to {limits.METRES:.0e}")
+    return np.array(numbers, float)

@@ -28,12 +28,17 @@ PLANES = 1_000
 CORNERS = 10_000
 """Corners of the polygon."""
 
+AREAS = 1_000
+"""Zones, and lines, of one measurement; CORNERS is the limit of each one's points."""
+
 METRES = 1e8
 """Coordinates on the ground, metres: those of map projections fit."""
 CELL = (1e-3, 1e3)
 """Side of a cell, metres."""
 TOP = (1e-3, 1e3)
 """Height of the uppermost plane, metres."""
+BODY = (1e-3, 2.2)
+"""Sizes of bodies, metres: taller pillars reach above most grids."""
 FRAME_RATE = (1e-3, 1e5)
 """Frames per second."""
 NUMBER = 1e12
@@ -47,6 +52,8 @@ PEOPLE_PER_FRAME = 2_000
 """Rows of one frame in a table of tracks."""
 ROWS = 20_000_000
 """Rows of a table."""
+INTERPOLATED = 500_000
+"""Boxes between the keyframes of a file."""
 POINTS = 20_000
 """Point correspondences of a scene."""
 LINE = 1 << 16

@@ -1,4 +1,4 @@
-"""Names of cameras and scenes, checked once for all uses: files, members of archives, HTML and the terminal."""
+"""Names checked once for all uses: files, members of archives, HTML and the terminal."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from stseg.io import limits
 
 _FORBIDDEN = frozenset("/\\")
 EXPECTED = f"a name of 1 to {limits.NAME} printable characters, without slashes, that a file can have"
+EXPECTED_TITLE = f"a name of 1 to {limits.NAME} printable characters"
 
 
 def is_name(text: object) -> bool:
@@ -19,6 +20,11 @@ def is_name(text: object) -> bool:
         and text.strip(".") != ""
         and not _FORBIDDEN & set(text)
     )
+
+
+def is_title(text: object) -> bool:
+    """Whether a text can name a track, a zone or a line: printable, and neither empty nor long."""
+    return isinstance(text, str) and 0 < len(text) <= limits.NAME and text.isprintable() and text == text.strip()
 
 
 def is_file_name(text: object) -> bool:

@@ -79,7 +79,7 @@ def set_score(members: Sequence[int], problem: Problem) -> float:
     gains = problem.birth_cost[chosen, None] + problem.track_gain[chosen]
     total += sum(gains[pair] for pair in best_pairs(gains))
     for i, j in combinations(members, 2):
-        apart = math.dist(ground[i], ground[j])
+        apart = math.dist(ground[i], ground[j]) / ((problem.breadth[i] + problem.breadth[j]) / 2)
         total -= repulsion(apart, parameters)
     total += sum(_boxes_of_view(view, members, boxes, parameters) for view in range(len(boxes.boxes)))
     total += sum(_pixels_of_view(view, members, pixels, parameters) for view in range(len(pixels.raster)))
@@ -131,7 +131,8 @@ def _pixels_of_view(view: int, members: Sequence[int], pixels: PixelEvidence, pa
 def touch(i: int, j: int, problem: Problem) -> bool:
     """Whether one of two candidates bears on what the other adds to a set."""
     boxes, pixels, parameters = problem.boxes, problem.pixels, problem.parameters
-    if math.dist(problem.ground[i], problem.ground[j]) < parameters.minimum_distance:
+    room = parameters.minimum_distance * (problem.breadth[i] + problem.breadth[j]) / 2
+    if math.dist(problem.ground[i], problem.ground[j]) < room:
         return True
     gains = problem.birth_cost[[i, j], None] + problem.track_gain[[i, j]]
     worth = parameters.box_log_ratio + boxes.match[:, [i, j]] - math.log(parameters.box_miss_rate)

@@ -9,10 +9,12 @@ from hypothesis import strategies as st
 from numpy.typing import ArrayLike
 
 from stseg.arrays import AnyArray, Rows
+from stseg.config import BodyConfig
+from stseg.engine.body_warnings import body_warnings
 from stseg.engine.silent_views import view_warnings
 from stseg.io.runfile.layout import ghost_type
 from stseg.model.ghost_reasons import DENIED, OTHERS, TOO_LITTLE, ghost_reasons
-from stseg.model.tables import TRAJECTORY
+from stseg.model.tables import RATES, TRAJECTORY
 from stseg.report.findings import ground_by_views, people_per_minute
 
 FRAMES = np.arange(100, 400)
@@ -117,3 +119,32 @@ def test_a_view_is_not_silent_where_nobody_was_there() -> None:
 def test_a_detector_that_hardly_speaks_of_the_hidden_denies_nobody() -> None:
     hidden = np.where(FRAMES % 3 == 0, 2.5, -0.016)
     assert view_warnings(("a", "b"), people_in(FRAMES, 3.0, hidden), FRAMES, 5.0) == []
+
+
+# Bodies
+
+
+def bodies_of(height: float, width: float, number: int = 40) -> Rows:
+    rows = np.zeros(number, TRAJECTORY)
+    rows["height"], rows["width"] = height, width
+    return rows
+
+
+def rates_of(*miss: float) -> Rows:
+    rows = np.zeros(len(miss), RATES)
+    rows["view"], rows["miss"] = np.arange(len(miss)), miss
+    return rows
+
+
+def test_wide_bodies_are_told_beside_what_was_expected_at_their_height() -> None:
+    calm = rates_of(0.1, 0.1)
+    assert body_warnings(("a", "b"), bodies_of(1.7, 0.5), calm, BodyConfig()) == []
+    assert body_warnings(("a", "b"), bodies_of(1.7, 0.9, number=5), calm, BodyConfig()) == []
+    (told,) = body_warnings(("a", "b"), bodies_of(1.7, 0.62), calm, BodyConfig())
+    assert "0.62 m wide" in told and "0.42 m were expected" in told
+    assert body_warnings(("a", "b"), bodies_of(1.7, 0.62), calm, BodyConfig(width_mean=0.6)) == []
+
+
+def test_a_view_of_torn_bodies_is_named() -> None:
+    (told,) = body_warnings(("a", "b"), bodies_of(1.7, 0.42), rates_of(0.15, 0.38), BodyConfig())
+    assert told.startswith("view b misses 38 %")

@@ -30,7 +30,15 @@ from strategies import numbers
 
 from stseg.arrays import Floats, Ints, ViewEvidence
 from stseg.detection.detector import Detector
-from stseg.detection.gains import clear_assignment, fill_assignment, gain_of, insert, matching_score, withdraw
+from stseg.detection.gains import (
+    box_scores,
+    clear_assignment,
+    fill_assignment,
+    gain_of,
+    insert,
+    loss_of,
+    withdraw,
+)
 from stseg.detection.groups import fill_groups, fill_interactions
 from stseg.detection.problem import BoxEvidence, Parameters, PixelEvidence, Problem
 from stseg.detection.scoring import set_score
@@ -46,7 +54,7 @@ from stseg.model.predicted_tracks import no_tracks
 
 WIDTH, HEIGHT = 128.0, 96.0
 KINDS = ("pixels", "boxes")
-TERMS = Parameters(-3.0, 0.3, 0.25, 3.0, 0.2, 0.2, 0.9, 0.02, 2.0)
+TERMS = Parameters(-3.0, 0.3, 0.25, 0.42, 3.0, 0.2, 0.2, 0.9, 0.02, 2.0)
 EDGES = st.tuples(numbers(-60, 150), numbers(-80, 100), numbers(1, 60), numbers(2, 150)).map(
     lambda b: np.array([b[0], b[1], b[0] + b[2], b[1] + b[3]])
 )
@@ -167,13 +175,16 @@ class CraftedFrame:
     ground: Floats
     newcomer: Floats
     known: Floats
+    breadth: Floats
 
     def problem(self) -> Problem:
         """The frame as the kernels take it."""
         views = len(self.boxes.boxes) + len(self.pixels.raster)
         owner = np.empty(max(self.pixels.raster[0].size, self.boxes.match.shape[2], self.known.shape[1]), np.int64)
         parts = np.zeros((views, len(self.own) + 1))
-        return Problem(self.boxes, self.pixels, self.own, self.newcomer, self.known, self.ground, TERMS, owner, parts)
+        return Problem(
+            self.boxes, self.pixels, self.own, self.newcomer, self.known, self.ground, self.breadth, TERMS, owner, parts
+        )
 
     def score(self, members: Sequence[int] | Ints) -> float:
         """The fast score of a set."""
@@ -210,7 +221,8 @@ def random_frame(seed: int, candidates: int, walkers: int = 0) -> CraftedFrame:
     )
     own, ground = rng.normal(0, 0.5, candidates), rng.uniform(0, 1.2, (candidates, 2))
     newcomer = rng.uniform(0, 5, candidates) * (walkers > 0)
-    return CraftedFrame(evidence, pixels, own, ground, newcomer, rng.normal(-3, 4, (candidates, walkers)))
+    known, breadth = rng.normal(-3, 4, (candidates, walkers)), np.maximum(rng.normal(1.0, 0.4, candidates), 1.0)
+    return CraftedFrame(evidence, pixels, own, ground, newcomer, known, breadth)
 
 
 def apart(frame: CraftedFrame, size: int) -> CraftedFrame:
@@ -231,13 +243,13 @@ def apart(frame: CraftedFrame, size: int) -> CraftedFrame:
     for walker, likes in enumerate(frame.known.T):
         known[np.arange(len(room)), walker * rooms + room] = likes
     ground = frame.ground + 10.0 * room[:, None]
-    return CraftedFrame(boxes, pixels, frame.own, ground, frame.newcomer, known)
+    return CraftedFrame(boxes, pixels, frame.own, ground, frame.newcomer, known, frame.breadth)
 
 
 def strangers(boxes: BoxEvidence, pixels: PixelEvidence) -> CraftedFrame:
     """Two candidates far apart, whom nobody expects and who may come in where they stand."""
     ground = np.array([[0.0, 0.0], [2.0, 0.0]])
-    return CraftedFrame(boxes, pixels, np.zeros(2), ground, np.zeros(2), np.zeros((2, 0)))
+    return CraftedFrame(boxes, pixels, np.zeros(2), ground, np.zeros(2), np.zeros((2, 0)), np.ones(2))
 
 
 @pytest.mark.parametrize("walkers", [0, 3])
@@ -323,8 +335,10 @@ def test_what_one_more_adds_is_the_difference_of_scores(seed: int, walkers: int)
         members = np.append(chosen, 0)
         owners = np.full((2, problem.pixels.raster[0].size), -1, np.int16)
         fill_assignment(members, count, problem.pixels, owners)
-        gain = gain_of(int(chosen[count]), members, count, matching_score(members, count, problem), owners, problem)
+        gain = gain_of(int(chosen[count]), members, count, box_scores(members, count, problem), owners, problem)
         assert gain == pytest.approx(frame.score(chosen[: count + 1]) - frame.score(chosen[:count]), abs=1e-5)
+        scores = box_scores(members, count + 1, problem)
+        assert loss_of(int(chosen[count]), members, count, scores, owners, problem) == pytest.approx(gain, abs=1e-5)
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -547,7 +561,7 @@ def test_the_first_frame_costs_nobody_anything(kind: str) -> None:
     size = np.zeros(len(found))
     for spread, off in (
         (BODY.height_spread, found.height - BODY.height_mean),
-        (BODY.width_spread, found.width - BODY.width_mean),
+        (BODY.width_spread, found.width - BODY.width_of(found.height)),
     ):
         z = np.abs(off / spread)
         size -= np.where(z < 2, z**2 / 2, 2 + 4 * np.log(np.maximum(z, 2) / 2))

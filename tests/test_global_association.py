@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from reference_global_association import gain, greatest_sum
 from strollers import BORDER, CONFIG, RATE, gone, rows_of, runs, swapped, visit
 
-from stseg.arrays import Floats, Ints, Rows
+from stseg.arrays import Ints, Rows
 from stseg.model.tables import EVENT, TRAJECTORY
-from stseg.tracking.global_association import GlobalAssociation, associate_globally
+from stseg.tracking.identities.global_association import GlobalAssociation, associate_globally
+from stseg.tracking.identities.size_model import MeasuredSizes
 from stseg.tracking.isolated_tracklets import isolated_tracklets
 
 
 def relinked(rows: Rows) -> GlobalAssociation:
-    return associate_globally(rows, RATE, BORDER, CONFIG)
+    return associate_globally(rows, MeasuredSizes.of_heights(rows["height"], CONFIG), RATE, BORDER, CONFIG)
 
 
 def names(rows: Rows, identity: Ints, track: int, frames: range) -> set[int]:
@@ -60,7 +58,7 @@ def test_who_walk_straight_past_each_other_keep_their_tracks() -> None:
             2: (lambda t: (4 - t, 0.15), 1.7, range(64)),
         }
     )
-    assert len(isolated_tracklets(rows, RATE, CONFIG.tracking, CONFIG.motion)) == 4
+    assert len(isolated_tracklets(rows, RATE)) == 4
     found = relinked(rows)
     np.testing.assert_array_equal(found.identity, rows["id"])
     assert not found.links
@@ -128,29 +126,6 @@ def test_the_order_of_rows_does_not_matter(rows: Rows, seed: int) -> None:
     assert relinked(rows).links == one.links
 
 
-@settings(max_examples=150, deadline=None)
-@given(runs(4))
-def test_no_other_links_have_a_greater_sum(rows: Rows) -> None:
-    parts = isolated_tracklets(rows, RATE, CONFIG.tracking, CONFIG.motion)
-    while len(parts) > 6:  # all choices of links are tried: fewer rows, whose tracks are cut anew
-        rows = rows[np.sort(np.concatenate([part.rows for part in parts[:-1]]))]
-        parts = isolated_tracklets(rows, RATE, CONFIG.tracking, CONFIG.motion)
-    found = relinked(rows)
-
-    def inside(ground: Floats) -> float:
-        return float(BORDER.inside(ground[None], CONFIG.detection.border_width)[0])
-
-    gains = [
-        [gain(a, b, (inside(a.end.ground) + inside(b.start.ground)) / 2, RATE, CONFIG) for b in parts] for a in parts
-    ]
-    identity = [int(found.identity[part.rows[0]]) for part in parts]
-    total = 0.0
-    for name in set(identity):
-        own = [k for k, other in enumerate(identity) if other == name]
-        total += sum(gains[a][b] for a, b in pairwise(own))
-    assert total == pytest.approx(greatest_sum(gains))
-
-
 def test_nobody_at_all() -> None:
     found = relinked(np.zeros(0, TRAJECTORY))
     assert len(found.identity) == len(found.links) == 0
@@ -168,35 +143,17 @@ def test_a_track_is_cut_where_it_met_another_and_where_it_was_unseen() -> None:
         noise=0.0,
     )
     rows = rows[(rows["id"] != 1) | (rows["frame"] < 50) | (rows["frame"] >= 53)]
-    parts = [
-        (part.track, part.start.frame, part.end.frame)
-        for part in isolated_tracklets(rows, RATE, CONFIG.tracking, CONFIG.motion)
-    ]
-    assert parts == [(1, 0, 31), (2, 0, 31), (1, 32, 49), (2, 32, 63), (1, 53, 63)]
+    parts = sorted(
+        (int(rows["id"][part[0]]), *rows["frame"][part[[0, -1]]].tolist()) for part in isolated_tracklets(rows, RATE)
+    )
+    assert parts == [(1, 0, 31), (1, 32, 49), (1, 53, 63), (2, 0, 31), (2, 32, 63)]
 
 
 @given(runs(6))
 def test_stretches_hold_every_row_once(rows: Rows) -> None:
-    parts = isolated_tracklets(rows, RATE, CONFIG.tracking, CONFIG.motion)
-    held = [row for part in parts for row in part.rows.tolist()]
-    assert sorted(held) == list(range(len(rows)))
+    parts = isolated_tracklets(rows, RATE)
+    assert sorted(row for part in parts for row in part.tolist()) == list(range(len(rows)))
     for part in parts:
-        own = rows[part.rows]
-        assert set(own["id"].tolist()) == {part.track}
+        own = rows[part]
+        assert len(set(own["id"].tolist())) == 1
         assert (np.diff(own["frame"]) == 1).all()
-        assert (part.start.frame, part.end.frame) == (own["frame"][0], own["frame"][-1])
-        assert part.height == pytest.approx(own["height"].mean(), rel=1e-5)
-
-
-def test_a_longer_stretch_tells_more() -> None:
-    def path(t: float) -> tuple[float, float]:
-        return -3 + 0.6 * t, 1 - 0.3 * t
-
-    short, long = (
-        isolated_tracklets(rows_of({1: (path, 1.7, range(n))}, 0.0), RATE, CONFIG.tracking, CONFIG.motion)[0]
-        for n in (3, 40)
-    )
-    np.testing.assert_allclose(long.end.velocity, [0.6, -0.3], rtol=0.35)
-    assert np.hypot(*short.end.velocity) < np.hypot(*long.end.velocity)
-    assert short.end.velocity_variance > long.end.velocity_variance
-    assert short.height_variance > long.height_variance

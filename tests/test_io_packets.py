@@ -13,7 +13,9 @@ from hypothesis import strategies as st
 from stseg.arrays import AnyArray, Floats
 from stseg.errors import SourceError
 from stseg.geometry import Camera
+from stseg.io.recording import video_stream
 from stseg.io.recording.packets import packet_times
+from stseg.io.recording.pictures import reduced_picture
 from stseg.io.recording.recording import Source
 from stseg.io.recording.video_stream import VideoStream
 
@@ -105,3 +107,48 @@ def test_a_damaged_picture_is_counted_as_it_decodes(tmp_path: Path, film: bytes,
     else:
         with pytest.raises(SourceError, match="no frame that decodes"):
             counted(path)
+
+
+@pytest.mark.parametrize("factor", [2, 3, 4, 6])
+def test_reduced_pictures_are_the_means_of_squares_nearly(tmp_path: Path, factor: int) -> None:
+    smooth = cv2.GaussianBlur(np.random.default_rng(5).integers(0, 255, (50, 66, 3), np.uint8), (0, 0), 5.0)
+    path = tmp_path / "film.avi"
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 5, (66, 50))
+    writer.write(smooth)
+    writer.release()
+    camera = Camera("cam1", (66, 50), np.eye(3), np.array([0.0, 0.0, -1.0]))
+    reduced = VideoStream(Source("video", path), camera, factor=factor).read()
+    whole = VideoStream(Source("video", path), camera).read()
+    assert reduced is not None and whole is not None
+    assert reduced.shape == (50 // factor, 66 // factor, 3)
+    difference = reduced.astype(float) - reduced_picture(whole, factor)
+    assert abs(difference.mean()) < 1.0
+    assert difference.std() < 2.0
+
+
+@pytest.mark.parametrize("frame", [0, 4, 8])
+@pytest.mark.parametrize("at", [0, 2, 30, 170, 640])
+def test_a_film_with_a_damaged_picture_has_the_same_frames_reduced(
+    tmp_path: Path, film: bytes, frame: int, at: int
+) -> None:
+    begin = -1
+    for _ in range(frame + 1):
+        begin = film.index(b"00dc", begin + 1)
+    begin += 8 + at
+    path = tmp_path / "film.avi"
+    path.write_bytes(film[:begin] + b"\xaa" * 12 + film[begin + 12 :])
+    times = decoded(path)
+    stream = VideoStream(Source("video", path), CAMERA, times, factor=2)
+    shown = 0
+    while stream.read() is not None:
+        shown += 1
+    assert shown == len(times)
+
+
+@pytest.mark.parametrize("frame", [0, 3, 8])
+def test_frames_are_found_by_seeking_packets(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, frame: int) -> None:
+    path = video(tmp_path / "film.avi", "MJPG")
+    monkeypatch.setattr(video_stream, "_NEAR", 1)
+    one, other = (VideoStream(Source("video", path), CAMERA, times, factor=2) for times in (None, decoded(path)))
+    assert one.skip(frame) == other.skip(frame) == frame
+    np.testing.assert_array_equal(one.read(), other.read())

@@ -127,6 +127,12 @@ def test_the_command_writes_tables_and_python_gives_the_same(
         ("{}", "no Polygon or MultiPolygon, expected GeoJSON with a feature a zone"),
         (json.dumps(feature("Polygon", [[[0, 0], [1, 1]]])), "a: found 2 points, expected 3 or more"),
         (json.dumps(feature("Polygon", [["x"]])), "a: found coordinates that are no points"),
+        (json.dumps(feature("Polygon", 7)), "a: found coordinates that are no points"),
+        (json.dumps(feature("Polygon", [[[0, 0], [1, 0], [1, "1"]]])), "a: found coordinates that are no points"),
+        (json.dumps(feature("Polygon", [[[0, 0], [1, 0], [1e300, 1]]])), "a: found coordinates that are no points"),
+        (json.dumps(feature("Polygon", [[[0, 0]] * 20_000])), "a: found 20000 points, expected at most 10000"),
+        (json.dumps(feature("Polygon", [SQUARE.tolist()]) | {"properties": {"name": "\x1b"}}), "1 to 100 printable"),
+        ('{"features": 7}', "no Polygon"),
         (json.dumps({"features": [feature("Polygon", [SQUARE.tolist()])] * 2}), "name: found 'a' twice"),
     ],
 )
@@ -137,3 +143,10 @@ def test_malformed_geojson_is_named(tmp_path: Path, text: str, message: str) -> 
         read_polygons(path)
     with pytest.raises(FormatError):
         read_lines(path)
+
+
+def test_a_ring_needs_not_be_closed(tmp_path: Path) -> None:
+    path = tmp_path / "zones.geojson"
+    path.write_text(json.dumps(feature("Polygon", [[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 0], [1, 1], [0, 0]]])))
+    ((_, (open_ring, closed_ring)),) = read_polygons(path)
+    np.testing.assert_array_equal(open_ring, closed_ring)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from urllib.parse import unquote
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ import run_files
 from browser import CHROMIUM, Page, chromium
 
 from stseg.commands.report import report
+from stseg.io.areas import read_lines, read_polygons
 from stseg.io.runfile.runs import RunWriter
 from stseg.model.tables import TRACK
 
@@ -115,3 +117,31 @@ def test_a_run_without_frames_has_a_page_that_does_not_complain(tmp_path: Path) 
         browser.open(tmp_path / "empty.html")
         assert browser.complaints == []
         assert "No person was found" in browser.ask("document.body.innerText")
+
+
+def test_zones_and_lines_are_drawn_on_the_plan_and_saved(page: Page, tmp_path: Path) -> None:
+    """Corners are clicked at shares of the canvas; the file is what `stseg measure` reads."""
+    click = """(u, v) => { const box = plan.getBoundingClientRect(); plan.dispatchEvent(new MouseEvent("click", {
+        clientX: box.left + u * box.width, clientY: box.top + v * box.height })); }"""
+    press = "document.body.dispatchEvent(new KeyboardEvent('keydown', { key: 'Enter', bubbles: true }))"
+    before = pictures(page)
+    corners = "[[0.3, 0.3], [0.7, 0.3], [0.7, 0.7], [0.3, 0.7]]"
+    page.ask("document.getElementById('area-name').value = 'door <a>'; document.getElementById('draw-zone').click(); 0")
+    page.ask(f"{corners}.forEach((place) => ({click})(...place)); {press}; 0")
+    page.ask(
+        f"document.getElementById('draw-line').click(); [[0.2, 0.5], [0.8, 0.5]].forEach((p) => ({click})(...p)); 0"
+    )
+    page.ask(f"{press}; document.getElementById('draw-zone').click(); ({click})(0.5, 0.5); {press}; 0")
+    assert [old == new for old, new in zip(before, pictures(page), strict=True)] == [False, True, True]
+    href = page.ask("document.getElementById('save-areas').href")
+    path = tmp_path / "areas.geojson"
+    path.write_text(unquote(href.partition(",")[2]), "utf-8")
+    (name, (ring,)), (line, (points,)) = *read_polygons(path), *read_lines(path)
+    assert (name, line) == ("door <a>", "line 2")
+    assert ring.shape == (4, 2) and points.shape == (2, 2)
+    middle, ends = ring.mean(axis=0), points.mean(axis=0)
+    np.testing.assert_allclose(middle, ends, atol=2e-3)
+    np.testing.assert_allclose(middle, [0.3, 0.2], atol=2e-3)  # of the ground, and so of the canvas
+    page.ask("document.getElementById('undo-area').click(); document.getElementById('undo-area').click(); 0")
+    assert pictures(page) == before
+    assert page.complaints == []

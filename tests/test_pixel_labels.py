@@ -35,7 +35,7 @@ BODY = BodyConfig(width_mean=WIDTH, width_spread=0.03)
 
 def standing(everybody: Floats, spread: float = 0.0) -> PlacedPeople:
     covariance = np.tile(spread**2 * np.eye(2), (len(everybody), 1, 1))
-    return PlacedPeople(everybody[:, :2], covariance, everybody[:, 2])
+    return PlacedPeople(everybody[:, :2], covariance, everybody[:, 2], np.arange(1, len(everybody) + 1))
 
 
 def labels_in(camera: Camera, everybody: Floats, config: LabelConfig = FEW) -> Labels:

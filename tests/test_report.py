@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import cv2
+import h5py
 import numpy as np
 import pytest
 import run_files
@@ -17,12 +18,13 @@ from hypothesis import strategies as st
 
 from stseg.arrays import AnyArray, Boxes, Bytes, Rows
 from stseg.commands.report import report, write_pictures
-from stseg.errors import ConfigError, OutputError, SourceError
+from stseg.errors import ConfigError, FormatError, OutputError, SourceError
 from stseg.geometry import Camera, Grid, Rig
 from stseg.io.recording.recording import CameraSource, Source
 from stseg.io.runfile.runs import RunWriter, read_run
 from stseg.model.tables import EVENT, TRACK, TRAJECTORY, Tracks
 from stseg.report import marginal_picture, overlay, plan_view, spacetime_picture, volume_picture
+from stseg.report.certainty import doubtful_stretches, mean_certainty
 from stseg.report.charts import Span, clock_time, people_chart, track_chart
 from stseg.report.colours import NIGHT, PAPER, track_colour
 from stseg.report.figures import backdrop
@@ -389,12 +391,27 @@ def test_bars_of_tracks_never_overlap(spans: list[tuple[int, int]]) -> None:
     tracks = np.zeros(len(spans), TRACK)
     for k, (first, length) in enumerate(spans):
         tracks["id"][k], tracks["first"][k], tracks["last"][k] = k + 1, first, first + length
-    svg = track_chart(Span(0, 1000, 5.0), tracks)
+    svg = track_chart(Span(0, 1000, 5.0), tracks, [])
     bars = [tuple(map(float, bar)) for bar in re.findall(r'<rect x="([\d.]+)" y="([\d.]+)" width="([\d.]+)"', svg)]
     assert len(bars) == len(spans)
     for k, (u, v, width) in enumerate(bars):
         for other_u, other_v, other_width in bars[:k]:
             assert v != other_v or u + width <= other_u or other_u + other_width <= u
+
+
+def test_doubtful_points_are_stretches_of_a_track_and_pale_in_its_bar() -> None:
+    rows = trajectory_of(*((frame, track, 0, 0) for track in (1, 2) for frame in range(10)), (30, 2, 0, 0))
+    rows["score"] = 8.0
+    rows["score"][[3, 4, 7, 12, 20]] = 0.0
+    found = doubtful_stretches(rows[::-1])
+    assert [(one.track, one.first, one.last) for one in found] == [(1, 3, 4), (1, 7, 7), (2, 2, 2), (2, 30, 30)]
+    assert [one.certainty for one in found] == pytest.approx([0.5] * 4)
+    tracks = np.zeros(3, TRACK)
+    tracks["id"], tracks["last"] = (1, 2, 3), (9, 30, 5)
+    np.testing.assert_allclose(mean_certainty(rows, tracks), [0.85, 1 - 1 / 11, np.nan], atol=1e-3)
+    svg = track_chart(Span(0, 40, 5.0), tracks, found)
+    assert svg.count('class="pale"') == 4
+    assert "track 1, frames 3 to 4: 50 % certain" in svg
 
 
 def test_times_are_written_as_people_say_them() -> None:
@@ -425,7 +442,7 @@ def test_the_page_holds_everything_and_loads_nothing(run_file: Path, tmp_path: P
     words = re.sub(r"data:image/png;base64,[^\"]+", "", page)
     assert not re.search(r"https?:|<link|url\(|src=\"[^\"]|<script[^>]* src|fetch\(|import\(|XMLHttpRequest", words)
     assert "default-src 'none'" in page
-    assert len(pictures_in(page)) == 6 + 3 * 2  # plan, space-time and four maps; two cameras at three frames
+    assert len(pictures_in(page)) == 7 + 3 * 2  # plan, space-time and five maps; two cameras at three frames
     for fact in ("hall", "ghosts removed <b>1</b> of 3", "birth <b>2</b>", "entered", "no image from a camera"):
         assert fact in page
 
@@ -451,15 +468,66 @@ def test_the_same_run_gives_the_same_page(run_file: Path, tmp_path: Path) -> Non
     assert pages[0].read_bytes() == pages[1].read_bytes()
 
 
+HOSTILE = "<img src=x onerror=alert(1)>'\"&amp;"
+
+
 def test_names_from_the_run_cannot_write_html(tmp_path: Path) -> None:
     recording = run_files.small_recording(tmp_path)
-    evil = replace(recording, rig=replace(recording.rig, name="<script>alert(1)"))
-    path = tmp_path / "evil.h5"
+    cameras = tuple(replace(camera, name=f"{HOSTILE}{k}") for k, camera in enumerate(recording.rig.cameras))
+    evil = replace(recording, rig=replace(recording.rig, name=HOSTILE, cameras=cameras))
+    path, names = tmp_path / "evil.h5", tmp_path / "names.csv"
     with RunWriter(path, evil, np.ones(evil.rig.grid.shape, np.uint8), run_files.CONFIG, overwrite=False) as writer:
-        writer.finish(np.zeros(0, TRACK))
-    report(path, output=tmp_path / "evil.html")
+        run_files.fill(writer)
+        writer.finish(Tracks(run_files.small_trajectory()).summary())
+    names.write_text("id,name\n1,</script><script>alert(1)</script>\n2,</td><img src=x onerror=alert(1)>\n")
+    report(path, output=tmp_path / "evil.html", names=names)
     page = (tmp_path / "evil.html").read_text()
-    assert "<script>alert" not in page and "&lt;script&gt;" in page  # and a run without frames has a page
+    assert page.count("<script") == 2, "the page's data and its own script"
+    assert "<img src=x" not in page and "alert(1)</script>" not in page
+    assert "&lt;img src=x onerror=alert(1)&gt;" in page and "&lt;script&gt;alert" in page
+
+
+def test_a_run_without_frames_has_a_page(tmp_path: Path) -> None:
+    recording, path = run_files.small_recording(tmp_path), tmp_path / "empty.h5"
+    with RunWriter(path, recording, np.ones(recording.rig.grid.shape, np.uint8), "", overwrite=False) as writer:
+        writer.finish(np.zeros(0, TRACK))
+    report(path, output=tmp_path / "empty.html")
+    assert "<title>hall</title>" in (tmp_path / "empty.html").read_text()
+
+
+@pytest.mark.parametrize("name", ["</script><script>alert(1)", "a\nb", ""])
+def test_names_that_no_file_can_have_are_refused(tmp_path: Path, name: str) -> None:
+    path = run_files.write_small_run(tmp_path / "run.h5")
+    with h5py.File(path, "r+") as file:
+        file.attrs["cameras"] = ["left", name]
+    with pytest.raises(FormatError, match="names of cameras"):
+        report(path, output=tmp_path / "evil.html")
+    assert not (tmp_path / "evil.html").exists()
+
+
+def test_names_of_cameras_are_not_on_the_numbers_of_the_axes() -> None:
+    matrix = np.array([[250.0, 0, 160], [0, 250.0, 120], [0, 0, 1]])
+    cameras = []
+    for name, (x, y) in {"a camera in the south": (2.0, -1.2), "in the west": (-0.2, 1.0)}.items():
+        way = np.array([2.0 - x, 0.5 - y, -1.0])
+        way /= np.linalg.norm(way)
+        right = np.array([way[1], -way[0], 0.0]) / np.hypot(*way[:2])
+        rotation = np.array([right, np.cross(way, right), way])
+        place = np.array([x, y, 2.5])
+        cameras.append(
+            Camera.from_projection(name, (320, 240), matrix @ np.column_stack([rotation, -rotation @ place]))
+        )
+    nameless = [replace(camera, name=" " * (1 + k)) for k, camera in enumerate(cameras)]
+    named, plain = (
+        plan_view(Rig("hall", 5.0, GRID, tuple(own)), trajectory_of(), width=700, height=600)
+        for own in (cameras, nameless)
+    )
+    plan = plan_map(Rig("hall", 5.0, GRID, tuple(cameras)), 700, 600)
+    (left, _), (_, bottom) = plan.corner, plan.far_corner
+    changed = (named != plain).any(axis=2)
+    assert changed.any(), "the names"
+    assert not changed[round(bottom) + 10 : round(bottom) + 32, round(left) :].any()
+    assert not changed[: round(bottom), : round(left) - 10].any()
 
 
 VIVID = (20, 240, 160)
@@ -507,7 +575,7 @@ def test_pictures_are_written_beside_the_page(
     run_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     report(run_file, output=tmp_path / "a.html", pictures=tmp_path / "one", frame=(11,))
-    maps = {"plan", "spacetime", "density", "dwell", "ghosts", "blind"}
+    maps = {"plan", "spacetime", "density", "dwell", "flow", "ghosts", "blind"}
     plain = maps | {"slices", "marginal", "overlay_left", "overlay_right"}
     assert {path.stem for path in (tmp_path / "one").iterdir()} == plain
     assert "a.html" in capsys.readouterr().out

@@ -110,7 +110,7 @@ def test_thin_tracks_keep_ends_and_moments() -> None:
 def embedded(trajectory: Rows, candidates: Rows, frames: AnyArray, tmp_path: Path) -> dict[str, object]:
     rig = run_files.small_recording(tmp_path).rig
     sheets = Sheets(frames, GRID.shape, 1.0, [b""] * len(frames))
-    text = embedded_json(rig, np.ones(rig.grid.shape, np.uint8), trajectory, candidates, sheets)
+    text = embedded_json(rig, np.ones(rig.grid.shape, np.uint8), trajectory, candidates, sheets, {1: "Ann"})
     assert "<" not in text
     found: dict[str, object] = json.loads(text)
     return found

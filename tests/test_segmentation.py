@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+import reference_blobs
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from strategies import numbers
 
@@ -12,6 +13,7 @@ from stseg.arrays import Flags, Floats
 from stseg.geometry import Grid
 from stseg.geometry.nearest_person import nearest_person
 from stseg.model.blobs import UNASSIGNED, Blobs
+from stseg.segmentation.blob_measures import Measures, fill_ground_labels, fill_measures
 from stseg.segmentation.blobs import find_blobs
 from stseg.segmentation.cell_motion import motion_field
 
@@ -149,6 +151,7 @@ def test_a_blob_holds_the_detection_inside_it() -> None:
 
 @settings(deadline=None, max_examples=40)
 @given(st.lists(st.tuples(numbers(0, 2), numbers(0, 1.5)), max_size=4), st.integers(0, 999))
+@example([(2.0, 0.0)], 0)
 def test_blobs_partition_the_occupied_cells(standing: list[tuple[float, float]], seed: int) -> None:
     rng = np.random.default_rng(seed)
     tracks = rng.permutation(5)[: len(standing)] + 1
@@ -169,3 +172,22 @@ def test_blobs_partition_the_occupied_cells(standing: list[tuple[float, float]],
     assert np.isfinite(found.ground).all()
     assert (np.linalg.eigvalsh(found.covariance) > 0).all()
     assert found.extent.sum() == pytest.approx((label != 0).any(0).sum() * 0.01)
+
+
+@given(seed=st.integers(0, 2**16))
+@settings(max_examples=20, deadline=None)
+def test_kernels_of_blobs_agree_with_their_plain_form(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    label = random.choice(np.array([0, 0, UNASSIGNED, 2, 5, 9], np.int32), GRID.shape)
+    log_odds = random.normal(0, 3, GRID.shape).astype(np.float32)
+    log_odds[random.random(GRID.shape) < 0.1] = np.nan
+    ground_label = np.zeros(GRID.shape[1:], np.int32)
+    fill_ground_labels(label, log_odds, ground_label)
+    np.testing.assert_array_equal(ground_label, reference_blobs.ground_labels(label, log_odds))
+    track = np.unique(ground_label[ground_label != 0]).astype(np.int64)
+    cells = np.where(ground_label != 0, 1 + track.searchsorted(ground_label), 0).astype(np.int32)
+    n = len(track)
+    found = Measures(np.zeros((n, 2)), np.zeros((n, 2, 2)), np.zeros(n), np.zeros(n), np.zeros(n))
+    fill_measures(cells, track, label, log_odds, GRID.ground_x, GRID.ground_y, GRID.heights, found)
+    for own, plain in zip(found, reference_blobs.measures(cells, track, label, log_odds, GRID), strict=True):
+        np.testing.assert_allclose(own, plain, rtol=1e-4, atol=1e-5)

@@ -25,7 +25,7 @@ from stseg.io.recording.rigs import read_rig
 from stseg.io.track_csv import read_tracks_csv
 from stseg.simulation import NAMED, Film, Lamp, SceneSpec
 from stseg.simulation import ray_casting as draw_module
-from stseg.simulation.body import PARTS, pose
+from stseg.simulation.body import PARTS, pose, upright_cylinders
 from stseg.simulation.cameras import build_rig, pixel_rays
 from stseg.simulation.clothes import clothing, own_clothing
 from stseg.simulation.crowd import Crowd, walk_freely
@@ -438,3 +438,20 @@ def test_command_suggests_a_scene(tmp_path: Path) -> None:
         simulate(tmp_path, scene="dence")
     with pytest.raises(ConfigError, match="--size"):
         simulate(tmp_path, scene="tiny", size="40x30")
+
+
+def test_animals_are_as_long_as_they_say_in_the_direction_in_which_they_face() -> None:
+    crowd = crowd_of(np.zeros((1, 2)), heading=0.4)
+    bodies = upright_cylinders(crowd, 0.35, 1.1)
+    ahead, aside = np.array([np.cos(0.4), np.sin(0.4), 0.0]), np.array([-np.sin(0.4), np.cos(0.4), 0.0])
+    for direction, half in ((ahead, 0.55), (aside, 0.175)):
+        reach = np.sqrt(((bodies.axes[0] @ direction) ** 2).sum(-1))
+        assert reach.max() == pytest.approx(half)
+
+
+def test_the_rig_says_what_animals_are(tmp_path: Path) -> None:
+    simulate(tmp_path / "a", scene="animals", seconds=0.06, size="64,48")
+    simulate(tmp_path / "b", scene="tiny", seconds=0.1)
+    body = read_rig(tmp_path / "a" / "rig_masks.toml").body
+    assert (body.height_mean, body.width_mean) == (0.6, 0.725)
+    assert read_rig(tmp_path / "b" / "rig.toml").body.height_mean is None

@@ -102,8 +102,8 @@ def test_the_e_step_by_definition(hidden: float) -> None:
     for lattice, off, fits, mean, variance in (
         (heights, (heights - BODY.height_mean) / BODY.height_spread, Candidates(everywhere, heights, 0.45 * one),
          found.height, found.height_variance),
-        (widths, (widths - BODY.width_mean) / BODY.width_spread, Candidates(everywhere, found.height * one, widths),
-         found.width, found.width_variance),
+        (widths, (widths - BODY.width_of(found.height)) / BODY.width_spread,
+         Candidates(everywhere, found.height * one, widths), found.width, found.width_variance),
     ):  # fmt: skip
         tail = np.where(abs(off) < 2, off**2 / 2, 2 + 4 * np.log(np.maximum(abs(off), 2) / 2))
         score = by_definition(view, sight.raster, open_pixels, fits) - tail

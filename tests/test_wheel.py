@@ -1,4 +1,4 @@
-"""What `pip install .` brings along: every module, also those behind the link stseg/io."""
+"""What `pip install .` brings along: every module, also those of io/ where the link stseg/io is a plain file."""
 
 from __future__ import annotations
 
@@ -25,6 +25,9 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name in ("stseg", "io"):
         kept = shutil.ignore_patterns("__pycache__")
         shutil.copytree(ROOT / name, sources / name, symlinks=True, ignore=kept)
+    link = sources / "stseg" / "io"
+    link.unlink()
+    link.write_text("../io", encoding="utf-8")  # what a checkout has where git makes no links
     folder = tmp_path_factory.mktemp("wheel")
     subprocess.run([sys.executable, "-c", _BUILD, str(folder)], cwd=sources, check=True, capture_output=True)
     return next(folder.glob("stseg-*.whl"))

@@ -22,7 +22,8 @@ from stseg.model.blobs import UNASSIGNED, Blobs
 from stseg.model.tables import TRAJECTORY
 from stseg.segmentation.blobs import find_blobs
 from stseg.tracking.assignment import assign, distances
-from stseg.tracking.pruning import drop_ghosts, drop_short, fill_gaps
+from stseg.tracking.interpolation import fill_gaps
+from stseg.tracking.pruning import drop_ghosts, drop_short
 from stseg.tracking.track_boxes import box_rows
 from stseg.tracking.tracklets import Tracklet, form_tracklets
 from stseg.tracking.window_association import TrackAssociation, WindowAssignment

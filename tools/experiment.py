@@ -8,6 +8,7 @@ pixels      share of pixels of people that carry the right label, from film to l
 points      calibration of the probability of track points
 rig         error of a rig against the true one, on the ground and at head height
 sizes       error of heights and widths of tracks, and their spread along a track
+spoil       what spoiled masks and boxes cost, by kinds, strengths, views and crowds
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from __future__ import annotations
 import importlib
 import sys
 
-EXPERIMENTS = ("ablation", "certainty", "labels", "memory", "pixels", "points", "rig", "sizes")
+EXPERIMENTS = ("ablation", "certainty", "labels", "memory", "pixels", "points", "rig", "sizes", "spoil")
 """Each is the module `experiments.NAME` with a function `main`, which reads the command line."""
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import sqlite3
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -43,6 +44,8 @@ def write_sqlite(path: Path, runs: Sequence[Run]) -> None:
     try:
         with connection:
             _fill(connection, runs)
+    except sqlite3.Error as error:
+        raise OSError(errno.EIO, str(error)) from error
     finally:
         connection.close()
 
@@ -51,10 +54,15 @@ def write_duckdb(path: Path, runs: Sequence[Run]) -> None:
     """Write a DuckDB database (needs duckdb)."""
     duckdb = load_extra("duckdb", "duckdb")
     path.unlink(missing_ok=True)
-    with duckdb.connect(str(path)) as connection:
-        connection.execute("BEGIN")
-        _fill(connection, runs)
-        connection.execute("COMMIT")
+    try:
+        with duckdb.connect(str(path)) as connection:
+            connection.execute("BEGIN")
+            _fill(connection, runs)
+            connection.execute("COMMIT")
+    except duckdb.Error as error:
+        raise OSError(errno.EIO, str(error)) from error
+    finally:
+        path.with_name(f"{path.name}.wal").unlink(missing_ok=True)
 
 
 ARCHIVES: Mapping[str, Callable[[Path, Sequence[Run]], None]] = {"sqlite": write_sqlite, "duckdb": write_duckdb}
@@ -72,14 +80,16 @@ def _fill(connection: Any, runs: Sequence[Run]) -> None:
 
 
 def _rows(run: Run) -> Iterator[tuple[str, Iterable[tuple[object, ...]]]]:
+    run.require_fit()
     name, rate, grid = run.path.stem, run.frame_rate, run.recording.rig.grid
     seconds, people = len(run.frames) / rate, len(run.trajectory) / max(len(run.frames), 1)
     about = (name, str(run.path), run.provenance.created, rate, len(run.frames), seconds, ",".join(run.cameras))
     yield "recordings", [(*about, grid.x[0], grid.y[0], grid.x[1], grid.y[1], len(run.tracks), people)]
-    yield "tracks", (_track(run, name, row) for row in run.tracks)
+    lengths = _path_lengths(run.trajectory)
+    yield "tracks", (_track(run, name, row, lengths.get(int(row["id"]), 0.0)) for row in run.tracks)
     yield "events", (
-        (name, int(e["frame"]), int(e["frame"]) / rate, e["kind"].decode(), int(e["id"]), int(e["other"]),
-         e["reason"].decode(errors="replace"))
+        (name, int(e["frame"]), int(e["frame"]) / rate, e["kind"].decode(errors="replace"), int(e["id"]),
+         int(e["other"]), e["reason"].decode(errors="replace"))
         for e in run.events
     )  # fmt: skip
     yield "trajectory", (
@@ -89,10 +99,16 @@ def _rows(run: Run) -> Iterator[tuple[str, Iterable[tuple[object, ...]]]]:
     )  # fmt: skip
 
 
-def _track(run: Run, recording: str, row: np.void) -> tuple[object, ...]:
+def _path_lengths(trajectory: Rows) -> dict[int, float]:
+    """Length of each track's path, metres."""
+    rows = trajectory[np.lexsort((trajectory["frame"], trajectory["id"]))]
+    ids, place = np.unique(rows["id"], return_inverse=True)
+    steps = np.hypot(np.diff(rows["x"]), np.diff(rows["y"])) * (np.diff(rows["id"]) == 0)
+    return dict(zip(ids.tolist(), np.bincount(place[1:], steps, len(ids)).tolist(), strict=True))
+
+
+def _track(run: Run, recording: str, row: np.void, distance: float) -> tuple[object, ...]:
     identity, rate = int(row["id"]), run.frame_rate
-    own: Rows = run.trajectory[run.trajectory["id"] == identity]
-    distance = float(np.hypot(np.diff(own["x"]), np.diff(own["y"])).sum())
     first, last = int(row["first"]), int(row["last"])
     spans = (first, last, first / rate, (last - first + 1) / rate, int(row["frames"]))
     return recording, identity, run.names.get(identity), *spans, _finite(row["height"]), _finite(row["score"]), distance

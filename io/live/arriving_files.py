@@ -138,10 +138,14 @@ class ArrivingVideos:
         The files of that pattern.
     notes
         Files that were read before; they are skipped unopened.
+    factor
+        Reduction of colour frames.
     """
 
-    def __init__(self, source: Source, camera: Camera, files: ArrivingFiles, notes: FileNotes) -> None:
-        self._source, self._camera, self._files, self._notes = source, camera, files, notes
+    def __init__(
+        self, source: Source, camera: Camera, files: ArrivingFiles, notes: FileNotes, factor: int = 1
+    ) -> None:  # fmt: skip
+        self._source, self._camera, self._files, self._notes, self._factor = source, camera, files, notes, factor
         self._known = list(notes.read.get(camera.name, []))
         self._stream: VideoStream | None = None
         self._path, self._read, self._size = Path(), 0, 0
@@ -188,7 +192,7 @@ class ArrivingVideos:
                 raise SourceError(self._source.path, f"camera {self._camera.name}", found, expected)
             self._require_unchanged()
             self._size = path.stat().st_size
-            self._stream = VideoStream(replace(self._source, path=path), self._camera)
+            self._stream = VideoStream(replace(self._source, path=path), self._camera, factor=self._factor)
             self._path, self._read, self.arrived = path, 0, now()
         return True
 

@@ -19,7 +19,6 @@ from stseg.errors import SourceError
 from stseg.geometry import Camera
 from stseg.io.live.arriving_files import ArrivingFiles, ArrivingVideos, FileNotes
 from stseg.io.live.live_frames import LiveFrameSet
-from stseg.io.recording.pictures import reduced_view
 from stseg.io.recording.recording import CameraSource, Recording
 
 _POLL = 0.2
@@ -68,7 +67,7 @@ class FollowedFiles:
         for camera, source, factor in cameras:
             files = ArrivingFiles(source.source.path, config.file_quiet_time, self._over, report)
             self._files.append(
-                _AlignedFiles(camera, source, ArrivingVideos(source.source, camera, files, notes), factor)
+                _AlignedFiles(camera, source, ArrivingVideos(source.source, camera, files, notes, factor))
             )
             self._files[-1].require_start(first)
         with ExitStack() as opened:
@@ -130,8 +129,8 @@ class FollowedFiles:
 class _AlignedFiles:
     """One camera's arriving files, read by frames of the recording."""
 
-    def __init__(self, camera: Camera, source: CameraSource, stream: ArrivingVideos, factor: int) -> None:
-        self.camera, self.source, self.stream, self._factor = camera, source, stream, factor
+    def __init__(self, camera: Camera, source: CameraSource, stream: ArrivingVideos) -> None:
+        self.camera, self.source, self.stream = camera, source, stream
         self._next = 0
 
     def require_start(self, first: int) -> None:
@@ -152,7 +151,7 @@ class _AlignedFiles:
         self._next += self.stream.skip(own - self._next)
         view = self.stream.read() if self._next == own else None
         self._next += view is not None
-        return reduced_view(view, self._factor)
+        return view
 
     def close(self) -> None:
         self.stream.close()

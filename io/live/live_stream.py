@@ -20,9 +20,9 @@ from stseg.io.live.live_frames import now
 from stseg.io.recording.pictures import as_observation, reduced_picture
 from stseg.io.recording.recording import Source, mask_passwords
 
-_OPTIONS = "rtsp_transport;tcp|fflags;nobuffer|analyzeduration;1000000"
-"""RTSP over TCP, without buffering; one second (in microseconds) to probe the format."""
-
+_PROTOCOLS = "rtsp,rtsps,rtp,srtp,rtmp,rtmps,rtmpt,srt,udp,tcp,tls,http,https,httpproxy,crypto"
+_OPTIONS = f"rtsp_transport;tcp|fflags;nobuffer|analyzeduration;1000000|protocol_whitelist;{_PROTOCOLS}"
+"""RTSP over TCP, without buffering; one second (in microseconds) to probe the format; no local files."""
 
 _ADDRESS = re.compile(r"(rtsps?|rtmps?|https?|srt|udp|tcp|rtp)://[^\s\x00-\x1f]+\Z", re.ASCII | re.IGNORECASE)
 """Addresses that are opened; above all, none of files and pipes."""
@@ -113,7 +113,7 @@ class LiveStream(Thread):
         factor: int = 1,
     ) -> None:
         super().__init__(name=f"camera {camera.name}", daemon=True)
-        self._source, self._arrivalra, self._config, self._report, self._connect = (
+        self._source, self._camera, self._config, self._report, self._connect = (
             source,
             camera,
             config,
@@ -179,7 +179,7 @@ class LiveStream(Thread):
                 yield picture
 
     def _keep(self, picture: AnyArray) -> None:
-        source, camera = self._source, self._arrivalra
+        source, camera = self._source, self._camera
         view = as_observation(picture, source.kind, camera.size, source.path, f"camera {camera.name}")
         with self._arrival:
             self.pictures.append(TimedPicture(now(), reduced_picture(view, self._factor)))
@@ -188,4 +188,4 @@ class LiveStream(Thread):
             self._arrival.notify_all()
 
     def _notify(self, what: str) -> None:
-        self._report(f"camera {self._arrivalra.name}: {what}")
+        self._report(f"camera {self._camera.name}: {what}")

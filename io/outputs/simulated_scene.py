@@ -3,7 +3,7 @@
 rig.toml  rig_masks.toml  rig_boxes.toml  [rig_instances.toml]    one rig file for each kind of foreground
 truth.csv                                                         frame,id,x,y,height of the people in the area
 cam1.avi  cam1_empty.avi                                          films in colour (Motion JPEG)
-cam1_masks.avi                                                    exact silhouettes, 0 or 255 (FFV1: lossless)
+cam1_masks.avi                                                    silhouettes, 0..255 (FFV1: lossless)
 cam1_boxes.csv                                                    simulated detections
 cam1_instances/000000.png                                         ids, 16 bits, optional
 """
@@ -27,15 +27,16 @@ from stseg.errors import OutputError
 from stseg.geometry import Camera, Rig
 from stseg.io.outputs.video_writer import require_utf8
 from stseg.io.outputs.whole_files import clear_frames
-from stseg.io.recording.recording import CameraSource, Recording, Source, SourceKind
+from stseg.io.recording.recording import BodyPrior, CameraSource, Recording, Source, SourceKind
 from stseg.io.recording.rigs import write_rig
 
+_ANYBODY = BodyPrior()
 Progress = Callable[[int, int], None]
 """Called after each frame with the number of finished frames and of all frames."""
 
 
 class SimulatedView(Protocol):
-    """One camera's frame: image uint8 (v, u, 3) BGR, instances uint16 (v, u), a detector's boxes."""
+    """One camera's frame: image uint8 (v, u, 3) BGR, instances uint16 (v, u), a detector's boxes, mask uint8 (v, u)."""
 
     @property
     def image(self) -> Bytes: ...
@@ -43,6 +44,8 @@ class SimulatedView(Protocol):
     def instances(self) -> NDArray[np.uint16]: ...
     @property
     def boxes(self) -> Boxes: ...
+    @property
+    def mask(self) -> Bytes: ...
 
 
 class SimulatedFrame(Protocol):
@@ -73,6 +76,7 @@ def write_scene(
     folder: Path,
     scene: SimulatedScene,
     *,
+    body: BodyPrior = _ANYBODY,
     instances: bool = False,
     overwrite: bool = False,
     progress: Progress | None = None,
@@ -85,6 +89,8 @@ def write_scene(
         The folder; made if it does not exist.
     scene
         What to film.
+    body
+        What the rig files say of the bodies.
     instances
         Also write instance images, one file a camera and frame.
     overwrite
@@ -118,7 +124,7 @@ def write_scene(
                 if progress is not None:
                     progress(done, scene.frames)
     # Last: a rig file promises that its sources exist.
-    _write_rigs(folder, scene, instances)
+    _write_rigs(folder, scene, body, instances)
 
 
 class _Video:
@@ -166,7 +172,7 @@ class _CameraFiles(AbstractContextManager["_CameraFiles"]):
     def write(self, frame: int, view: SimulatedView) -> None:
         """Write one frame."""
         self._image.write(view.image)
-        self._masks.write(np.where(view.instances > 0, 255, 0).astype(np.uint8))
+        self._masks.write(view.mask)
         rows = np.column_stack([np.full(len(view.boxes), frame), view.boxes.pixel, view.boxes.score])
         np.savetxt(self._boxes, rows, fmt="%d,%.1f,%.1f,%.1f,%.1f,%.3f")
         if self._instances is not None:
@@ -189,12 +195,12 @@ def _write_empty(folder: Path, scene: SimulatedScene) -> None:
                 video.write(image)
 
 
-def _write_rigs(folder: Path, scene: SimulatedScene, instances: bool) -> None:
+def _write_rigs(folder: Path, scene: SimulatedScene, body: BodyPrior, instances: bool) -> None:
     kinds: tuple[SourceKind, ...] = ("video", "masks", "boxes", *(("instances",) if instances else ()))
     for kind in kinds:
         path = folder / ("rig.toml" if kind == "video" else f"rig_{kind}.toml")
         sources = tuple(_source(folder, camera, kind, scene.frames) for camera in scene.rig.cameras)
-        write_rig(path, Recording(path, scene.rig, sources))
+        write_rig(path, Recording(path, scene.rig, sources, body))
 
 
 def _source(folder: Path, camera: Camera, kind: SourceKind, frames: int) -> CameraSource:

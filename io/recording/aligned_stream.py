@@ -14,7 +14,6 @@ from contextlib import ExitStack
 from stseg.arrays import Floats, Observation
 from stseg.errors import SourceError
 from stseg.geometry import Camera
-from stseg.io.recording.pictures import reduced_view
 from stseg.io.recording.recording import CameraSource, Recording
 from stseg.io.recording.streams import Stream, open_stream
 
@@ -22,8 +21,8 @@ from stseg.io.recording.streams import Stream, open_stream
 class AlignedStream:
     """One camera's stream, read by frames of the recording."""
 
-    def __init__(self, camera: Camera, source: CameraSource, stream: Stream, factor: int) -> None:
-        self.camera, self.source, self._stream, self._factor = camera, source, stream, factor
+    def __init__(self, camera: Camera, source: CameraSource, stream: Stream) -> None:
+        self.camera, self.source, self._stream = camera, source, stream
         self._next = 0
         self._last: Observation = None
         self.end = math.inf
@@ -57,7 +56,7 @@ class AlignedStream:
             self.end = self._next + self.source.offset
         else:
             self._next += 1
-        return reduced_view(view, self._factor)
+        return view
 
     def read_times(self) -> tuple[Floats, ...]:
         """Skip all frames and return their time stamps, milliseconds."""
@@ -83,7 +82,8 @@ def open_aligned_stream(
         Where the source is missing, empty or not of its kind.
     """
     camera, source = recording.rig.cameras[camera_index], recording.sources[camera_index]
-    return AlignedStream(camera, source, open_stream(source.source, camera, times), recording.factors[camera_index])
+    stream = open_stream(source.source, camera, times, recording.factors[camera_index])
+    return AlignedStream(camera, source, stream)
 
 
 def open_aligned_streams(

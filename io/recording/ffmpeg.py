@@ -1,15 +1,18 @@
 """Local video files for FFmpeg, as files and nothing else.
 
 FFmpeg takes a path for an address: what stands before a colon is a protocol, and playlists name other files and hosts.
-So a path is given as `file:PATH`, from which FFmpeg itself allows no other protocol than files, and what is text, as
-all playlists and session descriptions are, is refused: no container of video is text.
+So a path is given as `file:PATH`, the protocol of files is the only one allowed, and what is text, as all playlists and
+session descriptions are, is refused: no container of video is text.
 """
 
 from __future__ import annotations
 
 import os
 import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from threading import Lock
 
 # Silences FFmpeg, which reads this at its first use; failures raise SourceError instead.
 os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
@@ -20,6 +23,9 @@ from stseg.errors import SourceError
 from stseg.io import limits
 
 cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+
+_OPTIONS, _FILES_ONLY = "OPENCV_FFMPEG_CAPTURE_OPTIONS", "protocol_whitelist;file"
+_opening = Lock()
 
 _HEAD = 512
 _TEXT_VIDEO = b"YUV4MPEG2"
@@ -45,7 +51,8 @@ def open_video(path: Path, key: str) -> cv2.VideoCapture:
         head = os.pread(descriptor, _HEAD, 0)
         if _is_text(head):
             raise SourceError(path, key, "a text, such as a playlist", "a video that FFmpeg decodes")
-        capture = cv2.VideoCapture(_address(path, descriptor), cv2.CAP_FFMPEG)
+        with _files_only():
+            capture = cv2.VideoCapture(_address(path, descriptor), cv2.CAP_FFMPEG)
     finally:
         os.close(descriptor)
     size = tuple(capture.get(side) for side in (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT))
@@ -53,6 +60,20 @@ def open_video(path: Path, key: str) -> cv2.VideoCapture:
         capture.release()
         raise SourceError(path, key, f"frames of {size[0]:g}x{size[1]:g}", f"at most {limits.PIXELS:.0e} pixels")
     return capture
+
+
+@contextmanager
+def _files_only() -> Iterator[None]:
+    """FFmpeg opens nothing but files meanwhile; OpenCV takes its options from the environment alone."""
+    with _opening:
+        given = os.environ.get(_OPTIONS)
+        os.environ[_OPTIONS] = _FILES_ONLY
+        try:
+            yield
+        finally:
+            os.environ.pop(_OPTIONS)
+            if given is not None:
+                os.environ[_OPTIONS] = given
 
 
 def _address(path: Path, descriptor: int) -> str:

@@ -26,7 +26,6 @@ from stseg.io.recording.aligned_stream import (
     open_aligned_streams,
     recording_length,
 )
-from stseg.io.recording.pictures import reduced_view
 from stseg.io.recording.recording import Recording
 from stseg.io.recording.stream_index import StreamIndex
 from stseg.io.recording.streams import open_stream
@@ -187,9 +186,9 @@ def read_background(recording: Recording, camera_index: int) -> Iterator[Observa
     camera, background = recording.rig.cameras[camera_index], recording.sources[camera_index].background
     if background is None:
         raise SourceError(recording.path, f"camera {camera.name}, background", "none", "a source of the empty scene")
-    with closing(open_stream(background, camera)) as stream:
+    with closing(open_stream(background, camera, factor=recording.factors[camera_index])) as stream:
         while (view := stream.read()) is not None:
-            yield reduced_view(view, recording.factors[camera_index])
+            yield view
 
 
 def _require_start(streams: list[AlignedStream], first: int) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from stseg.arrays import AnyArray, Floats
 from stseg.errors import SourceError
 from stseg.geometry import Camera
-from stseg.io.recording.pictures import read_picture
+from stseg.io.recording.pictures import read_picture, reduced_view
 from stseg.io.recording.recording import Source
 
 _SUFFIXES = frozenset((".bmp", ".jpeg", ".jpg", ".pbm", ".pgm", ".png", ".pnm", ".ppm", ".tif", ".tiff", ".webp"))
@@ -21,6 +21,13 @@ _NUMBER = re.compile(r"(\d+)", re.ASCII)
 class ImageStream:
     """Colour frames, masks or instance images from files (see `stseg.io.recording.pictures.read_picture`).
 
+    Parameters
+    ----------
+    source, camera
+        The files, and the camera whose size they must have.
+    factor
+        Whole factor by which colour frames are reduced.
+
     Raises
     ------
     SourceError
@@ -28,8 +35,8 @@ class ImageStream:
         the camera's size.
     """
 
-    def __init__(self, source: Source, camera: Camera) -> None:
-        self._source, self._camera = source, camera
+    def __init__(self, source: Source, camera: Camera, factor: int = 1) -> None:
+        self._source, self._camera, self._factor = source, camera, factor
         self._paths = image_paths(source.path, f"camera {camera.name}")
         self._next = 0
 
@@ -45,7 +52,8 @@ class ImageStream:
             return None
         frame, self._next = self._next, self._next + 1
         key = f"camera {self._camera.name}, frame {frame}"
-        return read_picture(self._paths[frame], self._source.kind, self._camera.size, key)
+        picture = read_picture(self._paths[frame], self._source.kind, self._camera.size, key)
+        return np.asarray(reduced_view(picture, self._factor))
 
     def times(self) -> list[Floats]:
         """Image files have no time stamps."""

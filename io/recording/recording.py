@@ -103,6 +103,24 @@ class CameraSource:
     shown: Ints | None = field(default=None, compare=False, repr=False)
 
 
+@dataclass(frozen=True, slots=True)
+class BodyPrior:
+    """Sizes of the bodies that a rig watches, metres; None where the rig does not say.
+
+    Attributes
+    ----------
+    height_mean, height_spread
+        Mean and standard deviation of heights.
+    width_mean, width_spread
+        Of the widths across shoulders and arms.
+    """
+
+    height_mean: float | None = None
+    height_spread: float | None = None
+    width_mean: float | None = None
+    width_spread: float | None = None
+
+
 @dataclass(frozen=True)
 class Recording:
     """A rig and its streams, one per camera in the rig's order."""
@@ -110,7 +128,8 @@ class Recording:
     path: Path
     rig: Rig
     sources: tuple[CameraSource, ...]
-    reduction: tuple[int, ...] = ()
+    body: BodyPrior = BodyPrior()
+    reduction: tuple[int, ...] = field(default=(), kw_only=True)
     """Whole factors by which the cameras' colour frames are reduced as they are read; empty for frames as they are."""
 
     @property

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import os
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
 
 from stseg.arrays import Floats
 from stseg.geometry import Camera
-from stseg.io.recording.recording import CameraSource, Recording, Source
+from stseg.io.recording.recording import BodyPrior, CameraSource, Recording, Source
 from stseg.io.toml.text import toml_string
 
 FORMAT = 1
@@ -32,10 +33,16 @@ def format_rig(recording: Recording, path: Path) -> str:
         f"cell = {_number(grid.cell)}  # side of a cell, metres",
         f"top = {_number(grid.top)}  # height of the uppermost plane, metres",
         f"planes = {grid.planes}  # at linspace(0, top, planes)",
+        *_body_lines(recording.body),
     ]
     for camera, streams in zip(rig.cameras, recording.sources, strict=True):
         lines += ["", *_camera_lines(camera), *_stream_lines(streams, path.parent)]
     return "\n".join(lines) + "\n"
+
+
+def _body_lines(body: BodyPrior) -> list[str]:
+    sizes = [f"{name} = {_number(size)}" for name, size in asdict(body).items() if size is not None]
+    return ["", "[body]  # sizes of the bodies that are watched, metres", *sizes] if sizes else []
 
 
 def _camera_lines(camera: Camera) -> list[str]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Literal
 
@@ -20,7 +20,15 @@ from stseg.io import limits
 from stseg.io.bounded_files import read_text
 from stseg.io.outputs.whole_files import replacing
 from stseg.io.recording.detections.tables import COLUMNS
-from stseg.io.recording.recording import SOURCE_KINDS, CameraSource, ClockSource, Recording, Source, SourceKind
+from stseg.io.recording.recording import (
+    SOURCE_KINDS,
+    BodyPrior,
+    CameraSource,
+    ClockSource,
+    Recording,
+    Source,
+    SourceKind,
+)
 from stseg.io.recording.rig_text import FORMAT, format_rig
 from stseg.io.toml.table import ANY, Table
 from stseg.io.toml.text import parse_toml
@@ -69,7 +77,7 @@ def parse_rig(text: str, path: Path) -> Recording:
         raise RigError(path, "", f"what is not TOML ({error})", "TOML") from error
     if (found := top.integer("format", 0, 999)) != FORMAT:
         raise top.error("format", found, f"{FORMAT}, the format that this version reads")
-    top.allow("format", "scene", "grid", "camera")
+    top.allow("format", "scene", "grid", "body", "camera")
     scene, tables = top.table("scene"), _named(top.tables("camera", limits.CAMERAS))
     scene.allow("name", "frame_rate", "x", "y", "polygon")
     grid = _grid(scene, top.table("grid"))
@@ -79,7 +87,8 @@ def parse_rig(text: str, path: Path) -> Recording:
         for table, camera in zip(tables, cameras, strict=True):
             with _placed(table, "projection" in table):
                 replace(rig, cameras=(camera,)).require_coverage()
-    return Recording(path, rig, tuple(_camera_source(table) for table in tables))
+    body = _body(top.table("body")) if "body" in top else BodyPrior()
+    return Recording(path, rig, tuple(_camera_source(table) for table in tables), body)
 
 
 def write_rig(path: str | Path, recording: Recording) -> None:
@@ -113,6 +122,17 @@ def _named(tables: tuple[Table, ...]) -> tuple[Table, ...]:
         if name in names[:index]:
             raise table.error("name", f"{name!r}, the name of camera[{names.index(name)}] too", "a name of its own")
     return tuple(replace(table, place=f"{table.place} ({name})") for table, name in zip(tables, names, strict=True))
+
+
+def _body(table: Table) -> BodyPrior:
+    names = tuple(one.name for one in fields(BodyPrior))
+    table.allow(*names)
+    given = {name: table.within(name, limits.BODY) for name in names if name in table}
+    for size in ("height", "width"):
+        mean, spread = given.get(f"{size}_mean"), given.get(f"{size}_spread")
+        if mean is not None and spread is not None and mean <= 2 * spread:
+            raise table.error(f"{size}_spread", repr(spread), f"less than half of {size}_mean")
+    return BodyPrior(**given)
 
 
 def _grid(scene: Table, table: Table) -> Grid:

@@ -101,10 +101,12 @@ class JoinedStream:
         One source a file or folder, in chronological order.
     times
         Time stamps of the frames of each part, where known.
+    factor
+        Reduction of colour frames.
     """
 
-    def __init__(self, parts: Sequence[Source], camera: Camera, times: Sequence[Floats] | None) -> None:
-        self._parts, self._camera, self._times = parts, camera, times
+    def __init__(self, parts: Sequence[Source], camera: Camera, times: Sequence[Floats] | None, factor: int) -> None:
+        self._parts, self._camera, self._times, self._factor = parts, camera, times, factor
         self._at = 0
         self._stream = self._open()
 
@@ -154,13 +156,16 @@ class JoinedStream:
 
     def _open(self) -> Stream:
         known = None if self._times is None else [self._times[self._at]]
-        return open_stream(self._parts[self._at], self._camera, known)
+        return open_stream(self._parts[self._at], self._camera, known, self._factor)
 
 
-def open_stream(source: Source, camera: Camera, times: Sequence[Floats] | None = None) -> Stream:
+def open_stream(
+    source: Source, camera: Camera, times: Sequence[Floats] | None = None, factor: int = 1
+) -> Stream:  # fmt: skip
     """The stream of a source for a camera whose image size its frames must have.
 
-    With the time stamps of all frames, from `Stream.times`, a video is not decoded up to a distant frame.
+    With the time stamps of all frames, from `Stream.times`, a video is not decoded up to a distant frame. Colour frames
+    are reduced by a whole factor (`stseg.io.recording.pictures.reduced_view`).
 
     Raises
     ------
@@ -173,12 +178,12 @@ def open_stream(source: Source, camera: Camera, times: Sequence[Floats] | None =
         )
     parts = source_parts(source, f"camera {camera.name}")
     if len(parts) > 1:
-        return JoinedStream(parts, camera, times)
+        return JoinedStream(parts, camera, times, factor)
     (source,) = parts
     if source.kind == "boxes":
         return BoxStream(source, camera)
     if source.kind == "instances" and is_detection_file(source.path):
         return MaskStream(source, camera)
     if source.kind == "video" or (source.kind == "masks" and not is_image_source(source.path)):
-        return VideoStream(source, camera, None if times is None else times[0])
-    return ImageStream(source, camera)
+        return VideoStream(source, camera, None if times is None else times[0], factor)
+    return ImageStream(source, camera, factor)

@@ -9,8 +9,14 @@ from stseg.arrays import AnyArray, Floats
 from stseg.errors import SourceError
 from stseg.geometry import Camera
 from stseg.io.recording.ffmpeg import open_video
-from stseg.io.recording.packets import packet_times
-from stseg.io.recording.pictures import as_observation
+from stseg.io.recording.packets import (
+    PictureHeads,
+    decode_reduced,
+    decoder_reduction,
+    deliver_packets,
+    packet_times,
+)
+from stseg.io.recording.pictures import as_observation, reduced_view
 from stseg.io.recording.recording import Source
 
 _NEAR = 250
@@ -29,6 +35,10 @@ class VideoStream:
     times : float64 (n,)
         Time stamps of all frames, milliseconds, from `times`; distant frames are then sought. Seeking is inexact: the
         landing frame is identified by its stamp. Where the stamp is ambiguous the video is decoded from its beginning.
+    factor
+        Whole factor by which colour frames are reduced (`stseg.io.recording.pictures.reduced_view`). Of Motion JPEG
+        the decoder makes no more pixels than are asked for, as far as it can: means over squares but for rounding and
+        what lies beyond their detail.
 
     Raises
     ------
@@ -36,8 +46,13 @@ class VideoStream:
         Where the file is missing, no frame of it decodes, or its frames have not the camera's size.
     """
 
-    def __init__(self, source: Source, camera: Camera, times: Floats | None = None) -> None:
+    def __init__(self, source: Source, camera: Camera, times: Floats | None = None, factor: int = 1) -> None:
         self._source, self._camera, self._times = source, camera, times
+        self._factor = factor if source.kind == "video" else 1
+        self._scale, self._heads = decoder_reduction(self._factor), PictureHeads()
+        self._by_packets = self._scale > 1
+        """Whether the capture delivers packets, which are decoded here."""
+        self._packet = np.zeros(0, np.uint8)
         self._frame, self._ended = -1, False
         self._open()
 
@@ -46,10 +61,8 @@ class VideoStream:
         before = self._frame
         if self._times is not None and count >= len(self._times) - 1 - before:
             self._frame, self._ended = len(self._times) - 1, True
-        if self._times is not None and _NEAR < count <= len(self._times) - 1 - before:
-            self._seek(before + count, self._times)
-        while self._frame < before + count and self._advance():
-            pass
+        else:
+            self._go_to(before + count)
         return self._frame - before
 
     def times(self) -> list[Floats]:
@@ -69,11 +82,17 @@ class VideoStream:
         """The next frame; None after the last."""
         if not self._advance():
             return None
+        if self._by_packets:
+            reduced = decode_reduced(self._packet, self._camera.size, self._scale)
+            if reduced is not None:
+                return np.asarray(reduced_view(reduced, self._factor // self._scale))
+            self._decode_from(self._frame)
         decoded, picture = self._capture.retrieve()
         key = f"camera {self._camera.name}, frame {self._frame}"
         if not decoded:
             raise SourceError(self._source.path, key, "a broken frame", "one that decodes")
-        return as_observation(picture, self._source.kind, self._camera.size, self._source.path, key)
+        whole = as_observation(picture, self._source.kind, self._camera.size, self._source.path, key)
+        return np.asarray(reduced_view(whole, self._factor))
 
     def close(self) -> None:
         """Close the file."""
@@ -84,6 +103,21 @@ class VideoStream:
         if not self._capture.isOpened():
             raise self._error("a file that does not open as a video", "a video that FFmpeg decodes")
         self._frame, self._ended = -1, False
+        self._by_packets = self._by_packets and deliver_packets(self._capture)
+
+    def _decode_from(self, frame: int) -> None:
+        """Go on without packets, at a frame that may be read again."""
+        self._by_packets = False
+        self.close()
+        self._open()
+        self._go_to(frame)
+
+    def _go_to(self, frame: int) -> None:
+        """Go to a later frame, or to the last."""
+        if self._times is not None and frame - self._frame > _NEAR:
+            self._seek(frame, self._times)
+        while self._frame < frame and self._advance():
+            pass
 
     def _seek(self, frame: int, times: Floats) -> None:
         """Go to a frame at or shortly before this one; to the beginning where the landing frame is ambiguous."""
@@ -98,10 +132,19 @@ class VideoStream:
 
     def _advance(self) -> bool:
         self._ended = self._ended or not self._capture.grab()
+        if self._by_packets and not self._ended and not self._keep_packet():
+            self._decode_from(self._frame)  # whether this packet is a frame is for FFmpeg to say
+            self._ended = not self._capture.grab()
         if self._ended and self._frame < 0:
             raise self._error("no frame that decodes", "a video that FFmpeg decodes")
         self._frame += not self._ended
         return not self._ended
+
+    def _keep_packet(self) -> bool:
+        """Keep the grabbed packet; False where it is no complete picture."""
+        held, packet = self._capture.retrieve()
+        self._packet = np.asarray(packet, np.uint8).reshape(-1) if held else np.zeros(0, np.uint8)
+        return self._heads.fits(self._packet)
 
     def _error(self, found: str, expected: str) -> SourceError:
         return SourceError(self._source.path, f"camera {self._camera.name}", found, expected)

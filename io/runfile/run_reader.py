@@ -16,13 +16,15 @@ from stseg.arrays import Bytes, Floats, Ints, Labels, Rows, Singles
 from stseg.errors import FormatError
 from stseg.io import limits
 from stseg.io.extras import load_extra
-from stseg.io.names import EXPECTED, is_name, printable
+from stseg.io.names import EXPECTED, EXPECTED_TITLE, is_name, is_title, printable
+from stseg.io.numbers import parse_whole
 from stseg.io.recording.recording import Recording
 from stseg.io.recording.rigs import parse_rig
 from stseg.io.recording.time_alignment import with_alignment
 from stseg.io.runfile import layout
 from stseg.io.runfile.data_frames import to_data_frame
 from stseg.io.runfile.hdf5_reading import format_errors, read_object
+from stseg.io.runfile.packed_frames import PackedFrame
 from stseg.io.runfile.provenance import Provenance, read_provenance
 from stseg.io.runfile.safe_hdf5 import open_hdf5, read_whole
 from stseg.io.runfile.value_checks import Bounds, require_fit, require_table
@@ -215,13 +217,15 @@ class Run:
             raise ValueError(f"frame {frame} is not in {self.path}")
         return read_object(self.path, layout.OCCUPANCY, lambda file: _volume(file[layout.OCCUPANCY], index))
 
-    def read_volumes(self, number: int) -> Iterator[tuple[Ints, Singles, Labels]]:
-        """The volumes of all frames, `number` at a time: the frames, log-odds and labels as `read_frame` gives them."""
+    def read_packed_volumes(self, number: int) -> Iterator[tuple[Ints, list[PackedFrame], Labels]]:
+        """The volumes of all frames, `number` at a time: the frames, log-odds as they are packed, and labels."""
         with format_errors(self.path, layout.OCCUPANCY), open_hdf5(self.path) as file:
             group = file[layout.OCCUPANCY]
             for start in range(0, len(self.frames), number):
-                some = slice(start, start + number)
-                yield self.frames[some], group["log_odds"][some].astype(np.float32), group["label"][some]
+                frames, label = self.frames[start : start + number], group["label"][start : start + number]
+                chunks = range(start, start + len(frames))
+                packed = [PackedFrame(*group["log_odds"].id.read_direct_chunk((k, 0, 0, 0))) for k in chunks]
+                yield frames, packed, label
 
     def _table(self, name: str) -> Rows:
         def take(file: h5py.File) -> Rows:
@@ -280,7 +284,10 @@ def _names(group: h5py.Group) -> dict[int, str]:
     if "names" not in group:
         return {}
     pairs = (text.partition(",") for text in group["names"].asstr()[()])
-    return {int(identity): name for identity, _, name in pairs}
+    names = {parse_whole(identity, 1, limits.FRAMES): name for identity, _, name in pairs}
+    if None in names or not all(map(is_title, names.values())):
+        raise ValueError(f"names of tracks other than id,name with {EXPECTED_TITLE}")
+    return {identity: name for identity, name in names.items() if identity is not None}
 
 
 def _volume(group: h5py.Group, index: int) -> tuple[Singles, Labels]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -15,6 +15,7 @@ from stseg.geometry import Rig
 from stseg.io.outputs.whole_files import require_new
 from stseg.io.recording.recording import Recording
 from stseg.io.runfile import layout
+from stseg.io.runfile.packed_frames import PackedFrame
 from stseg.io.runfile.part_file import PartFile
 from stseg.io.runfile.provenance import gather_provenance, write_provenance
 
@@ -92,17 +93,31 @@ class RunWriter:
         shape = (len(frames), *self._views.shape)
         if log_odds.shape != shape or label.shape != shape:
             raise ValueError(f"volumes {log_odds.shape} and {label.shape} for {shape}")
-        if len(frames) and (frames[0] <= self._last_frame or (np.diff(frames) <= 0).any()):
-            raise ValueError(f"frames {frames} after frame {self._last_frame}")
+        self._require_later(frames)
         finite = np.clip(log_odds, -_LARGEST, _LARGEST, dtype=np.float32)
         coarse = np.round(finite / np.float32(layout.STEP)) * np.float32(layout.STEP)
         with self._disk.step():
             self._extend("log_odds", coarse)
-            self._extend("label", label)
-            self._extend("frame", frames)
-            self._extend("time", frames / self._recording.rig.frame_rate)
-        self._frames += len(frames)
-        self._last_frame = int(frames[-1]) if len(frames) else self._last_frame
+            self._extend_others(frames, label)
+
+    def append_packed_frames(self, frames: Ints, log_odds: Sequence[PackedFrame], label: Labels) -> None:
+        """Append the volume of the next frames, whose log-odds another file of this layout and grid has packed.
+
+        Parameters
+        ----------
+        frames, label
+            As of `append_frames`.
+        log_odds
+            One for each frame.
+        """
+        self._require_later(frames)
+        with self._disk.step():
+            dataset = self._occupancy["log_odds"]
+            start = len(dataset)
+            dataset.resize(start + len(frames), axis=0)
+            for k, packed in enumerate(log_odds):
+                dataset.id.write_direct_chunk((start + k, 0, 0, 0), packed.data, packed.filters)
+            self._extend_others(frames, label)
 
     def append(self, table: str, rows: Rows) -> None:
         """Add rows to one of the tables of `stseg.io.runfile.layout`, whose dtype they have."""
@@ -141,6 +156,18 @@ class RunWriter:
         file["ghosts"].attrs["views"] = cameras
         provenance = gather_provenance(self._recording, self._config_text)
         write_provenance(file.create_group(layout.PROVENANCE), provenance)
+
+    def _require_later(self, frames: Ints) -> None:
+        if len(frames) and (frames[0] <= self._last_frame or (np.diff(frames) <= 0).any()):
+            raise ValueError(f"frames {frames} after frame {self._last_frame}")
+
+    def _extend_others(self, frames: Ints, label: Labels) -> None:
+        """Append what stands beside the log-odds of frames."""
+        self._extend("label", label)
+        self._extend("frame", frames)
+        self._extend("time", frames / self._recording.rig.frame_rate)
+        self._frames += len(frames)
+        self._last_frame = int(frames[-1]) if len(frames) else self._last_frame
 
     def _extend(self, name: str, values: AnyArray) -> None:
         dataset = self._occupancy[name]

@@ -21,7 +21,9 @@ _PRIOR_SPREAD = np.zeros(SIZE)
 _PRIOR_SPREAD[FOCAL], _PRIOR_SPREAD[MIDDLE], _PRIOR_SPREAD[RADIAL] = 0.5, 0.01, 0.25
 _PRIOR_MEAN = np.zeros(SIZE)
 _PRIOR_MEAN[FOCAL], _PRIOR_MEAN[3] = np.log(0.85), -0.15
-_TOE_MEAN, _TOE_SPREAD = np.array([0.09, 0.08]), np.array([0.03, 0.04])
+_SAME_LENS = {FOCAL: 0.05, 3: 0.05, 4: 0.05}
+"""Standard deviations of log focal length, k1 and k2 between cameras of one make."""
+_TOE_MEAN, _TOE_SPREAD = np.array([0.12, 0.08]), np.array([0.06, 0.05])
 _PACE = 1.5
 """Speed above which steps no longer lengthen, m/s."""
 _OUTLIER = 3.0
@@ -69,6 +71,8 @@ class Problem:
         Observations per independent observation: errors within one step are correlated.
     clock_spread
         Standard deviation of the residual clock offsets, seconds.
+    make : float64 (view,)
+        How far a camera is taken for one of the make of the others, 0..1, see `same_make`.
     body : float64 (m,)
         1 for an observation of a person, 0 for one of a floor feature: that has no toe offset, and a head of infinite
         spread.
@@ -81,6 +85,7 @@ class Problem:
     height_spread: float
     redundancy: float
     clock_spread: float
+    make: Floats
     body: Floats
 
 
@@ -186,9 +191,37 @@ def _prior(parameters: Parameters, problem: Problem) -> tuple[float, Floats, Flo
     weight = np.where(known, 1.0 / np.where(known, _PRIOR_SPREAD, 1.0) ** 2, 0.0)
     weight[CLOCK] = problem.clock_spread**-2
     matrix = np.diag(np.append(np.tile(weight, len(parameters.views)), _TOE_SPREAD**-2))
+    alike = np.diag(problem.make) - np.outer(problem.make, problem.make) / max(problem.make.sum(), 1e-9)
+    for place, spread in _SAME_LENS.items():
+        rows = place + SIZE * np.arange(len(parameters.views))
+        matrix[np.ix_(rows, rows)] += alike / spread**2
     off = np.append((parameters.views - _PRIOR_MEAN).ravel(), parameters.toe_offset - _TOE_MEAN)
     slope = matrix @ off
     return float(off @ slope), slope, matrix
+
+
+def same_make(views: Floats, size: Ints) -> Floats:
+    """How far each camera seems to be of the make of most others, 0..1.
+
+    That is, with images of one size and a focal length near the median. People in a part of an image tell focal length
+    and lens apart badly; cameras of a rig are mostly of one make, and each sees people in another part. The weights are
+    those of Geman and McClure, so another lens is left alone.
+
+    Parameters
+    ----------
+    views : float64 (view, 12)
+        Cameras as far as they are known.
+    size : int64 (view, 2)
+        Width and height of their images, pixels.
+    """
+    make = np.zeros(len(views))
+    for own in np.unique(size, axis=0):
+        rows = np.flatnonzero((size == own).all(axis=1))
+        if len(rows) > make.astype(bool).sum():
+            off = (views[rows, FOCAL] - np.median(views[rows, FOCAL])) / _SAME_LENS[FOCAL]
+            make[:] = 0
+            make[rows] = (1 + (off / _OUTLIER) ** 2) ** -2
+    return make
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stseg.arrays import Floats, Ints
-from stseg.calibration.bundle_adjustment import Adjustment, Parameters, Problem, adjust
+from stseg.calibration.bundle_adjustment import Adjustment, Parameters, Problem, adjust, same_make
 from stseg.calibration.correspondence import Correspondences, match_endpoints
 from stseg.calibration.endpoint_paths import path_of
 from stseg.calibration.endpoints import Endpoints
@@ -157,6 +157,7 @@ def _turn(views: CalibrationInput, parameters: Parameters, delay: Ints, gate: fl
         _BOB if known else _HEIGHTS,
         _redundancy(matched, views),
         _CLOCKS if views.most_delay else _SAME_CLOCK,
+        same_make(parameters.views, np.array(views.sizes)),
         np.ones(len(matched.view)),
     )
     points = np.column_stack([matched.ground, height])

@@ -13,6 +13,7 @@ from io import TextIOWrapper
 from cyclopts import App, CycloptsError
 
 from stseg import __version__
+from stseg.commands.standard_error import without_library_messages
 from stseg.commands.termination import Termination
 from stseg.errors import ConfigError, StsegError
 from stseg.io.names import printable
@@ -43,8 +44,14 @@ _USER_ERROR = 2
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command line and return its exit status; a user's error is one line on standard error."""
     tokens = list(sys.argv[1:] if arguments is None else arguments)
-    termination = Termination()
     _require_streams()
+    with without_library_messages():
+        return _run(tokens)
+
+
+def _run(tokens: list[str]) -> int:
+    """Run a command line and return its exit status."""
+    termination = Termination()
     try:
         _require_command(tokens)
         _app(tokens)(tokens, exit_on_error=False, print_error=False, result_action="return_value")

@@ -15,6 +15,7 @@ from stseg.config.effect import require_effect
 from stseg.engine.forecast import Forecast, forecast
 from stseg.engine.frame_range import FrameRange, resolve_frames
 from stseg.engine.job import Job, VolumeKind
+from stseg.engine.rig_body import with_body_of
 from stseg.engine.workforce import Workforce
 from stseg.io.config_file import read_config
 from stseg.io.recording.recording import Recording
@@ -62,7 +63,8 @@ def plan(
     """
     workforce = Workforce(workers)
     chosen = None if frames is None else FrameRange.parse(frames)
-    recording, resolved = read_rig(rig), read_config(config, set_)
+    recording = read_rig(rig)
+    resolved = with_body_of(recording, read_config(config, set_))
     require_effect(resolved, tracker)
     start = perf_counter()
     streams = index_streams(recording)

@@ -67,8 +67,8 @@ def report(
         of three frames of the run.
     pictures
         Folder to write the pictures to as well: plan.png, spacetime.png, slices.png, marginal.png and an
-        overlay_CAMERA.png for each camera, and the maps density.png, dwell.png, ghosts.png and blind.png. With several
-        --frame, the frame's number is added to the name.
+        overlay_CAMERA.png for each camera, and the maps density.png, dwell.png, flow.png, ghosts.png and blind.png.
+        With several --frame, the frame's number is added to the name.
     video
         A film to write, MP4. It shows the cameras' frames with --camera-images, else pillars on the ruled ground.
     frames
@@ -76,7 +76,7 @@ def report(
     camera_images
         Show the cameras' frames under the tracks. Page, pictures and film then hold images of people.
     names
-        CSV with the columns id,name: names of tracks in the page's tables.
+        CSV with the columns id,name: names of tracks in the page and its pictures.
     overwrite
         Replace the page, the pictures and the film if they exist.
     """
@@ -160,7 +160,7 @@ def write_pictures(
         Where the cameras' frames are asked for and cannot be read.
     """
     instants = _read_instants(run, recording, [frame], camera_images)
-    ground = ground_figures(recording.rig, run.views, run.trajectory, truth)
+    ground = ground_figures(recording.rig, run.views, run.trajectory, truth, run.names)
     return _write_figures(folder, [*ground, *_named(recording, run, instants)], True)
 
 

@@ -12,16 +12,22 @@ from stseg.engine.warnings import run_warnings
 from stseg.evaluation import evaluate
 from stseg.geometry import Camera, Grid
 from stseg.io.runfile.runs import Run
+from stseg.measures.motion import flow_field
 from stseg.model.ghost_reasons import GhostReasons, ghost_reasons, has_evidence
 from stseg.report.answers import answers
+from stseg.report.busy_times import LONG, busiest_minutes, people_by_hour
 from stseg.report.charts import Span, clock_time
 from stseg.report.embedded import embedded_json
 from stseg.report.figures import Figure, Instant, camera_figures, ground_figures, slice_figures
 from stseg.report.findings import ground_by_views
+from stseg.report.flow_map import flow_map
 from stseg.report.maps import Bins, DwellPlace, blind_map, density, dwell, dwell_places, heat_map
 from stseg.report.page import Contents, ViewSummary
+from stseg.report.plan import plan_view
 from stseg.report.sheets import thin_sheets
 
+_FLOW = 0.5
+"""Side of a square of the map of flow, metres."""
 _SHEETS = 8_000_000  # bytes of all slices, a third more as text
 
 
@@ -46,7 +52,7 @@ def page_contents(
     places, shares = dwell_places(trajectory, bins), ground_by_views(run.views, rig.grid.inside(), len(run.cameras))
     shown = np.array([instant.frame for instant in instants], np.int64)
     sheets = thin_sheets(run.frames, rig.grid, run.read_frame, _SHEETS, shown)
-    plan, thread = ground_figures(rig, run.views, trajectory, truth)
+    plan, thread = ground_figures(rig, run.views, trajectory, truth, run.names)
     counts = (len(run.frames), trajectory, run.tracks, run.events, len(run.ghosts))
     return Contents(
         title=run.scene,
@@ -61,7 +67,7 @@ def page_contents(
         ghosts=ghosts,
         truth=truth,
         kept=run.kept,
-        data=embedded_json(rig, run.views, trajectory, run.ghosts, sheets),
+        data=embedded_json(rig, run.views, trajectory, run.ghosts, sheets, run.names),
         plan=plan,
         thread=thread,
         dwell_places=_haunt_figures(run, bins, places),
@@ -73,6 +79,8 @@ def page_contents(
         cameras=[figure for instant in instants for figure in camera_figures(rig, trajectory, instant)],
         has_images=has_images,
         names=run.names,
+        busy=_busy_figures(run, span),
+        hours=people_by_hour(span, trajectory),
     )
 
 
@@ -110,6 +118,7 @@ def _haunt_figures(run: Run, bins: Bins, places: Sequence[DwellPlace]) -> list[F
     rig, square = run.recording.rig, f"squares of {bins.side:g} m"
     people = density(bins, run.trajectory, len(run.frames))
     stays = dwell(bins, run.trajectory, run.frame_rate)
+    flow = flow_field(run.trajectory, run.frames, run.frame_rate, rig.grid.x, rig.grid.y, _FLOW)
     return [
         Figure(
             "density",
@@ -121,7 +130,26 @@ def _haunt_figures(run: Run, bins: Bins, places: Sequence[DwellPlace]) -> list[F
             heat_map(rig, bins, stays, "How long somebody stays", "seconds a stay", places),
             f"Dwell time: the mean time from entering a square to leaving it, {square}.",
         ),
+        Figure(
+            "flow",
+            flow_map(rig, flow, (), ()),
+            f"Flow: arrows are the mean way that people take, squares of {_FLOW:g} m.",
+        ),
     ]
+
+
+def _busy_figures(run: Run, span: Span) -> list[Figure]:
+    """Small plans of the busiest minutes of a long run."""
+    if (span.stop - span.first) / span.frame_rate < LONG:
+        return []
+    rig, trajectory, figures = run.recording.rig, run.trajectory, []
+    for number, minute in enumerate(busiest_minutes(span, trajectory), 1):
+        own = trajectory[(trajectory["frame"] >= minute.first) & (trajectory["frame"] < minute.stop)]
+        since = clock_time(minute.first / span.frame_rate)
+        picture = plan_view(rig, own, title=f"from {since}", width=640, height=680, names=run.names)
+        words = f"The minute from {since}: {minute.mean:.1f} people at a time, at most {minute.most}."
+        figures.append(Figure(f"busy{number}", picture, words))
+    return figures
 
 
 def _ghost_figure(run: Run, bins: Bins, ghosts: GhostReasons) -> Figure:

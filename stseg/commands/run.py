@@ -19,6 +19,7 @@ from stseg.engine.warnings import rig_warnings
 from stseg.engine.workforce import Workforce
 from stseg.errors import ConfigError
 from stseg.io.config_file import read_config
+from stseg.io.live.publishing import receiver_of
 from stseg.io.outputs.label_images import require_label_folder
 from stseg.io.recording.rigs import read_rig
 from stseg.io.runfile.runs import Run
@@ -39,6 +40,7 @@ def run(
     workers: int | None = None,
     scheduler: str | None = None,
     follow: Annotated[bool, Parameter(negative="")] = False,
+    publish: Annotated[str | None, Parameter(metavar="ADDRESS")] = None,
     overwrite: Annotated[bool, Parameter(negative="")] = False,
 ) -> None:
     """Track the people of a recording, and write everything that was found to one HDF5 file.
@@ -79,16 +81,22 @@ def run(
         The recording still goes on: the path of every source is a pattern of videos that arrive (cam1_*.mp4), or every
         one an address (rtsp://...). The tracks of each window are added to run.h5.live.csv as soon as it is decided.
         Ctrl-C or SIGTERM finishes the run file; --frames 0:B ends it by itself.
+    publish
+        With --follow: send the same tracks as JSON lines, one message a window, to mqtt://HOST[:PORT]/TOPIC (needs
+        paho-mqtt) or by POST to http://HOST/PATH. Tracking never waits for the receiver.
     overwrite
         Replace an older run file of that name, once this one is whole.
     """
     chosen, workforce = None if frames is None else FrameRange.parse(frames), Workforce(workers, scheduler)
     resolved, recording, reporter = read_config(config, set_), read_rig(rig), TerminalReporter()
+    receiver = None if publish is None else receiver_of(publish)
+    if receiver is not None and not follow:
+        raise ConfigError("--publish", "", "that alone", "--follow with it; stseg export writes finished runs")
     if follow:
         _require_alone(workers, scheduler, labels)
         followed = follow_recording(
-            recording, output, resolved, tracker, volume, chosen, reporter, overwrite=overwrite
-        )  # fmt: skip
+            recording, output, resolved, tracker, volume, chosen, reporter, publish=receiver, overwrite=overwrite
+        )
         nothing = f"{output}: not written, since nothing came"
         print(nothing if followed is None else f"{_summary(followed.run)}{followed.delay}")
         return

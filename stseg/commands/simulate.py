@@ -15,8 +15,10 @@ from stseg.errors import ConfigError
 from stseg.io import limits
 from stseg.io.numbers import parse_whole
 from stseg.io.outputs.simulated_scene import write_scene
+from stseg.io.recording.recording import BodyPrior
 from stseg.io.toml.text import shown
-from stseg.simulation import NAMED, Film, SceneSpec
+from stseg.simulation import NAMED, Film, SceneSpec, Spoil, SpoiledFilm
+from stseg.simulation.spoil import STRENGTHS
 
 
 def simulate(
@@ -33,6 +35,7 @@ def simulate(
     shadows: float | None = None,
     light_drift: float | None = None,
     seed: int | None = None,
+    spoil: Annotated[tuple[str, ...], Parameter(metavar="KIND[:STRENGTH]", negative="")] = (),
     instances: Annotated[bool, Parameter(negative="")] = False,
     overwrite: Annotated[bool, Parameter(negative="")] = False,
 ) -> None:
@@ -49,9 +52,9 @@ def simulate(
     scene
         easy (5 people, 4 cameras), dense (14 people on 6 m x 6 m, 8 cameras), dense4 (the same crowd, 4 of those
         cameras), similar (4 people, 3 of them dressed alike, 3 cameras), plaza (7 upright cylinders on 20 m x 20 m, 7
-        cameras), school (adults and children), demo (small images, 8 s), tiny (a second of very small images), or small
-        images of scripted routes: crossing, meeting, meeting_heights (the same, 8 cm apart
-        in height), border (encounters, entries and exits where windows meet). The other options change it.
+        cameras), school (adults and children), animals (0.6 m high and 1.1 m long), demo (small images, 8 s), tiny (a
+        second of very small images), or small images of scripted routes: crossing, meeting, meeting_heights (the same,
+        8 cm apart in height), border (encounters, entries and exits where windows meet). The other options change it.
     people
         Number of people in the area.
     cameras
@@ -70,6 +73,12 @@ def simulate(
         Relative amplitude of slow changes of the light, 0..1.
     seed
         Seed of people, paths and cameras.
+    spoil
+        Errors of the masks and boxes, which are exact and good without it: dilation, erosion (share of a body's
+        width), holes (share of the silhouettes), legs (share of the height that is missing), shadows (length, share
+        of the height), flicker (share of the time that a person is missing), staying (blobs that stay), rain (small
+        blobs a frame), jpeg (1 - quality / 100); jitter of boxes (share of their size), missed, doubled (share of the
+        boxes). Without a strength a middle one; the option may be repeated.
     instances
         Write images of person ids, too.
     overwrite
@@ -88,13 +97,15 @@ def simulate(
         "seed": seed,
     }
     given = {key: value for key, value in changes.items() if value is not None}
+    errors = [_spoil(text) for text in spoil]
     film = Film(replace(_named(scene), **given))  # type: ignore[arg-type]  # each value has its field's type
     console = Console(stderr=True)
     with Progress(console=console, disable=not console.is_terminal, transient=True) as bar:
         task = bar.add_task("filming", total=film.frames)
         write_scene(
             folder,
-            film,
+            SpoiledFilm(film, errors) if errors else film,
+            body=_body(film.spec),
             instances=instances,
             overwrite=overwrite,
             progress=lambda done, _: bar.update(task, completed=done),
@@ -108,6 +119,24 @@ def _named(name: str) -> SceneSpec:
     near = difflib.get_close_matches(name, NAMED, n=1)
     suggestion = f"; did you mean {near[0]}?" if near else ""
     raise ConfigError("command line", "--scene", repr(name), f"one of {', '.join(NAMED)}{suggestion}")
+
+
+def _body(spec: SceneSpec) -> BodyPrior:
+    """What a rig says of a scene's bodies: nothing of people."""
+    if not spec.length:
+        return BodyPrior()
+    low, high = spec.heights
+    width, spread = (spec.cylinder + spec.length) / 2, (spec.length - spec.cylinder) / 4
+    return BodyPrior(*(round(size, 3) for size in ((low + high) / 2, (high - low) / 2, width, spread)))
+
+
+def _spoil(text: str) -> Spoil:
+    """A kind of error with its strength, or with the kind's middle one."""
+    kind, colon, strength = text.partition(":")
+    try:
+        return Spoil(kind, float(strength) if colon else STRENGTHS.get(kind, (0.0, 0.0, 0.0))[1])
+    except ValueError as error:
+        raise ConfigError("command line", "--spoil", shown(text), "KIND or KIND:STRENGTH, a number") from error
 
 
 def _require_bounded(seconds: float | None, frame_rate: float | None) -> None:

@@ -114,7 +114,8 @@ def _end(number: int) -> None:
         for child in sys.modules["multiprocessing"].active_children():
             child.kill()
     said, status = ("terminated", TERMINATED) if number == signal.SIGTERM else ("interrupted", INTERRUPTED)
-    with suppress(OSError):
-        cursor = "\x1b[?25h" if os.isatty(2) else ""  # a progress bar has hidden it
-        os.write(2, f"{cursor}stseg: {said}\n".encode())
+    with suppress(OSError, ValueError):
+        error = sys.stderr.fileno()  # not the stream, in which a lock may be held
+        cursor = "\x1b[?25h" if os.isatty(error) else ""  # a progress bar has hidden it
+        os.write(error, f"{cursor}stseg: {said}\n".encode())
     os._exit(status)

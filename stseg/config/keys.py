@@ -13,7 +13,7 @@ from typing import Any
 from stseg.config import Config
 
 _USER = {
-    "body": "height_mean height_spread width_mean width_spread heights",
+    "body": "height_mean height_spread width_mean width_spread heights box_heights",
     "motion": "speed_spread velocity_noise position_noise",
     "foreground": "model body_rows",
     "foreground.mixture": "memory absorption_time darkest_shadow",

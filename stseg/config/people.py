@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
+from stseg.arrays import Floats
 from stseg.settings import require
 
 _TALLEST = 2.2
@@ -12,28 +15,42 @@ _TALLEST = 2.2
 
 @dataclass(frozen=True)
 class BodyConfig:
-    """Population prior of body height and width. A person is a pillar: a body of revolution of that size."""
+    """Population prior of body height and width. A person is a pillar: a body of revolution of that size.
+
+    Widths of bodies do not go with their heights, but for small ones: below one spread under the mean height, mean
+    widths fall in proportion.
+    """
 
     height_mean: float = 1.70
-    """Mean height of the people recorded, metres (HW12)."""
+    """Mean height of the people recorded, metres (HW12); the first guess of what the run learns."""
     height_spread: float = 0.12
-    """Standard deviation of their heights, metres."""
+    """Standard deviation of their heights, metres; the least that the run learns."""
     width_mean: float = 0.42
-    """Mean width of a body across shoulders and arms, metres."""
+    """Mean width of a body across shoulders and arms, metres; the first guess."""
     width_spread: float = 0.04
-    """Standard deviation of these widths, metres."""
-    heights: tuple[float, ...] = (1.5, 1.6, 1.7, 1.8, 1.9)
+    """Standard deviation of these widths, metres; the least that the run learns."""
+    prior_weight: float = 20.0
+    """Weight of these means and spreads: seconds of one person; sizes that the run measures count beside them."""
+    heights: tuple[float, ...] = (1.0, 1.25, 1.5, 1.6, 1.7, 1.8, 1.9)
     """Heights that the search for candidates tries, metres, rising."""
+    box_heights: tuple[float, ...] = (1.5, 1.6, 1.7, 1.8, 1.9)
+    """The same where cameras deliver boxes: the box of a half hidden adult is that of a child who stands elsewhere."""
+
+    def width_of(self, height: Floats) -> Floats:
+        """Mean width of bodies of given heights, both metres: that of all, less in proportion for small ones."""
+        small = self.height_mean - self.height_spread
+        return self.width_mean * np.minimum(height / small, 1.0)
 
     def __post_init__(self) -> None:
-        for name in ("height_mean", "height_spread", "width_mean", "width_spread"):
+        for name in ("height_mean", "height_spread", "width_mean", "width_spread", "prior_weight"):
             require(getattr(self, name) > 0, self, name, "a number above 0")
         require(self.height_mean > 2 * self.height_spread, self, "height_mean", "more than two standard deviations")
         require(self.width_mean > 2 * self.width_spread, self, "width_mean", "more than two standard deviations")
-        heights = self.heights
-        require(len(heights) > 0 and min(heights) > 0, self, "heights", "one or more heights above 0 m")
-        in_order = list(heights) == sorted(heights) and max(heights) <= _TALLEST
-        require(in_order, self, "heights", f"rising, at most {_TALLEST} m")
+        for name in ("heights", "box_heights"):
+            heights = getattr(self, name)
+            require(len(heights) > 0 and min(heights) > 0, self, name, "one or more heights above 0 m")
+            in_order = list(heights) == sorted(heights) and max(heights) <= _TALLEST
+            require(in_order, self, name, f"rising, at most {_TALLEST} m")
 
 
 @dataclass(frozen=True)

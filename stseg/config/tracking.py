@@ -48,6 +48,10 @@ class TrackingConfig:
     """How long a person may go undetected before the track ends, seconds."""
     maximum_gap: float = 4.0
     """Longest gap across which two tracklets may be joined by motion and height, seconds."""
+    hypotheses: int = 400
+    """Joint hypotheses of all identities that are kept: more are slower, and right more often in crowds."""
+    identity_lag: float = 60.0
+    """Time after which the identities of the best hypothesis are final, seconds."""
     interpolation_gap: float = 1.0
     """Longest gap that is filled with interpolated positions, seconds."""
     minimum_duration: float = 0.8
@@ -56,8 +60,9 @@ class TrackingConfig:
     """Time for which the cells of two people must stay apart to end their encounter, seconds."""
 
     def __post_init__(self) -> None:
-        for name in ("window", "height_noise", "width_noise"):
+        for name in ("window", "height_noise", "width_noise", "identity_lag"):
             require(getattr(self, name) > 0, self, name, "a number above 0")
+        require(1 <= self.hypotheses <= 100_000, self, "hypotheses", "1 to 100000")
         for name in (
             "assignment_distance",
             "prediction_horizon",

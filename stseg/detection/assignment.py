@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from stseg.arrays import Ints
 
 WORST = -8.0
@@ -26,3 +28,9 @@ class Assignment:
 
     box: Ints
     pixels: Sequence[Ints]
+
+    def of(self, chosen: Ints) -> Assignment:
+        """What is assigned to some of the people, int64 (k,), who count from 0; others are all person k."""
+        number = np.full(self.box.shape[1] + 1, len(chosen))
+        number[chosen], number[-1] = np.arange(len(chosen)), -1
+        return Assignment(self.box[:, chosen], [number[person] for person in self.pixels])

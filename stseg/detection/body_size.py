@@ -70,7 +70,9 @@ def measure(
     score = _score(places.ground, np.tile(_HEIGHTS, each), np.tile(width[:, None], all_steps), measured)
     height, height_variance = _posterior(_HEIGHTS, score, body.height_mean, body.height_spread)
     score = _score(places.ground, np.tile(height[:, None], all_steps), np.tile(_WIDTHS, each), measured)
-    return Sizes(height, height_variance, *_posterior(_WIDTHS, score, body.width_mean, body.width_spread))
+    return Sizes(
+        height, height_variance, *_posterior(_WIDTHS, score, body.width_of(height[:, None]), body.width_spread)
+    )
 
 
 class _PixelLabels(NamedTuple):
@@ -81,10 +83,11 @@ class _PixelLabels(NamedTuple):
     owner: Ints
 
 
-def _posterior(lattice: Floats, score: Floats, mean: float, spread: float) -> tuple[Floats, Floats]:
+def _posterior(lattice: Floats, score: Floats, mean: Floats | float, spread: float) -> tuple[Floats, Floats]:
     """Mean and variance of each person's size on the lattice, from log-likelihoods (person, pillar), nats.
 
-    Those of the population, `mean` and `spread` squared, where all sizes are as likely.
+    Those of the population, `mean`, which may be a column of one each, and `spread` squared, where all sizes are as
+    likely.
     """
     seen = np.ptp(score, axis=1) > 0
     score = score + log_heavy_tailed((lattice - mean) / spread)
@@ -92,7 +95,7 @@ def _posterior(lattice: Floats, score: Floats, mean: float, spread: float) -> tu
     weight /= weight.sum(1, keepdims=True)
     size = weight @ lattice
     variance = (weight * (lattice - size[:, None]) ** 2).sum(1)
-    return np.where(seen, size, mean), np.where(seen, variance, spread**2)
+    return np.where(seen, size, np.ravel(mean)), np.where(seen, variance, spread**2)
 
 
 def _score(ground: Floats, heights: Floats, widths: Floats, measured: Sequence[_PixelLabels]) -> Floats:

@@ -18,6 +18,7 @@ from stseg.detection.box_noise_calibration import BoxNoiseCalibration
 from stseg.detection.evidence import peaks
 from stseg.detection.map_estimate import FrameEvidence, MapEstimate
 from stseg.detection.merging import merged
+from stseg.detection.population_calibration import PopulationCalibration
 from stseg.detection.prior import Prior
 from stseg.detection.problem import Parameters
 from stseg.detection.repulsion import CORE
@@ -32,7 +33,9 @@ from stseg.model.people import Explanation
 from stseg.model.predicted_tracks import PredictedTracks
 
 _HOPELESS = -4.0
-"""Where the middle height is worth less, no other height makes a candidate, nats."""
+"""Where the probed heights are worth less, no other height makes a candidate, nats."""
+_ALIKE = 0.8
+"""Ratio of two heights above which what one pillar shows tells of the other."""
 _NEARLY = -15.0
 """Gain above which an alternative is fitted to its pixels, nats: what the right place and size may add."""
 _SEEN = 2.0
@@ -79,7 +82,7 @@ class Detector:
             for camera, kind in zip(rig.cameras, kinds, strict=True)
         ]
         core = config.minimum_distance - CORE if "pixels" in kinds else 0.0
-        self.parameters = Parameters.of(config, core)
+        self.parameters = Parameters.of(config, core, body.width_mean)
         self.border = Border.of(rig)
         self._has_boxes = "boxes" in kinds
         self._swap_rounds = 0 if self._has_boxes else config.swap_moves
@@ -88,18 +91,25 @@ class Detector:
         """Box noise calibration of a session that begins: the first guess."""
         return BoxNoiseCalibration(self._rate, self._level)
 
+    def new_population(self) -> PopulationCalibration:
+        """Population calibration of a session that begins: the configured prior."""
+        return PopulationCalibration(self.body, self._rate, self._level)
+
     def explain_next(
         self,
-        calibration: BoxNoiseCalibration,
+        box_noise: BoxNoiseCalibration,
+        population: PopulationCalibration,
         seen: Sequence[ViewEvidence],
         predicted: PredictedTracks | None,
         proposed: Candidates | None = None,
     ) -> Explanation:
-        """Explain a session's next frame, and update the session's box noise calibration with it."""
-        observations = self.observe(seen, calibration.noise)
-        explained = self._explain(observations, predicted, proposed)
+        """Explain a session's next frame, and update what the session has learned with it."""
+        observations = self.observe(seen, box_noise.noise)
+        explained = self._explain(observations, population.body, predicted, proposed)
         if self._has_boxes:
-            calibration.learn(explained, self.views, observations)
+            box_noise.learn(explained, self.views, observations)
+        else:
+            population.learn(explained.people)
         return explained
 
     def observe(self, seen: Sequence[ViewEvidence], noise: BoxNoise | None = None) -> list[ViewObservation | None]:
@@ -114,7 +124,7 @@ class Detector:
         proposed: Candidates | None = None,
         noise: BoxNoise | None = None,
     ) -> Explanation:
-        """Explain one frame.
+        """Explain one frame under the configured population.
 
         Parameters
         ----------
@@ -127,15 +137,16 @@ class Detector:
         noise
             Noise of boxes; by default the first guess.
         """
-        return self._explain(self.observe(seen, noise), predicted, proposed)
+        return self._explain(self.observe(seen, noise), self.body, predicted, proposed)
 
     def _explain(
         self,
         observations: Sequence[ViewObservation | None],
+        body: BodyConfig,
         predicted: PredictedTracks | None,
         proposed: Candidates | None,
     ) -> Explanation:
-        prior = Prior.of(predicted, self.config, self.body, self.border)
+        prior = Prior.of(predicted, self.config, body, self.border)
         evidence = FrameEvidence(self.views, observations, prior, self.parameters)
         tracked = prior.pool()
         estimate = MapEstimate.of_search(evidence, tracked, np.arange(len(tracked)))
@@ -181,7 +192,7 @@ class Detector:
     def lattice_candidates(self, estimate: MapEstimate) -> Candidates:
         """Peaks of the lattice's score by the evidence that an estimate leaves unexplained.
 
-        Pixels are summed at the middle height first, and at the others only where that is not hopeless.
+        Pixels are summed at one or two heights first, and at the others only where those are not all hopeless.
         """
         evidence, unexplained = estimate.evidence, estimate.unexplained()
         heights, (rows, columns) = np.asarray(self.body.heights), self.lattice_ground.shape[:2]
@@ -195,31 +206,39 @@ class Detector:
             else:
                 shown.append((view, view.row_sums(observation, free)))
         if shown:
-            _add_pixels(shown, score)
-        return peaks(score.reshape(-1, rows, columns), self.lattice_ground, heights, self.body.width_mean)
+            _add_pixels(shown, _probes(heights), score)
+        return peaks(
+            score.reshape(-1, rows, columns), self.lattice_ground, heights, evidence.prior.body.width_of(heights)
+        )
 
 
 def _fitted(estimate: MapEstimate, alternatives: Ints) -> Candidates:
     """Alternatives that are nearly worth a member, at the places and sizes that their own pixels show.
 
-    The lattice tries few heights and one width: a child is worth less than nothing at the size of an adult.
+    The lattice tries few heights and one width of each: a child is worth less than nothing at the size of an adult.
     """
     additions = estimate.additions(alternatives)
     nearly = alternatives[(additions.gain > _NEARLY) & (additions.view_evidence.sum(0) > _SEEN)]
     if not len(nearly):
         return estimate.pool.at(nearly)
     together = estimate.with_members(np.concatenate([estimate.members, nearly]))
-    return together.refined().pool.at(np.arange(len(estimate.members), len(together.members)))
+    return together.some_refined(np.arange(len(estimate.members), len(together.members))).pool
 
 
-def _add_pixels(shown: Sequence[tuple[PixelView, Floats]], score: Floats) -> None:
+def _probes(heights: Floats) -> list[int]:
+    """Heights that show whether a place is worth a look: the middle one, and a small one where they differ much."""
+    middle, small = len(heights) // 2, len(heights) // 4
+    return [middle, small] if heights[small] < _ALIKE * heights[middle] else [middle]
+
+
+def _add_pixels(shown: Sequence[tuple[PixelView, Floats]], probes: Sequence[int], score: Floats) -> None:
     """Add what pixels say of the lattice's pillars to score (height, cell); -inf where a height is not worth a look."""
-    middle = len(score) // 2
-    for view, row_sums in shown:
-        view.add_lattice_score(row_sums, middle, view.lattice_cells, score[middle])
-    worth = np.flatnonzero(score[middle] > _HOPELESS)
+    for height in probes:
+        for view, row_sums in shown:
+            view.add_lattice_score(row_sums, height, view.lattice_cells, score[height])
+    worth = np.flatnonzero(score[probes].max(0) > _HOPELESS)
     for height in range(len(score)):
-        if height != middle:
+        if height not in probes:
             others = np.full(len(score[height]), -np.inf)
             others[worth] = score[height, worth]
             for view, row_sums in shown:

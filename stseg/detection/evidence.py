@@ -19,13 +19,14 @@ _LEAST_SCORE = 0.0
 """Score above which a peak of the lattice is a candidate, nats."""
 
 
-def peaks(score: Floats, lattice_ground: Floats, heights: Floats, width: float) -> Candidates:
-    """Local maxima of a lattice score (height, y, x) over the ground (y, x, 2), all of one width, best first."""
+def peaks(score: Floats, lattice_ground: Floats, heights: Floats, widths: Floats) -> Candidates:
+    """Local maxima of a lattice score (height, y, x) over the ground (y, x, 2), best first."""
     best, tallest = score.max(0), score.argmax(0)
     rows, columns = np.nonzero((best == maximum_filter(best, 3)) & (best > _LEAST_SCORE))
     order = np.argsort(-best[rows, columns], kind="stable")[:MOST]
     rows, columns = rows[order], columns[order]
-    return Candidates(lattice_ground[rows, columns], heights[tallest[rows, columns]], np.full(len(rows), width))
+    chosen = tallest[rows, columns]
+    return Candidates(lattice_ground[rows, columns], heights[chosen], widths[chosen])
 
 
 def box_evidence(

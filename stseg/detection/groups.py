@@ -12,6 +12,7 @@ import numpy as np
 from stseg.accelerate import kernel
 from stseg.arrays import Flags, Floats, Ints
 from stseg.detection.problem import BoxEvidence, PixelEvidence, Problem
+from stseg.detection.repulsion import apart_of_bodies
 
 
 @kernel
@@ -58,9 +59,7 @@ def _hides(i: int, j: int, problem: Problem) -> bool:
 
 @kernel
 def _overlap_on_ground(i: int, j: int, problem: Problem) -> bool:
-    ground = problem.ground
-    distance = np.hypot(ground[i, 0] - ground[j, 0], ground[i, 1] - ground[j, 1])
-    return bool(distance < problem.parameters.minimum_distance)
+    return bool(apart_of_bodies(i, j, problem.ground, problem.breadth) < problem.parameters.minimum_distance)
 
 
 @kernel
@@ -124,6 +123,7 @@ def restricted(problem: Problem, own: Ints) -> Problem:
         problem.birth_cost,
         known,
         problem.ground,
+        problem.breadth,
         problem.parameters,
         problem.assigned,
         problem.view_evidence,

@@ -12,12 +12,12 @@ import numpy as np
 from stseg.accelerate import kernel
 from stseg.arrays import Flags, Ints
 from stseg.detection.gains import (
+    box_scores,
     clear_assignment,
     fill_assignment,
     gain_of,
     insert,
-    matching_score,
-    unpaired_gain,
+    loss_of,
     withdraw,
 )
 from stseg.detection.problem import PixelAssignment, Problem
@@ -118,7 +118,7 @@ def _insert_and_prune(
     Where just one near member is removed, that is a simple replacement, which was tried.
     """
     fill_assignment(members, count, problem.pixels, assigned)
-    gain = gain_of(i, members, count, matching_score(members, count, problem), assigned, problem)
+    gain = gain_of(i, members, count, box_scores(members, count, problem), assigned, problem)
     clear_assignment(members, count, problem.pixels, assigned)
     if gain < _HOPELESS:
         return -1
@@ -143,11 +143,11 @@ def _add(members: Ints, count: int, own: Ints, inside: Flags, assigned: PixelAss
     fill_assignment(members, count, problem.pixels, assigned)
     while True:
         best, best_gain = -1, GAINED
-        pairs = matching_score(members, count, problem)
+        scores = box_scores(members, count, problem)
         for k in range(len(own)):
             if inside[own[k]] or gain[k] < best_gain - _SLACK:
                 continue
-            gain[k] = gain_of(own[k], members, count, pairs, assigned, problem)
+            gain[k] = gain_of(own[k], members, count, scores, assigned, problem)
             if gain[k] > best_gain:
                 best, best_gain = own[k], gain[k]
         if best < 0:
@@ -165,7 +165,7 @@ def _remove(
 ) -> int:
     """Remove each member without whom the score is higher, of those that `may` (candidate,) leave, but not `keep`."""
     fill_assignment(members, count, problem.pixels, assigned)
-    pairs = matching_score(members, count, problem)
+    scores = box_scores(members, count, problem)
     a = 0
     while a < count:
         leaving = members[a]
@@ -174,11 +174,10 @@ def _remove(
             continue
         members[a] = members[count - 1]
         withdraw(leaving, members, count - 1, problem.pixels, assigned)
-        without = matching_score(members, count - 1, problem)
-        if unpaired_gain(leaving, members, count - 1, assigned, problem) + pairs - without < -GAINED:
+        if loss_of(leaving, members, count - 1, scores, assigned, problem) < -GAINED:
             inside[leaving] = False
             count -= 1
-            pairs = without
+            scores = box_scores(members, count, problem)
         else:
             members[a] = leaving
             insert(leaving, problem.pixels, assigned)
@@ -196,12 +195,12 @@ def _exchange(members: Ints, count: int, own: Ints, inside: Flags, assigned: Pix
         old = members[a]
         members[a] = members[count - 1]
         withdraw(old, members, count - 1, problem.pixels, assigned)
-        pairs = matching_score(members, count - 1, problem)
-        best, best_gain = old, gain_of(old, members, count - 1, pairs, assigned, problem) + GAINED
+        scores = box_scores(members, count - 1, problem)
+        best, best_gain = old, gain_of(old, members, count - 1, scores, assigned, problem) + GAINED
         for i in own:
             if inside[i] or _apart(i, old, problem) > _NEAR:
                 continue
-            gain = gain_of(i, members, count - 1, pairs, assigned, problem)
+            gain = gain_of(i, members, count - 1, scores, assigned, problem)
             if gain > best_gain:
                 best, best_gain = i, gain
         members[count - 1] = members[a]

@@ -12,6 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
+from stseg.accelerate import kernel
 from stseg.arrays import Flags, Floats, Ints
 from stseg.detection.assignment import Assignment
 from stseg.detection.body_size import measure
@@ -169,13 +170,10 @@ class MapEstimate:
         apart = 2 * self.evidence.prior.config.lattice_spacing
         others = np.setdiff1d(np.arange(len(self.pool)), self.members)
         gain = self.additions(others).gain
-        standing, kept = self.pool.ground[self.members], []
-        for i in others[np.argsort(-gain, kind="stable")]:
-            place = self.pool.ground[i]
-            if not (np.hypot(*(standing - place).T) < apart).any():
-                standing = np.concatenate([standing, place[None]])
-                kept.append(i)
-        return np.array(kept, np.int64)
+        order, count = others[np.argsort(-gain, kind="stable")], len(self.members)
+        standing = np.concatenate([self.members, np.empty(len(others), np.int64)])
+        number = _keep_apart(self.pool.ground, order, apart, standing, count)
+        return standing[count:number]
 
     @cached_property
     def box_assignment(self) -> list[Ints]:
@@ -235,12 +233,17 @@ class MapEstimate:
 
     def refined(self) -> RefinedPeople:
         """The members at the means of their posteriors."""
+        return self.some_refined(np.arange(len(self.members)))
+
+    def some_refined(self, chosen: Ints) -> RefinedPeople:
+        """Some of the members, int64 (k,) counted from 0, at the means of their posteriors."""
         views, observations, prior = self.evidence.views, self.evidence.observations, self.evidence.prior
-        pool = self.pool.at(self.members)
+        pool, track_index = self.pool.at(self.members[chosen]), self.track_index[chosen]
         own = Assignment(self._box_of_each(), self.pixel_assignment)
-        places = refine(pool, views, observations, own, prior, self.track_index)
+        own = own if len(chosen) == len(self.members) else own.of(chosen)
+        places = refine(pool, views, observations, own, prior, track_index)
         sizes = measure(places, pool.width, views, observations, own, prior.body)
-        known = prior.known_sizes(sizes, self.track_index)
+        known = prior.known_sizes(sizes, track_index)
         return RefinedPeople(Candidates(places.ground, sizes.height, known.width), places.covariance, sizes, known)
 
     def _box_of_each(self) -> Ints:
@@ -252,17 +255,33 @@ class MapEstimate:
         return box
 
 
+@kernel
+def _keep_apart(ground: Floats, order: Ints, apart: float, standing: Ints, count: int) -> int:
+    """Add to the first `count` of standing (n,) the candidates of an order that stand apart from all before, metres."""
+    for i in order:
+        near = False
+        for k in range(count):
+            x, y = ground[standing[k], 0] - ground[i, 0], ground[standing[k], 1] - ground[i, 1]
+            near = near or np.hypot(x, y) < apart
+        if not near:
+            standing[count] = i
+            count += 1
+    return count
+
+
 def _problem(evidence: FrameEvidence, pool: Candidates) -> Problem:
     """All that is known of the candidates, as the search kernels read it."""
     views, observations, prior = evidence.views, evidence.observations, evidence.prior
+    shown = any(isinstance(view, PixelView) for view in views)  # boxes show no widths
     boxes, pixels = box_evidence(views, observations, pool), pixel_evidence(views, observations, pool)
     return Problem(
         boxes=boxes,
         pixels=pixels,
-        size_prior=prior.log_size(pool.height, pool.width),
+        size_prior=prior.log_size(pool.height, pool.width) if shown else prior.log_height(pool.height),
         birth_cost=prior.birth_cost(pool.ground),
         track_gain=prior.track_log_ratio(pool),
         ground=pool.ground,
+        breadth=np.maximum(pool.width / evidence.parameters.common_width, 1.0) if shown else np.ones(len(pool)),
         parameters=evidence.parameters,
         assigned=np.empty(max(pixels.raster[:1].size, boxes.match.shape[2], len(prior.predicted), 1), np.int64),
         view_evidence=np.zeros((len(views), len(pool) + 1)),

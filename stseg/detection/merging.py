@@ -13,6 +13,7 @@ from stseg.arrays import Flags, Ints
 from stseg.detection.local_search import GAINED
 from stseg.detection.map_estimate import MapEstimate
 from stseg.detection.views import PixelView
+from stseg.model.candidates import Candidates
 
 _REACH = 0.6
 """Members at less than this distance may be one body, metres: half the widest body and half a common one."""
@@ -25,19 +26,39 @@ def merged(estimate: MapEstimate) -> MapEstimate:
         return estimate
     kept = _kept(estimate, near)
     absorbing = np.flatnonzero(near[kept].any(1))
-    alone = estimate.with_members(estimate.members[kept]).refined().pool.at(absorbing)
+    alone = estimate.with_members(estimate.members[kept]).some_refined(absorbing).pool
+    centred = _centred(estimate, near, kept).some_refined(absorbing).pool
     first = len(estimate.pool)
-    best = estimate.with_pool(estimate.pool.joined_with(alone))
+    best = estimate.with_pool(estimate.pool.joined_with(alone).joined_with(centred))
     for k, a in enumerate(kept[absorbing]):
-        one = first + k
+        ones = (first + k, first + len(absorbing) + k)
         others = np.flatnonzero(near[a])
         for absorbed in [others, *(others[[i]] for i in range(len(others) if len(others) > 1 else 0))]:
             gone = estimate.members[np.append(absorbed, a)]
-            trial = best.with_members(np.append(best.members[~np.isin(best.members, gone)], one))
-            if len(trial.members) < len(best.members) and trial.members_score.total > best.members_score.total + GAINED:
+            left = best.members[~np.isin(best.members, gone)]
+            trial = max((best.with_members(np.append(left, one)) for one in ones), key=_total)
+            if len(trial.members) < len(best.members) and _total(trial) > _total(best) + GAINED:
                 best = trial
                 break
     return best
+
+
+def _total(estimate: MapEstimate) -> float:
+    """Score of the members, nats."""
+    return estimate.members_score.total
+
+
+def _centred(estimate: MapEstimate, near: Flags, kept: Ints) -> MapEstimate:
+    """The kept members alone, each at the mean place of all that it may absorb: three members stand on its rim.
+
+    The mean is weighted by what the views say of each.
+    """
+    weight = np.where(near | np.eye(len(near), dtype=bool), estimate.members_score.view_evidence.sum(0).clip(1.0), 0.0)
+    ground = (weight @ estimate.pool.ground[estimate.members] / weight.sum(1, keepdims=True))[kept]
+    pool, first = estimate.pool, len(estimate.pool)
+    members = estimate.members[kept]
+    moved = Candidates(ground, pool.height[members], pool.width[members])
+    return estimate.with_pool(pool.joined_with(moved)).with_members(np.arange(first, first + len(kept)))
 
 
 def _near(estimate: MapEstimate) -> Flags:

@@ -56,7 +56,7 @@ class Prior:
 
     def log_size(self, heights: Floats, widths: Floats) -> Floats:
         """Log prior density of heights and widths, metres, beside that of the means: nats, float64 (n,)."""
-        wide = log_heavy_tailed((widths - self.body.width_mean) / self.body.width_spread)
+        wide = log_heavy_tailed((widths - self.body.width_of(heights)) / self.body.width_spread)
         return self.log_height(heights) + wide
 
     def known_sizes(self, sizes: Sizes, track_index: Ints) -> Sizes:

@@ -25,6 +25,7 @@ class Parameters(NamedTuple):
     prior_log_odds: float
     minimum_distance: float
     hard_core: float
+    common_width: float
     box_log_ratio: float
     box_miss_rate: float
     hidden_visibility: float
@@ -33,10 +34,10 @@ class Parameters(NamedTuple):
     effective_observations: float
 
     @classmethod
-    def of(cls, config: DetectionConfig, hard_core: float) -> Parameters:
-        """Those of a configuration; the hard core between bodies, metres, depends on what the views deliver."""
-        same = {name: getattr(config, name) for name in cls._fields if name != "hard_core"}
-        return cls(**same, hard_core=hard_core)
+    def of(cls, config: DetectionConfig, hard_core: float, common_width: float) -> Parameters:
+        """Those of a configuration; the hard core between bodies of common width, metres, depends on the views."""
+        same = {name: getattr(config, name) for name in cls._fields if name not in ("hard_core", "common_width")}
+        return cls(**same, hard_core=hard_core, common_width=common_width)
 
 
 class BoxEvidence(NamedTuple):
@@ -99,6 +100,8 @@ class Problem(NamedTuple):
         Log-ratio of each candidate being each predicted track against being a birth that costs nothing, nats.
     ground : float64 (candidate, 2)
         Metres.
+    breadth : float64 (candidate,)
+        Width of each body beside a common one, at least 1: wider bodies need more room. 1 where boxes alone are seen.
     parameters
         Constants of the score.
     assigned : int64 (at least boxes, at least v * u, at least tracks)
@@ -114,6 +117,7 @@ class Problem(NamedTuple):
     birth_cost: Floats
     track_gain: Floats
     ground: Floats
+    breadth: Floats
     parameters: Parameters
     assigned: Ints
     view_evidence: Floats

@@ -6,6 +6,7 @@ import numpy as np
 
 from stseg.arrays import Floats, Ints
 from stseg.detection.map_estimate import MapEstimate
+from stseg.detection.problem import Problem
 from stseg.detection.residual import reprojection_residuals
 from stseg.detection.views import BoxView, PixelView, View
 from stseg.model.candidates import Candidates
@@ -18,7 +19,8 @@ def explanation(estimate: MapEstimate) -> Explanation:
     """The result of a settled estimate."""
     views, members, score = estimate.evidence.views, estimate.members, estimate.members_score
     refined = estimate.refined()
-    exact = Candidates(refined.pool.ground, refined.known.height, refined.known.width)
+    ground = _outside_core(refined.pool.ground, members, estimate.problem)
+    exact = Candidates(ground, refined.known.height, refined.known.width)
     people = People(
         exact.ground, exact.height, exact.width, refined.covariance, estimate.losses(), score.view_evidence,
         _visibility(estimate), _prior(estimate, members, estimate.track_index), estimate.track_index, refined.sizes,
@@ -35,6 +37,22 @@ def explanation(estimate: MapEstimate) -> Explanation:
         tuple(estimate.box_assignment),
         reprojection_residuals(exact, views, estimate.evidence.observations, estimate.box_assignment),
     )
+
+
+def _outside_core(refined: Floats, members: Ints, problem: Problem) -> Floats:
+    """Refined places (n, 2), but where that would bring two bodies into the hard core those that were searched, metres.
+
+    Places are refined one by one; no two of those that were searched are within the core.
+    """
+    ground, kept, breadth = refined.copy(), np.zeros(len(refined), bool), problem.breadth[members]
+    room = problem.parameters.hard_core * (breadth[:, None] + breadth) / 2
+    np.fill_diagonal(room, 0.0)
+    while True:
+        near = (np.hypot(*np.moveaxis(ground[:, None] - ground, -1, 0)) < room).any(1) & ~kept
+        if not near.any():
+            return ground
+        kept |= near
+        ground[near] = problem.ground[members[near]]
 
 
 def _prior(estimate: MapEstimate, candidates: Ints, track_index: Ints) -> Floats:

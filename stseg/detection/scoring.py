@@ -16,14 +16,14 @@ import numpy as np
 from stseg.accelerate import kernel
 from stseg.arrays import Floats, Ints
 from stseg.detection.problem import BoxEvidence, Parameters, PixelEvidence, Problem
-from stseg.detection.repulsion import pair_cost
+from stseg.detection.repulsion import apart_of_bodies, pair_cost
 from stseg.linear_assignment import fill_assignment_of_least_cost
 
 
 @kernel
 def set_score(members: Ints, count: int, problem: Problem) -> float:
     """Score of the first `count` members, nats; fills `problem.view_evidence`, views with boxes first."""
-    total = -crowding(members, count, problem.ground, problem.parameters)
+    total = -crowding(members, count, problem)
     for a in range(count):
         total += problem.parameters.prior_log_odds + problem.size_prior[members[a]] - problem.birth_cost[members[a]]
     total += track_score(members, count, problem.track_gain, problem.birth_cost, problem.assigned)
@@ -95,20 +95,20 @@ def track_score(members: Ints, count: int, gain: Floats, birth_cost: Floats, tak
 
 
 @kernel
-def crowding(members: Ints, count: int, ground: Floats, parameters: Parameters) -> float:
+def crowding(members: Ints, count: int, problem: Problem) -> float:
     """Cost of all pairs of bodies, nats; see `stseg.detection.repulsion`."""
     total = 0.0
     for a in range(count):
         for b in range(a):
-            total += crowd(members[a], members[b], ground, parameters)
+            total += crowd(members[a], members[b], problem)
     return total
 
 
 @kernel
-def crowd(i: int, j: int, ground: Floats, parameters: Parameters) -> float:
+def crowd(i: int, j: int, problem: Problem) -> float:
     """Cost of one pair, nats."""
-    distance = np.hypot(ground[i, 0] - ground[j, 0], ground[i, 1] - ground[j, 1])
-    return float(pair_cost(distance, parameters.minimum_distance, parameters.hard_core))
+    distance = apart_of_bodies(i, j, problem.ground, problem.breadth)
+    return float(pair_cost(distance, problem.parameters.minimum_distance, problem.parameters.hard_core))
 
 
 @kernel
@@ -123,7 +123,7 @@ def box_score(
     gain, pair, found = np.empty(count * number), np.empty((count * number, 2), np.int64), 0
     for a in range(count):
         i = members[a]
-        parts[a] = _missing(_visible(view, i, members, count, boxes), parameters)
+        parts[a] = missing_box(view, i, members, count, boxes, parameters)
         for b in range(number):
             worth = parameters.box_log_ratio + boxes.match[view, i, b] - parts[a]
             if worth > 0:
@@ -137,6 +137,14 @@ def box_score(
             served[a], taken_by[b] = True, a
             parts[a] += gain[k]
     return float(parts[:count].sum())
+
+
+@kernel
+def missing_box(
+    view: int, i: int, members: Ints, count: int, boxes: BoxEvidence, parameters: Parameters
+) -> float:  # fmt: skip
+    """Cost of a missing box of candidate i, of whom members may hide a part, nats."""
+    return _missing(_visible(view, i, members, count, boxes), parameters)
 
 
 @kernel

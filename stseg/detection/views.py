@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.special import expit
 
-from stseg.accelerate import kernel
+from stseg.accelerate import kernel, wide_kernel
 from stseg.arrays import Boxes, Flags, Floats, Ints, Singles
 from stseg.config import BodyConfig, DetectionConfig
 from stseg.geometry import Camera, Grid
@@ -53,8 +52,9 @@ class ViewObservation:
     @cached_property
     def label_values(self) -> Singles:
         """Log-likelihood of each pixel inside a pillar beside outside, if open to the person: float32 (v, u), nats."""
-        own = expit(self.raster)
-        return np.asarray(2 * OWN * own + BACKGROUND * (1 - own), np.float32)
+        values = np.empty_like(self.raster)
+        _fill_label_values(self.raster, values)
+        return values
 
 
 class View:
@@ -63,7 +63,7 @@ class View:
     def __init__(
         self, camera: Camera, grid: Grid, lattice_ground: Floats, config: DetectionConfig, body: BodyConfig
     ) -> None:
-        self.camera = camera
+        self.camera, self.grid = camera, grid
         self.config, self.body = config, body
         self.centre = camera.centre[:2]
         self.table = BodyTable.of(camera, grid)
@@ -79,14 +79,22 @@ class View:
     def outlines(self, ground: Floats, heights: Floats, widths: Floats) -> tuple[Ints, Spans, Floats]:
         """Outlines of pillars on this view's raster, sizes in metres; see `stseg.model.outlines`.
 
-        Areas are those of people of mean size there: a pillar that covers more of a body must not count as less.
+        Areas are those that `_fair` makes of them.
         """
         first, spans, area = outlines(self.table, ground, heights, self.step, self.shape, widths / WIDTH)
-        return first, spans, self._fair(area, heights, widths)
+        return first, spans, self._fair(area, ground, heights, widths)
 
-    def _fair(self, area: Floats, heights: Floats, widths: Floats) -> Floats:
-        """Areas of outlines as if people were of mean size there."""
-        return area * (self.body.height_mean * self.body.width_mean / (heights * widths))
+    def _fair(self, area: Floats, ground: Floats, heights: Floats, widths: Floats) -> Floats:
+        """Areas over which outlines are averaged, of bodies beside one of mean size there.
+
+        Independent observations are as many as the greater of two ratios, that of the areas and its root: errors of a
+        segmentation fill areas, and lie along outlines. So a pillar that covers more of a body never counts as less, a
+        wide body outweighs a slim one within it, and a child is no third of an adult. At the border of the ground it is
+        the areas alone: people who stand outside are no candidates, and smaller bodies inside would stand for them.
+        """
+        share = heights * widths / (self.body.height_mean * self.body.width_mean)
+        inside = np.minimum(self.grid.edge_distance(ground) / self.config.border_width, 1.0)
+        return np.asarray(area / np.maximum(share, share ** (1.0 - 0.5 * inside)))
 
 
 class BoxView(View):
@@ -125,7 +133,8 @@ class BoxView(View):
             self.index, self.bodies.reshape(-1, 4), observation.edges[unexplained], observation.tolerance[unexplained],
             observation.belief[unexplained], width, height, -self.config.box_log_ratio - _OPTIMISM, best.reshape(-1),
         )  # fmt: skip
-        return np.where(self.found > 0, np.maximum(self.config.box_log_ratio + best, -_OPTIMISM * self.found), 0.0)
+        _take_for_score(best.reshape(-1), self.found.reshape(-1), self.config.box_log_ratio)
+        return best
 
 
 class PixelView(View):
@@ -137,7 +146,7 @@ class PixelView(View):
         super().__init__(camera, grid, lattice_ground, config, body)
         heights = np.repeat(np.asarray(body.heights), len(lattice_ground))
         places = np.tile(lattice_ground, (len(body.heights), 1))
-        self.lattice = self.outlines(places, heights, np.full(len(heights), body.width_mean))
+        self.lattice = self.outlines(places, heights, body.width_of(heights))
         drawn = self.lattice[1][:, ::-1, 1] > 0
         self.lattice_cells = np.arange(len(lattice_ground))
         self.lattice_rows = np.where(drawn.any(1), drawn.shape[1] - drawn.argmax(1), 0)
@@ -173,7 +182,14 @@ class PixelView(View):
         Both float64 (person, pillar); see `stseg.model.outlines.sums_inside`, sizes in metres.
         """
         sums, area = sums_inside(self.table, ground, heights, widths / WIDTH, self.step, values, owner)
-        return sums * self.config.effective_observations, self._fair(area, heights, widths)
+        return sums * self.config.effective_observations, self._fair(area, ground, heights, widths)
+
+
+@kernel
+def _take_for_score(best: Floats, found: Floats, log_ratio: float) -> None:
+    """Make scores of log-likelihoods of the best box, best (pillar,), where the view may find (pillar,) the body."""
+    for i in range(len(best)):
+        best[i] = max(log_ratio + best[i], -_OPTIMISM * found[i]) if found[i] > 0 else 0.0
 
 
 @kernel
@@ -223,18 +239,36 @@ def _fill_log_odds(mean: Singles, miss: np.float32, clutter: np.float32, raster:
             raster[v, u] = value
 
 
-@kernel
+@wide_kernel
 def _fill_means(likelihood: Singles, step: int, mean: Singles) -> None:
     """Fill mean (v, u) with the means over squares of `step` pixels; those at the border may be smaller."""
     height, width = likelihood.shape
+    down = np.empty(width, np.float32)
     for v in range(mean.shape[0]):
+        top, bottom = v * step, min((v + 1) * step, height)
+        down[:] = likelihood[top]
+        for row in range(top + 1, bottom):
+            for column in range(width):
+                down[column] += likelihood[row, column]
         for u in range(mean.shape[1]):
-            total, count = 0.0, 0
-            for row in range(v * step, min((v + 1) * step, height)):
-                for column in range(u * step, min((u + 1) * step, width)):
-                    total += likelihood[row, column]
-                    count += 1
-            mean[v, u] = total / count
+            left, right = u * step, min((u + 1) * step, width)
+            total = down[left]
+            for column in range(left + 1, right):
+                total += down[column]
+            mean[v, u] = total / np.float32((bottom - top) * (right - left))
+
+
+@kernel
+def _fill_label_values(raster: Singles, values: Singles) -> None:
+    """Fill values (v, u); see `ViewObservation.label_values`. Most log-odds are the same."""
+    one, last, value = np.float32(1), np.float32(np.nan), np.float32(0)
+    for v in range(raster.shape[0]):
+        for u in range(raster.shape[1]):
+            if raster[v, u] != last:
+                last = raster[v, u]
+                own = one / (one + np.exp(-last))
+                value = np.float32(2 * OWN) * own + np.float32(BACKGROUND) * (one - own)
+            values[v, u] = value
 
 
 def _raster_step(bodies: Floats, size: tuple[int, int]) -> int:

@@ -8,14 +8,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stseg.arrays import Bytes, Ints, Rows
+from stseg.arrays import Ints, Rows
 from stseg.engine.job import Job
-from stseg.engine.pipeline import Pipeline
+from stseg.engine.pipeline import finished_tracks
 from stseg.engine.segments import Segment
 from stseg.io.config_file import format_config
 from stseg.io.recording.time_alignment import with_alignment
 from stseg.io.runfile.runs import Run, RunWriter, read_run
 from stseg.model.tables import Tracks
+from stseg.trackers import find_tracker
 from stseg.tracking.stitching import SegmentTracks, Stitcher, rename_labels
 
 _BLOCK = 64
@@ -39,13 +40,13 @@ class _SegmentRows(NamedTuple):
     identity: Ints
 
 
-def assemble(job: Job, pipeline: Pipeline, finished: Sequence[FinishedSegment], output: Path) -> Tracks:
+def assemble(job: Job, finished: Sequence[FinishedSegment], output: Path) -> Tracks:
     """Write the run file of a job from its finished segments.
 
     Parameters
     ----------
-    job, pipeline
-        The run, and its stages.
+    job
+        The run.
     finished
         All segments of the run, in their order.
     output
@@ -63,8 +64,11 @@ def assemble(job: Job, pipeline: Pipeline, finished: Sequence[FinishedSegment], 
         stitcher.add(SegmentTracks(segment.first, run.trajectory, run.events, segment.first - before))
         before = segment.stop
     joined = stitcher.joined()
-    tracks, identity = pipeline.finished(joined.committed, joined.events, job.recording.rig)
-    views: Bytes = pipeline.occupancy.views
+    shown, tracker = job.recording.rig, find_tracker(job.tracker)
+    tracks, identity = finished_tracks(
+        job.read.read_rig, job.config, tracker, joined.committed, joined.events, shown
+    )  # fmt: skip
+    views = read_run(finished[0].path).views
     config = format_config(job.config)
     recording = with_alignment(job.recording, job.streams.shown)
     with RunWriter(output, recording, views, config, overwrite=True, kept=job.volume) as writer:
@@ -93,8 +97,8 @@ def _segment_rows(
 
 def _copy(part: _SegmentRows, writer: RunWriter) -> None:
     """Append a segment's volume, with the run's track ids, and its tables to the run file."""
-    for frames, log_odds, label in part.run.read_volumes(_BLOCK):
+    for frames, log_odds, label in part.run.read_packed_volumes(_BLOCK):
         rename_labels(label, frames, part.rows, part.identity)
-        writer.append_frames(frames, log_odds, label)
+        writer.append_packed_frames(frames, log_odds, label)
     for table in _COPIED:
         writer.append(table, np.asarray(getattr(part.run, table)))

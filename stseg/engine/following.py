@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from itertools import chain, takewhile
 from pathlib import Path
@@ -19,6 +19,7 @@ from stseg.engine.job import Job, VolumeKind
 from stseg.engine.live_foreground import LiveForegrounds
 from stseg.engine.live_run import LiveRun
 from stseg.engine.reporter import Reporter
+from stseg.engine.rig_body import with_body_of
 from stseg.engine.segments import Segment, endless_segments
 from stseg.engine.stopping import stop_asked
 from stseg.engine.track import resumable
@@ -29,6 +30,7 @@ from stseg.io.live.followed_cameras import FollowedCameras
 from stseg.io.live.followed_files import FollowedFiles
 from stseg.io.live.live_frames import LiveFrameSet, is_live
 from stseg.io.live.live_table import LiveTable
+from stseg.io.live.publishing import Publisher, Receiver
 from stseg.io.outputs.whole_files import require_new
 from stseg.io.recording.recording import Recording
 from stseg.io.recording.stream_index import StreamIndex
@@ -58,6 +60,7 @@ def follow_recording(
     frames: FrameRange | None,
     reporter: Reporter,
     *,
+    publish: Receiver | None = None,
     overwrite: bool = False,
 ) -> Followed | None:
     """Track a recording in progress until a stop is requested, then write its run file.
@@ -72,6 +75,8 @@ def follow_recording(
         0:B to stop before frame B; None to run until a signal.
     reporter
         Receives notes and progress.
+    publish
+        Receives the rows of the live table as JSON lines, too.
     overwrite
         Whether existing files of those names may be replaced.
 
@@ -86,6 +91,7 @@ def follow_recording(
         Where the sources cannot be followed, or a camera to be trained delivers no images.
     """
     require_effect(config, tracker)
+    config = with_body_of(recording, config)
     is_live(recording)  # raises where the sources cannot be followed
     job = Job(recording, config, tracker, volume, 0, last_frame(frames), StreamIndex(0, ()))
     request = run_request(recording, gather_provenance(recording, format_config(config)))
@@ -97,7 +103,7 @@ def follow_recording(
         require_new(table, overwrite)
     with work as folder, resumable(folder, reporter), compilation_noted(reporter.note):
         try:
-            followed = _follow(job, folder, output, overwrite, reporter)
+            followed = _follow(job, folder, output, overwrite, reporter, publish)
         except BaseException:
             if not folder.segments():  # nothing to resume
                 table.unlink(missing_ok=True)
@@ -122,7 +128,9 @@ class Followed:
     delay: str
 
 
-def _follow(job: Job, folder: WorkFolder, output: Path, overwrite: bool, reporter: Reporter) -> Followed | None:
+def _follow(
+    job: Job, folder: WorkFolder, output: Path, overwrite: bool, reporter: Reporter, receiver: Receiver | None
+) -> Followed | None:
     live = is_live(job.recording)
     finished = _kept(folder, live, reporter)
     stop = finished[-1].segment.stop if finished else 0
@@ -130,9 +138,10 @@ def _follow(job: Job, folder: WorkFolder, output: Path, overwrite: bool, reporte
     with (
         stop_asked() as halt,
         LiveTable(live_table_of(output), job.recording.rig.frame_rate, stop) as table,
+        _publisher(receiver, job.recording.rig.frame_rate, reporter) as publisher,
         reporter.progress("following", total, stop) as advance,
     ):
-        follower = LiveRun(job, folder, table, LiveForegrounds(job.read, job.config), finished)
+        follower = LiveRun(job, folder, table, publisher, LiveForegrounds(job.read, job.config), finished)
         with follower, (_cameras if live else _files)(job, folder, follower, halt, reporter) as coming:
             if coming is not None:
                 follower.begin(coming.plan, coming.since)
@@ -144,9 +153,15 @@ def _follow(job: Job, folder: WorkFolder, output: Path, overwrite: bool, reporte
         table.path.unlink()
         return None
     whole = replace(job, first=finished[0].segment.first, stop=finished[-1].segment.stop)
-    assemble(whole, follower.pipeline, finished, folder.result)
+    assemble(whole, finished, folder.result)
     folder.publish(overwrite)
     return Followed(read_run(output), follower.delay)
+
+
+def _publisher(
+    receiver: Receiver | None, frame_rate: float, reporter: Reporter
+) -> AbstractContextManager[Publisher | None]:
+    return nullcontext() if receiver is None else Publisher(receiver, frame_rate, reporter.note)
 
 
 def live_table_of(output: Path) -> Path:

@@ -67,7 +67,7 @@ def forecast(job: Job, counting: float, workers: int) -> Forecast:
             made.append(FinishedSegment(part, work.make(part, folder / f"{part.index}.h5", fused)))
             tracking += watch.lap()
         watch = _Clock()
-        assemble(job, work.pipeline, made, folder / "run.h5")
+        assemble(job, made, folder / "run.h5")
         joining, size = watch.lap(), (folder / "run.h5").stat().st_size
     # A segment is processed until its last window is solved: much of a short part, and little of a long one.
     beyond = (fused.calls - tried) / len(parts)

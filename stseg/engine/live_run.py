@@ -24,6 +24,7 @@ from stseg.engine.open_segment import OpenSegment
 from stseg.engine.segments import Segment
 from stseg.io.live.live_frames import LiveFrameSet, now
 from stseg.io.live.live_table import LiveTable
+from stseg.io.live.publishing import Publisher
 from stseg.io.runfile.work_folder import WorkFolder
 from stseg.model.tables import TRAJECTORY
 from stseg.tracking.live_ids import LiveIds, Names
@@ -51,6 +52,8 @@ class LiveRun:
         The job, and the folder of its segments.
     table
         The live table, to which committed track rows are appended.
+    publisher
+        Sends them on, too; None for nowhere.
     foregrounds
         Foreground models of the cameras.
     finished
@@ -67,11 +70,12 @@ class LiveRun:
         job: Job,
         folder: WorkFolder,
         table: LiveTable,
+        publisher: Publisher | None,
         foregrounds: LiveForegrounds,
         finished: list[FinishedSegment],
     ) -> None:
         self.foregrounds, self.finished = foregrounds, finished
-        self._job, self._folder, self._table = job, folder, table
+        self._job, self._folder, self._table, self._publisher = job, folder, table, publisher
         frame_rate = job.recording.rig.frame_rate
         self._window = window_length(frame_rate, job.config.tracking)[0]
         warm_up = round(job.config.segments.warm_up * frame_rate)
@@ -162,7 +166,10 @@ class LiveRun:
         new = step.within(max(segment.first, self._published), stop)
         if not new.commit.frames:
             return
-        self._table.append(self._names.named(new.commit.trajectory, member.names))
+        rows = self._names.named(new.commit.trajectory, member.names)
+        self._table.append(rows)
+        if self._publisher is not None:
+            self._publisher.append(rows)
         self._published = new.commit.frames[-1].frame + 1
         self._delays += [now() - self._arrived.pop(fused.frame) for fused in new.commit.frames]
 

@@ -9,6 +9,7 @@ What is learned from a recording, and its frames, are of a `stseg.engine.session
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from stseg.arrays import Ints, Rows
 from stseg.config import Config
@@ -16,9 +17,11 @@ from stseg.detection.detector import Detector
 from stseg.detection.proposals import Proposals
 from stseg.geometry import Rig
 from stseg.geometry.bodies import BodyTable
+from stseg.model.border import Border
 from stseg.model.tables import Tracks
 from stseg.occupancy.volume import Occupancy
 from stseg.trackers import find_tracker
+from stseg.trackers.protocol import Tracker
 from stseg.tracking.final_tracks import committed_tracks, final_tracks
 from stseg.tracking.track_boxes import box_rows
 
@@ -40,28 +43,36 @@ class Pipeline:
 
     def __init__(self, rig: Rig, kinds: Sequence[str], config: Config, tracker: str) -> None:
         self.rig, self.config, self.tracker = rig, config, find_tracker(tracker)
-        self.detector = Detector(rig, kinds, config.detection, config.body, config.error_rates)
-        self.occupancy = Occupancy(rig, kinds, config.occupancy, config.detection, config.body, config.error_rates)
+        body = replace(config.body, heights=config.body.box_heights) if "boxes" in kinds else config.body
+        self.detector = Detector(rig, kinds, config.detection, body, config.error_rates)
+        self.occupancy = Occupancy(rig, kinds, config.occupancy, config.detection, body, config.error_rates)
         self.proposals = Proposals(rig, kinds, config)
 
     def finished(self, committed: Rows, events: Rows, shown: Rig | None = None) -> tuple[Tracks, Ints]:
-        """The tracks of a whole run, and the track id of each committed row.
+        """The tracks of a whole run (`finished_tracks`), their boxes in this rig's pixels or those of another."""
+        shown = self.rig if shown is None else shown
+        return finished_tracks(self.rig, self.config, self.tracker, committed, events, shown)
 
-        Parameters
-        ----------
-        committed : TRAJECTORY (n,)
-            Rows of all frames, as the tracker committed them.
-        events : EVENT (k,)
-            All events, as the tracker committed them.
-        shown
-            The rig in whose pixels the tracks' boxes are given; by default this one.
-        """
-        rate, config = self.rig.frame_rate, self.config
-        if self.tracker.final:
-            whole = committed_tracks(committed, events, rate, config.tracking)
-        else:
-            whole = final_tracks(committed, events, rate, self.detector.border, config)
-        tables = [view.table for view in self.detector.views]
-        if shown is not None:
-            tables = [BodyTable.of(camera, shown.grid) for camera in shown.cameras]
-        return Tracks(whole.trajectory, box_rows(tables, whole.trajectory), whole.events), whole.identity
+
+def finished_tracks(
+    rig: Rig, config: Config, tracker: type[Tracker], committed: Rows, events: Rows, shown: Rig
+) -> tuple[Tracks, Ints]:
+    """The tracks of a whole run, and the track id of each committed row.
+
+    Parameters
+    ----------
+    rig, config, tracker
+        By which the rows were committed.
+    committed : TRAJECTORY (n,)
+        Rows of all frames, as the tracker committed them.
+    events : EVENT (k,)
+        All events, as the tracker committed them.
+    shown
+        The rig in whose pixels the tracks' boxes are given.
+    """
+    if tracker.final:
+        whole = committed_tracks(committed, events, rig.frame_rate, config.tracking)
+    else:
+        whole = final_tracks(committed, events, rig.frame_rate, Border.of(rig), config)
+    tables = [BodyTable.of(camera, shown.grid) for camera in shown.cameras]
+    return Tracks(whole.trajectory, box_rows(tables, whole.trajectory), whole.events), whole.identity

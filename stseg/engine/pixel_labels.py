@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -16,8 +16,12 @@ from stseg.io.outputs.label_images import LabelImages
 from stseg.io.recording.frames import FrameSet, open_frames
 from stseg.io.recording.recording import Recording
 from stseg.io.runfile.runs import Run
+from stseg.labels.appearance import Appearance, ColourSums
 from stseg.labels.placed_people import PlacedPeople
 from stseg.labels.views import ViewLabels, view_labels
+
+_LEARNING_FRAMES = 200
+"""Frames, about, from which the colours of tracks are learned."""
 
 
 def write_labels(
@@ -60,6 +64,7 @@ def write_labels(
     largest = int(run.trajectory["id"].max(initial=0))
     images = LabelImages(folder, [run.cameras[k] for k in cameras], largest, palette, overwrite)
     views = view_labels(recording.rig, config.labels, config.body)
+    worn = _appearances(run, views, people, frames, reporter)
     foregrounds = make_foregrounds(recording, config, int(run.frames[0]), int(run.frames[-1]) + 1)
     count = 0
     for frame_set in _frame_sets(run, frames, config.foreground.chosen.memory, reporter):
@@ -67,7 +72,8 @@ def write_labels(
             seen = frame_set.views[k]
             pixels = foregrounds[k].pixels(seen)
             if frame_set.frame in people:
-                images.write(run.cameras[k], frame_set.frame, _ids(views[k], people[frame_set.frame], pixels, seen))
+                ids = _ids(views[k], people[frame_set.frame], pixels, seen, worn.get(k))
+                images.write(run.cameras[k], frame_set.frame, ids)
                 count += 1
     return count
 
@@ -88,21 +94,52 @@ def _people(trajectory: Rows, frames: Ints) -> dict[int, Rows]:
     return {frame: trajectory[order[first:stop]] for frame, first, stop in parts}
 
 
-def _frame_sets(run: Run, frames: Ints, memory: float, reporter: Reporter) -> Iterator[FrameSet]:
+def _frame_sets(
+    run: Run, frames: Ints, memory: float, reporter: Reporter, stage: str = "labelling"
+) -> Iterator[FrameSet]:
     """The frames, and before them as many as a background needs to adapt to the light (`memory`, seconds)."""
     first, stop = max(int(run.frames[0]), int(frames[0]) - round(memory * run.frame_rate)), int(frames[-1]) + 1
-    with open_frames(run.recording, first, stop) as frame_sets, reporter.progress("labelling", stop - first) as advance:
+    with open_frames(run.recording, first, stop) as frame_sets, reporter.progress(stage, stop - first) as advance:
         for frame_set in frame_sets:
             yield frame_set
             advance(1)
 
 
-def _ids(view: ViewLabels, people: Rows, pixels: Singles | None, seen: Observation) -> Ints:
+def _appearances(
+    run: Run, views: Sequence[ViewLabels], people: dict[int, Rows], frames: Ints, reporter: Reporter
+) -> dict[int, Appearance]:
+    """Colours of the tracks in each view that delivers colours, learned from frames all over the selection."""
+    tracks = np.unique(np.concatenate([rows["id"] for rows in people.values()])).astype(np.int64)
+    kinds = [source.source.kind for source in run.recording.sources]
+    colours = {k: ColourSums.of(tracks) for k, kind in enumerate(kinds) if kind in ("video", "images")}
+    if not colours or not len(tracks):
+        return {}
+    every = max(len(frames) // _LEARNING_FRAMES, 1)
+    for frame_set in _frame_sets(run, frames, 0.0, reporter, "learning colours"):
+        if (frame_set.frame - int(frames[0])) % every == 0:
+            for k, sums in colours.items():
+                image = _colours(frame_set.views[k])
+                if image is not None:
+                    views[k].learn(_placed(people[frame_set.frame]), image, sums)
+    return {k: sums.appearance() for k, sums in colours.items()}
+
+
+def _ids(
+    view: ViewLabels, people: Rows, pixels: Singles | None, seen: Observation, worn: Appearance | None
+) -> Ints:  # fmt: skip
     """Ids of the tracks that a view shows, int64 (v, u); all 0 for a blind view."""
     if pixels is None:
         return np.zeros(view.camera.size[::-1], np.int64)
+    index = view.label(_placed(people), pixels, _colours(seen), worn)
+    return np.asarray(np.append(0, people["id"])[index], np.int64)
+
+
+def _placed(people: Rows) -> PlacedPeople:
     covariance = np.stack([people[name] for name in ("xx", "xy", "xy", "yy")], -1).reshape(-1, 2, 2)
     ground, height = np.stack([people["x"], people["y"]], -1), people["height"].astype(float)
-    image = np.asarray(seen, np.uint8) if isinstance(seen, np.ndarray) and seen.ndim == 3 else None
-    index = view.label(PlacedPeople(ground, covariance, height), pixels, image)
-    return np.asarray(np.append(0, people["id"])[index], np.int64)
+    return PlacedPeople(ground, covariance, height, people["id"].astype(np.int64))
+
+
+def _colours(seen: Observation) -> Bytes | None:
+    """The image of an observation that has colours."""
+    return np.asarray(seen, np.uint8) if isinstance(seen, np.ndarray) and seen.ndim == 3 else None

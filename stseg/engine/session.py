@@ -1,7 +1,7 @@
 """One pass of a recording, or of a part of it, through the stages: frame sets in, committed results out.
 
-All that is learned from the frames belongs to the session: the foreground models, the noise of boxes, the error rates
-of the views, and the tracker's tracks. Sessions of one pipeline know nothing of each other.
+All that is learned from the frames belongs to the session: the foreground models, the noise of boxes, the population of
+body sizes, the error rates of the views, and the tracker's tracks. Sessions of one pipeline know nothing of each other.
 
 Detection needs the tracks of the frame before, so it goes frame by frame. The foreground of the next frames needs
 nothing of it, and nothing waits for a frame's volume before its window is cut: `run_session` gives each a thread of its
@@ -65,6 +65,7 @@ class Session:
         self.pipeline, self.foregrounds, self.watch = pipeline, foregrounds, Stopwatch()
         self._tracker = pipeline.tracker(pipeline.rig, pipeline.config, first)
         self._box_noise = pipeline.detector.new_calibration()
+        self._population = pipeline.detector.new_population()
         self._error_rates = pipeline.occupancy.new_calibration()
         self._records: dict[int, FrameRecord] = {}
         self._executor = fusion
@@ -91,7 +92,9 @@ class Session:
         frame, predicted = frame_set.frame, self._tracker.predict(frame_set.frame)
         with self.watch.time("ghosts"):
             proposed = self.pipeline.proposals.of(evidence, self._fuse_with_current_rates)
-            explanation = self.pipeline.detector.explain_next(self._box_noise, evidence, predicted, proposed)
+            explanation = self.pipeline.detector.explain_next(
+                self._box_noise, self._population, evidence, predicted, proposed
+            )
         fusion = self._submit(frame, evidence, explanation, noise)
         self._records[frame] = FrameRecord(explanation, fusion)
         fused = FusedFrame(frame, explanation.people, explanation.ghosts, lambda: fusion.result().log_odds)

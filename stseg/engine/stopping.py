@@ -22,7 +22,7 @@ def stop_asked() -> Iterator[threading.Event]:
         if not halt.is_set():
             halt.set()
             # Not print: the signal may have come in the middle of one.
-            os.write(sys.__stderr__.fileno() if sys.__stderr__ else 2, b"stseg: finishing; once more to stop at once\n")
+            os.write(sys.stderr.fileno(), b"stseg: finishing; once more to stop at once\n")
         elif callable(ending):
             ending(number, frame)
 

@@ -16,6 +16,7 @@ from stseg.engine.assembly import FinishedSegment, assemble
 from stseg.engine.frame_range import FrameRange, resolve_frames
 from stseg.engine.job import Job, VolumeKind
 from stseg.engine.reporter import LogReporter, Progress, Reporter
+from stseg.engine.rig_body import with_body_of
 from stseg.engine.workforce import Workforce
 from stseg.errors import ConfigError
 from stseg.io.config_file import format_config, read_config
@@ -128,16 +129,18 @@ def track_recording(
         See `track`.
     """
     require_effect(config, tracker)
+    config = with_body_of(recording, config)
     request = run_request(recording, gather_provenance(recording, format_config(config)))
     request |= {"--frames": "all" if frames is None else str(frames), "--tracker": tracker, "--volume": volume}
     work = WorkFolder(output, request)
     work.require_output(overwrite)
     with work as folder, resumable(folder, reporter), compilation_noted(reporter.note):
         if not folder.published:
+            workforce.prepare()
             streams = _indexed(recording, folder, reporter)
             first, stop = resolve_frames(frames, streams, recording)
             job = Job(recording, config, tracker, volume, first, stop, streams)
-            assemble(job, job.pipeline(), _make_segments(job, folder, workforce, reporter), folder.result)
+            assemble(job, _make_segments(job, folder, workforce, reporter), folder.result)
             folder.publish(overwrite)
         folder.remove()
     return read_run(output)

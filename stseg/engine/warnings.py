@@ -1,4 +1,4 @@
-"""Warnings about the views of a finished run: silent ones, moved ones, and those with a systematic residual."""
+"""Warnings about a finished run: views that are silent, moved, off or torn, and bodies other than configured."""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ import numpy as np
 from stseg.arrays import Floats, Ints
 from stseg.calibration.knock_detection import find_knocks
 from stseg.calibration.run_check import find_residual_step, views_off
+from stseg.engine.body_warnings import body_warnings
 from stseg.engine.silent_views import view_warnings
+from stseg.io.config_file import parse_config
 from stseg.io.runfile.runs import Run
 
 _MOVED = 1.0
@@ -16,7 +18,12 @@ _MOVED = 1.0
 
 def run_warnings(run: Run) -> list[str]:
     """One sentence for everything that a user should look at."""
-    return view_warnings(run.cameras, run.ghosts, run.frames, run.frame_rate) + rig_warnings(run)
+    body = parse_config(run.provenance.config, f"{run.path}: the configuration").body
+    return [
+        *view_warnings(run.cameras, run.ghosts, run.frames, run.frame_rate),
+        *body_warnings(run.cameras, run.trajectory, run.rates, body),
+        *rig_warnings(run),
+    ]
 
 
 def rig_warnings(run: Run) -> list[str]:

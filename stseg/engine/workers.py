@@ -6,15 +6,16 @@ assigned to another.
 
 from __future__ import annotations
 
+import multiprocessing
 import signal
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from multiprocessing import get_context
 from multiprocessing.connection import Connection, wait
-from multiprocessing.context import SpawnProcess
+from multiprocessing.process import BaseProcess
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from stseg.accelerate import compilation_noted
 from stseg.engine.job import Job
@@ -22,18 +23,34 @@ from stseg.engine.segment_worker import SegmentWorker
 from stseg.engine.segments import Segment
 from stseg.errors import StsegError, WorkerError
 
+if TYPE_CHECKING:  # Windows has no contexts that fork
+    from multiprocessing.context import ForkServerContext, SpawnContext
+
 _TRIES = 3
 """Number of workers lost by the same segment at which the run fails."""
-_SPAWN = get_context("spawn")
+_FORKED = "forkserver" in multiprocessing.get_all_start_methods()
+_CONTEXT: ForkServerContext | SpawnContext = (
+    multiprocessing.get_context("forkserver") if _FORKED else multiprocessing.get_context("spawn")
+)
+"""Workers are forked from a process that has imported everything and has no threads, where the system can do that."""
 
 
 @dataclass
 class _Worker:
     """A worker process, its pipe, and its current segment."""
 
-    process: SpawnProcess
+    process: BaseProcess
     pipe: Connection
     segment: Segment | None = None
+
+
+def prepare_workers() -> None:
+    """Begin the imports of workers, in the process that they are forked from, while this one does other things."""
+    if _FORKED:
+        from multiprocessing import forkserver
+
+        _CONTEXT.set_forkserver_preload([__name__])
+        forkserver.ensure_running()
 
 
 def make_by_workers(
@@ -116,7 +133,7 @@ def _receive(worker: _Worker) -> object:
         return None
 
 
-def _limit_tries(segment: Segment, tries: int, process: SpawnProcess) -> None:
+def _limit_tries(segment: Segment, tries: int, process: BaseProcess) -> None:
     """Raise WorkerError where a segment has lost as many workers as are allowed."""
     if tries == _TRIES:
         frames = f"segment {segment.index}, frames {segment.first} to {segment.stop - 1}"
@@ -141,8 +158,8 @@ def _pool(job: Job, number: int) -> Iterator[list[_Worker]]:
 
 def _start(job: Job) -> _Worker:
     """Start a worker process."""
-    own, other = _SPAWN.Pipe()
-    process = _SPAWN.Process(target=_main, args=(job, other), daemon=True)
+    own, other = _CONTEXT.Pipe()
+    process = _CONTEXT.Process(target=_main, args=(job, other), daemon=True)
     process.start()
     other.close()
     return _Worker(process, own)

@@ -11,7 +11,7 @@ from stseg.engine.cluster import make_by_cluster
 from stseg.engine.job import Job
 from stseg.engine.segment_worker import SegmentWorker
 from stseg.engine.segments import Segment
-from stseg.engine.workers import make_by_workers
+from stseg.engine.workers import make_by_workers, prepare_workers
 from stseg.errors import ConfigError
 from stseg.io.machine import free_memory
 
@@ -40,6 +40,11 @@ class Workforce:
     def processes(self) -> int:
         """Number of processes of this machine."""
         return processes_that_fit() if self.workers is None else self.workers
+
+    def prepare(self) -> None:
+        """Make ready what takes time, while the recording is counted."""
+        if self.scheduler is None and self.processes > 1:
+            prepare_workers()
 
     def make(
         self,

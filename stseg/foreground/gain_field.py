@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import numpy as np
 from scipy import sparse
-from scipy.linalg import solveh_banded
 
 from stseg.arrays import Bytes, Floats, Singles
 
@@ -78,6 +77,8 @@ def _solve(matrix: Floats, right: Floats) -> Floats:
     """The solution of a positive definite system that couples neighbouring nodes only (banded Cholesky)."""
     band = _NODES[1] + 2
     diagonals = [np.pad(np.diagonal(matrix, -below), (0, below)) for below in range(band)]
+    from scipy.linalg import solveh_banded  # few runs see a sudden change of light
+
     return np.asarray(solveh_banded(np.stack(diagonals), right, lower=True))
 
 

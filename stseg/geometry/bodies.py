@@ -7,6 +7,7 @@ that a lens or a tilt bends the pillar as it bends the image. A disc projects to
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -136,8 +137,8 @@ def _fill_boxes(
         left, top, right, bottom = np.inf, np.inf, -np.inf, -np.inf
         seen = True
         for k in range(len(profile)):
-            wide = np.hypot(discs[k, 2], discs[k, 3])
-            tall = np.hypot(discs[k, 4], discs[k, 5])
+            wide = math.sqrt(discs[k, 2] * discs[k, 2] + discs[k, 3] * discs[k, 3])
+            tall = math.sqrt(discs[k, 4] * discs[k, 4] + discs[k, 5] * discs[k, 5])
             seen = seen and not np.isnan(wide + tall)
             left, right = min(left, discs[k, 0] - wide), max(right, discs[k, 0] + wide)
             top, bottom = min(top, discs[k, 1] - tall), max(bottom, discs[k, 1] + tall)

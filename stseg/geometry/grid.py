@@ -63,6 +63,12 @@ class Grid:
         """Cell coordinates (x, y) of ground points; cell centres are integers, float64 (..., 2)."""
         return (np.asarray(ground, float) - (self.x[0], self.y[0])) / self.cell - 0.5
 
+    def edge_distance(self, ground: Floats) -> Floats:
+        """Distance of points (..., 2) from the nearest edge of the rectangle, metres, float64 (...); 0 beyond."""
+        x, y = ground[..., 0], ground[..., 1]
+        nearest = np.minimum(np.minimum(x - self.x[0], self.x[1] - x), np.minimum(y - self.y[0], self.y[1] - y))
+        return np.asarray(np.maximum(nearest, 0.0))
+
     def inside(self) -> Flags:
         """Cells whose centre lies within the polygon, all without one, bool (y, x)."""
         if self.polygon is None:

@@ -1,10 +1,10 @@
 """Energy of the pixel labels of one view (Huang and Wang 2012, eq. 22 with statuses given).
 
-    E(l) = sum_p [ c1 (q_p [l_p = 0] + (1 - q_p) [l_p > 0]) - log p(l_p | S) ] + sum_(p,q) w_pq [l_p != l_q]
+    E(l) = sum_p [ c1 (q_p [l_p = 0] + (1 - q_p) [l_p > 0]) - log p(l_p | S) - a_p(l_p) ] + sum_(p,q) w_pq [l_p != l_q]
 
-q is the foreground probability of a person, where the paper has 0 or 1 (eqs 13 to 15). Costs are relative to the
-background, pixel by pixel. A label that costs a pixel more than the sum of its edges is in no minimum, so only pixels
-in and around people are nodes.
+a is the log-ratio of colours (`stseg.labels.colour_ratios`), 0 without. q is the foreground probability of a person,
+where the paper has 0 or 1 (eqs 13 to 15). Costs are relative to the background, pixel by pixel. A label that costs a
+pixel more than the sum of its edges is in no minimum, so only pixels in and around people are nodes.
 """
 
 from __future__ import annotations
@@ -38,8 +38,13 @@ class PixelEnergy:
 
 
 def pixel_energy(
-    prior: LabelLikelihood, foreground: Singles, across: Labels, down: Labels, config: LabelConfig
-) -> PixelEnergy:  # fmt: skip
+    prior: LabelLikelihood,
+    foreground: Singles,
+    across: Labels,
+    down: Labels,
+    config: LabelConfig,
+    colour: Singles | None = None,
+) -> PixelEnergy:
     """Energy of an image window.
 
     Parameters
@@ -50,6 +55,8 @@ def pixel_energy(
         q in the window.
     across, down : int32 (v, u)
         w to the next pixel in the row and in the column, quanta.
+    colour : float32 (m,)
+        a of each person at the pixels of the rectangle, nats; None without colours.
     """
     edges = prior.people.edges - np.tile([prior.left, prior.top], 2)
     patches = (edges, prior.people.first, prior.people.share, prior.background)
@@ -57,6 +64,8 @@ def pixel_energy(
     cost = np.empty(len(prior.people.share), np.int64)
     _fill_costs(*patches, foreground, config.foreground_weight, config.outlier_rate / (len(edges) + 1), QUANTUM, cost)
     count, node = np.zeros(foreground.shape, np.int64), np.full(foreground.shape, -1, np.int64)
+    if colour is not None:
+        cost -= np.rint(colour / QUANTUM).astype(np.int64)
     _count_labels(edges, cost, edge_sums, count)
     pixel = np.flatnonzero(count)
     node.flat[pixel] = np.arange(len(pixel))

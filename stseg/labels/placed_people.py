@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from stseg.arrays import Floats
+from stseg.arrays import Floats, Ints
 
 
 @dataclass(frozen=True)
@@ -19,11 +19,14 @@ class PlacedPeople:
         Covariance of each place, square metres.
     height : float64 (n,)
         Metres.
+    track : int64 (n,)
+        Ids.
     """
 
     ground: Floats
     covariance: Floats
     height: Floats
+    track: Ints
 
     def __len__(self) -> int:
         return len(self.ground)

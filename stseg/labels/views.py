@@ -12,7 +12,9 @@ from stseg.geometry import Camera, Rig
 from stseg.geometry.bodies import BodyTable
 from stseg.graphcut.expansion import expand
 from stseg.labels.adjacency import edge_costs
+from stseg.labels.appearance import Appearance, BodyRows, ColourSums
 from stseg.labels.body_masks import pillar_patches
+from stseg.labels.colour_ratios import colour_log_ratios
 from stseg.labels.energy import admissible, most_likely_labels, pixel_energy
 from stseg.labels.label_likelihood import LabelLikelihood, visible_shares
 from stseg.labels.placed_people import PlacedPeople
@@ -34,7 +36,9 @@ class ViewLabels:
     def __init__(self, camera: Camera, table: BodyTable, config: LabelConfig, body: BodyConfig) -> None:
         self.camera, self.table, self.config, self.body = camera, table, config, body
 
-    def label(self, people: PlacedPeople, foreground: Singles, image: Bytes | None) -> Labels:
+    def label(
+        self, people: PlacedPeople, foreground: Singles, image: Bytes | None, appearance: Appearance | None = None
+    ) -> Labels:
         """Person visible at each pixel.
 
         Parameters
@@ -45,6 +49,8 @@ class ViewLabels:
             Probability of a person by the view's foreground, 0..1.
         image : uint8 (v, u, 3)
             Colours, or None.
+        appearance
+            Colours that the people's tracks wear in this view; None where they are not known.
 
         Returns
         -------
@@ -55,12 +61,25 @@ class ViewLabels:
         likelihood = self.label_likelihood(people)
         colours = None if image is None else np.ascontiguousarray(image[likelihood.window])
         across, down = edge_costs(colours, likelihood.background.shape, self.config)
-        problem = pixel_energy(
-            likelihood, np.ascontiguousarray(foreground[likelihood.window]), across, down, self.config
-        )
+        worn = None
+        if colours is not None and appearance is not None:
+            worn = colour_log_ratios(appearance, likelihood, self.rows(people), people.track, colours)
+        seen = np.ascontiguousarray(foreground[likelihood.window])
+        problem = pixel_energy(likelihood, seen, across, down, self.config, worn)
         start = most_likely_labels(likelihood).flat[problem.pixel]
         labels[likelihood.window].flat[problem.pixel] = expand(problem.energy, admissible(problem.energy, start))
         return labels
+
+    def learn(self, people: PlacedPeople, image: Bytes, sums: ColourSums) -> None:
+        """Add the colours of people whom nobody hides; image uint8 (v, u, 3)."""
+        likelihood = self.label_likelihood(people)
+        sums.add(likelihood, self.rows(people), people.track, np.ascontiguousarray(image[likelihood.window]))
+
+    def rows(self, people: PlacedPeople) -> BodyRows:
+        """Image rows of heads and feet; 0 behind the camera."""
+        pixels = [self.camera.project(people.ground, height)[0] for height in (people.height, 0.0)]
+        head, feet = (np.nan_to_num(pixel[:, 1]) for pixel in pixels)
+        return BodyRows(head, feet)
 
     def label_likelihood(self, people: PlacedPeople) -> LabelLikelihood:
         """Prior shares of labels around the people, from their places and heights."""

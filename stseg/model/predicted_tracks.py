@@ -12,6 +12,7 @@ with d_jk the Mahalanobis distance of the places. Each track is assigned to one 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -49,23 +50,31 @@ class PredictedTracks:
     def __len__(self) -> int:
         return len(self.ground)
 
+    @cached_property
+    def _precision(self) -> NDArray[np.floating[Any]]:
+        return np.linalg.inv(self.covariance)
+
+    @cached_property
+    def _concentration(self) -> Floats:
+        """Log-ratio of the density at each track's place against that of a birth within the resolution, nats."""
+        return np.asarray(np.log(_RESOLUTION**2 / np.sqrt(np.linalg.det(self.covariance))))
+
     def track_log_ratio(self, ground: Floats, height: Floats, body: BodyConfig, birth_log_odds: float) -> Floats:
         """Log-ratio of candidates (n, 2), (n,) being tracks against being births, nats, float64 (n, track)."""
         if not len(self):
             return np.zeros((len(ground), 0))
-        sharp = np.log(_RESOLUTION**2 / np.sqrt(np.linalg.det(self.covariance)))
         variance = self.sizes.height_variance
         off = height[:, None] - self.sizes.height
         tall = -0.5 * off**2 / variance + np.log(body.height_spread / np.sqrt(variance))
         anybody = log_heavy_tailed((height - body.height_mean) / body.height_spread)
-        squares = _squares(ground[:, None] - self.ground, np.linalg.inv(self.covariance))
+        squares = _squares(ground[:, None] - self.ground, self._precision)
         shape = np.maximum(tall - anybody[:, None], _WORST_HEIGHT)
-        return np.asarray(self.existence - birth_log_odds + sharp - 0.5 * squares + shape)
+        return np.asarray(self.existence - birth_log_odds + self._concentration - 0.5 * squares + shape)
 
     def place_log_density(self, track: Ints, ground: Floats) -> Floats:
         """Log-densities of some tracks' places (n,) at points of each (n, point, 2), up to constants, nats."""
         off = ground - self.ground[track, None]
-        return -0.5 * _squares(off, np.linalg.inv(self.covariance[track])[:, None])
+        return -0.5 * _squares(off, self._precision[track][:, None])
 
 
 def _squares(off: Floats, precision: NDArray[np.floating[Any]]) -> Floats:

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from html import escape
+from types import MappingProxyType
 
 import numpy as np
 
 from stseg.arrays import Floats, Ints, Rows
+from stseg.report.certainty import DoubtfulStretch
 from stseg.report.colours import hex_colour, track_colour
 
 _WIDTH, _LEFT, _RIGHT = 1000, 44, 16  # pixels
@@ -47,8 +52,16 @@ def people_chart(span: Span, trajectory: Rows, truth: Rows | None) -> str:
     return "\n".join([*lines, "</svg>"])
 
 
-def track_chart(span: Span, tracks: Rows) -> str:
-    """A bar from each track's first frame to its last, packed into lanes; beyond the last lane they are left out."""
+def track_chart(
+    span: Span, tracks: Rows, doubtful: Sequence[DoubtfulStretch], names: Mapping[int, str] = MappingProxyType({})
+) -> str:
+    """A bar from each track's first frame to its last, with its name or id, pale where its points are doubtful.
+
+    Bars are packed into lanes; beyond the last lane they are left out.
+    """
+    pale = defaultdict(list)
+    for stretch in doubtful:
+        pale[stretch.track].append(stretch)
     lanes = _lanes(tracks, max(1, (span.stop - span.first) // 150))
     count = min(max(lanes, default=0) + 1, _MOST_LANES)
     bottom = 8 + count * _LANE + 4
@@ -57,14 +70,26 @@ def track_chart(span: Span, tracks: Rows) -> str:
         if lane < _MOST_LANES:
             u, end = span.place(int(row["first"])), span.place(int(row["last"]) + 1)
             v, colour = 8 + lane * _LANE, hex_colour(track_colour(int(row["id"])))
-            words = f"track {row['id']}: frames {row['first']} to {row['last']}"
+            name = names.get(int(row["id"]), str(row["id"]))
+            words = f"track {escape(name)}: frames {row['first']} to {row['last']}"
             lines.append(
                 f'<rect x="{u:.1f}" y="{v}" width="{max(end - u, 1.5):.1f}" height="{_LANE - 4}" rx="3" '
                 f'fill="{colour}"><title>{words}</title></rect>'
             )
-            if end - u > 8 * len(str(row["id"])) + 8:
-                lines.append(f'<text class="on" x="{u + 5:.1f}" y="{v + _LANE - 6}">{row["id"]}</text>')
+            lines += [_pale(span, stretch, v) for stretch in pale[int(row["id"])]]
+            if end - u > 8 * len(name) + 8:
+                lines.append(f'<text class="on" x="{u + 5:.1f}" y="{v + _LANE - 6}">{escape(name)}</text>')
     return "\n".join([*lines, "</svg>"])
+
+
+def _pale(span: Span, stretch: DoubtfulStretch, v: int) -> str:
+    """A veil over a doubtful part of a bar."""
+    u, end = span.place(stretch.first), span.place(stretch.last + 1)
+    words = f"track {stretch.track}, frames {stretch.first} to {stretch.last}: {100 * stretch.certainty:.0f} % certain"
+    return (
+        f'<rect class="pale" x="{u:.1f}" y="{v}" width="{max(end - u, 1.5):.1f}" height="{_LANE - 4}">'
+        f"<title>{words}</title></rect>"
+    )
 
 
 def _open(height: float) -> str:

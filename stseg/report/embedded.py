@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -18,7 +18,9 @@ _MOST_PLACES = 250_000  # of tracks
 _MOST_CANDIDATES = 120  # of a frame, those with most evidence
 
 
-def embedded_json(rig: Rig, views: Bytes, trajectory: Rows, candidates: Rows, sheets: Sheets) -> str:
+def embedded_json(
+    rig: Rig, views: Bytes, trajectory: Rows, candidates: Rows, sheets: Sheets, names: Mapping[int, str]
+) -> str:
     """The script's data; safe inside a script element.
 
     Parameters
@@ -30,6 +32,8 @@ def embedded_json(rig: Rig, views: Bytes, trajectory: Rows, candidates: Rows, sh
     candidates : rows (n,) with frame, x, y, status, evidence, parts
     sheets
         Its frames are those of the slider.
+    names
+        Of tracks, by id.
     """
     grid = rig.grid
     coverage = views.max(axis=0)[::-1]
@@ -48,7 +52,7 @@ def embedded_json(rig: Rig, views: Bytes, trajectory: Rows, candidates: Rows, sh
             "limit": round(sheets.limit, 3),
             "sheets": [base64.b64encode(png).decode("ascii") for png in sheets.pngs],
         },
-        "tracks": _tracks(rig, trajectory, sheets.frames),
+        "tracks": _tracks(rig, trajectory, sheets.frames, names),
         "reasons": REASONS,
         "candidates": _candidates(candidates, sheets.frames),
         "ghosts": _ghost_counts(candidates, sheets.frames),
@@ -69,7 +73,7 @@ def thin_tracks(trajectory: Rows, slider_frames: Ints, most: int = _MOST_PLACES)
     return table[kept], stride
 
 
-def _tracks(rig: Rig, trajectory: Rows, slider_frames: Ints) -> dict[str, object]:
+def _tracks(rig: Rig, trajectory: Rows, slider_frames: Ints, names: Mapping[int, str]) -> dict[str, object]:
     table, stride = thin_tracks(trajectory, slider_frames)
     (x0, x1), (y0, y1) = rig.grid.x, rig.grid.y
     quantum = max(0.001, max(x1 - x0, y1 - y0) / 15000)  # metres; places a little outside the ground still fit 16 bits
@@ -79,6 +83,7 @@ def _tracks(rig: Rig, trajectory: Rows, slider_frames: Ints) -> dict[str, object
         "quantum": quantum,
         "stride": stride,
         "ids": identities.tolist(),
+        "names": [names.get(int(identity), "") for identity in identities],
         "counts": counts.tolist(),
         "colours": [hex_colour(track_colour(int(identity))) for identity in identities],
         "frame": _base64(table["frame"].astype("<i4")),

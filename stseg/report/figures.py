@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -63,7 +63,9 @@ class Instant:
     views: tuple[Observation, ...]
 
 
-def ground_figures(rig: Rig, views: Bytes, trajectory: Rows, truth: Rows | None) -> list[Figure]:
+def ground_figures(
+    rig: Rig, views: Bytes, trajectory: Rows, truth: Rows | None, names: Mapping[int, str]
+) -> list[Figure]:
     """The plan view and the space-time picture.
 
     Parameters
@@ -73,8 +75,10 @@ def ground_figures(rig: Rig, views: Bytes, trajectory: Rows, truth: Rows | None)
         Number of views that see each cell.
     trajectory : TRAJECTORY (n,)
     truth : (m,) with frame, id, x, y, or None
+    names
+        Of tracks, by id.
     """
-    plan = plan_view(rig, trajectory, truth, views.max(axis=0), rig.name, *_PLAN)
+    plan = plan_view(rig, trajectory, truth, views.max(axis=0), rig.name, *_PLAN, names)
     thread = spacetime_picture(rig.grid, trajectory, rig.frame_rate, rig.name)
     return [
         Figure("plan", plan, "From above. The lighter the ground, the more views see what stands there."),

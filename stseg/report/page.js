@@ -22,7 +22,7 @@
     return t.ids.map((id, k) => {
       const stop = start + t.counts[k];
       const own = {
-        id, colour: t.colours[k], frame: frame.subarray(start, stop),
+        id, name: t.names[k] || `${id}`, colour: t.colours[k], frame: frame.subarray(start, stop),
         x: Float32Array.from(x.subarray(start, stop), (v) => (v + left) * t.quantum),
         y: Float32Array.from(y.subarray(start, stop), (v) => (v + low) * t.quantum),
       };
@@ -76,7 +76,10 @@
     const page = prepare(canvas, groundShape);
     const scale = Math.min((page.width - 2 * MARGIN) / (x1 - x0), (page.height - 2 * MARGIN) / (y1 - y0));
     const left = (page.width - scale * (x1 - x0)) / 2, top = (page.height - scale * (y1 - y0)) / 2;
-    return { ...page, scale, left, top, u: (x) => left + (x - x0) * scale, v: (y) => top + (y1 - y) * scale };
+    return {
+      ...page, scale, left, top, u: (x) => left + (x - x0) * scale, v: (y) => top + (y1 - y) * scale,
+      x: (u) => x0 + (u - left) / scale, y: (v) => y1 - (v - top) / scale,
+    };
   };
 
   const stepOf = (scale, apart) => [0.5, 1, 2, 5, 10, 20, 50, 100].find((step) => step * scale >= apart) || 200;
@@ -129,7 +132,7 @@
   const markPeople = (map) => people(now()).forEach(({ track, x, y }) => {
     disc(map.pen, map.u(x), map.v(y), 7, "#fff");
     disc(map.pen, map.u(x), map.v(y), 5.5, track.colour);
-    chip(map, `${track.id}`, map.u(x) + 17, map.v(y) - 14, track.colour);
+    chip(map, track.name, map.u(x) + 17, map.v(y) - 14, track.colour);
   });
 
   // ---- the plan ----
@@ -177,8 +180,10 @@
       pen.textAlign = "left";
       pen.fillText(letter(k), u(x) + 7, v(y) + 4);
     });
+    areas.draw(map, people(now()));
     markPeople(map);
   };
+  const areas = zoneDrawing(element("plan"), () => drawPlan());
 
   // ---- the slice ----
 
@@ -223,7 +228,7 @@
       map.pen.beginPath();
       map.pen.arc(map.u(x), map.v(y), Math.max(6, 0.3 * map.scale), 0, 2 * Math.PI);
       map.pen.stroke();
-      chip(map, `${track.id}`, map.u(x) + Math.max(17, 0.4 * map.scale), map.v(y) - 14, track.colour);
+      chip(map, track.name, map.u(x) + Math.max(17, 0.4 * map.scale), map.v(y) - 14, track.colour);
     });
     element("slice").dataset.frame = String(now());
   });
@@ -297,7 +302,7 @@
       const [u, v] = place(x, y, now());
       disc(pen, u, v, 6, "#fff");
       disc(pen, u, v, 4.5, track.colour);
-      chip(page, `${track.id}`, u + 15, v - 12, track.colour);
+      chip(page, track.name, u + 15, v - 12, track.colour);
     });
   };
   const thread = (pen, place, track, first, last, every, opacity) => {

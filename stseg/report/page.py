@@ -12,8 +12,10 @@ from importlib.resources import files
 
 import numpy as np
 
-from stseg.arrays import Rows
+from stseg.arrays import Floats, Rows
 from stseg.model.ghost_reasons import REASONS, GhostReasons
+from stseg.report.busy_times import BusyTime
+from stseg.report.certainty import DOUBTFUL, doubtful_stretches, mean_certainty
 from stseg.report.charts import Span, people_chart, track_chart
 from stseg.report.figures import Figure
 from stseg.report.html import MOST_ROWS, bars, chart, figure, figures, note, section, swatch, table, when
@@ -80,6 +82,8 @@ class Contents:
         Whether the cameras' figures show camera images, of which the page warns.
     names
         Names of tracks by id.
+    busy, hours
+        Plans of the busiest minutes, and people by the hour; empty of a short run.
     """
 
     title: str
@@ -106,6 +110,8 @@ class Contents:
     cameras: Sequence[Figure]
     has_images: bool
     names: Mapping[int, str]
+    busy: Sequence[Figure]
+    hours: Sequence[BusyTime]
 
     @property
     def still(self) -> list[Figure]:
@@ -130,7 +136,7 @@ def report_page(contents: Contents) -> str:
 
 @cache
 def _script() -> str:
-    return (files("stseg.report") / "page.js").read_text("utf-8")
+    return "\n".join((files("stseg.report") / name).read_text("utf-8") for name in ("zone_drawing.js", "page.js"))
 
 
 def _sections(contents: Contents) -> list[str]:
@@ -142,14 +148,22 @@ def _sections(contents: Contents) -> list[str]:
         section(
             "Moment by moment", _MOMENT.format(grey=_GREY[contents.kept], views=_view_heads(contents.view_summaries))
         ),
-        section("People over time", chart(people_chart(span, contents.trajectory, contents.truth), counted)),
+        section(
+            "People over time",
+            chart(people_chart(span, contents.trajectory, contents.truth), counted),
+            _hours(span, contents.hours),
+            figures(contents.busy, "sheets"),
+        ),
         section("Where people are", figures(contents.dwell_places, "pair")),
         section("Ghosts removed", _GHOSTS, _pair(figure(contents.ghost_map), _reasons(contents))),
         section("Where the rig is blind", _pair(figure(contents.blind_map), _view_summaries(contents.view_summaries))),
         section(
             "Tracks",
-            chart(track_chart(span, tracks), "from first frame to last"),
-            _track_table(span, tracks, contents.names),
+            chart(
+                track_chart(span, tracks, doubtful_stretches(contents.trajectory), contents.names),
+                f"from first frame to last; pale where a person is less than {100 * DOUBTFUL:.0f} % certain",
+            ),
+            _track_table(span, tracks, mean_certainty(contents.trajectory, tracks), contents.names),
         ),
         section("Events", _event_summary(contents), _event_table(span, contents.events)),
         section("Occupancy", figures(contents.slices, "sheets")),
@@ -188,7 +202,11 @@ _MOMENT = """<p class="note">The slider at the foot of the page chooses the mome
 the last 5 seconds; crosses are candidates that were dropped as ghosts. Red ground is seen by no view, orange by one.
 Right: the evidence for a person in each cell, blue against, orange for; grey cells
 {grey}.</p>
-<div class="pair live"><figure><canvas id="plan"></canvas><figcaption>the plan</figcaption></figure>
+<div class="pair live"><figure><canvas id="plan"></canvas><figcaption>the plan: draw a
+<button id="draw-zone">zone</button> or a <button id="draw-line">line</button> called
+<input id="area-name" size="12" maxlength="90" aria-label="its name"> <button id="undo-area" hidden>Undo</button>
+<a id="save-areas" download="areas.geojson" hidden>save areas.geojson</a> <output id="drawing"></output>
+</figcaption></figure>
 <figure><canvas id="slice"></canvas><figcaption>occupancy, <select id="plane" aria-label="plane">
 <option value="greatest">the greatest of all planes</option></select></figcaption></figure></div>
 <div class="scroll live"><table><thead><tr><th>candidate</th><th>x, y, m</th><th>evidence, nats</th>{views}
@@ -221,6 +239,14 @@ def _pair(left: str, right: str) -> str:
 
 def _answers(answers: Sequence[tuple[str, str]]) -> str:
     return "".join(f"<h3>{escape(question)}</h3><p>{answer}</p>" for question, answer in answers)
+
+
+def _hours(span: Span, hours: Sequence[BusyTime]) -> str:
+    """People by the hour, of a run of more than one."""
+    if len(hours) < 2:
+        return ""
+    rows = [(when(span, one.first), f"{one.mean:.1f}", str(one.most), str(one.come)) for one in hours]
+    return table(("hour from", "people at a time", "at most", "tracks begin"), rows, len(rows))
 
 
 def _thread(fallback: Figure) -> str:
@@ -273,7 +299,7 @@ def _view_summaries(view_summaries: Sequence[ViewSummary]) -> str:
     return f"<div>{table(names, rows, len(rows))}{_SIGHTS}</div>"
 
 
-def _track_table(span: Span, tracks: Rows, names: Mapping[int, str]) -> str:
+def _track_table(span: Span, tracks: Rows, certainty: Floats, names: Mapping[int, str]) -> str:
     rows = [
         (
             swatch(int(row["id"]), names.get(int(row["id"]), "")),
@@ -281,11 +307,11 @@ def _track_table(span: Span, tracks: Rows, names: Mapping[int, str]) -> str:
             when(span, int(row["last"])),
             f"{row['frames']}",
             f"{row['height']:.2f}",
-            f"{row['score']:.1f}",
+            f"{100 * sure:.1f}",
         )
-        for row in tracks[:MOST_ROWS]
+        for row, sure in zip(tracks[:MOST_ROWS], certainty.tolist(), strict=False)
     ]
-    return table(("track", "first", "last", "frames", "height, m", "score, nats"), rows, len(tracks))
+    return table(("track", "first", "last", "frames", "height, m", "certainty, %"), rows, len(tracks))
 
 
 def _event_summary(contents: Contents) -> str:

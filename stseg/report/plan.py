@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 import cv2
 import numpy as np
@@ -28,6 +29,7 @@ def plan_view(
     title: str = "",
     width: int = 1400,
     height: int = 1500,
+    names: Mapping[int, str] = MappingProxyType({}),
 ) -> Bytes:
     """Draw the ground from above, y up.
 
@@ -45,6 +47,8 @@ def plan_view(
         Stands above.
     width, height
         The largest size of the picture, pixels.
+    names
+        Names of tracks by id, which then stand instead of their ids.
 
     Returns
     -------
@@ -57,7 +61,7 @@ def plan_view(
     if truth is not None:
         for _, path in _paths(truth):
             dashes(canvas, plan.pixel(path), _TRUTH)
-    _label_tracks(canvas, plan, trajectory)
+    _label_tracks(canvas, plan, trajectory, names)
     _legend(canvas, plan, None if coverage is None else int(coverage.max()), truth is not None)
     return canvas
 
@@ -140,10 +144,21 @@ def _draw_camera(canvas: Bytes, plan: PlanMap, camera: Camera) -> tuple[Colour, 
         outline(canvas, wedge, mixed(tone, PAPER, 0.35))
     disc(canvas, place, 6, PAPER)
     disc(canvas, place, 4.5, tone)
-    back = np.array([0.0, -1.0]) if sides is None else -sides[1]
-    (wide, tall), space = text_size(camera.name, 15), np.array(plan.size)
-    u, v = np.clip(place + back * (14 + wide / 2, 22), (wide / 2 + 4, tall), space - (wide / 2 + 4, tall)).tolist()
-    return tone, (u, v)
+    return tone, _name_place(camera.name, place, np.array([0.0, -1.0]) if sides is None else -sides[1], plan)
+
+
+def _name_place(name: str, place: Floats, back: Floats, plan: PlanMap) -> tuple[float, float]:
+    """Middle of a camera's name: behind it, or where that would cover the numbers of the axes, before or beside it."""
+    (wide, tall), space = text_size(name, 15), np.array(plan.size)
+    half = np.array([wide / 2, tall / 2])
+    aside = np.array([-back[1], back[0]])
+    middles = [
+        np.clip(place + way * (14 + wide / 2, 22), (wide / 2 + 4, tall), space - (wide / 2 + 4, tall))
+        for way in (back, -back, aside, -aside)
+    ]
+    free = (middle for middle in middles if not plan.covers_numbers(middle - half, middle + half))
+    u, v = next(free, middles[0]).tolist()
+    return u, v
 
 
 def _view_directions(camera: Camera) -> Floats | None:
@@ -211,15 +226,16 @@ def _draw_ends(canvas: Bytes, pixel: Floats, colour: Colour, size: float) -> Non
     fill(canvas, head, colour)
 
 
-def _label_tracks(canvas: Bytes, plan: PlanMap, trajectory: Rows) -> None:
+def _label_tracks(canvas: Bytes, plan: PlanMap, trajectory: Rows, names: Mapping[int, str]) -> None:
     """Ids beside the ends; of many tracks only the longest."""
     paths = sorted(_paths(trajectory), key=lambda path: -len(path[1]))[:_LABELLED]
     size = 14.0 if len(paths) <= 12 else 11.0
     ends = np.array([plan.pixel(path[-1]) for _, path in paths]).reshape(-1, 2)
-    sizes = [chip_size(str(identity), size) for identity, _ in paths]
+    labels = [names.get(identity, str(identity)) for identity, _ in paths]
+    sizes = [chip_size(label, size) for label in labels]
     centres = place_labels(ends, sizes, (*plan.corner, *plan.far_corner), 16)
-    for (identity, _), (u, v) in zip(paths, centres.tolist(), strict=True):
-        chip(canvas, str(identity), (u, v), track_colour(identity), size)
+    for (identity, _), label, (u, v) in zip(paths, labels, centres.tolist(), strict=True):
+        chip(canvas, label, (u, v), track_colour(identity), size)
 
 
 def _legend(canvas: Bytes, plan: PlanMap, most: int | None, has_truth: bool) -> None:

@@ -62,6 +62,13 @@ class PlanMap:
         u, v = self.pixel(np.array([self.x[1], self.y[0]])).tolist()
         return u, v
 
+    def covers_numbers(self, low: Floats, high: Floats) -> bool:
+        """Whether a rectangle of the canvas lies on the numbers of `rule`, below and left of the ground."""
+        (left, top), (right, bottom) = self.corner, self.far_corner
+        below = high[1] > bottom + 8 and low[1] < bottom + 34 and low[0] < right + 24 and high[0] > left - 24
+        beside = high[0] > left - 60 and low[0] < left - 8 and low[1] < bottom + 12 and high[1] > top - 12
+        return bool(below or beside)
+
 
 def sheet(plan: PlanMap, title: str) -> Bytes:
     """An empty plan: white paper and a title."""

@@ -51,6 +51,7 @@ td.unsure { color: var(--quiet) }
 .chart { width: 100%; height: auto; display: block; margin-top: 8px }
 .chart text { font-size: 12px; fill: var(--quiet); font-variant-numeric: tabular-nums }
 .chart .on { fill: #fff; font-size: 10px; font-weight: 600 }
+.chart .pale { fill: #fff; opacity: 0.55 }
 .chart .rule { stroke: var(--rule) }
 .chart .area { fill: var(--accent); opacity: 0.12 }
 .chart .line { fill: none; stroke: var(--accent); stroke-width: 1.8 }

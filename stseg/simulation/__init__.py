@@ -6,5 +6,6 @@ from stseg.simulation.named_scenes import NAMED
 from stseg.simulation.render import RenderedView
 from stseg.simulation.routes import Route
 from stseg.simulation.scene import SceneSpec
+from stseg.simulation.spoil import Spoil, SpoiledFilm
 
-__all__ = ["NAMED", "Film", "Lamp", "RenderedView", "Route", "SceneSpec", "SimulatedFrame"]
+__all__ = ["NAMED", "Film", "Lamp", "RenderedView", "Route", "SceneSpec", "SimulatedFrame", "Spoil", "SpoiledFilm"]

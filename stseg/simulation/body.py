@@ -97,8 +97,8 @@ def pose(crowd: Crowd) -> Bodies:
     return Bodies(centre, form, axes)
 
 
-def upright_cylinders(crowd: Crowd, width: float) -> Bodies:
-    """The bodies of a crowd as upright cylinders, metres wide: ellipsoids in a stack, as many as a body has parts.
+def upright_cylinders(crowd: Crowd, width: float, length: float) -> Bodies:
+    """The bodies of a crowd as upright cylinders, metres: ellipsoids in a stack, as many as a body has parts.
 
     Each reaches to the nearer end of the cylinder; they lie densely towards the ends, where they are flat. Between two
     of them the outline is within a tenth of its width.
@@ -108,7 +108,8 @@ def upright_cylinders(crowd: Crowd, width: float) -> Bodies:
     centre, axes = np.zeros((n, len(PARTS), 3)), np.zeros((n, len(PARTS), 3, 3))
     centre[..., :2] = crowd.ground[:, None]
     centre[..., 2] = height * share
-    axes[..., 0, 0] = axes[..., 1, 1] = width / 2
+    axes[..., :2, :] = _turn(crowd.heading).transpose(0, 2, 1)[:, None, :2]
+    axes[..., :2, :] *= np.array([[length / 2], [width / 2]])
     axes[..., 2, 2] = height * np.minimum(share, 1 - share)
     return Bodies(centre, axes / (axes**2).sum(axis=-1, keepdims=True), axes)
 

@@ -74,7 +74,7 @@ class Film:
     def frame_sets(self) -> Iterator[SimulatedFrame]:
         """All frames in order, with every camera's view and the truth."""
         for crowd in (walk_routes if self.spec.routes else walk_freely)(self.spec):
-            wide = self.spec.cylinder
-            bodies = upright_cylinders(crowd, wide) if wide else pose(crowd)
+            wide, length = self.spec.cylinder, self.spec.length or self.spec.cylinder
+            bodies = upright_cylinders(crowd, wide, length) if wide else pose(crowd)
             views = tuple(viewer.view(crowd, bodies) for viewer in self.viewers)
             yield SimulatedFrame(crowd.frame, crowd.truth(self.spec.area), views)

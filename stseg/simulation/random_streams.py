@@ -18,6 +18,7 @@ class Topic(IntEnum):
     CLOTHES = 6
     SENSOR = 7
     DETECTOR = 8
+    SPOIL = 9
 
 
 def random_stream(seed: int, topic: Topic, *which: int) -> np.random.Generator:

@@ -44,6 +44,11 @@ class RenderedView:
     instances: NDArray[np.uint16]
     boxes: Boxes
 
+    @property
+    def mask(self) -> Bytes:
+        """Exact silhouettes of all people, uint8 (v, u), 0 or 255."""
+        return np.where(self.instances > 0, np.uint8(255), np.uint8(0))
+
 
 @dataclass(frozen=True, slots=True)
 class Drawing:

@@ -54,6 +54,8 @@ class SceneSpec:
         Shortest and tallest person, metres, uniformly between; empty for adults.
     cylinder
         Width of upright cylinders that stand for bodies, metres; 0 for bodies that walk.
+    length
+        Their length in the direction in which they face, metres: animals are ellipses from above; 0 for as wide.
     routes
         Scripted routes, one a person; without them people walk freely.
     seed
@@ -87,6 +89,7 @@ class SceneSpec:
     stay: float = 15.0
     heights: tuple[float, ...] = ()
     cylinder: float = 0.0
+    length: float = 0.0
     routes: tuple[Route, ...] = ()
     seed: int = 1
 
@@ -114,6 +117,8 @@ class SceneSpec:
         holds = self.heights == () or (len(self.heights) == 2 and 0 < self.heights[0] <= self.heights[1])
         self._require("heights", holds, self.heights, "none, or the shortest, then the tallest, metres")
         self._require("cylinder", 0 <= self.cylinder <= 2, self.cylinder, "0 to 2 metres")
+        holds = self.length == 0 or (self.cylinder > 0 and self.length <= 3)
+        self._require("length", holds, self.length, "0 to 3 metres, of cylinders")
         routes = len(self.routes)
         self._require("routes", routes in (0, self.people), routes, f"none, or {self.people}, one a person")
         self._require("seed", self.seed >= 0, self.seed, "a whole number from 0")

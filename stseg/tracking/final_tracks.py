@@ -1,7 +1,9 @@
 """From committed rows to the tracks of the whole run (docs/how-it-works.md, Tracks).
 
-committed rows -> global association -> short tracks and ghosts dropped -> short gaps filled -> places smoothed
-                  (global_association)  (pruning)                          (pruning)            (smoother)
+committed rows -> short gaps filled -> global association -> repetitions, short tracks, ghosts dropped -> smoothed
+                  (interpolation)      (identities)          (coincidence)  (pruning)                     (smoother)
+
+Global association moves no place: it decides which rows belong to one person, and fills gaps where nobody else stands.
 """
 
 from __future__ import annotations
@@ -15,10 +17,16 @@ from stseg.arrays import Ints, Rows
 from stseg.config import Config, TrackingConfig
 from stseg.model.border import Border
 from stseg.model.tables import EVENT
+from stseg.tracking.coincidence import coincident
 from stseg.tracking.encounters import encounters
-from stseg.tracking.global_association import Link, associate_globally
-from stseg.tracking.pruning import drop_ghosts, drop_short, fill_gaps
+from stseg.tracking.identities.global_association import Link, associate_globally
+from stseg.tracking.identities.size_model import MeasuredSizes
+from stseg.tracking.interpolation import apart_from, fill_gaps, interpolated_rows
+from stseg.tracking.pruning import drop_ghosts, drop_short
 from stseg.tracking.smoother import smooth_places
+
+_LASTING = 1.0
+"""Time in one place from which two tracks are one person, seconds."""
 
 
 @dataclass(frozen=True)
@@ -42,16 +50,22 @@ class FinalTracks:
 
 def final_tracks(committed: Rows, events: Rows, frame_rate: float, border: Border, config: Config) -> FinalTracks:
     """The tracks of a run from its committed TRAJECTORY and EVENT rows."""
-    linked = associate_globally(committed, frame_rate, border, config)
-    renamed = committed.copy()
-    renamed["id"] = linked.identity
-    long, short = drop_short(renamed, frame_rate, config.tracking)
+    gaps = interpolated_rows(committed, frame_rate, config.tracking)
+    bridged = np.concatenate([committed, gaps])
+    sizes = MeasuredSizes.of_heights(committed["height"], config).with_unmeasured(len(gaps))
+    linked = associate_globally(bridged, sizes, frame_rate, border, config)
+    bridged["id"] = linked.identity
+    named = linked.identity[: len(committed)]
+    repeats, repeated = coincident(bridged, frame_rate, _LASTING)
+    own = ~repeats[: len(committed)]
+    long, short = drop_short(bridged[: len(committed)][own], frame_rate, config.tracking)
     kept, ghosts = drop_ghosts(long, frame_rate, config.tracking)
-    identity = np.where(np.isin(linked.identity, kept["id"]), linked.identity, 0)
-    names = _Names(committed, linked.identity)
+    identity = np.where(np.isin(named, kept["id"]) & own, named, 0)
+    names = _Names(committed, named)
     met = _met(events, _Names(committed, identity), frame_rate, config.tracking)
-    every_event = np.concatenate([_renamed(events, names, linked.links), met, short, ghosts])
-    smoothed = smooth_places(fill_gaps(kept, frame_rate, config.tracking), frame_rate, config.motion)
+    every_event = np.concatenate([_renamed(events, names, linked.links), met, repeated, short, ghosts])
+    tracks = _without_gaps(bridged[np.isin(bridged["id"], kept["id"]) & ~repeats], frame_rate, config.tracking)
+    smoothed = smooth_places(tracks, frame_rate, config.motion)
     return FinalTracks(smoothed, every_event[np.argsort(every_event["frame"], kind="stable")], identity)
 
 
@@ -64,18 +78,23 @@ def committed_tracks(committed: Rows, events: Rows, frame_rate: float, config: T
     return FinalTracks(fill_gaps(kept, frame_rate, config), every_event[order], identity)
 
 
+def _without_gaps(tracks: Rows, frame_rate: float, config: TrackingConfig) -> Rows:
+    """Tracks with the gaps filled that global association left, sorted by frame, then id."""
+    filled = apart_from(interpolated_rows(tracks, frame_rate, config), tracks)
+    every = np.concatenate([tracks, filled])
+    return np.asarray(every[np.lexsort((every["id"], every["frame"]))])
+
+
 def _renamed(events: Rows, name_at: _Names, links: Sequence[Link]) -> Rows:
     """Births, deaths and hand-overs under the final identities: a linked track has neither birth nor death there."""
     events = events[~np.isin(events["kind"], (b"merge", b"split"))]
     named = events.copy()
     for role in ("id", "other"):
         named[role] = [name_at.name(track, frame) for track, frame in zip(events[role], events["frame"], strict=True)]
-    linked = {(link.frame, link.track) for link in links}
+    told = zip(named["frame"].tolist(), named["kind"].tolist(), named["id"].tolist(), strict=True)
     refuted = [
-        (kind == b"birth" and (frame, track) in linked) or (kind == b"death" and name_at.last(name) > frame)
-        for frame, kind, track, name in zip(
-            events["frame"].tolist(), events["kind"].tolist(), events["id"].tolist(), named["id"].tolist(), strict=True
-        )
+        (kind == b"birth" and name_at.first(name) < frame) or (kind == b"death" and name_at.last(name) > frame)
+        for frame, kind, name in told
     ]
     joined = [(link.frame, b"hand-over", link.identity, link.track, link.reason.encode()) for link in links]
     return np.concatenate([named[~np.array(refuted, bool)], np.array(joined, EVENT)])
@@ -93,14 +112,16 @@ def _met(events: Rows, name_at: _Names, frame_rate: float, config: TrackingConfi
 
 
 class _Names:
-    """The identity of a track in each frame, and the last frame of each identity."""
+    """The identity of a track in each frame, and the first and last frame of each identity."""
 
     def __init__(self, committed: Rows, identity: Ints) -> None:
         order = np.lexsort((committed["frame"], committed["id"]))
         self.track, self.frame, self.identity = committed["id"][order], committed["frame"][order], identity[order]
         names, where = np.unique(identity, return_inverse=True)
-        until = np.full(len(names), -1)
+        since, until = np.full(len(names), np.iinfo(np.int64).max), np.full(len(names), -1)
+        np.minimum.at(since, where, committed["frame"])
         np.maximum.at(until, where, committed["frame"])
+        self.since: dict[int, int] = dict(zip(names.tolist(), since.tolist(), strict=True))
         self.until: dict[int, int] = dict(zip(names.tolist(), until.tolist(), strict=True))
 
     def name(self, track: int, frame: int) -> int:
@@ -110,6 +131,10 @@ class _Names:
             return int(track)
         row = int(self.frame[first:stop].searchsorted(frame, side="right")) - 1
         return int(self.identity[first + max(row, 0)])
+
+    def first(self, identity: int) -> int:
+        """The first frame of an identity; -1 if it has none."""
+        return self.since.get(identity, -1)
 
     def last(self, identity: int) -> int:
         """The last frame of an identity; -1 if it has none."""

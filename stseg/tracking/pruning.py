@@ -1,4 +1,4 @@
-"""Short tracks and tracks of ghosts are dropped, short gaps filled (Hwang and Wang 2012, section V.E)."""
+"""Short tracks and tracks of ghosts are dropped (Hwang and Wang 2012, section V.E)."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from stseg.arrays import Ints, Rows
 from stseg.config import TrackingConfig
-from stseg.model.tables import EVENT, TRAJECTORY
+from stseg.model.tables import EVENT
 
 
 def drop_short(trajectory: Rows, frame_rate: float, config: TrackingConfig) -> tuple[Rows, Rows]:
@@ -54,35 +54,3 @@ def _dropped(trajectory: Rows, gone: Ints, reasons: Sequence[str]) -> Rows:
         first = trajectory["frame"][trajectory["id"] == identity].min()
         event["frame"], event["kind"], event["id"], event["reason"] = first, b"dropped", identity, reason
     return events
-
-
-def fill_gaps(trajectory: Rows, frame_rate: float, config: TrackingConfig) -> Rows:
-    """Fill gaps of at most `tracking.interpolation_gap` by linear interpolation.
-
-    Filled rows have extent 0, and a covariance that grows with the time to the nearest detection. Longer gaps stay
-    open: the path there is unknown. Sorted by frame, then id.
-    """
-    table = trajectory[np.lexsort((trajectory["frame"], trajectory["id"]))]
-    step, same = np.diff(table["frame"]), np.diff(table["id"]) == 0
-    gaps = np.flatnonzero(same & (step > 1) & (step <= config.interpolation_gap * frame_rate + 1))
-    rows = [trajectory, *(_between(table[k], table[k + 1]) for k in gaps.tolist())]
-    every = np.concatenate(rows)
-    return every[np.lexsort((every["id"], every["frame"]))]
-
-
-_DRIFT = 0.1
-"""Growth of a place's standard deviation a frame away from the nearest detection, metres."""
-
-
-def _between(before: np.void, after: np.void) -> Rows:
-    frames = np.arange(before["frame"] + 1, after["frame"])
-    filled = np.zeros(len(frames), TRAJECTORY)
-    fraction = (frames - before["frame"]) / (after["frame"] - before["frame"])
-    filled["frame"], filled["id"] = frames, before["id"]
-    for name in ("x", "y", "raw_x", "raw_y", "xx", "xy", "yy", "height", "width", "score"):
-        filled[name] = before[name] + fraction * (after[name] - before[name])
-    away = np.minimum(frames - before["frame"], after["frame"] - frames)
-    filled["xx"] += (_DRIFT * away) ** 2
-    filled["yy"] += (_DRIFT * away) ** 2
-    filled["views"] = before["views"]
-    return filled

@@ -134,12 +134,14 @@ class TrackFilter:
         self.tracks: list[TrackState] = []
         self.issued = 0
         self.begun = False
+        self._expected: tuple[int, list[TrackState]] = (-1, [])
+        """A frame, and the predictions of all tracks for it."""
 
     def predict(self, frame: int) -> PredictedTracks | None:
         """Predictions of all tracks for a later frame; None before the first update."""
         if not self.begun:
             return None
-        predicted = [self._predicted(track, frame) for track in self.tracks]
+        predicted = self._predictions(frame)
         return PredictedTracks(
             np.array([t.state[:2] for t in predicted]).reshape(-1, 2),
             np.array([t.covariance[:2, :2] for t in predicted]).reshape(-1, 2, 2) + self._place_noise,
@@ -162,10 +164,11 @@ class TrackFilter:
         """
         self.begun = True
         heights, widths = self._measured(people)
+        predicted = self._predictions(frame)
         names, detected = np.zeros(len(people), np.int64), []
         for j in range(len(people)):
             known = int(people.track_index[j])
-            before = self._predicted(self.tracks[known], frame) if known >= 0 else self._birth(frame, people, j)
+            before = predicted[known] if known >= 0 else self._birth(frame, people, j)
             odds = (before.odds if known >= 0 else self.birth_log_odds) + people.evidence[j] - people.prior[j]
             detected.append(
                 before.corrected(
@@ -176,15 +179,19 @@ class TrackFilter:
                 self.issued += 1
                 detected[-1] = replace(detected[-1], track=self.issued)
             names[j] = detected[-1].track
-        self.tracks = detected + self._undetected(frame, people)
-        self.tracks += self._tentative(frame, ghosts)
+        missed = self._undetected(frame, people)
+        standing = [track.state[:2] for track in detected] + [predicted[k].state[:2] for k in missed]
+        tentative = self._tentative(frame, ghosts, np.array(standing).reshape(-1, 2))
+        self.tracks = [*detected, *(self.tracks[k] for k in missed), *tentative]
+        self._expected = (-1, [])
         return names
 
-    def _undetected(self, frame: int, people: People) -> list[TrackState]:
-        """Confirmed tracks that a frame did not detect, for as long as patience lasts."""
+    def _undetected(self, frame: int, people: People) -> list[int]:
+        """Indices of confirmed tracks that a frame did not detect, for as long as patience lasts."""
         patience = round(self.config.patience * self.frame_rate)
-        missed = [self.tracks[k] for k in np.setdiff1d(np.arange(len(self.tracks)), people.track_index)]
-        return [track for track in missed if track.track and frame - track.last_seen <= patience]
+        detected = set(people.track_index.tolist())
+        missed = [k for k in range(len(self.tracks)) if k not in detected]
+        return [k for k in missed if self.tracks[k].track and frame - self.tracks[k].last_seen <= patience]
 
     def _measured(self, people: People) -> tuple[list[Measurement], list[Measurement]]:
         """Heights and widths that a frame measured; a size that it left open has no weight."""
@@ -198,14 +205,22 @@ class TrackFilter:
     def _place_noise(self) -> Floats:
         return np.eye(2) * self.motion.position_noise**2
 
+    def _predictions(self, frame: int) -> list[TrackState]:
+        """All tracks as predicted for a frame, in their order; made once a frame."""
+        if self._expected[0] != frame:
+            self._expected = frame, [self._predicted(track, frame) for track in self.tracks]
+        return self._expected[1]
+
     def _predicted(self, track: TrackState, frame: int) -> TrackState:
         seconds = (frame - track.last_seen) / self.frame_rate
         undetected = seconds - 1 / self.frame_rate
         return replace(track.predicted(seconds, self.motion), odds=track.odds - _DECAY * undetected)
 
-    def _tentative(self, frame: int, ghosts: People) -> list[TrackState]:
-        """Tentative tracks of rejected candidates: evidence adds up if the next frame shows them again."""
-        standing = np.array([self._predicted(track, frame).state[:2] for track in self.tracks]).reshape(-1, 2)
+    def _tentative(self, frame: int, ghosts: People, standing: Floats) -> list[TrackState]:
+        """Tentative tracks of rejected candidates: evidence adds up if the next frame shows them again.
+
+        None begins near the places of other tracks, `standing` float64 (n, 2), metres.
+        """
         near = distances(ghosts.ground, standing).min(1, initial=np.inf) < _EXCLUSION
         return [
             replace(self._birth(frame, ghosts, j), odds=float(ghosts.evidence[j]) - _REPEATED)

@@ -36,24 +36,27 @@ on_missing = "blind"
 source = { kind = "boxes", path = "boxes.csv", first_frame = 0, frames = 9 }
 """
 CONFIG = b"[tracking]\npatience = 2.0\n[segments]\nlength = 60.0\n"
-BOXES = b"frame,left,top,width,height,score\n0,10.5,10,5,20,0.9\n3,11,10,5,20,1\n"
-MOT = b"1,-1,10.5,10,5,20,0.9,-1,-1,-1\n3,-1,11,10,5,20,1,-1,-1,-1\n"
 TRACKS = b"frame,id,x,y,flag\n0,1,0.5,-0.5,0\n1,1,0.6,-0.5,0\n1,b,1,1,1\n"
 POINTS = b"camera,u,v,x,y,z\ncam1,1.5,2,3,4,0\ncam1,5,6,7,8,\ncam2,5,6,7,8,1.7\n"
-COCO = json.dumps([{"image_id": 1, "category_id": 1, "bbox": [1, 2, 3, 4], "score": 0.5}] * 2).encode()
-COCO_DATA = json.dumps(
+EIGHT_POINTS = b"camera,u,v,x,y,z\n" + b"".join(
+    b"a,%.1f,%.1f,%d,%d,%d\n" % (32 + 30 * x / (6 + y), 24 + 40 * (2 - z) / (6 + y), x, y, z)
+    for x, y, z in np.ndindex(2, 2, 2)
+)
+_RING = [[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, -0.5]]
+ZONES = json.dumps(
     {
-        "images": [{"id": 1, "file_name": "a_0001.png", "width": 64, "height": 48}],
-        "categories": [{"id": 1, "name": "person"}],
-        "annotations": [
-            {"image_id": 1, "category_id": 1, "bbox": [1, 2, 3, 4], "segmentation": [[1, 1, 5, 1, 5, 9]]},
-            {"image_id": 1, "category_id": 1, "segmentation": {"size": [48, 64], "counts": [3, 10, 3059]}},
+        "type": "FeatureCollection",
+        "features": [
+            {"type": "Feature", "properties": {"name": "a"}, "geometry": {"type": "Polygon", "coordinates": [_RING]}},
+            {"type": "Feature", "id": 7, "geometry": {"type": "MultiPolygon", "coordinates": [[_RING], [_RING]]}},
         ],
     }
 ).encode()
-CVAT = b"""<annotations><meta><task><size>9</size></task></meta><track id="0" label="person">
-<box frame="0" outside="0" xtl="1" ytl="2" xbr="9" ybr="20"/><polygon frame="1" outside="0" points="1,1;5,1;5,9"/>
-</track></annotations>"""
+LINES = json.dumps(
+    {"type": "Feature", "properties": {"name": "a"}, "geometry": {"type": "LineString", "coordinates": _RING}}
+).encode()
+ANSWERS = b"action,frame,id,other,name\nswap,12,1,2,\nname,,1,,Ann\nsplit,13,2,,\ndelete,,2,,\nkeep,,1,2,\n"
+NAMES = b"id,name\n1,Ann\n2,Bob\n"
 NUMBERS = " ".join(map(str, np.arange(12.0))).encode()
 OPENCV = b"""<?xml version="1.0"?><opencv_storage>
 <camera_matrix type_id="opencv-matrix"><rows>3</rows><cols>3</cols><dt>d</dt><data>500. 0. 320. 0. 510. 240. 0. 0. 1.
@@ -111,6 +114,11 @@ def npz() -> bytes:
     matrix = np.arange(12.0).reshape(3, 4)
     np.savez_compressed(file, files=np.array([1], np.int64), times0_0=np.arange(9.0), P=matrix)
     return file.getvalue()
+
+
+def floor_plan(suffix: str) -> bytes:
+    """A picture of the ground in colour."""
+    return bytes(cv2.imencode(suffix, np.full((48, 64, 3), 90, np.uint8))[1])
 
 
 def matlab_hdf5(folder: Path) -> bytes:

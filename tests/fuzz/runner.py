@@ -24,10 +24,13 @@ from pathlib import Path
 import numpy as np
 
 from fuzz.mutations import mutated
-from fuzz.targets import TARGETS, Target, answer
+from fuzz.target import Target, answer
+from fuzz.targets import TARGETS
 
 SECONDS = 10.0
-"""Longest time that one file may take."""
+"""Longest CPU time that one file may take."""
+WAIT = 120.0
+"""Longest time that one file may take where nothing is computed: the machine may have other work."""
 MEBI = 2048
 """Most memory that a process may hold."""
 
@@ -69,15 +72,17 @@ def _until_failure(target: Target, first: int, until: float, stop: int) -> tuple
         done, status = os.waitpid(child, os.WNOHANG)
         seed, since = struct.unpack("<qd", shared[:16])
         if done:
+            if os.WIFSIGNALED(status) and os.WTERMSIG(status) == signal.SIGPROF:
+                return seed, Failure(target.name, seed, f"more than {SECONDS:g} s")
             if os.WIFSIGNALED(status):
                 return seed, Failure(target.name, seed, f"signal {os.WTERMSIG(status)}")
             if os.WEXITSTATUS(status):
                 return seed, Failure(target.name, seed, bytes(shared[16:]).rstrip(b"\0").decode(errors="replace"))
             return seed, None
-        if time.monotonic() - since > SECONDS:
+        if time.monotonic() - since > WAIT:
             os.kill(child, signal.SIGKILL)
             os.waitpid(child, 0)
-            return seed, Failure(target.name, seed, f"more than {SECONDS:g} s")
+            return seed, Failure(target.name, seed, f"nothing for {WAIT:g} s")
         time.sleep(0.01)
 
 
@@ -90,6 +95,7 @@ def _work(target: Target, first: int, until: float, stop: int, shared: mmap.mmap
                 shared[:16] = struct.pack("<qd", seed, time.monotonic())
                 if time.monotonic() > until:
                     return 0
+                signal.setitimer(signal.ITIMER_PROF, SECONDS)
                 _one(target, Path(name) / f"fuzzed{target.suffix}", content(target, valid, seed))
             shared[:8] = struct.pack("<q", stop)
     except BaseException as error:

@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from contextlib import redirect_stdout
+from io import StringIO
 from pathlib import Path
 
 import numpy as np
-from run_files import write_small_run
+from run_files import small_trajectory, write_small_run
 
 from fuzz import corpus
-from stseg.errors import StsegError
-from stseg.geometry import Camera
+from fuzz.detection_files import BOXES
+from fuzz.detection_targets import CAMERA, DETECTION_TARGETS, frames
+from fuzz.target import Target, plain
+from stseg.calibration.point_fit import Points, fit_points
+from stseg.commands.calibrate_page import calibrate_page
+from stseg.commands.correct import correct
+from stseg.io.answers import read_answers, read_names
+from stseg.io.areas import read_lines, read_polygons
 from stseg.io.calibrations.formats import FORMATS, ImportOptions, read_cameras
 from stseg.io.calibrations.point_files import read_points
 from stseg.io.config_file import read_config
@@ -20,71 +27,34 @@ from stseg.io.live.arriving_files import FileNotes
 from stseg.io.live.live_table import LiveTable
 from stseg.io.outputs.whole_files import replacing
 from stseg.io.recording.pictures import read_picture
-from stseg.io.recording.recording import Source, SourceKind
+from stseg.io.recording.recording import Source
 from stseg.io.recording.rigs import parse_rig, read_rig
-from stseg.io.recording.streams import open_stream
 from stseg.io.recording.video_stream import VideoStream
 from stseg.io.runfile.runs import read_run
 from stseg.io.runfile.work_folder import WorkFolder
 from stseg.io.track_csv import read_tracks_csv
+from stseg.measures.areas import Line, Zone
+from stseg.model.tables import Tracks
+from stseg.tracking.corrections import ACTIONS, Answer, solve_corrections
 
-CAMERA = Camera("cam1", (64, 48), np.eye(3), np.array([0.0, 0.0, -1.0]))
+_GROUND = np.array([[0.1, 0.1], [0.3, 0.2], [5.0, 5.0]])
 OPTIONS = ImportOptions((64, 48), "m", 1.75)
-
-
-@dataclass(frozen=True)
-class Target:
-    """What is fuzzed.
-
-    Attributes
-    ----------
-    name
-        Of the target; its suffix is that of the file.
-    valid
-        A valid file, which `read` takes without an error; made in a folder.
-    read
-        Reads a file; raises StsegError for what it does not take.
-    """
-
-    name: str
-    valid: Callable[[Path], bytes]
-    read: Callable[[Path], object]
-
-    @property
-    def suffix(self) -> str:
-        """Of its files."""
-        return Path(self.name).suffix
-
-
-def _plain(data: bytes | str) -> Callable[[Path], bytes]:
-    whole = data.encode() if isinstance(data, str) else data
-    return lambda _: whole
 
 
 def _importer(format: str) -> Callable[[Path], object]:
     return lambda path: read_cameras(format, [path], OPTIONS)
 
 
-def _frames(kind: SourceKind) -> Callable[[Path], object]:
-    def read(path: Path) -> None:
-        stream = open_stream(Source(kind, path), CAMERA)
-        for _ in range(20):
-            if stream.read() is None:
-                break
-        stream.close()
-
-    return read
-
-
 def _video(path: Path) -> None:
     stream = VideoStream(Source("video", path), CAMERA)
     stream.times()
     stream.close()
-    _frames("video")(path)
+    frames("video")(path)
 
 
 def _run(path: Path) -> None:
     run = read_run(path)
+    assert isinstance(run.names, dict)
     for table in ("tracks", "events", "ghosts", "windows", "rates", "shifts", "timings"):
         getattr(run, table)
     for frame in run.frames[:2].tolist():
@@ -97,7 +67,7 @@ def _run(path: Path) -> None:
 def _streams(path: Path) -> None:
     rig = path.with_name("rig.toml")
     rig.write_bytes(corpus.RIG)
-    path.with_name("boxes.csv").write_bytes(corpus.BOXES)
+    path.with_name("boxes.csv").write_bytes(BOXES)
     with WorkFolder(path.with_name("q.h5"), {}) as work:
         (work.path / "streams.npz").write_bytes(path.read_bytes())
         work.streams(read_rig(rig))
@@ -118,37 +88,84 @@ def _live_table(path: Path) -> None:
 
 
 def _small_run(folder: Path) -> bytes:
-    return write_small_run(folder / "small.h5").read_bytes()
+    """A run with names."""
+    answers, output = folder / "answers.csv", folder / "corrected.h5"
+    answers.write_bytes(corpus.ANSWERS)
+    with redirect_stdout(StringIO()):
+        correct(write_small_run(folder / "small.h5", overwrite=True), answers, output=output, overwrite=True)
+    return output.read_bytes()
+
+
+def _small_run_beside(path: Path) -> Path:
+    run = path.with_name("small.h5")
+    return run if run.exists() else write_small_run(run)
+
+
+def _zones(path: Path) -> None:
+    for name, rings in read_polygons(path):
+        zone = Zone(name, rings)
+        zone.contains(_GROUND)
+        assert np.isfinite(zone.area)
+
+
+def _lines(path: Path) -> None:
+    for name, (points,) in read_lines(path):
+        assert np.isfinite(Line(name, points).distance(_GROUND)).all()
+
+
+def _answers(path: Path) -> None:
+    rows = read_answers(path, ACTIONS)
+    answers = [Answer(row.place, row.action, row.track, row.other, row.frame, row.name) for row in rows]
+    solve_corrections(Tracks(small_trajectory()).summary(), answers)
+
+
+def _names(path: Path) -> None:
+    run = read_run(_small_run_beside(path)).with_names(read_names(path))
+    with replacing(path.with_name("out"), overwrite=True) as part:
+        exports.write_tracks("geojson", part, run)
+
+
+def _points(path: Path) -> None:
+    for table in read_points(path):
+        fit_points(table.camera, (64, 48), Points(table.pixel, table.place[:, :2], table.place[:, 2]), None)
+
+
+def _calibration_page(path: Path) -> None:
+    with redirect_stdout(StringIO()):
+        calibrate_page(path, output=path.with_name("page.html"), area="0,0,4,3", plan=path, overwrite=True)
 
 
 TARGETS = (
-    Target("rig.toml", _plain(corpus.RIG), lambda path: parse_rig(path.read_text("utf-8", "replace"), path)),
-    Target("rig_file.toml", _plain(corpus.RIG), read_rig),
-    Target("config.toml", _plain(corpus.CONFIG), read_config),
-    Target("boxes.csv", _plain(corpus.BOXES), _frames("boxes")),
-    Target("mot.txt", _plain(corpus.MOT), _frames("boxes")),
-    Target("coco.json", _plain(corpus.COCO), _frames("boxes")),
-    Target("coco_data.json", _plain(corpus.COCO_DATA), _frames("instances")),
-    Target("cvat.xml", _plain(corpus.CVAT), _frames("instances")),
-    Target("tracks.csv", _plain(corpus.TRACKS), read_tracks_csv),
-    Target("points.csv", _plain(corpus.POINTS), read_points),
-    Target("matrix.txt", _plain(corpus.NUMBERS), _importer("matrix")),
+    *DETECTION_TARGETS,
+    Target("rig.toml", plain(corpus.RIG), lambda path: parse_rig(path.read_text("utf-8", "replace"), path)),
+    Target("rig_file.toml", plain(corpus.RIG), read_rig),
+    Target("config.toml", plain(corpus.CONFIG), read_config),
+    Target("tracks.csv", plain(corpus.TRACKS), read_tracks_csv),
+    Target("points.csv", plain(corpus.POINTS), read_points),
+    Target("eight_points.csv", plain(corpus.EIGHT_POINTS), _points),
+    Target("zones.geojson", plain(corpus.ZONES), _zones),
+    Target("lines.geojson", plain(corpus.LINES), _lines),
+    Target("answers.csv", plain(corpus.ANSWERS), _answers),
+    Target("names.csv", plain(corpus.NAMES), _names),
+    Target("floor_plan.png", lambda _: corpus.floor_plan(".png"), _calibration_page),
+    Target("floor_plan.jpg", lambda _: corpus.floor_plan(".jpg"), _calibration_page),
+    Target("matrix.txt", plain(corpus.NUMBERS), _importer("matrix")),
     Target("matrix.npy", lambda _: corpus.npy(), _importer("matrix")),
     Target("matrix.npz", lambda _: corpus.npz(), _importer("matrix")),
     Target("matrix.mat", lambda _: corpus.mat(), _importer("matrix")),
     Target("matrix_hdf5.mat", corpus.matlab_hdf5, _importer("matrix")),
-    Target("opencv.xml", _plain(corpus.OPENCV), _importer("opencv")),
-    Target("tsai.xml", _plain(corpus.TSAI), _importer("tsai")),
-    Target("pom.txt", _plain(corpus.POM), _importer("pom")),
-    Target("krt.json", _plain(corpus.KRT), _importer("krt")),
-    Target("poses.toml", _plain(corpus.POSES), _importer("anipose")),
-    Target("nvidia.json", _plain(corpus.NVIDIA), _importer("nvidia")),
-    Target("kalibr.yaml", _plain(corpus.KALIBR), _importer("kalibr")),
+    Target("opencv.xml", plain(corpus.OPENCV), _importer("opencv")),
+    Target("tsai.xml", plain(corpus.TSAI), _importer("tsai")),
+    Target("pom.txt", plain(corpus.POM), _importer("pom")),
+    Target("krt.json", plain(corpus.KRT), _importer("krt")),
+    Target("poses.toml", plain(corpus.POSES), _importer("anipose")),
+    Target("nvidia.json", plain(corpus.NVIDIA), _importer("nvidia")),
+    Target("kalibr.yaml", plain(corpus.KALIBR), _importer("kalibr")),
     Target("run.h5", _small_run, _run),
     Target("streams.npz", lambda _: corpus.npz(), _streams),
-    Target("begun.json", _plain(corpus.BEGUN), _begun),
-    Target("files.json", _plain(corpus.NOTES), FileNotes),
-    Target("live.table.csv", _plain(corpus.LIVE_TABLE), _live_table),
+    Target("begun.json", plain(corpus.BEGUN), _begun),
+    Target("files.json", plain(corpus.NOTES), FileNotes),
+    Target("live.table.csv", plain(corpus.LIVE_TABLE), _live_table),
     Target("indexed.png", lambda _: corpus.png(True), lambda path: read_picture(path, "instances", (64, 48), "")),
     Target("grey.png", lambda _: corpus.png(False), lambda path: read_picture(path, "instances", (64, 48), "")),
     Target("mask.png", lambda _: corpus.png(True), lambda path: read_picture(path, "masks", (64, 48), "")),
@@ -158,17 +175,3 @@ TARGETS = (
 """All of them."""
 
 assert {"opencv", "tsai", "pom", "krt", "anipose", "nvidia", "kalibr", "matrix"} <= set(FORMATS)
-
-
-def answer(target: Target, path: Path) -> str:
-    """What a target makes of a file: nothing, or its one line; anything else than StsegError is raised."""
-    try:
-        target.read(path)
-    except StsegError as error:
-        line = str(error)
-        assert "\n" not in line.strip() or len(line) < 1000, line
-        return line
-    return ""
-
-
-__all__ = ["TARGETS", "Target", "answer"]

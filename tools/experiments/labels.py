@@ -111,13 +111,13 @@ def measure(run_file: Path, truth_file: Path, methods: dict[str, Labelling]) -> 
     run, counts = read_run(run_file), {name: CellCounts() for name in methods}
     truth = read_truth(truth_file)
     grid = run.recording.rig.grid
-    for frames, log_odds, labels in run.read_volumes(8):
-        for frame, u, label in zip(frames.tolist(), log_odds, labels, strict=True):
-            true, touching = truth_of(grid, truth[truth["frame"] == frame])
-            rows = run.trajectory[run.trajectory["frame"] == frame]
-            ground = np.column_stack([rows["x"], rows["y"]])
-            for name, method in methods.items():
-                counts[name].add(true, method(label, u, rows["id"], ground, grid), touching)
+    for frame in run.frames.tolist():
+        u, label = run.read_frame(frame)
+        true, touching = truth_of(grid, truth[truth["frame"] == frame])
+        rows = run.trajectory[run.trajectory["frame"] == frame]
+        ground = np.column_stack([rows["x"], rows["y"]])
+        for name, method in methods.items():
+            counts[name].add(true, method(label, u, rows["id"], ground, grid), touching)
     return counts
 
 

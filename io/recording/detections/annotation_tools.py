@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from stseg.errors import FormatError
+from stseg.io import limits
 from stseg.io.calibrations.safe_xml import parse_xml
 from stseg.io.recording.detections.frame_names import listed_frames
 from stseg.io.recording.detections.json_files import require
@@ -107,12 +108,16 @@ def _add_video_track(request: Request, found: DetectionList, place: str, value: 
         [[number(request.path, place, key, require(request.path, place, step, key)) for key in ("frame", *_PERCENT)]
          for step in steps]
     ).reshape(-1, 5)  # fmt: skip
+    if (np.diff(table[:, 0]) <= 0).any() or table[-1:, 0].sum() - table[:1, 0].sum() > limits.INTERPOLATED - len(found):
+        expected = f"rising frames, and at most {limits.INTERPOLATED} boxes between all keyframes"
+        raise FormatError(request.path, place, "keyframes that do not rise, or are far apart", expected)
     on = [bool(step.get("enabled", True)) for step in steps]
     for k in range(len(steps)):
         stop = table[k + 1, 0] if on[k] and k + 1 < len(steps) else table[k, 0] + 1
-        for frame in np.arange(table[k, 0], stop):
-            box = [np.interp(frame, table[:, 0], table[:, column]) / 100 for column in range(1, 5)]
-            found.add(place, int(frame) - 1, (np.array(box) * size).tolist(), label=label)
+        frames = np.arange(table[k, 0], stop)
+        boxes = np.stack([np.interp(frames, table[:, 0], column) / 100 for column in table[:, 1:].T], -1) * size
+        for frame, box in zip(frames.tolist(), boxes.tolist(), strict=True):
+            found.add(place, int(frame) - 1, box, label=label)
 
 
 def is_via(data: Any) -> bool:

@@ -10,13 +10,13 @@ import numpy as np
 
 from stseg.arrays import Ints
 
-_DIGITS = re.compile(r"(\d+)(?!.*\d)")
+_DIGITS = re.compile(r"[0-9]+")
 
 
 def last_numbers(names: Sequence[str]) -> Ints | None:
     """The last number in each name, int64 (n,); None where a name has none or two share one."""
-    found = [_DIGITS.search(PurePath(name).stem) for name in names]
-    numbers = [int(match[1][-15:]) for match in found if match]
+    found = [_DIGITS.findall(PurePath(name).stem) for name in names]
+    numbers = [int(digits[-1][-15:]) for digits in found if digits]
     return None if len(set(numbers)) < len(names) else np.array(numbers, np.int64)
 
 

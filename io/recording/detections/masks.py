@@ -55,11 +55,17 @@ class RunLengths:
         return np.asarray(cv2.resize(np.ascontiguousarray(image), size, interpolation=cv2.INTER_NEAREST))
 
     def box(self) -> tuple[float, float, float, float]:
-        """left, top, width, height."""
-        v, u = np.nonzero(self.draw(self.size))
-        if not len(u):
+        """left, top, width, height; zeros where nothing is set."""
+        stop, height = np.cumsum(self.counts)[1::2], self.size[1]
+        start = stop - self.counts[1::2]
+        start, stop = start[start < stop], stop[start < stop]
+        if not len(start):
             return 0.0, 0.0, 0.0, 0.0
-        return float(u.min()), float(v.min()), float(np.ptp(u) + 1), float(np.ptp(v) + 1)
+        first, last = start // height, (stop - 1) // height
+        within = first == last  # a run over several columns reaches their upper and lower ends
+        top = int(np.where(within, start % height, 0).min())
+        bottom = int(np.where(within, (stop - 1) % height, height - 1).max())
+        return float(first[0]), float(top), float(last[-1] - first[0] + 1), float(bottom - top + 1)
 
 
 Mask = Polygons | RunLengths
@@ -67,10 +73,17 @@ Mask = Polygons | RunLengths
 
 def flat_polygons(flat: Sequence[Sequence[float]]) -> Polygons:
     """Polygons from flat lists u, v, u, v, ...; raises ValueError where one is none."""
-    outlines = tuple(np.array(one, float).reshape(-1, 2) for one in flat)
-    if not outlines or any(len(outline) < 3 or not (np.abs(outline) <= limits.SIDE * 4).all() for outline in outlines):
+    return polygons([np.array(one, float).reshape(-1, 2) for one in flat])
+
+
+def polygons(outlines: Sequence[Floats]) -> Polygons:
+    """Polygons from outlines (k, 2); raises ValueError where one is none."""
+    if not outlines or any(len(outline) < 3 for outline in outlines):
         raise ValueError("a polygon of fewer than 3 points")
-    return Polygons(outlines)
+    points = np.concatenate([np.asarray(outline, float) for outline in outlines])
+    if not (np.abs(points) <= limits.SIDE * 4).all():
+        raise ValueError("a polygon far beyond any image")
+    return Polygons(tuple(np.asarray(outline, float) for outline in outlines))
 
 
 def run_lengths(size: Sequence[int], counts: str | Sequence[int]) -> RunLengths:

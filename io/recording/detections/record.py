@@ -106,6 +106,9 @@ class DetectionList:
         self._label: list[str] = []
         self._mask: list[Mask | None] = []
 
+    def __len__(self) -> int:
+        return len(self._numbers)
+
     def add(
         self,
         place: str,

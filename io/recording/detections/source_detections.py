@@ -131,11 +131,13 @@ def instance_image(found: Detections, rows: Sequence[int], size: tuple[int, int]
     image = np.zeros(size[::-1], np.uint16)
     for value, k in enumerate(sorted(rows, key=lambda row: float(found.score[row])), 1):
         mask = found.mask[k] if found.mask else None
-        image[(mask or _box(found.pixel[k])).draw(size) > 0] = value
+        image[(mask or _box(found.pixel[k], size)).draw(size) > 0] = value
     return image
 
 
-def _box(pixel: Floats) -> Polygons:
+def _box(pixel: Floats, size: tuple[int, int]) -> Polygons:
+    """The outline of a box, cut off beyond the image."""
     left, top, width, height = pixel.tolist()
-    right, bottom = left + width, top + height
+    left, right = np.clip([left, left + width], -1, size[0])
+    top, bottom = np.clip([top, top + height], -1, size[1])
     return Polygons((np.array([[left, top], [right, top], [right, bottom], [left, bottom]]),))

@@ -50,8 +50,13 @@ def read_parquet(request: Request) -> Detections:
     """Boxes of a Parquet file."""
     parquet = load_extra("pyarrow.parquet", "parquet")
     try:
-        table = parquet.read_table(request.path)
-    except (OSError, ValueError) as error:
+        with parquet.ParquetFile(request.path, memory_map=True) as file:
+            header = list(file.schema_arrow.names)
+            if file.metadata.num_rows > limits.ROWS:
+                raise ValueError(f"{file.metadata.num_rows} rows, more than {limits.ROWS}")
+            wanted = sorted(set(known_columns(header, request.columns).values()))
+            table = file.read([header[k] for k in wanted])
+    except (OSError, ValueError, RuntimeError, load_extra("pyarrow", "parquet").ArrowException) as error:
         raise FormatError(request.path, "", f"no Parquet ({error})"[:100], "a Parquet file") from error
     columns = [column.to_pylist() for column in table.columns]
     rows = [(f"row {k}", row) for k, row in enumerate(zip(*columns, strict=True))]

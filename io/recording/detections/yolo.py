@@ -13,7 +13,7 @@ from stseg.io import limits
 from stseg.io.bounded_files import read_text
 from stseg.io.recording.detections.frame_names import last_numbers
 from stseg.io.recording.detections.json_files import require
-from stseg.io.recording.detections.masks import Mask, Polygons, flat_polygons
+from stseg.io.recording.detections.masks import Mask, flat_polygons, polygons
 from stseg.io.recording.detections.record import DetectionList, Detections, Request, number
 
 _NAMES = ("classes.txt", "obj.names", "names.txt")
@@ -85,10 +85,10 @@ def _outlined(request: Request, place: str, values: list[float]) -> tuple[tuple[
     score = values[-1] if len(values) % 2 == 0 else 1.0
     flat = values[1 : len(values) - (len(values) + 1) % 2]
     try:
-        (outline,) = flat_polygons([flat]).outlines
+        (shares,) = flat_polygons([flat]).outlines
+        mask = polygons([shares * np.array(request.size)])
     except ValueError as error:
         raise FormatError(request.path, place, str(error), "class and 3 or more points") from error
-    mask = Polygons((outline * np.array(request.size),))
     return mask.box(), score, mask
 
 
@@ -151,8 +151,18 @@ def read_results(request: Request, data: Any) -> Detections:
             place = f"frame {frame}, detection {index}"
             box, mask = require(request.path, place, row, "box"), None
             if segments := row.get("segments"):
-                points = np.column_stack([segments.get("x", []), segments.get("y", [])])
-                mask = Polygons((points,)) if len(points) > 2 else None
+                mask = _segments(request.path, place, segments)
             corners = [require(request.path, place, box, key) for key in ("x1", "y1", "x2", "y2")]
             found.add_corners(place, frame, corners, row.get("confidence", 1.0), str(row.get("name", "")), mask)
     return found.done(len(data))
+
+
+def _segments(path: Path, place: str, segments: Any) -> Mask | None:
+    """The mask of an outline; None where it has no area."""
+    u, v = ([number(path, place, key, one) for one in require(path, place, segments, key)] for key in ("x", "y"))
+    if len(u) != len(v):
+        raise FormatError(path, place, f"segments of {len(u)} x and {len(v)} y", "as many of each")
+    try:
+        return polygons([np.column_stack([u, v])]) if len(u) > 2 else None
+    except ValueError as error:
+        raise FormatError(path, place, error, "an outline in pixels") from error

@@ -1,0 +1,138 @@
+"""Kernels of blobs: the label of each ground cell, the nearest cell of a person's track, and each blob's measures."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from stseg.accelerate import kernel, part
+from stseg.arrays import Floats, Ints, Labels, Singles
+
+_FAINT = np.float32(1e-6)
+"""Mass of a cell without evidence, nats."""
+_ZERO = np.float32(0)
+
+
+class Measures(NamedTuple):
+    """Measures of the blobs (n,) of a frame, as of `stseg.model.blobs.Blobs`.
+
+    Attributes
+    ----------
+    ground : float64 (n, 2), covariance : float64 (n, 2, 2)
+        Centroid of the mass, metres; the cells' spread around it, square metres.
+    cells : float64 (n,)
+        Number of ground cells.
+    height, mass : float64 (n,)
+        Metres, nats.
+    """
+
+    ground: Floats
+    covariance: Floats
+    cells: Floats
+    height: Floats
+    mass: Floats
+
+
+@part
+def _strength(log_odds: np.float32) -> np.float32:
+    """Log-odds of a cell, 0 where no view sees it."""
+    return _ZERO if np.isnan(log_odds) else log_odds
+
+
+@kernel
+def fill_ground_labels(label: Labels, log_odds: Singles, ground_label: Labels) -> None:
+    """Fill ground_label (y, x), 0 everywhere before, with the label that has the most mass above each ground cell.
+
+    Of labels (plane, y, x) with the same mass the least is taken.
+    """
+    planes, rows, columns = label.shape
+    for y in range(rows):
+        for x in range(columns):
+            most = _ZERO
+            for z in range(planes):
+                own = label[z, y, x]
+                if own == 0 or own == ground_label[y, x]:
+                    continue
+                mass = _ZERO
+                for k in range(planes):
+                    if label[k, y, x] == own:
+                        strength = _strength(log_odds[k, y, x])
+                        mass += (strength if strength > _ZERO else _ZERO) + _FAINT
+                if mass > most or (mass == most and own < ground_label[y, x]):
+                    ground_label[y, x], most = own, mass
+
+
+@kernel
+def fill_nearest(
+    ground_label: Labels, people_ground: Floats, people_track: Ints, ground_x: Floats, ground_y: Floats, nearest: Floats
+) -> None:
+    """Fill nearest (person,) with the distance to the nearest cell that has the person's track, metres; inf for none.
+
+    Ground_x (x,) and ground_y (y,) are the cells' centres, metres.
+    """
+    nearest[:] = np.inf
+    for y in range(len(ground_y)):
+        for x in range(len(ground_x)):
+            if ground_label[y, x] > 0:
+                for j in range(len(people_track)):
+                    if people_track[j] == ground_label[y, x]:
+                        away = np.hypot(ground_x[x] - people_ground[j, 0], ground_y[y] - people_ground[j, 1])
+                        nearest[j] = min(nearest[j], away)
+
+
+@kernel
+def fill_measures(
+    cells: Labels,
+    track: Ints,
+    label: Labels,
+    log_odds: Singles,
+    ground_x: Floats,
+    ground_y: Floats,
+    heights: Floats,
+    found: Measures,
+) -> None:
+    """Fill the measures of blobs, 0 everywhere before.
+
+    Parameters
+    ----------
+    cells : int32 (y, x)
+        Blob of each ground cell, counted from 1; 0 for none.
+    track : int64 (n,)
+        Label of the cells of each blob.
+    label, log_odds : int32, float32 (plane, y, x)
+        Of each cell; nats.
+    ground_x, ground_y, heights : float64 (x,), (y,), (plane,)
+        Metres.
+    """
+    weight = np.zeros(cells.shape)
+    total, occupied = np.zeros(len(track)), np.zeros(len(track))
+    for y in range(cells.shape[0]):
+        for x in range(cells.shape[1]):
+            if cells[y, x] > 0:
+                b = cells[y, x] - 1
+                weight[y, x] = _FAINT
+                for z in range(len(heights)):
+                    if label[z, y, x] == track[b]:
+                        strength = _strength(log_odds[z, y, x])
+                        weight[y, x] += strength if strength > _ZERO else _ZERO
+                        found.mass[b] += strength
+                        occupied[b] += 1
+                        found.height[b] = max(found.height[b], heights[z])
+                total[b] += weight[y, x]
+                found.cells[b] += 1
+                found.ground[b, 0] += weight[y, x] * ground_x[x]
+                found.ground[b, 1] += weight[y, x] * ground_y[y]
+    for b in range(len(track)):
+        found.ground[b] /= total[b]
+        found.mass[b] /= max(occupied[b], 1.0)
+    for y in range(cells.shape[0]):
+        for x in range(cells.shape[1]):
+            if cells[y, x] > 0:
+                b = cells[y, x] - 1
+                share = weight[y, x] / (total[b] * found.cells[b])
+                dx, dy = ground_x[x] - found.ground[b, 0], ground_y[y] - found.ground[b, 1]
+                found.covariance[b, 0, 0] += share * dx * dx
+                found.covariance[b, 0, 1] += share * dx * dy
+                found.covariance[b, 1, 0] += share * dx * dy
+                found.covariance[b, 1, 1] += share * dy * dy

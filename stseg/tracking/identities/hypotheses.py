@@ -1,0 +1,58 @@
+"""Joint hypotheses of the identities of all people up to a frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stseg.arrays import Floats, Ints
+
+FREE = -1
+"""Name of a slot that holds no identity."""
+
+
+@dataclass(frozen=True)
+class Hypotheses:
+    """Hypotheses, the best first; each holds identities in slots.
+
+    Attributes
+    ----------
+    score : float64 (hypothesis,)
+        Nats.
+    name, last : int64 (hypothesis, slot)
+        First and last observation of each identity; the first is its name, `FREE` where there is none.
+    seconds : float64 (hypothesis, slot)
+        Time of the last observation.
+    state : float64 (hypothesis, slot, 4)
+        x, y, vx, vy, in metres and metres per second.
+    covariance : float64 (hypothesis, slot, 3)
+        Of either axis: place, place and velocity, velocity.
+    precision, information : float64 (hypothesis, slot, size)
+        Sums over the identity's observations.
+    """
+
+    score: Floats
+    name: Ints
+    last: Ints
+    seconds: Floats
+    state: Floats
+    covariance: Floats
+    precision: Floats
+    information: Floats
+
+    @classmethod
+    def empty(cls, number: int, slots: int, sizes: int) -> Hypotheses:
+        """Hypotheses of nobody."""
+        shape = (number, slots)
+        return cls(
+            np.zeros(number), np.full(shape, FREE), np.full(shape, -1), np.zeros(shape), np.zeros((*shape, 4)),
+            np.zeros((*shape, 3)), np.zeros((*shape, sizes)), np.zeros((*shape, sizes)),
+        )  # fmt: skip
+
+    def at(self, chosen: Ints) -> Hypotheses:
+        """Copies of the chosen hypotheses."""
+        return Hypotheses(
+            self.score[chosen], self.name[chosen], self.last[chosen], self.seconds[chosen], self.state[chosen],
+            self.covariance[chosen], self.precision[chosen], self.information[chosen],
+        )  # fmt: skip

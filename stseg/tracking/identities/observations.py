@@ -1,0 +1,111 @@
+"""Observations of the identity search: committed rows in the order of time, with what each says of its person."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stseg.arrays import Flags, Floats, Ints, Rows
+from stseg.config import Config
+from stseg.model.border import Border
+from stseg.tracking.assignment import distances
+from stseg.tracking.identities.size_model import MeasuredSizes, SizeModel
+
+_EXCHANGE_DISTANCE = 0.8
+"""Distance below which the filter may have exchanged two tracks, metres."""
+_LASTING = 0.4
+"""Correlation time of the error of a place, seconds: frames within it say less than independent ones."""
+_LEAST = 0.05
+"""Least error of a place, metres (standard deviation)."""
+
+
+@dataclass(frozen=True)
+class Observations:
+    """Rows of a run, frame by frame.
+
+    Attributes
+    ----------
+    order : int64 (n,)
+        Index of each observation in the trajectory.
+    start : int64 (frame + 1,)
+        First observation of each frame that has rows.
+    seconds : float64 (frame,)
+    ground : float64 (n, 2)
+        Metres.
+    variance : float64 (n,)
+        Of each coordinate, square metres.
+    previous : int64 (n,)
+        The observation before in the same filter track, -1 for none.
+    certain : bool (n,)
+        Whether the observation continues its filter track without doubt: nobody was near.
+    inside : float64 (n,)
+        How far inside the area: 0 at the border, 1 from `detection.border_width` on.
+    precision, information : float64 (n, size)
+        Inverse variance of each size, and that times its deviation from the population's mean.
+    """
+
+    order: Ints
+    start: Ints
+    seconds: Floats
+    ground: Floats
+    variance: Floats
+    previous: Ints
+    certain: Flags
+    inside: Floats
+    precision: Floats
+    information: Floats
+
+
+def observe(
+    trajectory: Rows, sizes: MeasuredSizes, model: SizeModel, frame_rate: float, border: Border, config: Config
+) -> Observations:
+    """Observations of a trajectory.
+
+    Parameters
+    ----------
+    trajectory : TRAJECTORY (n,)
+        In any order.
+    sizes
+        Of each row.
+    model
+        Their noise and spread.
+    frame_rate
+        Frames per second.
+    border
+        Where people come and go.
+    config
+        The constants of all stages.
+    """
+    order = np.lexsort((trajectory["id"], trajectory["frame"]))
+    rows = trajectory[order]
+    frames, start = np.unique(rows["frame"], return_index=True)
+    ground = np.column_stack([rows["x"], rows["y"]])
+    precision, information = model.evidence(sizes.value[order], frame_rate)
+    previous = _previous(rows)
+    start = np.append(start, len(rows))
+    alike = 1.0 + 2.0 * _LASTING * frame_rate
+    return Observations(
+        order, start, frames / frame_rate, ground, np.maximum(alike * (rows["xx"] + rows["yy"]) / 2, _LEAST**2),
+        previous, _certain(rows, ground, start, previous), border.inside(ground, config.detection.border_width),
+        precision, information,
+    )  # fmt: skip
+
+
+def _previous(rows: Rows) -> Ints:
+    by_track = np.lexsort((rows["frame"], rows["id"]))
+    previous = np.full(len(rows), -1)
+    same = np.diff(rows["id"][by_track]) == 0
+    previous[by_track[1:][same]] = by_track[:-1][same]
+    return previous
+
+
+def _certain(rows: Rows, ground: Floats, start: Ints, previous: Ints) -> Flags:
+    """Rows that follow their track in the very next frame, with nobody near in either."""
+    alone = np.ones(len(rows), bool)
+    for first, stop in zip(start[:-1].tolist(), start[1:].tolist(), strict=True):
+        away = distances(ground[first:stop], ground[first:stop])
+        np.fill_diagonal(away, np.inf)
+        alone[first:stop] = (away >= _EXCHANGE_DISTANCE).all(axis=1)
+    follows = (previous >= 0) & (rows["frame"] - rows["frame"][previous] == 1)
+    return np.asarray(alone & alone[previous] & follows)

@@ -1,0 +1,147 @@
+"""Search of identities: a beam of joint hypotheses over the frames of a run (Reid 1979).
+
+In every frame each hypothesis is extended by its exact best assignment of rows to identities, and by all that differ
+from it by one exchange. Of those with equal present names the best is kept (Viterbi over permutations), of all of them
+the best K. Names become final after a lag, so memory does not grow.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from stseg.arrays import Floats, Ints
+from stseg.config import MotionConfig
+from stseg.tracking.identities import step_kernels
+from stseg.tracking.identities.hypotheses import Hypotheses
+from stseg.tracking.identities.observations import Observations
+
+_BIRTH = 6.0
+"""Cost of a birth or a death inside the area, nats (per square metre)."""
+_ABSENCE = 1.0
+"""Cost of being unseen, nats per second."""
+_LEAST_PLACE = -25.0
+"""Least evidence of a place against an identity, nats."""
+_ALTERNATIVE_LOSS, _BEAM_LOSS = 15.0, 60.0
+"""Greatest loss of an alternative in one frame, and of a hypothesis against the best, nats."""
+_SPARE = 16
+"""Slots for people out of sight."""
+
+
+@dataclass(frozen=True)
+class SearchLimits:
+    """Extent of the search.
+
+    Attributes
+    ----------
+    hypotheses
+        Number that is kept.
+    longest
+        Longest time out of sight, seconds.
+    lag
+        Time after which names are final, seconds.
+    """
+
+    hypotheses: int
+    longest: float
+    lag: float
+
+
+@dataclass
+class _Step:
+    """The choices of one frame: parent (k,) and names (k, row), and the frame's observations and time."""
+
+    parent: Ints
+    names: Ints
+    first: int
+    seconds: float
+
+
+@dataclass
+class _History:
+    """Choices of the latest frames, until names are final."""
+
+    name: Ints
+    steps: list[_Step] = field(default_factory=list)
+
+    def decide(self, until: float, number: int) -> Ints:
+        """Make names up to a time final, by the best hypothesis; which of the `number` hypotheses agree, int64 (k,)."""
+        late = sum(step.seconds > until for step in self.steps)
+        ancestor = np.arange(number)
+        for step in self.steps[len(self.steps) - late :][::-1]:
+            ancestor = step.parent[ancestor]
+        agree, best = np.flatnonzero(ancestor == ancestor[0]), int(ancestor[0])
+        for step in self.steps[: len(self.steps) - late][::-1]:
+            self.name[step.first : step.first + step.names.shape[1]] = step.names[best]
+            best = int(step.parent[best])
+        self.steps = self.steps[len(self.steps) - late :]
+        return agree
+
+
+def search_identities(seen: Observations, spread: Floats, motion: MotionConfig, limits: SearchLimits) -> Ints:
+    """The most likely identity of each observation, named by its first observation, int64 (n,).
+
+    Parameters
+    ----------
+    seen
+        The observations.
+    spread : float64 (size,)
+        Variance of each size among people.
+    motion
+        Motion model.
+    limits
+        Extent of the search.
+    """
+    slots = int(np.diff(seen.start).max(initial=0)) + _SPARE
+    held = Hypotheses.empty(1, slots, len(spread))
+    history = _History(np.full(len(seen.order), -1))
+    for k, now in enumerate(seen.seconds.tolist()):
+        first, stop = int(seen.start[k]), int(seen.start[k + 1])
+        held, step = _extended(held, seen, first, stop, now, spread, motion, limits)
+        history.steps.append(step)
+        if now - history.steps[0].seconds > 2 * limits.lag:
+            agree = history.decide(now - limits.lag, len(held.score))
+            history.steps[-1].parent, history.steps[-1].names = step.parent[agree], step.names[agree]
+            held = held.at(agree)
+    history.decide(np.inf, len(held.score))
+    return history.name
+
+
+def _extended(
+    held: Hypotheses, seen: Observations, first: int, stop: int, now: float, spread: Floats, motion: MotionConfig,
+    limits: SearchLimits,
+) -> tuple[Hypotheses, _Step]:  # fmt: skip
+    """The best hypotheses after one more frame, and how they were chosen."""
+    turn, pace = motion.velocity_noise**2, motion.speed_spread**2
+    number, slots = held.name.shape
+    rows = stop - first
+    step_kernels.end_identities(
+        held.name, held.last, held.seconds, now, limits.longest, seen.inside, _BIRTH, held.score
+    )
+    cost = np.empty((number, rows, slots + rows))
+    step_kernels.fill_costs(
+        held.name, held.last, held.seconds, held.state, held.covariance, held.precision, held.information, first, now,
+        seen.ground, seen.variance, seen.previous, seen.certain, seen.inside, seen.precision, seen.information, spread,
+        turn, _BIRTH, _ABSENCE, _LEAST_PLACE, cost,
+    )  # fmt: skip
+    column, total = np.empty((number, rows), np.int64), np.empty(number)
+    step_kernels.fill_best_assignments(cost, column, total)
+    most = number * (1 + rows * (slots + 1) + rows * (rows - 1) // 2)
+    change, value = np.empty((most, 5), np.int64), np.empty(most)
+    found = step_kernels.fill_alternatives(cost, column, held.score - total, slots, _ALTERNATIVE_LOSS, change, value)
+    ordered = np.argsort(-value[:found], kind="stable")
+    kept = limits.hypotheses
+    parent, score, keys = np.empty(kept, np.int64), np.empty(kept), np.empty(kept, np.int64)
+    chosen, names = np.empty((kept, rows), np.int64), np.empty((kept, rows), np.int64)
+    kept = step_kernels.choose_distinct(
+        ordered, change, value, column, held.name, held.last, first, float(value[ordered[0]]) - _BEAM_LOSS,
+        parent, chosen, names, score, keys,
+    )  # fmt: skip
+    new = held.at(parent[:kept])
+    new.score[:] = score[:kept]
+    step_kernels.update_identities(
+        chosen[:kept], new.name, new.last, new.seconds, new.state, new.covariance, new.precision, new.information,
+        first, now, seen.ground, seen.variance, seen.precision, seen.information, turn, pace,
+    )  # fmt: skip
+    return new, _Step(parent[:kept], names[:kept], first, now)

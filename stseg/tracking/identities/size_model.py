@@ -1,0 +1,156 @@
+"""Noise and spread of people's sizes, learned from isolated tracklets (docs/how-it-works.md, Tracks).
+
+A measured size is x = mean + person + error. The error of a frame has a variance and lasts for some time; the person's
+part has the variance `spread` among people. A size whose spread is 0 says nothing of identity.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from stseg.arrays import Floats, Ints
+from stseg.config import Config
+
+_LONGEST = 1.5
+"""Longest lag at which errors of one tracklet are compared, seconds."""
+_LEAST_FRAMES = 4
+"""Least measured frames of a tracklet that is learned from."""
+_PRIOR_FRAMES, _PRIOR_PEOPLE = 50.0, 4.0
+"""Weight of the prior: differences of frames for the noise, pairs of tracklets for the spread."""
+_PRIOR_LASTING = 0.5
+"""Prior duration of an error, seconds."""
+
+
+@dataclass(frozen=True)
+class SizePrior:
+    """What is known of a size before the recording.
+
+    Attributes
+    ----------
+    noise, spread
+        Standard deviations of a frame's error, and among people.
+    """
+
+    noise: float
+    spread: float
+
+
+@dataclass(frozen=True)
+class MeasuredSizes:
+    """Sizes of the person in each row of a trajectory.
+
+    Attributes
+    ----------
+    value : float64 (n, size)
+        Nan where unmeasured.
+    priors
+        One for each size.
+    """
+
+    value: Floats
+    priors: list[SizePrior]
+
+    @classmethod
+    def of_heights(cls, height: Floats, config: Config) -> MeasuredSizes:
+        """Heights (n,) alone, metres."""
+        prior = SizePrior(config.tracking.height_noise, config.body.height_spread)
+        return cls(np.asarray(height, float)[:, None], [prior])
+
+    def with_unmeasured(self, number: int) -> MeasuredSizes:
+        """The sizes with some rows more, of which nothing is known."""
+        return MeasuredSizes(np.pad(self.value, ((0, number), (0, 0)), constant_values=np.nan), self.priors)
+
+
+@dataclass(frozen=True)
+class SizeModel:
+    """Statistics of each size; all float64 (size,).
+
+    Attributes
+    ----------
+    mean
+        Of the population.
+    noise
+        Variance of a frame's error.
+    lasting
+        Correlation time of the errors, seconds.
+    spread
+        Variance among people; 0 where the size says nothing.
+    """
+
+    mean: Floats
+    noise: Floats
+    lasting: Floats
+    spread: Floats
+
+    def evidence(self, sizes: Floats, frame_rate: float) -> tuple[Floats, Floats]:
+        """Precision of each measured size (n, size), and precision times deviation; 0 where unmeasured.
+
+        Errors that last are shared among the frames for which they last.
+        """
+        known = np.isfinite(sizes)
+        precision = np.where(known, 1.0 / (self.noise * np.maximum(self.lasting * frame_rate, 1.0)), 0.0)
+        return precision, np.where(known, sizes - self.mean, 0.0) * precision
+
+
+def learn_sizes(sizes: MeasuredSizes, frame: Ints, tracklets: Sequence[Ints], frame_rate: float) -> SizeModel:
+    """Statistics of the sizes of a recording.
+
+    Parameters
+    ----------
+    sizes
+        Of each row.
+    frame : int64 (n,)
+        Frame of each row.
+    tracklets
+        Rows of each isolated tracklet, in the order of time.
+    frame_rate
+        Frames per second.
+    """
+    columns = zip(sizes.value.T, sizes.priors, strict=True)
+    learned = [_learn(column, frame, tracklets, prior, frame_rate) for column, prior in columns]
+    return SizeModel(*np.array(learned, np.float64).reshape(-1, 4).T)
+
+
+def _learn(
+    size: Floats, frame: Ints, tracklets: Sequence[Ints], prior: SizePrior, frame_rate: float
+) -> tuple[float, float, float, float]:
+    known = [rows[np.isfinite(size[rows])] for rows in tracklets]
+    known = [rows for rows in known if len(rows) >= _LEAST_FRAMES]
+    mean = float(np.mean(size[np.concatenate(known)])) if known else 0.0
+    noise, lasting = _errors(size, frame, known, prior, frame_rate)
+    return mean, noise, lasting, _spread(size - mean, known, prior)
+
+
+def _errors(
+    size: Floats, frame: Ints, tracklets: Sequence[Ints], prior: SizePrior, frame_rate: float
+) -> tuple[float, float]:
+    """Variance and correlation time of a frame's error, from half squared differences at growing lags."""
+    lags = max(round(_LONGEST * frame_rate), 1)
+    total, count = np.zeros(lags), np.zeros(lags)
+    for rows in tracklets:
+        for lag in range(1, lags + 1):
+            later = np.searchsorted(frame[rows], frame[rows] + lag).clip(max=len(rows) - 1)
+            pairs = frame[rows[later]] - frame[rows] == lag
+            total[lag - 1] += 0.5 * float(((size[rows[later]] - size[rows])[pairs] ** 2).sum())
+            count[lag - 1] += pairs.sum()
+    expected = prior.noise**2 * (1.0 - np.exp(-np.arange(1, lags + 1) / frame_rate / _PRIOR_LASTING))
+    differences = (total + _PRIOR_FRAMES * expected) / (count + _PRIOR_FRAMES)
+    noise = float(differences.max())
+    alike = np.clip(1.0 - differences / noise, 0.0, 1.0)
+    return noise, float(1.0 + 2.0 * alike.sum()) / frame_rate
+
+
+def _spread(deviation: Floats, tracklets: Sequence[Ints], prior: SizePrior) -> float:
+    """Variance among people: the covariance of the first and the last third of each tracklet.
+
+    Errors of the two are independent unless they last as long, so no noise has to be subtracted.
+    """
+    total = people = 0.0
+    for rows in tracklets:
+        third = max(len(rows) // 3, 1)
+        total += float(deviation[rows[:third]].mean() * deviation[rows[-third:]].mean())
+        people += 1.0
+    return max((total + _PRIOR_PEOPLE * prior.spread**2) / (people + _PRIOR_PEOPLE), 0.0)

@@ -1,0 +1,279 @@
+"""Kernels of one frame of the identity search: costs, best assignments, alternatives, and the states after them.
+
+Columns of an assignment are slots of identities, then one place for a new identity of each row.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from stseg.accelerate import kernel, part
+from stseg.arrays import Flags, Floats, Ints
+from stseg.linear_assignment import fill_assignment_of_least_cost
+
+FORBIDDEN = 1e6
+"""Cost of an assignment that is not allowed, nats."""
+
+
+@part
+def size_evidence(precision: float, information: float, spread: float) -> float:
+    """Log-likelihood ratio of observations of one person against the population's mean, nats (Gaussian, pooled)."""
+    total = 1.0 + precision * spread
+    return 0.5 * (spread * information * information / total - math.log(total))
+
+
+@part
+def predicted_variance(covariance: Floats, seconds: float, turn: float) -> float:
+    """Variance of a predicted coordinate, square metres; `turn` is the variance of velocity gained in a second."""
+    still = covariance[0] + 2.0 * seconds * covariance[1] + seconds * seconds * covariance[2]
+    return float(still + turn * seconds * seconds * seconds / 3.0)
+
+
+@kernel
+def end_identities(
+    name: Ints, last: Ints, seconds: Floats, now: float, longest: float, inside: Floats, birth: float, score: Floats
+) -> None:
+    """Free the slots of identities that were unseen for too long; each costs its death."""
+    for h in range(name.shape[0]):
+        for s in range(name.shape[1]):
+            if name[h, s] >= 0 and now - seconds[h, s] > longest:
+                score[h] -= birth * inside[last[h, s]]
+                name[h, s] = -1
+
+
+@kernel
+def fill_costs(
+    name: Ints, last: Ints, seconds: Floats, state: Floats, covariance: Floats, held_precision: Floats,
+    held_information: Floats, first: int, now: float, ground: Floats, variance: Floats, previous: Ints,
+    certain: Flags, inside: Floats, precision: Floats, information: Floats, spread: Floats, turn: float, birth: float,
+    absence: float, least: float, cost: Floats,
+) -> None:  # fmt: skip
+    """Fill cost (hypothesis, row, slot + row) of the rows from `first` on, nats."""
+    hypotheses, slots = name.shape
+    rows = cost.shape[1]
+    alone = np.zeros(rows)
+    for i in range(rows):
+        for d in range(len(spread)):
+            alone[i] += size_evidence(precision[first + i, d], information[first + i, d], spread[d])
+    cost[:] = FORBIDDEN
+    for h in range(hypotheses):
+        for i in range(rows):
+            cost[h, i, slots + i] = birth * inside[first + i] - alone[i]
+        for s in range(slots):
+            if name[h, s] < 0:
+                continue
+            since = now - seconds[h, s]
+            x = state[h, s, 0] + since * state[h, s, 2]
+            y = state[h, s, 1] + since * state[h, s, 3]
+            spreads = predicted_variance(covariance[h, s], since, turn)
+            known = 0.0
+            for d in range(len(spread)):
+                known += size_evidence(held_precision[h, s, d], held_information[h, s, d], spread[d])
+            for i in range(rows):
+                r = first + i
+                follows = previous[r] == last[h, s]
+                if certain[r] and not follows:
+                    continue
+                total = spreads + variance[r]
+                square = (ground[r, 0] - x) ** 2 + (ground[r, 1] - y) ** 2
+                gain = max(-0.5 * square / total, least) - math.log(2.0 * math.pi * total) - absence * since - known
+                if gain < 4.0 * least and not follows:
+                    continue
+                for d in range(len(spread)):
+                    both = held_precision[h, s, d] + precision[r, d]
+                    gain += size_evidence(both, held_information[h, s, d] + information[r, d], spread[d])
+                cost[h, i, s] = -gain
+                if certain[r]:
+                    cost[h, i, slots + i] = FORBIDDEN
+
+
+@kernel
+def fill_best_assignments(cost: Floats, column: Ints, total: Floats) -> None:
+    """Fill column (hypothesis, row) with the assignment of least cost, and total (hypothesis,) with that cost."""
+    for h in range(cost.shape[0]):
+        fill_assignment_of_least_cost(cost[h], column[h])
+        total[h] = 0.0
+        for i in range(cost.shape[1]):
+            total[h] += cost[h, i, column[h, i]]
+
+
+@kernel
+def fill_alternatives(
+    cost: Floats, column: Ints, score: Floats, slots: int, most: float, change: Ints, value: Floats
+) -> int:
+    """Fill the assignments that differ from the best by one exchange of two rows, or by another column of one row.
+
+    Parameters
+    ----------
+    cost : float64 (hypothesis, row, slot + row)
+    column : int64 (hypothesis, row)
+        The best assignment.
+    score : float64 (hypothesis,)
+        Of the best assignment, nats.
+    slots
+        Number of slots.
+    most
+        Greatest loss of an alternative, nats.
+    change : int64 (alternative, 5), value : float64 (alternative,)
+        Filled with hypothesis, row, its column, other row (-1 for none), its column; and with the score.
+
+    Returns
+    -------
+    int
+        Number of alternatives.
+    """
+    hypotheses, rows, columns = cost.shape
+    number = 0
+    taken = np.zeros(columns, np.bool_)
+    for h in range(hypotheses):
+        change[number] = h, -1, -1, -1, -1
+        value[number] = score[h]
+        number += 1
+        taken[:] = False
+        for i in range(rows):
+            taken[column[h, i]] = True
+        for i in range(rows):
+            own = column[h, i]
+            for c in range(slots + 1):
+                to = c if c < slots else slots + i
+                if not taken[to] and cost[h, i, to] - cost[h, i, own] < most:
+                    change[number] = h, i, to, -1, -1
+                    value[number] = score[h] - cost[h, i, to] + cost[h, i, own]
+                    number += 1
+            for j in range(i):
+                other = column[h, j]
+                if own >= slots and other >= slots:
+                    continue
+                to = other if other < slots else slots + i
+                back = own if own < slots else slots + j
+                loss = cost[h, i, to] + cost[h, j, back] - cost[h, i, own] - cost[h, j, other]
+                if loss < most:
+                    change[number] = h, i, to, j, back
+                    value[number] = score[h] - loss
+                    number += 1
+    return number
+
+
+_PRIMES = (2147483647, 2147483629)
+"""Moduli of the two halves of a key; products of their remainders stay below 2^63."""
+
+
+@part
+def _cube(word: int, prime: int) -> int:
+    """The cube of a whole number modulo a prime: sums of cubes tell sets of numbers apart, in any order."""
+    rest = word % prime
+    return rest * rest % prime * rest % prime
+
+
+@kernel
+def choose_distinct(
+    ordered: Ints, change: Ints, value: Floats, column: Ints, name: Ints, last: Ints, first: int, least: float,
+    parent: Ints, chosen: Ints, names: Ints, score: Floats, keys: Ints,
+) -> int:  # fmt: skip
+    """Choose the best alternatives that differ in the present names, or in who is unseen.
+
+    Parameters
+    ----------
+    ordered
+        Alternatives, the best first.
+    change, value
+        See `fill_alternatives`.
+    column, name, last
+        Best assignments; names and last observations of the slots.
+    first
+        The frame's first observation.
+    least
+        Least score.
+    parent, score : (most,), chosen, names : (most, row)
+        Filled for each choice: its hypothesis, its score, the column and the name of each row.
+    keys : int64 (most,)
+        Work space.
+
+    Returns
+    -------
+    int
+        Number of choices.
+    """
+    rows, slots = column.shape[1], name.shape[1]
+    seen = np.zeros(slots, np.bool_)
+    number = 0
+    for a in ordered:
+        if number == len(parent) or value[a] < least:
+            break
+        h = change[a, 0]
+        own = chosen[number]
+        own[:] = column[h]
+        if change[a, 1] >= 0:
+            own[change[a, 1]] = change[a, 2]
+        if change[a, 3] >= 0:
+            own[change[a, 3]] = change[a, 4]
+        seen[:] = False
+        high, low = 0, 0
+        for i in range(rows):
+            if own[i] < slots:
+                seen[own[i]] = True
+                names[number, i] = name[h, own[i]]
+            else:
+                names[number, i] = first + i
+            word = names[number, i] * 1048576 + i
+            high, low = (high + _cube(word, _PRIMES[0])) % _PRIMES[0], (low + _cube(word, _PRIMES[1])) % _PRIMES[1]
+        for s in range(slots):
+            if name[h, s] >= 0 and not seen[s]:
+                word = name[h, s] * 1048576 + rows + last[h, s]
+                high, low = (high + _cube(word, _PRIMES[0])) % _PRIMES[0], (low + _cube(word, _PRIMES[1])) % _PRIMES[1]
+        key = high * 2147483648 + low
+        known = False
+        for k in range(number):
+            known = known or keys[k] == key
+        if not known:
+            keys[number], parent[number], score[number] = key, h, value[a]
+            number += 1
+    return number
+
+
+@kernel
+def update_identities(
+    chosen: Ints, name: Ints, last: Ints, seconds: Floats, state: Floats, covariance: Floats, held_precision: Floats,
+    held_information: Floats, first: int, now: float, ground: Floats, variance: Floats, precision: Floats,
+    information: Floats, turn: float, pace: float,
+) -> None:  # fmt: skip
+    """Update the identities of each hypothesis by the rows that it assigns to them, in place.
+
+    A new identity takes the first free slot, or that of the identity that was unseen for longest.
+    """
+    hypotheses, slots = name.shape
+    for h in range(hypotheses):
+        for i in range(chosen.shape[1]):
+            r, s = first + i, chosen[h, i]
+            if s < slots:
+                _correct(state[h, s], covariance[h, s], now - seconds[h, s], ground[r], variance[r], turn)
+            else:
+                s = 0
+                for other in range(slots):
+                    if name[h, s] >= 0 and (name[h, other] < 0 or seconds[h, other] < seconds[h, s]):
+                        s = other
+                name[h, s] = r
+                state[h, s] = ground[r, 0], ground[r, 1], 0.0, 0.0
+                covariance[h, s] = variance[r], 0.0, pace
+                held_precision[h, s], held_information[h, s] = 0.0, 0.0
+            last[h, s], seconds[h, s] = r, now
+            held_precision[h, s] += precision[r]
+            held_information[h, s] += information[r]
+
+
+@kernel
+def _correct(state: Floats, covariance: Floats, since: float, ground: Floats, variance: float, turn: float) -> None:
+    """Predict one filter and correct it by a place (Bar-Shalom, Li and Kirubarajan 2001, section 6.2.2)."""
+    place = predicted_variance(covariance, since, turn)
+    both = covariance[1] + since * covariance[2] + turn * since * since / 2.0
+    pace = covariance[2] + turn * since
+    total = place + variance
+    for axis in range(2):
+        off = ground[axis] - state[axis] - since * state[axis + 2]
+        state[axis] += since * state[axis + 2] + place / total * off
+        state[axis + 2] += both / total * off
+    covariance[0] = place - place * place / total
+    covariance[1] = both - both * place / total
+    covariance[2] = pace - both * both / total

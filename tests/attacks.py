@@ -1,0 +1,64 @@
+"""What tests of hostile input share: the one line of a refusal, a small rig, a short film."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from stseg.commands.main import main
+
+SECONDS = 10.0
+"""Time within which any input is answered."""
+
+RIG = """
+format = 1
+[scene]
+name = "yard"
+frame_rate = 10.0
+x = [-2.0, 2.0]
+y = [-2.0, 2.0]
+[grid]
+cell = 0.2
+top = 1.8
+planes = 4
+[[camera]]
+name = "cam1"
+size = [64, 48]
+ground = [[60.0, 32.0, 192.0], [0.0, 24.0, 324.0], [0.0, 1.0, 6.0]]
+vertical = [0.0, -60.0, 0.0]
+source = { kind = "boxes", path = "boxes.csv" }
+"""
+
+
+def refusal(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
+    """The one line of a command that refuses its input in time."""
+    begun = time.monotonic()
+    status = main([str(argument) for argument in arguments])
+    error = capsys.readouterr().err
+    assert status == 2, error
+    assert time.monotonic() - begun < SECONDS
+    lines = [line for line in error.splitlines() if line]
+    assert len(lines) == 1, error
+    assert lines[0].startswith("stseg: error: ")
+    assert lines[0].isprintable()
+    return lines[0]
+
+
+def write_rig(folder: Path, old: str = "", new: str = "") -> Path:
+    assert old in RIG
+    (folder / "boxes.csv").write_text("frame,left,top,width,height\n0,10,10,5,20\n3,11,10,5,20\n")
+    (folder / "rig.toml").write_text(RIG.replace(old, new) if old else RIG)
+    return folder / "rig.toml"
+
+
+def film(path: Path, plain: Path) -> None:
+    """A film of three frames; OpenCV writes it under a plain name."""
+    writer = cv2.VideoWriter(str(plain), cv2.VideoWriter.fourcc(*"MJPG"), 10, (64, 48))
+    for _ in range(3):
+        writer.write(np.zeros((48, 64, 3), np.uint8))
+    writer.release()
+    plain.rename(path)

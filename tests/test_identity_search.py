@@ -1,0 +1,79 @@
+"""The search of identities: against every partition of a few rows, with a short lag, and what sizes say of people."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from reference_identities import greatest_score, score
+from strollers import BORDER, CONFIG, RATE, rows_of, runs, swapped, visit
+
+from stseg.arrays import Floats, Ints, Rows
+from stseg.tracking.identities import search
+from stseg.tracking.identities.observations import Observations, observe
+from stseg.tracking.identities.search import SearchLimits, search_identities
+from stseg.tracking.identities.size_model import MeasuredSizes, SizeModel, SizePrior, learn_sizes
+from stseg.tracking.isolated_tracklets import isolated_tracklets
+
+MODEL = SizeModel(np.array([1.7]), np.array([0.03**2]), np.array([0.5]), np.array([0.1**2]))
+LONGEST = 1.0
+
+
+def seen_of(rows: Rows) -> Observations:
+    return observe(rows, MeasuredSizes.of_heights(rows["height"], CONFIG), MODEL, RATE, BORDER, CONFIG)
+
+
+def found(seen: Observations, lag: float = 60.0, hypotheses: int = 400) -> Ints:
+    return search_identities(seen, MODEL.spread, CONFIG.motion, SearchLimits(hypotheses, LONGEST, lag))
+
+
+@settings(max_examples=60, deadline=None)
+@given(runs(2))
+def test_no_partition_of_a_few_rows_is_better(rows: Rows) -> None:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(search, "_ALTERNATIVE_LOSS", 1e5)
+        patch.setattr(search, "_BEAM_LOSS", 1e5)
+        seen = seen_of(rows[:7])
+        names = found(seen, hypotheses=5000).tolist()
+    best = greatest_score(seen, MODEL.spread, CONFIG.motion, LONGEST) if len(rows) else 0.0
+    assert score(seen, names, MODEL.spread, CONFIG.motion, LONGEST) == pytest.approx(best, abs=1e-6)
+
+
+def test_names_that_are_final_early_belong_to_one_hypothesis() -> None:
+    """With a lag too short for sizes to tell, rows of a name are still apart in time, and most names are the same."""
+    rows = swapped(rows_of({1: (visit(-1), 1.7, range(160)), 2: (visit(1), 1.85, range(160))}), 80)
+    seen = seen_of(rows)
+    for lag in (0.1, 1.0, 5.0):
+        names = found(seen, lag)
+        frame = rows["frame"][seen.order]
+        assert len(set(zip(frame.tolist(), names.tolist(), strict=True))) == len(rows)
+        assert len(set(names.tolist())) <= 4
+    np.testing.assert_array_equal(found(seen, 10.0), found(seen))
+
+
+def sizes_of(people: Floats, noise: float, seed: int = 0) -> tuple[MeasuredSizes, Ints, list[Ints]]:
+    """A size of each person in 80 frames, one tracklet a person."""
+    rng = np.random.default_rng(seed)
+    value = np.repeat(people, 80) + rng.normal(0, noise, 80 * len(people))
+    frame = np.tile(np.arange(80), len(people))
+    return MeasuredSizes(value[:, None], [SizePrior(0.05, 0.1)]), frame, np.split(np.arange(len(value)), len(people))
+
+
+def test_noise_and_spread_of_a_size_are_learned() -> None:
+    people = np.random.default_rng(1).normal(1.7, 0.2, 60)
+    model = learn_sizes(*sizes_of(people, 0.03), RATE)
+    assert model.noise[0] == pytest.approx(0.03**2, rel=0.15)
+    assert model.spread[0] == pytest.approx(0.2**2, rel=0.3)
+    assert model.lasting[0] < 3 / RATE
+
+
+def test_a_size_that_is_everybodys_tells_nobody_apart() -> None:
+    model = learn_sizes(*sizes_of(np.full(400, 1.7), 0.03), RATE)
+    assert model.spread[0] < 0.012**2
+
+
+def test_few_people_keep_the_prior() -> None:
+    rows = rows_of({1: (visit(-1), 1.7, range(40))})
+    tracklets = isolated_tracklets(rows, RATE)
+    model = learn_sizes(MeasuredSizes.of_heights(rows["height"], CONFIG), rows["frame"], tracklets, RATE)
+    assert model.spread[0] == pytest.approx(0.8 * CONFIG.body.height_spread**2, rel=0.05)
