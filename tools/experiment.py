@@ -9,6 +9,7 @@ points      calibration of the probability of track points
 rig         error of a rig against the true one, on the ground and at head height
 sizes       error of heights and widths of tracks, and their spread along a track
 spoil       what spoiled masks and boxes cost, by kinds, strengths, views and crowds
+window      what a window decides better than its frames, and the candidates of people who are missed
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from __future__ import annotations
 import importlib
 import sys
 
-EXPERIMENTS = ("ablation", "certainty", "labels", "memory", "pixels", "points", "rig", "sizes", "spoil")
+EXPERIMENTS = ("ablation", "certainty", "labels", "memory", "pixels", "points", "rig", "sizes", "spoil", "window")
 """Each is the module `experiments.NAME` with a function `main`, which reads the command line."""
 
 

@@ -73,10 +73,12 @@ class Shown:
             )
 
 
-def crowd(people: int, views: int, seconds: float) -> Shown:
+def crowd(people: int, views: int, seconds: float, seed: int = NAMED["easy"].seed) -> Shown:
     """A crowd filmed by so many cameras."""
     whole = 8 if 8 % views == 0 else views
-    spec = replace(NAMED["easy"], people=people, cameras=whole, seconds=seconds, frame_rate=10.0, size=(320, 240))
+    spec = replace(
+        NAMED["easy"], people=people, cameras=whole, seconds=seconds, frame_rate=10.0, size=(320, 240), seed=seed
+    )
     film, frames, truth = Film(spec), [], [np.zeros(0, TRUTH)]
     empty = np.zeros((0, 0, 3), np.uint8)
     for frame_set in film.frame_sets():
