@@ -210,6 +210,7 @@ def test_every_format_gives_the_same_boxes(tmp_path: Path, name: str) -> None:
         ("CSV", "own.csv", "Bild", "Frame", r"columns.frame: found no column Bild"),
         ("CSV with corners", "own.csv", "xmax", "far", r"header: found the columns frame_id, xmin, ymin, far"),
         ("CSV with corners", "own.csv", "0,10.0,12.0", "0,10.0", r"line 2: found 6 fields"),
+        ("CSV with corners", "own.csv", "0,10.0,12.0", "0.5,10.0,12.0", r"line 2: found frame 0.5, expected a whole"),
     ],
 )  # fmt: skip
 def test_a_malformed_twin_is_one_line(tmp_path: Path, name: str, file: str, old: str, new: str, message: str) -> None:

@@ -91,6 +91,8 @@ def _collect(request: Request, header: Sequence[str], rows: Sequence[tuple[str, 
         if len(row) < len(header):
             raise FormatError(request.path, place, f"{len(row)} fields", f"{len(header)}")
         frame = number(request.path, place, "frame", row[at["frame"]])
+        if not float(frame).is_integer():
+            raise FormatError(request.path, place, f"frame {frame:g}", "a whole number")
         box = [number(request.path, place, name, row[at[name]]) for name in form]
         if form[2] == "right":
             box[2:] = box[2] - box[0], box[3] - box[1]
