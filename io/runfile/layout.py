@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -62,7 +63,8 @@ STEP = 1 / 32
 """Quantisation of log_odds, nats: finer digits are noise and would enlarge the file."""
 FIELDS = (*SCALES, LOG_ODDS, LABEL, FRAME, VIEWS)
 
-KEPT = ("all", "tracks", "none")
+VolumeKind = Literal["all", "tracks", "none"]
+KEPT = get_args(VolumeKind)
 """Values of @kept of the occupancy: the whole volume, cells near tracks, or nothing."""
 
 ABOUT = {

@@ -1,12 +1,23 @@
-"""Volumes of frames as a run file packs them: copied from file to file without being unpacked."""
+"""Volumes of frames as a run file packs them: each frame one chunk, shuffled by bytes and deflated.
+
+They are packed here instead of by HDF5, which matches runs alone: a volume packs smaller and in three quarters of the
+time. Threads may pack frames side by side, and what is packed is copied from file to file.
+"""
 
 from __future__ import annotations
 
+import zlib
 from typing import NamedTuple
+
+import numpy as np
+
+from stseg.arrays import AnyArray, Ints, Labels
+
+_LEVEL, _WINDOW, _MEMORY = 1, 15, 9
 
 
 class PackedFrame(NamedTuple):
-    """The log-odds of one frame, packed.
+    """The log-odds or the labels of one frame, packed.
 
     Attributes
     ----------
@@ -18,3 +29,30 @@ class PackedFrame(NamedTuple):
 
     filters: int
     data: bytes
+
+
+class PackedVolumes(NamedTuple):
+    """Consecutive frames of a run file.
+
+    Attributes
+    ----------
+    frames : int64 (time,)
+        Their numbers in the recording.
+    log_odds, label
+        One for each frame.
+    opened : int64 (k,), opened_label : int32 (k, plane, y, x)
+        Which of them are unpacked besides, and their track ids.
+    """
+
+    frames: Ints
+    log_odds: list[PackedFrame]
+    label: list[PackedFrame]
+    opened: Ints
+    opened_label: Labels
+
+
+def packed_frame(values: AnyArray) -> PackedFrame:
+    """A frame (plane, y, x), of the type in the file, as HDF5's filters shuffle and deflate unpack it."""
+    by_significance = np.ascontiguousarray(values).reshape(-1, 1).view(np.uint8).T
+    deflate = zlib.compressobj(_LEVEL, zlib.DEFLATED, _WINDOW, _MEMORY, zlib.Z_RLE)
+    return PackedFrame(0, deflate.compress(by_significance.tobytes()) + deflate.flush())

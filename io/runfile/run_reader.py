@@ -24,7 +24,7 @@ from stseg.io.recording.time_alignment import with_alignment
 from stseg.io.runfile import layout
 from stseg.io.runfile.data_frames import to_data_frame
 from stseg.io.runfile.hdf5_reading import format_errors, read_object
-from stseg.io.runfile.packed_frames import PackedFrame
+from stseg.io.runfile.packed_frames import PackedFrame, PackedVolumes
 from stseg.io.runfile.provenance import Provenance, read_provenance
 from stseg.io.runfile.safe_hdf5 import open_hdf5, read_whole
 from stseg.io.runfile.value_checks import Bounds, require_fit, require_table
@@ -217,15 +217,20 @@ class Run:
             raise ValueError(f"frame {frame} is not in {self.path}")
         return read_object(self.path, layout.OCCUPANCY, lambda file: _volume(file[layout.OCCUPANCY], index))
 
-    def read_packed_volumes(self, number: int) -> Iterator[tuple[Ints, list[PackedFrame], Labels]]:
-        """The volumes of all frames, `number` at a time: the frames, log-odds as they are packed, and labels."""
+    def read_packed_volumes(self, number: int, opened: Ints) -> Iterator[PackedVolumes]:
+        """The volumes of all frames, `number` at a time, as they are packed; unpacked labels of the frames `opened`."""
         with format_errors(self.path, layout.OCCUPANCY), open_hdf5(self.path) as file:
             group = file[layout.OCCUPANCY]
             for start in range(0, len(self.frames), number):
-                frames, label = self.frames[start : start + number], group["label"][start : start + number]
-                chunks = range(start, start + len(frames))
-                packed = [PackedFrame(*group["log_odds"].id.read_direct_chunk((k, 0, 0, 0))) for k in chunks]
-                yield frames, packed, label
+                frames = self.frames[start : start + number]
+                chosen = np.flatnonzero(np.isin(frames, opened))
+                yield PackedVolumes(
+                    frames,
+                    [_packed_chunk(group["log_odds"], start + k) for k in range(len(frames))],
+                    [_packed_chunk(group["label"], start + k) for k in range(len(frames))],
+                    chosen,
+                    group["label"][start + chosen] if len(chosen) else np.zeros((0, *self.views.shape), np.int32),
+                )
 
     def _table(self, name: str) -> Rows:
         def take(file: h5py.File) -> Rows:
@@ -239,6 +244,10 @@ class Run:
     @property
     def _bounds(self) -> Bounds:
         return Bounds(self.path, self.frames, len(self.cameras))
+
+
+def _packed_chunk(dataset: h5py.Dataset, index: int) -> PackedFrame:
+    return PackedFrame(*dataset.id.read_direct_chunk((index, 0, 0, 0)))
 
 
 def _with_added(rows: Rows, dtype: np.dtype[np.void]) -> Rows:

@@ -15,7 +15,7 @@ from stseg.geometry import Rig
 from stseg.io.outputs.whole_files import require_new
 from stseg.io.recording.recording import Recording
 from stseg.io.runfile import layout
-from stseg.io.runfile.packed_frames import PackedFrame
+from stseg.io.runfile.packed_frames import PackedFrame, packed_frame
 from stseg.io.runfile.part_file import PartFile
 from stseg.io.runfile.provenance import gather_provenance, write_provenance
 
@@ -93,31 +93,31 @@ class RunWriter:
         shape = (len(frames), *self._views.shape)
         if log_odds.shape != shape or label.shape != shape:
             raise ValueError(f"volumes {log_odds.shape} and {label.shape} for {shape}")
-        self._require_later(frames)
         finite = np.clip(log_odds, -_LARGEST, _LARGEST, dtype=np.float32)
         coarse = np.round(finite / np.float32(layout.STEP)) * np.float32(layout.STEP)
-        with self._disk.step():
-            self._extend("log_odds", coarse)
-            self._extend_others(frames, label)
+        whole = coarse.astype(layout.LOG_ODDS.dtype, copy=False), label.astype(layout.LABEL.dtype, copy=False)
+        self.append_packed_frames(frames, *([packed_frame(values) for values in volume] for volume in whole))
 
-    def append_packed_frames(self, frames: Ints, log_odds: Sequence[PackedFrame], label: Labels) -> None:
-        """Append the volume of the next frames, whose log-odds another file of this layout and grid has packed.
+    def append_packed_frames(
+        self, frames: Ints, log_odds: Sequence[PackedFrame], label: Sequence[PackedFrame]
+    ) -> None:  # fmt: skip
+        """Append the volume of the next frames, packed for this layout and grid.
 
         Parameters
         ----------
-        frames, label
+        frames
             As of `append_frames`.
-        log_odds
+        log_odds, label
             One for each frame.
         """
         self._require_later(frames)
         with self._disk.step():
-            dataset = self._occupancy["log_odds"]
-            start = len(dataset)
-            dataset.resize(start + len(frames), axis=0)
-            for k, packed in enumerate(log_odds):
-                dataset.id.write_direct_chunk((start + k, 0, 0, 0), packed.data, packed.filters)
-            self._extend_others(frames, label)
+            self._extend_packed("log_odds", log_odds)
+            self._extend_packed("label", label)
+            self._extend("frame", frames)
+            self._extend("time", frames / self._recording.rig.frame_rate)
+            self._frames += len(frames)
+            self._last_frame = int(frames[-1]) if len(frames) else self._last_frame
 
     def append(self, table: str, rows: Rows) -> None:
         """Add rows to one of the tables of `stseg.io.runfile.layout`, whose dtype they have."""
@@ -161,13 +161,12 @@ class RunWriter:
         if len(frames) and (frames[0] <= self._last_frame or (np.diff(frames) <= 0).any()):
             raise ValueError(f"frames {frames} after frame {self._last_frame}")
 
-    def _extend_others(self, frames: Ints, label: Labels) -> None:
-        """Append what stands beside the log-odds of frames."""
-        self._extend("label", label)
-        self._extend("frame", frames)
-        self._extend("time", frames / self._recording.rig.frame_rate)
-        self._frames += len(frames)
-        self._last_frame = int(frames[-1]) if len(frames) else self._last_frame
+    def _extend_packed(self, name: str, frames: Sequence[PackedFrame]) -> None:
+        dataset = self._occupancy[name]
+        start = len(dataset)
+        dataset.resize(start + len(frames), axis=0)
+        for k, packed in enumerate(frames):
+            dataset.id.write_direct_chunk((start + k, 0, 0, 0), packed.data, packed.filters)
 
     def _extend(self, name: str, values: AnyArray) -> None:
         dataset = self._occupancy[name]

@@ -14,13 +14,14 @@ from cyclopts import Parameter
 from stseg.config.effect import require_effect
 from stseg.engine.forecast import Forecast, forecast
 from stseg.engine.frame_range import FrameRange, resolve_frames
-from stseg.engine.job import Job, VolumeKind
+from stseg.engine.job import Job
 from stseg.engine.rig_body import with_body_of
 from stseg.engine.workforce import Workforce
 from stseg.io.config_file import read_config
 from stseg.io.recording.recording import Recording
 from stseg.io.recording.rigs import read_rig
 from stseg.io.recording.stream_index import index_streams
+from stseg.io.runfile.layout import VolumeKind
 
 
 def plan(

@@ -10,20 +10,15 @@ import numpy as np
 from cyclopts import Parameter
 
 from stseg.commands.progress import TerminalReporter
-from stseg.engine.following import follow_recording
 from stseg.engine.frame_range import FrameRange
-from stseg.engine.job import VolumeKind
-from stseg.engine.pixel_labels import require_pixels, write_labels
-from stseg.engine.track import track_recording
-from stseg.engine.warnings import rig_warnings
-from stseg.engine.workforce import Workforce
+from stseg.engine.worker_processes import prepare_workers
 from stseg.errors import ConfigError
 from stseg.io.config_file import read_config
 from stseg.io.live.publishing import receiver_of
 from stseg.io.outputs.label_images import require_label_folder
 from stseg.io.recording.rigs import read_rig
+from stseg.io.runfile.layout import VolumeKind
 from stseg.io.runfile.runs import Run
-from stseg.report.colours import track_palette
 
 
 def run(
@@ -87,6 +82,15 @@ def run(
     overwrite
         Replace an older run file of that name, once this one is whole.
     """
+    if scheduler is None and not follow:
+        prepare_workers(workers)  # they import the stages while this process does
+    from stseg.engine.following import follow_recording
+    from stseg.engine.pixel_labels import require_pixels, write_labels
+    from stseg.engine.track import track_recording
+    from stseg.engine.warnings import rig_warnings
+    from stseg.engine.workforce import Workforce
+    from stseg.report.colours import track_palette
+
     chosen, workforce = None if frames is None else FrameRange.parse(frames), Workforce(workers, scheduler)
     resolved, recording, reporter = read_config(config, set_), read_rig(rig), TerminalReporter()
     receiver = None if publish is None else receiver_of(publish)

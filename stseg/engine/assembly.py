@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Sequence
+from concurrent.futures import Executor, ThreadPoolExecutor
 from pathlib import Path
 from typing import NamedTuple
 
@@ -14,6 +16,7 @@ from stseg.engine.pipeline import finished_tracks
 from stseg.engine.segments import Segment
 from stseg.io.config_file import format_config
 from stseg.io.recording.time_alignment import with_alignment
+from stseg.io.runfile.packed_frames import packed_frame
 from stseg.io.runfile.runs import Run, RunWriter, read_run
 from stseg.model.tables import Tracks
 from stseg.trackers import find_tracker
@@ -71,9 +74,12 @@ def assemble(job: Job, finished: Sequence[FinishedSegment], output: Path) -> Tra
     views = read_run(finished[0].path).views
     config = format_config(job.config)
     recording = with_alignment(job.recording, job.streams.shown)
-    with RunWriter(output, recording, views, config, overwrite=True, kept=job.volume) as writer:
+    with (
+        RunWriter(output, recording, views, config, overwrite=True, kept=job.volume) as writer,
+        ThreadPoolExecutor(os.cpu_count()) as packers,
+    ):
         for part in _segment_rows(finished, joined.committed, joined.local, identity):
-            _copy(part, writer)
+            _copy(part, writer, packers)
         writer.append("trajectory", tracks.trajectory)
         writer.append("boxes", tracks.boxes)
         writer.append("events", tracks.events)
@@ -95,10 +101,17 @@ def _segment_rows(
         first = stop
 
 
-def _copy(part: _SegmentRows, writer: RunWriter) -> None:
-    """Append a segment's volume, with the run's track ids, and its tables to the run file."""
-    for frames, log_odds, label in part.run.read_packed_volumes(_BLOCK):
-        rename_labels(label, frames, part.rows, part.identity)
-        writer.append_packed_frames(frames, log_odds, label)
+def _copy(part: _SegmentRows, writer: RunWriter, packers: Executor) -> None:
+    """Append a segment's volume, with the run's track ids, and its tables to the run file.
+
+    Frames whose tracks keep their ids are copied as they are packed.
+    """
+    renamed = np.unique(part.rows["frame"][part.rows["id"] != part.identity])
+    for volumes in part.run.read_packed_volumes(_BLOCK, renamed):
+        rename_labels(volumes.opened_label, volumes.frames[volumes.opened], part.rows, part.identity)
+        label = volumes.label
+        for k, packed in zip(volumes.opened.tolist(), packers.map(packed_frame, volumes.opened_label), strict=True):
+            label[k] = packed
+        writer.append_packed_frames(volumes.frames, volumes.log_odds, label)
     for table in _COPIED:
         writer.append(table, np.asarray(getattr(part.run, table)))

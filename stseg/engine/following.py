@@ -15,7 +15,7 @@ from stseg.config.effect import require_effect
 from stseg.engine.assembly import FinishedSegment, assemble
 from stseg.engine.backgrounds import background_frames
 from stseg.engine.frame_range import FrameRange
-from stseg.engine.job import Job, VolumeKind
+from stseg.engine.job import Job
 from stseg.engine.live_foreground import LiveForegrounds
 from stseg.engine.live_run import LiveRun
 from stseg.engine.reporter import Reporter
@@ -34,6 +34,7 @@ from stseg.io.live.publishing import Publisher, Receiver
 from stseg.io.outputs.whole_files import require_new
 from stseg.io.recording.recording import Recording
 from stseg.io.recording.stream_index import StreamIndex
+from stseg.io.runfile.layout import VolumeKind
 from stseg.io.runfile.provenance import gather_provenance, run_request
 from stseg.io.runfile.runs import Run, read_run
 from stseg.io.runfile.work_folder import WorkFolder

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
 
 from stseg.config import Config
 from stseg.engine.pipeline import Pipeline
 from stseg.engine.segments import Segment, find_gaps, longest_absence, segments
 from stseg.io.recording.recording import Recording
 from stseg.io.recording.stream_index import StreamIndex
-
-VolumeKind = Literal["none", "tracks", "all"]
+from stseg.io.runfile.layout import VolumeKind
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from stseg.config import Config
 from stseg.config.effect import require_effect
 from stseg.engine.assembly import FinishedSegment, assemble
 from stseg.engine.frame_range import FrameRange, resolve_frames
-from stseg.engine.job import Job, VolumeKind
+from stseg.engine.job import Job
 from stseg.engine.reporter import LogReporter, Progress, Reporter
 from stseg.engine.rig_body import with_body_of
 from stseg.engine.workforce import Workforce
@@ -23,6 +23,7 @@ from stseg.io.config_file import format_config, read_config
 from stseg.io.recording.recording import Recording
 from stseg.io.recording.rigs import read_rig
 from stseg.io.recording.stream_index import StreamIndex, index_streams
+from stseg.io.runfile.layout import VolumeKind
 from stseg.io.runfile.provenance import gather_provenance, run_request
 from stseg.io.runfile.runs import Run, read_run
 from stseg.io.runfile.work_folder import WorkFolder

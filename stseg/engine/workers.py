@@ -6,7 +6,6 @@ assigned to another.
 
 from __future__ import annotations
 
-import multiprocessing
 import signal
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
@@ -15,24 +14,16 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from stseg.accelerate import compilation_noted
 from stseg.engine.job import Job
 from stseg.engine.segment_worker import SegmentWorker
 from stseg.engine.segments import Segment
+from stseg.engine.worker_processes import CONTEXT
 from stseg.errors import StsegError, WorkerError
-
-if TYPE_CHECKING:  # Windows has no contexts that fork
-    from multiprocessing.context import ForkServerContext, SpawnContext
 
 _TRIES = 3
 """Number of workers lost by the same segment at which the run fails."""
-_FORKED = "forkserver" in multiprocessing.get_all_start_methods()
-_CONTEXT: ForkServerContext | SpawnContext = (
-    multiprocessing.get_context("forkserver") if _FORKED else multiprocessing.get_context("spawn")
-)
-"""Workers are forked from a process that has imported everything and has no threads, where the system can do that."""
 
 
 @dataclass
@@ -42,15 +33,6 @@ class _Worker:
     process: BaseProcess
     pipe: Connection
     segment: Segment | None = None
-
-
-def prepare_workers() -> None:
-    """Begin the imports of workers, in the process that they are forked from, while this one does other things."""
-    if _FORKED:
-        from multiprocessing import forkserver
-
-        _CONTEXT.set_forkserver_preload([__name__])
-        forkserver.ensure_running()
 
 
 def make_by_workers(
@@ -158,8 +140,8 @@ def _pool(job: Job, number: int) -> Iterator[list[_Worker]]:
 
 def _start(job: Job) -> _Worker:
     """Start a worker process."""
-    own, other = _CONTEXT.Pipe()
-    process = _CONTEXT.Process(target=_main, args=(job, other), daemon=True)
+    own, other = CONTEXT.Pipe()
+    process = CONTEXT.Process(target=_main, args=(job, other), daemon=True)
     process.start()
     other.close()
     return _Worker(process, own)

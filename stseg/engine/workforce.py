@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,12 +10,9 @@ from stseg.engine.cluster import make_by_cluster
 from stseg.engine.job import Job
 from stseg.engine.segment_worker import SegmentWorker
 from stseg.engine.segments import Segment
-from stseg.engine.workers import make_by_workers, prepare_workers
+from stseg.engine.worker_processes import prepare_workers, processes_that_fit
+from stseg.engine.workers import make_by_workers
 from stseg.errors import ConfigError
-from stseg.io.machine import free_memory
-
-_MEMORY = 700 * 2**20
-"""Memory that a process of a run is taken to need, bytes."""
 
 
 @dataclass(frozen=True)
@@ -43,8 +39,8 @@ class Workforce:
 
     def prepare(self) -> None:
         """Make ready what takes time, while the recording is counted."""
-        if self.scheduler is None and self.processes > 1:
-            prepare_workers()
+        if self.scheduler is None:
+            prepare_workers(self.workers)
 
     def make(
         self,
@@ -78,9 +74,3 @@ class Workforce:
             worker = SegmentWorker(job)
             for segment in missing:
                 yield segment, worker.make(segment, draft(segment.index), advance)
-
-
-def processes_that_fit() -> int:
-    """Number of processes of a run for which this machine has cores and free memory, 1 at least."""
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return max(1, min(cores, free_memory() // _MEMORY))

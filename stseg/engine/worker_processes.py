@@ -1,0 +1,41 @@
+"""How many worker processes a run has, and the process that they are forked from.
+
+Both are known here without importing any stage: what forks the workers imports the stages at the same time as the
+process of the command does.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+from typing import TYPE_CHECKING
+
+from stseg.io.machine import free_memory
+
+if TYPE_CHECKING:  # Windows has no contexts that fork
+    from multiprocessing.context import ForkServerContext, SpawnContext
+
+_FORKED = "forkserver" in multiprocessing.get_all_start_methods()
+CONTEXT: ForkServerContext | SpawnContext = (
+    multiprocessing.get_context("forkserver") if _FORKED else multiprocessing.get_context("spawn")
+)
+"""Workers are forked from a process that has imported everything and has no threads, where the system can do that."""
+
+_PRELOADED = "stseg.engine.workers"
+_MEMORY = 700 * 2**20
+"""Memory that a process of a run is taken to need, bytes."""
+
+
+def processes_that_fit() -> int:
+    """Number of processes of a run for which this machine has cores and free memory, 1 at least."""
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return max(1, min(cores, free_memory() // _MEMORY))
+
+
+def prepare_workers(workers: int | None) -> None:
+    """Begin the imports of workers, where there are several (None: as many as fit), while this process does others."""
+    if _FORKED and (processes_that_fit() if workers is None else workers) > 1:
+        from multiprocessing import forkserver
+
+        CONTEXT.set_forkserver_preload([_PRELOADED])
+        forkserver.ensure_running()
