@@ -47,13 +47,13 @@ def test_segments_partition_the_run(rate: float, first: int, length: int, second
         assert part.first - part.lead >= min(part.first - first, warm_up * rate) or part.index == 0
 
 
-def test_less_than_two_segments_are_halved() -> None:
+def test_less_than_two_segments_become_two_of_equal_work() -> None:
     config = Config(segments=SegmentConfig(length=120.0, warm_up=6.0))
     for seconds, number in ((70, 1), (80, 2), (239, 2), (250, 3)):
         parts = segments(10.0, config, 100, 100 + 10 * seconds)
         assert len(parts) == number
         if number == 2:
-            assert abs((parts[0].stop - 100) - 5 * seconds) <= 10 * 8.0
+            assert abs((parts[0].stop - parts[0].lead) - (parts[1].stop - parts[1].lead)) <= 2 * 10
 
 
 @settings(max_examples=40, deadline=None)

@@ -49,8 +49,8 @@ def segments(
     """Segments that cover frames first .. stop - 1 except for gaps, aligned to the commit ranges of windows.
 
     A remainder at the end, or before a gap, of at most a window is added to the last segment. A range shorter than two
-    segments is halved if each half has at least a third of a segment. Each gap is a new beginning, as that of a run:
-    neither a segment nor its warm-up extends across a gap.
+    segments is divided in two if a half has at least a third of a segment. Each gap is a new beginning, as that of a
+    run: neither a segment nor its warm-up extends across a gap.
 
     Parameters
     ----------
@@ -124,13 +124,15 @@ def _lengths(frame_rate: float, config: Config) -> _Lengths:
 def _middle(frame_rate: float, config: Config, first: int, stop: int) -> int | None:
     """Division of a range shorter than two segments; None where the halves would be too short.
 
-    Halves balance the load of two processes, at the same cost of warm-up as any other division.
+    With its warm-up the second has as many frames as the first: two processes end together, at the same cost as by any
+    other division.
     """
     lengths, half = _lengths(frame_rate, config), (stop - first) // 2
     least = max(lengths.segment // _SHORTEST, 2 * window_length(frame_rate, config.tracking)[0])
     if half < least or half >= lengths.segment:
         return None
-    return (first + half - lengths.offset) // lengths.stride * lengths.stride + lengths.offset
+    even = first + half + min(lengths.warm_up, half) // 2
+    return (even - lengths.offset) // lengths.stride * lengths.stride + lengths.offset
 
 
 def endless_segments(frame_rate: float, config: Config, first: int, index: int = 0) -> Iterator[Segment]:
