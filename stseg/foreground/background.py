@@ -103,6 +103,7 @@ class PixelModel(ABC):
     def learn(self, image: Bytes) -> None:
         """Learn a frame of the empty scene, uint8 (v, u, 3) BGR; all such frames have equal weight."""
         self._check(image)
+        image = np.ascontiguousarray(image)
         self._learn_empty(image, self._gain(image))
         self._frames_learned += 1
 
@@ -149,6 +150,7 @@ class PixelModel(ABC):
         self._check(image)
         if self._frames_learned == 0:
             raise SourceError(self.name, "", "a model that has learned nothing", "frames to learn from first")
+        image = np.ascontiguousarray(image)
         gain = self._gain(image)
         log_odds, likelihood = (np.empty(image.shape[:2], np.float32) for _ in range(2))
         self._evaluate(image, gain, log_odds)

@@ -56,7 +56,7 @@ def _count_ratios(image: Bytes, background: Singles, logarithm: Floats, counts: 
                 if min(shown, expected) < _DARKEST or max(shown, expected) > _BRIGHTEST:
                     continue
                 ratio = logarithm[_FINE * int(shown)] - logarithm[int(_FINE * expected + 0.5)]
-                place = middle + round(ratio * bins)
+                place = middle + int(np.rint(ratio * bins))
                 if 0 <= place < counts.shape[1]:
                     counts[c, place] += 1
 

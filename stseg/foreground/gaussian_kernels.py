@@ -82,10 +82,14 @@ def evaluate(image: Bytes, gain: Singles, modes: Singles, priors: Priors, log_od
 @wide_kernel
 def _fill_colour(row: Bytes, colour: Singles) -> None:
     """Fill colour (3, u) from a row of an image, uint8 (u, 3)."""
+    values = row.reshape(-1)
+    blue, green, red = colour[0], colour[1], colour[2]
     for u in range(len(row)):
-        colour[0, u] = row[u, 0]
-        colour[1, u] = row[u, 1]
-        colour[2, u] = row[u, 2]
+        blue[u] = values[3 * u]
+    for u in range(len(row)):
+        green[u] = values[3 * u + 1]
+    for u in range(len(row)):
+        red[u] = values[3 * u + 2]
 
 
 @wide_kernel

@@ -96,8 +96,9 @@ class IlluminationMonitor:
         image : uint8 (v, u, 3) BGR
             The next frame.
         """
-        own = self.model.likelihood(image)
-        rise = 0.0 if self._good is None else self._share_rise(own)
+        own = seen = self.model.likelihood(image)
+        share = self._share(own)
+        rise = 0.0 if self._good is None else share - min(self._shares)
         if self._good is not None and rise > _FAINT * self._config.changed_share:
             if self._open is None and rise > self._config.changed_share:
                 self._record_change()
@@ -106,7 +107,7 @@ class IlluminationMonitor:
         found = own if self._open is None else self._settle(self._open, image, own)
         if found is not None:
             self._good = found
-            self._shares.append(self._share(found))
+            self._shares.append(share if found is seen else self._share(found))
         self._frames += 1
         return found
 
