@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -39,22 +40,22 @@ class Grid:
         """(plane, y, x)."""
         return self.planes, _count(self.y, self.cell), _count(self.x, self.cell)
 
-    @property
+    @cached_property
     def ground_x(self) -> Floats:
         """Cell centres along x, metres, float64 (x,)."""
         return np.asarray(self.x[0] + (np.arange(self.shape[2]) + 0.5) * self.cell, float)
 
-    @property
+    @cached_property
     def ground_y(self) -> Floats:
         """Cell centres along y, metres, float64 (y,)."""
         return np.asarray(self.y[0] + (np.arange(self.shape[1]) + 0.5) * self.cell, float)
 
-    @property
+    @cached_property
     def heights(self) -> Floats:
         """Heights of the planes, metres, float64 (plane,)."""
         return np.linspace(0.0, self.top, self.planes)
 
-    @property
+    @cached_property
     def ground(self) -> Floats:
         """Cell centres, metres, float64 (y, x, 2)."""
         return np.stack(np.meshgrid(self.ground_x, self.ground_y), -1)

@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import connected_components
 from stseg.accelerate import kernel
 from stseg.arrays import Flags, Ints, Labels
 from stseg.graphcut.energy import Energy
-from stseg.graphcut.lattice import Lattice, lattice_of, neighbour, spread
+from stseg.graphcut.lattice import Lattice, neighbour, spread
 
 _OUTSIDE, _FIRST = 1, 2
 
@@ -61,7 +61,7 @@ def subset(energy: Energy, inside: Flags) -> CellSubset:
     start, end, weight = (np.empty(len(energy.offsets) * len(cell), np.int64) for _ in range(3))
     border = np.zeros(len(cell), np.int64)
     nodes = np.flatnonzero(code >= _FIRST)  # in the order of the cells
-    edges = _fill_edges(nodes, code, lattice_of(energy), energy.capacity, start, end, weight, border)
+    edges = _fill_edges(nodes, code, energy.lattice, energy.capacity, start, end, weight, border)
     return CellSubset(cell, start[:edges], end[:edges], weight[:edges], border)
 
 

@@ -18,6 +18,7 @@ from stseg.arrays import Flags, Ints
 from stseg.graphcut.expansion_kernels import (
     Arcs,
     Neighbours,
+    fill_cheapest,
     fill_move,
     fill_neighbours,
     prune_unchanged,
@@ -65,12 +66,8 @@ class LabelEnergy:
 
     def cheapest_labels(self) -> Ints:
         """Label of least unary cost of each node, int64 (n,); of several the first."""
-        cell = np.repeat(np.arange(self.cells), np.diff(self.first))
-        order = np.lexsort((self.label, self.cost, cell))
-        first_cheapest = order[np.unique(cell[order], return_index=True)[1]]
         labels = np.full(self.cells, BACKGROUND, np.int64)
-        gains = first_cheapest[self.cost[first_cheapest] < 0]
-        labels[cell[gains]] = self.label[gains]
+        fill_cheapest(self.first, self.label, self.cost, labels)
         return labels
 
 

@@ -37,6 +37,16 @@ class Arcs(NamedTuple):
 
 
 @kernel
+def fill_cheapest(first: Ints, label: Ints, cost: Ints, labels: Ints) -> None:
+    """Fill labels (n,), which hold the background, with those of least cost below 0; of several the first."""
+    for p in range(len(labels)):
+        least = 0
+        for k in range(first[p], first[p + 1]):
+            if cost[k] < least:
+                least, labels[p] = cost[k], label[k]
+
+
+@kernel
 def fill_neighbours(start: Ints, end: Ints, weight: Ints, adjacency: Neighbours) -> None:
     """Fill the neighbours of all nodes from the edges; adjacency.first holds zeros."""
     for e in range(len(start)):

@@ -7,8 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from stseg.accelerate import part
-from stseg.arrays import AnyArray, Labels
-from stseg.graphcut.energy import Energy
+from stseg.arrays import AnyArray, Ints, Labels
 
 
 class Lattice(NamedTuple):
@@ -36,20 +35,20 @@ class Lattice(NamedTuple):
     frame: int
 
 
-def lattice_of(energy: Energy) -> Lattice:
-    """Lattice of an energy's grid."""
-    frames, planes, rows, columns = energy.unary.shape
+def lattice_of(shape: tuple[int, ...], offsets: Ints, successor: Labels) -> Lattice:
+    """Lattice of a grid of some shape (time, plane, y, x) with the neighbours of `stseg.graphcut.energy.Energy`."""
+    frames, planes, rows, columns = shape
     row, plane = columns + 1, (rows + 1) * (columns + 1)
     frame = (planes + 1) * plane
-    step = energy.offsets[:, 1:] @ (plane, row, 1)
-    spatial = int((energy.offsets[:, 0] == 0).sum())
-    time, y, x = np.nonzero(energy.successor >= 0)
-    to_y, to_x = np.divmod(energy.successor[time, y, x], columns)
+    step = offsets[:, 1:] @ (plane, row, 1)
+    spatial = int((offsets[:, 0] == 0).sum())
+    time, y, x = np.nonzero(successor >= 0)
+    to_y, to_x = np.divmod(successor[time, y, x], columns)
     step_in_time = frame + (to_y - y) * row + to_x - x
     to_next, to_previous = (np.zeros((frames, 1, rows, columns), np.int32) for _ in range(2))
     to_next[time, 0, y, x] = step_in_time
     to_previous[time + 1, 0, to_y, to_x] = -step_in_time
-    forward, backward = (spread(np.broadcast_to(table, energy.unary.shape)) for table in (to_next, to_previous))
+    forward, backward = (spread(np.broadcast_to(table, shape)) for table in (to_next, to_previous))
     return Lattice(np.stack([step, -step], 1).ravel().astype(np.int32), forward, backward, 2 * spatial, frame)
 
 

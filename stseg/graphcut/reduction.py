@@ -14,10 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stseg.accelerate import part
+from stseg.accelerate import kernel, part
 from stseg.arrays import Bytes, Labels
 from stseg.graphcut.energy import Energy
-from stseg.graphcut.lattice import Lattice, lattice_of, neighbour, spread
+from stseg.graphcut.lattice import Lattice, cells, neighbour, spread
 
 GUARD, OPEN, OCCUPIED, EMPTY = 0, 1, 2, 3
 """States of a node: no cell, undecided, label 1, label 0."""
@@ -52,22 +52,40 @@ class Reduction:
 
 def reduce(energy: Energy) -> Reduction:
     """Decide cells by both rules."""
-    lattice, capacity = lattice_of(energy), np.repeat(energy.capacity, 2)
+    lattice, capacity = energy.lattice, np.repeat(energy.capacity, 2)
     unary = spread(energy.unary)
-    weak = np.count_nonzero((energy.unary <= 0) & (energy.unary > -capacity.sum()))
+    state, margin = np.zeros(len(unary), np.uint8), np.zeros_like(unary)
+    shape = energy.unary.shape
+    weak = _fill_sets(energy.unary, int(capacity.sum()), cells(state, shape), cells(margin, shape))
     if weak > HOPELESS * energy.unary.size:
         state = spread(np.full(energy.unary.shape, OPEN, np.uint8))
         left = np.flatnonzero(state).astype(np.int32)
         return Reduction(lattice, capacity, state, left, unary[left])
-    state = spread(np.where(energy.unary > 0, np.uint8(OCCUPIED), np.uint8(EMPTY)))
     stack, undecided = (np.empty(len(state), np.int32) for _ in range(2))
-    # Of several minima the smallest source set is wanted, so a tie decides for label 0 only.
-    margin = np.where(unary > 0, unary - 1, -unary)
     _decide_sets(margin, state, lattice, capacity, stack)
     left = np.flatnonzero(state == OPEN).astype(np.int32)
     _decide_nodes(left, unary, undecided, state, lattice, capacity, stack)
     left = left[state[left] == OPEN]
     return Reduction(lattice, capacity, state, left, unary[left])
+
+
+@kernel
+def _fill_sets(unary: Labels, most: int, state: Bytes, margin: Labels) -> int:
+    """Fill the sets of all cells by sign, and their unary magnitudes, (time, plane, y, x); number of weak ones.
+
+    Of several minima the smallest source set is wanted, so a tie decides for label 0 only.
+    """
+    frames, planes, rows, columns = unary.shape
+    weak = 0
+    for t in range(frames):
+        for p in range(planes):
+            for y in range(rows):
+                for x in range(columns):
+                    gain = unary[t, p, y, x]
+                    state[t, p, y, x] = OCCUPIED if gain > 0 else EMPTY
+                    margin[t, p, y, x] = gain - 1 if gain > 0 else -gain
+                    weak += 1 if -most < gain <= 0 else 0
+    return weak
 
 
 @part

@@ -50,7 +50,9 @@ def find_blobs(
     held = np.flatnonzero(nearest <= reach / 2)
     person[known.searchsorted(people_track[held])] = held
     blobs = _measured(cells, track, person, label, log_odds, grid)
-    without = np.setdiff1d(np.flatnonzero(_in_volume(people_ground, log_odds, grid)), person)
+    alone = _in_volume(people_ground, log_odds, grid)
+    alone[person[person >= 0]] = False
+    without = np.flatnonzero(alone)
     return _joined(blobs, without, people_ground[without], people_track[without], grid)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from stseg.accelerate import kernel
 from stseg.arrays import Floats, Ints, Labels
 from stseg.geometry import Grid
 from stseg.geometry.nearest_person import nearest_person
@@ -55,13 +56,24 @@ def successor_cells(motion: Ints) -> Labels:
     int32 (time, y, x)
         y columns + x of the cell in the next frame, or -1.
     """
-    rows, columns = motion.shape[1:3]
-    to_y, to_x = np.arange(rows)[:, None] + motion[..., 0], np.arange(columns) + motion[..., 1]
-    inside = (to_y >= 0) & (to_y < rows) & (to_x >= 0) & (to_x < columns)
     successor = np.full(motion.shape[:3], -1, np.int32)
-    for frame, inside_now in enumerate(inside):
-        target = (to_y * columns + to_x)[frame][inside_now]
-        moving_first = np.argsort(~motion[frame][inside_now].any(-1), kind="stable")
-        to, first_claim = np.unique(target[moving_first], return_index=True)
-        successor[frame].reshape(-1)[np.flatnonzero(inside_now)[moving_first[first_claim]]] = to
+    _fill_successors(motion, successor)
     return successor
+
+
+@kernel
+def _fill_successors(motion: Ints, successor: Labels) -> None:
+    """Fill successor (time, y, x), which holds -1; moving cells claim theirs before still ones."""
+    frames, rows, columns = successor.shape
+    taken = np.empty((rows, columns), np.bool_)
+    for t in range(frames):
+        taken[:] = False
+        for moving in (True, False):
+            for y in range(rows):
+                for x in range(columns):
+                    down, right = motion[t, y, x, 0], motion[t, y, x, 1]
+                    to_y, to_x = y + down, x + right
+                    inside = 0 <= to_y < rows and 0 <= to_x < columns
+                    if moving == (down != 0 or right != 0) and inside and not taken[to_y, to_x]:
+                        taken[to_y, to_x] = True
+                        successor[t, y, x] = to_y * columns + to_x
