@@ -7,6 +7,7 @@ memory      resident memory of a long run, and the size of its run file
 pixels      share of pixels of people that carry the right label, from film to label images
 points      calibration of the probability of track points
 rig         error of a rig against the true one, on the ground and at head height
+scaling     CPU time of a frame over area, views, people and pixels, with exponents
 sizes       error of heights and widths of tracks, and their spread along a track
 spoil       what spoiled masks and boxes cost, by kinds, strengths, views and crowds
 window      what a window decides better than its frames, and the candidates of people who are missed
@@ -17,7 +18,19 @@ from __future__ import annotations
 import importlib
 import sys
 
-EXPERIMENTS = ("ablation", "certainty", "labels", "memory", "pixels", "points", "rig", "sizes", "spoil", "window")
+EXPERIMENTS = (
+    "ablation",
+    "certainty",
+    "labels",
+    "memory",
+    "pixels",
+    "points",
+    "rig",
+    "scaling",
+    "sizes",
+    "spoil",
+    "window",
+)
 """Each is the module `experiments.NAME` with a function `main`, which reads the command line."""
 
 

@@ -1,0 +1,163 @@
+"""How the time of a frame grows with the ground, the views, the people and the pixels: measured, with exponents.
+
+    python tools/experiment.py scaling -o docs/development/scaling.md [--axes area,views] [--kinds masks,boxes,video]
+
+One of the four is changed at a time; the others stay at 10 m x 10 m, 8 views, 10 people, 320 x 240 pixels. The area is
+that of the grid alone: people and cameras stay where they are, so that the ground is all that grows. Costs are CPU
+milliseconds a frame in one thread, tables and backgrounds made before. Beside the page a picture of its name is drawn.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from workbench import commit
+
+from stseg import Tracker
+from stseg.arrays import Bytes, Floats, Observation
+from stseg.geometry import Rig
+from stseg.simulation import NAMED, Film
+from stseg.simulation.render import RenderedView
+
+AXES = {
+    "area": ("side of the ground, m", (5, 10, 20, 40, 80)),
+    "views": ("views", (2, 4, 8, 16)),
+    "people": ("people", (1, 5, 10, 20, 50)),
+    "pixels": ("width of the images, pixels", (160, 320, 640, 1280)),
+}
+"""What is changed, and the values that it takes."""
+KINDS = ("masks", "boxes", "video")
+_USUAL = {"area": 10, "views": 8, "people": 10, "pixels": 320}
+_MOST_VIEWS = 16
+_READY, _MEASURED = 8, 16
+"""Frames before the clock starts, and while it runs."""
+_EMPTY = 10
+"""Images from which a background is learned."""
+_STAGES = ("foreground", "ghosts", "occupancy", "track")
+_PAGE = """# How the time of a frame grows
+
+CPU milliseconds a frame in one thread, and the share of each stage: foreground, detection (ghosts), occupancy, and the
+tracker with its cuts (track). One value is changed at a time, the others are 10 m x 10 m, 8 views, 10 people and images
+of 320 x 240; the area is that of the grid alone. The exponent is the slope of a line through all logarithms, behind it
+that of the last step. Made by `tools/experiment.py scaling` at commit {commit}.
+
+![Milliseconds a frame over area, views, people and pixels]({picture})
+"""
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A filmed crowd: its rig, the views of each frame, and images of the empty scene by camera."""
+
+    rig: Rig
+    frames: list[tuple[RenderedView, ...]]
+    empty: list[list[Bytes]]
+
+    def by(self, views: int, side: float) -> Shown:
+        """The same by some of the cameras, on a larger or smaller ground."""
+        chosen = range(0, len(self.rig.cameras), len(self.rig.cameras) // views)
+        grid = replace(self.rig.grid, x=(-side / 2, side / 2), y=(-side / 2, side / 2))
+        rig = replace(self.rig, cameras=tuple(self.rig.cameras[k] for k in chosen), grid=grid)
+        return Shown(rig, [tuple(views[k] for k in chosen) for views in self.frames], [self.empty[k] for k in chosen])
+
+    def observed(self, kind: str) -> Iterator[list[Observation]]:
+        """What the cameras deliver of each frame."""
+        for views in self.frames:
+            yield [{"masks": one.mask, "boxes": one.boxes, "video": one.image}[kind] for one in views]
+
+
+@cache
+def crowd(people: int, width: int, views: int) -> Shown:
+    """A crowd on 10 m x 10 m."""
+    spec = replace(
+        NAMED["easy"], area=(10.0, 10.0), camera_distance=9.0, people=people, cameras=views, stay=60.0,
+        seconds=(_READY + _MEASURED) / 10, frame_rate=10.0, size=(width, width * 3 // 4),
+    )  # fmt: skip
+    film = Film(spec)
+    empty = list(film.empty())[-_EMPTY:]
+    return Shown(
+        film.rig, [one.views for one in film.frame_sets()], [[images[k] for images in empty] for k in range(views)]
+    )
+
+
+def shown(axis: str, value: int) -> Shown:
+    """The recording of one measurement."""
+    asked = _USUAL | {axis: value}
+    filmed = _MOST_VIEWS if axis == "views" else asked["views"]
+    return crowd(asked["people"], asked["pixels"], filmed).by(asked["views"], asked["area"])
+
+
+def cost(recording: Shown, kind: str) -> tuple[float, list[float]]:
+    """CPU milliseconds a frame, and the share of each stage."""
+    empty = {one.name: images for one, images in zip(recording.rig.cameras, recording.empty, strict=True)}
+    tracker, results, start = Tracker(recording.rig, empty=empty if kind == "video" else None), [], 0.0
+    for k, views in enumerate(recording.observed(kind)):
+        if k == _READY:
+            start = time.process_time()
+        results += tracker.add(views)
+    results += tracker.finish()
+    taken = 1000 * (time.process_time() - start) / (len(recording.frames) - _READY)
+    timings = np.concatenate([one.timings for one in results])
+    seconds = [float(timings["seconds"][timings["stage"] == stage.encode()].sum()) for stage in _STAGES]
+    return taken, [one / sum(seconds) for one in seconds]
+
+
+def exponent(values: Sequence[int], taken: Sequence[float]) -> str:
+    """Slope over all logarithms, and of the last step."""
+    x, y = np.log(values), np.log(taken)
+    return f"{np.polyfit(x, y, 1)[0]:.2f}, last {(y[-1] - y[-2]) / (x[-1] - x[-2]):.2f}"
+
+
+def draw(found: dict[str, dict[str, list[float]]], path: Path) -> None:
+    """A panel for each axis, a line for each kind."""
+    import matplotlib.pyplot as plt
+
+    plt.rcParams.update({"svg.hashsalt": "scaling", "svg.fonttype": "none"})
+    figure, panels = plt.subplots(1, len(found), figsize=(3.2 * len(found), 3.0), squeeze=False, sharey=True)
+    for panel, (axis, by_kind) in zip(panels[0], found.items(), strict=True):
+        label, values = AXES[axis]
+        for kind, taken in by_kind.items():
+            panel.loglog(values, taken, marker="o", markersize=3, label=kind)
+        panel.set_xticks(values, [str(value) for value in values])
+        panel.minorticks_off()
+        panel.set_xlabel(label)
+        panel.grid(alpha=0.3)
+    panels[0][0].set_ylabel("CPU ms a frame")
+    panels[0][0].legend()
+    figure.tight_layout()
+    figure.savefig(path, metadata={"Date": None})
+
+
+def main() -> None:
+    """Measure; write the page and the picture."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("-o", "--output", type=Path, required=True)
+    parser.add_argument("--axes", type=lambda text: text.split(","), default=list(AXES))
+    parser.add_argument("--kinds", type=lambda text: text.split(","), default=list(KINDS))
+    asked = parser.parse_args()
+    picture: Path = asked.output.with_suffix(".svg")
+    lines, found = [_PAGE.format(commit=commit(), picture=picture.name)], dict[str, dict[str, list[float]]]()
+    for axis in asked.axes:
+        label, values = AXES[axis]
+        lines += [
+            f"\n| {label} | {' | '.join(map(str, values))} | exponent |",
+            f"| --- |{' --: |' * len(values)} --- |",
+        ]
+        found[axis] = {}
+        for kind in asked.kinds:
+            measured = [cost(shown(axis, value), kind) for value in values]
+            taken = found[axis][kind] = [one for one, _ in measured]
+            print(axis, kind, [round(one, 1) for one in taken], flush=True)
+            lines.append(f"| {kind} | {' | '.join(f'{one:.1f}' for one in taken)} | {exponent(values, taken)} |")
+            shares: Floats = np.array([share for _, share in measured])
+            for stage, own in zip(_STAGES, shares.T, strict=True):
+                lines.append(f"| &nbsp; {stage} | {' | '.join(f'{100 * one:.0f} %' for one in own)} | |")
+        crowd.cache_clear()
+    asked.output.write_text("\n".join(lines) + "\n", "utf-8")
+    draw(found, picture)
