@@ -69,7 +69,7 @@ class Shown:
     def observed(self, kind: str) -> Iterator[list[Observation]]:
         """What the cameras deliver of each frame."""
         for views in self.frames:
-            yield [{"masks": one.mask, "boxes": one.boxes, "video": one.image}[kind] for one in views]
+            yield [one.boxes if kind == "boxes" else one.mask if kind == "masks" else one.image for one in views]
 
 
 @cache
