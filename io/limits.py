@@ -48,6 +48,8 @@ FRAMES = 20_000_000
 """Frames of a recording, and frame numbers."""
 BOXES_PER_FRAME = 10_000
 """Detections of one camera in one frame."""
+FEATURES = 4096
+"""Numbers of a detector's appearance feature."""
 PEOPLE_PER_FRAME = 2_000
 """Rows of one frame in a table of tracks."""
 ROWS = 20_000_000

@@ -35,13 +35,21 @@ class Boxes:
         left, top, width, height in pixels; edges, not pixel centres, of the distorted image.
     score : float64 (n,)
         Detection score of each box, 0..1; 1 where the detector gives none.
+    features : float32 (n, feature), or None
+        Appearance features of each box, as the detector gives them.
     """
 
     pixel: Floats
     score: Floats
+    features: Singles | None = None
 
     def __len__(self) -> int:
         return len(self.pixel)
+
+    def of(self, chosen: Flags | Ints | slice) -> Boxes:
+        """A subset, by index, mask or slice."""
+        features = None if self.features is None else self.features[chosen]
+        return Boxes(self.pixel[chosen], self.score[chosen], features)
 
 
 Observation = Bytes | NDArray[np.uint16] | Singles | Boxes | None

@@ -18,6 +18,7 @@ from stseg.engine.pipeline import Pipeline
 from stseg.engine.session import run_session
 from stseg.evaluation import evaluate
 from stseg.foreground.view_foreground import ViewForeground
+from stseg.model.tables import APPEARANCE
 
 ROOT = Path(__file__).parents[1]
 INTERPRETED = python_form(set_score) is set_score
@@ -67,6 +68,6 @@ def test_two_labels_track_isolated_people(ablation: ModuleType) -> None:
         )
     ]
     rows, events = (np.concatenate([getattr(c, name) for c in commits]) for name in ("trajectory", "events"))
-    tracks, _ = pipeline.finished(rows, events)
+    tracks, _ = pipeline.finished(rows, events, np.zeros(0, APPEARANCE))
     scores = evaluate(truth[truth["frame"] < 20], tracks.trajectory)
     assert (scores.switches, scores.misses, scores.false_alarms) == (0, 0, 0)

@@ -19,6 +19,7 @@ from stseg.engine.session import run_session
 from stseg.errors import ConfigError
 from stseg.evaluation import evaluate
 from stseg.foreground.view_foreground import ViewForeground
+from stseg.model.tables import APPEARANCE
 from stseg.simulation import NAMED, Film, Route, SceneSpec
 from stseg.simulation.film import SimulatedFrame as Filmed
 from stseg.simulation.script import walk_routes
@@ -133,7 +134,7 @@ def switches(name: str, kind: str, stop: int) -> int:
         step.commit for step in run_session(pipeline, [ViewForeground() for _ in rig.cameras], moments, 0, done.append)
     ]
     rows, events = (np.concatenate([getattr(c, name) for c in commits]) for name in ("trajectory", "events"))
-    tracks, _ = pipeline.finished(rows, events)
+    tracks, _ = pipeline.finished(rows, events, np.zeros(0, APPEARANCE))
     scores = evaluate(np.concatenate([seen.truth for seen in film]), tracks.trajectory)
     assert scores.misses <= 0.02 * scores.truths
     return scores.switches

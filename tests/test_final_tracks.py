@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from strollers import BORDER, CONFIG, RATE, gone, rows_of, runs, swapped, visit
 
 from stseg.arrays import Rows
-from stseg.model.tables import EVENT, TRAJECTORY
+from stseg.model.tables import APPEARANCE, EVENT, TRAJECTORY
 from stseg.tracking.final_tracks import FinalTracks, final_tracks
 
 
@@ -33,7 +33,7 @@ def lives(rows: Rows) -> Rows:
 
 
 def whole(rows: Rows, events: Rows) -> FinalTracks:
-    return final_tracks(rows, events, RATE, BORDER, CONFIG)
+    return final_tracks(rows, events, np.zeros(0, APPEARANCE), RATE, BORDER, CONFIG)
 
 
 def story(events: Rows) -> list[tuple[int, bytes, int, int]]:

@@ -140,7 +140,7 @@ def moving_ghosts(kind: str) -> Run:
     ]
     steps = list(run_session(pipeline, [ViewForeground()] * 2, moments, 0, lambda _: None))
     rows, events = (np.concatenate([getattr(s.commit, name) for s in steps]) for name in ("trajectory", "events"))
-    return Run(steps, pipeline.finished(rows, events)[0])
+    return Run(steps, pipeline.finished(rows, events, np.concatenate([s.appearance for s in steps]))[0])
 
 
 @pytest.mark.parametrize("kind", KINDS)

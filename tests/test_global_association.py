@@ -9,14 +9,15 @@ from hypothesis import strategies as st
 from strollers import BORDER, CONFIG, RATE, gone, rows_of, runs, swapped, visit
 
 from stseg.arrays import Ints, Rows
-from stseg.model.tables import EVENT, TRAJECTORY
+from stseg.model.tables import APPEARANCE, EVENT, TRAJECTORY
 from stseg.tracking.identities.global_association import GlobalAssociation, associate_globally
 from stseg.tracking.identities.size_model import MeasuredSizes
 from stseg.tracking.isolated_tracklets import isolated_tracklets
 
 
 def relinked(rows: Rows) -> GlobalAssociation:
-    return associate_globally(rows, MeasuredSizes.of_heights(rows["height"], CONFIG), RATE, BORDER, CONFIG)
+    sizes = MeasuredSizes.of_heights(rows["height"], CONFIG)
+    return associate_globally(rows, sizes, np.zeros(0, APPEARANCE), RATE, BORDER, CONFIG)
 
 
 def names(rows: Rows, identity: Ints, track: int, frames: range) -> set[int]:

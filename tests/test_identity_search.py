@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from reference_identities import greatest_score, score
-from strollers import BORDER, CONFIG, RATE, rows_of, runs, swapped, visit
+from strollers import BORDER, CONFIG, RATE, rows_of, runs, straight, swapped, visit
 
 from stseg.arrays import Floats, Ints, Rows
 from stseg.tracking.identities import search
@@ -15,16 +17,16 @@ from stseg.tracking.identities.search import SearchLimits, search_identities
 from stseg.tracking.identities.size_model import MeasuredSizes, SizeModel, SizePrior, learn_sizes
 from stseg.tracking.isolated_tracklets import isolated_tracklets
 
-MODEL = SizeModel(np.array([1.7]), np.array([0.03**2]), np.array([0.5]), np.array([0.1**2]))
+MODEL = SizeModel(np.array([1.7]), np.array([0.03**2]), np.array([0.5]), np.array([0.1**2]), np.full(1, np.inf))
 LONGEST = 1.0
 
 
 def seen_of(rows: Rows) -> Observations:
-    return observe(rows, MeasuredSizes.of_heights(rows["height"], CONFIG), MODEL, RATE, BORDER, CONFIG)
+    return observe(rows, rows["height"][:, None].astype(float), MODEL, RATE, BORDER, CONFIG)
 
 
 def found(seen: Observations, lag: float = 60.0, hypotheses: int = 400) -> Ints:
-    return search_identities(seen, MODEL.spread, CONFIG.motion, SearchLimits(hypotheses, LONGEST, lag))
+    return search_identities(seen, MODEL, CONFIG.motion, SearchLimits(hypotheses, LONGEST, lag))
 
 
 @settings(max_examples=60, deadline=None)
@@ -57,6 +59,18 @@ def sizes_of(people: Floats, noise: float, seed: int = 0) -> tuple[MeasuredSizes
     value = np.repeat(people, 80) + rng.normal(0, noise, 80 * len(people))
     frame = np.tile(np.arange(80), len(people))
     return MeasuredSizes(value[:, None], [SizePrior(0.05, 0.1)]), frame, np.split(np.arange(len(value)), len(people))
+
+
+@pytest.mark.parametrize(("most", "people"), [(np.inf, 3), (1.0, 2)])
+def test_outliers_say_no_more_against_a_person_than_they_may(most: float, people: int) -> None:
+    """Two walk side by side; for a frame one of them is measured far too short."""
+    rows = rows_of({k: (straight(-1, 0.5 * k, 0.5, 0), 1.7 + 0.1 * k, range(20)) for k in (1, 2)}, noise=0.0)
+    rows["xx"] = rows["yy"] = 0.02
+    rows["height"][(rows["id"] == 1) & (rows["frame"] == 10)] = 1.2
+    seen = observe(rows, rows["height"][:, None].astype(float), MODEL, RATE, BORDER, CONFIG)
+    model = replace(MODEL, most_against=np.full(1, most))
+    found = search_identities(seen, model, CONFIG.motion, SearchLimits(50, LONGEST, 60.0))
+    assert len(np.unique(found)) == people
 
 
 def test_noise_and_spread_of_a_size_are_learned() -> None:

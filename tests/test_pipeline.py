@@ -63,7 +63,11 @@ def run(kind: str, moments: Iterable[Moment], tracker: str = "cut", first: int =
     advanced: list[int] = []
     steps = list(run_session(pipeline, foregrounds(), moments, first, advanced.append))
     trajectory = np.concatenate([step.commit.trajectory for step in steps])
-    tracks, identity = pipeline.finished(trajectory, np.concatenate([step.commit.events for step in steps]))
+    tracks, identity = pipeline.finished(
+        trajectory,
+        np.concatenate([step.commit.events for step in steps]),
+        np.concatenate([step.appearance for step in steps]),
+    )
     return Run(steps, tracks, identity, advanced)
 
 

@@ -19,6 +19,7 @@ from stseg.evaluation import evaluate
 from stseg.evaluation.scores import Scores
 from stseg.evaluation.sequence import Area
 from stseg.foreground.view_foreground import ViewForeground
+from stseg.io.recording.appearance_axes import appearance_axes
 from stseg.io.recording.frames import open_frames
 from stseg.io.recording.recording import Recording
 from stseg.io.recording.rigs import read_rig
@@ -40,7 +41,7 @@ class Perturbed(ViewForeground):
         evidence = super().evidence(seen)
         if isinstance(evidence, Boxes):
             kept = self._rng.random(len(evidence)) >= DROPPED
-            return Boxes(evidence.pixel[kept], evidence.score[kept])
+            return evidence.of(kept)
         return None if self._rng.random() < DROPPED else evidence
 
 
@@ -62,12 +63,13 @@ def track(
         pairs = zip(foregrounds, streams, strict=True)
         foregrounds = [Perturbed(whole, np.random.default_rng(stream)) for whole, stream in pairs]
     kinds = ["boxes" if source.source.kind in ("boxes", "instances") else "pixels" for source in recording.sources]
-    pipeline = Pipeline(recording.rig, kinds, config, tracker)
+    pipeline = Pipeline(recording.rig, kinds, config, tracker, appearance_axes(recording))
     done: list[int] = []
     with open_frames(recording, first, stop) as frames:
         steps = list(run_session(pipeline, foregrounds, frames, first, done.append))
     committed, events = (np.concatenate([getattr(s.commit, name) for s in steps]) for name in ("trajectory", "events"))
-    return Outcome(committed, pipeline.finished(committed, events)[0].trajectory)
+    appearance = np.concatenate([step.appearance for step in steps])
+    return Outcome(committed, pipeline.finished(committed, events, appearance)[0].trajectory)
 
 
 def first_views(recording: Recording, number: int) -> Recording:

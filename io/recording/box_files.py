@@ -13,7 +13,7 @@ from typing import TextIO
 
 import numpy as np
 
-from stseg.arrays import Boxes, Flags, Floats, Ints
+from stseg.arrays import Boxes, Flags, Floats, Ints, Singles
 from stseg.errors import FormatError, SourceError
 from stseg.io import limits
 from stseg.io.bounded_files import require_regular
@@ -37,17 +37,23 @@ class BoxTable:
         left, top, width, height.
     score : float64 (n,)
         0..1.
+    row : int64 (n,)
+        Which box of the file each is.
+    features : float32 (n, feature), or None
+        Appearance features.
     """
 
     frames: int
     frame: Ints
     pixel: Floats
     score: Floats
+    row: Ints
+    features: Singles | None = None
 
     def at(self, frame: int) -> Boxes:
         """The boxes of one frame, in the file's order."""
         start, stop = np.searchsorted(self.frame, (frame, frame + 1))
-        return Boxes(self.pixel[start:stop], self.score[start:stop])
+        return Boxes(self.pixel, self.score, self.features).of(slice(start, stop))
 
 
 @dataclass(frozen=True)
@@ -103,7 +109,7 @@ def read_boxes(path: Path, first_frame: int = 0, frames: int | None = None) -> B
         found = f"more than {limits.BOXES_PER_FRAME} boxes in frame {frame[order][crowded[0]] + first_frame}"
         raise FormatError(path, "", found, "no more")
     length = int(frame.max()) + 1 if frames is None else frames
-    return BoxTable(length, frame[order], values[order, 1:5], score[order])
+    return BoxTable(length, frame[order], values[order, 1:5], score[order], order)
 
 
 def _check(lines: _Lines, first_frame: int, frames: int | None) -> None:

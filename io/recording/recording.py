@@ -53,6 +53,8 @@ class Source:
         boxes only: file with the images of COCO results.
     columns
         boxes only: pairs of our name and a CSV or Parquet file's name of a column.
+    appearance
+        boxes only: .npy file of appearance features, one row a detection in the order of the detections; None without.
     """
 
     kind: SourceKind
@@ -68,6 +70,7 @@ class Source:
     select: str = ""
     image_list: Path | None = None
     columns: tuple[tuple[str, str], ...] = ()
+    appearance: Path | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -93,6 +93,8 @@ def _source_text(source: Source, folder: Path) -> str:
         entries.append(f"select = {toml_string(source.select)}")
     if source.image_list is not None:
         entries.append(f"image_list = {toml_string(_relative(source.image_list, folder).as_posix())}")
+    if source.appearance is not None:
+        entries.append(f"appearance = {toml_string(_relative(source.appearance, folder).as_posix())}")
     if source.columns:
         pairs = ", ".join(f"{toml_string(own)} = {toml_string(name)}" for own, name in source.columns)
         entries.append(f"columns = {{ {pairs} }}")

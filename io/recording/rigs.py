@@ -39,7 +39,7 @@ _CAMERA_KEYS = (
     *("name", "size", "ground", "vertical", "projection", "lens"),
     *("offset", "source", "images", "background", "on_missing", "clock"),
 )
-_DETECTION_KEYS = ("first_frame", "frames", "classes", "score", "view", "select", "image_list", "columns")
+_DETECTION_KEYS = ("first_frame", "frames", "classes", "score", "view", "select", "image_list", "columns", "appearance")
 
 
 def read_rig(path: str | Path) -> Recording:
@@ -251,6 +251,7 @@ def _source(table: Table, *more_keys: str) -> Source:
         select=table.text("select") if "select" in table else "",
         image_list=table.file.parent / table.text("image_list") if "image_list" in table else None,
         columns=_columns(table.table("columns")) if "columns" in table else (),
+        appearance=table.file.parent / table.text("appearance") if "appearance" in table else None,
     )
 
 

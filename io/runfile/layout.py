@@ -14,7 +14,18 @@ import numpy as np
 
 from stseg.arrays import Floats
 from stseg.geometry import Grid
-from stseg.model.tables import BOX, CANDIDATE, EVENT, RATES, SHIFT, TIMING, TRACK, TRAJECTORY, WINDOW
+from stseg.model.tables import (
+    APPEARANCE,
+    BOX,
+    CANDIDATE,
+    EVENT,
+    RATES,
+    SHIFT,
+    TIMING,
+    TRACK,
+    TRAJECTORY,
+    WINDOW,
+)  # fmt: skip
 
 FORMAT = "stseg-run"
 VERSION = 1
@@ -77,13 +88,16 @@ ABOUT = {
     "rates": "one row per window and view: error rates of the view, 0..1, and its reprojection residual, metres",
     "shifts": "every other second, image shift of each colour view since its background was learned, pixels",
     "timings": "seconds per stage and window; window -1 for work outside windows",
+    "committed": "rows before identities were decided, as in trajectory; id is the filter's track",
+    "committed_events": "events before identities were decided",
+    "appearance": "one row per detection, frame and view that sees it apart: colours and features, a few numbers",
 }
 """Every table and its contents."""
 
 EARLIER = {LOG_ODDS.name: np.dtype("<f2")}
 """Types of fields in the first files of this version, which readers accept; browsers cannot show half precision."""
 
-ADDED = frozenset({"rates", "shifts"})
+ADDED = frozenset({"rates", "shifts", "committed", "committed_events", "appearance"})
 """Tables absent from the first files of this version; read as empty."""
 
 ADDED_COLUMNS = frozenset({"width", "aside"})
@@ -102,6 +116,9 @@ def table_types(views: int) -> dict[str, np.dtype[np.void]]:
         "rates": RATES,
         "shifts": SHIFT,
         "timings": TIMING,
+        "committed": TRAJECTORY,
+        "committed_events": EVENT,
+        "appearance": APPEARANCE,
     }
 
 

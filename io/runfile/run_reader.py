@@ -122,6 +122,21 @@ class Run:
         return self._table("timings")
 
     @cached_property
+    def committed(self) -> Rows:
+        """TRAJECTORY (n,) before identities were decided, ids of the filter; empty in a file that has none."""
+        return self._table("committed")
+
+    @cached_property
+    def committed_events(self) -> Rows:
+        """EVENT (n,) before identities were decided; empty in a file that has none."""
+        return self._table("committed_events")
+
+    @cached_property
+    def appearance(self) -> Rows:
+        """APPEARANCE (n,); empty in a file that has none."""
+        return self._table("appearance")
+
+    @cached_property
     def names(self) -> dict[int, str]:
         """Names of tracks by id, where they were given (`stseg correct`, or `with_names`)."""
         if self.given_names is not None:

@@ -52,6 +52,9 @@ class TrackingConfig:
     """Joint hypotheses of all identities that are kept: more are slower, and right more often in crowds."""
     identity_lag: float = 60.0
     """Time after which the identities of the best hypothesis are final, seconds."""
+    appearance: Literal["learned", "none"] = "learned"
+    """Use of colours and of a detector's features for identities: as much as they tell in the recording, or none; with
+    none, nothing of them is stored."""
     interpolation_gap: float = 1.0
     """Longest gap that is filled with interpolated positions, seconds."""
     minimum_duration: float = 0.8

@@ -18,13 +18,13 @@ from stseg.io.config_file import format_config
 from stseg.io.recording.time_alignment import with_alignment
 from stseg.io.runfile.packed_frames import packed_frame
 from stseg.io.runfile.runs import Run, RunWriter, read_run
-from stseg.model.tables import Tracks
+from stseg.model.tables import APPEARANCE, Tracks
 from stseg.trackers import find_tracker
 from stseg.tracking.stitching import SegmentTracks, Stitcher, rename_labels
 
 _BLOCK = 64
 """Frames of the volume read at a time."""
-_COPIED = ("ghosts", "windows", "rates", "shifts", "timings")
+_COPIED = ("ghosts", "windows", "rates", "shifts", "timings", "appearance")
 """Tables of the segments that the run file takes unchanged."""
 
 
@@ -62,14 +62,16 @@ def assemble(job: Job, finished: Sequence[FinishedSegment], output: Path) -> Tra
     """
     stitcher = Stitcher(round(job.config.tracking.patience * job.recording.rig.frame_rate))
     before = finished[0].segment.first if finished else 0
+    looks = [np.zeros(0, APPEARANCE)]
     for segment, path in finished:
         run = read_run(path)
         stitcher.add(SegmentTracks(segment.first, run.trajectory, run.events, segment.first - before))
         before = segment.stop
+        looks.append(run.appearance)
     joined = stitcher.joined()
     shown, tracker = job.recording.rig, find_tracker(job.tracker)
     tracks, identity = finished_tracks(
-        job.read.read_rig, job.config, tracker, joined.committed, joined.events, shown
+        job.read.read_rig, job.config, tracker, joined.committed, joined.events, np.concatenate(looks), shown
     )  # fmt: skip
     views = read_run(finished[0].path).views
     config = format_config(job.config)
@@ -81,6 +83,8 @@ def assemble(job: Job, finished: Sequence[FinishedSegment], output: Path) -> Tra
         for part in _segment_rows(finished, joined.committed, joined.local, identity):
             _copy(part, writer, packers)
         writer.append("trajectory", tracks.trajectory)
+        writer.append("committed", joined.committed)
+        writer.append("committed_events", joined.events)
         writer.append("boxes", tracks.boxes)
         writer.append("events", tracks.events)
         writer.finish(tracks.summary())

@@ -29,6 +29,8 @@ class CommittedFrames:
     rates : RATES (view,)
         Error rates by which the last of the frames was fused; `aside` is a mean over all of them.
     timings : TIMING (k,)
+    appearance : APPEARANCE (l,)
+        What detections look like.
     """
 
     commit: Commit
@@ -36,6 +38,7 @@ class CommittedFrames:
     parts: Floats
     rates: Rows
     timings: Rows
+    appearance: Rows
 
     @property
     def frames(self) -> Ints:
@@ -85,6 +88,7 @@ class CommittedFrames:
             self.parts[candidate],
             self.rates[_inside(self.rates["frame"], first, stop)],
             self.timings,
+            self.appearance[_inside(self.appearance["frame"], first, stop)],
         )
 
 
@@ -96,18 +100,20 @@ class FusedEvidence(NamedTuple):
 
 
 class FrameRecord(NamedTuple):
-    """A frame's explanation and its fusion, which may still be at work: kept until the frame is committed."""
+    """A frame's explanation, fusion (which may still be at work) and APPEARANCE: kept until it is committed."""
 
     explanation: Explanation
     fusion: Future[FusedEvidence]
+    appearance: Rows
 
 
 def committed_frames(commit: Commit, records: dict[int, FrameRecord], watch: Stopwatch) -> CommittedFrames:
     """The results of a tracker's commit; takes its frames out of `records` and their time out of `watch`."""
-    rows, parts, residuals = [], [], []
+    rows, parts, residuals, appearance = [], [], [], []
     for fused in commit.frames:
-        explanation, fusion = records.pop(fused.frame)
+        explanation, fusion, looks = records.pop(fused.frame)
         rates = fusion.result().rates
+        appearance.append(looks)
         residuals.append(explanation.residual)
         for status, candidates in ((1, explanation.people), (0, explanation.ghosts)):
             rows.append(_candidate_rows(fused.frame, status, candidates))
@@ -115,8 +121,9 @@ def committed_frames(commit: Commit, records: dict[int, FrameRecord], watch: Sto
     rates["aside"] = _finite_mean(np.array(residuals))
     window = int(commit.windows["index"][0]) if len(commit.windows) else commit.frames[0].frame
     return CommittedFrames(
-        commit, np.concatenate(rows), np.concatenate(parts).astype(np.float32), rates, watch.take(window)
-    )
+        commit, np.concatenate(rows), np.concatenate(parts).astype(np.float32), rates, watch.take(window),
+        np.concatenate(appearance),
+    )  # fmt: skip
 
 
 def rate_rows(frame: int, calibration: RateCalibration) -> Rows:

@@ -8,6 +8,7 @@ from functools import cached_property
 from stseg.config import Config
 from stseg.engine.pipeline import Pipeline
 from stseg.engine.segments import Segment, find_gaps, longest_absence, segments
+from stseg.io.recording.appearance_axes import appearance_axes
 from stseg.io.recording.recording import Recording
 from stseg.io.recording.stream_index import StreamIndex
 from stseg.io.runfile.layout import VolumeKind
@@ -55,4 +56,4 @@ class Job:
         """The stages, with their tables."""
         sources = [source.source.kind for source in self.recording.sources]
         kinds = ["boxes" if kind in ("boxes", "instances") else "pixels" for kind in sources]
-        return Pipeline(self.read.read_rig, kinds, self.config, self.tracker)
+        return Pipeline(self.read.read_rig, kinds, self.config, self.tracker, appearance_axes(self.recording))

@@ -11,14 +11,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from stseg.arrays import Ints, Rows
+import numpy as np
+
+from stseg.arrays import Floats, Ints, Observation, Rows, ViewEvidence
 from stseg.config import Config
+from stseg.detection.appearance import appearance_rows
 from stseg.detection.detector import Detector
 from stseg.detection.proposals import Proposals
 from stseg.geometry import Rig
 from stseg.geometry.bodies import BodyTable
 from stseg.model.border import Border
-from stseg.model.tables import Tracks
+from stseg.model.people import Explanation
+from stseg.model.tables import APPEARANCE, Tracks
 from stseg.occupancy.volume import Occupancy
 from stseg.trackers import find_tracker
 from stseg.trackers.protocol import Tracker
@@ -39,23 +43,43 @@ class Pipeline:
         The constants of all stages.
     tracker
         Its name, one of `stseg.trackers.TRACKERS`.
+    axes : float64 (feature, k), or None
+        By which appearance features of boxes are reduced; None where boxes have none.
     """
 
-    def __init__(self, rig: Rig, kinds: Sequence[str], config: Config, tracker: str) -> None:
+    def __init__(
+        self, rig: Rig, kinds: Sequence[str], config: Config, tracker: str, axes: Floats | None = None
+    ) -> None:
         self.rig, self.config, self.tracker = rig, config, find_tracker(tracker)
         body = replace(config.body, heights=config.body.box_heights) if "boxes" in kinds else config.body
         self.detector = Detector(rig, kinds, config.detection, body, config.error_rates)
         self.occupancy = Occupancy(rig, kinds, config.occupancy, config.detection, body, config.error_rates)
         self.proposals = Proposals(rig, kinds, config)
+        self.axes = axes
 
-    def finished(self, committed: Rows, events: Rows, shown: Rig | None = None) -> tuple[Tracks, Ints]:
+    def appearance_rows(
+        self,
+        frame: int,
+        explanation: Explanation,
+        observations: Sequence[Observation],
+        evidence: Sequence[ViewEvidence],
+    ) -> Rows:
+        """APPEARANCE rows of a frame, as far as the configuration wants them."""
+        if self.tracker.final or self.config.tracking.appearance == "none":
+            return np.zeros(0, APPEARANCE)
+        tables = [view.table for view in self.detector.views]
+        return appearance_rows(frame, explanation, tables, self.axes, observations, evidence)
+
+    def finished(
+        self, committed: Rows, events: Rows, appearance: Rows, shown: Rig | None = None
+    ) -> tuple[Tracks, Ints]:
         """The tracks of a whole run (`finished_tracks`), their boxes in this rig's pixels or those of another."""
         shown = self.rig if shown is None else shown
-        return finished_tracks(self.rig, self.config, self.tracker, committed, events, shown)
+        return finished_tracks(self.rig, self.config, self.tracker, committed, events, appearance, shown)
 
 
 def finished_tracks(
-    rig: Rig, config: Config, tracker: type[Tracker], committed: Rows, events: Rows, shown: Rig
+    rig: Rig, config: Config, tracker: type[Tracker], committed: Rows, events: Rows, appearance: Rows, shown: Rig
 ) -> tuple[Tracks, Ints]:
     """The tracks of a whole run, and the track id of each committed row.
 
@@ -67,12 +91,14 @@ def finished_tracks(
         Rows of all frames, as the tracker committed them.
     events : EVENT (k,)
         All events, as the tracker committed them.
+    appearance : APPEARANCE (l,)
+        What the detections look like.
     shown
         The rig in whose pixels the tracks' boxes are given.
     """
     if tracker.final:
         whole = committed_tracks(committed, events, rig.frame_rate, config.tracking)
     else:
-        whole = final_tracks(committed, events, rig.frame_rate, Border.of(rig), config)
+        whole = final_tracks(committed, events, appearance, rig.frame_rate, Border.of(rig), config)
     tables = [BodyTable.of(camera, shown.grid) for camera in shown.cameras]
     return Tracks(whole.trajectory, box_rows(tables, whole.trajectory), whole.events), whole.identity

@@ -56,6 +56,7 @@ def write_step(job: Job, step: CommittedFrames, segment: Segment, writer: RunWri
     writer.append("events", own.commit.events)
     writer.append("windows", own.commit.windows)
     writer.append("rates", own.rates)
+    writer.append("appearance", own.appearance)
 
 
 def _kept(job: Job, step: CommittedFrames, frames: Ints, log_odds: Singles) -> tuple[Singles, Labels]:

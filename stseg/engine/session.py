@@ -96,7 +96,9 @@ class Session:
                 self._box_noise, self._population, evidence, predicted, proposed
             )
         fusion = self._submit(frame, evidence, explanation, noise)
-        self._records[frame] = FrameRecord(explanation, fusion)
+        with self.watch.time("appearance"):
+            looks = self.pipeline.appearance_rows(frame, explanation, frame_set.views, evidence)
+        self._records[frame] = FrameRecord(explanation, fusion, looks)
         fused = FusedFrame(frame, explanation.people, explanation.ghosts, lambda: fusion.result().log_odds)
         with self.watch.time("track"):
             commits = self._tracker.add(fused, FrameObservations(frame_set.views, evidence))

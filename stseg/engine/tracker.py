@@ -19,7 +19,7 @@ from stseg.geometry import Rig
 from stseg.geometry.reduction import greatest_reduction
 from stseg.io.recording.frames import FrameSet
 from stseg.io.recording.pictures import reduced_view
-from stseg.model.tables import EVENT, TRAJECTORY, Tracks
+from stseg.model.tables import APPEARANCE, EVENT, TRAJECTORY, Tracks
 
 
 class Tracker:
@@ -104,7 +104,8 @@ class Tracker:
             return Tracks(np.zeros(0, TRAJECTORY))
         rows: Rows = np.concatenate([np.zeros(0, TRAJECTORY), *(result.commit.trajectory for result in results)])
         events: Rows = np.concatenate([np.zeros(0, EVENT), *(result.commit.events for result in results)])
-        return self._session.pipeline.finished(rows, events, self.rig)[0]
+        looks: Rows = np.concatenate([np.zeros(0, APPEARANCE), *(result.appearance for result in results)])
+        return self._session.pipeline.finished(rows, events, looks, self.rig)[0]
 
     def _begin(self, seen: Sequence[Observation], frame: int) -> Session:
         """The stages, for the kinds of the first observations; a blind camera is taken to be of the others' kind."""

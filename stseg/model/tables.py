@@ -77,6 +77,21 @@ CANDIDATE = np.dtype(
 )
 """One row per candidate and frame, true or ghost. In the run file each row also has one column a view."""
 
+FEATURES, COLOURS = 16, 6
+"""Numbers of APPEARANCE."""
+
+APPEARANCE = np.dtype(
+    [
+        ("frame", "<i8"),
+        ("x", "<f8"),  # metres, place of the detection, as raw_x and raw_y of its trajectory row
+        ("y", "<f8"),
+        ("view", "<i4"),
+        ("features", "<f4", (FEATURES,)),  # of the detector, along the recording's principal axes; nan without
+        ("colours", "<f4", (COLOURS,)),  # mean logarithms of blue, green, red of trunk and legs; nan without
+    ]
+)
+"""One row per detected person, frame and view that sees the person apart from others."""
+
 WINDOW = np.dtype(
     [
         ("index", "<i8"),

@@ -22,7 +22,7 @@ def _jitter(boxes: Boxes, share: float, rng: np.random.Generator) -> Boxes:
 
 def _missed(boxes: Boxes, share: float, rng: np.random.Generator) -> Boxes:
     kept = rng.uniform(size=len(boxes)) >= share
-    return Boxes(boxes.pixel[kept], boxes.score[kept])
+    return boxes.of(kept)
 
 
 def _doubled(boxes: Boxes, share: float, rng: np.random.Generator) -> Boxes:

@@ -19,7 +19,9 @@ from stseg.model.border import Border
 from stseg.model.tables import EVENT
 from stseg.tracking.coincidence import coincident
 from stseg.tracking.encounters import encounters
+from stseg.tracking.identities.constraints import Constraints
 from stseg.tracking.identities.global_association import Link, associate_globally
+from stseg.tracking.identities.search import FREELY
 from stseg.tracking.identities.size_model import MeasuredSizes
 from stseg.tracking.interpolation import apart_from, fill_gaps, interpolated_rows
 from stseg.tracking.pruning import drop_ghosts, drop_short
@@ -48,12 +50,15 @@ class FinalTracks:
     identity: Ints
 
 
-def final_tracks(committed: Rows, events: Rows, frame_rate: float, border: Border, config: Config) -> FinalTracks:
-    """The tracks of a run from its committed TRAJECTORY and EVENT rows."""
+def final_tracks(
+    committed: Rows, events: Rows, appearance: Rows, frame_rate: float, border: Border, config: Config,
+    constraints: Constraints = FREELY,
+) -> FinalTracks:  # fmt: skip
+    """The tracks of a run from its committed TRAJECTORY, EVENT and APPEARANCE rows, under constraints on those rows."""
     gaps = interpolated_rows(committed, frame_rate, config.tracking)
     bridged = np.concatenate([committed, gaps])
     sizes = MeasuredSizes.of_heights(committed["height"], config).with_unmeasured(len(gaps))
-    linked = associate_globally(bridged, sizes, frame_rate, border, config)
+    linked = associate_globally(bridged, sizes, appearance, frame_rate, border, config, constraints)
     bridged["id"] = linked.identity
     named = linked.identity[: len(committed)]
     repeats, repeated = coincident(bridged, frame_rate, _LASTING)

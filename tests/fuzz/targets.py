@@ -55,7 +55,7 @@ def _video(path: Path) -> None:
 def _run(path: Path) -> None:
     run = read_run(path)
     assert isinstance(run.names, dict)
-    for table in ("tracks", "events", "ghosts", "windows", "rates", "shifts", "timings"):
+    for table in ("tracks", "events", "ghosts", "windows", "rates", "shifts", "timings", "committed", "appearance"):
         getattr(run, table)
     for frame in run.frames[:2].tolist():
         run.read_frame(frame)

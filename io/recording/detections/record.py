@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from stseg.arrays import Flags, Floats, Ints
+from stseg.arrays import Flags, Floats, Ints, Singles
 from stseg.errors import FormatError
 from stseg.io import limits
 from stseg.io.numbers import finite_number, parse_number
@@ -64,6 +64,8 @@ class Detections:
         Mask of each detection, None where it has none; empty where the source has no masks.
     frames
         Number of frames where the source lists them all, counted from 0; None where it lists detections alone.
+    features : float32 (n, feature), or None
+        Appearance features.
     """
 
     frame: Ints
@@ -72,6 +74,7 @@ class Detections:
     label: tuple[str, ...] = ()
     mask: tuple[Mask | None, ...] = ()
     frames: int | None = None
+    features: Singles | None = None
 
     def __len__(self) -> int:
         return len(self.frame)
@@ -81,9 +84,9 @@ class Detections:
         index = np.flatnonzero(rows) if rows.dtype == bool else rows
         label = tuple(self.label[k] for k in index) if self.label else ()
         mask = tuple(self.mask[k] for k in index) if self.mask else ()
-        return replace(
-            self, frame=self.frame[index], pixel=self.pixel[index], score=self.score[index], label=label, mask=mask
-        )
+        features = None if self.features is None else self.features[index]
+        frame, pixel, score = self.frame[index], self.pixel[index], self.score[index]
+        return Detections(frame, pixel, score, label, mask, self.frames, features)
 
     def classes(self) -> dict[str, int]:
         """Number of detections of each class, the most frequent first."""

@@ -10,8 +10,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from stseg.arrays import Flags, Floats
+from stseg.arrays import Flags, Floats, Ints
 from stseg.errors import FormatError, SourceError
+from stseg.io.recording.appearance_files import read_features
 from stseg.io.recording.box_files import BoxTable, read_boxes
 from stseg.io.recording.detections.formats import read_detections
 from stseg.io.recording.detections.masks import Polygons
@@ -44,7 +45,8 @@ class SourceDetections:
     def table(self) -> BoxTable:
         """The kept boxes by frame."""
         order = np.argsort(self.kept.frame, kind="stable")
-        return BoxTable(self.frames, self.kept.frame[order], self.kept.pixel[order], self.kept.score[order])
+        own = self.kept.of(order)
+        return BoxTable(self.frames, own.frame, own.pixel, own.score, order, own.features)
 
 
 def read_source(source: Source, size: tuple[int, int]) -> SourceDetections:
@@ -62,13 +64,13 @@ def read_source(source: Source, size: tuple[int, int]) -> SourceDetections:
     SourceError, FormatError
         Where it cannot be read, or has no detections.
     """
-    return _read(source, size, _stamp(source.path))
+    return _read(source, size, _stamp(source.path, *([source.appearance] if source.appearance else [])))
 
 
-def _stamp(path: Path) -> tuple[int, int]:
-    """Changes where a file does, so that nothing stale is kept."""
+def _stamp(*paths: Path) -> tuple[int, int]:
+    """Changes where one of the files does, so that nothing stale is kept."""
     try:
-        found = [file.stat() for file in (path.iterdir() if path.is_dir() else [path])]
+        found = [file.stat() for path in paths for file in (path.iterdir() if path.is_dir() else [path])]
     except OSError:
         return 0, 0
     return max((one.st_mtime_ns for one in found), default=0), sum(one.st_size for one in found)
@@ -90,14 +92,23 @@ def _read(source: Source, size: tuple[int, int], _stamp_of_file: tuple[int, int]
             raise SourceError(source.path, "classes", ", ".join(source.classes), "detections that have classes")
         table = read_boxes(source.path, source.first_frame, source.frames)
         found = Detections(table.frame + source.first_frame, table.pixel, table.score)
+        found = _with_features(found, table.row, source)
         kept = found.of(found.score >= source.least_score)
         return SourceDetections(
             "boxes as text", found, replace(kept, frame=kept.frame - source.first_frame), table.frames
         )
     name, found = recognised
+    found = _with_features(found, np.arange(len(found)), source)
     kept = found.of(_wanted(found, source.classes, source.least_score))
     kept = replace(kept, frame=kept.frame - source.first_frame)
     return SourceDetections(name, found, kept, _length(source, found, kept))
+
+
+def _with_features(found: Detections, row: Ints, source: Source) -> Detections:
+    """The detections with the appearance features that stand in `row` of the source's file of them."""
+    if source.appearance is None:
+        return found
+    return replace(found, features=read_features(source.appearance, len(found))[row])
 
 
 def _wanted(found: Detections, classes: Sequence[str], least_score: float) -> Flags:

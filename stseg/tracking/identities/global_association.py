@@ -9,11 +9,15 @@ import numpy as np
 from stseg.arrays import Ints, Rows
 from stseg.config import Config
 from stseg.model.border import Border
+from stseg.tracking.identities.appearance_model import learn_appearance
+from stseg.tracking.identities.constraints import Constraints
 from stseg.tracking.identities.observations import observe
-from stseg.tracking.identities.search import SearchLimits, search_identities
-from stseg.tracking.identities.size_model import MeasuredSizes, learn_sizes
+from stseg.tracking.identities.search import FREELY, SearchLimits, search_identities
+from stseg.tracking.identities.size_model import MeasuredSizes, SizeModel, learn_sizes
 from stseg.tracking.isolated_tracklets import isolated_tracklets
 
+_DRAFT = 4
+"""Share of the hypotheses, one in so many, of the search without appearance from which appearance is learned."""
 _AROUND = 0.5
 """Time before and after a row in which its identity holds one track, seconds."""
 
@@ -55,8 +59,9 @@ class GlobalAssociation:
 
 
 def associate_globally(
-    trajectory: Rows, sizes: MeasuredSizes, frame_rate: float, border: Border, config: Config
-) -> GlobalAssociation:
+    trajectory: Rows, sizes: MeasuredSizes, appearance: Rows, frame_rate: float, border: Border, config: Config,
+    constraints: Constraints = FREELY,
+) -> GlobalAssociation:  # fmt: skip
     """Identities from the whole run.
 
     Parameters
@@ -65,19 +70,33 @@ def associate_globally(
         In any order.
     sizes
         Of each row.
+    appearance : APPEARANCE (l,)
+        Of detections.
     frame_rate
         Frames per second.
     border
         Where people come and go.
     config
         The constants of all stages: body, motion, detection and tracking.
+    constraints
+        Pairs of rows that are one person, or two.
     """
     tracklets = isolated_tracklets(trajectory, frame_rate)
-    model = learn_sizes(sizes, trajectory["frame"], tracklets, frame_rate)
-    seen = observe(trajectory, sizes, model, frame_rate, border, config)
-    limits = SearchLimits(config.tracking.hypotheses, config.tracking.maximum_gap, config.tracking.identity_lag)
-    first = np.empty(len(trajectory), np.int64)
-    first[seen.order] = seen.order[search_identities(seen, model.spread, config.motion, limits)]
+    model, value = learn_sizes(sizes, trajectory["frame"], tracklets, frame_rate), sizes.value
+
+    def search(hypotheses: int) -> Ints:
+        seen = observe(trajectory, value, model, frame_rate, border, config)
+        limits = SearchLimits(hypotheses, config.tracking.maximum_gap, config.tracking.identity_lag)
+        first = np.empty(len(trajectory), np.int64)
+        known = constraints.observed(seen.order)
+        first[seen.order] = seen.order[search_identities(seen, model, config.motion, limits, known)]
+        return first
+
+    if len(appearance):
+        draft = search(-(-config.tracking.hypotheses // _DRAFT))
+        looks = learn_appearance(trajectory, appearance, tracklets, draft, frame_rate)
+        model, value = SizeModel.joined([model, looks.model]), np.concatenate([value, looks.value], axis=1)
+    first = search(config.tracking.hypotheses)
     identity = _numbered(trajectory, first)
     return GlobalAssociation(identity, _links(trajectory, identity, frame_rate))
 

@@ -30,6 +30,8 @@ class Hypotheses:
         Of either axis: place, place and velocity, velocity.
     precision, information : float64 (hypothesis, slot, size)
         Sums over the identity's observations.
+    bound : int64 (hypothesis, constraint)
+        Identity of the earlier observation of each constraint, `FREE` before it.
     """
 
     score: Floats
@@ -40,14 +42,16 @@ class Hypotheses:
     covariance: Floats
     precision: Floats
     information: Floats
+    bound: Ints
 
     @classmethod
-    def empty(cls, number: int, slots: int, sizes: int) -> Hypotheses:
+    def empty(cls, number: int, slots: int, sizes: int, constraints: int = 0) -> Hypotheses:
         """Hypotheses of nobody."""
         shape = (number, slots)
         return cls(
             np.zeros(number), np.full(shape, FREE), np.full(shape, -1), np.zeros(shape), np.zeros((*shape, 4)),
             np.zeros((*shape, 3)), np.zeros((*shape, sizes)), np.zeros((*shape, sizes)),
+            np.full((number, constraints), FREE),
         )  # fmt: skip
 
     def at(self, chosen: Ints) -> Hypotheses:
@@ -55,4 +59,5 @@ class Hypotheses:
         return Hypotheses(
             self.score[chosen], self.name[chosen], self.last[chosen], self.seconds[chosen], self.state[chosen],
             self.covariance[chosen], self.precision[chosen], self.information[chosen],
+            self.bound[chosen],
         )  # fmt: skip

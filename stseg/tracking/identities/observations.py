@@ -10,7 +10,7 @@ from stseg.arrays import Flags, Floats, Ints, Rows
 from stseg.config import Config
 from stseg.model.border import Border
 from stseg.tracking.assignment import distances
-from stseg.tracking.identities.size_model import MeasuredSizes, SizeModel
+from stseg.tracking.identities.size_model import SizeModel
 
 _EXCHANGE_DISTANCE = 0.8
 """Distance below which the filter may have exchanged two tracks, metres."""
@@ -58,7 +58,7 @@ class Observations:
 
 
 def observe(
-    trajectory: Rows, sizes: MeasuredSizes, model: SizeModel, frame_rate: float, border: Border, config: Config
+    trajectory: Rows, sizes: Floats, model: SizeModel, frame_rate: float, border: Border, config: Config
 ) -> Observations:
     """Observations of a trajectory.
 
@@ -66,8 +66,8 @@ def observe(
     ----------
     trajectory : TRAJECTORY (n,)
         In any order.
-    sizes
-        Of each row.
+    sizes : float64 (n, size)
+        Of each row, nan where unmeasured.
     model
         Their noise and spread.
     frame_rate
@@ -81,7 +81,7 @@ def observe(
     rows = trajectory[order]
     frames, start = np.unique(rows["frame"], return_index=True)
     ground = np.column_stack([rows["x"], rows["y"]])
-    precision, information = model.evidence(sizes.value[order], frame_rate)
+    precision, information = model.evidence(sizes[order], frame_rate)
     previous = _previous(rows)
     start = np.append(start, len(rows))
     alike = 1.0 + 2.0 * _LASTING * frame_rate

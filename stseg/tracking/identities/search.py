@@ -7,15 +7,17 @@ the best K. Names become final after a lag, so memory does not grow.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from stseg.arrays import Floats, Ints
+from stseg.arrays import Flags, Ints
 from stseg.config import MotionConfig
 from stseg.tracking.identities import step_kernels
+from stseg.tracking.identities.constraints import Constraints
 from stseg.tracking.identities.hypotheses import Hypotheses
 from stseg.tracking.identities.observations import Observations
+from stseg.tracking.identities.size_model import SizeModel
 
 _BIRTH = 6.0
 """Cost of a birth or a death inside the area, nats (per square metre)."""
@@ -25,6 +27,8 @@ _LEAST_PLACE = -25.0
 """Least evidence of a place against an identity, nats."""
 _ALTERNATIVE_LOSS, _BEAM_LOSS = 15.0, 60.0
 """Greatest loss of an alternative in one frame, and of a hypothesis against the best, nats."""
+FREELY = Constraints.of([], [])
+"""No constraint."""
 _SPARE = 16
 """Slots for people out of sight."""
 
@@ -79,26 +83,33 @@ class _History:
         return agree
 
 
-def search_identities(seen: Observations, spread: Floats, motion: MotionConfig, limits: SearchLimits) -> Ints:
+def search_identities(
+    seen: Observations, sizes: SizeModel, motion: MotionConfig, limits: SearchLimits, constraints: Constraints = FREELY
+) -> Ints:
     """The most likely identity of each observation, named by its first observation, int64 (n,).
 
     Parameters
     ----------
     seen
         The observations.
-    spread : float64 (size,)
-        Variance of each size among people.
+    sizes
+        Statistics of the sizes.
     motion
         Motion model.
     limits
         Extent of the search.
+    constraints
+        Pairs of observations.
     """
-    slots = int(np.diff(seen.start).max(initial=0)) + _SPARE
-    held = Hypotheses.empty(1, slots, len(spread))
+    certain = seen.certain.copy()
+    certain[constraints.later] = False
+    seen = replace(seen, certain=certain)
+    slots = int(np.diff(seen.start).max(initial=0)) + _SPARE + constraints.most_open()
+    held = Hypotheses.empty(1, slots, len(sizes.spread), len(constraints))
     history = _History(np.full(len(seen.order), -1))
     for k, now in enumerate(seen.seconds.tolist()):
         first, stop = int(seen.start[k]), int(seen.start[k + 1])
-        held, step = _extended(held, seen, first, stop, now, spread, motion, limits)
+        held, step = _extended(held, seen, first, stop, now, sizes, motion, limits, constraints)
         history.steps.append(step)
         if now - history.steps[0].seconds > 2 * limits.lag:
             agree = history.decide(now - limits.lag, len(held.score))
@@ -109,22 +120,26 @@ def search_identities(seen: Observations, spread: Floats, motion: MotionConfig, 
 
 
 def _extended(
-    held: Hypotheses, seen: Observations, first: int, stop: int, now: float, spread: Floats, motion: MotionConfig,
-    limits: SearchLimits,
+    held: Hypotheses, seen: Observations, first: int, stop: int, now: float, sizes: SizeModel, motion: MotionConfig,
+    limits: SearchLimits, constraints: Constraints,
 ) -> tuple[Hypotheses, _Step]:  # fmt: skip
     """The best hypotheses after one more frame, and how they were chosen."""
     turn, pace = motion.velocity_noise**2, motion.speed_spread**2
     number, slots = held.name.shape
     rows = stop - first
     step_kernels.end_identities(
-        held.name, held.last, held.seconds, now, limits.longest, seen.inside, _BIRTH, held.score
-    )
+        held.name, held.last, held.seconds, now, limits.longest, seen.inside, _BIRTH,
+        _awaited(held, constraints, first), held.score,
+    )  # fmt: skip
     cost = np.empty((number, rows, slots + rows))
     step_kernels.fill_costs(
         held.name, held.last, held.seconds, held.state, held.covariance, held.precision, held.information, first, now,
-        seen.ground, seen.variance, seen.previous, seen.certain, seen.inside, seen.precision, seen.information, spread,
-        turn, _BIRTH, _ABSENCE, _LEAST_PLACE, cost,
+        seen.ground, seen.variance, seen.previous, seen.certain, seen.inside, seen.precision, seen.information,
+        sizes.spread, sizes.most_against, turn, _BIRTH, _ABSENCE, _LEAST_PLACE, cost,
     )  # fmt: skip
+    for k in np.flatnonzero((constraints.later >= first) & (constraints.later < stop)).tolist():
+        row, same = int(constraints.later[k]) - first, bool(constraints.same[k])
+        step_kernels.impose_constraint(held.name, np.ascontiguousarray(held.bound[:, k]), row, same, cost)
     column, total = np.empty((number, rows), np.int64), np.empty(number)
     step_kernels.fill_best_assignments(cost, column, total)
     most = number * (1 + rows * (slots + 1) + rows * (rows - 1) // 2)
@@ -135,8 +150,8 @@ def _extended(
     parent, score, keys = np.empty(kept, np.int64), np.empty(kept), np.empty(kept, np.int64)
     chosen, names = np.empty((kept, rows), np.int64), np.empty((kept, rows), np.int64)
     kept = step_kernels.choose_distinct(
-        ordered, change, value, column, held.name, held.last, first, float(value[ordered[0]]) - _BEAM_LOSS,
-        parent, chosen, names, score, keys,
+        ordered, change, value, column, held.name, held.last, _marks(held, constraints, first), first,
+        float(value[ordered[0]]) - _BEAM_LOSS, parent, chosen, names, score, keys,
     )  # fmt: skip
     new = held.at(parent[:kept])
     new.score[:] = score[:kept]
@@ -144,4 +159,21 @@ def _extended(
         chosen[:kept], new.name, new.last, new.seconds, new.state, new.covariance, new.precision, new.information,
         first, now, seen.ground, seen.variance, seen.precision, seen.information, turn, pace,
     )  # fmt: skip
+    for k in np.flatnonzero((constraints.earlier >= first) & (constraints.earlier < stop)).tolist():
+        new.bound[:, k] = names[:kept, int(constraints.earlier[k]) - first]
     return new, _Step(parent[:kept], names[:kept], first, now)
+
+
+def _awaited(held: Hypotheses, constraints: Constraints, first: int) -> Flags:
+    """Which slots hold an identity that a later observation must have, bool (hypothesis, slot)."""
+    open_ = (constraints.earlier < first) & (constraints.later >= first) & constraints.same
+    return np.asarray((held.name[:, :, None] == held.bound[:, None, open_]).any(axis=2) & (held.name >= 0))
+
+
+def _marks(held: Hypotheses, constraints: Constraints, first: int) -> Ints:
+    """A number that differs where hypotheses differ in what open constraints bind, int64 (hypothesis,)."""
+    open_ = np.flatnonzero((constraints.earlier < first) & (constraints.later >= first))
+    mark = np.zeros(len(held.score), np.int64)
+    for k in open_.tolist():
+        mark = (mark * 1_000_003 + held.bound[:, k] + 2) % 2_147_483_647
+    return mark

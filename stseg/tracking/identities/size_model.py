@@ -78,12 +78,21 @@ class SizeModel:
         Correlation time of the errors, seconds.
     spread
         Variance among people; 0 where the size says nothing.
+    most_against
+        Greatest evidence of one frame for a new person instead of a known one, nats: errors may be outliers.
     """
 
     mean: Floats
     noise: Floats
     lasting: Floats
     spread: Floats
+    most_against: Floats
+
+    @classmethod
+    def joined(cls, parts: Sequence[SizeModel]) -> SizeModel:
+        """The sizes of all parts, one after the other."""
+        names = ("mean", "noise", "lasting", "spread", "most_against")
+        return cls(*(np.concatenate([np.zeros(0), *(getattr(part, name) for part in parts)]) for name in names))
 
     def evidence(self, sizes: Floats, frame_rate: float) -> tuple[Floats, Floats]:
         """Precision of each measured size (n, size), and precision times deviation; 0 where unmeasured.
@@ -111,7 +120,8 @@ def learn_sizes(sizes: MeasuredSizes, frame: Ints, tracklets: Sequence[Ints], fr
     """
     columns = zip(sizes.value.T, sizes.priors, strict=True)
     learned = [_learn(column, frame, tracklets, prior, frame_rate) for column, prior in columns]
-    return SizeModel(*np.array(learned, np.float64).reshape(-1, 4).T)
+    mean, noise, lasting, spread = np.array(learned, np.float64).reshape(-1, 4).T
+    return SizeModel(mean, noise, lasting, spread, np.full(len(learned), np.inf))
 
 
 def _learn(

@@ -15,6 +15,10 @@ from stseg.linear_assignment import fill_assignment_of_least_cost
 
 FORBIDDEN = 1e6
 """Cost of an assignment that is not allowed, nats."""
+UNLIKELY = 200.0
+"""Cost of an assignment that is demanded though the person is far away, nats."""
+CONTRADICTION = 1e4
+"""Cost of an assignment against a constraint, nats: taken only where constraints contradict each other."""
 
 
 @part
@@ -33,12 +37,16 @@ def predicted_variance(covariance: Floats, seconds: float, turn: float) -> float
 
 @kernel
 def end_identities(
-    name: Ints, last: Ints, seconds: Floats, now: float, longest: float, inside: Floats, birth: float, score: Floats
-) -> None:
-    """Free the slots of identities that were unseen for too long; each costs its death."""
+    name: Ints, last: Ints, seconds: Floats, now: float, longest: float, inside: Floats, birth: float,
+    awaited: Flags, score: Floats,
+) -> None:  # fmt: skip
+    """Free the slots of identities that were unseen for too long; each costs its death.
+
+    Those `awaited` (hypothesis, slot) by a constraint stay.
+    """
     for h in range(name.shape[0]):
         for s in range(name.shape[1]):
-            if name[h, s] >= 0 and now - seconds[h, s] > longest:
+            if name[h, s] >= 0 and now - seconds[h, s] > longest and not awaited[h, s]:
                 score[h] -= birth * inside[last[h, s]]
                 name[h, s] = -1
 
@@ -47,20 +55,21 @@ def end_identities(
 def fill_costs(
     name: Ints, last: Ints, seconds: Floats, state: Floats, covariance: Floats, held_precision: Floats,
     held_information: Floats, first: int, now: float, ground: Floats, variance: Floats, previous: Ints,
-    certain: Flags, inside: Floats, precision: Floats, information: Floats, spread: Floats, turn: float, birth: float,
-    absence: float, least: float, cost: Floats,
+    certain: Flags, inside: Floats, precision: Floats, information: Floats, spread: Floats, most_against: Floats,
+    turn: float, birth: float, absence: float, least: float, cost: Floats,
 ) -> None:  # fmt: skip
     """Fill cost (hypothesis, row, slot + row) of the rows from `first` on, nats."""
     hypotheses, slots = name.shape
     rows = cost.shape[1]
-    alone = np.zeros(rows)
+    alone = np.zeros((rows, len(spread)))
     for i in range(rows):
         for d in range(len(spread)):
-            alone[i] += size_evidence(precision[first + i, d], information[first + i, d], spread[d])
+            alone[i, d] = size_evidence(precision[first + i, d], information[first + i, d], spread[d])
+    known = np.zeros(len(spread))
     cost[:] = FORBIDDEN
     for h in range(hypotheses):
         for i in range(rows):
-            cost[h, i, slots + i] = birth * inside[first + i] - alone[i]
+            cost[h, i, slots + i] = birth * inside[first + i] - alone[i].sum()
         for s in range(slots):
             if name[h, s] < 0:
                 continue
@@ -68,9 +77,8 @@ def fill_costs(
             x = state[h, s, 0] + since * state[h, s, 2]
             y = state[h, s, 1] + since * state[h, s, 3]
             spreads = predicted_variance(covariance[h, s], since, turn)
-            known = 0.0
             for d in range(len(spread)):
-                known += size_evidence(held_precision[h, s, d], held_information[h, s, d], spread[d])
+                known[d] = size_evidence(held_precision[h, s, d], held_information[h, s, d], spread[d])
             for i in range(rows):
                 r = first + i
                 follows = previous[r] == last[h, s]
@@ -78,15 +86,35 @@ def fill_costs(
                     continue
                 total = spreads + variance[r]
                 square = (ground[r, 0] - x) ** 2 + (ground[r, 1] - y) ** 2
-                gain = max(-0.5 * square / total, least) - math.log(2.0 * math.pi * total) - absence * since - known
+                gain = max(-0.5 * square / total, least) - math.log(2.0 * math.pi * total) - absence * since
                 if gain < 4.0 * least and not follows:
                     continue
                 for d in range(len(spread)):
                     both = held_precision[h, s, d] + precision[r, d]
-                    gain += size_evidence(both, held_information[h, s, d] + information[r, d], spread[d])
+                    together = size_evidence(both, held_information[h, s, d] + information[r, d], spread[d])
+                    gain += max(together - known[d], alone[i, d] - most_against[d])
                 cost[h, i, s] = -gain
                 if certain[r]:
                     cost[h, i, slots + i] = FORBIDDEN
+
+
+@kernel
+def impose_constraint(name: Ints, bound: Ints, row: int, same: bool, cost: Floats) -> None:
+    """Impose on the cost (hypothesis, row, slot + row) that a row is, or is not, the identity bound (hypothesis,)."""
+    hypotheses, slots = name.shape
+    for h in range(hypotheses):
+        for s in range(slots):
+            demanded = name[h, s] >= 0 and name[h, s] == bound[h]
+            if demanded and same:
+                own = min(cost[h, row, s], UNLIKELY)
+                for c in range(cost.shape[2]):
+                    cost[h, row, c] = FORBIDDEN
+                cost[h, row, s] = own
+                cost[h, row, slots + row] = CONTRADICTION
+                break
+            if demanded:
+                cost[h, row, s] = FORBIDDEN
+                cost[h, row, slots + row] = min(cost[h, row, slots + row], CONTRADICTION)
 
 
 @kernel
@@ -169,8 +197,8 @@ def _cube(word: int, prime: int) -> int:
 
 @kernel
 def choose_distinct(
-    ordered: Ints, change: Ints, value: Floats, column: Ints, name: Ints, last: Ints, first: int, least: float,
-    parent: Ints, chosen: Ints, names: Ints, score: Floats, keys: Ints,
+    ordered: Ints, change: Ints, value: Floats, column: Ints, name: Ints, last: Ints, mark: Ints, first: int,
+    least: float, parent: Ints, chosen: Ints, names: Ints, score: Floats, keys: Ints,
 ) -> int:  # fmt: skip
     """Choose the best alternatives that differ in the present names, or in who is unseen.
 
@@ -182,6 +210,8 @@ def choose_distinct(
         See `fill_alternatives`.
     column, name, last
         Best assignments; names and last observations of the slots.
+    mark : int64 (hypothesis,)
+        Tells hypotheses apart that differ in what constraints bind.
     first
         The frame's first observation.
     least
@@ -210,7 +240,7 @@ def choose_distinct(
         if change[a, 3] >= 0:
             own[change[a, 3]] = change[a, 4]
         seen[:] = False
-        high, low = 0, 0
+        high, low = _cube(mark[h], _PRIMES[0]), _cube(mark[h], _PRIMES[1])
         for i in range(rows):
             if own[i] < slots:
                 seen[own[i]] = True

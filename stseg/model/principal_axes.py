@@ -1,0 +1,28 @@
+"""Principal axes of appearance features: the few numbers that tell most about the boxes of a recording."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from stseg.arrays import Floats, Singles
+
+
+def principal_axes(features: Sequence[Singles], number: int) -> Floats:
+    """Axes of the greatest variance within cameras (Pearson 1901), float64 (feature, number or less).
+
+    Parameters
+    ----------
+    features : float32 (box, feature)
+        Of each camera; their means may differ.
+    number
+        Most axes.
+    """
+    scatter = np.zeros((features[0].shape[1],) * 2)
+    for own in features:
+        centred = own.astype(np.float64) - own.mean(axis=0, dtype=np.float64)
+        scatter += centred.T @ centred
+    axes = np.linalg.eigh(scatter)[1][:, ::-1][:, :number]
+    largest = np.abs(axes).argmax(axis=0)
+    return np.asarray(axes * np.sign(axes[largest, np.arange(axes.shape[1])]))
