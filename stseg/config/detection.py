@@ -40,6 +40,8 @@ class DetectionConfig:
     """Probability that the foreground misses a pixel of a body, 0..1 (m); the volume's first guess."""
     pixel_clutter_rate: float = 0.07
     """Probability of foreground on a ray past all bodies, 0..1 (b); the volume's first guess."""
+    key_frame_interval: float = 0.5
+    """Longest time between two frames whose whole ground is searched, seconds; 0 to search it in every frame."""
     swap_moves: int = 2
     """Rounds of swap moves (one person for two, and the like) in larger groups, where all views deliver pixels."""
 
@@ -54,6 +56,7 @@ class DetectionConfig:
         for name in ("box_miss_rate", "hidden_detection_rate", "pixel_miss_rate", "pixel_clutter_rate"):
             require(0 < getattr(self, name) < 1, self, name, "a number between 0 and 1")
         require(self.box_log_ratio > 0, self, "box_log_ratio", "a number above 0")
+        require(self.key_frame_interval >= 0, self, "key_frame_interval", "0 or more seconds")
         require(self.birth_cost >= 0, self, "birth_cost", "0 or more nats")
         require(self.swap_moves >= 0, self, "swap_moves", "0 or more")
         require(self.border_width > 0, self, "border_width", "a number above 0")

@@ -12,10 +12,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from stseg.arrays import Floats, Ints, ViewEvidence
+from stseg.arrays import Ints, ViewEvidence
 from stseg.config import BodyConfig, DetectionConfig, ErrorRateConfig
 from stseg.detection.box_noise_calibration import BoxNoiseCalibration
-from stseg.detection.evidence import peaks
+from stseg.detection.key_frames import followed, key_frame_interval
+from stseg.detection.lattice import lattice, lattice_candidates
 from stseg.detection.map_estimate import FrameEvidence, MapEstimate
 from stseg.detection.merging import merged
 from stseg.detection.population_calibration import PopulationCalibration
@@ -32,10 +33,6 @@ from stseg.model.candidates import Candidates
 from stseg.model.people import Explanation
 from stseg.model.predicted_tracks import PredictedTracks
 
-_HOPELESS = -4.0
-"""Where the probed heights are worth less, no other height makes a candidate, nats."""
-_ALIKE = 0.8
-"""Ratio of two heights above which what one pillar shows tells of the other."""
 _NEARLY = -15.0
 """Gain above which an alternative is fitted to its pixels, nats: what the right place and size may add."""
 _SEEN = 2.0
@@ -71,9 +68,7 @@ class Detector:
         self._rate, self._level = rig.frame_rate, level or ErrorRateConfig()
         self.first_noise = self.new_calibration().noise
         grid = rig.grid
-        x = np.arange(grid.x[0] + config.lattice_spacing / 2, grid.x[1], config.lattice_spacing)
-        y = np.arange(grid.y[0] + config.lattice_spacing / 2, grid.y[1], config.lattice_spacing)
-        self.lattice_ground = np.stack(np.meshgrid(x, y), -1)
+        self.lattice_ground = lattice(grid, config.lattice_spacing)
         flat = self.lattice_ground.reshape(-1, 2)
         self.views: list[BoxView | PixelView] = [
             BoxView(camera, grid, flat, config, body)
@@ -84,6 +79,7 @@ class Detector:
         core = config.minimum_distance - CORE if "pixels" in kinds else 0.0
         self.parameters = Parameters.of(config, core, body.width_mean)
         self.border = Border.of(rig)
+        self._key_interval = key_frame_interval(rig.frame_rate, config)
         self._has_boxes = "boxes" in kinds
         self._swap_rounds = 0 if self._has_boxes else config.swap_moves
 
@@ -99,15 +95,25 @@ class Detector:
         self,
         box_noise: BoxNoiseCalibration,
         population: PopulationCalibration,
+        frame: int,
         seen: Sequence[ViewEvidence],
         predicted: PredictedTracks | None,
         proposed: Candidates | None = None,
     ) -> Explanation:
-        """Explain a session's next frame, and update what the session has learned with it."""
+        """Explain a session's next frame, and update what the session has learned with it.
+
+        `frame` is its number in the recording, which says whether it is a key frame (`stseg.detection.key_frames`).
+        """
         observations = self.observe(seen, box_noise.noise)
-        explained = self._explain(observations, population.body, predicted, proposed)
+        tracked = self._tracked(observations, population.body, predicted)
+        known = None
+        if frame % self._key_interval and predicted is not None and proposed is None:
+            known = followed(tracked, self.lattice_ground)
+        explained = known or self._searched(tracked, proposed)
         if self._has_boxes:
             box_noise.learn(explained, self.views, observations)
+        elif known:
+            population.let_pass()
         else:
             population.learn(explained.people)
         return explained
@@ -137,21 +143,22 @@ class Detector:
         noise
             Noise of boxes; by default the first guess.
         """
-        return self._explain(self.observe(seen, noise), self.body, predicted, proposed)
+        return self._searched(self._tracked(self.observe(seen, noise), self.body, predicted), proposed)
 
-    def _explain(
-        self,
-        observations: Sequence[ViewObservation | None],
-        body: BodyConfig,
-        predicted: PredictedTracks | None,
-        proposed: Candidates | None,
-    ) -> Explanation:
+    def _tracked(
+        self, observations: Sequence[ViewObservation | None], body: BodyConfig, predicted: PredictedTracks | None
+    ) -> MapEstimate:
+        """The best set of the predicted tracks alone."""
         prior = Prior.of(predicted, self.config, body, self.border)
         evidence = FrameEvidence(self.views, observations, prior, self.parameters)
         tracked = prior.pool()
-        estimate = MapEstimate.of_search(evidence, tracked, np.arange(len(tracked)))
+        return MapEstimate.of_search(evidence, tracked, np.arange(len(tracked)))
+
+    def _searched(self, estimate: MapEstimate, proposed: Candidates | None) -> Explanation:
+        """The whole search, from the predicted tracks on."""
+        evidence = estimate.evidence
         for _ in range(self.config.search_rounds):
-            fresh = self.lattice_candidates(estimate)
+            fresh = lattice_candidates(estimate, self.lattice_ground)
             if proposed is not None:
                 fresh, proposed = fresh.joined_apart(proposed, self.config.lattice_spacing), None
             moved = self._moved(estimate)
@@ -189,28 +196,6 @@ class Detector:
         start = np.arange(len(moved.members))
         return merged(MapEstimate.of_search(moved.evidence, pool, start, ENUMERATED, self._swap_rounds))
 
-    def lattice_candidates(self, estimate: MapEstimate) -> Candidates:
-        """Peaks of the lattice's score by the evidence that an estimate leaves unexplained.
-
-        Pixels are summed at one or two heights first, and at the others only where those are not all hopeless.
-        """
-        evidence, unexplained = estimate.evidence, estimate.unexplained()
-        heights, (rows, columns) = np.asarray(self.body.heights), self.lattice_ground.shape[:2]
-        score = np.repeat(evidence.prior.log_height(heights)[:, None], rows * columns, 1)
-        shown: list[tuple[PixelView, Floats]] = []
-        for view, observation, free in zip(self.views, evidence.observations, unexplained, strict=True):
-            if observation is None:
-                continue
-            if isinstance(view, BoxView):
-                score += view.lattice_score(observation, free)
-            else:
-                shown.append((view, view.row_sums(observation, free)))
-        if shown:
-            _add_pixels(shown, _probes(heights), score)
-        return peaks(
-            score.reshape(-1, rows, columns), self.lattice_ground, heights, evidence.prior.body.width_of(heights)
-        )
-
 
 def _fitted(estimate: MapEstimate, alternatives: Ints) -> Candidates:
     """Alternatives that are nearly worth a member, at the places and sizes that their own pixels show.
@@ -223,27 +208,6 @@ def _fitted(estimate: MapEstimate, alternatives: Ints) -> Candidates:
         return estimate.pool.at(nearly)
     together = estimate.with_members(np.concatenate([estimate.members, nearly]))
     return together.some_refined(np.arange(len(estimate.members), len(together.members))).pool
-
-
-def _probes(heights: Floats) -> list[int]:
-    """Heights that show whether a place is worth a look: the middle one, and a small one where they differ much."""
-    middle, small = len(heights) // 2, len(heights) // 4
-    return [middle, small] if heights[small] < _ALIKE * heights[middle] else [middle]
-
-
-def _add_pixels(shown: Sequence[tuple[PixelView, Floats]], probes: Sequence[int], score: Floats) -> None:
-    """Add what pixels say of the lattice's pillars to score (height, cell); -inf where a height is not worth a look."""
-    for height in probes:
-        for view, row_sums in shown:
-            view.add_lattice_score(row_sums, height, view.lattice_cells, score[height])
-    worth = np.flatnonzero(score[probes].max(0) > _HOPELESS)
-    for height in range(len(score)):
-        if height not in probes:
-            others = np.full(len(score[height]), -np.inf)
-            others[worth] = score[height, worth]
-            for view, row_sums in shown:
-                view.add_lattice_score(row_sums, height, worth, others)
-            score[height] = others
 
 
 def _same_people(members: Ints, before: Ints, known: int) -> bool:

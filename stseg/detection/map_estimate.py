@@ -228,8 +228,23 @@ class MapEstimate:
         """The members at the means of their places, each at the size that it has."""
         evidence, pool = self.evidence, self.pool.at(self.members)
         own = Assignment(self._box_of_each(), self.pixel_assignment)
-        ground = refine_places(pool, evidence.views, evidence.observations, own, evidence.prior, self.track_index)
-        return Candidates(ground, pool.height, pool.width)
+        places = refine_places(pool, evidence.views, evidence.observations, own, evidence.prior, self.track_index)
+        return Candidates(places.ground, pool.height, pool.width)
+
+    def followed(self, start: Candidates) -> RefinedPeople:
+        """The members at the means of their places, which are sought about those of `start`, one for each member.
+
+        Their sizes are those of their tracks where all views show pixels: a size errs alike in frames that follow each
+        other, so few of them need to measure it. Boxes show heights and places together.
+        """
+        evidence, own = self.evidence, Assignment(self._box_of_each(), self.pixel_assignment)
+        if any(isinstance(view, BoxView) for view in evidence.views):
+            return self._refined(start, own, self.track_index)
+        places = refine_places(start, evidence.views, evidence.observations, own, evidence.prior, self.track_index)
+        unmeasured = Sizes.of_population(len(start), evidence.prior.body)
+        known = evidence.prior.known_sizes(unmeasured, self.track_index)
+        sized = Candidates(places.ground, known.height, known.width)
+        return RefinedPeople(sized, places.covariance, unmeasured, known)
 
     def refined(self) -> RefinedPeople:
         """The members at the means of their posteriors."""
@@ -237,12 +252,15 @@ class MapEstimate:
 
     def some_refined(self, chosen: Ints) -> RefinedPeople:
         """Some of the members, int64 (k,) counted from 0, at the means of their posteriors."""
-        views, observations, prior = self.evidence.views, self.evidence.observations, self.evidence.prior
-        pool, track_index = self.pool.at(self.members[chosen]), self.track_index[chosen]
         own = Assignment(self._box_of_each(), self.pixel_assignment)
         own = own if len(chosen) == len(self.members) else own.of(chosen)
-        places = refine(pool, views, observations, own, prior, track_index)
-        sizes = measure(places, pool.width, views, observations, own, prior.body)
+        return self._refined(self.pool.at(self.members[chosen]), own, self.track_index[chosen])
+
+    def _refined(self, start: Candidates, own: Assignment, track_index: Ints) -> RefinedPeople:
+        """People at the means of their posteriors, sought about where they start, by what is assigned to each."""
+        views, observations, prior = self.evidence.views, self.evidence.observations, self.evidence.prior
+        places = refine(start, views, observations, own, prior, track_index)
+        sizes = measure(places, start.width, views, observations, own, prior.body)
         known = prior.known_sizes(sizes, track_index)
         return RefinedPeople(Candidates(places.ground, sizes.height, known.width), places.covariance, sizes, known)
 

@@ -44,6 +44,7 @@ class PopulationCalibration:
     def __init__(self, body: BodyConfig, frame_rate: float, config: ErrorRateConfig) -> None:
         self._first, self._rate, self._config = body, frame_rate, config
         self.height, self.relative_width = np.zeros(3), np.zeros(3)
+        self._unmeasured = 0
 
     @property
     def body(self) -> BodyConfig:
@@ -60,17 +61,22 @@ class PopulationCalibration:
             width_spread=max(spread * height, first.width_spread),
         )
 
+    def let_pass(self) -> None:
+        """Count a frame in which no size was measured: the next that is learned from counts for its time, too."""
+        self._unmeasured += 1
+
     def learn(self, people: People) -> None:
         """Count one frame, explained under the present population."""
         now, sizes = self.body, people.sizes
-        kept = np.exp(-1.0 / (self._rate * self._config.memory))
+        frames, self._unmeasured = 1 + self._unmeasured, 0
+        kept = np.exp(-frames / (self._rate * self._config.memory))
         trusted = people.evidence >= self._config.minimum_evidence
         for sums, size, variance, spread in (
             (self.height, sizes.height, sizes.height_variance, now.height_spread),
             (self.relative_width, sizes.width / sizes.height, sizes.width_variance, now.width_spread),
         ):
             sums *= kept
-            sums += _sums(size, variance / spread**2, trusted) / self._rate
+            sums += _sums(size, variance / spread**2, trusted) * frames / self._rate
 
     def _moments(self, sums: Floats, first_mean: float, first_spread: float) -> tuple[float, float]:
         """Posterior mean and spread of one size."""

@@ -91,8 +91,8 @@ def refine_places(
     own: Assignment,
     prior: Prior,
     track_index: Ints,
-) -> Floats:
-    """Means of the places alone, by pixels, each person at its height in the pool; float64 (n, 2), metres."""
+) -> RefinedPlaces:
+    """The posterior of each person's place alone, by pixels, at its height in the pool."""
     patch = pool.ground[:, None] + _PATCH
     score = np.zeros(patch.shape[:2])
     tall, wide = (np.repeat(size[:, None], len(_PATCH), 1) for size in (pool.height, pool.width))
@@ -104,7 +104,7 @@ def refine_places(
     score[met] += prior.predicted.place_log_density(track_index[met], patch[met])
     weight = np.exp(score - score.max(1, keepdims=True))
     weight /= weight.sum(1, keepdims=True)
-    return np.asarray(np.matmul(weight[:, None], patch)[:, 0])
+    return RefinedPlaces(*_moments(weight, patch), pool.height, np.zeros(len(pool)))
 
 
 def _posterior(score: Floats, patch: Floats, tried: Floats) -> RefinedPlaces:
@@ -112,10 +112,15 @@ def _posterior(score: Floats, patch: Floats, tried: Floats) -> RefinedPlaces:
     weight = np.exp(score - score.max((1, 2), keepdims=True))
     total = weight.reshape(len(score), len(tried) * patch.shape[1]).sum(1)[:, None]
     place, tall = weight.sum(1) / total, weight.sum(2) / total
-    ground, height = np.matmul(place[:, None], patch)[:, 0], tall @ tried
+    height = tall @ tried
+    return RefinedPlaces(*_moments(place, patch), height, (tall * (tried - height[:, None]) ** 2).sum(1))
+
+
+def _moments(weight: Floats, patch: Floats) -> tuple[Floats, Floats]:
+    """Means and covariances of places (person, place, 2) by their weights (person, place), metres, square metres."""
+    ground = np.matmul(weight[:, None], patch)[:, 0]
     spread = patch - ground[:, None]
-    covariance = np.matmul((spread * place[..., None]).transpose(0, 2, 1), spread) + np.eye(2) * _SPACING**2 / 12
-    return RefinedPlaces(ground, covariance, height, (tall * (tried - height[:, None]) ** 2).sum(1))
+    return ground, np.matmul((spread * weight[..., None]).transpose(0, 2, 1), spread) + np.eye(2) * _SPACING**2 / 12
 
 
 def _patch_score(

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from stseg.arrays import Floats, Ints
-from stseg.detection.map_estimate import MapEstimate
+from stseg.detection.map_estimate import MapEstimate, RefinedPeople
 from stseg.detection.problem import Problem
 from stseg.detection.residual import reprojection_residuals
 from stseg.detection.views import BoxView, PixelView, View
@@ -16,9 +18,17 @@ from stseg.model.sizes import Sizes
 
 
 def explanation(estimate: MapEstimate) -> Explanation:
-    """The result of a settled estimate."""
+    """The result of a settled estimate: its members are refined, residuals measured."""
+    explained = explanation_by(estimate, estimate.refined())
+    people, evidence = explained.people, estimate.evidence
+    exact = Candidates(people.ground, people.height, people.width)
+    residual = reprojection_residuals(exact, evidence.views, evidence.observations, estimate.box_assignment)
+    return replace(explained, residual=residual)
+
+
+def explanation_by(estimate: MapEstimate, refined: RefinedPeople) -> Explanation:
+    """The result of an estimate whose members are refined already; no residuals are measured."""
     views, members, score = estimate.evidence.views, estimate.members, estimate.members_score
-    refined = estimate.refined()
     ground = _outside_core(refined.pool.ground, members, estimate.problem)
     exact = Candidates(ground, refined.known.height, refined.known.width)
     people = People(
@@ -35,7 +45,7 @@ def explanation(estimate: MapEstimate) -> Explanation:
         tuple(pixels.astype(np.int16) for pixels in assigned),
         tuple(view.step for view in views),
         tuple(estimate.box_assignment),
-        reprojection_residuals(exact, views, estimate.evidence.observations, estimate.box_assignment),
+        np.full(len(views), np.nan),
     )
 
 

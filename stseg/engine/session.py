@@ -93,7 +93,7 @@ class Session:
         with self.watch.time("ghosts"):
             proposed = self.pipeline.proposals.of(evidence, self._fuse_with_current_rates)
             explanation = self.pipeline.detector.explain_next(
-                self._box_noise, self._population, evidence, predicted, proposed
+                self._box_noise, self._population, frame, evidence, predicted, proposed
             )
         fusion = self._submit(frame, evidence, explanation, noise)
         with self.watch.time("appearance"):
