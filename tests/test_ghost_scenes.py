@@ -161,13 +161,13 @@ def test_the_moving_ghost_is_borne_out_by_both_views() -> None:
     frame_pass = Detector(rig, ["pixels"] * 2, FEW_HEIGHTS, BODY)
     ground = frame_pass.lattice_ground.reshape(-1, 2)
     for frame in range(FRAMES):
-        seen, said = show("pixels", rig.cameras, strollers(frame)), np.zeros(len(ground))
+        seen, said = show("pixels", rig.cameras, strollers(frame)), np.zeros((3, len(ground)))
         for view, shown in zip(frame_pass.views, seen, strict=True):
             assert not isinstance(view, BoxView)
             row_sums = view.row_sums(view.observe(shown), np.ones(view.shape, bool))
-            view.add_lattice_score(row_sums, 1, view.lattice_cells, said)
+            view.add_lattice_score(row_sums, np.array([1]), view.lattice_cells, said)
         here = distances(ground, crossings(strollers(frame), rig)).min(1) < 0.3
-        worth += said[here].max() > -FEW_HEIGHTS.prior_log_odds
+        worth += said[1, here].max() > -FEW_HEIGHTS.prior_log_odds
     assert worth > 0.8 * FRAMES
 
 

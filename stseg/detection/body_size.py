@@ -101,7 +101,8 @@ def _posterior(lattice: Floats, score: Floats, mean: Floats | float, spread: flo
 def _score(ground: Floats, heights: Floats, widths: Floats, measured: Sequence[_PixelLabels]) -> Floats:
     """Log-likelihood in all views of people's pillars at their places (person, 2), nats, float64 (person, pillar)."""
     score, everywhere = np.zeros(heights.shape), np.repeat(ground[:, None], _STEPS, 1)
+    pillars = measured[0].view.tried(everywhere, heights, widths)
     for view, values, owner in measured:
-        sums, area = view.open_sums(values, owner, everywhere, heights, widths)
+        sums, area = view.open_sums(values, owner, pillars)
         score += sums / np.maximum(area.mean(1, keepdims=True), 1.0)
     return score

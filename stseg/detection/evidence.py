@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.ndimage import maximum_filter
 
-from stseg.arrays import Floats
+from stseg.arrays import Floats, Singles
 from stseg.detection.problem import BoxEvidence, PixelEvidence
 from stseg.detection.views import BoxView, PixelView, View, ViewObservation
 from stseg.model.box_fit import fill_cover, fill_inside, fill_match
@@ -55,30 +55,27 @@ def box_evidence(
     return evidence
 
 
-def pixel_evidence(
-    views: Sequence[View], observations: Sequence[ViewObservation | None], pool: Candidates
-) -> PixelEvidence:
-    """Evidence of all views that deliver pixels; a blind one (None) shows log-odds of zero everywhere."""
-    chosen = [
-        (view, observation)
-        for view, observation in zip(views, observations, strict=True)
-        if isinstance(view, PixelView)
-    ]
-    rows = max((view.shape[0] for view, _ in chosen), default=0)
-    columns = max((view.shape[1] for view, _ in chosen), default=0)
-    drawn = [view.outlines(pool.ground, pool.height, pool.width) for view, _ in chosen]
-    tall = max((spans.shape[1] for _, spans, _ in drawn), default=0)
-    n = len(pool)
-    evidence = PixelEvidence(
-        np.zeros((len(chosen), rows, columns), np.float32),
-        np.full((len(chosen), n), -1, np.int64),
-        np.zeros((len(chosen), n, tall, 2), np.int16),
-        np.ones((len(chosen), n)),
-        np.zeros((len(chosen), n)),
-    )
-    for k, ((view, observation), (first, spans, area)) in enumerate(zip(chosen, drawn, strict=True)):
-        if observation is not None:
-            evidence.raster[k, : view.shape[0], : view.shape[1]] = observation.raster
-        evidence.first[k], evidence.area[k], evidence.order[k] = first, area, view.distance(pool.ground)
-        evidence.spans[k, :, : spans.shape[1]] = spans
-    return evidence
+def stacked_rasters(views: Sequence[View], observations: Sequence[ViewObservation | None]) -> Singles:
+    """Rasters of all views that deliver pixels, float32 (view, v, u); zero beyond each, and where a view is blind."""
+    chosen = [(view, seen) for view, seen in zip(views, observations, strict=True) if isinstance(view, PixelView)]
+    shapes = np.array([view.shape for view, _ in chosen], int).reshape(-1, 2)
+    rasters = np.zeros((len(chosen), *shapes.max(0, initial=0)), np.float32)
+    for raster, (view, seen) in zip(rasters, chosen, strict=True):
+        if seen is not None:
+            raster[: view.shape[0], : view.shape[1]] = seen.raster
+    return rasters
+
+
+def pixel_evidence(views: Sequence[View], rasters: Singles, pool: Candidates) -> PixelEvidence:
+    """Evidence of all views that deliver pixels, by their `stacked_rasters`."""
+    chosen = [view for view in views if isinstance(view, PixelView)]
+    drawn = [view.whole_outlines(pool.ground, pool.height, pool.width) for view in chosen]
+    tall, n = max((spans.shape[1] for _, spans, _ in drawn), default=0), len(pool)
+    first, spans = np.empty((len(chosen), n), np.int64), np.zeros((len(chosen), n, tall, 2), np.int16)
+    area, order = np.empty((len(chosen), n)), np.empty((len(chosen), n))
+    for k, (view, (row, outline, whole)) in enumerate(zip(chosen, drawn, strict=True)):
+        first[k], area[k], order[k] = row, whole, view.distance(pool.ground)
+        spans[k, :, : outline.shape[1]] = outline
+    if chosen:
+        area /= chosen[0].area_ratio(pool.ground, pool.height, pool.width)
+    return PixelEvidence(rasters, first, spans, area, order)

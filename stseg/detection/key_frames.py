@@ -78,11 +78,10 @@ def _stand_apart(tracked: MapEstimate) -> bool:
 
 def _is_decided(tracked: MapEstimate) -> bool:
     """Whether all members continue tracks, and no track is nearly accepted or nearly rejected."""
-    others = np.setdiff1d(np.arange(len(tracked.pool)), tracked.members)
     return bool(
         (tracked.track_index >= 0).all()
         and (tracked.losses() >= _SURE).all()
-        and (tracked.additions(others).gain <= -_SURE).all()
+        and (tracked.additions(tracked.others).gain <= -_SURE).all()
     )
 
 

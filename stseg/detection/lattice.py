@@ -57,14 +57,11 @@ def _probes(heights: Floats) -> list[int]:
 
 def _add_pixels(shown: Sequence[tuple[PixelView, Floats]], probes: Sequence[int], score: Floats) -> None:
     """Add what pixels say of the lattice's pillars to score (height, cell); -inf where a height is not worth a look."""
-    for height in probes:
-        for view, row_sums in shown:
-            view.add_lattice_score(row_sums, height, view.lattice_cells, score[height])
-    worth = np.flatnonzero(score[probes].max(0) > _HOPELESS)
-    for height in range(len(score)):
-        if height not in probes:
-            others = np.full(len(score[height]), -np.inf)
-            others[worth] = score[height, worth]
-            for view, row_sums in shown:
-                view.add_lattice_score(row_sums, height, worth, others)
-            score[height] = others
+    probed = np.isin(np.arange(len(score)), probes)
+    for view, row_sums in shown:
+        view.add_lattice_score(row_sums, np.flatnonzero(probed), view.lattice_cells, score)
+    hopeless = score[probed].max(0) <= _HOPELESS
+    worth = np.flatnonzero(~hopeless)
+    for view, row_sums in shown:
+        view.add_lattice_score(row_sums, np.flatnonzero(~probed), worth, score)
+    score[np.ix_(~probed, hopeless)] = -np.inf

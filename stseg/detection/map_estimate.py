@@ -13,10 +13,10 @@ from functools import cached_property
 import numpy as np
 
 from stseg.accelerate import kernel
-from stseg.arrays import Flags, Floats, Ints
+from stseg.arrays import Flags, Floats, Ints, Singles
 from stseg.detection.assignment import Assignment
 from stseg.detection.body_size import measure
-from stseg.detection.evidence import box_evidence, pixel_evidence
+from stseg.detection.evidence import box_evidence, pixel_evidence, stacked_rasters
 from stseg.detection.prior import Prior
 from stseg.detection.problem import Parameters, Problem
 from stseg.detection.refine import refine, refine_places
@@ -42,6 +42,11 @@ class FrameEvidence:
     observations: Sequence[ViewObservation | None]
     prior: Prior
     parameters: Parameters
+
+    @cached_property
+    def rasters(self) -> Singles:
+        """`stacked_rasters` of the views."""
+        return stacked_rasters(self.views, self.observations)
 
 
 @dataclass(frozen=True)
@@ -159,6 +164,13 @@ class MapEstimate:
         fill_scores_with(self.members, others, self.problem, totals, view_evidence, tracks)
         return Additions(totals - before, view_evidence[self._row], tracks)
 
+    @cached_property
+    def others(self) -> Ints:
+        """The candidates outside the set, int64 (m,), rising."""
+        outside = np.ones(len(self.pool), bool)
+        outside[self.members] = False
+        return np.flatnonzero(outside)
+
     def losses(self) -> Floats:
         """What the score loses without each member, nats, float64 (n,)."""
         without = np.empty(len(self.members))
@@ -168,7 +180,7 @@ class MapEstimate:
     def alternatives(self) -> Ints:
         """Candidates outside the set, the best of each place, best first: int64 (n,)."""
         apart = 2 * self.evidence.prior.config.lattice_spacing
-        others = np.setdiff1d(np.arange(len(self.pool)), self.members)
+        others = self.others
         gain = self.additions(others).gain
         order, count = others[np.argsort(-gain, kind="stable")], len(self.members)
         standing = np.concatenate([self.members, np.empty(len(others), np.int64)])
@@ -291,7 +303,7 @@ def _problem(evidence: FrameEvidence, pool: Candidates) -> Problem:
     """All that is known of the candidates, as the search kernels read it."""
     views, observations, prior = evidence.views, evidence.observations, evidence.prior
     shown = any(isinstance(view, PixelView) for view in views)  # boxes show no widths
-    boxes, pixels = box_evidence(views, observations, pool), pixel_evidence(views, observations, pool)
+    boxes, pixels = box_evidence(views, observations, pool), pixel_evidence(views, evidence.rasters, pool)
     return Problem(
         boxes=boxes,
         pixels=pixels,

@@ -13,7 +13,7 @@ import numpy as np
 from stseg.arrays import Floats, Ints
 from stseg.detection.assignment import WORST, Assignment
 from stseg.detection.prior import Prior
-from stseg.detection.views import BoxView, PixelView, View, ViewObservation
+from stseg.detection.views import BoxView, PixelView, TriedPillars, View, ViewObservation
 from stseg.model.box_fit import fill_own_match
 from stseg.model.candidates import Candidates
 
@@ -76,9 +76,10 @@ def refine(
         tried = tried[::2]
     patch = pool.ground[:, None] + offset
     score = np.tile(prior.log_height(tried)[:, None], (len(pool), 1, len(offset)))
+    pillars = _pillars(views[0], patch, tried, pool.width)
     for k, (view, observation) in enumerate(zip(views, observations, strict=True)):
         if observation is not None and len(pool):
-            score += _patch_score(view, observation, own.box[k], own.pixels[k], patch, tried, pool.width)
+            score += _patch_score(view, observation, own.box[k], own.pixels[k], pillars).reshape(score.shape)
     met = np.flatnonzero(track_index >= 0)
     score[met] += prior.predicted.place_log_density(track_index[met], patch[met])[:, None]
     return _posterior(score, patch, tried)
@@ -96,9 +97,10 @@ def refine_places(
     patch = pool.ground[:, None] + _PATCH
     score = np.zeros(patch.shape[:2])
     tall, wide = (np.repeat(size[:, None], len(_PATCH), 1) for size in (pool.height, pool.width))
+    pillars = views[0].tried(patch, tall, wide)
     for k, (view, observation) in enumerate(zip(views, observations, strict=True)):
         if isinstance(view, PixelView) and observation is not None and len(pool):
-            sums, area = view.open_sums(observation.raster, own.pixels[k], patch, tall, wide)
+            sums, area = view.open_sums(observation.raster, own.pixels[k], pillars)
             score += np.divide(sums, area, out=np.zeros_like(sums), where=area > 0)
     met = np.flatnonzero(track_index >= 0)
     score[met] += prior.predicted.place_log_density(track_index[met], patch[met])
@@ -123,27 +125,27 @@ def _moments(weight: Floats, patch: Floats) -> tuple[Floats, Floats]:
     return ground, np.matmul((spread * weight[..., None]).transpose(0, 2, 1), spread) + np.eye(2) * _SPACING**2 / 12
 
 
-def _patch_score(
-    view: View, observation: ViewObservation, box: Ints, owner: Ints, patch: Floats, tried: Floats, width: Floats
-) -> Floats:
-    """Log-likelihood, in one view, of pillars on patches (person, place, 2), nats, float64 (person, height, place)."""
+def _pillars(view: View, patch: Floats, tried: Floats, width: Floats) -> TriedPillars:
+    """Pillars of all heights that are tried, then of all places of a patch (person, place, 2), for each person."""
     people, places = patch.shape[:2]
-    score = np.zeros((people, len(tried), places))
-    everywhere = np.repeat(patch[:, None], len(tried), 1).reshape(people, -1, 2)
+    everywhere = np.repeat(patch[:, None], len(tried), 1).reshape(people, len(tried) * places, 2)
     tall = np.tile(np.repeat(tried, places), (people, 1))
-    if isinstance(view, BoxView):
-        columns, rows = map(float, view.camera.size)
-        shown = np.flatnonzero(box >= 0)
-        bodies = view.table.boxes_of(everywhere[shown].reshape(-1, 2), tall[shown].reshape(-1))
-        match = np.empty((len(shown), len(tried) * places))
-        own = box[shown]
-        fill_own_match(
-            bodies.reshape(*match.shape, 4), observation.edges[own], observation.tolerance[own],
-            observation.belief[own], columns, rows, match,
-        )  # fmt: skip
-        score[shown] = np.maximum(match, WORST).reshape(len(shown), *score.shape[1:])
+    return view.tried(everywhere, tall, np.repeat(width[:, None], tall.shape[1], 1))
+
+
+def _patch_score(view: View, observation: ViewObservation, box: Ints, owner: Ints, pillars: TriedPillars) -> Floats:
+    """Log-likelihood of pillars in one view, nats, float64 (person, pillar)."""
     if isinstance(view, PixelView):
-        wide = np.repeat(width[:, None], len(tried) * places, 1)
-        sums, area = view.open_sums(observation.raster, owner, everywhere, tall, wide)
-        score = np.divide(sums, area, out=np.zeros_like(sums), where=area > 0).reshape(score.shape)
+        sums, area = view.open_sums(observation.raster, owner, pillars)
+        return np.divide(sums, area, out=np.zeros_like(sums), where=area > 0)
+    score = np.zeros_like(pillars.height)
+    columns, rows = map(float, view.camera.size)
+    shown = np.flatnonzero(box >= 0)
+    bodies = view.table.boxes_of(pillars.ground[shown].reshape(-1, 2), pillars.height[shown].reshape(-1))
+    match, own = np.empty((len(shown), score.shape[1])), box[shown]
+    fill_own_match(
+        bodies.reshape(*match.shape, 4), observation.edges[own], observation.tolerance[own],
+        observation.belief[own], columns, rows, match,
+    )  # fmt: skip
+    score[shown] = np.maximum(match, WORST)
     return score

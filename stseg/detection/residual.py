@@ -91,7 +91,8 @@ def _by_pixels(people: Candidates, j: int, right: Floats, view: PixelView, obser
     places = people.ground[j] + _SHIFTS[:, None] * right
     heights, widths = np.full(count, people.height[j]), np.full(count, people.width[j])
     unassigned = np.full(view.shape, -1, np.int64)
-    sums, area = view.open_sums(observation.raster, unassigned, places[None], heights[None], widths[None])
+    pillars = view.tried(places[None], heights[None], widths[None])
+    sums, area = view.open_sums(observation.raster, unassigned, pillars)
     score = sums[0] / np.maximum(area[0], 1.0)
     weight = np.exp(score - score.max())
     return float(weight @ _SHIFTS / weight.sum())

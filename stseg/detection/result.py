@@ -93,7 +93,7 @@ def _visibility(estimate: MapEstimate) -> Floats:
 def _ghosts(estimate: MapEstimate) -> People:
     """The rejected candidates, each with what it would add to the set."""
     config, body = estimate.evidence.prior.config, estimate.evidence.prior.body
-    rejected = np.setdiff1d(np.arange(len(estimate.pool)), estimate.members)
+    rejected = estimate.others
     added = estimate.additions(rejected)
     pool, births = estimate.pool.at(rejected), np.full(len(rejected), -1, np.int64)
     covariance = np.tile(np.eye(2) * config.lattice_spacing**2 / 12, (len(rejected), 1, 1))

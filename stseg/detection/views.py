@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -57,6 +58,23 @@ class ViewObservation:
         return values
 
 
+class TriedPillars(NamedTuple):
+    """Pillars that are tried for each person.
+
+    Attributes
+    ----------
+    ground : float64 (person, pillar, 2)
+        Metres.
+    height, width, area_ratio : float64 (person, pillar)
+        Metres, metres, and `View.area_ratio`.
+    """
+
+    ground: Floats
+    height: Floats
+    width: Floats
+    area_ratio: Floats
+
+
 class View:
     """Pillars of a ground lattice in one camera."""
 
@@ -79,22 +97,31 @@ class View:
     def outlines(self, ground: Floats, heights: Floats, widths: Floats) -> tuple[Ints, Spans, Floats]:
         """Outlines of pillars on this view's raster, sizes in metres; see `stseg.model.outlines`.
 
-        Areas are those that `_fair` makes of them.
+        Areas are fair ones.
         """
-        first, spans, area = outlines(self.table, ground, heights, self.step, self.shape, widths / WIDTH)
-        return first, spans, self._fair(area, ground, heights, widths)
+        first, spans, area = self.whole_outlines(ground, heights, widths)
+        return first, spans, area / self.area_ratio(ground, heights, widths)
 
-    def _fair(self, area: Floats, ground: Floats, heights: Floats, widths: Floats) -> Floats:
-        """Areas over which outlines are averaged, of bodies beside one of mean size there.
+    def whole_outlines(self, ground: Floats, heights: Floats, widths: Floats) -> tuple[Ints, Spans, Floats]:
+        """The same with the outlines' own areas."""
+        return outlines(self.table, ground, heights, self.step, self.shape, widths / WIDTH)
 
-        Independent observations are as many as the greater of two ratios, that of the areas and its root: errors of a
-        segmentation fill areas, and lie along outlines. So a pillar that covers more of a body never counts as less, a
-        wide body outweighs a slim one within it, and a child is no third of an adult. At the border of the ground it is
-        the areas alone: people who stand outside are no candidates, and smaller bodies inside would stand for them.
+    def area_ratio(self, ground: Floats, heights: Floats, widths: Floats) -> Floats:
+        """Areas of outlines beside the fair ones that they are averaged over; the same in all views of a rig.
+
+        Independent observations are as many as the greater of two ratios to a body of mean size there, that of the
+        areas and its root: errors of a segmentation fill areas, and lie along outlines. So a pillar that covers more of
+        a body never counts as less, a wide body outweighs a slim one within it, and a child is no third of an adult. At
+        the border of the ground it is the areas alone: people who stand outside are no candidates, and smaller bodies
+        inside would stand for them.
         """
         share = heights * widths / (self.body.height_mean * self.body.width_mean)
         inside = np.minimum(self.grid.edge_distance(ground) / self.config.border_width, 1.0)
-        return np.asarray(area / np.maximum(share, share ** (1.0 - 0.5 * inside)))
+        return np.asarray(np.maximum(share, share ** (1.0 - 0.5 * inside)))
+
+    def tried(self, ground: Floats, heights: Floats, widths: Floats) -> TriedPillars:
+        """Pillars that are tried for each person; the same for all views of a rig."""
+        return TriedPillars(ground, heights, widths, self.area_ratio(ground, heights, widths))
 
 
 class BoxView(View):
@@ -168,21 +195,20 @@ class PixelView(View):
         _fill_left_of(observation.raster, unexplained, sums)
         return sums
 
-    def add_lattice_score(self, row_sums: Floats, height: int, cells: Ints, score: Floats) -> None:
-        """Add the unexplained pixels' score of the pillars of a height at some cells to score (cell,), nats."""
+    def add_lattice_score(self, row_sums: Floats, heights: Ints, cells: Ints, score: Floats) -> None:
+        """Add to score (height, cell), nats, what unexplained pixels say of pillars of some heights at some cells."""
         first, spans, area = self.lattice
-        start, weight = height * len(score), self.config.effective_observations
-        _add_span_means(row_sums, first, self.lattice_rows, spans, area, start, cells, weight, score)
+        weight = self.config.effective_observations
+        _add_span_means(row_sums, first, self.lattice_rows, spans, area, heights, cells, weight, score)
 
-    def open_sums(
-        self, values: Singles, owner: Ints, ground: Floats, heights: Floats, widths: Floats
-    ) -> tuple[Floats, Floats]:
+    def open_sums(self, values: Singles, owner: Ints, pillars: TriedPillars) -> tuple[Floats, Floats]:
         """Weighted sums of the pixels open to each person inside their pillars, and the pillars' fair areas.
 
-        Both float64 (person, pillar); see `stseg.model.outlines.sums_inside`, sizes in metres.
+        Both float64 (person, pillar); see `stseg.model.outlines.sums_inside`.
         """
-        sums, area = sums_inside(self.table, ground, heights, widths / WIDTH, self.step, values, owner)
-        return sums * self.config.effective_observations, self._fair(area, ground, heights, widths)
+        wide = pillars.width / WIDTH
+        sums, area = sums_inside(self.table, pillars.ground, pillars.height, wide, self.step, values, owner)
+        return sums * self.config.effective_observations, area / pillars.area_ratio
 
 
 @kernel
@@ -211,18 +237,19 @@ def _add_span_means(
     rows: Ints,
     spans: Spans,
     area: Floats,
-    start: int,
+    heights: Ints,
     cells: Ints,
     weight: float,
     score: Floats,
 ) -> None:
-    """Add to score (cell,) the weighted means over outlines `start + cell`, of so many rows each, for some cells."""
-    for cell in cells:
-        i, total = start + cell, 0.0
-        for k in range(rows[i]):
-            total += row_sums[first[i] + k, spans[i, k, 1]] - row_sums[first[i] + k, spans[i, k, 0]]
-        if rows[i] > 0:
-            score[cell] += weight * total / area[i]
+    """Add to score (height, cell) the weighted means over outlines (height * cell,), of so many rows each, for some."""
+    for height in heights:
+        for cell in cells:
+            i, total = height * score.shape[1] + cell, 0.0
+            for k in range(rows[i]):
+                total += row_sums[first[i] + k, spans[i, k, 1]] - row_sums[first[i] + k, spans[i, k, 0]]
+            if rows[i] > 0:
+                score[height, cell] += weight * total / area[i]
 
 
 @kernel
