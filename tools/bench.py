@@ -97,7 +97,7 @@ def cpu_of_run(checkout: Path, rig: Path, output: Path, frames: int) -> float:
     words = ["run", str(rig), "-o", str(output), "--frames", f"0:{frames}", "--overwrite", "--workers", "1"]
     environment = os.environ | {"PYTHONPATH": str(checkout)}
     process = subprocess.Popen(
-        [sys.executable, "-c", _RUN, *words], env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
+        [sys.executable, "-P", "-c", _RUN, *words], env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
     )
     assert process.stderr is not None
     messages = process.stderr.read().decode()
