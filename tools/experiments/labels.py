@@ -1,7 +1,7 @@
 """How well cells carry the label of the person whose body fills them: cut, components of a threshold, nearest track.
 
     python tools/experiment.py labels [SCENE ...] [--seeds 1,2] [--rig rig_masks.toml] [--seconds 8]
-        [--smoothness 0.05,0.1,0.2] [--work FOLDER]
+        [--smoothness 0.2,0.4,0.8] [--work FOLDER] [--picture docs/figures/labels_compared.png]
 
 Simulated scenes are filmed and run. The truth of a cell is the person whose pillar covers it. Tracks are matched to
 people one to one for the whole recording, by the cells that they share.
@@ -11,6 +11,8 @@ touching    share of occupied cells with the right owner where bodies are within
 cut         the labels of the run file
 threshold   cells of u > 0; each connected component has the track nearest to its centroid
 nearest     cells of u > 0; each has the nearest track within the reach of a body
+
+The picture shows the plane at half a body's height in the frame of the last run with most cells of people who touch.
 """
 
 from __future__ import annotations
@@ -20,6 +22,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 from scipy.ndimage import label as connected
 from scipy.optimize import linear_sum_assignment
@@ -127,6 +130,28 @@ def read_truth(path: Path) -> Rows:
     return np.asarray(np.genfromtxt(path, delimiter=",", names=True))
 
 
+def draw(run_file: Path, truth_file: Path, methods: dict[str, Labelling], path: Path) -> None:
+    """One plane of the frame in which most cells are of people who touch: the truth, and the labels of each method."""
+    run, truth = read_run(run_file), read_truth(truth_file)
+    grid = run.recording.rig.grid
+    plane = int(np.abs(grid.heights - 1.0).argmin())
+    true = {frame: truth_of(grid, truth[truth["frame"] == frame]) for frame in run.frames.tolist()}
+    frame = max(true, key=lambda number: int(true[number][1].sum()))
+    u, label = run.read_frame(frame)
+    rows = run.trajectory[run.trajectory["frame"] == frame]
+    ground = np.column_stack([rows["x"], rows["y"]])
+    found = {name: method(label, u, rows["id"], ground, grid)[plane] for name, method in methods.items()}
+    person, near = true[frame][0][plane], np.argwhere(true[frame][1][plane])
+    (v0, u0), (v1, u1) = near.min(0) - 6, near.max(0) + 7
+    figure, axes = plt.subplots(1, 1 + len(found), figsize=(2.2 * (1 + len(found)), 2.6), layout="constrained")
+    for axis, (name, cells) in zip(axes, {"truth": person, **found}.items(), strict=True):
+        shown = np.where(cells > 0, cells % 10, np.nan)[max(v0, 0) : v1, max(u0, 0) : u1]
+        axis.imshow(shown, origin="lower", cmap="tab10", vmin=0, vmax=9, interpolation="nearest")
+        axis.contour(person[max(v0, 0) : v1, max(u0, 0) : u1] > 0, [0.5], colors="k", linewidths=0.6)
+        axis.set(title=name, xticks=[], yticks=[])
+    figure.savefig(path, dpi=110)
+
+
 def films(options: argparse.Namespace, bench: Bench) -> Iterator[tuple[str, str]]:
     """Name and folder of each filmed scene."""
     for scene in options.scenes or SCENES:
@@ -154,6 +179,8 @@ def main() -> None:
             for method, counts in found.items():
                 iou, owner = counts.scores()
                 print(f"| {name} | {smoothness:g} | {method} | {iou:.3f} | {owner:.3f} |", flush=True)
+            if options.picture:
+                draw(bench.path(run), bench.path(f"{folder}/truth.csv"), METHODS, options.picture)
 
 
 def _options() -> argparse.Namespace:
@@ -162,6 +189,7 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--seeds", type=lambda text: [int(n) for n in text.split(",")])
     parser.add_argument("--seconds", type=float, default=8.0)
     parser.add_argument("--rig", default="rig_masks.toml")
-    parser.add_argument("--smoothness", type=lambda text: [float(n) for n in text.split(",")], default=[0.1])
+    parser.add_argument("--smoothness", type=lambda text: [float(n) for n in text.split(",")], default=[0.4])
+    parser.add_argument("--picture", type=Path)
     parser.add_argument("--work", type=Path, default=ROOT / "build/results")
     return parser.parse_args()
