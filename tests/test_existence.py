@@ -13,7 +13,8 @@ from stseg.arrays import Floats, Ints
 from stseg.config import Config
 from stseg.graphcut.sparse import sparse_cut
 from stseg.model.border import Border
-from stseg.segmentation.existence import Existence, ExistenceModel, WindowCandidates, _marginals, _paths
+from stseg.segmentation.existence import Existence, ExistenceModel, WindowCandidates
+from stseg.segmentation.paths import best_paths, path_marginals
 
 CONFIG = Config()
 RIG = room()
@@ -71,6 +72,15 @@ def test_two_candidates_of_one_body_exclude_each_other() -> None:
     assert decision.gap == 0
 
 
+def test_a_path_leads_round_a_candidate_that_another_person_excludes() -> None:
+    standing = [(t, 0.0, -0.3, 20.0, 1) for t in range(9)]
+    passing = [(t, x, y, 3.0, 0 if t == 4 else 2) for t, (x, y) in enumerate(WALK)]
+    found = candidates(*standing, *passing)
+    real = decide(found).real
+    assert real[found.track > 0].all()
+    assert not real[found.track == 0].any()
+
+
 def test_no_candidates() -> None:
     none = np.zeros(0)
     empty = WindowCandidates(
@@ -79,7 +89,7 @@ def test_no_candidates() -> None:
     assert len(decide(empty).real) == 0
 
 
-def best_paths(gain: Floats, start: Ints, end: Ints, bonus: Floats) -> float:
+def greatest_gain(gain: Floats, start: Ints, end: Ints, bonus: Floats) -> float:
     """Greatest total over all sets of links that form paths, by trying all."""
     best = 0.0
     for chosen in range(1 << len(start)):
@@ -100,12 +110,12 @@ def test_paths_are_those_of_greatest_gain(seed: int) -> None:
     pairs = np.array([(i, j) for i in range(6) for j in range(i + 1, 6) if rng.random() < 0.5]).reshape(-1, 2)
     start, end = pairs.astype(np.int64).T
     bonus = rng.uniform(0, 4, len(start))
-    successor = _paths(gain, start, end, bonus)
+    successor = best_paths(gain, start, end, bonus)
     chosen = successor[start] == end
     joined = np.unique(np.concatenate([start[chosen], end[chosen]]))
     alone = np.setdiff1d(np.arange(6), joined)
     total = gain[joined].sum() + bonus[chosen].sum() + gain[alone].clip(0).sum()
-    np.testing.assert_allclose(total, best_paths(gain, start, end, bonus), atol=1e-9)
+    np.testing.assert_allclose(total, greatest_gain(gain, start, end, bonus), atol=1e-9)
 
 
 @settings(deadline=None, max_examples=30)
@@ -117,4 +127,4 @@ def test_marginals_are_those_of_all_labellings(seed: int) -> None:
     choices = np.array(list(product((0, 1), repeat=5)))
     weight = np.exp(choices @ gain + (choices[:, start] * choices[:, end]) @ bonus)
     share = (weight[:, None] * choices).sum(0) / weight.sum()
-    np.testing.assert_allclose(_marginals(gain, start, end, bonus), np.log(share / (1 - share)), atol=1e-9)
+    np.testing.assert_allclose(path_marginals(gain, start, end, bonus), np.log(share / (1 - share)), atol=1e-9)

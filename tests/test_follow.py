@@ -47,6 +47,7 @@ OPTIONS = tuple(
             "segments.warm_up=0.5",
             "segments.background_period=2",
             "segments.background_samples=4",
+            "tracking.context=0",
         ),
         *(
             "detection.lattice_spacing=0.25",
@@ -58,7 +59,7 @@ OPTIONS = tuple(
     )
     for word in ("--set", constant)
 )
-"""Segments of twelve frames; backgrounds that hold for sixteen."""
+"""Segments of twelve frames; backgrounds that hold for sixteen; tracks that are final with their window."""
 quick = pytest.mark.skipif(python_form(set_score) is set_score, reason="too slow without a compiler")
 
 

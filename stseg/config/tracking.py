@@ -12,7 +12,7 @@ from stseg.settings import require
 class SegmentationConfig:
     """Minimum cut of a window's volume (how-it-works, Energy)."""
 
-    smoothness: float = 0.1
+    smoothness: float = 0.4
     """lambda: cost of different labels of two adjacent cells, nats."""
     distance_scale: float = 0.20
     """s: distance of two cells at which that cost has fallen to 0.6, metres."""
@@ -35,7 +35,10 @@ class TrackingConfig:
     """Windows, and tracks from tracklets (how-it-works, Tracks)."""
 
     window: float = 1.0
-    """Length of a window, seconds; held between 8 and 30 frames. Tracks are final one window later."""
+    """Length of a window, seconds; held between 8 and 30 frames. Tracks are final one window and
+    `context` later."""
+    context: float = 1.0
+    """Time before and after a window that counts, too, when it is decided who is real, seconds; at most 30 frames."""
     assignment_distance: float = 0.35
     """Distance below which two observations may be the same person in adjacent frames, metres."""
     height_noise: float = 0.035
@@ -71,6 +74,7 @@ class TrackingConfig:
             "prediction_horizon",
             "patience",
             "maximum_gap",
+            "context",
             "interpolation_gap",
             "minimum_duration",
             "separation_time",

@@ -12,7 +12,8 @@ as the continuation of i than as the place of any other person. Birth and death 
 and at the ends of the window. Links form paths: each candidate has at most one predecessor and one successor, by a
 minimum-cost flow that ignores exclusions (Zhang, Li and Nevatia, CVPR 2008). Candidates of one frame that are closer
 than the reach of a body exclude each other, since their evidence is the same. Links are submodular, exclusions are not:
-roof duality.
+roof duality. A path through a candidate that another one excludes falls apart; so paths are then sought again without
+the candidates that are excluded, as long as the energy falls.
 """
 
 from __future__ import annotations
@@ -21,14 +22,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import min_weight_full_bipartite_matching
 
 from stseg.arrays import Flags, Floats, Ints
 from stseg.config import BodyConfig, DetectionConfig, MotionConfig
 from stseg.graphcut.energy import QUANTUM
 from stseg.graphcut.qpbo import QuadraticEnergy, QuadraticMinimum, minimise
 from stseg.model.border import Border
+from stseg.segmentation.paths import best_paths, path_marginals
 
 _RESOLUTION = 0.1
 """s: standard deviation of the place of a detection, to which the prior log-odds refer, metres."""
@@ -40,6 +40,12 @@ _OUT_OF_SHAPE = -4.0
 """Least log-ratio of two heights, nats: people stoop and sit."""
 _EXCLUDED = 1e4
 """K: repulsion of candidates that exclude each other, nats."""
+_ROUNDS = 4
+"""Most times that paths are sought again."""
+Links = tuple[Ints, Ints, Floats]
+"""Candidates before and after, and b, nats, (link,) each."""
+Exclusions = tuple[Ints, Ints]
+"""Candidates that exclude each other, (pair,) each."""
 
 
 @dataclass(frozen=True)
@@ -121,19 +127,14 @@ class ExistenceModel:
         if not n:
             return Existence(np.zeros(0, bool), np.zeros(0, np.int64), np.zeros(0), 0.0)
         gain, birth, death = self._gains(found)
-        start, end, bonus = self._links(found, birth, death)
-        successor = _paths(gain, start, end, bonus)
-        chosen = successor[start] == end
-        one, other = self._exclusions(found)
-        energy = QuadraticEnergy(
-            _quanta(-gain),
-            np.concatenate([start[chosen], one]),
-            np.concatenate([end[chosen], other]),
-            np.concatenate([_quanta(-bonus[chosen]), np.full(len(one), round(_EXCLUDED / QUANTUM), np.int64)]),
-        )
-        least: QuadraticMinimum = minimise(energy, cut)
-        log_odds = _marginals(gain, start[chosen], end[chosen], bonus[chosen])
-        return Existence(least.labels, successor, log_odds, least.gap * QUANTUM)
+        links, exclusions = self._links(found, birth, death), self._exclusions(found)
+        best, energy = _solve(gain, links, exclusions, np.zeros(n, bool), cut)
+        for _ in range(_ROUNDS):
+            other, its_energy = _solve(gain, links, exclusions, _excluded(best.real, exclusions), cut)
+            if its_energy >= energy:
+                break
+            best, energy = other, its_energy
+        return best
 
     def _gains(self, found: WindowCandidates) -> tuple[Floats, Floats, Floats]:
         """g, and in it the costs of birth and death, nats, float64 (n,) each."""
@@ -143,7 +144,7 @@ class ExistenceModel:
         tall = -0.5 * ((found.height - self.body.height_mean) / self.body.height_spread) ** 2
         return found.evidence + self.detection.prior_log_odds + tall - birth - death, birth, death
 
-    def _links(self, found: WindowCandidates, birth: Floats, death: Floats) -> tuple[Ints, Ints, Floats]:
+    def _links(self, found: WindowCandidates, birth: Floats, death: Floats) -> Links:
         """Possible links and b; those that gain nothing are left out."""
         span = max(1, round(self.patience * self.frame_rate))
         steps = found.frame[None] - found.frame[:, None]
@@ -168,7 +169,7 @@ class ExistenceModel:
         ratio = np.log(spread / error) - 0.5 * (off / error) ** 2 + 0.5 * (own / spread) ** 2
         return np.asarray(np.maximum(ratio, _OUT_OF_SHAPE))
 
-    def _exclusions(self, found: WindowCandidates) -> tuple[Ints, Ints]:
+    def _exclusions(self, found: WindowCandidates) -> Exclusions:
         """Pairs of one frame that share their evidence; two people of the detector do not."""
         together = found.frame[:, None] == found.frame
         distance = np.hypot(*np.moveaxis(found.ground[:, None] - found.ground, -1, 0))
@@ -177,42 +178,36 @@ class ExistenceModel:
         return one.astype(np.int64), other.astype(np.int64)
 
 
+def _solve(
+    gain: Floats, links: Links, exclusions: Exclusions, barred: Flags, cut: Callable[..., Flags]
+) -> tuple[Existence, float]:
+    """The candidates of least energy on the best paths that avoid those that are barred; and their energy, nats."""
+    start, end, bonus = links
+    allowed = ~(barred[start] | barred[end])
+    start, end, bonus = start[allowed], end[allowed], bonus[allowed]
+    successor = best_paths(np.where(barred, -_EXCLUDED, gain), start, end, bonus)
+    chosen = successor[start] == end
+    start, end, bonus = start[chosen], end[chosen], bonus[chosen]
+    one, other = exclusions
+    energy = QuadraticEnergy(
+        _quanta(-gain),
+        np.concatenate([start, one]),
+        np.concatenate([end, other]),
+        np.concatenate([_quanta(-bonus), np.full(len(one), round(_EXCLUDED / QUANTUM), np.int64)]),
+    )
+    least: QuadraticMinimum = minimise(energy, cut)
+    real = least.labels
+    value = -gain[real].sum() - bonus[real[start] & real[end]].sum()
+    return Existence(real, successor, path_marginals(gain, start, end, bonus), least.gap * QUANTUM), float(value)
+
+
+def _excluded(real: Flags, exclusions: Exclusions) -> Flags:
+    """Candidates that a real one excludes, bool (n,)."""
+    excluded = np.zeros(len(real), bool)
+    for one, other in (exclusions, exclusions[::-1]):
+        excluded[one[real[other]]] = True
+    return excluded
+
+
 def _quanta(nats: Floats) -> Ints:
     return np.rint(nats / QUANTUM).astype(np.int64)
-
-
-def _marginals(gain: Floats, start: Ints, end: Ints, bonus: Floats) -> Floats:
-    """Marginal log-odds of each candidate on its path by messages both ways, nats; links in order of time."""
-    forward, backward = gain.copy(), np.zeros(len(gain))
-    for i, j, b in zip(start.tolist(), end.tolist(), bonus.tolist(), strict=True):
-        forward[j] += _message(forward[i], b)
-    for i, j, b in zip(start[::-1].tolist(), end[::-1].tolist(), bonus[::-1].tolist(), strict=True):
-        backward[i] += _message(gain[j] + backward[j], b)
-    return forward + backward
-
-
-def _message(log_odds: float, bonus: float) -> float:
-    """Message of a neighbour with these log-odds across a link, nats."""
-    return float(np.logaddexp(0.0, log_odds + bonus) - np.logaddexp(0.0, log_odds))
-
-
-def _paths(gain: Floats, start: Ints, end: Ints, bonus: Floats) -> Ints:
-    """Successor of each candidate on the paths of greatest total gain, -1 for none, int64 (n,).
-
-    A bipartite matching: rows are the ends of candidates, columns their beginnings. A candidate that is unused is
-    matched to itself; one that is used is matched to its successor, or to an end of its own.
-    """
-    n = len(gain)
-    each = np.arange(n)
-    # Rows: n candidates as predecessors, n births. Columns: n candidates as successors, n deaths.
-    rows = np.concatenate([each, start, each, n + each, n + end])
-    columns = np.concatenate([each, end, n + each, each, n + start])
-    cost = np.concatenate([np.zeros(n), -gain[end] - bonus, np.zeros(n), -gain, np.zeros(len(start))])
-    free_rows, free_columns = n + each, n + each
-    rows, columns = np.concatenate([rows, free_rows]), np.concatenate([columns, free_columns])
-    cost = np.concatenate([cost, np.zeros(n)])
-    lift = 1.0 - cost.min()  # explicit zeros are no edges; every perfect matching has as many
-    table = coo_array((cost + lift, (rows, columns)), shape=(2 * n, 2 * n)).tocsr()
-    _, partner = min_weight_full_bipartite_matching(table)
-    successor = partner[:n].astype(np.int64)
-    return np.where((successor < n) & (successor != each), successor, -1)

@@ -31,7 +31,7 @@ from stseg.tracking.prediction import earlier_detections, predicted_places, toge
 from stseg.tracking.track_filter import TrackFilter
 from stseg.tracking.tracklets import form_tracklets
 from stseg.tracking.window_association import TrackAssociation, WindowAssignment
-from stseg.tracking.windows import Window, windows
+from stseg.tracking.windows import LONGEST, Window, windows
 
 _ENDLESS = 1 << 62
 """Stop frame of a run whose end is not known yet."""
@@ -58,6 +58,7 @@ class CutTracker:
         spread, unassigned = config.body.height_spread, config.occupancy.occupied_share
         self.solver = find_solver(config.segmentation.solver)
         self.existence = WindowExistence(rig, config, self.solver)
+        self.context = min(round(config.tracking.context * rig.frame_rate), LONGEST)
         self.pillar = BodyShape(config.occupancy.person_radius, spread, unassigned)
         self.held: list[TrackedFrame] = []
         self.first = self.committed = first
@@ -71,14 +72,15 @@ class CutTracker:
     def add(self, fused: FusedFrame, observed: FrameObservations) -> list[Commit]:
         """Add a frame; commit the window before it if that is complete.
 
-        A window waits for the frame after its last: the run's last window commits to its end, the others do not.
+        A window waits for the time after its last frame in which somebody hidden may appear again.
         """
         del observed
         commits = []
-        if fused.frame >= self.window.solve_stop:
+        if fused.frame >= self.window.solve_stop + self.context:
             commits.append(self._solve(self.window))
             self.window = next(self.coming)
-            self.held = [tracked for tracked in self.held if tracked.fused.frame >= self.window.solve_first]
+            needed = self.window.solve_first - self.context
+            self.held = [tracked for tracked in self.held if tracked.fused.frame >= needed]
         tracks = self.filter.update(fused.frame, fused.people, fused.ghosts)
         self.held.append(TrackedFrame(fused, tracks))
         return commits
@@ -92,8 +94,9 @@ class CutTracker:
         return [self._solve(window) for window in remaining if window.commit_stop > self.committed]
 
     def _solve(self, window: Window) -> Commit:
-        inside = [tracked for tracked in self.held if window.solve_first <= tracked.fused.frame < window.solve_stop]
-        held = self.existence.revised(inside)
+        first, stop = window.solve_first, window.solve_stop
+        around = [one for one in self.held if first - self.context <= one.fused.frame < stop + self.context]
+        held = self.existence.revised(around, first, stop)
         energy = self._energy(held)
         cut = self.solver.grid(energy)
         label = self._divide(window, held, energy, cut.occupied).label

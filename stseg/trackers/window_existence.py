@@ -56,15 +56,16 @@ class WindowExistence:
             config.motion, config.body,
         )  # fmt: skip
 
-    def revised(self, frames: Sequence[TrackedFrame]) -> list[TrackedFrame]:
-        """The frames with the people that the window holds to be real."""
+    def revised(self, frames: Sequence[TrackedFrame], first: int, stop: int) -> list[TrackedFrame]:
+        """Frames first .. stop - 1 with the people that are real by all frames given, those before and after too."""
         found = _candidates(frames)
         decision = self.model.decide(found, self.solver.sparse)
         tracks = _tracks(found, decision)
         bounds = np.searchsorted(found.frame, np.arange(len(frames) + 1))
         return [
-            self._frame(one, tracks[first:stop], decision.log_odds[first:stop])
-            for one, first, stop in zip(frames, bounds, bounds[1:], strict=False)
+            self._frame(one, tracks[own], decision.log_odds[own])
+            for one, own in zip(frames, map(slice, bounds, bounds[1:]), strict=False)
+            if first <= one.fused.frame < stop
         ]
 
     def _frame(self, one: TrackedFrame, tracks: Ints, log_odds: Floats) -> TrackedFrame:
