@@ -124,7 +124,8 @@ def _pixels_of_view(view: int, members: Sequence[int], pixels: PixelEvidence, pa
         there = [j for j in members if bodies[j][v, u]]
         if there:
             nearest = min(there, key=lambda j: pixels.order[view, j])
-            total += parameters.effective_observations * float(pixels.raster[view, v, u]) / pixels.area[view, nearest]
+            scale = max(pixels.area[view, nearest], float(pixels.scale[view, v, u]))
+            total += parameters.effective_observations * float(pixels.raster[view, v, u]) / scale
     return total
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -214,6 +214,7 @@ def random_frame(seed: int, candidates: int, walkers: int = 0) -> CraftedFrame:
     area = (stop - start).sum(-1) + rng.integers(1, 5, (views, candidates)).astype(float)
     pixels = PixelEvidence(
         rng.normal(0.3, 1.5, (views, rows, columns)).astype(np.float32),
+        np.zeros((views, rows, columns), np.float32),
         first,
         np.stack([start, stop], -1).astype(np.int16),
         area,
@@ -225,14 +226,21 @@ def random_frame(seed: int, candidates: int, walkers: int = 0) -> CraftedFrame:
     return CraftedFrame(evidence, pixels, own, ground, newcomer, known, breadth)
 
 
+def scaled(frame: CraftedFrame) -> CraftedFrame:
+    """The same, half the pixels explained by bodies of some scale."""
+    rng = np.random.default_rng(len(frame.own))
+    scale = rng.uniform(-20, 20, frame.pixels.raster.shape).clip(0).astype(np.float32)
+    return replace(frame, pixels=frame.pixels._replace(scale=scale))
+
+
 def apart(frame: CraftedFrame, size: int) -> CraftedFrame:
     """The same candidates, so many at a time in rooms of their own: their evidence lies on rasters side by side."""
     room = np.arange(len(frame.own)) // size
     rooms, rows = int(room.max()) + 1, frame.pixels.raster.shape[1]
-    taller = np.tile(frame.pixels.raster, (1, rooms, 1))
+    taller, scale = (np.tile(values, (1, rooms, 1)) for values in (frame.pixels.raster, frame.pixels.scale))
     tall = frame.pixels.spans.shape[2]
     first = np.where(frame.pixels.first < 0, -1, np.minimum(frame.pixels.first, rows - tall) + room * rows)
-    pixels = frame.pixels._replace(raster=taller, first=first)
+    pixels = frame.pixels._replace(raster=taller, scale=scale, first=first)
     most = frame.boxes.match.shape[2]
     match = np.full((*frame.boxes.match.shape[:2], most * rooms), -np.inf)
     for i, k in enumerate(room.tolist()):
@@ -255,7 +263,7 @@ def strangers(boxes: BoxEvidence, pixels: PixelEvidence) -> CraftedFrame:
 @pytest.mark.parametrize("walkers", [0, 3])
 @pytest.mark.parametrize("seed", range(40))
 def test_score_by_definition(seed: int, walkers: int) -> None:
-    frame = random_frame(seed, 6, walkers)
+    frame = scaled(random_frame(seed, 6, walkers))
     rng = np.random.default_rng(seed)
     for _ in range(3):
         members = rng.permutation(6)[: rng.integers(0, 7)].tolist()
@@ -275,7 +283,8 @@ def test_a_box_speaks_for_one_person() -> None:
 def test_a_pixel_belongs_to_the_nearest_body() -> None:
     spans = np.array([[[[0, 4]], [[2, 6]]]], np.int16)
     raster = np.array([[[1, 1, 1, 1, -5, -5]]], np.float32)
-    pixels = PixelEvidence(raster, np.zeros((1, 2), np.int64), spans, np.full((1, 2), 4.0), np.array([[3.0, 2.0]]))
+    first, area, away = np.zeros((1, 2), np.int64), np.full((1, 2), 4.0), np.array([[3.0, 2.0]])
+    pixels = PixelEvidence(raster, np.zeros_like(raster), first, spans, area, away)
     none = BoxEvidence(np.zeros((0, 2, 0)), np.zeros(0, np.int64), np.zeros((0, 2, 2)), np.zeros((0, 2)))
     frame = strangers(none, pixels)
     near = TERMS.prior_log_odds + TERMS.effective_observations * (1 + 1 - 5 - 5) / 4
@@ -283,6 +292,17 @@ def test_a_pixel_belongs_to_the_nearest_body() -> None:
     assert frame.score([0, 1]) == pytest.approx(
         near + TERMS.prior_log_odds + TERMS.effective_observations * (1 + 1) / 4
     )
+
+
+def test_pixels_weigh_no_more_than_in_the_largest_body_that_explains_them() -> None:
+    """A small far body in the head of a near one: two of eight pixels are a quarter of the near one's evidence."""
+    spans = np.array([[[[0, 8]], [[0, 2]]]], np.int16)
+    raster, scale = np.ones((1, 1, 8), np.float32), np.full((1, 1, 8), 8.0, np.float32)
+    first, area, away = np.zeros((1, 2), np.int64), np.array([[8.0, 2.0]]), np.array([[2.0, 6.0]])
+    none = BoxEvidence(np.zeros((0, 2, 0)), np.zeros(0, np.int64), np.zeros((0, 2, 2)), np.zeros((0, 2)))
+    frame = strangers(none, PixelEvidence(raster, scale, first, spans, area, away))
+    near, far = frame.score([0]) - TERMS.prior_log_odds, frame.score([1]) - TERMS.prior_log_odds
+    assert (near, far) == pytest.approx((TERMS.effective_observations, TERMS.effective_observations / 4))
 
 
 # The search
@@ -329,7 +349,7 @@ def test_of_more_candidates_the_best_set_is_found_here(walkers: int) -> None:
 @pytest.mark.parametrize("walkers", [0, 3])
 @pytest.mark.parametrize("seed", range(20))
 def test_what_one_more_adds_is_the_difference_of_scores(seed: int, walkers: int) -> None:
-    frame = random_frame(seed, 8, walkers)
+    frame = scaled(random_frame(seed, 8, walkers))
     problem, chosen = frame.problem(), np.random.default_rng(seed).permutation(8)
     for count in range(7):
         members = np.append(chosen, 0)

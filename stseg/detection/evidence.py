@@ -55,19 +55,19 @@ def box_evidence(
     return evidence
 
 
-def stacked_rasters(views: Sequence[View], observations: Sequence[ViewObservation | None]) -> Singles:
+def stacked_rasters(views: Sequence[View], own: Sequence[Singles | None]) -> Singles:
     """Rasters of all views that deliver pixels, float32 (view, v, u); zero beyond each, and where a view is blind."""
-    chosen = [(view, seen) for view, seen in zip(views, observations, strict=True) if isinstance(view, PixelView)]
+    chosen = [(view, seen) for view, seen in zip(views, own, strict=True) if isinstance(view, PixelView)]
     shapes = np.array([view.shape for view, _ in chosen], int).reshape(-1, 2)
     rasters = np.zeros((len(chosen), *shapes.max(0, initial=0)), np.float32)
     for raster, (view, seen) in zip(rasters, chosen, strict=True):
         if seen is not None:
-            raster[: view.shape[0], : view.shape[1]] = seen.raster
+            raster[: view.shape[0], : view.shape[1]] = seen
     return rasters
 
 
-def pixel_evidence(views: Sequence[View], rasters: Singles, pool: Candidates) -> PixelEvidence:
-    """Evidence of all views that deliver pixels, by their `stacked_rasters`."""
+def pixel_evidence(views: Sequence[View], rasters: Singles, scales: Singles, pool: Candidates) -> PixelEvidence:
+    """Evidence of all views that deliver pixels, by `stacked_rasters` of their log-odds and scales."""
     chosen = [view for view in views if isinstance(view, PixelView)]
     drawn = [view.whole_outlines(pool.ground, pool.height, pool.width) for view in chosen]
     tall, n = max((spans.shape[1] for _, spans, _ in drawn), default=0), len(pool)
@@ -78,4 +78,4 @@ def pixel_evidence(views: Sequence[View], rasters: Singles, pool: Candidates) ->
         spans[k, :, : outline.shape[1]] = outline
     if chosen:
         area /= chosen[0].area_ratio(pool.ground, pool.height, pool.width)
-    return PixelEvidence(rasters, first, spans, area, order)
+    return PixelEvidence(rasters, scales, first, spans, area, order)

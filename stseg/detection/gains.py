@@ -192,17 +192,17 @@ def _pixel_gain(i: int, pixels: PixelEvidence, parameters: Parameters, assigned:
     total = 0.0
     for view in range(len(pixels.raster)):
         first, raster, away = pixels.first[view, i], pixels.raster[view], pixels.order[view]
+        scale, area = pixels.scale[view], pixels.area[view]
         if first < 0:
             continue
-        unexplained, lost = 0.0, 0.0
+        gained = 0.0
         for k in range(_rows(first, pixels)):
             line = (first + k) * columns
             for u in range(pixels.spans[view, i, k, 0], pixels.spans[view, i, k, 1]):
                 before = assigned[view, line + u]
-                if before < 0:
-                    unexplained += raster[first + k, u]
-                elif away[before] > away[i]:
-                    unexplained += raster[first + k, u]
-                    lost += raster[first + k, u] / pixels.area[view, before]
-        total += unexplained / pixels.area[view, i] - lost
+                if before < 0 or away[before] > away[i]:
+                    gained += raster[first + k, u] / max(area[i], scale[first + k, u])
+                if before >= 0 and away[before] > away[i]:
+                    gained -= raster[first + k, u] / max(area[before], scale[first + k, u])
+        total += gained
     return float(parameters.effective_observations * total)

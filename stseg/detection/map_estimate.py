@@ -15,6 +15,7 @@ import numpy as np
 from stseg.accelerate import kernel
 from stseg.arrays import Flags, Floats, Ints, Singles
 from stseg.detection.assignment import Assignment
+from stseg.detection.blob_scale import blob_scales
 from stseg.detection.body_size import measure
 from stseg.detection.evidence import box_evidence, pixel_evidence, stacked_rasters
 from stseg.detection.prior import Prior
@@ -45,8 +46,13 @@ class FrameEvidence:
 
     @cached_property
     def rasters(self) -> Singles:
-        """`stacked_rasters` of the views."""
-        return stacked_rasters(self.views, self.observations)
+        """`stacked_rasters` of the views' log-odds."""
+        return stacked_rasters(self.views, [None if seen is None else seen.raster for seen in self.observations])
+
+    @cached_property
+    def scales(self) -> Singles:
+        """`stacked_rasters` of the scales of their pixels (`stseg.detection.blob_scale`)."""
+        return stacked_rasters(self.views, blob_scales(self.views, self.observations, self.prior.config))
 
 
 @dataclass(frozen=True)
@@ -303,7 +309,10 @@ def _problem(evidence: FrameEvidence, pool: Candidates) -> Problem:
     """All that is known of the candidates, as the search kernels read it."""
     views, observations, prior = evidence.views, evidence.observations, evidence.prior
     shown = any(isinstance(view, PixelView) for view in views)  # boxes show no widths
-    boxes, pixels = box_evidence(views, observations, pool), pixel_evidence(views, evidence.rasters, pool)
+    boxes, pixels = (
+        box_evidence(views, observations, pool),
+        pixel_evidence(views, evidence.rasters, evidence.scales, pool),
+    )
     return Problem(
         boxes=boxes,
         pixels=pixels,

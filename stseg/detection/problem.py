@@ -68,6 +68,8 @@ class PixelEvidence(NamedTuple):
     ----------
     raster : float32 (view, v, u)
         Log-odds of foreground, nats.
+    scale : float32 (view, v, u)
+        Raster pixels of the largest body that explains each pixel (`stseg.detection.blob_scale`); 0 where none does.
     first : int64 (view, candidate)
         First raster row of each candidate's outline; -1 where the view does not see it.
     spans : int16 (view, candidate, row, 2)
@@ -79,6 +81,7 @@ class PixelEvidence(NamedTuple):
     """
 
     raster: Singles
+    scale: Singles
     first: Ints
     spans: Spans
     area: Floats

@@ -170,7 +170,7 @@ def pixel_score(
     view: int, members: Ints, count: int, pixels: PixelEvidence, parameters: Parameters, owner: Ints, parts: Floats
 ) -> float:
     """One view of pixels; fills parts (member,) and owner (v * u,) inside outlines with the place in `members`."""
-    raster = pixels.raster[view]
+    raster, scale = pixels.raster[view], pixels.scale[view]
     rows, columns = raster.shape
     for a in range(count):
         first = pixels.first[view, members[a]]
@@ -184,12 +184,12 @@ def pixel_score(
         first = pixels.first[view, i]
         if first < 0:
             continue
-        total = 0.0
+        total, area = 0.0, pixels.area[view, i]
         for k in range(min(pixels.spans.shape[2], rows - first)):
             line = (first + k) * columns
             for u in range(pixels.spans[view, i, k, 0], pixels.spans[view, i, k, 1]):
                 if owner[line + u] < 0:
                     owner[line + u] = a
-                    total += raster[first + k, u]
-        parts[a] = parameters.effective_observations * total / pixels.area[view, i]
+                    total += raster[first + k, u] / max(area, scale[first + k, u])
+        parts[a] = parameters.effective_observations * total
     return float(parts[:count].sum())

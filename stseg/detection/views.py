@@ -175,7 +175,7 @@ class PixelView(View):
         places = np.tile(lattice_ground, (len(body.heights), 1))
         self.lattice = self.outlines(places, heights, body.width_of(heights))
         drawn = self.lattice[1][:, ::-1, 1] > 0
-        self.lattice_cells = np.arange(len(lattice_ground))
+        self.lattice_cells, self.common = np.arange(len(lattice_ground)), len(body.heights) // 2
         self.lattice_rows = np.where(drawn.any(1), drawn.shape[1] - drawn.argmax(1), 0)
 
     def observe(self, seen: Boxes | Singles | None, sharpness: BoxNoise = FIRST) -> ViewObservation:
@@ -194,6 +194,13 @@ class PixelView(View):
         sums = np.empty((self.shape[0], self.shape[1] + 1))
         _fill_left_of(observation.raster, unexplained, sums)
         return sums
+
+    def common_means(self, observation: ViewObservation) -> Floats:
+        """Mean log-odds over the lattice's pillars of common height, explained or not: nats, float64 (cell,)."""
+        score = np.zeros((self.common + 1, len(self.lattice_cells)))
+        row_sums = self.row_sums(observation, np.ones(self.shape, bool))
+        self.add_lattice_score(row_sums, np.array([self.common]), self.lattice_cells, score)
+        return np.asarray(score[self.common] / self.config.effective_observations)
 
     def add_lattice_score(self, row_sums: Floats, heights: Ints, cells: Ints, score: Floats) -> None:
         """Add to score (height, cell), nats, what unexplained pixels say of pillars of some heights at some cells."""

@@ -1,0 +1,56 @@
+"""Scale of blobs: how much of each view's foreground one body explains, pixel by pixel.
+
+Errors of a segmentation are alike over a body, so its pixels count as few independent observations
+(`effective_observations`), of which each is a share of the body's area. A small far body that stands in the image of a
+near one would count as many on a fraction of the pixels, though most of the blob is left unexplained. So no pixel
+weighs more than in the largest body that explains it: of all common bodies that the views together hold to be worth a
+person, the one with the greatest sum of log-odds, counted in pixels that are certainly foreground.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from stseg.accelerate import kernel
+from stseg.arrays import Floats, Ints, Singles
+from stseg.config import DetectionConfig
+from stseg.detection.views import BoxView, PixelView, ViewObservation
+from stseg.model.outlines import Spans
+
+
+def blob_scales(
+    views: Sequence[BoxView | PixelView], observations: Sequence[ViewObservation | None], config: DetectionConfig
+) -> list[Singles]:
+    """Raster pixels of the largest body that explains each pixel, float32 (v, u) a view; 0 where none does.
+
+    Those of views with boxes are empty.
+    """
+    scales = [np.zeros(view.shape if isinstance(view, PixelView) else (0, 0), np.float32) for view in views]
+    shown = [
+        (view, scale, view.common_means(observation))
+        for view, observation, scale in zip(views, observations, scales, strict=True)
+        if isinstance(view, PixelView) and observation is not None
+    ]
+    if shown:
+        evidence = config.effective_observations * np.sum([mean for _, _, mean in shown], axis=0)
+        worth = np.flatnonzero(config.prior_log_odds + evidence > 0)
+        certain = np.log((1 - config.pixel_miss_rate) / config.pixel_clutter_rate)
+        for view, scale, mean in shown:
+            first, spans, area = view.lattice
+            begin = view.common * len(mean)
+            _raise_inside(
+                scale, first, view.lattice_rows, spans, begin + worth, area[begin + worth] * mean[worth] / certain
+            )
+    return scales
+
+
+@kernel
+def _raise_inside(scale: Singles, first: Ints, rows: Ints, spans: Spans, pillars: Ints, explained: Floats) -> None:
+    """Raise scale (v, u) inside outlines, of so many rows each, to what each of some pillars (n,) explains (n,)."""
+    for n in range(len(pillars)):
+        i, value = pillars[n], np.float32(explained[n])
+        for k in range(rows[i]):
+            for u in range(spans[i, k, 0], spans[i, k, 1]):
+                scale[first[i] + k, u] = max(scale[first[i] + k, u], value)
