@@ -10,6 +10,7 @@ rig         error of a rig against the true one, on the ground and at head heigh
 scaling     CPU time of a frame over area, views, people and pixels, with exponents
 sizes       error of heights and widths of tracks, and their spread along a track
 spoil       what spoiled masks and boxes cost, by kinds, strengths, views and crowds
+targets     scores on the recordings for which least scores are promised, and what a perfect observer would have
 window      what a window decides better than its frames, and the candidates of people who are missed
 """
 
@@ -29,6 +30,7 @@ EXPERIMENTS = (
     "scaling",
     "sizes",
     "spoil",
+    "targets",
     "window",
 )
 """Each is the module `experiments.NAME` with a function `main`, which reads the command line."""

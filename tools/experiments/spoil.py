@@ -110,7 +110,7 @@ def scores(shown: Shown, kind: str, strength: float) -> str:
         results += tracker.add(views)
     results += tracker.finish()
     rows = tracker.tracks(results).trajectory
-    flagged = "flagged" in (shown.truth.dtype.names or ())
+    flagged = "flag" in (shown.truth.dtype.names or ())
     found = evaluate(shown.truth, rows, frames=np.arange(len(shown.frames)), ignore_flagged=flagged)
     return f"{found.moda:.1f} / {found.idf1:.1f}"
 
