@@ -6,7 +6,8 @@ Members that continue predicted tracks are no births: tracks(S) = sum of birth_j
 and track k, one to one, that is greatest.
 In a view with boxes, part_j is the best box that no other member takes, or the cost of a missing one, which is less
 the more of j is hidden by nearer members. In a view with pixels, part_j is the mean log-odds over j's outline of the
-pixels that no nearer member covers (HW12's detection energy, eqs 13 to 15, in soft form, for the labels of eq. 24).
+pixels that no nearer member covers (HW12's detection energy, eqs 13 to 15, in soft form, for the labels of eq. 24); in
+the image of a body that explains more, over as many pixels as that one explains (`stseg.detection.blob_scale`).
 """
 
 from __future__ import annotations
