@@ -23,15 +23,18 @@ NewIds = Callable[[Ints, Ints], Ints]
 
 
 def write_corrected(
-    run: Path, path: Path, new_ids: NewIds, names: Mapping[int, str], answers: str, overwrite: bool
+    run: Path, path: Path, tracks: Tracks, new_ids: NewIds, names: Mapping[int, str], answers: str, overwrite: bool
 ) -> None:
-    """Copy a run file with other ids; evidence (log_odds, ghosts, rates) is copied unchanged.
+    """Copy a run file with other tracks; evidence (log_odds, ghosts, rates) is copied unchanged.
 
     Parameters
     ----------
     run, path
         The run file, and the one to write.
+    tracks
+        The corrected tracks.
     new_ids
+        Ids of the labels.
     names
         Names by corrected id, kept in the provenance.
     answers
@@ -46,21 +49,15 @@ def write_corrected(
     with replacing(path, overwrite) as part:
         shutil.copyfile(run, part)
         with h5py.File(part, "r+") as file:
-            trajectory = _renamed(file["trajectory"][:], new_ids)
-            trajectory = trajectory[np.lexsort((trajectory["id"], trajectory["frame"]))]
-            _replace(file, "trajectory", trajectory)
-            _replace(file, "tracks", Tracks(trajectory).summary())
-            _replace(file, "boxes", _renamed(file["boxes"][:], new_ids))
-            events = _renamed(file["events"][:], new_ids)
-            events["other"] = new_ids(events["other"], events["frame"])
-            _replace(file, "events", events)
+            for name, rows in (
+                ("trajectory", tracks.trajectory),
+                ("tracks", tracks.summary()),
+                ("boxes", tracks.boxes),
+                ("events", tracks.events),
+            ):
+                _replace(file, name, rows)
             _relabel(file[layout.OCCUPANCY], new_ids)
             _note(file[layout.PROVENANCE], names, answers)
-
-
-def _renamed(rows: Rows, new_ids: NewIds) -> Rows:
-    rows["id"] = new_ids(rows["id"], rows["frame"])
-    return np.asarray(rows[rows["id"] > 0])
 
 
 def _replace(file: h5py.File, name: str, rows: Rows) -> None:

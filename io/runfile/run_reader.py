@@ -143,6 +143,11 @@ class Run:
             return dict(self.given_names)
         return read_object(self.path, layout.PROVENANCE, lambda file: _names(file[layout.PROVENANCE]))
 
+    @cached_property
+    def corrected(self) -> bool:
+        """Whether a person's answers changed its identities (`stseg correct`)."""
+        return read_object(self.path, layout.PROVENANCE, lambda file: "answers" in file[layout.PROVENANCE])
+
     def with_names(self, names: Mapping[int, str]) -> Run:
         """The run with other names of its tracks."""
         return replace(self, given_names=tuple(names.items()))

@@ -7,13 +7,14 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from stseg.engine.correction import corrected_tracks
 from stseg.errors import ConfigError
 from stseg.io.answers import read_answers
 from stseg.io.bounded_files import read_text
 from stseg.io.outputs.whole_files import require_new
 from stseg.io.runfile.corrected import write_corrected
 from stseg.io.runfile.runs import read_run
-from stseg.tracking.corrections import ACTIONS, Answer, solve_corrections
+from stseg.tracking.corrections import ACTIONS, Answer
 
 
 def correct(
@@ -35,8 +36,10 @@ def correct(
     id is another person. **delete**: id is no person (from frame on, if given). **name**: the person of id is called
     name. **keep**: nothing changes.
 
-    All answers hold together; one that contradicts another is refused. Positions and evidence are not changed; the
-    answers are kept in the file's provenance.
+    All answers hold together; one that contradicts another is refused. Identities of the whole run are solved again,
+    with the answers as facts: a few of them decide the rest. In a run that was corrected before, or of a tracker whose
+    identities are final, ids are only exchanged. Evidence is not changed; the answers are kept in the file's
+    provenance.
 
     Parameters
     ----------
@@ -53,8 +56,10 @@ def correct(
     if output.exists() and run_file.exists() and output.samefile(run_file):
         raise ConfigError("command line", "--output", "the run file itself", "another file")
     run, rows = read_run(run_file), read_answers(answers, ACTIONS)
-    solved = solve_corrections(run.tracks, [Answer(r.place, r.action, r.track, r.other, r.frame, r.name) for r in rows])
-    names = run.names | solved.names
-    write_corrected(run_file, output, solved.map, names, read_text(answers), overwrite)
+    given = [Answer(r.place, r.action, r.track, r.other, r.frame, r.name) for r in rows]
+    corrected = corrected_tracks(run, given)
+    write_corrected(
+        run_file, output, corrected.tracks, corrected.new_ids, corrected.names, read_text(answers), overwrite
+    )
     changed = sum(row.action != "keep" for row in rows)
     print(f"wrote {output}: {len(rows)} answers, {changed} changes; {len(read_run(output).tracks)} tracks")

@@ -109,7 +109,9 @@ def _words(doubt: Doubt) -> tuple[str, list[tuple[str, str, str]]]:
     keep = f"keep,{frame},{a},{b or ''},"
     if doubt.question == "encounter":
         swap = ("2", "they were swapped", f"swap,{frame},{a},{b},")
-        return f"Are {a} and {b} after the encounter who they were before?", [("1", "same people", keep), swap]
+        one, two = (f"split,{frame},{track},," for track in (a, b))
+        others = [("3", f"{a} is somebody else", one), ("4", f"{b} is", two), ("5", "both are", f"{one}\n{two}")]
+        return f"Are {a} and {b} after the encounter who they were before?", [("1", "same people", keep), swap, *others]
     if doubt.question == "gap":
         join = ("2", "the same person", f"join,,{a},{b},")
         return f"Is {b} the person who was {a}?", [("1", "two people", keep), join]

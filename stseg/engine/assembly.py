@@ -83,8 +83,9 @@ def assemble(job: Job, finished: Sequence[FinishedSegment], output: Path) -> Tra
         for part in _segment_rows(finished, joined.committed, joined.local, identity):
             _copy(part, writer, packers)
         writer.append("trajectory", tracks.trajectory)
-        writer.append("committed", joined.committed)
-        writer.append("committed_events", joined.events)
+        if not tracker.final:
+            writer.append("committed", joined.committed)
+            writer.append("committed_events", joined.events)
         writer.append("boxes", tracks.boxes)
         writer.append("events", tracks.events)
         writer.finish(tracks.summary())

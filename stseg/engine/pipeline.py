@@ -26,7 +26,9 @@ from stseg.model.tables import APPEARANCE, Tracks
 from stseg.occupancy.volume import Occupancy
 from stseg.trackers import find_tracker
 from stseg.trackers.protocol import Tracker
-from stseg.tracking.final_tracks import committed_tracks, final_tracks
+from stseg.tracking.final_tracks import FinalTracks, committed_tracks, final_tracks
+from stseg.tracking.identities.constraints import Constraints
+from stseg.tracking.identities.search import FREELY
 from stseg.tracking.track_boxes import box_rows
 
 
@@ -96,9 +98,21 @@ def finished_tracks(
     shown
         The rig in whose pixels the tracks' boxes are given.
     """
-    if tracker.final:
-        whole = committed_tracks(committed, events, rig.frame_rate, config.tracking)
-    else:
-        whole = final_tracks(committed, events, appearance, rig.frame_rate, Border.of(rig), config)
+    if not tracker.final:
+        return associated_tracks(rig, config, committed, events, appearance, shown)
+    whole = committed_tracks(committed, events, rig.frame_rate, config.tracking)
+    return _with_boxes(whole, shown), whole.identity
+
+
+def associated_tracks(
+    rig: Rig, config: Config, committed: Rows, events: Rows, appearance: Rows, shown: Rig,
+    constraints: Constraints = FREELY,
+) -> tuple[Tracks, Ints]:  # fmt: skip
+    """As `finished_tracks`, of a tracker whose identities are not final, under constraints on the committed rows."""
+    whole = final_tracks(committed, events, appearance, rig.frame_rate, Border.of(rig), config, constraints)
+    return _with_boxes(whole, shown), whole.identity
+
+
+def _with_boxes(whole: FinalTracks, shown: Rig) -> Tracks:
     tables = [BodyTable.of(camera, shown.grid) for camera in shown.cameras]
-    return Tracks(whole.trajectory, box_rows(tables, whole.trajectory), whole.events), whole.identity
+    return Tracks(whole.trajectory, box_rows(tables, whole.trajectory), whole.events)

@@ -88,7 +88,8 @@ def associate_globally(
         seen = observe(trajectory, value, model, frame_rate, border, config)
         limits = SearchLimits(hypotheses, config.tracking.maximum_gap, config.tracking.identity_lag)
         first = np.empty(len(trajectory), np.int64)
-        known = constraints.observed(seen.order)
+        place = np.argsort(seen.order)
+        known = Constraints(place[constraints.earlier], place[constraints.later], constraints.same)
         first[seen.order] = seen.order[search_identities(seen, model, config.motion, limits, known)]
         return first
 

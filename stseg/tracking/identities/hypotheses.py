@@ -30,8 +30,8 @@ class Hypotheses:
         Of either axis: place, place and velocity, velocity.
     precision, information : float64 (hypothesis, slot, size)
         Sums over the identity's observations.
-    bound : int64 (hypothesis, constraint)
-        Identity of the earlier observation of each constraint, `FREE` before it.
+    bound : int64 (hypothesis, person)
+        Identity of each person whom constraints know, `FREE` before the first observation.
     """
 
     score: Floats
@@ -45,13 +45,13 @@ class Hypotheses:
     bound: Ints
 
     @classmethod
-    def empty(cls, number: int, slots: int, sizes: int, constraints: int = 0) -> Hypotheses:
+    def empty(cls, number: int, slots: int, sizes: int, known: int = 0) -> Hypotheses:
         """Hypotheses of nobody."""
         shape = (number, slots)
         return cls(
             np.zeros(number), np.full(shape, FREE), np.full(shape, -1), np.zeros(shape), np.zeros((*shape, 4)),
             np.zeros((*shape, 3)), np.zeros((*shape, sizes)), np.zeros((*shape, sizes)),
-            np.full((number, constraints), FREE),
+            np.full((number, known), FREE),
         )  # fmt: skip
 
     def at(self, chosen: Ints) -> Hypotheses:

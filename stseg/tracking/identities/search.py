@@ -11,10 +11,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from stseg.arrays import Flags, Ints
+from stseg.arrays import Flags, Floats, Ints
 from stseg.config import MotionConfig
 from stseg.tracking.identities import step_kernels
-from stseg.tracking.identities.constraints import Constraints
+from stseg.tracking.identities.constraints import Constraints, KnownPeople
 from stseg.tracking.identities.hypotheses import Hypotheses
 from stseg.tracking.identities.observations import Observations
 from stseg.tracking.identities.size_model import SizeModel
@@ -99,17 +99,18 @@ def search_identities(
     limits
         Extent of the search.
     constraints
-        Pairs of observations.
+        Pairs of observations. All are obeyed unless they contradict each other.
     """
-    certain = seen.certain.copy()
-    certain[constraints.later] = False
-    seen = replace(seen, certain=certain)
-    slots = int(np.diff(seen.start).max(initial=0)) + _SPARE + constraints.most_open()
-    held = Hypotheses.empty(1, slots, len(sizes.spread), len(constraints))
+    frame = np.repeat(np.arange(len(seen.seconds)), np.diff(seen.start))
+    known = KnownPeople.of(constraints, frame)
+    # Where it is known who somebody is, who seemed certain may have to give way.
+    seen = replace(seen, certain=seen.certain & ~np.isin(frame, known.decided(frame)))
+    slots = int(np.diff(seen.start).max(initial=0)) + _SPARE + known.most_open()
+    held = Hypotheses.empty(1, slots, len(sizes.spread), len(known.first))
     history = _History(np.full(len(seen.order), -1))
     for k, now in enumerate(seen.seconds.tolist()):
         first, stop = int(seen.start[k]), int(seen.start[k + 1])
-        held, step = _extended(held, seen, first, stop, now, sizes, motion, limits, constraints)
+        held, step = _extended(held, seen, first, stop, now, sizes, motion, limits, known)
         history.steps.append(step)
         if now - history.steps[0].seconds > 2 * limits.lag:
             agree = history.decide(now - limits.lag, len(held.score))
@@ -121,7 +122,7 @@ def search_identities(
 
 def _extended(
     held: Hypotheses, seen: Observations, first: int, stop: int, now: float, sizes: SizeModel, motion: MotionConfig,
-    limits: SearchLimits, constraints: Constraints,
+    limits: SearchLimits, known: KnownPeople,
 ) -> tuple[Hypotheses, _Step]:  # fmt: skip
     """The best hypotheses after one more frame, and how they were chosen."""
     turn, pace = motion.velocity_noise**2, motion.speed_spread**2
@@ -129,7 +130,7 @@ def _extended(
     rows = stop - first
     step_kernels.end_identities(
         held.name, held.last, held.seconds, now, limits.longest, seen.inside, _BIRTH,
-        _awaited(held, constraints, first), held.score,
+        _awaited(held, known, first), held.score,
     )  # fmt: skip
     cost = np.empty((number, rows, slots + rows))
     step_kernels.fill_costs(
@@ -137,9 +138,7 @@ def _extended(
         seen.ground, seen.variance, seen.previous, seen.certain, seen.inside, seen.precision, seen.information,
         sizes.spread, sizes.most_against, turn, _BIRTH, _ABSENCE, _LEAST_PLACE, cost,
     )  # fmt: skip
-    for k in np.flatnonzero((constraints.later >= first) & (constraints.later < stop)).tolist():
-        row, same = int(constraints.later[k]) - first, bool(constraints.same[k])
-        step_kernels.impose_constraint(held.name, np.ascontiguousarray(held.bound[:, k]), row, same, cost)
+    _impose(held, known, first, stop, cost)
     column, total = np.empty((number, rows), np.int64), np.empty(number)
     step_kernels.fill_best_assignments(cost, column, total)
     most = number * (1 + rows * (slots + 1) + rows * (rows - 1) // 2)
@@ -150,7 +149,7 @@ def _extended(
     parent, score, keys = np.empty(kept, np.int64), np.empty(kept), np.empty(kept, np.int64)
     chosen, names = np.empty((kept, rows), np.int64), np.empty((kept, rows), np.int64)
     kept = step_kernels.choose_distinct(
-        ordered, change, value, column, held.name, held.last, _marks(held, constraints, first), first,
+        ordered, change, value, column, held.name, held.last, _marks(held, known, first), first,
         float(value[ordered[0]]) - _BEAM_LOSS, parent, chosen, names, score, keys,
     )  # fmt: skip
     new = held.at(parent[:kept])
@@ -159,21 +158,30 @@ def _extended(
         chosen[:kept], new.name, new.last, new.seconds, new.state, new.covariance, new.precision, new.information,
         first, now, seen.ground, seen.variance, seen.precision, seen.information, turn, pace,
     )  # fmt: skip
-    for k in np.flatnonzero((constraints.earlier >= first) & (constraints.earlier < stop)).tolist():
-        new.bound[:, k] = names[:kept, int(constraints.earlier[k]) - first]
+    for observation, person in known.within(first, stop):
+        new.bound[:, person] = names[:kept, observation - first]
     return new, _Step(parent[:kept], names[:kept], first, now)
 
 
-def _awaited(held: Hypotheses, constraints: Constraints, first: int) -> Flags:
+def _impose(held: Hypotheses, known: KnownPeople, first: int, stop: int, cost: Floats) -> None:
+    """Impose on the cost of a frame who its observations are, and who they are not."""
+    for observation, person in known.within(first, stop):
+        if known.first[person] < first:
+            step_kernels.impose_identity(held.name, held.bound[:, person].copy(), observation - first, True, cost)
+            continue
+        for other in np.flatnonzero(known.other[person] & (known.first < first)).tolist():
+            step_kernels.impose_identity(held.name, held.bound[:, other].copy(), observation - first, False, cost)
+
+
+def _awaited(held: Hypotheses, known: KnownPeople, first: int) -> Flags:
     """Which slots hold an identity that a later observation must have, bool (hypothesis, slot)."""
-    open_ = (constraints.earlier < first) & (constraints.later >= first) & constraints.same
-    return np.asarray((held.name[:, :, None] == held.bound[:, None, open_]).any(axis=2) & (held.name >= 0))
+    bound = held.bound[:, None, known.awaited(first)]
+    return np.asarray((held.name[:, :, None] == bound).any(axis=2) & (held.name >= 0))
 
 
-def _marks(held: Hypotheses, constraints: Constraints, first: int) -> Ints:
-    """A number that differs where hypotheses differ in what open constraints bind, int64 (hypothesis,)."""
-    open_ = np.flatnonzero((constraints.earlier < first) & (constraints.later >= first))
+def _marks(held: Hypotheses, known: KnownPeople, first: int) -> Ints:
+    """A number that differs where hypotheses differ in who known people are, int64 (hypothesis,)."""
     mark = np.zeros(len(held.score), np.int64)
-    for k in open_.tolist():
-        mark = (mark * 1_000_003 + held.bound[:, k] + 2) % 2_147_483_647
+    for person in np.flatnonzero(known.binding(first)).tolist():
+        mark = (mark * 1_000_003 + held.bound[:, person] + 2) % 2_147_483_647
     return mark

@@ -99,7 +99,7 @@ def fill_costs(
 
 
 @kernel
-def impose_constraint(name: Ints, bound: Ints, row: int, same: bool, cost: Floats) -> None:
+def impose_identity(name: Ints, bound: Ints, row: int, same: bool, cost: Floats) -> None:
     """Impose on the cost (hypothesis, row, slot + row) that a row is, or is not, the identity bound (hypothesis,)."""
     hypotheses, slots = name.shape
     for h in range(hypotheses):
