@@ -88,7 +88,7 @@ class KnownPeople:
         return list(zip(self.observation[start:end].tolist(), self.person[start:end].tolist(), strict=True))
 
     def decided(self, frame: Ints) -> Ints:
-        """Frames in which an observation must, or must not, have an identity; frame (n,) is that of every observation."""
+        """Frames in which an observation must, or must not, have an identity; frame (n,) is of all observations."""
         here, begin = frame[self.observation], frame[self.first]
         others = (self.other[self.person] & (begin < here[:, None])).any(axis=1)
         return np.asarray(here[(begin[self.person] < here) | others])
