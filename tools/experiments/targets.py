@@ -1,7 +1,7 @@
 """Scores on the recordings for which least scores are promised: wide, small and spoiled bodies, and few cameras.
 
     python tools/experiment.py targets -o docs/development/targets.md [--data ../shared/data] [--work FOLDER]
-        [--only REGEX] [--frames 60]
+        [--only REGEX] [--frames 100]
 
 WORK holds uu4.toml and cmc2.csv, as tools/results.py leaves them, and cmc2_fairmot.toml, made like cmc2.toml from the
 boxes in DATA/cmc/fairmot. Recordings are cut to so many frames; a target is judged by the mean of its recordings.
@@ -28,7 +28,8 @@ _EVERY = 3
 """Of the frames whose past is made right, every third."""
 _PAGE = """# Targets for bodies as they come
 
-MODA / IDF1, percent, of the default tracker on the first {frames} frames. Where a recording misses its target: MODA of
+MODA / IDF1, percent, of the default tracker on the first {frames} frames of the recordings that match
+`{only}`. Where a recording misses its target: MODA of
 every third frame by itself if the places of the frame before are given to the detector, as a perfect observer of the
 past would; and in how many of the frames that err even so the truth scores lower under the model than what was found
 (the model loses; in the others the search was short). Made by `tools/experiment.py targets` at commit {commit}.
@@ -69,7 +70,7 @@ def tracked(made: Recorded) -> Rows:
     return tracker.tracks(results + tracker.finish()).trajectory
 
 
-def page(rows: Sequence[Row], frames: int) -> str:
+def page(rows: Sequence[Row], frames: int, only: str) -> str:
     """The means of all targets, then each recording."""
     lines = ["| target | asked | mean | least |", "| --- | --- | --- | --- |"]
     for target in dict.fromkeys(row.trial.target for row in rows):
@@ -79,7 +80,7 @@ def page(rows: Sequence[Row], frames: int) -> str:
         wanted = " / ".join(f"{score:g}" if score else "-" for score in asked)
         lines.append(f"| {target} | {wanted} | {' | '.join(shown)} |")
     lines += ["", "| target | recording | MODA / IDF1 | perfect past |", "| --- | --- | --- | --- |", *map(str, rows)]
-    return _PAGE.format(frames=frames, commit=commit()) + "\n".join(lines) + "\n"
+    return _PAGE.format(frames=frames, only=only, commit=commit()) + "\n".join(lines) + "\n"
 
 
 def main() -> None:
@@ -88,7 +89,7 @@ def main() -> None:
     parser.add_argument("-o", "--output", type=Path, required=True)
     parser.add_argument("--data", type=Path, default=ROOT / "../shared/data")
     parser.add_argument("--work", type=Path, default=ROOT / "build/results")
-    parser.add_argument("--only", default="", help="of the recordings' names")
+    parser.add_argument("--only", default=".", help="of the recordings' names")
     parser.add_argument("--frames", type=int, default=100)
     asked = parser.parse_args()
     rows: list[Row] = []
@@ -96,7 +97,7 @@ def main() -> None:
         if re.search(asked.only, trial.name):
             rows.append(measured(trial, asked.frames))
             print(rows[-1], flush=True)
-            asked.output.write_text(page(rows, asked.frames), "utf-8")
+            asked.output.write_text(page(rows, asked.frames, asked.only), "utf-8")
 
 
 if __name__ == "__main__":
