@@ -181,7 +181,7 @@ def _window(discs: Floats, area: Floats, rows: int, columns: int) -> tuple[int, 
 
 @kernel
 def _from(place: float, most: int) -> int:
-    """The pixel at or before a place, 0..most."""
+    """The pixel at or before a place, 0..most: beside a camera places lie beyond what a whole number can hold."""
     return int(min(max(place, 0.0), float(most)))
 
 
@@ -207,7 +207,7 @@ def _between(left_of: Floats, low: Floats, high: Floats, top: int, bottom: int) 
     columns = left_of.shape[1] - 1
     for row in range(top, bottom):
         if low[row] <= high[row]:
-            start, stop = max(int(np.ceil(low[row])), 0), min(int(np.floor(high[row])) + 1, columns)
+            start, stop = _from(np.ceil(low[row]), columns), _from(np.floor(high[row]) + 1, columns)
             if start < stop:
                 total += left_of[row, stop] - left_of[row, start]
     return total
@@ -241,7 +241,7 @@ def _draw(discs: Floats, drawn: Floats, low: Floats, high: Floats) -> tuple[int,
     least, most = drawn[0, 1], drawn[0, 1]
     for k in range(len(drawn)):
         least, most = min(least, drawn[k, 1] - drawn[k, 5]), max(most, drawn[k, 1] + drawn[k, 5])
-    top, bottom = min(max(int(np.ceil(least)), 0), rows), max(min(int(np.floor(most)) + 1, rows), 0)
+    top, bottom = _from(np.ceil(least), rows), _from(np.floor(most) + 1, rows)
     low[top:bottom], high[top:bottom] = np.inf, -np.inf
     for k in range(len(drawn)):
         _widen(drawn, k, rows, low, high)
@@ -269,7 +269,7 @@ def _widen(drawn: Floats, k: int, rows: int, low: Floats, high: Floats) -> None:
     """Widen the rows' spans by the k-th drawn disc, and by the trapezoid to the disc before it."""
     u, v, slope, flat, wide, tall = drawn[k, 0], drawn[k, 1], drawn[k, 2], drawn[k, 3], drawn[k, 4], drawn[k, 5]
     shrink = 1.0 / (tall + 1e-12)
-    for row in range(max(int(np.ceil(v - tall)), 0), min(int(np.floor(v + tall)) + 1, rows)):
+    for row in range(_from(np.ceil(v - tall), rows), _from(np.floor(v + tall) + 1, rows)):
         away = row - v
         along = away * shrink
         middle, half = u + slope * away, flat * math.sqrt(max(1.0 - along * along, 0.0))
@@ -278,7 +278,7 @@ def _widen(drawn: Floats, k: int, rows: int, low: Floats, high: Floats) -> None:
         return
     u0, v0, wide0 = drawn[k - 1, 0], drawn[k - 1, 1], drawn[k - 1, 4]
     per_row = 0.0 if v == v0 else 1.0 / (v - v0)
-    for row in range(max(int(np.ceil(min(v, v0))), 0), min(int(np.floor(max(v, v0))) + 1, rows)):
+    for row in range(_from(np.ceil(min(v, v0)), rows), _from(np.floor(max(v, v0)) + 1, rows)):
         share = 0.5 if v == v0 else (row - v0) * per_row
         middle, half = u0 + (u - u0) * share, wide0 + (wide - wide0) * share
         low[row], high[row] = min(low[row], middle - half), max(high[row], middle + half)
@@ -308,8 +308,7 @@ def _store(
     for row in range(top, bottom):
         if low[row] > high[row]:
             continue
-        start = max(int(np.ceil(low[row])), 0)
-        stop = min(int(np.floor(high[row])) + 1, columns)
+        start, stop = _from(np.ceil(low[row]), columns), _from(np.floor(high[row]) + 1, columns)
         if stop <= start:
             continue
         if first[i] < 0:
