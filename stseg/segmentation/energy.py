@@ -13,7 +13,8 @@ from itertools import product
 
 import numpy as np
 
-from stseg.arrays import Ints, Singles
+from stseg.accelerate import wide_kernel
+from stseg.arrays import Ints, Labels, Singles
 from stseg.config import SegmentationConfig
 from stseg.geometry import Grid
 from stseg.graphcut.energy import QUANTUM, Energy
@@ -32,13 +33,23 @@ def build_energy(log_odds: Singles, motion: Ints, grid: Grid, config: Segmentati
     motion : int64 (time - 1, y, x, 2)
         Motion (dy, dx) until the next frame, cells.
     """
-    bounded = np.nan_to_num(log_odds, nan=0.0).clip(-_MOST_NATS, _MOST_NATS)
-    unary = np.rint(bounded / np.float32(QUANTUM)).astype(np.int32)
+    unary = np.empty(log_odds.shape, np.int32)
+    _fill_unary(log_odds.reshape(-1), np.float32(_MOST_NATS), np.float32(QUANTUM), unary.reshape(-1))
     offsets = neighbourhood(config.neighbours)
     scale = (config.time_distance, grid.top / max(grid.planes - 1, 1), grid.cell, grid.cell)
     distance = np.sqrt(((offsets * scale) ** 2).sum(1))
     capacity = config.smoothness * np.exp(-0.5 * (distance / config.distance_scale) ** 2) / QUANTUM
     return Energy(unary, offsets, np.rint(capacity).astype(np.int32), successor_cells(motion))
+
+
+@wide_kernel
+def _fill_unary(log_odds: Singles, most: np.float32, quantum: np.float32, unary: Labels) -> None:
+    """Fill unary (cell,) with log-odds held within `most` nats, in quanta; 0 where there are none."""
+    for i in range(len(unary)):
+        held = log_odds[i]
+        held = held if held < most else most if held == held else np.float32(0)
+        held = held if held > -most else -most
+        unary[i] = np.int32(np.rint(held / quantum))
 
 
 def neighbourhood(neighbours: int) -> Ints:
