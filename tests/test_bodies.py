@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -11,7 +13,8 @@ from strategies import numbers
 
 from stseg.arrays import Floats
 from stseg.geometry import Camera, Grid
-from stseg.geometry.bodies import PROFILE, BodyTable
+from stseg.geometry.bodies import LEVELS, PROFILE, BodyTable
+from stseg.model.outlines import outlines
 
 GRID = Grid((-2.0, 2.0), (-2.0, 2.0))
 SHARP = (1280, 960)
@@ -23,6 +26,7 @@ def sharp(distortion: tuple[float, ...] | None = None, centre: tuple[float, ...]
     return looking("sharp", centre, size=SHARP, focal=750.0, distortion=distortion)
 
 
+PLACES = np.stack(np.meshgrid(*[np.linspace(-2, 2, 21)] * 2), -1).reshape(-1, 2)
 VIEWS = {"ideal": sharp(), "barrel": sharp(BARREL), "low": sharp(None, (5.0, 0.5, 1.2))}
 TABLES = {name: BodyTable.of(camera, GRID) for name, camera in VIEWS.items()}
 
@@ -84,3 +88,14 @@ def test_taller_people_reach_higher_and_stand_where_they_stood() -> None:
 def test_nobody_has_no_box() -> None:
     assert TABLES["ideal"].boxes(np.zeros((0, 2)), np.array([1.7])).shape == (1, 0, 4)
     assert TABLES["ideal"].boxes_of(np.zeros((0, 2)), np.zeros(0)).shape == (0, 4)
+
+
+def test_an_outline_beside_the_camera_stays_on_the_raster() -> None:
+    # What stands beside a camera that sees wide angles lies further off than a whole number of pixels can say.
+    table, middle = TABLES["ideal"], len(LEVELS) // 2
+    for low, high in ((2.5e9, 2.3e19), (-2.3e19, 2.5e9), (1e20, 100.0)):
+        pixel = table.pixel.copy()
+        pixel[:middle, ..., 1], pixel[middle:, ..., 1] = low, high
+        first, spans, _ = outlines(replace(table, pixel=pixel), PLACES, np.full(len(PLACES), 1.7), 4, (240, 320))
+        assert ((first >= -1) & (first < 240)).all()
+        assert ((spans >= 0) & (spans <= 320)).all()
