@@ -97,9 +97,9 @@ def _plazas() -> Iterator[Trial]:
     for seed in PLAZA_SEEDS:
         spec = replace(NAMED["plaza"], seed=seed)
         small = replace(spec, size=(spec.size[0] // 2, spec.size[1] // 2))
-        half, wide = _filmed(small, "masks"), _changed(_filmed(spec, "masks"), lambda mask: _grown(mask, 2))
+        half, grown = _filmed(small, "masks"), _changed(_filmed(spec, "masks"), lambda mask: _grown(mask, 2))
         yield Trial("plaza, half size or dilated", f"plaza half size, seed {seed}", (97, 96), half)
-        yield Trial("plaza, half size or dilated", f"plaza dilated by 2, seed {seed}", (97, 96), wide)
+        yield Trial("plaza, half size or dilated", f"plaza dilated by 2, seed {seed}", (97, 96), grown)
 
 
 def _uu4(rig: Path, truth: Path) -> Iterator[Trial]:
