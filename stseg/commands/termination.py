@@ -1,4 +1,4 @@
-"""Answers to SIGINT and SIGTERM: an orderly end where Python comes to its handlers, else an end without them."""
+"""Answers to SIGINT and SIGTERM: an orderly end where it comes in time, else an end at once."""
 
 from __future__ import annotations
 
@@ -10,34 +10,33 @@ from contextlib import suppress
 from types import FrameType
 from typing import Any
 
+from stseg.engine.stopping import Stopping, stopping
+
 INTERRUPTED, TERMINATED = 130, 143
 """Exit status after SIGINT and SIGTERM."""
 
-_PATIENCE = 1.5
-"""Time in which Python must come to its handlers, seconds."""
-_ORDERLY = 10.0
-"""Time for an orderly end once it has, seconds: output is withdrawn, workers are ended."""
+_PATIENCE = 1.2
+"""Time for an orderly end, seconds: output is withdrawn, workers are ended."""
 
 
 class Termination:
     """SIGTERM acts as an interrupt: output is finished or withdrawn, and the command ends.
 
-    Python runs no handler while a kernel is at work in the main thread, and a kernel may take long. So a thread learns
-    of every signal as well, and ends the process where the command has not ended in time. Files are written so that an
-    end at any moment loses nothing. The first signal for which a command has a handler of its own (`run --follow`)
-    is left to that.
+    Python runs no handler while a kernel is at work or compiled in the main thread, and an orderly end may be slow. So
+    a thread learns of every signal as well, and ends the process where the command has not ended in time. Files are
+    written so that an end at any moment loses nothing. The first signal to a run that goes on (`run --follow`) only
+    asks it to finish.
     """
 
     def __init__(self) -> None:
         self.asked = False
-        self._answered = threading.Event()
         self._watch: _Watch | None = None
         self._before: dict[int, Any] = {}
         if threading.current_thread() is threading.main_thread():
             self._before[signal.SIGTERM] = signal.signal(signal.SIGTERM, self._ask)
             if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
                 self._before[signal.SIGINT] = signal.signal(signal.SIGINT, self._interrupt)
-            self._watch = _Watch((self._ask, self._interrupt, signal.default_int_handler), self._answered)
+            self._watch = _Watch()
 
     @property
     def line(self) -> str:
@@ -62,25 +61,17 @@ class Termination:
         self._interrupt(number, frame)
 
     def _interrupt(self, _number: int, _frame: FrameType | None) -> None:
-        self._answered.set()
         raise KeyboardInterrupt
 
 
 class _Watch:
-    """A thread that waits for signals.
+    """A thread that waits for signals, and for the end of the command after one."""
 
-    Parameters
-    ----------
-    orderly
-        Handlers that end the command.
-    answered
-        Set by these handlers.
-    """
-
-    def __init__(self, orderly: tuple[Any, ...], answered: threading.Event) -> None:
-        self._orderly, self._answered, self._ended = orderly, answered, threading.Event()
+    def __init__(self) -> None:
+        self._ended = threading.Event()
         self._reader, self._writer = os.pipe()
-        os.set_blocking(self._writer, False)
+        if hasattr(os, "set_blocking"):  # not in Python 3.11 on Windows
+            os.set_blocking(self._writer, False)
         self._before = signal.set_wakeup_fd(self._writer, warn_on_full_buffer=False)
         self._thread = threading.Thread(target=self._wait, name="signals", daemon=True)
         self._thread.start()
@@ -94,18 +85,16 @@ class _Watch:
         os.close(self._reader)
 
     def _wait(self) -> None:
-        left_alone = False
+        left_to: Stopping | None = None
         while numbers := os.read(self._reader, 64):
             for number in numbers:
                 if number not in (signal.SIGINT, signal.SIGTERM):
                     continue
-                if signal.getsignal(number) not in self._orderly and not left_alone:
-                    left_alone = True
-                elif not self._ended_in_time():
+                if (going_on := stopping()) is not None and going_on is not left_to:
+                    left_to = going_on
+                    going_on.ask()
+                elif not self._ended.wait(_PATIENCE):
                     _end(number)
-
-    def _ended_in_time(self) -> bool:
-        return self._ended.wait(_PATIENCE) or (self._answered.is_set() and self._ended.wait(_ORDERLY))
 
 
 def _end(number: int) -> None:
