@@ -1,8 +1,23 @@
-"""Limits of the machine: memory that is free for this process."""
+"""Limits of the machine: memory that is free for this process, and its address space."""
 
 from __future__ import annotations
 
 from pathlib import Path
+
+try:
+    from resource import RLIM_INFINITY, RLIMIT_AS, getrlimit
+except ImportError:  # Windows has no such limits
+
+    def address_space() -> int:
+        """Bytes of address space that a process of this user may have."""
+        return _ENDLESS
+else:
+
+    def address_space() -> int:
+        """Bytes of address space that a process of this user may have."""
+        limit, _ = getrlimit(RLIMIT_AS)
+        return _ENDLESS if limit == RLIM_INFINITY else limit
+
 
 _ENDLESS = 1 << 62
 

@@ -15,13 +15,14 @@ import pytest
 from stseg.accelerate import COMPILED
 
 _PROGRAM = """
+import ctypes
 import sys
+import threading
 import time
-from threading import Event
 import numpy as np
 import stseg.commands.inspect
 from stseg.accelerate import kernel
-from stseg.commands.main import main
+from stseg.commands.main import command
 from stseg.engine.stopping import stop_asked
 
 @kernel
@@ -60,6 +61,20 @@ def refusing_to_end():
         except KeyboardInterrupt:
             pass
 
+def calling_back():
+    callback = ctypes.CFUNCTYPE(None)(lambda: (begun(), time.sleep(60)))
+    while True:
+        callback()
+
+def failing_of_it():
+    ctypes.CFUNCTYPE(None)(lambda: (begun(), time.sleep(60)))()
+    raise RuntimeError("the compiler lost its way")
+
+def leaving_a_thread():
+    threading.Thread(target=time.sleep, args=(60,)).start()
+    begun()
+    time.sleep(60)
+
 def writing_a_run(path="part.h5"):
     from pathlib import Path
     from stseg.io.runfile.part_file import PartFile
@@ -78,8 +93,10 @@ def begun():
     print("begun", flush=True)
 
 spin(1)
-stseg.commands.inspect.read_run = lambda _: globals()[sys.argv[1]]()
-sys.exit(main(["inspect", "run.h5"]))
+what = globals()[sys.argv[1]]
+stseg.commands.inspect.read_run = lambda _: what()
+sys.argv[1:] = ["inspect", "run.h5"]
+command()
 """
 _SECONDS = 3.0
 """Two, on a machine that is busy."""
@@ -126,6 +143,9 @@ compiled = pytest.mark.skipif(not COMPILED, reason="nothing is compiled")
         pytest.param("in_a_kernel", INTERRUPTED, marks=compiled),
         pytest.param("compiling", TERMINATED, marks=compiled),
         pytest.param("writing_a_run", INTERRUPTED, marks=compiled),
+        ("calling_back", TERMINATED),
+        ("failing_of_it", TERMINATED),
+        ("leaving_a_thread", INTERRUPTED),
         ("ending_slowly", TERMINATED),
         ("refusing_to_end", INTERRUPTED),
     ],

@@ -9,13 +9,15 @@ from contextlib import suppress
 from difflib import get_close_matches
 from importlib import import_module
 from io import TextIOWrapper
+from typing import NoReturn
 
 from cyclopts import App, CycloptsError
 
 from stseg import __version__
 from stseg.commands.standard_error import without_library_messages
-from stseg.commands.termination import Termination
+from stseg.commands.termination import INTERRUPTED, TERMINATED, Termination
 from stseg.errors import ConfigError, StsegError
+from stseg.io.machine import address_space
 from stseg.io.names import printable
 
 COMMANDS = {
@@ -39,6 +41,18 @@ COMMANDS = {
 
 _FLAGS = ("--help", "-h", "--version")
 _USER_ERROR = 2
+_ADDRESS_SPACE = 2 * 2**30
+"""Least address space in which the libraries of all commands work, bytes: with less, they crash as they are loaded."""
+
+
+def command() -> NoReturn:
+    """The program `stseg`; after a signal it ends without waiting for its threads."""
+    status = main()
+    if status in (INTERRUPTED, TERMINATED):
+        with suppress(OSError):
+            sys.stdout.flush()
+        os._exit(status)
+    sys.exit(status)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -51,6 +65,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _run(tokens: list[str]) -> int:
     """Run a command line and return its exit status."""
+    if address_space() < _ADDRESS_SPACE:
+        found, least = (f"{size // 2**20} MiB" for size in (address_space(), _ADDRESS_SPACE))
+        return _fail(f"limit of address space (ulimit -v): found {found}, expected {least} or more")
     termination = Termination()
     try:
         _require_command(tokens)
@@ -68,6 +85,11 @@ def _run(tokens: list[str]) -> int:
     except OSError as error:
         _drop_output()  # or Python would try once more to write it
         return _fail(f"{error.filename or 'standard output'}: {error.strerror or error}")
+    except Exception:
+        if not termination.asked:
+            raise
+        print(termination.line, file=sys.stderr)  # the compiler has dropped the interrupt, and failed of it
+        return termination.status
     finally:
         termination.forget()
     return 0

@@ -15,7 +15,7 @@ from stseg.engine.stopping import Stopping, stopping
 INTERRUPTED, TERMINATED = 130, 143
 """Exit status after SIGINT and SIGTERM."""
 
-_PATIENCE = 1.2
+_PATIENCE = 0.8
 """Time for an orderly end, seconds: output is withdrawn, workers are ended."""
 
 
@@ -29,38 +29,48 @@ class Termination:
     """
 
     def __init__(self) -> None:
-        self.asked = False
+        self._number: int | None = None
         self._watch: _Watch | None = None
         self._before: dict[int, Any] = {}
+        self._unraisable = sys.unraisablehook
         if threading.current_thread() is threading.main_thread():
-            self._before[signal.SIGTERM] = signal.signal(signal.SIGTERM, self._ask)
+            self._before[signal.SIGTERM] = signal.signal(signal.SIGTERM, self._interrupt)
             if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
                 self._before[signal.SIGINT] = signal.signal(signal.SIGINT, self._interrupt)
             self._watch = _Watch()
+            sys.unraisablehook = self._drop_interrupts
+
+    @property
+    def asked(self) -> bool:
+        """Whether the command was asked to end."""
+        return self._number is not None
 
     @property
     def line(self) -> str:
         """What there is to say of it."""
-        return f"stseg: {'terminated' if self.asked else 'interrupted'}"
+        return f"stseg: {'terminated' if self._number == signal.SIGTERM else 'interrupted'}"
 
     @property
     def status(self) -> int:
         """Exit status."""
-        return TERMINATED if self.asked else INTERRUPTED
+        return TERMINATED if self._number == signal.SIGTERM else INTERRUPTED
 
     def forget(self) -> None:
         """Restore the previous handlers."""
         if self._watch is not None:
             self._watch.close()
             self._watch = None
+            sys.unraisablehook = self._unraisable
             for number, handler in self._before.items():
                 signal.signal(number, handler)
 
-    def _ask(self, number: int, frame: FrameType | None) -> None:
-        self.asked = True
-        self._interrupt(number, frame)
+    def _drop_interrupts(self, unraisable: Any) -> None:
+        """Say nothing of an interrupt that came while the compiler called Python, which cannot raise it."""
+        if not issubclass(unraisable.exc_type, KeyboardInterrupt):
+            self._unraisable(unraisable)
 
-    def _interrupt(self, _number: int, _frame: FrameType | None) -> None:
+    def _interrupt(self, number: int, _frame: FrameType | None) -> None:
+        self._number = number
         raise KeyboardInterrupt
 
 

@@ -7,6 +7,7 @@ assigned to another.
 from __future__ import annotations
 
 import signal
+import sys
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -160,3 +161,5 @@ def _main(job: Job, pipe: Connection) -> None:
                     pipe.send(worker.make(segment, draft, pipe.send))
             except StsegError as error:
                 pipe.send(error)
+            except MemoryError:
+                sys.exit(1)  # as if the system had killed it: another tries
