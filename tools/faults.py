@@ -1,7 +1,7 @@
 """Faults of the system at every call of a run, and kills at random moments: what was injected, survived and lost.
 
 python tools/faults.py -o docs/development/faults.md      each fault at each call that writes, and 100 kills
-python tools/faults.py --every 5 --kills 20               a fifth of it, printed
+python tools/faults.py --every 32 --kills 20              at every 32nd write, and at each call of any other kind
 
 A fault is survived if the command ends with a whole output or with one line, and the same command then gives the same
 datasets, bit for bit. Anything else is lost.
@@ -41,11 +41,11 @@ class Row:
 
 
 def at_calls(driver: Driver, whole: Path, calls: Sequence[str], name: str, every: int, scratch: Path) -> Row:
-    """One fault at every call, or every few."""
+    """One fault at every call; of the writes, at every few."""
     fault, row = FAULTS[name], Row(name)
-    for at in range(0, len(calls), every):
-        if fault == "short" and calls[at] != "write":
-            continue
+    writes = [at for at, call in enumerate(calls) if call == "write"]
+    others = [] if fault == "short" else [at for at, call in enumerate(calls) if call != "write"]
+    for at in sorted(writes[::every] + others):
         output = scratch / f"{fault}-{at}" / "run.h5"
         output.parent.mkdir()
         _count(row, driver, driver.run(output, fault, at).status, output, whole, f"{name}, call {at} ({calls[at]})")
@@ -93,13 +93,16 @@ def _is_same(output: Path, whole: Path) -> bool:
     return True
 
 
-def table(rows: Sequence[Row], calls: Sequence[str]) -> str:
+def table(rows: Sequence[Row], calls: Sequence[str], every: int) -> str:
     """The page."""
     kinds = ", ".join(f"{calls.count(kind)} {kind}" for kind in dict.fromkeys(calls))
     lines = [
         "# Faults injected", "",
-        "Made by `python tools/faults.py -o docs/development/faults.md`; see there what counts as lost.", "",
-        f"A run of 12 frames of three cameras in two segments makes {len(calls)} calls that write: {kinds}.", "",
+        f"Made by `python {' '.join(['tools/faults.py', *sys.argv[1:]])}`. A fault is survived if the command ends with",
+        "a whole output or with one line, and the same command then gives the same datasets, bit for bit; else it is",
+        "lost.", "",
+        f"A run of 12 frames of three cameras in two segments makes {len(calls)} calls that write: {kinds}.",
+        f"Each fault strikes at each of them{f', of the writes at every {every}th' if every > 1 else ''}.", "",
         "| fault | injected | run ended whole | one line | killed | lost |", "| --- | --- | --- | --- | --- | --- |",
         *(f"| {r.fault} | {r.injected} | {r.ended} | {r.refused} | {r.killed} | {r.lost} |" for r in rows),
     ]  # fmt: skip
@@ -109,7 +112,7 @@ def table(rows: Sequence[Row], calls: Sequence[str]) -> str:
 def main() -> int:
     """The command line; status 1 where something was lost."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--every", type=int, default=1, help="calls from one fault to the next")
+    parser.add_argument("--every", type=int, default=1, help="writes from one fault to the next")
     parser.add_argument("--kills", type=int, default=100)
     parser.add_argument("-o", "--output", type=Path)
     given = parser.parse_args()
@@ -126,7 +129,7 @@ def main() -> int:
         rows = [at_calls(driver, whole, calls, fault, given.every, folder) for fault in FAULTS]
         rows.append(at_random(driver, whole, seconds, given.kills, folder))
         driver.close()
-    page = table(rows, calls)
+    page = table(rows, calls, given.every)
     print(page)
     if given.output is not None:
         given.output.write_text(page, "utf-8")
