@@ -98,9 +98,9 @@ def table(rows: Sequence[Row], calls: Sequence[str], every: int) -> str:
     kinds = ", ".join(f"{calls.count(kind)} {kind}" for kind in dict.fromkeys(calls))
     lines = [
         "# Faults injected", "",
-        f"Made by `python {' '.join(['tools/faults.py', *sys.argv[1:]])}`. A fault is survived if the command ends with",
-        "a whole output or with one line, and the same command then gives the same datasets, bit for bit; else it is",
-        "lost.", "",
+        f"Made by `python {' '.join(['tools/faults.py', *sys.argv[1:]])}`. A fault is survived if the command ends",
+        "with a whole output or with one line, and the same command then gives the same datasets, bit for bit; else it",
+        "is lost.", "",
         f"A run of 12 frames of three cameras in two segments makes {len(calls)} calls that write: {kinds}.",
         f"Each fault strikes at each of them{f', of the writes at every {every}th' if every > 1 else ''}.", "",
         "| fault | injected | run ended whole | one line | killed | lost |", "| --- | --- | --- | --- | --- | --- |",
