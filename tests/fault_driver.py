@@ -13,7 +13,7 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from recordings import OPTIONS
+from recordings import ALONE, OPTIONS
 
 ROOT = Path(__file__).parents[1]
 SHORT = ("--frames", "0:12", "--set", "segments.length=0.6", "--set", "segments.warm_up=0.2")
@@ -111,7 +111,7 @@ class Driver:
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         self._log.unlink(missing_ok=True)
-        arguments = ["run", str(self._rig), "-o", str(output), *OPTIONS, *SHORT]
+        arguments = ["run", str(self._rig), "-o", str(output), *OPTIONS, *SHORT, *ALONE]
         self._process.stdin.write(json.dumps([fault, at, str(output.parent), str(self._log), arguments, after]) + "\n")
         self._process.stdin.flush()
         status = int(self._process.stdout.readline())
