@@ -143,7 +143,7 @@ def clear_frames(folder: Path) -> None:
 def _remove_abandoned(path: Path) -> None:
     for part in parts_of(path):
         with suppress(OSError):
-            if time.time() - part.stat().st_mtime > _ABANDONED:
+            if abs(time.time() - part.stat().st_mtime) > _ABANDONED:  # a clock may have been set back meanwhile
                 part.unlink()
 
 

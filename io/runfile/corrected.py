@@ -12,6 +12,7 @@ import numpy as np
 from stseg.arrays import Ints, Rows
 from stseg.io.outputs.whole_files import replacing
 from stseg.io.runfile import layout
+from stseg.io.runfile.safe_hdf5 import hdf5_file
 from stseg.model.tables import Tracks
 
 NAMES = "names"
@@ -48,7 +49,7 @@ def write_corrected(
     """
     with replacing(path, overwrite) as part:
         shutil.copyfile(run, part)
-        with h5py.File(part, "r+") as file:
+        with hdf5_file(part, "r+") as file:
             for name, rows in (
                 ("trajectory", tracks.trajectory),
                 ("tracks", tracks.summary()),

@@ -31,6 +31,8 @@ def format_errors(path: Path, place: str) -> Iterator[None]:
         raise FormatError(path, "", "no such file", "a run file") from error
     except BlockingIOError as error:
         raise FormatError(path, "", "a file that is still being written", "a finished run file") from error
+    except PermissionError as error:
+        raise FormatError(path, "", "a file that this user may not read", "a run file") from error
     except (OSError, RuntimeError, KeyError, TypeError, ValueError) as error:  # whatever h5py raises on broken files
         if path.is_file() and not h5py.is_hdf5(path):
             raise FormatError(path, "", "something that is not HDF5", "a run file") from error

@@ -11,6 +11,7 @@ import numpy as np
 from stseg.arrays import Floats
 from stseg.io.runfile import layout
 from stseg.io.runfile.run_reader import Run, read_run
+from stseg.io.runfile.safe_hdf5 import hdf5_file
 
 Layer = tuple[Any, dict[str, Any], str]
 """Data, what the layer's constructor is given, kind of layer: napari's LayerData."""
@@ -22,7 +23,7 @@ def get_reader(path: str | list[str]) -> Callable[[str], list[Layer]] | None:
     """The reader of a path that is dropped on napari; None unless it is a single run file."""
     if not isinstance(path, str) or not h5py.is_hdf5(path):
         return None
-    with h5py.File(path, "r") as file:
+    with hdf5_file(path, "r") as file:
         return read_layers if file.attrs.get("format") == layout.FORMAT else None
 
 
@@ -43,7 +44,7 @@ def read_layers(path: str) -> list[Layer]:
         Where the run file is broken.
     """
     run = read_run(path)
-    group = h5py.File(path, "r")[layout.OCCUPANCY]  # checked by `read_run`; open as long as napari holds the arrays
+    group = hdf5_file(path, "r")[layout.OCCUPANCY]  # checked by `read_run`; open as long as napari holds the arrays
     cells = {"scale": _scale(run), "translate": _first_cell(run), **_axes()}
     volume: Layer = (
         group[layout.LOG_ODDS.name],

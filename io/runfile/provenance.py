@@ -171,8 +171,15 @@ def _files_in_words(row: np.void) -> str:
     name = Path(_word(row["path"])).name
     if not row["files"]:
         return f"{name}, which does not exist"
-    written = datetime.fromtimestamp(float(row["modified"]), UTC).isoformat()
-    return f"{name}, {row['files']} files, {row['size']} bytes in all, written {written}"
+    return f"{name}, {row['files']} files, {row['size']} bytes in all, written {_moment(float(row['modified']))}"
+
+
+def _moment(seconds: float) -> str:
+    """A time of change, seconds since 1970, in words; clocks and archives set any."""
+    try:
+        return datetime.fromtimestamp(seconds, UTC).isoformat()
+    except (ValueError, OverflowError, OSError):  # before the year 1 or after 9999
+        return f"{seconds:.0f} s from 1970"
 
 
 def _word(text: bytes | str) -> str:

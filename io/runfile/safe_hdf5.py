@@ -6,10 +6,12 @@ its own. Sizes are checked before anything is read: what a dataset declares must
 
 from __future__ import annotations
 
+import errno
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Literal
 
 import h5py
 import numpy as np
@@ -28,6 +30,16 @@ _CHUNK = 1 << 29
 """Bytes of one chunk, which HDF5 unpacks at once."""
 
 
+def hdf5_file(path: Path | str, mode: Literal["r", "r+"]) -> h5py.File:
+    """An HDF5 file, locked where its file system has locks; raises OSError."""
+    try:
+        return h5py.File(path, mode)
+    except OSError as error:
+        if error.errno not in (errno.ENOLCK, errno.ENOSYS, errno.ENOTSUP):
+            raise
+    return h5py.File(path, mode, locking=False)
+
+
 @contextmanager
 def open_hdf5(path: Path) -> Iterator[h5py.File]:
     """An HDF5 file, open for reading, all of whose objects stand in it.
@@ -42,7 +54,7 @@ def open_hdf5(path: Path) -> Iterator[h5py.File]:
     if not path.is_file():
         raise FileNotFoundError(2, "no such file", str(path))
     try:
-        with h5py.File(path, "r") as file:
+        with hdf5_file(path, "r") as file:
             _require_own(file)
             yield file
     except (RuntimeError, KeyError, TypeError, AttributeError, OverflowError) as error:  # h5py, of broken files
