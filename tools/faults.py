@@ -77,7 +77,7 @@ def _count(row: Row, driver: Driver, status: int, output: Path, whole: Path, wha
         row.killed + (status < 0),
     )
     was_whole = not output.exists() or _is_same(output, whole)
-    if status != 0:  # a run that was whole is refused as any other output that exists, and what is left is removed
+    if {path.name for path in output.parent.iterdir()} != {"run.h5"}:
         driver.run(output)
     left = {path.name for path in output.parent.iterdir()}
     if status not in (0, 2, -9) or not was_whole or left != {"run.h5"} or not _is_same(output, whole):
@@ -126,8 +126,8 @@ def main() -> int:
         begun = time.monotonic()
         calls = driver.run(whole).calls
         seconds = time.monotonic() - begun
-        rows = [at_calls(driver, whole, calls, fault, given.every, folder) for fault in FAULTS]
-        rows.append(at_random(driver, whole, seconds, given.kills, folder))
+        rows = [at_random(driver, whole, seconds, given.kills, folder)]
+        rows += [at_calls(driver, whole, calls, fault, given.every, folder) for fault in FAULTS]
         driver.close()
     page = table(rows, calls, given.every)
     print(page)

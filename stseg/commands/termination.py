@@ -15,7 +15,7 @@ from stseg.engine.stopping import Stopping, stopping
 INTERRUPTED, TERMINATED = 130, 143
 """Exit status after SIGINT and SIGTERM."""
 
-_PATIENCE = 0.8
+_PATIENCE = 1.5
 """Time for an orderly end, seconds: output is withdrawn, workers are ended."""
 
 

@@ -6,8 +6,8 @@ assigned to another.
 
 from __future__ import annotations
 
+import os
 import signal
-import sys
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -162,4 +162,4 @@ def _main(job: Job, pipe: Connection) -> None:
             except StsegError as error:
                 pipe.send(error)
             except MemoryError:
-                sys.exit(1)  # as if the system had killed it: another tries
+                os._exit(1)  # as if the system had killed it, without waiting for its threads: another tries
