@@ -12,7 +12,9 @@ import numpy as np
 import pytest
 from attacks import film, refusal, write_rig
 
-from stseg.errors import InputError
+from stseg.errors import InputError, SourceError
+from stseg.io.recording.packets import PictureHeads
+from stseg.io.recording.pictures import read_picture
 from stseg.io.recording.rigs import read_rig
 from stseg.io.recording.video_size import read_video_size
 
@@ -80,3 +82,27 @@ def test_damaged_pictures_are_answered_in_one_line(tmp_path: Path) -> None:
         )  # fmt: skip
         assert done.returncode in (0, 2)
         assert done.stderr.count("\n") == (done.returncode == 2), done.stderr
+
+
+def test_a_png_chunk_longer_than_its_file_is_not_decoded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """OpenCV would take two gigabytes for it."""
+    data = bytearray(cv2.imencode(".png", np.zeros((48, 64, 3), np.uint8))[1].tobytes())
+    start = data.index(b"IDAT") - 4
+    data[start : start + 4] = b"\x7f\xff\xff\xff"
+    (tmp_path / "a.png").write_bytes(data)
+    monkeypatch.setattr(cv2, "imdecode", decoded_nothing)
+    with pytest.raises(SourceError, match="a broken file"):
+        read_picture(tmp_path / "a.png", "images", (64, 48), "")
+
+
+def test_a_packet_that_declares_a_huge_picture_is_not_decoded(monkeypatch: pytest.MonkeyPatch) -> None:
+    packet = bytearray(cv2.imencode(".jpg", np.zeros((48, 64, 3), np.uint8))[1].tobytes())
+    start = packet.index(b"\xff\xc0") + 5
+    assert PictureHeads().fits(np.frombuffer(packet, np.uint8))
+    packet[start : start + 4] = (16000).to_bytes(2, "big") + (65500).to_bytes(2, "big")
+    monkeypatch.setattr(cv2, "imdecode", decoded_nothing)
+    assert not PictureHeads().fits(np.frombuffer(packet, np.uint8))
+
+
+def decoded_nothing(*_: object) -> None:
+    raise AssertionError("it was decoded")

@@ -26,6 +26,14 @@ def stores_numbers(data: bytes) -> bool:
     return colour == _INDEXED or (colour == _GREY and bits < 8)
 
 
+def declares_more(data: bytes) -> bool:
+    """Whether the bytes are a PNG with a chunk that is longer than the file: OpenCV would make room for all of it."""
+    at = len(_SIGNATURE)
+    while data[:8] == _SIGNATURE and at + 8 <= len(data) and data[at + 4 : at + 8] != b"IEND":
+        at += 12 + int.from_bytes(data[at : at + 4], "big")
+    return at > len(data)
+
+
 def decode_indexed(data: bytes) -> AnyArray | None:
     """The numbers of a PNG for which `stores_numbers` holds.
 

@@ -9,7 +9,9 @@ import cv2
 import numpy as np
 
 from stseg.arrays import Bytes, Floats
+from stseg.io import limits
 from stseg.io.recording.ffmpeg import open_video
+from stseg.io.recording.pictures import declared_size
 
 _RAW = -1
 """Value of CAP_PROP_FORMAT at which OpenCV delivers undecoded packets."""
@@ -29,7 +31,7 @@ class PictureHeads:
     def fits(self, packet: Bytes) -> bool:
         """Whether a packet uint8 (byte,) is a complete picture, with a header that decodes."""
         head = _head(packet.tobytes())
-        if head and head not in self._known and cv2.imdecode(packet, cv2.IMREAD_GRAYSCALE) is not None:
+        if head not in self._known and _is_bounded(head) and cv2.imdecode(packet, cv2.IMREAD_GRAYSCALE) is not None:
             self._known.add(head)
         return head in self._known
 
@@ -83,6 +85,12 @@ def decode_reduced(packet: Bytes, size: tuple[int, int], scale: int) -> Bytes | 
     if picture is None or picture.shape != (-(-height // scale), -(-width // scale), 3):
         return None
     return np.asarray(picture[: height // scale, : width // scale], np.uint8)
+
+
+def _is_bounded(head: bytes) -> bool:
+    """Whether a header declares a picture, and none larger than are read."""
+    size = declared_size(head) if head else None
+    return size is not None and size[0] * size[1] <= limits.PIXELS and max(size) <= limits.SIDE
 
 
 def _head(packet: bytes) -> bytes:

@@ -12,7 +12,7 @@ from PIL import Image
 from stseg.arrays import AnyArray, Bytes, Observation
 from stseg.errors import SourceError
 from stseg.io.bounded_files import read_bytes
-from stseg.io.recording.indexed_png import decode_indexed, stores_numbers
+from stseg.io.recording.indexed_png import declares_more, decode_indexed, stores_numbers
 from stseg.io.recording.recording import SourceKind
 
 # Video codecs leave a trace of colour on grey; real colour pictures have far more.
@@ -97,7 +97,7 @@ def reduced_picture(picture: AnyArray, factor: int) -> AnyArray:
 
 def _decode(data: bytes, kind: SourceKind) -> AnyArray | None:
     """The picture in a file's bytes, None where it is broken."""
-    if not data:
+    if not data or declares_more(data):
         return None
     flags = cv2.IMREAD_COLOR if kind in ("video", "images") else cv2.IMREAD_UNCHANGED
     try:

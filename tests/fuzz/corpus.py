@@ -134,6 +134,12 @@ def png(indexed: bool) -> bytes:
     return bytes(cv2.imencode(".png", numbers.astype(np.uint16))[1])
 
 
+def picture(suffix: str) -> bytes:
+    """A picture in colour."""
+    ramp = np.arange(64 * 48 * 3, dtype=np.uint32).reshape(48, 64, 3) % 251
+    return bytes(cv2.imencode(suffix, ramp.astype(np.uint8))[1])
+
+
 def video(folder: Path, suffix: str, codec: str) -> bytes:
     path = folder / f"film{suffix}"
     writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*codec), 10, (64, 48))

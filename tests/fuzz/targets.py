@@ -52,6 +52,10 @@ def _video(path: Path) -> None:
     frames("video")(path)
 
 
+def _picture(path: Path) -> None:
+    read_picture(path, "images", (64, 48), "")
+
+
 def _run(path: Path) -> None:
     run = read_run(path)
     assert isinstance(run.names, dict)
@@ -169,6 +173,10 @@ TARGETS = (
     Target("indexed.png", lambda _: corpus.png(True), lambda path: read_picture(path, "instances", (64, 48), "")),
     Target("grey.png", lambda _: corpus.png(False), lambda path: read_picture(path, "instances", (64, 48), "")),
     Target("mask.png", lambda _: corpus.png(True), lambda path: read_picture(path, "masks", (64, 48), "")),
+    *(
+        Target(f"colour{suffix}", lambda _, suffix=suffix: corpus.picture(suffix), _picture)
+        for suffix in (".png", ".jpg", ".bmp", ".tiff", ".webp")
+    ),
     Target("mjpeg.avi", lambda folder: corpus.video(folder, ".avi", "MJPG"), _video),
     Target("mpeg4.mp4", lambda folder: corpus.video(folder, ".mp4", "mp4v"), _video),
 )  # fmt: skip
