@@ -23,7 +23,7 @@ from stseg.io.bounded_files import read_bytes
 
 _MAGIC = b"\x93NUMPY"
 _HEADER = re.compile(
-    r"\{'descr': '([<>|=]?[fiub][1248]|[<>]U\d{1,4})', 'fortran_order': (True|False), "
+    r"\{'descr': '([<>|=]?(?:f[248]|[iu][1248]|b1)|[<>]U\d{1,4})', 'fortran_order': (True|False), "
     r"'shape': \(([\d, ]{0,100})\), \}\s*",
     re.ASCII,
 )

@@ -53,6 +53,7 @@ def test_a_matlab_file_that_declares_more_than_it_has_is_refused() -> None:
         "{'descr': '<f8', 'fortran_order': False, 'shape': (1000000, 1000000), }",
         "{'descr': '<f8', 'fortran_order': False, 'shape': (3, ",
         "{'descr': '|O', 'fortran_order': False, 'shape': (3, 4), }",
+        "{'descr': '<b8', 'fortran_order': False, 'shape': (3, 4), }",
         "(" * 200,
     ],
 )

@@ -174,7 +174,7 @@ TARGETS = (
     Target("grey.png", lambda _: corpus.png(False), lambda path: read_picture(path, "instances", (64, 48), "")),
     Target("mask.png", lambda _: corpus.png(True), lambda path: read_picture(path, "masks", (64, 48), "")),
     *(
-        Target(f"colour{suffix}", lambda _, suffix=suffix: corpus.picture(suffix), _picture)
+        Target(f"colour{suffix}", plain(corpus.picture(suffix)), _picture)
         for suffix in (".png", ".jpg", ".bmp", ".tiff", ".webp")
     ),
     Target("mjpeg.avi", lambda folder: corpus.video(folder, ".avi", "MJPG"), _video),
