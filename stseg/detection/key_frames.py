@@ -5,7 +5,7 @@ something may be decided otherwise. The best set of the predicted tracks alone i
 
 - every member continues a track, and the score would lose at least `_SURE` nats without it,
 - nobody else, of the other tracks or of the lattice by what the members leave unexplained, comes nearer than `_SURE`
-  nats to being worth a member,
+  nats to being worth a member, a candidate of the lattice being worth up to `_COARSE` more than it shows,
 - no two members are so near that they touch, their places being uncertain by `_EXPECTED`,
 - and every member stands within `_EXPECTED` of its track's prediction.
 
@@ -27,6 +27,8 @@ from stseg.model.people import Explanation
 
 _SURE = 3.0
 """Least difference of score between a decision and its opposite, nats: 20 to 1."""
+_COARSE = 3.0
+"""Most that a candidate gains where its place and size are fitted to its pixels, nats: those of spoiled silhouettes."""
 _EXPECTED = 0.10
 """Greatest distance of a person from the prediction, metres: the resolution of places in one frame."""
 _SETTLED = 0.02
@@ -92,7 +94,7 @@ def _shows_someone_new(tracked: MapEstimate, lattice_ground: Floats) -> bool:
         return False
     known = len(tracked.pool)
     together = tracked.with_pool(tracked.pool.joined_with(fresh))
-    return bool((together.additions(np.arange(known, len(together.pool))).gain > -_SURE).any())
+    return bool((together.additions(np.arange(known, len(together.pool))).gain > -_SURE - _COARSE).any())
 
 
 def _outside_core(fresh: Candidates, tracked: MapEstimate) -> Candidates:
