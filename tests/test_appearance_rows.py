@@ -57,6 +57,13 @@ def looks(views: list[Observation], likely: list[ViewEvidence], axes: Floats | N
     return appearance_rows(7, explained(), TABLES, axes, views, likely)
 
 
+def test_nobody_looks_like_nothing() -> None:
+    nobody = found(STANDING[:0])
+    empty = tuple(np.full((camera.size[1] // 2, camera.size[0] // 2), -1, np.int16) for camera in CAMERAS)
+    explanation = Explanation(nobody, nobody, empty, (2,) * 4, (np.zeros(0, np.int64),) * 4, np.zeros(4))
+    assert not len(appearance_rows(0, explanation, TABLES, None, *painted()))
+
+
 def test_colours_are_those_that_each_person_wears() -> None:
     rows = looks(*painted())
     assert set(rows["frame"].tolist()) == {7}

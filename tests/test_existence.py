@@ -15,6 +15,7 @@ from stseg.graphcut.sparse import sparse_cut
 from stseg.model.border import Border
 from stseg.segmentation.existence import Existence, ExistenceModel, WindowCandidates
 from stseg.segmentation.paths import best_paths, path_marginals
+from stseg.trackers.window_existence import tracks_of
 
 CONFIG = Config()
 RIG = room()
@@ -79,6 +80,15 @@ def test_a_path_leads_round_a_candidate_that_another_person_excludes() -> None:
     real = decide(found).real
     assert real[found.track > 0].all()
     assert not real[found.track == 0].any()
+
+
+def test_candidates_are_added_between_detections_and_before_the_first_away_from_the_border() -> None:
+    weak = np.array([3.0, 3.0, 12.0, 12.0, 3.0, 12.0, 12.0, 3.0, 3.0])
+    found = candidates(*walk(weak))
+    decision = decide(found)
+    assert decision.real.all()
+    for inside, expected in ((True, [1] * 7 + [0] * 2), (False, [0] * 2 + [1] * 5 + [0] * 2)):
+        assert tracks_of(found, decision, np.full(9, inside)).tolist() == expected
 
 
 def test_no_candidates() -> None:

@@ -86,4 +86,4 @@ def _colours(
         for channel in range(3):
             total = np.bincount(person[inside], colour[inside, channel], len(people))
             found[enough, s, channel] = total[enough] / count[enough]
-    return found.reshape(len(people), -1)
+    return found.reshape(len(people), len(_SLICES) * 3)

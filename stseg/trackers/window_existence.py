@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import logit
 
-from stseg.arrays import Floats, Ints, Singles
+from stseg.arrays import Flags, Floats, Ints, Singles
 from stseg.config import Config
 from stseg.geometry import Rig
 from stseg.geometry.nearest_person import nearest_person
@@ -60,7 +60,8 @@ class WindowExistence:
         """Frames first .. stop - 1 with the people that are real by all frames given, those before and after too."""
         found = _candidates(frames)
         decision = self.model.decide(found, self.solver.sparse)
-        tracks = _tracks(found, decision)
+        inside = self.model.border.inside(found.ground, self.model.detection.border_width) >= 1
+        tracks = tracks_of(found, decision, inside)
         bounds = np.searchsorted(found.frame, np.arange(len(frames) + 1))
         return [
             self._frame(one, tracks[own], decision.log_odds[own])
@@ -104,11 +105,12 @@ def _candidates(frames: Sequence[TrackedFrame]) -> WindowCandidates:
     )
 
 
-def _tracks(found: WindowCandidates, decision: Existence) -> Ints:
+def tracks_of(found: WindowCandidates, decision: Existence, inside: Flags) -> Ints:
     """Track of each candidate that is real, 0 for the others: added ones take that of the next detection on their path.
 
-    Only between two of the detector's people is a candidate added. Elsewhere candidates are the best of many places
-    that were tried, and so are their sums; and what prolongs a track at the border of the area costs nothing.
+    A candidate is added between two of the detector's people, and before the first of a path away from the border,
+    where nobody appears. Elsewhere candidates are the best of many places that were tried, and so are their sums; and
+    what prolongs a track at the border of the area costs nothing.
     """
     own = np.where(decision.real, found.track, 0)
     linked = np.flatnonzero((decision.successor >= 0) & decision.real)
@@ -118,7 +120,7 @@ def _tracks(found: WindowCandidates, decision: Existence) -> Ints:
         _take_over(earlier, int(decision.successor[i]), i, found)
     for i in linked[::-1].tolist():
         _take_over(later, i, int(decision.successor[i]), found)
-    return np.where(earlier > 0, later, 0)
+    return np.where((earlier > 0) | inside, later, 0)
 
 
 def _take_over(tracks: Ints, to: int, source: int, found: WindowCandidates) -> None:
