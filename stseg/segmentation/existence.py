@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -145,11 +146,22 @@ class ExistenceModel:
         return found.evidence + self.detection.prior_log_odds + tall - birth - death, birth, death
 
     def _links(self, found: WindowCandidates, birth: Floats, death: Floats) -> Links:
-        """Possible links and b; those that gain nothing are left out."""
+        """Possible links and b; those that gain nothing are left out.
+
+        Frame by frame: a window's pairs all at once would take more memory than its volume.
+        """
         span = max(1, round(self.patience * self.frame_rate))
-        steps = found.frame[None] - found.frame[:, None]
-        start, end = np.nonzero((steps > 0) & (steps <= span))
-        seconds = steps[start, end] / self.frame_rate
+        ends = np.searchsorted(found.frame, np.arange(found.frame[-1] + 2))
+        each = []
+        for first, stop, last in zip(ends, ends[1:], ends[1 + span :].tolist() + [len(found)] * span, strict=False):
+            start, end = np.meshgrid(np.arange(first, stop), np.arange(stop, last), indexing="ij")
+            each.append(self._worthwhile(found, start.ravel(), end.ravel(), birth, death))
+        start, end, bonus = (np.concatenate(part) for part in zip(*each, strict=True))
+        return start, end, bonus
+
+    def _worthwhile(self, found: WindowCandidates, start: Ints, end: Ints, birth: Floats, death: Floats) -> Links:
+        """Those of some pairs of candidates whose link gains something."""
+        seconds = (found.frame[end] - found.frame[start]) / self.frame_rate
         off = found.ground[end] - found.ground[start]
         noise = 2 * self.motion.position_noise**2 + (self.motion.speed_spread * seconds) ** 2
         spread = found.covariance[start] + found.covariance[end] + noise[:, None, None] * np.eye(2)
@@ -171,11 +183,12 @@ class ExistenceModel:
 
     def _exclusions(self, found: WindowCandidates) -> Exclusions:
         """Pairs of one frame that share their evidence; two people of the detector do not."""
-        together = found.frame[:, None] == found.frame
-        distance = np.hypot(*np.moveaxis(found.ground[:, None] - found.ground, -1, 0))
-        kept = (found.track > 0)[:, None] & (found.track > 0)
-        one, other = np.nonzero(np.triu(together & (distance < self.reach) & ~kept, 1))
-        return one.astype(np.int64), other.astype(np.int64)
+        ends = np.searchsorted(found.frame, np.arange(found.frame[-1] + 2))
+        pairs = [first + np.stack(np.triu_indices(stop - first, 1)) for first, stop in pairwise(ends.tolist())]
+        one, other = np.concatenate(pairs, axis=1)
+        near = np.hypot(*(found.ground[one] - found.ground[other]).T) < self.reach
+        kept = near & ~((found.track[one] > 0) & (found.track[other] > 0))
+        return one[kept].astype(np.int64), other[kept].astype(np.int64)
 
 
 def _solve(
