@@ -1,4 +1,4 @@
-"""What each detected person looks like in each view: features of the detector's box, or colours of trunk and legs."""
+"""Appearance of each detected person in each view: features of the detector's box, or colours of trunk and legs."""
 
 from __future__ import annotations
 

@@ -62,16 +62,16 @@ def assemble(job: Job, finished: Sequence[FinishedSegment], output: Path) -> Tra
     """
     stitcher = Stitcher(round(job.config.tracking.patience * job.recording.rig.frame_rate))
     before = finished[0].segment.first if finished else 0
-    looks = [np.zeros(0, APPEARANCE)]
+    appearance = [np.zeros(0, APPEARANCE)]
     for segment, path in finished:
         run = read_run(path)
         stitcher.add(SegmentTracks(segment.first, run.trajectory, run.events, segment.first - before))
         before = segment.stop
-        looks.append(run.appearance)
+        appearance.append(run.appearance)
     joined = stitcher.joined()
     shown, tracker = job.recording.rig, find_tracker(job.tracker)
     tracks, identity = finished_tracks(
-        job.read.read_rig, job.config, tracker, joined.committed, joined.events, np.concatenate(looks), shown
+        job.read.read_rig, job.config, tracker, joined.committed, joined.events, np.concatenate(appearance), shown
     )  # fmt: skip
     views = read_run(finished[0].path).views
     config = format_config(job.config)

@@ -111,9 +111,9 @@ def committed_frames(commit: Commit, records: dict[int, FrameRecord], watch: Sto
     """The results of a tracker's commit; takes its frames out of `records` and their time out of `watch`."""
     rows, parts, residuals, appearance = [], [], [], []
     for fused in commit.frames:
-        explanation, fusion, looks = records.pop(fused.frame)
+        explanation, fusion, own = records.pop(fused.frame)
         rates = fusion.result().rates
-        appearance.append(looks)
+        appearance.append(own)
         residuals.append(explanation.residual)
         for status, candidates in ((1, explanation.people), (0, explanation.ghosts)):
             rows.append(_candidate_rows(fused.frame, status, candidates))

@@ -53,17 +53,17 @@ def corrected_tracks(run: Run, answers: Sequence[Answer]) -> CorrectedTracks:
     if not len(run.committed) or run.corrected:
         return _renamed(run, linked)
     old = _with_ids_of(run.trajectory, run.committed)
-    told = answered_rows(old, answers, run.frame_rate)
-    kept = np.flatnonzero(~told.deleted)
-    place = np.cumsum(~told.deleted) - 1
-    constraints = told.constraints
+    answered = answered_rows(old, answers, run.frame_rate)
+    kept = np.flatnonzero(~answered.deleted)
+    place = np.cumsum(~answered.deleted) - 1
+    constraints = answered.constraints
     constraints = Constraints(place[constraints.earlier], place[constraints.later], constraints.same)
     config = parse_config(run.provenance.config, f"{run.path}: configuration")
     rig = run.recording.reduced(config.foreground.body_rows).read_rig
     tracks, identity = associated_tracks(
         rig, config, run.committed[kept], run.committed_events, run.appearance, run.recording.rig, constraints
     )
-    _require_obeyed(constraints, told.places, identity)
+    _require_obeyed(constraints, answered.places, identity)
     numbers = _numbers(old[kept], identity, np.concatenate([tracks.events["id"], tracks.events["other"]]))
     solved = Tracks(*(_numbered(rows, numbers) for rows in (tracks.trajectory, tracks.boxes, tracks.events)))
     new = np.zeros(len(old), np.int64)
@@ -74,12 +74,12 @@ def corrected_tracks(run: Run, answers: Sequence[Answer]) -> CorrectedTracks:
 
 def _with_ids_of(trajectory: Rows, committed: Rows) -> Rows:
     """Committed rows with the ids of the run's tracks, 0 for none; tracks keep the places of their rows as raw ones."""
-    told, own = np.zeros(len(trajectory), _PLACE), np.zeros(len(committed), _PLACE)
+    kept, own = np.zeros(len(trajectory), _PLACE), np.zeros(len(committed), _PLACE)
     for name, _ in _PLACE:
-        told[name], own[name] = trajectory[name], committed[name]
+        kept[name], own[name] = trajectory[name], committed[name]
     rows = committed.copy()
     rows["id"] = 0
-    _, index, row = np.intersect1d(told, own, return_indices=True)
+    _, index, row = np.intersect1d(kept, own, return_indices=True)
     rows["id"][row] = trajectory["id"][index]
     return rows
 

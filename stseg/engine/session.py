@@ -97,8 +97,8 @@ class Session:
             )
         fusion = self._submit(frame, evidence, explanation, noise)
         with self.watch.time("appearance"):
-            looks = self.pipeline.appearance_rows(frame, explanation, frame_set.views, evidence)
-        self._records[frame] = FrameRecord(explanation, fusion, looks)
+            appearance = self.pipeline.appearance_rows(frame, explanation, frame_set.views, evidence)
+        self._records[frame] = FrameRecord(explanation, fusion, appearance)
         fused = FusedFrame(frame, explanation.people, explanation.ghosts, lambda: fusion.result().log_odds)
         with self.watch.time("track"):
             commits = self._tracker.add(fused, FrameObservations(frame_set.views, evidence))

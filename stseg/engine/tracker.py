@@ -104,8 +104,8 @@ class Tracker:
             return Tracks(np.zeros(0, TRAJECTORY))
         rows: Rows = np.concatenate([np.zeros(0, TRAJECTORY), *(result.commit.trajectory for result in results)])
         events: Rows = np.concatenate([np.zeros(0, EVENT), *(result.commit.events for result in results)])
-        looks: Rows = np.concatenate([np.zeros(0, APPEARANCE), *(result.appearance for result in results)])
-        return self._session.pipeline.finished(rows, events, looks, self.rig)[0]
+        appearance: Rows = np.concatenate([np.zeros(0, APPEARANCE), *(result.appearance for result in results)])
+        return self._session.pipeline.finished(rows, events, appearance, self.rig)[0]
 
     def _begin(self, seen: Sequence[Observation], frame: int) -> Session:
         """The stages, for the kinds of the first observations; a blind camera is taken to be of the others' kind."""

@@ -96,10 +96,10 @@ def _renamed(events: Rows, name_at: _Names, links: Sequence[Link]) -> Rows:
     named = events.copy()
     for role in ("id", "other"):
         named[role] = [name_at.name(track, frame) for track, frame in zip(events[role], events["frame"], strict=True)]
-    told = zip(named["frame"].tolist(), named["kind"].tolist(), named["id"].tolist(), strict=True)
+    rows = zip(named["frame"].tolist(), named["kind"].tolist(), named["id"].tolist(), strict=True)
     refuted = [
         (kind == b"birth" and name_at.first(name) < frame) or (kind == b"death" and name_at.last(name) > frame)
-        for frame, kind, name in told
+        for frame, kind, name in rows
     ]
     joined = [(link.frame, b"hand-over", link.identity, link.track, link.reason.encode()) for link in links]
     return np.concatenate([named[~np.array(refuted, bool)], np.array(joined, EVENT)])

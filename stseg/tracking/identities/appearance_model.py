@@ -3,14 +3,15 @@
 A row's appearance is the mean over the views that see its person apart, less each camera's offset (a gain, where the
 numbers are logarithms of colours). It is whitened by its scatter within people and turned to the axes along which
 people differ most: probabilistic linear discriminant analysis (Ioffe 2006). Each axis is then one more size of the
-person (`stseg.tracking.identities.size_model`). Who is who is known from a search without appearance: where that errs,
-people seem to change their looks, and appearance is believed less.
+person (`stseg.tracking.identities.size_model`). Identities are those of a search without appearance: where that errs,
+the appearance of people seems to change, and weighs less.
 
-Looks last: a turned back stays turned for seconds, a place in the light for longer. So frames are not independent, and
-how many of them make one independent look is learned where it matters. Axes are learned from one half of each person's
-time; then each tracklet of the other half is compared with the person's first half, and with those of the people who
-are there at the same time. Under the true number of frames a look the log-likelihood ratios of these pairs are most
-probable (Bruemmer and du Preez 2006). Where none is better than chance, appearance says nothing and is left out.
+Appearance lasts: a turned back stays turned for seconds, a place in the light for longer. So frames are not
+independent, and how many of them make one independent observation is learned where it matters. Axes are learned from
+one half of each person's time; then each tracklet of the other half is compared with the person's first half, and with
+those of the people who are there at the same time. Under the true number of frames an observation the log-likelihood
+ratios of these pairs are most probable (Bruemmer and du Preez 2006). Where none is better than chance, appearance says
+nothing and is left out.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ _LEAST_PEOPLE = 3
 _PRIOR = 0.1
 """Weight of the whole scatter in that within people: no axis is free of noise."""
 _LASTING = 2.0 ** np.arange(0, 13)
-"""Numbers of frames that make one independent look, of which one is chosen."""
+"""Numbers of frames that make one independent observation, of which one is chosen."""
 _WRONG = 0.1
 """Share of wrong answers: the search without appearance exchanges people."""
 _LEAST_GAIN = 0.05
@@ -73,7 +74,7 @@ class _Axes:
 def learn_appearance(
     trajectory: Rows, appearance: Rows, tracklets: Sequence[Ints], person: Ints, frame_rate: float
 ) -> LearnedAppearance:
-    """What the appearance of a recording's people tells.
+    """Learn how much the appearance of a recording's people tells of identity.
 
     Parameters
     ----------
@@ -160,7 +161,7 @@ def _learned(
     axes = _discriminant_axes(value, [rows for half in halves for rows in half])
     number = len(axes.spread)
     seconds = np.full(number, lasting / frame_rate)
-    # A look may be of somebody else in front: under a share of wrong looks, none says more than this against a person.
+    # An observation may be of a person in front: under a share of such errors none says more than this against one.
     most_against = np.full(number, -np.log(_WRONG) / lasting / max(number, 1))
     model = SizeModel(np.zeros(number), np.ones(number), seconds, axes.spread, most_against)
     return LearnedAppearance(axes.of(value), model)
@@ -189,7 +190,7 @@ def _discriminant_axes(value: Floats, people: Sequence[Ints]) -> _Axes:
 def _lasting(
     value: Floats, frame: Ints, tracklets: Sequence[Ints], person: Ints, halves: Sequence[tuple[Ints, Ints]]
 ) -> float:
-    """Frames of one independent look, under which pairs of a person and a later or earlier tracklet are most probable.
+    """Frames of one independent observation: with this number the pairs of a person and a tracklet are most probable.
 
     Infinite where no number is better than chance.
     """

@@ -43,7 +43,7 @@ class Constraints:
 
 @dataclass(frozen=True)
 class KnownPeople:
-    """Observations of which constraints say whose they are: those that are one person, and people who are not the same.
+    """Observations that constraints name: those that are one person, and pairs of people that are two.
 
     Attributes
     ----------
@@ -63,7 +63,7 @@ class KnownPeople:
 
     @classmethod
     def of(cls, constraints: Constraints, frame: Ints) -> KnownPeople:
-        """Whom constraints on observations know; frame (n,) is that of every observation."""
+        """People whose observations constraints name; frame (n,) is that of every observation."""
         pairs = np.stack([constraints.earlier, constraints.later])
         observation, ends = np.unique(pairs, return_inverse=True)
         ends = ends.reshape(2, -1)
@@ -94,7 +94,7 @@ class KnownPeople:
         return np.asarray(here[(begin[self.person] < here) | others])
 
     def most_open(self) -> int:
-        """Most people at once of whom observations are still to come."""
+        """Most people at once with observations still to come."""
         ends = np.concatenate([self.first, self.last])
         change = np.repeat([1, -1], len(self.first))
         return int(np.cumsum(change[np.lexsort((change, ends))]).max(initial=0))

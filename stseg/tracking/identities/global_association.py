@@ -95,8 +95,8 @@ def associate_globally(
 
     if len(appearance):
         draft = search(-(-config.tracking.hypotheses // _DRAFT))
-        looks = learn_appearance(trajectory, appearance, tracklets, draft, frame_rate)
-        model, value = SizeModel.joined([model, looks.model]), np.concatenate([value, looks.value], axis=1)
+        learned = learn_appearance(trajectory, appearance, tracklets, draft, frame_rate)
+        model, value = SizeModel.joined([model, learned.model]), np.concatenate([value, learned.value], axis=1)
     first = search(config.tracking.hypotheses)
     identity = _numbered(trajectory, first)
     return GlobalAssociation(identity, _links(trajectory, identity, frame_rate))
