@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
+from stseg.errors import OutputError
 from stseg.io import limits
 
 _FORBIDDEN = frozenset("/\\")
@@ -40,6 +43,14 @@ def is_path(text: str) -> bool:
         and b"\0" not in data
         and all(len(part) <= limits.PATH_PART for part in data.split(b"/"))
     )
+
+
+def require_utf8(path: Path, purpose: str) -> None:
+    """Refuse an output at a path that is no UTF-8, where a library cannot write there; raises OutputError."""
+    try:
+        str(path.absolute()).encode("utf-8")
+    except UnicodeEncodeError as error:
+        raise OutputError(path, "", "a path that is no UTF-8", f"one that is, for {purpose}") from error
 
 
 def printable(text: str) -> str:

@@ -22,10 +22,12 @@ from run_files import write_small_run
 from stseg.accelerate import python_form
 from stseg.commands.main import main
 from stseg.detection.scoring import set_score
+from stseg.io.names import printable
 from stseg.io.outputs.whole_files import create_part, replacing
 from stseg.io.recording.rigs import read_rig
 from stseg.io.runfile import locks
 from stseg.io.runfile.provenance import gather_provenance, run_request
+from stseg.io.runfile.run_reader import read_run
 
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="a limit or a user of Linux")
 COMPILED = pytest.mark.skipif(python_form(set_score) is set_score, reason="too slow without a compiler")
@@ -53,6 +55,25 @@ def lines_of(program: str, *arguments: object, **environment: str) -> tuple[int,
         env=ENVIRONMENT | environment, capture_output=True, text=True, check=False,
     )  # fmt: skip
     return done.returncode, done.stderr.splitlines()
+
+
+@COMPILED
+@LINUX
+def test_a_path_that_is_no_utf8_serves(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = tmp_path / os.fsdecode(b"caf\xe9:1")
+    folder.mkdir()
+    rig, run = write_recording(folder), str(folder / "run.h5")
+    assert main(["run", str(rig), "-o", run, *OPTIONS]) == 0
+    assert read_run(Path(run)).provenance.rig_path == rig
+    for to in ("csv", "parquet", "sqlite"):
+        assert main(["export", run, "--to", to, "-o", f"{run}.{to}"]) == 0
+    assert main(["export", run, "--to", "sqlite", "-o", str(tmp_path / "archive.sqlite")]) == 0
+    assert main(["inspect", run]) == 0
+    assert main(["report", run, "-o", f"{run}.html"]) == 0
+    assert main(["export", run, "--to", "duckdb", "-o", f"{run}.duckdb"]) == 2
+    assert capsys.readouterr().err.splitlines() == [
+        f"stseg: error: {printable(run)}.duckdb: found a path that is no UTF-8, expected one that is, for DuckDB"
+    ]
 
 
 @COMPILED

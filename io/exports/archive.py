@@ -12,6 +12,7 @@ import numpy as np
 
 from stseg.arrays import Rows
 from stseg.io.extras import load_extra
+from stseg.io.names import printable, require_utf8
 from stseg.io.runfile.run_reader import Run
 
 _TABLES: Mapping[str, tuple[tuple[str, str], ...]] = {
@@ -53,6 +54,7 @@ def write_sqlite(path: Path, runs: Sequence[Run]) -> None:
 def write_duckdb(path: Path, runs: Sequence[Run]) -> None:
     """Write a DuckDB database (needs duckdb)."""
     duckdb = load_extra("duckdb", "duckdb")
+    require_utf8(path, "DuckDB")
     path.unlink(missing_ok=True)
     try:
         with duckdb.connect(str(path)) as connection:
@@ -81,9 +83,10 @@ def _fill(connection: Any, runs: Sequence[Run]) -> None:
 
 def _rows(run: Run) -> Iterator[tuple[str, Iterable[tuple[object, ...]]]]:
     run.require_fit()
-    name, rate, grid = run.path.stem, run.frame_rate, run.recording.rig.grid
+    name, file = printable(run.path.stem), printable(str(run.path))
+    rate, grid = run.frame_rate, run.recording.rig.grid
     seconds, people = len(run.frames) / rate, len(run.trajectory) / max(len(run.frames), 1)
-    about = (name, str(run.path), run.provenance.created, rate, len(run.frames), seconds, ",".join(run.cameras))
+    about = (name, file, run.provenance.created, rate, len(run.frames), seconds, ",".join(run.cameras))
     yield "recordings", [(*about, grid.x[0], grid.y[0], grid.x[1], grid.y[1], len(run.tracks), people)]
     lengths = _path_lengths(run.trajectory)
     yield "tracks", (_track(run, name, row, lengths.get(int(row["id"]), 0.0)) for row in run.tracks)

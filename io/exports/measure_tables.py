@@ -37,4 +37,6 @@ def _write_parquet(path: Path, rows: Rows) -> None:
     arrow, parquet = load_extra("pyarrow", "parquet"), load_extra("pyarrow.parquet", "parquet")
     columns = {name: rows[name].tolist() for name in rows.dtype.names or ()}
     types = {name: arrow.string() if rows.dtype[name] == np.dtype("O") else None for name in columns}
-    parquet.write_table(arrow.table({name: arrow.array(own, types[name]) for name, own in columns.items()}), path)
+    table = arrow.table({name: arrow.array(own, types[name]) for name, own in columns.items()})
+    with path.open("wb") as file:  # a path that is no UTF-8 is refused by the library
+        parquet.write_table(table, file)

@@ -56,7 +56,8 @@ def write_parquet(path: Path, run: Run) -> None:
         arrays.append(arrow.array([run.names.get(int(one)) for one in run.trajectory["id"]], arrow.string()))
     about = {"scene": run.scene, "frame_rate": run.frame_rate, "cameras": list(run.cameras)}
     schema = arrow.schema(fields, {"stseg": json.dumps(about)})
-    parquet.write_table(arrow.table(arrays, schema=schema), path)
+    with path.open("wb") as file:  # a path that is no UTF-8 is refused by the library
+        parquet.write_table(arrow.table(arrays, schema=schema), file)
 
 
 def write_napari_tracks(path: Path, run: Run) -> None:

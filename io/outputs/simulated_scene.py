@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from stseg.arrays import Boxes, Bytes, Rows
 from stseg.errors import OutputError
 from stseg.geometry import Camera, Rig
-from stseg.io.outputs.video_writer import require_utf8
+from stseg.io.names import require_utf8
 from stseg.io.outputs.whole_files import clear_frames
 from stseg.io.recording.recording import BodyPrior, CameraSource, Recording, Source, SourceKind
 from stseg.io.recording.rigs import write_rig
@@ -103,7 +103,7 @@ def write_scene(
     OutputError
         Where the folder holds something already, or cannot be written to.
     """
-    require_utf8(folder)
+    require_utf8(folder, "a video")
     with _as_output_error(folder):
         folder.mkdir(parents=True, exist_ok=True)
         if any(folder.iterdir()) and not overwrite:

@@ -9,6 +9,7 @@ import cv2
 
 from stseg.arrays import Bytes
 from stseg.errors import OutputError
+from stseg.io.names import require_utf8
 from stseg.io.outputs.whole_files import replacing
 
 _ENDING = ".mp4"
@@ -45,7 +46,7 @@ def write_film(path: Path, pictures: Iterable[Bytes], frame_rate: float, overwri
         Where the file cannot be written.
     """
     require_film_name(path)
-    require_utf8(path)
+    require_utf8(path, "a video")
     with replacing(path, overwrite) as part:
         film = part.with_name(part.name + _ENDING)  # the ending decides the container
         try:
@@ -54,14 +55,6 @@ def write_film(path: Path, pictures: Iterable[Bytes], frame_rate: float, overwri
         finally:
             film.unlink(missing_ok=True)
     return count
-
-
-def require_utf8(path: Path) -> None:
-    """Refuse a path that is no UTF-8, on which OpenCV's writer crashes; raises OutputError."""
-    try:
-        str(path.absolute()).encode("utf-8")
-    except UnicodeEncodeError as error:
-        raise OutputError(path, "", "a path that is no UTF-8", "one that is, for a video") from error
 
 
 def _write(film: Path, pictures: Iterable[Bytes], frame_rate: float) -> int:

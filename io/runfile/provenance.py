@@ -28,6 +28,7 @@ from stseg.io.toml.text import parse_toml
 
 _PACKAGES = ("numpy", "scipy", "numba", "h5py", "opencv-python-headless", "PyMaxflow")
 _TEXT = h5py.string_dtype()
+"""UTF-8; a path may hold other bytes, which are stored as they are (PEP 383)."""
 _SAMPLE, _SAMPLED_FILES = 1 << 16, 64
 """Bytes of a sample, and files of a source that are sampled."""
 _VERSION = np.dtype([("name", "S32"), ("version", "S32")])
@@ -94,9 +95,9 @@ def gather_provenance(recording: Recording, config_text: str) -> Provenance:
 def write_provenance(group: h5py.Group, provenance: Provenance) -> None:
     """Fill the group /provenance."""
     group.attrs["created"] = provenance.created
-    group.attrs["rig_path"] = str(provenance.rig_path)
+    group.attrs.create("rig_path", os.fsencode(provenance.rig_path), dtype=_TEXT)
     group["config"] = provenance.config
-    group["rig"] = provenance.rig
+    group.create_dataset("rig", data=os.fsencode(provenance.rig), dtype=_TEXT)
     versions = [(name.encode(), number.encode()) for name, number in provenance.versions.items()]
     group["versions"] = np.array(versions, _VERSION)
     group.create_dataset("sources", data=provenance.sources, dtype=SOURCE)
@@ -115,7 +116,7 @@ def read_provenance(group: h5py.Group) -> Provenance:
     return Provenance(
         printable(str(group.attrs["created"]))[: limits.NAME],
         group["config"].asstr()[()],
-        group["rig"].asstr()[()],
+        group["rig"].asstr(errors="surrogateescape")[()],
         Path(str(group.attrs["rig_path"])),
         {name.decode(): number.decode() for name, number in read_whole(group["versions"]).tolist()},
         _checked_sources(group["sources"]),
@@ -183,7 +184,7 @@ def _moment(seconds: float) -> str:
 
 
 def _word(text: bytes | str) -> str:
-    return text.decode() if isinstance(text, bytes) else text
+    return os.fsdecode(text)
 
 
 def _versions() -> dict[str, str]:
@@ -205,12 +206,12 @@ def _sources(recording: Recording) -> Rows:
     return np.array(rows, SOURCE)
 
 
-def _described(source: Source) -> tuple[bytes, str, int, int, float]:
+def _described(source: Source) -> tuple[bytes, bytes, int, int, float]:
     """kind, path, files, size, modified; zeros for streams that cannot be found."""
     try:
         states = [path.stat() for path in source_files(source)] if not source.address else []
     except (OSError, SourceError):
         states = []
     modified = max((state.st_mtime for state in states), default=np.nan)
-    path = mask_passwords(source.address) or str(source.path)
+    path = os.fsencode(mask_passwords(source.address) or source.path)
     return source.kind.encode(), path, len(states), sum(state.st_size for state in states), modified
