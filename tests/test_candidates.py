@@ -54,7 +54,8 @@ def candidates(kind: str, asked: Asked) -> Proposals:
 
 
 def fuse(kind: str) -> Fuse:
-    return Occupancy(RIG, [kind] * 4, CONFIG.occupancy, FEW_HEIGHTS, BODY).fuse
+    occupancy = Occupancy(RIG, [kind] * 4, CONFIG.occupancy, FEW_HEIGHTS, BODY)
+    return lambda seen, explanation: occupancy.fuse(seen, explanation).dense()
 
 
 def pool(*places: tuple[float, float]) -> Candidates:
@@ -94,7 +95,7 @@ def test_both_sources_have_no_duplicates_of_each_other() -> None:
 def test_the_volume_of_an_unexplained_frame_is_filled_where_people_stand() -> None:
     occupancy = Occupancy(RIG, ["pixels"] * 4, CONFIG.occupancy, FEW_HEIGHTS, BODY)
     seen = evidence("pixels")
-    filled = marginal(occupancy.fuse(seen, empty_explanation(occupancy.rig, seen)))
+    filled = marginal(occupancy.fuse(seen, empty_explanation(occupancy.rig, seen)).dense())
     away = np.hypot(*np.moveaxis(RIG.grid.ground[:, :, None] - STANDING[:, :2], -1, 0)).min(-1)
     assert filled[away < 0.12].min() > 0.5
     assert filled[away > 0.8].max() < 0.1

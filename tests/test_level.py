@@ -48,15 +48,16 @@ def teach(
     view: int, shown: reference.Shown, near: Ints, inside: Flags, trusted: Flags, rates: list[ErrorRates], looks: float
 ) -> tuple[Floats, Floats]:
     """What the kernel counts of one of several views of equal weight."""
-    sums, certain = Sums.zero((len(inside), *near.shape)), np.ones(near.shape, np.float32)
+    sums, one = Sums.zero((inside.size,)), np.ones(inside.size, np.float32)
+    person, number = np.tile(near.ravel(), len(inside)), np.ones(inside.size)
     views = [
-        ViewTerms(levels, log_odds_terms(rate), np.float32(1), share, certain)
+        ViewTerms(levels.ravel(), log_odds_terms(rate), np.float32(1), share.ravel(), one)
         for levels, share, rate in zip(*shown, rates, strict=True)
     ]
     for terms in views:
-        add_terms(terms, near, sums)
-    errors, seen = np.full(3, np.nan), np.full(3, np.nan)
-    fill_counts(views[view], sums, near, inside, trusted, np.array(rates[view]), looks, PRIOR, errors, seen)
+        add_terms(terms, person, sums)
+    errors, seen, own = np.full(3, np.nan), np.full(3, np.nan), np.array(rates[view])
+    fill_counts(views[view], sums, person, inside.ravel(), number, trusted, own, looks, PRIOR, errors, seen)
     return errors, seen
 
 
@@ -192,7 +193,7 @@ def test_a_frame_is_fused_by_those_before_it(kind: str) -> None:
     fusion = occupancy(kind)
     running, fresh = fusion.new_calibration(), fusion.new_calibration()
     frames = [frame(kind, k) for k in range(2)]
-    np.testing.assert_array_equal(fusion.fuse_and_learn(running, *frames[0]), fusion.fuse(*frames[0]))
+    np.testing.assert_array_equal(fusion.fuse_and_learn(running, *frames[0]).dense(), fusion.fuse(*frames[0]).dense())
     for one in frames[1:]:
         fusion.fuse_and_learn(running, *one)
     assert running.rates != fresh.rates
@@ -205,14 +206,14 @@ def test_going_on_from_a_state_is_going_on() -> None:
     frames = [frame("pixels", k) for k in range(3)]
     fusion = occupancy("pixels")
     whole = fusion.new_calibration()
-    volumes = [fusion.fuse_and_learn(whole, *one) for one in frames]
+    volumes = [fusion.fuse_and_learn(whole, *one).dense() for one in frames]
     for division in (1, 2):
         part = fusion.new_calibration()
         for one in frames[:division]:
             fusion.fuse_and_learn(part, *one)
         rest = deepcopy(part)
         for one, volume in zip(frames[division:], volumes[division:], strict=True):
-            np.testing.assert_array_equal(fusion.fuse_and_learn(rest, *one), volume)
+            np.testing.assert_array_equal(fusion.fuse_and_learn(rest, *one).dense(), volume)
 
 
 def test_a_blind_view_learns_nothing() -> None:

@@ -131,7 +131,7 @@ def test_nobody_explained_is_the_plain_localisation() -> None:
     explained = Occupancy(
         COARSE, ["pixels"] * 4, OccupancyConfig(sampling="footprint", effective_observations=1.0), FEW_HEIGHTS, BODY
     )
-    np.testing.assert_array_equal(explained.fuse([*maps], explanation), plain)
+    np.testing.assert_array_equal(explained.fuse([*maps], explanation).dense(), plain)
 
 
 def test_terms_at_their_ends() -> None:

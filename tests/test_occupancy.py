@@ -26,6 +26,7 @@ from stseg.model.pillar_index import PillarIndex
 from stseg.occupancy.box_planes import CellsByPerson, ViewBoxes, fill_fit, fill_levels, plane_likelihood
 from stseg.occupancy.clutter import clutter, clutter_weights
 from stseg.occupancy.fusion import ErrorRates, log_odds_terms
+from stseg.occupancy.shown_cells import ShownCells
 from stseg.occupancy.volume import Occupancy
 
 COARSE = rig_of(corner_cameras(), cell=0.5, planes=3)
@@ -184,7 +185,9 @@ def test_likelihood_per_plane_by_definition(seed: int) -> None:
     rates, levels = ErrorRates(0.1, 0.2, 0.3), np.empty((4, 16), np.int16)
     footprint = np.ones((4, 16, 4), np.int16)
     footprint[2, 5] = 0
-    fill_levels(fit, tried, grid.heights, near.reshape(-1), footprint, rates, levels)
+    every = np.arange(levels.size, dtype=np.int32)
+    listed = ShownCells(every, every % 16, np.tile(near.ravel(), 4), np.ones(levels.size))
+    fill_levels(fit, tried, grid.heights, listed, footprint.reshape(-1, 4), rates, levels.reshape(-1))
     for cell, (y, x) in enumerate(np.ndindex(4, 4)):
         free = [b for b in range(len(found)) if box_owner[b] in (-1, near[y, x])]
         clutter_rate = rates.clutter if near[y, x] < 0 else rates.near_clutter
@@ -271,16 +274,41 @@ def test_fusion_by_definition(kind: SamplingKind, blind: int | None, step: int) 
     maps: list[Singles | None] = [*noise(step)]
     if blind is not None:
         maps[blind] = None
-    fused = Occupancy(COARSE, PIXELS, replace(CONFIG, sampling=kind), FEW_HEIGHTS, BODY).fuse(maps, explanation)
+    fused = Occupancy(COARSE, PIXELS, replace(CONFIG, sampling=kind), FEW_HEIGHTS, BODY).fuse(maps, explanation).dense()
     assert fused.dtype == np.float32
     np.testing.assert_allclose(fused, volume_by_definition(COARSE, maps, explanation, kind), atol=LEVEL)
+
+
+@pytest.mark.parametrize("kind", ["pixels", "boxes"])
+def test_cells_at_which_nothing_is_shown_are_fused_as_all_others(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With every block marked, no cell has a representative; rates are the same up to the order of sums."""
+    rig = rig_of(corner_cameras(), cell=0.1, planes=3)
+    standing = people((-1.6, 0.3), (1.4, -1.6))
+    seen: list[ViewEvidence] = [boxes(one, standing) for one in rig.cameras]
+    if kind == "pixels":
+        seen = [view * (view > 0.5) for view in likelihoods(rig.cameras, standing)]
+    explanation = Detector(rig, [kind] * 4, FEW_HEIGHTS, BODY).explain(seen, None)
+    occupancy = Occupancy(rig, [kind] * 4, CONFIG, FEW_HEIGHTS, BODY)
+    some, every = occupancy.new_calibration(), occupancy.new_calibration()
+    sparse = occupancy.fuse_and_learn(some, seen, explanation)
+    assert 0 < len(sparse.cell) < 0.8 * sparse.of_cell.size
+    tables = occupancy._tables
+    monkeypatch.setattr(tables, "nothing_marked", lambda: np.ones(tables.reach[0].shape[:3], bool))
+    whole = occupancy.fuse_and_learn(every, seen, explanation)
+    assert len(whole.cell) == (occupancy.views > 0).sum()
+    np.testing.assert_array_equal(sparse.dense(), whole.dense())
+    np.testing.assert_allclose(some.errors, every.errors, rtol=1e-9)
+    np.testing.assert_allclose(some.seen, every.seen, rtol=1e-9)
+    np.testing.assert_array_equal(some.filled, every.filled)
 
 
 @pytest.mark.parametrize("value", [0.0, 0.3, 1.0])
 def test_more_views_are_sharper_evidence(value: float) -> None:
     """With equal weights u is the plain sum of the views' log-odds and the prior."""
     rig = rig_of([looking(f"cam{k}", (x, y, 2.6), focal=200.0) for k, (x, y) in enumerate([(-3, -3), (3, -3), (3, 3)])])
-    fused = Occupancy(rig, PIXELS[:3], CONFIG, FEW_HEIGHTS, BODY).fuse([flat(value)] * 3, explained(rig, people()))
+    fused = (
+        Occupancy(rig, PIXELS[:3], CONFIG, FEW_HEIGHTS, BODY).fuse([flat(value)] * 3, explained(rig, people())).dense()
+    )
     miss, false, _ = RATES
     one = np.log(((1 - miss) * value + miss * (1 - value)) / (false * value + (1 - false) * (1 - value)))
     views = Sampling.of(rig, "point").views()
@@ -293,7 +321,7 @@ def test_more_views_are_sharper_evidence(value: float) -> None:
 
 def test_all_blind_leaves_the_prior() -> None:
     occupancy = Occupancy(COARSE, PIXELS, CONFIG, FEW_HEIGHTS, BODY)
-    fused = occupancy.fuse([None] * 4, explained(COARSE, people()))
+    fused = occupancy.fuse([None] * 4, explained(COARSE, people())).dense()
     np.testing.assert_allclose(fused[occupancy.views > 0], PRIOR, rtol=1e-6)
     assert np.isnan(fused[occupancy.views == 0]).all()
 
@@ -308,8 +336,8 @@ def line_of_sight() -> tuple[Rig, Explanation]:
 def test_explained_evidence_does_not_speak_elsewhere() -> None:
     rig, explanation = line_of_sight()
     occupancy = Occupancy(rig, PIXELS[:1], CONFIG, FEW_HEIGHTS, BODY)
-    fused = occupancy.fuse([flat(1.0)], explanation)
-    nobodys = occupancy.fuse([flat(0.0)], explained(rig, people()))
+    fused = occupancy.fuse([flat(1.0)], explanation).dense()
+    nobodys = occupancy.fuse([flat(0.0)], explained(rig, people())).dense()
     seen = occupancy.views[0] > 0
     away = np.hypot(*np.moveaxis(rig.grid.ground, -1, 0))
     in_front = seen & (rig.grid.ground[..., 0] < -0.5)
@@ -324,7 +352,7 @@ def test_a_hidden_view_does_not_count() -> None:
     behind = (occupancy.views[0] > 0) & (rig.grid.ground[..., 0] > 0.6)
     assert behind.any()
     for value in (0.0, 1.0):
-        fused = occupancy.fuse([flat(value)], explanation)
+        fused = occupancy.fuse([flat(value)], explanation).dense()
         np.testing.assert_allclose(fused[0][behind], PRIOR, rtol=1e-6)
 
 
@@ -333,8 +361,8 @@ def test_a_missing_box_says_less_of_somebody_hidden() -> None:
     occupancy = Occupancy(rig, BOXES[:1], CONFIG, FEW_HEIGHTS, BODY)
     explanation = explained(rig, people((0.0, 0.0)))
     half = replace(explanation.people, visibility=np.array([[0.5]]))
-    whole_says = occupancy.fuse([no_boxes()], explanation)
-    half_says = occupancy.fuse([no_boxes()], replace(explanation, people=half))
+    whole_says = occupancy.fuse([no_boxes()], explanation).dense()
+    half_says = occupancy.fuse([no_boxes()], replace(explanation, people=half)).dense()
     near = np.hypot(*np.moveaxis(rig.grid.ground, -1, 0)) <= CONFIG.person_radius
     assert (whole_says[0][near] < -CONFIG.effective_observations).all()
     np.testing.assert_allclose(half_says[0][near], whole_says[0][near] / 2, rtol=1e-5)
@@ -349,7 +377,7 @@ def test_a_person_is_a_column_of_occupied_cells(kind: str) -> None:
     if kind == "boxes":
         seen = [boxes(camera, standing) for camera in rig.cameras]
     explanation = Detector(rig, [kind] * 4, FEW_HEIGHTS, BODY).explain(seen, None)
-    fused = Occupancy(rig, [kind] * 4, CONFIG, FEW_HEIGHTS, BODY).fuse(seen, explanation)
+    fused = Occupancy(rig, [kind] * 4, CONFIG, FEW_HEIGHTS, BODY).fuse(seen, explanation).dense()
     away = np.hypot(*np.moveaxis(rig.grid.ground[:, :, None] - standing[:, :2], -1, 0)).min(2)
     assert fused.shape == rig.grid.shape
     assert (fused[:3, away < 0.15] > 0).all()  # the uppermost plane is above them
@@ -357,12 +385,12 @@ def test_a_person_is_a_column_of_occupied_cells(kind: str) -> None:
     # A volume from nobody's evidence holds nobody.
     empty: list[ViewEvidence] = [flat(0.0)] * 4 if kind == "pixels" else [no_boxes()] * 4
     nobody = Detector(rig, [kind] * 4, FEW_HEIGHTS, BODY).explain(empty, None)
-    assert (Occupancy(rig, [kind] * 4, CONFIG, FEW_HEIGHTS, BODY).fuse(empty, nobody) < PRIOR).all()
+    assert (Occupancy(rig, [kind] * 4, CONFIG, FEW_HEIGHTS, BODY).fuse(empty, nobody).dense() < PRIOR).all()
 
 
 def test_the_same_frame_twice() -> None:
     occupancy = Occupancy(COARSE, PIXELS, CONFIG, FEW_HEIGHTS, BODY)
     explanation = explained(COARSE, people((0.2, 0.3)))
-    first = occupancy.fuse(noise(1), explanation)
+    first = occupancy.fuse(noise(1), explanation).dense()
     occupancy.fuse(noise(2), explanation)
-    np.testing.assert_array_equal(first, occupancy.fuse(noise(1), explanation))
+    np.testing.assert_array_equal(first, occupancy.fuse(noise(1), explanation).dense())

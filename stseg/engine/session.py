@@ -128,12 +128,13 @@ class Session:
         rates = rate_rows(frame, self._error_rates)
         with self.watch.time("occupancy"):
             log_odds = self.pipeline.occupancy.fuse_and_learn(self._error_rates, evidence, explanation, noise)
-        return FusedEvidence(log_odds, rates)
+        return FusedEvidence(log_odds.dense(), rates)
 
     def _fuse_with_current_rates(self, evidence: Sequence[ViewEvidence], explanation: Explanation) -> Singles:
         while self._open:
             self._open.popleft().result()
-        return self.pipeline.occupancy.fuse(evidence, explanation, self._error_rates.rates, self._box_noise.noise)
+        rates, noise = self._error_rates.rates, self._box_noise.noise
+        return self.pipeline.occupancy.fuse(evidence, explanation, rates, noise).dense()
 
 
 class _Prepared(NamedTuple):

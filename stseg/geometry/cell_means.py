@@ -20,7 +20,7 @@ class SumTable(NamedTuple):
 
 
 class CellMeans:
-    """Means over the footprints of a rig's cells. Its buffers are used anew by every call: one object a thread.
+    """Means over the footprints of a rig's cells. Its buffers, one a view, are used anew: one object a thread.
 
     Parameters
     ----------
@@ -32,29 +32,25 @@ class CellMeans:
         self.footprint = sampling.footprint
         self.regions = sampling.regions()
         self.points = [int(boxes[..., 2:].max(initial=0)) <= 1 for boxes in self.footprint]
-        largest = max(
-            (rows.stop - rows.start + 1) * (columns.stop - columns.start + 1) for rows, columns in self.regions
-        )
-        self._sums = np.empty(largest, np.uint32)
-        self._levels = np.empty(self.footprint.shape[1:4], np.int16)
+        shapes = [(rows.stop - rows.start + 1, columns.stop - columns.start + 1) for rows, columns in self.regions]
+        self._sums = [np.empty(shape, np.uint32) for shape in shapes]
 
     def sum_table(self, view: int, likelihood: Singles) -> SumTable:
         """Sums over the part of a view's map (v, u) that cells cover."""
         rows, columns = self.regions[view]
-        part = likelihood[rows, columns]
-        shape = part.shape[0] + 1, part.shape[1] + 1
-        sums = self._sums[: shape[0] * shape[1]].reshape(shape)
-        fill_sums(part, sums)
-        return SumTable(sums, columns.start, rows.start)
+        fill_sums(likelihood[rows, columns], self._sums[view])
+        return SumTable(self._sums[view], columns.start, rows.start)
 
     def levels(self, view: int, likelihood: Singles) -> Levels:
         """Mean levels of all cells in a view's map (v, u); see `stseg.geometry.summed_area`."""
         if self.points[view]:
-            fill_points(likelihood, self.footprint[view], self._levels)
-            return self._levels
+            levels = np.empty(self.footprint.shape[1:4], np.int16)
+            fill_points(likelihood, self.footprint[view], levels)
+            return levels
         return self.levels_from(view, self.sum_table(view, likelihood))
 
     def levels_from(self, view: int, table: SumTable) -> Levels:
         """The same from the map's sums."""
-        fill_means(table.sums, self.footprint[view], table.left, table.top, self._levels)
-        return self._levels
+        levels = np.empty(self.footprint.shape[1:4], np.int16)
+        fill_means(table.sums, self.footprint[view], table.left, table.top, levels)
+        return levels

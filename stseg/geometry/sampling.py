@@ -12,12 +12,12 @@ at least one pixel each way. Point sampling is the footprint of one pixel.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from stseg.arrays import Bytes, Flags, Floats, Ints, Labels, Singles
+from stseg.arrays import Bytes, Flags, Floats, Singles
 from stseg.geometry import Camera, Rig
 from stseg.geometry.summed_area import LARGEST_SIDE
 
@@ -27,24 +27,6 @@ Footprints = NDArray[np.int16]
 
 _STEP = 1e-3
 """Of a cell's side, over which derivatives are taken."""
-
-
-class SeenCells(NamedTuple):
-    """The cells that a view sees, plane by plane.
-
-    Attributes
-    ----------
-    start : int64 (plane + 1,)
-        First cell of each plane.
-    place : int32 (cell,)
-        Ground cell of each, counted along x first.
-    footprint : int16 (cell, 4)
-        left, top, width and height in pixels.
-    """
-
-    start: Ints
-    place: Labels
-    footprint: Footprints
 
 
 @dataclass(frozen=True)
@@ -69,14 +51,6 @@ class Sampling:
         ground = rig.grid.ground
         away = [np.hypot(*np.moveaxis(ground - camera.centre[:2], -1, 0)) for camera in rig.cameras]
         return cls(footprint, np.stack(away).astype(np.float32))
-
-    def seen_cells(self, view: int) -> SeenCells:
-        """The cells that a view sees."""
-        footprint = self.footprint[view]
-        planes = footprint.reshape(len(footprint), -1, 4)
-        plane, place = np.nonzero(planes[..., 2] > 0)
-        start = np.searchsorted(plane, np.arange(len(planes) + 1))
-        return SeenCells(start, place.astype(np.int32), np.ascontiguousarray(planes[plane, place]))
 
     def views(self) -> Bytes:
         """Number of views that see each cell, uint8 (plane, y, x)."""

@@ -20,12 +20,13 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from stseg.accelerate import kernel
-from stseg.arrays import Floats, Ints, Singles
+from stseg.arrays import Flags, Floats, Ints, Singles
 from stseg.geometry.sampling import Footprints
 from stseg.geometry.summed_area import TOP, UNSEEN, Levels
 from stseg.model.box_fit import FAR, half_square
 from stseg.model.pillar_index import PillarIndex, run_of
 from stseg.occupancy.fusion import ErrorRates
+from stseg.occupancy.shown_cells import ShownCells
 
 
 class ViewBoxes(NamedTuple):
@@ -120,36 +121,51 @@ def fill_fit(
 
 
 @kernel
+def mark_fit(fit: Singles, columns: Flags) -> None:
+    """Mark the ground cells, columns bool (cell,), that a box of fit (height, cell) might show."""
+    for h in range(fit.shape[0]):
+        for cell in range(fit.shape[1]):
+            if fit[h, cell] > -np.inf:
+                columns[cell] = True
+
+
+@kernel
 def fill_levels(
-    fit: Singles, heights: Floats, planes: Floats, near: Ints, footprint: Footprints, rates: ErrorRates, levels: Levels
+    fit: Singles,
+    heights: Floats,
+    planes: Floats,
+    cells: ShownCells,
+    footprint: Footprints,
+    rates: ErrorRates,
+    levels: Levels,
 ) -> None:
-    """Fill levels (plane, cell) with L of each cell, UNSEEN where the view does not see it.
+    """Fill levels (n,) with L of each cell, UNSEEN where the view does not see it.
 
     Parameters
     ----------
-    fit : float32 (height, cell)
+    fit : float32 (height, place)
         From `fill_fit`.
     heights : float64 (height,), planes : float64 (plane,)
         Metres, rising.
-    near : int64 (cell,)
-        The person near each cell, -1 for none.
-    footprint : int16 (plane, cell, 4)
-        See `stseg.geometry.sampling`.
+    footprint : int16 (cell, 4)
+        Of the whole volume; see `stseg.geometry.sampling`.
     """
-    for cell in range(fit.shape[1]):
-        clutter = rates.clutter if near[cell] < 0 else rates.near_clutter
-        best, h = -np.inf, len(heights) - 1
-        changed = True
-        level = np.int16(0)
-        for plane in range(len(planes) - 1, -1, -1):
-            while h >= 0 and heights[h] >= planes[plane]:
-                if fit[h, cell] > best:
-                    best, changed = float(fit[h, cell]), True
-                h -= 1
-            if changed:
-                level = np.int16(np.rint(plane_likelihood(np.exp(best), rates.miss, clutter) * TOP))
-                changed = False
-            levels[plane, cell] = level if footprint[plane, cell, 2] > 0 else UNSEEN
+    for k in range(len(cells.cell)):
+        if footprint[cells.cell[k], 2] == 0:
+            levels[k] = UNSEEN
+            continue
+        place, height, best = cells.place[k], planes[cells.cell[k] // fit.shape[1]], -np.inf
+        for h in range(len(heights)):
+            if heights[h] >= height:
+                best = max(best, float(fit[h, place]))
+        clutter = rates.clutter if cells.near[k] < 0 else rates.near_clutter
+        levels[k] = level_of_match(np.exp(best) if best > -np.inf else 0.0, rates.miss, clutter)
+
+
+@kernel
+def level_of_match(match: float, miss: float, clutter: float) -> np.int16:
+    """L in whole levels."""
+    return np.int16(np.rint(plane_likelihood(match, miss, clutter) * TOP))
 
 
 @kernel

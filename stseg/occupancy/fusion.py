@@ -55,15 +55,15 @@ class ViewTerms(NamedTuple):
 
     Attributes
     ----------
-    levels : int16 (plane, y, x)
+    levels : int16 (plane, y, x), or (n,) of some cells
         Mean likelihood of each cell, or UNSEEN.
     terms : float32 (2, TOP + 1)
         The term of each level near no person, and within reach of a person, nats.
     weight : float
         1 / C_i, in any scale.
-    share : float32 (plane, y, x)
+    share : float32, as the levels
         a_i, 0..1: visible share of the footprint; undefined where the level is UNSEEN.
-    confidence : float32 (y, x)
+    confidence : float32 (y, x), or (n,)
         Further factor of the terms, 0..1, which does not reduce the view's count.
     """
 
@@ -79,7 +79,7 @@ class Sums(NamedTuple):
 
     Attributes
     ----------
-    weighted, weights, shares : float32 (plane, y, x)
+    weighted, weights, shares : float32 (plane, y, x), or (n,) of some cells
         Sums of w_i a_i times term, of w_i a_i, and of a_i.
     """
 
@@ -88,12 +88,12 @@ class Sums(NamedTuple):
     shares: Singles
 
     @classmethod
-    def zero(cls, shape: tuple[int, int, int]) -> Self:
+    def zero(cls, shape: tuple[int, ...]) -> Self:
         """Before any view."""
         return cls(*(np.zeros(shape, np.float32) for _ in range(3)))
 
     def total(self, views: Bytes, near: Ints, observations: float, priors: tuple[float, float]) -> Singles:
-        """k n_vis sum_i w_i term_i and the prior, nats, float32 (plane, y, x); see `fill_total`."""
+        """k n_vis sum_i w_i term_i and the prior, nats, float32 as the sums; see `fill_total`."""
         total = np.empty(self.weighted.shape, np.float32)
         prior, near_prior = np.float32(priors[0]), np.float32(priors[1])
         fill_total(self, views, near, np.float32(observations), prior, near_prior, total)
@@ -124,11 +124,11 @@ def synergy_terms(floor: float) -> Singles:
 
 @kernel
 def add_terms(view: ViewTerms, near: Ints, sums: Sums) -> None:
-    """Add one view's terms to the frame's sums; near int64 (y, x) is the person near each cell, -1 for none."""
+    """Add one view's terms to the frame's sums; near int64 (y, x), or (n,), is the person near each, -1 for none."""
     level, share = view.levels.reshape(-1), view.share.reshape(-1)
     confidence, person = view.confidence.reshape(-1), near.reshape(-1)
     weighted, weights, count = sums.weighted.reshape(-1), sums.weights.reshape(-1), sums.shares.reshape(-1)
-    for start in range(0, len(level), len(person)):
+    for start in range(0, len(level), max(len(person), 1)):
         for place in range(len(person)):
             c = start + place
             if level[c] >= 0:
@@ -149,26 +149,27 @@ def fill_total(
     near_prior: np.float32,
     total: Singles,
 ) -> None:
-    """Fill total (plane, y, x): nan where no view's image holds the cell, the prior where all are hidden.
+    """Fill total (plane, y, x), or (n,): nan where no view's image holds the cell, the prior where all are hidden.
 
     Parameters
     ----------
-    views : uint8 (plane, y, x)
+    views : uint8, as the sums
         Number of views whose image holds the cell.
-    near : int64 (y, x)
+    near : int64 (y, x), or (n,)
         The person near each cell, -1 for none.
     observations
         k.
     prior, near_prior
         log(pi / (1 - pi)) near no person, and within reach of a person.
     """
-    for z in range(views.shape[0]):
-        for y in range(views.shape[1]):
-            for x in range(views.shape[2]):
-                if views[z, y, x] == 0:
-                    total[z, y, x] = np.nan
-                    continue
-                total[z, y, x] = prior if near[y, x] < 0 else near_prior
-                weight = sums.weights[z, y, x]
-                if weight > 0:
-                    total[z, y, x] += observations * sums.shares[z, y, x] * sums.weighted[z, y, x] / weight
+    held, person, flat = views.reshape(-1), near.reshape(-1), total.reshape(-1)
+    weighted, weights, count = sums.weighted.reshape(-1), sums.weights.reshape(-1), sums.shares.reshape(-1)
+    for start in range(0, len(held), max(len(person), 1)):
+        for place in range(len(person)):
+            c = start + place
+            if held[c] == 0:
+                flat[c] = np.nan
+                continue
+            flat[c] = prior if person[place] < 0 else near_prior
+            if weights[c] > 0:
+                flat[c] += observations * count[c] * weighted[c] / weights[c]

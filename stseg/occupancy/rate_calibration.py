@@ -133,6 +133,7 @@ def fill_counts(
     sums: Sums,
     near: Ints,
     inside: Flags,
+    number: Floats,
     trusted: Flags,
     rates: Floats,
     observations: float,
@@ -146,8 +147,8 @@ def fill_counts(
     ----------
     view, sums
         The view's terms, and the sums over all views that contain them.
-    near : int64 (y, x), inside : bool (plane, y, x)
-        The person near each cell, -1 for none, and whether the pillar fills the cell.
+    near : int64 (n,), inside : bool (n,), number : float64 (n,)
+        The person near each cell, -1 for none, whether the pillar fills the cell, and cells that it stands for.
     trusted : bool (person,)
         Persons supported by the rest of the evidence, and not hidden from this view.
     rates : float64 (3,)
@@ -158,23 +159,20 @@ def fill_counts(
         Prior log-odds of a cell near no person, nats.
     """
     errors[:], seen[:] = 0.0, 0.0
-    levels, shares, body = view.levels.reshape(-1), view.share.reshape(-1), inside.reshape(-1)
-    weighted, weights, count = sums.weighted.reshape(-1), sums.weights.reshape(-1), sums.shares.reshape(-1)
-    confidence, person = view.confidence.reshape(-1), near.reshape(-1)
+    levels, shares = view.levels, view.share
     for c in range(len(levels)):
         if levels[c] < 0 or shares[c] <= 0.0:
             continue
-        likelihood, place = levels[c] / TOP, c % len(person)
-        nearest = person[place]
+        likelihood, nearest = levels[c] / TOP, near[c]
         if nearest < 0:
-            rest, others = weights[c] - view.weight * shares[c], prior
+            rest, others = sums.weights[c] - view.weight * shares[c], prior
             if rest > _LEAST_WEIGHT * view.weight:
-                own = view.weight * shares[c] * confidence[place] * view.terms[0, levels[c]]
-                others += observations * (count[c] - shares[c]) * (weighted[c] - own) / rest
-            empty = shares[c] / (1.0 + np.exp(min(max(others, -30.0), 30.0)))
+                own = view.weight * shares[c] * view.confidence[c] * view.terms[0, levels[c]]
+                others += observations * (sums.shares[c] - shares[c]) * (sums.weighted[c] - own) / rest
+            empty = number[c] * shares[c] / (1.0 + np.exp(min(max(others, -30.0), 30.0)))
             errors[CLUTTER] += _error_posterior(rates[CLUTTER], likelihood) * empty
             seen[CLUTTER] += empty
         elif trusted[nearest]:
-            rate, error_likelihood = (MISS, 1.0 - likelihood) if body[c] else (NEAR_CLUTTER, likelihood)
+            rate, error_likelihood = (MISS, 1.0 - likelihood) if inside[c] else (NEAR_CLUTTER, likelihood)
             errors[rate] += _error_posterior(rates[rate], error_likelihood) * shares[c]
             seen[rate] += shares[c]

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from stseg.accelerate import kernel, part
 from stseg.arrays import Flags, Floats, Ints, Labels, Singles
 from stseg.geometry.cell_means import SumTable
-from stseg.geometry.sampling import SeenCells
-from stseg.geometry.summed_area import TOP, Levels, sum_of
-from stseg.occupancy.fusion import Sums
+from stseg.geometry.sampling import Footprints
+from stseg.geometry.summed_area import TOP, UNSEEN, Levels, sum_of
+from stseg.occupancy.shown_cells import Reach, ShownCells
 
 SHOULDER = 0.3
 """A person hides what is at least this much farther from the camera than they are, metres."""
@@ -110,65 +110,66 @@ def _sum_of_others(
 
 
 @kernel
-def fill_share(cells: SeenCells, shown: PixelAssignment, near: Ints, distance: Singles, share: Singles) -> None:
-    """Fill share (plane, y, x) of the cells that a view sees: how much of each footprint no nearer person hides.
-
-    Parameters
-    ----------
-    near : int64 (y, x)
-        Person near each cell, -1 for none.
-    distance : float32 (y, x)
-        From the camera along the ground, metres.
-    """
-    person, cell_distance = near.reshape(-1), distance.reshape(-1)
-    for z in range(len(share)):
-        plane = share[z].reshape(-1)
-        for k in range(cells.start[z], cells.start[z + 1]):
-            place, whole = cells.place[k], np.float32(1)
-            left, top, width, height = cells.footprint[k]
-            nearest = person[place]
-            if _shows_a_person(shown, left, top, width, height) and not (nearest >= 0 and shown.separate[nearest]):
-                hidden = _hidden_pixels(shown, left, top, width, height, nearest, cell_distance[place])
-                whole -= np.float32(hidden) / np.float32(np.int32(width) * np.int32(height))
-            plane[place] = whole
+def mark_people(reach: Reach, shown: PixelAssignment, marked: Flags) -> None:
+    """Mark the blocks (plane, row, column) in whose box a view shows a person."""
+    for z in range(marked.shape[0]):
+        for j in range(marked.shape[1]):
+            for i in range(marked.shape[2]):
+                left, top, right, bottom = reach[z, j, i]
+                if right > 0 and not marked[z, j, i]:
+                    marked[z, j, i] = _shows_a_person(shown, left, top, right - left, bottom - top)
 
 
 @kernel
-def add_map(
-    cells: SeenCells,
+def fill_share(
+    cells: ShownCells, footprint: Footprints, shown: PixelAssignment, distance: Singles, share: Singles
+) -> None:
+    """Fill share (n,) of the cells that a view sees: how much of each footprint no nearer person hides.
+
+    Parameters
+    ----------
+    footprint : int16 (cell, 4)
+        Of the whole volume.
+    distance : float32 (place,)
+        Of each ground cell from the camera along the ground, metres.
+    """
+    for k in range(len(cells.cell)):
+        left, top, width, height = footprint[cells.cell[k]]
+        nearest, whole = cells.near[k], np.float32(1)
+        if width == 0:
+            continue
+        if _shows_a_person(shown, left, top, width, height) and not (nearest >= 0 and shown.separate[nearest]):
+            hidden = _hidden_pixels(shown, left, top, width, height, nearest, distance[cells.place[k]])
+            whole -= np.float32(hidden) / np.float32(np.int32(width) * np.int32(height))
+        share[k] = whole
+
+
+@kernel
+def fill_map(
+    cells: ShownCells,
+    footprint: Footprints,
     table: SumTable,
     shown: PixelAssignment,
-    near: Ints,
     distance: Singles,
-    terms: Singles,
-    weight: np.float32,
     levels: Levels,
     share: Singles,
-    sums: Sums,
 ) -> None:
-    """Fill levels and share (plane, y, x) of the cells seen by a view with a likelihood map; add its terms to the sums.
+    """Fill levels and share (n,) of the cells by a view with a likelihood map; UNSEEN where it does not see them.
 
     The level is the mean over the visible pixels of the footprint, those of other persons counted as background.
     """
-    person, cell_distance = near.reshape(-1), distance.reshape(-1)
-    for z in range(len(share)):
-        level_of, share_of = levels[z].reshape(-1), share[z].reshape(-1)
-        weighted, weights, count = sums.weighted[z].reshape(-1), sums.weights[z].reshape(-1), sums.shares[z].reshape(-1)
-        for k in range(cells.start[z], cells.start[z + 1]):
-            place = cells.place[k]
-            left, top, width, height = cells.footprint[k]
-            u, v = left - table.left, top - table.top
-            total, pixels = int(sum_of(table.sums, u, v, u + width, v + height)), np.int32(width) * np.int32(height)
-            nearest, visible = person[place], np.float32(1)
-            if _shows_a_person(shown, left, top, width, height) and not (nearest >= 0 and shown.separate[nearest]):
-                hidden = _hidden_pixels(shown, left, top, width, height, nearest, cell_distance[place])
-                visible -= np.float32(hidden) / np.float32(pixels)
-                if visible > 0:
-                    total -= _sum_of_others(shown, table, left, top, width, height, nearest)
-            mean = np.float32(total) / (np.float32(pixels) * (visible if visible > 0 else np.float32(1)))
-            level = min(int(mean + np.float32(0.5)), TOP)
-            level_of[place], share_of[place] = level, visible
-            seen = weight * visible
-            weighted[place] += seen * terms[1 if nearest >= 0 else 0, level]
-            weights[place] += seen
-            count[place] += visible
+    for k in range(len(cells.cell)):
+        left, top, width, height = footprint[cells.cell[k]]
+        if width == 0:
+            levels[k] = UNSEEN
+            continue
+        u, v = left - table.left, top - table.top
+        total, pixels = int(sum_of(table.sums, u, v, u + width, v + height)), np.int32(width) * np.int32(height)
+        nearest, visible = cells.near[k], np.float32(1)
+        if _shows_a_person(shown, left, top, width, height) and not (nearest >= 0 and shown.separate[nearest]):
+            hidden = _hidden_pixels(shown, left, top, width, height, nearest, distance[cells.place[k]])
+            visible -= np.float32(hidden) / np.float32(pixels)
+            if visible > 0:
+                total -= _sum_of_others(shown, table, left, top, width, height, nearest)
+        mean = np.float32(total) / (np.float32(pixels) * (visible if visible > 0 else np.float32(1)))
+        levels[k], share[k] = min(int(mean + np.float32(0.5)), TOP), visible

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import logit
@@ -11,25 +12,44 @@ from stseg.arrays import Boxes, Bytes, Flags, Floats, Ints, Singles, ViewEvidenc
 from stseg.config import BodyConfig, DetectionConfig, ErrorRateConfig, OccupancyConfig
 from stseg.geometry import Rig
 from stseg.geometry.bodies import BodyTable
-from stseg.geometry.cell_means import CellMeans
+from stseg.geometry.cell_means import CellMeans, SumTable
 from stseg.geometry.nearest_person import nearest_person
 from stseg.geometry.sampling import Sampling
-from stseg.geometry.summed_area import UNSEEN, Levels
+from stseg.geometry.summed_area import UNSEEN
 from stseg.model.box_likelihood import box_likelihood
 from stseg.model.box_noise import FIRST, BoxNoise
 from stseg.model.people import Explanation
 from stseg.model.pillar_index import PillarIndex
-from stseg.occupancy.box_planes import CellsByPerson, ViewBoxes, fill_fit, fill_levels
+from stseg.model.sparse_volume import SparseVolume
+from stseg.occupancy.box_planes import CellsByPerson, ViewBoxes, fill_fit, fill_levels, level_of_match, mark_fit
 from stseg.occupancy.clutter import clutter, clutter_side, clutter_weights
 from stseg.occupancy.fusion import ErrorRates, Sums, ViewTerms, add_terms, log_odds_terms
 from stseg.occupancy.rate_calibration import RateCalibration, cells_per_person, fill_counts, inside_bodies
-from stseg.occupancy.visible_cells import PixelAssignment, add_map, fill_occupied, fill_share
+from stseg.occupancy.shown_cells import CellTables, ShownCells, mark_columns, mark_map
+from stseg.occupancy.visible_cells import PixelAssignment, fill_map, fill_occupied, fill_share, mark_people
 
 _MAP_STEP = 8
 _NEAR_PRIOR = 0.0
 """Prior log-odds of a cell within reach of a person, nats."""
 _UNOCCLUDED = 0.99
 """Least visible share of a body that counts as unoccluded."""
+
+
+class _PreparedView(NamedTuple):
+    """What a view shows in a frame: its people, and its map's sums or the fit of its boxes."""
+
+    shown: PixelAssignment
+    table: SumTable | None
+    fit: Singles | None
+
+
+class _Fused(NamedTuple):
+    """The cells of a frame, the person near each ground cell, each view's terms, and their sums."""
+
+    cells: ShownCells
+    near: Ints
+    terms: list[ViewTerms | None]
+    sums: Sums
 
 
 class Occupancy:
@@ -51,12 +71,11 @@ class Occupancy:
         self.height_mean, self.height_spread = body.height_mean, body.height_spread
         self.prior = float(logit(config.occupied_share))
         self._means = CellMeans(self.sampling)
-        self._cells = [self.sampling.seen_cells(view) for view in range(len(rig.cameras))]
+        self._tables = CellTables(self.sampling.footprint)
         self._pillars = [self._pillars_of(view) if kind == "boxes" else None for view, kind in enumerate(kinds)]
         self._first_rates = [_first_rates(kind, detection) for kind in kinds]
         self._ground = rig.grid.ground
         self._rate_config = rates or ErrorRateConfig()
-        self._certain = np.ones(rig.grid.shape[1:], np.float32)
 
     def new_calibration(self) -> RateCalibration:
         """Error-rate calibration of a new session, at the first guess."""
@@ -68,8 +87,8 @@ class Occupancy:
         explanation: Explanation,
         rates: Sequence[ErrorRates] | None = None,
         noise: BoxNoise = FIRST,
-    ) -> Singles:
-        """A frame's log-odds, float32 (plane, y, x), nats; nan where no view sees the cell.
+    ) -> SparseVolume:
+        """A frame's log-odds, nats; nan where no view sees the cell.
 
         The prior pi is one half within reach of a person of the explanation, whose existence is already
         decided, and `occupied_share` elsewhere.
@@ -83,9 +102,7 @@ class Occupancy:
         noise
             Noise of boxes; by default the first guess.
         """
-        near, sums = self._near(explanation), Sums.zero(self.rig.grid.shape)
-        self._add_views(seen, explanation, near, rates or self.new_calibration().rates, noise, sums)
-        return self._total(sums, near)
+        return self._volume(self._fused(seen, explanation, rates or self.new_calibration().rates, noise))
 
     def fuse_and_learn(
         self,
@@ -93,104 +110,106 @@ class Occupancy:
         seen: Sequence[ViewEvidence],
         explanation: Explanation,
         noise: BoxNoise = FIRST,
-    ) -> Singles:
+    ) -> SparseVolume:
         """`fuse` of a session's next frame, followed by the update of the session's error rates."""
-        near, sums = self._near(explanation), Sums.zero(self.rig.grid.shape)
-        views = self._add_views(seen, explanation, near, calibration.rates, noise, sums)
+        fused = self._fused(seen, explanation, calibration.rates, noise)
         if calibration.next_is_due():
-            self._learn(calibration, views, sums, explanation, near)
-        return self._total(sums, near)
+            self._learn(calibration, fused, explanation)
+        return self._volume(fused)
 
-    def _near(self, explanation: Explanation) -> Ints:
-        return nearest_person(self._ground, explanation.people.ground, self.config.person_radius)
-
-    def _add_views(
+    def _fused(
         self,
         seen: Sequence[ViewEvidence],
         explanation: Explanation,
-        near: Ints,
         rates: Sequence[ErrorRates],
         noise: BoxNoise,
-        sums: Sums,
-    ) -> list[ViewTerms | None]:
-        """Add the terms of all views to the sums; None for a blind view."""
+    ) -> _Fused:
+        near = nearest_person(self._ground, explanation.people.ground, self.config.person_radius)
+        views = [
+            None if view is None else self._prepared(i, view, explanation, near, noise) for i, view in enumerate(seen)
+        ]
+        cells = self._tables.shown(self._marked(views, near), near, self.views)
+        sums, terms = Sums.zero(cells.near.shape), list[ViewTerms | None]()
         weights = clutter_weights(np.array([self._clutter(i, view) for i, view in enumerate(seen)]))
-        added: list[ViewTerms | None] = []
-        for i, (view, weight) in enumerate(zip(seen, weights.astype(np.float32), strict=True)):
-            if view is None:
-                added.append(None)
-            elif isinstance(view, Boxes):
-                added.append(self._add_boxes(i, view, explanation, near, rates[i], noise, weight, sums))
-            else:
-                added.append(self._add_map(i, view, explanation, near, rates[i], weight, sums))
-        return added
+        for i, (view, weight) in enumerate(zip(views, weights.astype(np.float32), strict=True)):
+            added = None if view is None else self._terms(i, view, cells, explanation, rates[i], weight)
+            terms.append(added)
+            if added is not None:
+                add_terms(added, cells.near, sums)
+        return _Fused(cells, near, terms, sums)
 
-    def _add_map(
+    def _prepared(
+        self, i: int, view: Boxes | Singles, explanation: Explanation, near: Ints, noise: BoxNoise
+    ) -> _PreparedView:
+        shown = self._assignment(i, explanation)
+        if isinstance(view, Boxes):
+            return _PreparedView(shown, None, self._fit(i, view, explanation, near, noise))
+        return _PreparedView(shown, self._means.sum_table(i, view), None)
+
+    def _marked(self, views: Sequence[_PreparedView | None], near: Ints) -> Flags:
+        """The blocks at which something is shown, or somebody near."""
+        marked, columns = self._tables.nothing_marked(), near >= 0
+        for view in views:
+            if view is not None and view.fit is not None:
+                mark_fit(view.fit, columns.reshape(-1))
+        mark_columns(columns, marked)
+        for reach, view in zip(self._tables.reach, views, strict=True):
+            if view is not None:
+                mark_people(reach, view.shown, marked)
+                if view.table is not None:
+                    mark_map(reach, view.table, marked)
+        return marked
+
+    def _terms(
         self,
         i: int,
-        view: Singles,
+        view: _PreparedView,
+        cells: ShownCells,
         explanation: Explanation,
-        near: Ints,
         rates: ErrorRates,
         weight: np.float32,
-        sums: Sums,
     ) -> ViewTerms:
-        shape, terms = self.rig.grid.shape, log_odds_terms(rates)
-        levels, share = np.full(shape, UNSEEN, np.int16), np.empty(shape, np.float32)
-        add_map(
-            self._cells[i], self._means.sum_table(i, view), self._assignment(i, explanation), near,
-            self.sampling.distance[i], terms, weight, levels, share, sums,
-        )  # fmt: skip
-        return ViewTerms(levels, terms, weight, share, self._certain)
+        """Terms of a view at the cells that are fused one by one, and at the representatives of the others."""
+        footprint, distance = self.sampling.footprint[i].reshape(-1, 4), self.sampling.distance[i].reshape(-1)
+        number, seen = len(cells.cell), self._tables.sets.seen[:, i]
+        levels, share = np.empty(len(cells.near), np.int16), np.ones(len(cells.near), np.float32)
+        confidence, empty = np.ones(len(cells.near), np.float32), np.int16(0)
+        if view.table is not None:
+            fill_map(cells, footprint, view.table, view.shown, distance, levels[:number], share[:number])
+        elif view.fit is not None:
+            fill_share(cells, footprint, view.shown, distance, share[:number])
+            fill_levels(view.fit, self.heights, self.rig.grid.heights, cells, footprint, rates, levels[:number])
+            confidence = _confidence(cells.near, view.shown.separate, explanation.people.visibility[i])
+            empty = level_of_match(0.0, rates.miss, rates.clutter)
+        levels[number:] = np.where(seen, empty, UNSEEN)
+        return ViewTerms(levels, log_odds_terms(rates), weight, share, confidence)
 
-    def _add_boxes(
-        self,
-        i: int,
-        view: Boxes,
-        explanation: Explanation,
-        near: Ints,
-        rates: ErrorRates,
-        noise: BoxNoise,
-        weight: np.float32,
-        sums: Sums,
-    ) -> ViewTerms:
-        shown, share = self._assignment(i, explanation), np.empty(self.rig.grid.shape, np.float32)
-        fill_share(self._cells[i], shown, near, self.sampling.distance[i], share)
-        levels = self._levels_of_boxes(i, view, explanation, near, rates, noise)
-        confidence = _confidence(near, shown.separate, explanation.people.visibility[i])
-        added = ViewTerms(levels, log_odds_terms(rates), weight, share, confidence)
-        add_terms(added, near, sums)
-        return added
+    def _volume(self, fused: _Fused) -> SparseVolume:
+        cells, sets = fused.cells, self._tables.sets
+        views = np.append(self.views.reshape(-1)[cells.cell], sets.seen.any(1)).astype(np.uint8)
+        observations, priors = self.config.effective_observations, (self.prior, _NEAR_PRIOR)
+        total = fused.sums.total(views, cells.near, observations, priors)
+        return SparseVolume(sets.of_cell, total[len(cells.cell) :], cells.cell, total[: len(cells.cell)])
 
-    def _total(self, sums: Sums, near: Ints) -> Singles:
-        return sums.total(self.views, near, self.config.effective_observations, (self.prior, _NEAR_PRIOR))
-
-    def _learn(
-        self,
-        calibration: RateCalibration,
-        views: Sequence[ViewTerms | None],
-        sums: Sums,
-        explanation: Explanation,
-        near: Ints,
-    ) -> None:
-        people, grid = explanation.people, self.rig.grid
-        inside = inside_bodies(grid, near, people.ground, people.height)
+    def _learn(self, calibration: RateCalibration, fused: _Fused, explanation: Explanation) -> None:
+        people, grid, cells = explanation.people, self.rig.grid, fused.cells
+        filled = inside_bodies(grid, fused.near, people.ground, people.height)
+        inside = np.append(filled.reshape(-1)[cells.cell], np.zeros(len(cells.near) - len(cells.cell), bool))
         body, reached = cells_per_person(grid, self.height_mean, self.config.person_radius)
-        errors, seen = np.zeros((2, len(views), 3))
-        for i, (view, rates) in enumerate(zip(views, calibration.rates, strict=True)):
+        errors, seen = np.zeros((2, len(fused.terms), 3))
+        for i, (view, rates) in enumerate(zip(fused.terms, calibration.rates, strict=True)):
             if view is not None:
                 trusted = people.evidence - people.view_evidence[i] >= calibration.config.minimum_evidence
                 trusted &= people.visibility[i] >= _UNOCCLUDED
                 fill_counts(
-                    view, sums, near, inside, trusted, np.array(rates), self.config.effective_observations, self.prior,
-                    errors[i], seen[i],
+                    view, fused.sums, cells.near, inside, cells.number, trusted, np.array(rates),
+                    self.config.effective_observations, self.prior, errors[i], seen[i],
                 )  # fmt: skip
-        seen_cells = np.maximum([len(cells.place) for cells in self._cells], 1)
-        units = np.column_stack([np.full(len(views), body), seen_cells, np.full(len(views), reached - body)])
-        supported = np.append(people.evidence >= calibration.config.minimum_evidence, False)[near]
-        counted = (self.views > 0) & supported
-        filled = np.array([inside[counted].sum(), counted.sum()]) / reached
-        calibration.learn(errors / units, seen / units, filled, calibration.interval)
+        seen_cells = np.maximum(self._tables.sets.size @ self._tables.sets.seen, 1)
+        units = np.column_stack([np.full(len(errors), body), seen_cells, np.full(len(errors), reached - body)])
+        supported = np.append(people.evidence >= calibration.config.minimum_evidence, False)[cells.near]
+        share = np.array([inside[supported].sum(), supported.sum()]) / reached
+        calibration.learn(errors / units, seen / units, share, calibration.interval)
 
     def _assignment(self, i: int, explanation: Explanation) -> PixelAssignment:
         people, assigned = explanation.people, explanation.box_assignment[i]
@@ -212,13 +231,11 @@ class Occupancy:
         pillars = bodies.reshape(-1, 4).astype(np.float32)
         return pillars, PillarIndex.of(pillars, camera.size)
 
-    def _levels_of_boxes(
-        self, i: int, view: Boxes, explanation: Explanation, near: Ints, rates: ErrorRates, noise: BoxNoise
-    ) -> Levels:
-        """Likelihood per plane of each cell."""
+    def _fit(self, i: int, view: Boxes, explanation: Explanation, near: Ints, noise: BoxNoise) -> Singles:
+        """Log-likelihood of the best box of each height and ground cell; see `fill_fit`."""
         pillars = self._pillars[i]
         assert pillars is not None, "the view was to deliver boxes"
-        people, grid, levels = explanation.people, self.rig.grid, np.empty(self.rig.grid.shape, np.int16)
+        people = explanation.people
         edges = np.concatenate([view.pixel[:, :2], view.pixel[:, :2] + view.pixel[:, 2:]], 1)
         width, height = map(float, self.rig.cameras[i].size)
         edges = edges.clip(0, [width - 1, height - 1] * 2)
@@ -228,10 +245,7 @@ class Occupancy:
             pillars[1], pillars[0], self._height_prior(np.array([self.height_mean]))[0],
             self._height_prior(people.height), boxes, CellsByPerson.of(near, len(people)), fit,
         )  # fmt: skip
-        footprint = self.sampling.footprint[i].reshape(len(levels), -1, 4)
-        flat = levels.reshape(len(levels), -1)
-        fill_levels(fit, self.heights, grid.heights, near.reshape(-1), footprint, rates, flat)
-        return levels
+        return fit
 
     def _height_prior(self, expected: Floats) -> Floats:
         """Log-prior of `self.heights` around expected heights (n,), metres; float64 (n, height)."""
@@ -256,6 +270,6 @@ def _first_rates(kind: str, detection: DetectionConfig) -> ErrorRates:
 
 
 def _confidence(near: Ints, separate: Flags, visibility: Floats) -> Singles:
-    """Confidence of a view with boxes, float32 (y, x): 1, but near a person without a box the person's visibility."""
+    """Confidence of a view with boxes, float32 as near: 1, but near a person without a box the person's visibility."""
     missing = np.where(separate, 1.0, np.append(visibility, 1.0))
     return np.asarray(missing[near], np.float32)

@@ -93,8 +93,8 @@ def measure(rig: Path, frames: slice) -> dict[str, Tally]:
         near = nearest_person(recording.rig.grid.ground, explanation.people.ground, config.occupancy.person_radius) >= 0
         share = float(logit(rates.filled_share))
         forms = {
-            "constants": constant.fuse(seen, explanation),
-            "learned": learned.fuse_and_learn(rates, seen, explanation),
+            "constants": constant.fuse(seen, explanation).dense(),
+            "learned": learned.fuse_and_learn(rates, seen, explanation).dense(),
         }
         forms["without"] = forms["learned"] + np.where(near, share, 0.0)
         doubt = np.min([np.abs(u) for u in forms.values()], axis=0) < DOUBT

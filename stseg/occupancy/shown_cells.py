@@ -1,0 +1,185 @@
+"""The cells of a frame at which some view shows something; of all others one stands for many.
+
+Where no view shows foreground or a person, and nobody is near, every view that sees a cell has its *empty level* (0 of
+a map) and nothing hidden. What such a cell sums to depends on the set of views that see it and on nothing else. So the
+cells at which something is shown are fused one by one, and behind them one representative of each set of views, by the
+same kernels: the volume is that of all cells fused one by one, bit for bit.
+
+Blocks of cells, not cells, are asked whether something is shown: the box around a block's footprints in each view, by
+the summed-area tables that hold the likelihoods and the people's pixels.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stseg.accelerate import kernel
+from stseg.arrays import Bytes, Flags, Floats, Ints, Labels
+from stseg.geometry.cell_means import SumTable
+from stseg.geometry.sampling import Footprints
+from stseg.geometry.summed_area import sum_of
+
+SIDE = 8
+"""Cells along the side of a block."""
+_MOST_PIXELS = 1 << 20
+"""Pixels up to which a sum of levels fits into 32 bits; blocks with more are taken to show something."""
+_CODES = 60
+"""Views whose sets one whole number holds."""
+
+Reach = NDArray[np.int16]
+"""int16 (plane, block row, block column, 4): left, top, right, bottom of the box around a block's footprints, pixels;
+right 0 where the view sees none of its cells."""
+
+
+class ViewSets(NamedTuple):
+    """Sets of views that see a cell.
+
+    Attributes
+    ----------
+    of_cell : int32 (plane, y, x)
+        The set of each cell.
+    seen : bool (set, view)
+        The views of each set.
+    size : int64 (set,)
+        Number of cells of each set.
+    """
+
+    of_cell: Labels
+    seen: Flags
+    size: Ints
+
+
+class ShownCells(NamedTuple):
+    """The cells (n,) of a frame that are fused one by one, and the representatives (k,) of the others.
+
+    Attributes
+    ----------
+    cell : int32 (n,)
+        Index in the flattened volume.
+    place : int32 (n,)
+        Index in the flattened ground.
+    near : int64 (n + k,)
+        The person near each, -1 for none.
+    number : float64 (n + k,)
+        Cells that each stands for.
+    """
+
+    cell: Labels
+    place: Labels
+    near: Ints
+    number: Floats
+
+
+class CellTables:
+    """What is known of a rig's cells before any frame.
+
+    Parameters
+    ----------
+    footprint : int16 (view, plane, y, x, 4)
+        See `stseg.geometry.sampling`.
+    """
+
+    def __init__(self, footprint: Footprints) -> None:
+        self.footprint = footprint
+        self.reach: list[Reach] = []
+        for boxes in footprint:
+            blocks = tuple(-(-side // SIDE) for side in boxes.shape[1:3])
+            reach = np.zeros((len(boxes), *blocks, 4), np.int16)
+            _fill_reach(boxes, reach)
+            self.reach.append(reach)
+
+    @cached_property
+    def sets(self) -> ViewSets:
+        """The sets of views that occur."""
+        shape = self.footprint.shape[1:4]
+        code = np.zeros(shape, np.int64)
+        for k, boxes in enumerate(self.footprint):
+            if k and k % _CODES == 0:
+                code = np.unique(code, return_inverse=True)[1].reshape(shape)
+            code += code + (boxes[..., 2] > 0)
+        _, example, of_cell, size = np.unique(code, return_index=True, return_inverse=True, return_counts=True)
+        seen = self.footprint.reshape(len(self.footprint), -1, 4)[:, example, 2] > 0
+        return ViewSets(of_cell.reshape(shape).astype(np.int32), np.ascontiguousarray(seen.T), size.astype(np.int64))
+
+    def nothing_marked(self) -> Flags:
+        """No block marked, bool (plane, block row, block column)."""
+        return np.zeros(self.reach[0].shape[:3], bool)
+
+    def shown(self, marked: Flags, near: Ints, views: Bytes) -> ShownCells:
+        """The cells of the marked blocks, as far as a view sees them.
+
+        Parameters
+        ----------
+        marked : bool (plane, block row, block column)
+            Every block at which something is shown, or somebody near.
+        near : int64 (y, x)
+            The person near each cell, -1 for none.
+        views : uint8 (plane, y, x)
+            Number of views that see each cell.
+        """
+        found = np.empty(int(marked.sum()) * SIDE**2, np.int32)
+        cell = found[: _fill_cells(marked, views, found)]
+        place = cell % np.int32(near.size)
+        sets, own = self.sets, self.sets.of_cell.reshape(-1)[cell]
+        others = sets.size - np.bincount(own, minlength=len(sets.size))
+        number = np.concatenate([np.ones(len(cell)), others])
+        return ShownCells(cell, place, np.append(near.reshape(-1)[place], np.full(len(others), -1)), number)
+
+
+@kernel
+def mark_map(reach: Reach, table: SumTable, marked: Flags) -> None:
+    """Mark the blocks (plane, row, column) in whose box a view's map has a level above 0."""
+    for z in range(marked.shape[0]):
+        for j in range(marked.shape[1]):
+            for i in range(marked.shape[2]):
+                left, top, right, bottom = reach[z, j, i]
+                if right > 0 and not marked[z, j, i]:
+                    pixels = (np.int64(right) - left) * (np.int64(bottom) - top)
+                    u, v = left - table.left, top - table.top
+                    total = sum_of(table.sums, u, v, right - table.left, bottom - table.top)
+                    marked[z, j, i] = pixels > _MOST_PIXELS or total != 0
+
+
+@kernel
+def mark_columns(columns: Flags, marked: Flags) -> None:
+    """Mark the blocks of all planes above ground cells, columns bool (y, x)."""
+    for y in range(columns.shape[0]):
+        for x in range(columns.shape[1]):
+            if columns[y, x]:
+                marked[:, y // SIDE, x // SIDE] = True
+
+
+@kernel
+def _fill_reach(footprint: Footprints, reach: Reach) -> None:
+    """Fill reach, 0 everywhere before, from the footprints (plane, y, x, 4) of a view."""
+    for z in range(footprint.shape[0]):
+        for y in range(footprint.shape[1]):
+            for x in range(footprint.shape[2]):
+                left, top, width, height = footprint[z, y, x]
+                if width > 0:
+                    box = reach[z, y // SIDE, x // SIDE]
+                    first = box[2] == 0
+                    box[0] = left if first else min(box[0], left)
+                    box[1] = top if first else min(box[1], top)
+                    box[2], box[3] = max(box[2], left + width), max(box[3], top + height)
+
+
+@kernel
+def _fill_cells(marked: Flags, views: Bytes, cell: Labels) -> int:
+    """Fill cell (n,) with the indices of the cells of marked blocks that a view sees; their number."""
+    planes, rows, columns = views.shape
+    count = 0
+    for z in range(planes):
+        for j in range(marked.shape[1]):
+            for i in range(marked.shape[2]):
+                if marked[z, j, i]:
+                    for y in range(j * SIDE, min((j + 1) * SIDE, rows)):
+                        for x in range(i * SIDE, min((i + 1) * SIDE, columns)):
+                            if views[z, y, x] > 0:
+                                cell[count] = (z * rows + y) * columns + x
+                                count += 1
+    return count
