@@ -95,3 +95,17 @@ def test_a_run_file_is_still_read(run_file: Path) -> None:
     run = read_run(run_file)
     run.require_fit()
     assert len(run.trajectory)
+
+
+@pytest.mark.parametrize("command", ["review", "measure", "export --to geojson"])
+@pytest.mark.parametrize("column", ["id", "first"])
+def test_tracks_that_are_not_those_of_the_rows_are_refused(
+    run_file: Path, capsys: pytest.CaptureFixture[str], command: str, column: str
+) -> None:
+    with h5py.File(run_file, "r+") as file:
+        rows = file["tracks"][:]
+        rows[column][0] = {"id": 90, "first": 0}[column]
+        rows["last"][0] += column == "first"
+        file["tracks"][...] = rows
+    said = refusal(capsys, *command.split(), run_file, "-o", run_file.with_name("output.html"))
+    assert "/tra" in said

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -16,7 +15,7 @@ from stseg.arrays import Bytes, Floats, Ints, Labels, Rows, Singles
 from stseg.errors import FormatError
 from stseg.io import limits
 from stseg.io.extras import load_extra
-from stseg.io.names import EXPECTED, EXPECTED_TITLE, is_name, is_title, printable
+from stseg.io.names import EXPECTED_TITLE, is_title, printable
 from stseg.io.numbers import parse_whole
 from stseg.io.recording.recording import Recording
 from stseg.io.recording.rigs import parse_rig
@@ -24,6 +23,7 @@ from stseg.io.recording.time_alignment import with_alignment
 from stseg.io.runfile import layout
 from stseg.io.runfile.data_frames import to_data_frame
 from stseg.io.runfile.hdf5_reading import format_errors, read_object
+from stseg.io.runfile.layout_checks import LayoutChecks, lacking_columns, require_bounded_volume
 from stseg.io.runfile.packed_frames import PackedFrame, PackedVolumes
 from stseg.io.runfile.provenance import Provenance, read_provenance
 from stseg.io.runfile.safe_hdf5 import open_hdf5, read_whole
@@ -276,12 +276,8 @@ def _with_added(rows: Rows, dtype: np.dtype[np.void]) -> Rows:
         return rows
     whole = np.zeros(len(rows), dtype)
     for name in dtype.names or ():
-        whole[name] = np.nan if name in _lacking(rows.dtype, dtype) else rows[name]
+        whole[name] = np.nan if name in lacking_columns(rows.dtype, dtype) else rows[name]
     return whole
-
-
-def _lacking(found: np.dtype[np.generic], dtype: np.dtype[np.generic]) -> set[str]:
-    return set(dtype.names or ()) - set(found.names or ())
 
 
 def read_run(path: Path | str) -> Run:
@@ -301,14 +297,6 @@ def read_trajectory(path: Path) -> Rows:
     return read_run(path).trajectory
 
 
-def _require_bounded_volume(group: h5py.Group) -> None:
-    """Raise ValueError where a frame or a chunk of the volume is larger than is read."""
-    for name in (layout.LOG_ODDS.name, layout.LABEL.name):
-        array = group[name]
-        if math.prod(array.shape[1:]) > limits.CELLS or (array.chunks is not None and array.chunks[0] > 64):
-            raise ValueError(f"{array.name}: frames of {array.shape[1:]} in chunks of {array.chunks}")
-
-
 def _names(group: h5py.Group) -> dict[int, str]:
     if "names" not in group:
         return {}
@@ -324,7 +312,7 @@ def _volume(group: h5py.Group, index: int) -> tuple[Singles, Labels]:
 
 
 def _checked_run(path: Path, file: h5py.File) -> Run:
-    checks = _Checks(path, file)
+    checks = LayoutChecks(path, file)
     for name in ("format", "format_version"):
         checks.require_value("/", name, layout.ROOT_ATTRIBUTES[name])
     cameras = checks.names("/", "cameras")
@@ -336,7 +324,7 @@ def _checked_run(path: Path, file: h5py.File) -> Run:
             checks.require_dataset(f"/{name}", dtype, 1)
     checks.require_provenance()
     entry, group = checks.require("/entry/title"), file[layout.OCCUPANCY]
-    _require_bounded_volume(group)
+    require_bounded_volume(group)
     arrays = (read_whole(group[name], _SCALES) for name in ("frame", "plane", "y", "x", "views"))
     frames, heights, ground_y, ground_x, views = arrays
     checks.require_rising(frames)
@@ -347,81 +335,3 @@ def _checked_run(path: Path, file: h5py.File) -> Run:
         raise FormatError(path, f"{layout.OCCUPANCY}@kept", shown(kept), f"one of {', '.join(layout.KEPT)}")
     title = printable(str(entry.asstr()[()]))[: limits.NAME]
     return Run(path, title, checks.frame_rate(), cameras, frames, heights, ground_y, ground_x, views, str(kept))
-
-
-@dataclass(frozen=True)
-class _Checks:
-    """The layout, object by object; each raises a FormatError that names the object."""
-
-    path: Path
-    file: h5py.File
-
-    def require(self, name: str) -> h5py.Dataset:
-        found = self.file.get(name)
-        if not isinstance(found, h5py.Dataset):
-            raise FormatError(self.path, name, "nothing" if found is None else "no array", "an array")
-        return found
-
-    def attribute(self, name: str, key: str, expected: str) -> h5py.AttributeManager:
-        attributes = self.file[name].attrs
-        if key not in attributes:
-            raise FormatError(self.path, f"{name}@{key}", "nothing", expected)
-        return attributes[key]
-
-    def names(self, name: str, key: str) -> tuple[str, ...]:
-        """An attribute of several names of cameras, each once."""
-        found = np.ravel(self.attribute(name, key, "names of cameras")).tolist()[: limits.CAMERAS + 1]
-        if len(found) > limits.CAMERAS or not all(map(is_name, found)) or len(set(found)) != len(found):
-            raise FormatError(self.path, f"{name}@{key}", shown(found), f"names of cameras: {EXPECTED}")
-        return tuple(found)
-
-    def frame_rate(self) -> float:
-        """Frames per second."""
-        low, high = limits.FRAME_RATE
-        found = self.attribute("/trajectory", "fps", "frames per second")
-        if np.shape(found) or not isinstance(found, float | int | np.number) or not low <= found <= high:
-            raise FormatError(self.path, "/trajectory@fps", shown(found), f"a number from {low:g} to {high:g}")
-        return float(found)
-
-    def require_rising(self, frames: Ints) -> None:
-        """Frames of the run: numbers from 0 on, rising."""
-        name = f"{layout.OCCUPANCY}/frame"
-        if len(frames) and (frames[0] < 0 or frames[-1] > limits.FRAMES or (np.diff(frames) <= 0).any()):
-            raise FormatError(self.path, name, "numbers that do not rise from 0 on", f"at most {limits.FRAMES}, rising")
-
-    def require_finite(self, name: str, values: Floats) -> None:
-        """Coordinates: finite and of usual size."""
-        if not (np.abs(values) <= limits.METRES).all():
-            raise FormatError(self.path, name, "a coordinate that is not finite", f"metres up to {limits.METRES:g}")
-
-    def require_value(self, name: str, key: str, expected: str | int) -> None:
-        found = self.attribute(name, key, repr(expected))
-        if np.shape(found) or found != expected:
-            raise FormatError(self.path, f"{name}@{key}", repr(found), repr(expected))
-
-    def require_dataset(self, name: str, dtype: np.dtype[np.generic], dimensions: int) -> h5py.Dataset:
-        """A dataset of that dtype, or of its first form without the columns that were added, and so many dimensions."""
-        dataset = self.require(name)
-        lacking = _lacking(dataset.dtype, dtype)
-        first = [column for column in dtype.descr if column[0] not in lacking & layout.ADDED_COLUMNS]
-        if dataset.dtype not in (dtype, np.dtype(first)):
-            raise FormatError(self.path, name, f"the type {dataset.dtype}", str(dtype))
-        if dataset.ndim != dimensions:
-            raise FormatError(self.path, name, f"{dataset.ndim} dimensions", str(dimensions))
-        return dataset
-
-    def require_field(self, field: layout.Field, lengths: dict[str, int]) -> None:
-        """Scales come first and say how long the axes are."""
-        name = f"{layout.OCCUPANCY}/{field.name}"
-        found = self.require(name).dtype
-        dtype = found if found == layout.EARLIER.get(field.name) else field.dtype
-        dataset = self.require_dataset(name, dtype, len(field.axes))
-        expected = tuple(lengths.setdefault(axis, len(dataset)) for axis in field.axes)
-        if dataset.shape != expected:
-            raise FormatError(self.path, name, f"the shape {dataset.shape}", f"{expected}, as its axes say")
-
-    def require_provenance(self) -> None:
-        for name in ("config", "rig", "versions", "sources"):
-            self.require(f"{layout.PROVENANCE}/{name}")
-        for key in ("created", "rig_path"):
-            self.attribute(layout.PROVENANCE, key, "a text")

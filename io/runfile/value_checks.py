@@ -88,7 +88,7 @@ def _repeated(rows: Rows) -> bool:
 
 
 def require_fit(bounds: Bounds, trajectory: Rows, boxes: Rows, tracks: Rows) -> None:
-    """Raise FormatError where tables do not fit each other: rows of no frame or track, a track without length."""
+    """Raise FormatError where tables do not fit each other: rows of no frame or track, a track of other rows."""
     for name, rows in (("trajectory", trajectory), ("boxes", boxes)):
         absent = ~np.isin(rows["frame"], bounds.frames)
         if absent.any():
@@ -100,3 +100,10 @@ def require_fit(bounds: Bounds, trajectory: Rows, boxes: Rows, tracks: Rows) -> 
     if strange.any():
         found = f"id {trajectory['id'][int(np.argmax(strange))]}, of which /tracks has no row"
         raise FormatError(bounds.path, "/trajectory, id", found, "tracks of the run")
+    identities, index = np.unique(trajectory["id"], return_inverse=True)
+    ends = np.array([limits.FRAMES, -1]) + np.zeros((len(identities), 2), np.int64)
+    np.minimum.at(ends[:, 0], index, trajectory["frame"])
+    np.maximum.at(ends[:, 1], index, trajectory["frame"])
+    own = tracks[np.argsort(tracks["id"])]
+    if not np.array_equal(own["id"], identities) or not np.array_equal(np.stack([own["first"], own["last"]], 1), ends):
+        raise FormatError(bounds.path, "/tracks", "other frames than its rows in /trajectory have", "theirs")

@@ -56,6 +56,7 @@ def measure(
         Replace tables that exist.
     """
     run = read_run(run_file)
+    run.require_fit()
     found = measure_run(run, zones, lines)
     make_folder(output)
     write_tables(output, found.tables(), format_, overwrite)

@@ -53,6 +53,7 @@ def review(
         raise ConfigError("--most", "", most, "1 or more questions")
     require_new(output, overwrite)
     run = read_run(run_file)
+    run.require_fit()
     doubts = doubts_of(run)[:most]
     views = _frames(run, doubts) if camera_images and doubts else {}
     questions = [_question(run, doubt, views) for doubt in doubts]
