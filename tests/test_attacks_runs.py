@@ -109,3 +109,15 @@ def test_tracks_that_are_not_those_of_the_rows_are_refused(
         file["tracks"][...] = rows
     said = refusal(capsys, *command.split(), run_file, "-o", run_file.with_name("output.html"))
     assert "/tra" in said
+
+
+@pytest.mark.parametrize("name", ["label", "frame", "views"])
+def test_whole_numbers_stored_as_floats_are_refused(
+    run_file: Path, capsys: pytest.CaptureFixture[str], name: str
+) -> None:
+    with h5py.File(run_file, "r+") as file:
+        group = file["entry/occupancy"]
+        values = group[name][:].astype(float)
+        del group[name]
+        group[name] = values
+    assert "found the type float64" in refusal(capsys, "inspect", run_file)

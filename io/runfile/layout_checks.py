@@ -81,8 +81,8 @@ class LayoutChecks:
     def require_field(self, field: layout.Field, lengths: dict[str, int]) -> None:
         """Scales come first and say how long the axes are."""
         name = f"{layout.OCCUPANCY}/{field.name}"
-        found = self.require(name).dtype
-        dtype = found if found == layout.EARLIER.get(field.name) else field.dtype
+        earlier = layout.EARLIER.get(field.name, field.dtype)
+        dtype = earlier if self.require(name).dtype == earlier else field.dtype
         dataset = self.require_dataset(name, dtype, len(field.axes))
         expected = tuple(lengths.setdefault(axis, len(dataset)) for axis in field.axes)
         if dataset.shape != expected:
