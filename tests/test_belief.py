@@ -20,6 +20,7 @@ from stseg.config import BeliefConfig, Config
 from stseg.errors import CalibrationError, ConfigError, SourceError
 from stseg.geometry import Camera
 from stseg.geometry.square_pixels import vertical_of_square_pixels
+from stseg.model.sparse_volume import SparseVolume
 from stseg.trackers import Commit, FrameObservations, FusedFrame, find_tracker
 from stseg.trackers.belief import BeliefTracker
 from stseg.trackers.belief.exclusion import exclusion
@@ -63,9 +64,8 @@ def images_of(standing: Floats) -> list[Bytes | None]:
 
 def scene(frame: int, standing: Floats, seen: Floats | None = None) -> FusedFrame:
     """A frame in which the pass finds these people; occupied where they stand."""
-    return FusedFrame(
-        frame, found(standing if seen is None else seen), found(people()), np.full(RIG.grid.shape, 3.0, np.float32)
-    )
+    volume = SparseVolume.whole(np.full(RIG.grid.shape, 3.0, np.float32))
+    return FusedFrame(frame, found(standing if seen is None else seen), found(people()), volume)
 
 
 def known(standing: Floats, count: int = 30) -> Target:

@@ -70,7 +70,9 @@ def smooth_window(seed: int, shape: tuple[int, ...], neighbours: int = 8, smooth
     log_odds[rng.random(shape) < 0.05] = np.nan
     motion = rng.integers(-2, 3, (frames - 1, rows, columns, 2))
     grid = Grid((0.0, columns * 0.1), (0.0, rows * 0.1), 0.1, 1.8, planes)
-    return build_energy(log_odds, motion, grid, SegmentationConfig(smoothness=smoothness, neighbours=neighbours))
+    return build_energy(
+        log_odds, successor_cells(motion), grid, SegmentationConfig(smoothness=smoothness, neighbours=neighbours)
+    )
 
 
 # The energy
@@ -93,7 +95,7 @@ def test_energy_of_log_odds() -> None:
     log_odds = np.array([1.5, np.nan, -1e9, 1e9], np.float32).reshape(1, 1, 1, 4)
     config = SegmentationConfig(smoothness=0.5, distance_scale=0.2, time_distance=0.3)
     grid = Grid((0, 0.4), (0, 0.1), cell=0.1, top=0.6, planes=3)
-    energy = build_energy(log_odds, np.zeros((0, 1, 4, 2), np.int64), grid, config)
+    energy = build_energy(log_odds, np.zeros((0, 1, 4), np.int32), grid, config)
     assert energy.unary.ravel().tolist()[:2] == [1500, 0]
     assert energy.unary.min() == -energy.unary.max() < -10_000
     distance = [{(0, 0, 0, 1): 0.1, (0, 0, 1, 0): 0.1}.get(tuple(o), 0.3) for o in energy.offsets.tolist()]
@@ -231,8 +233,8 @@ def test_smoothness_bridges_a_gap_along_the_motion() -> None:
     moving = np.zeros((4, 1, 12, 2), np.int64)
     moving[..., 1] = 2
     config = SegmentationConfig(smoothness=0.5)
-    followed = minimum_cut(build_energy(log_odds, moving, grid, config)).occupied
-    straight = minimum_cut(build_energy(log_odds, np.zeros_like(moving), grid, config)).occupied
+    followed = minimum_cut(build_energy(log_odds, successor_cells(moving), grid, config)).occupied
+    straight = minimum_cut(build_energy(log_odds, successor_cells(np.zeros_like(moving)), grid, config)).occupied
     assert followed[2, 0, 0].nonzero()[0].tolist() == [4, 5]
     assert not straight[2].any()
 

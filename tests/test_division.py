@@ -163,7 +163,7 @@ def window_of(truth: Labels, seed: int = 1) -> Energy:
     noise = np.random.default_rng(seed).normal(0, 0.7, truth.shape)
     log_odds = (np.where(truth > 0, 2.5, -2.5) + noise).astype(np.float32)
     still = np.zeros((len(truth) - 1, *GRID.shape[1:], 2), np.int64)
-    return build_energy(log_odds, still, GRID, SegmentationConfig())
+    return build_energy(log_odds, successor_cells(still), GRID, SegmentationConfig())
 
 
 def divided(

@@ -13,6 +13,7 @@ from scenes import CONFIG, FRAME_RATE, found, people, room
 from stseg.arrays import Floats, Rows
 from stseg.config import Config, KalmanConfig, MotionConfig
 from stseg.errors import ConfigError
+from stseg.model.sparse_volume import SparseVolume
 from stseg.trackers import FrameObservations, FusedFrame
 from stseg.trackers.kalman import KalmanTracker
 from stseg.trackers.kalman_filters import corrected, initial, innovations, predicted
@@ -20,7 +21,7 @@ from stseg.tracking.final_tracks import committed_tracks
 
 RIG = room()
 UNSEEN = FrameObservations((None,) * 4, (None,) * 4)
-EMPTY = np.full(RIG.grid.shape, -3.0, np.float32)
+EMPTY = SparseVolume.whole(np.full(RIG.grid.shape, -3.0, np.float32))
 
 
 def follow(frames: list[list[tuple[float, float]]], config: Config = CONFIG) -> tuple[Rows, Rows]:

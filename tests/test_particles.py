@@ -16,6 +16,7 @@ from stseg.arrays import Boxes, Bytes, Floats, Observation, Rows, Singles
 from stseg.config import Config, ParticleConfig
 from stseg.errors import ConfigError, SourceError
 from stseg.geometry import Camera
+from stseg.model.sparse_volume import SparseVolume
 from stseg.trackers import Commit, FrameObservations, FusedFrame
 from stseg.trackers.colour_views import colour_views
 from stseg.trackers.particles import ParticleTracker
@@ -54,7 +55,9 @@ def shown(standing: Floats, shirts: tuple[tuple[int, int, int], ...] = SHIRTS) -
 
 def scene(frame: int, standing: Floats) -> FusedFrame:
     """A frame in which the pass finds these people."""
-    return FusedFrame(frame, found(standing), found(people()), np.full(RIG.grid.shape, -3.0, np.float32))
+    return FusedFrame(
+        frame, found(standing), found(people()), SparseVolume.whole(np.full(RIG.grid.shape, -3.0, np.float32))
+    )
 
 
 def rows_of(commits: list[Commit]) -> Rows:

@@ -16,6 +16,7 @@ from stseg.model.blobs import UNASSIGNED, Blobs
 from stseg.segmentation.blob_measures import Measures, fill_ground_labels, fill_measures
 from stseg.segmentation.blobs import find_blobs
 from stseg.segmentation.cell_motion import motion_field
+from stseg.segmentation.patches import Patches
 
 GRID = Grid((0.0, 2.0), (0.0, 1.5), cell=0.1, top=1.8, planes=4)
 
@@ -25,7 +26,7 @@ GRID = Grid((0.0, 2.0), (0.0, 1.5), cell=0.1, top=1.8, planes=4)
 def test_cells_near_a_person_move_with_them() -> None:
     now = np.array([[0.55, 0.55], [1.45, 0.95]])
     then = np.array([[1.25, 0.85], [0.85, 0.45]])
-    motion = motion_field(now, then, np.array([4, 7]), np.array([7, 4]), 0.25, GRID)
+    motion = motion_field(now, then, np.array([4, 7]), np.array([7, 4]), 0.25, GRID.cell, GRID.ground)
     assert motion[5, 5].tolist() == [-1, 3]
     assert motion[9, 14].tolist() == [-1, -2]
     assert motion[6, 6].tolist() == [-1, 3]
@@ -38,10 +39,12 @@ def test_a_track_not_detected_again_does_not_move() -> None:
     here = np.array([[0.55, 0.55]])
     for chains_then in ([], [9]):
         then = np.tile([[1.0, 1.0]], (len(chains_then), 1))
-        motion = motion_field(here, then, np.array([3]), np.array(chains_then, np.int64), 0.3, GRID)
+        motion = motion_field(here, then, np.array([3]), np.array(chains_then, np.int64), 0.3, GRID.cell, GRID.ground)
         assert motion.shape == (15, 20, 2)
         assert not motion.any()
-    assert not motion_field(np.zeros((0, 2)), here, np.zeros(0, np.int64), np.array([3]), 0.3, GRID).any()
+    assert not motion_field(
+        np.zeros((0, 2)), here, np.zeros(0, np.int64), np.array([3]), 0.3, GRID.cell, GRID.ground
+    ).any()
 
 
 # Blobs
@@ -62,7 +65,7 @@ def blobs_of(occupied: Flags, *standing: tuple[float, float], strength: Floats |
     label = np.where(
         occupied, np.append(np.arange(len(ground)) + 11, UNASSIGNED)[nearest_person(GRID.ground, ground, 0.4)], 0
     )
-    return find_blobs(label.astype(np.int32), log_odds, ground, np.arange(len(ground)) + 11, 0.4, GRID)
+    return find_blobs(label.astype(np.int32), log_odds, ground, np.arange(len(ground)) + 11, 0.4, Patches.whole(GRID))
 
 
 def test_a_person_is_a_blob() -> None:
@@ -123,7 +126,9 @@ def test_a_track_is_one_blob_unassigned_cells_are_many() -> None:
     label = np.zeros(GRID.shape, np.int32)
     label[1, 3, 3], label[1, 3, 8] = 4, 4
     label[1, 9, 3], label[1, 9, 8] = UNASSIGNED, UNASSIGNED
-    found = find_blobs(label, np.ones(GRID.shape, np.float32), np.zeros((0, 2)), np.zeros(0, np.int64), 0.4, GRID)
+    found = find_blobs(
+        label, np.ones(GRID.shape, np.float32), np.zeros((0, 2)), np.zeros(0, np.int64), 0.4, Patches.whole(GRID)
+    )
     assert found.track.tolist() == [4, UNASSIGNED, UNASSIGNED]
     assert found.person.tolist() == [-1, -1, -1]
     np.testing.assert_allclose(found.ground[0], (GRID.ground[3, 3] + GRID.ground[3, 8]) / 2)
@@ -135,7 +140,7 @@ def test_a_column_belongs_to_the_label_with_most_mass() -> None:
     for strength, whose in ((1.0, 2), (9.0, 1)):
         log_odds = np.ones(GRID.shape, np.float32)
         log_odds[3] = strength
-        found = find_blobs(label, log_odds, GRID.ground[5, 5][None], np.array([1]), 0.4, GRID)
+        found = find_blobs(label, log_odds, GRID.ground[5, 5][None], np.array([1]), 0.4, Patches.whole(GRID))
         assert found.track.tolist() == ([1] if whose == 1 else [2, 1])  # a detection without cells comes last
         assert found.person.tolist() == ([0] if whose == 1 else [-1, 0])
         assert found.mass[0] == pytest.approx(strength if whose == 1 else 1.0)
@@ -145,7 +150,9 @@ def test_a_column_belongs_to_the_label_with_most_mass() -> None:
 def test_a_blob_holds_the_detection_inside_it() -> None:
     label = disc((0.45, 0.75)).astype(np.int32) * 3
     for x, held in ((0.45, [0]), (0.85, [0]), (0.95, [-1, 0])):  # its outermost cell is at 0.65
-        found = find_blobs(label, label.astype(np.float32), np.array([[x, 0.75]]), np.array([3]), 0.4, GRID)
+        found = find_blobs(
+            label, label.astype(np.float32), np.array([[x, 0.75]]), np.array([3]), 0.4, Patches.whole(GRID)
+        )
         assert found.person.tolist() == held
 
 
@@ -158,7 +165,7 @@ def test_blobs_partition_the_occupied_cells(standing: list[tuple[float, float]],
     label = np.where(rng.random(GRID.shape) < 0.08, rng.choice([UNASSIGNED, 1, 2, 3], GRID.shape), 0).astype(np.int32)
     log_odds = rng.normal(0, 2, GRID.shape).astype(np.float32)
     log_odds[rng.random(GRID.shape) < 0.1] = np.nan
-    found = find_blobs(label, log_odds, np.array(standing).reshape(-1, 2), tracks, 0.4, GRID)
+    found = find_blobs(label, log_odds, np.array(standing).reshape(-1, 2), tracks, 0.4, Patches.whole(GRID))
     number = int((found.extent > 0).sum())
     np.testing.assert_array_equal(found.cells > 0, (label != 0).any(0))
     assert np.unique(found.cells[found.cells > 0]).tolist() == list(range(1, number + 1))
@@ -188,6 +195,6 @@ def test_kernels_of_blobs_agree_with_their_plain_form(seed: int) -> None:
     cells = np.where(ground_label != 0, 1 + track.searchsorted(ground_label), 0).astype(np.int32)
     n = len(track)
     found = Measures(np.zeros((n, 2)), np.zeros((n, 2, 2)), np.zeros(n), np.zeros(n), np.zeros(n))
-    fill_measures(cells, track, label, log_odds, GRID.ground_x, GRID.ground_y, GRID.heights, found)
+    fill_measures(cells, track, label, log_odds, GRID.ground, GRID.heights, found)
     for own, plain in zip(found, reference_blobs.measures(cells, track, label, log_odds, GRID), strict=True):
         np.testing.assert_allclose(own, plain, rtol=1e-4, atol=1e-5)

@@ -14,6 +14,7 @@ from stseg.arrays import Floats, Rows
 from stseg.errors import ConfigError
 from stseg.geometry.nearest_person import nearest_person
 from stseg.graphcut.energy import QUANTUM
+from stseg.model.sparse_volume import SparseVolume
 from stseg.model.tables import WINDOW
 from stseg.trackers import TRACKERS, Commit, FrameObservations, FusedFrame, Tracker, find_tracker
 from stseg.trackers.rows import event_rows, trajectory_rows, views_at
@@ -35,7 +36,7 @@ def scene(follow: Tracker, frame: int, *places: tuple[float, float]) -> FusedFra
     log_odds = np.full(RIG.grid.shape, -3.0, np.float32)
     log_odds[:, nearest_person(RIG.grid.ground, standing[:, :2], 0.3) >= 0] = 3.0
     log_odds[:, -1, -1] = np.nan
-    return FusedFrame(frame, found(standing, follow.predict(frame)), found(people()), log_odds)
+    return FusedFrame(frame, found(standing, follow.predict(frame)), found(people()), SparseVolume.whole(log_odds))
 
 
 def crossing(frame: int) -> list[tuple[float, float]]:
@@ -141,7 +142,7 @@ def test_who_touches_is_cut_apart() -> None:
         x = -1.0 + 0.1 * frame
         both = scene(follow, frame, (x, -0.25), (x, 0.3))
         seen = both if frame not in (4, 5, 6) else scene(follow, frame, (x, -0.25))
-        commits += follow.add(replace(seen, volume=both.log_odds), UNSEEN)
+        commits += follow.add(replace(seen, made=both.volume), UNSEEN)
     commits += follow.finish()
     rows, labels = rows_of(commits), np.concatenate([commit.label for commit in commits])
     assert np.unique(rows["id"]).tolist() == [1, 2]

@@ -21,6 +21,7 @@ from stseg.geometry.nearest_person import nearest_person
 from stseg.model.blobs import UNASSIGNED, Blobs
 from stseg.model.tables import TRAJECTORY
 from stseg.segmentation.blobs import find_blobs
+from stseg.segmentation.patches import Patches
 from stseg.tracking.assignment import assign, distances
 from stseg.tracking.interpolation import fill_gaps
 from stseg.tracking.pruning import drop_ghosts, drop_short
@@ -128,7 +129,7 @@ def blobs_in(
     owner = np.append(names, UNASSIGNED)[nearest_person(GRID.ground, held, 0.4)]
     label = np.where(occupied, owner, 0).astype(np.int32)
     log_odds = np.where(occupied, 2.0, -2.0).astype(np.float32)
-    return find_blobs(label, log_odds, held, names, 0.4, GRID)
+    return find_blobs(label, log_odds, held, names, 0.4, Patches.whole(GRID))
 
 
 def tracklets_of(
@@ -168,7 +169,7 @@ def test_a_gap_is_bridged_by_cells_of_the_track_itself() -> None:
     for whose, bridged in ((1, True), (UNASSIGNED, True), (2, False)):
         label = np.where(column([path[45]]), whose, 0).astype(np.int32)
         nobody = np.zeros((0, 2)), np.zeros(0, np.int64)
-        blobs[5] = find_blobs(label, np.ones(GRID.shape, np.float32), *nobody, 0.4, GRID)
+        blobs[5] = find_blobs(label, np.ones(GRID.shape, np.float32), *nobody, 0.4, Patches.whole(GRID))
         (one,) = form_tracklets(blobs, FRAMES[0], CONFIG)
         assert (45 in one.frames) == bridged
 

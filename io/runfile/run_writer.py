@@ -93,10 +93,8 @@ class RunWriter:
         shape = (len(frames), *self._views.shape)
         if log_odds.shape != shape or label.shape != shape:
             raise ValueError(f"volumes {log_odds.shape} and {label.shape} for {shape}")
-        finite = np.clip(log_odds, -_LARGEST, _LARGEST, dtype=np.float32)
-        coarse = np.round(finite / np.float32(layout.STEP)) * np.float32(layout.STEP)
-        whole = coarse.astype(layout.LOG_ODDS.dtype, copy=False), label.astype(layout.LABEL.dtype, copy=False)
-        self.append_packed_frames(frames, *([packed_frame(values) for values in volume] for volume in whole))
+        packed = [packed_volume(*volume) for volume in zip(log_odds, label, strict=True)]
+        self.append_packed_frames(frames, [one for one, _ in packed], [other for _, other in packed])
 
     def append_packed_frames(
         self, frames: Ints, log_odds: Sequence[PackedFrame], label: Sequence[PackedFrame]
@@ -177,6 +175,14 @@ class RunWriter:
     def _close(self) -> None:
         if self._file is not None:
             self._file.close()
+
+
+def packed_volume(log_odds: Singles, label: Labels) -> tuple[PackedFrame, PackedFrame]:
+    """The log-odds and labels (plane, y, x) of a frame as `RunWriter.append_frames` packs them."""
+    finite = np.clip(log_odds, -_LARGEST, _LARGEST, dtype=np.float32)
+    coarse = np.round(finite / np.float32(layout.STEP)) * np.float32(layout.STEP)
+    whole = coarse.astype(layout.LOG_ODDS.dtype, copy=False), label.astype(layout.LABEL.dtype, copy=False)
+    return packed_frame(whole[0]), packed_frame(whole[1])
 
 
 class _Table:

@@ -11,6 +11,7 @@ import numpy as np
 from stseg.arrays import Flags, Floats, Ints, Labels, Rows, Singles
 from stseg.engine.stopwatch import Stopwatch
 from stseg.model.people import Explanation, People
+from stseg.model.sparse_volume import SparseVolume
 from stseg.model.tables import CANDIDATE, RATES
 from stseg.occupancy.rate_calibration import RateCalibration
 from stseg.trackers import Commit
@@ -93,9 +94,9 @@ class CommittedFrames:
 
 
 class FusedEvidence(NamedTuple):
-    """A frame's volume, float32 (plane, y, x), nats, and the RATES (view,) by which it was fused."""
+    """A frame's volume, and the RATES (view,) by which it was fused."""
 
-    log_odds: Singles
+    volume: SparseVolume
     rates: Rows
 
 

@@ -6,13 +6,14 @@ from pathlib import Path
 
 import numpy as np
 
-from stseg.arrays import Bytes, Ints, Labels, Singles
+from stseg.arrays import Bytes, Labels, Singles
 from stseg.engine.committed_frames import CommittedFrames
 from stseg.engine.job import Job
 from stseg.engine.segments import Segment
 from stseg.geometry.nearest_person import nearest_person
 from stseg.io.config_file import format_config
 from stseg.io.runfile.layout import ghost_type
+from stseg.io.runfile.run_writer import packed_volume
 from stseg.io.runfile.runs import RunWriter
 
 _KEPT_RADIUS = 1.0
@@ -46,8 +47,8 @@ def write_step(job: Job, step: CommittedFrames, segment: Segment, writer: RunWri
     if not own.commit.frames:
         return
     frames = np.array([scene.frame for scene in own.commit.frames])
-    log_odds = np.stack([scene.log_odds for scene in own.commit.frames])
-    writer.append_frames(frames, *_kept(job, own, frames, log_odds))
+    packed = [packed_volume(*_kept(job, own, k)) for k in range(len(frames))]
+    writer.append_packed_frames(frames, [log_odds for log_odds, _ in packed], [label for _, label in packed])
     ghosts = np.zeros(len(own.candidates), ghost_type(len(job.recording.sources)))
     for name in own.candidates.dtype.names or ():
         ghosts[name] = own.candidates[name]
@@ -59,14 +60,14 @@ def write_step(job: Job, step: CommittedFrames, segment: Segment, writer: RunWri
     writer.append("appearance", own.appearance)
 
 
-def _kept(job: Job, step: CommittedFrames, frames: Ints, log_odds: Singles) -> tuple[Singles, Labels]:
-    """Log-odds and labels (time, plane, y, x) as far as the job keeps the volume; nan and 0 elsewhere."""
-    label, rows = step.commit.label, step.commit.trajectory
+def _kept(job: Job, step: CommittedFrames, k: int) -> tuple[Singles, Labels]:
+    """Log-odds and labels (plane, y, x) of a frame as far as the job keeps the volume; nan and 0 elsewhere."""
+    label, scene = step.commit.label[k], step.commit.frames[k]
     if job.volume == "none":
-        return np.full_like(log_odds, np.nan), np.zeros_like(label)
+        return np.full(label.shape, np.nan, np.float32), np.zeros_like(label)
+    log_odds = scene.log_odds
     if job.volume == "tracks":
-        ground = job.recording.rig.grid.ground
-        for frame, volume in zip(frames, log_odds, strict=True):
-            here = rows[rows["frame"] == frame]
-            volume[:, nearest_person(ground, np.column_stack([here["x"], here["y"]]), _KEPT_RADIUS) < 0] = np.nan
+        rows, ground = step.commit.trajectory, job.recording.rig.grid.ground
+        here = rows[rows["frame"] == scene.frame]
+        log_odds[:, nearest_person(ground, np.column_stack([here["x"], here["y"]]), _KEPT_RADIUS) < 0] = np.nan
     return log_odds, label

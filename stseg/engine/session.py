@@ -99,7 +99,7 @@ class Session:
         with self.watch.time("appearance"):
             appearance = self.pipeline.appearance_rows(frame, explanation, frame_set.views, evidence)
         self._records[frame] = FrameRecord(explanation, fusion, appearance)
-        fused = FusedFrame(frame, explanation.people, explanation.ghosts, lambda: fusion.result().log_odds)
+        fused = FusedFrame(frame, explanation.people, explanation.ghosts, lambda: fusion.result().volume)
         with self.watch.time("track"):
             commits = self._tracker.add(fused, FrameObservations(frame_set.views, evidence))
         return [committed_frames(commit, self._records, self.watch) for commit in commits]
@@ -127,8 +127,8 @@ class Session:
     ) -> FusedEvidence:
         rates = rate_rows(frame, self._error_rates)
         with self.watch.time("occupancy"):
-            log_odds = self.pipeline.occupancy.fuse_and_learn(self._error_rates, evidence, explanation, noise)
-        return FusedEvidence(log_odds.dense(), rates)
+            volume = self.pipeline.occupancy.fuse_and_learn(self._error_rates, evidence, explanation, noise)
+        return FusedEvidence(volume, rates)
 
     def _fuse_with_current_rates(self, evidence: Sequence[ViewEvidence], explanation: Explanation) -> Singles:
         while self._open:

@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import connected_components
 from stseg.accelerate import kernel
 from stseg.arrays import Flags, Ints, Labels
 from stseg.graphcut.energy import Energy
-from stseg.graphcut.lattice import Lattice, neighbour, spread
+from stseg.graphcut.lattice import Lattice, neighbour
 
 _OUTSIDE, _FIRST = 1, 2
 
@@ -57,7 +57,7 @@ def subset(energy: Energy, inside: Flags) -> CellSubset:
     cell = np.flatnonzero(inside)
     index = np.full(inside.shape, _OUTSIDE, np.int32)
     index.flat[cell] = np.arange(_FIRST, _FIRST + len(cell))
-    code = spread(index)
+    code = energy.spread(index)
     start, end, weight = (np.empty(len(energy.offsets) * len(cell), np.int64) for _ in range(3))
     border = np.zeros(len(cell), np.int64)
     nodes = np.flatnonzero(code >= _FIRST)  # in the order of the cells

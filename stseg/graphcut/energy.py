@@ -37,22 +37,29 @@ class Energy:
         B: cost of different labels at each offset, quanta.
     successor : int32 (time - 1, y, x)
         Cell (y columns + x) of the next frame to which each cell's edges in time lead; -1 for none. Injective.
+    present : bool (y, x), or None
+        Where there are cells, in all frames and planes: others have no edges, and label 0. None for everywhere.
     """
 
     unary: Labels
     offsets: Ints
     capacity: Labels
     successor: Labels
+    present: Flags | None = None
 
     @cached_property
     def lattice(self) -> Lattice:
         """Numbering of the cells, and their neighbours."""
         return lattice_of(self.unary.shape, self.offsets, self.successor)
 
+    def spread(self, values: AnyArray) -> AnyArray:
+        """Values of cells (time, plane, y, x) at their nodes, 0 at guards and where there is no cell; (node,)."""
+        return spread(values if self.present is None else np.where(self.present, values, np.zeros(1, values.dtype)))
+
     def of(self, labels: Labels | Flags) -> int:
         """Energy of a labelling (time, plane, y, x) relative to all 0; labels bool or 0 / 1."""
         occupied = labels != 0
-        state = spread(np.where(occupied, np.uint8(_OCCUPIED), np.uint8(_FREE)))
+        state = self.spread(np.where(occupied, np.uint8(_OCCUPIED), np.uint8(_FREE)))
         border = _border_capacity(np.flatnonzero(state == _OCCUPIED), state, self.lattice, self.capacity)
         return border - int(self.unary[occupied].sum(dtype=np.int64))
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stseg.accelerate import kernel, part
-from stseg.arrays import Bytes, Labels
+from stseg.arrays import Bytes, Flags, Labels
 from stseg.graphcut.energy import Energy
 from stseg.graphcut.lattice import Lattice, cells, neighbour, spread
 
@@ -57,8 +57,9 @@ def reduce(energy: Energy) -> Reduction:
     state, margin = np.zeros(len(unary), np.uint8), np.zeros_like(unary)
     shape = energy.unary.shape
     weak = _fill_sets(energy.unary, int(capacity.sum()), cells(state, shape), cells(margin, shape))
+    _leave_out_absent(energy, state)
     if weak > HOPELESS * energy.unary.size:
-        state = spread(np.full(energy.unary.shape, OPEN, np.uint8))
+        state = energy.spread(np.full(energy.unary.shape, OPEN, np.uint8))
         left = np.flatnonzero(state).astype(np.int32)
         return Reduction(lattice, capacity, state, left, unary[left])
     stack, undecided = (np.empty(len(state), np.int32) for _ in range(2))
@@ -67,6 +68,23 @@ def reduce(energy: Energy) -> Reduction:
     _decide_nodes(left, unary, undecided, state, lattice, capacity, stack)
     left = left[state[left] == OPEN]
     return Reduction(lattice, capacity, state, left, unary[left])
+
+
+def greatest_empty_set(energy: Energy) -> Flags:
+    """The cells that the set rule gives label 0, bool (time, plane, y, x)."""
+    lattice, capacity, shape = energy.lattice, np.repeat(energy.capacity, 2), energy.unary.shape
+    nodes = len(lattice.forward)
+    state, margin = np.zeros(nodes, np.uint8), np.zeros(nodes, np.int32)
+    _fill_sets(energy.unary, 0, cells(state, shape), cells(margin, shape))
+    _leave_out_absent(energy, state)
+    _decide_sets(margin, state, lattice, capacity, np.empty(nodes, np.int32))
+    return np.asarray(cells(state, shape) == EMPTY)
+
+
+def _leave_out_absent(energy: Energy, state: Bytes) -> None:
+    """Make guards of the nodes where there is no cell."""
+    if energy.present is not None:
+        cells(state, energy.unary.shape)[..., ~energy.present] = GUARD
 
 
 @kernel

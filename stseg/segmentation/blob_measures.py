@@ -65,19 +65,19 @@ def fill_ground_labels(label: Labels, log_odds: Singles, ground_label: Labels) -
 
 @kernel
 def fill_nearest(
-    ground_label: Labels, people_ground: Floats, people_track: Ints, ground_x: Floats, ground_y: Floats, nearest: Floats
+    ground_label: Labels, people_ground: Floats, people_track: Ints, ground: Floats, nearest: Floats
 ) -> None:
     """Fill nearest (person,) with the distance to the nearest cell that has the person's track, metres; inf for none.
 
-    Ground_x (x,) and ground_y (y,) are the cells' centres, metres.
+    Ground (y, x, 2) are the cells' centres, metres.
     """
     nearest[:] = np.inf
-    for y in range(len(ground_y)):
-        for x in range(len(ground_x)):
+    for y in range(ground.shape[0]):
+        for x in range(ground.shape[1]):
             if ground_label[y, x] > 0:
                 for j in range(len(people_track)):
                     if people_track[j] == ground_label[y, x]:
-                        away = np.hypot(ground_x[x] - people_ground[j, 0], ground_y[y] - people_ground[j, 1])
+                        away = np.hypot(ground[y, x, 0] - people_ground[j, 0], ground[y, x, 1] - people_ground[j, 1])
                         nearest[j] = min(nearest[j], away)
 
 
@@ -87,8 +87,7 @@ def fill_measures(
     track: Ints,
     label: Labels,
     log_odds: Singles,
-    ground_x: Floats,
-    ground_y: Floats,
+    ground: Floats,
     heights: Floats,
     found: Measures,
 ) -> None:
@@ -102,7 +101,7 @@ def fill_measures(
         Label of the cells of each blob.
     label, log_odds : int32, float32 (plane, y, x)
         Of each cell; nats.
-    ground_x, ground_y, heights : float64 (x,), (y,), (plane,)
+    ground, heights : float64 (y, x, 2), (plane,)
         Metres.
     """
     weight = np.zeros(cells.shape)
@@ -121,8 +120,8 @@ def fill_measures(
                         found.height[b] = max(found.height[b], heights[z])
                 total[b] += weight[y, x]
                 found.cells[b] += 1
-                found.ground[b, 0] += weight[y, x] * ground_x[x]
-                found.ground[b, 1] += weight[y, x] * ground_y[y]
+                found.ground[b, 0] += weight[y, x] * ground[y, x, 0]
+                found.ground[b, 1] += weight[y, x] * ground[y, x, 1]
     for b in range(len(track)):
         found.ground[b] /= total[b]
         found.mass[b] /= max(occupied[b], 1.0)
@@ -131,7 +130,7 @@ def fill_measures(
             if cells[y, x] > 0:
                 b = cells[y, x] - 1
                 share = weight[y, x] / (total[b] * found.cells[b])
-                dx, dy = ground_x[x] - found.ground[b, 0], ground_y[y] - found.ground[b, 1]
+                dx, dy = ground[y, x, 0] - found.ground[b, 0], ground[y, x, 1] - found.ground[b, 1]
                 found.covariance[b, 0, 0] += share * dx * dx
                 found.covariance[b, 0, 1] += share * dx * dy
                 found.covariance[b, 1, 0] += share * dx * dy

@@ -11,12 +11,13 @@ from stseg.arrays import Flags, Floats, Ints, Labels, Singles
 from stseg.geometry import Grid
 from stseg.model.blobs import UNASSIGNED, Blobs
 from stseg.segmentation.blob_measures import Measures, fill_ground_labels, fill_measures, fill_nearest
+from stseg.segmentation.patches import Patches
 
 _EIGHT = np.ones((3, 3), int)
 
 
 def find_blobs(
-    label: Labels, log_odds: Singles, people_ground: Floats, people_track: Ints, reach: float, grid: Grid
+    label: Labels, log_odds: Singles, people_ground: Floats, people_track: Ints, reach: float, patches: Patches
 ) -> Blobs:
     """Blobs of one frame.
 
@@ -27,9 +28,9 @@ def find_blobs(
 
     Parameters
     ----------
-    label : int32 (plane, y, x)
-        Track of each cell, UNASSIGNED, or 0 for background.
-    log_odds : float32 (plane, y, x)
+    label : int32 (plane, row, column)
+        Track of each cell of the patches, UNASSIGNED, or 0 for background.
+    log_odds : float32 (plane, row, column)
         u, nats.
     people_ground, people_track : float64 (n, 2), int64 (n,)
         Detections of the frame, metres, and their tracks.
@@ -39,30 +40,47 @@ def find_blobs(
     """
     ground_label = np.zeros(label.shape[1:], np.int32)
     fill_ground_labels(label, log_odds, ground_label)
-    unassigned_component, number = connected(ground_label == UNASSIGNED, _EIGHT)
+    unassigned_component, number = _in_ground_order(ground_label == UNASSIGNED, patches.place)
     known = np.unique(ground_label[ground_label > 0])
     cells = np.where(ground_label > 0, 1 + np.searchsorted(known, ground_label), 0).astype(np.int32)
     cells[unassigned_component > 0] = len(known) + unassigned_component[unassigned_component > 0]
     track = np.concatenate([known, np.full(number, UNASSIGNED)]).astype(np.int64)
     nearest = np.empty(len(people_ground))
-    fill_nearest(ground_label, people_ground, people_track, grid.ground_x, grid.ground_y, nearest)
+    fill_nearest(ground_label, people_ground, people_track, patches.ground, nearest)
     person = np.full(len(track), -1, np.int64)
     held = np.flatnonzero(nearest <= reach / 2)
     person[known.searchsorted(people_track[held])] = held
-    blobs = _measured(cells, track, person, label, log_odds, grid)
-    alone = _in_volume(people_ground, log_odds, grid)
+    blobs = _measured(cells, track, person, label, log_odds, patches)
+    alone = _in_volume(people_ground, log_odds, patches)
     alone[person[person >= 0]] = False
     without = np.flatnonzero(alone)
-    return _joined(blobs, without, people_ground[without], people_track[without], grid)
+    return _joined(blobs, without, people_ground[without], people_track[without], patches.grid)
 
 
-def _in_volume(ground: Floats, log_odds: Singles, grid: Grid) -> Flags:
+def _in_ground_order(taken: Flags, place: Ints) -> tuple[Labels, int]:
+    """Components of what is taken on a sheet (row, column), from 1 in the order of their first ground cells."""
+    found, number = connected(taken, _EIGHT)
+    component: Labels = np.asarray(found, np.int32)
+    if number < 2:
+        return component, number
+    first = np.full(number, np.iinfo(np.int64).max)
+    np.minimum.at(first, component[taken] - 1, place[taken])
+    rank = np.zeros(number + 1, np.int32)
+    rank[1 + np.argsort(first)] = np.arange(1, number + 1)
+    return rank[component], number
+
+
+def _in_volume(ground: Floats, log_odds: Singles, patches: Patches) -> Flags:
     """Places (n, 2) above which the volume has a cell that some view sees, bool (n,)."""
-    rows, columns = log_odds.shape[1:]
+    grid = patches.grid
+    _, rows, columns = grid.shape
     cell = np.rint(grid.cell_of(ground)).astype(np.int64)
     column, row = cell.clip(0, (columns - 1, rows - 1)).T
     inside = (ground >= (grid.x[0], grid.y[0])).all(1) & (ground <= (grid.x[1], grid.y[1])).all(1)
-    return np.asarray(inside & np.isfinite(log_odds[:, row, column]).any(0))
+    seen = np.zeros(rows * columns, bool)
+    held = patches.place >= 0
+    seen[patches.place[held]] = np.isfinite(log_odds[:, held]).any(0)
+    return np.asarray(inside & seen[row * columns + column])
 
 
 def _joined(blobs: Blobs, person: Ints, ground: Floats, track: Ints, grid: Grid) -> Blobs:
@@ -82,14 +100,15 @@ def _joined(blobs: Blobs, person: Ints, ground: Floats, track: Ints, grid: Grid)
     )
 
 
-def _measured(cells: Labels, track: Ints, person: Ints, label: Labels, log_odds: Singles, grid: Grid) -> Blobs:
-    n = len(track)
+def _measured(cells: Labels, track: Ints, person: Ints, label: Labels, log_odds: Singles, patches: Patches) -> Blobs:
+    n, grid = len(track), patches.grid
     found = Measures(np.zeros((n, 2)), np.zeros((n, 2, 2)), np.zeros(n), np.zeros(n), np.zeros(n))
-    fill_measures(cells, track, label, log_odds, grid.ground_x, grid.ground_y, grid.heights, found)
+    fill_measures(cells, track, label, log_odds, patches.ground, grid.heights, found)
     covariance = found.covariance + np.eye(2) * grid.cell**2 / 12
     extent = found.cells * grid.cell**2
     return Blobs(
-        cells, track, person, found.ground, covariance, extent, found.height, found.mass, _touches(cells, n)
+        patches.on_ground(cells), track, person, found.ground, covariance, extent, found.height, found.mass,
+        _touches(cells, n),
     )  # fmt: skip
 
 

@@ -6,12 +6,17 @@ import numpy as np
 
 from stseg.accelerate import kernel
 from stseg.arrays import Floats, Ints, Labels
-from stseg.geometry import Grid
 from stseg.geometry.nearest_person import nearest_person
 
 
 def motion_field(
-    ground_now: Floats, ground_next: Floats, track_now: Ints, track_next: Ints, reach: float, grid: Grid
+    ground_now: Floats,
+    ground_next: Floats,
+    track_now: Ints,
+    track_next: Ints,
+    reach: float,
+    cell: float,
+    ground: Floats,
 ) -> Ints:
     """Motion of each cell until the next frame, in cells.
 
@@ -23,19 +28,23 @@ def motion_field(
         Their tracks.
     reach
         Reach of a body's cells around its place, metres.
+    cell
+        Side of a cell, metres.
+    ground : float64 (y, x, 2)
+        Centres of the cells, metres.
 
     Returns
     -------
     int64 (y, x, 2)
         (dy, dx); zero out of reach of tracks detected in both frames.
     """
-    motion = np.zeros((*grid.shape[1:], 2), np.int64)
+    motion = np.zeros(ground.shape, np.int64)
     _, now, later = np.intersect1d(track_now, track_next, return_indices=True)
     if not len(now):
         return motion
     start = ground_now[now]
-    moved = np.rint((ground_next[later] - start) / grid.cell).astype(np.int64)
-    near = nearest_person(grid.ground, start, reach)
+    moved = np.rint((ground_next[later] - start) / cell).astype(np.int64)
+    near = nearest_person(ground, start, reach)
     motion[near >= 0] = moved[near[near >= 0]][:, ::-1]
     return motion
 

@@ -14,24 +14,27 @@ from itertools import product
 import numpy as np
 
 from stseg.accelerate import wide_kernel
-from stseg.arrays import Ints, Labels, Singles
+from stseg.arrays import Flags, Ints, Labels, Singles
 from stseg.config import SegmentationConfig
 from stseg.geometry import Grid
 from stseg.graphcut.energy import QUANTUM, Energy
-from stseg.segmentation.cell_motion import successor_cells
 
 _MOST_NATS = 30.0
 
 
-def build_energy(log_odds: Singles, motion: Ints, grid: Grid, config: SegmentationConfig) -> Energy:
+def build_energy(
+    log_odds: Singles, successor: Labels, grid: Grid, config: SegmentationConfig, present: Flags | None = None
+) -> Energy:
     """Energy of a window.
 
     Parameters
     ----------
     log_odds : float32 (time, plane, y, x)
         u, nats; nan where no view sees the cell: unary term 0.
-    motion : int64 (time - 1, y, x, 2)
-        Motion (dy, dx) until the next frame, cells.
+    successor : int32 (time - 1, y, x)
+        See `stseg.segmentation.cell_motion.successor_cells`.
+    present : bool (y, x), or None
+        See `stseg.graphcut.energy.Energy`.
     """
     unary = np.empty(log_odds.shape, np.int32)
     _fill_unary(log_odds.reshape(-1), np.float32(_MOST_NATS), np.float32(QUANTUM), unary.reshape(-1))
@@ -39,7 +42,7 @@ def build_energy(log_odds: Singles, motion: Ints, grid: Grid, config: Segmentati
     scale = (config.time_distance, grid.top / max(grid.planes - 1, 1), grid.cell, grid.cell)
     distance = np.sqrt(((offsets * scale) ** 2).sum(1))
     capacity = config.smoothness * np.exp(-0.5 * (distance / config.distance_scale) ** 2) / QUANTUM
-    return Energy(unary, offsets, np.rint(capacity).astype(np.int32), successor_cells(motion))
+    return Energy(unary, offsets, np.rint(capacity).astype(np.int32), successor, present)
 
 
 @wide_kernel

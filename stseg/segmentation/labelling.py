@@ -10,11 +10,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints, Labels
-from stseg.geometry import Grid
 from stseg.graphcut.cell_subset import CellSubset, subset
 from stseg.graphcut.energy import Energy
 from stseg.graphcut.expansion import expand
@@ -22,6 +22,18 @@ from stseg.graphcut.solvers import Solver
 from stseg.model.blobs import UNASSIGNED
 from stseg.model.predicted_places import PredictedPlaces
 from stseg.segmentation.unary import BodyShape, label_energy, track_shares
+
+
+class CellPlaces(Protocol):
+    """Where the cells of a window are: a grid, or patches of one."""
+
+    @property
+    def ground(self) -> Floats:
+        """Centres of the cells, metres, float64 (y, x, 2)."""
+
+    @property
+    def heights(self) -> Floats:
+        """Heights of the planes, metres, float64 (plane,)."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +74,7 @@ def label_cells(
     detections: WindowDetections,
     predicted: PredictedPlaces,
     body: BodyShape,
-    grid: Grid,
+    places: CellPlaces,
     solver: Solver,
 ) -> WindowLabels:
     """Label every occupied cell by a track or as UNASSIGNED.
@@ -84,25 +96,30 @@ def label_cells(
     if not len(subgraph.cell):
         return WindowLabels(np.zeros(occupied.shape, np.int32), 0)
     component = subgraph.components()
-    occupied_by, displaced = _occupants(subgraph, component, occupied, detections, predicted, body.reach, grid)
+    occupied_by, displaced = _occupants(subgraph, component, occupied, detections, predicted, body.reach, places)
     count = occupied_by.sum(1)
     track_ids = np.append(predicted.track, UNASSIGNED)
     labels = track_ids[np.where(count == 1, np.argmax(np.column_stack([occupied_by, count != 1]), 1), -1)][component]
     touching = count[component] > 1
     if touching.any():
         present = replace(predicted, expected=predicted.expected & ~displaced)
-        labels[touching] = _expanded(energy, subgraph.only(touching), present, body, grid, solver)
+        labels[touching] = _expanded(energy, subgraph.only(touching), present, body, places, solver)
     label = np.zeros(occupied.shape, np.int32)
     label.flat[subgraph.cell] = labels
     return WindowLabels(label, int(touching.sum()))
 
 
 def _expanded(
-    energy: Energy, subgraph: CellSubset, predicted: PredictedPlaces, body: BodyShape, grid: Grid, solver: Solver
+    energy: Energy,
+    subgraph: CellSubset,
+    predicted: PredictedPlaces,
+    body: BodyShape,
+    places: CellPlaces,
+    solver: Solver,
 ) -> Ints:
     """Track of each cell of a subgraph, UNASSIGNED or 0, by expansion moves, int64 (n,)."""
     frame, plane, y, x = np.unravel_index(subgraph.cell, energy.unary.shape)
-    share = track_shares(frame, grid.ground[y, x], grid.heights[plane], predicted, body)
+    share = track_shares(frame, places.ground[y, x], places.heights[plane], predicted, body)
     problem = label_energy(energy.unary.ravel()[subgraph.cell], share, subgraph)
     track_ids = np.concatenate([[0], predicted.track, [UNASSIGNED]])
     return np.asarray(track_ids[expand(problem, problem.cheapest_labels(), solver.sparse)])
@@ -115,7 +132,7 @@ def _occupants(
     detections: WindowDetections,
     predicted: PredictedPlaces,
     reach: float,
-    grid: Grid,
+    places: CellPlaces,
 ) -> tuple[Flags, Flags]:
     """Tracks detected in each component, and tracks detected outside all components in a frame.
 
@@ -129,7 +146,7 @@ def _occupants(
     displaced = np.zeros_like(predicted.expected)
     volume = np.full(occupied.shape, -1, np.int64)
     volume.flat[subgraph.cell] = component
-    cell_ground = grid.ground
+    cell_ground = places.ground
     for t, (ground, track) in enumerate(zip(detections.ground, detections.track, strict=True)):
         rows, columns = np.nonzero(occupied[t].any(0))
         cells_ground = cell_ground[rows, columns]

@@ -15,7 +15,8 @@ from stseg.config import Config
 from stseg.geometry import Rig
 from stseg.geometry.sampling import Sampling
 from stseg.graphcut.energy import QUANTUM, Energy
-from stseg.graphcut.solvers import find_solver
+from stseg.graphcut.reduction import greatest_empty_set
+from stseg.graphcut.solvers import SOLVERS, find_solver
 from stseg.model.blobs import Blobs
 from stseg.model.predicted_tracks import PredictedTracks
 from stseg.model.tables import WINDOW
@@ -23,6 +24,7 @@ from stseg.segmentation.blobs import find_blobs
 from stseg.segmentation.cell_motion import motion_field
 from stseg.segmentation.energy import build_energy
 from stseg.segmentation.labelling import WindowDetections, WindowLabels, label_cells
+from stseg.segmentation.patches import Patches, mark_places, no_squares, people_squares
 from stseg.segmentation.unary import BodyShape
 from stseg.trackers.protocol import Commit, FrameObservations, FusedFrame
 from stseg.trackers.rows import event_rows, trajectory_rows, views_at
@@ -97,31 +99,64 @@ class CutTracker:
         first, stop = window.solve_first, window.solve_stop
         around = [one for one in self.held if first - self.context <= one.fused.frame < stop + self.context]
         held = self.existence.revised(around, first, stop)
-        energy = self._energy(held)
+        patches, energy = self._cut_out(held)
         cut = self.solver.grid(energy)
-        label = self._divide(window, held, energy, cut.occupied).label
-        reach, grid = self.config.occupancy.person_radius, self.rig.grid
+        label = self._divide(window, held, patches, energy, cut.occupied).label
+        reach = self.config.occupancy.person_radius
         blobs = [
-            find_blobs(cells, tracked.fused.log_odds, tracked.fused.people.ground, tracked.tracks, reach, grid)
-            for cells, tracked in zip(label, held, strict=True)
+            find_blobs(cells, patches.log_odds(one.fused.volume), one.fused.people.ground, one.tracks, reach, patches)
+            for cells, one in zip(label, held, strict=True)
         ]
         tracklets = form_tracklets(blobs, window.solve_first, self.config.tracking)
         decision = self.association.decide(window, blobs, tracklets)
         row = np.array([(*_ranges(window), energy.of(cut.occupied), QUANTUM, cut.nodes)], WINDOW)
         self.committed = window.commit_stop
-        return self._commit(window, held, label, blobs, decision, row)
+        return self._commit(window, held, patches, label, blobs, decision, row)
 
-    def _energy(self, held: list[TrackedFrame]) -> Energy:
-        log_odds = np.stack([tracked.fused.log_odds for tracked in held])
+    def _cut_out(self, held: list[TrackedFrame]) -> tuple[Patches, Energy]:
+        """Patches of the ground that are enough, and the window's energy there; see `stseg.segmentation.patches`."""
+        grid, squares = self.rig.grid, self._squares(held)
+        if self.solver is not SOLVERS["stseg"]:  # others take whole grids
+            squares[:] = True
+        while True:
+            patches = Patches.of(grid, squares)
+            energy = self._energy(held, patches)
+            if not patches.border.any():
+                return patches, energy
+            open_border = patches.border & ~greatest_empty_set(energy).all((0, 1))
+            if not open_border.any():
+                return patches, energy
+            mark_places(squares, patches.place[open_border], grid)
+
+    def _squares(self, held: list[TrackedFrame]) -> Flags:
+        """Squares of the ground where somebody is, or log-odds are above 0."""
+        grid, reach = self.rig.grid, self.config.occupancy.person_radius
+        squares = no_squares(grid)
+        for now, then in zip(held, [*held[1:], held[-1]], strict=True):
+            mark_places(squares, now.fused.volume.occupied_places(), grid)
+            ahead = now.fused.people.ground.copy()
+            _, own, later = np.intersect1d(now.tracks, then.tracks, return_indices=True)
+            ahead[own] = then.fused.people.ground[later]
+            squares |= people_squares(grid, now.fused.people.ground, ahead, reach)
+        return squares
+
+    def _energy(self, held: list[TrackedFrame], patches: Patches) -> Energy:
+        log_odds = np.stack([patches.log_odds(tracked.fused.volume) for tracked in held])
         reach, grid = self.config.occupancy.person_radius, self.rig.grid
         motion = [
-            motion_field(now.fused.people.ground, then.fused.people.ground, now.tracks, then.tracks, reach, grid)
+            motion_field(
+                now.fused.people.ground, then.fused.people.ground, now.tracks, then.tracks, reach, grid.cell,
+                patches.ground,
+            )
             for now, then in pairwise(held)
-        ]
-        steps = np.array(motion, np.int64).reshape(-1, *grid.shape[1:], 2)
-        return build_energy(log_odds, steps, grid, self.config.segmentation)
+        ]  # fmt: skip
+        steps = np.array(motion, np.int64).reshape(-1, *patches.place.shape, 2)
+        successor, present = patches.successors(steps), patches.place >= 0
+        return build_energy(log_odds, successor, grid, self.config.segmentation, present)
 
-    def _divide(self, window: Window, held: list[TrackedFrame], energy: Energy, occupied: Flags) -> WindowLabels:
+    def _divide(
+        self, window: Window, held: list[TrackedFrame], patches: Patches, energy: Energy, occupied: Flags
+    ) -> WindowLabels:
         """Label the occupied cells with the filter tracks of this window and of active tracks."""
         tails = [track.tail for track in self.association.active]
         mean_height = self.config.body.height_mean
@@ -131,12 +166,13 @@ class CutTracker:
             together(seen), window.solve_first, window.solve_stop, self.rig.frame_rate, self.config.tracking
         )
         found = WindowDetections([one.fused.people.ground for one in held], [one.tracks for one in held])
-        return label_cells(energy, occupied, found, places, self.pillar, self.rig.grid, self.solver)
+        return label_cells(energy, occupied, found, places, self.pillar, patches, self.solver)
 
     def _commit(
         self,
         window: Window,
         held: list[TrackedFrame],
+        patches: Patches,
         label: Labels,
         blobs: list[Blobs],
         decision: WindowAssignment,
@@ -147,7 +183,9 @@ class CutTracker:
         rows = []
         for k, cells in zip(kept, named, strict=True):
             identity = np.append(0, decision.identity[k])
-            cells[:] = np.where(label[k] != 0, identity[blobs[k].cells], 0)
+            plane, down, across = np.nonzero(label[k])
+            place = patches.place[down, across]
+            cells.reshape(len(cells), -1)[plane, place] = identity[blobs[k].cells.reshape(-1)[place]]
             rows.append(self._rows(held[k].fused, blobs[k], decision.identity[k]))
         frames = [held[k].fused for k in kept]
         return Commit(frames, named, np.concatenate(rows), event_rows(decision.events), row)

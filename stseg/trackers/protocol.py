@@ -11,6 +11,7 @@ from stseg.config import Config
 from stseg.geometry import Rig
 from stseg.model.people import People
 from stseg.model.predicted_tracks import PredictedTracks
+from stseg.model.sparse_volume import SparseVolume
 
 STAYING, FORGETTING = 1.0, 4.0
 """Existence of a track in trackers that do not estimate it: log-odds that a track detected in one frame is detected in
@@ -29,19 +30,24 @@ class FusedFrame:
         Its detections.
     ghosts
         Rejected candidates.
-    volume : float32 (plane, y, x), or a function that gives it
-        See `log_odds`; a function where the fusion may still be at work.
+    made
+        The volume, or a function that gives it where the fusion may still be at work.
     """
 
     frame: int
     people: People
     ghosts: People
-    volume: Singles | Callable[[], Singles]
+    made: SparseVolume | Callable[[], SparseVolume]
+
+    @property
+    def volume(self) -> SparseVolume:
+        """The log-odds as they were made."""
+        return self.made() if callable(self.made) else self.made
 
     @property
     def log_odds(self) -> Singles:
-        """The volume, float32 (plane, y, x), nats; nan where no view sees the cell."""
-        return self.volume() if callable(self.volume) else self.volume
+        """The log-odds of all cells, float32 (plane, y, x), nats; nan where no view sees the cell."""
+        return self.volume.dense()
 
 
 @dataclass(frozen=True)

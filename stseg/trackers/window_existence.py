@@ -8,13 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import logit
 
-from stseg.arrays import Flags, Floats, Ints, Singles
+from stseg.arrays import Flags, Floats, Ints
 from stseg.config import Config
 from stseg.geometry import Rig
 from stseg.geometry.nearest_person import nearest_person
 from stseg.graphcut.solvers import Solver
 from stseg.model.border import Border
 from stseg.model.people import People
+from stseg.model.sparse_volume import SparseVolume
 from stseg.segmentation.existence import Existence, ExistenceModel, WindowCandidates
 from stseg.trackers.protocol import FusedFrame
 from stseg.tracking.prediction import DetectionHistory
@@ -76,19 +77,23 @@ class WindowExistence:
         every = replace(_joined(fused.people, fused.ghosts), evidence=log_odds)
         people, ghosts = _at(every, np.flatnonzero(real)), _at(every, np.flatnonzero(~real))
         if not real[:number].all() or real[number:].any():
-            volume = self._volume(fused, people, _at(every, number + np.flatnonzero(real[number:])))
-            fused = replace(fused, volume=volume)
+            added = _at(every, number + np.flatnonzero(real[number:]))
+            fused = replace(fused, made=self._volume(fused, people, added))
         return TrackedFrame(replace(fused, people=people, ghosts=ghosts), tracks[real])
 
-    def _volume(self, fused: FusedFrame, people: People, added: People) -> Singles:
+    def _volume(self, fused: FusedFrame, people: People, added: People) -> SparseVolume:
         """Log-odds with the prior of the revised people, and at least the odds of a body inside those added."""
         ground = self.grid.ground
         before = nearest_person(ground, fused.people.ground, self.radius) >= 0
         now = nearest_person(ground, people.ground, self.radius) >= 0
-        log_odds = fused.log_odds + (self.prior * (now.astype(np.float32) - before)).astype(np.float32)
         body = nearest_person(ground, added.ground, self.width / 2)
-        tall = np.append(added.height, -1.0)[body] >= self.grid.heights[:, None, None]
-        return np.where(tall & (body >= 0), np.fmax(log_odds, np.float32(_OCCUPIED)), log_odds)
+        places = np.flatnonzero((before != now) | (body >= 0))
+        before, now, body = before.reshape(-1)[places], now.reshape(-1)[places], body.reshape(-1)[places]
+        volume = fused.volume
+        log_odds = volume.at(places) + (self.prior * (now.astype(np.float32) - before)).astype(np.float32)
+        tall = np.append(added.height, -1.0)[body] >= self.grid.heights[:, None]
+        revised = np.where(tall & (body >= 0), np.fmax(log_odds, np.float32(_OCCUPIED)), log_odds)
+        return volume.with_values(places, revised)
 
 
 def _candidates(frames: Sequence[TrackedFrame]) -> WindowCandidates:

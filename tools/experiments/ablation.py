@@ -33,6 +33,7 @@ from stseg.io.config_file import read_config
 from stseg.io.recording.recording import Recording
 from stseg.model.blobs import UNASSIGNED
 from stseg.segmentation.labelling import WindowLabels
+from stseg.segmentation.patches import Patches
 from stseg.trackers import TRACKERS
 from stseg.trackers.cut import CutTracker
 from stseg.trackers.window_existence import TrackedFrame
@@ -46,13 +47,13 @@ _SCORES = ("MODA", "precision", "recall", "IDF1", "IDSW", "Frag", "false_tracks"
 class TwoLabels(CutTracker):
     """The cut without the expansion."""
 
-    def _divide(self, window: Window, held: list[TrackedFrame], energy: Energy, occupied: Flags) -> WindowLabels:
+    def _divide(
+        self, window: Window, held: list[TrackedFrame], patches: Patches, energy: Energy, occupied: Flags
+    ) -> WindowLabels:
         del window, energy
         label = np.zeros(occupied.shape, np.int32)
         for cells, own, tracked in zip(occupied, label, held, strict=True):
-            near = nearest_person(
-                self.rig.grid.ground, tracked.fused.people.ground, self.config.occupancy.person_radius
-            )
+            near = nearest_person(patches.ground, tracked.fused.people.ground, self.config.occupancy.person_radius)
             own[cells] = np.broadcast_to(np.append(tracked.tracks, UNASSIGNED)[near], cells.shape)[cells]
         return WindowLabels(label, 0)
 

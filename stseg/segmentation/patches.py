@@ -1,0 +1,212 @@
+"""Patches of the ground around people, side by side: a window is cut there alone, with the labels of the whole ground.
+
+Let R be a part of a window's cells that holds all cells with u > 0, and G the greatest empty set (the set rule of
+`stseg.graphcut.reduction`) of the energy on R alone, its edges to other cells left out. If every cell of R with an edge
+to a cell outside R is in G, then G and all cells outside R together obey the set rule in the whole energy: the cells of
+G have no edges but those within R and some into the set, the cells outside R have u <= 0 and edges into the set alone.
+So all cells outside R have label 0 in the minimum with the smallest source set. Conversely, what the whole energy's
+greatest empty set has in R obeys the rule on R alone, so it is G: the cells that are left undecided are the same, with
+the same edges, and so is their minimum.
+
+Patches grow until their borders are in G. They hold everybody's cells too, so that edges in time stay within a patch:
+elsewhere a cell's successor is the same cell.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Self
+
+import numpy as np
+from scipy.ndimage import binary_dilation, binary_erosion, find_objects
+from scipy.ndimage import label as connected
+
+from stseg.accelerate import kernel
+from stseg.arrays import AnyArray, Flags, Floats, Ints, Labels, Singles
+from stseg.geometry import Grid
+from stseg.model.sparse_volume import SparseVolume
+from stseg.segmentation.cell_motion import successor_cells
+
+SIDE = 8
+"""Cells along the side of the squares of which patches are made, and least distance of a patch's border."""
+_BETWEEN = np.float32(-30.0)
+"""Log-odds of what is between patches, nats."""
+_EIGHT = np.ones((3, 3), bool)
+
+
+@dataclass(frozen=True)
+class Patches:
+    """Rectangles of a grid's ground, beside each other on a sheet (row, column) with an empty column between them.
+
+    Attributes
+    ----------
+    grid
+    rectangles
+        Rows and columns of the ground.
+    place : int64 (row, column)
+        Ground cell of each, in the flattened ground; -1 between patches.
+    """
+
+    grid: Grid
+    rectangles: tuple[tuple[slice, slice], ...]
+    place: Ints
+
+    @classmethod
+    def of(cls, grid: Grid, squares: Flags) -> Self:
+        """Patches that hold the marked squares, bool (square row, square column), and all beside them."""
+        grown = np.asarray(binary_dilation(squares, _EIGHT))
+        pieces, number = connected(grown, _EIGHT)
+        before = number + 1
+        while number < before:
+            for piece in find_objects(pieces):
+                grown[piece] = True
+            before = number
+            pieces, number = connected(grown, _EIGHT)
+        rows, columns = grid.shape[1:]
+        return cls._arranged(
+            grid, [(_cells(down, rows), _cells(across, columns)) for down, across in find_objects(pieces)]
+        )
+
+    @classmethod
+    def whole(cls, grid: Grid) -> Self:
+        """One patch, the whole ground."""
+        rows, columns = grid.shape[1:]
+        return cls._arranged(grid, [(slice(0, rows), slice(0, columns))])
+
+    @classmethod
+    def _arranged(cls, grid: Grid, rectangles: Sequence[tuple[slice, slice]]) -> Self:
+        flat = np.arange(np.prod(grid.shape[1:])).reshape(grid.shape[1:])
+        tall = max((rows.stop - rows.start for rows, _ in rectangles), default=1)
+        wide = sum(columns.stop - columns.start + 1 for _, columns in rectangles)
+        place, left = np.full((tall, max(wide - 1, 1)), -1, np.int64), 0
+        for rectangle in rectangles:
+            own = flat[rectangle]
+            place[: own.shape[0], left : left + own.shape[1]] = own
+            left += own.shape[1] + 1
+        return cls(grid, tuple(rectangles), place)
+
+    @cached_property
+    def ground(self) -> Floats:
+        """Cell centres, metres, float64 (row, column, 2); infinite between patches."""
+        ground = np.full((*self.place.shape, 2), np.inf)
+        ground[self.place >= 0] = self.grid.ground.reshape(-1, 2)[self.place[self.place >= 0]]
+        return ground
+
+    @property
+    def heights(self) -> Floats:
+        """Heights of the planes, metres, float64 (plane,)."""
+        return self.grid.heights
+
+    @cached_property
+    def border(self) -> Flags:
+        """Cells beside ground outside their patch, bool (row, column)."""
+        inside = np.zeros(self.grid.shape[1:], bool)
+        inside.reshape(-1)[self.place[self.place >= 0]] = True
+        edge = inside & ~binary_erosion(inside, _EIGHT, border_value=1)
+        return np.asarray(self.on_sheet(edge))
+
+    def on_sheet(self, values: AnyArray) -> AnyArray:
+        """Values of ground cells (y, x) at their places on the sheet (row, column), 0 between patches."""
+        return np.where(self.place >= 0, values.reshape(-1)[self.place], np.zeros(1, values.dtype))
+
+    def on_ground(self, values: AnyArray) -> AnyArray:
+        """Values on the sheet (..., row, column) at their ground cells (..., y, x), 0 outside the patches."""
+        ground = np.zeros((*values.shape[:-2], *self.grid.shape[1:]), values.dtype)
+        inside = self.place >= 0
+        ground.reshape(*values.shape[:-2], ground.shape[-2] * ground.shape[-1])[..., self.place[inside]] = values[
+            ..., inside
+        ]
+        return ground
+
+    def log_odds(self, volume: SparseVolume) -> Singles:
+        """A frame's log-odds on the sheet, float32 (plane, row, column), nats; nan where no view sees the cell."""
+        index = np.full(self.grid.shape[1] * self.grid.shape[2], -1, np.int32)
+        inside = self.place.reshape(-1) >= 0
+        index[self.place.reshape(-1)[inside]] = np.flatnonzero(inside)
+        sheet = np.empty((self.grid.planes, *self.place.shape), np.float32)
+        _fill_sheet(
+            volume.of_cell.reshape(-1),
+            volume.empty,
+            volume.cell,
+            volume.value,
+            self.place.reshape(-1),
+            index,
+            _BETWEEN,
+            sheet.reshape(self.grid.planes, -1),
+        )
+        return sheet
+
+    def successors(self, motion: Ints) -> Labels:
+        """Cell of the sheet in the next frame, int32 (time, row, column), -1 for none: see `successor_cells`.
+
+        Motion int64 (time, row, column, 2) is that of the cells of the sheet; it stays within each patch.
+        """
+        columns, left = self.place.shape[1], 0
+        sheet = np.full(motion.shape[:3], -1, np.int32)
+        for down, across in self.rectangles:
+            tall, wide = down.stop - down.start, across.stop - across.start
+            own = successor_cells(np.ascontiguousarray(motion[:, :tall, left : left + wide]))
+            to_row, to_column = np.divmod(own, wide)
+            sheet[:, :tall, left : left + wide] = np.where(own >= 0, to_row * columns + to_column + left, -1)
+            left += wide + 1
+        return sheet
+
+
+def _cells(squares: slice, most: int) -> slice:
+    return slice(squares.start * SIDE, min(squares.stop * SIDE, most))
+
+
+def people_squares(grid: Grid, ground: Floats, ahead: Floats, reach: float) -> Flags:
+    """Squares that people's cells cover on their way to the next frame, bool (square row, square column).
+
+    Parameters
+    ----------
+    ground, ahead : float64 (n, 2)
+        Their places in a frame and in the next, metres.
+    reach
+        Reach of a body's cells around its place, metres.
+    """
+    squares = no_squares(grid)
+    corners = np.sort(np.stack([grid.cell_of(ground), grid.cell_of(ahead)]), axis=0)
+    margin = reach / grid.cell + 1
+    first = np.floor((corners[0] - margin) / SIDE).astype(np.int64).clip(0)
+    last = np.floor((corners[1] + margin) / SIDE).astype(np.int64)
+    for (left, top), (right, bottom) in zip(first.tolist(), last.tolist(), strict=True):
+        if right >= 0 and bottom >= 0:
+            squares[top : bottom + 1, left : right + 1] = True
+    return squares
+
+
+def no_squares(grid: Grid) -> Flags:
+    """No square marked, bool (square row, square column)."""
+    return np.zeros([-(-side // SIDE) for side in grid.shape[1:]], bool)
+
+
+def mark_places(squares: Flags, places: Ints, grid: Grid) -> None:
+    """Mark the squares of ground cells (k,) of the flattened ground."""
+    y, x = np.divmod(places, grid.shape[2])
+    squares[y // SIDE, x // SIDE] = True
+
+
+@kernel
+def _fill_sheet(
+    of_cell: Labels,
+    empty: Singles,
+    cell: Labels,
+    value: Singles,
+    place: Ints,
+    index: Labels,
+    between: np.float32,
+    sheet: Singles,
+) -> None:
+    """Fill sheet (plane, place on the sheet); index (ground cell,) is each one's place on it, -1 for none."""
+    planes, ground = sheet.shape[0], len(index)
+    for z in range(planes):
+        for k in range(len(place)):
+            sheet[z, k] = empty[of_cell[z * ground + place[k]]] if place[k] >= 0 else between
+    for c in range(len(cell)):
+        k = index[cell[c] % ground]
+        if k >= 0:
+            sheet[cell[c] // ground, k] = value[c]
