@@ -10,6 +10,8 @@ import h5py
 import numpy as np
 
 from stseg.arrays import Ints, Rows
+from stseg.errors import FormatError
+from stseg.io import limits
 from stseg.io.outputs.whole_files import replacing
 from stseg.io.runfile import layout
 from stseg.io.runfile.safe_hdf5 import hdf5_file
@@ -46,6 +48,8 @@ def write_corrected(
     Raises
     ------
     OutputError
+    FormatError
+        Where a table cannot be resized, or labels are no ids.
     """
     with replacing(path, overwrite) as part:
         shutil.copyfile(run, part)
@@ -56,21 +60,24 @@ def write_corrected(
                 ("boxes", tracks.boxes),
                 ("events", tracks.events),
             ):
-                _replace(file, name, rows)
-            _relabel(file[layout.OCCUPANCY], new_ids)
+                _replace(run, file[name], rows)
+            _relabel(run, file[layout.OCCUPANCY], new_ids)
             _note(file[layout.PROVENANCE], names, answers)
 
 
-def _replace(file: h5py.File, name: str, rows: Rows) -> None:
-    dataset = file[name]
+def _replace(run: Path, dataset: h5py.Dataset, rows: Rows) -> None:
+    if dataset.chunks is None or dataset.maxshape != (None,):
+        raise FormatError(run, dataset.name, "a table of fixed size", "one that can grow, as stseg writes it")
     dataset.resize((len(rows),))
     dataset[:] = rows
 
 
-def _relabel(group: h5py.Group, new_ids: NewIds) -> None:
+def _relabel(run: Path, group: h5py.Group, new_ids: NewIds) -> None:
     frames = group["frame"][:]
     for start in range(0, len(frames), _FRAMES):
         label = group["label"][start : start + _FRAMES]
+        if not 0 <= label.min(initial=0) <= label.max(initial=0) <= limits.FRAMES:
+            raise FormatError(run, f"{layout.OCCUPANCY}/label", "labels that are no ids", f"0 to {limits.FRAMES}")
         for k, frame in enumerate(frames[start : start + _FRAMES].tolist()):
             old = np.unique(label[k][label[k] > 0]).astype(np.int64)
             new = new_ids(old, np.full(len(old), frame, np.int64))

@@ -115,13 +115,20 @@ def read_provenance(group: h5py.Group) -> Provenance:
             raise ValueError(f"shown of camera {camera}: no frames by tick")
     return Provenance(
         printable(str(group.attrs["created"]))[: limits.NAME],
-        group["config"].asstr()[()],
-        group["rig"].asstr(errors="surrogateescape")[()],
+        _text(group["config"]),
+        _text(group["rig"]),
         Path(str(group.attrs["rig_path"])),
         {name.decode(): number.decode() for name, number in read_whole(group["versions"]).tolist()},
         _checked_sources(group["sources"]),
         shown,
     )
+
+
+def _text(dataset: h5py.Dataset) -> str:
+    text = dataset.asstr(errors="surrogateescape")[()]
+    if not isinstance(text, str):
+        raise ValueError(f"{dataset.name}: no text")
+    return text
 
 
 def _checked_sources(dataset: h5py.Dataset) -> Rows:

@@ -23,7 +23,6 @@ from pathlib import Path
 
 import numpy as np
 
-from fuzz.mutations import mutated
 from fuzz.target import Target, answer
 from fuzz.targets import TARGETS
 
@@ -46,7 +45,7 @@ class Failure:
 
 def content(target: Target, valid: bytes, seed: int) -> bytes:
     """The mutated file of a seed."""
-    return mutated(valid, np.random.default_rng((seed, len(target.name), *target.name.encode())))
+    return target.mutate(valid, np.random.default_rng((seed, len(target.name), *target.name.encode())))
 
 
 def fuzz(target: Target, first: int, until: float, most: int) -> tuple[int, list[Failure]]:

@@ -6,6 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
+from fuzz.mutations import mutated
 from stseg.errors import StsegError
 
 
@@ -21,11 +24,14 @@ class Target:
         A valid file, which `read` takes without an error; made in a folder.
     read
         Reads a file; raises StsegError for what it does not take.
+    mutate
+        Makes another file of a valid one.
     """
 
     name: str
     valid: Callable[[Path], bytes]
     read: Callable[[Path], object]
+    mutate: Callable[[bytes, np.random.Generator], bytes] = mutated
 
     @property
     def suffix(self) -> str:

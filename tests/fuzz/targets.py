@@ -13,10 +13,13 @@ from run_files import small_trajectory, write_small_run
 from fuzz import corpus
 from fuzz.detection_files import BOXES
 from fuzz.detection_targets import CAMERA, DETECTION_TARGETS, frames
+from fuzz.hdf5_mutations import mutated_objects
 from fuzz.target import Target, plain
 from stseg.calibration.point_fit import Points, fit_points
 from stseg.commands.calibrate_page import calibrate_page
 from stseg.commands.correct import correct
+from stseg.commands.measure import measure
+from stseg.commands.review import review
 from stseg.io.answers import read_answers, read_names
 from stseg.io.areas import read_lines, read_polygons
 from stseg.io.calibrations.formats import FORMATS, ImportOptions, read_cameras
@@ -66,6 +69,17 @@ def _run(path: Path) -> None:
     for to in ("csv", "jupedsim", "wildtrack", "mot-boxes", "geojson", "mf-json"):
         with replacing(path.with_name("out"), overwrite=True) as part:
             exports.write_tracks(to, part, run)
+
+
+def _used_run(path: Path) -> None:
+    """Commands that use its tables together; `report` takes too long here."""
+    _run(path)
+    answers = path.with_name("answers.csv")
+    answers.write_bytes(corpus.ANSWERS)
+    with redirect_stdout(StringIO()):
+        review(path, output=path.with_name("review.html"), overwrite=True)
+        measure(path, output=path.with_name("measures"), overwrite=True)
+        correct(path, answers, output=path.with_name("corrected.h5"), overwrite=True)
 
 
 def _streams(path: Path) -> None:
@@ -166,6 +180,7 @@ TARGETS = (
     Target("nvidia.json", plain(corpus.NVIDIA), _importer("nvidia")),
     Target("kalibr.yaml", plain(corpus.KALIBR), _importer("kalibr")),
     Target("run.h5", _small_run, _run),
+    Target("run_objects.h5", _small_run, _used_run, mutated_objects),
     Target("streams.npz", lambda _: corpus.npz(), _streams),
     Target("begun.json", plain(corpus.BEGUN), _begun),
     Target("files.json", plain(corpus.NOTES), FileNotes),
