@@ -6,7 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from stseg.arrays import Boxes, Bytes, Flags, Floats, Observation, Rows, Singles, ViewEvidence
+from stseg.accelerate import wide_kernel
+from stseg.arrays import Boxes, Bytes, Flags, Floats, Ints, Observation, Rows, Singles, ViewEvidence
+from stseg.detection.problem import PixelAssignment
 from stseg.geometry.bodies import BodyTable
 from stseg.model.people import Explanation
 from stseg.model.tables import APPEARANCE, FEATURES
@@ -21,6 +23,7 @@ _LEAST_PIXELS = 8
 """Least pixels of the raster in each of them."""
 _DARK = 16.0
 """Grey levels added to a colour before its logarithm is taken: noise of dark pixels says little."""
+_LOGARITHM = np.log(np.arange(256) + _DARK)
 
 
 def appearance_rows(
@@ -68,22 +71,37 @@ def _colours(
     A gain of the camera adds the same to all of them.
     """
     people, step = explanation.people, explanation.raster_step[view]
-    found = np.full((len(people), len(_SLICES), 3), np.nan, np.float32)
-    assigned = explanation.pixel_assignment[view]
-    v, u = np.nonzero(assigned >= 0)
-    person = assigned[v, u].astype(np.int64)
-    row, column = (np.minimum(at * step + step // 2, size - 1) for at, size in zip((v, u), image.shape, strict=False))
-    kept = apart[person] & (likelihood[row, column] > _FOREGROUND)
-    person, row, column = person[kept], row[kept], column[kept]
     box = table.boxes_of(people.ground, people.height)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        down = (row - box[person, 1]) / (box[person, 3] - box[person, 1])
-    colour = np.log(image[row, column] + _DARK)
-    for s, (start, stop) in enumerate(_SLICES):
-        inside = (down >= start) & (down < stop)
-        count = np.bincount(person[inside], minlength=len(people))
-        enough = count >= _LEAST_PIXELS
-        for channel in range(3):
-            total = np.bincount(person[inside], colour[inside, channel], len(people))
-            found[enough, s, channel] = total[enough] / count[enough]
+    total, count = np.zeros((len(people), len(_SLICES), 3)), np.zeros((len(people), len(_SLICES)), np.int64)
+    _add_colours(explanation.pixel_assignment[view], step, apart, box, image, likelihood, total, count)
+    enough = count >= _LEAST_PIXELS
+    found = np.full(total.shape, np.nan, np.float32)
+    found[enough] = total[enough] / count[enough][:, None]
     return found.reshape(len(people), len(_SLICES) * 3)
+
+
+@wide_kernel
+def _add_colours(
+    assigned: PixelAssignment, step: int, apart: Flags, box: Floats, image: Bytes, likelihood: Singles, total: Floats,
+    count: Ints,
+) -> None:  # fmt: skip
+    """Add the logarithms of colours to total (person, slice, channel), and their number to count (person, slice).
+
+    Of each raster pixel that is assigned (v, u) to a person seen apart (person,), whose box (person, 4) is in pixels,
+    the pixel in its middle counts.
+    """
+    for v in range(assigned.shape[0]):
+        row = min(v * step + step // 2, image.shape[0] - 1)
+        for u in range(assigned.shape[1]):
+            person = assigned[v, u]
+            if person < 0 or not apart[person]:
+                continue
+            column = min(u * step + step // 2, image.shape[1] - 1)
+            if not likelihood[row, column] > _FOREGROUND:
+                continue
+            down = (row - box[person, 1]) / (box[person, 3] - box[person, 1])
+            for s in range(len(_SLICES)):
+                if _SLICES[s][0] <= down < _SLICES[s][1]:
+                    count[person, s] += 1
+                    for channel in range(3):
+                        total[person, s, channel] += _LOGARITHM[image[row, column, channel]]

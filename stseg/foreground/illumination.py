@@ -22,6 +22,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.ndimage import gaussian_filter, minimum_filter
 
+from stseg.accelerate import kernel
 from stseg.arrays import Bytes, Flags, Singles
 from stseg.config import IlluminationConfig
 from stseg.foreground.background import Background
@@ -113,7 +114,7 @@ class IlluminationMonitor:
 
     def _share(self, likelihood: Singles) -> float:
         """Share of the view with a likelihood above the prior."""
-        return float((likelihood[::_STEP, ::_STEP] > self.model.prior).mean())
+        return _share_above(likelihood, np.float32(self.model.prior))
 
     def _share_rise(self, likelihood: Singles) -> float:
         """Rise of that share within the window."""
@@ -172,6 +173,17 @@ def _is_broad(gain: Singles) -> bool:
     logarithm = np.log(gain[::_STEP, ::_STEP])
     differs = np.abs(logarithm - np.median(logarithm, axis=(0, 1))).max(-1) > _UNLIKE
     return bool(differs.mean() > _BROAD)
+
+
+@kernel
+def _share_above(likelihood: Singles, bound: np.float32) -> float:
+    """Share of the pixels (v, u), of every `_STEP`-th along each axis, that are above a bound."""
+    above, count = 0, 0
+    for v in range(0, likelihood.shape[0], _STEP):
+        for u in range(0, likelihood.shape[1], _STEP):
+            above += 1 if likelihood[v, u] > bound else 0
+            count += 1
+    return above / count
 
 
 @dataclass(slots=True)

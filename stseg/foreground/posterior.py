@@ -17,6 +17,7 @@ from stseg.accelerate import kernel
 UNIFORM = 1.0 / 256.0**3  # density of an unknown colour, per cubed grey level
 CERTAIN = 5.0  # nats; beyond it one pixel would outvote all its neighbours
 FAR = 50.0  # half a squared Mahalanobis distance; beyond it the density is below every constant here
+_CERTAIN_RATIO = math.exp(CERTAIN)
 _ROUNDING = 1.001  # more than single precision loses
 _UNIFORM = np.float32(UNIFORM)
 _ZERO, _ONE, _TWO, _SIXTEENTH = np.float32(0), np.float32(1), np.float32(2), np.float32(1 / 16)
@@ -29,8 +30,10 @@ def bounded_log_odds(
     """The log-odds of a person, nats, within 5."""
     person = (1.0 - mimicry) * UNIFORM + mimicry * dimmed
     scene = (1.0 - unexplained) * ((1.0 - shadow) * lit + shadow * dimmed) + unexplained * UNIFORM
-    odds = math.log(foreground * person / ((1.0 - foreground) * scene))
-    return min(max(odds, -CERTAIN), CERTAIN)
+    ratio = foreground * person / ((1.0 - foreground) * scene)
+    if ratio >= _CERTAIN_RATIO:
+        return CERTAIN
+    return max(math.log(ratio), -CERTAIN) if ratio * _CERTAIN_RATIO > 1.0 else -CERTAIN
 
 
 @kernel

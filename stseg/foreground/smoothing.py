@@ -39,23 +39,30 @@ def pool_log_odds(log_odds: Singles, radius: int, likelihood: Singles) -> None:
         scale = np.float32(1.0 / _weight_within(v, height, radius))
         down[:] = np.float32(0)
         for k in range(max(0, v - radius), min(height, v + radius + 1)):
-            weight = scale * np.float32(radius + 1 - abs(k - v))
-            for u in range(width):
-                down[u] += weight * log_odds[k, u]
+            _add(scale * np.float32(radius + 1 - abs(k - v)), log_odds[k], down)
         for u in range(width):
             mean[u] = np.float32(radius + 1) * down[u]
         for shift in range(1, radius + 1):
             weight = np.float32(radius + 1 - shift)
-            for u in range(width - shift):
-                mean[u] += weight * down[u + shift]
-            for u in range(shift, width):
-                mean[u] += weight * down[u - shift]
+            _add(weight, down[shift:], mean[: width - shift])
+            _add(weight, down[: width - shift], mean[shift:])
         for u in range(width):
             mean[u] *= share[u]
             likelihood[v, u] = lowest
+        last, value = np.float32(np.nan), lowest
         for u in range(width):
-            if mean[u] > _NEAR_BOUND:  # few are: spare the exponential of the others
-                likelihood[v, u] = np.float32(1) / (np.float32(1) + np.exp(-mean[u]))
+            if mean[u] > _NEAR_BOUND:  # few are, and of those that nothing explains all are the same
+                if mean[u] != last:
+                    last = mean[u]
+                    value = np.float32(1) / (np.float32(1) + np.exp(-last))
+                likelihood[v, u] = value
+
+
+@wide_kernel
+def _add(weight: np.float32, values: Singles, total: Singles) -> None:
+    """Add weighted values to total, both (u,): without arithmetic on places it becomes vector code."""
+    for u in range(len(total)):
+        total[u] += weight * values[u]
 
 
 @wide_kernel
