@@ -52,5 +52,6 @@ def _raise_inside(scale: Singles, first: Ints, rows: Ints, spans: Spans, pillars
     for n in range(len(pillars)):
         i, value = pillars[n], np.float32(explained[n])
         for k in range(rows[i]):
-            for u in range(spans[i, k, 0], spans[i, k, 1]):
-                scale[first[i] + k, u] = max(scale[first[i] + k, u], value)
+            line = scale[first[i] + k, spans[i, k, 0] : spans[i, k, 1]]
+            for u in range(len(line)):
+                line[u] = value if value > line[u] else line[u]

@@ -211,16 +211,17 @@ class MapEstimate:
         box_view = pixel_view = 0
         for view, observation in zip(self.evidence.views, self.evidence.observations, strict=True):
             boxes = np.full(len(observation.edges) if observation else 0, -1, np.int64)
-            pixels = np.full(view.shape, -1, np.int64)
             if isinstance(view, BoxView):
+                pixels = np.full(view.shape, -1, np.int64)
                 box_score(box_view, self.members, count, problem.boxes, problem.parameters, scratch, view_evidence)
                 boxes[:] = scratch[: len(boxes)]
                 box_view += 1
             else:
-                scratch[:] = -1
+                columns = problem.pixels.raster.shape[2]
+                scratch[: view.shape[0] * columns] = -1
                 pixel_score(pixel_view, self.members, count, problem.pixels, problem.parameters, scratch, view_evidence)
-                rows, columns = problem.pixels.raster.shape[1:]
-                pixels[:] = scratch[: rows * columns].reshape(rows, columns)[: view.shape[0], : view.shape[1]]
+                owner = scratch[: view.shape[0] * columns].reshape(-1, columns)
+                pixels = owner[:, : view.shape[1]].copy()
                 pixel_view += 1
             assigned.append((boxes, pixels))
         return assigned

@@ -183,8 +183,9 @@ class PixelView(View):
         del sharpness
         raster = np.zeros(self.shape, np.float32)
         if isinstance(seen, np.ndarray):
-            mean = np.empty(self.shape, np.float32)
-            _fill_means(seen, self.step, mean)
+            mean = seen if self.step == 1 else np.empty(self.shape, np.float32)
+            if self.step > 1:
+                _fill_means(seen, self.step, mean)
             miss, clutter = self.config.pixel_miss_rate, self.config.pixel_clutter_rate
             _fill_log_odds(mean, np.float32(miss), np.float32(clutter), raster)
         return ViewObservation(np.zeros((0, 4)), np.zeros(0), np.zeros((0, 5)), np.zeros(0), raster)
@@ -250,13 +251,18 @@ def _add_span_means(
     score: Floats,
 ) -> None:
     """Add to score (height, cell) the weighted means over outlines (height * cell,), of so many rows each, for some."""
+    flat = row_sums.reshape(-1)
     for height in heights:
         for cell in cells:
             i, total = height * score.shape[1] + cell, 0.0
-            for k in range(rows[i]):
-                total += row_sums[first[i] + k, spans[i, k, 1]] - row_sums[first[i] + k, spans[i, k, 0]]
-            if rows[i] > 0:
-                score[height, cell] += weight * total / area[i]
+            if rows[i] == 0:
+                continue
+            line, outline = np.uint64(first[i] * row_sums.shape[1]), spans[i, : rows[i]]
+            for k in range(len(outline)):  # unsigned places: none is negative, which is not asked here
+                start, stop = np.uint64(np.uint16(outline[k, 0])), np.uint64(np.uint16(outline[k, 1]))
+                total += flat[line + stop] - flat[line + start]
+                line += np.uint64(row_sums.shape[1])
+            score[height, cell] += weight * total / area[i]
 
 
 @kernel
@@ -277,19 +283,23 @@ def _fill_log_odds(mean: Singles, miss: np.float32, clutter: np.float32, raster:
 def _fill_means(likelihood: Singles, step: int, mean: Singles) -> None:
     """Fill mean (v, u) with the means over squares of `step` pixels; those at the border may be smaller."""
     height, width = likelihood.shape
-    down = np.empty(width, np.float32)
+    down, whole = np.empty(width, np.float32), width // step
     for v in range(mean.shape[0]):
         top, bottom = v * step, min((v + 1) * step, height)
         down[:] = likelihood[top]
         for row in range(top + 1, bottom):
             for column in range(width):
                 down[column] += likelihood[row, column]
-        for u in range(mean.shape[1]):
-            left, right = u * step, min((u + 1) * step, width)
-            total = down[left]
-            for column in range(left + 1, right):
+        for u in range(whole):
+            total = down[u * step]
+            for shift in range(1, step):
+                total += down[u * step + shift]
+            mean[v, u] = total / np.float32((bottom - top) * step)
+        if whole < mean.shape[1]:
+            total = np.float32(0)
+            for column in range(whole * step, width):
                 total += down[column]
-            mean[v, u] = total / np.float32((bottom - top) * (right - left))
+            mean[v, whole] = total / np.float32((bottom - top) * (width - whole * step))
 
 
 @kernel

@@ -11,6 +11,8 @@ from stseg.accelerate import kernel, part
 from stseg.arrays import Floats, Ints, Singles
 from stseg.geometry.bodies import LEVELS, SILHOUETTE, BodyTable, fill_discs
 
+# Innermost loops have unsigned places: whether one is negative, and counts from the end, is not asked there.
+
 Spans = NDArray[np.int16]
 """int16 (..., row, 2): first and last column (exclusive) of an outline in each raster row."""
 
@@ -193,11 +195,11 @@ def _fill_left_of(
     top, bottom, left, right = window
     for row in range(top, bottom):
         total = 0.0
-        left_of[row, left] = 0.0
-        for u in range(left, right):
-            if owner[row, u] < 0 or owner[row, u] == person:
-                total += float(values[row, u])
-            left_of[row, u + 1] = total
+        shown, whose, sums = values[row, left:right], owner[row, left:right], left_of[row, left : right + 1]
+        sums[0] = 0.0
+        for u in range(len(shown)):
+            total += float(shown[u]) if whose[u] < 0 or whose[u] == person else 0.0
+            sums[u + 1] = total
 
 
 @kernel
@@ -206,10 +208,11 @@ def _between(left_of: Floats, low: Floats, high: Floats, top: int, bottom: int) 
     total = 0.0
     columns = left_of.shape[1] - 1
     for row in range(top, bottom):
-        if low[row] <= high[row]:
-            start, stop = _from(np.ceil(low[row]), columns), _from(np.floor(high[row]) + 1, columns)
+        at = np.uint64(row)
+        if low[at] <= high[at]:
+            start, stop = _from(np.ceil(low[at]), columns), _from(np.floor(high[at]) + 1, columns)
             if start < stop:
-                total += left_of[row, stop] - left_of[row, start]
+                total += left_of[at, np.uint64(stop)] - left_of[at, np.uint64(start)]
     return total
 
 
@@ -270,18 +273,18 @@ def _widen(drawn: Floats, k: int, rows: int, low: Floats, high: Floats) -> None:
     u, v, slope, flat, wide, tall = drawn[k, 0], drawn[k, 1], drawn[k, 2], drawn[k, 3], drawn[k, 4], drawn[k, 5]
     shrink = 1.0 / (tall + 1e-12)
     for row in range(_from(np.ceil(v - tall), rows), _from(np.floor(v + tall) + 1, rows)):
-        away = row - v
+        at, away = np.uint64(row), row - v
         along = away * shrink
         middle, half = u + slope * away, flat * math.sqrt(max(1.0 - along * along, 0.0))
-        low[row], high[row] = min(low[row], middle - half), max(high[row], middle + half)
+        low[at], high[at] = min(low[at], middle - half), max(high[at], middle + half)
     if k == 0:
         return
     u0, v0, wide0 = drawn[k - 1, 0], drawn[k - 1, 1], drawn[k - 1, 4]
     per_row = 0.0 if v == v0 else 1.0 / (v - v0)
     for row in range(_from(np.ceil(min(v, v0)), rows), _from(np.floor(max(v, v0)) + 1, rows)):
-        share = 0.5 if v == v0 else (row - v0) * per_row
+        at, share = np.uint64(row), 0.5 if v == v0 else (row - v0) * per_row
         middle, half = u0 + (u - u0) * share, wide0 + (wide - wide0) * share
-        low[row], high[row] = min(low[row], middle - half), max(high[row], middle + half)
+        low[at], high[at] = min(low[at], middle - half), max(high[at], middle + half)
 
 
 @kernel
