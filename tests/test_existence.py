@@ -13,13 +13,15 @@ from stseg.arrays import Floats, Ints
 from stseg.config import Config
 from stseg.graphcut.sparse import sparse_cut
 from stseg.model.border import Border
-from stseg.segmentation.existence import Existence, ExistenceModel, WindowCandidates
+from stseg.segmentation.candidate_links import LinkModel, WindowCandidates
+from stseg.segmentation.existence import Existence, ExistenceModel
 from stseg.segmentation.paths import best_paths, path_marginals
 from stseg.trackers.window_existence import tracks_of
 
 CONFIG = Config()
 RIG = room()
-MODEL = ExistenceModel(RIG.frame_rate, 0.4, 1.0, Border.of(RIG), CONFIG.detection, CONFIG.motion, CONFIG.body)
+LINKS = LinkModel(RIG.frame_rate, 1.0, CONFIG.detection.prior_log_odds, CONFIG.motion, CONFIG.body)
+MODEL = ExistenceModel(LINKS, 0.4, Border.of(RIG), CONFIG.detection, CONFIG.body)
 WALK = np.column_stack([np.linspace(-0.6, 0.6, 9), np.zeros(9)])
 
 

@@ -5,15 +5,14 @@ variable x_i for each; a link i -> j says that candidate j of a later frame is t
 
     -E(x) = sum_i g_i x_i + sum_links b_ij x_i x_j - sum_exclusions K x_i x_j
     g_i   = view evidence + prior log-odds + height prior - birth cost - death cost
-    b_ij  = birth cost_j + death cost_i + log [ N(m_j - m_i; 0, S_ij) / (prior odds / s^2) ] + height ratio - absence
+    b_ij  as of `stseg.segmentation.candidate_links`
 
-Without links a candidate pays for its birth and its death; a link saves both, and adds how much likelier j's place is
-as the continuation of i than as the place of any other person. Birth and death cost nothing at the border of the scene
-and at the ends of the window. Links form paths: each candidate has at most one predecessor and one successor, by a
-minimum-cost flow that ignores exclusions (Zhang, Li and Nevatia, CVPR 2008). Candidates of one frame that are closer
-than the reach of a body exclude each other, since their evidence is the same. Links are submodular, exclusions are not:
-roof duality. A path through a candidate that another one excludes falls apart; so paths are then sought again without
-the candidates that are excluded, as long as the energy falls.
+Without links a candidate pays for its birth and its death; a link saves both. Birth and death cost nothing at the
+border of the scene and at the ends of the window. Links form paths: each candidate has at most one predecessor and one
+successor, by a minimum-cost flow that ignores exclusions (Zhang, Li and Nevatia, CVPR 2008). Candidates of one frame
+that are closer than the reach of a body exclude each other, since their evidence is the same. Links are submodular,
+exclusions are not: roof duality. A path through a candidate that another one excludes falls apart; so paths are then
+sought again without the candidates that are excluded, as long as the energy falls.
 """
 
 from __future__ import annotations
@@ -25,57 +24,19 @@ from itertools import pairwise
 import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints
-from stseg.config import BodyConfig, DetectionConfig, MotionConfig
+from stseg.config import BodyConfig, DetectionConfig
 from stseg.graphcut.energy import QUANTUM
 from stseg.graphcut.qpbo import QuadraticEnergy, QuadraticMinimum, minimise
 from stseg.model.border import Border
+from stseg.segmentation.candidate_links import LinkModel, Links, WindowCandidates
 from stseg.segmentation.paths import best_paths, path_marginals
 
-_RESOLUTION = 0.1
-"""s: standard deviation of the place of a detection, to which the prior log-odds refer, metres."""
-_ABSENCE = 4.0
-"""Cost of a frame without a candidate inside a path, nats per second."""
-_GATE = 13.8
-"""Squared Mahalanobis distance of a link that one step in a thousand exceeds."""
-_OUT_OF_SHAPE = -4.0
-"""Least log-ratio of two heights, nats: people stoop and sit."""
 _EXCLUDED = 1e4
 """K: repulsion of candidates that exclude each other, nats."""
 _ROUNDS = 4
 """Most times that paths are sought again."""
-Links = tuple[Ints, Ints, Floats]
-"""Candidates before and after, and b, nats, (link,) each."""
 Exclusions = tuple[Ints, Ints]
 """Candidates that exclude each other, (pair,) each."""
-
-
-@dataclass(frozen=True)
-class WindowCandidates:
-    """Candidates of all frames of a window, by rising frame.
-
-    Attributes
-    ----------
-    frame : int64 (n,)
-        From the window's first.
-    ground, covariance : float64 (n, 2), (n, 2, 2)
-        Metres, square metres.
-    height : float64 (n,)
-        Metres.
-    evidence : float64 (n,)
-        Evidence of the views alone, given the detector's people of the frame, nats.
-    track : int64 (n,)
-        Track that the detector gave each person; 0 for rejected candidates.
-    """
-
-    frame: Ints
-    ground: Floats
-    covariance: Floats
-    height: Floats
-    evidence: Floats
-    track: Ints
-
-    def __len__(self) -> int:
-        return len(self.frame)
 
 
 @dataclass(frozen=True)
@@ -106,20 +67,16 @@ class ExistenceModel:
 
     Attributes
     ----------
-    frame_rate
-        Frames per second.
+    links
+        b.
     reach
         Distance below which candidates of one frame exclude each other, metres.
-    patience
-        Longest absence inside a path, seconds.
     """
 
-    frame_rate: float
+    links: LinkModel
     reach: float
-    patience: float
     border: Border
     detection: DetectionConfig
-    motion: MotionConfig
     body: BodyConfig
 
     def decide(self, found: WindowCandidates, cut: Callable[..., Flags]) -> Existence:
@@ -128,7 +85,7 @@ class ExistenceModel:
         if not n:
             return Existence(np.zeros(0, bool), np.zeros(0, np.int64), np.zeros(0), 0.0)
         gain, birth, death = self._gains(found)
-        links, exclusions = self._links(found, birth, death), self._exclusions(found)
+        links, exclusions = self.links.between(found, birth, death), self._exclusions(found)
         best, energy = _solve(gain, links, exclusions, np.zeros(n, bool), cut)
         for _ in range(_ROUNDS):
             other, its_energy = _solve(gain, links, exclusions, _excluded(best.real, exclusions), cut)
@@ -144,42 +101,6 @@ class ExistenceModel:
         death = np.where(found.frame == found.frame.max(), 0.0, inside)
         tall = -0.5 * ((found.height - self.body.height_mean) / self.body.height_spread) ** 2
         return found.evidence + self.detection.prior_log_odds + tall - birth - death, birth, death
-
-    def _links(self, found: WindowCandidates, birth: Floats, death: Floats) -> Links:
-        """Possible links and b; those that gain nothing are left out.
-
-        Frame by frame: a window's pairs all at once would take more memory than its volume.
-        """
-        span = max(1, round(self.patience * self.frame_rate))
-        ends = np.searchsorted(found.frame, np.arange(found.frame[-1] + 2))
-        each = []
-        for first, stop, last in zip(ends, ends[1:], ends[1 + span :].tolist() + [len(found)] * span, strict=False):
-            start, end = np.meshgrid(np.arange(first, stop), np.arange(stop, last), indexing="ij")
-            each.append(self._worthwhile(found, start.ravel(), end.ravel(), birth, death))
-        start, end, bonus = (np.concatenate(part) for part in zip(*each, strict=True))
-        return start, end, bonus
-
-    def _worthwhile(self, found: WindowCandidates, start: Ints, end: Ints, birth: Floats, death: Floats) -> Links:
-        """Those of some pairs of candidates whose link gains something."""
-        seconds = (found.frame[end] - found.frame[start]) / self.frame_rate
-        off = found.ground[end] - found.ground[start]
-        noise = 2 * self.motion.position_noise**2 + (self.motion.speed_spread * seconds) ** 2
-        spread = found.covariance[start] + found.covariance[end] + noise[:, None, None] * np.eye(2)
-        square = np.einsum("ei,eij,ej->e", off, np.linalg.inv(spread), off)
-        place = np.log(_RESOLUTION**2 / np.sqrt(np.linalg.det(spread))) - 0.5 * square
-        absence = _ABSENCE * (seconds - 1 / self.frame_rate)
-        bonus = place - self.detection.prior_log_odds + self._height_ratio(found, start, end) - absence
-        bonus = bonus + birth[end] + death[start]
-        kept = (bonus > 0) & (square < _GATE)
-        return start[kept], end[kept], bonus[kept]
-
-    def _height_ratio(self, found: WindowCandidates, start: Ints, end: Ints) -> Floats:
-        """Log-ratio of a height as the continuation of another against the population, nats."""
-        spread, error = self.body.height_spread, self.body.height_spread / 2
-        off = found.height[end] - found.height[start]
-        own = found.height[end] - self.body.height_mean
-        ratio = np.log(spread / error) - 0.5 * (off / error) ** 2 + 0.5 * (own / spread) ** 2
-        return np.asarray(np.maximum(ratio, _OUT_OF_SHAPE))
 
     def _exclusions(self, found: WindowCandidates) -> Exclusions:
         """Pairs of one frame that share their evidence; two people of the detector do not."""

@@ -16,7 +16,8 @@ from stseg.graphcut.solvers import Solver
 from stseg.model.border import Border
 from stseg.model.people import People
 from stseg.model.sparse_volume import SparseVolume
-from stseg.segmentation.existence import Existence, ExistenceModel, WindowCandidates
+from stseg.segmentation.candidate_links import LinkModel, WindowCandidates
+from stseg.segmentation.existence import Existence, ExistenceModel
 from stseg.trackers.protocol import FusedFrame
 from stseg.tracking.prediction import DetectionHistory
 
@@ -52,10 +53,9 @@ class WindowExistence:
         self.grid, self.solver = rig.grid, solver
         self.radius, self.width = config.occupancy.person_radius, config.body.width_mean
         self.prior = -float(logit(config.occupancy.occupied_share))
-        self.model = ExistenceModel(
-            rig.frame_rate, self.radius, config.tracking.interpolation_gap, Border.of(rig), config.detection,
-            config.motion, config.body,
-        )  # fmt: skip
+        patience, prior = config.tracking.interpolation_gap, config.detection.prior_log_odds
+        links = LinkModel(rig.frame_rate, patience, prior, config.motion, config.body)
+        self.model = ExistenceModel(links, self.radius, Border.of(rig), config.detection, config.body)
 
     def revised(self, frames: Sequence[TrackedFrame], first: int, stop: int) -> list[TrackedFrame]:
         """Frames first .. stop - 1 with the people that are real by all frames given, those before and after too."""
