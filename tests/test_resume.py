@@ -20,7 +20,7 @@ from stseg.accelerate import python_form
 from stseg.detection.scoring import set_score
 from stseg.evaluation import evaluate
 from stseg.io.runfile.runs import read_run
-from stseg.io.runfile.work_folder import checksum
+from stseg.io.runfile.segment_files import checksum
 
 PROGRAM = """
 import signal, sys

@@ -20,30 +20,25 @@ import os
 import re
 import secrets
 from contextlib import suppress
-from dataclasses import dataclass
-from hashlib import blake2b, file_digest
 from pathlib import Path
 from types import TracebackType
 from typing import Any, BinaryIO, Self
 
-import numpy as np
-
-from stseg.arrays import Floats
 from stseg.errors import OutputError
 from stseg.io import limits
 from stseg.io.bounded_files import is_regular, parse_json, read_text
-from stseg.io.names import printable
-from stseg.io.numpy_files import read_npz
 from stseg.io.outputs.whole_files import create_part, output_error, publish_part, replacing, require_new, sync_folder
 from stseg.io.recording.recording import Recording
-from stseg.io.recording.source_files import source_parts
-from stseg.io.recording.stream_index import StreamIndex, index_from_times
+from stseg.io.recording.stream_index import StreamIndex
 from stseg.io.runfile.locks import lock
+from stseg.io.runfile.request_differences import differences
+from stseg.io.runfile.segment_files import FinishedSegments, finished_segments
+from stseg.io.runfile.stream_times import read_stream_times, write_stream_times
 from stseg.io.toml.text import shown
 
 _MARK = "stseg-work-folder"
+_STREAMS = "streams.npz"
 _ABOUT = "Made by stseg: it may delete the files in this folder that it made.\n"
-_SEGMENT = re.compile(r"segment-(\d{5})-([0-9a-f]{32})\.h5")
 _OWN = re.compile(
     r"(begun\.json|streams\.npz|files\.json|clock\.json|result\.h5|segment-\d{5}(-[0-9a-f]{32})?\.h5)"
     r"(\.[0-9a-f]{16}\.part)?"
@@ -51,25 +46,6 @@ _OWN = re.compile(
 """Names of files in the folder that are ours."""
 _LAST = frozenset((_MARK, "lock", "begun.json", "result.h5"))
 """Files by which a published run is known, until the folder is gone."""
-_STAMPS = 1 << 32
-"""Bytes of all time stamps, unpacked."""
-
-
-@dataclass(frozen=True)
-class Difference:
-    """A difference between two requests.
-
-    Attributes
-    ----------
-    key
-        The differing key.
-    now, begun
-        Its value in the present request and in that of the unfinished run.
-    """
-
-    key: str
-    now: str
-    begun: str
 
 
 class WorkFolder:
@@ -178,17 +154,11 @@ class WorkFolder:
 
     def segments(self) -> dict[int, Path]:
         """The finished segments by number; files whose bytes have changed are deleted and listed in `broken`."""
-        found = {}
-        for path in sorted(self.path.iterdir()) if self._is_own() else ():
-            name = _SEGMENT.fullmatch(path.name)
-            if name is None or not is_regular(path):
-                continue
-            if checksum(path) == name[2]:
-                found[int(name[1])] = path
-            else:
-                self.broken.append(path)
-                path.unlink()
-        return found
+        found = finished_segments(self.path) if self._is_own() else FinishedSegments({}, [])
+        self.broken += found.broken
+        for path in found.broken:
+            path.unlink()
+        return found.whole
 
     def draft(self, index: int) -> Path:
         """Path at which a segment is written, before `keep_segment`."""
@@ -196,20 +166,11 @@ class WorkFolder:
 
     def streams(self, recording: Recording) -> StreamIndex | None:
         """The stream index of the stored time stamps; None where there are none, or not of this recording."""
-        try:
-            stored = read_npz(self.path / "streams.npz", _STAMPS)
-            times = tuple(tuple(_stamps(stored, k, own)) for k, own in enumerate(_counts(stored)))
-        except (OSError, ValueError):
-            return None
-        expected = [len(source_parts(source.source, "")) for source in recording.sources]
-        return index_from_times(recording, times) if list(map(len, times)) == expected else None
+        return read_stream_times(self.path / _STREAMS, recording)
 
     def keep_streams(self, streams: StreamIndex) -> None:
         """Store the time stamps of all streams."""
-        times = {f"times{k}_{j}": own for k, files in enumerate(streams.times) for j, own in enumerate(files)}
-        files = np.array([len(own) for own in streams.times], np.int64)
-        with replacing(self.path / "streams.npz", overwrite=True) as part, part.open("wb") as file:
-            np.savez_compressed(file, files=files, **times)  # type: ignore[arg-type]
+        write_stream_times(self.path / _STREAMS, streams)
 
     def clock(self) -> float | None:
         """Stored time of frame 0 of a live recording, seconds since 1970, or None."""
@@ -303,55 +264,7 @@ def _delete(folder: Path) -> None:
     folder.rmdir()
 
 
-def _value(value: object) -> str:
-    return printable(value[: limits.NAME]) if isinstance(value, str) else shown(value)
-
-
 def _open_own(path: Path) -> BinaryIO:
     """A file of ours, made where there is none; links are not followed."""
     flags = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0)
     return os.fdopen(os.open(path, flags, 0o666), "r+b")
-
-
-def _counts(stored: Any) -> list[int]:
-    """Number of files of each camera; ValueError where the archive does not say it."""
-    files = stored.get("files")
-    if files is None or files.ndim != 1 or files.dtype != np.int64 or not 0 < len(files) <= limits.CAMERAS:
-        raise ValueError("no numbers of files")
-    if (files < 1).any() or files.max() > limits.MEMBERS:
-        raise ValueError("numbers of files that cannot be")
-    return [int(count) for count in files]
-
-
-def _stamps(stored: Any, camera: int, files: int) -> list[Floats]:
-    """The time stamps of one camera's files; ValueError where they are none."""
-    found = [stored.get(f"times{camera}_{file}") for file in range(files)]
-    if any(own is None or own.ndim != 1 or own.dtype != np.float64 or len(own) > limits.FRAMES for own in found):
-        raise ValueError("no time stamps")
-    return [np.array(own, float) for own in found]
-
-
-def checksum(path: Path) -> str:
-    """Checksum of a file, 32 hexadecimal digits."""
-    with path.open("rb") as file:
-        return file_digest(file, lambda: blake2b(digest_size=16)).hexdigest()
-
-
-def keep_segment(draft: Path) -> Path:
-    """Rename a complete, synced segment to the name that contains its checksum."""
-    kept = draft.with_name(f"{draft.stem}-{checksum(draft)}.h5")
-    draft.replace(kept)
-    sync_folder(kept.parent)
-    return kept
-
-
-def differences(now: dict[str, Any], begun: dict[str, Any], prefix: str = "") -> list[Difference]:
-    """All differences of two nested tables."""
-    found = []
-    for key in (*now, *(key for key in begun if key not in now)):
-        a, b, name = now.get(key, "nothing"), begun.get(key, "nothing"), f"{prefix}{key}"
-        if isinstance(a, dict) and isinstance(b, dict):
-            found += differences(a, b, f"{name}.")
-        elif a != b:
-            found.append(Difference(name, _value(a), _value(b)))
-    return found

@@ -18,7 +18,7 @@ from stseg.engine.segments import Segment
 from stseg.engine.session import Session
 from stseg.foreground.view_foreground import ViewForeground
 from stseg.io.live.live_frames import LiveFrameSet
-from stseg.io.runfile.work_folder import keep_segment
+from stseg.io.runfile.segment_files import keep_segment
 from stseg.model.tables import TRACK
 
 

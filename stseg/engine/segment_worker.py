@@ -16,7 +16,7 @@ from stseg.engine.segments import Segment
 from stseg.engine.session import run_session
 from stseg.foreground.view_foreground import ViewForeground
 from stseg.io.recording.frames import open_frames
-from stseg.io.runfile.work_folder import keep_segment
+from stseg.io.runfile.segment_files import keep_segment
 from stseg.model.tables import TRACK
 
 
