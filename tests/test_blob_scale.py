@@ -25,7 +25,8 @@ def scales_by_definition(detector: Detector, observations: list[ViewObservation]
     mean = np.zeros((len(views), cells))
     inside: list[list[np.ndarray]] = []
     for k, (view, observation) in enumerate(zip(views, observations, strict=True)):
-        first, spans, area = (values[cells : 2 * cells] for values in view.lattice)
+        first, area = view.lattice.first[cells : 2 * cells], view.lattice.area[cells : 2 * cells]
+        spans = [view.lattice.spans[slice(*view.lattice.start[i : i + 2])] for i in range(cells, 2 * cells)]
         shown = np.zeros((cells, *view.shape), bool)
         for cell in range(cells):
             for row, (left, right) in enumerate(spans[cell]):
@@ -38,7 +39,7 @@ def scales_by_definition(detector: Detector, observations: list[ViewObservation]
     certain = np.log((1 - config.pixel_miss_rate) / config.pixel_clutter_rate)
     scales = []
     for k, view in enumerate(views):
-        explained: Floats = view.lattice[2][cells : 2 * cells] * mean[k] / certain
+        explained: Floats = view.lattice.area[cells : 2 * cells] * mean[k] / certain
         every = [own * value for own, value in zip(inside[k], explained, strict=True)]
         scales.append(np.max([*(one for one, held in zip(every, worth, strict=True) if held), 0 * every[0]], axis=0))
     return scales

@@ -17,7 +17,7 @@ from stseg.accelerate import kernel
 from stseg.arrays import Floats, Ints, Singles
 from stseg.config import DetectionConfig
 from stseg.detection.views import BoxView, PixelView, ViewObservation
-from stseg.model.outlines import Spans
+from stseg.model.packed_outlines import PackedOutlines
 
 
 def blob_scales(
@@ -38,20 +38,19 @@ def blob_scales(
         worth = np.flatnonzero(config.prior_log_odds + evidence > 0)
         certain = np.log((1 - config.pixel_miss_rate) / config.pixel_clutter_rate)
         for view, scale, mean in shown:
-            first, spans, area = view.lattice
-            begin = view.common * len(mean)
-            _raise_inside(
-                scale, first, view.lattice_rows, spans, begin + worth, area[begin + worth] * mean[worth] / certain
-            )
+            pillars = view.common * len(mean) + worth
+            _raise_inside(scale, view.lattice, pillars, view.lattice.area[pillars] * mean[worth] / certain)
     return scales
 
 
 @kernel
-def _raise_inside(scale: Singles, first: Ints, rows: Ints, spans: Spans, pillars: Ints, explained: Floats) -> None:
-    """Raise scale (v, u) inside outlines, of so many rows each, to what each of some pillars (n,) explains (n,)."""
+def _raise_inside(scale: Singles, outlines: PackedOutlines, pillars: Ints, explained: Floats) -> None:
+    """Raise scale (v, u) inside outlines to what each of some pillars (n,) explains (n,)."""
     for n in range(len(pillars)):
         i, value = pillars[n], np.float32(explained[n])
-        for k in range(rows[i]):
-            line = scale[first[i] + k, spans[i, k, 0] : spans[i, k, 1]]
+        row = outlines.first[i]
+        for k in range(outlines.start[i], outlines.start[i + 1]):
+            line = scale[row, outlines.spans[k, 0] : outlines.spans[k, 1]]
             for u in range(len(line)):
                 line[u] = value if value > line[u] else line[u]
+            row += 1

@@ -16,12 +16,15 @@ from stseg.geometry.bodies import WIDTH, BodyTable
 from stseg.model.box_fit import fill_inside
 from stseg.model.box_noise import FIRST, BoxNoise
 from stseg.model.outlines import Spans, outlines, sums_inside
+from stseg.model.packed_outlines import PackedOutlines
 from stseg.model.pillar_index import PillarIndex, raise_to_best_match
 
 OWN, BACKGROUND = 5.0, -10.0
 """Weights of a person's own pixels and of background inside their pillar (HW12 eq. 27)."""
 _BODY_ROWS = 30
 """Rows of a body on a raster: enough for its outline, few enough for speed."""
+_DRAWN = 4096
+"""Pillars of the lattice that are drawn at once: until they are packed, each takes as many rows as the tallest."""
 _LEAST_INSIDE = 0.02
 """Share of a body's box in the image below which the view does not see it."""
 _OPTIMISM = 0.3
@@ -173,10 +176,10 @@ class PixelView(View):
         super().__init__(camera, grid, lattice_ground, config, body)
         heights = np.repeat(np.asarray(body.heights), len(lattice_ground))
         places = np.tile(lattice_ground, (len(body.heights), 1))
-        self.lattice = self.outlines(places, heights, body.width_of(heights))
-        drawn = self.lattice[1][:, ::-1, 1] > 0
+        widths = body.width_of(heights)
+        parts = [slice(begin, begin + _DRAWN) for begin in range(0, len(heights), _DRAWN)]
+        self.lattice = PackedOutlines.of(self.outlines(places[own], heights[own], widths[own]) for own in parts)
         self.lattice_cells, self.common = np.arange(len(lattice_ground)), len(body.heights) // 2
-        self.lattice_rows = np.where(drawn.any(1), drawn.shape[1] - drawn.argmax(1), 0)
 
     def observe(self, seen: Boxes | Singles | None, sharpness: BoxNoise = FIRST) -> ViewObservation:
         """The frame's log-odds on the raster; all zero where the view is blind."""
@@ -205,9 +208,7 @@ class PixelView(View):
 
     def add_lattice_score(self, row_sums: Floats, heights: Ints, cells: Ints, score: Floats) -> None:
         """Add to score (height, cell), nats, what unexplained pixels say of pillars of some heights at some cells."""
-        first, spans, area = self.lattice
-        weight = self.config.effective_observations
-        _add_span_means(row_sums, first, self.lattice_rows, spans, area, heights, cells, weight, score)
+        _add_span_means(row_sums, self.lattice, heights, cells, self.config.effective_observations, score)
 
     def open_sums(self, values: Singles, owner: Ints, pillars: TriedPillars) -> tuple[Floats, Floats]:
         """Weighted sums of the pixels open to each person inside their pillars, and the pillars' fair areas.
@@ -240,29 +241,22 @@ def _fill_left_of(raster: Singles, unexplained: Flags, left_of: Floats) -> None:
 
 @kernel
 def _add_span_means(
-    row_sums: Floats,
-    first: Ints,
-    rows: Ints,
-    spans: Spans,
-    area: Floats,
-    heights: Ints,
-    cells: Ints,
-    weight: float,
-    score: Floats,
+    row_sums: Floats, outlines: PackedOutlines, heights: Ints, cells: Ints, weight: float, score: Floats
 ) -> None:
-    """Add to score (height, cell) the weighted means over outlines (height * cell,), of so many rows each, for some."""
+    """Add to score (height, cell) the weighted means over outlines (height * cell,), for some."""
     flat = row_sums.reshape(-1)
     for height in heights:
         for cell in cells:
             i, total = height * score.shape[1] + cell, 0.0
-            if rows[i] == 0:
+            outline = outlines.spans[outlines.start[i] : outlines.start[i + 1]]
+            if len(outline) == 0:
                 continue
-            line, outline = np.uint64(first[i] * row_sums.shape[1]), spans[i, : rows[i]]
+            line = np.uint64(outlines.first[i] * row_sums.shape[1])
             for k in range(len(outline)):  # unsigned places: none is negative, which is not asked here
                 start, stop = np.uint64(np.uint16(outline[k, 0])), np.uint64(np.uint16(outline[k, 1]))
                 total += flat[line + stop] - flat[line + start]
                 line += np.uint64(row_sums.shape[1])
-            score[height, cell] += weight * total / area[i]
+            score[height, cell] += weight * total / outlines.area[i]
 
 
 @kernel
