@@ -26,7 +26,7 @@ from stseg.model.pillar_index import PillarIndex
 from stseg.occupancy.box_planes import CellsByPerson, ViewBoxes, fill_fit, fill_levels, plane_likelihood
 from stseg.occupancy.clutter import clutter, clutter_weights
 from stseg.occupancy.fusion import ErrorRates, log_odds_terms
-from stseg.occupancy.shown_cells import ShownCells
+from stseg.occupancy.shown_cells import CellTables, ShownCells
 from stseg.occupancy.volume import Occupancy
 
 COARSE = rig_of(corner_cameras(), cell=0.5, planes=3)
@@ -186,7 +186,7 @@ def test_likelihood_per_plane_by_definition(seed: int) -> None:
     footprint = np.ones((4, 16, 4), np.int16)
     footprint[2, 5] = 0
     every = np.arange(levels.size, dtype=np.int32)
-    listed = ShownCells(every, every % 16, np.tile(near.ravel(), 4), np.ones(levels.size))
+    listed = ShownCells(every, every % 16, every, np.tile(near.ravel(), 4), np.ones(levels.size))
     fill_levels(fit, tried, grid.heights, listed, footprint.reshape(-1, 4), rates, levels.reshape(-1))
     for cell, (y, x) in enumerate(np.ndindex(4, 4)):
         free = [b for b in range(len(found)) if box_owner[b] in (-1, near[y, x])]
@@ -292,8 +292,7 @@ def test_cells_at_which_nothing_is_shown_are_fused_as_all_others(kind: str, monk
     some, every = occupancy.new_calibration(), occupancy.new_calibration()
     sparse = occupancy.fuse_and_learn(some, seen, explanation)
     assert 0 < len(sparse.cell) < 0.8 * sparse.of_cell.size
-    tables = occupancy._tables
-    monkeypatch.setattr(tables, "nothing_marked", lambda: np.ones(tables.reach[0].shape[:3], bool))
+    monkeypatch.setattr(CellTables, "nothing_marked", lambda self: np.ones(self.reach[0].shape[:3], bool))
     whole = occupancy.fuse_and_learn(every, seen, explanation)
     assert len(whole.cell) == (occupancy.views > 0).sum()
     np.testing.assert_array_equal(sparse.dense(), whole.dense())

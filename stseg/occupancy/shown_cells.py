@@ -62,6 +62,8 @@ class ShownCells(NamedTuple):
         Index in the flattened volume.
     place : int32 (n,)
         Index in the flattened ground.
+    block : int32 (n,)
+        Index of its block among those of all planes.
     near : int64 (n + k,)
         The person near each, -1 for none.
     number : float64 (n + k,)
@@ -70,6 +72,7 @@ class ShownCells(NamedTuple):
 
     cell: Labels
     place: Labels
+    block: Labels
     near: Ints
     number: Floats
 
@@ -121,13 +124,14 @@ class CellTables:
         views : uint8 (plane, y, x)
             Number of views that see each cell.
         """
-        found = np.empty(int(marked.sum()) * SIDE**2, np.int32)
-        cell = found[: _fill_cells(marked, views, found)]
+        found, blocks = np.empty((2, int(marked.sum()) * SIDE**2), np.int32)
+        count = _fill_cells(marked, views, found, blocks)
+        cell, block = found[:count], blocks[:count]
         place = cell % np.int32(near.size)
         sets, own = self.sets, self.sets.of_cell.reshape(-1)[cell]
         others = sets.size - np.bincount(own, minlength=len(sets.size))
         number = np.concatenate([np.ones(len(cell)), others])
-        return ShownCells(cell, place, np.append(near.reshape(-1)[place], np.full(len(others), -1)), number)
+        return ShownCells(cell, place, block, np.append(near.reshape(-1)[place], np.full(len(others), -1)), number)
 
 
 @kernel
@@ -169,8 +173,8 @@ def _fill_reach(footprint: Footprints, reach: Reach) -> None:
 
 
 @kernel
-def _fill_cells(marked: Flags, views: Bytes, cell: Labels) -> int:
-    """Fill cell (n,) with the indices of the cells of marked blocks that a view sees; their number."""
+def _fill_cells(marked: Flags, views: Bytes, cell: Labels, block: Labels) -> int:
+    """Fill cell and block (n,) with the indices of the cells of marked blocks that a view sees; their number."""
     planes, rows, columns = views.shape
     count = 0
     for z in range(planes):
@@ -181,5 +185,6 @@ def _fill_cells(marked: Flags, views: Bytes, cell: Labels) -> int:
                         for x in range(i * SIDE, min((i + 1) * SIDE, columns)):
                             if views[z, y, x] > 0:
                                 cell[count] = (z * rows + y) * columns + x
+                                block[count] = (z * marked.shape[1] + j) * marked.shape[2] + i
                                 count += 1
     return count

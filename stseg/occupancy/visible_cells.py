@@ -122,12 +122,14 @@ def mark_people(reach: Reach, shown: PixelAssignment, marked: Flags) -> None:
 
 @kernel
 def fill_share(
-    cells: ShownCells, footprint: Footprints, shown: PixelAssignment, distance: Singles, share: Singles
+    cells: ShownCells, marked: Flags, footprint: Footprints, shown: PixelAssignment, distance: Singles, share: Singles
 ) -> None:
-    """Fill share (n,) of the cells that a view sees: how much of each footprint no nearer person hides.
+    """Fill share (n,), 1 before, of the cells that a view sees: how much of each footprint no nearer person hides.
 
     Parameters
     ----------
+    marked : bool (block,)
+        Blocks at which the view shows something.
     footprint : int16 (cell, 4)
         Of the whole volume.
     distance : float32 (place,)
@@ -136,7 +138,7 @@ def fill_share(
     for k in range(len(cells.cell)):
         left, top, width, height = footprint[cells.cell[k]]
         nearest, whole = cells.near[k], np.float32(1)
-        if width == 0:
+        if width == 0 or not marked[cells.block[k]]:
             continue
         if _shows_a_person(shown, left, top, width, height) and not (nearest >= 0 and shown.separate[nearest]):
             hidden = _hidden_pixels(shown, left, top, width, height, nearest, distance[cells.place[k]])
@@ -147,6 +149,7 @@ def fill_share(
 @kernel
 def fill_map(
     cells: ShownCells,
+    marked: Flags,
     footprint: Footprints,
     table: SumTable,
     shown: PixelAssignment,
@@ -154,14 +157,18 @@ def fill_map(
     levels: Levels,
     share: Singles,
 ) -> None:
-    """Fill levels and share (n,) of the cells by a view with a likelihood map; UNSEEN where it does not see them.
+    """Fill levels and share (n,), 1 before, of cells by a view with a map; UNSEEN where it does not see them.
 
-    The level is the mean over the visible pixels of the footprint, those of other persons counted as background.
+    The level is the mean over the visible pixels of the footprint, those of other persons counted as background. It is
+    0 outside the blocks, marked bool (block,), at which the view shows something.
     """
     for k in range(len(cells.cell)):
         left, top, width, height = footprint[cells.cell[k]]
         if width == 0:
             levels[k] = UNSEEN
+            continue
+        if not marked[cells.block[k]]:
+            levels[k] = 0
             continue
         u, v = left - table.left, top - table.top
         total, pixels = int(sum_of(table.sums, u, v, u + width, v + height)), np.int32(width) * np.int32(height)

@@ -128,11 +128,14 @@ class Occupancy:
         views = [
             None if view is None else self._prepared(i, view, explanation, near, noise) for i, view in enumerate(seen)
         ]
-        cells = self._tables.shown(self._marked(views, near), near, self.views)
+        marked = [self._marked(i, view) for i, view in enumerate(views)]
+        everywhere = np.logical_or.reduce([self._beside_people(views, near), *marked])
+        cells = self._tables.shown(everywhere, near, self.views)
         sums, terms = Sums.zero(cells.near.shape), list[ViewTerms | None]()
         weights = clutter_weights(np.array([self._clutter(i, view) for i, view in enumerate(seen)]))
         for i, (view, weight) in enumerate(zip(views, weights.astype(np.float32), strict=True)):
-            added = None if view is None else self._terms(i, view, cells, explanation, rates[i], weight)
+            own = marked[i].reshape(-1)
+            added = None if view is None else self._terms(i, view, cells, own, explanation, rates[i], weight)
             terms.append(added)
             if added is not None:
                 add_terms(added, cells.near, sums)
@@ -146,18 +149,22 @@ class Occupancy:
             return _PreparedView(shown, None, self._fit(i, view, explanation, near, noise))
         return _PreparedView(shown, self._means.sum_table(i, view), None)
 
-    def _marked(self, views: Sequence[_PreparedView | None], near: Ints) -> Flags:
-        """The blocks at which something is shown, or somebody near."""
+    def _marked(self, i: int, view: _PreparedView | None) -> Flags:
+        """The blocks at which a view shows a person or foreground."""
+        marked, reach = self._tables.nothing_marked(), self._tables.reach[i]
+        if view is not None:
+            mark_people(reach, view.shown, marked)
+            if view.table is not None:
+                mark_map(reach, view.table, marked)
+        return marked
+
+    def _beside_people(self, views: Sequence[_PreparedView | None], near: Ints) -> Flags:
+        """The blocks above the ground near somebody, and above what a box might show."""
         marked, columns = self._tables.nothing_marked(), near >= 0
         for view in views:
             if view is not None and view.fit is not None:
                 mark_fit(view.fit, columns.reshape(-1))
         mark_columns(columns, marked)
-        for reach, view in zip(self._tables.reach, views, strict=True):
-            if view is not None:
-                mark_people(reach, view.shown, marked)
-                if view.table is not None:
-                    mark_map(reach, view.table, marked)
         return marked
 
     def _terms(
@@ -165,6 +172,7 @@ class Occupancy:
         i: int,
         view: _PreparedView,
         cells: ShownCells,
+        marked: Flags,
         explanation: Explanation,
         rates: ErrorRates,
         weight: np.float32,
@@ -175,9 +183,9 @@ class Occupancy:
         levels, share = np.empty(len(cells.near), np.int16), np.ones(len(cells.near), np.float32)
         confidence, empty = np.ones(len(cells.near), np.float32), np.int16(0)
         if view.table is not None:
-            fill_map(cells, footprint, view.table, view.shown, distance, levels[:number], share[:number])
+            fill_map(cells, marked, footprint, view.table, view.shown, distance, levels[:number], share[:number])
         elif view.fit is not None:
-            fill_share(cells, footprint, view.shown, distance, share[:number])
+            fill_share(cells, marked, footprint, view.shown, distance, share[:number])
             fill_levels(view.fit, self.heights, self.rig.grid.heights, cells, footprint, rates, levels[:number])
             confidence = _confidence(cells.near, view.shown.separate, explanation.people.visibility[i])
             empty = level_of_match(0.0, rates.miss, rates.clutter)
