@@ -74,7 +74,7 @@ def plan(
         print(f"stseg: {note}", file=sys.stderr)
     first, stop = resolve_frames(chosen, streams, recording)
     job = Job(recording, resolved, tracker, volume, first, stop, streams)
-    estimate = forecast(job, counting, workforce.processes)
+    estimate = forecast(job, counting, workforce.processes(job))
     print(
         json.dumps(asdict(estimate) | {"seconds": estimate.seconds}, indent=1)
         if as_json

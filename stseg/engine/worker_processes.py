@@ -22,14 +22,19 @@ CONTEXT: ForkServerContext | SpawnContext = (
 """Workers are forked from a process that has imported everything and has no threads, where the system can do that."""
 
 _PRELOADED = "stseg.engine.workers"
-_MEMORY = 700 * 2**20
-"""Memory that a process of a run is taken to need, bytes."""
+_MEMORY = 650 * 2**20
+"""Memory that a process of a run is taken to need on a small ground, bytes."""
+_CELL_MEMORY = 350
+"""The same of each cell and view, bytes: tables of footprints and outlines, and the volumes of a window."""
 
 
-def processes_that_fit() -> int:
-    """Number of processes of a run for which this machine has cores and free memory, 1 at least."""
+def processes_that_fit(cells: int = 0) -> int:
+    """Number of processes of a run for which this machine has cores and free memory, 1 at least.
+
+    `cells` is the number of the volume's cells times that of the views.
+    """
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return max(1, min(cores, free_memory() // _MEMORY))
+    return max(1, min(cores, free_memory() // (_MEMORY + cells * _CELL_MEMORY)))
 
 
 def prepare_workers(workers: int | None) -> None:

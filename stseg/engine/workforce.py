@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from math import prod
 from pathlib import Path
 
 from stseg.engine.cluster import make_by_cluster
@@ -32,10 +33,12 @@ class Workforce:
         if self.workers is not None and self.workers < 1:
             raise ConfigError("--workers", "", self.workers, "1 or more processes")
 
-    @property
-    def processes(self) -> int:
+    def processes(self, job: Job) -> int:
         """Number of processes of this machine."""
-        return processes_that_fit() if self.workers is None else self.workers
+        if self.workers is not None:
+            return self.workers
+        rig = job.recording.rig
+        return processes_that_fit(len(rig.cameras) * prod(rig.grid.shape))
 
     def prepare(self) -> None:
         """Make ready what takes time, while the recording is counted."""
@@ -65,7 +68,7 @@ class Workforce:
         """
         if not missing:
             return
-        workers = min(len(missing), self.processes)
+        workers = min(len(missing), self.processes(job))
         if self.scheduler is not None:
             yield from make_by_cluster(job, missing, draft, self.scheduler, advance)
         elif workers > 1:
