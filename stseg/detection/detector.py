@@ -23,6 +23,7 @@ from stseg.detection.population_calibration import PopulationCalibration
 from stseg.detection.prior import Prior
 from stseg.detection.problem import Parameters
 from stseg.detection.repulsion import CORE
+from stseg.detection.restart import restarted
 from stseg.detection.result import explanation
 from stseg.detection.search import ENUMERATED
 from stseg.detection.views import BoxView, PixelView, ViewObservation
@@ -189,6 +190,8 @@ class Detector:
         exact, known = self._moved(estimate), len(estimate.pool)
         start = np.arange(known, known + len(exact))
         moved = MapEstimate.of_search(estimate.evidence, estimate.pool.joined_with(exact), start)
+        if self._has_boxes:
+            moved = restarted(moved, self.lattice_ground)
         alternatives = moved.alternatives()
         pool = moved.pool.at(np.concatenate([moved.members, alternatives]))
         if not self._has_boxes:
