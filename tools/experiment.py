@@ -2,6 +2,7 @@
 
 ablation    what each stage is worth: threshold, per-frame detection, cut without expansion, cut; on fewer views
 certainty   calibration of stated probabilities: of cells stated as occupied with 0.8, are 80 % occupied?
+identities  identities decided again, in seconds, from the rows of perturbed runs
 labels      IoU of the cells of a track, and the right owner where bodies touch: cut, threshold, nearest track
 memory      resident memory of a long run, and the size of its run file
 pixels      share of pixels of people that carry the right label, from film to label images
@@ -22,6 +23,7 @@ import sys
 EXPERIMENTS = (
     "ablation",
     "certainty",
+    "identities",
     "labels",
     "memory",
     "pixels",

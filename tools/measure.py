@@ -46,6 +46,15 @@ class Perturbed(ViewForeground):
 
 
 @dataclass(frozen=True)
+class Committed:
+    """Rows of a whole recording as the tracker committed them, and what the identity search needs besides."""
+
+    trajectory: Rows
+    events: Rows
+    appearance: Rows
+
+
+@dataclass(frozen=True)
 class Outcome:
     """Trajectories before and after the final association over the whole recording."""
 
@@ -57,19 +66,34 @@ def track(
     recording: Recording, first: int, stop: int, tracker: str, config: Config, seed: int | None = None
 ) -> Outcome:
     """Track a recording; with a seed, perturbed."""
-    foregrounds: Sequence[ViewForeground] = make_foregrounds(recording, config, first, stop)
+    pipeline = _pipeline(recording, config, tracker)
+    rows = committed(recording, pipeline, first, stop, seed)
+    finished = pipeline.finished(rows.trajectory, rows.events, rows.appearance)[0]
+    return Outcome(rows.trajectory, finished.trajectory)
+
+
+def commit_rows(recording: Recording, first: int, stop: int, tracker: str, config: Config, seed: int) -> Committed:
+    """What the tracker commits on perturbed evidence."""
+    return committed(recording, _pipeline(recording, config, tracker), first, stop, seed)
+
+
+def committed(recording: Recording, pipeline: Pipeline, first: int, stop: int, seed: int | None) -> Committed:
+    """What the pipeline's tracker commits; with a seed, on perturbed evidence."""
+    foregrounds: Sequence[ViewForeground] = make_foregrounds(recording, pipeline.config, first, stop)
     if seed is not None:
         streams = np.random.SeedSequence(seed).spawn(len(foregrounds))
         pairs = zip(foregrounds, streams, strict=True)
         foregrounds = [Perturbed(whole, np.random.default_rng(stream)) for whole, stream in pairs]
-    kinds = ["boxes" if source.source.kind in ("boxes", "instances") else "pixels" for source in recording.sources]
-    pipeline = Pipeline(recording.rig, kinds, config, tracker, appearance_axes(recording))
     done: list[int] = []
     with open_frames(recording, first, stop) as frames:
         steps = list(run_session(pipeline, foregrounds, frames, first, done.append))
-    committed, events = (np.concatenate([getattr(s.commit, name) for s in steps]) for name in ("trajectory", "events"))
-    appearance = np.concatenate([step.appearance for step in steps])
-    return Outcome(committed, pipeline.finished(committed, events, appearance)[0].trajectory)
+    trajectory, events = (np.concatenate([getattr(s.commit, name) for s in steps]) for name in ("trajectory", "events"))
+    return Committed(trajectory, events, np.concatenate([step.appearance for step in steps]))
+
+
+def _pipeline(recording: Recording, config: Config, tracker: str) -> Pipeline:
+    kinds = ["boxes" if source.source.kind in ("boxes", "instances") else "pixels" for source in recording.sources]
+    return Pipeline(recording.rig, kinds, config, tracker, appearance_axes(recording))
 
 
 def first_views(recording: Recording, number: int) -> Recording:
