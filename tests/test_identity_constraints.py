@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -13,7 +14,7 @@ from strollers import BORDER, CONFIG, RATE, gone, rows_of, runs, straight, swapp
 
 from stseg.arrays import Ints, Rows
 from stseg.commands.correct import correct
-from stseg.errors import InputError
+from stseg.errors import FormatError, InputError
 from stseg.io.runfile.runs import read_run
 from stseg.model.tables import APPEARANCE
 from stseg.tracking.answered_constraints import answered_rows
@@ -165,6 +166,35 @@ def test_a_run_is_solved_again(tmp_path: Path) -> None:
         table[list(crossed)] = 1, 2
         np.testing.assert_array_equal(after, table[before])
     np.testing.assert_array_equal(new.read_frame(20)[0], run.read_frame(20)[0])
+
+
+def test_a_corrected_run_is_corrected_again_under_the_answers_before(tmp_path: Path) -> None:
+    """Two corrections one after the other are both at once; an old one holds, whatever a later one says."""
+    run_file, answers = tmp_path / "run.h5", tmp_path / "a.csv"
+    assert track(write_recording(tmp_path), run_file) == 0
+    given = ("swap,20,1,2,\n", "delete,,3,,\n")
+    for text, source, result in ((given[0], run_file, "one.h5"), (given[1], tmp_path / "one.h5", "two.h5")):
+        answers.write_text(f"action,frame,id,other,name\n{text}")
+        correct(source, answers, output=tmp_path / result)
+    answers.write_text(f"action,frame,id,other,name\n{''.join(given)}")
+    correct(run_file, answers, output=tmp_path / "both.h5")
+    two, both = (read_run(tmp_path / f"{name}.h5") for name in ("two", "both"))
+    np.testing.assert_array_equal(two.trajectory, both.trajectory)
+    assert sorted(two.answered.tolist()) == sorted(both.answered.tolist())
+    answers.write_text("action,frame,id,other,name\nswap,20,1,2,\n")
+    with pytest.raises(InputError, match="contradicts others"):
+        correct(tmp_path / "one.h5", answers, output=tmp_path / "back.h5")
+
+
+def test_rows_that_are_not_there_are_refused(tmp_path: Path) -> None:
+    run_file = tmp_path / "run.h5"
+    assert track(write_recording(tmp_path), run_file) == 0
+    (tmp_path / "a.csv").write_text("action,frame,id,other,name\nswap,20,1,2,\n")
+    correct(run_file, tmp_path / "a.csv", output=tmp_path / "new.h5")
+    with h5py.File(tmp_path / "new.h5", "r+") as file:
+        file["answered"][0] = (10**6, 10**6 + 1, 1)
+    with pytest.raises(FormatError, match="/answered: found row 1000001"):
+        correct(tmp_path / "new.h5", tmp_path / "a.csv", output=tmp_path / "more.h5")
 
 
 def test_answers_that_cannot_all_be_true_are_refused(tmp_path: Path) -> None:

@@ -26,7 +26,7 @@ def seen_of(rows: Rows) -> Observations:
 
 
 def found(seen: Observations, lag: float = 60.0, hypotheses: int = 400) -> Ints:
-    return search_identities(seen, MODEL, CONFIG.motion, SearchLimits(hypotheses, LONGEST, lag))
+    return search_identities(seen, MODEL, CONFIG.motion, SearchLimits(hypotheses, LONGEST, lag)).name
 
 
 @settings(max_examples=60, deadline=None)
@@ -69,7 +69,7 @@ def test_outliers_say_no_more_against_a_person_than_they_may(most: float, people
     rows["height"][(rows["id"] == 1) & (rows["frame"] == 10)] = 1.2
     seen = observe(rows, rows["height"][:, None].astype(float), MODEL, RATE, BORDER, CONFIG)
     model = replace(MODEL, most_against=np.full(1, most))
-    found = search_identities(seen, model, CONFIG.motion, SearchLimits(50, LONGEST, 60.0))
+    found = search_identities(seen, model, CONFIG.motion, SearchLimits(50, LONGEST, 60.0)).name
     assert len(np.unique(found)) == people
 
 

@@ -64,6 +64,16 @@ def test_gaps_and_weak_tracks_are_asked_about() -> None:
     assert {(one.question, one.track, one.other) for one in doubts} >= {("gap", 1, 2), ("false", 3, 0)}
 
 
+def test_who_appears_beside_a_track_may_be_who_that_was() -> None:
+    """The filter's track 1 passes on to somebody else, and track 2 begins where its person is."""
+    rows = np.concatenate(
+        [walk(1, 0, line(-4, 0, 51), 0.0, 1.7), walk(1, 51, line(1.2, 1.3, 5), 1.2, 1.7),
+         walk(2, 51, line(0.08, 4, 50), 0.0, 1.7)]
+    )  # fmt: skip
+    doubts = find_doubts(rows, Tracks(rows).summary(), 10.0, BORDER)
+    assert ("birth", 1, 2, 50, 51) in {(one.question, one.track, one.other, one.first, one.last) for one in doubts}
+
+
 @pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium (.ci/run installs it where it may)")
 def test_one_key_answers_and_the_answers_correct_the_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     run = write_small_run(tmp_path / "run.h5")

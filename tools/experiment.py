@@ -1,6 +1,7 @@
 """Run one experiment: python tools/experiment.py NAME [options], NAME --help for its options.
 
 ablation    what each stage is worth: threshold, per-frame detection, cut without expansion, cut; on fewer views
+answers     IDF1 over the number of answers that the truth gives to the questions of stseg review
 certainty   calibration of stated probabilities: of cells stated as occupied with 0.8, are 80 % occupied?
 identities  identities decided again, in seconds, from the rows of perturbed runs
 labels      IoU of the cells of a track, and the right owner where bodies touch: cut, threshold, nearest track
@@ -22,6 +23,7 @@ import sys
 
 EXPERIMENTS = (
     "ablation",
+    "answers",
     "certainty",
     "identities",
     "labels",

@@ -26,8 +26,9 @@ NewIds = Callable[[Ints, Ints], Ints]
 
 
 def write_corrected(
-    run: Path, path: Path, tracks: Tracks, new_ids: NewIds, names: Mapping[int, str], answers: str, overwrite: bool
-) -> None:
+    run: Path, path: Path, tracks: Tracks, answered: Rows, new_ids: NewIds, names: Mapping[int, str], answers: str,
+    overwrite: bool,
+) -> None:  # fmt: skip
     """Copy a run file with other tracks; evidence (log_odds, ghosts, rates) is copied unchanged.
 
     Parameters
@@ -36,6 +37,8 @@ def write_corrected(
         The run file, and the one to write.
     tracks
         The corrected tracks.
+    answered : ANSWERED (n,)
+        What was answered so far.
     new_ids
         Ids of the labels.
     names
@@ -59,7 +62,10 @@ def write_corrected(
                 ("tracks", tracks.summary()),
                 ("boxes", tracks.boxes),
                 ("events", tracks.events),
+                ("answered", answered),
             ):
+                if name not in file:  # the first files of this version lack a table
+                    file.create_dataset(name, (0,), rows.dtype, maxshape=(None,))
                 _replace(run, file[name], rows)
             _relabel(run, file[layout.OCCUPANCY], new_ids)
             _note(file[layout.PROVENANCE], names, answers)

@@ -15,6 +15,7 @@ import numpy as np
 from stseg.arrays import Floats
 from stseg.geometry import Grid
 from stseg.model.tables import (
+    ANSWERED,
     APPEARANCE,
     BOX,
     CANDIDATE,
@@ -91,13 +92,14 @@ ABOUT = {
     "committed": "rows before identities were decided, as in trajectory; id is the filter's track",
     "committed_events": "events before identities were decided",
     "appearance": "one row per detection, frame and view that sees it apart: colours and features, a few numbers",
+    "answered": "pairs of rows of /committed that answers bind: one person (same 1) or two (0)",
 }
 """Every table and its contents."""
 
 EARLIER = {LOG_ODDS.name: np.dtype("<f2")}
 """Types of fields in the first files of this version, which readers accept; browsers cannot show half precision."""
 
-ADDED = frozenset({"rates", "shifts", "committed", "committed_events", "appearance"})
+ADDED = frozenset({"rates", "shifts", "committed", "committed_events", "appearance", "answered"})
 """Tables absent from the first files of this version; read as empty."""
 
 ADDED_COLUMNS = frozenset({"width", "aside"})
@@ -119,6 +121,7 @@ def table_types(views: int) -> dict[str, np.dtype[np.void]]:
         "committed": TRAJECTORY,
         "committed_events": EVENT,
         "appearance": APPEARANCE,
+        "answered": ANSWERED,
     }
 
 

@@ -137,6 +137,11 @@ class Run:
         return self._table("appearance")
 
     @cached_property
+    def answered(self) -> Rows:
+        """ANSWERED (n,): what was answered so far (`stseg correct`); empty in a file that has none."""
+        return self._table("answered")
+
+    @cached_property
     def names(self) -> dict[int, str]:
         """Names of tracks by id, where they were given (`stseg correct`, or `with_names`)."""
         if self.given_names is not None:

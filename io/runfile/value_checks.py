@@ -20,6 +20,8 @@ _RANGES: dict[str, tuple[int, int]] = {
     "id": (0, 2**31 - 1),
     "other": (0, 2**31 - 1),
     "window": (-1, limits.FRAMES),
+    "row": (0, limits.ROWS),
+    "same": (0, 1),
 }
 """Columns of whole numbers; `view` counts the cameras."""
 _PLACES = {"trajectory": ("x", "y", "z"), "boxes": ("left", "top", "width", "height"), "ghosts": ("x", "y")}

@@ -37,9 +37,9 @@ def correct(
     name. **keep**: nothing changes.
 
     All answers hold together; one that contradicts another is refused. Identities of the whole run are solved again,
-    with the answers as facts: a few of them decide the rest. In a run that was corrected before, or of a tracker whose
-    identities are final, ids are only exchanged. Evidence is not changed; the answers are kept in the file's
-    provenance.
+    with the answers as facts: a few of them decide the rest. A corrected run can be reviewed and corrected again; what
+    was answered before still holds. In a run of a tracker whose identities are final, ids are only exchanged. Evidence
+    is not changed; the answers are kept in the file's provenance.
 
     Parameters
     ----------
@@ -57,9 +57,8 @@ def correct(
         raise ConfigError("command line", "--output", "the run file itself", "another file")
     run, rows = read_run(run_file), read_answers(answers, ACTIONS)
     given = [Answer(r.place, r.action, r.track, r.other, r.frame, r.name) for r in rows]
-    corrected = corrected_tracks(run, given)
-    write_corrected(
-        run_file, output, corrected.tracks, corrected.new_ids, corrected.names, read_text(answers), overwrite
-    )
+    found = corrected_tracks(run, given)
+    text = read_text(answers)
+    write_corrected(run_file, output, found.tracks, found.answered, found.new_ids, found.names, text, overwrite)
     changed = sum(row.action != "keep" for row in rows)
     print(f"wrote {output}: {len(rows)} answers, {changed} changes; {len(read_run(output).tracks)} tracks")

@@ -10,13 +10,14 @@ import numpy as np
 from cyclopts import Parameter
 
 from stseg.arrays import Observation
+from stseg.engine.doubtful_decisions import doubtful_decisions
 from stseg.errors import ConfigError
 from stseg.io.outputs.output_files import write_page
 from stseg.io.outputs.whole_files import require_new
 from stseg.io.recording.frames import open_frames
 from stseg.io.runfile.runs import Run, read_run
 from stseg.report.review_page import Question, best_views, moment_picture, review_page
-from stseg.tracking.doubts import Doubt, find_doubts
+from stseg.tracking.doubts import Doubt
 
 
 def review(
@@ -54,20 +55,11 @@ def review(
     require_new(output, overwrite)
     run = read_run(run_file)
     run.require_fit()
-    doubts = doubts_of(run)[:most]
+    doubts = doubtful_decisions(run)[:most]
     views = _frames(run, doubts) if camera_images and doubts else {}
     questions = [_question(run, doubt, views) for doubt in doubts]
     write_page(output, review_page(f"{run.scene}: review", questions, camera_images), overwrite)
     print(f"wrote {output}: {len(questions)} questions")
-
-
-def doubts_of(run: Run) -> list[Doubt]:
-    """The doubtful decisions of a run."""
-    grid = run.recording.rig.grid
-    border = np.array([[grid.x[0], grid.y[0]], [grid.x[1], grid.y[1]]])
-    if not len(run.trajectory):
-        return []
-    return find_doubts(run.trajectory, run.tracks, run.frame_rate, border)
 
 
 def _moments(run: Run, doubt: Doubt) -> tuple[tuple[str, int], ...]:
@@ -113,6 +105,10 @@ def _words(doubt: Doubt) -> tuple[str, list[tuple[str, str, str]]]:
         one, two = (f"split,{frame},{track},," for track in (a, b))
         others = [("3", f"{a} is somebody else", one), ("4", f"{b} is", two), ("5", "both are", f"{one}\n{two}")]
         return f"Are {a} and {b} after the encounter who they were before?", [("1", "same people", keep), swap, *others]
+    if doubt.question == "birth":
+        swap = ("2", f"{b} is who was {a}", f"swap,{doubt.last},{a},{b},")
+        other = ("3", f"{a} is somebody else from then on", f"split,{doubt.last},{a},,")
+        return f"{b} begins: is it the person who was {a} until then?", [("1", f"no, {a} goes on", keep), swap, other]
     if doubt.question == "gap":
         join = ("2", "the same person", f"join,,{a},{b},")
         return f"Is {b} the person who was {a}?", [("1", "two people", keep), join]

@@ -9,11 +9,11 @@ import numpy as np
 
 from stseg.arrays import Ints, Rows
 from stseg.engine.pipeline import associated_tracks
-from stseg.errors import InputError
+from stseg.errors import FormatError, InputError
 from stseg.io.config_file import parse_config
 from stseg.io.runfile.runs import Run
 from stseg.model.tables import Tracks
-from stseg.tracking.answered_constraints import answered_rows
+from stseg.tracking.answered_constraints import AnsweredRows, answered_rows
 from stseg.tracking.corrections import Answer, Corrections, solve_corrections
 from stseg.tracking.identities.constraints import Constraints
 
@@ -27,6 +27,8 @@ class CorrectedTracks:
     Attributes
     ----------
     tracks
+    answered : ANSWERED (n,)
+        What was answered so far.
     new_ids
         Corrected ids of labels by the run's id and frame, 0 where they are no person.
     names
@@ -34,6 +36,7 @@ class CorrectedTracks:
     """
 
     tracks: Tracks
+    answered: Rows
     new_ids: Callable[[Ints, Ints], Ints]
     names: dict[int, str]
 
@@ -41,7 +44,7 @@ class CorrectedTracks:
 def corrected_tracks(run: Run, answers: Sequence[Answer]) -> CorrectedTracks:
     """The tracks of a run under answers; each keeps the id of the run's track in which it begins.
 
-    Identities are solved again where the run has the rows that its tracker committed, and was not corrected before.
+    Identities are solved again where the run has the rows that its tracker committed, under answers given before, too.
     Else ids are exchanged from the frames of the answers on.
 
     Raises
@@ -50,14 +53,11 @@ def corrected_tracks(run: Run, answers: Sequence[Answer]) -> CorrectedTracks:
         For an answer that names no such track or frame, or that contradicts another.
     """
     linked = solve_corrections(run.tracks, answers)
-    if not len(run.committed) or run.corrected:
+    if not is_solved_again(run):
         return _renamed(run, linked)
-    old = _with_ids_of(run.trajectory, run.committed)
-    answered = answered_rows(old, answers, run.frame_rate)
-    kept = np.flatnonzero(~answered.deleted)
-    place = np.cumsum(~answered.deleted) - 1
-    constraints = answered.constraints
-    constraints = Constraints(place[constraints.earlier], place[constraints.later], constraints.same)
+    old = rows_with_ids(run)
+    answered = answered_before(run) + answered_rows(old, answers, run.frame_rate)
+    kept, constraints = answered.kept
     config = parse_config(run.provenance.config, f"{run.path}: configuration")
     rig = run.recording.reduced(config.foreground.body_rows).read_rig
     tracks, identity = associated_tracks(
@@ -69,7 +69,29 @@ def corrected_tracks(run: Run, answers: Sequence[Answer]) -> CorrectedTracks:
     new = np.zeros(len(old), np.int64)
     new[kept] = [numbers.get(one, 0) for one in identity.tolist()]
     given = run.names | {answer.track: answer.name for answer in answers if answer.action == "name"}
-    return CorrectedTracks(solved, _label_ids(old, new), _names(old, new, given))
+    return CorrectedTracks(solved, answered.table, _label_ids(old, new), _names(old, new, given))
+
+
+def is_solved_again(run: Run) -> bool:
+    """Whether answers solve the identities of a run again: it has committed rows, and what was answered before."""
+    return len(run.committed) > 0 and (len(run.answered) > 0 or not run.corrected)
+
+
+def answered_before(run: Run) -> AnsweredRows:
+    """What answers said of the committed rows of a run so far; raises FormatError where they name no such rows."""
+    table, number = run.answered, len(run.committed)
+    last = np.maximum(table["row"], table["other"])
+    if (last >= number).any():
+        raise FormatError(run.path, "/answered", f"row {last.max()}", f"rows of /committed, which has {number}")
+    frame = run.committed["frame"]
+    if (frame[table["row"]] > frame[table["other"]]).any():
+        raise FormatError(run.path, "/answered", "a row after its other", "rows in the order of frames")
+    return AnsweredRows.of_table(table, number)
+
+
+def rows_with_ids(run: Run) -> Rows:
+    """Committed rows with the ids of the run's tracks, 0 for none."""
+    return _with_ids_of(run.trajectory, run.committed)
 
 
 def _with_ids_of(trajectory: Rows, committed: Rows) -> Rows:
@@ -155,4 +177,5 @@ def _renamed(run: Run, linked: Corrections) -> CorrectedTracks:
     trajectory, events = of(run.trajectory), of(run.events)
     events["other"] = linked.map(events["other"], events["frame"])
     trajectory = trajectory[np.lexsort((trajectory["id"], trajectory["frame"]))]
-    return CorrectedTracks(Tracks(trajectory, of(run.boxes), events), linked.map, run.names | linked.names)
+    tracks = Tracks(trajectory, of(run.boxes), events)
+    return CorrectedTracks(tracks, run.answered, linked.map, run.names | linked.names)

@@ -26,8 +26,9 @@ from stseg.model.tables import APPEARANCE, Tracks
 from stseg.occupancy.volume import Occupancy
 from stseg.trackers import find_tracker
 from stseg.trackers.protocol import Tracker
-from stseg.tracking.final_tracks import FinalTracks, committed_tracks, final_tracks
+from stseg.tracking.final_tracks import FinalTracks, bridged_rows, committed_tracks, final_tracks
 from stseg.tracking.identities.constraints import Constraints
+from stseg.tracking.identities.identity_problem import IdentityProblem
 from stseg.tracking.identities.search import FREELY
 from stseg.tracking.track_boxes import box_rows
 
@@ -111,6 +112,14 @@ def associated_tracks(
     """As `finished_tracks`, of a tracker whose identities are not final, under constraints on the committed rows."""
     whole = final_tracks(committed, events, appearance, rig.frame_rate, Border.of(rig), config, constraints)
     return _with_boxes(whole, shown), whole.identity
+
+
+def identity_problem(
+    rig: Rig, config: Config, committed: Rows, appearance: Rows, constraints: Constraints = FREELY
+) -> IdentityProblem:
+    """Whose the committed rows are, as a problem of which single decisions can be tried."""
+    bridged, sizes = bridged_rows(committed, rig.frame_rate, config)
+    return IdentityProblem.of(bridged, sizes, appearance, rig.frame_rate, Border.of(rig), config, constraints)
 
 
 def _with_boxes(whole: FinalTracks, shown: Rig) -> Tracks:

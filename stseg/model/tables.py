@@ -128,6 +128,13 @@ SHIFT = np.dtype([("frame", "<i8"), ("view", "<i4"), ("u", "<f4"), ("v", "<f4")]
 """How far a colour view's picture has moved since its background was learned, pixels, every other second."""
 
 
+ANSWERED = np.dtype([("row", "<i8"), ("other", "<i8"), ("same", "u1")])
+"""What answers of a person say of committed rows, by their index: two that are one person (`same` 1) or two people (0).
+
+A row beside itself with 0 is nobody's.
+"""
+
+
 @dataclass(frozen=True)
 class Tracks:
     """Result of a tracker.

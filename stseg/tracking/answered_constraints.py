@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints, Rows
+from stseg.model.tables import ANSWERED
 from stseg.tracking.corrections import Answer
 from stseg.tracking.identities.constraints import Constraints
 
@@ -19,6 +20,8 @@ _APART = 0.8
 """Distance from which on two people stand apart, metres."""
 _LONGEST = 5.0
 """Longest time before and after the frame of an answer in which rows are looked for, seconds."""
+_SOON = 1.0
+"""Time from there on in which a row apart from everybody is preferred, seconds: later, others may be exchanged."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +41,38 @@ class AnsweredRows:
     constraints: Constraints
     places: list[str]
     deleted: Flags
+
+    @classmethod
+    def of_table(cls, table: Rows, number: int) -> AnsweredRows:
+        """What ANSWERED rows say of so many rows."""
+        pair = table["row"] != table["other"]
+        deleted = np.zeros(number, bool)
+        deleted[table["row"][~pair & (table["same"] == 0)]] = True
+        bound = table[pair]
+        found = Constraints(bound["row"], bound["other"], bound["same"] == 1)
+        return cls(found, ["an answer given before"] * len(found), deleted)
+
+    def __add__(self, more: AnsweredRows) -> AnsweredRows:
+        """Both of two; who is no person by one of them is bound by none."""
+        deleted, both = self.deleted | more.deleted, self.constraints + more.constraints
+        known = ~(deleted[both.earlier] | deleted[both.later])
+        places = [place for place, one in zip([*self.places, *more.places], known, strict=True) if one]
+        return AnsweredRows(both.where(known), places, deleted)
+
+    @property
+    def table(self) -> Rows:
+        """ANSWERED rows that say the same."""
+        gone, bound = np.flatnonzero(self.deleted), self.constraints
+        table = np.zeros(len(bound) + len(gone), ANSWERED)
+        table["row"], table["other"] = np.append(bound.earlier, gone), np.append(bound.later, gone)
+        table["same"][: len(bound)] = bound.same
+        return table
+
+    @property
+    def kept(self) -> tuple[Ints, Constraints]:
+        """Rows that are people, int64 (k,), and the constraints on them, numbered among these."""
+        place = np.where(self.deleted, -1, np.cumsum(~self.deleted) - 1)
+        return np.flatnonzero(~self.deleted), self.constraints.renumbered(place)
 
 
 def answered_rows(rows: Rows, answers: Sequence[Answer], frame_rate: float) -> AnsweredRows:
@@ -70,7 +105,7 @@ class _Tracks:
     """Rows of each track in the order of time."""
 
     def __init__(self, rows: Rows, frame_rate: float) -> None:
-        self.rows, self.reach = rows, _LONGEST * frame_rate
+        self.rows, self.frame_rate, self.reach = rows, frame_rate, _LONGEST * frame_rate
         self.of, self.by_frame = _divided(rows["id"], rows["frame"]), _divided(rows["frame"], rows["id"])
 
     def pairs(self, answer: Answer) -> tuple[list[tuple[int, int]], list[tuple[int, int]]]:
@@ -110,15 +145,15 @@ class _Tracks:
         return self._first_apart(own[self.rows["frame"][own] <= frame + self.reach], other)
 
     def _first_apart(self, own: Ints, other: int) -> int | None:
-        """The first of some rows in which a track is apart from everybody, else from another, else the first."""
+        """The first of some rows in which a track is apart from another, if soon after, from everybody."""
         if not len(own):
             return None
-        from_all, from_other = self._distances(own, 0), self._distances(own, other)
-        for away in (from_all, from_other):
-            apart = np.flatnonzero(away >= _APART)
-            if len(apart):
-                return int(own[apart[0]])
-        return int(own[0])
+        apart = own[self._distances(own, other) >= _APART]
+        first = apart[0] if len(apart) else own[0]
+        passed = np.abs(self.rows["frame"][own] - self.rows["frame"][first])
+        soon = own[(passed <= _SOON * self.frame_rate) & (np.arange(len(own)) >= np.flatnonzero(own == first)[0])]
+        alone = soon[self._distances(soon, 0) >= _APART]
+        return int(alone[0] if len(alone) else first)
 
     def _distances(self, own: Ints, other: int) -> Floats:
         """Distance of rows (n,) from another track in the same frame, or from the nearest (0); inf where alone."""

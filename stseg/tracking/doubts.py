@@ -34,7 +34,8 @@ class Doubt:
     Attributes
     ----------
     question
-        "encounter": were two tracks swapped; "gap": does one track continue another; "false": is a track a person.
+        "encounter": were two tracks swapped; "gap": does one track continue another; "birth": is a track that begins
+        beside another who that one was until then; "false": is a track a person.
     track, other
         Ids; 0 for none.
     first, last
@@ -65,7 +66,9 @@ def find_doubts(trajectory: Rows, tracks: Rows, frame_rate: float, border: Float
     """
     ordered = trajectory[np.argsort(trajectory["frame"], kind="stable")]
     rows = {int(identity): ordered[ordered["id"] == identity] for identity in tracks["id"]}
-    found = [*_encounters(rows, frame_rate), *_gaps(rows, frame_rate), *_weak(rows, frame_rate, border)]
+    found = _encounters(rows, frame_rate)
+    found += _births(rows, frame_rate, {(one.other, one.track, one.first) for one in found})
+    found += [*_gaps(rows, frame_rate), *_weak(rows, frame_rate, border)]
     return sorted(found, key=lambda one: (one.margin, one.first, one.track))
 
 
@@ -132,6 +135,23 @@ def _gaps(rows: dict[int, Rows], frame_rate: float) -> list[Doubt]:
                 if margin < _MOST and (best is None or margin < best.margin):
                     best = Doubt("gap", early, late, int(other["frame"][-1]), int(own["frame"][0]), float(margin))
         found += [] if best is None else [best]
+    return found
+
+
+def _births(rows: dict[int, Rows], frame_rate: float, met: set[tuple[int, int, int]]) -> list[Doubt]:
+    """Tracks that begin while another one goes on from where it may come; `met` there are asked about already."""
+    found = []
+    for late, own in rows.items():
+        first = int(own["frame"][0])
+        for other, seen in rows.items():
+            before, after = seen[seen["frame"] < first], seen[seen["frame"] >= first]
+            if not (len(before) and len(after)) or {(other, late, first), (late, other, first)} & met:
+                continue
+            if first - int(before["frame"][-1]) <= frame_rate:
+                begun = own[own["frame"] <= first + _AROUND * frame_rate]
+                margin = _motion(before, own, frame_rate) + _height(before[-len(begun) :], begun)
+                if margin < _MOST:
+                    found.append(Doubt("birth", other, late, int(before["frame"][-1]), first, margin))
     return found
 
 

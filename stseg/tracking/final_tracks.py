@@ -55,9 +55,7 @@ def final_tracks(
     constraints: Constraints = FREELY,
 ) -> FinalTracks:  # fmt: skip
     """The tracks of a run from its committed TRAJECTORY, EVENT and APPEARANCE rows, under constraints on those rows."""
-    gaps = interpolated_rows(committed, frame_rate, config.tracking)
-    bridged = np.concatenate([committed, gaps])
-    sizes = MeasuredSizes.of_heights(committed["height"], config).with_unmeasured(len(gaps))
+    bridged, sizes = bridged_rows(committed, frame_rate, config)
     linked = associate_globally(bridged, sizes, appearance, frame_rate, border, config, constraints)
     bridged["id"] = linked.identity
     named = linked.identity[: len(committed)]
@@ -72,6 +70,13 @@ def final_tracks(
     tracks = _without_gaps(bridged[np.isin(bridged["id"], kept["id"]) & ~repeats], frame_rate, config.tracking)
     smoothed = smooth_places(tracks, frame_rate, config.motion)
     return FinalTracks(smoothed, every_event[np.argsort(every_event["frame"], kind="stable")], identity)
+
+
+def bridged_rows(committed: Rows, frame_rate: float, config: Config) -> tuple[Rows, MeasuredSizes]:
+    """Committed rows and those that fill their short gaps after them, with the sizes of all."""
+    gaps = interpolated_rows(committed, frame_rate, config.tracking)
+    sizes = MeasuredSizes.of_heights(committed["height"], config).with_unmeasured(len(gaps))
+    return np.concatenate([committed, gaps]), sizes
 
 
 def committed_tracks(committed: Rows, events: Rows, frame_rate: float, config: TrackingConfig) -> FinalTracks:

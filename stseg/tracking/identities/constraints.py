@@ -36,6 +36,23 @@ class Constraints:
         pairs = np.array([*same, *other], np.int64).reshape(-1, 2)
         return cls(pairs[:, 0], pairs[:, 1], np.arange(len(pairs)) < len(same))
 
+    def __add__(self, more: Constraints) -> Constraints:
+        """Both of two."""
+        pairs = zip((self.earlier, self.later, self.same), (more.earlier, more.later, more.same), strict=True)
+        return Constraints(*(np.concatenate(pair) for pair in pairs))
+
+    def where(self, chosen: Flags) -> Constraints:
+        """Some of them."""
+        return Constraints(self.earlier[chosen], self.later[chosen], self.same[chosen])
+
+    def renumbered(self, place: Ints) -> Constraints:
+        """The same of rows under other numbers: place (row,) is that of each."""
+        return Constraints(place[self.earlier], place[self.later], self.same)
+
+    def among(self) -> Constraints:
+        """Those of which both rows are there, numbered from 0."""
+        return self.where((self.earlier >= 0) & (self.later >= 0))
+
     def violated(self, identity: Ints) -> Flags:
         """Which of them identities (row,) do not obey, bool (constraint,)."""
         return np.asarray((identity[self.earlier] == identity[self.later]) != self.same)

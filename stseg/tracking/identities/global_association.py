@@ -9,15 +9,11 @@ import numpy as np
 from stseg.arrays import Ints, Rows
 from stseg.config import Config
 from stseg.model.border import Border
-from stseg.tracking.identities.appearance_model import learn_appearance
 from stseg.tracking.identities.constraints import Constraints
-from stseg.tracking.identities.observations import observe
-from stseg.tracking.identities.search import FREELY, SearchLimits, search_identities
-from stseg.tracking.identities.size_model import MeasuredSizes, SizeModel, learn_sizes
-from stseg.tracking.isolated_tracklets import isolated_tracklets
+from stseg.tracking.identities.identity_problem import IdentityProblem
+from stseg.tracking.identities.search import FREELY
+from stseg.tracking.identities.size_model import MeasuredSizes
 
-_DRAFT = 4
-"""Share of the hypotheses, one in so many, of the search without appearance from which appearance is learned."""
 _AROUND = 0.5
 """Time before and after a row in which its identity holds one track, seconds."""
 
@@ -81,23 +77,8 @@ def associate_globally(
     constraints
         Pairs of rows that are one person, or two.
     """
-    tracklets = isolated_tracklets(trajectory, frame_rate)
-    model, value = learn_sizes(sizes, trajectory["frame"], tracklets, frame_rate), sizes.value
-
-    def search(hypotheses: int) -> Ints:
-        seen = observe(trajectory, value, model, frame_rate, border, config)
-        limits = SearchLimits(hypotheses, config.tracking.maximum_gap, config.tracking.identity_lag)
-        first = np.empty(len(trajectory), np.int64)
-        place = np.argsort(seen.order)
-        known = Constraints(place[constraints.earlier], place[constraints.later], constraints.same)
-        first[seen.order] = seen.order[search_identities(seen, model, config.motion, limits, known)]
-        return first
-
-    if len(appearance):
-        draft = search(-(-config.tracking.hypotheses // _DRAFT))
-        learned = learn_appearance(trajectory, appearance, tracklets, draft, frame_rate)
-        model, value = SizeModel.joined([model, learned.model]), np.concatenate([value, learned.value], axis=1)
-    first = search(config.tracking.hypotheses)
+    problem = IdentityProblem.of(trajectory, sizes, appearance, frame_rate, border, config, constraints)
+    first = problem.solve(constraints)
     identity = _numbered(trajectory, first)
     return GlobalAssociation(identity, _links(trajectory, identity, frame_rate))
 

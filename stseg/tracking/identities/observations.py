@@ -56,6 +56,17 @@ class Observations:
     precision: Floats
     information: Floats
 
+    def between(self, start: int, stop: int) -> Observations:
+        """Those of the frames from `start` to before `stop`; who was observed before is new there."""
+        first, last = int(self.start[start]), int(self.start[stop])
+        part = slice(first, last)
+        previous = np.where(self.previous[part] >= first, self.previous[part] - first, -1)
+        return Observations(
+            self.order[part], self.start[start : stop + 1] - first, self.seconds[start:stop], self.ground[part],
+            self.variance[part], previous, self.certain[part] & (previous >= 0), self.inside[part],
+            self.precision[part], self.information[part],
+        )  # fmt: skip
+
 
 def observe(
     trajectory: Rows, sizes: Floats, model: SizeModel, frame_rate: float, border: Border, config: Config

@@ -83,10 +83,26 @@ class _History:
         return agree
 
 
+@dataclass(frozen=True)
+class Solution:
+    """The best hypothesis found.
+
+    Attributes
+    ----------
+    name : int64 (n,)
+        Identity of each observation, named by its first observation.
+    score
+        Nats.
+    """
+
+    name: Ints
+    score: float
+
+
 def search_identities(
     seen: Observations, sizes: SizeModel, motion: MotionConfig, limits: SearchLimits, constraints: Constraints = FREELY
-) -> Ints:
-    """The most likely identity of each observation, named by its first observation, int64 (n,).
+) -> Solution:
+    """The most likely identity of each observation.
 
     Parameters
     ----------
@@ -117,7 +133,7 @@ def search_identities(
             history.steps[-1].parent, history.steps[-1].names = step.parent[agree], step.names[agree]
             held = held.at(agree)
     history.decide(np.inf, len(held.score))
-    return history.name
+    return Solution(history.name, float(held.score[0]))
 
 
 def _extended(

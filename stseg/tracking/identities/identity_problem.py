@@ -1,0 +1,110 @@
+"""The identities of a run as one problem: its observations, what sizes and appearance tell, and the search's limits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from stseg.arrays import Floats, Ints, Rows
+from stseg.config import Config, MotionConfig
+from stseg.model.border import Border
+from stseg.tracking.identities.appearance_model import learn_appearance
+from stseg.tracking.identities.constraints import Constraints
+from stseg.tracking.identities.observations import Observations, observe
+from stseg.tracking.identities.search import FREELY, SearchLimits, search_identities
+from stseg.tracking.identities.size_model import MeasuredSizes, SizeModel, learn_sizes
+from stseg.tracking.isolated_tracklets import isolated_tracklets
+
+_DRAFT = 4
+"""Share of the hypotheses, one in so many, of the search without appearance from which appearance is learned."""
+
+
+@dataclass(frozen=True)
+class IdentityProblem:
+    """Whose are the rows of a run?
+
+    Attributes
+    ----------
+    seen
+        The rows in the order of time.
+    model
+        Statistics of sizes and appearance.
+    motion
+        Motion model.
+    limits
+        Extent of the search.
+    """
+
+    seen: Observations
+    model: SizeModel
+    motion: MotionConfig
+    limits: SearchLimits
+
+    @classmethod
+    def of(
+        cls, trajectory: Rows, sizes: MeasuredSizes, appearance: Rows, frame_rate: float, border: Border,
+        config: Config, constraints: Constraints = FREELY,
+    ) -> IdentityProblem:  # fmt: skip
+        """The problem of a run; sizes and appearance are learned from it.
+
+        Parameters
+        ----------
+        trajectory : TRAJECTORY (n,)
+            In any order.
+        sizes
+            Of each row.
+        appearance : APPEARANCE (l,)
+            Of detections.
+        frame_rate
+            Frames per second.
+        border
+            Where people come and go.
+        config
+            The constants of all stages: body, motion, detection and tracking.
+        constraints
+            Pairs of rows that are one person, or two: identities from which appearance is learned obey them.
+        """
+        tracklets, own = isolated_tracklets(trajectory, frame_rate), config.tracking
+        limits = SearchLimits(own.hypotheses, own.maximum_gap, own.identity_lag)
+
+        def problem(model: SizeModel, value: Floats) -> IdentityProblem:
+            seen = observe(trajectory, value, model, frame_rate, border, config)
+            return cls(seen, model, config.motion, limits)
+
+        model = learn_sizes(sizes, trajectory["frame"], tracklets, frame_rate)
+        plain = problem(model, sizes.value)
+        if not len(appearance):
+            return plain
+        draft = plain.with_hypotheses(-(-own.hypotheses // _DRAFT)).solve(constraints)
+        learned = learn_appearance(trajectory, appearance, tracklets, draft, frame_rate)
+        joined = SizeModel.joined([model, learned.model])
+        return problem(joined, np.concatenate([sizes.value, learned.value], axis=1))
+
+    def with_hypotheses(self, number: int) -> IdentityProblem:
+        """The problem with another number of hypotheses."""
+        return replace(self, limits=replace(self.limits, hypotheses=number))
+
+    def solve(self, constraints: Constraints = FREELY) -> Ints:
+        """The first row of the identity of each row, int64 (n,)."""
+        order, first = self.seen.order, np.empty(len(self.seen.order), np.int64)
+        known = constraints.renumbered(np.argsort(order))
+        first[order] = order[search_identities(self.seen, self.model, self.motion, self.limits, known).name]
+        return first
+
+    def score(self, constraints: Constraints, since: float, until: float) -> float:
+        """Score of the best identities of the rows between two times, nats.
+
+        Parameters
+        ----------
+        constraints
+            Pairs of rows; those of which a row lies outside are left out.
+        since, until
+            Seconds.
+        """
+        start, stop = np.searchsorted(self.seen.seconds, (since, until)).tolist()
+        part = self.seen.between(start, stop)
+        place = np.full(len(self.seen.order), -1)
+        place[part.order] = np.arange(len(part.order))
+        known = constraints.renumbered(place).among()
+        return search_identities(part, self.model, self.motion, self.limits, known).score
