@@ -59,7 +59,9 @@ def fill_sums(likelihood: Singles, sums: Sums) -> None:
 @kernel
 def sum_of(sums: Sums, left: int, top: int, right: int, bottom: int) -> np.uint32:
     """Sum over the pixels of rows top..bottom - 1 and columns left..right - 1."""
-    return np.uint32((sums[bottom, right] - sums[bottom, left]) - (sums[top, right] - sums[top, left]))
+    # Unsigned places: none is negative, which is not asked here.
+    u, v, stop, end = np.uint64(left), np.uint64(top), np.uint64(right), np.uint64(bottom)
+    return np.uint32((sums[end, stop] - sums[end, u]) - (sums[v, stop] - sums[v, u]))
 
 
 @kernel

@@ -72,8 +72,9 @@ def _overlap(first: int, extent: int, step: int, k: int) -> int:
 
 @part
 def _shows_a_person(shown: PixelAssignment, left: int, top: int, width: int, height: int) -> bool:
-    above, below = shown.row[top], shown.row[top + height - 1] + 1
-    first, stop = shown.column[left], shown.column[left + width - 1] + 1
+    # Unsigned places: none is negative, which is not asked here.
+    above, below = np.uint64(shown.row[np.uint64(top)]), np.uint64(shown.row[np.uint64(top + height - 1)] + 1)
+    first, stop = np.uint64(shown.column[np.uint64(left)]), np.uint64(shown.column[np.uint64(left + width - 1)] + 1)
     table = shown.occupied
     return bool(table[below, stop] - table[below, first] != table[above, stop] - table[above, first])
 
