@@ -1,15 +1,18 @@
-"""What `--publish` sends arrives, as JSON lines at a real MQTT broker and by HTTP; a missing receiver costs nothing."""
+"""What `--publish` sends arrives at a real MQTT broker, by WebSocket and by HTTP; a missing receiver costs nothing."""
 
 from __future__ import annotations
 
 import asyncio
 import json
 import socket
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from http.server import BaseHTTPRequestHandler, HTTPServer
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,7 +20,8 @@ import pytest
 from stseg.arrays import Rows
 from stseg.commands.main import main
 from stseg.errors import ConfigError
-from stseg.io.live.publishing import Publisher, receiver_of
+from stseg.io.live.publishing import Publisher
+from stseg.io.live.receivers import receiver_of
 from stseg.model.tables import TRAJECTORY
 
 
@@ -112,7 +116,18 @@ def test_a_missing_receiver_delays_nothing(monkeypatch: pytest.MonkeyPatch) -> N
 
 @pytest.mark.parametrize(
     "address",
-    ["file:///etc/passwd", "mqtt://host", "mqtt:///topic", "http://", "x", "http://[", "http://a:b/", "ftp://a/b"],
+    [
+        "file:///etc/passwd",
+        "mqtt://host",
+        "mqtt:///topic",
+        "http://",
+        "x",
+        "http://[",
+        "http://a:b/",
+        "ftp://a/b",
+        "ws:///path",
+        "ws://a/b#c",
+    ],
 )
 def test_other_addresses_are_refused(address: str) -> None:
     with pytest.raises(ConfigError, match=r"expected mqtt://HOST\[:PORT\]/TOPIC"):
@@ -123,6 +138,104 @@ def test_publishing_needs_follow(tmp_path: Path, capsys: pytest.CaptureFixture[s
     (tmp_path / "rig.toml").write_text("")
     assert main(["run", str(tmp_path / "rig.toml"), "-o", "x.h5", "--publish", "http://127.0.0.1:9/"]) == 2
     assert capsys.readouterr().err.count("\n") == 1
+
+
+@contextmanager
+def listening_socket(handle: Callable[[Any], None], port: int = 0) -> Iterator[int]:
+    """A WebSocket server that gives each connection to `handle`; its port."""
+    serving = pytest.importorskip("websockets.sync.server")
+    with serving.serve(handle, "127.0.0.1", port) as server:
+        thread = threading.Thread(target=server.serve_forever, daemon=True)
+        thread.start()
+        yield server.socket.getsockname()[1]
+        server.shutdown()
+        thread.join()
+
+
+def test_rows_arrive_at_a_web_socket_that_answers_a_lot() -> None:
+    """More answers to each message than a connection holds unread."""
+    bodies: list[bytes] = []
+    paths: list[str] = []
+
+    def handle(connection: Any) -> None:
+        paths.append(connection.request.path)
+        for text in connection:
+            bodies.append(text.encode())
+            for _ in range(40):
+                connection.send("thank you")
+
+    with (
+        listening_socket(handle) as port,
+        Publisher(receiver_of(f"ws://127.0.0.1:{port}/hall?live=1"), 5.0, pytest.fail) as publisher,
+    ):
+        publisher.append(rows_of(7, 8))
+        publisher.append(rows_of(9))
+        wait_for(lambda: len(bodies) == 2)
+    assert [len(body.splitlines()) for body in bodies] == [2, 1]
+    assert parsed(bodies) == EXPECTED and paths == ["/hall?live=1"]
+
+
+def test_a_web_socket_that_breaks_is_opened_again() -> None:
+    messages: list[str] = []
+    sent, closed = threading.Event(), threading.Event()
+
+    def handle(connection: Any) -> None:
+        for text in connection:
+            messages.append(text)
+            if text == "first":
+                sent.wait(10)
+                connection.close()
+                closed.set()
+
+    with listening_socket(handle) as port:
+        receiver = receiver_of(f"ws://127.0.0.1:{port}/")
+        receiver.send(b"first")
+        sent.set()
+        assert closed.wait(10)
+        with pytest.raises(OSError, match="1000"):
+            receiver.send(b"second")
+        receiver.send(b"second")
+        wait_for(lambda: len(messages) == 2)
+        receiver.close()
+    assert messages == ["first", "second"]
+
+
+def test_a_web_socket_that_comes_late_is_one_line_and_another(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("stseg.io.live.publishing._RETRY", 0.05)
+    said: list[str] = []
+    bodies: list[bytes] = []
+    with socket.socket() as unused:
+        unused.bind(("127.0.0.1", 0))
+        port = unused.getsockname()[1]
+    with Publisher(receiver_of(f"ws://127.0.0.1:{port}/"), 5.0, said.append) as publisher:
+        publisher.append(rows_of(7, 8, 9))
+        wait_for(lambda: said)
+        time.sleep(0.2)
+        with listening_socket(lambda connection: bodies.extend(text.encode() for text in connection), port):
+            wait_for(lambda: bodies and len(said) == 2)
+    assert said[0].startswith("publishing waits for its receiver (") and "refused" in said[0]
+    assert said[1:] == ["publishing goes on"] and parsed(bodies) == EXPECTED
+
+
+def test_a_web_server_that_is_none_of_sockets_is_one_line(
+    posted: tuple[str, list[bytes], list[int]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("websockets.sync.client")
+    monkeypatch.setattr("stseg.io.live.publishing._RETRY", 0.05)
+    said: list[str] = []
+    with Publisher(receiver_of(posted[0].replace("http", "ws")), 5.0, said.append) as publisher:
+        publisher.append(rows_of(7))
+        wait_for(lambda: said)
+    assert said == [
+        "publishing waits for its receiver (did not receive a valid HTTP response)",
+        "1 messages were not published; the live table has their rows",
+    ]
+
+
+def test_without_its_library_a_web_socket_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "websockets.sync.client", None)
+    with pytest.raises(ConfigError, match=r"pip install 'stseg\[websocket\]'"):
+        receiver_of("ws://127.0.0.1/")
 
 
 def test_rows_arrive_at_a_broker() -> None:

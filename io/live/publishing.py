@@ -1,4 +1,4 @@
-"""Rows of the live table sent on as JSON lines: to a topic of an MQTT broker, or by HTTP POST.
+"""Rows of the live table sent on as JSON lines.
 
 A thread sends what a queue holds, so a slow or missing receiver never delays tracking. While it cannot be reached the
 newest messages wait, as many as `_WAITING`; older ones are dropped, and the live table has them still.
@@ -7,114 +7,23 @@ newest messages wait, as many as `_WAITING`; older ones are dropped, and the liv
 from __future__ import annotations
 
 import json
-import urllib.error
-import urllib.request
 from collections.abc import Callable
 from contextlib import suppress
 from queue import Empty, Full, Queue
 from threading import Event, Thread
 from types import TracebackType
-from typing import Any, Protocol, Self
-from urllib.parse import SplitResult, urlsplit
+from typing import Any, Self
 
 from stseg.arrays import Rows
-from stseg.errors import ConfigError
-from stseg.io.extras import load_extra
+from stseg.io.live.receivers import Receiver
 from stseg.io.recording.recording import mask_passwords
 
 _WAITING = 1000
 """Messages that wait for a receiver, one a window."""
-_TIMEOUT = 5.0
-"""Longest wait for an answer, seconds."""
 _RETRY = 2.0
 """Time between attempts, seconds."""
 _ENDING = 10.0
 """Longest time in which the last messages are sent after the run, seconds."""
-_MQTT_PORT = 1883
-_EXPECTED = "mqtt://HOST[:PORT]/TOPIC, http://HOST/PATH or https://HOST/PATH"
-
-
-class Receiver(Protocol):
-    """Where messages go."""
-
-    def send(self, message: bytes) -> None:
-        """Send a message; OSError where it was not received."""
-
-    def close(self) -> None:
-        """End the connection."""
-
-
-class HttpReceiver:
-    """Each message is the body of one POST request, of type application/x-ndjson."""
-
-    def __init__(self, address: SplitResult) -> None:
-        self._url = address.geturl()
-
-    def send(self, message: bytes) -> None:
-        """Post it; any answer but success is an error."""
-        request = urllib.request.Request(self._url, message, {"Content-Type": "application/x-ndjson"})
-        with urllib.request.urlopen(request, timeout=_TIMEOUT):  # an address of http or https alone, see `receiver_of`
-            pass
-
-    def close(self) -> None:
-        """Each request has a connection of its own."""
-
-
-class MqttReceiver:
-    """Each message is published to one topic, at least once (quality of service 1)."""
-
-    def __init__(self, address: SplitResult) -> None:
-        mqtt = load_extra("paho.mqtt.client", "mqtt")
-        self._address, self._topic = address, address.path.lstrip("/")
-        self._client: Any = mqtt.Client(mqtt.CallbackAPIVersion.VERSION2)
-        if address.username is not None:
-            self._client.username_pw_set(address.username, address.password)
-        self._is_begun = False
-
-    def send(self, message: bytes) -> None:
-        """Publish it, and wait until the broker has it."""
-        if not self._is_begun:
-            self._client.connect(self._address.hostname, self._address.port or _MQTT_PORT)
-            self._client.loop_start()
-            self._is_begun = True
-        try:
-            sent = self._client.publish(self._topic, message, qos=1)
-            sent.wait_for_publish(_TIMEOUT)
-        except (RuntimeError, ValueError) as error:
-            raise OSError(str(error)) from error
-        if not sent.is_published():
-            raise OSError("no answer of the broker")
-
-    def close(self) -> None:
-        """Leave the broker."""
-        if self._is_begun:
-            self._client.disconnect()
-            self._client.loop_stop()
-
-
-_RECEIVERS: dict[str, Callable[[SplitResult], Receiver]] = {
-    "mqtt": MqttReceiver,
-    "http": HttpReceiver,
-    "https": HttpReceiver,
-}
-
-
-def receiver_of(address: str) -> Receiver:
-    """The receiver at an address.
-
-    Raises
-    ------
-    ConfigError
-        Where it is none, or its library is not installed.
-    """
-    try:
-        parts = urlsplit(address)
-        whole = bool(parts.hostname) and (parts.scheme != "mqtt" or len(parts.path) > 1) and parts.port != 0
-    except ValueError:
-        whole = False
-    if not whole or parts.scheme not in _RECEIVERS or not address.isprintable():
-        raise ConfigError("--publish", "", repr(mask_passwords(address)), _EXPECTED)
-    return _RECEIVERS[parts.scheme](parts)
 
 
 class Publisher:
@@ -186,7 +95,7 @@ class Publisher:
         while True:
             try:
                 self._receiver.send(message)
-            except (OSError, urllib.error.URLError) as error:
+            except OSError as error:
                 if not is_failing:
                     self._report(f"publishing waits for its receiver ({mask_passwords(str(error))})")
                 is_failing = True

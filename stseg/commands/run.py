@@ -14,7 +14,7 @@ from stseg.engine.frame_range import FrameRange
 from stseg.engine.worker_processes import prepare_workers
 from stseg.errors import ConfigError
 from stseg.io.config_file import read_config
-from stseg.io.live.publishing import receiver_of
+from stseg.io.live.receivers import receiver_of
 from stseg.io.outputs.label_images import require_label_folder
 from stseg.io.recording.rigs import read_rig
 from stseg.io.runfile.layout import VolumeKind
@@ -78,7 +78,8 @@ def run(
         Ctrl-C or SIGTERM finishes the run file; --frames 0:B ends it by itself.
     publish
         With --follow: send the same tracks as JSON lines, one message a window, to mqtt://HOST[:PORT]/TOPIC (needs
-        paho-mqtt) or by POST to http://HOST/PATH. Tracking never waits for the receiver.
+        paho-mqtt), over a WebSocket to ws://HOST[:PORT]/PATH or wss://HOST/PATH (needs websockets), or by POST to
+        http://HOST/PATH: --publish ws://localhost:8765/tracks, for instance. Tracking never waits for the receiver.
     overwrite
         Replace an older run file of that name, once this one is whole.
     """

@@ -30,7 +30,8 @@ from stseg.io.live.followed_cameras import FollowedCameras
 from stseg.io.live.followed_files import FollowedFiles
 from stseg.io.live.live_frames import LiveFrameSet, is_live
 from stseg.io.live.live_table import LiveTable
-from stseg.io.live.publishing import Publisher, Receiver
+from stseg.io.live.publishing import Publisher
+from stseg.io.live.receivers import Receiver
 from stseg.io.outputs.whole_files import require_new
 from stseg.io.recording.recording import Recording
 from stseg.io.recording.stream_index import StreamIndex
