@@ -115,6 +115,13 @@ def cvat(folder: Path) -> Source:
     return source(folder / "video.xml", classes=("person",))
 
 
+def motchallenge_truth(folder: Path) -> Source:
+    boxes = [(frame + 1, *box[:4]) for frame, own in BOXES.items() for box in own]
+    rows = [f"{frame},0,{left},{top},{width},{height},1,1,0.8\n" for frame, left, top, width, height in boxes]
+    (folder / "gt.txt").write_text("".join(rows) + "2,9,1,1,5,5,0,1,1\n")
+    return source(folder / "gt.txt", first_frame=1)
+
+
 def label_studio(folder: Path) -> Source:
     def result(box: tuple[float, ...]) -> dict[str, Any]:
         x, y, w, h = box[0] / 0.8, box[1] / 0.6, box[2] / 0.8, box[3] / 0.6
@@ -177,7 +184,13 @@ SCORED: dict[str, Writer] = {
     "CSV with corners": csv_corners,
     "Parquet": parquet,
 }
-ANNOTATED: dict[str, Writer] = {"WILDTRACK": wildtrack, "CVAT XML": cvat, "Label Studio": label_studio, "VIA": via}
+ANNOTATED: dict[str, Writer] = {
+    "WILDTRACK": wildtrack,
+    "MOTChallenge truth": motchallenge_truth,
+    "CVAT XML": cvat,
+    "Label Studio": label_studio,
+    "VIA": via,
+}
 
 
 @pytest.mark.parametrize("name", [*SCORED, *ANNOTATED])
@@ -202,6 +215,11 @@ def test_every_format_gives_the_same_boxes(tmp_path: Path, name: str) -> None:
         ("COCO data set", "data.json", "12.0, 20.0, 30.0]", "12.0, 20.0]", r"detection 0: found a box of 3 numbers"),
         ("MMDetection", "preds/000002.json", "[0, 0]", "[0]", r"frame 2: found bboxes, scores, labels and masks"),
         ("WILDTRACK", "annotations_positions/00000000.json", '"ymax": 42', '"ymax": "a"', r"person 0: found box 'a'"),
+        ("MOTChallenge truth", "gt.txt", "16.0,40.0,1,1,0.8", "16.0,40.0", r"line 3: found 6 fields, expected 9"),
+        ("MOTChallenge truth", "gt.txt", "10.0,24.0", "10.0,tall", r"line 2: found field 'tall'"),
+        ("MOTChallenge truth", "gt.txt", "3,0,5.0", "3.5,0,5.0", r"line 2: found frame 3.5, expected a whole"),
+        ("MOTChallenge truth", "gt.txt", "30.0,1,1,", "30.0,1,1.5,", r"line 1: found class 1.5, expected a whole"),
+        ("MOTChallenge truth", "gt.txt", "1,0,10.0", "0,0,10.0", r"found frame 0, expected a frame from first_frame"),
         ("CVAT XML", "video.xml", 'xtl="10.0"', "", r"track 00, frame 0: found box ''"),
         ("CVAT XML", "video.xml", "</annotations>", "", r"video.xml: found what is not XML"),
         ("Label Studio", "studio.json", '"width": 25.0, ', "", r"task 0, result 0: found no width"),
@@ -221,6 +239,31 @@ def test_a_malformed_twin_is_one_line(tmp_path: Path, name: str, file: str, old:
     path.write_text(text.replace(old, new, 1))
     with pytest.raises(InputError, match=message) as raised:
         read_source(made, SIZE)
+    assert "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("column", "values", "message"),
+    [
+        ("score", [0.9, 1.9], r"row 1: found score 1.9"),
+        ("frame", [0.0, 0.5], r"row 1: found frame 0.5, expected a whole"),
+        ("left", ["1", "far"], r"row 1: found left 'far'"),
+        ("height", [3.0, -3.0], r"row 1: found a box 4 by -3 pixels"),
+        ("width", None, r"header: found the columns frame, left, top, height, score"),
+    ],
+)
+def test_a_malformed_table_of_parquet_is_one_line(
+    tmp_path: Path, column: str, values: list[object] | None, message: str
+) -> None:
+    pyarrow = pytest.importorskip("pyarrow")
+    from pyarrow import parquet as writer
+
+    columns = {"frame": [0, 1], "left": [1, 1], "top": [2, 2], "width": [4, 4], "height": [3, 3], "score": [0.5, 0.5]}
+    chosen = {name: values if name == column else own for name, own in columns.items()}
+    table = {name: own for name, own in chosen.items() if own is not None}
+    writer.write_table(pyarrow.table(table), tmp_path / "b.parquet")
+    with pytest.raises(InputError, match=message) as raised:
+        read_source(source(tmp_path / "b.parquet"), SIZE)
     assert "\n" not in str(raised.value)
 
 

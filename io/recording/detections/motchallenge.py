@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+from stseg.errors import FormatError
 from stseg.io import limits
 from stseg.io.bounded_files import read_text
 from stseg.io.numbers import parse_number
@@ -35,9 +36,17 @@ def read_ground_truth(request: Request) -> Detections:
             continue
         place = f"line {row}"
         values = [number(request.path, place, "field", word) for word in line.replace(",", " ").split()]
-        if len(values) < 8 or values[6] == 0:
-            continue
-        kind = int(values[7])
-        label = _CLASSES[kind] if 0 < kind < len(_CLASSES) else str(kind)
-        found.add(place, int(values[0]), values[2:6], label=label)
+        _check(request.path, place, values)
+        if values[6] != 0:
+            kind = int(values[7])
+            label = _CLASSES[kind] if 0 < kind < len(_CLASSES) else str(kind)
+            found.add(place, int(values[0]), values[2:6], label=label)
     return found.done()
+
+
+def _check(path: Path, place: str, values: list[float]) -> None:
+    if len(values) not in (8, 9):
+        raise FormatError(path, place, f"{len(values)} fields", "9, as the first line has")
+    for name, value in (("frame", values[0]), ("class", values[7])):
+        if not value.is_integer():
+            raise FormatError(path, place, f"{name} {value:g}", "a whole number")
