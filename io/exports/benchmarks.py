@@ -34,7 +34,8 @@ def write_mot(path: Path, run: Run) -> None:
 def write_mot_boxes(path: Path, run: Run) -> None:
     """Write a zip of 2-D MOTChallenge lines, `CAMERA.txt` each: frame, id, left, top, width, height, 1, -1, -1, -1.
 
-    Frames count from 1 there; left and top are edges in pixels of the real image, as in the boxes that we read.
+    Frames count from 1 there; left and top are edges in pixels of the real image, counted from 0 as in the boxes that
+    we read: MOTChallenge's own files count pixels from 1.
     """
     texts = {}
     for view, camera in enumerate(run.cameras):

@@ -29,7 +29,11 @@ def is_ground_truth(path: Path) -> bool:
 
 
 def read_ground_truth(request: Request) -> Detections:
-    """Boxes that the flag includes, with their classes."""
+    """Boxes that the flag includes, with their classes.
+
+    Left and top stay as they stand: the benchmark counts pixels from 1, many programs that write its files from 0, and
+    no file says which.
+    """
     found = DetectionList(request.path)
     for row, line in enumerate(read_text(request.path, limits.DETECTIONS_FILE).splitlines(), 1):
         if not line.strip():
