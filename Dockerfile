@@ -1,5 +1,5 @@
 # Built by: docker build -t stseg .
-# Run with: docker run --rm -v "$PWD:/data" stseg run room.toml -o room.h5
+# Run with: docker run --rm --user "$(id -u):$(id -g)" -v "$PWD:/data" stseg run room.toml -o room.h5
 FROM python:3.12-slim AS build
 COPY . /source
 RUN apt-get update && apt-get install -y --no-install-recommends g++ && \
