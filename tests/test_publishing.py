@@ -99,6 +99,26 @@ def test_a_receiver_that_fails_for_a_while_gets_everything(
     assert [line.split(" (")[0] for line in said] == ["publishing waits for its receiver", "publishing goes on"]
 
 
+def test_an_answer_that_is_no_http_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("stseg.io.live.publishing._RETRY", 0.05)
+    said: list[str] = []
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        def answer() -> None:
+            connection, _ = server.accept()
+            with connection:
+                connection.recv(65536)
+                connection.sendall(b"what?\r\n")
+
+        thread = threading.Thread(target=answer, daemon=True)
+        thread.start()
+        with Publisher(receiver_of(f"http://127.0.0.1:{server.getsockname()[1]}/"), 5.0, said.append) as publisher:
+            publisher.append(rows_of(7))
+            wait_for(lambda: said, 5)
+        thread.join(10)
+    assert said[0].startswith("publishing waits for its receiver (") and "\n" not in said[0]
+
+
 def test_a_missing_receiver_delays_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("stseg.io.live.publishing._RETRY", 0.05)
     monkeypatch.setattr("stseg.io.live.publishing._WAITING", 10)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import urllib.request
 from collections.abc import Callable
 from contextlib import suppress
+from http.client import HTTPException
 from threading import Thread
 from typing import Any, Protocol
 from urllib.parse import SplitResult, urlsplit
@@ -38,8 +39,11 @@ class HttpReceiver:
     def send(self, message: bytes) -> None:
         """Post it; any answer but success is an error."""
         request = urllib.request.Request(self._url, message, {"Content-Type": "application/x-ndjson"})
-        with urllib.request.urlopen(request, timeout=_TIMEOUT):  # an address of http or https alone, see `receiver_of`
-            pass
+        try:
+            with urllib.request.urlopen(request, timeout=_TIMEOUT):  # of http or https alone, see `receiver_of`
+                pass
+        except HTTPException as error:
+            raise OSError(f"no answer of HTTP: {error!r}") from error
 
     def close(self) -> None:
         """Each request has a connection of its own."""
