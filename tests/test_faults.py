@@ -67,6 +67,7 @@ def places(calls: tuple[str, ...], fault: str) -> list[int]:
     return sorted(chosen)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "fault", ["kill", "kill after", "short", *map(str, (errno.ENOSPC, errno.EIO, errno.EMFILE, errno.EACCES))]
 )

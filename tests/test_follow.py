@@ -287,6 +287,7 @@ def server(cameras_rig: Path) -> Iterator[dict[str, str]]:
         serving.communicate()
 
 
+@pytest.mark.slow
 @quick
 def test_a_real_rtsp_server_whose_streams_end_is_followed(
     cameras_rig: Path, server: dict[str, str], tmp_path: Path

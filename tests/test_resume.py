@@ -69,6 +69,7 @@ def test_a_run_in_segments_follows_everybody(undisturbed: Path) -> None:
     assert labels == {0, *run.tracks["id"].tolist()}
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
 def test_twenty_kills_lose_nothing(rig_path: Path, undisturbed: Path, night: Path) -> None:
     """Processes that have everything imported are forked and killed at random moments, until one comes to its end."""
