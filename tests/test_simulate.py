@@ -32,6 +32,7 @@ from stseg.simulation.crowd import Crowd, walk_freely
 from stseg.simulation.detector import detect, visible_boxes
 from stseg.simulation.ray_casting import draw_bodies, pixel_boxes
 from stseg.simulation.render import LAMP, Viewer
+from stseg.simulation.scene import KINDS
 from stseg.simulation.shadows import PENUMBRA, darken
 
 TINY = NAMED["tiny"]
@@ -65,7 +66,16 @@ def test_people_who_dress_alike_do_so_in_tones_of_their_own() -> None:
 
 @pytest.mark.parametrize(
     ("key", "value"),
-    [("people", -1), ("cameras", 0), ("seconds", 0.0), ("camera_distance", 1.0), ("quality", 0), ("speed", (2.0, 1.0))],
+    [
+        ("people", -1),
+        ("cameras", 0),
+        ("seconds", 0.0),
+        ("camera_distance", 1.0),
+        ("quality", 0),
+        ("speed", (2.0, 1.0)),
+        ("absence", -1.0),
+        ("kinds", ()),
+    ],
 )
 def test_scene_refuses_what_cannot_be(key: str, value: object) -> None:
     with pytest.raises(ConfigError, match=f"scene tiny: {key}"):
@@ -266,6 +276,27 @@ def test_crowds_keep_apart_come_and_go(name: str) -> None:
     assert len(known) > spec.people
 
 
+def test_regulars_come_back_as_they_were() -> None:
+    spec = NAMED["return"]
+    came: dict[int, list[int]] = {}
+    heights: dict[int, set[float]] = {}
+    before: set[int] = set()
+    for crowd in walk_freely(spec):
+        for person, height in zip(crowd.id.tolist(), crowd.height.tolist(), strict=True):
+            heights.setdefault(person, set()).add(height)
+            if person not in before:
+                came.setdefault(person, []).append(crowd.frame)
+        before = set(crowd.id.tolist())
+    assert set(came) == set(range(1, spec.people + 1))
+    assert all(len(frames) >= 6 for frames in came.values())
+    assert all(len(own) == 1 for own in heights.values())
+
+
+def test_nobody_leaves_the_closed_room() -> None:
+    spec = replace(NAMED["long"], seconds=120.0)
+    assert all(len(crowd.truth(spec.area)) == spec.people for crowd in walk_freely(spec))
+
+
 def test_places_do_not_depend_on_the_views() -> None:
     spec = replace(TINY, cameras=1, noise=9.0, size=(32, 24))
     for one, other in zip(walk_freely(TINY), walk_freely(spec), strict=True):
@@ -431,6 +462,19 @@ def test_command_changes_the_named_scene(tmp_path: Path, capsys: pytest.CaptureF
     assert [camera.size for camera in recording.rig.cameras] == [(40, 32)]
     assert read_tracks_csv(tmp_path / "s" / "truth.csv")["frame"].max() == 1
     assert "2 frames of 1 cameras" in capsys.readouterr().out
+
+
+def test_a_scene_of_boxes_has_nothing_else(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    simulate(tmp_path / "s", scene="long", cameras=2, seconds=0.4, size="64,48")
+    assert {path.name for path in (tmp_path / "s").iterdir()} == {
+        "rig_boxes.toml", "truth.csv", "cam1_boxes.csv", "cam2_boxes.csv",
+    }  # fmt: skip
+    assert "rig_boxes.toml: 2 frames" in capsys.readouterr().out
+    spec = replace(NAMED["long"], seconds=0.4, cameras=2)
+    alone, whole_film = Film(spec), Film(replace(spec, kinds=KINDS))
+    for one, other in zip(alone.frame_sets(), whole_film.frame_sets(), strict=True):
+        for view, whole in zip(one.views, other.views, strict=True):
+            np.testing.assert_array_equal(view.boxes.pixel, whole.boxes.pixel)
 
 
 def test_command_suggests_a_scene(tmp_path: Path) -> None:

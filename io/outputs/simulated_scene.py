@@ -6,6 +6,8 @@ cam1.avi  cam1_empty.avi                                          films in colou
 cam1_masks.avi                                                    silhouettes, 0..255 (FFV1: lossless)
 cam1_boxes.csv                                                    simulated detections
 cam1_instances/000000.png                                         ids, 16 bits, optional
+
+A scene that has but some kinds of foreground leaves out the files of the others.
 """
 
 from __future__ import annotations
@@ -67,6 +69,8 @@ class SimulatedScene(Protocol):
     @property
     def frames(self) -> int: ...
     @property
+    def kinds(self) -> tuple[SourceKind, ...]: ...
+    @property
     def quality(self) -> int: ...
     def empty(self) -> Iterator[tuple[Bytes, ...]]: ...
     def frame_sets(self) -> Iterator[SimulatedFrame]: ...
@@ -110,7 +114,8 @@ def write_scene(
             raise OutputError(folder, "", "files in it", "an empty folder, or leave to overwrite")
         if links := [path.name for path in folder.iterdir() if path.is_symlink()]:
             raise OutputError(folder, "", f"{links[0]}, a link", "no links, which would be written through")
-        _write_empty(folder, scene)
+        if "video" in scene.kinds:
+            _write_empty(folder, scene)
         with ExitStack() as open_files:
             truth = open_files.enter_context((folder / "truth.csv").open("w", encoding="utf-8"))
             truth.write("frame,id,x,y,height\n")
@@ -162,17 +167,19 @@ class _CameraFiles(AbstractContextManager["_CameraFiles"]):
             _clear(self._instances)
         with ExitStack() as stack:
             self._boxes: IO[str] = stack.enter_context(paths["boxes"].open("w", encoding="utf-8"))
-            self._image = _Video(paths["video"], camera, rate, scene.quality)
-            stack.callback(self._image.close)
-            self._masks = _Video(paths["masks"], camera, rate, None)
-            stack.callback(self._masks.close)
+            self._videos = dict[str, _Video]()
+            for kind in ("video", "masks"):
+                if kind in scene.kinds:
+                    quality = scene.quality if kind == "video" else None
+                    self._videos[kind] = _Video(paths[kind], camera, rate, quality)
+                    stack.callback(self._videos[kind].close)
             self._boxes.write("frame,left,top,width,height,score\n")
             self._stack = stack.pop_all()
 
     def write(self, frame: int, view: SimulatedView) -> None:
         """Write one frame."""
-        self._image.write(view.image)
-        self._masks.write(view.mask)
+        for kind, video in self._videos.items():
+            video.write(view.image if kind == "video" else view.mask)
         rows = np.column_stack([np.full(len(view.boxes), frame), view.boxes.pixel, view.boxes.score])
         np.savetxt(self._boxes, rows, fmt="%d,%.1f,%.1f,%.1f,%.1f,%.3f")
         if self._instances is not None:
@@ -196,11 +203,16 @@ def _write_empty(folder: Path, scene: SimulatedScene) -> None:
 
 
 def _write_rigs(folder: Path, scene: SimulatedScene, body: BodyPrior, instances: bool) -> None:
-    kinds: tuple[SourceKind, ...] = ("video", "masks", "boxes", *(("instances",) if instances else ()))
+    kinds: tuple[SourceKind, ...] = (*scene.kinds, *(("instances",) if instances else ()))
     for kind in kinds:
-        path = folder / ("rig.toml" if kind == "video" else f"rig_{kind}.toml")
+        path = folder / rig_name(kind)
         sources = tuple(_source(folder, camera, kind, scene.frames) for camera in scene.rig.cameras)
         write_rig(path, Recording(path, scene.rig, sources, body))
+
+
+def rig_name(kind: SourceKind) -> str:
+    """Name of the rig file of one kind of foreground."""
+    return "rig.toml" if kind == "video" else f"rig_{kind}.toml"
 
 
 def _source(folder: Path, camera: Camera, kind: SourceKind, frames: int) -> CameraSource:

@@ -14,7 +14,7 @@ from rich.progress import Progress
 from stseg.errors import ConfigError
 from stseg.io import limits
 from stseg.io.numbers import parse_whole
-from stseg.io.outputs.simulated_scene import write_scene
+from stseg.io.outputs.simulated_scene import rig_name, write_scene
 from stseg.io.recording.recording import BodyPrior
 from stseg.io.toml.text import shown
 from stseg.simulation import NAMED, Film, SceneSpec, Spoil, SpoiledFilm
@@ -53,10 +53,12 @@ def simulate(
         easy (5 people, 4 cameras), dense (14 people on 6 m x 6 m, 8 cameras), dense4 (the same crowd, 4 of those
         cameras), similar (4 people, 3 of them dressed alike, 3 cameras), plaza (7 upright cylinders on 20 m x 20 m, 7
         cameras), school (adults and children), animals (0.6 m high and 1.1 m long), demo (small images, 8 s), tiny (a
-        second of very small images), or small images of scripted routes: crossing, meeting, meeting_heights (the same,
-        8 cm apart in height), border (encounters, entries and exits where windows meet). The other options change it.
+        second of very small images), long (boxes alone of 10 people in a closed room for half an hour), return (small
+        images of 6 people who come and go for 10 minutes), or small images of scripted routes: crossing, meeting,
+        meeting_heights (the same, 8 cm apart in height), border (encounters, entries and exits where windows meet). The
+        other options change it.
     people
-        Number of people in the area.
+        Number of people in the area; of all who come and go in the scene return.
     cameras
         Number of cameras around the area.
     seconds
@@ -110,7 +112,8 @@ def simulate(
             overwrite=overwrite,
             progress=lambda done, _: bar.update(task, completed=done),
         )
-    print(f"{folder / 'rig.toml'}: {film.frames} frames of {len(film.rig.cameras)} cameras; truth in truth.csv")
+    rig = folder / rig_name(film.kinds[0])
+    print(f"{rig}: {film.frames} frames of {len(film.rig.cameras)} cameras; truth in truth.csv")
 
 
 def _named(name: str) -> SceneSpec:

@@ -13,6 +13,7 @@ from typing import overload
 import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints, Rows
+from stseg.simulation.arrivals import Arrivals, Newcomers, Regulars
 from stseg.simulation.errands import Errand, Planner
 from stseg.simulation.random_streams import Topic, random_stream
 from stseg.simulation.scene import SceneSpec
@@ -39,7 +40,7 @@ class Crowd:
     frame
         Frame number.
     id : int64 (n,)
-        From 1; each id enters once.
+        From 1; each id enters once, unless the scene's people come back.
     ground : float64 (n, 2)
         Body axes, metres.
     heading, phase : float64 (n,)
@@ -87,26 +88,26 @@ class Pedestrian:
 def walk_freely(spec: SceneSpec) -> Iterator[Crowd]:
     """Simulate the crowd of a scene, frame by frame."""
     planner = Planner(spec.area, spec.stay, random_stream(spec.seed, Topic.CROWD))
+    arrivals: Arrivals = Regulars(spec) if spec.absence else Newcomers(spec)
     pedestrians: list[Pedestrian] = []
     steps = int(np.ceil(1 / spec.frame_rate / _STEP))
     step = 1 / spec.frame_rate / steps
-    spawned = 0
     for frame in range(-int(np.ceil(_WARM_UP * spec.frame_rate)), spec.frames):
         for _ in range(steps):
-            while sum(pedestrian.errand.counts(pedestrian.ground) for pedestrian in pedestrians) < spec.people:
-                spawned += 1
+            while number := arrivals.next(sum(one.errand.counts(one.ground) for one in pedestrians)):
                 others = np.array([pedestrian.ground for pedestrian in pedestrians]).reshape(-1, 2)
-                pedestrians.append(_new_pedestrian(spec, planner, spawned, others))
+                pedestrians.append(_new_pedestrian(spec, planner, number, others))
             planner.revise([(pedestrian.ground, pedestrian.errand) for pedestrian in pedestrians], step)
             _advance(pedestrians, np.array(spec.area) / 2, step)
             pedestrians = [pedestrian for pedestrian in pedestrians if not pedestrian.errand.is_over(pedestrian.ground)]
+            arrivals.advance(step, (pedestrian.id for pedestrian in pedestrians))
         if frame >= 0:
             yield _crowd(frame, pedestrians)
 
 
 def _new_pedestrian(spec: SceneSpec, planner: Planner, number: int, others: Floats) -> Pedestrian:
     own = random_stream(spec.seed, Topic.PERSON, number)
-    crowded_start = number <= spec.people
+    crowded_start = number <= spec.people and not spec.absence
     ground = planner.place_inside(others) if crowded_start else planner.door(others)
     return Pedestrian(
         number,

@@ -11,7 +11,7 @@ from stseg.simulation.body import pose, upright_cylinders
 from stseg.simulation.cameras import build_rig, turns
 from stseg.simulation.crowd import walk_freely
 from stseg.simulation.render import RenderedView, Viewer
-from stseg.simulation.scene import SceneSpec
+from stseg.simulation.scene import Kind, SceneSpec
 from stseg.simulation.script import walk_routes
 
 EMPTY_FRAMES = 40
@@ -60,6 +60,11 @@ class Film:
     def frames(self) -> int:
         """Number of frames."""
         return self.spec.frames
+
+    @property
+    def kinds(self) -> tuple[Kind, ...]:
+        """Kinds of foreground that are written."""
+        return self.spec.kinds
 
     @property
     def quality(self) -> int:

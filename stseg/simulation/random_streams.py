@@ -19,6 +19,7 @@ class Topic(IntEnum):
     SENSOR = 7
     DETECTOR = 8
     SPOIL = 9
+    ARRIVALS = 10
 
 
 def random_stream(seed: int, topic: Topic, *which: int) -> np.random.Generator:

@@ -33,7 +33,7 @@ class RenderedView:
     Attributes
     ----------
     image : uint8 (v, u, 3)
-        Blue, green, red.
+        Blue, green, red; black where the scene has no video.
     instances : uint16 (v, u)
         Id of the person that each pixel shows, 0 for background; also people just outside the area.
     boxes
@@ -104,6 +104,8 @@ class Viewer:
         visible_boxes(drawing.instances, row_of, visible)
         rng = random_stream(self._spec.seed, Topic.DETECTOR, *frame_seed(self._turn, crowd.frame))
         boxes = detect(self.camera, visible, drawing.silhouettes, np.array(self._spec.area) / 2, rng)
+        if "video" not in self._spec.kinds:
+            return RenderedView(np.zeros_like(drawing.light), drawing.instances, boxes)
         image = self._expose(drawing.light, drawing.depth, crowd.frame)
         return RenderedView(image, drawing.instances, boxes)
 
@@ -133,6 +135,8 @@ class Viewer:
 
     def _with_shadows(self, bodies: Bodies) -> Bytes:
         """The room with the people's shadows and without the people."""
+        if self._spec.shadows == 0:
+            return self.room.image.copy()
         corners = bodies.corners(PENUMBRA)
         fallen: Floats = corners - corners[..., 2:] / LAMP[2] * LAMP
         boxes = pixel_boxes(self.camera, fallen).reshape(-1, 4)

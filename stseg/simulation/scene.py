@@ -4,10 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Literal
 
 from stseg.errors import ConfigError
 from stseg.simulation.illumination import Lamp
 from stseg.simulation.routes import Route
+
+Kind = Literal["video", "masks", "boxes"]
+KINDS: tuple[Kind, ...] = ("video", "masks", "boxes")
+"""Kinds of foreground of a scene."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,7 +24,7 @@ class SceneSpec:
     name
         The scene's name.
     people
-        Number of people in the area; who leaves is replaced.
+        Number of people in the area, where those who leave are replaced; with an absence, all who ever come.
     area
         Sides of the ground rectangle along x and y, metres; its centre is the origin.
     seconds, frame_rate
@@ -50,6 +55,8 @@ class SceneSpec:
         Number of people (the first ones) in clothes of similar colours.
     stay
         Mean time that a person stays, seconds.
+    absence
+        Mean time after which a person who left comes back, seconds; 0 where only new people come.
     heights
         Shortest and tallest person, metres, uniformly between; empty for adults.
     cylinder
@@ -58,6 +65,8 @@ class SceneSpec:
         Their length in the direction in which they face, metres: animals are ellipses from above; 0 for as wide.
     routes
         Scripted routes, one a person; without them people walk freely.
+    kinds
+        Kinds of foreground that are written, of `KINDS`; without video, views have no image.
     seed
         Seed of all random streams.
 
@@ -87,10 +96,12 @@ class SceneSpec:
     speed: tuple[float, float] = (0.6, 1.5)
     alike: int = 0
     stay: float = 15.0
+    absence: float = 0.0
     heights: tuple[float, ...] = ()
     cylinder: float = 0.0
     length: float = 0.0
     routes: tuple[Route, ...] = ()
+    kinds: tuple[Kind, ...] = KINDS
     seed: int = 1
 
     def __post_init__(self) -> None:
@@ -114,6 +125,8 @@ class SceneSpec:
         self._require("speed", 0 < self.speed[0] <= self.speed[1], self.speed, "the slowest, then the fastest, m/s")
         self._require("alike", self.alike >= 0, self.alike, "a number of people")
         self._require("stay", self.stay > 0, self.stay, "seconds")
+        self._require("absence", self.absence >= 0, self.absence, "0 or more seconds")
+        self._require("kinds", len(self.kinds) > 0 and set(self.kinds) <= set(KINDS), self.kinds, ", ".join(KINDS))
         holds = self.heights == () or (len(self.heights) == 2 and 0 < self.heights[0] <= self.heights[1])
         self._require("heights", holds, self.heights, "none, or the shortest, then the tallest, metres")
         self._require("cylinder", 0 <= self.cylinder <= 2, self.cylinder, "0 to 2 metres")

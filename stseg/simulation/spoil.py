@@ -16,6 +16,7 @@ from stseg.arrays import Boxes, Bytes, Floats, Rows
 from stseg.errors import ConfigError
 from stseg.geometry import Camera, Rig
 from stseg.simulation.film import Film
+from stseg.simulation.scene import Kind
 from stseg.simulation.spoiled_boxes import BOX_KINDS
 from stseg.simulation.spoiled_masks import MASK_KINDS, Moment
 
@@ -93,6 +94,11 @@ class SpoiledFilm:
     def frames(self) -> int:
         """Number of frames."""
         return self.film.frames
+
+    @property
+    def kinds(self) -> tuple[Kind, ...]:
+        """Kinds of foreground that are written."""
+        return self.film.kinds
 
     @property
     def quality(self) -> int:
