@@ -11,6 +11,7 @@ import pytest
 from attacks import RIG, refusal
 from run_files import write_small_run
 
+from stseg.io.runfile import global_heaps
 from stseg.io.runfile.runs import read_run
 
 
@@ -121,3 +122,33 @@ def test_whole_numbers_stored_as_floats_are_refused(
         del group[name]
         group[name] = values
     assert "found the type float64" in refusal(capsys, "inspect", run_file)
+
+
+def test_a_heap_that_never_ends_is_refused(run_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """HDF5 walks on the spot where the free space of a global heap, object 0, has a false size."""
+    contents = bytearray(run_file.read_bytes())
+    start = contents.rindex(b"GCOL\x01\0\0\0")
+    place = start + 16
+    while contents[place : place + 2] != b"\0\0":
+        place += 16 + -(-int.from_bytes(contents[place + 8 : place + 16], "little") // 8) * 8
+    contents[place + 8 : place + 16] = (0).to_bytes(8, "little")
+    run_file.write_bytes(contents)
+    assert f"a global heap at byte {start}: 0 bytes free" in refusal(capsys, "inspect", run_file)
+
+
+@pytest.mark.parametrize("size", [0, 15, 2**62])
+def test_a_heap_of_false_size_is_refused(run_file: Path, capsys: pytest.CaptureFixture[str], size: int) -> None:
+    contents = bytearray(run_file.read_bytes())
+    start = contents.index(b"GCOL\x01\0\0\0")
+    contents[start + 8 : start + 16] = size.to_bytes(8, "little")
+    run_file.write_bytes(contents)
+    assert f"a global heap at byte {start}" in refusal(capsys, "inspect", run_file)
+
+
+def test_heaps_are_found_astride_of_blocks(run_file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    contents = run_file.read_bytes()
+    expected = [place for place in range(len(contents)) if contents.startswith(b"GCOL\x01\0\0\0", place)]
+    for block in (9, 100, 901):
+        monkeypatch.setattr(global_heaps, "_BLOCK", block)
+        with run_file.open("rb") as file:
+            assert list(global_heaps._collections(file)) == expected

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import h5py
@@ -11,7 +12,7 @@ import numpy as np
 from stseg.arrays import Floats
 from stseg.io.runfile import layout
 from stseg.io.runfile.run_reader import Run, read_run
-from stseg.io.runfile.safe_hdf5 import hdf5_file
+from stseg.io.runfile.safe_hdf5 import hdf5_file, open_hdf5
 
 Layer = tuple[Any, dict[str, Any], str]
 """Data, what the layer's constructor is given, kind of layer: napari's LayerData."""
@@ -20,11 +21,14 @@ _UNITS = ("s", "m", "m", "m")
 
 
 def get_reader(path: str | list[str]) -> Callable[[str], list[Layer]] | None:
-    """The reader of a path that is dropped on napari; None unless it is a single run file."""
+    """The reader of a path that is dropped on napari; None unless it is a single run file that can be opened."""
     if not isinstance(path, str) or not h5py.is_hdf5(path):
         return None
-    with hdf5_file(path, "r") as file:
-        return read_layers if file.attrs.get("format") == layout.FORMAT else None
+    try:
+        with open_hdf5(Path(path)) as file:
+            return read_layers if file.attrs.get("format") == layout.FORMAT else None
+    except (OSError, ValueError):
+        return None
 
 
 def read_layers(path: str) -> list[Layer]:

@@ -1,7 +1,8 @@
 """HDF5 files from outside: opened without links, storage, filters or references that lead out of the file.
 
 An HDF5 file may name other files (external links, external storage, virtual datasets) and would show their contents as
-its own. Sizes are checked before anything is read: what a dataset declares must have been stored in the file.
+its own. Sizes are checked before anything is read: what a dataset declares must have been stored in the file. Nor does
+HDF5 check all that it follows: `global_heaps` does where it would not come back.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from h5py import h5z
 from stseg.arrays import AnyArray
 from stseg.io import limits
 from stseg.io.names import printable
+from stseg.io.runfile.global_heaps import require_sound_heaps
 
 _FILTERS = frozenset((h5z.FILTER_DEFLATE, h5z.FILTER_SHUFFLE, h5z.FILTER_FLETCHER32, h5z.FILTER_SCALEOFFSET))
 """Filters of HDF5 itself; any other would be loaded as a library from a folder of plug-ins."""
@@ -49,12 +51,14 @@ def open_hdf5(path: Path) -> Iterator[h5py.File]:
     OSError
         Where it cannot be read.
     ValueError
-        Where it leads out of itself, or has too many objects; the message is one line.
+        Where it leads out of itself, has too many objects, or heaps without an end; the message is one line.
     """
     if not path.is_file():
         raise FileNotFoundError(2, "no such file", str(path))
+    require_sound_heaps(path)
     try:
         with hdf5_file(path, "r") as file:
+            _require_known_sizes(file)
             _require_own(file)
             yield file
     except (RuntimeError, KeyError, TypeError, AttributeError, OverflowError) as error:  # h5py, of broken files
@@ -76,6 +80,13 @@ def require_stored(dataset: h5py.Dataset, most: int) -> None:
         raise ValueError(f"{dataset.name}: {declared} bytes, more than {most}")
     if declared > _PACKED * (dataset.id.get_storage_size() + 64):
         raise ValueError(f"{dataset.name}: {declared} bytes declared, {dataset.id.get_storage_size()} stored")
+
+
+def _require_known_sizes(file: h5py.File) -> None:
+    """Addresses and lengths of 8 bytes, as every library of today writes: `global_heaps` reads no others."""
+    sizes = file.id.get_create_plist().get_sizes()
+    if sizes != (8, 8):
+        raise ValueError(f"addresses and lengths of {sizes} bytes, expected 8 and 8")
 
 
 def _require_own(file: h5py.File) -> None:
