@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 try:
-    from resource import RLIM_INFINITY, RLIMIT_AS, getrlimit
+    from resource import RLIM_INFINITY, RLIMIT_AS, getrlimit, setrlimit
 except ImportError:  # Windows has no such limits
 
     def address_space() -> int:
         """Bytes of address space that a process of this user may have."""
         return _ENDLESS
+
+    @contextmanager
+    def bounded_growth(most: int) -> Iterator[None]:  # noqa: ARG001
+        """Nothing is bounded here."""
+        yield
 else:
 
     def address_space() -> int:
@@ -18,8 +26,33 @@ else:
         limit, _ = getrlimit(RLIMIT_AS)
         return _ENDLESS if limit == RLIM_INFINITY else limit
 
+    @contextmanager
+    def bounded_growth(most: int) -> Iterator[None]:
+        """Within, the process cannot take more than `most` bytes of memory beyond what it has; Linux alone knows that.
+
+        For libraries that ask for as much as a file says; threads beside share the bound.
+        """
+        soft, hard = getrlimit(RLIMIT_AS)
+        bound = _held() + most
+        if bound >= min(address_space(), _ENDLESS):
+            yield
+            return
+        setrlimit(RLIMIT_AS, (bound, hard))
+        try:
+            yield
+        finally:
+            setrlimit(RLIMIT_AS, (soft, hard))
+
 
 _ENDLESS = 1 << 62
+
+
+def _held() -> int:
+    """Bytes of address space of this process; without end where the system does not say."""
+    try:
+        return int(Path("/proc/self/statm").read_text("ascii").split()[0]) * os.sysconf("SC_PAGE_SIZE")
+    except (OSError, ValueError):
+        return _ENDLESS
 
 
 def free_memory() -> int:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import resource
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -143,6 +145,18 @@ def test_a_heap_of_false_size_is_refused(run_file: Path, capsys: pytest.CaptureF
     contents[start + 8 : start + 16] = size.to_bytes(8, "little")
     run_file.write_bytes(contents)
     assert f"a global heap at byte {start}" in refusal(capsys, "inspect", run_file)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="memory is bounded there alone")
+def test_a_text_of_2_gib_takes_no_such_memory(run_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with h5py.File(run_file) as file:
+        place = file["provenance/config"].id.get_offset()
+    contents = bytearray(run_file.read_bytes())
+    contents[place : place + 4] = (2**31 - 1).to_bytes(4, "little")
+    run_file.write_bytes(contents)
+    before = resource.getrlimit(resource.RLIMIT_AS)
+    assert "allocation failed" in refusal(capsys, "report", run_file, "-o", run_file.with_name("report.html"))
+    assert resource.getrlimit(resource.RLIMIT_AS) == before
 
 
 def test_heaps_are_found_astride_of_blocks(run_file: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -14,6 +15,7 @@ from stseg.errors import FormatError
 from stseg.io import limits
 from stseg.io.names import EXPECTED, is_name
 from stseg.io.runfile import layout
+from stseg.io.runfile.texts import read_attribute
 from stseg.io.toml.text import shown
 
 
@@ -30,11 +32,10 @@ class LayoutChecks:
             raise FormatError(self.path, name, "nothing" if found is None else "no array", "an array")
         return found
 
-    def attribute(self, name: str, key: str, expected: str) -> h5py.AttributeManager:
-        attributes = self.file[name].attrs
-        if key not in attributes:
+    def attribute(self, name: str, key: str, expected: str) -> Any:
+        if key not in self.file[name].attrs:
             raise FormatError(self.path, f"{name}@{key}", "nothing", expected)
-        return attributes[key]
+        return read_attribute(self.file[name], key)
 
     def names(self, name: str, key: str) -> tuple[str, ...]:
         """An attribute of several names of cameras, each once."""

@@ -13,6 +13,7 @@ from stseg.arrays import Floats
 from stseg.io.runfile import layout
 from stseg.io.runfile.run_reader import Run, read_run
 from stseg.io.runfile.safe_hdf5 import hdf5_file, open_hdf5
+from stseg.io.runfile.texts import read_attribute
 
 Layer = tuple[Any, dict[str, Any], str]
 """Data, what the layer's constructor is given, kind of layer: napari's LayerData."""
@@ -26,7 +27,8 @@ def get_reader(path: str | list[str]) -> Callable[[str], list[Layer]] | None:
         return None
     try:
         with open_hdf5(Path(path)) as file:
-            return read_layers if file.attrs.get("format") == layout.FORMAT else None
+            ours = "format" in file.attrs and read_attribute(file, "format") == layout.FORMAT
+            return read_layers if ours else None
     except (OSError, ValueError):
         return None
 

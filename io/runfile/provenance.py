@@ -24,6 +24,7 @@ from stseg.io.recording.recording import Recording, Source, mask_passwords
 from stseg.io.recording.rig_text import format_rig
 from stseg.io.recording.source_files import source_files
 from stseg.io.runfile.safe_hdf5 import read_whole
+from stseg.io.runfile.texts import read_attribute, read_text
 from stseg.io.toml.text import parse_toml
 
 _PACKAGES = ("numpy", "scipy", "numba", "h5py", "opencv-python-headless", "PyMaxflow")
@@ -109,26 +110,19 @@ def write_provenance(group: h5py.Group, provenance: Provenance) -> None:
 
 def read_provenance(group: h5py.Group) -> Provenance:
     """Read the group /provenance; ValueError where its values cannot be."""
-    shown = {str(dataset.attrs["camera"]): read_whole(dataset) for dataset in group.get("shown", {}).values()}
+    shown = {str(read_attribute(dataset, "camera")): read_whole(dataset) for dataset in group.get("shown", {}).values()}
     for camera, own in shown.items():
         if own.ndim != 1 or own.dtype.kind != "i" or ((own < -1) | (own > limits.FRAMES)).any():
             raise ValueError(f"shown of camera {camera}: no frames by tick")
     return Provenance(
-        printable(str(group.attrs["created"]))[: limits.NAME],
-        _text(group["config"]),
-        _text(group["rig"]),
-        Path(str(group.attrs["rig_path"])),
+        printable(str(read_attribute(group, "created")))[: limits.NAME],
+        read_text(group["config"]),
+        read_text(group["rig"]),
+        Path(str(read_attribute(group, "rig_path"))),
         {name.decode(): number.decode() for name, number in read_whole(group["versions"]).tolist()},
         _checked_sources(group["sources"]),
         shown,
     )
-
-
-def _text(dataset: h5py.Dataset) -> str:
-    text = dataset.asstr(errors="surrogateescape")[()]
-    if not isinstance(text, str):
-        raise ValueError(f"{dataset.name}: no text")
-    return text
 
 
 def _checked_sources(dataset: h5py.Dataset) -> Rows:

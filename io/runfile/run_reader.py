@@ -27,6 +27,7 @@ from stseg.io.runfile.layout_checks import LayoutChecks, lacking_columns, requir
 from stseg.io.runfile.packed_frames import PackedFrame, PackedVolumes
 from stseg.io.runfile.provenance import Provenance, read_provenance
 from stseg.io.runfile.safe_hdf5 import open_hdf5, read_whole
+from stseg.io.runfile.texts import read_attribute, read_texts
 from stseg.io.runfile.value_checks import Bounds, require_fit, require_table
 from stseg.io.runfile.volume import RunVolume
 from stseg.io.toml.text import shown
@@ -305,7 +306,7 @@ def read_trajectory(path: Path) -> Rows:
 def _names(group: h5py.Group) -> dict[int, str]:
     if "names" not in group:
         return {}
-    pairs = (text.partition(",") for text in group["names"].asstr()[()])
+    pairs = (text.partition(",") for text in read_texts(group["names"]))
     names = {parse_whole(identity, 1, limits.FRAMES): name for identity, _, name in pairs}
     if None in names or not all(map(is_title, names.values())):
         raise ValueError(f"names of tracks other than id,name with {EXPECTED_TITLE}")
@@ -335,8 +336,8 @@ def _checked_run(path: Path, file: h5py.File) -> Run:
     checks.require_rising(frames)
     for name, axis in (("plane", heights), ("y", ground_y), ("x", ground_x)):
         checks.require_finite(f"{layout.OCCUPANCY}/{name}", axis)
-    kept = group.attrs.get("kept", layout.KEPT[0])
+    kept = read_attribute(group, "kept") if "kept" in group.attrs else layout.KEPT[0]
     if kept not in layout.KEPT:
         raise FormatError(path, f"{layout.OCCUPANCY}@kept", shown(kept), f"one of {', '.join(layout.KEPT)}")
-    title = printable(str(entry.asstr()[()]))[: limits.NAME]
+    title = printable(str(read_texts(entry)))[: limits.NAME]
     return Run(path, title, checks.frame_rate(), cameras, frames, heights, ground_y, ground_x, views, str(kept))
