@@ -57,6 +57,17 @@ def test_standing_on_a_line_is_no_traffic() -> None:
     assert (line["left"], line["right"]) == (1, 1)
 
 
+def test_the_way_from_exit_to_entrance_is_nobodys() -> None:
+    """Somebody leaves to the left of a line and comes back on its right a minute later."""
+    first, second = walk(1, np.linspace(-0.5, -2.0, 16)), walk(1, np.linspace(2.0, 0.5, 16))
+    second["frame"] += 600
+    found = measure_tracks(np.concatenate([first, second]), np.arange(700), 10.0, GRID, Areas((), (UP,)))
+    assert not len(found.crossings)
+    (track,) = found.tracks
+    assert (track["first"], track["last"]) == (0, 615)
+    assert track["distance"] == pytest.approx(3.0) and track["seconds"] == pytest.approx(3.2)
+
+
 def test_counts_have_the_uncertainty_of_scores() -> None:
     still = [walk(k, np.zeros(50), 0.1 * k, score=0.0) for k in range(4)]
     found = measure_tracks(np.concatenate(still), np.arange(50), 10.0, GRID, Areas((Zone("z", (SQUARE,)),)))

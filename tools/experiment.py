@@ -8,6 +8,7 @@ labels      IoU of the cells of a track, and the right owner where bodies touch:
 memory      resident memory of a long run, and the size of its run file
 pixels      share of pixels of people that carry the right label, from film to label images
 points      calibration of the probability of track points
+returns     who comes back: returns that are recognised, and wrong ones, at each least probability
 rig         error of a rig against the true one, on the ground and at head height
 scaling     CPU time of a frame over area, views, people and pixels, with exponents
 sizes       error of heights and widths of tracks, and their spread along a track
@@ -30,6 +31,7 @@ EXPERIMENTS = (
     "memory",
     "pixels",
     "points",
+    "returns",
     "rig",
     "scaling",
     "sizes",

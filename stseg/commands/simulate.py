@@ -34,6 +34,7 @@ def simulate(
     noise: float | None = None,
     shadows: float | None = None,
     light_drift: float | None = None,
+    alike: int | None = None,
     seed: int | None = None,
     spoil: Annotated[tuple[str, ...], Parameter(metavar="KIND[:STRENGTH]", negative="")] = (),
     instances: Annotated[bool, Parameter(negative="")] = False,
@@ -73,6 +74,8 @@ def simulate(
         Darkening of the ground by the people's shadows, 0..1.
     light_drift
         Relative amplitude of slow changes of the light, 0..1.
+    alike
+        Number of people in clothes of similar colours.
     seed
         Seed of people, paths and cameras.
     spoil
@@ -96,6 +99,7 @@ def simulate(
         "noise": noise,
         "shadows": shadows,
         "light_drift": light_drift,
+        "alike": alike,
         "seed": seed,
     }
     given = {key: value for key, value in changes.items() if value is not None}

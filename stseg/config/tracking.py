@@ -58,6 +58,9 @@ class TrackingConfig:
     appearance: Literal["learned", "none"] = "learned"
     """Use of colours and of a detector's features for identities: as much as they tell in the recording, or none; with
     none, nothing of them is stored."""
+    return_probability: float = 1.0
+    """Least probability, by sizes and appearance, at which somebody who comes back takes the id of the earlier visit;
+    1 for never: whoever comes is new."""
     interpolation_gap: float = 1.0
     """Longest gap that is filled with interpolated positions, seconds."""
     minimum_duration: float = 0.8
@@ -69,6 +72,7 @@ class TrackingConfig:
         for name in ("window", "height_noise", "width_noise", "identity_lag"):
             require(getattr(self, name) > 0, self, name, "a number above 0")
         require(1 <= self.hypotheses <= 100_000, self, "hypotheses", "1 to 100000")
+        require(0.5 <= self.return_probability <= 1, self, "return_probability", "0.5 to 1")
         for name in (
             "assignment_distance",
             "prediction_horizon",

@@ -6,7 +6,7 @@ import numpy as np
 
 from stseg.arrays import Floats, Rows
 from stseg.measures.areas import Line
-from stseg.measures.zones import by_track
+from stseg.measures.zones import by_track, stays
 
 CROSSING = np.dtype(
     [("line", "O"), ("frame", "<i8"), ("time", "<f8"), ("id", "<i8"), ("to", "O"), ("x", "<f8"), ("y", "<f8"),
@@ -22,7 +22,7 @@ def line_crossings(line: Line, trajectory: Rows, frame_rate: float, band: float)
     them: a person who stands on it does not cross it again and again.
     """
     found = []
-    for own in by_track(trajectory):
+    for own in (stay for track in by_track(trajectory) for stay in stays(track, frame_rate)):
         ground = np.stack([own["x"], own["y"]], -1)
         kept: list[tuple[int, float, int]] = []
         for row, share, side in _intersections(line, ground):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from stseg.arrays import Floats, Ints, Rows
-from stseg.measures.zones import by_track
+from stseg.measures.zones import by_track, stays
 
 TRACK_MEASURE = np.dtype(
     [("id", "<i8"), ("first", "<i8"), ("last", "<i8"), ("seconds", "<f8"), ("distance", "<f8"), ("mean_speed", "<f8"),
@@ -23,16 +23,22 @@ _STANDING = 0.2
 
 
 def track_measures(trajectory: Rows, frame_rate: float) -> Rows:
-    """Duration, distance and speeds of every track, TRACK_MEASURE (n,)."""
+    """Duration, distance and speeds of every track while it is there, TRACK_MEASURE (n,)."""
     rows = []
     for own in by_track(trajectory):
-        speed, ground, frame = np.hypot(*velocities(own, frame_rate).T), _ground(own), own["frame"]
-        every = np.unique(np.append(np.arange(0, len(own), max(1, round(frame_rate / 2))), len(own) - 1))
-        seconds = (frame[-1] - frame[0] + 1) / frame_rate
-        distance = float(np.hypot(*np.diff(ground[every], axis=0).T).sum())
+        speed, frame = np.hypot(*velocities(own, frame_rate).T), own["frame"]
+        there = stays(own, frame_rate)
+        seconds = sum(int(stay["frame"][-1] - stay["frame"][0] + 1) for stay in there) / frame_rate
+        distance = sum(_distance(stay, frame_rate) for stay in there)
         speeds = (speed.mean(), np.median(speed), speed.max(), (speed < _STANDING).mean())
         rows.append((own["id"][0], frame[0], frame[-1], seconds, distance, *speeds, own["score"].mean()))
     return np.array(rows, TRACK_MEASURE)
+
+
+def _distance(own: Rows, frame_rate: float) -> float:
+    """Way of a track in steps of half a second, metres."""
+    every = np.unique(np.append(np.arange(0, len(own), max(1, round(frame_rate / 2))), len(own) - 1))
+    return float(np.hypot(*np.diff(_ground(own)[every], axis=0).T).sum())
 
 
 def velocities(own: Rows, frame_rate: float) -> Floats:

@@ -18,6 +18,8 @@ VISIT = np.dtype(
      ("entered", "?"), ("left", "?")]
 )  # fmt: skip
 """One row per stay of a track in a zone: frames, seconds; whether the track was seen outside before and after."""
+AWAY = 5.0
+"""Gap of a track from which its person was away, seconds."""
 
 
 def zone_counts(zone: Zone, trajectory: Rows, frames: Ints, frame_rate: float) -> Rows:
@@ -57,6 +59,11 @@ def by_track(trajectory: Rows) -> list[Rows]:
     """The rows of each track in order of time."""
     table = trajectory[np.lexsort((trajectory["frame"], trajectory["id"]))]
     return [own for own in np.split(table, np.flatnonzero(np.diff(table["id"])) + 1) if len(own)]
+
+
+def stays(own: Rows, frame_rate: float) -> list[Rows]:
+    """The rows of one track, parted where its person was away: nobody knows the way from the exit to the entrance."""
+    return np.split(own, np.flatnonzero(np.diff(own["frame"]) > AWAY * frame_rate) + 1)
 
 
 def _spells(inside: Flags, frame: Ints, patience: int) -> tuple[Ints, Ints]:

@@ -2,6 +2,8 @@
 
 committed rows -> short gaps filled -> global association -> repetitions, short tracks, ghosts dropped -> smoothed
                   (interpolation)      (identities)          (coincidence)  (pruning)                     (smoother)
+-> people who come back, where that is wanted
+   (returned_tracks)
 
 Global association moves no place: it decides which rows belong to one person, and fills gaps where nobody else stands.
 """
@@ -21,10 +23,12 @@ from stseg.tracking.coincidence import coincident
 from stseg.tracking.encounters import encounters
 from stseg.tracking.identities.constraints import Constraints
 from stseg.tracking.identities.global_association import Link, associate_globally
+from stseg.tracking.identities.returns import Return
 from stseg.tracking.identities.search import FREELY
 from stseg.tracking.identities.size_model import MeasuredSizes
 from stseg.tracking.interpolation import apart_from, fill_gaps, interpolated_rows
 from stseg.tracking.pruning import drop_ghosts, drop_short
+from stseg.tracking.returned_tracks import renamed_events, renamed_ids, renamed_trajectory, returns_of
 from stseg.tracking.smoother import smooth_places
 
 _LASTING = 1.0
@@ -69,7 +73,18 @@ def final_tracks(
     every_event = np.concatenate([_renamed(events, names, linked.links), met, repeated, short, ghosts])
     tracks = _without_gaps(bridged[np.isin(bridged["id"], kept["id"]) & ~repeats], frame_rate, config.tracking)
     smoothed = smooth_places(tracks, frame_rate, config.motion)
-    return FinalTracks(smoothed, every_event[np.argsort(every_event["frame"], kind="stable")], identity)
+    whole = FinalTracks(smoothed, every_event[np.argsort(every_event["frame"], kind="stable")], identity)
+    least = config.tracking.return_probability
+    if least == 1:
+        return whole
+    return _under_people(whole, returns_of(linked.problem, identity, bridged, least, constraints), frame_rate)
+
+
+def _under_people(whole: FinalTracks, returns: Sequence[Return], frame_rate: float) -> FinalTracks:
+    """Tracks of which some are visits of one person."""
+    trajectory = renamed_trajectory(whole.trajectory, returns)
+    events = renamed_events(whole.events, trajectory, returns, frame_rate)
+    return FinalTracks(trajectory, events, renamed_ids(whole.identity, returns))
 
 
 def bridged_rows(committed: Rows, frame_rate: float, config: Config) -> tuple[Rows, MeasuredSizes]:

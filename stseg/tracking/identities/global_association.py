@@ -48,10 +48,13 @@ class GlobalAssociation:
         Of each row of the trajectory.
     links
         Where they differ from the filter tracks.
+    problem
+        What they were decided by.
     """
 
     identity: Ints
     links: list[Link]
+    problem: IdentityProblem
 
 
 def associate_globally(
@@ -80,7 +83,7 @@ def associate_globally(
     problem = IdentityProblem.of(trajectory, sizes, appearance, frame_rate, border, config, constraints)
     first = problem.solve(constraints)
     identity = _numbered(trajectory, first)
-    return GlobalAssociation(identity, _links(trajectory, identity, frame_rate))
+    return GlobalAssociation(identity, _links(trajectory, identity, frame_rate), problem)
 
 
 def _numbered(trajectory: Rows, first: Ints) -> Ints:

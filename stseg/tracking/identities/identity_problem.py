@@ -14,6 +14,7 @@ from stseg.tracking.identities.constraints import Constraints
 from stseg.tracking.identities.observations import Observations, observe
 from stseg.tracking.identities.search import FREELY, SearchLimits, search_identities
 from stseg.tracking.identities.size_model import MeasuredSizes, SizeModel, learn_sizes
+from stseg.tracking.identities.visits import Visits, pooled_visits
 from stseg.tracking.isolated_tracklets import isolated_tracklets
 
 _DRAFT = 4
@@ -91,6 +92,11 @@ class IdentityProblem:
         known = constraints.renumbered(np.argsort(order))
         first[order] = order[search_identities(self.seen, self.model, self.motion, self.limits, known).name]
         return first
+
+    def visits(self, identity: Ints, frame: Ints) -> Visits:
+        """What sizes and appearance tell of identities: that of each row, 0 for none, and its frame, int64 (n,)."""
+        order = self.seen.order
+        return pooled_visits(identity[order], frame[order], self.seen.precision, self.seen.information)
 
     def score(self, constraints: Constraints, since: float, until: float) -> float:
         """Score of the best identities of the rows between two times, nats.
