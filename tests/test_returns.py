@@ -151,8 +151,7 @@ def test_who_comes_back_has_one_id_and_the_events_say_so() -> None:
     assert set(after.trajectory["id"].tolist()) == {1, 2, 3, 4, 5}
     assert (np.diff(after.trajectory["frame"] * 10 + after.trajectory["id"]) > 0).all()
     for name in ("x", "y", "xx"):
-        mine = [np.sort(part.trajectory[name]) for part in (before, after)]
-        np.testing.assert_array_equal(*mine)
+        np.testing.assert_array_equal(np.sort(after.trajectory[name]), np.sort(before.trajectory[name]))
     own = after.events[after.events["id"] == 1]
     assert [(int(e["frame"]), bytes(e["kind"])) for e in own] == [(0, b"birth"), (180, b"return"), (399, b"death")]
     assert own["reason"][1].startswith(b"the same person with probability 0.99")
