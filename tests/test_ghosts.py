@@ -26,23 +26,24 @@ from scenes import (
     room,
     together,
 )
+from scipy.optimize import linear_sum_assignment
 from strategies import numbers
 
 from stseg.arrays import Floats, Ints, ViewEvidence
 from stseg.detection.detector import Detector
 from stseg.detection.gains import (
-    box_scores,
     clear_assignment,
     fill_assignment,
     gain_of,
     insert,
-    loss_of,
     withdraw,
 )
 from stseg.detection.groups import fill_groups, fill_interactions
 from stseg.detection.problem import BoxEvidence, Parameters, PixelEvidence, Problem
 from stseg.detection.scoring import set_score
 from stseg.detection.search import ENUMERATED, search
+from stseg.detection.sharing import sharing_of
+from stseg.detection.track_sharing import assign_track, assign_tracks, gain_of_track, track_sharing
 from stseg.geometry import Camera, Rig
 from stseg.geometry.bodies import BodyTable
 from stseg.model.box_fit import TOLERANCE, fill_cover, fill_inside, fill_match, half_square
@@ -355,10 +356,26 @@ def test_what_one_more_adds_is_the_difference_of_scores(seed: int, walkers: int)
         members = np.append(chosen, 0)
         owners = np.full((2, problem.pixels.raster[0].size), -1, np.int16)
         fill_assignment(members, count, problem.pixels, owners)
-        gain = gain_of(int(chosen[count]), members, count, box_scores(members, count, problem), owners, problem)
+        inside, sharing = np.isin(np.arange(8), chosen[:count]), sharing_of(problem)
+        assign_tracks(members, count, sharing.tracks)
+        gain = gain_of(int(chosen[count]), members, count, inside, owners, problem, sharing)
         assert gain == pytest.approx(frame.score(chosen[: count + 1]) - frame.score(chosen[:count]), abs=1e-5)
-        scores = box_scores(members, count + 1, problem)
-        assert loss_of(int(chosen[count]), members, count, scores, owners, problem) == pytest.approx(gain, abs=1e-5)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_tracks_assigned_one_by_one_are_those_of_the_greatest_sum(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    gain, birth_cost = rng.normal(-3, 4, (7, 5)), rng.uniform(0, 5, 7)
+    sharing, worth = track_sharing(gain, birth_cost), np.maximum(gain + birth_cost[:, None], 0)
+    sums = [0.0]
+    for i in range(7):
+        added = gain_of_track(i, sharing)
+        assign_track(i, sharing)
+        sums.append(worth[: i + 1][linear_sum_assignment(-worth[: i + 1])].sum())
+        assert added == pytest.approx(sums[-1] - sums[-2], abs=1e-9)
+        taken = np.flatnonzero(sharing.holder >= 0)
+        assert worth[sharing.holder[taken], taken].sum() == pytest.approx(sums[-1], abs=1e-9)
+        assert len(set(sharing.holder[taken].tolist())) == len(taken)
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -391,7 +408,7 @@ def test_groups_are_those_of_the_touching_and_their_scores_add_up(seed: int) -> 
     frame = apart(random_frame(seed, 9, 2), 3)
     problem = frame.problem()
     touch, group = np.empty((9, 9), bool), np.empty(9, np.int64)
-    fill_interactions(problem, touch)
+    fill_interactions(problem, sharing_of(problem), touch)
     np.testing.assert_array_equal(
         touch, [[i == j or reference.touch(i, j, problem) for j in range(9)] for i in range(9)]
     )

@@ -6,12 +6,13 @@ the set's assignment at hand, the gain is a sum over that outline alone.
 
 from __future__ import annotations
 
-import numpy as np
-
 from stseg.accelerate import kernel, part
-from stseg.arrays import Floats, Ints
+from stseg.arrays import Flags, Ints
+from stseg.detection.box_sharing import box_gain
 from stseg.detection.problem import Parameters, PixelAssignment, PixelEvidence, Problem
-from stseg.detection.scoring import box_score, crowd, missing_box, track_score
+from stseg.detection.scoring import crowd
+from stseg.detection.sharing import Sharing
+from stseg.detection.track_sharing import gain_of_track
 
 
 @kernel
@@ -75,109 +76,27 @@ def _rows(first: int, pixels: PixelEvidence) -> int:
 
 
 @kernel
-def box_scores(members: Ints, count: int, problem: Problem) -> Floats:
-    """Score of each view with boxes, nats, float64 (view,): boxes are assigned anew whenever the set changes."""
-    scores = np.empty(len(problem.boxes.boxes))
-    for view in range(len(scores)):
-        scores[view] = box_score(
-            view, members, count, problem.boxes, problem.parameters, problem.assigned, problem.view_evidence[view]
-        )
-    return scores
-
-
-@kernel
-def gain_of(i: int, members: Ints, count: int, scores: Floats, assigned: PixelAssignment, problem: Problem) -> float:
+def gain_of(
+    i: int, members: Ints, count: int, inside: Flags, assigned: PixelAssignment, problem: Problem, sharing: Sharing
+) -> float:
     """Gain of candidate i, nats.
 
     Parameters
     ----------
     members : int64 (candidate + 1,)
-        The first `count` are the set; the next place is scratch.
-    scores
-        The set's `box_scores`.
+        The first `count` are the set.
+    inside : bool (candidate,)
+        The set, beside members of other groups; without i.
     assigned
         The set's, from `fill_assignment`.
+    sharing
+        Its tracks are assigned to the set.
     """
-    gain = unpaired_gain(i, members, count, assigned, problem) + _track_gain(i, members, count, problem)
-    members[count] = i
-    for view in range(len(scores)):
-        if _shares_no_box(view, i, members, count, problem):
-            gain += missing_box(view, i, members, count, problem.boxes, problem.parameters)
-        else:
-            parts = problem.view_evidence[view]
-            gain -= scores[view]
-            gain += box_score(
-                view, members, count + 1, problem.boxes, problem.parameters, problem.assigned, parts
-            )  # fmt: skip
-    return gain
+    gain = unpaired_gain(i, members, count, assigned, problem) + gain_of_track(i, sharing.tracks)
+    return gain + box_gain(i, inside, sharing.boxes, problem.parameters)
 
 
-@kernel
-def loss_of(i: int, members: Ints, count: int, scores: Floats, assigned: PixelAssignment, problem: Problem) -> float:
-    """What a set loses without its member i, nats.
-
-    Parameters
-    ----------
-    members : int64 (candidate + 1,)
-        The first `count` are the other members.
-    scores
-        The `box_scores` of the set with i.
-    assigned
-        That of the set without i.
-    """
-    loss = unpaired_gain(i, members, count, assigned, problem) + _track_gain(i, members, count, problem)
-    for view in range(len(scores)):
-        if _shares_no_box(view, i, members, count, problem):
-            loss += missing_box(view, i, members, count, problem.boxes, problem.parameters)
-        else:
-            parts = problem.view_evidence[view]
-            loss += scores[view]
-            loss -= box_score(view, members, count, problem.boxes, problem.parameters, problem.assigned, parts)
-    return loss
-
-
-@kernel
-def _shares_no_box(view: int, i: int, members: Ints, count: int, problem: Problem) -> bool:
-    """Whether candidate i fits no box of a view, and hides no member there: then the others' parts stay the same."""
-    boxes, parameters = problem.boxes, problem.parameters
-    for a in range(count):
-        if boxes.cover[view, members[a], i] > 0.0:
-            return False
-    missing = missing_box(view, i, members, count, boxes, parameters)
-    best = -np.inf
-    for b in range(boxes.boxes[view]):
-        best = max(best, boxes.match[view, i, b])
-    return bool(parameters.box_log_ratio + best - missing <= 0.0)
-
-
-@kernel
-def _track_gain(i: int, members: Ints, count: int, problem: Problem) -> float:
-    """Gain of candidate i from the assignment of tracks, nats.
-
-    It changes among the members alone that are linked with i by tracks that two of them may continue.
-    """
-    tracks = problem.track_gain.shape[1]
-    linked, taken, reached = np.empty(count + 1, np.int64), np.zeros(count, np.bool_), np.zeros(tracks, np.bool_)
-    linked[0] = i
-    number, next_one = 1, 0
-    while next_one < number:
-        one = linked[next_one]
-        next_one += 1
-        for k in range(tracks):
-            if reached[k] or problem.birth_cost[one] + problem.track_gain[one, k] <= 0.0:
-                continue
-            reached[k] = True
-            for a in range(count):
-                j = members[a]
-                if not taken[a] and problem.birth_cost[j] + problem.track_gain[j, k] > 0.0:
-                    taken[a] = True
-                    linked[number] = j
-                    number += 1
-    gain = track_score(linked, number, problem.track_gain, problem.birth_cost, problem.assigned)
-    return gain - track_score(linked[1:], number - 1, problem.track_gain, problem.birth_cost, problem.assigned)
-
-
-@kernel
+@part
 def unpaired_gain(i: int, members: Ints, count: int, assigned: PixelAssignment, problem: Problem) -> float:
     """The part of that gain that needs no matching: prior, crowding and pixels."""
     gain = problem.parameters.prior_log_odds + problem.size_prior[i] - problem.birth_cost[i]
@@ -186,7 +105,7 @@ def unpaired_gain(i: int, members: Ints, count: int, assigned: PixelAssignment, 
     return float(gain + _pixel_gain(i, problem.pixels, problem.parameters, assigned))
 
 
-@kernel
+@part
 def _pixel_gain(i: int, pixels: PixelEvidence, parameters: Parameters, assigned: PixelAssignment) -> float:
     columns = pixels.raster.shape[2]
     total = 0.0

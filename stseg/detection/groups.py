@@ -9,29 +9,46 @@ from __future__ import annotations
 
 import numpy as np
 
-from stseg.accelerate import kernel
+from stseg.accelerate import kernel, part
 from stseg.arrays import Flags, Floats, Ints
+from stseg.detection.lists import Lists, append, lists_of
 from stseg.detection.problem import BoxEvidence, PixelEvidence, Problem
 from stseg.detection.repulsion import apart_of_bodies
+from stseg.detection.sharing import Sharing
 
 
 @kernel
-def fill_interactions(problem: Problem, interacts: Flags) -> None:
+def fill_interactions(problem: Problem, sharing: Sharing, interacts: Flags) -> None:
     """Fill touch (candidate, candidate), symmetric: whether the gain of one depends on the other."""
-    boxes, pixels, known = problem.boxes, problem.pixels, problem.track_gain
+    boxes, tracks, candidates = sharing.boxes, sharing.tracks, len(interacts)
     interacts[:] = False
-    for k in range(known.shape[1]):
-        _join_all(np.flatnonzero(problem.birth_cost + known[:, k] > 0), interacts)
-    for view in range(len(boxes.boxes)):
-        for b in range(boxes.boxes[view]):
-            _join_all(np.flatnonzero(_fits(boxes.match[view, :, b], problem)), interacts)
-    for i in range(len(interacts)):
+    followers, place = lists_of(np.bincount(tracks.may.item, minlength=len(tracks.holder)))
+    for i in range(candidates):
+        for k in range(tracks.may.start[i], tracks.may.start[i + 1]):
+            append(followers, place, tracks.may.item[k], i, tracks.may.value[k])
+    _join_lists(followers, interacts)
+    _join_lists(boxes.fitting, interacts)
+    for view in range(boxes.views):
+        for i in range(candidates):
+            row = view * candidates + i
+            for k in range(boxes.hidden.start[row], boxes.hidden.start[row + 1]):
+                j = boxes.hidden.item[k]
+                interacts[i, j] = interacts[j, i] = True
+    for i in range(candidates):
         interacts[i, i] = True
         for j in range(i):
             if not interacts[i, j]:
-                interacts[i, j] = interacts[j, i] = (
-                    _hides(i, j, problem) or _overlap_on_ground(i, j, problem) or _overlap(i, j, pixels)
-                )
+                interacts[i, j] = interacts[j, i] = _overlap_on_ground(i, j, problem) or _overlap(i, j, problem.pixels)
+
+
+@part
+def _join_lists(lists: Lists, interacts: Flags) -> None:
+    """Let all of each list interact."""
+    for row in range(len(lists.start) - 1):
+        for a in range(lists.start[row], lists.start[row + 1]):
+            for b in range(lists.start[row], a):
+                i, j = lists.item[a], lists.item[b]
+                interacts[i, j] = interacts[j, i] = True
 
 
 @kernel
@@ -40,29 +57,15 @@ def _fits(match: Floats, problem: Problem) -> Flags:
     return np.asarray(problem.parameters.box_log_ratio + match > np.log(problem.parameters.box_miss_rate))
 
 
-@kernel
-def _join_all(marked: Ints, interacts: Flags) -> None:
-    for i in marked:
-        for j in marked:
-            interacts[i, j] = True
-
-
-@kernel
-def _hides(i: int, j: int, problem: Problem) -> bool:
-    """Whether one hides the other in a view with boxes."""
-    cover = problem.boxes.cover
-    hidden = 0.0
-    for view in range(len(cover)):
-        hidden += cover[view, i, j] + cover[view, j, i]
-    return hidden > 0
-
-
-@kernel
+@part
 def _overlap_on_ground(i: int, j: int, problem: Problem) -> bool:
+    room = 0.5 * problem.parameters.minimum_distance * (problem.breadth[i] + problem.breadth[j])
+    if abs(problem.ground[i, 0] - problem.ground[j, 0]) > room:
+        return False
     return bool(apart_of_bodies(i, j, problem.ground, problem.breadth) < problem.parameters.minimum_distance)
 
 
-@kernel
+@part
 def _overlap(i: int, j: int, pixels: PixelEvidence) -> bool:
     """Whether their outlines share a pixel."""
     for view in range(len(pixels.raster)):

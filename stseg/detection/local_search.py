@@ -9,19 +9,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from stseg.accelerate import kernel
+from stseg.accelerate import kernel, part
 from stseg.arrays import Flags, Ints
 from stseg.detection.gains import (
-    box_scores,
     clear_assignment,
     fill_assignment,
     gain_of,
     insert,
-    loss_of,
     withdraw,
 )
 from stseg.detection.problem import PixelAssignment, Problem
 from stseg.detection.scoring import set_score
+from stseg.detection.sharing import Sharing
+from stseg.detection.track_sharing import assign_track, assign_tracks
 
 SWEEPS = 8
 """Sweeps of simple moves at most; two or three are usual."""
@@ -37,7 +37,13 @@ _HOPELESS = -12.0
 
 @kernel
 def local_search(
-    members: Ints, count: int, own: Ints, inside: Flags, assigned: PixelAssignment, problem: Problem
+    members: Ints,
+    count: int,
+    own: Ints,
+    inside: Flags,
+    assigned: PixelAssignment,
+    problem: Problem,
+    sharing: Sharing,
 ) -> int:
     """Simple moves until none helps; returns the set's new size.
 
@@ -53,9 +59,9 @@ def local_search(
         Scratch, -1 everywhere before and after.
     """
     for _ in range(SWEEPS):
-        grown = _add(members, count, own, inside, assigned, problem)
-        shrunk = _remove(members, grown, -1, inside, inside, assigned, problem)
-        exchanged = _exchange(members, shrunk, own, inside, assigned, problem)
+        grown = _add(members, count, own, inside, assigned, problem, sharing)
+        shrunk = _remove(members, grown, -1, inside, inside, assigned, problem, sharing)
+        exchanged = _exchange(members, shrunk, own, inside, assigned, problem, sharing)
         if grown == count and shrunk == grown and not exchanged:
             break
         count = shrunk
@@ -72,6 +78,7 @@ def swap(
     assigned: PixelAssignment,
     trades: int,
     problem: Problem,
+    sharing: Sharing,
 ) -> int:
     """Sweeps of swap moves until none helps; arguments of `local_search`, and `interacts` (candidate, candidate)."""
     trial, trial_inside = members.copy(), inside.copy()
@@ -82,12 +89,12 @@ def swap(
             trial[:], trial_inside[:] = members, inside
             near = own[interacts[i][own]]
             if inside[i]:
-                size = _withdraw_and_refill(trial, count, i, near[near != i], trial_inside, assigned, problem)
+                size = _withdraw_and_refill(trial, count, i, near[near != i], trial_inside, assigned, problem, sharing)
             else:
-                size = _insert_and_prune(trial, count, i, trial_inside, interacts, assigned, problem)
+                size = _insert_and_prune(trial, count, i, trial_inside, interacts, assigned, problem, sharing)
             if size < 0:
                 continue
-            size = local_search(trial, size, near, trial_inside, assigned, problem)
+            size = local_search(trial, size, near, trial_inside, assigned, problem, sharing)
             after = set_score(trial, size, problem)
             if after > score + GAINED:
                 members[:], inside[:], count, score = trial, trial_inside, size, after
@@ -98,56 +105,79 @@ def swap(
 
 @kernel
 def _withdraw_and_refill(
-    members: Ints, count: int, i: int, near: Ints, inside: Flags, assigned: PixelAssignment, problem: Problem
+    members: Ints,
+    count: int,
+    i: int,
+    near: Ints,
+    inside: Flags,
+    assigned: PixelAssignment,
+    problem: Problem,
+    sharing: Sharing,
 ) -> int:
     """Force member i out and add candidates near it; the set's size, or -1 where none is added."""
     for a in range(count):
         if members[a] == i:
             members[a] = members[count - 1]
     inside[i] = False
-    size = _add(members, count - 1, near, inside, assigned, problem)
+    size = _add(members, count - 1, near, inside, assigned, problem, sharing)
     return size if size > count - 1 else -1
 
 
 @kernel
 def _insert_and_prune(
-    members: Ints, count: int, i: int, inside: Flags, interacts: Flags, assigned: PixelAssignment, problem: Problem
+    members: Ints,
+    count: int,
+    i: int,
+    inside: Flags,
+    interacts: Flags,
+    assigned: PixelAssignment,
+    problem: Problem,
+    sharing: Sharing,
 ) -> int:
     """Force candidate i in and remove members that add nothing beside it; the set's size, or -1 where none is removed.
 
     Where just one near member is removed, that is a simple replacement, which was tried.
     """
     fill_assignment(members, count, problem.pixels, assigned)
-    gain = gain_of(i, members, count, box_scores(members, count, problem), assigned, problem)
+    assign_tracks(members, count, sharing.tracks)
+    gain = gain_of(i, members, count, inside, assigned, problem, sharing)
     clear_assignment(members, count, problem.pixels, assigned)
     if gain < _HOPELESS:
         return -1
     before = members[:count].copy()
     members[count], inside[i] = i, True
-    left = _remove(members, count + 1, i, interacts[i], inside, assigned, problem)
+    left = _remove(members, count + 1, i, interacts[i], inside, assigned, problem, sharing)
     gone = before[~inside[before]]
     if len(gone) == 0 or (len(gone) == 1 and _apart(i, gone[0], problem) <= _NEAR):
         return -1
     return left
 
 
-@kernel
+@part
 def _apart(i: int, j: int, problem: Problem) -> float:
     return float(np.hypot(problem.ground[i, 0] - problem.ground[j, 0], problem.ground[i, 1] - problem.ground[j, 1]))
 
 
 @kernel
-def _add(members: Ints, count: int, own: Ints, inside: Flags, assigned: PixelAssignment, problem: Problem) -> int:
+def _add(
+    members: Ints,
+    count: int,
+    own: Ints,
+    inside: Flags,
+    assigned: PixelAssignment,
+    problem: Problem,
+    sharing: Sharing,
+) -> int:
     """Add the best candidate while one helps; gains seldom rise, so candidates far below the best are tried once."""
     gain = np.full(len(own), np.inf)
     fill_assignment(members, count, problem.pixels, assigned)
+    assign_tracks(members, count, sharing.tracks)
     while True:
         best, best_gain = -1, GAINED
-        scores = box_scores(members, count, problem)
         for k in range(len(own)):
             if inside[own[k]] or gain[k] < best_gain - _SLACK:
                 continue
-            gain[k] = gain_of(own[k], members, count, scores, assigned, problem)
+            gain[k] = gain_of(own[k], members, count, inside, assigned, problem, sharing)
             if gain[k] > best_gain:
                 best, best_gain = own[k], gain[k]
         if best < 0:
@@ -155,17 +185,24 @@ def _add(members: Ints, count: int, own: Ints, inside: Flags, assigned: PixelAss
         members[count], inside[best] = best, True
         count += 1
         insert(best, problem.pixels, assigned)
+        assign_track(best, sharing.tracks)
     clear_assignment(members, count, problem.pixels, assigned)
     return count
 
 
 @kernel
 def _remove(
-    members: Ints, count: int, keep: int, may: Flags, inside: Flags, assigned: PixelAssignment, problem: Problem
+    members: Ints,
+    count: int,
+    keep: int,
+    may: Flags,
+    inside: Flags,
+    assigned: PixelAssignment,
+    problem: Problem,
+    sharing: Sharing,
 ) -> int:
     """Remove each member without whom the score is higher, of those that `may` (candidate,) leave, but not `keep`."""
     fill_assignment(members, count, problem.pixels, assigned)
-    scores = box_scores(members, count, problem)
     a = 0
     while a < count:
         leaving = members[a]
@@ -173,13 +210,13 @@ def _remove(
             a += 1
             continue
         members[a] = members[count - 1]
+        inside[leaving] = False
         withdraw(leaving, members, count - 1, problem.pixels, assigned)
-        if loss_of(leaving, members, count - 1, scores, assigned, problem) < -GAINED:
-            inside[leaving] = False
+        assign_tracks(members, count - 1, sharing.tracks)
+        if gain_of(leaving, members, count - 1, inside, assigned, problem, sharing) < -GAINED:
             count -= 1
-            scores = box_scores(members, count, problem)
         else:
-            members[a] = leaving
+            members[a], inside[leaving] = leaving, True
             insert(leaving, problem.pixels, assigned)
             a += 1
     clear_assignment(members, count, problem.pixels, assigned)
@@ -187,27 +224,33 @@ def _remove(
 
 
 @kernel
-def _exchange(members: Ints, count: int, own: Ints, inside: Flags, assigned: PixelAssignment, problem: Problem) -> bool:
+def _exchange(
+    members: Ints,
+    count: int,
+    own: Ints,
+    inside: Flags,
+    assigned: PixelAssignment,
+    problem: Problem,
+    sharing: Sharing,
+) -> bool:
     """Replace each member by the near candidate that raises the score most."""
     changed = False
     fill_assignment(members, count, problem.pixels, assigned)
     for a in range(count):
         old = members[a]
-        members[a] = members[count - 1]
+        members[a], inside[old] = members[count - 1], False
         withdraw(old, members, count - 1, problem.pixels, assigned)
-        scores = box_scores(members, count - 1, problem)
-        best, best_gain = old, gain_of(old, members, count - 1, scores, assigned, problem) + GAINED
+        assign_tracks(members, count - 1, sharing.tracks)
+        best, best_gain = old, gain_of(old, members, count - 1, inside, assigned, problem, sharing) + GAINED
         for i in own:
-            if inside[i] or _apart(i, old, problem) > _NEAR:
+            if inside[i] or i == old or _apart(i, old, problem) > _NEAR:
                 continue
-            gain = gain_of(i, members, count - 1, scores, assigned, problem)
+            gain = gain_of(i, members, count - 1, inside, assigned, problem, sharing)
             if gain > best_gain:
                 best, best_gain = i, gain
         members[count - 1] = members[a]
-        members[a] = best
+        members[a], inside[best] = best, True
         insert(best, problem.pixels, assigned)
-        if best != old:
-            inside[old], inside[best] = False, True
-            changed = True
+        changed = changed or best != old
     clear_assignment(members, count, problem.pixels, assigned)
     return changed

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from stseg.accelerate import kernel
+from stseg.accelerate import part
 from stseg.arrays import Floats
 
 CORE = 0.05
@@ -28,7 +28,7 @@ _EXCLUDED = 1e4
 """Cost of a pair within the hard core, nats: more than all views together say of a person."""
 
 
-@kernel
+@part
 def pair_cost(distance: float, minimum_distance: float, hard_core: float) -> float:
     """Cost of a pair of bodies at a distance, nats; all distances in metres."""
     if distance >= minimum_distance:
@@ -38,7 +38,7 @@ def pair_cost(distance: float, minimum_distance: float, hard_core: float) -> flo
     return _TOUCH + _COINCIDENCE * (1.0 - distance / minimum_distance)
 
 
-@kernel
+@part
 def apart_of_bodies(i: int, j: int, ground: Floats, breadth: Floats) -> float:
     """Distance of two bodies on the ground float64 (n, 2), as of bodies of common width: metres."""
     distance = np.hypot(ground[i, 0] - ground[j, 0], ground[i, 1] - ground[j, 1])

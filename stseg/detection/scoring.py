@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from stseg.accelerate import kernel
+from stseg.accelerate import kernel, part
 from stseg.arrays import Floats, Ints
 from stseg.detection.problem import BoxEvidence, Parameters, PixelEvidence, Problem
 from stseg.detection.repulsion import apart_of_bodies, pair_cost
@@ -105,7 +105,7 @@ def crowding(members: Ints, count: int, problem: Problem) -> float:
     return total
 
 
-@kernel
+@part
 def crowd(i: int, j: int, problem: Problem) -> float:
     """Cost of one pair, nats."""
     distance = apart_of_bodies(i, j, problem.ground, problem.breadth)
@@ -140,15 +140,15 @@ def box_score(
     return float(parts[:count].sum())
 
 
-@kernel
+@part
 def missing_box(
     view: int, i: int, members: Ints, count: int, boxes: BoxEvidence, parameters: Parameters
 ) -> float:  # fmt: skip
     """Cost of a missing box of candidate i, of whom members may hide a part, nats."""
-    return _missing(_visible(view, i, members, count, boxes), parameters)
+    return missing_by_share(_visible(view, i, members, count, boxes), parameters)
 
 
-@kernel
+@part
 def _visible(view: int, i: int, members: Ints, count: int, boxes: BoxEvidence) -> float:
     """Share of candidate i's box in the image and not behind a member's, 0..1."""
     visible = boxes.inside[view, i]
@@ -157,8 +157,8 @@ def _visible(view: int, i: int, members: Ints, count: int, boxes: BoxEvidence) -
     return float(visible)
 
 
-@kernel
-def _missing(visible: float, parameters: Parameters) -> float:
+@part
+def missing_by_share(visible: float, parameters: Parameters) -> float:
     """Cost of a missing box of a body of which such a share is visible, nats."""
     share = (visible - parameters.hidden_visibility) / (parameters.full_visibility - parameters.hidden_visibility)
     return float(

@@ -16,6 +16,7 @@ from stseg.detection.groups import fill_groups, fill_interactions, restricted
 from stseg.detection.local_search import GAINED, local_search, swap
 from stseg.detection.problem import Problem
 from stseg.detection.scoring import set_score
+from stseg.detection.sharing import sharing_of
 
 ENUMERATED = 8
 """Largest group of which all subsets are tried in the final search."""
@@ -36,22 +37,22 @@ def search(members: Ints, count: int, problem: Problem, enumerated: int, trades:
     """
     candidates = len(problem.size_prior)
     interacts, group = np.empty((candidates, candidates), np.bool_), np.empty(candidates, np.int64)
-    fill_interactions(problem, interacts)
+    sharing = sharing_of(problem)
+    fill_interactions(problem, sharing, interacts)
     views, rows, columns = problem.pixels.raster.shape
     assigned, chosen = np.full((views, rows * columns), -1, np.int16), np.empty(candidates + 1, np.int64)
     inside = np.zeros(candidates, np.bool_)
     inside[members[:count]] = True
     for g in range(fill_groups(interacts, group)):
         own = np.flatnonzero(group == g)
-        part = restricted(problem, own)
         if len(own) <= enumerated:
-            size = _best_of_all_subsets(chosen, own, part)
+            size = _best_of_all_subsets(chosen, own, restricted(problem, own))
         else:
             start = own[inside[own]]
             size = len(start)
             chosen[:size] = start
-            size = local_search(chosen, size, own, inside, assigned, part)
-            size = swap(chosen, size, own, inside, interacts, assigned, trades, part)
+            size = local_search(chosen, size, own, inside, assigned, problem, sharing)
+            size = swap(chosen, size, own, inside, interacts, assigned, trades, problem, sharing)
         inside[own] = False
         inside[chosen[:size]] = True
     best = np.flatnonzero(inside)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from stseg.accelerate import kernel
+from stseg.accelerate import kernel, part
 from stseg.arrays import Floats
 
 MIDDLE, WIDE, HEAD, LATE, EARLY = range(5)
@@ -26,15 +26,21 @@ LEAST_HEIGHT = 8.0
 """Shares are taken of at least this height, pixels."""
 
 
-@kernel
+@part
 def half_square(body: Floats, box: Floats, tolerance: Floats, width: float, height: float) -> float:
     """Half the squared Mahalanobis distance of a box from a pillar's box, both left, top, right, bottom in pixels.
 
     `tolerance` float64 (5,) holds standard deviations, shares of the body's height in the image and its grain.
     """
-    middle, wide, head, feet = _offsets(body, box, width, height)
-    middle /= tolerance[MIDDLE]
-    if not abs(middle) <= FAR:
+    left, right = min(max(body[0], 0.0), width - 1.0), min(max(body[2], 0.0), width - 1.0)
+    if right <= left:
+        return np.inf
+    tall = max(body[3] - body[1], LEAST_HEIGHT)
+    middle = ((left + right) - (box[0] + box[2])) / 2.0 / (tall + GRAIN[MIDDLE]) / tolerance[MIDDLE]
+    if not abs(middle) <= FAR:  # most pairs are decided here
+        return np.inf
+    _, wide, head, feet = _offsets(body, box, width, height)
+    if np.isnan(wide):
         return np.inf
     wide /= tolerance[WIDE]
     head /= tolerance[HEAD]
@@ -52,7 +58,7 @@ def fill_offsets(bodies: Floats, boxes: Floats, width: float, height: float, off
         offsets[i] = _offsets(bodies[i], boxes[i], width, height)
 
 
-@kernel
+@part
 def _offsets(body: Floats, box: Floats, width: float, height: float) -> tuple[float, float, float, float]:
     left, right = min(max(body[0], 0.0), width - 1.0), min(max(body[2], 0.0), width - 1.0)
     top, bottom = min(max(body[1], 0.0), height - 1.0), min(max(body[3], 0.0), height - 1.0)
@@ -110,9 +116,11 @@ def fill_cover(bodies: Floats, distance: Floats, width: float, height: float, co
         left, right = max(bodies[i, 0], 0.0), min(bodies[i, 2], width)
         top, bottom = max(bodies[i, 1], 0.0), min(bodies[i, 3], height)
         area = max(right - left, 0.0) * max(bottom - top, 0.0)
+        cover[i] = 0.0
+        if not area > 0:
+            continue
         for k in range(len(bodies)):
-            cover[i, k] = 0.0
-            if not (area > 0 and distance[k] < distance[i] - 0.1 and not np.isnan(bodies[k, 0])):
+            if not (bodies[k, 2] > left and bodies[k, 0] < right and distance[k] < distance[i] - 0.1):
                 continue
             inset = 0.1 * (bodies[k, 2] - bodies[k, 0])
             wide = min(right, bodies[k, 2] - inset) - max(left, bodies[k, 0] + inset)

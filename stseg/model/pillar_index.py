@@ -12,9 +12,9 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from stseg.accelerate import kernel
+from stseg.accelerate import kernel, part
 from stseg.arrays import Floats, Ints, Labels, Singles
-from stseg.model.box_fit import FAR, GRAIN, LEAST_HEIGHT, MIDDLE, half_square
+from stseg.model.box_fit import FAR, GRAIN, HEAD, LATE, LEAST_HEIGHT, MIDDLE, half_square
 
 _CLASSES = 2.0
 """Classes of height to a factor of two."""
@@ -57,7 +57,14 @@ class PillarIndex(NamedTuple):
         return cls(order.astype(np.int32), middle[order], np.append(starts, len(order)).astype(np.int64), tallest)
 
 
-@kernel
+@part
+def _overhang(tall: float, tolerance: Floats, deviations: float) -> float:
+    """How much taller a box may be than a pillar that it fits within so many tolerances, pixels."""
+    head, feet = tolerance[HEAD] * (tall + GRAIN[HEAD]), tolerance[LATE] * (tall + GRAIN[LATE])
+    return float(deviations * (head + feet) + 1e-3)
+
+
+@part
 def run_of(index: PillarIndex, kind: int, box: Floats, tolerance: Floats, deviations: float) -> tuple[int, int]:
     """First and stop in `index.order` of the pillars of a class that a box may fit within so many tolerances.
 
@@ -103,6 +110,11 @@ def raise_to_best_match(
             continue
         deviations = min(FAR, math.sqrt(2.0 * spare))
         for kind in range(len(index.tallest)):
+            if (
+                index.tallest[kind] + _overhang(index.tallest[kind], tolerance[b], deviations)
+                < boxes[b, 3] - boxes[b, 1]
+            ):
+                continue
             first, stop = run_of(index, kind, boxes[b], tolerance[b], deviations)
             for k in range(first, stop):
                 i = index.order[k]
