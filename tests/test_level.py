@@ -17,6 +17,7 @@ from stseg.arrays import Flags, Floats, Ints, ViewEvidence
 from stseg.config import ErrorRateConfig, OccupancyConfig
 from stseg.detection.detector import Detector
 from stseg.geometry import Grid
+from stseg.geometry.filled_cells import inside_bodies
 from stseg.geometry.nearest_person import nearest_person
 from stseg.geometry.summed_area import TOP, UNSEEN, Levels
 from stseg.model.people import Explanation
@@ -28,7 +29,6 @@ from stseg.occupancy.rate_calibration import (
     RateCalibration,
     cells_per_person,
     fill_counts,
-    inside_bodies,
 )
 from stseg.occupancy.volume import Occupancy
 

@@ -9,8 +9,6 @@ import numpy as np
 import pytest
 from scipy.special import expit
 
-from stseg.geometry import Grid
-
 sys.path.append(str(Path(__file__).parents[1] / "tools"))
 
 from experiments import certainty
@@ -37,12 +35,3 @@ def test_the_error_is_weighed_by_cells() -> None:
     assert tally.error() == pytest.approx(3 / 4 * (1 / 2 - 1 / 3))
     assert tally.score == pytest.approx(3 * np.log(2))
     assert np.isnan(tally.table()).sum() == 2 * 8
-
-
-def test_cells_that_anybody_covers() -> None:
-    grid = Grid((-1.0, 1.0), (-1.0, 1.0), 0.1, 1.8, 10)
-    truth = np.array([(0.3, 0.3, 1.5), (-0.4, 0.0, 1.9)], [("x", float), ("y", float), ("height", float)])
-    both = certainty.occupied_cells(grid, truth)
-    apart = [certainty.occupied_cells(grid, truth[k : k + 1]) for k in range(2)]
-    np.testing.assert_array_equal(both, apart[0] | apart[1])
-    assert [cells.any((1, 2)).sum() for cells in apart] == [8, 10]

@@ -21,6 +21,7 @@ from stseg.io.recording.recording import Recording
 from stseg.io.recording.rigs import parse_rig
 from stseg.io.recording.time_alignment import with_alignment
 from stseg.io.runfile import layout
+from stseg.io.runfile.cell_probability import learn_reliability
 from stseg.io.runfile.data_frames import to_data_frame
 from stseg.io.runfile.hdf5_reading import format_errors, read_object
 from stseg.io.runfile.layout_checks import LayoutChecks, lacking_columns, require_bounded_volume
@@ -31,6 +32,7 @@ from stseg.io.runfile.texts import read_attribute, read_texts
 from stseg.io.runfile.value_checks import Bounds, require_fit, require_table
 from stseg.io.runfile.volume import RunVolume
 from stseg.io.toml.text import shown
+from stseg.model.cell_reliability import CellReliability
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -242,6 +244,19 @@ class Run:
         if index == len(self.frames) or self.frames[index] != frame:
             raise ValueError(f"frame {frame} is not in {self.path}")
         return read_object(self.path, layout.OCCUPANCY, lambda file: _volume(file[layout.OCCUPANCY], index))
+
+    @cached_property
+    def cell_reliability(self) -> CellReliability:
+        """How far the volume's log-odds can be believed: their calibration by the run's own tracks."""
+        return learn_reliability(self)
+
+    def read_cell_probability(self, frame: int) -> Singles:
+        """Probability that a body fills each cell of one frame, float32 (plane, y, x), NaN where no view sees the cell.
+
+        Calibrated: of the cells with 0.8, 80 % are filled. Cells alone are judged; labels know of their neighbours,
+        and of other frames.
+        """
+        return self.cell_reliability.of_cells(self.read_frame(frame)[0])
 
     def read_packed_volumes(self, number: int, opened: Ints) -> Iterator[PackedVolumes]:
         """The volumes of all frames, `number` at a time, as they are packed; unpacked labels of the frames `opened`."""

@@ -28,6 +28,8 @@ from stseg.report.sheets import thin_sheets
 
 _FLOW = 0.5
 """Side of a square of the map of flow, metres."""
+_LOG_ODDS = (-6.0, -3.0, 0.0, 3.0, 6.0, 9.0)
+"""At which the page gives the probability of cells, nats."""
 _SHEETS = 8_000_000  # bytes of all slices, a third more as text
 
 
@@ -76,12 +78,21 @@ def page_contents(
         view_summaries=_view_summaries(run, ghosts),
         stages=list(seconds_by_stage(run).items()),
         slices=[figure for instant in instants for figure in slice_figures(rig, instant)] if has_slices else [],
+        cell_probability=_cell_probability(run),
         cameras=[figure for instant in instants for figure in camera_figures(rig, trajectory, instant)],
         has_images=has_images,
         names=run.names,
         busy=_busy_figures(run, span),
         hours=people_by_hour(span, trajectory),
     )
+
+
+def _cell_probability(run: Run) -> list[tuple[float, float]]:
+    """Log-odds and the calibrated probability of cells; empty where the run kept none."""
+    if run.kept == "none" or not len(run.frames):
+        return []
+    probability = run.cell_reliability.of_cells(np.array(_LOG_ODDS, np.float32))
+    return list(zip(_LOG_ODDS, probability.tolist(), strict=True))
 
 
 def _span(run: Run) -> Span:

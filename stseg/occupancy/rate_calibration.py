@@ -94,25 +94,6 @@ class RateCalibration:
             total += frames * count / self.frame_rate
 
 
-def inside_bodies(grid: Grid, near: Ints, ground: Floats, height: Floats) -> Flags:
-    """Cells that the pillar of the person near them fills, bool (plane, y, x).
-
-    Parameters
-    ----------
-    near : int64 (y, x)
-        The person near each cell, -1 for none.
-    ground, height : float64 (person, 2), (person,)
-        Metres.
-    """
-    inside = np.zeros(grid.shape, bool)
-    within_reach = near >= 0
-    person = near[within_reach]
-    distance = np.hypot(*(grid.ground[within_reach] - ground[person]).T)
-    for plane, above in zip(inside, grid.heights, strict=True):
-        plane[within_reach] = distance <= np.interp(above / height[person], PROFILE[:, 0], PROFILE[:, 1], right=-1.0)
-    return inside
-
-
 def cells_per_person(grid: Grid, height: float, reach: float) -> tuple[float, float]:
     """Number of cells that one person's pillar fills, and number within reach of the person."""
     radius = np.interp(grid.heights / height, PROFILE[:, 0], PROFILE[:, 1], right=0.0)

@@ -13,6 +13,7 @@ from stseg.config import BodyConfig, DetectionConfig, ErrorRateConfig, Occupancy
 from stseg.geometry import Rig
 from stseg.geometry.bodies import BodyTable
 from stseg.geometry.cell_means import CellMeans, SumTable
+from stseg.geometry.filled_cells import inside_bodies
 from stseg.geometry.nearest_person import nearest_person
 from stseg.geometry.sampling import Sampling
 from stseg.geometry.summed_area import UNSEEN
@@ -24,7 +25,7 @@ from stseg.model.sparse_volume import SparseVolume
 from stseg.occupancy.box_planes import CellsByPerson, ViewBoxes, fill_fit, fill_levels, level_of_match, mark_fit
 from stseg.occupancy.clutter import clutter, clutter_side, clutter_weights
 from stseg.occupancy.fusion import ErrorRates, Sums, ViewTerms, add_terms, log_odds_terms
-from stseg.occupancy.rate_calibration import RateCalibration, cells_per_person, fill_counts, inside_bodies
+from stseg.occupancy.rate_calibration import RateCalibration, cells_per_person, fill_counts
 from stseg.occupancy.shown_cells import CellTables, ShownCells, mark_columns, mark_map
 from stseg.occupancy.visible_cells import PixelAssignment, fill_map, fill_occupied, fill_share, mark_people
 

@@ -107,6 +107,7 @@ class Contents:
     view_summaries: Sequence[ViewSummary]
     stages: Sequence[tuple[str, float]]
     slices: Sequence[Figure]
+    cell_probability: Sequence[tuple[float, float]]
     cameras: Sequence[Figure]
     has_images: bool
     names: Mapping[int, str]
@@ -166,7 +167,7 @@ def _sections(contents: Contents) -> list[str]:
             _track_table(span, tracks, mean_certainty(contents.trajectory, tracks), contents.names),
         ),
         section("Events", _event_summary(contents), _event_table(span, contents.events)),
-        section("Occupancy", figures(contents.slices, "sheets")),
+        section("Occupancy", _cells(contents.cell_probability), figures(contents.slices, "sheets")),
         section("Cameras", _privacy(contents), figures(contents.cameras, "pair")) if contents.cameras else "",
         section("Time to compute", _stages(contents.stages)),
     ]
@@ -312,6 +313,15 @@ def _track_table(span: Span, tracks: Rows, certainty: Floats, names: Mapping[int
         for row, sure in zip(tracks[:MOST_ROWS], certainty.tolist(), strict=False)
     ]
     return table(("track", "first", "last", "frames", "height, m", "certainty, %"), rows, len(tracks))
+
+
+def _cells(cell_probability: Sequence[tuple[float, float]]) -> str:
+    """How far log-odds of cells can be believed; nothing where no volume was kept."""
+    if not cell_probability:
+        return ""
+    cells = [(f"{nats:+g}", f"{100 * probability:.0f} %") for nats, probability in cell_probability]
+    words = note("Log-odds of cells are evidence of single cells; so often are cells of that evidence in a person.")
+    return f"<div>{words}{table(('log-odds, nats', 'cells that people fill'), cells, len(cells))}</div>"
 
 
 def _event_summary(contents: Contents) -> str:

@@ -1,47 +1,33 @@
-"""How far the volume's probabilities can be believed: of cells said to be occupied with 0.8, are 80 % occupied?
+"""How far the cells of a run can be believed: of cells said to be filled with 0.8, do bodies fill 80 %?
 
-    python tools/experiment.py certainty SCENE=RIG... [--frames A:B] [-o docs/figures/reliability.svg]
+    python tools/experiment.py certainty RUN.h5=TRUTH.csv... [--step 8]
 
-Scenes are those of `stseg simulate`: truth.csv stands beside each rig file. A cell is occupied where the pillar of
-somebody of the truth covers it. Each frame is explained once, by the first guesses and without what tracks foretell,
-and fused three times:
+Truth is that of `stseg simulate`, with heights. A cell is filled where the pillar of somebody of the truth covers it.
+Cells count that are in doubt: within 1 m of a track, or of log-odds within 6 nats; every eighth frame, between those
+that the run's own calibration is learned from.
 
-    constants   by the first guesses of all rates, every view a look of its own
-    learned     by the rates learned from the frames before, as the cut is given it: pi is one half beside people
-    without     the same with the share of those cells that bodies fill, as it was learned, in place of one half
+    log-odds    as the volume has them: evidence, with a half beforehand beside people
+    calibrated  `Run.read_cell_probability`: the same by the share that the run's own tracks fill
 
-Cells count that are in doubt: within reach of a person whom the pass found, or of stated odds below 400 to 1 for any
-of the three. ECE is the expected calibration error: the mean over these cells of |stated - occupied| of their bin; the
+ECE is the expected calibration error: the mean over these cells of |stated - filled| of their bin of a tenth; the
 logarithmic score is the mean of -log of the probability stated of what is true, nats.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Mapping
-from dataclasses import replace
 from pathlib import Path
 
-import matplotlib.pyplot as plt
 import numpy as np
 from scipy.special import expit, logit
 
-from stseg.arrays import Flags, Floats, Rows
-from stseg.config import Config
-from stseg.detection.detector import Detector
-from stseg.engine.backgrounds import make_foregrounds
-from stseg.geometry import Grid
-from stseg.geometry.nearest_person import nearest_person
-from stseg.io.recording.frames import open_frames
-from stseg.io.recording.rigs import read_rig
-from stseg.io.recording.stream_index import index_streams
-from stseg.occupancy.rate_calibration import inside_bodies
-from stseg.occupancy.volume import Occupancy
+from stseg.arrays import Flags, Floats
+from stseg.io.runfile.runs import Run, read_run
+from stseg.model.cell_reliability import doubtful_cells, filled_cells
 
 BINS = 10
-DOUBT = 6.0
-"""Cells whose log-odds are farther from 0 are sure, nats."""
-FORMS = ("constants", "learned", "without")
+_SUREST = 1e-6
+"""Probabilities nearer to 0 or 1 than this are taken for this by the score."""
 
 
 class Tally:
@@ -70,89 +56,29 @@ class Tally:
         return float(np.abs(self.stated - self.occupied).sum() / self.cells.sum())
 
 
-def occupied_cells(grid: Grid, truth: Rows) -> Flags:
-    """Cells that anybody's pillar covers, bool (plane, y, x)."""
-    covered = np.zeros(grid.shape, bool)
-    for ground, height in zip(np.column_stack([truth["x"], truth["y"]]), truth["height"], strict=True):
-        near = nearest_person(grid.ground, ground[None], 1.0)
-        covered |= inside_bodies(grid, near, ground[None], np.array([height]))
-    return covered
-
-
-def measure(rig: Path, frames: slice) -> dict[str, Tally]:
-    """The three forms on one scene."""
-    config, recording = Config(), read_rig(rig)
-    still = replace(config, occupancy=replace(config.occupancy, effective_observations=1.0))
-    truth = np.genfromtxt(rig.with_name("truth.csv"), delimiter=",", names=True)
-    kinds = ["boxes" if s.source.kind in ("boxes", "instances") else "pixels" for s in recording.sources]
-    constant = Occupancy(recording.rig, kinds, still.occupancy, still.detection, still.body, still.error_rates)
-    learned = Occupancy(recording.rig, kinds, config.occupancy, config.detection, config.body, config.error_rates)
-    rates = learned.new_calibration()
-    tallies = {form: Tally() for form in FORMS}
-    for frame, seen, explanation in _explained(rig, kinds, frames, config):
-        near = nearest_person(recording.rig.grid.ground, explanation.people.ground, config.occupancy.person_radius) >= 0
-        share = float(logit(rates.filled_share))
-        forms = {
-            "constants": constant.fuse(seen, explanation).dense(),
-            "learned": learned.fuse_and_learn(rates, seen, explanation).dense(),
-        }
-        forms["without"] = forms["learned"] + np.where(near, share, 0.0)
-        doubt = np.min([np.abs(u) for u in forms.values()], axis=0) < DOUBT
-        doubt = (doubt | near) & (learned.views > 0)
-        occupied = occupied_cells(recording.rig.grid, truth[truth["frame"] == frame])
-        for form, log_odds in forms.items():
-            tallies[form].add(log_odds[doubt].astype(float), occupied[doubt])
+def measure(run: Run, truth_path: Path, step: int) -> dict[str, Tally]:
+    """Both forms of one run."""
+    truth = np.genfromtxt(truth_path, delimiter=",", names=True)
+    grid, tallies = run.recording.rig.grid, {"log-odds": Tally(), "calibrated": Tally()}
+    for frame in run.frames[step // 2 :: step].tolist():
+        log_odds, _ = run.read_frame(frame)
+        doubt = doubtful_cells(grid, log_odds, run.trajectory[run.trajectory["frame"] == frame])
+        filled = filled_cells(grid, truth[truth["frame"] == frame])[doubt]
+        probability = np.clip(run.read_cell_probability(frame)[doubt].astype(float), _SUREST, 1 - _SUREST)
+        tallies["log-odds"].add(log_odds[doubt].astype(float), filled)
+        tallies["calibrated"].add(logit(probability), filled)
     return tallies
 
 
-def _explained(rig: Path, kinds: list[str], frames: slice, config: Config) -> Iterator[tuple]:  # type: ignore[type-arg]
-    recording = read_rig(rig)
-    streams = index_streams(recording)
-    first, stop, _ = frames.indices(streams.length)
-    sights = make_foregrounds(recording, config, first, stop, streams=streams)
-    frame_pass = Detector(recording.rig, kinds, config.detection, config.body)
-    with open_frames(recording, first, stop, streams) as moments:
-        for moment in moments:
-            seen = [sight.evidence(view) for sight, view in zip(sights, moment.views, strict=True)]
-            yield moment.frame, seen, frame_pass.explain(seen, None)
-
-
-def show(scene: str, tallies: Mapping[str, Tally]) -> None:
-    """Print one scene's rows."""
-    for form, tally in tallies.items():
-        shares = " ".join("   -" if np.isnan(share) else f"{share:4.2f}" for share in tally.table()[1])
-        cells = tally.cells.sum()
-        print(f"{scene:12} {form:10} ECE {tally.error():5.3f}  score {tally.score / cells:5.3f}  {shares}", flush=True)
-
-
-def draw(scenes: Mapping[str, Mapping[str, Tally]], path: Path) -> None:
-    """One small diagram a scene."""
-    plt.rcParams.update({"svg.hashsalt": "reliability", "svg.fonttype": "none"})
-    figure, axes = plt.subplots(1, len(scenes), figsize=(2.6 * len(scenes), 2.7), sharey=True, squeeze=False)
-    for axis, (scene, tallies) in zip(axes[0], scenes.items(), strict=True):
-        axis.plot([0, 1], [0, 1], color="0.7", linewidth=0.8)
-        for (form, tally), colour in zip(tallies.items(), ("tab:gray", "tab:orange", "tab:blue"), strict=True):
-            axis.plot(*tally.table(), ".-", color=colour, linewidth=1.2, markersize=4, label=form)
-        axis.set(title=scene, xlabel="stated probability", xlim=(0, 1), ylim=(0, 1), aspect="equal")
-    axes[0, 0].set_ylabel("share occupied")
-    axes[0, 0].legend(frameon=False, fontsize=7)
-    figure.tight_layout()
-    figure.savefig(path, metadata={"Date": None} if path.suffix == ".svg" else None)
-
-
 def main() -> None:
-    """Measure, print and draw."""
+    """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("scenes", nargs="+", metavar="SCENE=RIG")
-    parser.add_argument("--frames", default=":", metavar="A:B")
-    parser.add_argument("-o", "--output", type=Path)
+    parser.add_argument("runs", nargs="+", metavar="RUN.h5=TRUTH.csv")
+    parser.add_argument("--step", type=int, default=8, help="frames from one that is measured to the next")
     asked = parser.parse_args()
-    head, _, tail = asked.frames.partition(":")
-    frames = slice(int(head) if head else None, int(tail) if tail else None)
-    print(f"{'share occupied, by tenths of the stated probability':>100}")
-    scenes = {}
-    for name, _, rig in (scene.partition("=") for scene in asked.scenes):
-        scenes[name] = measure(Path(rig), frames)
-        show(name, scenes[name])
-    if asked.output:
-        draw(scenes, asked.output)
+    print(f"{'share filled, by tenths of the stated probability':>94}")
+    for run, _, truth in (pair.partition("=") for pair in asked.runs):
+        for form, tally in measure(read_run(Path(run)), Path(truth), asked.step).items():
+            shares = " ".join("   -" if np.isnan(share) else f"{share:4.2f}" for share in tally.table()[1])
+            score = tally.score / tally.cells.sum()
+            print(f"{Path(run).stem:12} {form:10} ECE {tally.error():5.3f}  score {score:5.3f}  {shares}", flush=True)

@@ -31,10 +31,10 @@ from workbench import ROOT, Bench
 from stseg.arrays import Flags, Floats, Ints, Labels, Rows, Singles
 from stseg.config import Config
 from stseg.geometry import Grid
+from stseg.geometry.filled_cells import inside_bodies
 from stseg.geometry.nearest_person import nearest_person
 from stseg.io.runfile.runs import read_run
 from stseg.io.track_csv import read_tracks_csv
-from stseg.occupancy.rate_calibration import inside_bodies
 
 SCENES = ("crossing", "border", "meeting")
 TOUCHING = 0.8
