@@ -12,7 +12,7 @@ the summed-area tables that hold the likelihoods and the people's pixels.
 from __future__ import annotations
 
 from functools import cached_property
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,8 +77,24 @@ class ShownCells(NamedTuple):
     number: Floats
 
 
+class _MarkedCells(NamedTuple):
+    """The marked blocks, and what they make of `ShownCells`."""
+
+    marked: Flags
+    cell: Labels
+    place: Labels
+    block: Labels
+    number: Floats
+
+    @classmethod
+    def none(cls) -> Self:
+        """Before the first frame."""
+        nothing = np.zeros(0, np.int32)
+        return cls(np.zeros(0, bool), nothing, nothing, nothing, np.zeros(0))
+
+
 class CellTables:
-    """What is known of a rig's cells before any frame.
+    """What is known of a rig's cells before any frame, and the cells of the last frame's blocks.
 
     Parameters
     ----------
@@ -94,6 +110,7 @@ class CellTables:
             reach = np.zeros((len(boxes), *blocks, 4), np.int16)
             _fill_reach(boxes, reach)
             self.reach.append(reach)
+        self._last = _MarkedCells.none()
 
     @cached_property
     def sets(self) -> ViewSets:
@@ -124,14 +141,20 @@ class CellTables:
         views : uint8 (plane, y, x)
             Number of views that see each cell.
         """
+        if not np.array_equal(marked, self._last.marked):  # the same from frame to frame where all are, as by video
+            self._last = self._cells_of(marked, views)
+        _, cell, place, block, number = self._last
+        beside = np.full(len(number) - len(cell), -1)
+        return ShownCells(cell, place, block, np.append(near.reshape(-1)[place], beside), number)
+
+    def _cells_of(self, marked: Flags, views: Bytes) -> _MarkedCells:
         found, blocks = np.empty((2, int(marked.sum()) * SIDE**2), np.int32)
         count = _fill_cells(marked, views, found, blocks)
         cell, block = found[:count], blocks[:count]
-        place = cell % np.int32(near.size)
         sets, own = self.sets, self.sets.of_cell.reshape(-1)[cell]
         others = sets.size - np.bincount(own, minlength=len(sets.size))
         number = np.concatenate([np.ones(len(cell)), others])
-        return ShownCells(cell, place, block, np.append(near.reshape(-1)[place], np.full(len(others), -1)), number)
+        return _MarkedCells(marked.copy(), cell, cell % np.int32(views[0].size), block, number)
 
 
 @kernel

@@ -94,20 +94,30 @@ def _hidden_pixels(
 
 
 @part
-def _sum_of_others(
-    shown: PixelAssignment, table: SumTable, left: int, top: int, width: int, height: int, person: int
-) -> int:
-    """Sum of the likelihood levels of a footprint's pixels that show a person other than `person`."""
-    total = 0
-    for j in range(shown.row[top], shown.row[top + height - 1] + 1):
-        for i in range(shown.column[left], shown.column[left + width - 1] + 1):
+def _others_inside(
+    shown: PixelAssignment,
+    table: SumTable,
+    left: int,
+    top: int,
+    width: int,
+    height: int,
+    person: int,
+    distance: float,
+) -> tuple[int, int]:
+    """`_hidden_pixels`, and the sum of the likelihood levels of all pixels that show a person other than `person`."""
+    hidden, total = 0, 0
+    above, below = np.uint64(shown.row[np.uint64(top)]), np.uint64(shown.row[np.uint64(top + height - 1)] + 1)
+    first, stop = np.uint64(shown.column[np.uint64(left)]), np.uint64(shown.column[np.uint64(left + width - 1)] + 1)
+    for j in range(above, below):
+        v, end = max(top, j * shown.step), min(top + height, (j + 1) * shown.step)
+        for i in range(first, stop):
             other = shown.raster[j, i]
             if other >= 0 and other != person:
-                v, u = max(top, j * shown.step), max(left, i * shown.step)
-                down = v + _overlap(top, height, shown.step, j) - table.top
-                right = u + _overlap(left, width, shown.step, i) - table.left
-                total += int(sum_of(table.sums, u - table.left, v - table.top, right, down))
-    return total
+                u, until = max(left, i * shown.step), min(left + width, (i + 1) * shown.step)
+                if shown.distance[np.uint64(other)] < distance - SHOULDER:
+                    hidden += (end - v) * (until - u)
+                total += int(sum_of(table.sums, u - table.left, v - table.top, until - table.left, end - table.top))
+    return hidden, total
 
 
 @kernel
@@ -151,6 +161,7 @@ def fill_share(
 def fill_map(
     cells: ShownCells,
     marked: Flags,
+    people: Flags,
     footprint: Footprints,
     table: SumTable,
     shown: PixelAssignment,
@@ -161,23 +172,27 @@ def fill_map(
     """Fill levels and share (n,), 1 before, of cells by a view with a map; UNSEEN where it does not see them.
 
     The level is the mean over the visible pixels of the footprint, those of other persons counted as background. It is
-    0 outside the blocks, marked bool (block,), at which the view shows something.
+    0 outside the blocks, marked bool (block,), at which the view shows something; people bool (block,) are those of
+    them at which it shows a person.
     """
     for k in range(len(cells.cell)):
         left, top, width, height = footprint[cells.cell[k]]
+        block = np.uint64(cells.block[k])
         if width == 0:
             levels[k] = UNSEEN
             continue
-        if not marked[cells.block[k]]:
+        if not marked[block]:
             levels[k] = 0
             continue
         u, v = left - table.left, top - table.top
         total, pixels = int(sum_of(table.sums, u, v, u + width, v + height)), np.int32(width) * np.int32(height)
         nearest, visible = cells.near[k], np.float32(1)
-        if _shows_a_person(shown, left, top, width, height) and not (nearest >= 0 and shown.separate[nearest]):
-            hidden = _hidden_pixels(shown, left, top, width, height, nearest, distance[cells.place[k]])
+        is_separate = nearest >= 0 and shown.separate[nearest]
+        if people[block] and not is_separate and _shows_a_person(shown, left, top, width, height):
+            far = distance[cells.place[k]]
+            hidden, others = _others_inside(shown, table, left, top, width, height, nearest, far)
             visible -= np.float32(hidden) / np.float32(pixels)
             if visible > 0:
-                total -= _sum_of_others(shown, table, left, top, width, height, nearest)
+                total -= others
         mean = np.float32(total) / (np.float32(pixels) * (visible if visible > 0 else np.float32(1)))
         levels[k], share[k] = min(int(mean + np.float32(0.5)), TOP), visible

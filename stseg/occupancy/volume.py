@@ -37,9 +37,10 @@ _UNOCCLUDED = 0.99
 
 
 class _PreparedView(NamedTuple):
-    """What a view shows in a frame: its people, and its map's sums or the fit of its boxes."""
+    """What a view shows in a frame: its people, the blocks where it shows them, its map's sums or its boxes' fit."""
 
     shown: PixelAssignment
+    people: Flags
     table: SumTable | None
     fit: Singles | None
 
@@ -145,18 +146,19 @@ class Occupancy:
     def _prepared(
         self, i: int, view: Boxes | Singles, explanation: Explanation, near: Ints, noise: BoxNoise
     ) -> _PreparedView:
-        shown = self._assignment(i, explanation)
+        shown, people = self._assignment(i, explanation), self._tables.nothing_marked()
+        mark_people(self._tables.reach[i], shown, people)
         if isinstance(view, Boxes):
-            return _PreparedView(shown, None, self._fit(i, view, explanation, near, noise))
-        return _PreparedView(shown, self._means.sum_table(i, view), None)
+            return _PreparedView(shown, people, None, self._fit(i, view, explanation, near, noise))
+        return _PreparedView(shown, people, self._means.sum_table(i, view), None)
 
     def _marked(self, i: int, view: _PreparedView | None) -> Flags:
         """The blocks at which a view shows a person or foreground."""
-        marked, reach = self._tables.nothing_marked(), self._tables.reach[i]
-        if view is not None:
-            mark_people(reach, view.shown, marked)
-            if view.table is not None:
-                mark_map(reach, view.table, marked)
+        if view is None:
+            return self._tables.nothing_marked()
+        marked = view.people.copy()
+        if view.table is not None:
+            mark_map(self._tables.reach[i], view.table, marked)
         return marked
 
     def _beside_people(self, views: Sequence[_PreparedView | None], near: Ints) -> Flags:
@@ -184,7 +186,10 @@ class Occupancy:
         levels, share = np.empty(len(cells.near), np.int16), np.ones(len(cells.near), np.float32)
         confidence, empty = np.ones(len(cells.near), np.float32), np.int16(0)
         if view.table is not None:
-            fill_map(cells, marked, footprint, view.table, view.shown, distance, levels[:number], share[:number])
+            people = view.people.reshape(-1)
+            fill_map(
+                cells, marked, people, footprint, view.table, view.shown, distance, levels[:number], share[:number]
+            )
         elif view.fit is not None:
             fill_share(cells, marked, footprint, view.shown, distance, share[:number])
             fill_levels(view.fit, self.heights, self.rig.grid.heights, cells, footprint, rates, levels[:number])

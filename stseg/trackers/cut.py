@@ -10,7 +10,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from stseg.arrays import Flags, Ints, Labels, Rows
+from stseg.arrays import Flags, Ints, Labels, Rows, Singles
 from stseg.config import Config
 from stseg.geometry import Rig
 from stseg.geometry.sampling import Sampling
@@ -99,13 +99,13 @@ class CutTracker:
         first, stop = window.solve_first, window.solve_stop
         around = [one for one in self.held if first - self.context <= one.fused.frame < stop + self.context]
         held = self.existence.revised(around, first, stop)
-        patches, energy = self._cut_out(held)
+        patches, log_odds, energy = self._cut_out(held)
         cut = self.solver.grid(energy)
         label = self._divide(window, held, patches, energy, cut.occupied).label
         reach = self.config.occupancy.person_radius
         blobs = [
-            find_blobs(cells, patches.log_odds(one.fused.volume), one.fused.people.ground, one.tracks, reach, patches)
-            for cells, one in zip(label, held, strict=True)
+            find_blobs(cells, volume, one.fused.people.ground, one.tracks, reach, patches)
+            for cells, volume, one in zip(label, log_odds, held, strict=True)
         ]
         tracklets = form_tracklets(blobs, window.solve_first, self.config.tracking)
         decision = self.association.decide(window, blobs, tracklets)
@@ -113,19 +113,23 @@ class CutTracker:
         self.committed = window.commit_stop
         return self._commit(window, held, patches, label, blobs, decision, row)
 
-    def _cut_out(self, held: list[TrackedFrame]) -> tuple[Patches, Energy]:
-        """Patches of the ground that are enough, and the window's energy there; see `stseg.segmentation.patches`."""
+    def _cut_out(self, held: list[TrackedFrame]) -> tuple[Patches, Singles, Energy]:
+        """Patches of the ground that are enough, and the window's log-odds (time, plane, row, column) and energy there.
+
+        See `stseg.segmentation.patches`.
+        """
         grid, squares = self.rig.grid, self._squares(held)
         if self.solver is not SOLVERS["stseg"]:  # others take whole grids
             squares[:] = True
         while True:
             patches = Patches.of(grid, squares)
-            energy = self._energy(held, patches)
+            log_odds = np.stack([patches.log_odds(tracked.fused.volume) for tracked in held])
+            energy = self._energy(held, patches, log_odds)
             if not patches.border.any():
-                return patches, energy
+                return patches, log_odds, energy
             open_border = patches.border & ~greatest_empty_set(energy).all((0, 1))
             if not open_border.any():
-                return patches, energy
+                return patches, log_odds, energy
             mark_places(squares, patches.place[open_border], grid)
 
     def _squares(self, held: list[TrackedFrame]) -> Flags:
@@ -140,8 +144,7 @@ class CutTracker:
             squares |= people_squares(grid, now.fused.people.ground, ahead, reach)
         return squares
 
-    def _energy(self, held: list[TrackedFrame], patches: Patches) -> Energy:
-        log_odds = np.stack([patches.log_odds(tracked.fused.volume) for tracked in held])
+    def _energy(self, held: list[TrackedFrame], patches: Patches, log_odds: Singles) -> Energy:
         reach, grid = self.config.occupancy.person_radius, self.rig.grid
         motion = [
             motion_field(
