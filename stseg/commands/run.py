@@ -4,21 +4,16 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
 from cyclopts import Parameter
 
-from stseg.commands.progress import TerminalReporter
-from stseg.engine.frame_range import FrameRange
 from stseg.engine.worker_processes import prepare_workers
 from stseg.errors import ConfigError
-from stseg.io.config_file import read_config
-from stseg.io.live.receivers import receiver_of
-from stseg.io.outputs.label_images import require_label_folder
-from stseg.io.recording.rigs import read_rig
 from stseg.io.runfile.layout import VolumeKind
-from stseg.io.runfile.runs import Run
+
+if TYPE_CHECKING:
+    from stseg.io.runfile.runs import Run
 
 
 def run(
@@ -84,12 +79,18 @@ def run(
         Replace an older run file of that name, once this one is whole.
     """
     if scheduler is None and not follow:
-        prepare_workers(workers)  # they import the stages while this process does
+        prepare_workers(workers)  # they import the stages while this process does: nothing is imported before
+    from stseg.commands.progress import TerminalReporter
     from stseg.engine.following import follow_recording
+    from stseg.engine.frame_range import FrameRange
     from stseg.engine.pixel_labels import require_pixels, write_labels
     from stseg.engine.track import track_recording
     from stseg.engine.warnings import rig_warnings
     from stseg.engine.workforce import Workforce
+    from stseg.io.config_file import read_config
+    from stseg.io.live.receivers import receiver_of
+    from stseg.io.outputs.label_images import require_label_folder
+    from stseg.io.recording.rigs import read_rig
     from stseg.report.colours import track_palette
 
     chosen, workforce = None if frames is None else FrameRange.parse(frames), Workforce(workers, scheduler)
@@ -130,5 +131,5 @@ def _require_alone(workers: int | None, scheduler: str | None, labels: Path | No
 
 
 def _summary(run: Run) -> str:
-    people = len(np.unique(run.trajectory["id"]))
+    people = len(set(run.trajectory["id"].tolist()))
     return f"{run.path}: {people} tracks in frames {run.frames[0]} to {run.frames[-1]}"
