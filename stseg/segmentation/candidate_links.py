@@ -96,6 +96,9 @@ class LinkModel:
         off = found.ground[end] - found.ground[start]
         noise = 2 * self.motion.position_noise**2 + (self.motion.speed_spread * seconds) ** 2
         spread = found.covariance[start] + found.covariance[end] + noise[:, None, None] * np.eye(2)
+        # The square distance is at least that by the sum of both variances: most pairs need no inverse.
+        near = np.einsum("ei,ei->e", off, off) < _GATE * np.trace(spread, axis1=1, axis2=2)
+        start, end, seconds, off, spread = start[near], end[near], seconds[near], off[near], spread[near]
         square = np.einsum("ei,eij,ej->e", off, np.linalg.inv(spread), off)
         place = np.log(_RESOLUTION**2 / np.sqrt(np.linalg.det(spread))) - 0.5 * square
         absence = _ABSENCE * (seconds - 1 / self.frame_rate)
