@@ -393,3 +393,19 @@ def test_the_same_frame_twice() -> None:
     first = occupancy.fuse(noise(1), explanation).dense()
     occupancy.fuse(noise(2), explanation)
     np.testing.assert_array_equal(first, occupancy.fuse(noise(1), explanation).dense())
+
+
+def test_cells_kept_from_the_frame_before_are_those_of_this_one() -> None:
+    """People elsewhere mark other blocks; the first frame's come again."""
+    rig = rig_of(corner_cameras(), cell=0.1, planes=3)
+    kept, volumes = Occupancy(rig, PIXELS, CONFIG, FEW_HEIGHTS, BODY), []
+    for place in ((-1.6, 0.3), (-1.6, 0.3), (1.4, -1.6), (-1.6, 0.3)):
+        standing = people(place)
+        seen: list[ViewEvidence] = [view * (view > 0.5) for view in likelihoods(rig.cameras, standing)]
+        explanation = Detector(rig, PIXELS, FEW_HEIGHTS, BODY).explain(seen, None)
+        volume = kept.fuse(seen, explanation)
+        fresh = Occupancy(rig, PIXELS, CONFIG, FEW_HEIGHTS, BODY).fuse(seen, explanation)
+        np.testing.assert_array_equal(volume.cell, fresh.cell)
+        np.testing.assert_array_equal(volume.dense(), fresh.dense())
+        volumes.append(volume)
+    assert set(volumes[0].cell.tolist()) != set(volumes[2].cell.tolist())
