@@ -6,6 +6,7 @@ time. Threads may pack frames side by side, and what is packed is copied from fi
 
 from __future__ import annotations
 
+import math
 import zlib
 from typing import NamedTuple
 
@@ -40,15 +41,11 @@ class PackedVolumes(NamedTuple):
         Their numbers in the recording.
     log_odds, label
         One for each frame.
-    opened : int64 (k,), opened_label : int32 (k, plane, y, x)
-        Which of them are unpacked besides, and their track ids.
     """
 
     frames: Ints
     log_odds: list[PackedFrame]
     label: list[PackedFrame]
-    opened: Ints
-    opened_label: Labels
 
 
 def packed_frame(values: AnyArray) -> PackedFrame:
@@ -56,3 +53,17 @@ def packed_frame(values: AnyArray) -> PackedFrame:
     by_significance = np.ascontiguousarray(values).reshape(-1, 1).view(np.uint8).T
     deflate = zlib.compressobj(_LEVEL, zlib.DEFLATED, _WINDOW, _MEMORY, zlib.Z_RLE)
     return PackedFrame(0, deflate.compress(by_significance.tobytes()) + deflate.flush())
+
+
+def unpacked_label(packed: PackedFrame, shape: tuple[int, ...]) -> Labels:
+    """The labels that `packed_frame` packed, int32 (plane, y, x); ValueError where it did not, or not that many."""
+    size = math.prod(shape) * 4
+    inflate = zlib.decompressobj()
+    try:
+        values = inflate.decompress(packed.data, size + 1)
+    except zlib.error as error:
+        raise ValueError(str(error)) from error
+    if packed.filters or len(values) != size or not inflate.eof:
+        raise ValueError(f"labels of a frame packed otherwise than {size} bytes, shuffled and deflated")
+    by_significance = np.frombuffer(values, np.uint8).reshape(4, -1)
+    return np.ascontiguousarray(by_significance.T).view(np.int32).reshape(shape)

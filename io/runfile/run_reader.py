@@ -258,20 +258,17 @@ class Run:
         """
         return self.cell_reliability.of_cells(self.read_frame(frame)[0])
 
-    def read_packed_volumes(self, number: int, opened: Ints) -> Iterator[PackedVolumes]:
-        """The volumes of all frames, `number` at a time, as they are packed; unpacked labels of the frames `opened`."""
+    def read_packed_volumes(self, number: int) -> Iterator[PackedVolumes]:
+        """The volumes of all frames, `number` at a time, as they are packed."""
         with format_errors(self.path, layout.OCCUPANCY), open_hdf5(self.path) as file:
             group = file[layout.OCCUPANCY]
             for start in range(0, len(self.frames), number):
                 frames = self.frames[start : start + number]
-                chosen = np.flatnonzero(np.isin(frames, opened))
-                yield PackedVolumes(
-                    frames,
-                    [_packed_chunk(group["log_odds"], start + k) for k in range(len(frames))],
-                    [_packed_chunk(group["label"], start + k) for k in range(len(frames))],
-                    chosen,
-                    group["label"][start + chosen] if len(chosen) else np.zeros((0, *self.views.shape), np.int32),
+                log_odds, label = (
+                    [_packed_chunk(group[name], start + k) for k in range(len(frames))]
+                    for name in ("log_odds", "label")
                 )
+                yield PackedVolumes(frames, log_odds, label)
 
     def _table(self, name: str) -> Rows:
         def take(file: h5py.File) -> Rows:

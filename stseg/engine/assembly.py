@@ -16,7 +16,7 @@ from stseg.engine.pipeline import finished_tracks
 from stseg.engine.segments import Segment
 from stseg.io.config_file import format_config
 from stseg.io.recording.time_alignment import with_alignment
-from stseg.io.runfile.packed_frames import packed_frame
+from stseg.io.runfile.packed_frames import PackedFrame, packed_frame, unpacked_label
 from stseg.io.runfile.runs import Run, RunWriter, read_run
 from stseg.model.tables import APPEARANCE, Tracks
 from stseg.trackers import find_tracker
@@ -109,14 +109,22 @@ def _segment_rows(
 def _copy(part: _SegmentRows, writer: RunWriter, packers: Executor) -> None:
     """Append a segment's volume, with the run's track ids, and its tables to the run file.
 
-    Frames whose tracks keep their ids are copied as they are packed.
+    Frames whose tracks keep their ids are copied as they are packed; the others are renamed side by side.
     """
-    renamed = np.unique(part.rows["frame"][part.rows["id"] != part.identity])
-    for volumes in part.run.read_packed_volumes(_BLOCK, renamed):
-        rename_labels(volumes.opened_label, volumes.frames[volumes.opened], part.rows, part.identity)
-        label = volumes.label
-        for k, packed in zip(volumes.opened.tolist(), packers.map(packed_frame, volumes.opened_label), strict=True):
-            label[k] = packed
+    order = np.argsort(part.rows["frame"], kind="stable")
+    rows, identity = part.rows[order], part.identity[order]
+
+    def renamed(frame: int, label: PackedFrame) -> PackedFrame:
+        first, stop = rows["frame"].searchsorted([frame, frame + 1])
+        own, names = rows[first:stop], identity[first:stop]
+        if (own["id"] == names).all():
+            return label
+        cells = unpacked_label(label, part.run.views.shape)
+        rename_labels(cells[None], np.array([frame]), own, names)
+        return packed_frame(cells)
+
+    for volumes in part.run.read_packed_volumes(_BLOCK):
+        label = list(packers.map(renamed, volumes.frames.tolist(), volumes.label))
         writer.append_packed_frames(volumes.frames, volumes.log_odds, label)
     for table in _COPIED:
         writer.append(table, np.asarray(getattr(part.run, table)))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -56,8 +56,4 @@ class Hypotheses:
 
     def at(self, chosen: Ints) -> Hypotheses:
         """Copies of the chosen hypotheses."""
-        return Hypotheses(
-            self.score[chosen], self.name[chosen], self.last[chosen], self.seconds[chosen], self.state[chosen],
-            self.covariance[chosen], self.precision[chosen], self.information[chosen],
-            self.bound[chosen],
-        )  # fmt: skip
+        return Hypotheses(*(getattr(self, own.name).take(chosen, axis=0) for own in fields(self)))

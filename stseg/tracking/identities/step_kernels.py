@@ -73,12 +73,14 @@ def fill_costs(
         for s in range(slots):
             if name[h, s] < 0:
                 continue
+            if h > 0 and _alike(h, s, name, last, seconds, state, covariance, held_precision, held_information):
+                _take_over(cost, h, s, slots, certain[first : first + rows])
+                continue
             since = now - seconds[h, s]
             x = state[h, s, 0] + since * state[h, s, 2]
             y = state[h, s, 1] + since * state[h, s, 3]
             spreads = predicted_variance(covariance[h, s], since, turn)
-            for d in range(len(spread)):
-                known[d] = size_evidence(held_precision[h, s, d], held_information[h, s, d], spread[d])
+            measured = False
             for i in range(rows):
                 r = first + i
                 follows = previous[r] == last[h, s]
@@ -89,6 +91,9 @@ def fill_costs(
                 gain = max(-0.5 * square / total, least) - math.log(2.0 * math.pi * total) - absence * since
                 if gain < 4.0 * least and not follows:
                     continue
+                for d in range(0 if measured else len(spread)):  # few rows may be those of somebody out of sight
+                    known[d] = size_evidence(held_precision[h, s, d], held_information[h, s, d], spread[d])
+                measured = True
                 for d in range(len(spread)):
                     both = held_precision[h, s, d] + precision[r, d]
                     together = size_evidence(both, held_information[h, s, d] + information[r, d], spread[d])
@@ -96,6 +101,37 @@ def fill_costs(
                 cost[h, i, s] = -gain
                 if certain[r]:
                     cost[h, i, slots + i] = FORBIDDEN
+
+
+@part
+def _alike(
+    h: int, s: int, name: Ints, last: Ints, seconds: Floats, state: Floats, covariance: Floats, held_precision: Floats,
+    held_information: Floats,
+) -> bool:  # fmt: skip
+    """Whether the hypothesis before has the same identity in the same slot, with the same past: most often it has."""
+    if name[h, s] != name[h - 1, s] or last[h, s] != last[h - 1, s] or seconds[h, s] != seconds[h - 1, s]:
+        return False
+    for k in range(state.shape[2]):
+        if state[h, s, k] != state[h - 1, s, k]:
+            return False
+    for k in range(covariance.shape[2]):
+        if covariance[h, s, k] != covariance[h - 1, s, k]:
+            return False
+    for d in range(held_precision.shape[2]):
+        if held_precision[h, s, d] != held_precision[h - 1, s, d]:
+            return False
+        if held_information[h, s, d] != held_information[h - 1, s, d]:
+            return False
+    return True
+
+
+@part
+def _take_over(cost: Floats, h: int, s: int, slots: int, certain: Flags) -> None:
+    """Take the costs of a slot from the hypothesis before; who certainly is somebody is nobody new."""
+    for i in range(len(certain)):
+        cost[h, i, s] = cost[h - 1, i, s]
+        if certain[i] and cost[h, i, s] != FORBIDDEN:
+            cost[h, i, slots + i] = FORBIDDEN
 
 
 @kernel
