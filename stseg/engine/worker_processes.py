@@ -1,7 +1,7 @@
 """How many worker processes a run has, and the process that they are forked from.
 
-Both are known here without importing any stage: what forks the workers imports the stages at the same time as the
-process of the command does.
+Both are known here without importing any stage: what forks the workers imports the stages (`stseg.engine.preloaded`)
+at the same time as the process of the command does.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ CONTEXT: ForkServerContext | SpawnContext = (
 )
 """Workers are forked from a process that has imported everything and has no threads, where the system can do that."""
 
-_PRELOADED = "stseg.engine.workers"
+_PRELOADED = "stseg.engine.preloaded"
 _MEMORY = 650 * 2**20
 """Memory that a process of a run is taken to need on a small ground, bytes."""
 _CELL_MEMORY = 350
