@@ -77,10 +77,9 @@ def _in_volume(ground: Floats, log_odds: Singles, patches: Patches) -> Flags:
     cell = np.rint(grid.cell_of(ground)).astype(np.int64)
     column, row = cell.clip(0, (columns - 1, rows - 1)).T
     inside = (ground >= (grid.x[0], grid.y[0])).all(1) & (ground <= (grid.x[1], grid.y[1])).all(1)
-    seen = np.zeros(rows * columns, bool)
-    held = patches.place >= 0
-    seen[patches.place[held]] = np.isfinite(log_odds[:, held]).any(0)
-    return np.asarray(inside & seen[row * columns + column])
+    place = patches.on_sheet_at[row * columns + column]
+    seen = np.isfinite(log_odds.reshape(len(log_odds), -1)[:, place]).any(0)
+    return np.asarray(inside & (place >= 0) & seen)
 
 
 def _joined(blobs: Blobs, person: Ints, ground: Floats, track: Ints, grid: Grid) -> Blobs:

@@ -107,6 +107,14 @@ class Patches:
         edge = inside & ~binary_erosion(inside, _EIGHT, border_value=1)
         return np.asarray(self.on_sheet(edge))
 
+    @cached_property
+    def on_sheet_at(self) -> Labels:
+        """Place on the flattened sheet of each cell of the flattened ground, int32 (ground cell,); -1 for none."""
+        index = np.full(self.grid.shape[1] * self.grid.shape[2], -1, np.int32)
+        inside = self.place.reshape(-1) >= 0
+        index[self.place.reshape(-1)[inside]] = np.flatnonzero(inside)
+        return index
+
     def on_sheet(self, values: AnyArray) -> AnyArray:
         """Values of ground cells (y, x) at their places on the sheet (row, column), 0 between patches."""
         return np.where(self.place >= 0, values.reshape(-1)[self.place], np.zeros(1, values.dtype))
@@ -122,9 +130,6 @@ class Patches:
 
     def log_odds(self, volume: SparseVolume) -> Singles:
         """A frame's log-odds on the sheet, float32 (plane, row, column), nats; nan where no view sees the cell."""
-        index = np.full(self.grid.shape[1] * self.grid.shape[2], -1, np.int32)
-        inside = self.place.reshape(-1) >= 0
-        index[self.place.reshape(-1)[inside]] = np.flatnonzero(inside)
         sheet = np.empty((self.grid.planes, *self.place.shape), np.float32)
         _fill_sheet(
             volume.of_cell.reshape(-1),
@@ -132,7 +137,7 @@ class Patches:
             volume.cell,
             volume.value,
             self.place.reshape(-1),
-            index,
+            self.on_sheet_at,
             _BETWEEN,
             sheet.reshape(self.grid.planes, -1),
         )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import min_weight_full_bipartite_matching
@@ -33,14 +35,19 @@ def best_paths(gain: Floats, start: Ints, end: Ints, bonus: Floats) -> Ints:
 
 def path_marginals(gain: Floats, start: Ints, end: Ints, bonus: Floats) -> Floats:
     """Marginal log-odds of each candidate on its path by messages both ways, nats; links in order of time."""
-    forward, backward = gain.copy(), np.zeros(len(gain))
+    own, forward, backward = gain.tolist(), gain.tolist(), [0.0] * len(gain)  # lists: few links, one after the other
     for i, j, b in zip(start.tolist(), end.tolist(), bonus.tolist(), strict=True):
         forward[j] += _message(forward[i], b)
     for i, j, b in zip(start[::-1].tolist(), end[::-1].tolist(), bonus[::-1].tolist(), strict=True):
-        backward[i] += _message(gain[j] + backward[j], b)
-    return forward + backward
+        backward[i] += _message(own[j] + backward[j], b)
+    return np.array(forward) + np.array(backward)
 
 
 def _message(log_odds: float, bonus: float) -> float:
     """Message of a neighbour with these log-odds across a link, nats."""
-    return float(np.logaddexp(0.0, log_odds + bonus) - np.logaddexp(0.0, log_odds))
+    return _log_one_and(log_odds + bonus) - _log_one_and(log_odds)
+
+
+def _log_one_and(nats: float) -> float:
+    """log(1 + e^x)."""
+    return max(nats, 0.0) + math.log1p(math.exp(-abs(nats)))
