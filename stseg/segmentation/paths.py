@@ -40,7 +40,7 @@ def path_marginals(gain: Floats, start: Ints, end: Ints, bonus: Floats) -> Float
         forward[j] += _message(forward[i], b)
     for i, j, b in zip(start[::-1].tolist(), end[::-1].tolist(), bonus[::-1].tolist(), strict=True):
         backward[i] += _message(own[j] + backward[j], b)
-    return np.array(forward) + np.array(backward)
+    return np.asarray(np.array(forward) + np.array(backward))
 
 
 def _message(log_odds: float, bonus: float) -> float:
