@@ -81,6 +81,7 @@ class ResultSet:
 _ROOM = "--size 644,486 --unit mm --up=-z --area=-2.5,-4.5,2.5,1.5"
 _ROOM_1 = "--size 644,486 --unit mm --up=-z --area=-2.5,-3,2.5,2"
 _CMC = "--names Cam1,Cam2,Cam3,Cam4 --size 1920,1024 --unit m --area=0,-0.4,7.67,3.6 --frame-rate 4"
+_FASTER_RCNN, _FAIRMOT = "a detector's boxes, without scores", "another detector's boxes, with scores"
 _CMC_AREA = "--area=1.9,-0.3,6.2,3.5"
 _WILDTRACK_VIEWS = ("CVLab1", "CVLab2", "CVLab3", "CVLab4", "IDIAP1", "IDIAP2", "IDIAP3")
 _WILDTRACK_FILES = " ".join(
@@ -95,17 +96,18 @@ _WILDTRACK = (
 )
 
 
-def _cmc(number: int, people: str) -> ResultSet:
-    name = f"cmc{number}"
+def _cmc(name: str, foreground: str, boxes: str, people: str) -> ResultSet:
+    """One of the recordings of the room CMC; `boxes` are options that name a detector's files."""
+    number = name[3]
     return ResultSet(
         name,
-        "a detector's boxes, without scores",
+        foreground,
         4,
         "0:261",
         f"$WORK/{name}.toml",
         (
             f"stseg calibrate import matrix $DATA/cmc/cam?_cam_mat.mat -o $WORK/{name}.toml {_CMC} --source-kind boxes "
-            f"--source-pattern '$DATA/cmc/DET_CMC{number}_{{name}}.txt' --first-frame 1 --overwrite",
+            f"--source-pattern {boxes} --overwrite",
             f"python tools/result_inputs.py cmc-truth $DATA/cmc/GT_CMC{number}_WORLD_CENTROID.txt $WORK/{name}.csv",
         ),
         truth=f"$WORK/{name}.csv",
@@ -194,8 +196,9 @@ _ALL = (
         remark="4 people, flagged rows not judged",
         colour=True,
     ),
-    _cmc(1, "3 people"),
-    _cmc(2, "up to 10 people"),
+    _cmc("cmc1", _FASTER_RCNN, "'$DATA/cmc/DET_CMC1_{name}.txt' --first-frame 1", "3 people"),
+    _cmc("cmc2", _FASTER_RCNN, "'$DATA/cmc/DET_CMC2_{name}.txt' --first-frame 1", "up to 10 people"),
+    _cmc("cmc2_fairmot", _FAIRMOT, "'$DATA/cmc/fairmot/CMC2_{name}.csv'", "up to 10 people"),
     _wildtrack("wildtrack", "detector-like boxes with scores", "$DATA/wildtrack/detector"),
     _wildtrack(
         "wildtrack_annotated",
