@@ -25,6 +25,7 @@ from stseg.detection.problem import Parameters
 from stseg.detection.repulsion import CORE
 from stseg.detection.restart import restarted
 from stseg.detection.result import explanation
+from stseg.detection.rim import RimCalibration
 from stseg.detection.search import ENUMERATED
 from stseg.detection.views import BoxView, PixelView, ViewObservation
 from stseg.geometry import Rig
@@ -36,6 +37,8 @@ from stseg.model.predicted_tracks import PredictedTracks
 
 _NEARLY = -15.0
 """Gain above which an alternative is fitted to its pixels, nats: what the right place and size may add."""
+_LOOKS = 2
+"""Searches of a session's first frame from which its rims are learned: the second finds who was missed by the first."""
 _SEEN = 2.0
 """Evidence of all views above which it is, nats: less is no foreground left over."""
 
@@ -92,10 +95,15 @@ class Detector:
         """Population calibration of a session that begins: the configured prior."""
         return PopulationCalibration(self.body, self._rate, self._level)
 
+    def new_rims(self) -> RimCalibration:
+        """Rim calibration of a session that begins: nothing is withdrawn."""
+        return RimCalibration(len(self.views), self.body, self.config, self._rate, self._level)
+
     def explain_next(
         self,
         box_noise: BoxNoiseCalibration,
         population: PopulationCalibration,
+        rims: RimCalibration,
         frame: int,
         seen: Sequence[ViewEvidence],
         predicted: PredictedTracks | None,
@@ -105,7 +113,10 @@ class Detector:
 
         `frame` is its number in the recording, which says whether it is a key frame (`stseg.detection.key_frames`).
         """
-        observations = self.observe(seen, box_noise.noise)
+        shown = self.observe(seen, box_noise.noise)
+        if predicted is None and not self._has_boxes:
+            self._look_at_rims(rims, shown, population.body)
+        observations = rims.applied(shown)
         tracked = self._tracked(observations, population.body, predicted)
         known = None
         if frame % self._key_interval and predicted is not None and proposed is None:
@@ -115,9 +126,17 @@ class Detector:
             box_noise.learn(explained, self.views, observations)
         elif known:
             population.let_pass()
+            rims.let_pass()
         else:
             population.learn(explained.people)
+            rims.learn(explained.people, self.views, shown)
         return explained
+
+    def _look_at_rims(self, rims: RimCalibration, shown: Sequence[ViewObservation | None], body: BodyConfig) -> None:
+        """Learn the rims of a session's first frame before it is explained: births cost nothing in that frame alone."""
+        for _ in range(_LOOKS):
+            explained = self._searched(self._tracked(rims.applied(shown), body, None), None)
+            rims.learn(explained.people, self.views, shown)
 
     def observe(self, seen: Sequence[ViewEvidence], noise: BoxNoise | None = None) -> list[ViewObservation | None]:
         """Observations of the views under a box noise, by default the first guess; None where a view is blind."""

@@ -66,6 +66,7 @@ class Session:
         self._tracker = pipeline.tracker(pipeline.rig, pipeline.config, first)
         self._box_noise = pipeline.detector.new_calibration()
         self._population = pipeline.detector.new_population()
+        self._rims = pipeline.detector.new_rims()
         self._error_rates = pipeline.occupancy.new_calibration()
         self._records: dict[int, FrameRecord] = {}
         self._executor = fusion
@@ -93,7 +94,7 @@ class Session:
         with self.watch.time("ghosts"):
             proposed = self.pipeline.proposals.of(evidence, self._fuse_with_current_rates)
             explanation = self.pipeline.detector.explain_next(
-                self._box_noise, self._population, frame, evidence, predicted, proposed
+                self._box_noise, self._population, self._rims, frame, evidence, predicted, proposed
             )
         fusion = self._submit(frame, evidence, explanation, noise)
         with self.watch.time("appearance"):
