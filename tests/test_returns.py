@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
+from run_files import write_small_run
 from strollers import BORDER, CONFIG, RATE, rows_of, straight
 
 from stseg.arrays import Floats, Rows
 from stseg.config import Config
-from stseg.errors import ConfigError
-from stseg.model.tables import APPEARANCE, EVENT, FEATURES
+from stseg.engine.known import digest, read_known
+from stseg.errors import ConfigError, FormatError, InputError
+from stseg.model.tables import APPEARANCE, COLOURS, EVENT, FEATURES, KNOWN
 from stseg.tracking.final_tracks import FinalTracks, final_tracks
 from stseg.tracking.identities.constraints import Constraints
+from stseg.tracking.identities.known_people import known_people
 from stseg.tracking.identities.returns import find_returns
 from stseg.tracking.identities.search import FREELY
 from stseg.tracking.identities.visits import Visits, lasting_variance, pooled_visits
@@ -31,7 +36,7 @@ def visits_of(
     if seed is not None:
         mean = mean + np.random.default_rng(seed).normal(size=mean.shape) / np.sqrt(precision)
     weight = np.full(mean.shape, precision)
-    return Visits(np.arange(11, 11 + len(stays)), first, last, weight, weight * mean)
+    return Visits(np.arange(11, 11 + len(stays)), first, last, weight, weight * mean, np.zeros(mean.shape[1]))
 
 
 def found(visits: Visits, least: float = 0.9) -> dict[int, int]:
@@ -168,3 +173,85 @@ def test_an_answer_that_they_are_two_is_obeyed() -> None:
 def test_a_probability_below_a_half_is_refused() -> None:
     with pytest.raises(ConfigError, match="return_probability"):
         returning(0.3)
+
+
+# People of an earlier recording
+
+
+def coloured(people: dict[int, int], seed: int) -> tuple[Rows, Rows]:
+    """Rows of some tracks, each of a person whose clothes are always the same, and what two cameras see of them."""
+    rows = rows_of({k: (straight(-4, 2 * k - 7, 0.02, 0), 1.7, range(240)) for k in people}, noise=0.0)
+    rows["raw_x"], rows["raw_y"] = rows["x"], rows["y"]
+    rows["xx"] = rows["yy"] = 0.02
+    rows["extent"], rows["score"] = 0.5, 5.0
+    clothes = 0.6 * np.random.default_rng(8).normal(size=(20, COLOURS))
+    rng = np.random.default_rng(seed)
+    gains = rng.normal(size=2)
+    seen = []
+    for view in range(2):
+        looks = np.zeros(len(rows), APPEARANCE)
+        looks["frame"], looks["x"], looks["y"], looks["view"] = rows["frame"], rows["raw_x"], rows["raw_y"], view
+        own = clothes[[people[k] for k in rows["id"].tolist()]]
+        looks["colours"] = own + gains[view] - gains.mean() + 0.2 * rng.normal(size=own.shape)
+        looks["features"] = np.nan
+        seen.append(looks)
+    return rows, np.concatenate(seen)
+
+
+def test_people_of_an_earlier_run_keep_their_ids_and_others_get_greater_ones() -> None:
+    morning, looks = coloured({1: 1, 2: 2, 3: 3, 4: 4, 5: 5}, seed=1)
+    morning["id"] += 10
+    known = known_people(morning, looks)
+    assert known["id"].tolist() == [11, 12, 13, 14, 15]
+    assert known["looks"].tolist() == [240] * 5 and known["height"] == pytest.approx(1.7, abs=0.02)
+    rows, looks = coloured({1: 4, 2: 9, 3: 1, 4: 8, 5: 7}, seed=2)
+    birth = np.array([(0, b"birth", 2, 0, b"")], EVENT)
+    found = final_tracks(rows, birth, looks, RATE, BORDER, returning(0.99), known=known)
+    names = [np.unique(found.identity[rows["id"] == track]).tolist() for track in range(1, 6)]
+    assert names[0] == [14] and names[2] == [11]
+    assert all(one > 15 for track in (1, 3, 4) for one in names[track])
+    assert set(found.trajectory["id"].tolist()) == set(found.identity.tolist())
+    told = {int(e["id"]): bytes(e["reason"]) for e in found.events if e["kind"] == b"return"}
+    assert set(told) == {11, 14}
+    assert all(reason.endswith(b"known from an earlier recording") for reason in told.values())
+    assert [int(e["id"]) for e in found.events if e["kind"] == b"birth"] == names[1]
+
+
+def test_nobody_of_whom_nothing_is_known_is_recognised() -> None:
+    rows, looks = coloured({1: 1, 2: 2, 3: 3, 4: 4, 5: 5}, seed=1)
+    rows["height"] = np.nan
+    known = known_people(rows, looks[:0])
+    assert np.isnan(known["height"]).all() and not known["heights"].any() and not known["looks"].any()
+    rows, looks = coloured({1: 1, 2: 2, 3: 3, 4: 4, 5: 5}, seed=2)
+    found = final_tracks(rows, np.zeros(0, EVENT), looks, RATE, BORDER, returning(0.9), known=known)
+    assert found.identity.min() > 5
+
+
+def test_a_run_file_tells_of_its_people_or_says_why_not(tmp_path: Path) -> None:
+    path = write_small_run(tmp_path / "run.h5")
+    with pytest.raises(ConfigError, match=r"--known: found that alone, expected tracking.return_probability below 1"):
+        read_known(path, CONFIG)
+    with pytest.raises(FormatError, match=r"run.h5: /committed: found no rows"):
+        read_known(path, returning(0.99))
+    before = np.zeros(2, KNOWN)
+    before["id"] = 2, 7
+    with h5py.File(path, "r+") as file:
+        rows = file["trajectory"][:]
+        rows["raw_x"] = rows["x"]
+        file["trajectory"][:] = rows
+        file["committed"].resize((len(rows),))
+        file["committed"][:] = rows
+        file["known"].resize((2,))
+        file["known"][:] = before
+    known = read_known(path, returning(0.99))
+    assert known["id"].tolist() == [7, 1, 2] and known["heights"].tolist() == [0, 6, 3]
+    assert digest(known) != digest(known[::-1])
+    for ids, message in (((7, 7), "a person twice"), ((0, 7), "an id from 1 on"), ((2, 2**31 - 1), "ids up to")):
+        with h5py.File(path, "r+") as file:
+            before["id"] = ids
+            file["known"][:] = before
+        with pytest.raises(FormatError, match=message):
+            read_known(path, returning(0.99))
+    (tmp_path / "text.h5").write_text("not HDF5")
+    with pytest.raises(InputError, match=r"text\.h5"):
+        read_known(tmp_path / "text.h5", returning(0.99))

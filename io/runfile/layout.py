@@ -20,6 +20,7 @@ from stseg.model.tables import (
     BOX,
     CANDIDATE,
     EVENT,
+    KNOWN,
     RATES,
     SHIFT,
     TIMING,
@@ -93,13 +94,14 @@ ABOUT = {
     "committed_events": "events before identities were decided",
     "appearance": "one row per detection, frame and view that sees it apart: colours and features, a few numbers",
     "answered": "pairs of rows of /committed that answers bind: one person (same 1) or two (0)",
+    "known": "people of earlier recordings, whom those who came were compared with: mean height and colours",
 }
 """Every table and its contents."""
 
 EARLIER = {LOG_ODDS.name: np.dtype("<f2")}
 """Types of fields in the first files of this version, which readers accept; browsers cannot show half precision."""
 
-ADDED = frozenset({"rates", "shifts", "committed", "committed_events", "appearance", "answered"})
+ADDED = frozenset({"rates", "shifts", "committed", "committed_events", "appearance", "answered", "known"})
 """Tables absent from the first files of this version; read as empty."""
 
 ADDED_COLUMNS = frozenset({"width", "aside"})
@@ -122,6 +124,7 @@ def table_types(views: int) -> dict[str, np.dtype[np.void]]:
         "committed_events": EVENT,
         "appearance": APPEARANCE,
         "answered": ANSWERED,
+        "known": KNOWN,
     }
 
 

@@ -145,6 +145,11 @@ class Run:
         return self._table("answered")
 
     @cached_property
+    def known(self) -> Rows:
+        """KNOWN (n,): people of earlier recordings (`stseg run --known`); empty in a file that has none."""
+        return self._table("known")
+
+    @cached_property
     def names(self) -> dict[int, str]:
         """Names of tracks by id, where they were given (`stseg correct`, or `with_names`)."""
         if self.given_names is not None:

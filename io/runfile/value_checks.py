@@ -22,6 +22,8 @@ _RANGES: dict[str, tuple[int, int]] = {
     "window": (-1, limits.FRAMES),
     "row": (0, limits.ROWS),
     "same": (0, 1),
+    "heights": (0, limits.ROWS),
+    "looks": (0, limits.ROWS),
 }
 """Columns of whole numbers; `view` counts the cameras."""
 _PLACES = {"trajectory": ("x", "y", "z"), "boxes": ("left", "top", "width", "height"), "ghosts": ("x", "y")}
@@ -45,6 +47,8 @@ def require_table(bounds: Bounds, name: str, rows: Rows) -> Rows:
             raise FormatError(bounds.path, f"/{name}, {column}", printable(str(value))[: limits.NAME], expected)
     if name in ("trajectory", "boxes") and _repeated(rows):
         raise FormatError(bounds.path, f"/{name}", "a track twice in a frame", "once, or once a view")
+    if name == "known" and _repeated(rows):
+        raise FormatError(bounds.path, "/known", "a person twice", "each once")
     return rows
 
 
@@ -63,7 +67,7 @@ def _wrong_values(bounds: Bounds, name: str, rows: Rows) -> Iterator[tuple[str, 
         elif column in _RANGES and values.dtype.kind in "iu":
             low, high = _RANGES[column]
             yield column, (values < low) | (values > high), f"a whole number from {low} to {high}"
-    if name in ("trajectory", "boxes"):
+    if name in ("trajectory", "boxes", "known"):
         yield "id", rows["id"] < 1, "an id from 1 on"
 
 

@@ -31,6 +31,7 @@ def run(
     scheduler: str | None = None,
     follow: Annotated[bool, Parameter(negative="")] = False,
     publish: Annotated[str | None, Parameter(metavar="ADDRESS")] = None,
+    known: Annotated[Path | None, Parameter(metavar="RUN.h5")] = None,
     overwrite: Annotated[bool, Parameter(negative="")] = False,
 ) -> None:
     """Track the people of a recording, and write everything that was found to one HDF5 file.
@@ -75,6 +76,9 @@ def run(
         With --follow: send the same tracks as JSON lines, one message a window, to mqtt://HOST[:PORT]/TOPIC (needs
         paho-mqtt), over a WebSocket to ws://HOST[:PORT]/PATH or wss://HOST/PATH (needs websockets), or by POST to
         http://HOST/PATH: --publish ws://localhost:8765/tracks, for instance. Tracking never waits for the receiver.
+    known
+        A run file of earlier the same day, by the same cameras: its people are recognised by height and colours and
+        keep their ids, with --set tracking.return_probability=0.99; everybody else gets a greater one.
     overwrite
         Replace an older run file of that name, once this one is whole.
     """
@@ -99,7 +103,7 @@ def run(
     if receiver is not None and not follow:
         raise ConfigError("--publish", "", "that alone", "--follow with it; stseg export writes finished runs")
     if follow:
-        _require_alone(workers, scheduler, labels)
+        _require_alone(workers, scheduler, labels, known)
         followed = follow_recording(
             recording, output, resolved, tracker, volume, chosen, reporter, publish=receiver, overwrite=overwrite
         )
@@ -110,8 +114,8 @@ def run(
         require_pixels(recording)
         require_label_folder(labels, overwrite)
     done = track_recording(
-        recording, output, resolved, tracker, volume, chosen, workforce, reporter, overwrite=overwrite
-    )  # fmt: skip
+        recording, output, resolved, tracker, volume, chosen, workforce, reporter, known=known, overwrite=overwrite
+    )
     for warning in rig_warnings(done):
         print(f"stseg: warning: {warning}", file=sys.stderr)
     print(_summary(done))
@@ -120,11 +124,12 @@ def run(
         print(f"{labels}: {count} label images")
 
 
-def _require_alone(workers: int | None, scheduler: str | None, labels: Path | None) -> None:
+def _require_alone(workers: int | None, scheduler: str | None, labels: Path | None, known: Path | None) -> None:
     for name, given in (
         ("--workers", workers is not None and workers > 1),
         ("--scheduler", scheduler),
         ("--labels", labels),
+        ("--known", known),
     ):
         if given:
             raise ConfigError(name, "", "that beside --follow", "one of them: a recording that goes on has one worker")

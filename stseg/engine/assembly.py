@@ -71,7 +71,8 @@ def assemble(job: Job, finished: Sequence[FinishedSegment], output: Path) -> Tra
     joined = stitcher.joined()
     shown, tracker = job.recording.rig, find_tracker(job.tracker)
     tracks, identity = finished_tracks(
-        job.read.read_rig, job.config, tracker, joined.committed, joined.events, np.concatenate(appearance), shown
+        job.read.read_rig, job.config, tracker, joined.committed, joined.events, np.concatenate(appearance), shown,
+        job.known,
     )  # fmt: skip
     views = read_run(finished[0].path).views
     config = format_config(job.config)
@@ -86,6 +87,7 @@ def assemble(job: Job, finished: Sequence[FinishedSegment], output: Path) -> Tra
         if not tracker.final:
             writer.append("committed", joined.committed)
             writer.append("committed_events", joined.events)
+            writer.append("known", job.known)
         writer.append("boxes", tracks.boxes)
         writer.append("events", tracks.events)
         writer.finish(tracks.summary())

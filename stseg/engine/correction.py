@@ -61,8 +61,9 @@ def corrected_tracks(run: Run, answers: Sequence[Answer]) -> CorrectedTracks:
     config = parse_config(run.provenance.config, f"{run.path}: configuration")
     rig = run.recording.reduced(config.foreground.body_rows).read_rig
     tracks, identity = associated_tracks(
-        rig, config, run.committed[kept], run.committed_events, run.appearance, run.recording.rig, constraints
-    )
+        rig, config, run.committed[kept], run.committed_events, run.appearance, run.recording.rig, constraints,
+        run.known,
+    )  # fmt: skip
     _require_obeyed(constraints, answered.places, identity)
     numbers = _numbers(old[kept], identity, np.concatenate([tracks.events["id"], tracks.events["other"]]))
     solved = Tracks(*(_numbered(rows, numbers) for rows in (tracks.trajectory, tracks.boxes, tracks.events)))

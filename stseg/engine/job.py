@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
+from stseg.arrays import Rows
 from stseg.config import Config
 from stseg.engine.pipeline import Pipeline
 from stseg.engine.segments import Segment, find_gaps, longest_absence, segments
@@ -12,6 +13,7 @@ from stseg.io.recording.appearance_axes import appearance_axes
 from stseg.io.recording.recording import Recording
 from stseg.io.recording.stream_index import StreamIndex
 from stseg.io.runfile.layout import VolumeKind
+from stseg.tracking.identities.identity_problem import NOBODY
 
 
 @dataclass(frozen=True)
@@ -28,6 +30,8 @@ class Job:
         The frames of the run, half open.
     streams
         Lengths and frame times of the streams (`stseg.io.recording.stream_index`).
+    known : KNOWN (k,)
+        People of earlier recordings.
     """
 
     recording: Recording
@@ -37,6 +41,7 @@ class Job:
     first: int
     stop: int
     streams: StreamIndex
+    known: Rows = NOBODY
 
     @cached_property
     def read(self) -> Recording:

@@ -28,7 +28,7 @@ from stseg.trackers import find_tracker
 from stseg.trackers.protocol import Tracker
 from stseg.tracking.final_tracks import FinalTracks, bridged_rows, committed_tracks, final_tracks
 from stseg.tracking.identities.constraints import Constraints
-from stseg.tracking.identities.identity_problem import IdentityProblem
+from stseg.tracking.identities.identity_problem import NOBODY, IdentityProblem
 from stseg.tracking.identities.search import FREELY
 from stseg.tracking.track_boxes import box_rows
 
@@ -82,8 +82,9 @@ class Pipeline:
 
 
 def finished_tracks(
-    rig: Rig, config: Config, tracker: type[Tracker], committed: Rows, events: Rows, appearance: Rows, shown: Rig
-) -> tuple[Tracks, Ints]:
+    rig: Rig, config: Config, tracker: type[Tracker], committed: Rows, events: Rows, appearance: Rows, shown: Rig,
+    known: Rows = NOBODY,
+) -> tuple[Tracks, Ints]:  # fmt: skip
     """The tracks of a whole run, and the track id of each committed row.
 
     Parameters
@@ -98,19 +99,21 @@ def finished_tracks(
         What the detections look like.
     shown
         The rig in whose pixels the tracks' boxes are given.
+    known : KNOWN (m,)
+        People of earlier recordings.
     """
     if not tracker.final:
-        return associated_tracks(rig, config, committed, events, appearance, shown)
+        return associated_tracks(rig, config, committed, events, appearance, shown, known=known)
     whole = committed_tracks(committed, events, rig.frame_rate, config.tracking)
     return _with_boxes(whole, shown), whole.identity
 
 
 def associated_tracks(
     rig: Rig, config: Config, committed: Rows, events: Rows, appearance: Rows, shown: Rig,
-    constraints: Constraints = FREELY,
+    constraints: Constraints = FREELY, known: Rows = NOBODY,
 ) -> tuple[Tracks, Ints]:  # fmt: skip
     """As `finished_tracks`, of a tracker whose identities are not final, under constraints on the committed rows."""
-    whole = final_tracks(committed, events, appearance, rig.frame_rate, Border.of(rig), config, constraints)
+    whole = final_tracks(committed, events, appearance, rig.frame_rate, Border.of(rig), config, constraints, known)
     return _with_boxes(whole, shown), whole.identity
 
 

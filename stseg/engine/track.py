@@ -15,6 +15,7 @@ from stseg.config.effect import require_effect
 from stseg.engine.assembly import FinishedSegment, assemble
 from stseg.engine.frame_range import FrameRange, resolve_frames
 from stseg.engine.job import Job
+from stseg.engine.known import digest, read_known
 from stseg.engine.reporter import LogReporter, Progress, Reporter
 from stseg.engine.rig_body import with_body_of
 from stseg.engine.workforce import Workforce
@@ -27,6 +28,7 @@ from stseg.io.runfile.layout import VolumeKind
 from stseg.io.runfile.provenance import gather_provenance, run_request
 from stseg.io.runfile.runs import Run, read_run
 from stseg.io.runfile.work_folder import WorkFolder
+from stseg.tracking.identities.identity_problem import NOBODY
 
 
 def track(
@@ -38,6 +40,7 @@ def track(
     config: Config | Path | str | None = None,
     workers: int | None = 1,
     volume: VolumeKind = "all",
+    known: Path | str | None = None,
     overwrite: bool = False,
     progress: Progress | None = None,
 ) -> Run:
@@ -61,6 +64,8 @@ def track(
         number. With several, a script needs `if __name__ == "__main__":`, as for every use of `multiprocessing`.
     volume
         The part of the occupancy volume that is kept: "all", "tracks" for a metre around tracks, or "none".
+    known
+        A run file of earlier the same day, whose people are recognised; see `stseg run --known`.
     overwrite
         Whether an older file of that name may be replaced.
     progress
@@ -80,14 +85,17 @@ def track(
     resolved = config if isinstance(config, Config) else read_config(None if config is None else Path(config))
     force = Workforce(workers)
     chosen, reporter = None if frames is None else FrameRange(*frames), LogReporter(progress)
-    recording = read_rig(Path(rig))
+    recording, earlier = read_rig(Path(rig)), None if known is None else Path(known)
     if output is not None:
         return track_recording(
-            recording, Path(output), resolved, tracker, volume, chosen, force, reporter, overwrite=overwrite
-        )
+            recording, Path(output), resolved, tracker, volume, chosen, force, reporter, known=earlier,
+            overwrite=overwrite,
+        )  # fmt: skip
     folder = Path(mkdtemp(prefix="stseg-"))
     try:
-        run = track_recording(recording, folder / "run.h5", resolved, tracker, volume, chosen, force, reporter)
+        run = track_recording(
+            recording, folder / "run.h5", resolved, tracker, volume, chosen, force, reporter, known=earlier
+        )
     except BaseException:
         shutil.rmtree(folder, ignore_errors=True)
         raise
@@ -105,6 +113,7 @@ def track_recording(
     workforce: Workforce,
     reporter: Reporter,
     *,
+    known: Path | None = None,
     overwrite: bool = False,
 ) -> Run:
     """Track a recording; segments that an unfinished run of the same output left are used.
@@ -121,6 +130,8 @@ def track_recording(
         The processes that make segments.
     reporter
         Receives notes and progress.
+    known
+        The run file of an earlier recording, whose people are recognised.
     overwrite
         Whether an older file of that name may be replaced.
 
@@ -131,8 +142,10 @@ def track_recording(
     """
     require_effect(config, tracker)
     config = with_body_of(recording, config)
+    people = NOBODY if known is None else read_known(known, config)
     request = run_request(recording, gather_provenance(recording, format_config(config)))
     request |= {"--frames": "all" if frames is None else str(frames), "--tracker": tracker, "--volume": volume}
+    request |= {"--known": "nobody" if known is None else digest(people)}
     work = WorkFolder(output, request)
     work.require_output(overwrite)
     with work as folder, resumable(folder, reporter), compilation_noted(reporter.note):
@@ -140,7 +153,7 @@ def track_recording(
             workforce.prepare()
             streams = _indexed(recording, folder, reporter)
             first, stop = resolve_frames(frames, streams, recording)
-            job = Job(recording, config, tracker, volume, first, stop, streams)
+            job = Job(recording, config, tracker, volume, first, stop, streams, people)
             assemble(job, _make_segments(job, folder, workforce, reporter), folder.result)
             folder.publish(overwrite)
         folder.remove()

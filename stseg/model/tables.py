@@ -135,6 +135,18 @@ A row beside itself with 0 is nobody's.
 """
 
 
+KNOWN = np.dtype(
+    [
+        ("id", "<i8"),
+        ("height", "<f8"),  # metres, mean over so many rows; nan without
+        ("heights", "<i8"),
+        ("colours", "<f8", (COLOURS,)),  # as of APPEARANCE, mean over so many rows, without the cameras' offsets
+        ("looks", "<i8"),
+    ]
+)
+"""One row per person of earlier recordings, whom those who come are compared with."""
+
+
 @dataclass(frozen=True)
 class Tracks:
     """Result of a tracker.

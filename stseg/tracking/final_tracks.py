@@ -23,6 +23,7 @@ from stseg.tracking.coincidence import coincident
 from stseg.tracking.encounters import encounters
 from stseg.tracking.identities.constraints import Constraints
 from stseg.tracking.identities.global_association import Link, associate_globally
+from stseg.tracking.identities.identity_problem import NOBODY
 from stseg.tracking.identities.returns import Return
 from stseg.tracking.identities.search import FREELY
 from stseg.tracking.identities.size_model import MeasuredSizes
@@ -56,9 +57,12 @@ class FinalTracks:
 
 def final_tracks(
     committed: Rows, events: Rows, appearance: Rows, frame_rate: float, border: Border, config: Config,
-    constraints: Constraints = FREELY,
+    constraints: Constraints = FREELY, known: Rows = NOBODY,
 ) -> FinalTracks:  # fmt: skip
-    """The tracks of a run from its committed TRAJECTORY, EVENT and APPEARANCE rows, under constraints on those rows."""
+    """The tracks of a run from its committed TRAJECTORY, EVENT and APPEARANCE rows, under constraints on those rows.
+
+    People of earlier recordings, KNOWN (k,), keep their ids; all others have greater ones.
+    """
     bridged, sizes = bridged_rows(committed, frame_rate, config)
     linked = associate_globally(bridged, sizes, appearance, frame_rate, border, config, constraints)
     bridged["id"] = linked.identity
@@ -77,7 +81,18 @@ def final_tracks(
     least = config.tracking.return_probability
     if least == 1:
         return whole
-    return _under_people(whole, returns_of(linked.problem, identity, bridged, least, constraints), frame_rate)
+    whole = _beyond(whole, int(known["id"].max(initial=0)))
+    returns = returns_of(linked.problem, whole.identity, bridged, least, constraints, known)
+    return _under_people(whole, returns, frame_rate)
+
+
+def _beyond(whole: FinalTracks, taken: int) -> FinalTracks:
+    """Tracks under ids above those that are taken."""
+    trajectory, events = whole.trajectory.copy(), whole.events.copy()
+    trajectory["id"] += taken
+    for role in ("id", "other"):
+        events[role] += taken * (events[role] > 0)
+    return FinalTracks(trajectory, events, whole.identity + taken * (whole.identity > 0))
 
 
 def _under_people(whole: FinalTracks, returns: Sequence[Return], frame_rate: float) -> FinalTracks:

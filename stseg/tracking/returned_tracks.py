@@ -14,7 +14,7 @@ from stseg.tracking.identities.returns import Return, find_returns
 
 
 def returns_of(
-    problem: IdentityProblem, identity: Ints, bridged: Rows, least: float, constraints: Constraints
+    problem: IdentityProblem, identity: Ints, bridged: Rows, least: float, constraints: Constraints, known: Rows
 ) -> list[Return]:
     """Visits that are one person's with an earlier one.
 
@@ -30,8 +30,10 @@ def returns_of(
         Least probability.
     constraints
         Pairs of rows that are one person, or two.
+    known : KNOWN (k,)
+        People of earlier recordings, whose ids are no others'.
     """
-    visits = problem.visits(np.pad(identity, (0, len(bridged) - len(identity))), bridged["frame"])
+    visits = problem.visits(np.pad(identity, (0, len(bridged) - len(identity))), bridged["frame"], known)
     two = [identity[rows[~constraints.same]] for rows in (constraints.earlier, constraints.later)]
     return find_returns(visits, problem.model.spread, least, np.column_stack(two))
 
@@ -83,5 +85,5 @@ def renamed_events(events: Rows, trajectory: Rows, returns: Sequence[Return], fr
 
 
 def _reason(one: Return, frame_rate: float) -> str:
-    seconds = one.absence / frame_rate
-    return f"the same person with probability {min(one.probability, 0.9999):.4f}, {seconds:.1f} s away"
+    since = f"{one.absence / frame_rate:.1f} s away" if one.absence is not None else "known from an earlier recording"
+    return f"the same person with probability {min(one.probability, 0.9999):.4f}, {since}"

@@ -65,7 +65,10 @@ def _visits(path: Path, truth: Rows, heights: bool) -> tuple[Visits, Floats, Row
     more = len(problem.seen.order) - len(rows)
     visits = problem.visits(np.pad(rows["id"], (0, more)), np.pad(rows["frame"], (0, more)))
     sizes = slice(0, 1) if heights else slice(None)
-    kept = Visits(visits.identity, visits.first, visits.last, visits.precision[:, sizes], visits.information[:, sizes])
+    kept = Visits(
+        visits.identity, visits.first, visits.last, visits.precision[:, sizes], visits.information[:, sizes],
+        visits.lasting[sizes],
+    )  # fmt: skip
     owners = {one: _owner(run.trajectory[run.trajectory["id"] == one], truth) for one in visits.identity.tolist()}
     return kept, problem.model.spread[sizes], np.array([owners[one] for one in visits.identity.tolist()])
 
@@ -94,7 +97,8 @@ def _is_taken(visits: Visits, spread: Floats, owner: Rows, newcomer: int, least:
     """Whether a track without the others of its person is taken for a return."""
     kept: Flags = owner != owner[newcomer]
     kept[newcomer] = True
-    alone = Visits(*(getattr(visits, field.name)[kept] for field in fields(Visits)))
+    by_visit = (getattr(visits, field.name)[kept] for field in fields(Visits) if field.name != "lasting")
+    alone = Visits(*by_visit, visits.lasting)
     return any(one.visit == visits.identity[newcomer] for one in find_returns(alone, spread, least))
 
 

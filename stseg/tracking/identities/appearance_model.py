@@ -52,14 +52,17 @@ class LearnedAppearance:
         Of each row, nan where unknown.
     model
         Statistics of each axis.
+    colours
+        The last of the axes: those of colours; None where colours say nothing.
     """
 
     value: Floats
     model: SizeModel
+    colours: Axes | None = None
 
 
 @dataclass(frozen=True)
-class _Axes:
+class Axes:
     """mean (k,), axis (k, d) of unit noise, and the spread among people along each, (d,)."""
 
     mean: Floats
@@ -89,14 +92,14 @@ def learn_appearance(
     """
     found = []
     for name in ("features", "colours"):
-        value = _row_means(trajectory, appearance, name)
+        value = row_means(trajectory, appearance, name)
         halves = _halves(trajectory["frame"], person, np.isfinite(value[:, 0]))
         found.append(_learned(value, trajectory["frame"], tracklets, person, halves, frame_rate))
     value = np.concatenate([one.value for one in found], axis=1)
-    return LearnedAppearance(value, SizeModel.joined([one.model for one in found]))
+    return LearnedAppearance(value, SizeModel.joined([one.model for one in found]), found[-1].colours)
 
 
-def _row_means(trajectory: Rows, appearance: Rows, name: str) -> Floats:
+def row_means(trajectory: Rows, appearance: Rows, name: str) -> Floats:
     """Mean over views of each row's appearance, less the cameras' offsets, float64 (n, k); nan where unknown."""
     known = appearance[np.isfinite(appearance[name]).all(axis=1)]
     value, view = known[name].astype(np.float64), known["view"].astype(np.int64)
@@ -164,10 +167,10 @@ def _learned(
     # An observation may be of a person in front: under a share of such errors none says more than this against one.
     most_against = np.full(number, -np.log(_WRONG) / lasting / max(number, 1))
     model = SizeModel(np.zeros(number), np.ones(number), seconds, axes.spread, most_against)
-    return LearnedAppearance(axes.of(value), model)
+    return LearnedAppearance(axes.of(value), model, axes)
 
 
-def _discriminant_axes(value: Floats, people: Sequence[Ints]) -> _Axes:
+def _discriminant_axes(value: Floats, people: Sequence[Ints]) -> Axes:
     """Axes of the greatest spread among people (rows of each, in the order of time) beside the scatter within them."""
     every = value[np.concatenate(people)]
     mean, size = every.mean(axis=0), value.shape[1]
@@ -184,7 +187,7 @@ def _discriminant_axes(value: Floats, people: Sequence[Ints]) -> _Axes:
     spread, turn = np.linalg.eigh(root.T @ between @ root)
     chosen = np.argsort(-spread, kind="stable")[:_AXES]
     chosen = chosen[spread[chosen] > 0]
-    return _Axes(mean, root @ turn[:, chosen], spread[chosen])
+    return Axes(mean, root @ turn[:, chosen], spread[chosen])
 
 
 def _lasting(
@@ -239,7 +242,7 @@ class _Pairs:
     spread: Floats
 
     @classmethod
-    def of(cls, axes: _Axes, value: Floats, people: Sequence[Ints], probes: Sequence[Ints]) -> _Pairs:
+    def of(cls, axes: Axes, value: Floats, people: Sequence[Ints], probes: Sequence[Ints]) -> _Pairs:
         """Of rows of each person and probe."""
         y, size = axes.of(value), len(axes.spread)
         sums = [np.array([y[rows].sum(axis=0) for rows in part]).reshape(-1, size) for part in (people, probes)]

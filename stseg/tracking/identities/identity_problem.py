@@ -9,7 +9,8 @@ import numpy as np
 from stseg.arrays import Floats, Ints, Rows
 from stseg.config import Config, MotionConfig
 from stseg.model.border import Border
-from stseg.tracking.identities.appearance_model import learn_appearance
+from stseg.model.tables import KNOWN
+from stseg.tracking.identities.appearance_model import Axes, learn_appearance
 from stseg.tracking.identities.constraints import Constraints
 from stseg.tracking.identities.observations import Observations, observe
 from stseg.tracking.identities.search import FREELY, SearchLimits, search_identities
@@ -19,6 +20,8 @@ from stseg.tracking.isolated_tracklets import isolated_tracklets
 
 _DRAFT = 4
 """Share of the hypotheses, one in so many, of the search without appearance from which appearance is learned."""
+NOBODY: Rows = np.zeros(0, KNOWN)
+"""Nobody who was known before."""
 
 
 @dataclass(frozen=True)
@@ -35,12 +38,18 @@ class IdentityProblem:
         Motion model.
     limits
         Extent of the search.
+    frame_rate
+        Frames per second.
+    colours
+        The last axes of the model: those of colours; None where there are none.
     """
 
     seen: Observations
     model: SizeModel
     motion: MotionConfig
     limits: SearchLimits
+    frame_rate: float
+    colours: Axes | None = None
 
     @classmethod
     def of(
@@ -71,7 +80,7 @@ class IdentityProblem:
 
         def problem(model: SizeModel, value: Floats) -> IdentityProblem:
             seen = observe(trajectory, value, model, frame_rate, border, config)
-            return cls(seen, model, config.motion, limits)
+            return cls(seen, model, config.motion, limits, frame_rate)
 
         model = learn_sizes(sizes, trajectory["frame"], tracklets, frame_rate)
         plain = problem(model, sizes.value)
@@ -80,7 +89,8 @@ class IdentityProblem:
         draft = plain.with_hypotheses(-(-own.hypotheses // _DRAFT)).solve(constraints)
         learned = learn_appearance(trajectory, appearance, tracklets, draft, frame_rate)
         joined = SizeModel.joined([model, learned.model])
-        return problem(joined, np.concatenate([sizes.value, learned.value], axis=1))
+        whole = problem(joined, np.concatenate([sizes.value, learned.value], axis=1))
+        return replace(whole, colours=learned.colours)
 
     def with_hypotheses(self, number: int) -> IdentityProblem:
         """The problem with another number of hypotheses."""
@@ -93,10 +103,26 @@ class IdentityProblem:
         first[order] = order[search_identities(self.seen, self.model, self.motion, self.limits, known).name]
         return first
 
-    def visits(self, identity: Ints, frame: Ints) -> Visits:
-        """What sizes and appearance tell of identities: that of each row, 0 for none, and its frame, int64 (n,)."""
+    def visits(self, identity: Ints, frame: Ints, known: Rows = NOBODY) -> Visits:
+        """What sizes and appearance tell of identities, and of people who were known before.
+
+        Parameters
+        ----------
+        identity, frame : int64 (n,)
+            Of each row; identity 0 for none.
+        known : KNOWN (k,)
+            People of earlier recordings.
+        """
         order = self.seen.order
-        return pooled_visits(identity[order], frame[order], self.seen.precision, self.seen.information)
+        visits = pooled_visits(identity[order], frame[order], self.seen.precision, self.seen.information)
+        value = np.full((len(known), len(self.model.spread)), np.nan)
+        number = np.zeros(value.shape)
+        value[:, 0], number[:, 0] = known["height"], known["heights"]
+        if self.colours is not None and len(known):
+            axes = self.colours.of(known["colours"])
+            value[:, -axes.shape[1] :], number[:, -axes.shape[1] :] = axes, known["looks"][:, None]
+        precision, information = self.model.evidence(value, self.frame_rate)
+        return visits.after(known["id"], number * precision, number * information)
 
     def score(self, constraints: Constraints, since: float, until: float) -> float:
         """Score of the best identities of the rows between two times, nats.

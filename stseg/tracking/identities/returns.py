@@ -41,14 +41,14 @@ class Return:
     probability
         That both are one person's.
     absence
-        Frames since that person was there.
+        Frames since that person was there; None for somebody of an earlier recording.
     """
 
     frame: int
     identity: int
     visit: int
     probability: float
-    absence: int
+    absence: int | None
 
 
 @dataclass
@@ -136,7 +136,8 @@ def _beside(visits: Visits, visit: int, founders: Ints) -> Ints:
 def _return(visits: Visits, visit: int, person: int, probability: float, people: _People) -> Return:
     frame = int(visits.first[visit])
     identity, own = visits.identity[[person, visit]].tolist()
-    return Return(frame, identity, own, probability, frame - int(people.last[person]))
+    last = int(people.last[person])
+    return Return(frame, identity, own, probability, frame - last if last >= 0 else None)
 
 
 def evidence(precision: Floats, information: Floats, spread: Floats) -> Floats:

@@ -21,6 +21,8 @@ class Visits:
         Frames.
     precision, information : float64 (visit, size)
         Inverse variance of the visit's mean of each size and axis of appearance, and that times the mean.
+    lasting : float64 (size,)
+        Variance of what lasts as long as a visit, which the precision counts.
     """
 
     identity: Ints
@@ -28,9 +30,19 @@ class Visits:
     last: Ints
     precision: Floats
     information: Floats
+    lasting: Floats
 
     def __len__(self) -> int:
         return len(self.identity)
+
+    def after(self, identity: Ints, precision: Floats, information: Floats) -> Visits:
+        """The visits after those of some people (person,) before the recording, by sums over these (person, size)."""
+        shrink, before = 1.0 / (1.0 + precision * self.lasting), np.full(len(identity), -1)
+        return Visits(
+            np.concatenate([identity, self.identity]), np.concatenate([before, self.first]),
+            np.concatenate([before, self.last]), np.concatenate([precision * shrink, self.precision]),
+            np.concatenate([information * shrink, self.information]), self.lasting,
+        )  # fmt: skip
 
 
 def pooled_visits(identity: Ints, frame: Ints, precision: Floats, information: Floats) -> Visits:
@@ -59,7 +71,7 @@ def pooled_visits(identity: Ints, frame: Ints, precision: Floats, information: F
     by_time = np.lexsort((own, first))
     return Visits(
         own[by_time], first[by_time], last[by_time], (weight.sum(axis=1) * shrink)[by_time],
-        (total.sum(axis=1) * shrink)[by_time],
+        (total.sum(axis=1) * shrink)[by_time], lasting,
     )  # fmt: skip
 
 
