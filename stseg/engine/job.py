@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 from stseg.arrays import Rows
@@ -41,7 +41,7 @@ class Job:
     first: int
     stop: int
     streams: StreamIndex
-    known: Rows = NOBODY
+    known: Rows = field(default_factory=lambda: NOBODY)
 
     @cached_property
     def read(self) -> Recording:
