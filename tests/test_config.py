@@ -251,6 +251,7 @@ def test_every_key_has_a_meaning_of_one_sentence_or_more() -> None:
         (("foreground.model=codebook", "foreground.mixture.memory=9"), "cut", "expected foreground.model = mixture"),
         (("proposals.kernel_radius=1",), "cut", "expected another proposals.source"),
         (("segmentation.smoothness=1",), "kalman", "expected --tracker cut"),
+        (("tracking.return_probability=0.99",), "kalman", "expected --tracker cut"),
     ],
 )
 def test_a_value_without_effect_is_refused(assignments: tuple[str, ...], tracker: str, found: str) -> None:
@@ -264,6 +265,7 @@ def test_a_value_without_effect_is_refused(assignments: tuple[str, ...], tracker
         (("kalman.patience=3",), "kalman"),
         (("foreground.model=codebook", "foreground.codebook.memory=9"), "cut"),
         (("proposals.source=volume", "proposals.kernel_radius=1"), "cut"),
+        (("tracking.return_probability=0.99",), "frames"),
         (("segmentation.smoothness=1", "kalman.patience=1"), "cut"),  # the default may be given
     ],
 )

@@ -41,6 +41,8 @@ def _conditions(config: Config, tracker: str) -> Iterator[tuple[str, tuple[str, 
     yield "proposals.", _PROPOSALS[config.proposals.source], "another proposals.source beside it, or the default"
     for name in _tables(config, "stseg.config.trackers"):
         yield f"{name}.", (f"{tracker}.",), f"--tracker {name} beside it, or the default"
+    if tracker not in ("cut", "frames"):
+        yield "tracking.return_probability", (), "--tracker cut beside it, or the default"
     if tracker != "cut":
         for prefix in ("segmentation.", "tracking.prediction_horizon", "tracking.assignment_distance"):
             yield prefix, (), "--tracker cut beside it, or the default"

@@ -12,12 +12,11 @@ from __future__ import annotations
 
 import argparse
 from collections import Counter
-from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
 
-from stseg.arrays import Flags, Floats, Rows
+from stseg.arrays import Flags, Floats, Ints, Rows
 from stseg.engine.correction import rows_with_ids
 from stseg.engine.pipeline import identity_problem
 from stseg.io.config_file import parse_config
@@ -47,14 +46,14 @@ def main() -> None:
     _show("all", total)
 
 
-def _show(name: str, counts: Rows) -> None:
+def _show(name: str, counts: Ints) -> None:
     print(name)
     for least, (returns, right, wrong, newcomers, taken) in zip(_LEVELS, counts.tolist(), strict=True):
         shares = f"{100 * right / max(returns, 1):.1f} % of {returns} returns recognised, {wrong} wrong"
         print(f"  {least:5}: {shares}; {taken} of {newcomers} newcomers taken for somebody")
 
 
-def _visits(path: Path, truth: Rows, heights: bool) -> tuple[Visits, Floats, Rows]:
+def _visits(path: Path, truth: Rows, heights: bool) -> tuple[Visits, Floats, Ints]:
     """The visits of a run, the spread of what is known of them, and the true person of each, 0 for nobody."""
     run = read_run(path)
     config = parse_config(run.provenance.config, str(path))
@@ -83,7 +82,7 @@ def _owner(track: Rows, truth: Rows) -> int:
     return near.most_common(1)[0][0]
 
 
-def _counts(visits: Visits, spread: Floats, owner: Rows, least: float) -> tuple[int, int, int, int, int]:
+def _counts(visits: Visits, spread: Floats, owner: Ints, least: float) -> tuple[int, int, int, int, int]:
     """Returns, those recognised, wrong ones, newcomers, and those taken for somebody who was there."""
     who = dict(zip(visits.identity.tolist(), owner.tolist(), strict=True))
     found = find_returns(visits, spread, least)
@@ -93,12 +92,14 @@ def _counts(visits: Visits, spread: Floats, owner: Rows, least: float) -> tuple[
     return returns, right, len(found) - right, len(visits) - 1, taken
 
 
-def _is_taken(visits: Visits, spread: Floats, owner: Rows, newcomer: int, least: float) -> bool:
+def _is_taken(visits: Visits, spread: Floats, owner: Ints, newcomer: int, least: float) -> bool:
     """Whether a track without the others of its person is taken for a return."""
     kept: Flags = owner != owner[newcomer]
     kept[newcomer] = True
-    by_visit = (getattr(visits, field.name)[kept] for field in fields(Visits) if field.name != "lasting")
-    alone = Visits(*by_visit, visits.lasting)
+    alone = Visits(
+        visits.identity[kept], visits.first[kept], visits.last[kept], visits.precision[kept], visits.information[kept],
+        visits.lasting,
+    )  # fmt: skip
     return any(one.visit == visits.identity[newcomer] for one in find_returns(alone, spread, least))
 
 
