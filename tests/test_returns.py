@@ -16,6 +16,8 @@ from stseg.config import Config
 from stseg.engine.known import digest, read_known
 from stseg.errors import ConfigError, FormatError, InputError
 from stseg.model.tables import APPEARANCE, COLOURS, EVENT, FEATURES, KNOWN
+from stseg.tracking.answered_constraints import answered_rows
+from stseg.tracking.corrections import Answer
 from stseg.tracking.final_tracks import FinalTracks, final_tracks
 from stseg.tracking.identities.constraints import Constraints
 from stseg.tracking.identities.known_people import known_people
@@ -168,6 +170,15 @@ def test_an_answer_that_they_are_two_is_obeyed() -> None:
     last, first = np.flatnonzero(rows["id"] == 1)[-1], np.flatnonzero(rows["id"] == 6)[0]
     two = Constraints.of([], [(int(last), int(first))])
     assert set(whole(returning(0.99), two).identity.tolist()) == {1, 2, 3, 4, 5, 6}
+
+
+def test_who_came_back_can_be_split_where_they_came() -> None:
+    rows, *_ = scene()
+    rows["id"] = whole(returning(0.99)).identity
+    for frame in (100, 150, 180):
+        answered = answered_rows(rows, [Answer("", "split", 1, 0, frame)], RATE)
+        assert len(answered.constraints) == 1
+        assert len(set(whole(returning(0.99), answered.constraints).identity.tolist())) == 6
 
 
 def test_a_probability_below_a_half_is_refused() -> None:

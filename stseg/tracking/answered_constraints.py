@@ -137,12 +137,17 @@ class _Tracks:
     def before(self, track: int, other: int, frame: int) -> int | None:
         """The last row of a track before a frame in which it is apart; None where it has none before."""
         own = self.of[track][self.rows["frame"][self.of[track]] < frame][::-1]
-        return self._first_apart(own[self.rows["frame"][own] >= frame - self.reach], other)
+        return self._first_apart(self._near(own, frame), other)
 
     def after(self, track: int, other: int, frame: int) -> int | None:
         """The first row of a track from a frame on in which it is apart; None where it has none."""
         own = self.of[track][self.rows["frame"][self.of[track]] >= frame]
-        return self._first_apart(own[self.rows["frame"][own] <= frame + self.reach], other)
+        return self._first_apart(self._near(own, frame), other)
+
+    def _near(self, own: Ints, frame: int) -> Ints:
+        """Those of some rows, the nearest first, that are near a frame; the nearest where the person was away."""
+        near = own[np.abs(self.rows["frame"][own] - frame) <= self.reach]
+        return near if len(near) else own[:1]
 
     def _first_apart(self, own: Ints, other: int) -> int | None:
         """The first of some rows in which a track is apart from another, if soon after, from everybody."""
