@@ -3,8 +3,8 @@
     python tools/experiment.py targets -o docs/development/targets.md [--data ../shared/data] [--work FOLDER]
         [--only REGEX] [--frames 100]
 
-WORK holds uu4.toml and cmc2.csv, as tools/results.py leaves them, and cmc2_fairmot.toml, made like cmc2.toml from the
-boxes in DATA/cmc/fairmot. Recordings are cut to so many frames; a target is judged by the mean of its recordings.
+WORK holds uu4.toml, cmc2.csv and cmc2_fairmot.toml, as tools/results.py leaves them.
+Recordings are cut to so many frames; a target is judged by the mean of its recordings.
 """
 
 from __future__ import annotations
