@@ -320,7 +320,7 @@ def _cells(cell_probability: Sequence[tuple[float, float]]) -> str:
     if not cell_probability:
         return ""
     cells = [(f"{nats:+g}", f"{100 * probability:.0f} %") for nats, probability in cell_probability]
-    words = note("Log-odds of single cells overstate. What share of them people fill, by this run's tracks:")
+    words = note("Log-odds are evidence on single cells. The share of them that people fill, by this run's tracks:")
     return f"<div>{words}{table(('log-odds, nats', 'cells that people fill'), cells, len(cells))}</div>"
 
 
