@@ -19,7 +19,7 @@ from stseg.accelerate import python_form
 from stseg.arrays import Boxes, Bytes, Floats, Singles
 from stseg.errors import InputError, SourceError, StsegError
 from stseg.foreground import Mixture, MixtureConfig, box_likelihood, instance_boxes, mask_likelihood
-from stseg.foreground.channel_gain import channel_gains
+from stseg.foreground.channel_gain import channel_gains, fill_gains
 from stseg.foreground.gaussian_kernels import Adaptation, Priors, evaluate, put_strongest_first, update
 from stseg.foreground.smoothing import pool_log_odds
 from stseg.foreground.temporal_mode import commonest_colours
@@ -166,6 +166,20 @@ def test_the_gain_holds_where_people_cover_more_than_half() -> None:
 
 
 # Kernels against their plain definitions
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_gains_are_the_centroids_of_the_peaks_of_histograms(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    counts = rng.integers(0, 4, (3, 21)) + np.eye(3, 21, (0, 18, 7)[seed % 3], dtype=np.int64) * 9
+    held = np.apply_along_axis(np.convolve, 1, counts, np.ones(5), "same")
+    peak, bins = held.argmax(1), np.arange(21)
+    near = (abs(bins - peak[:, None]) <= 2) * counts
+    gains = np.empty(3)
+    fill_gains(counts, 1.0, gains)
+    np.testing.assert_allclose(gains, np.exp((near * (bins - 10)).sum(1) / near.sum(1) * 0.01))
+    fill_gains(counts, 1e6, gains)
+    np.testing.assert_array_equal(gains, 1)
 
 
 def random_modes(rng: np.random.Generator, modes: int) -> tuple[Singles, Singles, Singles]:

@@ -41,7 +41,7 @@ def channel_gains(image: Bytes, background: Singles) -> Floats:
     """
     counts, gains = np.zeros((3, _BINS), np.int64), np.empty(3)
     _count_ratios(image, background, _LOG, counts)
-    _fill_gains(counts, max(_ENOUGH * image.shape[0] * image.shape[1], _FEWEST), gains)
+    fill_gains(counts, max(_ENOUGH * image.shape[0] * image.shape[1], _FEWEST), gains)
     return gains
 
 
@@ -62,16 +62,19 @@ def _count_ratios(image: Bytes, background: Singles, logarithm: Floats, counts: 
 
 
 @kernel
-def _fill_gains(counts: Ints, enough: float, gains: Floats) -> None:
-    """Fill gains (3,): the centroid of the bins around each histogram's peak."""
+def fill_gains(counts: Ints, enough: float, gains: Floats) -> None:
+    """Fill gains (3,): the centroid of the bins around the peak of each histogram, counts (3, bin)."""
     bins = counts.shape[1]
     for c in range(3):
-        most, total = 0, 0.0
-        for middle in range(bins):
-            held, weighted = 0, 0.0
-            for k in range(max(0, middle - _REACH), min(bins, middle + _REACH + 1)):
-                held += counts[c, k]
-                weighted += counts[c, k] * (k - bins // 2)
-            if held > most:
+        most, total, held, weighted = 0, 0, 0, 0
+        for last in range(bins + _REACH):  # the last of the bins around a middle, which are moved by one
+            if last < bins:
+                held += counts[c, last]
+                weighted += counts[c, last] * (last - bins // 2)
+            before = last - 2 * _REACH - 1
+            if before >= 0:
+                held -= counts[c, before]
+                weighted -= counts[c, before] * (before - bins // 2)
+            if last >= _REACH and held > most:
                 most, total = held, weighted
-        gains[c] = np.exp(total / most * _BIN) if most >= enough else 1.0
+        gains[c] = np.exp(float(total) / most * _BIN) if most >= enough else 1.0

@@ -13,7 +13,7 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from stseg.accelerate import wide_kernel
+from stseg.accelerate import part, wide_kernel
 from stseg.arrays import Bytes, Labels, Singles
 from stseg.config import MixtureConfig
 from stseg.foreground.posterior import CERTAIN, FAR, UNIFORM, bounded_log_odds, doubt_of
@@ -64,16 +64,17 @@ def evaluate(image: Bytes, gain: Singles, modes: Singles, priors: Priors, log_od
     )
     for v in range(rows):
         _fill_colour(image[v], colour)
-        _fill_margin(colour, gain, modes[v, 0], priors, margin)
+        own, row = modes[v], log_odds[v]
+        _fill_margin(colour, gain, own[0], priors, margin)
         for u in range(columns):
-            log_odds[v, u] = least
+            row[u] = least
         for u in range(columns):
             if margin[u] > _ZERO:
                 continue
-            lit, dimmed = _densities(u, colour, gain, modes[v], priors)
-            log_odds[v, u] = none
+            lit, dimmed = _densities(u, colour, gain, own, priors)
+            row[u] = none
             if lit + dimmed > _ZERO:
-                log_odds[v, u] = bounded_log_odds(
+                row[u] = bounded_log_odds(
                     float(lit), float(dimmed), priors.foreground_prior, priors.outlier_rate, priors.shadow_prior,
                     priors.shadow_confusion,
                 )  # fmt: skip
@@ -130,7 +131,7 @@ def _fill_margin(colour: Singles, gain: Singles, mode: Singles, priors: Priors, 
         margin[u] = excess if weight > sure else _ZERO
 
 
-@wide_kernel
+@part
 def _densities(u: int, colour: Singles, gain: Singles, modes: Singles, priors: Priors) -> tuple[np.float32, np.float32]:
     """Densities of column u's colour under the background modes (mode, plane, u): lit, and in shadow."""
     x0, x1, x2 = colour[0, u], colour[1, u], colour[2, u]
