@@ -13,7 +13,8 @@ import pytest
 from attacks import RIG, refusal
 from run_files import write_small_run
 
-from stseg.io.runfile import global_heaps
+from stseg.errors import FormatError
+from stseg.io.runfile import global_heaps, safe_hdf5
 from stseg.io.runfile.runs import read_run
 
 
@@ -166,3 +167,16 @@ def test_heaps_are_found_astride_of_blocks(run_file: Path, monkeypatch: pytest.M
         monkeypatch.setattr(global_heaps, "_BLOCK", block)
         with run_file.open("rb") as file:
             assert list(global_heaps._collections(file)) == expected
+
+
+def test_a_file_is_examined_once_and_again_when_it_has_changed(run_file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    examined: list[h5py.File] = []
+    monkeypatch.setattr(safe_hdf5, "_require_own", examined.append)
+    for _ in range(3):
+        assert len(read_run(run_file).trajectory)
+    assert len(examined) == 1
+    with h5py.File(run_file, "r+") as file:
+        file["another"] = h5py.ExternalLink("elsewhere.h5", "/")
+    monkeypatch.undo()
+    with pytest.raises(FormatError, match="a link that leads elsewhere"):
+        read_run(run_file)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterator
-from functools import lru_cache
 from pathlib import Path
 from typing import BinaryIO
 
@@ -24,16 +23,8 @@ _BLOCK = 1 << 24
 def require_sound_heaps(path: Path) -> None:
     """Raise ValueError, in one line, where a global heap of a file would not be left again.
 
-    The bytes of the whole file are searched, so that a collection is found wherever a text claims to stand. A file is
-    searched once by a process, and again when it has changed.
+    The bytes of the whole file are searched, so that a collection is found wherever a text claims to stand.
     """
-    state = path.stat()
-    if state.st_size:
-        _search(path, state.st_ino, state.st_size, state.st_mtime_ns)
-
-
-@lru_cache(maxsize=64)
-def _search(path: Path, _inode: int, _size: int, _modified: int) -> None:
     with path.open("rb") as file:
         end = 0
         for start in _collections(file):

@@ -11,6 +11,7 @@ import errno
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import lru_cache
 from pathlib import Path
 from typing import Literal
 
@@ -55,14 +56,22 @@ def open_hdf5(path: Path) -> Iterator[h5py.File]:
     """
     if not path.is_file():
         raise FileNotFoundError(2, "no such file", str(path))
-    require_sound_heaps(path)
+    state = path.stat()
     try:
+        _examine(path, state.st_ino, state.st_size, state.st_mtime_ns)
         with hdf5_file(path, "r") as file:
-            _require_known_sizes(file)
-            _require_own(file)
             yield file
     except (RuntimeError, KeyError, TypeError, AttributeError, OverflowError) as error:  # h5py, of broken files
         raise ValueError(printable(str(error))[:200]) from error
+
+
+@lru_cache(maxsize=64)
+def _examine(path: Path, _inode: int, _size: int, _modified: int) -> None:
+    """Raise what `open_hdf5` raises of a whole file: once in a process, and again when the file has changed."""
+    require_sound_heaps(path)
+    with hdf5_file(path, "r") as file:
+        _require_known_sizes(file)
+        _require_own(file)
 
 
 def read_whole(dataset: h5py.Dataset, most: int = limits.UNPACKED) -> AnyArray:

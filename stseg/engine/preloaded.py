@@ -2,15 +2,9 @@
 
 from __future__ import annotations
 
-from stseg.accelerate import kernel
 from stseg.engine import workers
+from stseg.engine.first_kernel import start_compiler
 
-__all__ = ["start_compiler", "workers"]
-
-
-@kernel
-def start_compiler() -> None:
-    """The least kernel: the first one of a process takes a fifth of a second more than the others."""
-
+__all__ = ["workers"]
 
 start_compiler()
