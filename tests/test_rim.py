@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import cv2
@@ -30,9 +31,15 @@ def seen(standing: Floats, eaten: int) -> list[ViewEvidence]:
 
 
 def learned(standing: Floats, eaten: int, frames: int = 10, evidence: float = 20.0) -> RimCalibration:
+    return learned_from(seen(standing, eaten), standing, frames, evidence)
+
+
+def learned_from(
+    evidence_of_views: Sequence[ViewEvidence], standing: Floats, frames: int = 10, evidence: float = 20.0
+) -> RimCalibration:
     asked = Detector(room(), ["pixels"] * 4, FEW_HEIGHTS, BODY)
     rims, here = asked.new_rims(), replace(found(standing, evidence=evidence), height=standing[:, 2])
-    observations = asked.observe(seen(standing, eaten))
+    observations = asked.observe(evidence_of_views)
     for _ in range(frames):
         rims.learn(here, asked.views, observations)
     return rims
@@ -62,10 +69,29 @@ def test_eaten_silhouettes_lose_their_rim() -> None:
 
 def test_the_share_is_that_which_leaves_the_usual_misses() -> None:
     rims = learned(people(*APART), 2, frames=200)
-    weight, background, rim = rims.shares.T
-    left = (background - rims.withdrawn * rim) / weight
+    weight, missing, rim = rims.shares.T
+    left = (missing - rims.withdrawn * rim) / weight
     np.testing.assert_allclose(left[rims.withdrawn < 1], FEW_HEIGHTS.pixel_miss_rate, atol=0.01)
     assert (rims.withdrawn > 0).any()
+
+
+def test_limbs_beside_an_outline_make_up_for_background_within() -> None:
+    alone = people((0.0, 0.0, 1.7))
+    eaten: list[ViewEvidence] = []
+    shifted: list[ViewEvidence] = []
+    for view in likelihoods(room().cameras, alone):
+        beside = np.roll(view, 2, axis=1)
+        shifted.append(beside)
+        eaten.append(np.minimum(view, beside))
+    assert (learned_from(eaten, alone).shares[:, 1] > 1.5 * learned_from(shifted, alone).shares[:, 1]).all()
+
+
+def test_a_view_that_has_seen_nobody_takes_the_mean_of_the_others() -> None:
+    rims = learned(people(*APART), 3)
+    every = rims.withdrawn
+    rims.shares[2] = 0.0
+    assert rims.withdrawn[2] == pytest.approx(np.delete(every, 2).mean(), abs=0.1)
+    assert rims.withdrawn[2] > 0.5
 
 
 @pytest.mark.parametrize(

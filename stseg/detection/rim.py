@@ -3,14 +3,18 @@
 A segmentation that errs along outlines errs alike in all frames of a view: silhouettes come out narrower than bodies,
 and legs and arms vanish. Then a pixel of background next to foreground is no evidence that nobody is there. A share of
 what such pixels say is withdrawn, and learned view by view from people who stand alone: with A pixels of their bodies,
-B of them background and R of these on the rim, the share
+B of them missing and R of them background on the rim, the share
 
     w = (B - m A) / R,    within 0 and 1,
 
-leaves as much background as a segmentation misses at the usual rate m (`pixel_miss_rate`). Bodies are as wide as the
-configured population: sizes that are measured in eaten silhouettes hide what is missing. A short time of one person at
-that rate counts beside what is seen, since one look at a person shows what a segmentation leaves of them; what was seen
-is forgotten at exp(-t / memory), as for the noise of boxes. Only rigs of pixels learn.
+leaves as much background as a segmentation misses at the usual rate m (`pixel_miss_rate`). Whole silhouettes have
+background within the outline of a pillar, too: a limb stands beside it. So of each row of an outline as many pixels
+are missing as it has more of background within than of foreground beside, up to half its width on either side.
+
+Bodies are as wide as the configured population: sizes that are measured in eaten silhouettes hide what is missing. A
+short time of one person at the rate m counts beside what is seen, since one look at a person shows what a segmentation
+leaves of them; and a longer one at the mean of all views, whose pictures are mostly segmented alike. What was seen is
+forgotten at exp(-t / memory), as for the noise of boxes. Only rigs of pixels learn.
 """
 
 from __future__ import annotations
@@ -32,7 +36,9 @@ _WHOLE = 0.9
 
 
 _PRIOR = 0.25
-"""Weight of the first guess, that nothing is withdrawn: seconds of one person."""
+"""Weight of the first guess, that nothing is withdrawn: seconds of one person in any view."""
+_ALIKE = 2.0
+"""Weight of the mean of all views in each of them: seconds of one person."""
 
 
 class RimCalibration:
@@ -54,7 +60,7 @@ class RimCalibration:
     Attributes
     ----------
     shares : float64 (view, 3)
-        Weight, and weighted sums of the shares of bodies that are background, and background on the rim; seconds.
+        Weight, and weighted sums of the shares of bodies that are missing, and background on the rim; seconds.
     """
 
     def __init__(
@@ -67,9 +73,13 @@ class RimCalibration:
     @property
     def withdrawn(self) -> Floats:
         """Share of what rim pixels say that is withdrawn, 0..1, float64 (view,)."""
-        weight, background, rim = self.shares.T
-        excess, rim_at_first = background - self._miss * weight, self._miss * _PRIOR
-        return np.asarray((excess / (rim + rim_at_first)).clip(0.0, 1.0))
+        weight, missing, rim = (self.shares + _ALIKE * self._mean()).T
+        return np.asarray(((missing - self._miss * weight) / rim).clip(0.0, 1.0))
+
+    def _mean(self) -> Floats:
+        """Shares of all views and the first guess for one second of one person, float64 (3,)."""
+        total = self.shares.sum(0) + _PRIOR * np.array([1.0, self._miss, self._miss])
+        return np.asarray(total / total[0])
 
     def applied(self, shown: Sequence[ViewObservation | None]) -> list[ViewObservation | None]:
         """What the views show, less what is withdrawn."""
@@ -92,7 +102,7 @@ class RimCalibration:
                 widths = self._body.width_of(people.height)
                 first, spans, whole = view.whole_outlines(people.ground, people.height, widths)
                 counts = np.zeros((len(people), 3))
-                _fill_background(first, spans, observation.raster, counts)
+                _fill_counts(first, spans, observation.raster, counts)
                 counted = trusted & (counts[:, 0] > _WHOLE * whole)
                 self.shares[k] += (counts[counted] / counts[counted, :1]).sum(0) * frames / self._rate
 
@@ -128,28 +138,41 @@ def _fill_without_rim(raster: Singles, kept: np.float32, weaker: Singles) -> Non
 
 
 @kernel
-def _fill_background(first: Ints, spans: Spans, raster: Singles, counts: Floats) -> None:
-    """Fill counts (n, 3): pixels of each outline (n,), background among them, and background on the rim of foreground.
+def _fill_counts(first: Ints, spans: Spans, raster: Singles, counts: Floats) -> None:
+    """Fill counts (n, 3): pixels of each outline (n,), missing among them, and background on the rim of foreground.
 
     All are 0 for outlines that another one overlaps, and for those that the view does not see.
     """
-    rows, columns = raster.shape
-    covered = np.zeros((rows, columns), np.int16)
+    covered = np.zeros(raster.shape, np.int64)
     for j in range(len(first)):
-        for k in range(min(spans.shape[1], rows - first[j]) if first[j] >= 0 else 0):
-            covered[first[j] + k, spans[j, k, 0] : spans[j, k, 1]] += 1
+        for v in range(first[j], _end(first[j], spans, raster)):
+            covered[v, spans[j, v - first[j], 0] : spans[j, v - first[j], 1]] += 1
     for j in range(len(first)):
-        inside = background = rim = 0
-        alone = True
-        for k in range(min(spans.shape[1], rows - first[j]) if first[j] >= 0 else 0):
-            v = first[j] + k
-            for u in range(spans[j, k, 0], spans[j, k, 1]):
-                inside += 1
-                alone = alone and covered[v, u] == 1
+        counts[j] = 0.0
+        for v in range(first[j], _end(first[j], spans, raster)):
+            left, right = spans[j, v - first[j], 0], spans[j, v - first[j], 1]
+            if (covered[v, left:right] > 1).any():
+                counts[j] = 0.0
+                break
+            background = 0
+            for u in range(left, right):
                 if raster[v, u] <= 0:
                     background += 1
-                    rim += _on_rim(raster, v, u)
-        if alone:
-            counts[j, 0], counts[j, 1], counts[j, 2] = inside, background, rim
-        else:
-            counts[j] = 0.0
+                    counts[j, 2] += _on_rim(raster, v, u)
+            counts[j, 0] += right - left
+            counts[j, 1] += max(background - _foreground_beside(v, left, right, raster, covered), 0)
+
+
+@kernel
+def _end(first: int, spans: Spans, raster: Singles) -> int:
+    """The row after an outline's last one that the raster may have; its first row is -1 where it is not seen."""
+    return min(first + spans.shape[1], raster.shape[0]) if first >= 0 else -1
+
+
+@kernel
+def _foreground_beside(v: int, left: int, right: int, raster: Singles, covered: Ints) -> int:
+    """Pixels of foreground beside columns left..right of a row, within half their number, that no outline covers."""
+    reach, found = (right - left + 1) // 2, 0
+    for u in range(max(left - reach, 0), min(right + reach, raster.shape[1])):
+        found += (u < left or u >= right) and covered[v, u] == 0 and raster[v, u] > 0
+    return found
