@@ -15,11 +15,15 @@ from typing import Any, ParamSpec, TypeVar, cast
 import numba
 from numba.core import event
 
+from stseg.kernel_linking import Kernel
+
 _UNCOUNTED: dict[str, Any] = {"_nrt": False}
 """No reference is counted for the arguments of an inlined kernel: an option that numba does not document."""
 _LOCATOR = "stseg.kernel_cache.KernelCache"
 _PAUSE = 10.0
 """Seconds between notes on compilation."""
+_USUAL = 70
+"""Kernels that Python calls in a run of a rig, about; those that only kernels call are part of these."""
 
 COMPILED = hasattr(numba.njit(lambda: None), "py_func")
 """Whether kernels are compiled; else they are plain Python."""
@@ -60,33 +64,40 @@ def compilation_noted(note: Callable[[str], None]) -> Iterator[None]:
 
 
 class _Notes(event.Listener):
-    """Counts kernels that are compiled."""
+    """Counts kernels that are compiled, each with those that it calls."""
 
     def __init__(self, note: Callable[[str], None]) -> None:
-        self._note, self._number, self._last = note, 0, -_PAUSE
+        self._note, self._number, self._within, self._last = note, 0, 0, -_PAUSE
 
     def on_start(self, event: Any) -> None:
         """A kernel is to be compiled."""
         del event
+        self._within += 1
         if monotonic() - self._last >= _PAUSE:
             self._last = monotonic()
-            so_far = f"; {self._number} are done" if self._number else ", about a minute of work"
+            so_far = f"; {self._number} of about {_USUAL} are done" if self._number else ", about a minute of work"
             self._note(f"compiling kernels, once on this machine{so_far}")
 
     def on_end(self, event: Any) -> None:
         """A kernel is compiled."""
         del event
-        self._number += 1
+        self._within -= 1
+        if self._within == 0:
+            self._number += 1
 
 
 def _compiled(function: Callable[P, R], **options: Any) -> Callable[P, R]:
     """The kernel, cached by our locator; the option is the process's, so it is put back."""
+    if not COMPILED:
+        return function
     config: Any = numba.config
+    made = Kernel(function, {"nopython": True, "nogil": True, "no_cfunc_wrapper": True, **options})
     before = config.CACHE_LOCATOR_CLASSES
     config.CACHE_LOCATOR_CLASSES = _LOCATOR
     try:
-        return cast("Callable[P, R]", numba.njit(cache=True, nogil=True, **options)(function))
+        made.enable_caching()
     except RuntimeError:  # no folder can be written to: compiled in each process
-        return cast("Callable[P, R]", numba.njit(nogil=True, **options)(function))
+        pass
     finally:
         config.CACHE_LOCATOR_CLASSES = before
+    return cast("Callable[P, R]", made)

@@ -1,0 +1,100 @@
+"""Kernels that kernels call become machine code within these alone.
+
+Numba makes machine code of a kernel with all that it calls, and of each kernel that it calls with all that this one
+calls, and so on: most of that code never runs. Here the code of a kernel is linked into its callers as it is, and is
+optimised once a kernel's address is asked for, which Python needs to call it. The parts of numba that this replaces
+are not documented; `pyproject.toml` says of which version they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import cached_property
+from typing import Any
+
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler_lock import global_compiler_lock
+from numba.core.registry import CPUDispatcher, cpu_target
+
+_INNER = {"no_cpython_wrapper": True}
+"""An inner kernel has no form that Python could call."""
+
+
+class Kernel(CPUDispatcher):
+    """A kernel that Python and kernels call.
+
+    Parameters
+    ----------
+    function
+        The kernel as plain Python.
+    options
+        Numba's.
+    """
+
+    def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
+        super().__init__(function, targetoptions=options)
+
+    @cached_property
+    def _inner(self) -> Any:
+        """The same kernel as part of others."""
+        return CPUDispatcher(self.py_func, targetoptions=self.targetoptions | _INNER)
+
+    @property
+    def _numba_type_(self) -> Any:
+        """The type by which numba finds what a kernel calls."""
+        return self._inner._numba_type_
+
+    def compile(self, sig: Any) -> Any:
+        """Compile for the types of some arguments, or take the machine code from the cache."""
+        with global_compiler_lock, _optimised_late(cpu_target.target_context.codegen()):
+            return super().compile(sig)
+
+
+class _Library(JITCodeLibrary):
+    """Code of a kernel, not optimised before its address is asked for."""
+
+    _optimised = False
+
+    def finalize(self) -> None:
+        """Link what is called."""
+        self._raise_if_finalized()
+        for library in dict.fromkeys(self._linking_libraries):
+            self._reload_init.update(library._reload_init)
+            self._final_module.link_in(library._get_module_for_linking(), preserve=True)
+        self._finalized = True
+
+    def get_pointer_to_function(self, name: str) -> int:
+        """Address of a function; 0 where this code does not define it."""
+        self._ensure_finalized()
+        if not self._optimised:
+            if not any(function.name == name for function in self.get_defined_functions()):
+                return 0
+            self._optimize_final_module()
+            self._final_module.verify()
+            self._finalize_final_module()
+        return int(super().get_pointer_to_function(name))
+
+    def _optimize_functions(self, ll_module: Any) -> None:
+        """Leave functions as they are, until they are optimised together."""
+        ll_module.data_layout = self._codegen._data_layout
+
+    def _finalize_final_module(self) -> None:
+        self._optimised = True
+        super()._finalize_final_module()
+
+
+@contextmanager
+def _optimised_late(codegen: Any) -> Iterator[None]:
+    """Let all code that is made within the body, numba's own functions included, be of that kind."""
+    library, set_environment = codegen._library_class, codegen.set_env
+
+    def set_where_known(name: str, environment: Any) -> None:
+        if codegen._engine.is_symbol_defined(name):
+            set_environment(name, environment)
+
+    codegen._library_class, codegen.set_env = _Library, set_where_known
+    try:
+        yield
+    finally:
+        codegen._library_class, codegen.set_env = library, set_environment
