@@ -11,7 +11,7 @@ from reference_identities import greatest_score, score
 from strollers import BORDER, CONFIG, RATE, rows_of, runs, straight, swapped, visit
 
 from stseg.arrays import Floats, Ints, Rows
-from stseg.tracking.identities import search
+from stseg.tracking.identities import search, step_kernels
 from stseg.tracking.identities.observations import Observations, observe
 from stseg.tracking.identities.search import SearchLimits, search_identities
 from stseg.tracking.identities.size_model import MeasuredSizes, SizeModel, SizePrior, learn_sizes
@@ -51,6 +51,39 @@ def test_names_that_are_final_early_belong_to_one_hypothesis() -> None:
         assert len(set(zip(frame.tolist(), names.tolist(), strict=True))) == len(rows)
         assert len(set(names.tolist())) <= 4
     np.testing.assert_array_equal(found(seen, 10.0), found(seen))
+
+
+def test_what_comes_later_counts_where_a_track_is_certain() -> None:
+    """Two are exchanged by the filter while they stand together, unmeasured: one hypothesis has to be the right one."""
+    true = rows_of({1: (visit(-1), 1.7, range(160)), 2: (visit(1), 1.85, range(160))}, noise=0.0)
+    true["height"][(true["frame"] >= 66) & (true["frame"] < 110)] = np.nan
+    true["xx"] = true["yy"] = 0.02
+    seen = seen_of(swapped(true, 80))
+    names, apart = found(seen, hypotheses=1), np.abs(seen.ground[:, 0]) > 0.5
+    assert len(np.unique([names[apart], true["id"][seen.order][apart]], axis=1).T) == 2
+
+
+@pytest.mark.parametrize(
+    ("names", "columns", "distinct"),
+    [
+        ([[0, 3], [1, 3]], [0, 0], 1),  # one begins a frame later in the same track
+        ([[0, 3], [2, 3]], [0, 0], 2),  # in another track
+        ([[0, 1], [0, 1]], [0, 1], 2),  # two began in one track, and either is there
+    ],
+)
+def test_hypotheses_that_differ_in_the_frame_of_a_birth_are_one(
+    names: list[list[int]], columns: list[int], distinct: int
+) -> None:
+    name, track = np.array(names), np.array([0, 0, 2, 3, 4])
+    change = np.array([[h, -1, -1, -1, -1] for h in range(2)])
+    value, column, none = np.array([2.0, 1.0]), np.array(columns)[:, None], np.zeros(2, np.int64)
+    parent, chosen, given, keys = none.copy(), np.zeros((2, 1), np.int64), np.zeros((2, 1), np.int64), none.copy()
+    number = step_kernels.choose_distinct(
+        np.arange(2), change, value, column, name, name, track, none, 4, -np.inf, parent, chosen, given, np.zeros(2),
+        keys,
+    )  # fmt: skip
+    assert number == distinct
+    assert given[0, 0] == name[0, columns[0]]
 
 
 def sizes_of(people: Floats, noise: float, seed: int = 0) -> tuple[MeasuredSizes, Ints, list[Ints]]:

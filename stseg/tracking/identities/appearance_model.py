@@ -3,15 +3,16 @@
 A row's appearance is the mean over the views that see its person apart, less each camera's offset (a gain, where the
 numbers are logarithms of colours). It is whitened by its scatter within people and turned to the axes along which
 people differ most: probabilistic linear discriminant analysis (Ioffe 2006). Each axis is then one more size of the
-person (`stseg.tracking.identities.size_model`). Identities are those of a search without appearance: where that errs,
-the appearance of people seems to change, and weighs less.
+person (`stseg.tracking.identities.size_model`). It is learned twice: first from isolated tracklets, each a person of
+its own, then from the identities that are found with it, for looks outlast tracklets. Where identities err, the
+appearance of people seems to change, and weighs less.
 
 Appearance lasts: a turned back stays turned for seconds, a place in the light for longer. So frames are not
 independent, and how many of them make one independent observation is learned where it matters. Axes are learned from
 one half of each person's time; then each tracklet of the other half is compared with the person's first half, and with
 those of the people who are there at the same time. Under the true number of frames an observation the log-likelihood
-ratios of these pairs are most probable (Bruemmer and du Preez 2006). Where none is better than chance, appearance says
-nothing and is left out.
+ratios of these pairs are most probable (Bruemmer and du Preez 2006); it is no less than differences within tracklets
+say. Where none is better than chance, appearance says nothing and is left out.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints, Rows, Singles
-from stseg.tracking.identities.size_model import SizeModel
+from stseg.tracking.identities.size_model import SizeModel, SizePrior, frame_errors, measured_tracklets
 
 _AXES = 4
 """Most axes."""
@@ -30,14 +31,18 @@ _LEAST_FRAMES = 8
 """Least frames of half a person's time."""
 _LEAST_PROBE = 4
 """Least frames of a tracklet that is compared."""
-_LEAST_PEOPLE = 3
-"""Least people."""
+_LEAST_PEOPLE, _MOST_PEOPLE = 3, 1000
+"""Least and most people."""
+_TOGETHER = 50
+"""People who come one after the other, of whom all are taken or none: tracklets are compared with who is there."""
 _PRIOR = 0.1
 """Weight of the whole scatter in that within people: no axis is free of noise."""
 _LASTING = 2.0 ** np.arange(0, 13)
 """Numbers of frames that make one independent observation, of which one is chosen."""
+_UNIT = SizePrior(1.0, 1.0)
+"""Of an axis of unit noise."""
 _WRONG = 0.1
-"""Share of wrong answers: the search without appearance exchanges people."""
+"""Share of wrong answers: identities are exchanged, and tracks slip from one person to another."""
 _LEAST_GAIN = 0.05
 """Least gain of a pair's mean log-probability that is no chance, nats."""
 
@@ -59,6 +64,11 @@ class LearnedAppearance:
     value: Floats
     model: SizeModel
     colours: Axes | None = None
+
+    @classmethod
+    def nothing(cls, rows: int) -> LearnedAppearance:
+        """Appearance that says nothing of some rows."""
+        return cls(np.zeros((rows, 0)), SizeModel.joined([]))
 
 
 @dataclass(frozen=True)
@@ -86,7 +96,7 @@ def learn_appearance(
     tracklets
         Rows of each isolated tracklet, in the order of time.
     person : int64 (n,)
-        Identity of each row, by a search without appearance.
+        Who each row is thought to be; some may be wrong.
     frame_rate
         Frames per second.
     """
@@ -139,22 +149,25 @@ def _offsets(value: Floats, view: Ints, detection: Ints) -> Floats:
 
 
 def _halves(frame: Ints, person: Ints, known: Flags) -> list[tuple[Ints, Ints]]:
-    """Rows of the first and the second half of the time of each person who has enough of both."""
-    halves = []
-    for one in np.unique(person).tolist():
-        rows = np.flatnonzero((person == one) & known)
-        rows = rows[np.argsort(frame[rows], kind="stable")]
-        middle = len(rows) // 2
-        if middle >= _LEAST_FRAMES:
-            halves.append((rows[:middle], rows[middle:]))
-    return halves
+    """Rows of the first and the second half of the time of each person who has enough of both.
+
+    Of more than `_MOST_PEOPLE`, who come one after the other are taken together, and the next left out.
+    """
+    rows = np.flatnonzero(known)
+    rows = rows[np.lexsort((frame[rows], person[rows]))]
+    people = np.split(rows, np.flatnonzero(np.diff(person[rows])) + 1)
+    long = [own for own in people if len(own) // 2 >= _LEAST_FRAMES]
+    long.sort(key=lambda own: (int(frame[own[0]]), int(person[own[0]])))
+    share = -(-len(long) // _MOST_PEOPLE)
+    kept = [own for k, own in enumerate(long) if k // _TOGETHER % share == 0]
+    return [(own[: len(own) // 2], own[len(own) // 2 :]) for own in kept]
 
 
 def _learned(
     value: Floats, frame: Ints, tracklets: Sequence[Ints], person: Ints, halves: Sequence[tuple[Ints, Ints]],
     frame_rate: float,
 ) -> LearnedAppearance:  # fmt: skip
-    nothing = LearnedAppearance(np.zeros((len(value), 0)), SizeModel.joined([]))
+    nothing = LearnedAppearance.nothing(len(value))
     if len(halves) < _LEAST_PEOPLE:
         return nothing
     lasting = _lasting(value, frame, tracklets, person, halves)
@@ -162,12 +175,15 @@ def _learned(
         return nothing
     # Halves count as people of their own: who was exchanged between them must not seem to vary.
     axes = _discriminant_axes(value, [rows for half in halves for rows in half])
-    number = len(axes.spread)
-    seconds = np.full(number, lasting / frame_rate)
+    number, along = len(axes.spread), axes.of(value)
+    # Where all pairs are far apart, they do not say how long errors last, but differences within tracklets do.
+    known = measured_tracklets(value[:, 0], tracklets)
+    errors = [frame_errors(one, frame, known, _UNIT, frame_rate) for one in along.T]
+    seconds = np.array([max(lasting / frame_rate, noise * alike) for noise, alike in errors])
     # An observation may be of a person in front: under a share of such errors none says more than this against one.
-    most_against = np.full(number, -np.log(_WRONG) / lasting / max(number, 1))
+    most_against = np.full(number, -np.log(_WRONG) / max(number, 1))
     model = SizeModel(np.zeros(number), np.ones(number), seconds, axes.spread, most_against)
-    return LearnedAppearance(axes.of(value), model, axes)
+    return LearnedAppearance(along, model, axes)
 
 
 def _discriminant_axes(value: Floats, people: Sequence[Ints]) -> Axes:

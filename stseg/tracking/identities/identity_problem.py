@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from stseg.arrays import Floats, Ints, Rows
+from stseg.arrays import Ints, Rows
 from stseg.config import Config, MotionConfig
 from stseg.model.border import Border
 from stseg.model.tables import KNOWN
-from stseg.tracking.identities.appearance_model import Axes, learn_appearance
+from stseg.tracking.identities.appearance_model import Axes, LearnedAppearance, learn_appearance
 from stseg.tracking.identities.constraints import Constraints
 from stseg.tracking.identities.observations import Observations, observe
 from stseg.tracking.identities.search import FREELY, SearchLimits, search_identities
@@ -19,7 +20,7 @@ from stseg.tracking.identities.visits import Visits, pooled_visits
 from stseg.tracking.isolated_tracklets import isolated_tracklets
 
 _DRAFT = 4
-"""Share of the hypotheses, one in so many, of the search without appearance from which appearance is learned."""
+"""Share of the hypotheses, one in so many, of the search from whose identities appearance is learned."""
 NOBODY: Rows = np.zeros(0, KNOWN)
 """Nobody who was known before."""
 
@@ -77,20 +78,22 @@ class IdentityProblem:
         """
         tracklets, own = isolated_tracklets(trajectory, frame_rate), config.tracking
         limits = SearchLimits(own.hypotheses, own.maximum_gap, own.identity_lag)
-
-        def problem(model: SizeModel, value: Floats) -> IdentityProblem:
-            seen = observe(trajectory, value, model, frame_rate, border, config)
-            return cls(seen, model, config.motion, limits, frame_rate)
-
         model = learn_sizes(sizes, trajectory["frame"], tracklets, frame_rate)
-        plain = problem(model, sizes.value)
+
+        def problem(learned: LearnedAppearance) -> IdentityProblem:
+            joined = SizeModel.joined([model, learned.model])
+            value = np.concatenate([sizes.value, learned.value], axis=1)
+            seen = observe(trajectory, value, joined, frame_rate, border, config)
+            return cls(seen, joined, config.motion, limits, frame_rate, learned.colours)
+
+        def learned(person: Ints) -> LearnedAppearance:
+            return learn_appearance(trajectory, appearance, tracklets, person, frame_rate)
+
         if not len(appearance):
-            return plain
-        draft = plain.with_hypotheses(-(-own.hypotheses // _DRAFT)).solve(constraints)
-        learned = learn_appearance(trajectory, appearance, tracklets, draft, frame_rate)
-        joined = SizeModel.joined([model, learned.model])
-        whole = problem(joined, np.concatenate([sizes.value, learned.value], axis=1))
-        return replace(whole, colours=learned.colours)
+            return problem(LearnedAppearance.nothing(len(trajectory)))
+        # Tracklets are right, but looks outlast them; identities last, and with appearance few are wrong.
+        draft = problem(learned(_tracklet_of(tracklets))).with_hypotheses(-(-own.hypotheses // _DRAFT))
+        return problem(learned(draft.solve(constraints)))
 
     def with_hypotheses(self, number: int) -> IdentityProblem:
         """The problem with another number of hypotheses."""
@@ -140,3 +143,11 @@ class IdentityProblem:
         place[part.order] = np.arange(len(part.order))
         known = constraints.renumbered(place).among()
         return search_identities(part, self.model, self.motion, self.limits, known).score
+
+
+def _tracklet_of(tracklets: Sequence[Ints]) -> Ints:
+    """The first row of the tracklet of each row."""
+    first = np.empty(sum(map(len, tracklets)), np.int64)
+    for rows in tracklets:
+        first[rows] = rows[0]
+    return first

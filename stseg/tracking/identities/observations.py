@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -56,6 +57,22 @@ class Observations:
     precision: Floats
     information: Floats
 
+    @cached_property
+    def track(self) -> Ints:
+        """Filter track of each observation, as its first observation, int64 (n,)."""
+        return _heads(self.previous, self.previous >= 0)
+
+    def foreseen(self) -> Observations:
+        """The same, with what a part of a track that is certainly one person's tells said by its first observation.
+
+        The score of a whole hypothesis stays as it is, but decisions are made with what comes after them.
+        """
+        head = _heads(self.previous, self.certain)
+        precision, information = np.zeros_like(self.precision), np.zeros_like(self.information)
+        np.add.at(precision, head, self.precision)
+        np.add.at(information, head, self.information)
+        return replace(self, precision=precision, information=information)
+
     def between(self, start: int, stop: int) -> Observations:
         """Those of the frames from `start` to before `stop`; who was observed before is new there."""
         first, last = int(self.start[start]), int(self.start[stop])
@@ -101,6 +118,14 @@ def observe(
         previous, _certain(rows, ground, start, previous), border.inside(ground, config.detection.border_width),
         precision, information,
     )  # fmt: skip
+
+
+def _heads(previous: Ints, follows: Flags) -> Ints:
+    """First observation of the chain of each (n,), in which those that follow are linked to the one before them."""
+    head = np.arange(len(previous))
+    for row in np.flatnonzero(follows).tolist():
+        head[row] = head[previous[row]]
+    return head
 
 
 def _previous(rows: Rows) -> Ints:

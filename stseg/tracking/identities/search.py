@@ -120,7 +120,7 @@ def search_identities(
     frame = np.repeat(np.arange(len(seen.seconds)), np.diff(seen.start))
     known = KnownPeople.of(constraints, frame)
     # Where it is known who somebody is, who seemed certain may have to give way.
-    seen = replace(seen, certain=seen.certain & ~np.isin(frame, known.decided(frame)))
+    seen = replace(seen, certain=seen.certain & ~np.isin(frame, known.decided(frame))).foreseen()
     slots = int(np.diff(seen.start).max(initial=0)) + _SPARE + known.most_open()
     held = Hypotheses.empty(1, slots, len(sizes.spread), len(known.first))
     history = _History(np.full(len(seen.order), -1))
@@ -152,7 +152,7 @@ def _extended(
     step_kernels.fill_costs(
         held.name, held.last, held.seconds, held.state, held.covariance, held.precision, held.information, first, now,
         seen.ground, seen.variance, seen.previous, seen.certain, seen.inside, seen.precision, seen.information,
-        sizes.spread, sizes.most_against, turn, _BIRTH, _ABSENCE, _LEAST_PLACE, cost,
+        sizes.spread, sizes.most_against * sizes.noise, turn, _BIRTH, _ABSENCE, _LEAST_PLACE, cost,
     )  # fmt: skip
     _impose(held, known, first, stop, cost)
     column, total = np.empty((number, rows), np.int64), np.empty(number)
@@ -165,7 +165,7 @@ def _extended(
     parent, score, keys = np.empty(kept, np.int64), np.empty(kept), np.empty(kept, np.int64)
     chosen, names = np.empty((kept, rows), np.int64), np.empty((kept, rows), np.int64)
     kept = step_kernels.choose_distinct(
-        ordered, change, value, column, held.name, held.last, _marks(held, known, first), first,
+        ordered, change, value, column, held.name, held.last, seen.track, _marks(held, known, first), first,
         float(value[ordered[0]]) - _BEAM_LOSS, parent, chosen, names, score, keys,
     )  # fmt: skip
     new = held.at(parent[:kept])

@@ -79,7 +79,7 @@ class SizeModel:
     spread
         Variance among people; 0 where the size says nothing.
     most_against
-        Greatest evidence of one frame for a new person instead of a known one, nats: errors may be outliers.
+        Greatest evidence of one independent look for a new person instead of a known one, nats: it may be an outlier.
     """
 
     mean: Floats
@@ -124,20 +124,30 @@ def learn_sizes(sizes: MeasuredSizes, frame: Ints, tracklets: Sequence[Ints], fr
     return SizeModel(mean, noise, lasting, spread, np.full(len(learned), np.inf))
 
 
-def _learn(
-    size: Floats, frame: Ints, tracklets: Sequence[Ints], prior: SizePrior, frame_rate: float
-) -> tuple[float, float, float, float]:
+def measured_tracklets(size: Floats, tracklets: Sequence[Ints]) -> list[Ints]:
+    """Rows with a size (n,) of each tracklet that has enough of them."""
     known = [rows[np.isfinite(size[rows])] for rows in tracklets]
-    known = [rows for rows in known if len(rows) >= _LEAST_FRAMES]
-    mean = float(np.mean(size[np.concatenate(known)])) if known else 0.0
-    noise, lasting = _errors(size, frame, known, prior, frame_rate)
-    return mean, noise, lasting, _spread(size - mean, known, prior)
+    return [rows for rows in known if len(rows) >= _LEAST_FRAMES]
 
 
-def _errors(
+def frame_errors(
     size: Floats, frame: Ints, tracklets: Sequence[Ints], prior: SizePrior, frame_rate: float
 ) -> tuple[float, float]:
-    """Variance and correlation time of a frame's error, from half squared differences at growing lags."""
+    """Variance and correlation time (seconds) of a frame's error, from half squared differences at growing lags.
+
+    Parameters
+    ----------
+    size : float64 (n,)
+        Of each row.
+    frame : int64 (n,)
+        Frame of each row.
+    tracklets
+        Measured rows of each isolated tracklet, in the order of time.
+    prior
+        What is known of the error before the recording.
+    frame_rate
+        Frames per second.
+    """
     lags = max(round(_LONGEST * frame_rate), 1)
     total, count = np.zeros(lags), np.zeros(lags)
     for rows in tracklets:
@@ -151,6 +161,15 @@ def _errors(
     noise = float(differences.max())
     alike = np.clip(1.0 - differences / noise, 0.0, 1.0)
     return noise, float(1.0 + 2.0 * alike.sum()) / frame_rate
+
+
+def _learn(
+    size: Floats, frame: Ints, tracklets: Sequence[Ints], prior: SizePrior, frame_rate: float
+) -> tuple[float, float, float, float]:
+    known = measured_tracklets(size, tracklets)
+    mean = float(np.mean(size[np.concatenate(known)])) if known else 0.0
+    noise, lasting = frame_errors(size, frame, known, prior, frame_rate)
+    return mean, noise, lasting, _spread(size - mean, known, prior)
 
 
 def _spread(deviation: Floats, tracklets: Sequence[Ints], prior: SizePrior) -> float:

@@ -95,9 +95,11 @@ def fill_costs(
                     known[d] = size_evidence(held_precision[h, s, d], held_information[h, s, d], spread[d])
                 measured = True
                 for d in range(len(spread)):
+                    if precision[r, d] == 0.0:
+                        continue
                     both = held_precision[h, s, d] + precision[r, d]
                     together = size_evidence(both, held_information[h, s, d] + information[r, d], spread[d])
-                    gain += max(together - known[d], alone[i, d] - most_against[d])
+                    gain += max(together - known[d], alone[i, d] - most_against[d] * precision[r, d])
                 cost[h, i, s] = -gain
                 if certain[r]:
                     cost[h, i, slots + i] = FORBIDDEN
@@ -231,12 +233,28 @@ def _cube(word: int, prime: int) -> int:
     return rest * rest % prime * rest % prime
 
 
+@part
+def _kin(name: Ints, track: Ints, own: int) -> int:
+    """How an identity (its first observation) of the names of a hypothesis (slot,) is known to others.
+
+    By the filter track in which it began, and how many of the others began there before.
+    """
+    rank = 0
+    for other in name:
+        if 0 <= other < own and track[other] == track[own]:
+            rank += 1
+    return int(track[own] * 64 + rank)
+
+
 @kernel
 def choose_distinct(
-    ordered: Ints, change: Ints, value: Floats, column: Ints, name: Ints, last: Ints, mark: Ints, first: int,
-    least: float, parent: Ints, chosen: Ints, names: Ints, score: Floats, keys: Ints,
+    ordered: Ints, change: Ints, value: Floats, column: Ints, name: Ints, last: Ints, track: Ints, mark: Ints,
+    first: int, least: float, parent: Ints, chosen: Ints, names: Ints, score: Floats, keys: Ints,
 ) -> int:  # fmt: skip
-    """Choose the best alternatives that differ in the present names, or in who is unseen.
+    """Choose the best alternatives that differ in who is present, or in who is unseen.
+
+    Whoever began in the same filter track is the same: hypotheses that differ in nothing but the frame in which
+    somebody begins, or is last seen in a track, have the same future.
 
     Parameters
     ----------
@@ -246,6 +264,8 @@ def choose_distinct(
         See `fill_alternatives`.
     column, name, last
         Best assignments; names and last observations of the slots.
+    track : int64 (n,)
+        Filter track of each observation, as its first observation.
     mark : int64 (hypothesis,)
         Tells hypotheses apart that differ in what constraints bind.
     first
@@ -264,6 +284,10 @@ def choose_distinct(
     """
     rows, slots = column.shape[1], name.shape[1]
     seen = np.zeros(slots, np.bool_)
+    kin = np.empty((len(name), slots), np.int64)
+    for h in range(len(name)):
+        for s in range(slots):
+            kin[h, s] = _kin(name[h], track, name[h, s]) if name[h, s] >= 0 else -1
     number = 0
     for a in ordered:
         if number == len(parent) or value[a] < least:
@@ -281,13 +305,14 @@ def choose_distinct(
             if own[i] < slots:
                 seen[own[i]] = True
                 names[number, i] = name[h, own[i]]
+                word = kin[h, own[i]] * 1048576 + i
             else:
                 names[number, i] = first + i
-            word = names[number, i] * 1048576 + i
+                word = _kin(name[h], track, first + i) * 1048576 + i
             high, low = (high + _cube(word, _PRIMES[0])) % _PRIMES[0], (low + _cube(word, _PRIMES[1])) % _PRIMES[1]
         for s in range(slots):
             if name[h, s] >= 0 and not seen[s]:
-                word = name[h, s] * 1048576 + rows + last[h, s]
+                word = kin[h, s] * 1048576 + rows + track[last[h, s]]
                 high, low = (high + _cube(word, _PRIMES[0])) % _PRIMES[0], (low + _cube(word, _PRIMES[1])) % _PRIMES[1]
         key = high * 2147483648 + low
         known = False
