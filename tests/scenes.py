@@ -41,6 +41,7 @@ class Moment:
 
     frame: int
     views: tuple[Observation, ...]
+    images: tuple[Observation, ...] = ()
 
 
 def looking(

@@ -111,6 +111,24 @@ def test_features_of_boxes_go_to_the_people_whose_boxes_they_are() -> None:
     assert rows["colours"].shape[1] == COLOURS
 
 
+def test_colours_beside_boxes_are_those_of_their_middles() -> None:
+    """One person has no box in the third view; what is seen behind people counts nothing."""
+    views, _ = painted()
+    likely: list[ViewEvidence] = [boxes(camera, STANDING) for camera in CAMERAS]
+    explanation = explained(step=1)
+    explanation.box_assignment[2][0] = -1
+    for assigned in explanation.pixel_assignment:  # outlines of pillars are wider than people
+        assigned[assigned < 0] = 0
+    rows = appearance_rows(7, explanation, TABLES, None, likely, likely, views)
+    assert not ((rows["view"] == 2) & (rows["x"] == STANDING[0, 0])).any()
+    for (x, _, _), blue_to_red in zip(STANDING, (1, -1), strict=True):
+        own = rows["colours"][rows["x"] == x].reshape(-1, 2, 3)
+        assert len(own) >= 3
+        difference = np.log(160 + 16) - np.log(40 + 16)
+        np.testing.assert_allclose(own[..., 0] - own[..., 2], blue_to_red * difference, atol=0.3)
+    assert not len(appearance_rows(7, explanation, TABLES, None, likely, likely, [None] * 4))
+
+
 def test_masks_have_no_looks() -> None:
     views, likely = painted()
     assert not len(looks([mask(camera, STANDING) for camera in CAMERAS], likely))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import struct
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -239,6 +240,31 @@ def test_pictures_of_another_size_are_refused(tmp_path: Path, kind: SourceKind) 
     rec = recording(CameraSource(Source(kind, path)), size=(20, 12))
     with pytest.raises(SourceError, match="camera cam1, frame 0: found an image of 16x12, expected 20x12"):
         shown(rec)
+
+
+def beside(folder: Path, detections: int, frames: int, offset: int = 0) -> CameraSource:
+    """A camera of boxes, with colour frames."""
+    own = box_camera(folder, detections, offset)
+    return replace(own, images=Source("images", images(folder / f"beside{frames}", frames)))
+
+
+def test_colour_frames_stand_beside_detections(tmp_path: Path) -> None:
+    """Frame k of the images is that of frame k of the boxes; more of them are left over."""
+    rec = recording(box_camera(tmp_path, 5), beside(tmp_path, 3, 9, offset=2))
+    with open_frames(rec, 2, 5) as reader:
+        told = [(number(frame_set.views[1]), *map(number, frame_set.images)) for frame_set in reader]
+    assert told == [(0, None, 0), (1, None, 1), (2, None, 2)]
+    with open_frames(rec.without_images(), 2, 5) as reader:
+        assert all(frame_set.images == () for frame_set in reader)
+
+
+def test_colour_frames_that_end_before_their_detections_are_refused(tmp_path: Path) -> None:
+    rec = recording(beside(tmp_path, 5, 3))
+    with pytest.raises(SourceError, match="camera cam1, images: found its end at frame 3, where the detections go on"):
+        shown(rec)
+    other = recording(beside(tmp_path, 4, 4), size=(20, 12))
+    with pytest.raises(SourceError, match="camera cam1, frame 0: found an image of 16x12, expected 20x12"):
+        shown(other)
 
 
 def test_a_broken_image_is_named(tmp_path: Path) -> None:

@@ -32,12 +32,15 @@ class LiveFrameSet:
         When all its observations had arrived, by `now`.
     dropped
         Whether its observations were dropped because tracking is slower than the cameras.
+    images
+        Empty: live cameras deliver no detections.
     """
 
     frame: int
     views: tuple[Observation, ...]
     arrived: float
     dropped: bool = False
+    images: tuple[Observation, ...] = ()
 
 
 def is_live(recording: Recording) -> bool:

@@ -10,6 +10,7 @@ import math
 import os
 from collections.abc import Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 
 from stseg.arrays import Floats, Observation
 from stseg.errors import SourceError
@@ -94,6 +95,20 @@ def open_aligned_streams(
     for camera_index in range(len(recording.sources)):
         streams.append(open_aligned_stream(recording, camera_index, times[camera_index] if times else None))
         opened.callback(streams[-1].close)
+    return streams
+
+
+def open_image_streams(recording: Recording, opened: ExitStack) -> dict[int, AlignedStream]:
+    """Streams of colour frames beside detections, by the number of the camera, closed with `opened`.
+
+    Their frame k belongs to frame k of the detections. Raises as `open_aligned_stream` does.
+    """
+    streams = dict[int, AlignedStream]()
+    for k, (camera, own) in enumerate(zip(recording.rig.cameras, recording.sources, strict=True)):
+        if own.images is not None:
+            beside = replace(own, source=own.images, images=None)
+            streams[k] = AlignedStream(camera, beside, open_stream(own.images, camera))
+            opened.callback(streams[k].close)
     return streams
 
 

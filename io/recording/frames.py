@@ -11,7 +11,7 @@ none (`stseg.io.recording.time_alignment`).
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack, closing
 from dataclasses import dataclass
@@ -24,6 +24,7 @@ from stseg.io.recording.aligned_stream import (
     decoder_threads,
     open_aligned_stream,
     open_aligned_streams,
+    open_image_streams,
     recording_length,
 )
 from stseg.io.recording.recording import Recording
@@ -42,10 +43,13 @@ class FrameSet:
         The recording's frame.
     views
         One observation per camera in the rig's order, None where a camera is blind.
+    images
+        Colour frames beside detections, one per camera, None where it has none; empty where none has.
     """
 
     frame: int
     views: tuple[Observation, ...]
+    images: tuple[Observation, ...] = ()
 
 
 class FrameReader:
@@ -65,6 +69,7 @@ class FrameReader:
         self._frame, self._least = first, first if stop is None else stop
         with ExitStack() as opened:
             self._streams = open_aligned_streams(recording, opened, streams.times if streams else ())
+            self._images = open_image_streams(recording, opened)
             _require_start(self._streams, first)
             self._pool = opened.enter_context(ThreadPoolExecutor(decoder_threads(recording)))
             self._opened = opened.pop_all()
@@ -84,14 +89,15 @@ class FrameReader:
     def __next__(self) -> FrameSet:
         if self._frame == self._stop:
             raise StopIteration
-        views = tuple(view.result() for view in self._ahead)
+        number, read = len(self._streams), tuple(view.result() for view in self._ahead)
+        views = read[:number]
         length = recording_length(self._streams)
         if length <= self._frame:
             if length < self._least:
                 found = f"a recording of {length} frames"
                 raise SourceError(self._recording.path, "frames", found, f"at least {self._least}")
             raise StopIteration
-        frame_set = FrameSet(self._frame, views)
+        frame_set = FrameSet(self._frame, views, self._beside(views, read[number:]))
         self._frame += 1
         self._ahead = self._read_ahead()
         return frame_set
@@ -103,7 +109,21 @@ class FrameReader:
     def _read_ahead(self) -> list[Future[Observation]]:
         if self._frame == self._stop:
             return []
-        return [self._pool.submit(stream.read, self._frame) for stream in self._streams]
+        every = [*self._streams, *self._images.values()]
+        return [self._pool.submit(stream.read, self._frame) for stream in every]
+
+    def _beside(self, views: Sequence[Observation], read: Sequence[Observation]) -> tuple[Observation, ...]:
+        """Colour frames in the places of their cameras; each detection's frame has one."""
+        if not self._images:
+            return ()
+        images: list[Observation] = [None] * len(views)
+        for (k, stream), image in zip(self._images.items(), read, strict=True):
+            if image is None and views[k] is not None:
+                found = f"its end at frame {stream.end}, where the detections go on"
+                place = f"camera {stream.camera.name}, images"
+                raise SourceError(stream.source.source.path, place, found, "a frame for each frame of the detections")
+            images[k] = image
+        return tuple(images)
 
 
 def open_frames(

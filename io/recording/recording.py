@@ -155,6 +155,10 @@ class Recording:
         sources = (own if own.images is None else replace(own, source=own.images, images=None) for own in self.sources)
         return replace(self, sources=tuple(sources))
 
+    def without_images(self) -> Recording:
+        """The recording without the colour frames beside detections."""
+        return replace(self, sources=tuple(replace(own, images=None) for own in self.sources))
+
     def _factor(self, camera: Camera, own: CameraSource, rows: float) -> int:
         colour = own.source.kind in ("video", "images")
         return greatest_reduction(camera, self.rig.grid, rows) if colour else 1

@@ -204,6 +204,8 @@ def _sources(recording: Recording) -> Rows:
         rows.append((camera.name, b"frames", *_described(streams.source)))
         if streams.background is not None:
             rows.append((camera.name, b"background", *_described(streams.background)))
+        if streams.images is not None:
+            rows.append((camera.name, b"images", *_described(streams.images)))
     return np.array(rows, SOURCE)
 
 

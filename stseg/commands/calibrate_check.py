@@ -118,7 +118,7 @@ def _look(recording: Recording, first: int, stop: int) -> _Seen:
     shown: dict[int, list[Floats]] = {}
     kept: tuple[int, tuple[Observation, ...]] = (first, (None,) * len(foregrounds))
     console = Console(stderr=True)
-    with open_frames(recording, first, None) as frame_sets:
+    with open_frames(recording.without_images(), first, None) as frame_sets:
         steps: Iterator[int] = iter(
             track(range(first, stop), "looking", console=console, disable=not console.is_terminal, transient=True)
         )

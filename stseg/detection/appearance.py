@@ -1,4 +1,4 @@
-"""Appearance of each detected person in each view: features of the detector's box, or colours of trunk and legs."""
+"""Appearance of each detected person in each view: features of the detector's box, and colours of trunk and legs."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _LOGARITHM = np.log(np.arange(256) + _DARK)
 
 def appearance_rows(
     frame: int, explanation: Explanation, tables: Sequence[BodyTable], axes: Floats | None,
-    observations: Sequence[Observation], evidence: Sequence[ViewEvidence],
+    observations: Sequence[Observation], evidence: Sequence[ViewEvidence], images: Sequence[Observation] = (),
 ) -> Rows:  # fmt: skip
     """APPEARANCE rows of a frame: for each view and person that it sees apart from others.
 
@@ -43,9 +43,12 @@ def appearance_rows(
         By which features of boxes are reduced (`stseg.model.principal_axes`); None to leave them out.
     observations, evidence
         Of each view, in the rig's order.
+    images
+        Colour frames beside boxes, of each view, None where it has none; empty where none has.
     """
     parts = []
-    for k, (seen, likely) in enumerate(zip(observations, evidence, strict=True)):
+    beside = images or [None] * len(observations)
+    for k, (seen, likely, image) in enumerate(zip(observations, evidence, beside, strict=True)):
         apart = explanation.people.visibility[k] >= _APART
         rows = np.zeros(len(apart), APPEARANCE)
         rows["frame"], rows["view"] = frame, k
@@ -55,12 +58,23 @@ def appearance_rows(
             owner = explanation.box_assignment[k]
             reduced = likely.features[owner >= 0] @ axes
             rows["features"][owner[owner >= 0]] = np.pad(reduced, ((0, 0), (0, FEATURES - axes.shape[1])))
+        if isinstance(likely, Boxes) and isinstance(image, np.ndarray):
+            middles = _middles(likely, explanation.box_assignment[k], image.shape[:2])
+            rows["colours"] = _colours(explanation, k, tables[k], apart, np.asarray(image, np.uint8), middles)
         elif isinstance(likely, np.ndarray) and isinstance(seen, np.ndarray) and seen.ndim == 3:
-            image = np.asarray(seen, np.uint8)
-            rows["colours"] = _colours(explanation, k, tables[k], apart, image, likely)
+            rows["colours"] = _colours(explanation, k, tables[k], apart, np.asarray(seen, np.uint8), likely)
         known = np.isfinite(rows["features"]).any(axis=1) | np.isfinite(rows["colours"]).all(axis=1)
         parts.append(rows[apart & known])
     return np.concatenate([np.zeros(0, APPEARANCE), *parts])
+
+
+def _middles(boxes: Boxes, owner: Ints, shape: tuple[int, ...]) -> Singles:
+    """Where the boxes of people show bodies: 1 in the middle half of their width, 0 elsewhere, float32 (v, u)."""
+    shown = np.zeros(shape, np.float32)
+    for left, top, width, height in boxes.pixel[owner >= 0].tolist():
+        columns = slice(max(round(left + width / 4), 0), max(round(left + 3 * width / 4), 0))
+        shown[max(round(top), 0) : max(round(top + height), 0), columns] = 1.0
+    return shown
 
 
 def _colours(

@@ -7,12 +7,13 @@ from functools import cached_property
 
 from stseg.arrays import Rows
 from stseg.config import Config
-from stseg.engine.pipeline import Pipeline
+from stseg.engine.pipeline import Pipeline, decides_by_appearance
 from stseg.engine.segments import Segment, find_gaps, longest_absence, segments
 from stseg.io.recording.appearance_axes import appearance_axes
 from stseg.io.recording.recording import Recording
 from stseg.io.recording.stream_index import StreamIndex
 from stseg.io.runfile.layout import VolumeKind
+from stseg.trackers import find_tracker
 from stseg.tracking.identities.identity_problem import NOBODY
 
 
@@ -45,8 +46,10 @@ class Job:
 
     @cached_property
     def read(self) -> Recording:
-        """The recording with images no larger than the foreground needs."""
-        return self.recording.reduced(self.config.foreground.body_rows)
+        """The recording with images no larger than the foreground needs, and none beside detections in vain."""
+        reduced = self.recording.reduced(self.config.foreground.body_rows)
+        wanted = decides_by_appearance(find_tracker(self.tracker), self.config)
+        return reduced if wanted else reduced.without_images()
 
     def gaps(self) -> list[tuple[int, int]]:
         """Half-open ranges of frames that no camera shows, longer than any track is continued unseen."""

@@ -66,12 +66,13 @@ class Pipeline:
         explanation: Explanation,
         observations: Sequence[Observation],
         evidence: Sequence[ViewEvidence],
+        images: Sequence[Observation] = (),
     ) -> Rows:
-        """APPEARANCE rows of a frame, as far as the configuration wants them."""
-        if self.tracker.final or self.config.tracking.appearance == "none":
+        """APPEARANCE rows of a frame, as far as the configuration wants them; `images` are beside detections."""
+        if not decides_by_appearance(self.tracker, self.config):
             return np.zeros(0, APPEARANCE)
         tables = [view.table for view in self.detector.views]
-        return appearance_rows(frame, explanation, tables, self.axes, observations, evidence)
+        return appearance_rows(frame, explanation, tables, self.axes, observations, evidence, images)
 
     def finished(
         self, committed: Rows, events: Rows, appearance: Rows, shown: Rig | None = None
@@ -79,6 +80,11 @@ class Pipeline:
         """The tracks of a whole run (`finished_tracks`), their boxes in this rig's pixels or those of another."""
         shown = self.rig if shown is None else shown
         return finished_tracks(self.rig, self.config, self.tracker, committed, events, appearance, shown)
+
+
+def decides_by_appearance(tracker: type[Tracker], config: Config) -> bool:
+    """Whether appearance is evidence of identity."""
+    return not tracker.final and config.tracking.appearance != "none"
 
 
 def finished_tracks(

@@ -99,7 +99,10 @@ def _frame_sets(
 ) -> Iterator[FrameSet]:
     """The frames, and before them as many as a background needs to adapt to the light (`memory`, seconds)."""
     first, stop = max(int(run.frames[0]), int(frames[0]) - round(memory * run.frame_rate)), int(frames[-1]) + 1
-    with open_frames(run.recording, first, stop) as frame_sets, reporter.progress(stage, stop - first) as advance:
+    with (
+        open_frames(run.recording.without_images(), first, stop) as frame_sets,
+        reporter.progress(stage, stop - first) as advance,
+    ):
         for frame_set in frame_sets:
             yield frame_set
             advance(1)

@@ -38,6 +38,8 @@ class FrameSet(Protocol):
     def frame(self) -> int: ...
     @property
     def views(self) -> Sequence[Observation]: ...
+    @property
+    def images(self) -> Sequence[Observation]: ...
 
 
 class Session:
@@ -98,7 +100,7 @@ class Session:
             )
         fusion = self._submit(frame, evidence, explanation, noise)
         with self.watch.time("appearance"):
-            appearance = self.pipeline.appearance_rows(frame, explanation, frame_set.views, evidence)
+            appearance = self.pipeline.appearance_rows(frame, explanation, frame_set.views, evidence, frame_set.images)
         self._records[frame] = FrameRecord(explanation, fusion, appearance)
         fused = FusedFrame(frame, explanation.people, explanation.ghosts, lambda: fusion.result().volume)
         with self.watch.time("track"):
