@@ -19,7 +19,7 @@ from stseg.tracking.smoother import smoothed_path
 from stseg.tracking.track_filter import Measurement, TrackState
 
 MOTION = MotionConfig()
-WALKS, STEPS, SECONDS = 120, 15, 0.2
+WALKS, STEPS, SECONDS = 200, 15, 0.2
 NOISE = np.array([[0.02, 0.006], [0.006, 0.01]])
 ROUND = 0.015
 """Variance of both coordinates, for the filter of the identity search."""
