@@ -66,24 +66,35 @@ def test_what_comes_later_counts_where_a_track_is_certain() -> None:
 @pytest.mark.parametrize(
     ("names", "columns", "distinct"),
     [
-        ([[0, 3], [1, 3]], [0, 0], 1),  # one begins a frame later in the same track
-        ([[0, 3], [2, 3]], [0, 0], 2),  # in another track
-        ([[0, 1], [0, 1]], [0, 1], 2),  # two began in one track, and either is there
+        ([[0, 3], [1, 3]], [0, 0], 1),  # one begins a frame later, which is the same birth
+        ([[0, 3], [2, 3]], [0, 0], 2),  # another birth
+        ([[0, 1], [0, 1]], [0, 1], 2),  # two of one birth, of whom either is there
     ],
 )
 def test_hypotheses_that_differ_in_the_frame_of_a_birth_are_one(
     names: list[list[int]], columns: list[int], distinct: int
 ) -> None:
-    name, track = np.array(names), np.array([0, 0, 2, 3, 4])
+    name, birth = np.array(names), np.array([0, 0, 2, 3, 4])
     change = np.array([[h, -1, -1, -1, -1] for h in range(2)])
     value, column, none = np.array([2.0, 1.0]), np.array(columns)[:, None], np.zeros(2, np.int64)
+    same = np.zeros_like(name)
     parent, chosen, given, keys = none.copy(), np.zeros((2, 1), np.int64), np.zeros((2, 1), np.int64), none.copy()
     number = step_kernels.choose_distinct(
-        np.arange(2), change, value, column, name, name, track, none, 4, -np.inf, parent, chosen, given, np.zeros(2),
+        np.arange(2), change, value, column, name, same, birth, none, 4, -np.inf, parent, chosen, given, np.zeros(2),
         keys,
     )  # fmt: skip
     assert number == distinct
     assert given[0, 0] == name[0, columns[0]]
+
+
+def test_births_within_a_second_of_a_track_are_one() -> None:
+    rows = rows_of({1: (straight(-3, 0, 0.5, 0), 1.7, range(20)), 2: (straight(3, 0, 0.5, 0), 1.7, range(20))})
+    seen = seen_of(rows)
+    birth, track = seen.birth, rows["id"][seen.order]
+    second = np.repeat(np.floor(seen.seconds), np.diff(seen.start))
+    assert len(np.unique(birth)) == len(np.unique(np.stack([track, second]), axis=1).T) == 6
+    for one in np.unique(birth):
+        assert len(np.unique(track[birth == one])) == len(np.unique(second[birth == one])) == 1
 
 
 def sizes_of(people: Floats, noise: float, seed: int = 0) -> tuple[MeasuredSizes, Ints, list[Ints]]:

@@ -17,6 +17,8 @@ _EXCHANGE_DISTANCE = 0.8
 """Distance below which the filter may have exchanged two tracks, metres."""
 _LASTING = 0.4
 """Correlation time of the error of a place, seconds: frames within it say less than independent ones."""
+_ONE_BIRTH = 1.0
+"""Time within which it does not matter in which frame of a track somebody begins, seconds."""
 _LEAST = 0.05
 """Least error of a place, metres (standard deviation)."""
 
@@ -58,9 +60,11 @@ class Observations:
     information: Floats
 
     @cached_property
-    def track(self) -> Ints:
-        """Filter track of each observation, as its first observation, int64 (n,)."""
-        return _heads(self.previous, self.previous >= 0)
+    def birth(self) -> Ints:
+        """A number of each filter track and second, of which births are one, int64 (n,)."""
+        second = np.repeat(self.seconds // _ONE_BIRTH, np.diff(self.start))
+        track = _heads(self.previous, self.previous >= 0)
+        return np.asarray(np.unique(np.stack([track, second]), axis=1, return_inverse=True)[1].reshape(-1), np.int64)
 
     def foreseen(self) -> Observations:
         """The same, with what a part of a track that is certainly one person's tells said by its first observation.

@@ -165,7 +165,7 @@ def _extended(
     parent, score, keys = np.empty(kept, np.int64), np.empty(kept), np.empty(kept, np.int64)
     chosen, names = np.empty((kept, rows), np.int64), np.empty((kept, rows), np.int64)
     kept = step_kernels.choose_distinct(
-        ordered, change, value, column, held.name, held.last, seen.track, _marks(held, known, first), first,
+        ordered, change, value, column, held.name, held.last, seen.birth, _marks(held, known, first), first,
         float(value[ordered[0]]) - _BEAM_LOSS, parent, chosen, names, score, keys,
     )  # fmt: skip
     new = held.at(parent[:kept])

@@ -234,27 +234,26 @@ def _cube(word: int, prime: int) -> int:
 
 
 @part
-def _kin(name: Ints, track: Ints, own: int) -> int:
-    """How an identity (its first observation) of the names of a hypothesis (slot,) is known to others.
+def _kin(name: Ints, birth: Ints, own: int) -> int:
+    """How an identity (its first observation) among the names of a hypothesis (slot,) is known to other hypotheses.
 
-    By the filter track in which it began, and how many of the others began there before.
+    By its birth, and how many of the others have the same one and began before.
     """
     rank = 0
     for other in name:
-        if 0 <= other < own and track[other] == track[own]:
+        if 0 <= other < own and birth[other] == birth[own]:
             rank += 1
-    return int(track[own] * 64 + rank)
+    return int(birth[own] * 64 + rank)
 
 
 @kernel
 def choose_distinct(
-    ordered: Ints, change: Ints, value: Floats, column: Ints, name: Ints, last: Ints, track: Ints, mark: Ints,
+    ordered: Ints, change: Ints, value: Floats, column: Ints, name: Ints, last: Ints, birth: Ints, mark: Ints,
     first: int, least: float, parent: Ints, chosen: Ints, names: Ints, score: Floats, keys: Ints,
 ) -> int:  # fmt: skip
     """Choose the best alternatives that differ in who is present, or in who is unseen.
 
-    Whoever began in the same filter track is the same: hypotheses that differ in nothing but the frame in which
-    somebody begins, or is last seen in a track, have the same future.
+    Identities of one birth are the same: hypotheses that differ in nothing but the frame of it have the same future.
 
     Parameters
     ----------
@@ -264,8 +263,8 @@ def choose_distinct(
         See `fill_alternatives`.
     column, name, last
         Best assignments; names and last observations of the slots.
-    track : int64 (n,)
-        Filter track of each observation, as its first observation.
+    birth : int64 (n,)
+        Number of the birth of an identity that begins with an observation, the same for births that are one.
     mark : int64 (hypothesis,)
         Tells hypotheses apart that differ in what constraints bind.
     first
@@ -287,7 +286,7 @@ def choose_distinct(
     kin = np.empty((len(name), slots), np.int64)
     for h in range(len(name)):
         for s in range(slots):
-            kin[h, s] = _kin(name[h], track, name[h, s]) if name[h, s] >= 0 else -1
+            kin[h, s] = _kin(name[h], birth, name[h, s]) if name[h, s] >= 0 else -1
     number = 0
     for a in ordered:
         if number == len(parent) or value[a] < least:
@@ -308,11 +307,11 @@ def choose_distinct(
                 word = kin[h, own[i]] * 1048576 + i
             else:
                 names[number, i] = first + i
-                word = _kin(name[h], track, first + i) * 1048576 + i
+                word = _kin(name[h], birth, first + i) * 1048576 + i
             high, low = (high + _cube(word, _PRIMES[0])) % _PRIMES[0], (low + _cube(word, _PRIMES[1])) % _PRIMES[1]
         for s in range(slots):
             if name[h, s] >= 0 and not seen[s]:
-                word = kin[h, s] * 1048576 + rows + track[last[h, s]]
+                word = kin[h, s] * 1048576 + rows + last[h, s]
                 high, low = (high + _cube(word, _PRIMES[0])) % _PRIMES[0], (low + _cube(word, _PRIMES[1])) % _PRIMES[1]
         key = high * 2147483648 + low
         known = False
