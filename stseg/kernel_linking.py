@@ -13,10 +13,12 @@ from contextlib import contextmanager
 from functools import cached_property
 from typing import Any
 
-from numba.core.codegen import JITCodeLibrary
+from numba.core.codegen import JITCodeLibrary, ll
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher, cpu_target
 
+_KNOWN_OUTSIDE = ("external", "common")
+"""Kinds of names that may be asked for."""
 _INNER = {"no_cpython_wrapper": True}
 """An inner kernel has no form that Python could call."""
 
@@ -74,6 +76,17 @@ class _Library(JITCodeLibrary):
             self._final_module.verify()
             self._finalize_final_module()
         return int(super().get_pointer_to_function(name))
+
+    def serialize_using_object_code(self) -> tuple[str, str, tuple[bytes, bytes]]:
+        """Name, kind and machine code, with the names that Python asks for; kernels link the inner form instead."""
+        made = self._final_module
+        names = [
+            one.name
+            for one in (*made.functions, *made.global_variables)
+            if not one.is_declaration and one.linkage.name in _KNOWN_OUTSIDE
+        ]
+        stubs = ll.parse_assembly("\n".join(f'@"{name}" = global i8 0' for name in names))
+        return self.name, "object", (self._get_compiled_object(), stubs.as_bitcode())
 
     def _optimize_functions(self, ll_module: Any) -> None:
         """Leave functions as they are, until they are optimised together."""
