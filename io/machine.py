@@ -1,4 +1,4 @@
-"""Limits of the machine: memory that is free for this process, and its address space."""
+"""Limits of the machine: its cores, memory that is free for this process, and its address space."""
 
 from __future__ import annotations
 
@@ -53,6 +53,11 @@ def _held() -> int:
         return int(Path("/proc/self/statm").read_text("ascii").split()[0]) * os.sysconf("SC_PAGE_SIZE")
     except (OSError, ValueError):
         return _ENDLESS
+
+
+def free_cores() -> int:
+    """Number of processor cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def free_memory() -> int:

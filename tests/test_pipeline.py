@@ -58,10 +58,10 @@ def foregrounds() -> list[ViewForeground]:
     return [ViewForeground() for _ in RIG.cameras]
 
 
-def run(kind: str, moments: Iterable[Moment], tracker: str = "cut", first: int = 0) -> Run:
+def run(kind: str, moments: Iterable[Moment], tracker: str = "cut", first: int = 0, cores: int = 2) -> Run:
     pipeline = Pipeline(RIG, [kind] * len(RIG.cameras), CONFIG, tracker)
     advanced: list[int] = []
-    steps = list(run_session(pipeline, foregrounds(), moments, first, advanced.append))
+    steps = list(run_session(pipeline, foregrounds(), moments, first, advanced.append, cores))
     trajectory = np.concatenate([step.commit.trajectory for step in steps])
     tracks, identity = pipeline.finished(
         trajectory,
@@ -171,8 +171,10 @@ def test_the_same_recording_twice(tracker: str) -> None:
     assert_equal(run("boxes", recording("boxes", FRAMES), tracker), whole("boxes", tracker))
 
 
-def test_masks_twice() -> None:
-    assert_equal(run("pixels", recording("pixels", MASKED)), whole("pixels", "cut"))
+@pytest.mark.parametrize("kind", ["boxes", "pixels"])
+def test_one_core_alone_gives_the_same(kind: str) -> None:
+    stop = FRAMES if kind == "boxes" else MASKED
+    assert_equal(run(kind, recording(kind, stop), cores=1), whole(kind, "cut"))
 
 
 def test_moments_may_come_in_chunks() -> None:

@@ -27,10 +27,12 @@ class SegmentWorker:
     ----------
     job
         The run.
+    cores
+        Processor cores for this worker; see `run_session`.
     """
 
-    def __init__(self, job: Job) -> None:
-        self.job, self.pipeline = job, job.pipeline()
+    def __init__(self, job: Job, cores: int = 2) -> None:
+        self.job, self.pipeline, self.cores = job, job.pipeline(), cores
         self._ends = [*(begin for begin, _ in job.gaps()), job.stop]
         self._learned = list[ViewForeground]()
         self._learned_from: BackgroundFrames | None = None
@@ -64,7 +66,8 @@ class SegmentWorker:
             open_frames(job.read, segment.lead, end, job.streams) as frame_sets,
             open_segment_file(job, self.pipeline.occupancy.views, draft) as writer,
         ):
-            for step in run_session(self.pipeline, foregrounds, shifts.measured(frame_sets), segment.lead, fused):
+            observed = shifts.measured(frame_sets)
+            for step in run_session(self.pipeline, foregrounds, observed, segment.lead, fused, self.cores):
                 write_step(job, step, segment, writer)
                 if step.commit.frames[-1].frame >= segment.stop - 1:
                     break

@@ -5,7 +5,8 @@ body sizes, the error rates of the views, and the tracker's tracks. Sessions of 
 
 Detection needs the tracks of the frame before, so it goes frame by frame. The foreground of the next frames needs
 nothing of it, and nothing waits for a frame's volume before its window is cut: `run_session` gives each a thread of its
-own. Every stage still takes the frames in their order, so the results are the same, bit for bit.
+own, unless it has one core alone: threads cost a seventh more processor time. Every stage still takes the frames in
+their order, so the results are the same, bit for bit.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import ExitStack
+from functools import partial
 from typing import NamedTuple, Protocol
 
 from stseg.arrays import Observation, Singles, ViewEvidence
@@ -153,6 +155,7 @@ def run_session(
     frame_sets: Iterable[FrameSet],
     first: int,
     advance: Callable[[int], None],
+    cores: int = 2,
 ) -> Iterator[CommittedFrames]:
     """The results of frame sets in a session of their own, each as soon as it is decided.
 
@@ -161,32 +164,40 @@ def run_session(
     pipeline, foregrounds, first
         As of `Session`.
     frame_sets
-        In the order of time; they are read in a thread.
+        In the order of time.
     advance
         Called with the number of each frame that went through detection.
+    cores
+        Processor cores for this session; with one it has no threads but those that decode.
     """
     with ExitStack() as threads:
-        ahead, behind = (threads.enter_context(ThreadPoolExecutor(1, name)) for name in ("foreground", "fusion"))
+        ahead, behind = (
+            threads.enter_context(ThreadPoolExecutor(1, name)) if cores > 1 else None
+            for name in ("foreground", "fusion")
+        )
         session = Session(pipeline, foregrounds, first, behind)
-        for frame_set, evidence in _prepared(session, frame_sets, ahead):
+        for frame_set, evidence in _prepared(session, iter(frame_sets), ahead):
             yield from session.add(frame_set, evidence)
             advance(frame_set.frame)
         yield from session.finish()
 
 
-def _prepared(session: Session, frame_sets: Iterable[FrameSet], executor: Executor) -> Iterator[_Prepared]:
-    """Frame sets with their evidence, of which some are made in a thread while the caller works on the last."""
-    coming = iter(frame_sets)
+def _next_prepared(session: Session, coming: Iterator[FrameSet]) -> _Prepared | None:
+    """The next frame set with its evidence; None after the last."""
+    with session.watch.time("read"):
+        frame_set = next(coming, None)
+    return None if frame_set is None else _Prepared(frame_set, session.evidence(frame_set))
 
-    def prepare() -> _Prepared | None:
-        with session.watch.time("read"):
-            frame_set = next(coming, None)
-        return None if frame_set is None else _Prepared(frame_set, session.evidence(frame_set))
 
-    waiting = deque(executor.submit(prepare) for _ in range(_AHEAD))
+def _prepared(session: Session, coming: Iterator[FrameSet], executor: Executor | None) -> Iterator[_Prepared]:
+    """Frame sets with their evidence; by an executor some are made while the caller works on the last."""
+    if executor is None:
+        yield from iter(partial(_next_prepared, session, coming), None)
+        return
+    waiting = deque(executor.submit(_next_prepared, session, coming) for _ in range(_AHEAD))
     try:
         while (prepared := waiting.popleft().result()) is not None:
-            waiting.append(executor.submit(prepare))
+            waiting.append(executor.submit(_next_prepared, session, coming))
             yield prepared
     finally:
         for future in waiting:

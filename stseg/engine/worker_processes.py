@@ -7,10 +7,9 @@ at the same time as the process of the command does.
 from __future__ import annotations
 
 import multiprocessing
-import os
 from typing import TYPE_CHECKING
 
-from stseg.io.machine import free_memory
+from stseg.io.machine import free_cores, free_memory
 
 if TYPE_CHECKING:  # Windows has no contexts that fork
     from multiprocessing.context import ForkServerContext, SpawnContext
@@ -33,8 +32,7 @@ def processes_that_fit(cells: int = 0) -> int:
 
     `cells` is the number of the volume's cells times that of the views.
     """
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return max(1, min(cores, free_memory() // (_MEMORY + cells * _CELL_MEMORY)))
+    return max(1, min(free_cores(), free_memory() // (_MEMORY + cells * _CELL_MEMORY)))
 
 
 def prepare_workers(workers: int | None) -> None:

@@ -22,6 +22,7 @@ from stseg.engine.segment_worker import SegmentWorker
 from stseg.engine.segments import Segment
 from stseg.engine.worker_processes import CONTEXT
 from stseg.errors import StsegError, WorkerError
+from stseg.io.machine import free_cores
 
 _TRIES = 3
 """Number of workers lost by the same segment at which the run fails."""
@@ -72,7 +73,9 @@ def make_by_workers(
         An error raised by a worker.
     """
     pending, tries, notes = list(missing)[::-1], Counter[int](), set[str]()
-    with _pool(job, min(workers, len(missing))) as pool:
+    number = min(workers, len(missing))
+    cores = -(-free_cores() // number)
+    with _pool(job, number, cores) as pool:
         while pending or any(worker.segment for worker in pool):
             for worker in pool:
                 if worker.segment is None and pending:
@@ -94,7 +97,7 @@ def make_by_workers(
                 elif isinstance(message, BaseException):
                     raise message
                 else:
-                    pool[pool.index(worker)] = _start(job)
+                    pool[pool.index(worker)] = _start(job, cores)
                     if segment is not None:
                         tries[segment.index] += 1
                         _limit_tries(segment, tries[segment.index], worker.process)
@@ -125,11 +128,11 @@ def _limit_tries(segment: Segment, tries: int, process: BaseProcess) -> None:
 
 
 @contextmanager
-def _pool(job: Job, number: int) -> Iterator[list[_Worker]]:
-    """Worker processes waiting for segments; killed on exit."""
+def _pool(job: Job, number: int, cores: int) -> Iterator[list[_Worker]]:
+    """Worker processes waiting for segments, with a number of cores each; killed on exit."""
     pool: list[_Worker] = []
     try:
-        pool += [_start(job) for _ in range(number)]
+        pool += [_start(job, cores) for _ in range(number)]
         yield pool
     finally:
         for worker in pool:
@@ -139,16 +142,16 @@ def _pool(job: Job, number: int) -> Iterator[list[_Worker]]:
             worker.pipe.close()
 
 
-def _start(job: Job) -> _Worker:
+def _start(job: Job, cores: int) -> _Worker:
     """Start a worker process."""
     own, other = CONTEXT.Pipe()
-    process = CONTEXT.Process(target=_main, args=(job, other), daemon=True)
+    process = CONTEXT.Process(target=_main, args=(job, cores, other), daemon=True)
     process.start()
     other.close()
     return _Worker(process, own)
 
 
-def _main(job: Job, pipe: Connection) -> None:
+def _main(job: Job, cores: int, pipe: Connection) -> None:
     """Main loop of a worker process, which ends when its parent closes the pipe or kills it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     worker: SegmentWorker | None = None
@@ -157,7 +160,7 @@ def _main(job: Job, pipe: Connection) -> None:
             segment, draft = pipe.recv()
             try:
                 with compilation_noted(pipe.send):
-                    worker = worker or SegmentWorker(job)
+                    worker = worker or SegmentWorker(job, cores)
                     pipe.send(worker.make(segment, draft, pipe.send))
             except StsegError as error:
                 pipe.send(error)

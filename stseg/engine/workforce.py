@@ -16,6 +16,7 @@ from stseg.engine.segments import Segment
 from stseg.engine.worker_processes import prepare_workers, processes_that_fit
 from stseg.engine.workers import make_by_workers
 from stseg.errors import ConfigError
+from stseg.io.machine import free_cores
 
 
 @dataclass(frozen=True)
@@ -77,6 +78,6 @@ class Workforce:
         elif workers > 1:
             yield from make_by_workers(job, missing, draft, workers, advance, note)
         else:
-            worker = SegmentWorker(job)
+            worker = SegmentWorker(job, free_cores())
             for segment in missing:
                 yield segment, worker.make(segment, draft(segment.index), advance)
