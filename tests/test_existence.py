@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -46,6 +47,11 @@ def walk(evidence: Floats, track: int = 1, off: float = 0.0) -> list[tuple[int, 
 def test_a_person_seen_badly_for_five_frames_stays() -> None:
     evidence = np.array([12.0, 12.0, 1.0, 0.5, 0.2, 0.5, 1.0, 12.0, 12.0])
     assert decide(candidates(*walk(evidence))).real.all()
+
+
+def test_a_child_pays_for_being_small_what_the_detector_takes_for_it() -> None:
+    found = replace(candidates(*walk(np.full(9, 3.0), off=0.1)), height=np.full(9, 1.05))
+    assert decide(found).real.all()
 
 
 def test_strong_evidence_against_a_person_ends_them() -> None:

@@ -14,6 +14,7 @@ import numpy as np
 
 from stseg.arrays import Floats, Ints
 from stseg.config import BodyConfig, MotionConfig
+from stseg.model.sizes import log_heavy_tailed
 
 _RESOLUTION = 0.1
 """s: standard deviation of the place of a detection, to which the prior log-odds refer, metres."""
@@ -111,6 +112,6 @@ class LinkModel:
         """Log-ratio of a height as the continuation of another against the population, nats."""
         spread, error = self.body.height_spread, self.body.height_spread / 2
         off = found.height[end] - found.height[start]
-        own = found.height[end] - self.body.height_mean
-        ratio = np.log(spread / error) - 0.5 * (off / error) ** 2 + 0.5 * (own / spread) ** 2
+        anybody = log_heavy_tailed((found.height[end] - self.body.height_mean) / spread)
+        ratio = np.log(spread / error) - 0.5 * (off / error) ** 2 - anybody
         return np.asarray(np.maximum(ratio, _OUT_OF_SHAPE))

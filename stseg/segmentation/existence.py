@@ -28,6 +28,7 @@ from stseg.config import BodyConfig, DetectionConfig
 from stseg.graphcut.energy import QUANTUM
 from stseg.graphcut.qpbo import QuadraticEnergy, QuadraticMinimum, minimise
 from stseg.model.border import Border
+from stseg.model.sizes import log_heavy_tailed
 from stseg.segmentation.candidate_links import LinkModel, Links, WindowCandidates
 from stseg.segmentation.paths import best_paths, path_marginals
 
@@ -99,7 +100,7 @@ class ExistenceModel:
         inside = self.detection.birth_cost * self.border.inside(found.ground, self.detection.border_width)
         birth = np.where(found.frame == 0, 0.0, inside)
         death = np.where(found.frame == found.frame.max(), 0.0, inside)
-        tall = -0.5 * ((found.height - self.body.height_mean) / self.body.height_spread) ** 2
+        tall = log_heavy_tailed((found.height - self.body.height_mean) / self.body.height_spread)
         return found.evidence + self.detection.prior_log_odds + tall - birth - death, birth, death
 
     def _exclusions(self, found: WindowCandidates) -> Exclusions:
