@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
-from scenes import BODY, FEW_HEIGHTS, boxes, expecting, people, room
+from scenes import BODY, FEW_HEIGHTS, boxes, expecting, likelihoods, people, room
 
 from stseg.arrays import Boxes, Floats
 from stseg.detection.detector import Detector
@@ -22,19 +23,29 @@ def detector() -> Detector:
     return Detector(room(), ["boxes"] * 4, FEW_HEIGHTS, BODY)
 
 
-def crowd(seed: int) -> tuple[Floats, list[Boxes], PredictedTracks]:
-    """Eight people, three boxes in four of each, and tracks of which three went astray."""
-    rng, standing = np.random.default_rng(seed), list[Floats]()
-    while len(standing) < 8:
+def standing_apart(rng: np.random.Generator, number: int, least: float) -> Floats:
+    standing = list[Floats]()
+    while len(standing) < number:
         place = rng.uniform(-1.6, 1.6, 2)
-        if all(np.hypot(*(place - other)) > 0.4 for other in standing):
+        if all(np.hypot(*(place - other)) > least for other in standing):
             standing.append(place)
-    ground = np.array(standing)
-    seen = [boxes(camera, people(*ground)) for camera in room().cameras]
-    seen = [found.of(rng.random(len(found)) > 0.25) for found in seen]
+    return np.array(standing)
+
+
+def astray(rng: np.random.Generator, ground: Floats) -> PredictedTracks:
+    """Tracks of people, the first three beside where they stand."""
     expected = ground.copy()
     expected[:3] += rng.normal(0, 0.6, (3, 2))
-    return ground, seen, expecting(*expected.clip(-1.7, 1.7))
+    return expecting(*expected.clip(-1.7, 1.7))
+
+
+def crowd(seed: int) -> tuple[Floats, list[Boxes], PredictedTracks]:
+    """Eight people, three boxes in four of each, and tracks of which three went astray."""
+    rng = np.random.default_rng(seed)
+    ground = standing_apart(rng, 8, 0.4)
+    seen = [boxes(camera, people(*ground)) for camera in room().cameras]
+    seen = [found.of(rng.random(len(found)) > 0.25) for found in seen]
+    return ground, seen, astray(rng, ground)
 
 
 def of_tracks(seen: list[Boxes], expected: PredictedTracks) -> MapEstimate:
@@ -51,6 +62,20 @@ def test_people_whose_boxes_a_followed_ghost_holds_are_found(seed: int) -> None:
     found = detector().explain(seen, expected).people
     assert len(found) == len(ground)
     assert len(match(distances(ground, found.ground), 0.3)[0]) == len(ground)
+
+
+@pytest.mark.parametrize("seed", [8, 31, 37])
+def test_key_frames_of_two_views_leave_the_set_into_which_tracks_lead(seed: int) -> None:
+    rng, rig = np.random.default_rng(seed), replace(room(), cameras=room().cameras[:2])
+    ground = standing_apart(rng, 5, 0.5)
+    expected = astray(rng, ground)
+    seen = likelihoods(rig.cameras, people(*ground))
+    asked, hits = Detector(rig, ["pixels"] * 2, FEW_HEIGHTS, BODY), []
+    for frame in range(2):  # the first is a key frame
+        learned = asked.new_calibration(), asked.new_population(), asked.new_rims()
+        found = asked.explain_next(*learned, frame, seen, expected).people
+        hits.append(len(match(distances(ground, found.ground), 0.3)[0]))
+    assert hits[0] == len(ground) > hits[1]
 
 
 @pytest.mark.parametrize("seed", range(6))

@@ -23,7 +23,7 @@ from stseg.detection.population_calibration import PopulationCalibration
 from stseg.detection.prior import Prior
 from stseg.detection.problem import Parameters
 from stseg.detection.repulsion import CORE
-from stseg.detection.restart import restarted
+from stseg.detection.restart import better, is_doubtful, restarted
 from stseg.detection.result import explanation
 from stseg.detection.rim import RimCalibration
 from stseg.detection.search import ENUMERATED
@@ -118,10 +118,14 @@ class Detector:
             self._look_at_rims(rims, shown, population.body)
         observations = rims.applied(shown)
         tracked = self._tracked(observations, population.body, predicted)
-        known = None
-        if frame % self._key_interval and predicted is not None and proposed is None:
+        known, is_key = None, frame % self._key_interval == 0
+        if not is_key and predicted is not None and proposed is None:
             known = followed(tracked, self.lattice_ground)
-        explained = known or self._searched(tracked, proposed)
+        if known is None:
+            found = self._searched(tracked, proposed)
+            if is_key and predicted is not None and not self._has_boxes and is_doubtful(found):
+                found = better(found, self._searched_afresh(found))
+        explained = known or explanation(found)
         if self._has_boxes:
             box_noise.learn(explained, self.views, observations)
         elif known:
@@ -135,7 +139,7 @@ class Detector:
     def _look_at_rims(self, rims: RimCalibration, shown: Sequence[ViewObservation | None], body: BodyConfig) -> None:
         """Learn the rims of a session's first frame before it is explained: births cost nothing in that frame alone."""
         for _ in range(_LOOKS):
-            explained = self._searched(self._tracked(rims.applied(shown), body, None), None)
+            explained = explanation(self._searched(self._tracked(rims.applied(shown), body, None), None))
             rims.learn(explained.people, self.views, shown)
 
     def observe(self, seen: Sequence[ViewEvidence], noise: BoxNoise | None = None) -> list[ViewObservation | None]:
@@ -163,7 +167,7 @@ class Detector:
         noise
             Noise of boxes; by default the first guess.
         """
-        return self._searched(self._tracked(self.observe(seen, noise), self.body, predicted), proposed)
+        return explanation(self._searched(self._tracked(self.observe(seen, noise), self.body, predicted), proposed))
 
     def _tracked(
         self, observations: Sequence[ViewObservation | None], body: BodyConfig, predicted: PredictedTracks | None
@@ -174,7 +178,18 @@ class Detector:
         tracked = prior.pool()
         return MapEstimate.of_search(evidence, tracked, np.arange(len(tracked)))
 
-    def _searched(self, estimate: MapEstimate, proposed: Candidates | None) -> Explanation:
+    def _searched_afresh(self, found: MapEstimate) -> MapEstimate:
+        """The search from whom it finds where no track is known.
+
+        With few views many sets are better than all that exchange one or two members, and tracks lead into one of them.
+        """
+        evidence = found.evidence
+        forgetful = self._searched(self._tracked(evidence.observations, evidence.prior.body, None), None)
+        start = forgetful.pool.at(forgetful.members)
+        pool = start.joined_with(evidence.prior.pool()).joined_with(found.pool.at(found.members))
+        return self._settled(merged(MapEstimate.of_search(evidence, pool, np.arange(len(start)))))
+
+    def _searched(self, estimate: MapEstimate, proposed: Candidates | None) -> MapEstimate:
         """The whole search, from the predicted tracks on."""
         evidence = estimate.evidence
         for _ in range(self.config.search_rounds):
@@ -193,7 +208,7 @@ class Detector:
             settled = len(estimate.members) == len(searched.members)
             if settled and not self._has_boxes and _same_people(estimate.members, before, known):
                 break
-        return explanation(self._settled(estimate))
+        return self._settled(estimate)
 
     def _moved(self, estimate: MapEstimate) -> Candidates:
         """The members nearer to where they stand: a step between two searches.

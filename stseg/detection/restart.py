@@ -32,11 +32,21 @@ def restarted(estimate: MapEstimate, lattice_ground: Floats) -> MapEstimate:
         The lattice, metres.
     """
     for _ in range(_MOST):
-        trial = _from_sure_members(estimate, lattice_ground)
-        if trial.members_score.total <= estimate.members_score.total + _WORTH:
+        trial = better(estimate, _from_sure_members(estimate, lattice_ground))
+        if trial is estimate:
             break
         estimate = trial
     return estimate
+
+
+def better(estimate: MapEstimate, trial: MapEstimate) -> MapEstimate:
+    """A trial, if it explains the frame better than the estimate."""
+    return trial if trial.members_score.total > estimate.members_score.total + _WORTH else estimate
+
+
+def is_doubtful(estimate: MapEstimate) -> bool:
+    """Whether an estimate has members who would be put aside."""
+    return bool((estimate.losses() < _DOUBTFUL).any())
 
 
 def _from_sure_members(estimate: MapEstimate, lattice_ground: Floats) -> MapEstimate:
