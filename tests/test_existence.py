@@ -17,7 +17,7 @@ from stseg.model.border import Border
 from stseg.segmentation.candidate_links import LinkModel, WindowCandidates
 from stseg.segmentation.existence import Existence, ExistenceModel
 from stseg.segmentation.paths import best_paths, path_marginals
-from stseg.trackers.window_existence import tracks_of
+from stseg.trackers.window_existence import found_by_window, tracks_of
 
 CONFIG = Config()
 RIG = room()
@@ -52,6 +52,16 @@ def test_a_person_seen_badly_for_five_frames_stays() -> None:
 def test_a_child_pays_for_being_small_what_the_detector_takes_for_it() -> None:
     found = replace(candidates(*walk(np.full(9, 3.0), off=0.1)), height=np.full(9, 1.05))
     assert decide(found).real.all()
+
+
+def test_a_path_of_rejected_candidates_alone_is_a_person_where_the_window_is_sure() -> None:
+    for evidence, paths in ((7.0, 1), (2.0, 0)):
+        found = candidates(*walk(np.full(9, evidence), track=0), *walk(np.full(9, 9.0), off=1.0))
+        decision = decide(found)
+        assert decision.real.all()
+        rows = found_by_window(found, decision)
+        assert len(rows) == paths
+        assert all((found.ground[own, 1] == 0).all() and len(own) == 9 for own in rows)
 
 
 def test_strong_evidence_against_a_person_ends_them() -> None:

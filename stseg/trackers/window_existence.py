@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import count
 
 import numpy as np
 from scipy.special import logit
@@ -21,6 +22,10 @@ from stseg.segmentation.existence import Existence, ExistenceModel
 from stseg.trackers.protocol import FusedFrame
 from stseg.tracking.prediction import DetectionHistory
 
+_SURE = 12.0
+"""Least log-odds of people whom the window alone finds, nats: 40 m x 40 m have e^12 places and heights to try."""
+_FOUND_BY_WINDOW = 1 << 30
+"""First number of their tracks: those of the filter count from 1."""
 _OCCUPIED = 1.0
 """Least log-odds of the cells inside a body that the window holds to be real, nats."""
 
@@ -56,6 +61,7 @@ class WindowExistence:
         patience, prior = config.tracking.interpolation_gap, config.detection.prior_log_odds
         links = LinkModel(rig.frame_rate, patience, prior, config.motion, config.body)
         self.model = ExistenceModel(links, self.radius, Border.of(rig), config.detection, config.body)
+        self._numbers = count(_FOUND_BY_WINDOW)
 
     def revised(self, frames: Sequence[TrackedFrame], first: int, stop: int) -> list[TrackedFrame]:
         """Frames first .. stop - 1 with the people that are real by all frames given, those before and after too."""
@@ -63,6 +69,8 @@ class WindowExistence:
         decision = self.model.decide(found, self.solver.sparse)
         inside = self.model.border.inside(found.ground, self.model.detection.border_width) >= 1
         tracks = tracks_of(found, decision, inside)
+        for rows in found_by_window(found, decision):
+            tracks[rows] = next(self._numbers)
         bounds = np.searchsorted(found.frame, np.arange(len(frames) + 1))
         return [
             self._frame(one, tracks[own], decision.log_odds[own])
@@ -114,8 +122,8 @@ def tracks_of(found: WindowCandidates, decision: Existence, inside: Flags) -> In
     """Track of each candidate that is real, 0 for the others: added ones take that of the next detection on their path.
 
     A candidate is added between two of the detector's people, and before the first of a path away from the border,
-    where nobody appears. Elsewhere candidates are the best of many places that were tried, and so are their sums; and
-    what prolongs a track at the border of the area costs nothing.
+    where nobody appears. Elsewhere candidates are the best of many places that were tried, and so are their sums
+    (`found_by_window` asks for more); and what prolongs a track at the border of the area costs nothing.
     """
     own = np.where(decision.real, found.track, 0)
     linked = np.flatnonzero((decision.successor >= 0) & decision.real)
@@ -126,6 +134,20 @@ def tracks_of(found: WindowCandidates, decision: Existence, inside: Flags) -> In
     for i in linked[::-1].tolist():
         _take_over(later, i, int(decision.successor[i]), found)
     return np.where((earlier > 0) | inside, later, 0)
+
+
+def found_by_window(found: WindowCandidates, decision: Existence) -> list[Ints]:
+    """Rows of each path of rejected candidates alone that the window is sure of, one int64 (k,) a path.
+
+    Somebody small or seen badly is worth less than a birth in every frame, and much more than one birth in all of them.
+    """
+    head, rows = np.arange(len(found)), np.flatnonzero(decision.real)
+    for i in rows.tolist():
+        if decision.successor[i] >= 0:
+            head[decision.successor[i]] = head[i]
+    by_path = rows[np.argsort(head[rows], kind="stable")]
+    paths = np.split(by_path, np.flatnonzero(np.diff(head[by_path])) + 1)
+    return [own for own in paths if not found.track[own].any() and decision.log_odds[own].max(initial=0.0) >= _SURE]
 
 
 def _take_over(tracks: Ints, to: int, source: int, found: WindowCandidates) -> None:
