@@ -106,7 +106,9 @@ def test_inside_and_cover_by_definition(bodies: Floats, seed: int) -> None:
     distance = np.random.default_rng(seed).uniform(2, 3, len(bodies))
     inside, cover = np.empty(len(bodies)), np.empty((len(bodies),) * 2)
     fill_inside(bodies, WIDTH, HEIGHT, inside)
-    fill_cover(bodies, distance, WIDTH, HEIGHT, cover)
+    known = seed % (len(bodies) + 1)
+    fill_cover(bodies[:known], distance[:known], WIDTH, HEIGHT, 0, cover[:known, :known])
+    fill_cover(bodies, distance, WIDTH, HEIGHT, known, cover)
     everyone = range(len(bodies))
     np.testing.assert_allclose(inside, [reference.inside(b, WIDTH, HEIGHT) for b in bodies], atol=1e-12)
     hidden = [[reference.cover(bodies, distance, WIDTH, HEIGHT, i, k) for k in everyone] for i in everyone]

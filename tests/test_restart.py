@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 
@@ -11,6 +12,7 @@ from scenes import BODY, FEW_HEIGHTS, boxes, expecting, likelihoods, people, roo
 
 from stseg.arrays import Boxes, Floats
 from stseg.detection.detector import Detector
+from stseg.detection.lattice import lattice_candidates
 from stseg.detection.map_estimate import FrameEvidence, MapEstimate
 from stseg.detection.prior import Prior
 from stseg.detection.restart import restarted
@@ -48,7 +50,7 @@ def crowd(seed: int) -> tuple[Floats, list[Boxes], PredictedTracks]:
     return ground, seen, astray(rng, ground)
 
 
-def of_tracks(seen: list[Boxes], expected: PredictedTracks) -> MapEstimate:
+def of_tracks(seen: Sequence[Boxes | None], expected: PredictedTracks) -> MapEstimate:
     """The best set of the predicted tracks alone."""
     asked = detector()
     prior = Prior.of(expected, asked.config, asked.body, asked.border)
@@ -84,6 +86,26 @@ def test_no_set_becomes_less_likely(seed: int) -> None:
     before = of_tracks(seen, expected)
     after = restarted(before, detector().lattice_ground)
     assert after.members_score.total >= before.members_score.total
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_more_candidates_have_the_evidence_of_a_pool_that_is_made_whole(seed: int) -> None:
+    _, seen, expected = crowd(seed)
+    shown: list[Boxes | None] = [seen[0], None, *seen[2:]]
+    before = of_tracks(shown, expected)
+    nobody = before.with_members(before.members[:0])
+    fresh = lattice_candidates(nobody, detector().lattice_ground)
+    found = before.with_more(fresh.at([0])).with_more(fresh)
+    whole = MapEstimate.of_search(before.evidence, found.pool, before.members)
+    assert len(found.pool) == len(before.pool) + 1 + len(fresh) > len(before.pool) + 2
+    np.testing.assert_array_equal(found.members, before.members)
+    for table, made_whole in zip(found.problem.boxes, whole.problem.boxes, strict=True):
+        np.testing.assert_array_equal(table, made_whole)
+    np.testing.assert_array_equal(found.problem.track_gain, whole.problem.track_gain)
+    searched = before.searched_with(fresh, before.members)
+    np.testing.assert_array_equal(
+        searched.members, MapEstimate.of_search(before.evidence, searched.pool, before.members).members
+    )
 
 
 def test_sure_members_are_not_sought_again() -> None:

@@ -191,7 +191,6 @@ class Detector:
 
     def _searched(self, estimate: MapEstimate, proposed: Candidates | None) -> MapEstimate:
         """The whole search, from the predicted tracks on."""
-        evidence = estimate.evidence
         for _ in range(self.config.search_rounds):
             fresh = lattice_candidates(estimate, self.lattice_ground)
             if proposed is not None:
@@ -200,8 +199,7 @@ class Detector:
             if not len(fresh) and not len(moved):
                 break
             known, before = len(estimate.pool), estimate.members
-            pool = estimate.pool.joined_with(moved).joined_with(fresh)
-            searched = MapEstimate.of_search(evidence, pool, before)
+            searched = estimate.searched_with(moved.joined_with(fresh), before)
             estimate = merged(searched)
             if (searched.members < known).all():
                 break
@@ -222,8 +220,7 @@ class Detector:
     def _settled(self, estimate: MapEstimate) -> MapEstimate:
         """The final search: from the refined places, which may show two members to be one, then thoroughly."""
         exact, known = self._moved(estimate), len(estimate.pool)
-        start = np.arange(known, known + len(exact))
-        moved = MapEstimate.of_search(estimate.evidence, estimate.pool.joined_with(exact), start)
+        moved = estimate.searched_with(exact, np.arange(known, known + len(exact)))
         if self._has_boxes:
             moved = restarted(moved, self.lattice_ground)
         alternatives = moved.alternatives()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import maximum_filter
@@ -29,30 +30,77 @@ def peaks(score: Floats, lattice_ground: Floats, heights: Floats, widths: Floats
     return Candidates(lattice_ground[rows, columns], heights[chosen], widths[chosen])
 
 
+@dataclass(frozen=True)
+class ProjectedBodies:
+    """Candidates in the views that deliver boxes.
+
+    Attributes
+    ----------
+    edges : float64 (view, candidate, 4)
+        left, top, right, bottom, pixels, not clipped to the image; nan where the view cannot see the place.
+    distance : float64 (view, candidate)
+        Distance from the camera on the ground, metres.
+    """
+
+    edges: Floats
+    distance: Floats
+
+    @classmethod
+    def of(cls, views: Sequence[View], pool: Candidates) -> ProjectedBodies:
+        """The candidates of a pool."""
+        chosen = [view for view in views if isinstance(view, BoxView)]
+        edges, distance = np.empty((len(chosen), len(pool), 4)), np.empty((len(chosen), len(pool)))
+        for k, view in enumerate(chosen):
+            edges[k], distance[k] = view.table.boxes_of(pool.ground, pool.height), view.distance(pool.ground)
+        return cls(edges, distance)
+
+    def joined_with(self, other: ProjectedBodies) -> ProjectedBodies:
+        """These candidates, then the others."""
+        return ProjectedBodies(
+            np.concatenate([self.edges, other.edges], 1), np.concatenate([self.distance, other.distance], 1)
+        )
+
+
 def box_evidence(
-    views: Sequence[View], observations: Sequence[ViewObservation | None], pool: Candidates
+    views: Sequence[View],
+    observations: Sequence[ViewObservation | None],
+    bodies: ProjectedBodies,
+    known: BoxEvidence | None = None,
 ) -> BoxEvidence:
-    """Evidence of all views that deliver boxes; a blind one (None) has the candidates outside its image."""
+    """Evidence of all views that deliver boxes; a blind one (None) has the candidates outside its image.
+
+    `known` is that of the first candidates, where it was found before: the others alone are compared with the boxes.
+    """
     chosen = [
         (view, observation) for view, observation in zip(views, observations, strict=True) if isinstance(view, BoxView)
     ]
-    most = max((len(observation.edges) for _, observation in chosen if observation), default=0)
-    n = len(pool)
-    evidence = BoxEvidence(
-        np.full((len(chosen), n, most), -np.inf),
-        np.array([len(observation.edges) if observation else 0 for _, observation in chosen], np.int64),
-        np.zeros((len(chosen), n, n)),
-        np.zeros((len(chosen), n)),
-    )
+    evidence = _empty_evidence([observation for _, observation in chosen], bodies.edges.shape[1])
+    first = 0
+    if known is not None:
+        first = known.inside.shape[1]
+        evidence.match[:, :first], evidence.inside[:, :first] = known.match, known.inside
+        evidence.cover[:, :first, :first] = known.cover
     for k, (view, observation) in enumerate(chosen):
         if observation is not None:
             width, height = map(float, view.camera.size)
-            bodies = view.table.boxes_of(pool.ground, pool.height)
-            match = evidence.match[k, :, : len(observation.edges)]
-            fill_match(bodies, observation.edges, observation.tolerance, observation.belief, width, height, match)
-            fill_inside(bodies, width, height, evidence.inside[k])
-            fill_cover(bodies, view.distance(pool.ground), width, height, evidence.cover[k])
+            edges, match = bodies.edges[k], evidence.match[k, first:, : len(observation.edges)]
+            fill_match(
+                edges[first:], observation.edges, observation.tolerance, observation.belief, width, height, match
+            )
+            fill_inside(edges[first:], width, height, evidence.inside[k, first:])
+            fill_cover(edges, bodies.distance[k], width, height, first, evidence.cover[k])
     return evidence
+
+
+def _empty_evidence(observations: Sequence[ViewObservation | None], candidates: int) -> BoxEvidence:
+    """Evidence of views in none of which a candidate is seen."""
+    boxes = np.array([len(observation.edges) if observation else 0 for observation in observations], np.int64)
+    return BoxEvidence(
+        np.full((len(boxes), candidates, boxes.max(initial=0)), -np.inf),
+        boxes,
+        np.zeros((len(boxes), candidates, candidates)),
+        np.zeros((len(boxes), candidates)),
+    )
 
 
 def stacked_rasters(views: Sequence[View], own: Sequence[Singles | None]) -> Singles:

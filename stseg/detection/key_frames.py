@@ -93,7 +93,7 @@ def _shows_someone_new(tracked: MapEstimate, lattice_ground: Floats) -> bool:
     if not len(fresh):
         return False
     known = len(tracked.pool)
-    together = tracked.with_pool(tracked.pool.joined_with(fresh))
+    together = tracked.with_more(fresh)
     return bool((together.additions(np.arange(known, len(together.pool))).gain > -_SURE - _COARSE).any())
 
 

@@ -17,9 +17,9 @@ from stseg.arrays import Flags, Floats, Ints, Singles
 from stseg.detection.assignment import Assignment
 from stseg.detection.blob_scale import blob_scales
 from stseg.detection.body_size import measure
-from stseg.detection.evidence import box_evidence, pixel_evidence, stacked_rasters
+from stseg.detection.evidence import ProjectedBodies, box_evidence, pixel_evidence, stacked_rasters
 from stseg.detection.prior import Prior
-from stseg.detection.problem import Parameters, Problem
+from stseg.detection.problem import BoxEvidence, Parameters, Problem
 from stseg.detection.refine import refine, refine_places
 from stseg.detection.scoring import (
     box_score,
@@ -114,6 +114,8 @@ class MapEstimate:
         What the frame is judged by.
     pool
         The candidates.
+    bodies
+        The same in the views that deliver boxes.
     problem
         The same as arrays, for the kernels.
     members : int64 (n,)
@@ -122,6 +124,7 @@ class MapEstimate:
 
     evidence: FrameEvidence
     pool: Candidates
+    bodies: ProjectedBodies
     problem: Problem
     members: Ints
 
@@ -133,19 +136,31 @@ class MapEstimate:
 
         `enumerated` and `swap_rounds` are the effort, see `stseg.detection.search`.
         """
-        problem = _problem(evidence, pool)
-        scratch = np.zeros(len(pool) + 1, np.int64)
-        scratch[: len(start)] = start
-        count = search(scratch, len(start), problem, enumerated, swap_rounds)
-        return cls(evidence, pool, problem, scratch[:count].copy())
+        bodies = ProjectedBodies.of(evidence.views, pool)
+        unsearched = cls(evidence, pool, bodies, _problem(evidence, pool, bodies, None), start)
+        return unsearched._searched(enumerated, swap_rounds)
+
+    def _searched(self, enumerated: int = 0, swap_rounds: int = 0) -> MapEstimate:
+        """The best set among the same candidates, from the members on."""
+        scratch, count = np.zeros(len(self.pool) + 1, np.int64), len(self.members)
+        scratch[:count] = self.members
+        count = search(scratch, count, self.problem, enumerated, swap_rounds)
+        return self.with_members(scratch[:count].copy())
 
     def with_members(self, members: Ints) -> MapEstimate:
         """The same candidates with other members, int64 (n,)."""
-        return MapEstimate(self.evidence, self.pool, self.problem, members)
+        return MapEstimate(self.evidence, self.pool, self.bodies, self.problem, members)
 
-    def with_pool(self, pool: Candidates) -> MapEstimate:
+    def with_more(self, more: Candidates) -> MapEstimate:
         """The same members among more candidates, which come after those of this estimate."""
-        return MapEstimate(self.evidence, pool, _problem(self.evidence, pool), self.members)
+        evidence, pool = self.evidence, self.pool.joined_with(more)
+        bodies = self.bodies.joined_with(ProjectedBodies.of(evidence.views, more))
+        problem = _problem(evidence, pool, bodies, self.problem.boxes)
+        return MapEstimate(evidence, pool, bodies, problem, self.members)
+
+    def searched_with(self, more: Candidates, start: Ints) -> MapEstimate:
+        """Search the best set among more candidates, from the candidates `start` int64 (n,) on."""
+        return self.with_more(more).with_members(start)._searched()
 
     def score(self, members: Ints) -> SetScore:
         """Score of any set of the candidates, int64 (n,)."""
@@ -306,12 +321,12 @@ def _keep_apart(ground: Floats, order: Ints, apart: float, standing: Ints, count
     return count
 
 
-def _problem(evidence: FrameEvidence, pool: Candidates) -> Problem:
-    """All that is known of the candidates, as the search kernels read it."""
+def _problem(evidence: FrameEvidence, pool: Candidates, bodies: ProjectedBodies, known: BoxEvidence | None) -> Problem:
+    """All that is known of the candidates, as the search kernels read it; `known` is that of the first ones."""
     views, observations, prior = evidence.views, evidence.observations, evidence.prior
     shown = any(isinstance(view, PixelView) for view in views)  # boxes show no widths
     boxes, pixels = (
-        box_evidence(views, observations, pool),
+        box_evidence(views, observations, bodies, known),
         pixel_evidence(views, evidence.rasters, evidence.scales, pool),
     )
     return Problem(

@@ -29,7 +29,7 @@ def merged(estimate: MapEstimate) -> MapEstimate:
     alone = estimate.with_members(estimate.members[kept]).some_refined(absorbing).pool
     centred = _centred(estimate, near, kept).some_refined(absorbing).pool
     first = len(estimate.pool)
-    best = estimate.with_pool(estimate.pool.joined_with(alone).joined_with(centred))
+    best = estimate.with_more(alone.joined_with(centred))
     for k, a in enumerate(kept[absorbing]):
         ones = (first + k, first + len(absorbing) + k)
         others = np.flatnonzero(near[a])
@@ -58,7 +58,7 @@ def _centred(estimate: MapEstimate, near: Flags, kept: Ints) -> MapEstimate:
     pool, first = estimate.pool, len(estimate.pool)
     members = estimate.members[kept]
     moved = Candidates(ground, pool.height[members], pool.width[members])
-    return estimate.with_pool(pool.joined_with(moved)).with_members(np.arange(first, first + len(kept)))
+    return estimate.with_more(moved).with_members(np.arange(first, first + len(kept)))
 
 
 def _near(estimate: MapEstimate) -> Flags:

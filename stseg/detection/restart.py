@@ -55,7 +55,6 @@ def _from_sure_members(estimate: MapEstimate, lattice_ground: Floats) -> MapEsti
     if len(sure) == len(estimate.members):
         return estimate
     fresh = lattice_candidates(estimate.with_members(sure), lattice_ground)
-    found = MapEstimate.of_search(estimate.evidence, estimate.pool.joined_with(fresh), sure)
+    found = estimate.searched_with(fresh, sure)
     exact, known = found.refined().pool, len(found.pool)
-    start = np.arange(known, known + len(exact))
-    return MapEstimate.of_search(found.evidence, found.pool.joined_with(exact), start)
+    return found.searched_with(exact, np.arange(known, known + len(exact)))

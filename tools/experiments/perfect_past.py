@@ -89,7 +89,7 @@ def _best_score(evidence: FrameEvidence, ground: Floats) -> float:
         nearer = np.minimum(1.0, _FREE / np.maximum(np.hypot(*off.T), 1e-9))[:, None]
         first = len(estimate.pool)
         moved = Candidates(ground + off * nearer, fitted.height, fitted.width)
-        estimate = estimate.with_pool(estimate.pool.joined_with(moved))
+        estimate = estimate.with_more(moved)
         estimate = estimate.with_members(np.arange(first, first + number))
         best = max(best, estimate.members_score.total)
     return best
