@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 import reference_core as reference
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scenes import (
     BODY,
@@ -81,6 +81,7 @@ def test_a_box_that_fits_costs_nothing_and_early_feet_little() -> None:
 
 @settings(deadline=None)
 @given(st.lists(EDGES, min_size=1, max_size=4).map(np.array), st.lists(EDGES, max_size=3), st.integers(0, 99))
+@example(np.array([[0.0, 0.0, 1.0, 2.0], [0.0, 5.0, 1.0, 16.0]]), [np.array([0.0, 0.0, 1.0, 40.0])], 0)  # far too tall
 def test_matches_by_definition(bodies: Floats, found: list[Floats], seed: int) -> None:
     bodies[seed % len(bodies)] = np.nan if seed % 3 == 0 else bodies[0]
     edges = np.array(found).reshape(-1, 4)

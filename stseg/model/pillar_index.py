@@ -108,14 +108,14 @@ def raise_to_best_match(
         spare = belief[b] - least
         if spare <= 0.0:
             continue
-        deviations = min(FAR, math.sqrt(2.0 * spare))
+        deviations = math.sqrt(2.0 * spare)
         for kind in range(len(index.tallest)):
             if (
                 index.tallest[kind] + _overhang(index.tallest[kind], tolerance[b], deviations)
                 < boxes[b, 3] - boxes[b, 1]
             ):
                 continue
-            first, stop = run_of(index, kind, boxes[b], tolerance[b], deviations)
+            first, stop = run_of(index, kind, boxes[b], tolerance[b], min(FAR, deviations))
             for k in range(first, stop):
                 i = index.order[k]
                 fit = belief[b] - half_square(bodies[i], boxes[b], tolerance[b], width, height)
