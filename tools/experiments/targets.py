@@ -1,7 +1,7 @@
 """Scores on the recordings for which least scores are promised: wide, small and spoiled bodies, and few cameras.
 
     python tools/experiment.py targets -o docs/development/targets.md [--data ../shared/data] [--work FOLDER]
-        [--only REGEX] [--frames 100]
+        [--only REGEX] [--frames 250]
 
 WORK holds uu4.toml, cmc2.csv and cmc2_fairmot.toml, as tools/results.py leaves them.
 Recordings are cut to so many frames; a target is judged by the mean of its recordings.
@@ -90,7 +90,7 @@ def main() -> None:
     parser.add_argument("--data", type=Path, default=ROOT / "../shared/data")
     parser.add_argument("--work", type=Path, default=ROOT / "build/results")
     parser.add_argument("--only", default=".", help="of the recordings' names")
-    parser.add_argument("--frames", type=int, default=100)
+    parser.add_argument("--frames", type=int, default=250)
     asked = parser.parse_args()
     rows: list[Row] = []
     for trial in trials(asked.data, asked.work):
