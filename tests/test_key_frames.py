@@ -36,9 +36,7 @@ def show(kind: str, standing: Floats) -> list[ViewEvidence]:
 
 def explained(kind: str, frame: int, standing: Floats, predicted: PredictedTracks) -> Explanation:
     asked = detector(kind)
-    return asked.explain_next(
-        asked.new_calibration(), asked.new_population(), asked.new_rims(), frame, show(kind, standing), predicted
-    )  # fmt: skip
+    return asked.explain_next(asked.new_calibrations(), frame, show(kind, standing), predicted)
 
 
 def is_searched(explanation: Explanation) -> bool:
@@ -105,12 +103,11 @@ def test_an_empty_room_stays_empty() -> None:
 @pytest.mark.parametrize("kind", KINDS)
 def test_walkers_are_followed_as_by_searches(kind: str) -> None:
     truth, asked = walkers(24), detector(kind)
-    follow, noise, population = TrackFilter(RATE, CONFIG), asked.new_calibration(), asked.new_population()
-    rims = asked.new_rims()
+    follow, learned = TrackFilter(RATE, CONFIG), asked.new_calibrations()
     names, searched = set[int](), 0
     for frame in range(24):
         standing = standing_at(truth, frame)
-        answer = asked.explain_next(noise, population, rims, frame, show(kind, standing), follow.predict(frame))
+        answer = asked.explain_next(learned, frame, show(kind, standing), follow.predict(frame))
         names |= set(follow.update(frame, answer.people, answer.ghosts).tolist())
         searched += is_searched(answer)
         away = np.hypot(*(answer.people.ground[:, None] - standing[:, :2]).transpose(2, 0, 1))

@@ -78,11 +78,11 @@ def test_a_run_among_children_learns_it_and_one_among_adults_does_not() -> None:
     means = {}
     for who, places in standing.items():
         asked = Detector(rig, ["pixels"] * 4, FEW_HEIGHTS, replace(BODY, heights=(1.1, 1.4, 1.7)))
-        noise, population, rims = asked.new_calibration(), asked.new_population(), asked.new_rims()
+        calibrations = asked.new_calibrations()
         for _ in range(40):
-            explained = asked.explain_next(noise, population, rims, 0, likelihoods(rig.cameras, people(*places)), None)
+            explained = asked.explain_next(calibrations, 0, likelihoods(rig.cameras, people(*places)), None)
         assert len(explained.people) == 2
-        means[who] = population.body.height_mean
+        means[who] = calibrations.population.body.height_mean
     assert means["children"] < 1.62
     assert means["adults"] == pytest.approx(1.7, abs=0.04)
 

@@ -38,7 +38,7 @@ def learned_from(
     evidence_of_views: Sequence[ViewEvidence], standing: Floats, frames: int = 10, evidence: float = 20.0
 ) -> RimCalibration:
     asked = Detector(room(), ["pixels"] * 4, FEW_HEIGHTS, BODY)
-    rims, here = asked.new_rims(), replace(found(standing, evidence=evidence), height=standing[:, 2])
+    rims, here = asked.new_calibrations().rims, replace(found(standing, evidence=evidence), height=standing[:, 2])
     observations = asked.observe(evidence_of_views)
     for _ in range(frames):
         rims.learn(here, asked.views, observations)
@@ -104,9 +104,9 @@ def test_who_overlaps_or_is_doubted_teaches_nothing(standing: list[tuple[float, 
 def test_people_in_eaten_silhouettes_are_surer_once_rims_are_known() -> None:
     standing = people((-0.9, 0.4, 1.7), (0.8, -0.6, 1.75), (0.7, 0.9, 1.65))
     asked, evidence = Detector(room(), ["pixels"] * 4, FEW_HEIGHTS, BODY), []
-    for rims in (asked.new_rims(), learned(people(*APART), 1)):
-        noise, population = asked.new_calibration(), asked.new_population()
-        explained = asked.explain_next(noise, population, rims, 0, seen(standing, 1), expecting(*standing))
+    first = asked.new_calibrations()
+    for known in (first, replace(first, rims=learned(people(*APART), 1))):
+        explained = asked.explain_next(known, 0, seen(standing, 1), expecting(*standing))
         assert len(explained.people) == len(standing)
         evidence.append(explained.people.evidence.sum())
     assert evidence[1] > evidence[0] + 2.0

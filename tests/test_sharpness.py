@@ -109,7 +109,7 @@ def test_each_session_begins_with_the_first_guess() -> None:
     standing = people((-0.8, 0.3, 1.7), (0.7, -0.6, 1.7))
     rng = np.random.default_rng(0)
     seen = [shaken(view.table.boxes_of(*standing_of(standing)), 0.02, 1.0, rng) for view in frame_pass.views]
-    calibration = frame_pass.new_calibration()
-    frame_pass.explain_next(calibration, frame_pass.new_population(), frame_pass.new_rims(), 0, seen, None)
-    assert (calibration.seen > 0).any()
-    np.testing.assert_allclose(frame_pass.new_calibration().noise.spread, FIRST.spread)
+    learned = frame_pass.new_calibrations()
+    frame_pass.explain_next(learned, 0, seen, None)
+    assert (learned.box_noise.seen > 0).any()
+    np.testing.assert_allclose(frame_pass.new_calibrations().box_noise.noise.spread, FIRST.spread)

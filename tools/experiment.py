@@ -3,6 +3,7 @@
 ablation    what each stage is worth: threshold, per-frame detection, cut without expansion, cut; on fewer views
 answers     IDF1 over the number of answers that the truth gives to the questions of stseg review
 certainty   calibration of stated probabilities: of cells stated as occupied with 0.8, are 80 % occupied?
+failing     what a view that fails for three seconds costs, beside its absence
 identities  identities decided again, in seconds, from the rows of perturbed runs
 labels      IoU of the cells of a track, and the right owner where bodies touch: cut, threshold, nearest track
 memory      resident memory of a long run, and the size of its run file
@@ -26,6 +27,7 @@ EXPERIMENTS = (
     "ablation",
     "answers",
     "certainty",
+    "failing",
     "identities",
     "labels",
     "memory",

@@ -15,6 +15,7 @@ import numpy as np
 from stseg.arrays import Ints, ViewEvidence
 from stseg.config import BodyConfig, DetectionConfig, ErrorRateConfig
 from stseg.detection.box_noise_calibration import BoxNoiseCalibration
+from stseg.detection.calibrations import Calibrations
 from stseg.detection.key_frames import followed, key_frame_interval
 from stseg.detection.lattice import lattice, lattice_candidates
 from stseg.detection.map_estimate import FrameEvidence, MapEstimate
@@ -27,6 +28,7 @@ from stseg.detection.restart import better, is_doubtful, restarted
 from stseg.detection.result import explanation
 from stseg.detection.rim import RimCalibration
 from stseg.detection.search import ENUMERATED
+from stseg.detection.view_failures import ViewFailures
 from stseg.detection.views import BoxView, PixelView, ViewObservation
 from stseg.geometry import Rig
 from stseg.model.border import Border
@@ -70,7 +72,7 @@ class Detector:
     ) -> None:
         self.config, self.body = config, body
         self._rate, self._level = rig.frame_rate, level or ErrorRateConfig()
-        self.first_noise = self.new_calibration().noise
+        self.first_noise = BoxNoiseCalibration(self._rate, self._level).noise
         grid = rig.grid
         self.lattice_ground = lattice(grid, config.lattice_spacing)
         flat = self.lattice_ground.reshape(-1, 2)
@@ -87,54 +89,67 @@ class Detector:
         self._has_boxes = "boxes" in kinds
         self._swap_rounds = 0 if self._has_boxes else config.swap_moves
 
-    def new_calibration(self) -> BoxNoiseCalibration:
-        """Box noise calibration of a session that begins: the first guess."""
-        return BoxNoiseCalibration(self._rate, self._level)
-
-    def new_population(self) -> PopulationCalibration:
-        """Population calibration of a session that begins: the configured prior."""
-        return PopulationCalibration(self.body, self._rate, self._level)
-
-    def new_rims(self) -> RimCalibration:
-        """Rim calibration of a session that begins: nothing is withdrawn."""
-        return RimCalibration(len(self.views), self.body, self.config, self._rate, self._level)
+    def new_calibrations(self) -> Calibrations:
+        """Calibrations of a session that begins: first guesses, the configured population, and no view that fails."""
+        number, rate, level = len(self.views), self._rate, self._level
+        return Calibrations(
+            BoxNoiseCalibration(rate, level),
+            PopulationCalibration(self.body, rate, level),
+            RimCalibration(number, self.body, self.config, rate, level),
+            ViewFailures(number, rate, level),
+        )
 
     def explain_next(
         self,
-        box_noise: BoxNoiseCalibration,
-        population: PopulationCalibration,
-        rims: RimCalibration,
+        learned: Calibrations,
         frame: int,
         seen: Sequence[ViewEvidence],
         predicted: PredictedTracks | None,
         proposed: Candidates | None = None,
     ) -> Explanation:
-        """Explain a session's next frame, and update what the session has learned with it.
+        """Explain a session's next frame by the views that do not fail, and update what the session has learned.
 
-        `frame` is its number in the recording, which says whether it is a key frame (`stseg.detection.key_frames`).
+        `frame` is its number in the recording, which says whether it is a key frame (`stseg.detection.key_frames`). A
+        frame in which a view begins to fail is explained again without it.
         """
-        shown = self.observe(seen, box_noise.noise)
+        every, failures = self.observe(seen, learned.box_noise.noise), learned.failures
+        shown: Sequence[ViewObservation | None] = failures.kept(every)
         if predicted is None and not self._has_boxes:
-            self._look_at_rims(rims, shown, population.body)
-        observations = rims.applied(shown)
-        tracked = self._tracked(observations, population.body, predicted)
-        known, is_key = None, frame % self._key_interval == 0
+            self._look_at_rims(learned.rims, shown, learned.population.body)
+        is_key, before = frame % self._key_interval == 0, failures.failing.copy()
+        explained, is_searched = self._explained(learned, is_key, shown, predicted, proposed)
+        failures.learn(explained, self.views, every)
+        if (failures.failing & ~before).any():
+            shown = failures.kept(every)
+            explained, is_searched = self._explained(learned, is_key, shown, predicted, proposed)
+        if self._has_boxes:
+            learned.box_noise.learn(explained, self.views, shown)
+        elif is_searched:
+            learned.population.learn(explained.people)
+            learned.rims.learn(explained.people, self.views, shown)
+        else:
+            learned.population.let_pass()
+            learned.rims.let_pass()
+        return explained
+
+    def _explained(
+        self,
+        learned: Calibrations,
+        is_key: bool,
+        shown: Sequence[ViewObservation | None],
+        predicted: PredictedTracks | None,
+        proposed: Candidates | None,
+    ) -> tuple[Explanation, bool]:
+        """A frame's explanation by what has been learned, and whether the whole ground was searched for it."""
+        tracked = self._tracked(learned.rims.applied(shown), learned.population.body, predicted)
         if not is_key and predicted is not None and proposed is None:
             known = followed(tracked, self.lattice_ground)
-        if known is None:
-            found = self._searched(tracked, proposed)
-            if is_key and predicted is not None and not self._has_boxes and is_doubtful(found):
-                found = better(found, self._searched_afresh(found))
-        explained = known or explanation(found)
-        if self._has_boxes:
-            box_noise.learn(explained, self.views, observations)
-        elif known:
-            population.let_pass()
-            rims.let_pass()
-        else:
-            population.learn(explained.people)
-            rims.learn(explained.people, self.views, shown)
-        return explained
+            if known is not None:
+                return known, False
+        found = self._searched(tracked, proposed)
+        if is_key and predicted is not None and not self._has_boxes and is_doubtful(found):
+            found = better(found, self._searched_afresh(found))
+        return explanation(found), True
 
     def _look_at_rims(self, rims: RimCalibration, shown: Sequence[ViewObservation | None], body: BodyConfig) -> None:
         """Learn the rims of a session's first frame before it is explained: births cost nothing in that frame alone."""

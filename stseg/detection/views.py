@@ -155,6 +155,13 @@ class BoxView(View):
         edges = np.concatenate([corner, corner + extent], 1).clip(0, [width - 1, height - 1] * 2)
         return ViewObservation(edges, boxes.score, *sharpness.of(boxes.score), np.zeros((0, 0), np.float32))
 
+    def foreground(self, observation: ViewObservation) -> Flags:
+        """Raster pixels inside any box, bool (v, u)."""
+        inside = np.zeros(self.shape, bool)
+        for left, top, right, bottom in np.floor(observation.edges / self.step).astype(int).tolist():
+            inside[top : bottom + 1, left : right + 1] = True
+        return inside
+
     def lattice_score(self, observation: ViewObservation, unexplained: Flags) -> Floats:
         """Score of each lattice pillar by the free boxes, nats, float64 (height, cell)."""
         width, height = map(float, self.camera.size)
@@ -192,6 +199,10 @@ class PixelView(View):
             miss, clutter = self.config.pixel_miss_rate, self.config.pixel_clutter_rate
             _fill_log_odds(mean, np.float32(miss), np.float32(clutter), raster)
         return ViewObservation(np.zeros((0, 4)), np.zeros(0), np.zeros((0, 5)), np.zeros(0), raster)
+
+    def foreground(self, observation: ViewObservation) -> Flags:
+        """Raster pixels that are foreground rather than not, bool (v, u)."""
+        return np.asarray(observation.raster > 0)
 
     def row_sums(self, observation: ViewObservation, unexplained: Flags) -> Floats:
         """Cumulative sums along rows of the unexplained pixels' log-odds, float64 (v, u + 1)."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from concurrent.futures import Future
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -101,26 +101,29 @@ class FusedEvidence(NamedTuple):
 
 
 class FrameRecord(NamedTuple):
-    """A frame's explanation, fusion (which may still be at work) and APPEARANCE: kept until it is committed."""
+    """A frame's explanation, fusion (which may still be at work), APPEARANCE and EVENT of views, until its commit."""
 
     explanation: Explanation
     fusion: Future[FusedEvidence]
     appearance: Rows
+    events: Rows
 
 
 def committed_frames(commit: Commit, records: dict[int, FrameRecord], watch: Stopwatch) -> CommittedFrames:
     """The results of a tracker's commit; takes its frames out of `records` and their time out of `watch`."""
-    rows, parts, residuals, appearance = [], [], [], []
+    rows, parts, residuals, appearance, events = [], [], [], [], [commit.events]
     for fused in commit.frames:
-        explanation, fusion, own = records.pop(fused.frame)
+        explanation, fusion, own, of_views = records.pop(fused.frame)
         rates = fusion.result().rates
         appearance.append(own)
+        events.append(of_views)
         residuals.append(explanation.residual)
         for status, candidates in ((1, explanation.people), (0, explanation.ghosts)):
             rows.append(_candidate_rows(fused.frame, status, candidates))
             parts.append(candidates.view_evidence.T)
     rates["aside"] = _finite_mean(np.array(residuals))
     window = int(commit.windows["index"][0]) if len(commit.windows) else commit.frames[0].frame
+    commit = replace(commit, events=np.concatenate(events))
     return CommittedFrames(
         commit, np.concatenate(rows), np.concatenate(parts).astype(np.float32), rates, watch.take(window),
         np.concatenate(appearance),

@@ -20,6 +20,8 @@ from typing import NamedTuple, Protocol
 
 from stseg.arrays import Observation, Singles, ViewEvidence
 from stseg.engine.committed_frames import CommittedFrames, FrameRecord, FusedEvidence, committed_frames, rate_rows
+from stseg.engine.excluded_views import ExcludedViews
+from stseg.engine.frozen_views import FrozenViews
 from stseg.engine.pipeline import Pipeline
 from stseg.engine.stopwatch import Stopwatch
 from stseg.foreground.view_foreground import ViewForeground
@@ -68,9 +70,9 @@ class Session:
     ) -> None:
         self.pipeline, self.foregrounds, self.watch = pipeline, foregrounds, Stopwatch()
         self._tracker = pipeline.tracker(pipeline.rig, pipeline.config, first)
-        self._box_noise = pipeline.detector.new_calibration()
-        self._population = pipeline.detector.new_population()
-        self._rims = pipeline.detector.new_rims()
+        cameras = [camera.name for camera in pipeline.rig.cameras]
+        self._frozen, self._excluded = FrozenViews(len(cameras), pipeline.rig.frame_rate), ExcludedViews(cameras)
+        self._learned = pipeline.detector.new_calibrations()
         self._error_rates = pipeline.occupancy.new_calibration()
         self._records: dict[int, FrameRecord] = {}
         self._executor = fusion
@@ -79,7 +81,7 @@ class Session:
     def evidence(self, frame_set: FrameSet) -> list[ViewEvidence]:
         """The foreground of all views; to be called once for each frame set, in the order of time."""
         with self.watch.time("foreground"):
-            views = zip(self.foregrounds, frame_set.views, strict=True)
+            views = zip(self.foregrounds, self._frozen.without(frame_set.views), strict=True)
             return [foreground.evidence(view) for foreground, view in views]
 
     def add(self, frame_set: FrameSet, evidence: list[ViewEvidence] | None = None) -> list[CommittedFrames]:
@@ -93,20 +95,20 @@ class Session:
             The result of `evidence` for them, if it was called before.
         """
         evidence = self.evidence(frame_set) if evidence is None else evidence
-        noise = self._box_noise.noise
+        noise, failures = self._learned.box_noise.noise, self._learned.failures
         frame, predicted = frame_set.frame, self._tracker.predict(frame_set.frame)
         with self.watch.time("ghosts"):
-            proposed = self.pipeline.proposals.of(evidence, self._fuse_with_current_rates)
-            explanation = self.pipeline.detector.explain_next(
-                self._box_noise, self._population, self._rims, frame, evidence, predicted, proposed
-            )
-        fusion = self._submit(frame, evidence, explanation, noise)
+            proposed = self.pipeline.proposals.of(failures.kept(evidence), self._fuse_with_current_rates)
+            explanation = self.pipeline.detector.explain_next(self._learned, frame, evidence, predicted, proposed)
+        events = self._excluded.events(frame, frame_set.views, evidence, failures.failing)
+        used = failures.kept(evidence)
+        fusion = self._submit(frame, used, explanation, noise)
         with self.watch.time("appearance"):
-            appearance = self.pipeline.appearance_rows(frame, explanation, frame_set.views, evidence, frame_set.images)
-        self._records[frame] = FrameRecord(explanation, fusion, appearance)
+            appearance = self.pipeline.appearance_rows(frame, explanation, frame_set.views, used, frame_set.images)
+        self._records[frame] = FrameRecord(explanation, fusion, appearance, events)
         fused = FusedFrame(frame, explanation.people, explanation.ghosts, lambda: fusion.result().volume)
         with self.watch.time("track"):
-            commits = self._tracker.add(fused, FrameObservations(frame_set.views, evidence))
+            commits = self._tracker.add(fused, FrameObservations(frame_set.views, used))
         return [committed_frames(commit, self._records, self.watch) for commit in commits]
 
     def finish(self) -> list[CommittedFrames]:
@@ -138,7 +140,7 @@ class Session:
     def _fuse_with_current_rates(self, evidence: Sequence[ViewEvidence], explanation: Explanation) -> Singles:
         while self._open:
             self._open.popleft().result()
-        rates, noise = self._error_rates.rates, self._box_noise.noise
+        rates, noise = self._error_rates.rates, self._learned.box_noise.noise
         return self.pipeline.occupancy.fuse(evidence, explanation, rates, noise).dense()
 
 

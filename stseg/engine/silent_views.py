@@ -54,7 +54,7 @@ def _silent_interval(name: str, frame: Ints, own: Floats, frames: Ints, frame_ra
     if missed < max(_ENOUGH, _SILENT_SHARE * len(frames)):
         return []
     seconds = (stop - start) / frame_rate
-    return [f"view {name} has no evidence in frames {start} to {stop - 1} ({seconds:.0f} s): did its stream end?"]
+    return [f"view {name} has no evidence in frames {start} to {stop - 1} ({seconds:.0f} s): did it end, or fail?"]
 
 
 def _weak_support(name: str, frame: Ints, own: Floats, frames: Ints) -> list[str]:

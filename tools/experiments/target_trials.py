@@ -84,9 +84,9 @@ def trials(data: Path, work: Path) -> Iterator[Trial]:
     for kind in (EXACT, *MASK_KINDS, *BOX_KINDS):
         yield Trial("easy, each spoil of middle strength", f"easy {kind}", (96, 96), _easy(kind))
     for kind in ("masks", "colour"):
-        yield Trial("adults and children", f"school {kind}", (97, 97), _filmed(NAMED["school"], kind))
-    yield Trial("adults and children, from boxes", "school boxes", (97, 97), _filmed(NAMED["school"], "boxes"))
-    yield Trial("dense4", "dense4 colour", (93, 85), _filmed(NAMED["dense4"], "colour"))
+        yield Trial("adults and children", f"school {kind}", (97, 97), filmed(NAMED["school"], kind))
+    yield Trial("adults and children, from boxes", "school boxes", (97, 97), filmed(NAMED["school"], "boxes"))
+    yield Trial("dense4", "dense4 colour", (93, 85), filmed(NAMED["dense4"], "colour"))
     yield from _plazas()
 
 
@@ -94,11 +94,11 @@ def _plazas() -> Iterator[Trial]:
     for seed in PLAZA_SEEDS:
         for wide in (0.5, 0.4, 0.6):
             spec = replace(NAMED["plaza"], seed=seed, cylinder=wide)
-            yield Trial("plaza", f"plaza {wide:g} m, seed {seed}", (98.5, 98), _filmed(spec, "masks"))
+            yield Trial("plaza", f"plaza {wide:g} m, seed {seed}", (98.5, 98), filmed(spec, "masks"))
     for seed in PLAZA_SEEDS:
         spec = replace(NAMED["plaza"], seed=seed)
         small = replace(spec, size=(spec.size[0] // 2, spec.size[1] // 2))
-        half, grown = _filmed(small, "masks"), _changed(_filmed(spec, "masks"), lambda mask: _grown(mask, 2))
+        half, grown = filmed(small, "masks"), _changed(filmed(spec, "masks"), lambda mask: _grown(mask, 2))
         yield Trial("plaza, half size or dilated", f"plaza half size, seed {seed}", (97, 96), half)
         yield Trial("plaza, half size or dilated", f"plaza dilated by 2, seed {seed}", (97, 96), grown)
 
@@ -171,7 +171,7 @@ def _easy(kind: str) -> Callable[[int], Recorded]:
     return make
 
 
-def _filmed(spec: SceneSpec, kind: str) -> Callable[[int], Recorded]:
+def filmed(spec: SceneSpec, kind: str) -> Callable[[int], Recorded]:
     """A simulated scene by masks, boxes or colour."""
 
     def make(most: int) -> Recorded:

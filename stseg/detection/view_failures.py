@@ -1,0 +1,138 @@
+"""Views that fail for a while: black, overexposed, pushed aside, or empty though people stand before them.
+
+A view shows the people that other views see, and nothing where nobody is. With the share h of the outlines of people in
+it that is foreground, and the share c of all the rest, its informedness (Youden, Cancer 3, 1950) is
+
+    J = h - c:
+
+1 for a view without errors, and 0 for one that shows nothing, everything or noise. What is seen of people counts for
+the time of a frame and person, and is forgotten quickly for J now and slowly for the usual J of the view. A view whose
+J now is less than 0.7 of its usual one fails: its evidence is left out until J has come back. The usual J stands while
+it fails, and counts in J now where little was seen of late, so a view without people comes back by itself.
+
+Only people count who would be there without the view, and whom two other views show: of two views nobody can say which
+one fails.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stseg.accelerate import kernel
+from stseg.arrays import Flags, Floats, Ints
+from stseg.config import ErrorRateConfig
+from stseg.detection.views import BoxView, PixelView, ViewObservation
+from stseg.model.people import Explanation
+
+T = TypeVar("T")
+
+_LEAST = 0.7
+"""Share of its usual informedness below which a view fails."""
+_RECENT = 0.25
+"""Time constant of the informedness now, seconds."""
+_FIRST = 0.7, 2.0
+"""Informedness of a view that is not known yet, and its weight, seconds of one person."""
+_EXPECTED = 0.1
+"""Weight of the usual informedness in that of now, seconds of one person."""
+_OTHERS = 2
+"""Least number of other views that show a person who counts."""
+_SHOWN = 1.0
+"""Evidence from which a view shows a person, nats."""
+
+
+class ViewFailures:
+    """Informedness of each view in a session.
+
+    Parameters
+    ----------
+    views
+        Number of views.
+    frame_rate
+        Frames per second.
+    level
+        How fast is forgotten, and from which evidence on people count.
+
+    Attributes
+    ----------
+    failing : bool (view,)
+        Views whose evidence is left out.
+    usual, recent : float64 (view, 2)
+        Weight, and weighted sum of the informedness; seconds of one person.
+    """
+
+    def __init__(self, views: int, frame_rate: float, level: ErrorRateConfig) -> None:
+        self._rate, self._level = frame_rate, level
+        self.failing = np.zeros(views, bool)
+        self.usual, self.recent = np.zeros((views, 2)), np.zeros((views, 2))
+
+    def kept(self, seen: Sequence[T]) -> list[T | None]:
+        """What the views show; None for those that fail."""
+        return [None if fails else view for fails, view in zip(self.failing, seen, strict=True)]
+
+    def learn(
+        self,
+        explanation: Explanation,
+        views: Sequence[BoxView | PixelView],
+        observations: Sequence[ViewObservation | None],
+    ) -> None:
+        """Count one frame; `observations` are those of all views, failing ones too."""
+        people = explanation.people
+        shows = np.nan_to_num(people.view_evidence) >= _SHOWN
+        for k, (view, observation) in enumerate(zip(views, observations, strict=True)):
+            if observation is None:
+                continue
+            without = people.evidence - np.nan_to_num(people.view_evidence[k])
+            sure = (without >= self._level.minimum_evidence) & (shows.sum(0) - shows[k] >= _OTHERS)
+            self._count(k, *informedness(explanation.pixel_assignment[k], sure, view.foreground(observation)))
+
+    def _count(self, k: int, number: int, informedness: float) -> None:
+        """Count what view k shows of a number of people."""
+        seconds = number / self._rate
+        own = np.array([seconds, seconds * informedness])
+        self.recent[k] = self.recent[k] * np.exp(-1 / (self._rate * _RECENT)) + own
+        weight, total = self.usual[k] + _FIRST[1] * np.array([1.0, _FIRST[0]])
+        usual = total / weight
+        weight, total = self.recent[k] + _EXPECTED * np.array([1.0, usual])
+        self.failing[k] = total / weight < _LEAST * usual
+        if not self.failing[k]:
+            self.usual[k] = self.usual[k] * np.exp(-1 / (self._rate * self._level.memory)) + own
+
+
+def informedness(assignment: NDArray[np.int16], sure: Flags, foreground: Flags) -> tuple[int, float]:
+    """How many people count in a view, and its informedness by them; 0 and 0 without any.
+
+    Parameters
+    ----------
+    assignment : int16 (v, u)
+        The person whose body is nearest at each raster pixel, -1 for none.
+    sure : bool (person,)
+        Who counts; others' pixels do not.
+    foreground : bool (v, u)
+    """
+    counts = np.zeros((2, 2), np.int64)
+    shown = np.zeros(len(sure), bool)
+    _fill_counts(assignment, sure, foreground, shown, counts)
+    number = int(shown.sum())
+    if number == 0:
+        return 0, 0.0
+    share: Floats = counts[:, 1] / np.maximum(counts[:, 0], 1)
+    return number, float(share[1] - share[0])
+
+
+@kernel
+def _fill_counts(assignment: NDArray[np.int16], sure: Flags, foreground: Flags, shown: Flags, counts: Ints) -> None:
+    """Fill who is shown (person,), and the pixels and foreground ones of nobody and of who is sure, counts (2, 2)."""
+    for v in range(assignment.shape[0]):
+        for u in range(assignment.shape[1]):
+            person = assignment[v, u]
+            if person >= 0 and not sure[person]:
+                continue
+            body = 1 if person >= 0 else 0
+            if person >= 0:
+                shown[person] = True
+            counts[body, 0] += 1
+            counts[body, 1] += foreground[v, u]
