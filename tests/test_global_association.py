@@ -10,7 +10,7 @@ from strollers import BORDER, CONFIG, RATE, gone, rows_of, runs, swapped, visit
 
 from stseg.arrays import Ints, Rows
 from stseg.model.tables import APPEARANCE, EVENT, TRAJECTORY
-from stseg.tracking.identities.global_association import GlobalAssociation, associate_globally
+from stseg.tracking.identities.global_association import GlobalAssociation, _mostly_held, associate_globally
 from stseg.tracking.identities.size_model import MeasuredSizes
 from stseg.tracking.isolated_tracklets import isolated_tracklets
 
@@ -158,3 +158,17 @@ def test_stretches_hold_every_row_once(rows: Rows) -> None:
         own = rows[part]
         assert len(set(own["id"].tolist())) == 1
         assert (np.diff(own["frame"]) == 1).all()
+
+
+@given(st.lists(st.tuples(st.integers(1, 3), st.integers(1, 4)), max_size=40), st.sampled_from([0.0, 1.0, 2.5, 4.0]))
+def test_the_track_that_an_identity_holds_is_that_of_most_rows_around(
+    steps: list[tuple[int, int]], reach: float
+) -> None:
+    rows = np.zeros(len(steps), TRAJECTORY)
+    rows["id"], rows["frame"] = [track for track, _ in steps], np.cumsum([step for _, step in steps])
+    held = []
+    for row in rows:
+        around = rows["id"][np.abs(rows["frame"] - row["frame"]) <= reach].tolist()
+        (most,) = [one for one in set(around) if 2 * around.count(one) > len(around)] or [int(row["id"])]
+        held.append(most)
+    assert _mostly_held(rows, reach).tolist() == held

@@ -14,7 +14,7 @@ from stseg.commands.correct import correct
 from stseg.commands.review import review
 from stseg.io.runfile.runs import read_run
 from stseg.model.tables import TRAJECTORY, Tracks
-from stseg.tracking.doubts import find_doubts
+from stseg.tracking.doubts import _together, find_doubts
 
 BORDER = np.array([[-5.0, -5.0], [5.0, 5.0]])
 
@@ -72,6 +72,18 @@ def test_who_appears_beside_a_track_may_be_who_that_was() -> None:
     )  # fmt: skip
     doubts = find_doubts(rows, Tracks(rows).summary(), 10.0, BORDER)
     assert ("birth", 1, 2, 50, 51) in {(one.question, one.track, one.other, one.first, one.last) for one in doubts}
+
+
+def test_tracks_that_are_there_at_one_time_are_compared() -> None:
+    lots = np.random.default_rng(2)
+    spans = {int(k): np.sort(lots.integers(0, 60, 2)) for k in lots.permutation(30) + 1}
+    rows = {k: walk(k, int(first), [0.0] * int(last - first + 1), 0.0, 1.7) for k, (first, last) in spans.items()}
+    together = [
+        (a, b) for a in range(1, 31) for b in range(a + 1, 31)
+        if spans[a][0] <= spans[b][1] and spans[b][0] <= spans[a][1]
+    ]  # fmt: skip
+    assert 0 < len(together) < 435
+    assert list(_together(rows)) == together
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium (.ci/run installs it where it may)")

@@ -20,7 +20,7 @@ from stseg.io.runfile.packed_frames import PackedFrame, packed_frame, unpacked_l
 from stseg.io.runfile.runs import Run, RunWriter, read_run
 from stseg.model.tables import APPEARANCE, Tracks
 from stseg.trackers import find_tracker
-from stseg.tracking.stitching import SegmentTracks, Stitcher, rename_labels
+from stseg.tracking.stitching import SegmentTracks, StitchedTracks, Stitcher, rename_labels
 
 _BLOCK = 64
 """Frames of the volume read at a time."""
@@ -60,19 +60,10 @@ def assemble(job: Job, finished: Sequence[FinishedSegment], output: Path) -> Tra
     Tracks
         The tracks of the whole run.
     """
-    stitcher = Stitcher(round(job.config.tracking.patience * job.recording.rig.frame_rate))
-    before = finished[0].segment.first if finished else 0
-    appearance = [np.zeros(0, APPEARANCE)]
-    for segment, path in finished:
-        run = read_run(path)
-        stitcher.add(SegmentTracks(segment.first, run.trajectory, run.events, segment.first - before))
-        before = segment.stop
-        appearance.append(run.appearance)
-    joined = stitcher.joined()
+    joined, appearance = _joined(job, finished)
     shown, tracker = job.recording.rig, find_tracker(job.tracker)
     tracks, identity = finished_tracks(
-        job.read.read_rig, job.config, tracker, joined.committed, joined.events, np.concatenate(appearance), shown,
-        job.known,
+        job.read.read_rig, job.config, tracker, joined.committed, joined.events, appearance, shown, job.known
     )  # fmt: skip
     views = read_run(finished[0].path).views
     config = format_config(job.config)
@@ -92,6 +83,19 @@ def assemble(job: Job, finished: Sequence[FinishedSegment], output: Path) -> Tra
         writer.append("events", tracks.events)
         writer.finish(tracks.summary())
     return tracks
+
+
+def _joined(job: Job, finished: Sequence[FinishedSegment]) -> tuple[StitchedTracks, Rows]:
+    """The tracks of all segments under names of the run, and their APPEARANCE rows."""
+    stitcher = Stitcher(round(job.config.tracking.patience * job.recording.rig.frame_rate))
+    before = finished[0].segment.first if finished else 0
+    appearance = [np.zeros(0, APPEARANCE)]
+    for segment, path in finished:
+        run = read_run(path)
+        stitcher.add(SegmentTracks(segment.first, run.trajectory, run.events, segment.first - before))
+        before = segment.stop
+        appearance.append(run.appearance)
+    return stitcher.joined(), np.concatenate(appearance)
 
 
 def _segment_rows(

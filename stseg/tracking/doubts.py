@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import combinations
 
 import numpy as np
 
 from stseg.arrays import Floats, Rows
+from stseg.tracking.rows_of_tracks import rows_of_tracks
 
 _NEAR = 0.7
 """Distance of an encounter, metres."""
@@ -65,7 +66,9 @@ def find_doubts(trajectory: Rows, tracks: Rows, frame_rate: float, border: Float
         Lower and upper corner of the area, metres.
     """
     ordered = trajectory[np.argsort(trajectory["frame"], kind="stable")]
-    rows = {int(identity): ordered[ordered["id"] == identity] for identity in tracks["id"]}
+    own = [ordered[of_track] for of_track in rows_of_tracks(ordered["id"])]
+    every = {int(one["id"][0]): one for one in own}
+    rows = {int(identity): every[int(identity)] for identity in tracks["id"]}
     found = _encounters(rows, frame_rate)
     found += _births(rows, frame_rate, {(one.other, one.track, one.first) for one in found})
     found += [*_gaps(rows, frame_rate), *_weak(rows, frame_rate, border)]
@@ -75,7 +78,7 @@ def find_doubts(trajectory: Rows, tracks: Rows, frame_rate: float, border: Float
 def _encounters(rows: dict[int, Rows], frame_rate: float) -> list[Doubt]:
     """Times in which two tracks were near each other, and births beside a track that was there before."""
     found = []
-    for a, b in combinations(sorted(rows), 2):
+    for a, b in _together(rows):
         common, in_a, in_b = np.intersect1d(rows[a]["frame"], rows[b]["frame"], return_indices=True)
         if not len(common):
             continue
@@ -89,14 +92,24 @@ def _encounters(rows: dict[int, Rows], frame_rate: float) -> list[Doubt]:
     return found
 
 
+def _together(rows: dict[int, Rows]) -> Iterator[tuple[int, int]]:
+    """Pairs of tracks of which neither ends before the other begins, in the order of their ids."""
+    ids = sorted(rows)
+    first, last = np.array([rows[one]["frame"][[0, -1]] for one in ids]).T
+    for k, one in enumerate(ids):
+        for later in np.flatnonzero((first[k + 1 :] <= last[k]) & (last[k + 1 :] >= first[k])).tolist():
+            yield one, ids[k + 1 + later]
+
+
+def _between(own: Rows, first: float, last: float) -> Rows:
+    """Rows of a track from one frame to another, both included."""
+    return own[np.searchsorted(own["frame"], first) : np.searchsorted(own["frame"], last, "right")]
+
+
 def _swap_margin(a: Rows, b: Rows, first: int, last: int, frame_rate: float) -> float:
     """Log-odds of the identities as they are against swapped ones: heights, and motion over short encounters."""
     length = round(_AROUND * frame_rate)
-    parts = [
-        (own[(own["frame"] >= first - length) & (own["frame"] <= first)],
-         own[(own["frame"] >= last) & (own["frame"] <= last + length)])
-        for own in (a, b)
-    ]  # fmt: skip
+    parts = [(_between(own, first - length, first), _between(own, last, last + length)) for own in (a, b)]
     if any(not len(part) for pair in parts for part in pair):
         return 0.0
     (a0, a1), (b0, b1) = parts
@@ -125,30 +138,32 @@ def _motion(before: Rows, after: Rows, frame_rate: float) -> float:
 
 def _gaps(rows: dict[int, Rows], frame_rate: float) -> list[Doubt]:
     """Tracks that begin where another ended shortly before: the decision is that they are two people."""
-    found = []
+    found, ids = [], list(rows)
+    last = np.array([own["frame"][-1] for own in rows.values()])
     for late, own in rows.items():
         best: Doubt | None = None
-        for early, other in rows.items():
-            gap = (int(own["frame"][0]) - int(other["frame"][-1])) / frame_rate
-            if early != late and 0 < gap <= _GAP:
-                margin = _motion(other, own, frame_rate) + _height(other, own) + np.log1p(gap) - 1.0
-                if margin < _MOST and (best is None or margin < best.margin):
-                    best = Doubt("gap", early, late, int(other["frame"][-1]), int(own["frame"][0]), float(margin))
+        gaps = (own["frame"][0] - last) / frame_rate
+        for k in np.flatnonzero((gaps > 0) & (gaps <= _GAP)).tolist():
+            early, other = ids[k], rows[ids[k]]
+            margin = _motion(other, own, frame_rate) + _height(other, own) + np.log1p(gaps[k]) - 1.0
+            if margin < _MOST and (best is None or margin < best.margin):
+                best = Doubt("gap", early, late, int(other["frame"][-1]), int(own["frame"][0]), float(margin))
         found += [] if best is None else [best]
     return found
 
 
 def _births(rows: dict[int, Rows], frame_rate: float, met: set[tuple[int, int, int]]) -> list[Doubt]:
     """Tracks that begin while another one goes on from where it may come; `met` there are asked about already."""
-    found = []
+    found, ids = [], list(rows)
+    begin, end = np.array([own["frame"][[0, -1]] for own in rows.values()]).T
     for late, own in rows.items():
         first = int(own["frame"][0])
-        for other, seen in rows.items():
-            before, after = seen[seen["frame"] < first], seen[seen["frame"] >= first]
-            if not (len(before) and len(after)) or {(other, late, first), (late, other, first)} & met:
+        for other in (ids[k] for k in np.flatnonzero((begin < first) & (end >= first)).tolist()):
+            if {(other, late, first), (late, other, first)} & met:
                 continue
+            before = rows[other][: np.searchsorted(rows[other]["frame"], first)]
             if first - int(before["frame"][-1]) <= frame_rate:
-                begun = own[own["frame"] <= first + _AROUND * frame_rate]
+                begun = _between(own, first, first + _AROUND * frame_rate)
                 margin = _motion(before, own, frame_rate) + _height(before[-len(begun) :], begun)
                 if margin < _MOST:
                     found.append(Doubt("birth", other, late, int(before["frame"][-1]), first, margin))

@@ -69,13 +69,12 @@ def final_tracks(
     named = linked.identity[: len(committed)]
     repeats, repeated = coincident(bridged, frame_rate, _LASTING)
     own = ~repeats[: len(committed)]
-    long, short = drop_short(bridged[: len(committed)][own], frame_rate, config.tracking)
-    kept, ghosts = drop_ghosts(long, frame_rate, config.tracking)
-    identity = np.where(np.isin(named, kept["id"]) & own, named, 0)
-    names = _Names(committed, named)
+    kept, dropped = _kept(bridged[: len(committed)][own], frame_rate, config.tracking)
+    identity = np.where(np.isin(named, kept) & own, named, 0)
     met = _met(events, _Names(committed, identity), frame_rate, config.tracking)
-    every_event = np.concatenate([_renamed(events, names, linked.links), met, repeated, short, ghosts])
-    tracks = _without_gaps(bridged[np.isin(bridged["id"], kept["id"]) & ~repeats], frame_rate, config.tracking)
+    renamed = _renamed(events, _Names(committed, named), linked.links)
+    every_event = np.concatenate([renamed, met, repeated, dropped])
+    tracks = _without_gaps(bridged[np.isin(bridged["id"], kept) & ~repeats], frame_rate, config.tracking)
     smoothed = smooth_places(tracks, frame_rate, config.motion)
     whole = FinalTracks(smoothed, every_event[np.argsort(every_event["frame"], kind="stable")], identity)
     least = config.tracking.return_probability
@@ -84,6 +83,13 @@ def final_tracks(
     whole = _beyond(whole, int(known["id"].max(initial=0)))
     returns = returns_of(linked.problem, whole.identity, bridged, least, constraints, known)
     return _under_people(whole, returns, frame_rate)
+
+
+def _kept(trajectory: Rows, frame_rate: float, config: TrackingConfig) -> tuple[Ints, Rows]:
+    """Ids of the tracks that are neither short nor ghosts, and an event for each of the others."""
+    long, short = drop_short(trajectory, frame_rate, config)
+    kept, ghosts = drop_ghosts(long, frame_rate, config)
+    return np.unique(kept["id"]), np.concatenate([short, ghosts])
 
 
 def _beyond(whole: FinalTracks, taken: int) -> FinalTracks:

@@ -49,8 +49,9 @@ def drop_ghosts(trajectory: Rows, frame_rate: float, config: TrackingConfig) -> 
 
 def _dropped(trajectory: Rows, gone: Ints, reasons: Sequence[str]) -> Rows:
     """An event for each dropped track."""
+    of_gone = np.flatnonzero(np.isin(trajectory["id"], gone))
+    first = np.full(len(gone), np.iinfo(np.int64).max)
+    np.minimum.at(first, np.searchsorted(gone, trajectory["id"][of_gone]), trajectory["frame"][of_gone])
     events = np.zeros(len(gone), EVENT)
-    for event, identity, reason in zip(events, gone, reasons, strict=True):
-        first = trajectory["frame"][trajectory["id"] == identity].min()
-        event["frame"], event["kind"], event["id"], event["reason"] = first, b"dropped", identity, reason
+    events["frame"], events["kind"], events["id"], events["reason"] = first, b"dropped", gone, reasons
     return events

@@ -12,6 +12,7 @@ import numpy as np
 from stseg.arrays import Floats, Rows
 from stseg.config import MotionConfig
 from stseg.tracking.motion_model import process_noise, transition
+from stseg.tracking.rows_of_tracks import rows_of_tracks
 
 
 def smooth_places(trajectory: Rows, frame_rate: float, model: MotionConfig) -> Rows:
@@ -27,8 +28,7 @@ def smooth_places(trajectory: Rows, frame_rate: float, model: MotionConfig) -> R
         Motion model.
     """
     smoothed = trajectory.copy()
-    for identity in np.unique(trajectory["id"]):
-        rows = np.flatnonzero(trajectory["id"] == identity)
+    for rows in rows_of_tracks(trajectory["id"]):
         own = trajectory[rows]
         places = np.column_stack([own["raw_x"], own["raw_y"]])
         noise = np.array([[own["xx"], own["xy"]], [own["xy"], own["yy"]]]).transpose(2, 0, 1)

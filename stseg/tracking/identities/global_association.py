@@ -13,6 +13,7 @@ from stseg.tracking.identities.constraints import Constraints
 from stseg.tracking.identities.identity_problem import IdentityProblem
 from stseg.tracking.identities.search import FREELY
 from stseg.tracking.identities.size_model import MeasuredSizes
+from stseg.tracking.rows_of_tracks import rows_of_tracks
 
 _AROUND = 0.5
 """Time before and after a row in which its identity holds one track, seconds."""
@@ -108,9 +109,8 @@ def _links(trajectory: Rows, identity: Ints, frame_rate: float) -> list[Link]:
     around.
     """
     links = []
-    for name in np.unique(identity).tolist():
-        own = np.flatnonzero(identity == name)
-        rows = trajectory[own[np.argsort(trajectory["frame"][own])]]
+    for own in rows_of_tracks(identity):
+        rows, name = trajectory[own[np.argsort(trajectory["frame"][own])]], int(identity[own[0]])
         held = int(rows["id"][0])
         for k, track in enumerate(_mostly_held(rows, _AROUND * frame_rate).tolist()):
             if track != held and track == rows["id"][k]:
@@ -124,10 +124,10 @@ def _mostly_held(rows: Rows, reach: float) -> Ints:
     first = np.searchsorted(rows["frame"], rows["frame"] - reach)
     stop = np.searchsorted(rows["frame"], rows["frame"] + reach, "right")
     mostly = rows["id"].copy()
-    for track in np.unique(rows["id"]).tolist():
-        number = np.append(0, np.cumsum(rows["id"] == track))
-        among = number[stop] - number[first]
-        mostly[2 * among > stop - first] = track
+    for own in rows_of_tracks(rows["id"]):
+        near = slice(first[own[0]], stop[own[-1]])
+        among = np.searchsorted(own, stop[near]) - np.searchsorted(own, first[near])
+        mostly[near][2 * among > stop[near] - first[near]] = rows["id"][own[0]]
     return np.asarray(mostly)
 
 

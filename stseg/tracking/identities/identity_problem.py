@@ -11,8 +11,9 @@ from stseg.arrays import Ints, Rows
 from stseg.config import Config, MotionConfig
 from stseg.model.border import Border
 from stseg.model.tables import KNOWN
-from stseg.tracking.identities.appearance_model import Axes, LearnedAppearance, learn_appearance
+from stseg.tracking.identities.appearance_model import LearnedAppearance, learn_appearance
 from stseg.tracking.identities.constraints import Constraints
+from stseg.tracking.identities.discriminant_axes import Axes
 from stseg.tracking.identities.observations import Observations, observe
 from stseg.tracking.identities.search import FREELY, SearchLimits, search_identities
 from stseg.tracking.identities.size_model import MeasuredSizes, SizeModel, learn_sizes

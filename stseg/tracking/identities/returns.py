@@ -20,6 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stseg.arrays import Floats, Ints
+from stseg.tracking.identities.size_model import evidence
 from stseg.tracking.identities.visits import Visits
 
 NOBODY: Ints = np.zeros((0, 2), np.int64)
@@ -138,9 +139,3 @@ def _return(visits: Visits, visit: int, person: int, probability: float, people:
     identity, own = visits.identity[[person, visit]].tolist()
     last = int(people.last[person])
     return Return(frame, identity, own, probability, frame - last if last >= 0 else None)
-
-
-def evidence(precision: Floats, information: Floats, spread: Floats) -> Floats:
-    """Log-likelihood ratio of sums of one person against the population's mean, over the last axis, nats."""
-    total = 1.0 + precision * spread
-    return np.asarray((0.5 * (spread * information**2 / total - np.log(total))).sum(axis=-1))

@@ -124,6 +124,12 @@ def learn_sizes(sizes: MeasuredSizes, frame: Ints, tracklets: Sequence[Ints], fr
     return SizeModel(mean, noise, lasting, spread, np.full(len(learned), np.inf))
 
 
+def evidence(precision: Floats, information: Floats, spread: Floats) -> Floats:
+    """Log-likelihood ratio of sums of one person against the population's mean, over the last axis, nats."""
+    total = 1.0 + precision * spread
+    return np.asarray((0.5 * (spread * information**2 / total - np.log(total))).sum(axis=-1))
+
+
 def measured_tracklets(size: Floats, tracklets: Sequence[Ints]) -> list[Ints]:
     """Rows with a size (n,) of each tracklet that has enough of them."""
     known = [rows[np.isfinite(size[rows])] for rows in tracklets]
