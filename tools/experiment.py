@@ -3,6 +3,7 @@
 ablation    what each stage is worth: threshold, per-frame detection, cut without expansion, cut; on fewer views
 answers     IDF1 over the number of answers that the truth gives to the questions of stseg review
 certainty   calibration of stated probabilities: of cells stated as occupied with 0.8, are 80 % occupied?
+day         identities of a whole day: processor time and memory of deciding them, over the number of rows
 failing     what a view that fails for three seconds costs, beside its absence
 identities  identities decided again, in seconds, from the rows of perturbed runs
 labels      IoU of the cells of a track, and the right owner where bodies touch: cut, threshold, nearest track
@@ -27,6 +28,7 @@ EXPERIMENTS = (
     "ablation",
     "answers",
     "certainty",
+    "day",
     "failing",
     "identities",
     "labels",
