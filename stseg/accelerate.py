@@ -19,7 +19,6 @@ from stseg.kernel_linking import Kernel
 
 _UNCOUNTED: dict[str, Any] = {"_nrt": False}
 """No reference is counted for the arguments of an inlined kernel: an option that numba does not document."""
-_LOCATOR = "stseg.kernel_cache.KernelCache"
 _PAUSE = 10.0
 """Seconds between notes on compilation."""
 _USUAL = 70
@@ -87,17 +86,8 @@ class _Notes(event.Listener):
 
 
 def _compiled(function: Callable[P, R], **options: Any) -> Callable[P, R]:
-    """The kernel, cached by our locator; the option is the process's, so it is put back."""
+    """The kernel, with numba's options."""
     if not COMPILED:
         return function
-    config: Any = numba.config
     made = Kernel(function, {"nopython": True, "nogil": True, "no_cfunc_wrapper": True, **options})
-    before = config.CACHE_LOCATOR_CLASSES
-    config.CACHE_LOCATOR_CLASSES = _LOCATOR
-    try:
-        made.enable_caching()
-    except RuntimeError:  # no folder can be written to: compiled in each process
-        pass
-    finally:
-        config.CACHE_LOCATOR_CLASSES = before
     return cast("Callable[P, R]", made)

@@ -1,7 +1,8 @@
 """Where compiled kernels are kept, and when they are stale.
 
 Kernels are kept in the user's cache folder, so that they outlive an installation and need no writable one. A kernel is
-stale when its file changes, or a file of kernels or constants that its file imports: numba copies both into it.
+stale when its file changes, or a file of kernels or constants that its file imports: numba copies both into it. All
+are stale when code is linked, or kept, in another way.
 """
 
 from __future__ import annotations
@@ -18,13 +19,17 @@ from hashlib import blake2b
 from pathlib import Path
 from typing import Any, Self
 
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, NullCache
+from numba.core.runtime.nrt import rtsys
+
 _PACKAGE = Path(__file__).parent
 _IMPORTED = re.compile(rb"^from (stseg[\w.]*) import |^import (stseg[\w.]*)", re.MULTILINE)
 _KERNELS = b"from stseg.accelerate import"
+_KEEPING = (_PACKAGE / "kernel_linking.py", _PACKAGE / "kernel_cache.py")
 
 
-class KernelCache:
-    """Locator of a kernel's files, as numba asks for one (`NUMBA_CACHE_LOCATOR_CLASSES`).
+class KernelFolder:
+    """Locator of a kernel's files, as numba asks for one.
 
     Parameters
     ----------
@@ -62,6 +67,37 @@ class KernelCache:
         return str(self._line)
 
 
+class _CompiledKernel(CompileResultCacheImpl):
+    """What is kept of a kernel, and where."""
+
+    _locator_classes: list[type[object]] = [KernelFolder]  # noqa: RUF012  # as numba declares it
+
+    def reduce(self, cres: Any) -> Any:
+        """The result of a compilation; of environments those alone that hold Python's objects."""
+        *kept, environments = super().reduce(cres)
+        return *kept, [one for one in environments if one.consts]
+
+
+class _KernelCache(FunctionCache):
+    """Machine code of a kernel, read without all that numba knows of functions and types: compiling alone needs it."""
+
+    _impl_class = _CompiledKernel
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """The machine code for the types of some arguments; None where there is none."""
+        rtsys.initialize(target_context)
+        with self._guard_against_spurious_io_errors():
+            return self._load_overload(sig, target_context)
+
+
+def kept_code(function: Callable[..., Any]) -> Any:
+    """The machine code of a kernel on disk; one that keeps nothing where no folder can be written to."""
+    try:
+        return _KernelCache(function)
+    except RuntimeError:
+        return NullCache()
+
+
 @cache
 def folder() -> Path:
     """The folder of all kernels: the first that can be written to; else one of this process alone."""
@@ -75,8 +111,8 @@ def folder() -> Path:
 
 @cache
 def source_stamp(path: Path) -> str:
-    """Digest of a file and of all files whose kernels or constants are compiled into its kernels."""
-    seen, waiting = set[Path](), [path]
+    """Digest of a file and of all files whose kernels or constants are compiled into its kernels, and of how."""
+    seen, waiting = set(_KEEPING), [path]
     while waiting:
         one = waiting.pop()
         if one not in seen:

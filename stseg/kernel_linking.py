@@ -13,9 +13,11 @@ from contextlib import contextmanager
 from functools import cached_property
 from typing import Any
 
-from numba.core.codegen import JITCodeLibrary, ll
+from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher, cpu_target
+
+from stseg.kernel_cache import kept_code
 
 _KNOWN_OUTSIDE = ("external", "common")
 """Kinds of names that may be asked for."""
@@ -50,7 +52,13 @@ class Kernel(CPUDispatcher):
     def compile(self, sig: Any) -> Any:
         """Compile for the types of some arguments, or take the machine code from the cache."""
         with global_compiler_lock, _optimised_late(cpu_target.target_context.codegen()):
+            self._cache = self._kept
             return super().compile(sig)
+
+    @cached_property
+    def _kept(self) -> Any:
+        """Its machine code on disk, which most kernels are not asked for in a run."""
+        return kept_code(self.py_func)
 
 
 class _Library(JITCodeLibrary):
@@ -77,16 +85,26 @@ class _Library(JITCodeLibrary):
             self._finalize_final_module()
         return int(super().get_pointer_to_function(name))
 
-    def serialize_using_object_code(self) -> tuple[str, str, tuple[bytes, bytes]]:
-        """Name, kind and machine code, with the names that Python asks for; kernels link the inner form instead."""
+    def serialize_using_object_code(self) -> tuple[str, bytes, list[str]]:
+        """Name and machine code, with the names that Python asks for; kernels link the inner form instead."""
         made = self._final_module
         names = [
             one.name
             for one in (*made.functions, *made.global_variables)
             if not one.is_declaration and one.linkage.name in _KNOWN_OUTSIDE
         ]
-        stubs = ll.parse_assembly("\n".join(f'@"{name}" = global i8 0' for name in names))
-        return self.name, "object", (self._get_compiled_object(), stubs.as_bitcode())
+        return self.name, self._get_compiled_object(), names
+
+    @classmethod
+    def _unserialize(cls, codegen: Any, state: tuple[str, bytes, list[str]]) -> Any:
+        """Code as it was kept."""
+        name, code, names = state
+        library = codegen.create_library(name)
+        library.enable_object_caching()
+        library._set_compiled_object(code)
+        library._finalize_final_module()
+        codegen._engine._defined_symbols.update(names)
+        return library
 
     def _optimize_functions(self, ll_module: Any) -> None:
         """Leave functions as they are, until they are optimised together."""

@@ -48,7 +48,7 @@ AT_HOME = {
     "h5py": ("stseg.io",),
     "cv2": ("stseg.io", "stseg.report", "stseg.simulation", "stseg.calibration"),
     "PIL": ("stseg.io",),
-    "numba": ("stseg.accelerate", "stseg.kernel_linking"),
+    "numba": ("stseg.accelerate", "stseg.kernel_cache", "stseg.kernel_linking"),
     "maxflow": ("stseg.graphcut.pymaxflow",),
     "cyclopts": ("stseg.commands",),
     "rich": ("stseg.commands",),

@@ -14,14 +14,16 @@ from stseg.accelerate import kernel, python_form
 from stseg.arrays import Floats
 
 PROGRAM = """
+import sys
 import numpy as np
 from stseg.accelerate import compilation_noted
 from stseg.detection.scoring import track_score
 with compilation_noted(print):
     gain, taken = np.array([[3.0, 2.0], [2.9, 0.0]]), np.empty(2, np.int64)
     print(track_score(np.arange(2), 2, gain, np.zeros(2), taken), *taken)
+print("numba.cpython.unicode" in sys.modules)
 """
-"""Prints notes, and the result of a kernel that calls another kernel."""
+"""Prints notes, the result of a kernel that calls another kernel, and whether what compiling needs was imported."""
 
 
 @kernel
@@ -60,6 +62,6 @@ def test_the_cache_holds_the_kernels_that_python_calls(tmp_path: Path) -> None:
         ).stdout.splitlines()
         for _ in range(2)
     )  # fmt: skip
-    assert first == ["compiling kernels, once on this machine, about a minute of work", "4.9 1 0"]
-    assert second == ["4.9 1 0"]
+    assert first == ["compiling kernels, once on this machine, about a minute of work", "4.9 1 0", "True"]
+    assert second == ["4.9 1 0", "False"]
     assert {path.name.split("-")[0] for path in tmp_path.rglob("*.nbi")} == {"scoring.track_score"}

@@ -6,10 +6,8 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from math import prod
 from pathlib import Path
-from threading import Thread
 
 from stseg.engine.cluster import make_by_cluster
-from stseg.engine.first_kernel import start_compiler
 from stseg.engine.job import Job
 from stseg.engine.segment_worker import SegmentWorker
 from stseg.engine.segments import Segment
@@ -45,7 +43,6 @@ class Workforce:
 
     def prepare(self) -> None:
         """Make ready what takes time, while the recording is counted."""
-        Thread(target=start_compiler).start()
         if self.scheduler is None:
             prepare_workers(self.workers)
 
