@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import subprocess
 import sys
 import tomllib
 from collections.abc import Iterator
@@ -10,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from recordings import ENVIRONMENT
 
 ROOT = Path(__file__).parents[1]
 
@@ -175,3 +177,9 @@ def test_pyproject_lists_every_package() -> None:
         ROOT / "stseg" / path.parent.relative_to(ROOT) for path in (ROOT / "io").rglob("*.py")
     }
     assert sorted(listed) == sorted(".".join(folder.relative_to(ROOT).parts) for folder in folders)
+
+
+def test_a_run_imports_no_library_that_it_does_not_use() -> None:
+    started = "import stseg.commands.progress, stseg.engine.track, stseg.engine.warnings, sys; print(*sys.modules)"
+    found = subprocess.run([sys.executable, "-c", started], capture_output=True, text=True, check=True, env=ENVIRONMENT)
+    assert not {"rich", "ssl", "scipy.optimize", "stseg.engine.following"} & set(found.stdout.split())

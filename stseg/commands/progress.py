@@ -6,9 +6,6 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-
 
 @contextmanager
 def frame_bar(work: str, total: int | None, done: int = 0) -> Iterator[Callable[[int], None]]:
@@ -21,9 +18,16 @@ def frame_bar(work: str, total: int | None, done: int = 0) -> Iterator[Callable[
     total, done
         Frames in all, None if unknown, and those done before.
     """
-    console = Console(stderr=True)
-    columns = TextColumn(work), BarColumn(), TaskProgressColumn(), TimeElapsedColumn(), TimeRemainingColumn()
-    with Progress(*columns, console=console, disable=not console.is_terminal, transient=True) as bar:
+    if not sys.stderr.isatty():
+        yield lambda more: None  # noqa: ARG005
+        return
+    from rich.console import Console  # imported where there is a bar
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
+    from rich.progress import TimeElapsedColumn as Elapsed
+    from rich.progress import TimeRemainingColumn as Remaining
+
+    columns = TextColumn(work), BarColumn(), TaskProgressColumn(), Elapsed(), Remaining()
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(work, total=total, completed=done)
         yield lambda more: bar.advance(task, more)
 

@@ -85,24 +85,25 @@ def run(
     if scheduler is None and not follow:
         prepare_workers(workers)  # they import the stages while this process does: nothing is imported before
     from stseg.commands.progress import TerminalReporter
-    from stseg.engine.following import follow_recording
     from stseg.engine.frame_range import FrameRange
-    from stseg.engine.pixel_labels import require_pixels, write_labels
     from stseg.engine.track import track_recording
     from stseg.engine.warnings import rig_warnings
     from stseg.engine.workforce import Workforce
     from stseg.io.config_file import read_config
-    from stseg.io.live.receivers import receiver_of
-    from stseg.io.outputs.label_images import require_label_folder
     from stseg.io.recording.rigs import read_rig
-    from stseg.report.colours import track_palette
 
     chosen, workforce = None if frames is None else FrameRange.parse(frames), Workforce(workers, scheduler)
     resolved, recording, reporter = read_config(config, set_), read_rig(rig), TerminalReporter()
-    receiver = None if publish is None else receiver_of(publish)
+    receiver = None
+    if publish is not None:
+        from stseg.io.live.receivers import receiver_of  # most runs send nothing
+
+        receiver = receiver_of(publish)
     if receiver is not None and not follow:
         raise ConfigError("--publish", "", "that alone", "--follow with it; stseg export writes finished runs")
     if follow:
+        from stseg.engine.following import follow_recording
+
         _require_alone(workers, scheduler, labels, known)
         followed = follow_recording(
             recording, output, resolved, tracker, volume, chosen, reporter, publish=receiver, overwrite=overwrite
@@ -111,6 +112,10 @@ def run(
         print(nothing if followed is None else f"{_summary(followed.run)}{followed.delay}")
         return
     if labels is not None:
+        from stseg.engine.pixel_labels import require_pixels, write_labels
+        from stseg.io.outputs.label_images import require_label_folder
+        from stseg.report.colours import track_palette
+
         require_pixels(recording)
         require_label_folder(labels, overwrite)
     done = track_recording(

@@ -13,7 +13,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import isotonic_regression
 
 from stseg.arrays import Flags, Floats, Rows, Singles
 from stseg.geometry.filled_cells import inside_bodies
@@ -86,6 +85,8 @@ class CellReliability:
         seen = cells > 0
         if not seen.any():
             return cls(np.full(len(KNOTS), 0.5))
+        from scipy.optimize import isotonic_regression  # a run is read far more often than its cells' probability
+
         share = isotonic_regression(filled[seen] / cells[seen], weights=cells[seen]).x
         return cls(np.interp(KNOTS, KNOTS[seen], share))
 
