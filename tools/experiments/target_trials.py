@@ -101,6 +101,10 @@ def _plazas() -> Iterator[Trial]:
         half, grown = filmed(small, "masks"), _changed(filmed(spec, "masks"), lambda mask: _grown(mask, 2))
         yield Trial("plaza, half size or dilated", f"plaza half size, seed {seed}", (97, 96), half)
         yield Trial("plaza, half size or dilated", f"plaza dilated by 2, seed {seed}", (97, 96), grown)
+    large = replace(NAMED["plaza"], area=(40.0, 40.0), camera_distance=34.0, cameras=8, people=10, seed=PLAZA_SEEDS[0])
+    for name, spec in (("20 m", replace(NAMED["plaza"], seed=PLAZA_SEEDS[0])), ("40 m", large)):
+        target = "plaza, each camera off by 2 pixels"
+        yield Trial(target, f"plaza of {name}, off by 2 pixels", (97, 96), _misplaced(filmed(spec, "masks"), 2.0))
 
 
 def _uu4(rig: Path, truth: Path) -> Iterator[Trial]:
@@ -151,6 +155,20 @@ def _changed(whole: Callable[[int], Recorded], change: Callable[[Bytes], Bytes])
     def make(most: int) -> Recorded:
         made = whole(most)
         return replace(made, frames=[tuple(change(np.asarray(view, np.uint8)) for view in one) for one in made.frames])
+
+    return make
+
+
+def _misplaced(whole: Callable[[int], Recorded], pixels: float) -> Callable[[int], Recorded]:
+    """A recording whose calibration is off in each camera, by so many pixels in a direction of its own."""
+
+    def make(most: int) -> Recorded:
+        made, cameras = whole(most), []
+        for k, camera in enumerate(made.rig.cameras):
+            angle, shift = 2.4 * k, np.eye(3)
+            shift[:2, 2] = pixels * np.cos(angle), pixels * np.sin(angle)
+            cameras.append(replace(camera, ground=shift @ camera.ground, vertical=shift @ camera.vertical))
+        return replace(made, rig=replace(made.rig, cameras=tuple(cameras)))
 
     return make
 
