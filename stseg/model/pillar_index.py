@@ -14,7 +14,7 @@ import numpy as np
 
 from stseg.accelerate import kernel, part
 from stseg.arrays import Floats, Ints, Labels, Singles
-from stseg.model.box_fit import FAR, GRAIN, HEAD, LATE, LEAST_HEIGHT, MIDDLE, half_square
+from stseg.model.box_fit import EARLY, FAR, GRAIN, HEAD, LATE, LEAST_HEIGHT, MIDDLE, half_square
 
 _CLASSES = 2.0
 """Classes of height to a factor of two."""
@@ -27,8 +27,8 @@ class PillarIndex(NamedTuple):
     ----------
     order : int32 (k,)
         Numbers of the pillars, by class, then by column.
-    middle : float64 (k,)
-        Column of the middle of each, clipped to the image, pixels.
+    middle, top, bottom : float64 (k,)
+        Column of the middle of each, and rows of its edges, clipped to the image, pixels.
     start : int64 (class + 1,)
         First of each class in `order`.
     tallest : float64 (class,)
@@ -37,6 +37,8 @@ class PillarIndex(NamedTuple):
 
     order: Labels
     middle: Floats
+    top: Floats
+    bottom: Floats
     start: Ints
     tallest: Floats
 
@@ -54,14 +56,14 @@ class PillarIndex(NamedTuple):
         order = order[inside[order]]
         starts = np.flatnonzero(np.diff(kind[order], prepend=-1.0))
         tallest = np.maximum.reduceat(tall[order], starts) if len(order) else np.zeros(0)
-        return cls(order.astype(np.int32), middle[order], np.append(starts, len(order)).astype(np.int64), tallest)
+        start = np.append(starts, len(order)).astype(np.int64)
+        return cls(order.astype(np.int32), middle[order], top[order], bottom[order], start, tallest)
 
 
 @part
-def _overhang(tall: float, tolerance: Floats, deviations: float) -> float:
-    """How much taller a box may be than a pillar that it fits within so many tolerances, pixels."""
-    head, feet = tolerance[HEAD] * (tall + GRAIN[HEAD]), tolerance[LATE] * (tall + GRAIN[LATE])
-    return float(deviations * (head + feet) + 1e-3)
+def _reach(quantity: int, tall: float, tolerance: Floats, deviations: float) -> float:
+    """How far a box may be in one quantity from a pillar that it fits within so many tolerances, pixels."""
+    return float(deviations * tolerance[quantity] * (tall + GRAIN[quantity]) + 1e-3)
 
 
 @part
@@ -76,7 +78,7 @@ def run_of(index: PillarIndex, kind: int, box: Floats, tolerance: Floats, deviat
         See `stseg.model.box_fit`.
     """
     place = (box[0] + box[2]) / 2
-    reach = deviations * tolerance[MIDDLE] * (index.tallest[kind] + GRAIN[MIDDLE]) + 1e-3
+    reach = _reach(MIDDLE, index.tallest[kind], tolerance, deviations)
     middle = index.middle[index.start[kind] : index.start[kind + 1]]
     first = np.searchsorted(middle, place - reach)
     stop = np.searchsorted(middle, place + reach, side="right")
@@ -109,14 +111,17 @@ def raise_to_best_match(
         if spare <= 0.0:
             continue
         deviations = math.sqrt(2.0 * spare)
+        top, bottom = boxes[b, 1], boxes[b, 3]
         for kind in range(len(index.tallest)):
-            if (
-                index.tallest[kind] + _overhang(index.tallest[kind], tolerance[b], deviations)
-                < boxes[b, 3] - boxes[b, 1]
-            ):
+            tall = index.tallest[kind]
+            head, late = _reach(HEAD, tall, tolerance[b], deviations), _reach(LATE, tall, tolerance[b], deviations)
+            if tall + head + late < bottom - top:
                 continue
+            early = _reach(EARLY, tall, tolerance[b], deviations)
             first, stop = run_of(index, kind, boxes[b], tolerance[b], min(FAR, deviations))
-            for k in range(first, stop):
+            for k in range(np.uint64(first), np.uint64(stop)):  # most pillars are decided by their edges
+                if abs(index.top[k] - top) > head or not -late <= index.bottom[k] - bottom <= early:
+                    continue
                 i = index.order[k]
                 fit = belief[b] - half_square(bodies[i], boxes[b], tolerance[b], width, height)
                 if fit > least:
