@@ -134,6 +134,16 @@ def test_tracks_are_told_window_by_window_under_lasting_names(live: Path) -> Non
 
 
 @quick
+def test_the_run_file_keeps_every_line_of_the_live_table(live: Path) -> None:
+    """By frame and place, so that final ids are found for what was told under provisional ones."""
+    told, kept = read_tracks_csv(live.with_name("run.h5.live.csv")), read_run(live).committed
+    assert len(told) == len(kept) > 0
+    told, kept = (rows[np.lexsort((rows["x"], rows["frame"]))] for rows in (told, kept))
+    for name in ("frame", "x", "y"):
+        np.testing.assert_allclose(told[name], kept[name], atol=6e-4, rtol=0)
+
+
+@quick
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_finishes_the_run_file(tmp_path: Path, number: signal.Signals) -> None:
     rig, output = write_pieces(tmp_path, empty=True), tmp_path / "run.h5"
