@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scenes import BODY, FEW_HEIGHTS, boxes, likelihoods, people, room
 
 from stseg import Tracker
-from stseg.arrays import Boxes, Bytes, Floats, Observation, ViewEvidence
+from stseg.arrays import Boxes, Floats, Observation, ViewEvidence
 from stseg.detection.calibrations import Calibrations
 from stseg.detection.detector import Detector
 from stseg.detection.view_failures import informedness
@@ -52,13 +52,11 @@ def explained(asked: Detector, learned: Calibrations, seen: Sequence[ViewEvidenc
 
 
 def failed(kind: str, failure: str, seen: Sequence[ViewEvidence]) -> list[ViewEvidence]:
-    view = seen[FAILED]
-    assert view is not None
     if kind == "boxes":
         bad: ViewEvidence = Boxes(np.zeros((0, 4)), np.zeros(0))
     else:
         level = {"black": np.zeros, "white": np.ones}.get(failure, np.random.default_rng(3).random)
-        bad = np.asarray(level(np.shape(view)), np.float32)
+        bad = np.asarray(level(np.asarray(seen[FAILED]).shape), np.float32)
     return [bad if k == FAILED else own for k, own in enumerate(seen)]
 
 
@@ -93,28 +91,37 @@ def test_of_two_views_neither_fails() -> None:
     assert not learned.failures.failing.any()
 
 
-def masks(standing: Floats) -> list[Bytes]:
+def delivered(kind: str, standing: Floats) -> list[Observation]:
+    if kind == "boxes":
+        return [boxes(camera, standing) for camera in room().cameras]
     return [np.asarray(255 * (view > 0.5), np.uint8) for view in likelihoods(room().cameras, standing)]
 
 
+def nothing(view: Observation) -> Observation:
+    if isinstance(view, Boxes):
+        return Boxes(np.zeros((0, 4)), np.zeros(0))
+    return np.zeros_like(np.asarray(view, np.uint8))
+
+
 def moved(frame: int) -> Floats:
-    return STANDING + np.array([0.04, 0.02, 0.0]) * np.sin(0.3 * frame)
+    return np.asarray(STANDING + np.array([0.04, 0.02, 0.0]) * np.sin(0.3 * frame))
 
 
-def test_a_run_says_from_when_to_when_a_view_is_left_out() -> None:
+@pytest.mark.parametrize("kind", ["masks", "boxes"])
+def test_a_run_says_from_when_to_when_a_view_is_left_out(kind: str) -> None:
     rig = replace(room(), frame_rate=RATE)
     tracker, results = Tracker(rig), []
     for frame in range(45):
-        views: list[Observation] = list(masks(moved(frame)))
+        views = delivered(kind, moved(frame))
         if 15 <= frame < 30:
-            views[FAILED] = np.zeros_like(np.asarray(views[FAILED], np.uint8))
+            views[FAILED] = nothing(views[FAILED])
         results += tracker.add(views)
     results += tracker.finish()
     events = np.concatenate([result.events for result in results])
     events = events[events["kind"] == b"blind"]
     name = rig.cameras[FAILED].name.encode()
     assert [name in reason for reason in events["reason"]] == [True, True]
-    assert 15 < events["frame"][0] < 20
+    assert 15 <= events["frame"][0] < 20
     assert 30 < events["frame"][1] < 36
     assert b"excluded" in events["reason"][0]
     assert f"after {events['frame'][1] - events['frame'][0]} frames".encode() in events["reason"][1]

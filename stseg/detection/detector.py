@@ -119,8 +119,8 @@ class Detector:
         is_key, before = frame % self._key_interval == 0, failures.failing.copy()
         explained, is_searched = self._explained(learned, is_key, shown, predicted, proposed)
         failures.learn(explained, self.views, every)
-        if (failures.failing & ~before).any():
-            shown = failures.kept(every)
+        if (failures.excluded & ~before).any():
+            shown = failures.used(every)
             explained, is_searched = self._explained(learned, is_key, shown, predicted, proposed)
         if self._has_boxes:
             learned.box_noise.learn(explained, self.views, shown)

@@ -59,19 +59,25 @@ class ViewFailures:
     Attributes
     ----------
     failing : bool (view,)
-        Views whose evidence is left out.
+        Views whose evidence is left out of the next frame.
+    excluded : bool (view,)
+        Views whose evidence was left out of the last frame: those that failed before it, or began to fail in it.
     usual, recent : float64 (view, 2)
         Weight, and weighted sum of the informedness; seconds of one person.
     """
 
     def __init__(self, views: int, frame_rate: float, level: ErrorRateConfig) -> None:
         self._rate, self._level = frame_rate, level
-        self.failing = np.zeros(views, bool)
+        self.failing, self.excluded = np.zeros(views, bool), np.zeros(views, bool)
         self.usual, self.recent = np.zeros((views, 2)), np.zeros((views, 2))
 
     def kept(self, seen: Sequence[T]) -> list[T | None]:
-        """What the views show; None for those that fail."""
-        return [None if fails else view for fails, view in zip(self.failing, seen, strict=True)]
+        """What the views show in the next frame; None for those that fail."""
+        return _without(self.failing, seen)
+
+    def used(self, seen: Sequence[T]) -> list[T | None]:
+        """What the views showed in the last frame; None for those that were left out of its explanation."""
+        return _without(self.excluded, seen)
 
     def learn(
         self,
@@ -80,7 +86,7 @@ class ViewFailures:
         observations: Sequence[ViewObservation | None],
     ) -> None:
         """Count one frame; `observations` are those of all views, failing ones too."""
-        people = explanation.people
+        people, before = explanation.people, self.failing.copy()
         shows = np.nan_to_num(people.view_evidence) >= _SHOWN
         for k, (view, observation) in enumerate(zip(views, observations, strict=True)):
             if observation is None:
@@ -88,6 +94,7 @@ class ViewFailures:
             without = people.evidence - np.nan_to_num(people.view_evidence[k])
             sure = (without >= self._level.minimum_evidence) & (shows.sum(0) - shows[k] >= _OTHERS)
             self._count(k, *informedness(explanation.pixel_assignment[k], sure, view.foreground(observation)))
+        self.excluded = before | self.failing
 
     def _count(self, k: int, number: int, informedness: float) -> None:
         """Count what view k shows of a number of people."""
@@ -100,6 +107,10 @@ class ViewFailures:
         self.failing[k] = total / weight < _LEAST * usual
         if not self.failing[k]:
             self.usual[k] = self.usual[k] * np.exp(-1 / (self._rate * self._level.memory)) + own
+
+
+def _without(left_out: Flags, seen: Sequence[T]) -> list[T | None]:
+    return [None if out else view for out, view in zip(left_out, seen, strict=True)]
 
 
 def informedness(assignment: NDArray[np.int16], sure: Flags, foreground: Flags) -> tuple[int, float]:

@@ -26,7 +26,9 @@ class ExcludedViews:
         self._cameras = cameras
         self._since: list[int | None] = [None] * len(cameras)
 
-    def events(self, frame: int, seen: Sequence[Observation], evidence: Sequence[ViewEvidence], failing: Flags) -> Rows:
+    def events(
+        self, frame: int, seen: Sequence[Observation], evidence: Sequence[ViewEvidence], left_out: Flags
+    ) -> Rows:
         """EVENT rows of kind `blind` of the next frame.
 
         Parameters
@@ -35,13 +37,13 @@ class ExcludedViews:
             Its number.
         seen, evidence
             What the cameras deliver, and what of it is evidence; None for nothing.
-        failing : bool (view,)
+        left_out : bool (view,)
             Views that fail (`stseg.detection.view_failures`).
         """
         reasons = []
         for k, name in enumerate(self._cameras):
             since = self._since[k]
-            excluded = seen[k] is not None and (evidence[k] is None or failing[k])
+            excluded = seen[k] is not None and (evidence[k] is None or left_out[k])
             if excluded and since is None:
                 self._since[k] = frame
                 reasons.append(f"camera {name} {_NO_EVIDENCE if evidence[k] is None else _FAILS}")

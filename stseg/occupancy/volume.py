@@ -249,11 +249,13 @@ class Occupancy:
         """Log-likelihood of the best box of each height and ground cell; see `fill_fit`."""
         pillars = self._pillars[i]
         assert pillars is not None, "the view was to deliver boxes"
-        people = explanation.people
+        people, owner = explanation.people, explanation.box_assignment[i]
+        if len(owner) != len(view):
+            raise ValueError(f"{len(view)} boxes, of which an explanation assigns {len(owner)}")
         edges = np.concatenate([view.pixel[:, :2], view.pixel[:, :2] + view.pixel[:, 2:]], 1)
         width, height = map(float, self.rig.cameras[i].size)
         edges = edges.clip(0, [width - 1, height - 1] * 2)
-        boxes = ViewBoxes(edges, *noise.of(view.score), explanation.box_assignment[i], width, height)
+        boxes = ViewBoxes(edges, *noise.of(view.score), owner, width, height)
         fit = np.empty((len(self.heights), near.size), np.float32)
         fill_fit(
             pillars[1], pillars[0], self._height_prior(np.array([self.height_mean]))[0],
