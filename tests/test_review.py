@@ -105,3 +105,7 @@ def test_one_key_answers_and_the_answers_correct_the_run(tmp_path: Path, capsys:
     correct(run, tmp_path / "answers.csv", output=tmp_path / "new.h5")
     rows = read_run(tmp_path / "new.h5").trajectory
     assert rows["x"][(rows["frame"] == 15) & (rows["id"] == 2)] == pytest.approx(0.15)
+
+
+def test_without_tracks_nothing_is_doubted() -> None:
+    assert find_doubts(np.zeros(0, TRAJECTORY), Tracks(np.zeros(0, TRAJECTORY)).summary(), 10.0, BORDER) == []

@@ -65,6 +65,8 @@ def find_doubts(trajectory: Rows, tracks: Rows, frame_rate: float, border: Float
     border : float64 (2, 2)
         Lower and upper corner of the area, metres.
     """
+    if not len(tracks):
+        return []
     ordered = trajectory[np.argsort(trajectory["frame"], kind="stable")]
     own = [ordered[of_track] for of_track in rows_of_tracks(ordered["id"])]
     every = {int(one["id"][0]): one for one in own}
