@@ -8,7 +8,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 
@@ -27,10 +27,12 @@ from stseg.engine.following import ENDLESS, last_frame
 from stseg.engine.frame_range import FrameRange
 from stseg.errors import ConfigError
 from stseg.evaluation import evaluate
+from stseg.io.live.correction_table import CorrectionTable
 from stseg.io.live.followed_cameras import FollowedCameras
 from stseg.io.runfile.runs import read_run
 from stseg.io.track_csv import read_tracks_csv
-from stseg.model.tables import TRAJECTORY
+from stseg.model.tables import CORRECTION, TRAJECTORY
+from stseg.tracking.live_corrections import LiveCorrections, corrected
 from stseg.tracking.live_ids import LiveIds
 
 PROGRAM = """
@@ -131,6 +133,34 @@ def test_tracks_are_told_window_by_window_under_lasting_names(live: Path) -> Non
     assert (np.diff(messages["frame"]) >= 0).all()
     scores = evaluate(walkers(FRAMES), messages)
     assert (scores.tracks, scores.switches, scores.false_alarms) == (3, 0, 0)
+
+
+@quick
+def test_ids_that_are_corrected_go_on_so_and_are_told(
+    rig: Path, live: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As if two had been exchanged from frame 4 on, which is decided with some frame after 20."""
+    assert live.exists()
+    decided = list[int]()
+
+    def exchange(_: LiveCorrections, rows: Rows, appearance: Rows, fresh: Callable[[], int]) -> Rows:
+        assert len(appearance) >= 0 and callable(fresh)
+        last = int(rows["frame"].max())
+        if decided or last < 20:
+            return np.zeros(0, CORRECTION)
+        decided.append(last)
+        return np.array([(last, 4, last, 1, 2), (last, 4, last, 2, 1)], CORRECTION)
+
+    monkeypatch.setattr(LiveCorrections, "decide", exchange)
+    output = tmp_path / "run.h5"
+    assert track(rig, output, "--follow", "--frames", f"0:{FRAMES}") == 0
+    messages = read_tracks_csv(output.with_name("run.h5.live.csv"))
+    assert evaluate(walkers(FRAMES), messages).switches == 2
+    told = CorrectionTable(output.with_name("run.h5.live_corrections.csv"), FRAMES).rows
+    assert told["decided"].tolist() == decided * 2
+    late = corrected(messages, told)
+    assert evaluate(walkers(FRAMES), late[late["frame"] >= 4]).switches == 0
+    assert_same(output, live)
 
 
 @quick

@@ -243,8 +243,11 @@ def test_a_detector_is_not_blamed_for_the_hidden() -> None:
     running = fusion.new_calibration()
     seen, explanation = frame("boxes", 0)
     hidden = np.array([[0.5] * len(explanation.people), *np.ones((3, len(explanation.people)))])
-    fusion.fuse_and_learn(
-        running, [no_boxes(), *seen[1:]], replace(explanation, people=replace(explanation.people, visibility=hidden))
+    unseen = replace(
+        explanation,
+        people=replace(explanation.people, visibility=hidden),
+        box_assignment=(np.zeros(0, np.int64), *explanation.box_assignment[1:]),
     )
+    fusion.fuse_and_learn(running, [no_boxes(), *seen[1:]], unseen)
     assert not running.seen[0, MISS].any()
     assert running.seen[1:, MISS].all()

@@ -7,6 +7,7 @@ day         identities of a whole day: processor time and memory of deciding the
 failing     what a view that fails for three seconds costs, beside its absence
 identities  identities decided again, in seconds, from the rows of perturbed runs
 labels      IoU of the cells of a track, and the right owner where bodies touch: cut, threshold, nearest track
+live        what corrections of live ids bring, from run files and their truths
 memory      resident memory of a long run, and the size of its run file
 pixels      share of pixels of people that carry the right label, from film to label images
 points      calibration of the probability of track points
@@ -32,6 +33,7 @@ EXPERIMENTS = (
     "failing",
     "identities",
     "labels",
+    "live",
     "memory",
     "pixels",
     "points",

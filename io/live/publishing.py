@@ -1,4 +1,4 @@
-"""Rows of the live table sent on as JSON lines.
+"""Rows of the live table, and corrections of its ids, sent on as JSON lines.
 
 A thread sends what a queue holds, so a slow or missing receiver never delays tracking. While it cannot be reached the
 newest messages wait, as many as `_WAITING`; older ones are dropped, and the live table has them still.
@@ -7,7 +7,7 @@ newest messages wait, as many as `_WAITING`; older ones are dropped, and the liv
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from queue import Empty, Full, Queue
 from threading import Event, Thread
@@ -15,6 +15,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from stseg.arrays import Rows
+from stseg.io.live.correction_table import COLUMNS
 from stseg.io.live.receivers import Receiver
 from stseg.io.recording.recording import mask_passwords
 
@@ -62,7 +63,15 @@ class Publisher:
         """Send TRAJECTORY rows as one message, a JSON object a line; returns at once."""
         if not len(rows):
             return
-        message = "".join(f"{json.dumps(self._object(row))}\n" for row in rows).encode()
+        self._send([self._object(row) for row in rows])
+
+    def correct(self, corrections: Rows) -> None:
+        """Send CORRECTION rows as one message likewise."""
+        if len(corrections):
+            self._send([dict(zip(COLUMNS, one, strict=True)) for one in corrections.tolist()])
+
+    def _send(self, objects: Sequence[dict[str, object]]) -> None:
+        message = "".join(f"{json.dumps(one)}\n" for one in objects).encode()
         while True:
             try:
                 self._messages.put_nowait(message)

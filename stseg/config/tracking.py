@@ -126,6 +126,10 @@ class LiveConfig:
     """Longest time by which work may lag behind live streams, seconds; older frames lose their images."""
     buffer_memory: float = 512.0
     """Largest memory for buffered live images, MiB; older frames lose their images."""
+    correction_interval: float = 15.0
+    """Time after which live ids are decided again, seconds; 0 for never."""
+    correction_memory: float = 90.0
+    """Time of the latest frames by which live ids are decided again, seconds."""
 
     def __post_init__(self) -> None:
         for name in (
@@ -137,5 +141,7 @@ class LiveConfig:
             "longest_reconnect_wait",
             "buffer_time",
             "buffer_memory",
+            "correction_memory",
         ):
             require(getattr(self, name) > 0, self, name, "a number above 0")
+        require(self.correction_interval >= 0, self, "correction_interval", "seconds, 0 or more")

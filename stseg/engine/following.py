@@ -26,6 +26,7 @@ from stseg.engine.track import resumable
 from stseg.errors import ConfigError, SourceError
 from stseg.io.config_file import format_config
 from stseg.io.live.arriving_files import FileNotes
+from stseg.io.live.correction_table import CorrectionTable
 from stseg.io.live.followed_cameras import FollowedCameras
 from stseg.io.live.followed_files import FollowedFiles
 from stseg.io.live.live_frames import LiveFrameSet, is_live
@@ -103,12 +104,14 @@ def follow_recording(
     work.require_output(overwrite)
     if not work.begun:
         require_new(table, overwrite)
+        require_new(live_corrections_of(output), overwrite)
     with work as folder, resumable(folder, reporter), compilation_noted(reporter.note):
         try:
             followed = _follow(job, folder, output, overwrite, reporter, publish)
         except BaseException:
             if not folder.segments():  # nothing to resume
                 table.unlink(missing_ok=True)
+                live_corrections_of(output).unlink(missing_ok=True)
             raise
         folder.remove()
     return followed
@@ -143,7 +146,9 @@ def _follow(
         _publisher(receiver, job.recording.rig.frame_rate, reporter) as publisher,
         reporter.progress("following", total, stop) as advance,
     ):
-        follower = LiveRun(job, folder, table, publisher, LiveForegrounds(job.read, job.config), finished)
+        corrections = CorrectionTable(live_corrections_of(output), stop)
+        foregrounds = LiveForegrounds(job.read, job.config)
+        follower = LiveRun(job, folder, table, corrections, publisher, foregrounds, finished)
         with follower, (_cameras if live else _files)(job, folder, follower, halt, reporter) as coming:
             if coming is not None:
                 follower.begin(coming.plan, coming.since)
@@ -169,6 +174,11 @@ def _publisher(
 def live_table_of(output: Path) -> Path:
     """Path of the live table, the tracks of a run in progress."""
     return output.with_name(f"{output.name}.live.csv")
+
+
+def live_corrections_of(output: Path) -> Path:
+    """Path of the table of ids of the live table that are corrected."""
+    return output.with_name(f"{output.name}.live_corrections.csv")
 
 
 def last_frame(frames: FrameRange | None) -> int:

@@ -22,11 +22,15 @@ from stseg.engine.job import Job
 from stseg.engine.live_foreground import LiveForegrounds
 from stseg.engine.open_segment import OpenSegment
 from stseg.engine.segments import Segment
+from stseg.io.live.correction_table import CorrectionTable
 from stseg.io.live.live_frames import LiveFrameSet, now
 from stseg.io.live.live_table import LiveTable
 from stseg.io.live.publishing import Publisher
 from stseg.io.runfile.work_folder import WorkFolder
+from stseg.model.border import Border
 from stseg.model.tables import TRAJECTORY
+from stseg.trackers import find_tracker
+from stseg.tracking.live_corrections import LiveCorrections, corrected, renamed
 from stseg.tracking.live_ids import LiveIds, Names
 from stseg.tracking.windows import window_length
 
@@ -50,8 +54,8 @@ class LiveRun:
     ----------
     job, folder
         The job, and the folder of its segments.
-    table
-        The live table, to which committed track rows are appended.
+    table, corrections
+        The live table, to which committed track rows are appended, and that of its corrected ids.
     publisher
         Sends them on, too; None for nowhere.
     foregrounds
@@ -70,16 +74,19 @@ class LiveRun:
         job: Job,
         folder: WorkFolder,
         table: LiveTable,
+        corrections: CorrectionTable,
         publisher: Publisher | None,
         foregrounds: LiveForegrounds,
         finished: list[FinishedSegment],
     ) -> None:
         self.foregrounds, self.finished = foregrounds, finished
         self._job, self._folder, self._table, self._publisher = job, folder, table, publisher
+        self._corrections = corrections
         frame_rate = job.recording.rig.frame_rate
         self._window = window_length(frame_rate, job.config.tracking)[0]
         warm_up = round(job.config.segments.warm_up * frame_rate)
-        self._names = LiveIds(table.rows, warm_up + 2 * self._window)
+        self._names = LiveIds(corrected(table.rows, corrections.rows), warm_up + 2 * self._window)
+        self._decided_again = LiveCorrections(frame_rate, Border.of(job.read.read_rig), job.config)
         self._blind_views = BlindViews([camera.name for camera in job.recording.rig.cameras])
         self.pipeline = job.pipeline()
         self._members: list[_Member] = []
@@ -170,8 +177,25 @@ class LiveRun:
         self._table.append(rows)
         if self._publisher is not None:
             self._publisher.append(rows)
+        self._correct(member, rows, new)
         self._published = new.commit.frames[-1].frame + 1
         self._delays += [now() - self._arrived.pop(fused.frame) for fused in new.commit.frames]
+
+    def _correct(self, member: _Member, rows: Rows, new: CommittedFrames) -> None:
+        """Decide live ids again with newly published rows, and append what is corrected; some trackers' are final."""
+        if find_tracker(self._job.tracker).final:
+            return
+        found = self._decided_again.decide(rows, new.appearance, self._names.fresh)
+        if not len(found):
+            return
+        self._corrections.append(found)
+        if self._publisher is not None:
+            self._publisher.correct(found)
+        self._names.correct(found)
+        present = set(new.commit.trajectory["id"].tolist())
+        for one in self._members:
+            if one.names is not None:
+                one.names = renamed(one.names, found, present if one is member else ())
 
     def _keep(self, stop: int) -> None:
         """Finish the oldest segment before frame `stop`."""

@@ -62,6 +62,9 @@ BOX = np.dtype(
 EVENT = np.dtype([("frame", "<i8"), ("kind", "S12"), ("id", "<i8"), ("other", "<i8"), ("reason", "S96")])
 """birth, death, merge, split, hand-over, return, dropped, blind; `other` is the other track, 0 for none."""
 
+CORRECTION = np.dtype([("decided", "<i8"), ("first", "<i8"), ("last", "<i8"), ("id", "<i8"), ("corrected", "<i8")])
+"""Rows of a live id in frames first to last, both included, that are of another; as decided with a frame."""
+
 CANDIDATE = np.dtype(
     [
         ("frame", "<i8"),

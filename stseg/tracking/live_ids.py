@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from stseg.arrays import Rows
+from stseg.tracking.live_corrections import corrected
 from stseg.tracking.stitching import matches
 
 Names = dict[int, int]
@@ -39,15 +40,25 @@ class LiveIds:
         return matches(recent[recent["frame"] >= lead["frame"].min()], lead)
 
     def named(self, rows: Rows, names: Names) -> Rows:
-        """Rows of a segment under names of the run; `names` gains an entry for each new track."""
+        """Rows of a segment under names of the run; `names` gains one for each new track, and for one of two alike."""
+        taken = set[int]()
         for own in np.unique(rows["id"]).tolist():
-            if own not in names:
-                self._issued += 1
-                names[own] = self._issued
+            if own not in names or names[own] in taken:
+                names[own] = self.fresh()
+            taken.add(names[own])
         named = rows.copy()
         named["id"] = [names[own] for own in rows["id"].tolist()]
         self._recent = self._last(np.concatenate([self._recent, named]))
         return named
+
+    def fresh(self) -> int:
+        """A name that was never given."""
+        self._issued += 1
+        return self._issued
+
+    def correct(self, corrections: Rows) -> None:
+        """Take CORRECTION rows into account."""
+        self._recent = corrected(self._recent, corrections)
 
     def _last(self, rows: Rows) -> Rows:
         return np.asarray(rows[rows["frame"] > rows["frame"].max(initial=0) - self._kept])
