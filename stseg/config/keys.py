@@ -20,8 +20,7 @@ _USER = {
     "detection": "prior_log_odds birth_cost border_width minimum_distance",
     "tracking": "window patience maximum_gap interpolation_gap minimum_duration",
     "segments": "length background_period",
-    "live": "file_quiet_time background_time stream_timeout buffer_time buffer_memory "
-    "correction_interval correction_memory",
+    "live": "file_quiet_time background_time stream_timeout buffer_time buffer_memory",
 }
 USER_KEYS = frozenset(f"{section}.{name}" for section, names in _USER.items() for name in names.split())
 """Keys in words of the recording: people, cameras, patience. All others are constants of the methods.
