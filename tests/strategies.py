@@ -98,7 +98,8 @@ def rigs(draw: st.DrawFn, most: int = 4, lenses: bool = True) -> Rig:
     names = draw(st.lists(_NAMES, min_size=1, max_size=most, unique=True))
     size = draw(st.sampled_from(((640, 480), (1920, 1080), (160, 121))))
     views = tuple(draw(cameras(name, size, target, lenses)) for name in names)
-    return Rig(draw(_NAMES), draw(numbers(0.1, 120.0)), grid, views)
+    doors = draw(st.sampled_from(((), ((*target, target[0] + 0.3, target[1]),), ((*target, *target),) * 2)))
+    return Rig(draw(_NAMES), draw(numbers(0.1, 120.0)), grid, views, doors, draw(st.booleans()))
 
 
 @st.composite

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -175,6 +176,30 @@ def test_a_newcomer_costs_away_from_the_border() -> None:
     share = np.array([0.05, 0.55, 1.0, 1.0, 0.0])
     np.testing.assert_allclose(later.birth_cost(places), share * CONFIG.birth_cost, atol=1e-6)
     np.testing.assert_array_equal(Prior.of(None, CONFIG, BODY, border).birth_cost(places), 0.0)
+
+
+def test_newcomers_cost_nothing_at_doors_and_all_at_walls() -> None:
+    rig = open_ground(Grid((-3.0, 3.0), (-3.0, 3.0), 0.1, 1.8, 2))
+    places = np.array([[0.0, 0.0], [0.5, 0.0], [1.3, 0.0], [-2.95, 0.0], [-3.5, 0.0]])
+    door = (-0.2, -0.1, 0.2, 0.1)
+    shares = {
+        (): ([1.0, 1.0, 1.0, 0.05, 0.0], [1.0, 1.0, 1.0, 1.0, 0.0]),
+        (door,): ([0.0, 0.3, 1.0, 0.05, 0.0], [0.0, 0.3, 1.0, 1.0, 0.0]),
+    }
+    for doors, (unwalled, walled) in shares.items():
+        for closed, share in ((False, unwalled), (True, walled)):
+            border = Border.of(replace(rig, doors=doors, closed=closed))
+            cost = Prior.of(no_tracks(), CONFIG, BODY, border).birth_cost(places)
+            np.testing.assert_allclose(cost, np.array(share) * CONFIG.birth_cost, atol=0.06 * CONFIG.birth_cost)
+
+
+@pytest.mark.parametrize("closed", [False, True])
+def test_who_stands_in_a_door_stays_a_candidate_and_who_is_beyond_the_border_none(closed: bool) -> None:
+    corners = np.array([[-2.0, -2.0], [2.0, -2.0], [2.0, 2.0], [-2.0, 2.0]])
+    rig = open_ground(Grid((-3.0, 3.0), (-3.0, 3.0), 0.1, 1.8, 2, corners))
+    border = Border.of(replace(rig, doors=((-0.2, -0.1, 0.2, 0.1),), closed=closed))
+    prior = Prior.of(expecting((0.0, 0.0), (2.5, 0.0), (1.0, 0.5)), CONFIG, BODY, border)
+    np.testing.assert_array_equal(prior.pool().ground, [[0.0, 0.0], [1.0, 0.5]])
 
 
 def test_who_leaves_the_area_is_no_candidate() -> None:

@@ -28,6 +28,8 @@ def format_rig(recording: Recording, path: Path) -> str:
         f"x = {_list(np.array(grid.x))}  # ground rectangle, metres",
         f"y = {_list(np.array(grid.y))}",
         *([] if grid.polygon is None else [f"polygon = {_rows(grid.polygon)}  # the part of it that counts"]),
+        *([f"doors = {_rows(np.array(rig.doors))}  # where people come and go"] if rig.doors else []),
+        *(["closed = true  # nobody crosses the border but through doors"] if rig.closed else []),
         "",
         "[grid]",
         f"cell = {_number(grid.cell)}  # side of a cell, metres",

@@ -79,11 +79,12 @@ def parse_rig(text: str, path: Path) -> Recording:
         raise top.error("format", found, f"{FORMAT}, the format that this version reads")
     top.allow("format", "scene", "grid", "body", "camera")
     scene, tables = top.table("scene"), _named(top.tables("camera", limits.CAMERAS))
-    scene.allow("name", "frame_rate", "x", "y", "polygon")
+    scene.allow("name", "frame_rate", "x", "y", "polygon", "doors", "closed")
     grid = _grid(scene, top.table("grid"))
     with np.errstate(all="ignore"):  # what overflows fails the checks of the geometry
         cameras = tuple(_camera(table) for table in tables)
-        rig = Rig(scene.name("name"), scene.within("frame_rate", limits.FRAME_RATE), grid, cameras)
+        rate, doors = scene.within("frame_rate", limits.FRAME_RATE), _doors(scene, grid)
+        rig = Rig(scene.name("name"), rate, grid, cameras, doors, "closed" in scene and scene.truth("closed"))
         for table, camera in zip(tables, cameras, strict=True):
             with _placed(table, "projection" in table):
                 replace(rig, cameras=(camera,)).require_coverage()
@@ -160,6 +161,19 @@ def _grid(scene: Table, table: Table) -> Grid:
     if not grid.inside().any():
         raise scene.error("polygon", "a polygon that holds no cell", "one that overlaps the rectangle x, y")
     return grid
+
+
+def _doors(scene: Table, grid: Grid) -> tuple[tuple[float, float, float, float], ...]:
+    if "doors" not in scene:
+        return ()
+    doors = scene.numbers("doors", ANY, 4, largest=limits.METRES)
+    if len(doors) > limits.AREAS:
+        raise scene.error("doors", f"{len(doors)} doors", f"at most {limits.AREAS}")
+    found = [(float(x0), float(y0), float(x1), float(y1)) for x0, y0, x1, y1 in doors]
+    for door in found:
+        if door[0] > door[2] or door[1] > door[3] or not (grid.touching(door) & grid.inside()).any():
+            raise scene.error("doors", list(door), "x0, y0, x1, y1: lower, then upper bounds, of a part of the area")
+    return tuple(found)
 
 
 def _bounds(table: Table, name: str) -> tuple[float, float]:

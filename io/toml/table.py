@@ -104,6 +104,13 @@ class Table:
             raise self.error(name, shown(value), expected)
         return value
 
+    def truth(self, name: str) -> bool:
+        """True or false."""
+        value = self._get(name, "true or false")
+        if not isinstance(value, bool):
+            raise self.error(name, shown(value), "true or false")
+        return value
+
     def within(self, name: str, bounds: tuple[float, float]) -> float:
         """A finite number within bounds."""
         number = float(self.numbers(name, largest=np.inf))

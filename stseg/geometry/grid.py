@@ -82,6 +82,13 @@ class Grid:
                 within[rows] ^= x < ((x1 - x0) * (y[rows] - y0) / (y1 - y0) + x0)[:, None]
         return within
 
+    def touching(self, rectangle: tuple[float, float, float, float]) -> Flags:
+        """Cells that a rectangle x0, y0, x1, y1 touches, metres, bool (y, x)."""
+        (x0, y0, x1, y1), half = rectangle, self.cell / 2
+        columns = (self.ground_x >= x0 - half) & (self.ground_x <= x1 + half)
+        rows = (self.ground_y >= y0 - half) & (self.ground_y <= y1 + half)
+        return rows[:, None] & columns
+
 
 def inside_polygon(ground: Floats, polygon: Floats) -> Flags:
     """Even-odd rule for points (..., 2) and a closed polygon (n, 2), both metres; bool (...)."""

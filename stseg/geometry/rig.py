@@ -28,12 +28,18 @@ class Rig:
         Ground cells and planes.
     cameras
         The views, in the order of the rig file.
+    doors : (x0, y0, x1, y1) each
+        Rectangles of ground where people come and go, metres.
+    closed
+        Whether nobody crosses the border of the area but through doors.
     """
 
     name: str
     frame_rate: float
     grid: Grid
     cameras: tuple[Camera, ...]
+    doors: tuple[tuple[float, float, float, float], ...] = ()
+    closed: bool = False
 
     @classmethod
     def from_homographies(

@@ -1,4 +1,4 @@
-"""Border over which people enter and leave: that of the area, and of what the views see of it."""
+"""Border over which people enter and leave: that of the area, of what the views see of it, and doors."""
 
 from __future__ import annotations
 
@@ -12,6 +12,10 @@ from stseg.geometry import Grid, Rig
 
 _TRUNK = 1.0
 """Height at which a body must be visible in a view, metres."""
+_NOWHERE = 1e6
+"""Distance where there is no border at all, cells."""
+_AT_DOOR = 1e-6
+"""Distance within a door, metres: 0 is beyond the border."""
 
 
 @dataclass(frozen=True)
@@ -23,14 +27,18 @@ class Border:
 
     @classmethod
     def of(cls, rig: Rig) -> Border:
-        """The border of `rig`'s area and of its views."""
-        seen = np.zeros(rig.grid.shape[1:], bool)
+        """The border of the views and the doors of `rig`, and of its area unless that is closed."""
+        grid, seen = rig.grid, np.zeros(rig.grid.shape[1:], bool)
         for camera in rig.cameras:
-            image, ahead = camera.project(rig.grid.ground, _TRUNK)
+            image, ahead = camera.project(grid.ground, _TRUNK)
             seen |= ahead & camera.inside(image)
-        inside = np.pad(seen & rig.grid.inside(), 1)
-        away = np.asarray(distance_transform_edt(inside), float)[1:-1, 1:-1]
-        return cls((away - 0.5).clip(0) * rig.grid.cell, rig.grid)
+        area = seen & grid.inside()
+        within = seen | ~grid.inside() if rig.closed else area.copy()
+        for door in rig.doors:
+            within &= ~grid.touching(door)
+        inside = np.pad(within, 1, constant_values=rig.closed)
+        cells = np.asarray(distance_transform_edt(inside), float)[1:-1, 1:-1] if not inside.all() else _NOWHERE
+        return cls(np.where(area, np.maximum((cells - 0.5) * grid.cell, _AT_DOOR), 0.0), grid)
 
     def away(self, ground: Floats) -> Floats:
         """Distance of ground points (n, 2) from the border, metres, float64 (n,); 0 beyond it."""
