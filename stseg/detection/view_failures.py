@@ -1,7 +1,7 @@
 """Views that fail for a while: black, overexposed, pushed aside, or empty though people stand before them.
 
-A view shows the people that other views see, and nothing where nobody is. With the share h of the outlines of people in
-it that is foreground, and the share c of all the rest, its informedness (Youden, Cancer 3, 1950) is
+A view shows the people that other views see, and nothing where nobody is. With the share h of a person's outline in
+it that is foreground, the mean over people, and the share c of all the rest, its informedness (Youden 1950) is
 
     J = h - c:
 
@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stseg.accelerate import kernel
-from stseg.arrays import Flags, Floats, Ints
+from stseg.arrays import Flags, Ints
 from stseg.config import ErrorRateConfig
 from stseg.detection.views import BoxView, PixelView, ViewObservation
 from stseg.model.people import Explanation
@@ -32,8 +32,8 @@ T = TypeVar("T")
 
 _LEAST = 0.7
 """Share of its usual informedness below which a view fails."""
-_RECENT = 0.25
-"""Time constant of the informedness now, seconds."""
+_RECENT, _FRAMES = 0.25, 3.0
+"""Time constant of the informedness now, seconds, and frames at least: a detector may miss many in one frame."""
 _FIRST = 0.7, 2.0
 """Informedness of a view that is not known yet, and its weight, seconds of one person."""
 _EXPECTED = 0.1
@@ -100,7 +100,7 @@ class ViewFailures:
         """Count what view k shows of a number of people."""
         seconds = number / self._rate
         own = np.array([seconds, seconds * informedness])
-        self.recent[k] = self.recent[k] * np.exp(-1 / (self._rate * _RECENT)) + own
+        self.recent[k] = self.recent[k] * np.exp(-1 / max(self._rate * _RECENT, _FRAMES)) + own
         weight, total = self.usual[k] + _FIRST[1] * np.array([1.0, _FIRST[0]])
         usual = total / weight
         weight, total = self.recent[k] + _EXPECTED * np.array([1.0, usual])
@@ -124,26 +124,23 @@ def informedness(assignment: NDArray[np.int16], sure: Flags, foreground: Flags) 
         Who counts; others' pixels do not.
     foreground : bool (v, u)
     """
-    counts = np.zeros((2, 2), np.int64)
-    shown = np.zeros(len(sure), bool)
-    _fill_counts(assignment, sure, foreground, shown, counts)
-    number = int(shown.sum())
-    if number == 0:
+    people, rest = np.zeros((len(sure), 2), np.int64), np.zeros(2, np.int64)
+    _fill_counts(assignment, sure, foreground, people, rest)
+    shown = people[people[:, 0] > 0]
+    if not len(shown):
         return 0, 0.0
-    share: Floats = counts[:, 1] / np.maximum(counts[:, 0], 1)
-    return number, float(share[1] - share[0])
+    return len(shown), float((shown[:, 1] / shown[:, 0]).mean() - rest[1] / max(int(rest[0]), 1))
 
 
 @kernel
-def _fill_counts(assignment: NDArray[np.int16], sure: Flags, foreground: Flags, shown: Flags, counts: Ints) -> None:
-    """Fill who is shown (person,), and the pixels and foreground ones of nobody and of who is sure, counts (2, 2)."""
+def _fill_counts(assignment: NDArray[np.int16], sure: Flags, foreground: Flags, people: Ints, rest: Ints) -> None:
+    """Fill the pixels, and the foreground ones, of each person who is sure (person, 2), and of nobody (2,)."""
     for v in range(assignment.shape[0]):
         for u in range(assignment.shape[1]):
             person = assignment[v, u]
-            if person >= 0 and not sure[person]:
-                continue
-            body = 1 if person >= 0 else 0
-            if person >= 0:
-                shown[person] = True
-            counts[body, 0] += 1
-            counts[body, 1] += foreground[v, u]
+            if person < 0:
+                rest[0] += 1
+                rest[1] += foreground[v, u]
+            elif sure[person]:
+                people[person, 0] += 1
+                people[person, 1] += foreground[v, u]
