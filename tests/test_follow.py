@@ -374,12 +374,16 @@ def places(track: int, frames: range, x: float) -> Rows:
 
 
 def test_names_last_over_segments() -> None:
-    names = LiveIds(np.zeros(0, TRAJECTORY), 20)
+    nothing = np.zeros(0, CORRECTION)
+    names = LiveIds(np.zeros(0, TRAJECTORY), nothing, 20)
     first = names.begin(np.zeros(0, TRAJECTORY))
     messages = names.named(np.concatenate([places(4, range(10), 0.0), places(7, range(10), 3.0)]), first)
     assert messages["id"].tolist() == [1] * 10 + [2] * 10
     second = names.begin(np.concatenate([places(1, range(5, 10), 3.1), places(2, range(5, 10), 9.0)]))
     later = np.concatenate([places(k, range(10, 12), 0.0) for k in (1, 2, 3)])
     assert names.named(later, second)["id"].tolist() == [2, 2, 3, 3, 4, 4]
-    again = LiveIds(messages, 20)  # a run that goes on from what it has told
+    again = LiveIds(messages, nothing, 20)  # a run that goes on from what it has told
     assert again.named(later, again.begin(places(1, range(5, 10), 0.1)))["id"].tolist() == [1, 1, 3, 3, 4, 4]
+    corrections = np.array([(9, 0, 9, 2, 1), (9, 0, 9, 1, 7)], CORRECTION)
+    again = LiveIds(messages, corrections, 20)
+    assert again.named(later, again.begin(places(1, range(5, 10), 0.1)))["id"].tolist() == [7, 7, 8, 8, 9, 9]

@@ -30,7 +30,7 @@ from stseg.io.runfile.work_folder import WorkFolder
 from stseg.model.border import Border
 from stseg.model.tables import TRAJECTORY
 from stseg.trackers import find_tracker
-from stseg.tracking.live_corrections import LiveCorrections, corrected, renamed
+from stseg.tracking.live_corrections import LiveCorrections, renamed
 from stseg.tracking.live_ids import LiveIds, Names
 from stseg.tracking.windows import window_length
 
@@ -85,7 +85,7 @@ class LiveRun:
         frame_rate = job.recording.rig.frame_rate
         self._window = window_length(frame_rate, job.config.tracking)[0]
         warm_up = round(job.config.segments.warm_up * frame_rate)
-        self._names = LiveIds(corrected(table.rows, corrections.rows), warm_up + 2 * self._window)
+        self._names = LiveIds(table.rows, corrections.rows, warm_up + 2 * self._window)
         self._decided_again = LiveCorrections(frame_rate, Border.of(job.read.read_rig), job.config)
         self._blind_views = BlindViews([camera.name for camera in job.recording.rig.cameras])
         self.pipeline = job.pipeline()

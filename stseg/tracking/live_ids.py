@@ -21,16 +21,16 @@ class LiveIds:
 
     Parameters
     ----------
-    rows : TRAJECTORY (n,)
-        Rows committed before, under names of the run.
+    rows : TRAJECTORY (n,), corrections : CORRECTION (k,)
+        Rows committed before, under names of the run, and what was corrected in them.
     kept
         Number of latest frames whose rows are kept for stitching.
     """
 
-    def __init__(self, rows: Rows, kept: int) -> None:
+    def __init__(self, rows: Rows, corrections: Rows, kept: int) -> None:
         self._kept = kept
-        self._issued = int(rows["id"].max(initial=0))
-        self._recent = self._last(rows)
+        self._issued = max(int(ids.max(initial=0)) for ids in (rows["id"], corrections["id"], corrections["corrected"]))
+        self._recent = self._last(corrected(rows, corrections))
 
     def begin(self, lead: Rows) -> Names:
         """Names for a new segment, from the TRAJECTORY rows of its warm-up."""

@@ -27,6 +27,7 @@ from stseg.io.calibrations.point_files import read_points
 from stseg.io.config_file import read_config
 from stseg.io.exports import formats as exports
 from stseg.io.live.arriving_files import FileNotes
+from stseg.io.live.correction_table import CorrectionTable
 from stseg.io.live.live_table import LiveTable
 from stseg.io.outputs.whole_files import replacing
 from stseg.io.recording.pictures import read_picture
@@ -103,6 +104,12 @@ def _live_table(path: Path) -> None:
     copy.write_bytes(path.read_bytes())
     with LiveTable(copy, 10.0, 5):
         pass
+
+
+def _live_corrections(path: Path) -> None:
+    copy = path.with_name("live_corrections.csv")
+    copy.write_bytes(path.read_bytes())
+    CorrectionTable(copy, 90)
 
 
 def _small_run(folder: Path) -> bytes:
@@ -185,6 +192,7 @@ TARGETS = (
     Target("begun.json", plain(corpus.BEGUN), _begun),
     Target("files.json", plain(corpus.NOTES), FileNotes),
     Target("live.table.csv", plain(corpus.LIVE_TABLE), _live_table),
+    Target("live.corrections.csv", plain(corpus.LIVE_CORRECTIONS), _live_corrections),
     Target("indexed.png", lambda _: corpus.png(True), lambda path: read_picture(path, "instances", (64, 48), "")),
     Target("grey.png", lambda _: corpus.png(False), lambda path: read_picture(path, "instances", (64, 48), "")),
     Target("mask.png", lambda _: corpus.png(True), lambda path: read_picture(path, "masks", (64, 48), "")),
