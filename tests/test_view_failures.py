@@ -78,9 +78,16 @@ def test_a_view_that_fails_is_left_out_and_counts_again(kind: str, failure: str)
 
 def test_a_view_that_fails_for_long_counts_again_once_nobody_is_there() -> None:
     (asked, learned), seen = session("pixels"), shown("pixels")
+    explained(asked, learned, seen, 10)
     explained(asked, learned, failed("pixels", "black", seen), 40)
     assert learned.failures.failing[FAILED]
     explained(asked, learned, shown("pixels", people()), 20)
+    assert not learned.failures.failing.any()
+
+
+def test_a_view_that_never_showed_people_does_not_fail() -> None:
+    (asked, learned), seen = session("pixels"), shown("pixels")
+    explained(asked, learned, failed("pixels", "black", seen), 40)
     assert not learned.failures.failing.any()
 
 

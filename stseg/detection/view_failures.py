@@ -10,8 +10,8 @@ the time of a frame and person, and is forgotten quickly for J now and slowly fo
 J now is less than 0.7 of its usual one fails: its evidence is left out until J has come back. The usual J stands while
 it fails, and counts in J now where little was seen of late, so a view without people comes back by itself.
 
-Only people count who would be there without the view, and whom two other views show: of two views nobody can say which
-one fails.
+A view that never showed more, since its calibration is wrong, does not fail: the run says so afterwards. Only people
+count who would be there without the view, and whom two other views show: of two views nobody can say which one fails.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ _LEAST = 0.7
 """Share of its usual informedness below which a view fails."""
 _RECENT, _FRAMES = 0.25, 3.0
 """Time constant of the informedness now, seconds, and frames at least: a detector may miss many in one frame."""
-_FIRST = 0.7, 2.0
-"""Informedness of a view that is not known yet, and its weight, seconds of one person."""
+_KNOWN = 2.0
+"""Time of one person from which the usual informedness of a view is known, seconds."""
 _EXPECTED = 0.1
 """Weight of the usual informedness in that of now, seconds of one person."""
 _OTHERS = 2
@@ -101,10 +101,11 @@ class ViewFailures:
         seconds = number / self._rate
         own = np.array([seconds, seconds * informedness])
         self.recent[k] = self.recent[k] * np.exp(-1 / max(self._rate * _RECENT, _FRAMES)) + own
-        weight, total = self.usual[k] + _FIRST[1] * np.array([1.0, _FIRST[0]])
-        usual = total / weight
-        weight, total = self.recent[k] + _EXPECTED * np.array([1.0, usual])
-        self.failing[k] = total / weight < _LEAST * usual
+        known, total = self.usual[k]
+        if known >= _KNOWN:
+            usual = total / known
+            weight, total = self.recent[k] + _EXPECTED * np.array([1.0, usual])
+            self.failing[k] = total / weight < _LEAST * usual
         if not self.failing[k]:
             self.usual[k] = self.usual[k] * np.exp(-1 / (self._rate * self._level.memory)) + own
 
