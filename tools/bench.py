@@ -9,8 +9,8 @@ A workload is `stseg run` with one worker on a simulated recording. Its cost is 
 children; what starting costs is measured by a run of fewer frames and taken off. Figures are milliseconds a frame set,
 and the same beside the time of a fixed calibration kernel, which makes machines comparable. Other load slows caches and
 clocks for seconds at a time, so the kernel works for seconds, too, before and after each pair of runs, and they are
-compared within each round: the median of the rounds counts. A check that fails is measured again, twice at most: load
-passes, a loss stays. `start` is the CPU time until the first frames are out.
+compared within each round: the median of the rounds counts. A check that fails is measured again, four times at most,
+and the least of its rounds counts: load passes, a loss stays. `start` is the CPU time until the first frames are out.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from stseg.simulation import NAMED, Film, SceneSpec
 TABLE = ROOT / "docs" / "development" / "speed.csv"
 _ALLOWED = 1.25
 """How many times the stored ratio a check may come to."""
-_ATTEMPTS = 3
+_ATTEMPTS = 5
 """How often a check that fails is measured."""
 _CALIBRATED = 2.0
 """CPU seconds of a calibration: long enough to meet the load that a run of seconds meets."""
@@ -106,8 +106,8 @@ def cpu_of_run(checkout: Path, rig: Path, output: Path, frames: int) -> float:
     return usage.ru_utime + usage.ru_stime
 
 
-def measure(workload: Workload, checkouts: Sequence[Path], work: Path, rounds: int) -> tuple[list[float], float]:
-    """Milliseconds a frame set by each checkout (of `start`, of the whole run), and the ratio of the first one."""
+def measure(workload: Workload, checkouts: Sequence[Path], work: Path, rounds: int) -> tuple[list[float], list[float]]:
+    """Milliseconds a frame set by each checkout (of `start`, of the whole run), and the first one's ratio by round."""
     rig, output = work / workload.name / workload.rig, work / f"{workload.name}.h5"
     if not rig.exists():
         write_scene(rig.parent, Film(workload.scene), overwrite=True)
@@ -122,7 +122,7 @@ def measure(workload: Workload, checkouts: Sequence[Path], work: Path, rounds: i
         after = calibration_seconds()
         ratios.append(costs[-1][0] / (0.5 * (before + after)))
         before = after
-    return [1000 * float(cost) for cost in np.median(costs, axis=0)], float(np.median(ratios))
+    return [1000 * float(cost) for cost in np.median(costs, axis=0)], ratios
 
 
 def _cost(workload: Workload, checkout: Path, rig: Path, output: Path) -> float:
@@ -174,7 +174,8 @@ def main() -> None:
     for workload in workloads():
         if names and workload.name not in names:
             continue
-        taken, ratio = measure(workload, checkouts, asked.work, asked.rounds)
+        taken, ratios = measure(workload, checkouts, asked.work, asked.rounds)
+        ratio = float(np.median(ratios))
         rows.append((workload.name, taken[0], ratio))
         beside = "" if asked.base is None else f" {taken[1]:8.1f} {taken[1] / taken[0]:6.2f}"
         print(f"{workload.name:10} {taken[0]:12.1f} {ratio:8.3f}{beside}", flush=True)
@@ -186,9 +187,9 @@ def check(work: Path, rounds: int) -> None:
     """End with an error where the smallest workload lost more than is allowed, in each of several attempts."""
     small, allowed = workloads()[0], _ALLOWED * stored_ratio("small")
     for _ in range(_ATTEMPTS):
-        taken, ratio = measure(small, [ROOT], work, rounds)
-        print(f"small: {taken[0]:.1f} ms a frame set, ratio {ratio:.3f}, allowed {allowed:.3f}", flush=True)
-        if ratio <= allowed:
+        taken, ratios = measure(small, [ROOT], work, rounds)
+        print(f"small: {taken[0]:.1f} ms a frame set, least ratio {min(ratios):.3f}, allowed {allowed:.3f}", flush=True)
+        if min(ratios) <= allowed:
             return
     sys.exit(f"small: more than {_ALLOWED} times the stored ratio")
 
