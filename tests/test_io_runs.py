@@ -335,6 +335,27 @@ def test_a_full_disk_is_told_and_leaves_the_old_file(
     gc.collect()  # a file that HDF5 could not close would crash here
 
 
+def test_what_a_full_disk_did_not_take_is_read_back_and_the_rest_is_zero(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A buffer that is not filled has what lay there in memory before, which HDF5 would take for its own."""
+
+    def fill_up(data: memoryview) -> None:
+        if data.nbytes > 4:
+            raise OSError(28, "No space left on device")
+
+    patch_file(monkeypatch, fill_up)
+    file = part_file.PartFile(tmp_path / "night.h5")
+    for place, data in ((0, b"abcd"), (2, b"CDEFGH"), (10, b"kl")):
+        file.seek(place)
+        assert file.write(memoryview(data)) == len(data)
+    buffer = bytearray(b"?" * 14)
+    file.seek(1)
+    assert file.readinto(memoryview(buffer)) == 14
+    assert bytes(buffer) == b"bCDEFGH\0\0kl\0\0\0"
+    file.discard(lambda: None)
+
+
 def test_text_outputs_replace_only_when_whole(tmp_path: Path) -> None:
     path = tmp_path / "tracks.csv"
     path.write_text("old")

@@ -21,9 +21,9 @@ _Handler = Callable[[int, FrameType | None], object]
 class PartFile(io.RawIOBase):
     """A part of an output as a file object that never raises while HDF5 calls it.
 
-    HDF5 cannot close a file once a write has failed, and crashes on trying. So the first failure is recorded, later
-    writes are dropped, and both failures and interrupts (Ctrl-C) are raised at the end of the step. All calls of HDF5,
-    closing of datasets included, belong into a `step`.
+    HDF5 cannot close a file once a write has failed, and crashes on trying. So the first failure is recorded, what is
+    not written is kept in memory, where HDF5 reads it back, and both failures and interrupts (Ctrl-C) are raised at the
+    end of the step. All calls of HDF5, closing of datasets included, belong into a `step`.
 
     Parameters
     ----------
@@ -44,6 +44,7 @@ class PartFile(io.RawIOBase):
     def __init__(self, path: Path) -> None:
         self._path = path
         self._failure: OSError | None = None
+        self._unwritten: list[tuple[int, bytes]] = []
         self._in_step = False
         self._interrupted: int | None = None
         try:
@@ -65,7 +66,7 @@ class PartFile(io.RawIOBase):
         self._in_step = True
         try:
             yield
-        except (OSError, RuntimeError):  # HDF5 reading back what was dropped
+        except (OSError, RuntimeError):  # HDF5 after a failure
             self._raise_failure()
             raise
         finally:
@@ -107,13 +108,15 @@ class PartFile(io.RawIOBase):
             signal.signal(number, before)
 
     def write(self, data: memoryview) -> int:  # type: ignore[override]  # what h5py gives
-        """Write everything, or record the failure."""
+        """Write everything; what cannot be written is kept, and the failure recorded."""
         rest = memoryview(data)
         try:
             while self._failure is None and rest.nbytes:
                 rest = rest[self._file.write(rest) :]
         except OSError as error:
             self._failure = error
+        if rest.nbytes:
+            self._unwritten.append((self._file.tell(), bytes(rest)))
         return memoryview(data).nbytes
 
     def truncate(self, size: int | None = None) -> int:
@@ -126,8 +129,17 @@ class PartFile(io.RawIOBase):
         return size or 0
 
     def readinto(self, buffer: memoryview) -> int:  # type: ignore[override]  # what h5py gives
-        """As of any file."""
-        return self._file.readinto(buffer) or 0
+        """Fill the whole buffer: HDF5 takes what is left of it for a part of the file. Zeros beyond the end."""
+        whole, start = memoryview(buffer).cast("B"), self._file.tell()
+        read = 0
+        while read < whole.nbytes and (more := self._file.readinto(whole[read:])):
+            read += more
+        whole[read:] = bytes(whole.nbytes - read)
+        for place, kept in self._unwritten:
+            first, stop = max(place, start), min(place + len(kept), start + whole.nbytes)
+            if first < stop:
+                whole[first - start : stop - start] = kept[first - place : stop - place]
+        return whole.nbytes
 
     def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
         """As of any file."""
