@@ -26,7 +26,7 @@ from stseg.model.pillar_index import PillarIndex
 from stseg.occupancy.box_planes import CellsByPerson, ViewBoxes, fill_fit, fill_levels, plane_likelihood
 from stseg.occupancy.clutter import clutter, clutter_weights
 from stseg.occupancy.fusion import ErrorRates, log_odds_terms
-from stseg.occupancy.shown_cells import CellTables, ShownCells
+from stseg.occupancy.shown_cells import SIDE, CellTables, ShownCells
 from stseg.occupancy.volume import Occupancy
 
 COARSE = rig_of(corner_cameras(), cell=0.5, planes=3)
@@ -397,7 +397,7 @@ def test_the_same_frame_twice() -> None:
 
 def test_cells_kept_from_the_frame_before_are_those_of_this_one() -> None:
     occupancy = Occupancy(COARSE, PIXELS, CONFIG, FEW_HEIGHTS, BODY)
-    kept, marked = CellTables(occupancy.sampling.footprint), occupancy.views[:, ::8, ::8] < 0
+    kept, marked = CellTables(occupancy.sampling.footprint), occupancy.views[:, ::SIDE, ::SIDE] < 0
     assert marked.size > 1
     for block in (0, 0, -1, 0):
         marked[:] = False

@@ -8,15 +8,16 @@ import numpy as np
 
 from stseg.arrays import Singles
 from stseg.geometry.sampling import Sampling
-from stseg.geometry.summed_area import Levels, Sums, fill_means, fill_points, fill_sums
+from stseg.geometry.summed_area import Levels, Sums, fill_means, fill_points, fill_sums, level_of
 
 
 class SumTable(NamedTuple):
-    """Summed-area table of a part of a view, and the column and row where that part begins."""
+    """Summed-area table of a part of a view, the column and row where that part begins, and its lowest level."""
 
     sums: Sums
     left: int
     top: int
+    lowest: int
 
 
 class CellMeans:
@@ -38,8 +39,10 @@ class CellMeans:
     def sum_table(self, view: int, likelihood: Singles) -> SumTable:
         """Sums over the part of a view's map (v, u) that cells cover."""
         rows, columns = self.regions[view]
-        fill_sums(likelihood[rows, columns], self._sums[view])
-        return SumTable(self._sums[view], columns.start, rows.start)
+        covered = likelihood[rows, columns]
+        fill_sums(covered, self._sums[view])
+        lowest = int(level_of(covered.min(initial=np.inf)))
+        return SumTable(self._sums[view], columns.start, rows.start, lowest)
 
     def levels(self, view: int, likelihood: Singles) -> Levels:
         """Mean levels of all cells in a view's map (v, u); see `stseg.geometry.summed_area`."""

@@ -1,9 +1,10 @@
 """The cells of a frame at which some view shows something; of all others one stands for many.
 
-Where no view shows foreground or a person, and nobody is near, every view that sees a cell has its *empty level* (0 of
-a map) and nothing hidden. What such a cell sums to depends on the set of views that see it and on nothing else. So the
-cells at which something is shown are fused one by one, and behind them one representative of each set of views, by the
-same kernels: the volume is that of all cells fused one by one, bit for bit.
+Where no view shows foreground or a person, and nobody is near, every view that sees a cell has its *empty level* (of a
+map the lowest in the frame: certain background) and nothing hidden. What such a cell sums to depends on the set of
+views that see it and on nothing else. So the cells at which something is shown are fused one by one, and behind them
+one representative of each set of views, by the same kernels: the volume is that of all cells fused one by one, bit for
+bit.
 
 Blocks of cells, not cells, are asked whether something is shown: the box around a block's footprints in each view, by
 the summed-area tables that hold the likelihoods and the people's pixels.
@@ -23,8 +24,10 @@ from stseg.geometry.cell_means import SumTable
 from stseg.geometry.sampling import Footprints
 from stseg.geometry.summed_area import sum_of
 
-SIDE = 8
+SIDE = 4
 """Cells along the side of a block."""
+_NEARLY_ALL = 0.75
+"""Share of blocks from which all are taken: to list cells anew in each frame would cost more than to fuse the rest."""
 _MOST_PIXELS = 1 << 20
 """Pixels up to which a sum of levels fits into 32 bits; blocks with more are taken to show something."""
 _CODES = 60
@@ -141,7 +144,9 @@ class CellTables:
         views : uint8 (plane, y, x)
             Number of views that see each cell.
         """
-        if not np.array_equal(marked, self._last.marked):  # the same from frame to frame where all are, as by video
+        if marked.mean() > _NEARLY_ALL:
+            marked = np.ones_like(marked)
+        if not np.array_equal(marked, self._last.marked):
             self._last = self._cells_of(marked, views)
         _, cell, place, block, number = self._last
         beside = np.full(len(number) - len(cell), -1)
@@ -159,7 +164,7 @@ class CellTables:
 
 @kernel
 def mark_map(reach: Reach, table: SumTable, marked: Flags) -> None:
-    """Mark the blocks (plane, row, column) in whose box a view's map has a level above 0."""
+    """Mark the blocks (plane, row, column) in whose box a view's map has a level above its lowest."""
     for z in range(marked.shape[0]):
         for j in range(marked.shape[1]):
             for i in range(marked.shape[2]):
@@ -168,7 +173,7 @@ def mark_map(reach: Reach, table: SumTable, marked: Flags) -> None:
                     pixels = (np.int64(right) - left) * (np.int64(bottom) - top)
                     u, v = left - table.left, top - table.top
                     total = sum_of(table.sums, u, v, right - table.left, bottom - table.top)
-                    marked[z, j, i] = pixels > _MOST_PIXELS or total != 0
+                    marked[z, j, i] = pixels > _MOST_PIXELS or total != table.lowest * pixels
 
 
 @kernel

@@ -172,17 +172,18 @@ def fill_map(
     """Fill levels and share (n,), 1 before, of cells by a view with a map; UNSEEN where it does not see them.
 
     The level is the mean over the visible pixels of the footprint, those of other persons counted as background. It is
-    0 outside the blocks, marked bool (block,), at which the view shows something; people bool (block,) are those of
-    them at which it shows a person.
+    the map's lowest outside the blocks, marked bool (block,), at which the view shows something; people bool (block,)
+    are those of them at which it shows a person.
     """
+    lowest = np.int16(table.lowest)
     for k in range(len(cells.cell)):
-        left, top, width, height = footprint[cells.cell[k]]
+        left, top, width, height = footprint[np.uint64(cells.cell[k])]
         block = np.uint64(cells.block[k])
         if width == 0:
             levels[k] = UNSEEN
             continue
         if not marked[block]:
-            levels[k] = 0
+            levels[k] = lowest
             continue
         u, v = left - table.left, top - table.top
         total, pixels = int(sum_of(table.sums, u, v, u + width, v + height)), np.int32(width) * np.int32(height)

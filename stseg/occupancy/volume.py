@@ -186,7 +186,7 @@ class Occupancy:
         levels, share = np.empty(len(cells.near), np.int16), np.ones(len(cells.near), np.float32)
         confidence, empty = np.ones(len(cells.near), np.float32), np.int16(0)
         if view.table is not None:
-            people = view.people.reshape(-1)
+            people, empty = view.people.reshape(-1), np.int16(view.table.lowest)
             fill_map(
                 cells, marked, people, footprint, view.table, view.shown, distance, levels[:number], share[:number]
             )
