@@ -9,10 +9,11 @@ accepted are fitted to their pixels (docs/how-it-works.md, Detection).
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from stseg.arrays import Ints, ViewEvidence
+from stseg.arrays import Flags, Ints, ViewEvidence
 from stseg.config import BodyConfig, DetectionConfig, ErrorRateConfig
 from stseg.detection.box_noise_calibration import BoxNoiseCalibration
 from stseg.detection.calibrations import Calibrations
@@ -24,6 +25,7 @@ from stseg.detection.population_calibration import PopulationCalibration
 from stseg.detection.prior import Prior
 from stseg.detection.problem import Parameters
 from stseg.detection.repulsion import CORE
+from stseg.detection.residual import nearest_people, reprojection_residuals
 from stseg.detection.restart import better, is_doubtful, restarted
 from stseg.detection.result import explanation
 from stseg.detection.rim import RimCalibration
@@ -96,7 +98,7 @@ class Detector:
             BoxNoiseCalibration(rate, level),
             PopulationCalibration(self.body, rate, level),
             RimCalibration(number, self.body, self.config, rate, level),
-            ViewFailures(number, rate, level),
+            ViewFailures(number, self.body, rate, level),
         )
 
     def explain_next(
@@ -107,20 +109,20 @@ class Detector:
         predicted: PredictedTracks | None,
         proposed: Candidates | None = None,
     ) -> Explanation:
-        """Explain a session's next frame by the views that do not fail, and update what the session has learned.
+        """Explain a session's next frame by the views that are not excluded, and update what the session has learned.
 
         `frame` is its number in the recording, which says whether it is a key frame (`stseg.detection.key_frames`). A
         frame in which a view begins to fail is explained again without it.
         """
         every, failures = self.observe(seen, learned.box_noise.noise), learned.failures
+        failures.begin(predicted, self.views, every)
         shown: Sequence[ViewObservation | None] = failures.kept(every)
         if predicted is None and not self._has_boxes:
             self._look_at_rims(learned.rims, shown, learned.population.body)
-        is_key, before = frame % self._key_interval == 0, failures.failing.copy()
+        is_key = frame % self._key_interval == 0
         explained, is_searched = self._explained(learned, is_key, shown, predicted, proposed)
-        failures.learn(explained, self.views, every)
-        if (failures.excluded & ~before).any():
-            shown = failures.used(every)
+        if failures.learn(explained, self.views, every):
+            shown = failures.kept(every)
             explained, is_searched = self._explained(learned, is_key, shown, predicted, proposed)
         if self._has_boxes:
             learned.box_noise.learn(explained, self.views, shown)
@@ -130,7 +132,23 @@ class Detector:
         else:
             learned.population.let_pass()
             learned.rims.let_pass()
-        return explained
+        return (
+            self._with_excluded_residuals(explained, every, failures.excluded) if failures.excluded.any() else explained
+        )
+
+    def _with_excluded_residuals(
+        self, explained: Explanation, every: Sequence[ViewObservation | None], excluded: Flags
+    ) -> Explanation:
+        """A frame's explanation with the residuals of excluded views, too: a camera that was moved shows in them."""
+        people = explained.people
+        exact = Candidates(people.ground, people.height, people.width)
+        seen = [view if out else None for view, out in zip(every, excluded, strict=True)]
+        owners = [
+            np.zeros(0, np.int64) if own is None else nearest_people(exact, view, own)
+            for view, own in zip(self.views, seen, strict=True)
+        ]
+        measured = reprojection_residuals(exact, self.views, seen, owners)
+        return replace(explained, residual=np.where(excluded, measured, explained.residual))
 
     def _explained(
         self,

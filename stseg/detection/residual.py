@@ -52,6 +52,22 @@ def reprojection_residuals(
     return measured
 
 
+def nearest_people(people: Candidates, view: View, observation: ViewObservation) -> Ints:
+    """The person whose body's middle is nearest to that of each box, within its height, int64 (box,); -1 for none."""
+    if not len(people):
+        return np.full(len(observation.edges), -1)
+    bodies = view.table.boxes_of(people.ground, people.height)
+    away = np.hypot(*np.moveaxis(_middles(observation.edges)[:, None] - _middles(bodies), -1, 0))
+    nearest = np.nan_to_num(away, nan=np.inf).argmin(1)
+    near = away[np.arange(len(away)), nearest] < (bodies[:, 3] - bodies[:, 1])[nearest]
+    return np.asarray(np.where(near, nearest, -1))
+
+
+def _middles(edges: Floats) -> Floats:
+    """Middles of boxes (n, 4), float64 (n, 2)."""
+    return (edges[:, :2] + edges[:, 2:]) / 2
+
+
 def _of_view(people: Candidates, view: BoxView | PixelView, observation: ViewObservation, owner: Ints) -> Floats:
     """Residual of each person, float64 (n,), metres; nan for those not apart."""
     found = np.full(len(people), np.nan)

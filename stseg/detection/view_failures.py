@@ -7,11 +7,13 @@ it that is foreground, the mean over people, and the share c of all the rest, it
 
 1 for a view without errors, and 0 for one that shows nothing, everything or noise. What is seen of people counts for
 the time of a frame and person, and is forgotten quickly for J now and slowly for the usual J of the view. A view whose
-J now is less than 0.7 of its usual one fails: its evidence is left out until J has come back. The usual J stands while
+J now is less than 0.7 of its usual one fails: it is excluded until J has come back. The usual J stands while
 it fails, and counts in J now where little was seen of late, so a view without people comes back by itself.
 
 A view that never showed more, since its calibration is wrong, does not fail: the run says so afterwards. Only people
 count who would be there without the view, and whom two other views show: of two views nobody can say which one fails.
+
+A camera that is pushed still shows people: `stseg.detection.knocked_views` recognises it, and its view is excluded too.
 """
 
 from __future__ import annotations
@@ -24,11 +26,14 @@ from numpy.typing import NDArray
 
 from stseg.accelerate import kernel
 from stseg.arrays import Flags, Ints
-from stseg.config import ErrorRateConfig
+from stseg.config import BodyConfig, ErrorRateConfig
+from stseg.detection.knocked_views import KnockedViews
 from stseg.detection.views import BoxView, PixelView, ViewObservation
 from stseg.model.people import Explanation
+from stseg.model.predicted_tracks import PredictedTracks
 
-T = TypeVar("T")
+Seen = TypeVar("Seen")
+"""What a view shows: evidence, or an observation."""
 
 _LEAST = 0.7
 """Share of its usual informedness below which a view fails."""
@@ -45,12 +50,14 @@ _SHOWN = 1.0
 
 
 class ViewFailures:
-    """Informedness of each view in a session.
+    """Views of a session that fail, or are knocked: their evidence is excluded.
 
     Parameters
     ----------
     views
         Number of views.
+    body
+        Sizes of the population.
     frame_rate
         Frames per second.
     level
@@ -59,34 +66,44 @@ class ViewFailures:
     Attributes
     ----------
     failing : bool (view,)
-        Views whose evidence is left out of the next frame.
+        Views whose informedness is too small.
+    knocks
+        Views that show people beside their places.
     excluded : bool (view,)
-        Views whose evidence was left out of the last frame: those that failed before it, or began to fail in it.
+        Views that are excluded from the last frame.
     usual, recent : float64 (view, 2)
         Weight, and weighted sum of the informedness; seconds of one person.
     """
 
-    def __init__(self, views: int, frame_rate: float, level: ErrorRateConfig) -> None:
+    def __init__(self, views: int, body: BodyConfig, frame_rate: float, level: ErrorRateConfig) -> None:
         self._rate, self._level = frame_rate, level
         self.failing, self.excluded = np.zeros(views, bool), np.zeros(views, bool)
+        self.knocks = KnockedViews(views, body, frame_rate, level)
         self.usual, self.recent = np.zeros((views, 2)), np.zeros((views, 2))
 
-    def kept(self, seen: Sequence[T]) -> list[T | None]:
-        """What the views show in the next frame; None for those that fail."""
-        return _without(self.failing, seen)
+    def kept(self, seen: Sequence[Seen]) -> list[Seen | None]:
+        """What the views show; None for those that are excluded."""
+        return [None if out else view for out, view in zip(self.excluded, seen, strict=True)]
 
-    def used(self, seen: Sequence[T]) -> list[T | None]:
-        """What the views showed in the last frame; None for those that were left out of its explanation."""
-        return _without(self.excluded, seen)
+    def begin(
+        self,
+        predicted: PredictedTracks | None,
+        views: Sequence[BoxView | PixelView],
+        observations: Sequence[ViewObservation | None],
+    ) -> None:
+        """Exclude views from the next frame, before it is explained; `observations` are those of all views."""
+        if predicted is not None:
+            self.knocks.compare(predicted, views, observations)
+        self.excluded = self.failing | self.knocks.knocked
 
     def learn(
         self,
         explanation: Explanation,
         views: Sequence[BoxView | PixelView],
         observations: Sequence[ViewObservation | None],
-    ) -> None:
-        """Count one frame; `observations` are those of all views, failing ones too."""
-        people, before = explanation.people, self.failing.copy()
+    ) -> bool:
+        """Count one frame by its explanation; whether more views are excluded from it now."""
+        people = explanation.people
         shows = np.nan_to_num(people.view_evidence) >= _SHOWN
         for k, (view, observation) in enumerate(zip(views, observations, strict=True)):
             if observation is None:
@@ -94,7 +111,9 @@ class ViewFailures:
             without = people.evidence - np.nan_to_num(people.view_evidence[k])
             sure = (without >= self._level.minimum_evidence) & (shows.sum(0) - shows[k] >= _OTHERS)
             self._count(k, *informedness(explanation.pixel_assignment[k], sure, view.foreground(observation)))
-        self.excluded = before | self.failing
+        begins = self.failing & ~self.excluded
+        self.excluded |= begins
+        return bool(begins.any())
 
     def _count(self, k: int, number: int, informedness: float) -> None:
         """Count what view k shows of a number of people."""
@@ -106,12 +125,8 @@ class ViewFailures:
             usual = total / known
             weight, total = self.recent[k] + _EXPECTED * np.array([1.0, usual])
             self.failing[k] = total / weight < _LEAST * usual
-        if not self.failing[k]:
+        if not (self.failing[k] or self.knocks.knocked[k]):
             self.usual[k] = self.usual[k] * np.exp(-1 / (self._rate * self._level.memory)) + own
-
-
-def _without(left_out: Flags, seen: Sequence[T]) -> list[T | None]:
-    return [None if out else view for out, view in zip(left_out, seen, strict=True)]
 
 
 def informedness(assignment: NDArray[np.int16], sure: Flags, foreground: Flags) -> tuple[int, float]:

@@ -100,8 +100,8 @@ class Session:
         with self.watch.time("ghosts"):
             proposed = self.pipeline.proposals.of(failures.kept(evidence), self._fuse_with_current_rates)
             explanation = self.pipeline.detector.explain_next(self._learned, frame, evidence, predicted, proposed)
-        events = self._excluded.events(frame, frame_set.views, evidence, failures.excluded)
-        used = failures.used(evidence)
+        events = self._excluded.events(frame, frame_set.views, evidence, failures)
+        used = failures.kept(evidence)
         fusion = self._submit(frame, used, explanation, noise)
         with self.watch.time("appearance"):
             appearance = self.pipeline.appearance_rows(frame, explanation, frame_set.views, used, frame_set.images)
