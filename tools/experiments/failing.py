@@ -73,9 +73,11 @@ def recordings(asked: argparse.Namespace) -> Iterator[tuple[str, Recorded]]:
     for kind in ("masks", "colour", "boxes"):
         yield f"easy, {kind}", filmed(easy, kind)(FRAMES)
     yield "easy, 3 cameras, masks", filmed(replace(easy, cameras=3, seed=31), "masks")(FRAMES)
-    shown = crowd(8, 4, FRAMES / 10, seed=77)
-    yield "crowd of 8, masks", Recorded(shown.rig, shown.truth, list(shown.spoiled([], False)))
-    yield "crowd of 8, boxes", Recorded(shown.rig, shown.truth, list(shown.spoiled([], True)))
+    for cameras, seed in ((4, 77), (3, 131)):
+        shown = crowd(8, cameras, FRAMES / 10, seed=seed)
+        for kind, by_boxes in (("masks", False), ("boxes", True)):
+            made = Recorded(shown.rig, shown.truth, list(shown.spoiled([], by_boxes)))
+            yield f"crowd of 8, {cameras} cameras, {kind}", made
     if asked.uu4 is not None:
         shown = recorded(asked.uu4, asked.uu4_truth, 0, FRAMES)
         yield "uu4, masks", Recorded(shown.rig, shown.truth, [tuple(v.mask for v in views) for views in shown.frames])
