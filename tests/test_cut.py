@@ -25,7 +25,8 @@ from stseg.graphcut.arcs import in_place, in_rows
 from stseg.graphcut.cut import Storage, minimum_cut
 from stseg.graphcut.energy import QUANTUM, Energy
 from stseg.graphcut.pymaxflow import grid_cut
-from stseg.graphcut.reduction import OCCUPIED, OPEN, reduce
+from stseg.graphcut.reduction import reduce
+from stseg.graphcut.sign_sets import OCCUPIED, OPEN
 from stseg.graphcut.solvers import SOLVERS, find_solver
 from stseg.graphcut.sparse import MOST, sparse_cut
 from stseg.segmentation.cell_motion import successor_cells

@@ -110,5 +110,5 @@ def test_more_candidates_have_the_evidence_of_a_pool_that_is_made_whole(seed: in
 def test_sure_members_are_not_sought_again() -> None:
     seen = [boxes(camera, people((-1, -1), (1, 1))) for camera in room().cameras]
     before = of_tracks(seen, expecting((-1, -1), (1, 1)))
-    assert (before.losses() > 12).all()
+    assert (before.losses > 12).all()
     assert restarted(before, detector().lattice_ground) is before

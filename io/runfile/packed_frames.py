@@ -1,13 +1,15 @@
 """Volumes of frames as a run file packs them: each frame one chunk, shuffled by bytes and deflated.
 
-They are packed here instead of by HDF5, which matches runs alone: a volume packs smaller and in three quarters of the
-time. Threads may pack frames side by side, and what is packed is copied from file to file.
+They are packed here instead of by HDF5, which matches runs alone: a volume packs smaller and in half of the time.
+Threads may pack frames side by side, and what is packed is copied from file to file. Most bytes of a significance are 0
+in the whole frame (labels are small, log-odds are rounded); these are deflated once for all frames.
 """
 
 from __future__ import annotations
 
 import math
 import zlib
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +17,8 @@ import numpy as np
 from stseg.arrays import AnyArray, Ints, Labels
 
 _LEVEL, _WINDOW, _MEMORY = 1, 15, 9
+_HEADER, _END = b"\x78\x01", b"\x03\x00"
+"""What comes before and after the blocks of a stream (RFC 1950): a header for `_WINDOW`, and an empty last block."""
 
 
 class PackedFrame(NamedTuple):
@@ -50,9 +54,25 @@ class PackedVolumes(NamedTuple):
 
 def packed_frame(values: AnyArray) -> PackedFrame:
     """A frame (plane, y, x), of the type in the file, as HDF5's filters shuffle and deflate unpack it."""
-    by_significance = np.ascontiguousarray(values).reshape(-1, 1).view(np.uint8).T
-    deflate = zlib.compressobj(_LEVEL, zlib.DEFLATED, _WINDOW, _MEMORY, zlib.Z_RLE)
-    return PackedFrame(0, deflate.compress(by_significance.tobytes()) + deflate.flush())
+    whole = np.ascontiguousarray(values).reshape(-1)
+    used = np.bitwise_or.reduce(whole.view(f"u{whole.itemsize}"), keepdims=True).view(np.uint8) != 0
+    blocks, checksum = [_HEADER], 1
+    for own, is_used in zip(whole.reshape(-1, 1).view(np.uint8).T, used.tolist(), strict=True):
+        shown = own.tobytes() if is_used else bytes(len(own))
+        blocks.append(_blocks(shown) if is_used else _blocks_of_zeros(len(own)))
+        checksum = zlib.adler32(shown, checksum)
+    return PackedFrame(0, b"".join([*blocks, _END, checksum.to_bytes(4, "big")]))
+
+
+def _blocks(values: bytes) -> bytes:
+    """Blocks of a deflated stream (RFC 1951) that depend on none before and are not the last."""
+    deflate = zlib.compressobj(_LEVEL, zlib.DEFLATED, -_WINDOW, _MEMORY, zlib.Z_RLE)
+    return deflate.compress(values) + deflate.flush(zlib.Z_FULL_FLUSH)
+
+
+@lru_cache(maxsize=8)
+def _blocks_of_zeros(number: int) -> bytes:
+    return _blocks(bytes(number))
 
 
 def unpacked_label(packed: PackedFrame, shape: tuple[int, ...]) -> Labels:

@@ -9,12 +9,13 @@ score relative to the median of the others: where all fall at once, the scene ch
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import cv2
 import numpy as np
 from scipy.fft import irfft2, rfft2
 
-from stseg.arrays import Bytes, Floats
+from stseg.arrays import Bytes, Floats, Singles
 
 _LEAST = 20
 """Least number of scored frames on either side of a step."""
@@ -75,18 +76,19 @@ def background_shift(background: Bytes, image: Bytes) -> Floats:
         Of one size.
     """
     # With SciPy's transforms: OpenCV's differ in the last digits from one call to the next.
-    one, other = (rfft2(_edges(picture) * _window(picture.shape[:2])) for picture in (background, image))
+    one, other = (rfft2(_edges(picture) * _window(*picture.shape[:2])) for picture in (background, image))
     crossed = np.conj(one) * other
-    likeness = irfft2(crossed / np.maximum(np.abs(crossed), 1e-12), image.shape[:2])
+    likeness = irfft2(crossed / np.maximum(np.abs(crossed), np.float32(1e-12)), image.shape[:2])
     return _peak(np.asarray(likeness))
 
 
-def _window(shape: tuple[int, ...]) -> Floats:
+@lru_cache(maxsize=8)  # shapes of a rig's images
+def _window(rows: int, columns: int) -> Singles:
     """Hann window: the image's borders would otherwise count as edges that do not move."""
-    return np.asarray(np.outer(*(np.hanning(side) for side in shape)))
+    return np.outer(np.hanning(rows), np.hanning(columns)).astype(np.float32)
 
 
-def _peak(likeness: Floats) -> Floats:
+def _peak(likeness: Singles) -> Floats:
     """Sub-pixel position (u, v) of the correlation peak: the centroid around the highest pixel."""
     middle = np.array(likeness.shape) // 2
     centred = np.roll(likeness, tuple(middle), (0, 1))
@@ -98,9 +100,9 @@ def _peak(likeness: Floats) -> Floats:
     return np.asarray(centre - middle[::-1])
 
 
-def _edges(image: Bytes) -> Floats:
+def _edges(image: Bytes) -> Singles:
     grey = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
-    across, down = (np.asarray(cv2.Sobel(grey, cv2.CV_16S, *step), float) for step in ((1, 0), (0, 1)))
+    across, down = (np.asarray(cv2.Sobel(grey, cv2.CV_16S, *step), np.float32) for step in ((1, 0), (0, 1)))
     # The fourth root, so that strong edges count little more than weak ones. Roots are rounded exactly, logarithms are
     # not: equal pictures give equal results to the last bit.
     return np.asarray(np.sqrt(np.sqrt(across**2 + down**2)))

@@ -82,8 +82,8 @@ def _is_decided(tracked: MapEstimate) -> bool:
     """Whether all members continue tracks, and no track is nearly accepted or nearly rejected."""
     return bool(
         (tracked.track_index >= 0).all()
-        and (tracked.losses() >= _SURE).all()
-        and (tracked.additions(tracked.others).gain <= -_SURE).all()
+        and (tracked.losses >= _SURE).all()
+        and (tracked.other_additions.gain <= -_SURE).all()
     )
 
 

@@ -192,6 +192,12 @@ class MapEstimate:
         outside[self.members] = False
         return np.flatnonzero(outside)
 
+    @cached_property
+    def other_additions(self) -> Additions:
+        """What each of the candidates outside the set would add to it."""
+        return self.additions(self.others)
+
+    @cached_property
     def losses(self) -> Floats:
         """What the score loses without each member, nats, float64 (n,)."""
         without = np.empty(len(self.members))
@@ -202,7 +208,7 @@ class MapEstimate:
         """Candidates outside the set, the best of each place, best first: int64 (n,)."""
         apart = 2 * self.evidence.prior.config.lattice_spacing
         others = self.others
-        gain = self.additions(others).gain
+        gain = self.other_additions.gain
         order, count = others[np.argsort(-gain, kind="stable")], len(self.members)
         standing = np.concatenate([self.members, np.empty(len(others), np.int64)])
         number = _keep_apart(self.pool.ground, order, apart, standing, count)
@@ -233,10 +239,9 @@ class MapEstimate:
                 box_view += 1
             else:
                 columns = problem.pixels.raster.shape[2]
-                scratch[: view.shape[0] * columns] = -1
-                pixel_score(pixel_view, self.members, count, problem.pixels, problem.parameters, scratch, view_evidence)
-                owner = scratch[: view.shape[0] * columns].reshape(-1, columns)
-                pixels = owner[:, : view.shape[1]].copy()
+                owner = np.full(view.shape[0] * columns, -1, np.int64)
+                pixel_score(pixel_view, self.members, count, problem.pixels, problem.parameters, owner, view_evidence)
+                pixels = np.ascontiguousarray(owner.reshape(-1, columns)[:, : view.shape[1]])
                 pixel_view += 1
             assigned.append((boxes, pixels))
         return assigned

@@ -46,12 +46,12 @@ def better(estimate: MapEstimate, trial: MapEstimate) -> MapEstimate:
 
 def is_doubtful(estimate: MapEstimate) -> bool:
     """Whether an estimate has members who would be put aside."""
-    return bool((estimate.losses() < _DOUBTFUL).any())
+    return bool((estimate.losses < _DOUBTFUL).any())
 
 
 def _from_sure_members(estimate: MapEstimate, lattice_ground: Floats) -> MapEstimate:
     """A search that begins with the sure members; twice, the second time with places refined."""
-    sure = estimate.members[estimate.losses() >= _DOUBTFUL]
+    sure = estimate.members[estimate.losses >= _DOUBTFUL]
     if len(sure) == len(estimate.members):
         return estimate
     fresh = lattice_candidates(estimate.with_members(sure), lattice_ground)

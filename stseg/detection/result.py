@@ -32,7 +32,7 @@ def explanation_by(estimate: MapEstimate, refined: RefinedPeople) -> Explanation
     ground = _outside_core(refined.pool.ground, members, estimate.problem)
     exact = Candidates(ground, refined.known.height, refined.known.width)
     people = People(
-        exact.ground, exact.height, exact.width, refined.covariance, estimate.losses(), score.view_evidence,
+        exact.ground, exact.height, exact.width, refined.covariance, estimate.losses, score.view_evidence,
         _visibility(estimate), _prior(estimate, members, estimate.track_index), estimate.track_index, refined.sizes,
     )  # fmt: skip
     assigned = [
@@ -94,7 +94,7 @@ def _ghosts(estimate: MapEstimate) -> People:
     """The rejected candidates, each with what it would add to the set."""
     config, body = estimate.evidence.prior.config, estimate.evidence.prior.body
     rejected = estimate.others
-    added = estimate.additions(rejected)
+    added = estimate.other_additions
     pool, births = estimate.pool.at(rejected), np.full(len(rejected), -1, np.int64)
     covariance = np.tile(np.eye(2) * config.lattice_spacing**2 / 12, (len(rejected), 1, 1))
     prior, sizes = _prior(estimate, rejected, added.track_index), Sizes.of_population(len(rejected), body)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -73,7 +74,7 @@ class Camera:
         """The 3x4 matrix [h1 h2 av h3], metres to (undistorted) pixels."""
         return np.column_stack([self.ground[:, :2], self.vertical, self.ground[:, 2]])
 
-    @property
+    @cached_property
     def centre(self) -> Floats:
         """The camera's centre in metres (x, y, z), float64 (3,)."""
         return np.asarray(-np.linalg.solve(self.projection[:, :3], self.projection[:, 3]))

@@ -13,7 +13,8 @@ from stseg.arrays import AnyArray, Bytes, Ints, Labels
 from stseg.graphcut.graph import Graph
 from stseg.graphcut.lattice import Lattice, neighbour
 from stseg.graphcut.parallel_max_flow import Bridges
-from stseg.graphcut.reduction import OPEN, Reduction
+from stseg.graphcut.reduction import Reduction
+from stseg.graphcut.sign_sets import OPEN
 
 
 def in_rows(reduced: Reduction, middle: int) -> tuple[Graph, Bridges]:

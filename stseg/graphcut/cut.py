@@ -13,7 +13,8 @@ from stseg.graphcut.energy import Energy
 from stseg.graphcut.graph import Graph
 from stseg.graphcut.lattice import cells
 from stseg.graphcut.parallel_max_flow import Bridges, solve, solve_halves
-from stseg.graphcut.reduction import OCCUPIED, Reduction, reduce
+from stseg.graphcut.reduction import Reduction, reduce
+from stseg.graphcut.sign_sets import OCCUPIED
 
 DENSE = 0.5
 """Share of undecided cells from which the graph is stored in place: renumbered rows would take twice the memory."""

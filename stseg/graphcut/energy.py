@@ -17,6 +17,7 @@ import numpy as np
 from stseg.accelerate import kernel
 from stseg.arrays import AnyArray, Bytes, Flags, Ints, Labels
 from stseg.graphcut.lattice import Lattice, lattice_of, neighbour, spread
+from stseg.graphcut.sign_sets import SignSets, sign_sets
 
 QUANTUM = 1e-3
 """One unit of capacity, nats."""
@@ -51,6 +52,11 @@ class Energy:
     def lattice(self) -> Lattice:
         """Numbering of the cells, and their neighbours."""
         return lattice_of(self.unary.shape, self.offsets, self.successor)
+
+    @cached_property
+    def signs(self) -> SignSets:
+        """The cells whose label their sign tells."""
+        return sign_sets(self.unary, self.lattice, self.capacity, self.present)
 
     def spread(self, values: AnyArray) -> AnyArray:
         """Values of cells (time, plane, y, x) at their nodes, 0 at guards and where there is no cell; (node,)."""

@@ -49,7 +49,7 @@ class SparseVolume:
 
     def occupied_places(self) -> Ints:
         """Ground cells (k,), in the flattened ground, above which log-odds are above 0."""
-        places = self.place[self.value > 0]
+        places = self.cell[self.value > 0] % np.int32(self.of_cell[0].size)
         sets = np.flatnonzero(self.empty > 0)
         if len(sets):
             places = np.append(places, np.flatnonzero(np.isin(self.of_cell, sets).any(0)))

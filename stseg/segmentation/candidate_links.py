@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from stseg.accelerate import kernel
 from stseg.arrays import Floats, Ints
 from stseg.config import BodyConfig, MotionConfig
 from stseg.model.sizes import log_heavy_tailed
@@ -78,28 +79,12 @@ class LinkModel:
     body: BodyConfig
 
     def between(self, found: WindowCandidates, birth: Floats, death: Floats) -> Links:
-        """Possible links and b; those that gain nothing are left out.
-
-        Frame by frame: a window's pairs all at once would take more memory than its volume.
-        """
-        span = max(1, round(self.patience * self.frame_rate))
-        ends = np.searchsorted(found.frame, np.arange(found.frame[-1] + 2))
-        each = []
-        for first, stop, last in zip(ends, ends[1:], ends[1 + span :].tolist() + [len(found)] * span, strict=False):
-            start, end = np.meshgrid(np.arange(first, stop), np.arange(stop, last), indexing="ij")
-            each.append(self._worthwhile(found, start.ravel(), end.ravel(), birth, death))
-        start, end, bonus = (np.concatenate(part) for part in zip(*each, strict=True))
-        return start, end, bonus
-
-    def _worthwhile(self, found: WindowCandidates, start: Ints, end: Ints, birth: Floats, death: Floats) -> Links:
-        """Those of some pairs of candidates whose link gains something."""
+        """Possible links and b; those that gain nothing are left out."""
+        start, end = self._near(found)
         seconds = (found.frame[end] - found.frame[start]) / self.frame_rate
         off = found.ground[end] - found.ground[start]
         noise = 2 * self.motion.position_noise**2 + (self.motion.speed_spread * seconds) ** 2
         spread = found.covariance[start] + found.covariance[end] + noise[:, None, None] * np.eye(2)
-        # The square distance is at least that by the sum of both variances: most pairs need no inverse.
-        near = np.einsum("ei,ei->e", off, off) < _GATE * np.trace(spread, axis1=1, axis2=2)
-        start, end, seconds, off, spread = start[near], end[near], seconds[near], off[near], spread[near]
         square = np.einsum("ei,eij,ej->e", off, np.linalg.inv(spread), off)
         place = np.log(_RESOLUTION**2 / np.sqrt(np.linalg.det(spread))) - 0.5 * square
         absence = _ABSENCE * (seconds - 1 / self.frame_rate)
@@ -108,6 +93,16 @@ class LinkModel:
         kept = (bonus > 0) & (square < _GATE)
         return start[kept], end[kept], bonus[kept]
 
+    def _near(self, found: WindowCandidates) -> tuple[Ints, Ints]:
+        """Pairs within a patience and the gate: a window's pairs would take more memory than its volume."""
+        span = max(1, round(self.patience * self.frame_rate))
+        noise, speed = 2 * self.motion.position_noise**2, self.motion.speed_spread / self.frame_rate
+        number = _fill_near(found.frame, found.ground, found.covariance, span, noise, speed, np.empty((0, 2), np.int64))
+        pair = np.empty((number, 2), np.int64)
+        _fill_near(found.frame, found.ground, found.covariance, span, noise, speed, pair)
+        start, end = pair.T
+        return start, end
+
     def _height_ratio(self, found: WindowCandidates, start: Ints, end: Ints) -> Floats:
         """Log-ratio of a height as the continuation of another against the population, nats."""
         spread, error = self.body.height_spread, self.body.height_spread / 2
@@ -115,3 +110,39 @@ class LinkModel:
         anybody = log_heavy_tailed((found.height[end] - self.body.height_mean) / spread)
         ratio = np.log(spread / error) - 0.5 * (off / error) ** 2 - anybody
         return np.asarray(np.maximum(ratio, _OUT_OF_SHAPE))
+
+
+@kernel
+def _fill_near(
+    frame: Ints, ground: Floats, covariance: Floats, span: int, noise: float, speed: float, pair: Ints
+) -> int:  # fmt: skip
+    """Fill pair (pair, 2), as far as it reaches, with candidates that may be linked; the number of these pairs.
+
+    Parameters
+    ----------
+    frame, ground, covariance
+        As of `WindowCandidates`.
+    span
+        Most frames between two that are linked.
+    noise
+        Variance of the distance between two places of somebody who stands, square metres.
+    speed
+        Standard deviation of a step, metres a frame.
+    """
+    found = 0
+    for i in range(len(frame)):
+        x, y = ground[i]
+        own = covariance[i, 0, 0] + covariance[i, 1, 1] + 2.0 * noise
+        for j in range(i + 1, len(frame)):
+            frames = frame[j] - frame[i]
+            if frames > span:
+                break
+            if frames == 0:
+                continue
+            # The square distance is at least that by the sum of both variances: most pairs need no inverse.
+            spread = own + covariance[j, 0, 0] + covariance[j, 1, 1] + 2.0 * (speed * frames) * (speed * frames)
+            if (ground[j, 0] - x) ** 2 + (ground[j, 1] - y) ** 2 < _GATE * spread:
+                if found < len(pair):
+                    pair[found, 0], pair[found, 1] = i, j
+                found += 1
+    return found

@@ -1,7 +1,7 @@
 """Patches of the ground around people, side by side: a window is cut there alone, with the labels of the whole ground.
 
 Let R be a part of a window's cells that holds all cells with u > 0, and G the greatest empty set (the set rule of
-`stseg.graphcut.reduction`) of the energy on R alone, its edges to other cells left out. If every cell of R with an edge
+`stseg.graphcut.sign_sets`) of the energy on R alone, its edges to other cells left out. If every cell of R with an edge
 to a cell outside R is in G, then G and all cells outside R together obey the set rule in the whole energy: the cells of
 G have no edges but those within R and some into the set, the cells outside R have u <= 0 and edges into the set alone.
 So all cells outside R have label 0 in the minimum with the smallest source set. Conversely, what the whole energy's

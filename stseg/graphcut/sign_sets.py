@@ -1,0 +1,107 @@
+"""Cells whose optimal label their sign tells, in sets.
+
+Let every cell of a set S have u <= 0 and -u at least the sum of its capacities to cells outside S. Then label 1 for any
+subset of S gains nothing, so all of S has label 0 in the minimum with the smallest source set. The greatest such set is
+found by removing violating cells from {u <= 0} until none is left. The mirror rule gives label 1.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stseg.accelerate import kernel, part
+from stseg.arrays import Bytes, Flags, Labels
+from stseg.graphcut.lattice import Lattice, cells, neighbour
+
+GUARD, OPEN, OCCUPIED, EMPTY = 0, 1, 2, 3
+"""States of a node: no cell, undecided, label 1, label 0."""
+
+
+@dataclass(frozen=True)
+class SignSets:
+    """The greatest sets of both signs.
+
+    Attributes
+    ----------
+    state : uint8 (node,)
+        State of each node; not to be written to.
+    weak
+        Number of cells with u <= 0 whose unary term is less than all their capacities.
+    """
+
+    state: Bytes
+    weak: int
+
+
+def sign_sets(unary: Labels, lattice: Lattice, capacity: Labels, present: Flags | None) -> SignSets:
+    """The greatest sets of an energy; unary, capacity and present as of `stseg.graphcut.energy.Energy`."""
+    arcs, shape, nodes = np.repeat(capacity, 2), unary.shape, len(lattice.forward)
+    state, margin = np.zeros(nodes, np.uint8), np.zeros(nodes, np.int32)
+    weak = _fill_sets(unary, int(arcs.sum()), cells(state, shape), cells(margin, shape))
+    if present is not None:
+        cells(state, shape)[..., ~present] = GUARD
+    _decide_sets(margin, state, lattice, arcs, np.empty(nodes, np.int32))
+    return SignSets(state, weak)
+
+
+@kernel
+def _fill_sets(unary: Labels, most: int, state: Bytes, margin: Labels) -> int:
+    """Fill the sets of all cells by sign, and their unary magnitudes, (time, plane, y, x); number of weak ones.
+
+    Of several minima the smallest source set is wanted, so a tie decides for label 0 only.
+    """
+    frames, planes, rows, columns = unary.shape
+    weak = 0
+    for t in range(frames):
+        for p in range(planes):
+            for y in range(rows):
+                for x in range(columns):
+                    gain = unary[t, p, y, x]
+                    state[t, p, y, x] = OCCUPIED if gain > 0 else EMPTY
+                    margin[t, p, y, x] = gain - 1 if gain > 0 else -gain
+                    weak += 1 if -most < gain <= 0 else 0
+    return weak
+
+
+@part
+def _decide_sets(margin: Labels, state: Bytes, lattice: Lattice, capacity: Labels, stack: Labels) -> None:
+    """Start from the sets of all nodes by sign, and remove those that violate the set rule.
+
+    `margin` is a node's unary magnitude less its capacities to nodes outside its set.
+    """
+    for node in range(len(state)):
+        if state[node] == OCCUPIED:
+            for slot in range(len(capacity)):
+                to = neighbour(node, slot, lattice)
+                if state[to] == OPEN or state[to] == EMPTY:
+                    margin[node] -= capacity[slot]
+                    margin[to] -= capacity[slot]
+                    if state[to] == EMPTY and margin[to] < 0:
+                        _remove_from_set(to, margin, state, lattice, capacity, stack)
+    for node in range(len(state)):
+        if state[node] == OCCUPIED and margin[node] < 0:
+            _remove_from_set(node, margin, state, lattice, capacity, stack)
+
+
+@part
+def _remove_from_set(
+    node: int, margin: Labels, state: Bytes, lattice: Lattice, capacity: Labels, stack: Labels
+) -> None:
+    """Remove a node from its set, and all that violate the rule without it."""
+    side = state[node]
+    state[node] = OPEN
+    stack[0] = node
+    top = 1
+    while top > 0:
+        top -= 1
+        taken = stack[top]
+        for slot in range(len(capacity)):
+            to = neighbour(taken, slot, lattice)
+            if state[to] == side:
+                margin[to] -= capacity[slot]
+                if margin[to] < 0:
+                    state[to] = OPEN
+                    stack[top] = to
+                    top += 1
