@@ -315,7 +315,8 @@ class TestCommand:
     def test_pairs_names_sources_polygon(self, calibrations: list[str]) -> None:
         Path("in.xml").write_text(xml(camera_matrix=MATRIX, distortion_coefficients=np.zeros(5)))
         Path("ex.xml").write_text(xml(rvec=ROTATION, tvec=TRANSLATION))
-        boxes = ("--sources=a.txt,b.txt", "--source-kind=boxes", "--first-frame=1")
+        kept = ("--first-frame=1", "--score=0.3", "--appearance={name}.npy")
+        boxes = ("--sources=a.txt,b.txt", "--source-kind=boxes", *kept)
         scene = (*SCENE, "--polygon=-1,0.5,1,0.5,1,3", "--scene=hall", "--names=a,b")
         calibrate("opencv", "in.xml+ex.xml", calibrations[0], *scene, *boxes, "-o=room.toml")
         recording = read_rig("room.toml")
@@ -324,6 +325,8 @@ class TestCommand:
         assert recording.rig.grid.polygon is not None and len(recording.rig.grid.polygon) == 3
         assert recording.sources[1].source.path == Path("b.txt")
         assert recording.sources[1].source.first_frame == 1
+        assert recording.sources[1].source.least_score == 0.3
+        assert recording.sources[1].source.appearance == Path("b.npy")
 
     def test_matrices(self, calibrations: list[str]) -> None:
         np.savetxt("p.txt", matrix_of(MATRIX, ROTATION, TRANSLATION), fmt="%.17g")
@@ -357,6 +360,8 @@ class TestCommand:
             ("--sources=a,b", ConfigError, r"found both or neither"),
             ("--source-pattern=a.avi", ConfigError, r"--source-pattern: found 'a.avi', expected a path with"),
             ("--first-frame=1", ConfigError, r"--first-frame: found --source-kind video"),
+            ("--score=0.3", ConfigError, r"--score: found --source-kind video"),
+            ("--appearance={name}.npy", ConfigError, r"--appearance: found --source-kind video"),
             ("--cell=0", RigError, r"grid.cell: found 0.0"),
             ("--up=y", CycloptsError, r"--up"),
         ],
@@ -366,6 +371,11 @@ class TestCommand:
     ) -> None:
         with pytest.raises(kind, match=complaint):
             calibrate("opencv", *calibrations, *SCENE, *SOURCE, "-o=room.toml", token)
+        assert not Path("room.toml").exists()
+
+    def test_score_out_of_range(self, calibrations: list[str]) -> None:
+        with pytest.raises(ConfigError, match=r"--score: found 30.0, expected a number of 0..1"):
+            calibrate("opencv", *calibrations, *SCENE, *SOURCE, "--source-kind=boxes", "--score=30", "-o=room.toml")
         assert not Path("room.toml").exists()
 
     def test_which_files(self, calibrations: list[str]) -> None:

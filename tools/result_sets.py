@@ -82,6 +82,8 @@ _ROOM = "--size 644,486 --unit mm --up=-z --area=-2.5,-4.5,2.5,1.5"
 _ROOM_1 = "--size 644,486 --unit mm --up=-z --area=-2.5,-3,2.5,2"
 _CMC = "--names Cam1,Cam2,Cam3,Cam4 --size 1920,1024 --unit m --area=0,-0.4,7.67,3.6 --frame-rate 4"
 _FASTER_RCNN, _FAIRMOT = "a detector's boxes, without scores", "another detector's boxes, with scores"
+_FAIRMOT_BOXES = "'$DATA/cmc/fairmot/CMC2_{name}.csv'"
+_FAIRMOT_FEATURES = f"{_FAIRMOT_BOXES} --score 0.3 --appearance '$DATA/cmc/fairmot/CMC2_{{name}}_appearance.npy'"
 _CMC_AREA = "--area=1.9,-0.3,6.2,3.5"
 _WILDTRACK_VIEWS = ("CVLab1", "CVLab2", "CVLab3", "CVLab4", "IDIAP1", "IDIAP2", "IDIAP3")
 _WILDTRACK_FILES = " ".join(
@@ -198,7 +200,9 @@ _ALL = (
     ),
     _cmc("cmc1", _FASTER_RCNN, "'$DATA/cmc/DET_CMC1_{name}.txt' --first-frame 1", "3 people"),
     _cmc("cmc2", _FASTER_RCNN, "'$DATA/cmc/DET_CMC2_{name}.txt' --first-frame 1", "up to 10 people"),
-    _cmc("cmc2_fairmot", _FAIRMOT, "'$DATA/cmc/fairmot/CMC2_{name}.csv'", "up to 10 people"),
+    _cmc("cmc2_fairmot", _FAIRMOT, _FAIRMOT_BOXES, "up to 10 people"),
+    _cmc("cmc2_fairmot_03", f"{_FAIRMOT} of 0.3 at least", f"{_FAIRMOT_BOXES} --score 0.3", "up to 10 people"),
+    _cmc("cmc2_fairmot_features", f"{_FAIRMOT} of 0.3 at least, and features", _FAIRMOT_FEATURES, "up to 10 people"),
     _wildtrack("wildtrack", "detector-like boxes with scores", "$DATA/wildtrack/detector"),
     _wildtrack(
         "wildtrack_annotated",

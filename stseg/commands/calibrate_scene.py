@@ -64,6 +64,10 @@ class StreamOptions:
     """Kind of the frames."""
     first_frame: int | None = None
     """Number of the first frame in boxes files; without it, 0."""
+    score: float | None = None
+    """Least score of boxes that are kept, 0..1; without it, all are."""
+    appearance: Annotated[str | None, Parameter(metavar="PATTERN")] = None
+    """Path of the appearance features beside every camera's boxes, `{name}` standing for the camera's name."""
     background: Annotated[str | None, Parameter(metavar="PATTERN")] = None
     """Path of every camera's view of the empty scene, `{name}` standing for the camera's name."""
     background_kind: Literal["video", "images"] = "video"
@@ -71,13 +75,25 @@ class StreamOptions:
 
     def of(self, names: Sequence[str]) -> tuple[CameraSource, ...]:
         """The streams of these cameras."""
-        if self.first_frame is not None and self.source_kind != "boxes":
-            raise ConfigError(
-                "--first-frame", "", f"--source-kind {self.source_kind}", "boxes: frames count from 0 else"
-            )
+        self._require_boxes()
+        if self.score is not None and not 0 <= self.score <= 1:
+            raise ConfigError("--score", "", repr(self.score), "a number of 0..1")
         return tuple(
-            CameraSource(Source(self.source_kind, path, self.first_frame or 0), self._background_of(name))
+            CameraSource(self._source_of(name, path), self._background_of(name))
             for name, path in zip(names, self._paths(names), strict=True)
+        )
+
+    def _require_boxes(self) -> None:
+        """Refuse options of boxes beside other frames."""
+        given = {"--first-frame": self.first_frame, "--score": self.score, "--appearance": self.appearance}
+        for option, value in given.items():
+            if value is not None and self.source_kind != "boxes":
+                raise ConfigError(option, "", f"--source-kind {self.source_kind}", "boxes")
+
+    def _source_of(self, name: str, path: Path) -> Source:
+        appearance = None if self.appearance is None else _filled(self.appearance, name)
+        return Source(
+            self.source_kind, path, self.first_frame or 0, least_score=self.score or 0.0, appearance=appearance
         )
 
     def _paths(self, names: Sequence[str]) -> list[Path]:
