@@ -88,6 +88,16 @@ def test_the_whole_frame_is_searched_where_something_is_open(
 
 
 @pytest.mark.parametrize("kind", KINDS)
+def test_who_lingers_beyond_the_border_needs_no_search(kind: str) -> None:
+    everybody = (*HERE, (room().grid.x[1] + 0.05, 0.4, 1.75))
+    answer = explained(kind, BETWEEN, people(*everybody), expecting(*everybody))
+    assert not is_searched(answer)
+    who = answer.people.track_index
+    assert sorted(who.tolist()) == [0, 1, 2]
+    np.testing.assert_allclose(answer.people.ground, people(*everybody)[who, :2], atol=0.04)
+
+
+@pytest.mark.parametrize("kind", KINDS)
 def test_who_is_clearly_gone_needs_no_search(kind: str) -> None:
     answer = explained(kind, BETWEEN, people(*HERE), expecting(*HERE, (1.2, 1.2)))
     assert sorted(answer.people.track_index.tolist()) == [0, 1]

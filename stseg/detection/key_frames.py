@@ -9,6 +9,9 @@ something may be decided otherwise. The best set of the predicted tracks alone i
 - no two members are so near that they touch, their places being uncertain by `_EXPECTED`,
 - and every member stands within `_EXPECTED` of its track's prediction.
 
+Somebody whose track is predicted beyond the border is found by the lattice alone. So where the lattice shows somebody,
+its candidates join the tracks, and the best set of both is the answer if all this is true of it.
+
 Otherwise the frame is searched as a whole. The rule reads the frame's number, its evidence and its prediction alone, so
 it does not depend on who works on the frame.
 """
@@ -52,9 +55,13 @@ def followed(tracked: MapEstimate, lattice_ground: Floats) -> Explanation | None
     lattice_ground : float64 (y, x, 2)
         The birth lattice, metres.
     """
-    if not (_stand_apart(tracked) and _is_decided(tracked)) or _shows_someone_new(tracked, lattice_ground):
+    if not (_stand_apart(tracked) and _is_decided(tracked)):
         return None
-    start = before = tracked.pool.at(tracked.members)
+    if len(fresh := _shown_anew(tracked, lattice_ground)):
+        tracked = tracked.searched_with(fresh, tracked.members)
+        if not (_stand_apart(tracked) and _is_decided(tracked)) or len(_shown_anew(tracked, lattice_ground)):
+            return None
+    start = before = tracked.evidence.prior.expected(tracked.track_index)
     for _ in range(_STEPS):
         people = tracked.followed(start)
         if _farthest(before, people.pool) > _EXPECTED:
@@ -87,14 +94,15 @@ def _is_decided(tracked: MapEstimate) -> bool:
     )
 
 
-def _shows_someone_new(tracked: MapEstimate, lattice_ground: Floats) -> bool:
-    """Whether the lattice has a candidate that is nearly worth a member beside the tracks."""
+def _shown_anew(tracked: MapEstimate, lattice_ground: Floats) -> Candidates:
+    """Candidates of the lattice that are nearly worth a member beside the set."""
     fresh = _outside_core(lattice_candidates(tracked, lattice_ground), tracked)
     if not len(fresh):
-        return False
+        return fresh
     known = len(tracked.pool)
     together = tracked.with_more(fresh)
-    return bool((together.additions(np.arange(known, len(together.pool))).gain > -_SURE - _COARSE).any())
+    gain = together.additions(np.arange(known, len(together.pool))).gain
+    return fresh.at(np.flatnonzero(gain > -_SURE - _COARSE))
 
 
 def _outside_core(fresh: Candidates, tracked: MapEstimate) -> Candidates:

@@ -50,6 +50,11 @@ class Prior:
         inside, sizes = self.border.away(self.predicted.ground) > 0, self.predicted.sizes
         return Candidates(self.predicted.ground[inside], sizes.height[inside], sizes.width[inside])
 
+    def expected(self, track_index: Ints) -> Candidates:
+        """Some of the predicted tracks, int64 (n,), as candidates."""
+        sizes = self.predicted.sizes.at(track_index)
+        return Candidates(self.predicted.ground[track_index], sizes.height, sizes.width)
+
     def log_height(self, heights: Floats) -> Floats:
         """Log prior density of heights, metres, beside that of the mean height: nats, float64 (n,)."""
         return log_heavy_tailed((heights - self.body.height_mean) / self.body.height_spread)
