@@ -8,6 +8,7 @@ are not documented; `pyproject.toml` says of which version they are.
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cached_property
@@ -51,7 +52,7 @@ class Kernel(CPUDispatcher):
 
     def compile(self, sig: Any) -> Any:
         """Compile for the types of some arguments, or take the machine code from the cache."""
-        with global_compiler_lock, _optimised_late(cpu_target.target_context.codegen()):
+        with global_compiler_lock, _nothing_collected(), _optimised_late(cpu_target.target_context.codegen()):
             self._cache = self._kept
             return super().compile(sig)
 
@@ -113,6 +114,18 @@ class _Library(JITCodeLibrary):
     def _finalize_final_module(self) -> None:
         self._optimised = True
         super()._finalize_final_module()
+
+
+@contextmanager
+def _nothing_collected() -> Iterator[None]:
+    """Collect no garbage within the body: what a compiler makes mostly stays, and each collection visits all of it."""
+    collecting = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if collecting:
+            gc.enable()
 
 
 @contextmanager

@@ -11,6 +11,7 @@ import pytest
 import reference_core as reference
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from reference_track_filter import best_pairs
 from scenes import (
     BODY,
     FEW_HEIGHTS,
@@ -40,8 +41,9 @@ from stseg.detection.gains import (
 )
 from stseg.detection.groups import fill_groups, fill_interactions
 from stseg.detection.problem import BoxEvidence, Parameters, PixelEvidence, Problem
-from stseg.detection.scoring import set_score
+from stseg.detection.scoring import box_score, pixel_score, set_score
 from stseg.detection.search import ENUMERATED, search
+from stseg.detection.set_scores import fill_assignments, fill_set_scores
 from stseg.detection.sharing import sharing_of
 from stseg.detection.track_sharing import assign_track, assign_tracks, gain_of_track, track_sharing
 from stseg.geometry import Camera, Rig
@@ -273,6 +275,39 @@ def test_score_by_definition(seed: int, walkers: int) -> None:
         members = rng.permutation(6)[: rng.integers(0, 7)].tolist()
         expected = reference.set_score(members, frame.problem())
         assert frame.score(members) == pytest.approx(expected, abs=1e-5)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_sets_are_scored_as_each_by_itself(seed: int) -> None:
+    frame = scaled(random_frame(seed, 6, 3))
+    sets = np.array([[0, 1, 2], [5, 3, 0], [4, 2, 5]])
+    totals, evidence, tracks = np.empty(3), np.empty((3, 4, 3)), np.empty((3, 3), np.int64)
+    fill_set_scores(sets, frame.problem(), totals, evidence, tracks)
+    for s, members in enumerate(sets):
+        one = frame.problem()
+        assert totals[s] == pytest.approx(set_score(members, 3, one), abs=1e-9)
+        np.testing.assert_allclose(evidence[s], one.view_evidence[:, :3], atol=1e-9)
+        gains = frame.newcomer[members, None] + frame.known[members]
+        followed = [(a, track) for a, track in enumerate(tracks[s]) if track >= 0]
+        best = sum(gains[pair] for pair in best_pairs(gains))
+        assert sum(gains[pair] for pair in followed) == pytest.approx(best)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_evidence_of_all_views_is_assigned_as_that_of_each(seed: int) -> None:
+    frame, members = scaled(random_frame(seed, 6)), np.array([5, 1, 3])
+    problem = frame.problem()
+    boxes, pixels = np.empty((2, 4), np.int64), np.empty((2, frame.pixels.raster[0].size), np.int64)
+    fill_assignments(members, problem, boxes, pixels)
+    for view in range(2):
+        own, parts = np.full(4, -1), np.empty(3)
+        box_score(view, members, 3, frame.boxes, TERMS, own, parts)
+        np.testing.assert_array_equal(boxes[view], own)
+        owner = np.full(pixels.shape[1], -1)
+        pixel_score(view, members, 3, frame.pixels, TERMS, owner, parts)
+        np.testing.assert_array_equal(pixels[view], owner)
+    assert (boxes >= 0).any()
+    assert (pixels >= 0).any()
 
 
 def test_a_box_speaks_for_one_person() -> None:

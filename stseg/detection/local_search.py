@@ -86,7 +86,7 @@ def swap(
     for _ in range(trades):
         before = score
         for i in own:
-            trial[:], trial_inside[:] = members, inside
+            _become(trial, trial_inside, members, inside)
             near = own[interacts[i][own]]
             if inside[i]:
                 size = _withdraw_and_refill(trial, count, i, near[near != i], trial_inside, assigned, problem, sharing)
@@ -97,10 +97,20 @@ def swap(
             size = local_search(trial, size, near, trial_inside, assigned, problem, sharing)
             after = set_score(trial, size, problem)
             if after > score + GAINED:
-                members[:], inside[:], count, score = trial, trial_inside, size, after
+                _become(members, inside, trial, trial_inside)
+                count, score = size, after
         if score <= before + GAINED:
             break
     return count
+
+
+@part
+def _become(members: Ints, inside: Flags, other: Ints, other_inside: Flags) -> None:
+    """Make a set that of others: as loops, since assigned slices are checked by code that takes seconds to compile."""
+    for a in range(len(members)):
+        members[a] = other[a]
+    for i in range(len(inside)):
+        inside[i] = other_inside[i]
 
 
 @kernel

@@ -21,15 +21,8 @@ from stseg.detection.evidence import ProjectedBodies, box_evidence, pixel_eviden
 from stseg.detection.prior import Prior
 from stseg.detection.problem import BoxEvidence, Parameters, Problem
 from stseg.detection.refine import refine, refine_places
-from stseg.detection.scoring import (
-    box_score,
-    fill_scores_with,
-    fill_scores_without,
-    pixel_score,
-    set_score,
-    track_score,
-)
 from stseg.detection.search import search
+from stseg.detection.set_scores import fill_assignments, fill_set_scores
 from stseg.detection.views import BoxView, PixelView, ViewObservation
 from stseg.model.candidates import Candidates
 from stseg.model.sizes import Sizes
@@ -79,10 +72,21 @@ class RefinedPeople:
 
 @dataclass(frozen=True)
 class SetScore:
-    """Score of a set of candidates, nats; and what each view says of each member, float64 (view, member), nats."""
+    """Score of a set of candidates.
+
+    Attributes
+    ----------
+    total
+        Nats.
+    view_evidence : float64 (view, member)
+        What each view says of each member, nats.
+    track_index : int64 (member,)
+        The predicted track that each member continues, -1 for births.
+    """
 
     total: float
     view_evidence: Floats
+    track_index: Ints
 
 
 @dataclass(frozen=True)
@@ -164,8 +168,16 @@ class MapEstimate:
 
     def score(self, members: Ints) -> SetScore:
         """Score of any set of the candidates, int64 (n,)."""
-        total = set_score(members, len(members), self.problem)
-        return SetScore(total, self.problem.view_evidence[self._row, : len(members)])
+        totals, view_evidence, tracks = self._scores(members[None])
+        return SetScore(float(totals[0]), view_evidence[0], tracks[0])
+
+    def _scores(self, sets: Ints) -> tuple[Floats, Floats, Ints]:
+        """What `SetScore` has, of sets (set, member) of candidates, with the set before the other axes."""
+        number, count = sets.shape
+        totals, tracks = np.empty(number), np.empty((number, count), np.int64)
+        view_evidence = np.empty((number, len(self.evidence.views), count))
+        fill_set_scores(sets, self.problem, totals, view_evidence, tracks)
+        return totals, view_evidence[:, self._row], tracks
 
     @cached_property
     def members_score(self) -> SetScore:
@@ -180,10 +192,10 @@ class MapEstimate:
 
     def additions(self, others: Ints) -> Additions:
         """What each of some candidates outside the set, int64 (m,), would add to it."""
-        before, totals, tracks = self.members_score.total, np.empty(len(others)), np.empty(len(others), np.int64)
-        view_evidence = np.empty((len(self.evidence.views), len(others)))
-        fill_scores_with(self.members, others, self.problem, totals, view_evidence, tracks)
-        return Additions(totals - before, view_evidence[self._row], tracks)
+        sets = np.empty((len(others), len(self.members) + 1), np.int64)
+        sets[:, :-1], sets[:, -1] = self.members, others
+        totals, view_evidence, tracks = self._scores(sets)
+        return Additions(totals - self.members_score.total, view_evidence[..., -1].T, tracks[:, -1])
 
     @cached_property
     def others(self) -> Ints:
@@ -200,9 +212,9 @@ class MapEstimate:
     @cached_property
     def losses(self) -> Floats:
         """What the score loses without each member, nats, float64 (n,)."""
-        without = np.empty(len(self.members))
-        fill_scores_without(self.members, self.problem, without)
-        return self.members_score.total - without
+        count = len(self.members)
+        others = np.tile(self.members, (count, 1))[~np.eye(count, dtype=bool)].reshape(count, max(count - 1, 0))
+        return self.members_score.total - self._scores(others)[0]
 
     def alternatives(self) -> Ints:
         """Candidates outside the set, the best of each place, best first: int64 (n,)."""
@@ -227,34 +239,25 @@ class MapEstimate:
     @cached_property
     def _assignments(self) -> list[tuple[Ints, Ints]]:
         """Boxes and pixels of each view."""
-        assigned, problem, count = [], self.problem, len(self.members)
-        scratch, view_evidence = problem.assigned, problem.view_evidence[0]
-        box_view = pixel_view = 0
+        problem, raster = self.problem, self.problem.pixels.raster
+        of_boxes = np.empty(problem.boxes.match.shape[::2], np.int64)
+        of_pixels = np.empty((len(raster), raster[:1].size), np.int64)
+        fill_assignments(self.members, problem, of_boxes, of_pixels)
+        assigned, box_rows, pixel_rows = [], iter(of_boxes), iter(of_pixels.reshape(raster.shape))
         for view, observation in zip(self.evidence.views, self.evidence.observations, strict=True):
             boxes = np.full(len(observation.edges) if observation else 0, -1, np.int64)
             if isinstance(view, BoxView):
                 pixels = np.full(view.shape, -1, np.int64)
-                box_score(box_view, self.members, count, problem.boxes, problem.parameters, scratch, view_evidence)
-                boxes[:] = scratch[: len(boxes)]
-                box_view += 1
+                boxes[:] = next(box_rows)[: len(boxes)]
             else:
-                columns = problem.pixels.raster.shape[2]
-                owner = np.full(view.shape[0] * columns, -1, np.int64)
-                pixel_score(pixel_view, self.members, count, problem.pixels, problem.parameters, owner, view_evidence)
-                pixels = np.ascontiguousarray(owner.reshape(-1, columns)[:, : view.shape[1]])
-                pixel_view += 1
+                pixels = np.ascontiguousarray(next(pixel_rows)[: view.shape[0], : view.shape[1]])
             assigned.append((boxes, pixels))
         return assigned
 
-    @cached_property
+    @property
     def track_index(self) -> Ints:
         """The predicted track that each member continues, int64 (member,); -1 for births."""
-        problem, index = self.problem, np.full(len(self.members), -1, np.int64)
-        track_score(self.members, len(self.members), problem.track_gain, problem.birth_cost, problem.assigned)
-        for k, place in enumerate(problem.assigned[: problem.track_gain.shape[1]]):
-            if place >= 0:
-                index[place] = k
-        return index
+        return self.members_score.track_index
 
     def unexplained(self) -> list[Flags]:
         """For each view the boxes, or the pixels, that are assigned to no member."""

@@ -24,7 +24,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from stseg.accelerate import kernel
+from stseg.accelerate import kernel, part
 from stseg.arrays import Floats, Ints, Singles
 from stseg.config import BodyConfig, DetectionConfig, ErrorRateConfig
 from stseg.detection.views import PixelView, View, ViewObservation
@@ -146,12 +146,13 @@ def _fill_counts(first: Ints, spans: Spans, raster: Singles, counts: Floats) -> 
     covered = np.zeros(raster.shape, np.int64)
     for j in range(len(first)):
         for v in range(first[j], _end(first[j], spans, raster)):
-            covered[v, spans[j, v - first[j], 0] : spans[j, v - first[j], 1]] += 1
+            for u in range(spans[j, v - first[j], 0], spans[j, v - first[j], 1]):
+                covered[v, u] += 1
     for j in range(len(first)):
         counts[j] = 0.0
         for v in range(first[j], _end(first[j], spans, raster)):
             left, right = spans[j, v - first[j], 0], spans[j, v - first[j], 1]
-            if (covered[v, left:right] > 1).any():
+            if _most(covered[v], left, right) > 1:
                 counts[j] = 0.0
                 break
             background = 0
@@ -167,6 +168,15 @@ def _fill_counts(first: Ints, spans: Spans, raster: Singles, counts: Floats) -> 
 def _end(first: int, spans: Spans, raster: Singles) -> int:
     """The row after an outline's last one that the raster may have; its first row is -1 where it is not seen."""
     return min(first + spans.shape[1], raster.shape[0]) if first >= 0 else -1
+
+
+@part
+def _most(covered: Ints, left: int, right: int) -> int:
+    """Most outlines that cover a pixel of columns left..right of a row, covered (u,)."""
+    most = 0
+    for u in range(left, right):
+        most = max(most, covered[u])
+    return most
 
 
 @kernel

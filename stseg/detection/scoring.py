@@ -40,37 +40,6 @@ def set_score(members: Ints, count: int, problem: Problem) -> float:
 
 
 @kernel
-def fill_scores_with(
-    members: Ints, others: Ints, problem: Problem, totals: Floats, view_evidence: Floats, tracks: Ints
-) -> None:
-    """Score the members int64 (n,) with each of some other candidates int64 (m,) beside them.
-
-    Fills totals (m,) with the scores, view_evidence (view, m) with what the views say of the candidate, and tracks (m,)
-    with the predicted track that it would continue, -1 for none.
-    """
-    count = len(members)
-    together = np.empty(count + 1, np.int64)
-    together[:count] = members
-    for k in range(len(others)):
-        together[count], tracks[k] = others[k], -1
-        totals[k] = set_score(together, count + 1, problem)
-        view_evidence[:, k] = problem.view_evidence[:, count]
-        track_score(together, count + 1, problem.track_gain, problem.birth_cost, problem.assigned)
-        for track in range(problem.track_gain.shape[1]):
-            if problem.assigned[track] == count:
-                tracks[k] = track
-
-
-@kernel
-def fill_scores_without(members: Ints, problem: Problem, totals: Floats) -> None:
-    """Fill totals (n,) with the scores of the members int64 (n,) without each of them."""
-    others = np.empty(len(members), np.int64)
-    for a in range(len(members)):
-        others[:a], others[a : len(members) - 1] = members[:a], members[a + 1 :]
-        totals[a] = set_score(others, len(members) - 1, problem)
-
-
-@kernel
 def track_score(members: Ints, count: int, gain: Floats, birth_cost: Floats, taken_by: Ints) -> float:
     """Assign tracks to members, one to one, at the greatest sum; fills taken_by (track,) with places in `members`.
 
@@ -178,7 +147,7 @@ def pixel_score(
         for k in range(min(pixels.spans.shape[2], rows - first) if first >= 0 else 0):
             line = (first + k) * columns
             owner[line + pixels.spans[view, members[a], k, 0] : line + pixels.spans[view, members[a], k, 1]] = -1
-    order = np.argsort(pixels.order[view][members[:count]])
+    order = np.argsort(pixels.order[view][members[:count]], kind="mergesort")
     for a in order:
         parts[a] = 0.0
         i = members[a]

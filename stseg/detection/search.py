@@ -16,7 +16,8 @@ from stseg.detection.groups import fill_groups, fill_interactions, restricted
 from stseg.detection.local_search import GAINED, local_search, swap
 from stseg.detection.problem import Problem
 from stseg.detection.scoring import set_score
-from stseg.detection.sharing import sharing_of
+from stseg.detection.sharing import Sharing, sharing_of
+from stseg.pointed_tuples import pointed
 
 ENUMERATED = 8
 """Largest group of which all subsets are tried in the final search."""
@@ -35,9 +36,15 @@ def search(members: Ints, count: int, problem: Problem, enumerated: int, trades:
     trades
         Sweeps of swap moves in larger groups, at most; 0 for simple moves alone.
     """
+    return _improve(members, count, problem, sharing_of(problem), enumerated, trades)
+
+
+@kernel
+def _improve(members: Ints, count: int, whole: Problem, shared: Sharing, enumerated: int, trades: int) -> int:
+    """The search, with what candidates share at hand."""
+    problem, sharing = pointed(whole), pointed(shared)
     candidates = len(problem.size_prior)
     interacts, group = np.empty((candidates, candidates), np.bool_), np.empty(candidates, np.int64)
-    sharing = sharing_of(problem)
     fill_interactions(problem, sharing, interacts)
     views, rows, columns = problem.pixels.raster.shape
     assigned, chosen = np.full((views, rows * columns), -1, np.int16), np.empty(candidates + 1, np.int64)
@@ -46,23 +53,26 @@ def search(members: Ints, count: int, problem: Problem, enumerated: int, trades:
     for g in range(fill_groups(interacts, group)):
         own = np.flatnonzero(group == g)
         if len(own) <= enumerated:
-            size = _best_of_all_subsets(chosen, own, restricted(problem, own))
+            size = _best_of_all_subsets(chosen, own, restricted(whole, own))
         else:
             start = own[inside[own]]
             size = len(start)
-            chosen[:size] = start
+            for a in range(size):
+                chosen[a] = start[a]
             size = local_search(chosen, size, own, inside, assigned, problem, sharing)
             size = swap(chosen, size, own, inside, interacts, assigned, trades, problem, sharing)
         inside[own] = False
         inside[chosen[:size]] = True
     best = np.flatnonzero(inside)
-    members[: len(best)] = best
+    for a in range(len(best)):
+        members[a] = best[a]
     return len(best)
 
 
 @kernel
-def _best_of_all_subsets(members: Ints, own: Ints, problem: Problem) -> int:
+def _best_of_all_subsets(members: Ints, own: Ints, whole: Problem) -> int:
     """The best of all subsets; of equals, the one without the later candidates. Bits of a number name a subset."""
+    problem = pointed(whole)
     best, best_score = 0, -np.inf
     for chosen in range(1 << len(own)):
         score = set_score(members, _members_of(chosen, own, members), problem)

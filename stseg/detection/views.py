@@ -291,7 +291,8 @@ def _fill_means(likelihood: Singles, step: int, mean: Singles) -> None:
     down, whole = np.empty(width, np.float32), width // step
     for v in range(mean.shape[0]):
         top, bottom = v * step, min((v + 1) * step, height)
-        down[:] = likelihood[top]
+        for column in range(width):
+            down[column] = likelihood[top, column]
         for row in range(top + 1, bottom):
             for column in range(width):
                 down[column] += likelihood[row, column]

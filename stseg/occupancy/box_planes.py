@@ -98,14 +98,14 @@ def fill_fit(
         Log-prior of the height at cells near no person, and near each person. The second is centred on the person's
         estimated height, so that an unusual height costs nothing again in every view.
     """
-    ground_cells, body = fit.shape[1], np.empty(4)
+    ground_cells = fit.shape[1]
     fit[:] = -np.inf
     for b in range(len(boxes.edges)):
         box, tolerance, person = boxes.edges[b], boxes.tolerance[b], boxes.person[b]
         if person >= 0:
             for k in range(cells.start[person], cells.start[person + 1]):
                 for h in range(len(height_prior)):
-                    body[:] = pillars[h * ground_cells + cells.cell[k]]
+                    body = pillars[h * ground_cells + cells.cell[k]]
                     match = boxes.belief[b] - half_square(body, box, tolerance, boxes.width, boxes.height)
                     log_fit = np.float32(person_prior[person, h] + match)
                     fit[h, cells.cell[k]] = max(fit[h, cells.cell[k]], log_fit)
@@ -114,7 +114,7 @@ def fill_fit(
             first, stop = run_of(index, kind, box, tolerance, FAR)
             for k in range(first, stop):
                 h, cell = index.order[k] // ground_cells, index.order[k] % ground_cells
-                body[:] = pillars[index.order[k]]
+                body = pillars[index.order[k]]
                 match = boxes.belief[b] - half_square(body, box, tolerance, boxes.width, boxes.height)
                 prior = height_prior[h] if cells.near[cell] < 0 else person_prior[cells.near[cell], h]
                 fit[h, cell] = max(fit[h, cell], np.float32(prior + match))

@@ -293,7 +293,8 @@ def choose_distinct(
             break
         h = change[a, 0]
         own = chosen[number]
-        own[:] = column[h]
+        for i in range(rows):
+            own[i] = column[h, i]
         if change[a, 1] >= 0:
             own[change[a, 1]] = change[a, 2]
         if change[a, 3] >= 0:
