@@ -10,6 +10,9 @@ from scipy.sparse.csgraph import min_weight_full_bipartite_matching
 
 from stseg.arrays import Floats, Ints
 
+_QUANTUM = 1e-6
+"""Unit of the matching's costs, nats. In whole units sums are exact: by rounded ones the matching may never end."""
+
 
 def best_paths(gain: Floats, start: Ints, end: Ints, bonus: Floats) -> Ints:
     """Successor of each candidate on the paths of greatest total gain, -1 for none, int64 (n,).
@@ -26,6 +29,7 @@ def best_paths(gain: Floats, start: Ints, end: Ints, bonus: Floats) -> Ints:
     free_rows, free_columns = n + each, n + each
     rows, columns = np.concatenate([rows, free_rows]), np.concatenate([columns, free_columns])
     cost = np.concatenate([cost, np.zeros(n)])
+    cost = np.rint(cost / _QUANTUM)
     lift = 1.0 - cost.min()  # explicit zeros are no edges; every perfect matching has as many
     table = coo_array((cost + lift, (rows, columns)), shape=(2 * n, 2 * n)).tocsr()
     _, partner = min_weight_full_bipartite_matching(table)
