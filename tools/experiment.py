@@ -5,6 +5,7 @@ answers     IDF1 over the number of answers that the truth gives to the question
 certainty   calibration of stated probabilities: of cells stated as occupied with 0.8, are 80 % occupied?
 day         identities of a whole day: processor time and memory of deciding them, over the number of rows
 failing     what a view that fails for three seconds costs, beside its absence
+few_views   two and three views of everything: scores, and how many of the points the run takes for wrong
 identities  identities decided again, in seconds, from the rows of perturbed runs
 labels      IoU of the cells of a track, and the right owner where bodies touch: cut, threshold, nearest track
 live        what corrections of live ids bring, from run files and their truths
@@ -31,6 +32,7 @@ EXPERIMENTS = (
     "certainty",
     "day",
     "failing",
+    "few_views",
     "identities",
     "labels",
     "live",

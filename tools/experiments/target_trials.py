@@ -127,13 +127,17 @@ def _uu4(rig: Path, truth: Path) -> Iterator[Trial]:
     yield from _subsets("uu4", 4, whole, {3: (98.5, 0), 2: (94, 0)})
 
 
+def delivered(rig: Path, truth: Path, stop: int, area: Area | None = None) -> Recorded:
+    """A recording's first frames."""
+    recording, rows = read_rig(rig), read_tracks_csv(truth)
+    with open_frames(recording, 0, stop) as sets:
+        frames = [frame_set.views for frame_set in sets]
+    return Recorded(recording.rig, rows[rows["frame"] < stop], frames, area)
+
+
 def _cmc2(rig: Path, truth: Path) -> Iterator[Trial]:
     def whole(most: int) -> Recorded:
-        recording, rows = read_rig(rig), read_tracks_csv(truth)
-        stop = min(261, most)
-        with open_frames(recording, 0, stop) as sets:
-            frames = [frame_set.views for frame_set in sets]
-        return Recorded(recording.rig, rows[rows["frame"] < stop], frames, CMC_AREA)
+        return delivered(rig, truth, min(261, most), CMC_AREA)
 
     yield from _subsets("cmc2, fairmot", 4, whole, {3: (97, 92), 2: (90, 80)})
 

@@ -1,0 +1,125 @@
+"""Two and three views of everything: scores, and how many of its points the run itself takes for wrong.
+
+    python tools/experiment.py few_views -o docs/development/few_views.md [--data ../shared/data] [--work FOLDER]
+        [--only REGEX] [--frames 60] [--choices 6]
+
+WORK holds uu4.toml, cmc2.csv, cmc2.toml, cmc2_fairmot.toml, wildtrack.csv and wildtrack.toml, as tools/results.py
+leaves them. Of a rig with many cameras some choices are tried, evenly among all.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from itertools import combinations
+from math import comb
+from pathlib import Path
+
+import numpy as np
+from workbench import ROOT, commit
+
+from experiments.points import matched
+from experiments.target_trials import CMC_AREA, Recorded, delivered, filmed
+from experiments.targets import tracked
+from stseg.evaluation import evaluate
+from stseg.simulation import NAMED
+
+_VIEWS = (2, 3)
+_GATE = 0.5
+"""Distance within which a point is right, metres."""
+_PAGE = """# Two and three views of everything
+
+Of the default tracker on the first {frames} frames, by choices of two and three of a recording's cameras: mean and
+least MODA / IDF1, percent; the share of its points that are wrong, percent; and the share that it states itself, by the
+log-odds of each point. Everybody counts, also whom the chosen cameras cannot see: in `wildtrack` most people. Made by
+`tools/experiment.py few_views` at commit {commit}.
+
+"""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One choice of cameras: scores and shares of wrong points, percent."""
+
+    chosen: str
+    moda: float
+    idf1: float
+    wrong: float
+    stated: float
+
+    def __str__(self) -> str:
+        return f"{self.chosen}: {self.moda:.1f} / {self.idf1:.1f}; {self.wrong:.1f}, stated {self.stated:.1f}"
+
+
+def recordings(data: Path, work: Path) -> dict[str, Callable[[int], Recorded]]:
+    """The recordings by name; each is made with so many frames."""
+    return {
+        "uu4": lambda most: delivered(work / "uu4.toml", data / "uu4" / "reference_tracks.csv", most),
+        "cmc2": lambda most: delivered(work / "cmc2.toml", work / "cmc2.csv", most, CMC_AREA),
+        "cmc2, fairmot": lambda most: delivered(work / "cmc2_fairmot.toml", work / "cmc2.csv", most, CMC_AREA),
+        "easy, masks": filmed(NAMED["easy"], "masks"),
+        "easy, boxes": filmed(NAMED["easy"], "boxes"),
+        "dense4, masks": filmed(NAMED["dense4"], "masks"),
+        "wildtrack": lambda most: delivered(work / "wildtrack.toml", work / "wildtrack.csv", most),
+    }
+
+
+def choices(cameras: int, number: int, most: int) -> Iterator[tuple[int, ...]]:
+    """Choices of a number of cameras, `most` at most, evenly among all in their order."""
+    every = list(combinations(range(cameras), number))
+    for k in np.unique(np.linspace(0, len(every) - 1, min(most, comb(cameras, number))).astype(int)):
+        yield every[k]
+
+
+def measured(made: Recorded, chosen: tuple[int, ...]) -> Row:
+    """Track by some cameras, and score."""
+    made = made.seen_by(chosen)
+    found, truth = tracked(made), made.truth
+    flagged = "flag" in (truth.dtype.names or ())
+    scores = evaluate(truth, found, area=made.area, frames=np.arange(len(made.frames)), ignore_flagged=flagged)
+    if made.area is not None:
+        x0, y0, x1, y1 = made.area
+        found = found[(found["x"] >= x0) & (found["x"] <= x1) & (found["y"] >= y0) & (found["y"] <= y1)]
+    wrong, stated = 1 - matched(found, truth, _GATE).mean(), (1 / (1 + np.exp(found["score"]))).mean()
+    named = "".join(str(k + 1) for k in chosen)
+    return Row(named, scores.moda or 0.0, scores.idf1, 100 * wrong, 100 * stated)
+
+
+def line(name: str, number: int, rows: list[Row]) -> str:
+    """One line of the table."""
+    values = np.array([(row.moda, row.idf1, row.wrong, row.stated) for row in rows])
+    (moda, idf1, wrong, stated), least = values.mean(0), values.min(0)
+    worst = min(rows, key=lambda row: row.moda).chosen
+    return (
+        f"| {name} | {number} | {len(rows)} | {moda:.1f} / {idf1:.1f} | {least[0]:.1f} / {least[1]:.1f} | {worst} "
+        f"| {wrong:.1f} | {stated:.1f} |"
+    )
+
+
+def main() -> None:
+    """Write the table, after each line."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("-o", "--output", type=Path, required=True)
+    parser.add_argument("--data", type=Path, default=ROOT / "../shared/data")
+    parser.add_argument("--work", type=Path, default=ROOT / "build/results")
+    parser.add_argument("--only", default=".", help="of the recordings' names")
+    parser.add_argument("--frames", type=int, default=60)
+    parser.add_argument("--choices", type=int, default=6)
+    asked = parser.parse_args()
+    head = _PAGE.format(frames=asked.frames, commit=commit())
+    lines = [
+        "| recording | views | choices | mean | least | least by cameras | wrong points | stated |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    for name, make in recordings(asked.data, asked.work).items():
+        if re.search(asked.only, name):
+            made = make(asked.frames)
+            for number in _VIEWS:
+                rows = []
+                for chosen in choices(len(made.rig.cameras), number, asked.choices):
+                    rows.append(measured(made, chosen))
+                    print(f"{name}, {rows[-1]}", flush=True)
+                lines.append(line(name, number, rows))
+                asked.output.write_text(head + "\n".join(lines) + "\n", "utf-8")
