@@ -7,11 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from reference_identities import greatest_score, score
+from reference_identities import crossings, greatest_score, score
 from strollers import BORDER, CONFIG, RATE, rows_of, runs, straight, swapped, visit
 
 from stseg.arrays import Floats, Ints, Rows
 from stseg.tracking.identities import search, step_kernels
+from stseg.tracking.identities.crossings import crossing, crossings_of
 from stseg.tracking.identities.observations import Observations, observe
 from stseg.tracking.identities.search import SearchLimits, search_identities
 from stseg.tracking.identities.size_model import MeasuredSizes, SizeModel, SizePrior, learn_sizes
@@ -39,6 +40,22 @@ def test_no_partition_of_a_few_rows_is_better(rows: Rows) -> None:
         names = found(seen, hypotheses=5000).tolist()
     best = greatest_score(seen, MODEL.spread, CONFIG.motion, LONGEST) if len(rows) else 0.0
     assert score(seen, names, MODEL.spread, CONFIG.motion, LONGEST) == pytest.approx(best, abs=1e-6)
+
+
+@pytest.mark.parametrize("away", [0.0, 0.2])
+def test_who_stand_beside_each_other_do_not_pass_through_each_other(away: float) -> None:
+    """Two of one height, between two frames exchanged to within `away` metres: less likely than the distance says."""
+    rows = rows_of({k: (straight(0, 0.35 * k, 0, 0), 1.7, range(2)) for k in (1, 2)}, noise=0.0)
+    rows["y"][rows["frame"] == 1] += away
+    seen = seen_of(rows)
+    stay, pass_by = (crossings(seen, names, 1, CONFIG.motion) for names in ([0, 1, 0, 1], [0, 1, 1, 0]))
+    assert stay == 0.0
+    assert pass_by > 0.5
+    own = crossings_of(0, 2, 4, seen.ground, seen.variance, CONFIG.motion.speed_spread / RATE / 4, seen.room)
+    last = np.array([0, 1])
+    assert crossing(0, 0, 1, 1, last, own) == 0.0
+    assert crossing(0, 1, 1, 0, last, own) == pytest.approx(pass_by, abs=1e-4)
+    assert crossing(0, 1, 1, 2, last, own) == 0.0  # somebody new has no past
 
 
 def test_names_that_are_final_early_belong_to_one_hypothesis() -> None:

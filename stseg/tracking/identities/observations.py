@@ -46,6 +46,8 @@ class Observations:
         How far inside the area: 0 at the border, 1 from `detection.border_width` on.
     precision, information : float64 (n, size)
         Inverse variance of each size, and that times its deviation from the population's mean.
+    room
+        Distance below which two bodies overlap, metres.
     """
 
     order: Ints
@@ -58,6 +60,7 @@ class Observations:
     inside: Floats
     precision: Floats
     information: Floats
+    room: float
 
     @cached_property
     def birth(self) -> Ints:
@@ -85,7 +88,7 @@ class Observations:
         return Observations(
             self.order[part], self.start[start : stop + 1] - first, self.seconds[start:stop], self.ground[part],
             self.variance[part], previous, self.certain[part] & (previous >= 0), self.inside[part],
-            self.precision[part], self.information[part],
+            self.precision[part], self.information[part], self.room,
         )  # fmt: skip
 
 
@@ -120,7 +123,7 @@ def observe(
     return Observations(
         order, start, frames / frame_rate, ground, np.maximum(alike * (rows["xx"] + rows["yy"]) / 2, _LEAST**2),
         previous, _certain(rows, ground, start, previous), border.inside(ground, config.detection.border_width),
-        precision, information,
+        precision, information, config.detection.minimum_distance,
     )  # fmt: skip
 
 

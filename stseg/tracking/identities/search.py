@@ -15,6 +15,7 @@ from stseg.arrays import Flags, Floats, Ints
 from stseg.config import MotionConfig
 from stseg.tracking.identities import step_kernels
 from stseg.tracking.identities.constraints import Constraints, KnownPeople
+from stseg.tracking.identities.crossings import Crossings, crossings_of
 from stseg.tracking.identities.hypotheses import Hypotheses
 from stseg.tracking.identities.observations import Observations
 from stseg.tracking.identities.size_model import SizeModel
@@ -125,8 +126,7 @@ def search_identities(
     held = Hypotheses.empty(1, slots, len(sizes.spread), len(known.first))
     history = _History(np.full(len(seen.order), -1))
     for k, now in enumerate(seen.seconds.tolist()):
-        first, stop = int(seen.start[k]), int(seen.start[k + 1])
-        held, step = _extended(held, seen, first, stop, now, sizes, motion, limits, known)
+        held, step = _extended(held, seen, k, sizes, motion, limits, known)
         history.steps.append(step)
         if now - history.steps[0].seconds > 2 * limits.lag:
             agree = history.decide(now - limits.lag, len(held.score))
@@ -137,10 +137,11 @@ def search_identities(
 
 
 def _extended(
-    held: Hypotheses, seen: Observations, first: int, stop: int, now: float, sizes: SizeModel, motion: MotionConfig,
-    limits: SearchLimits, known: KnownPeople,
+    held: Hypotheses, seen: Observations, k: int, sizes: SizeModel, motion: MotionConfig, limits: SearchLimits,
+    known: KnownPeople,
 ) -> tuple[Hypotheses, _Step]:  # fmt: skip
-    """The best hypotheses after one more frame, and how they were chosen."""
+    """The best hypotheses after one more frame, the k-th, and how they were chosen."""
+    first, stop, now = int(seen.start[k]), int(seen.start[k + 1]), float(seen.seconds[k])
     turn, pace = motion.velocity_noise**2, motion.speed_spread**2
     number, slots = held.name.shape
     rows = stop - first
@@ -159,7 +160,10 @@ def _extended(
     step_kernels.fill_best_assignments(cost, column, total)
     most = number * (1 + rows * (slots + 1) + rows * (rows - 1) // 2)
     change, value = np.empty((most, 5), np.int64), np.empty(most)
-    found = step_kernels.fill_alternatives(cost, column, held.score - total, slots, _ALTERNATIVE_LOSS, change, value)
+    crossings = _crossings(seen, k, motion)
+    found = step_kernels.fill_alternatives(
+        cost, column, held.score - total, held.last, crossings, _ALTERNATIVE_LOSS, change, value
+    )
     ordered = np.argsort(-value[:found], kind="stable")
     kept = limits.hypotheses
     parent, score, keys = np.empty(kept, np.int64), np.empty(kept), np.empty(kept, np.int64)
@@ -177,6 +181,14 @@ def _extended(
     for observation, person in known.within(first, stop):
         new.bound[:, person] = names[:kept, observation - first]
     return new, _Step(parent[:kept], names[:kept], first, now)
+
+
+def _crossings(seen: Observations, k: int, motion: MotionConfig) -> Crossings:
+    """Crossings between the frame before and the k-th."""
+    earlier = max(k - 1, 0)
+    before, first, stop = (int(seen.start[frame]) for frame in (earlier, k, k + 1))
+    bend = motion.speed_spread * float(seen.seconds[k] - seen.seconds[earlier]) / 4.0
+    return crossings_of(before, first, stop, seen.ground, seen.variance, bend, seen.room)
 
 
 def _impose(held: Hypotheses, known: KnownPeople, first: int, stop: int, cost: Floats) -> None:

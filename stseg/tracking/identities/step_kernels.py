@@ -12,6 +12,7 @@ import numpy as np
 from stseg.accelerate import kernel, part
 from stseg.arrays import Flags, Floats, Ints
 from stseg.linear_assignment import fill_assignment_of_least_cost
+from stseg.tracking.identities.crossings import Crossings, crossing, crossings_with_others
 
 FORBIDDEN = 1e6
 """Cost of an assignment that is not allowed, nats."""
@@ -167,8 +168,9 @@ def fill_best_assignments(cost: Floats, column: Ints, total: Floats) -> None:
 
 @kernel
 def fill_alternatives(
-    cost: Floats, column: Ints, score: Floats, slots: int, most: float, change: Ints, value: Floats
-) -> int:
+    cost: Floats, column: Ints, score: Floats, last: Ints, crossings: Crossings, most: float, change: Ints,
+    value: Floats,
+) -> int:  # fmt: skip
     """Fill the assignments that differ from the best by one exchange of two rows, or by another column of one row.
 
     Parameters
@@ -177,11 +179,13 @@ def fill_alternatives(
     column : int64 (hypothesis, row)
         The best assignment.
     score : float64 (hypothesis,)
-        Of the best assignment, nats.
-    slots
-        Number of slots.
+        Of the best assignment, nats, but for crossings.
+    last : int64 (hypothesis, slot)
+        Last row of each identity.
+    crossings
+        What it costs that two people cross.
     most
-        Greatest loss of an alternative, nats.
+        Greatest loss of an alternative, nats, but for crossings.
     change : int64 (alternative, 5), value : float64 (alternative,)
         Filled with hypothesis, row, its column, other row (-1 for none), its column; and with the score.
 
@@ -191,11 +195,15 @@ def fill_alternatives(
         Number of alternatives.
     """
     hypotheses, rows, columns = cost.shape
+    slots = last.shape[1]
     number = 0
     taken = np.zeros(columns, np.bool_)
     for h in range(hypotheses):
+        best = score[h]
+        for i in range(rows):
+            best -= crossings_with_others(i, column[h, i], -1, column[h], last[h], crossings) / 2.0
         change[number] = h, -1, -1, -1, -1
-        value[number] = score[h]
+        value[number] = best
         number += 1
         taken[:] = False
         for i in range(rows):
@@ -204,9 +212,12 @@ def fill_alternatives(
             own = column[h, i]
             for c in range(slots + 1):
                 to = c if c < slots else slots + i
-                if not taken[to] and cost[h, i, to] - cost[h, i, own] < most:
+                loss = cost[h, i, to] - cost[h, i, own]
+                if not taken[to] and loss < most:
+                    loss += crossings_with_others(i, to, -1, column[h], last[h], crossings)
+                    loss -= crossings_with_others(i, own, -1, column[h], last[h], crossings)
                     change[number] = h, i, to, -1, -1
-                    value[number] = score[h] - cost[h, i, to] + cost[h, i, own]
+                    value[number] = best - loss
                     number += 1
             for j in range(i):
                 other = column[h, j]
@@ -216,10 +227,22 @@ def fill_alternatives(
                 back = own if own < slots else slots + j
                 loss = cost[h, i, to] + cost[h, j, back] - cost[h, i, own] - cost[h, j, other]
                 if loss < most:
+                    loss += _crossings_of_two(i, to, j, back, column[h], last[h], crossings)
+                    loss -= _crossings_of_two(i, own, j, other, column[h], last[h], crossings)
                     change[number] = h, i, to, j, back
-                    value[number] = score[h] - loss
+                    value[number] = best - loss
                     number += 1
     return number
+
+
+@part
+def _crossings_of_two(
+    i: int, slot: int, j: int, other: int, column: Ints, last: Ints, crossings: Crossings
+) -> float:  # fmt: skip
+    """Cost of crossings of two rows as those of two slots, with each other and with all others, nats."""
+    with_others = crossings_with_others(i, slot, j, column, last, crossings)
+    with_others += crossings_with_others(j, other, i, column, last, crossings)
+    return with_others + crossing(i, slot, j, other, last, crossings)
 
 
 _PRIMES = (2147483647, 2147483629)
