@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from typing import Any, TypeVar
 
-from llvmlite import ir
 from numba.core import cgutils, types
 from numba.core.imputils import impl_ret_borrowed
 from numba.core.typing.templates import AttributeTemplate
@@ -45,7 +44,7 @@ class _PointedModel(models.PrimitiveModel):
     """An address."""
 
     def __init__(self, manager: Any, pointed_type: Any) -> None:
-        super().__init__(manager, pointed_type, ir.PointerType(manager[pointed_type.fields].get_value_type()))
+        super().__init__(manager, pointed_type, manager[pointed_type.fields].get_value_type().as_pointer())
 
 
 @type_callable(pointed)
