@@ -132,9 +132,9 @@ class Detector:
         else:
             learned.population.let_pass()
             learned.rims.let_pass()
-        return (
-            self._with_excluded_residuals(explained, every, failures.excluded) if failures.excluded.any() else explained
-        )
+        if failures.excluded.any():
+            return self._with_excluded_residuals(explained, every, failures.excluded)
+        return explained
 
     def _with_excluded_residuals(
         self, explained: Explanation, every: Sequence[ViewObservation | None], excluded: Flags
