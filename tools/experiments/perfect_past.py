@@ -11,13 +11,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from experiments.target_trials import Recorded
-from stseg.arrays import Boxes, Floats
+from stseg.arrays import Boxes, Floats, ViewEvidence
 from stseg.config import Config
 from stseg.detection.detector import Detector
 from stseg.detection.map_estimate import FrameEvidence, MapEstimate
 from stseg.detection.prior import Prior
+from stseg.engine.tracker import Tracker
 from stseg.evaluation.matching import distances, match
-from stseg.foreground.view_foreground import ViewForeground
+from stseg.geometry import Rig
+from stseg.io.recording.frames import FrameSet
+from stseg.io.recording.pictures import reduced_view
 from stseg.model.candidates import Candidates
 from stseg.model.predicted_tracks import PredictedTracks
 from stseg.model.sizes import Sizes
@@ -41,16 +44,16 @@ class PerfectPast:
 
 
 def perfect_past(made: Recorded, every: int) -> PerfectPast:
-    """Over every so many frames of a recording of masks or boxes."""
-    config, foreground = Config(), ViewForeground()
+    """Over every so many frames of a recording."""
+    config = Config()
     kinds = ["boxes" if view is None or isinstance(view, Boxes) else "pixels" for view in made.frames[0]]
-    body = config.body
-    detector = Detector(made.rig, kinds, config.detection, body, config.error_rates)
+    body, (rig, evidence_of) = config.body, _evidence(made)
+    detector = Detector(rig, kinds, config.detection, body, config.error_rates)
     people = errors = wrong = less_likely = 0
     for frame in range(2, len(made.frames), every):
         here, before, earlier = (_standing(made, number) for number in (frame, frame - 1, frame - 2))
         predicted = _predicted(before, earlier, made.rig.frame_rate, config)
-        seen = [foreground.evidence(view) for view in made.frames[frame]]
+        seen = evidence_of[frame]
         found, true = detector.explain(seen, predicted).people, np.array(list(here.values())).reshape(-1, 2)
         hits = len(match(distances(true, found.ground), _GATE)[0])
         people, errors = people + len(true), errors + len(true) + len(found) - 2 * hits
@@ -61,6 +64,17 @@ def perfect_past(made: Recorded, every: int) -> PerfectPast:
             wrong += 1
             less_likely += _best_score(evidence, true) < _best_score(evidence, chosen.ground)
     return PerfectPast(100 * (1 - errors / max(people, 1)), wrong, less_likely)
+
+
+def _evidence(made: Recorded) -> tuple[Rig, list[list[ViewEvidence]]]:
+    """The foreground of all views, frame by frame, and the rig at its size."""
+    session = Tracker(made.rig, empty=made.empty)._begin(made.frames[0], 0)
+    rig = session.pipeline.rig
+    factors = [whole.size[0] // camera.size[0] for whole, camera in zip(made.rig.cameras, rig.cameras, strict=True)]
+    return rig, [
+        session.evidence(FrameSet(frame, tuple(map(reduced_view, views, factors))))
+        for frame, views in enumerate(made.frames)
+    ]
 
 
 def _standing(made: Recorded, frame: int) -> dict[int, Floats]:

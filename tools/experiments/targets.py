@@ -58,7 +58,7 @@ def measured(trial: Trial, frames: int) -> Row:
     found = evaluate(made.truth, tracked(made), area=made.area, frames=shown, ignore_flagged=flagged)
     moda = np.nan if found.moda is None else found.moda
     missed = moda < trial.least[0] or found.idf1 < trial.least[1]
-    past = str(perfect_past(made, _EVERY)) if missed and not made.empty else "-"
+    past = str(perfect_past(made, _EVERY)) if missed else "-"
     return Row(trial, moda, found.idf1, past)
 
 
