@@ -23,11 +23,15 @@ from stseg.io.runfile.runs import read_run
 from stseg.io.runfile.segment_files import checksum
 
 PROGRAM = """
-import signal, sys
+import signal, sys, time
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell that runs the tests in its background has it ignored
 from stseg.commands.main import main
+from stseg.engine import segment_worker
+keep_segment = segment_worker.keep_segment
+segment_worker.keep_segment = lambda draft: (time.sleep(0.3), keep_segment(draft))[1]
 sys.exit(main())
 """
+"""A run on a slow disk, that it is still at work when a signal reaches it on a machine of any speed."""
 pytestmark = pytest.mark.skipif(python_form(set_score) is set_score, reason="too slow without a compiler")
 
 

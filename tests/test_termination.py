@@ -66,6 +66,11 @@ def calling_back():
     while True:
         callback()
 
+def going_on_after_a_callback():
+    ctypes.CFUNCTYPE(None)(lambda: (begun(), time.sleep(60)))()
+    time.sleep(0.5)
+    sys.exit()
+
 def failing_of_it():
     ctypes.CFUNCTYPE(None)(lambda: (begun(), time.sleep(60)))()
     raise RuntimeError("the compiler lost its way")
@@ -144,6 +149,7 @@ compiled = pytest.mark.skipif(not COMPILED, reason="nothing is compiled")
         pytest.param("compiling", TERMINATED, marks=compiled),
         pytest.param("writing_a_run", INTERRUPTED, marks=compiled),
         ("calling_back", TERMINATED),
+        ("going_on_after_a_callback", TERMINATED),
         ("failing_of_it", TERMINATED),
         ("leaving_a_thread", INTERRUPTED),
         ("ending_slowly", TERMINATED),

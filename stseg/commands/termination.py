@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import _thread
 import os
 import signal
 import sys
@@ -17,6 +18,8 @@ INTERRUPTED, TERMINATED = 130, 143
 
 _PATIENCE = 1.5
 """Time for an orderly end, seconds: output is withdrawn, workers are ended."""
+_AGAIN = 0.02
+"""Time after which a dropped interrupt is repeated, seconds."""
 
 
 class Termination:
@@ -38,7 +41,7 @@ class Termination:
             if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
                 self._before[signal.SIGINT] = signal.signal(signal.SIGINT, self._interrupt)
             self._watch = _Watch()
-            sys.unraisablehook = self._drop_interrupts
+            sys.unraisablehook = self._repeat_interrupt
 
     @property
     def asked(self) -> bool:
@@ -64,10 +67,14 @@ class Termination:
             for number, handler in self._before.items():
                 signal.signal(number, handler)
 
-    def _drop_interrupts(self, unraisable: Any) -> None:
-        """Say nothing of an interrupt that came while the compiler called Python, which cannot raise it."""
+    def _repeat_interrupt(self, unraisable: Any) -> None:
+        """Repeat an interrupt that came while C code called Python, which cannot raise it, instead of reporting it."""
         if not issubclass(unraisable.exc_type, KeyboardInterrupt):
             self._unraisable(unraisable)
+        elif self._number is not None:
+            again = threading.Timer(_AGAIN, _thread.interrupt_main, (self._number,))
+            again.daemon = True
+            again.start()
 
     def _interrupt(self, number: int, _frame: FrameType | None) -> None:
         self._number = number
