@@ -28,7 +28,7 @@ signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell that runs th
 from stseg.commands.main import main
 from stseg.engine import segment_worker
 keep_segment = segment_worker.keep_segment
-segment_worker.keep_segment = lambda draft: (time.sleep(0.3), keep_segment(draft))[1]
+segment_worker.keep_segment = lambda draft: (time.sleep(0.5), keep_segment(draft))[1]
 sys.exit(main())
 """
 """A run on a slow disk, that it is still at work when a signal reaches it on a machine of any speed."""

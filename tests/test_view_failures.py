@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scenes import BODY, FEW_HEIGHTS, boxes, likelihoods, people, room
+from scenes import BODY, FEW_HEIGHTS, boxes, likelihoods, looking, people, rig_of, room
 
 from stseg import Tracker
 from stseg.arrays import Boxes, Floats, Observation, ViewEvidence
@@ -88,6 +88,19 @@ def test_a_view_that_fails_for_long_counts_again_once_nobody_is_there() -> None:
 def test_a_view_that_never_showed_people_does_not_fail() -> None:
     (asked, learned), seen = session("pixels"), shown("pixels")
     explained(asked, learned, failed("pixels", "black", seen), 40)
+    assert not learned.failures.failing.any()
+
+
+@pytest.mark.parametrize(("others", "failing"), [(3, False), (4, True)])
+def test_beside_four_sound_views_one_that_never_showed_people_fails(others: int, failing: bool) -> None:
+    corner, *more = room().cameras
+    rig = rig_of([corner, *more, looking("beside", (0.0, -3.6, 2.6))][: others + 1])
+    asked = Detector(replace(rig, frame_rate=RATE), ["pixels"] * len(rig.cameras), FEW_HEIGHTS, BODY)
+    learned, seen = asked.new_calibrations(), list(likelihoods(rig.cameras, STANDING))
+    half = [np.where(np.arange(view.shape[1]) % 2, view, 0.0).astype(np.float32) for view in map(np.asarray, seen)]
+    explained(asked, learned, [half[0], *seen[1:]], 40)
+    assert learned.failures.failing.tolist() == [failing] + [False] * others
+    explained(asked, learned, seen, 10)
     assert not learned.failures.failing.any()
 
 

@@ -10,8 +10,10 @@ the time of a frame and person, and is forgotten quickly for J now and slowly fo
 J now is less than 0.7 of its usual one fails: it is excluded until J has come back. The usual J stands while
 it fails, and counts in J now where little was seen of late, so a view without people comes back by itself.
 
-A view that never showed more, since its calibration is wrong, does not fail: the run says so afterwards. Only people
-count who would be there without the view, and whom two other views show: of two views nobody can say which one fails.
+A view that never showed more, since its calibration is wrong, has no better past to be measured by. It fails beside
+four sound views or more, where its J now is less than 0.7 of the median of their usual J; among fewer it is used, and
+the run says so afterwards. Only people count who would be there without the view, and whom two other views show: of two
+views nobody can say which one fails.
 
 A camera that is pushed still shows people: `stseg.detection.knocked_views` recognises it, and its view is excluded too.
 """
@@ -45,6 +47,8 @@ _EXPECTED = 0.1
 """Weight of the usual informedness in that of now, seconds of one person."""
 _OTHERS = 2
 """Least number of other views that show a person who counts."""
+_COMPARED = 4
+"""Least number of other views by which a view fails that was never better."""
 _SHOWN = 1.0
 """Evidence from which a view shows a person, nats."""
 
@@ -124,9 +128,17 @@ class ViewFailures:
         if known >= _KNOWN:
             usual = total / known
             weight, total = self.recent[k] + _EXPECTED * np.array([1.0, usual])
-            self.failing[k] = total / weight < _LEAST * usual
+            self.failing[k] = total / weight < _LEAST * max(usual, self._usual_of_others(k))
         if not (self.failing[k] or self.knocks.knocked[k]):
             self.usual[k] = self.usual[k] * np.exp(-1 / (self._rate * self._level.memory)) + own
+
+    def _usual_of_others(self, k: int) -> float:
+        """The median of the usual informedness of sound views but view k, 0 where they are too few."""
+        sound = ~self.failing & ~self.knocks.knocked & (self.usual[:, 0] >= _KNOWN)
+        sound[k] = False
+        if np.count_nonzero(sound) < _COMPARED:
+            return 0.0
+        return float(np.median(self.usual[sound, 1] / self.usual[sound, 0]))
 
 
 def informedness(assignment: NDArray[np.int16], sure: Flags, foreground: Flags) -> tuple[int, float]:
