@@ -19,6 +19,7 @@ from functools import partial
 from typing import NamedTuple, Protocol
 
 from stseg.arrays import Observation, Singles, ViewEvidence
+from stseg.engine.area import within_area
 from stseg.engine.committed_frames import CommittedFrames, FrameRecord, FusedEvidence, committed_frames, rate_rows
 from stseg.engine.excluded_views import ExcludedViews
 from stseg.engine.frozen_views import FrozenViews
@@ -27,7 +28,7 @@ from stseg.engine.stopwatch import Stopwatch
 from stseg.foreground.view_foreground import ViewForeground
 from stseg.model.box_noise import BoxNoise
 from stseg.model.people import Explanation
-from stseg.trackers import FrameObservations, FusedFrame
+from stseg.trackers import Commit, FrameObservations, FusedFrame
 
 _AHEAD = 2
 """Frames whose foreground is made before their detection."""
@@ -109,13 +110,16 @@ class Session:
         fused = FusedFrame(frame, explanation.people, explanation.ghosts, lambda: fusion.result().volume)
         with self.watch.time("track"):
             commits = self._tracker.add(fused, FrameObservations(frame_set.views, used))
-        return [committed_frames(commit, self._records, self.watch) for commit in commits]
+        return [self._committed(commit) for commit in commits]
 
     def finish(self) -> list[CommittedFrames]:
         """No more frame sets; the results of all frames that are still open."""
         with self.watch.time("track"):
             commits = self._tracker.finish()
-        return [committed_frames(commit, self._records, self.watch) for commit in commits]
+        return [self._committed(commit) for commit in commits]
+
+    def _committed(self, commit: Commit) -> CommittedFrames:
+        return committed_frames(within_area(commit, self.pipeline.rig), self._records, self.watch)
 
     def _submit(
         self, frame: int, evidence: Sequence[ViewEvidence], explanation: Explanation, noise: BoxNoise

@@ -70,6 +70,12 @@ class Grid:
         nearest = np.minimum(np.minimum(x - self.x[0], self.x[1] - x), np.minimum(y - self.y[0], self.y[1] - y))
         return np.asarray(np.maximum(nearest, 0.0))
 
+    def contains(self, ground: Floats) -> Flags:
+        """Whether points (..., 2), metres, lie in the area: the rectangle and the polygon, bool (...)."""
+        x, y = ground[..., 0], ground[..., 1]
+        inside = (self.x[0] <= x) & (x <= self.x[1]) & (self.y[0] <= y) & (y <= self.y[1])
+        return inside if self.polygon is None else inside & inside_polygon(ground, self.polygon)
+
     def inside(self) -> Flags:
         """Cells whose centre lies within the polygon, all without one, bool (y, x)."""
         if self.polygon is None:

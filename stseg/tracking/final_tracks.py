@@ -132,18 +132,22 @@ def _without_gaps(tracks: Rows, frame_rate: float, config: TrackingConfig) -> Ro
 
 
 def _renamed(events: Rows, name_at: _Names, links: Sequence[Link]) -> Rows:
-    """Births, deaths and hand-overs under the final identities: a linked track has neither birth nor death there."""
+    """Births, deaths and hand-overs under the final identities: a linked track has neither birth nor death there.
+
+    Where somebody is born or dies beyond the area's border, the event is at the first or last row.
+    """
     events = events[~np.isin(events["kind"], (b"merge", b"split"))]
     named = events.copy()
     for role in ("id", "other"):
         named[role] = [name_at.name(track, frame) for track, frame in zip(events[role], events["frame"], strict=True)]
-    rows = zip(named["frame"].tolist(), named["kind"].tolist(), named["id"].tolist(), strict=True)
-    refuted = [
-        (kind == b"birth" and name_at.first(name) < frame) or (kind == b"death" and name_at.last(name) > frame)
-        for frame, kind, name in rows
-    ]
+    born, dead = (np.isin(named["kind"], kind) & np.isin(events["id"], name_at.track) for kind in (b"birth", b"death"))
+    first, last = (np.array([at(name) for name in named["id"]]) for at in (name_at.first, name_at.last))
+    named["frame"][born] = np.maximum(named["frame"], first)[born]
+    named["frame"][dead] = np.minimum(named["frame"], last)[dead]
+    refuted = (born & (first < named["frame"])) | (dead & (last > named["frame"]))
+    nowhere = np.isin(named["kind"], (b"birth", b"death")) & ~born & ~dead
     joined = [(link.frame, b"hand-over", link.identity, link.track, link.reason.encode()) for link in links]
-    return np.concatenate([named[~np.array(refuted, bool)], np.array(joined, EVENT)])
+    return np.concatenate([named[~(refuted | nowhere)], np.array(joined, EVENT)])
 
 
 def _met(events: Rows, name_at: _Names, frame_rate: float, config: TrackingConfig) -> Rows:
