@@ -21,7 +21,7 @@ from stseg.geometry.filled_cells import inside_bodies
 from stseg.geometry.nearest_person import nearest_person
 from stseg.geometry.summed_area import TOP, UNSEEN, Levels
 from stseg.model.people import Explanation
-from stseg.occupancy.fusion import ErrorRates, Sums, ViewTerms, add_terms, log_odds_terms
+from stseg.occupancy.fusion import ErrorRates, FrameTerms, Sums, log_odds_terms
 from stseg.occupancy.rate_calibration import (
     CLUTTER,
     MISS,
@@ -48,17 +48,18 @@ def teach(
     view: int, shown: reference.Shown, near: Ints, inside: Flags, trusted: Flags, rates: list[ErrorRates], looks: float
 ) -> tuple[Floats, Floats]:
     """What the kernel counts of one of several views of equal weight."""
-    sums, one = Sums.zero((inside.size,)), np.ones(inside.size, np.float32)
-    person, number = np.tile(near.ravel(), len(inside)), np.ones(inside.size)
-    views = [
-        ViewTerms(levels.ravel(), log_odds_terms(rate), np.float32(1), share.ravel(), one)
-        for levels, share, rate in zip(*shown, rates, strict=True)
-    ]
-    for terms in views:
-        add_terms(terms, person, sums)
-    errors, seen, own = np.full(3, np.nan), np.full(3, np.nan), np.array(rates[view])
-    fill_counts(views[view], sums, person, inside.ravel(), number, trusted, own, looks, PRIOR, errors, seen)
-    return errors, seen
+    of_cells, views = np.zeros(inside.size, np.int32), len(rates)
+    terms = FrameTerms(
+        of_cells, of_cells, np.ones((views, 1), bool), np.array([own.ravel() for own in shown.levels]),
+        np.array([own.ravel() for own in shown.share]), np.ones((1, views), bool), np.zeros(views, np.int16),
+        np.array([log_odds_terms(rate) for rate in rates]), np.ones(views, np.float32),
+        np.ones((views, len(trusted)), np.float32),
+    )  # fmt: skip
+    sums = Sums.of(terms, np.tile(near.ravel(), len(inside)).astype(np.int32))
+    errors, seen = np.full((2, views, 3), np.nan)
+    number, by_all = np.ones(inside.size), np.tile(trusted, (views, 1))
+    fill_counts(terms, sums, inside.ravel(), number, by_all, np.array(rates), looks, PRIOR, errors, seen)
+    return errors[view], seen[view]
 
 
 def random_levels(rng: np.random.Generator, shape: tuple[int, ...], chance: Floats) -> Levels:

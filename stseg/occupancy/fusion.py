@@ -27,9 +27,9 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from stseg.accelerate import kernel
-from stseg.arrays import Bytes, Ints, Singles
-from stseg.geometry.summed_area import TOP, Levels
+from stseg.accelerate import kernel, part
+from stseg.arrays import Flags, Labels, Singles
+from stseg.geometry.summed_area import TOP, UNSEEN, Levels
 
 
 class ErrorRates(NamedTuple):
@@ -50,53 +50,91 @@ class ErrorRates(NamedTuple):
     near_clutter: float
 
 
-class ViewTerms(NamedTuple):
-    """What one view adds to a frame's sums.
+class FrameTerms(NamedTuple):
+    """What the views of a frame add to its sums at cells (n,).
+
+    In the blocks of cells where a view shows something its levels are given cell by cell. In all others it sees its
+    empty level, and all of each footprint.
 
     Attributes
     ----------
-    levels : int16 (plane, y, x), or (n,) of some cells
-        Mean likelihood of each cell, or UNSEEN.
-    terms : float32 (2, TOP + 1)
+    view_set : int32 (n,), block : int32 (n,)
+        The set of views that see each cell, and its block.
+    shown : bool (view, block)
+        Whether the view's levels are given there.
+    levels : int16 (view, n)
+        Mean likelihood of each cell, or UNSEEN; undefined where not given.
+    share : float32 (view, n)
+        a_i, 0..1: visible share of the footprint; undefined where the level is, or is UNSEEN.
+    seen : bool (set, view)
+        The views of each set that are not blind.
+    empty : int16 (view,)
+        The level where nothing is shown.
+    terms : float32 (view, 2, TOP + 1)
         The term of each level near no person, and within reach of a person, nats.
-    weight : float
+    weight : float32 (view,)
         1 / C_i, in any scale.
-    share : float32, as the levels
-        a_i, 0..1: visible share of the footprint; undefined where the level is UNSEEN.
-    confidence : float32 (y, x), or (n,)
-        Further factor of the terms, 0..1, which does not reduce the view's count.
+    confidence : float32 (view, person)
+        Further factor of the terms near each person, 0..1, which does not reduce the view's count.
     """
 
+    view_set: Labels
+    block: Labels
+    shown: Flags
     levels: Levels
-    terms: Singles
-    weight: np.float32
     share: Singles
+    seen: Flags
+    empty: Levels
+    terms: Singles
+    weight: Singles
     confidence: Singles
 
 
 class Sums(NamedTuple):
-    """Sums over the views of a frame.
+    """Sums over the views of a frame, of runs of cells that all views see alike.
 
     Attributes
     ----------
-    weighted, weights, shares : float32 (plane, y, x), or (n,) of some cells
+    start : int32 (run + 1,)
+        First cell of each run, and behind the last one the number of cells.
+    near : int32 (run,)
+        The person near the cells of each run, -1 for none; each cell near a person is a run.
+    weighted, weights, shares : float32 (run,)
         Sums of w_i a_i times term, of w_i a_i, and of a_i.
     """
 
+    start: Labels
+    near: Labels
     weighted: Singles
     weights: Singles
     shares: Singles
 
     @classmethod
-    def zero(cls, shape: tuple[int, ...]) -> Self:
-        """Before any view."""
-        return cls(*(np.zeros(shape, np.float32) for _ in range(3)))
+    def of(cls, views: FrameTerms, near: Labels) -> Self:
+        """Of all views at cells; near int32 (n,) is the person near each, -1 for none."""
+        start = np.empty(len(near) + 1, np.int32)
+        runs = fill_runs(views, near, start)
+        start = start[: runs + 1].copy()
+        sums = cls(start, near[start[:-1]], *(np.empty(runs, np.float32) for _ in range(3)))
+        fill_sums(views, sums)
+        return sums
 
-    def total(self, views: Bytes, near: Ints, observations: float, priors: tuple[float, float]) -> Singles:
-        """k n_vis sum_i w_i term_i and the prior, nats, float32 as the sums; see `fill_total`."""
-        total = np.empty(self.weighted.shape, np.float32)
-        prior, near_prior = np.float32(priors[0]), np.float32(priors[1])
-        fill_total(self, views, near, np.float32(observations), prior, near_prior, total)
+    def total(self, held: Flags, observations: float, priors: tuple[float, float]) -> Singles:
+        """k n_vis sum_i w_i term_i and the prior of each cell, nats, float32 (n,).
+
+        Parameters
+        ----------
+        held : bool (n,)
+            Whether a view's image holds the cell; nan where none does. Where all are hidden it is the prior.
+        observations
+            k.
+        priors
+            log(pi / (1 - pi)) near no person, and within reach of a person.
+        """
+        of_run = np.empty(len(self.near), np.float32)
+        fill_total(self, np.float32(observations), np.float32(priors[0]), np.float32(priors[1]), of_run)
+        total = np.repeat(of_run, np.diff(self.start))
+        total[~held] = np.nan
         return total
 
 
@@ -122,54 +160,66 @@ def synergy_terms(floor: float) -> Singles:
     return np.tile(np.log(np.maximum(likelihood, floor)).astype(np.float32), (2, 1))
 
 
-@kernel
-def add_terms(view: ViewTerms, near: Ints, sums: Sums) -> None:
-    """Add one view's terms to the frame's sums; near int64 (y, x), or (n,), is the person near each, -1 for none."""
-    level, share = view.levels.reshape(-1), view.share.reshape(-1)
-    confidence, person = view.confidence.reshape(-1), near.reshape(-1)
-    weighted, weights, count = sums.weighted.reshape(-1), sums.weights.reshape(-1), sums.shares.reshape(-1)
-    for start in range(0, len(level), max(len(person), 1)):
-        for place in range(len(person)):
-            c = start + place
-            if level[c] >= 0:
-                weight = view.weight * share[c]
-                near_person = 1 if person[place] >= 0 else 0
-                weighted[c] += weight * confidence[place] * view.terms[near_person, level[c]]
-                weights[c] += weight
-                count[c] += share[c]
+@part
+def level_and_share(views: FrameTerms, i: int, c: int) -> tuple[int, np.float32]:
+    """What view i sees of cell c; the level is UNSEEN where it does not see the cell."""
+    if views.shown[i, views.block[c]]:
+        return int(views.levels[i, c]), views.share[i, c]
+    return int(views.empty[i]) if views.seen[views.view_set[c], i] else UNSEEN, np.float32(1)
 
 
 @kernel
-def fill_total(
-    sums: Sums,
-    views: Bytes,
-    near: Ints,
-    observations: np.float32,
-    prior: np.float32,
-    near_prior: np.float32,
-    total: Singles,
-) -> None:
-    """Fill total (plane, y, x), or (n,): nan where no view's image holds the cell, the prior where all are hidden.
-
-    Parameters
-    ----------
-    views : uint8, as the sums
-        Number of views whose image holds the cell.
-    near : int64 (y, x), or (n,)
-        The person near each cell, -1 for none.
-    observations
-        k.
-    prior, near_prior
-        log(pi / (1 - pi)) near no person, and within reach of a person.
-    """
-    held, person, flat = views.reshape(-1), near.reshape(-1), total.reshape(-1)
-    weighted, weights, count = sums.weighted.reshape(-1), sums.weights.reshape(-1), sums.shares.reshape(-1)
-    for start in range(0, len(held), max(len(person), 1)):
-        for place in range(len(person)):
-            c = start + place
-            if held[c] == 0:
-                flat[c] = np.nan
+def fill_runs(views: FrameTerms, near: Labels, start: Labels) -> int:
+    """Fill start (n + 1,) with the runs of cells of a block that all views see alike; their number."""
+    shown, number, runs = np.empty(len(views.weight), np.int64), 0, 0
+    for c in range(len(near)):
+        if c > 0 and views.block[c] == views.block[c - 1]:
+            alike = views.view_set[c] == views.view_set[c - 1] and near[c] < 0 and near[c - 1] < 0
+            for k in range(number):
+                alike = alike and _is_seen_alike(views, shown[k], c)
+            if alike:
                 continue
-            flat[c] = prior if person[place] < 0 else near_prior
-            if weights[c] > 0:
-                flat[c] += observations * count[c] * weighted[c] / weights[c]
+        else:
+            number = 0
+            for i in range(len(shown)):
+                if views.shown[i, views.block[c]]:
+                    shown[number] = i
+                    number += 1
+        start[runs] = c
+        runs += 1
+    start[runs] = len(near)
+    return runs
+
+
+@part
+def _is_seen_alike(views: FrameTerms, i: int, c: int) -> bool:
+    """Whether view i, which shows something in their block, sees cell c as it sees the one before."""
+    level = views.levels[i, c]
+    return bool(level == views.levels[i, c - 1] and (level < 0 or views.share[i, c] == views.share[i, c - 1]))
+
+
+@kernel
+def fill_sums(views: FrameTerms, sums: Sums) -> None:
+    """Fill the sums of runs, whose start and persons are given."""
+    for r in range(len(sums.near)):
+        person, weighted, weights, shares = sums.near[r], np.float32(0), np.float32(0), np.float32(0)
+        for i in range(len(views.weight)):
+            level, share = level_and_share(views, i, sums.start[r])
+            if level >= 0:
+                weight = views.weight[i] * share
+                if person < 0:
+                    weighted += weight * views.terms[i, 0, level]
+                else:
+                    weighted += weight * views.confidence[i, person] * views.terms[i, 1, level]
+                weights += weight
+                shares += share
+        sums.weighted[r], sums.weights[r], sums.shares[r] = weighted, weights, shares
+
+
+@kernel
+def fill_total(sums: Sums, observations: np.float32, prior: np.float32, near_prior: np.float32, total: Singles) -> None:
+    """Fill total (run,); see `Sums.total`."""
+    for r in range(len(sums.near)):
+        total[r] = prior if sums.near[r] < 0 else near_prior
+        if sums.weights[r] > 0:
+            total[r] += observations * sums.shares[r] * sums.weighted[r] / sums.weights[r]

@@ -15,8 +15,9 @@ from stseg.errors import SourceError
 from stseg.geometry import Rig
 from stseg.geometry.cell_means import CellMeans
 from stseg.geometry.sampling import Sampling, SamplingKind
+from stseg.geometry.summed_area import Levels
 from stseg.occupancy.clutter import clutter, clutter_side, clutter_weights
-from stseg.occupancy.fusion import ErrorRates, Sums, ViewTerms, add_terms, log_odds_terms, synergy_terms
+from stseg.occupancy.fusion import ErrorRates, FrameTerms, Sums, log_odds_terms, synergy_terms
 
 Maps = Sequence[Singles | None]
 """The likelihood map float32 (v, u) of each view, 0..1, or None where it is blind."""
@@ -39,8 +40,7 @@ class Localiser:
         self.rig, self.sampling = rig, Sampling.of(rig, sampling)
         self._means = CellMeans(self.sampling)
         self._views = self.sampling.views()
-        self._whole, self._certain = np.ones(rig.grid.shape, np.float32), np.ones(rig.grid.shape[1:], np.float32)
-        self._no_person = np.full(rig.grid.shape[1:], -1, np.int64)
+        self._no_person = np.full(self._views.size, -1, np.int32)
 
     def clutter_weights(self, maps: Maps) -> Floats:
         """1 / C_i of each view, mean 1, 0 for blind views (Khan and Shah 2009, eqs 5, 6); float64 (view,)."""
@@ -75,7 +75,7 @@ class Localiser:
         SourceError
             Where a map is missing or of another size than its camera's image.
         """
-        return self._fuse(maps, weights, [synergy_terms(least)] * len(maps), 0.0)
+        return self._fuse(maps, weights, np.stack([synergy_terms(least)] * len(maps)), 0.0)
 
     def log_odds(self, maps: Maps, weights: Floats, rates: Sequence[ErrorRates], occupied: float) -> Singles:
         """The calibrated log-odds u of all planes, nats (docs/how-it-works.md, Fusion).
@@ -100,17 +100,16 @@ class Localiser:
             Where a map is missing or of another size than its camera's image.
         """
         prior = float(np.log(occupied / (1 - occupied)))
-        return self._fuse(maps, weights, [log_odds_terms(rate) for rate in rates], prior)
+        return self._fuse(maps, weights, np.stack([log_odds_terms(rate) for rate in rates]), prior)
 
-    def _fuse(self, maps: Maps, weights: Floats, terms: Sequence[Singles], prior: float) -> Singles:
+    def _fuse(self, maps: Maps, weights: Floats, terms: Singles, prior: float) -> Singles:
         self._require(maps)
-        sums = Sums.zero(self.rig.grid.shape)
-        for i, (view, weight, term) in enumerate(zip(maps, weights, terms, strict=True)):
-            if view is not None:
-                levels = self._means.levels(i, view)
-                added = ViewTerms(levels, term, np.float32(weight), self._whole, self._certain)
-                add_terms(added, self._no_person, sums)
-        return sums.total(self._views, self._no_person, 1.0, (prior, prior))
+        levels = [self._means.levels(i, view).reshape(-1) for i, view in enumerate(maps) if view is not None]
+        sighted = [i for i, view in enumerate(maps) if view is not None]
+        every = np.array(levels, np.int16).reshape(len(sighted), -1)
+        sums = Sums.of(_all_shown(every, terms[sighted], weights[sighted].astype(np.float32)), self._no_person)
+        total = sums.total(self._views.reshape(-1) > 0, 1.0, (prior, prior))
+        return total.reshape(self._views.shape)
 
     def _require(self, maps: Maps) -> None:
         cameras = self.rig.cameras
@@ -119,3 +118,12 @@ class Localiser:
         for camera, view in zip(cameras, maps, strict=True):
             if view is not None and view.shape != camera.size[::-1]:
                 raise SourceError(f"camera {camera.name}", "shape of the map", view.shape, f"{camera.size[::-1]}")
+
+
+def _all_shown(levels: Levels, terms: Singles, weights: Singles) -> FrameTerms:
+    """Views that show something everywhere, near nobody: levels int16 (view, cell)."""
+    views, cells = levels.shape
+    nothing, confidence = np.zeros(cells, np.int32), np.ones((views, 0), np.float32)
+    shown, seen, empty = np.ones((views, 1), bool), np.ones((1, views), bool), np.zeros(views, np.int16)
+    share = np.ones(levels.shape, np.float32)
+    return FrameTerms(nothing, nothing, shown, levels, share, seen, empty, terms, weights, confidence)

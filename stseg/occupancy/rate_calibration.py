@@ -24,13 +24,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from stseg.accelerate import kernel
-from stseg.arrays import Flags, Floats, Ints
+from stseg.accelerate import kernel, part
+from stseg.arrays import Flags, Floats
 from stseg.config import ErrorRateConfig
 from stseg.geometry import Grid
 from stseg.geometry.bodies import PROFILE
 from stseg.geometry.summed_area import TOP
-from stseg.occupancy.fusion import ErrorRates, Sums, ViewTerms
+from stseg.occupancy.fusion import ErrorRates, FrameTerms, Sums, level_and_share
 
 MISS, CLUTTER, NEAR_CLUTTER = 0, 1, 2
 _FIRST_FILLED = 0.5
@@ -110,9 +110,8 @@ def _error_posterior(rate: float, likelihood: float) -> float:
 
 @kernel
 def fill_counts(
-    view: ViewTerms,
+    views: FrameTerms,
     sums: Sums,
-    near: Ints,
     inside: Flags,
     number: Floats,
     trusted: Flags,
@@ -122,17 +121,17 @@ def fill_counts(
     errors: Floats,
     seen: Floats,
 ) -> None:
-    """Fill errors and seen (3,) with one view's errors and trials of m, b and b' in a frame, in cells.
+    """Fill errors and seen (view, 3) with each view's errors and trials of m, b and b' in a frame, in cells.
 
     Parameters
     ----------
-    view, sums
-        The view's terms, and the sums over all views that contain them.
-    near : int64 (n,), inside : bool (n,), number : float64 (n,)
-        The person near each cell, -1 for none, whether the pillar fills the cell, and cells that it stands for.
-    trusted : bool (person,)
-        Persons supported by the rest of the evidence, and not hidden from this view.
-    rates : float64 (3,)
+    views, sums
+        The views' terms, and their sums.
+    inside : bool (n,), number : float64 (n,)
+        Whether the pillar of the person near it fills each cell, and cells that it stands for.
+    trusted : bool (view, person)
+        Persons supported by the rest of the evidence, and not hidden from the view.
+    rates : float64 (view, 3)
         m, b and b' so far.
     observations
         k of `stseg.occupancy.fusion`.
@@ -140,20 +139,47 @@ def fill_counts(
         Prior log-odds of a cell near no person, nats.
     """
     errors[:], seen[:] = 0.0, 0.0
-    levels, shares = view.levels, view.share
-    for c in range(len(levels)):
-        if levels[c] < 0 or shares[c] <= 0.0:
+    wrong, empty, all_wrong, all_empty = np.zeros((4, len(views.weight)))
+    for r in range(len(sums.near)):
+        c = sums.start[r]
+        if sums.near[r] >= 0:
+            _count_beside_person(views, sums.near[r], c, inside[c], trusted, rates, errors, seen)
             continue
-        likelihood, nearest = levels[c] / TOP, near[c]
-        if nearest < 0:
-            rest, others = sums.weights[c] - view.weight * shares[c], prior
-            if rest > _LEAST_WEIGHT * view.weight:
-                own = view.weight * shares[c] * view.confidence[c] * view.terms[0, levels[c]]
-                others += observations * (sums.shares[c] - shares[c]) * (sums.weighted[c] - own) / rest
-            empty = number[c] * shares[c] / (1.0 + np.exp(min(max(others, -30.0), 30.0)))
-            errors[CLUTTER] += _error_posterior(rates[CLUTTER], likelihood) * empty
-            seen[CLUTTER] += empty
-        elif trusted[nearest]:
-            rate, error_likelihood = (MISS, 1.0 - likelihood) if inside[c] else (NEAR_CLUTTER, likelihood)
-            errors[rate] += _error_posterior(rates[rate], error_likelihood) * shares[c]
-            seen[rate] += shares[c]
+        for i in range(len(views.weight)):
+            level, share = level_and_share(views, i, c)
+            wrong[i], empty[i] = 0.0, 0.0
+            if level >= 0 and share > 0.0:
+                odds = _occupied_odds(views, sums, i, r, level, share, observations, prior)
+                empty[i] = number[c] * share / (1.0 + odds)
+                wrong[i] = _error_posterior(rates[i, CLUTTER], level / TOP) * empty[i]
+        for _ in range(c, sums.start[r + 1]):
+            for i in range(len(wrong)):
+                all_wrong[i] += wrong[i]
+                all_empty[i] += empty[i]
+    errors[:, CLUTTER], seen[:, CLUTTER] = all_wrong, all_empty
+
+
+@part
+def _count_beside_person(
+    views: FrameTerms, person: int, c: int, is_inside: bool, trusted: Flags, rates: Floats, errors: Floats, seen: Floats
+) -> None:
+    """Count a cell within reach of a person."""
+    for i in range(len(views.weight)):
+        level, share = level_and_share(views, i, c)
+        if level >= 0 and share > 0.0 and trusted[i, person]:
+            likelihood = level / TOP
+            rate, error_likelihood = (MISS, 1.0 - likelihood) if is_inside else (NEAR_CLUTTER, likelihood)
+            errors[i, rate] += _error_posterior(rates[i, rate], error_likelihood) * share
+            seen[i, rate] += share
+
+
+@part
+def _occupied_odds(
+    views: FrameTerms, sums: Sums, i: int, r: int, level: int, share: np.float32, observations: float, prior: float
+) -> float:
+    """Odds that the cells of a run near no person are occupied, by all views but one."""
+    rest, others = sums.weights[r] - views.weight[i] * share, prior
+    if rest > _LEAST_WEIGHT * views.weight[i]:
+        own = views.weight[i] * share * views.terms[i, 0, level]
+        others += observations * (sums.shares[r] - share) * (sums.weighted[r] - own) / rest
+    return float(np.exp(min(max(others, -30.0), 30.0)))

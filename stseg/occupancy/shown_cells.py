@@ -65,9 +65,11 @@ class ShownCells(NamedTuple):
         Index in the flattened volume.
     place : int32 (n,)
         Index in the flattened ground.
-    block : int32 (n,)
-        Index of its block among those of all planes.
-    near : int64 (n + k,)
+    block : int32 (n + k,)
+        Index of its block among those of all planes; of the others that behind the last.
+    view_set : int32 (n + k,)
+        The set of views that see it.
+    near : int32 (n + k,)
         The person near each, -1 for none.
     number : float64 (n + k,)
         Cells that each stands for.
@@ -76,7 +78,8 @@ class ShownCells(NamedTuple):
     cell: Labels
     place: Labels
     block: Labels
-    near: Ints
+    view_set: Labels
+    near: Labels
     number: Floats
 
 
@@ -87,13 +90,14 @@ class _MarkedCells(NamedTuple):
     cell: Labels
     place: Labels
     block: Labels
+    view_set: Labels
     number: Floats
 
     @classmethod
     def none(cls) -> Self:
         """Before the first frame."""
         nothing = np.zeros(0, np.int32)
-        return cls(np.zeros(0, bool), nothing, nothing, nothing, np.zeros(0))
+        return cls(np.zeros(0, bool), nothing, nothing, nothing, nothing, np.zeros(0))
 
 
 class CellTables:
@@ -148,18 +152,23 @@ class CellTables:
             marked = np.ones_like(marked)
         if not np.array_equal(marked, self._last.marked):
             self._last = self._cells_of(marked, views)
-        _, cell, place, block, number = self._last
-        beside = np.full(len(number) - len(cell), -1)
-        return ShownCells(cell, place, block, np.append(near.reshape(-1)[place], beside), number)
+        _, cell, place, block, view_set, number = self._last
+        person = np.full(len(number), -1, np.int32)
+        np.take(near.reshape(-1).astype(np.int32), place, out=person[: len(place)])
+        return ShownCells(cell, place, block, view_set, person, number)
 
     def _cells_of(self, marked: Flags, views: Bytes) -> _MarkedCells:
-        found, blocks = np.empty((2, int(marked.sum()) * SIDE**2), np.int32)
-        count = _fill_cells(marked, views, found, blocks)
-        cell, block = found[:count], blocks[:count]
-        sets, own = self.sets, self.sets.of_cell.reshape(-1)[cell]
-        others = sets.size - np.bincount(own, minlength=len(sets.size))
-        number = np.concatenate([np.ones(len(cell)), others])
-        return _MarkedCells(marked.copy(), cell, cell % np.int32(views[0].size), block, number)
+        sets, most = self.sets, int(marked.sum()) * SIDE**2
+        representatives = len(sets.size)
+        cell, place = np.empty((2, most), np.int32)
+        block, view_set = np.empty((2, most + representatives), np.int32)
+        number = np.ones(most + representatives)
+        others = sets.size.copy()
+        count = _fill_cells(marked, views, sets.of_cell, cell, place, block, view_set, others)
+        every = count + representatives
+        block[count:every], view_set[count:every] = marked.size, np.arange(representatives)
+        number[count:every] = others
+        return _MarkedCells(marked.copy(), cell[:count], place[:count], block[:every], view_set[:every], number[:every])
 
 
 @kernel
@@ -201,8 +210,20 @@ def _fill_reach(footprint: Footprints, reach: Reach) -> None:
 
 
 @kernel
-def _fill_cells(marked: Flags, views: Bytes, cell: Labels, block: Labels) -> int:
-    """Fill cell and block (n,) with the indices of the cells of marked blocks that a view sees; their number."""
+def _fill_cells(
+    marked: Flags,
+    views: Bytes,
+    of_cell: Labels,
+    cell: Labels,
+    place: Labels,
+    block: Labels,
+    view_set: Labels,
+    others: Ints,
+) -> int:
+    """Fill cell, place, block and view_set (n,) of the cells of marked blocks that a view sees; their number.
+
+    They are taken from the number of cells of each set, others (set,).
+    """
     planes, rows, columns = views.shape
     count = 0
     for z in range(planes):
@@ -212,7 +233,9 @@ def _fill_cells(marked: Flags, views: Bytes, cell: Labels, block: Labels) -> int
                     for y in range(j * SIDE, min((j + 1) * SIDE, rows)):
                         for x in range(i * SIDE, min((i + 1) * SIDE, columns)):
                             if views[z, y, x] > 0:
-                                cell[count] = (z * rows + y) * columns + x
+                                cell[count], place[count] = (z * rows + y) * columns + x, y * columns + x
                                 block[count] = (z * marked.shape[1] + j) * marked.shape[2] + i
+                                view_set[count] = of_cell[z, y, x]
+                                others[of_cell[z, y, x]] -= 1
                                 count += 1
     return count

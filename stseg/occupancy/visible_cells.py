@@ -169,27 +169,30 @@ def fill_map(
     levels: Levels,
     share: Singles,
 ) -> None:
-    """Fill levels and share (n,), 1 before, of cells by a view with a map; UNSEEN where it does not see them.
+    """Fill levels and share (n,) of the cells of marked blocks by a view with a map; UNSEEN where it does not see them.
 
-    The level is the mean over the visible pixels of the footprint, those of other persons counted as background. It is
-    the map's lowest outside the blocks, marked bool (block,), at which the view shows something; people bool (block,)
-    are those of them at which it shows a person.
+    The level is the mean over the visible pixels of the footprint, those of other persons counted as background. Blocks
+    marked bool (block,) are those at which the view shows something, people bool (block,) those of them at which it
+    shows a person.
     """
-    lowest = np.int16(table.lowest)
     for k in range(len(cells.cell)):
-        left, top, width, height = footprint[np.uint64(cells.cell[k])]
         block = np.uint64(cells.block[k])
+        if not marked[block]:
+            continue
+        left, top, width, height = footprint[np.uint64(cells.cell[k])]
         if width == 0:
             levels[k] = UNSEEN
-            continue
-        if not marked[block]:
-            levels[k] = lowest
             continue
         u, v = left - table.left, top - table.top
         total, pixels = int(sum_of(table.sums, u, v, u + width, v + height)), np.int32(width) * np.int32(height)
         nearest, visible = cells.near[k], np.float32(1)
-        is_separate = nearest >= 0 and shown.separate[nearest]
-        if people[block] and not is_separate and _shows_a_person(shown, left, top, width, height):
+        is_apart = not people[block] or (nearest >= 0 and shown.separate[nearest])
+        if not is_apart and pixels == 1:
+            other = shown.raster[shown.row[np.uint64(top)], shown.column[np.uint64(left)]]
+            if other >= 0 and other != nearest:
+                is_hidden = shown.distance[np.uint64(other)] < distance[cells.place[k]] - SHOULDER
+                visible, total = np.float32(0 if is_hidden else 1), total if is_hidden else 0
+        elif not is_apart and _shows_a_person(shown, left, top, width, height):
             far = distance[cells.place[k]]
             hidden, others = _others_inside(shown, table, left, top, width, height, nearest, far)
             visible -= np.float32(hidden) / np.float32(pixels)

@@ -16,7 +16,7 @@ from stseg.geometry.cell_means import CellMeans, SumTable
 from stseg.geometry.filled_cells import inside_bodies
 from stseg.geometry.nearest_person import nearest_person
 from stseg.geometry.sampling import Sampling
-from stseg.geometry.summed_area import UNSEEN
+from stseg.geometry.summed_area import Levels
 from stseg.model.box_likelihood import box_likelihood
 from stseg.model.box_noise import FIRST, BoxNoise
 from stseg.model.people import Explanation
@@ -24,7 +24,7 @@ from stseg.model.pillar_index import PillarIndex
 from stseg.model.sparse_volume import SparseVolume
 from stseg.occupancy.box_planes import CellsByPerson, ViewBoxes, fill_fit, fill_levels, level_of_match, mark_fit
 from stseg.occupancy.clutter import clutter, clutter_side, clutter_weights
-from stseg.occupancy.fusion import ErrorRates, Sums, ViewTerms, add_terms, log_odds_terms
+from stseg.occupancy.fusion import ErrorRates, FrameTerms, Sums, log_odds_terms
 from stseg.occupancy.rate_calibration import RateCalibration, cells_per_person, fill_counts
 from stseg.occupancy.shown_cells import CellTables, ShownCells, mark_columns, mark_map
 from stseg.occupancy.visible_cells import PixelAssignment, fill_map, fill_occupied, fill_share, mark_people
@@ -46,11 +46,11 @@ class _PreparedView(NamedTuple):
 
 
 class _Fused(NamedTuple):
-    """The cells of a frame, the person near each ground cell, each view's terms, and their sums."""
+    """The cells of a frame, the person near each ground cell, the views' terms, and their sums."""
 
     cells: ShownCells
     near: Ints
-    terms: list[ViewTerms | None]
+    terms: FrameTerms
     sums: Sums
 
 
@@ -133,15 +133,9 @@ class Occupancy:
         marked = [self._marked(i, view) for i, view in enumerate(views)]
         everywhere = np.logical_or.reduce([self._beside_people(views, near), *marked])
         cells = self._tables.shown(everywhere, near, self.views)
-        sums, terms = Sums.zero(cells.near.shape), list[ViewTerms | None]()
         weights = clutter_weights(np.array([self._clutter(i, view) for i, view in enumerate(seen)]))
-        for i, (view, weight) in enumerate(zip(views, weights.astype(np.float32), strict=True)):
-            own = marked[i].reshape(-1)
-            added = None if view is None else self._terms(i, view, cells, own, explanation, rates[i], weight)
-            terms.append(added)
-            if added is not None:
-                add_terms(added, cells.near, sums)
-        return _Fused(cells, near, terms, sums)
+        terms = self._terms(views, marked, cells, explanation, rates, weights.astype(np.float32))
+        return _Fused(cells, near, terms, Sums.of(terms, cells.near))
 
     def _prepared(
         self, i: int, view: Boxes | Singles, explanation: Explanation, near: Ints, noise: BoxNoise
@@ -172,57 +166,79 @@ class Occupancy:
 
     def _terms(
         self,
+        views: Sequence[_PreparedView | None],
+        marked: Sequence[Flags],
+        cells: ShownCells,
+        explanation: Explanation,
+        rates: Sequence[ErrorRates],
+        weights: Singles,
+    ) -> FrameTerms:
+        """Terms of the views at the cells that are fused one by one, and at the representatives of the others."""
+        number, blocks = len(views), marked[0].size
+        shown = np.zeros((number, blocks + 1), bool)
+        levels, share = np.empty((number, len(cells.cell)), np.int16), np.empty((number, len(cells.cell)), np.float32)
+        confidence, empty = np.ones((number, len(explanation.people)), np.float32), np.zeros(number, np.int16)
+        for i, view in enumerate(views):
+            if view is None:
+                continue
+            shown[i, :blocks] = marked[i].reshape(-1) if view.fit is None else True
+            self._fill_view(i, view, marked[i].reshape(-1), cells, rates[i], levels[i], share[i])
+            if view.table is not None:
+                empty[i] = view.table.lowest
+            else:
+                empty[i] = level_of_match(0.0, rates[i].miss, rates[i].clutter)
+                missing = np.where(view.shown.separate[:-1], 1.0, explanation.people.visibility[i])
+                confidence[i] = missing.astype(np.float32)
+        seen = self._tables.sets.seen & np.array([view is not None for view in views])
+        terms = np.stack([log_odds_terms(one) for one in rates])
+        return FrameTerms(cells.view_set, cells.block, shown, levels, share, seen, empty, terms, weights, confidence)
+
+    def _fill_view(
+        self,
         i: int,
         view: _PreparedView,
-        cells: ShownCells,
         marked: Flags,
-        explanation: Explanation,
+        cells: ShownCells,
         rates: ErrorRates,
-        weight: np.float32,
-    ) -> ViewTerms:
-        """Terms of a view at the cells that are fused one by one, and at the representatives of the others."""
+        levels: Levels,
+        share: Singles,
+    ) -> None:
+        """Fill levels and share (n,) of a view at the cells that are fused one by one."""
         footprint, distance = self.sampling.footprint[i].reshape(-1, 4), self.sampling.distance[i].reshape(-1)
-        number, seen = len(cells.cell), self._tables.sets.seen[:, i]
-        levels, share = np.empty(len(cells.near), np.int16), np.ones(len(cells.near), np.float32)
-        confidence, empty = np.ones(len(cells.near), np.float32), np.int16(0)
         if view.table is not None:
-            people, empty = view.people.reshape(-1), np.int16(view.table.lowest)
-            fill_map(
-                cells, marked, people, footprint, view.table, view.shown, distance, levels[:number], share[:number]
-            )
+            people = view.people.reshape(-1)
+            fill_map(cells, marked, people, footprint, view.table, view.shown, distance, levels, share)
         elif view.fit is not None:
-            fill_share(cells, marked, footprint, view.shown, distance, share[:number])
-            fill_levels(view.fit, self.heights, self.rig.grid.heights, cells, footprint, rates, levels[:number])
-            confidence = _confidence(cells.near, view.shown.separate, explanation.people.visibility[i])
-            empty = level_of_match(0.0, rates.miss, rates.clutter)
-        levels[number:] = np.where(seen, empty, UNSEEN)
-        return ViewTerms(levels, log_odds_terms(rates), weight, share, confidence)
+            share[:] = 1.0
+            fill_share(cells, marked, footprint, view.shown, distance, share)
+            fill_levels(view.fit, self.heights, self.rig.grid.heights, cells, footprint, rates, levels)
 
     def _volume(self, fused: _Fused) -> SparseVolume:
         cells, sets = fused.cells, self._tables.sets
-        views = np.append(self.views.reshape(-1)[cells.cell], sets.seen.any(1)).astype(np.uint8)
+        held = np.append(np.ones(len(cells.cell), bool), sets.seen.any(1))
         observations, priors = self.config.effective_observations, (self.prior, _NEAR_PRIOR)
-        total = fused.sums.total(views, cells.near, observations, priors)
+        total = fused.sums.total(held, observations, priors)
         return SparseVolume(sets.of_cell, total[len(cells.cell) :], cells.cell, total[: len(cells.cell)])
 
     def _learn(self, calibration: RateCalibration, fused: _Fused, explanation: Explanation) -> None:
-        people, grid, cells = explanation.people, self.rig.grid, fused.cells
+        people, grid, cells, config = explanation.people, self.rig.grid, fused.cells, calibration.config
+        beside = np.flatnonzero(cells.near >= 0)
         filled = inside_bodies(grid, fused.near, people.ground, people.height)
-        inside = np.append(filled.reshape(-1)[cells.cell], np.zeros(len(cells.near) - len(cells.cell), bool))
+        inside = np.zeros(len(cells.near), bool)
+        inside[beside] = filled.reshape(-1)[cells.cell[beside]]
         body, reached = cells_per_person(grid, self.height_mean, self.config.person_radius)
-        errors, seen = np.zeros((2, len(fused.terms), 3))
-        for i, (view, rates) in enumerate(zip(fused.terms, calibration.rates, strict=True)):
-            if view is not None:
-                trusted = people.evidence - people.view_evidence[i] >= calibration.config.minimum_evidence
-                trusted &= people.visibility[i] >= _UNOCCLUDED
-                fill_counts(
-                    view, fused.sums, cells.near, inside, cells.number, trusted, np.array(rates),
-                    self.config.effective_observations, self.prior, errors[i], seen[i],
-                )  # fmt: skip
+        errors, seen = np.empty((2, len(fused.terms.weight), 3))
+        trusted = (people.evidence - people.view_evidence >= config.minimum_evidence) & (
+            people.visibility >= _UNOCCLUDED
+        )
+        fill_counts(
+            fused.terms, fused.sums, inside, cells.number, trusted, np.array(calibration.rates),
+            self.config.effective_observations, self.prior, errors, seen,
+        )  # fmt: skip
         seen_cells = np.maximum(self._tables.sets.size @ self._tables.sets.seen, 1)
         units = np.column_stack([np.full(len(errors), body), seen_cells, np.full(len(errors), reached - body)])
-        supported = np.append(people.evidence >= calibration.config.minimum_evidence, False)[cells.near]
-        share = np.array([inside[supported].sum(), supported.sum()]) / reached
+        supported = inside[beside][(people.evidence >= config.minimum_evidence)[cells.near[beside]]]
+        share = np.array([supported.sum(), len(supported)]) / reached
         calibration.learn(errors / units, seen / units, share, calibration.interval)
 
     def _assignment(self, i: int, explanation: Explanation) -> PixelAssignment:
@@ -283,9 +299,3 @@ def _first_rates(kind: str, detection: DetectionConfig) -> ErrorRates:
         clutter_rate = (1 - detection.box_miss_rate) / float(np.exp(detection.box_log_ratio))
         return ErrorRates(detection.box_miss_rate, clutter_rate, clutter_rate)
     return ErrorRates(detection.pixel_miss_rate, detection.pixel_clutter_rate, detection.pixel_clutter_rate)
-
-
-def _confidence(near: Ints, separate: Flags, visibility: Floats) -> Singles:
-    """Confidence of a view with boxes, float32 as near: 1, but near a person without a box the person's visibility."""
-    missing = np.where(separate, 1.0, np.append(visibility, 1.0))
-    return np.asarray(missing[near], np.float32)
