@@ -13,6 +13,7 @@ from stseg.errors import CalibrationError
 from stseg.geometry import Camera, Grid, Lens, Rig
 from stseg.geometry.grid import inside_polygon
 from stseg.geometry.planes import plane_homography, vanishing_line
+from stseg.geometry.projection import LensTerms, pixel_of
 
 MATRIX = np.array([[492.3, 0.0, 341.1], [0.0, 494.7, 225.1], [0.0, 0.0, 1.0]])
 LENS = Lens(MATRIX, np.array(BARREL))
@@ -41,6 +42,24 @@ def straight_down(height: float = 3.0, lens: Lens | None = None) -> Camera:
     rotation = np.diag([1.0, -1.0, -1.0])
     projection = MATRIX @ np.column_stack([rotation, [0.0, 0.0, height]])
     return Camera.from_projection("down", (644, 486), projection, lens)
+
+
+@given(cameras(), GROUNDS, HEIGHTS)
+def test_single_points_are_projected_alike(camera: Camera, ground: Floats, height: float) -> None:
+    expected, ahead = camera.project(ground, height)
+    lens = LensTerms.of(camera.lens)
+    for (x, y), pixel, is_ahead in zip(ground, expected, ahead, strict=True):
+        found = pixel_of(camera.projection, lens, x, y, height)
+        if is_ahead:
+            np.testing.assert_allclose(found, pixel, rtol=1e-9, atol=1e-9)
+
+
+def test_a_rational_lens_bends_single_points_alike_and_nothing_is_seen_behind() -> None:
+    lens = Lens(MATRIX, np.array([0.4, 0.1, 0.002, -0.003, 0.01, 0.6, 0.2, 0.02]))
+    camera = Camera.from_projection("cam", (640, 480), LEVEL, lens)
+    expected, _ = camera.project(np.array([0.4, 3.0]), 1.0)
+    np.testing.assert_allclose(pixel_of(LEVEL, LensTerms.of(lens), 0.4, 3.0, 1.0), expected, rtol=1e-9)
+    assert np.isnan(pixel_of(LEVEL, LensTerms.of(lens), 0.4, -3.0, 1.0)).all()
 
 
 class TestPlanes:

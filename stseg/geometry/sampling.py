@@ -11,14 +11,17 @@ at least one pixel each way. Point sampling is the footprint of one pixel.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from stseg.accelerate import kernel, part
 from stseg.arrays import Bytes, Flags, Floats, Singles
 from stseg.geometry import Camera, Rig
+from stseg.geometry.projection import LensTerms, pixel_of
 from stseg.geometry.summed_area import LARGEST_SIDE
 
 SamplingKind = Literal["footprint", "point"]
@@ -68,31 +71,67 @@ def _span(first: NDArray[np.int16], extent: NDArray[np.int16]) -> slice:
 
 
 def _footprints(camera: Camera, rig: Rig, kind: SamplingKind) -> Footprints:
-    footprint = np.zeros((*rig.grid.shape, 4), np.int16)
+    footprint, within = np.zeros((*rig.grid.shape, 4), np.int16), rig.grid.inside()
+    lens = LensTerms.of(camera.lens)
+    shift = (_STEP * rig.grid.cell / 2) if kind == "footprint" else 0.0
     for plane, height in enumerate(rig.grid.heights):
         centre, ahead = camera.project(rig.grid.ground, float(height))
-        seen = ahead & camera.inside(centre) & rig.grid.inside()
-        extent = np.ones_like(centre)
-        if kind == "footprint":
-            extent = _extent(camera, rig, float(height), seen)
-        footprint[plane][seen] = _boxes(centre[seen], extent[seen], camera.size)
+        seen = ahead & camera.inside(centre) & within
+        _fill_boxes(
+            rig.grid.ground, float(height), camera.projection, lens, centre, seen, shift, camera.size, footprint[plane]
+        )
     return footprint
 
 
-def _extent(camera: Camera, rig: Rig, height: float, seen: Flags) -> Floats:
-    """Width and height of the cells' images, pixels, float64 (y, x, 2); 1 where a derivative is not to be had."""
-    cell, ground = rig.grid.cell, rig.grid.ground
-    square = np.zeros((*ground.shape[:2], 2))
-    for axis in np.eye(2) * _STEP * cell / 2:
-        (before, _), (behind, _) = camera.project(ground + axis, height), camera.project(ground - axis, height)
-        square[seen] += ((before - behind)[seen] / _STEP) ** 2
-    return np.asarray(np.nan_to_num(np.sqrt(square), nan=1.0))
+@kernel
+def _fill_boxes(
+    ground: Floats,
+    height: float,
+    projection: Floats,
+    lens: LensTerms,
+    centre: Floats,
+    seen: Flags,
+    shift: float,
+    size: tuple[int, int],
+    boxes: Footprints,
+) -> None:
+    """Fill boxes (y, x, 4) of whole pixels, clipped to the image, about the centres (y, x, 2) of cells that are seen.
+
+    Their sides are the derivative of the pixel, by a shift in metres to either side along x and y, times the cell's
+    side; one pixel where the shift is 0 or there is no derivative.
+    """
+    for j in range(seen.shape[0]):
+        for i in range(seen.shape[1]):
+            if not seen[j, i]:
+                continue
+            x, y, wide, tall = ground[j, i, 0], ground[j, i, 1], 1.0, 1.0
+            if shift > 0:
+                east, west = (
+                    pixel_of(projection, lens, x + shift, y, height),
+                    pixel_of(projection, lens, x - shift, y, height),
+                )
+                north, south = (
+                    pixel_of(projection, lens, x, y + shift, height),
+                    pixel_of(projection, lens, x, y - shift, height),
+                )
+                wide = _extent(east[0] - west[0], north[0] - south[0])
+                tall = _extent(east[1] - west[1], north[1] - south[1])
+            boxes[j, i, 0], boxes[j, i, 2] = _span_about(centre[j, i, 0], wide, size[0])
+            boxes[j, i, 1], boxes[j, i, 3] = _span_about(centre[j, i, 1], tall, size[1])
 
 
-def _boxes(centre: Floats, extent: Floats, size: tuple[int, int]) -> Footprints:
-    """Boxes of whole pixels about centres (n, 2), clipped to the image, int16 (n, 4)."""
-    sides = np.rint(extent).clip(1, LARGEST_SIDE)
-    first = np.rint(centre - (sides - 1) / 2)
-    stop = (first + sides).clip(1, size)
-    first = first.clip(0, stop - 1)
-    return np.concatenate([first, stop - first], -1).astype(np.int16)
+@part
+def _extent(along_x: float, along_y: float) -> float:
+    """Pixels that a cell spans, from its pixel's differences over `_STEP` of a cell; 1 where they are not numbers."""
+    extent = math.sqrt((along_x / _STEP) ** 2 + (along_y / _STEP) ** 2)
+    return 1.0 if math.isnan(extent) else extent
+
+
+@part
+def _span_about(centre: float, extent: float, size: int) -> tuple[int, int]:
+    """First pixel and number of pixels of a span about a centre, inside the image."""
+    side = min(max(np.rint(extent), 1.0), float(LARGEST_SIDE))
+    first = np.rint(centre - (side - 1) / 2)
+    stop = min(max(first + side, 1.0), float(size))
+    first = min(max(first, 0.0), stop - 1)
+    return int(first), int(stop - first)
