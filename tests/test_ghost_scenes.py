@@ -164,8 +164,8 @@ def test_the_moving_ghost_is_borne_out_by_both_views() -> None:
         seen, said = show("pixels", rig.cameras, strollers(frame)), np.zeros((3, len(ground)))
         for view, shown in zip(frame_pass.views, seen, strict=True):
             assert not isinstance(view, BoxView)
-            row_sums = view.row_sums(view.observe(shown), np.ones(view.shape, bool))
-            view.add_lattice_score(row_sums, np.array([1]), view.lattice_cells, said)
+            pixels = view.open_pixels(view.observe(shown), np.ones(view.shape, bool))
+            view.add_lattice_score(pixels, np.array([1]), view.lattice_cells, said)
         here = distances(ground, crossings(strollers(frame), rig)).min(1) < 0.3
         worth += said[1, here].max() > -FEW_HEIGHTS.prior_log_odds
     assert worth > 0.8 * FRAMES

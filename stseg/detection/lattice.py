@@ -9,6 +9,7 @@ import numpy as np
 from stseg.arrays import Floats
 from stseg.detection.evidence import peaks
 from stseg.detection.map_estimate import MapEstimate
+from stseg.detection.open_pixels import OpenPixels
 from stseg.detection.views import BoxView, PixelView
 from stseg.geometry import Grid
 from stseg.model.candidates import Candidates
@@ -36,14 +37,14 @@ def lattice_candidates(estimate: MapEstimate, lattice_ground: Floats) -> Candida
     body, (rows, columns) = evidence.prior.body, lattice_ground.shape[:2]
     heights = np.asarray(body.heights)
     score = np.repeat(evidence.prior.log_height(heights)[:, None], rows * columns, 1)
-    shown: list[tuple[PixelView, Floats]] = []
+    shown: list[tuple[PixelView, OpenPixels]] = []
     for view, observation, free in zip(evidence.views, evidence.observations, unexplained, strict=True):
         if observation is None:
             continue
         if isinstance(view, BoxView):
             score += view.lattice_score(observation, free)
         else:
-            shown.append((view, view.row_sums(observation, free)))
+            shown.append((view, view.open_pixels(observation, free)))
     if shown:
         _add_pixels(shown, _probes(heights), score)
     return peaks(score.reshape(-1, rows, columns), lattice_ground, heights, body.width_of(heights))
@@ -55,13 +56,13 @@ def _probes(heights: Floats) -> list[int]:
     return [middle, small] if heights[small] < _ALIKE * heights[middle] else [middle]
 
 
-def _add_pixels(shown: Sequence[tuple[PixelView, Floats]], probes: Sequence[int], score: Floats) -> None:
+def _add_pixels(shown: Sequence[tuple[PixelView, OpenPixels]], probes: Sequence[int], score: Floats) -> None:
     """Add what pixels say of the lattice's pillars to score (height, cell); -inf where a height is not worth a look."""
     probed = np.isin(np.arange(len(score)), probes)
-    for view, row_sums in shown:
-        view.add_lattice_score(row_sums, np.flatnonzero(probed), view.lattice_cells, score)
+    for view, pixels in shown:
+        view.add_lattice_score(pixels, np.flatnonzero(probed), view.lattice_cells, score)
     hopeless = score[probed].max(0) <= _HOPELESS
     worth = np.flatnonzero(~hopeless)
-    for view, row_sums in shown:
-        view.add_lattice_score(row_sums, np.flatnonzero(~probed), worth, score)
+    for view, pixels in shown:
+        view.add_lattice_score(pixels, np.flatnonzero(~probed), worth, score)
     score[np.ix_(~probed, hopeless)] = -np.inf

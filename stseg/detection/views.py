@@ -11,6 +11,7 @@ import numpy as np
 from stseg.accelerate import kernel, wide_kernel
 from stseg.arrays import Boxes, Flags, Floats, Ints, Singles
 from stseg.config import BodyConfig, DetectionConfig
+from stseg.detection.open_pixels import OpenPixels, add_means, strip_boxes
 from stseg.geometry import Camera, Grid
 from stseg.geometry.bodies import WIDTH, BodyTable
 from stseg.model.box_fit import fill_inside
@@ -187,6 +188,7 @@ class PixelView(View):
         parts = [slice(begin, begin + _DRAWN) for begin in range(0, len(heights), _DRAWN)]
         self.lattice = PackedOutlines.of(self.outlines(places[own], heights[own], widths[own]) for own in parts)
         self.lattice_cells, self.common = np.arange(len(lattice_ground)), len(body.heights) // 2
+        self._strips = strip_boxes(self.lattice, len(lattice_ground))
 
     def observe(self, seen: Boxes | Singles | None, sharpness: BoxNoise = FIRST) -> ViewObservation:
         """The frame's log-odds on the raster; all zero where the view is blind."""
@@ -204,22 +206,20 @@ class PixelView(View):
         """Raster pixels that are foreground rather than not, bool (v, u)."""
         return np.asarray(observation.raster > 0)
 
-    def row_sums(self, observation: ViewObservation, unexplained: Flags) -> Floats:
-        """Cumulative sums along rows of the unexplained pixels' log-odds, float64 (v, u + 1)."""
-        sums = np.empty((self.shape[0], self.shape[1] + 1))
-        _fill_left_of(observation.raster, unexplained, sums)
-        return sums
+    def open_pixels(self, observation: ViewObservation, unexplained: Flags) -> OpenPixels:
+        """The unexplained pixels of a frame, bool (v, u)."""
+        return OpenPixels.of(observation.raster, unexplained)
 
     def common_means(self, observation: ViewObservation) -> Floats:
         """Mean log-odds over the lattice's pillars of common height, explained or not: nats, float64 (cell,)."""
         score = np.zeros((self.common + 1, len(self.lattice_cells)))
-        row_sums = self.row_sums(observation, np.ones(self.shape, bool))
-        self.add_lattice_score(row_sums, np.array([self.common]), self.lattice_cells, score)
+        pixels = self.open_pixels(observation, np.ones(self.shape, bool))
+        self.add_lattice_score(pixels, np.array([self.common]), self.lattice_cells, score)
         return np.asarray(score[self.common] / self.config.effective_observations)
 
-    def add_lattice_score(self, row_sums: Floats, heights: Ints, cells: Ints, score: Floats) -> None:
+    def add_lattice_score(self, pixels: OpenPixels, heights: Ints, cells: Ints, score: Floats) -> None:
         """Add to score (height, cell), nats, what unexplained pixels say of pillars of some heights at some cells."""
-        _add_span_means(row_sums, self.lattice, heights, cells, self.config.effective_observations, score)
+        add_means(pixels, self._strips, self.lattice, heights, cells, self.config.effective_observations, score)
 
     def open_sums(self, values: Singles, owner: Ints, pillars: TriedPillars) -> tuple[Floats, Floats]:
         """Weighted sums of the pixels open to each person inside their pillars, and the pillars' fair areas.
@@ -236,38 +236,6 @@ def _take_for_score(best: Floats, found: Floats, log_ratio: float) -> None:
     """Make scores of log-likelihoods of the best box, best (pillar,), where the view may find (pillar,) the body."""
     for i in range(len(best)):
         best[i] = max(log_ratio + best[i], -_OPTIMISM * found[i]) if found[i] > 0 else 0.0
-
-
-@kernel
-def _fill_left_of(raster: Singles, unexplained: Flags, left_of: Floats) -> None:
-    """Fill left_of (v, u + 1) with the sums of the free pixels (v, u) along rows, from the left."""
-    rows, columns = raster.shape
-    for v in range(rows):
-        total = 0.0
-        left_of[v, 0] = 0.0
-        for u in range(columns):
-            total += float(raster[v, u]) if unexplained[v, u] else 0.0
-            left_of[v, u + 1] = total
-
-
-@kernel
-def _add_span_means(
-    row_sums: Floats, outlines: PackedOutlines, heights: Ints, cells: Ints, weight: float, score: Floats
-) -> None:
-    """Add to score (height, cell) the weighted means over outlines (height * cell,), for some."""
-    flat = row_sums.reshape(-1)
-    for height in heights:
-        for cell in cells:
-            i, total = height * score.shape[1] + cell, 0.0
-            outline = outlines.spans[outlines.start[i] : outlines.start[i + 1]]
-            if len(outline) == 0:
-                continue
-            line = np.uint64(outlines.first[i] * row_sums.shape[1])
-            for k in range(len(outline)):  # unsigned places: none is negative, which is not asked here
-                start, stop = np.uint64(np.uint16(outline[k, 0])), np.uint64(np.uint16(outline[k, 1]))
-                total += flat[line + stop] - flat[line + start]
-                line += np.uint64(row_sums.shape[1])
-            score[height, cell] += weight * total / outlines.area[i]
 
 
 @kernel

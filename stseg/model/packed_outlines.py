@@ -7,6 +7,7 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
+from stseg.accelerate import kernel
 from stseg.arrays import Floats, Ints
 from stseg.model.outlines import Spans
 
@@ -24,23 +25,52 @@ class PackedOutlines(NamedTuple):
         Columns from (included) to (excluded).
     area : float64 (n,)
         Pixels of the whole outline, those outside the raster included.
+    inside : int64 (n,)
+        Pixels of the outline on the raster.
     """
 
     first: Ints
     start: Ints
     spans: Spans
     area: Floats
+    inside: Ints
 
     @classmethod
     def of(cls, parts: Iterable[tuple[Ints, Spans, Floats]]) -> Self:
         """From consecutive outlines as `outlines` returns them."""
-        firsts, counts, packed, areas = [], [], [], []
+        firsts, counts, packed, areas, insides = [], [], [], [], []
         for first, spans, area in parts:
-            drawn = spans[:, ::-1, 1] > 0
-            rows = np.where(drawn.any(1), drawn.shape[1] - drawn.argmax(1), 0)
+            rows, inside = np.empty((2, len(spans)), np.int64)
+            _count(spans, rows, inside)
+            kept = np.empty((int(rows.sum()), 2), np.int16)
+            _pack(spans, rows, kept)
             firsts.append(first)
             counts.append(rows)
-            packed.append(spans[np.arange(spans.shape[1]) < rows[:, None]])
+            packed.append(kept)
             areas.append(area)
+            insides.append(inside)
         start = np.append(0, np.cumsum(np.concatenate(counts)))
-        return cls(np.concatenate(firsts), start, np.concatenate(packed), np.concatenate(areas))
+        return cls(
+            np.concatenate(firsts), start, np.concatenate(packed), np.concatenate(areas), np.concatenate(insides)
+        )
+
+
+@kernel
+def _count(spans: Spans, rows: Ints, inside: Ints) -> None:
+    """Fill rows and inside (n,) with the rows up to the last one drawn of spans (n, row, 2), and their pixels."""
+    for i in range(len(spans)):
+        rows[i], inside[i] = 0, 0
+        for k in range(spans.shape[1]):
+            if spans[i, k, 1] > 0:
+                rows[i] = k + 1
+                inside[i] += spans[i, k, 1] - spans[i, k, 0]
+
+
+@kernel
+def _pack(spans: Spans, rows: Ints, packed: Spans) -> None:
+    """Fill packed (span, 2) with the first rows (n,) of spans (n, row, 2)."""
+    place = 0
+    for i in range(len(spans)):
+        for k in range(rows[i]):
+            packed[place] = spans[i, k]
+            place += 1
