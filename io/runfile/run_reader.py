@@ -270,8 +270,8 @@ class Run:
             for start in range(0, len(self.frames), number):
                 frames = self.frames[start : start + number]
                 log_odds, label = (
-                    [_packed_chunk(group[name], start + k) for k in range(len(frames))]
-                    for name in ("log_odds", "label")
+                    [_packed_chunk(dataset, start + k) for k in range(len(frames))]
+                    for dataset in (group["log_odds"], group["label"])
                 )
                 yield PackedVolumes(frames, log_odds, label)
 

@@ -58,22 +58,20 @@ def smoothed_path(seconds: Floats, ground: Floats, noise: Floats, model: MotionC
     """
     state, spread = np.append(ground[0], [0.0, 0.0]), np.diag([0.0, 0.0, model.speed_spread**2, model.speed_spread**2])
     spread[:2, :2] = noise[0]
-    filtered = [(state, spread)]
+    number = len(seconds)
+    states, spreads = np.zeros((number, 4)), np.zeros((number, 4, 4))
+    predicted, ahead = np.zeros((number, 4)), np.zeros((number, 4, 4))
+    states[0], spreads[0] = state, spread
     steps = [(transition(b - a), process_noise(b - a, model)) for a, b in pairwise(seconds.tolist())]
-    for (motion, turn), place, error in zip(steps, ground[1:], noise[1:], strict=True):
+    for k, (motion, turn) in enumerate(steps, 1):
         state, spread = motion @ state, motion @ spread @ motion.T + turn
-        gain = spread[:, :2] @ np.linalg.inv(spread[:2, :2] + error)
-        state, spread = state + gain @ (place - state[:2]), spread - gain @ spread[:2]
-        filtered.append((state, spread))
-    result = [filtered[-1]]
-    for (motion, turn), (state, spread) in zip(steps[::-1], filtered[-2::-1], strict=True):
-        ahead = motion @ spread @ motion.T + turn
-        gain = spread @ motion.T @ np.linalg.inv(ahead)
-        later, later_spread = result[-1]
-        result.append((state + gain @ (later - motion @ state), spread + gain @ (later_spread - ahead) @ gain.T))
-    result.reverse()
-    places: Floats = np.zeros((len(result), 2))
-    spreads: Floats = np.zeros((len(result), 2, 2))
-    for k, (middle, covariance) in enumerate(result):
-        places[k], spreads[k] = middle[:2], covariance[:2, :2]
-    return places, spreads
+        predicted[k], ahead[k] = state, spread
+        gain = spread[:, :2] @ np.linalg.inv(spread[:2, :2] + noise[k])
+        state, spread = state + gain @ (ground[k] - state[:2]), spread - gain @ spread[:2]
+        states[k], spreads[k] = state, spread
+    motions = np.array([motion for motion, _ in steps]).reshape(-1, 4, 4)
+    gains = spreads[:-1] @ motions.transpose(0, 2, 1) @ np.linalg.inv(ahead[1:])
+    for k in range(number - 2, -1, -1):
+        states[k] += gains[k] @ (states[k + 1] - predicted[k + 1])
+        spreads[k] += gains[k] @ (spreads[k + 1] - ahead[k + 1]) @ gains[k].T
+    return states[:, :2].copy(), spreads[:, :2, :2].copy()

@@ -153,8 +153,8 @@ def _learned(
     number, along = len(axes.spread), axes.of(value)
     # Where all pairs are far apart, they do not say how long errors last, but differences within tracklets do.
     known = measured_tracklets(value[:, 0], tracklets)
-    errors = [frame_errors(one, frame, known, _UNIT, frame_rate) for one in along.T]
-    seconds = np.array([max(lasting / frame_rate, noise * alike) for noise, alike in errors])
+    noise, alike = frame_errors(np.ascontiguousarray(along.T), frame, known, _UNIT, frame_rate)
+    seconds = np.maximum(lasting / frame_rate, noise * alike)
     # An observation may be of a person in front: under a share of such errors none says more than this against one.
     most_against = np.full(number, -np.log(WRONG) / max(number, 1))
     model = SizeModel(np.zeros(number), np.ones(number), seconds, axes.spread, most_against)

@@ -10,6 +10,8 @@ from stseg.arrays import Floats, Ints
 
 FREE = -1
 """Name of a slot that holds no identity."""
+_STEP = 4
+"""Slots by which their number changes: most often it need not."""
 
 
 @dataclass(frozen=True)
@@ -57,3 +59,16 @@ class Hypotheses:
     def at(self, chosen: Ints) -> Hypotheses:
         """Copies of the chosen hypotheses."""
         return Hypotheses(*(getattr(self, own.name).take(chosen, axis=0) for own in fields(self)))
+
+    def with_room(self, free: int, most: int) -> Hypotheses:
+        """The same, with at least so many free slots after all that are used, but `most` slots at most."""
+        used = int(np.flatnonzero((self.name != FREE).any(axis=0)).max(initial=-1)) + 1
+        number, before = min(-(-(used + free) // _STEP) * _STEP, most), self.name.shape[1]
+        if number == before:
+            return self
+        more = Hypotheses.empty(len(self.score), max(number - before, 0), self.precision.shape[2])
+        of_slots = [
+            np.concatenate([getattr(self, own.name)[:, :number], getattr(more, own.name)], axis=1)
+            for own in fields(self)[1:-1]
+        ]
+        return Hypotheses(self.score, *of_slots, self.bound)

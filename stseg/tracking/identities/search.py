@@ -123,9 +123,10 @@ def search_identities(
     # Where it is known who somebody is, who seemed certain may have to give way.
     seen = replace(seen, certain=seen.certain & ~np.isin(frame, known.decided(frame))).foreseen()
     slots = int(np.diff(seen.start).max(initial=0)) + _SPARE + known.most_open()
-    held = Hypotheses.empty(1, slots, len(sizes.spread), len(known.first))
+    held = Hypotheses.empty(1, 0, len(sizes.spread), len(known.first))
     history = _History(np.full(len(seen.order), -1))
     for k, now in enumerate(seen.seconds.tolist()):
+        held = held.with_room(int(seen.start[k + 1] - seen.start[k]), slots)
         held, step = _extended(held, seen, k, sizes, motion, limits, known)
         history.steps.append(step)
         if now - history.steps[0].seconds > 2 * limits.lag:

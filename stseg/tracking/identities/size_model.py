@@ -137,14 +137,14 @@ def measured_tracklets(size: Floats, tracklets: Sequence[Ints]) -> list[Ints]:
 
 
 def frame_errors(
-    size: Floats, frame: Ints, tracklets: Sequence[Ints], prior: SizePrior, frame_rate: float
-) -> tuple[float, float]:
-    """Variance and correlation time (seconds) of a frame's error, from half squared differences at growing lags.
+    sizes: Floats, frame: Ints, tracklets: Sequence[Ints], prior: SizePrior, frame_rate: float
+) -> tuple[Floats, Floats]:
+    """Variance and correlation time of a frame's error, from half squared differences at growing lags.
 
     Parameters
     ----------
-    size : float64 (n,)
-        Of each row.
+    sizes : float64 (size, n)
+        Of each row; all sizes are measured in the same rows.
     frame : int64 (n,)
         Frame of each row.
     tracklets
@@ -153,20 +153,27 @@ def frame_errors(
         What is known of the error before the recording.
     frame_rate
         Frames per second.
+
+    Returns
+    -------
+    noise, lasting : float64 (size,)
+        The variance, and the correlation time in seconds.
     """
-    lags = max(round(_LONGEST * frame_rate), 1)
-    total, count = np.zeros(lags), np.zeros(lags)
+    lags = np.arange(1, max(round(_LONGEST * frame_rate), 1) + 1)
+    total, count = np.zeros((len(sizes), len(lags))), np.zeros(len(lags))
     for rows in tracklets:
-        for lag in range(1, lags + 1):
-            later = np.searchsorted(frame[rows], frame[rows] + lag).clip(max=len(rows) - 1)
-            pairs = frame[rows[later]] - frame[rows] == lag
-            total[lag - 1] += 0.5 * float(((size[rows[later]] - size[rows])[pairs] ** 2).sum())
-            count[lag - 1] += pairs.sum()
-    expected = prior.noise**2 * (1.0 - np.exp(-np.arange(1, lags + 1) / frame_rate / _PRIOR_LASTING))
+        own = frame[rows]
+        after = np.searchsorted(own, own + lags[:, None]).clip(max=len(rows) - 1)
+        paired = own[after] - own == lags[:, None]
+        for k, (later, pairs) in enumerate(zip(after, paired, strict=True)):
+            difference = sizes[:, rows[later[pairs]]] - sizes[:, rows[pairs]]
+            total[:, k] += 0.5 * (difference**2).sum(axis=1)
+        count += paired.sum(axis=1)
+    expected = prior.noise**2 * (1.0 - np.exp(-lags / frame_rate / _PRIOR_LASTING))
     differences = (total + _PRIOR_FRAMES * expected) / (count + _PRIOR_FRAMES)
-    noise = float(differences.max())
-    alike = np.clip(1.0 - differences / noise, 0.0, 1.0)
-    return noise, float(1.0 + 2.0 * alike.sum()) / frame_rate
+    noise = differences.max(axis=1)
+    alike = np.clip(1.0 - differences / noise[:, None], 0.0, 1.0)
+    return noise, (1.0 + 2.0 * alike.sum(axis=1)) / frame_rate
 
 
 def _learn(
@@ -174,7 +181,7 @@ def _learn(
 ) -> tuple[float, float, float, float]:
     known = measured_tracklets(size, tracklets)
     mean = float(np.mean(size[np.concatenate(known)])) if known else 0.0
-    noise, lasting = frame_errors(size, frame, known, prior, frame_rate)
+    noise, lasting = (float(one[0]) for one in frame_errors(size[None], frame, known, prior, frame_rate))
     return mean, noise, lasting, _spread(size - mean, known, prior)
 
 

@@ -62,15 +62,16 @@ def fill_costs(
     """Fill cost (hypothesis, row, slot + row) of the rows from `first` on, nats."""
     hypotheses, slots = name.shape
     rows = cost.shape[1]
-    alone = np.zeros((rows, len(spread)))
+    alone, begun = np.zeros((rows, len(spread))), np.zeros(rows)
     for i in range(rows):
         for d in range(len(spread)):
             alone[i, d] = size_evidence(precision[first + i, d], information[first + i, d], spread[d])
+        begun[i] = birth * inside[first + i] - alone[i].sum()
     known = np.zeros(len(spread))
     cost[:] = FORBIDDEN
     for h in range(hypotheses):
         for i in range(rows):
-            cost[h, i, slots + i] = birth * inside[first + i] - alone[i].sum()
+            cost[h, i, slots + i] = begun[i]
         for s in range(slots):
             if name[h, s] < 0:
                 continue
@@ -159,11 +160,34 @@ def impose_identity(name: Ints, bound: Ints, row: int, same: bool, cost: Floats)
 @kernel
 def fill_best_assignments(cost: Floats, column: Ints, total: Floats) -> None:
     """Fill column (hypothesis, row) with the assignment of least cost, and total (hypothesis,) with that cost."""
+    taken = np.zeros(cost.shape[2], np.bool_)
     for h in range(cost.shape[0]):
-        fill_assignment_of_least_cost(cost[h], column[h])
+        if not _fill_cheapest(cost[h], column[h], taken):
+            fill_assignment_of_least_cost(cost[h], column[h])
         total[h] = 0.0
         for i in range(cost.shape[1]):
             total[h] += cost[h, i, column[h, i]]
+
+
+@part
+def _fill_cheapest(cost: Floats, column: Ints, taken: Flags) -> bool:
+    """Fill column (row,) with the cheapest of each row of cost (row, column); whether no other assignment is as cheap.
+
+    It is the best one where each row has one cheapest column of its own.
+    """
+    taken[:] = False
+    for i in range(len(column)):
+        best, ties = 0, False
+        for c in range(1, len(taken)):
+            if cost[i, c] < cost[i, best]:
+                best, ties = c, False
+            elif cost[i, c] == cost[i, best]:
+                ties = True
+        if ties or taken[best]:
+            return False
+        taken[best] = True
+        column[i] = best
+    return True
 
 
 @kernel
@@ -373,8 +397,9 @@ def update_identities(
                 covariance[h, s] = variance[r], 0.0, pace
                 held_precision[h, s], held_information[h, s] = 0.0, 0.0
             last[h, s], seconds[h, s] = r, now
-            held_precision[h, s] += precision[r]
-            held_information[h, s] += information[r]
+            for d in range(precision.shape[1]):
+                held_precision[h, s, d] += precision[r, d]
+                held_information[h, s, d] += information[r, d]
 
 
 @kernel
