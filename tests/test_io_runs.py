@@ -30,6 +30,7 @@ from stseg.geometry import Grid
 from stseg.io.outputs.whole_files import create_part, parts_of, replacing
 from stseg.io.recording.rig_text import format_rig
 from stseg.io.runfile import layout, part_file
+from stseg.io.runfile.packed_frames import packed_frame
 from stseg.io.runfile.runs import RunWriter, read_run, read_trajectory
 from stseg.model.tables import RATES, TRAJECTORY, Tracks
 
@@ -202,6 +203,8 @@ def test_slips_of_the_caller_are_refused(tmp_path: Path) -> None:
             writer.append_frames(np.array([6, 7]), log_odds, label)
         with pytest.raises(ValueError, match="volumes"):
             writer.append_frames(np.array([8]), log_odds, label)
+        with pytest.raises(ValueError, match="labels of 3 frames for 2"):
+            writer.append_packed_labels([packed_frame(label[0])])
         with pytest.raises(ValueError, match="rows"):
             writer.append("ghosts", np.zeros(1, layout.ghost_type(3)))
     with pytest.raises(ValueError, match="views"):

@@ -36,20 +36,19 @@ class PackedFrame(NamedTuple):
     data: bytes
 
 
-class PackedVolumes(NamedTuple):
-    """Consecutive frames of a run file.
+class PackedFrames(NamedTuple):
+    """The log-odds or the labels of consecutive frames of a run file.
 
     Attributes
     ----------
     frames : int64 (time,)
         Their numbers in the recording.
-    log_odds, label
+    packed
         One for each frame.
     """
 
     frames: Ints
-    log_odds: list[PackedFrame]
-    label: list[PackedFrame]
+    packed: list[PackedFrame]
 
 
 def packed_frame(values: AnyArray) -> PackedFrame:

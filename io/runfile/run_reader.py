@@ -25,7 +25,7 @@ from stseg.io.runfile.cell_probability import learn_reliability
 from stseg.io.runfile.data_frames import to_data_frame
 from stseg.io.runfile.hdf5_reading import format_errors, read_object
 from stseg.io.runfile.layout_checks import LayoutChecks, lacking_columns, require_bounded_volume
-from stseg.io.runfile.packed_frames import PackedFrame, PackedVolumes
+from stseg.io.runfile.packed_frames import PackedFrame, PackedFrames
 from stseg.io.runfile.provenance import Provenance, read_provenance
 from stseg.io.runfile.safe_hdf5 import open_hdf5, read_whole
 from stseg.io.runfile.texts import read_attribute, read_texts
@@ -263,17 +263,13 @@ class Run:
         """
         return self.cell_reliability.of_cells(self.read_frame(frame)[0])
 
-    def read_packed_volumes(self, number: int) -> Iterator[PackedVolumes]:
-        """The volumes of all frames, `number` at a time, as they are packed."""
+    def read_packed_frames(self, field: layout.Field, number: int) -> Iterator[PackedFrames]:
+        """The log-odds or labels of all frames, `number` at a time, as they are packed."""
         with format_errors(self.path, layout.OCCUPANCY), open_hdf5(self.path) as file:
-            group = file[layout.OCCUPANCY]
+            dataset = file[layout.OCCUPANCY][field.name]
             for start in range(0, len(self.frames), number):
                 frames = self.frames[start : start + number]
-                log_odds, label = (
-                    [_packed_chunk(dataset, start + k) for k in range(len(frames))]
-                    for dataset in (group["log_odds"], group["label"])
-                )
-                yield PackedVolumes(frames, log_odds, label)
+                yield PackedFrames(frames, [_packed_chunk(dataset, start + k) for k in range(len(frames))])
 
     def _table(self, name: str) -> Rows:
         def take(file: h5py.File) -> Rows:

@@ -58,7 +58,7 @@ class RunWriter:
             raise ValueError(f"views {views.shape} on a grid {recording.rig.grid.shape}")
         self._recording, self._views, self._config_text, self._overwrite = recording, views, config_text, overwrite
         self._kept = kept
-        self._frames, self._last_frame = 0, -1
+        self._frames, self._labels, self._last_frame = 0, 0, -1
         self._finished = False
         self._file: h5py.File | None = None
 
@@ -94,28 +94,34 @@ class RunWriter:
         if log_odds.shape != shape or label.shape != shape:
             raise ValueError(f"volumes {log_odds.shape} and {label.shape} for {shape}")
         packed = [packed_volume(*volume) for volume in zip(log_odds, label, strict=True)]
-        self.append_packed_frames(frames, [one for one, _ in packed], [other for _, other in packed])
+        self.append_packed_log_odds(frames, [one for one, _ in packed])
+        self.append_packed_labels([other for _, other in packed])
 
-    def append_packed_frames(
-        self, frames: Ints, log_odds: Sequence[PackedFrame], label: Sequence[PackedFrame]
-    ) -> None:  # fmt: skip
-        """Append the volume of the next frames, packed for this layout and grid.
+    def append_packed_log_odds(self, frames: Ints, log_odds: Sequence[PackedFrame]) -> None:
+        """Append the log-odds of the next frames, packed for this layout and grid; their labels may come later.
 
         Parameters
         ----------
         frames
             As of `append_frames`.
-        log_odds, label
+        log_odds
             One for each frame.
         """
         self._require_later(frames)
         with self._disk.step():
             self._extend_packed("log_odds", log_odds)
-            self._extend_packed("label", label)
             self._extend("frame", frames)
             self._extend("time", frames / self._recording.rig.frame_rate)
             self._frames += len(frames)
             self._last_frame = int(frames[-1]) if len(frames) else self._last_frame
+
+    def append_packed_labels(self, label: Sequence[PackedFrame]) -> None:
+        """Append the labels of the next frames that have none, packed for this layout and grid."""
+        if self._labels + len(label) > self._frames:
+            raise ValueError(f"labels of {self._labels + len(label)} frames for {self._frames}")
+        with self._disk.step():
+            self._extend_packed("label", label)
+            self._labels += len(label)
 
     def append(self, table: str, rows: Rows) -> None:
         """Add rows to one of the tables of `stseg.io.runfile.layout`, whose dtype they have."""
@@ -124,6 +130,8 @@ class RunWriter:
 
     def finish(self, tracks: Rows) -> None:
         """Write the TRACK rows, then sync the file and give it its name."""
+        if self._labels != self._frames:
+            raise ValueError(f"labels of {self._labels} frames for {self._frames}")
         with self._disk.step():
             self._tables["tracks"].append(tracks)
             for table in self._tables.values():

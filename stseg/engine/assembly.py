@@ -11,11 +11,13 @@ from typing import NamedTuple
 import numpy as np
 
 from stseg.arrays import Ints, Rows
+from stseg.engine.calls import Caller, called_here
 from stseg.engine.job import Job
 from stseg.engine.pipeline import finished_tracks
 from stseg.engine.segments import Segment
 from stseg.io.config_file import format_config
 from stseg.io.recording.time_alignment import with_alignment
+from stseg.io.runfile import layout
 from stseg.io.runfile.packed_frames import PackedFrame, packed_frame, unpacked_label
 from stseg.io.runfile.runs import Run, RunWriter, read_run
 from stseg.model.tables import APPEARANCE, Tracks
@@ -43,8 +45,27 @@ class _SegmentRows(NamedTuple):
     identity: Ints
 
 
-def assemble(job: Job, finished: Sequence[FinishedSegment], output: Path) -> Tracks:
+class _Association(NamedTuple):
+    """The tracks of a run.
+
+    Attributes
+    ----------
+    joined
+        The tracks of all segments under names of the run.
+    tracks
+    identity : int64 (n,)
+        The track id of each of the joined rows, 0 for none.
+    """
+
+    joined: StitchedTracks
+    tracks: Tracks
+    identity: Ints
+
+
+def assemble(job: Job, finished: Sequence[FinishedSegment], output: Path, call: Caller = called_here) -> Tracks:
     """Write the run file of a job from its finished segments.
+
+    What takes no track ids is copied while the tracks are associated.
 
     Parameters
     ----------
@@ -54,28 +75,28 @@ def assemble(job: Job, finished: Sequence[FinishedSegment], output: Path) -> Tra
         All segments of the run, in their order.
     output
         Path of the run file; an existing file is replaced.
+    call
+        How the tracks are associated, see `stseg.engine.calls`.
 
     Returns
     -------
     Tracks
         The tracks of the whole run.
     """
-    joined, appearance = _joined(job, finished)
-    shown, tracker = job.recording.rig, find_tracker(job.tracker)
-    tracks, identity = finished_tracks(
-        job.read.read_rig, job.config, tracker, joined.committed, joined.events, appearance, shown, job.known
-    )  # fmt: skip
     views = read_run(finished[0].path).views
-    config = format_config(job.config)
-    recording = with_alignment(job.recording, job.streams.shown)
+    config, recording = format_config(job.config), with_alignment(job.recording, job.streams.shown)
     with (
+        call(_associated, job, finished) as association,
         RunWriter(output, recording, views, config, overwrite=True, kept=job.volume) as writer,
-        ThreadPoolExecutor(os.cpu_count()) as packers,
     ):
-        for part in _segment_rows(finished, joined.committed, joined.local, identity):
-            _copy(part, writer, packers)
+        for _, path in finished:
+            _copy(read_run(path), writer)
+        joined, tracks, identity = association()
+        with ThreadPoolExecutor(os.cpu_count()) as packers:
+            for part in _segment_rows(finished, joined, identity):
+                _append_labels(part, writer, packers)
         writer.append("trajectory", tracks.trajectory)
-        if not tracker.final:
+        if not find_tracker(job.tracker).final:
             writer.append("committed", joined.committed)
             writer.append("committed_events", joined.events)
             writer.append("known", job.known)
@@ -85,8 +106,8 @@ def assemble(job: Job, finished: Sequence[FinishedSegment], output: Path) -> Tra
     return tracks
 
 
-def _joined(job: Job, finished: Sequence[FinishedSegment]) -> tuple[StitchedTracks, Rows]:
-    """The tracks of all segments under names of the run, and their APPEARANCE rows."""
+def _associated(job: Job, finished: Sequence[FinishedSegment]) -> _Association:
+    """The tracks of a run from those of its segments."""
     stitcher = Stitcher(round(job.config.tracking.patience * job.recording.rig.frame_rate))
     before = finished[0].segment.first if finished else 0
     appearance = [np.zeros(0, APPEARANCE)]
@@ -95,25 +116,38 @@ def _joined(job: Job, finished: Sequence[FinishedSegment]) -> tuple[StitchedTrac
         stitcher.add(SegmentTracks(segment.first, run.trajectory, run.events, segment.first - before))
         before = segment.stop
         appearance.append(run.appearance)
-    return stitcher.joined(), np.concatenate(appearance)
+    joined = stitcher.joined()
+    tracks, identity = finished_tracks(
+        job.read.read_rig, job.config, find_tracker(job.tracker), joined.committed, joined.events,
+        np.concatenate(appearance), job.recording.rig, job.known,
+    )  # fmt: skip
+    return _Association(joined, tracks, identity)
+
+
+def _copy(run: Run, writer: RunWriter) -> None:
+    """Append what the run file takes unchanged of a segment."""
+    for frames, log_odds in run.read_packed_frames(layout.LOG_ODDS, _BLOCK):
+        writer.append_packed_log_odds(frames, log_odds)
+    for table in _COPIED:
+        writer.append(table, np.asarray(getattr(run, table)))
 
 
 def _segment_rows(
-    finished: Sequence[FinishedSegment], committed: Rows, local: Ints, identity: Ints
+    finished: Sequence[FinishedSegment], joined: StitchedTracks, identity: Ints
 ) -> Iterator[_SegmentRows]:
     """Divide the committed rows and their ids, which are in the order of the segments, among the segments."""
     first = 0
     for segment, path in finished:
         run = read_run(path)
         stop = first + int((run.trajectory["frame"] >= segment.first).sum())
-        rows = committed[first:stop].copy()
-        rows["id"] = local[first:stop]
+        rows = joined.committed[first:stop].copy()
+        rows["id"] = joined.local[first:stop]
         yield _SegmentRows(run, rows, identity[first:stop])
         first = stop
 
 
-def _copy(part: _SegmentRows, writer: RunWriter, packers: Executor) -> None:
-    """Append a segment's volume, with the run's track ids, and its tables to the run file.
+def _append_labels(part: _SegmentRows, writer: RunWriter, packers: Executor) -> None:
+    """Append a segment's labels, with the run's track ids, to the run file.
 
     Frames whose tracks keep their ids are copied as they are packed; the others are renamed side by side.
     """
@@ -129,8 +163,5 @@ def _copy(part: _SegmentRows, writer: RunWriter, packers: Executor) -> None:
         rename_labels(cells[None], np.array([frame]), own, names)
         return packed_frame(cells)
 
-    for volumes in part.run.read_packed_volumes(_BLOCK):
-        label = list(packers.map(renamed, volumes.frames.tolist(), volumes.label))
-        writer.append_packed_frames(volumes.frames, volumes.log_odds, label)
-    for table in _COPIED:
-        writer.append(table, np.asarray(getattr(part.run, table)))
+    for frames, label in part.run.read_packed_frames(layout.LABEL, _BLOCK):
+        writer.append_packed_labels(list(packers.map(renamed, frames.tolist(), label)))

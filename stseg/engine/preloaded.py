@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from stseg.engine import workers
+from stseg.engine import assembly, workers
 
-__all__ = ["workers"]
+__all__ = ["assembly", "workers"]

@@ -48,7 +48,8 @@ def write_step(job: Job, step: CommittedFrames, segment: Segment, writer: RunWri
         return
     frames = np.array([scene.frame for scene in own.commit.frames])
     packed = [packed_volume(*_kept(job, own, k)) for k in range(len(frames))]
-    writer.append_packed_frames(frames, [log_odds for log_odds, _ in packed], [label for _, label in packed])
+    writer.append_packed_log_odds(frames, [log_odds for log_odds, _ in packed])
+    writer.append_packed_labels([label for _, label in packed])
     ghosts = np.zeros(len(own.candidates), ghost_type(len(job.recording.sources)))
     for name in own.candidates.dtype.names or ():
         ghosts[name] = own.candidates[name]

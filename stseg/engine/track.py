@@ -154,7 +154,7 @@ def track_recording(
             streams = _indexed(recording, folder, reporter)
             first, stop = resolve_frames(frames, streams, recording)
             job = Job(recording, config, tracker, volume, first, stop, streams, people)
-            assemble(job, _make_segments(job, folder, workforce, reporter), folder.result)
+            assemble(job, _make_segments(job, folder, workforce, reporter), folder.result, workforce.caller(job))
             folder.publish(overwrite)
         folder.remove()
     return read_run(output)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from math import prod
 from pathlib import Path
 
+from stseg.engine.calls import Caller, called_beside, called_here
 from stseg.engine.cluster import make_by_cluster
 from stseg.engine.job import Job
 from stseg.engine.segment_worker import SegmentWorker
@@ -45,6 +46,10 @@ class Workforce:
         """Make ready what takes time, while the recording is counted."""
         if self.scheduler is None:
             prepare_workers(self.workers)
+
+    def caller(self, job: Job) -> Caller:
+        """How a call is made that this process need not wait for."""
+        return called_beside if self.scheduler is None and self.processes(job) > 1 else called_here
 
     def make(
         self,
