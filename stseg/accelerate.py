@@ -8,7 +8,7 @@ every kernel is plain Python.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from time import monotonic
 from typing import Any, ParamSpec, TypeVar, cast
 
@@ -60,6 +60,13 @@ def compilation_noted(note: Callable[[str], None]) -> Iterator[None]:
     listener = _Notes(note)
     with event.install_listener("numba:compile", listener):
         yield
+
+
+def take_kept_kernels() -> None:
+    """Take from the cache what it holds of the kernels of all imported modules; what fails is left for later."""
+    for one in Kernel.made:
+        with suppress(Exception):
+            one.take_kept()
 
 
 class _Notes(event.Listener):

@@ -78,7 +78,7 @@ class _CompiledKernel(CompileResultCacheImpl):
         return *kept, [one for one in environments if one.consts]
 
 
-class _KernelCache(FunctionCache):
+class KernelCache(FunctionCache):
     """Machine code of a kernel, read without all that numba knows of functions and types: compiling alone needs it."""
 
     _impl_class = _CompiledKernel
@@ -89,11 +89,16 @@ class _KernelCache(FunctionCache):
         with self._guard_against_spurious_io_errors():
             return self._load_overload(sig, target_context)
 
+    def kept_types(self, codegen: Any) -> list[Any]:
+        """Types of the arguments for which machine code of this processor is kept."""
+        keys = self._cache_file._load_index()
+        return [types for types, *_ in keys if self._index_key(types, codegen) in keys]
+
 
 def kept_code(function: Callable[..., Any]) -> Any:
     """The machine code of a kernel on disk; one that keeps nothing where no folder can be written to."""
     try:
-        return _KernelCache(function)
+        return KernelCache(function)
     except RuntimeError:
         return NullCache()
 

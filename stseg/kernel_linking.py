@@ -12,13 +12,13 @@ import gc
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher, cpu_target
 
-from stseg.kernel_cache import kept_code
+from stseg.kernel_cache import KernelCache, kept_code
 
 _KNOWN_OUTSIDE = ("external", "common")
 """Kinds of names that may be asked for."""
@@ -37,8 +37,12 @@ class Kernel(CPUDispatcher):
         Numba's.
     """
 
+    made: ClassVar[list[Kernel]] = []
+    """All of them."""
+
     def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
         super().__init__(function, targetoptions=options)
+        self.made.append(self)
 
     @cached_property
     def _inner(self) -> Any:
@@ -55,6 +59,12 @@ class Kernel(CPUDispatcher):
         with global_compiler_lock, _nothing_collected(), _optimised_late(cpu_target.target_context.codegen()):
             self._cache = self._kept
             return super().compile(sig)
+
+    def take_kept(self) -> None:
+        """Take from the cache what it holds of this kernel, for arguments of whatever types."""
+        if isinstance(self._kept, KernelCache):
+            for types in self._kept.kept_types(cpu_target.target_context.codegen()):
+                self.compile(types)
 
     @cached_property
     def _kept(self) -> Any:

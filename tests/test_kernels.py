@@ -24,6 +24,13 @@ with compilation_noted(print):
 print("numba.cpython.unicode" in sys.modules)
 """
 """Prints notes, the result of a kernel that calls another kernel, and whether what compiling needs was imported."""
+AHEAD = """
+from stseg.accelerate import take_kept_kernels
+from stseg.detection.scoring import track_score
+take_kept_kernels()
+print(len(track_score.signatures))
+"""
+"""Prints how many forms of a kernel were taken from the cache before it was called."""
 
 
 @kernel
@@ -55,13 +62,14 @@ def test_python_and_kernels_call_the_same_kernel() -> None:
 
 @COMPILED
 def test_the_cache_holds_the_kernels_that_python_calls(tmp_path: Path) -> None:
-    first, second = (
+    empty, first, second, ahead = (
         subprocess.run(
-            [sys.executable, "-c", PROGRAM],
+            [sys.executable, "-c", program],
             env=ENVIRONMENT | {"NUMBA_CACHE_DIR": str(tmp_path)}, capture_output=True, text=True, check=True,
         ).stdout.splitlines()
-        for _ in range(2)
+        for program in (AHEAD, PROGRAM, PROGRAM, AHEAD)
     )  # fmt: skip
     assert first == ["compiling kernels, once on this machine, about a minute of work", "4.9 1 0", "True"]
     assert second == ["4.9 1 0", "False"]
+    assert (empty, ahead) == (["0"], ["1"])
     assert {path.name.split("-")[0] for path in tmp_path.rglob("*.nbi")} == {"scoring.track_score"}

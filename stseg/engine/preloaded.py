@@ -1,7 +1,10 @@
-"""What is done once for all workers, in the process that they are forked from: imports."""
+"""What is done once for all workers, in the process that they are forked from: imports, and kernels from the cache."""
 
 from __future__ import annotations
 
+from stseg.accelerate import take_kept_kernels
 from stseg.engine import assembly, workers
 
 __all__ = ["assembly", "workers"]
+
+take_kept_kernels()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -67,8 +67,10 @@ class Hypotheses:
         if number == before:
             return self
         more = Hypotheses.empty(len(self.score), max(number - before, 0), self.precision.shape[2])
-        of_slots = [
-            np.concatenate([getattr(self, own.name)[:, :number], getattr(more, own.name)], axis=1)
-            for own in fields(self)[1:-1]
-        ]
-        return Hypotheses(self.score, *of_slots, self.bound)
+        return replace(
+            self,
+            **{
+                own.name: np.concatenate([getattr(self, own.name)[:, :number], getattr(more, own.name)], axis=1)
+                for own in fields(self)[1:-1]
+            },
+        )
