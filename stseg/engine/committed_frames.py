@@ -75,12 +75,12 @@ class CommittedFrames:
     def within(self, first: int, stop: int) -> CommittedFrames:
         """The results of frames first .. stop - 1; timings are kept whole."""
         commit, candidates = self.commit, self.candidates
-        kept = np.array([first <= fused.frame < stop for fused in commit.frames], bool)
+        begin, end = np.searchsorted(self.frames, [first, stop]).tolist()
         candidate = _inside(candidates["frame"], first, stop)
         return CommittedFrames(
             Commit(
-                [commit.frames[k] for k in np.flatnonzero(kept).tolist()],
-                commit.label[kept],
+                commit.frames[begin:end],
+                commit.label[begin:end],
                 commit.trajectory[_inside(commit.trajectory["frame"], first, stop)],
                 commit.events[_inside(commit.events["frame"], first, stop)],
                 commit.windows[_inside(commit.windows["commit_stop"] - 1, first, stop)],

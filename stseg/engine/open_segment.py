@@ -13,7 +13,7 @@ from stseg.engine.committed_frames import CommittedFrames
 from stseg.engine.image_shift import ImageShifts
 from stseg.engine.job import Job
 from stseg.engine.pipeline import Pipeline
-from stseg.engine.segment_file import open_segment_file, write_step
+from stseg.engine.segment_file import open_segment_file, packed_step, write_step
 from stseg.engine.segments import Segment
 from stseg.engine.session import Session
 from stseg.foreground.view_foreground import ViewForeground
@@ -99,6 +99,6 @@ class OpenSegment:
         return self.segment, keep_segment(self._draft)
 
     def _write(self, step: CommittedFrames, events: Rows) -> None:
-        write_step(self._job, step, self.segment, self._writer)
+        write_step(self._job, packed_step(self._job, step, self.segment, None), self._writer)
         own = (self.segment.first <= events["frame"]) & (events["frame"] < self.segment.stop)
         self._writer.append("events", events[own])

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from concurrent.futures import Executor, Future
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
-from stseg.arrays import Bytes, Labels, Singles
+from stseg.arrays import Bytes, Labels, Rows, Singles
 from stseg.engine.committed_frames import CommittedFrames
 from stseg.engine.job import Job
 from stseg.engine.segments import Segment
 from stseg.geometry.nearest_person import nearest_person
 from stseg.io.config_file import format_config
 from stseg.io.runfile.layout import ghost_type
+from stseg.io.runfile.packed_frames import PackedFrame
 from stseg.io.runfile.run_writer import packed_volume
 from stseg.io.runfile.runs import RunWriter
 
@@ -35,20 +38,48 @@ def open_segment_file(job: Job, views: Bytes, draft: Path) -> RunWriter:
     return RunWriter(draft, job.recording, views, format_config(job.config), overwrite=True, kept=job.volume)
 
 
-def write_step(job: Job, step: CommittedFrames, segment: Segment, writer: RunWriter) -> None:
-    """Append committed frames to a segment's file.
+class PackedStep(NamedTuple):
+    """Committed frames on their way to a segment's file: those of the segment itself, and their volumes.
 
-    Of the warm-up only the trajectory is written: by it the segment's tracks are associated with those of the segment
+    Attributes
+    ----------
+    trajectory : TRAJECTORY (n,)
+        Of the frames of the segment and of its warm-up.
+    own
+        The results of the segment's frames.
+    volumes
+        Their log-odds and labels, packed.
+    """
+
+    trajectory: Rows
+    own: CommittedFrames
+    volumes: Future[list[tuple[PackedFrame, PackedFrame]]]
+
+
+def packed_step(job: Job, step: CommittedFrames, segment: Segment, executor: Executor | None) -> PackedStep:
+    """The part of committed frames that a segment's file keeps, packed by a thread of an executor if there is one.
+
+    Of the warm-up it is the trajectory alone: by it the segment's tracks are associated with those of the segment
     before (`stseg.tracking.stitching`).
     """
     own = step.within(segment.first, segment.stop)
-    writer.append("trajectory", step.within(segment.lead, segment.stop).commit.trajectory)
+    trajectory = step.within(segment.lead, segment.stop).commit.trajectory
+    if executor is not None:
+        return PackedStep(trajectory, own, executor.submit(_packed_volumes, job, own))
+    done = Future[list[tuple[PackedFrame, PackedFrame]]]()
+    done.set_result(_packed_volumes(job, own))
+    return PackedStep(trajectory, own, done)
+
+
+def write_step(job: Job, step: PackedStep, writer: RunWriter) -> None:
+    """Append committed frames to a segment's file."""
+    own = step.own
+    writer.append("trajectory", step.trajectory)
     writer.append("timings", own.timings)
     if not own.commit.frames:
         return
-    frames = np.array([scene.frame for scene in own.commit.frames])
-    packed = [packed_volume(*_kept(job, own, k)) for k in range(len(frames))]
-    writer.append_packed_log_odds(frames, [log_odds for log_odds, _ in packed])
+    packed = step.volumes.result()
+    writer.append_packed_log_odds(own.frames, [log_odds for log_odds, _ in packed])
     writer.append_packed_labels([label for _, label in packed])
     ghosts = np.zeros(len(own.candidates), ghost_type(len(job.recording.sources)))
     for name in own.candidates.dtype.names or ():
@@ -59,6 +90,10 @@ def write_step(job: Job, step: CommittedFrames, segment: Segment, writer: RunWri
     writer.append("windows", own.commit.windows)
     writer.append("rates", own.rates)
     writer.append("appearance", own.appearance)
+
+
+def _packed_volumes(job: Job, step: CommittedFrames) -> list[tuple[PackedFrame, PackedFrame]]:
+    return [packed_volume(*_kept(job, step, k)) for k in range(len(step.commit.frames))]
 
 
 def _kept(job: Job, step: CommittedFrames, k: int) -> tuple[Singles, Labels]:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
 from copy import deepcopy
 from pathlib import Path
 
@@ -11,7 +14,7 @@ import numpy as np
 from stseg.engine.backgrounds import BackgroundFrames, background_frames, make_foregrounds
 from stseg.engine.image_shift import ImageShifts
 from stseg.engine.job import Job
-from stseg.engine.segment_file import open_segment_file, write_step
+from stseg.engine.segment_file import PackedStep, open_segment_file, packed_step, write_step
 from stseg.engine.segments import Segment
 from stseg.engine.session import run_session
 from stseg.foreground.view_foreground import ViewForeground
@@ -65,12 +68,18 @@ class SegmentWorker:
         with (
             open_frames(job.read, segment.lead, end, job.streams) as frame_sets,
             open_segment_file(job, self.pipeline.occupancy.views, draft) as writer,
+            ExitStack() as threads,
         ):
-            observed = shifts.measured(frame_sets)
+            packing = threads.enter_context(ThreadPoolExecutor(1, "packing")) if self.cores > 1 else None
+            observed, packed = shifts.measured(frame_sets), deque[PackedStep]()
             for step in run_session(self.pipeline, foregrounds, observed, segment.lead, fused, self.cores):
-                write_step(job, step, segment, writer)
+                packed.append(packed_step(job, step, segment, packing))
+                if len(packed) > 1:  # the last step is packed while the session goes on
+                    write_step(job, packed.popleft(), writer)
                 if step.commit.frames[-1].frame >= segment.stop - 1:
                     break
+            for one in packed:
+                write_step(job, one, writer)
             writer.append("shifts", shifts.rows(segment.first, segment.stop))
             writer.finish(np.zeros(0, TRACK))
         return keep_segment(draft)
