@@ -99,12 +99,15 @@ class Sums(NamedTuple):
         First cell of each run, and behind the last one the number of cells.
     near : int32 (run,)
         The person near the cells of each run, -1 for none; each cell near a person is a run.
+    is_empty : bool (run,)
+        Whether every view sees its empty level there, and all of the footprints.
     weighted, weights, shares : float32 (run,)
         Sums of w_i a_i times term, of w_i a_i, and of a_i.
     """
 
     start: Labels
     near: Labels
+    is_empty: Flags
     weighted: Singles
     weights: Singles
     shares: Singles
@@ -115,7 +118,7 @@ class Sums(NamedTuple):
         start = np.empty(len(near) + 1, np.int32)
         runs = fill_runs(views, near, start)
         start = start[: runs + 1].copy()
-        sums = cls(start, near[start[:-1]], *(np.empty(runs, np.float32) for _ in range(3)))
+        sums = cls(start, near[start[:-1]], np.empty(runs, bool), *np.empty((3, runs), np.float32))
         fill_sums(views, sums)
         return sums
 
@@ -203,9 +206,11 @@ def fill_sums(views: FrameTerms, sums: Sums) -> None:
     """Fill the sums of runs, whose start and persons are given."""
     for r in range(len(sums.near)):
         person, weighted, weights, shares = sums.near[r], np.float32(0), np.float32(0), np.float32(0)
+        sums.is_empty[r] = person < 0
         for i in range(len(views.weight)):
             level, share = level_and_share(views, i, sums.start[r])
             if level >= 0:
+                sums.is_empty[r] &= level == views.empty[i] and share == 1
                 weight = views.weight[i] * share
                 if person < 0:
                     weighted += weight * views.terms[i, 0, level]

@@ -140,23 +140,42 @@ def fill_counts(
     """
     errors[:], seen[:] = 0.0, 0.0
     wrong, empty, all_wrong, all_empty = np.zeros((4, len(views.weight)))
+    odds, odds_of_set, is_known = (
+        np.empty(len(views.weight)),
+        np.empty(views.seen.shape),
+        np.zeros(len(views.seen), np.bool_),
+    )
     for r in range(len(sums.near)):
         c = sums.start[r]
+        own = views.view_set[c]
         if sums.near[r] >= 0:
             _count_beside_person(views, sums.near[r], c, inside[c], trusted, rates, errors, seen)
             continue
-        for i in range(len(views.weight)):
+        if not sums.is_empty[r]:
+            _fill_odds(views, sums, r, observations, prior, odds)
+        elif not is_known[own]:
+            _fill_odds(views, sums, r, observations, prior, odds_of_set[own])
+            is_known[own] = True
+        for i in range(len(wrong)):
             level, share = level_and_share(views, i, c)
             wrong[i], empty[i] = 0.0, 0.0
             if level >= 0 and share > 0.0:
-                odds = _occupied_odds(views, sums, i, r, level, share, observations, prior)
-                empty[i] = number[c] * share / (1.0 + odds)
+                empty[i] = number[c] * share / (1.0 + (odds_of_set[own, i] if sums.is_empty[r] else odds[i]))
                 wrong[i] = _error_posterior(rates[i, CLUTTER], level / TOP) * empty[i]
         for _ in range(c, sums.start[r + 1]):
             for i in range(len(wrong)):
                 all_wrong[i] += wrong[i]
                 all_empty[i] += empty[i]
     errors[:, CLUTTER], seen[:, CLUTTER] = all_wrong, all_empty
+
+
+@part
+def _fill_odds(views: FrameTerms, sums: Sums, r: int, observations: float, prior: float, odds: Floats) -> None:
+    """Fill odds (view,) of the views that see the cells of a run with `_occupied_odds`."""
+    for i in range(len(odds)):
+        level, share = level_and_share(views, i, sums.start[r])
+        if level >= 0 and share > 0.0:
+            odds[i] = _occupied_odds(views, sums, i, r, level, share, observations, prior)
 
 
 @part

@@ -67,6 +67,8 @@ class ShownCells(NamedTuple):
         Index in the flattened ground.
     block : int32 (n + k,)
         Index of its block among those of all planes; of the others that behind the last.
+    start : int32 (b + 1,)
+        First cell of each block that has any, and n behind the last one.
     view_set : int32 (n + k,)
         The set of views that see it.
     near : int32 (n + k,)
@@ -78,6 +80,7 @@ class ShownCells(NamedTuple):
     cell: Labels
     place: Labels
     block: Labels
+    start: Labels
     view_set: Labels
     near: Labels
     number: Floats
@@ -90,6 +93,7 @@ class _MarkedCells(NamedTuple):
     cell: Labels
     place: Labels
     block: Labels
+    start: Labels
     view_set: Labels
     number: Floats
 
@@ -97,7 +101,7 @@ class _MarkedCells(NamedTuple):
     def none(cls) -> Self:
         """Before the first frame."""
         nothing = np.zeros(0, np.int32)
-        return cls(np.zeros(0, bool), nothing, nothing, nothing, nothing, np.zeros(0))
+        return cls(np.zeros(0, bool), nothing, nothing, nothing, nothing, nothing, np.zeros(0))
 
 
 class CellTables:
@@ -152,10 +156,10 @@ class CellTables:
             marked = np.ones_like(marked)
         if not np.array_equal(marked, self._last.marked):
             self._last = self._cells_of(marked, views)
-        _, cell, place, block, view_set, number = self._last
+        _, cell, place, block, start, view_set, number = self._last
         person = np.full(len(number), -1, np.int32)
         np.take(near.reshape(-1).astype(np.int32), place, out=person[: len(place)])
-        return ShownCells(cell, place, block, view_set, person, number)
+        return ShownCells(cell, place, block, start, view_set, person, number)
 
     def _cells_of(self, marked: Flags, views: Bytes) -> _MarkedCells:
         sets, most = self.sets, int(marked.sum()) * SIDE**2
@@ -168,7 +172,10 @@ class CellTables:
         every = count + representatives
         block[count:every], view_set[count:every] = marked.size, np.arange(representatives)
         number[count:every] = others
-        return _MarkedCells(marked.copy(), cell[:count], place[:count], block[:every], view_set[:every], number[:every])
+        start = np.append(np.flatnonzero(np.diff(block[:count], prepend=-1)), count).astype(np.int32)
+        return _MarkedCells(
+            marked.copy(), cell[:count], place[:count], block[:every], start, view_set[:every], number[:every]
+        )
 
 
 @kernel

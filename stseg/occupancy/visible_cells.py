@@ -175,28 +175,41 @@ def fill_map(
     marked bool (block,) are those at which the view shows something, people bool (block,) those of them at which it
     shows a person.
     """
-    for k in range(len(cells.cell)):
-        block = np.uint64(cells.block[k])
-        if not marked[block]:
-            continue
-        left, top, width, height = footprint[np.uint64(cells.cell[k])]
-        if width == 0:
-            levels[k] = UNSEEN
-            continue
-        u, v = left - table.left, top - table.top
-        total, pixels = int(sum_of(table.sums, u, v, u + width, v + height)), np.int32(width) * np.int32(height)
-        nearest, visible = cells.near[k], np.float32(1)
-        is_apart = not people[block] or (nearest >= 0 and shown.separate[nearest])
-        if not is_apart and pixels == 1:
-            other = shown.raster[shown.row[np.uint64(top)], shown.column[np.uint64(left)]]
-            if other >= 0 and other != nearest:
-                is_hidden = shown.distance[np.uint64(other)] < distance[cells.place[k]] - SHOULDER
-                visible, total = np.float32(0 if is_hidden else 1), total if is_hidden else 0
-        elif not is_apart and _shows_a_person(shown, left, top, width, height):
-            far = distance[cells.place[k]]
-            hidden, others = _others_inside(shown, table, left, top, width, height, nearest, far)
-            visible -= np.float32(hidden) / np.float32(pixels)
-            if visible > 0:
-                total -= others
-        mean = np.float32(total) / (np.float32(pixels) * (visible if visible > 0 else np.float32(1)))
-        levels[k], share[k] = min(int(mean + np.float32(0.5)), TOP), visible
+    for b in range(len(cells.start) - 1):
+        block = np.uint64(cells.block[cells.start[b]])
+        if marked[block]:
+            for k in range(cells.start[b], cells.start[b + 1]):
+                levels[k], share[k] = _level_and_share(cells, k, people[block], footprint, table, shown, distance)
+
+
+@part
+def _level_and_share(
+    cells: ShownCells,
+    k: int,
+    shows_people: bool,
+    footprint: Footprints,
+    table: SumTable,
+    shown: PixelAssignment,
+    distance: Singles,
+) -> tuple[int, np.float32]:
+    """Level and share of cell k; see `fill_map`."""
+    left, top, width, height = footprint[np.uint64(cells.cell[k])]
+    if width == 0:
+        return UNSEEN, np.float32(1)
+    u, v = left - table.left, top - table.top
+    total, pixels = int(sum_of(table.sums, u, v, u + width, v + height)), np.int32(width) * np.int32(height)
+    nearest, visible = cells.near[k], np.float32(1)
+    is_open = shows_people and not (nearest >= 0 and shown.separate[nearest])
+    if is_open and pixels == 1:
+        other = shown.raster[shown.row[np.uint64(top)], shown.column[np.uint64(left)]]
+        if other >= 0 and other != nearest:
+            is_hidden = shown.distance[np.uint64(other)] < distance[cells.place[k]] - SHOULDER
+            visible, total = np.float32(0 if is_hidden else 1), total if is_hidden else 0
+    elif is_open and _shows_a_person(shown, left, top, width, height):
+        far = distance[cells.place[k]]
+        hidden, others = _others_inside(shown, table, left, top, width, height, nearest, far)
+        visible -= np.float32(hidden) / np.float32(pixels)
+        if visible > 0:
+            total -= others
+    mean = np.float32(total) / (np.float32(pixels) * (visible if visible > 0 else np.float32(1)))
+    return min(int(mean + np.float32(0.5)), TOP), visible
