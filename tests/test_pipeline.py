@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cache
+from itertools import chain, repeat
 
 import numpy as np
 import pytest
@@ -58,10 +59,12 @@ def foregrounds() -> list[ViewForeground]:
     return [ViewForeground() for _ in RIG.cameras]
 
 
-def run(kind: str, moments: Iterable[Moment], tracker: str = "cut", first: int = 0, cores: int = 2) -> Run:
+def run(
+    kind: str, moments: Iterable[Moment], tracker: str = "cut", first: int = 0, cores: Iterable[int] = repeat(2)
+) -> Run:
     pipeline = Pipeline(RIG, [kind] * len(RIG.cameras), CONFIG, tracker)
     advanced: list[int] = []
-    steps = list(run_session(pipeline, foregrounds(), moments, first, advanced.append, cores))
+    steps = list(run_session(pipeline, foregrounds(), moments, first, advanced.append, iter(cores).__next__))
     trajectory = np.concatenate([step.commit.trajectory for step in steps])
     tracks, identity = pipeline.finished(
         trajectory,
@@ -172,9 +175,10 @@ def test_the_same_recording_twice(tracker: str) -> None:
 
 
 @pytest.mark.parametrize("kind", ["boxes", "pixels"])
-def test_one_core_alone_gives_the_same(kind: str) -> None:
+@pytest.mark.parametrize("alone", [7, 10_000])
+def test_one_core_alone_or_at_first_gives_the_same(kind: str, alone: int) -> None:
     stop = FRAMES if kind == "boxes" else MASKED
-    assert_equal(run(kind, recording(kind, stop), cores=1), whole(kind, "cut"))
+    assert_equal(run(kind, recording(kind, stop), cores=chain(repeat(1, alone), repeat(2))), whole(kind, "cut"))
 
 
 def test_moments_may_come_in_chunks() -> None:

@@ -16,7 +16,7 @@ from stseg.engine.image_shift import ImageShifts
 from stseg.engine.job import Job
 from stseg.engine.segment_file import PackedStep, open_segment_file, packed_step, write_step
 from stseg.engine.segments import Segment
-from stseg.engine.session import run_session
+from stseg.engine.session import run_session, two_cores
 from stseg.foreground.view_foreground import ViewForeground
 from stseg.io.recording.frames import open_frames
 from stseg.io.runfile.segment_files import keep_segment
@@ -31,10 +31,10 @@ class SegmentWorker:
     job
         The run.
     cores
-        Processor cores for this worker; see `run_session`.
+        Processor cores for this worker, asked at each frame; see `run_session`.
     """
 
-    def __init__(self, job: Job, cores: int = 2) -> None:
+    def __init__(self, job: Job, cores: Callable[[], int] = two_cores) -> None:
         self.job, self.pipeline, self.cores = job, job.pipeline(), cores
         self._ends = [*(begin for begin, _ in job.gaps()), job.stop]
         self._learned = list[ViewForeground]()

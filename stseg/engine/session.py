@@ -5,8 +5,8 @@ body sizes, the error rates of the views, and the tracker's tracks. Sessions of 
 
 Detection needs the tracks of the frame before, so it goes frame by frame. The foreground of the next frames needs
 nothing of it, and nothing waits for a frame's volume before its window is cut: `run_session` gives each a thread of its
-own, unless it has one core alone: threads cost a seventh more processor time. Every stage still takes the frames in
-their order, so the results are the same, bit for bit.
+own from the frame on at which it has more than one core: threads cost a seventh more processor time. Every stage still
+takes the frames in their order, so the results are the same, bit for bit.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import ExitStack
-from functools import partial
 from typing import NamedTuple, Protocol
 
 from stseg.arrays import Observation, Singles, ViewEvidence
@@ -58,17 +57,14 @@ class Session:
         Foreground model of each camera, in the rig's order; they learn from the frames.
     first
         Number of the first frame.
+
+    Attributes
+    ----------
     fusion
         One thread that fuses evidence while detection goes on; None to fuse in the caller's.
     """
 
-    def __init__(
-        self,
-        pipeline: Pipeline,
-        foregrounds: Sequence[ViewForeground],
-        first: int,
-        fusion: Executor | None = None,
-    ) -> None:
+    def __init__(self, pipeline: Pipeline, foregrounds: Sequence[ViewForeground], first: int) -> None:
         self.pipeline, self.foregrounds, self.watch = pipeline, foregrounds, Stopwatch()
         self._tracker = pipeline.tracker(pipeline.rig, pipeline.config, first)
         cameras = [camera.name for camera in pipeline.rig.cameras]
@@ -76,7 +72,7 @@ class Session:
         self._learned = pipeline.detector.new_calibrations()
         self._error_rates = pipeline.occupancy.new_calibration()
         self._records: dict[int, FrameRecord] = {}
-        self._executor = fusion
+        self.fusion: Executor | None = None
         self._open: deque[Future[FusedEvidence]] = deque()
 
     def evidence(self, frame_set: FrameSet) -> list[ViewEvidence]:
@@ -124,13 +120,13 @@ class Session:
     def _submit(
         self, frame: int, evidence: Sequence[ViewEvidence], explanation: Explanation, noise: BoxNoise
     ) -> Future[FusedEvidence]:
-        if self._executor is None:
+        if self.fusion is None:
             done = Future[FusedEvidence]()
             done.set_result(self._fuse(frame, evidence, explanation, noise))
             return done
         if len(self._open) == _BEHIND:
             self._open.popleft().result()
-        self._open.append(self._executor.submit(self._fuse, frame, evidence, explanation, noise))
+        self._open.append(self.fusion.submit(self._fuse, frame, evidence, explanation, noise))
         return self._open[-1]
 
     def _fuse(
@@ -155,13 +151,18 @@ class _Prepared(NamedTuple):
     evidence: list[ViewEvidence]
 
 
+def two_cores() -> int:
+    """As many as a session has unless it is said."""
+    return 2
+
+
 def run_session(
     pipeline: Pipeline,
     foregrounds: Sequence[ViewForeground],
     frame_sets: Iterable[FrameSet],
     first: int,
     advance: Callable[[int], None],
-    cores: int = 2,
+    cores: Callable[[], int] = two_cores,
 ) -> Iterator[CommittedFrames]:
     """The results of frame sets in a session of their own, each as soon as it is decided.
 
@@ -174,15 +175,11 @@ def run_session(
     advance
         Called with the number of each frame that went through detection.
     cores
-        Processor cores for this session; with one it has no threads but those that decode.
+        Processor cores for this session from the next frame on; with one it has no threads but those that decode.
     """
     with ExitStack() as threads:
-        ahead, behind = (
-            threads.enter_context(ThreadPoolExecutor(1, name)) if cores > 1 else None
-            for name in ("foreground", "fusion")
-        )
-        session = Session(pipeline, foregrounds, first, behind)
-        for frame_set, evidence in _prepared(session, iter(frame_sets), ahead):
+        session = Session(pipeline, foregrounds, first)
+        for frame_set, evidence in _prepared(session, iter(frame_sets), cores, threads):
             yield from session.add(frame_set, evidence)
             advance(frame_set.frame)
         yield from session.finish()
@@ -195,15 +192,19 @@ def _next_prepared(session: Session, coming: Iterator[FrameSet]) -> _Prepared | 
     return None if frame_set is None else _Prepared(frame_set, session.evidence(frame_set))
 
 
-def _prepared(session: Session, coming: Iterator[FrameSet], executor: Executor | None) -> Iterator[_Prepared]:
-    """Frame sets with their evidence; by an executor some are made while the caller works on the last."""
-    if executor is None:
-        yield from iter(partial(_next_prepared, session, coming), None)
-        return
-    waiting = deque(executor.submit(_next_prepared, session, coming) for _ in range(_AHEAD))
+def _prepared(
+    session: Session, coming: Iterator[FrameSet], cores: Callable[[], int], threads: ExitStack
+) -> Iterator[_Prepared]:
+    """Frame sets with their evidence; with several cores some are made while the caller works on the last."""
+    while cores() < 2:
+        if (prepared := _next_prepared(session, coming)) is None:
+            return
+        yield prepared
+    ahead, session.fusion = (threads.enter_context(ThreadPoolExecutor(1, name)) for name in ("foreground", "fusion"))
+    waiting = deque(ahead.submit(_next_prepared, session, coming) for _ in range(_AHEAD))
     try:
         while (prepared := waiting.popleft().result()) is not None:
-            waiting.append(executor.submit(_next_prepared, session, coming))
+            waiting.append(ahead.submit(_next_prepared, session, coming))
             yield prepared
     finally:
         for future in waiting:

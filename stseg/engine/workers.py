@@ -1,7 +1,7 @@
 """Parallel processing of segments by worker processes of this machine, with the same results as by one process.
 
 Each worker has a pipe of its own and one segment at a time. Thus a worker that dies loses only that segment, which is
-assigned to another.
+assigned to another. The last to work share the cores of those that have nothing left to do.
 """
 
 from __future__ import annotations
@@ -30,11 +30,17 @@ _TRIES = 3
 
 @dataclass
 class _Worker:
-    """A worker process, its pipe, and its current segment."""
+    """A worker process, its pipe, its processor cores, and its current segment."""
 
     process: BaseProcess
     pipe: Connection
+    cores: int
     segment: Segment | None = None
+
+    def send(self, order: object) -> None:
+        """Send it a segment and the path of its file, or a number of cores."""
+        with suppress(OSError):  # a dead worker is replaced once it is found
+            self.pipe.send(order)
 
 
 def make_by_workers(
@@ -74,14 +80,13 @@ def make_by_workers(
     """
     pending, tries, notes = list(missing)[::-1], Counter[int](), set[str]()
     number = min(workers, len(missing))
-    cores = -(-free_cores() // number)
-    with _pool(job, number, cores) as pool:
+    with _pool(job, number) as pool:
         while pending or any(worker.segment for worker in pool):
             for worker in pool:
                 if worker.segment is None and pending:
                     worker.segment = pending.pop()
-                    with suppress(OSError):  # a dead worker is replaced below
-                        worker.pipe.send((worker.segment, draft(worker.segment.index)))
+                    worker.send((worker.segment, draft(worker.segment.index)))
+            _share_cores([worker for worker in pool if worker.segment])
             for worker in _ready(pool):
                 message = _receive(worker)
                 segment = worker.segment
@@ -97,11 +102,25 @@ def make_by_workers(
                 elif isinstance(message, BaseException):
                     raise message
                 else:
-                    pool[pool.index(worker)] = _start(job, cores)
+                    pool[pool.index(worker)] = _start(job, worker.cores)
                     if segment is not None:
                         tries[segment.index] += 1
                         _limit_tries(segment, tries[segment.index], worker.process)
                         pending.append(segment)
+
+
+def _share_cores(busy: list[_Worker]) -> None:
+    """Give the workers that have a segment all cores of this machine."""
+    for worker in busy:
+        cores = _share(len(busy))
+        if worker.cores != cores:
+            worker.cores = cores
+            worker.send(cores)
+
+
+def _share(workers: int) -> int:
+    """Cores of each of some workers."""
+    return -(-free_cores() // workers)
 
 
 def _ready(pool: list[_Worker]) -> list[_Worker]:
@@ -128,11 +147,11 @@ def _limit_tries(segment: Segment, tries: int, process: BaseProcess) -> None:
 
 
 @contextmanager
-def _pool(job: Job, number: int, cores: int) -> Iterator[list[_Worker]]:
-    """Worker processes waiting for segments, with a number of cores each; killed on exit."""
+def _pool(job: Job, number: int) -> Iterator[list[_Worker]]:
+    """Worker processes waiting for segments; killed on exit."""
     pool: list[_Worker] = []
     try:
-        pool += [_start(job, cores) for _ in range(number)]
+        pool += [_start(job, _share(number)) for _ in range(number)]
         yield pool
     finally:
         for worker in pool:
@@ -148,19 +167,39 @@ def _start(job: Job, cores: int) -> _Worker:
     process = CONTEXT.Process(target=_main, args=(job, cores, other), daemon=True)
     process.start()
     other.close()
-    return _Worker(process, own)
+    return _Worker(process, own, cores)
+
+
+class _Orders:
+    """What a worker is to do, by its pipe: segments, and between them or meanwhile the number of its cores."""
+
+    def __init__(self, pipe: Connection, cores: int) -> None:
+        self._pipe, self._cores = pipe, cores
+
+    def cores(self) -> int:
+        """The number of cores by now, while a segment is made."""
+        while self._pipe.poll():
+            self._cores = self._pipe.recv()
+        return self._cores
+
+    def segment(self) -> tuple[Segment, Path]:
+        """The next segment, and the path of its file."""
+        while isinstance(order := self._pipe.recv(), int):
+            self._cores = order
+        segment, draft = order
+        return segment, draft
 
 
 def _main(job: Job, cores: int, pipe: Connection) -> None:
     """Main loop of a worker process, which ends when its parent closes the pipe or kills it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    worker: SegmentWorker | None = None
+    orders, worker = _Orders(pipe, cores), None
     with suppress(EOFError, BrokenPipeError):  # the parent process has ended
         while True:
-            segment, draft = pipe.recv()
+            segment, draft = orders.segment()
             try:
                 with compilation_noted(pipe.send):
-                    worker = worker or SegmentWorker(job, cores)
+                    worker = worker or SegmentWorker(job, orders.cores)
                     pipe.send(worker.make(segment, draft, pipe.send))
             except StsegError as error:
                 pipe.send(error)

@@ -80,6 +80,6 @@ class Workforce:
         elif workers > 1:
             yield from make_by_workers(job, missing, draft, workers, advance, note)
         else:
-            worker = SegmentWorker(job, free_cores())
+            worker = SegmentWorker(job, free_cores)
             for segment in missing:
                 yield segment, worker.make(segment, draft(segment.index), advance)

@@ -101,6 +101,8 @@ class KnownPeople:
 
     def within(self, first: int, stop: int) -> list[tuple[int, int]]:
         """Observations from `first` to before `stop`, and the person of each."""
+        if not len(self.observation):
+            return []
         start, end = np.searchsorted(self.observation, (first, stop))
         return list(zip(self.observation[start:end].tolist(), self.person[start:end].tolist(), strict=True))
 

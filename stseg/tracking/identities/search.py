@@ -204,6 +204,8 @@ def _impose(held: Hypotheses, known: KnownPeople, first: int, stop: int, cost: F
 
 def _awaited(held: Hypotheses, known: KnownPeople, first: int) -> Flags:
     """Which slots hold an identity that a later observation must have, bool (hypothesis, slot)."""
+    if not len(known.first):
+        return np.zeros(held.name.shape, bool)
     bound = held.bound[:, None, known.awaited(first)]
     return np.asarray((held.name[:, :, None] == bound).any(axis=2) & (held.name >= 0))
 
@@ -211,6 +213,7 @@ def _awaited(held: Hypotheses, known: KnownPeople, first: int) -> Flags:
 def _marks(held: Hypotheses, known: KnownPeople, first: int) -> Ints:
     """A number that differs where hypotheses differ in who known people are, int64 (hypothesis,)."""
     mark = np.zeros(len(held.score), np.int64)
-    for person in np.flatnonzero(known.binding(first)).tolist():
+    binding = known.binding(first) if len(known.first) else known.first
+    for person in np.flatnonzero(binding).tolist():
         mark = (mark * 1_000_003 + held.bound[:, person] + 2) % 2_147_483_647
     return mark
