@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import ExitStack
 from copy import deepcopy
 from pathlib import Path
@@ -70,9 +70,11 @@ class SegmentWorker:
             open_segment_file(job, self.pipeline.occupancy.views, draft) as writer,
             ExitStack() as threads,
         ):
-            packing = threads.enter_context(ThreadPoolExecutor(1, "packing")) if self.cores > 1 else None
+            packing: Executor | None = None
             observed, packed = shifts.measured(frame_sets), deque[PackedStep]()
             for step in run_session(self.pipeline, foregrounds, observed, segment.lead, fused, self.cores):
+                if packing is None and self.cores() > 1:
+                    packing = threads.enter_context(ThreadPoolExecutor(1, "packing"))
                 packed.append(packed_step(job, step, segment, packing))
                 if len(packed) > 1:  # the last step is packed while the session goes on
                     write_step(job, packed.popleft(), writer)
