@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import os
 
+import numba
 import pytest
 
+from stseg.accelerate import COMPILED
 from stseg.engine.calls import called_beside, called_here
 from stseg.errors import ConfigError
 
@@ -20,13 +22,17 @@ def _refuses() -> None:
     raise ConfigError("--frames", "", "none", "some")
 
 
+def _compiles() -> int:
+    return int(numba.njit(lambda: 3)())
+
+
 def test_a_call_is_made_in_another_process() -> None:
-    with called_beside(os.getpid) as result:
+    with called_beside(print, os.getpid) as result:
         assert result() != os.getpid()
 
 
 def test_a_call_whose_process_dies_is_made_here() -> None:
-    with called_beside(_dies_elsewhere, os.getpid()) as result:
+    with called_beside(print, _dies_elsewhere, os.getpid()) as result:
         assert result() == 7
 
 
@@ -39,5 +45,13 @@ def test_a_call_here_is_made_once_its_result_is_asked_for() -> None:
 
 
 def test_an_error_passes_from_the_other_process() -> None:
-    with called_beside(_refuses) as result, pytest.raises(ConfigError, match="--frames"):
+    with called_beside(print, _refuses) as result, pytest.raises(ConfigError, match="--frames"):
         result()
+
+
+@pytest.mark.skipif(not COMPILED, reason="kernels are not compiled")
+def test_what_the_other_process_compiles_is_noted() -> None:
+    notes = list[str]()
+    with called_beside(notes.append, _compiles) as result:
+        assert result() == 3
+    assert notes == ["compiling kernels, once on this machine, about a minute of work"]

@@ -5,10 +5,12 @@ from __future__ import annotations
 import signal
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, suppress
+from dataclasses import dataclass
 from functools import partial
 from multiprocessing.connection import Connection
 from typing import Protocol, TypeVar
 
+from stseg.accelerate import compilation_noted
 from stseg.engine.worker_processes import CONTEXT
 from stseg.errors import StsegError
 
@@ -29,9 +31,21 @@ def called_here(function: Callable[..., _Result], *arguments: object) -> Iterato
     yield partial(function, *arguments)
 
 
+@dataclass(frozen=True)
+class _Note:
+    """A line about the work in another process."""
+
+    text: str
+
+
 @contextmanager
-def called_beside(function: Callable[..., _Result], *arguments: object) -> Iterator[Callable[[], _Result]]:
-    """Call in another process at once, or in this one if that dies; arguments and result are pickled."""
+def called_beside(
+    note: Callable[[str], None], function: Callable[..., _Result], *arguments: object
+) -> Iterator[Callable[[], _Result]]:
+    """Call in another process at once, or in this one if that dies; arguments and result are pickled.
+
+    `note` is called with lines about the work, once the result is waited for.
+    """
     own, other = CONTEXT.Pipe(duplex=False)
     process = CONTEXT.Process(target=_answer, args=(other, function, arguments), daemon=True)
     process.start()
@@ -39,7 +53,8 @@ def called_beside(function: Callable[..., _Result], *arguments: object) -> Itera
 
     def result() -> _Result:
         try:
-            answer = own.recv()
+            while isinstance(answer := own.recv(), _Note):
+                note(answer.text)
         except EOFError:
             return function(*arguments)
         if isinstance(answer, StsegError):
@@ -58,6 +73,7 @@ def _answer(pipe: Connection, function: Callable[..., object], arguments: tuple[
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     with suppress(BrokenPipeError):  # nobody waits any more
         try:
-            pipe.send(function(*arguments))
+            with compilation_noted(lambda text: pipe.send(_Note(text))):
+                pipe.send(function(*arguments))
         except StsegError as error:
             pipe.send(error)

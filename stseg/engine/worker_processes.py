@@ -14,9 +14,10 @@ from stseg.io.machine import free_cores, free_memory
 if TYPE_CHECKING:  # Windows has no contexts that fork
     from multiprocessing.context import ForkServerContext, SpawnContext
 
-_FORKED = "forkserver" in multiprocessing.get_all_start_methods()
+FORKED = "forkserver" in multiprocessing.get_all_start_methods()
+"""Whether a further process starts at once, with all imports."""
 CONTEXT: ForkServerContext | SpawnContext = (
-    multiprocessing.get_context("forkserver") if _FORKED else multiprocessing.get_context("spawn")
+    multiprocessing.get_context("forkserver") if FORKED else multiprocessing.get_context("spawn")
 )
 """Workers are forked from a process that has imported everything and has no threads, where the system can do that."""
 
@@ -37,7 +38,7 @@ def processes_that_fit(cells: int = 0) -> int:
 
 def prepare_workers(workers: int | None) -> None:
     """Begin the imports of workers, where there are several (None: as many as fit), while this process does others."""
-    if _FORKED and (processes_that_fit() if workers is None else workers) > 1:
+    if FORKED and (processes_that_fit() if workers is None else workers) > 1:
         from multiprocessing import forkserver
 
         CONTEXT.set_forkserver_preload([_PRELOADED])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import prod
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from stseg.engine.cluster import make_by_cluster
 from stseg.engine.job import Job
 from stseg.engine.segment_worker import SegmentWorker
 from stseg.engine.segments import Segment
-from stseg.engine.worker_processes import prepare_workers, processes_that_fit
+from stseg.engine.worker_processes import FORKED, prepare_workers, processes_that_fit
 from stseg.engine.workers import make_by_workers
 from stseg.errors import ConfigError
 from stseg.io.machine import free_cores
@@ -47,9 +48,10 @@ class Workforce:
         if self.scheduler is None:
             prepare_workers(self.workers)
 
-    def caller(self, job: Job) -> Caller:
-        """How a call is made that this process need not wait for."""
-        return called_beside if self.scheduler is None and self.processes(job) > 1 else called_here
+    def caller(self, job: Job, note: Callable[[str], None]) -> Caller:
+        """How a call is made that this process need not wait for; `note` is called with lines about the work."""
+        several = self.scheduler is None and self.processes(job) > 1
+        return partial(called_beside, note) if several and FORKED else called_here
 
     def make(
         self,
