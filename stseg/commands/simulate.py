@@ -53,11 +53,11 @@ def simulate(
     scene
         easy (5 people, 4 cameras), dense (14 people on 6 m x 6 m, 8 cameras), dense4 (the same crowd, 4 of those
         cameras), similar (4 people, 3 of them dressed alike, 3 cameras), plaza (7 upright cylinders on 20 m x 20 m, 7
-        cameras), school (adults and children), animals (0.6 m high and 1.1 m long), demo (small images, 8 s), tiny (a
-        second of very small images), long (boxes alone of 10 people in a closed room for half an hour), return (small
-        images of 6 people who come and go for 10 minutes), or small images of scripted routes: crossing, meeting,
-        meeting_heights (the same, 8 cm apart in height), border (encounters, entries and exits where windows meet). The
-        other options change it.
+        cameras), large_plaza (10 on 40 m x 40 m, 8 cameras), school (adults and children), animals (0.6 m high and 1.1
+        m long), demo (small images, 8 s), tiny (a second of very small images), long (boxes alone of 10 people in a
+        closed room for half an hour), return (small images of 6 people who come and go for 10 minutes), or small images
+        of scripted routes: crossing, meeting, meeting_heights (the same, 8 cm apart in height), border (encounters,
+        entries and exits where windows meet). The other options change it.
     people
         Number of people in the area; of all who come and go in the scene return.
     cameras

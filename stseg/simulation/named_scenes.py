@@ -106,6 +106,16 @@ NAMED: dict[str, SceneSpec] = {
             seed=605,
         ),
         _PLAZA,
+        replace(
+            _PLAZA,
+            name="large_plaza",
+            people=10,
+            area=(40.0, 40.0),
+            seconds=60.0,
+            frame_rate=7.0,
+            cameras=8,
+            camera_distance=38.0,
+        ),
         SceneSpec(
             name="school",
             people=6,
