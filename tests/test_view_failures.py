@@ -98,7 +98,7 @@ def test_beside_four_sound_views_one_that_never_showed_people_fails(others: int,
     asked = Detector(replace(rig, frame_rate=RATE), ["pixels"] * len(rig.cameras), FEW_HEIGHTS, BODY)
     learned, seen = asked.new_calibrations(), list(likelihoods(rig.cameras, STANDING))
     half = [np.where(np.arange(view.shape[1]) % 2, view, 0.0).astype(np.float32) for view in map(np.asarray, seen)]
-    explained(asked, learned, [half[0], *seen[1:]], 40)
+    explained(asked, learned, [half[0], *seen[1:]], 50)
     assert learned.failures.failing.tolist() == [failing] + [False] * others
     explained(asked, learned, seen, 10)
     assert not learned.failures.failing.any()

@@ -10,10 +10,10 @@ the time of a frame and person, and is forgotten quickly for J now and slowly fo
 J now is less than 0.7 of its usual one fails: it is excluded until J has come back. The usual J stands while
 it fails, and counts in J now where little was seen of late, so a view without people comes back by itself.
 
-A view that never showed more, since its calibration is wrong, has no better past to be measured by. It fails beside
-four sound views or more, where its J now is less than 0.7 of the median of their usual J; among fewer it is used, and
-the run says so afterwards. Only people count who would be there without the view, and whom two other views show: of two
-views nobody can say which one fails.
+A view that never showed more, since its calibration is wrong, has no better past to be measured by. Where its usual J
+is less than 0.7 of the median usual J of four other sound views or more, that median is expected of it; among fewer it
+is used, and the run says so afterwards. Only people count who would be there without the view, and whom two other views
+show: of two views nobody can say which one fails.
 
 A camera that is pushed still shows people: `stseg.detection.knocked_views` recognises it, and its view is excluded too.
 """
@@ -47,8 +47,8 @@ _EXPECTED = 0.1
 """Weight of the usual informedness in that of now, seconds of one person."""
 _OTHERS = 2
 """Least number of other views that show a person who counts."""
-_COMPARED = 4
-"""Least number of other views by which a view fails that was never better."""
+_COMPARED, _LONG = 4, 3.0
+"""Least number of other views by which a view fails that was never better, and time with people before, seconds."""
 _SHOWN = 1.0
 """Evidence from which a view shows a person, nats."""
 
@@ -84,6 +84,7 @@ class ViewFailures:
         self.failing, self.excluded = np.zeros(views, bool), np.zeros(views, bool)
         self.knocks = KnockedViews(views, body, frame_rate, level)
         self.usual, self.recent = np.zeros((views, 2)), np.zeros((views, 2))
+        self._frames = np.zeros(views, np.int64)
 
     def kept(self, seen: Sequence[Seen]) -> list[Seen | None]:
         """What the views show; None for those that are excluded."""
@@ -122,21 +123,24 @@ class ViewFailures:
     def _count(self, k: int, number: int, informedness: float) -> None:
         """Count what view k shows of a number of people."""
         seconds = number / self._rate
+        self._frames[k] += number > 0
         own = np.array([seconds, seconds * informedness])
         self.recent[k] = self.recent[k] * np.exp(-1 / max(self._rate * _RECENT, _FRAMES)) + own
         known, total = self.usual[k]
         if known >= _KNOWN:
-            usual = total / known
+            usual, of_others = total / known, self._usual_of_others(k)
+            expected = usual if usual >= _LEAST * of_others else of_others
             weight, total = self.recent[k] + _EXPECTED * np.array([1.0, usual])
-            self.failing[k] = total / weight < _LEAST * max(usual, self._usual_of_others(k))
+            self.failing[k] = total / weight < _LEAST * expected
         if not (self.failing[k] or self.knocks.knocked[k]):
             self.usual[k] = self.usual[k] * np.exp(-1 / (self._rate * self._level.memory)) + own
 
     def _usual_of_others(self, k: int) -> float:
-        """The median of the usual informedness of sound views but view k, 0 where they are too few."""
-        sound = ~self.failing & ~self.knocks.knocked & (self.usual[:, 0] >= _KNOWN)
+        """The median of the usual informedness of sound views but view k, 0 where too little is known."""
+        long = self._frames >= _LONG * self._rate
+        sound = ~self.failing & ~self.knocks.knocked & long
         sound[k] = False
-        if np.count_nonzero(sound) < _COMPARED:
+        if not long[k] or np.count_nonzero(sound) < _COMPARED:
             return 0.0
         return float(np.median(self.usual[sound, 1] / self.usual[sound, 0]))
 
