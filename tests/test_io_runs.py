@@ -5,9 +5,12 @@ from __future__ import annotations
 import gc
 import os
 import signal
+import sys
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
-from typing import BinaryIO
+from types import FrameType
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import h5py
 import numpy as np
@@ -33,6 +36,9 @@ from stseg.io.runfile import layout, part_file
 from stseg.io.runfile.packed_frames import packed_frame
 from stseg.io.runfile.runs import RunWriter, read_run, read_trajectory
 from stseg.model.tables import RATES, TRAJECTORY, Tracks
+
+if TYPE_CHECKING:
+    from _typeshed import TraceFunction
 
 VIEWS: Bytes = np.full((3, 4, 6), 2, np.uint8)
 
@@ -266,6 +272,50 @@ def test_an_interrupt_inside_a_write_leaves_nothing(tmp_path: Path, monkeypatch:
     assert [file.name for file in tmp_path.iterdir()] == ["left.avi"]
     gc.collect()  # a file that HDF5 could not close would crash here
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+@pytest.mark.usefixtures("interruptible")
+def test_an_interrupt_at_any_line_leaves_no_part(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Once at each line of the code that makes a part, writes to it and publishes it, and while the system makes it."""
+    reached, interrupted = list[tuple[str, int]](), False
+
+    def interrupt(frame: FrameType, event: str, _: object) -> TraceFunction | None:
+        nonlocal interrupted
+        name = Path(frame.f_code.co_filename).name
+        if name not in ("part_file.py", "whole_files.py"):
+            return None
+        if event == "line" and not interrupted and (name, frame.f_lineno) not in reached:
+            reached.append((name, frame.f_lineno))
+            interrupted = True
+            signal.raise_signal(signal.SIGINT)
+        return interrupt
+
+    def interrupted_open(*arguments: Any) -> int:
+        descriptor = system_open(*arguments)
+        if not reached and str(arguments[0]).endswith(".part"):
+            signal.raise_signal(signal.SIGINT)
+        return descriptor
+
+    def write(trace: TraceFunction | None) -> None:
+        sys.settrace(trace)
+        try:
+            with writer_at(tmp_path / "night.h5", overwrite=True) as writer:
+                fill(writer)
+                writer.finish(Tracks(small_trajectory()).summary())
+        finally:
+            sys.settrace(None)
+            assert not parts_of(tmp_path / "night.h5"), reached[-1:]
+
+    system_open = os.open
+    monkeypatch.setattr(os, "open", interrupted_open)
+    with pytest.raises(KeyboardInterrupt):
+        write(None)
+    interrupted = True
+    while interrupted:
+        interrupted = False
+        with suppress(KeyboardInterrupt):
+            write(interrupt)
+    assert len(reached) > 50
 
 
 def test_the_part_of_a_killed_run_is_removed_and_foreign_files_are_not(tmp_path: Path) -> None:

@@ -45,7 +45,11 @@ def require_new(path: Path, overwrite: bool) -> None:
 def create_part(path: Path) -> tuple[Path, int]:
     """A new, empty part of `path` and its descriptor, open for reading and writing; raises OSError."""
     part = path.with_name(f"{path.name}.{secrets.token_hex(8)}.part")
-    return part, os.open(part, os.O_RDWR | os.O_CREAT | os.O_EXCL | _NO_FOLLOW | getattr(os, "O_BINARY", 0), 0o666)
+    try:
+        return part, os.open(part, os.O_RDWR | os.O_CREAT | os.O_EXCL | _NO_FOLLOW | getattr(os, "O_BINARY", 0), 0o666)
+    except KeyboardInterrupt:  # it may have come when the file was made
+        part.unlink(missing_ok=True)
+        raise
 
 
 def parts_of(path: Path) -> list[Path]:

@@ -45,20 +45,14 @@ class PartFile(io.RawIOBase):
         self._path = path
         self._failure: OSError | None = None
         self._unwritten: list[tuple[int, bytes]] = []
-        self._in_step = False
         self._interrupted: int | None = None
-        try:
-            _remove_abandoned(path)
-            self.part, descriptor = create_part(path)
-        except OSError as error:
-            raise output_error(path, error) from error
-        self._file = os.fdopen(descriptor, "r+b", buffering=0)
-        try:
-            lock(self._file)
-        except OSError as error:
-            self._file.close()
-            raise output_error(path, error) from error
+        self._in_step = True  # until the end of the first step: nobody would delete the part before
         self._handlers = self._shield()
+        try:
+            self._file = self._create()
+        except OSError as error:
+            self._restore_handlers()
+            raise output_error(path, error) from error
 
     @contextmanager
     def step(self) -> Iterator[None]:
@@ -104,8 +98,7 @@ class PartFile(io.RawIOBase):
         with suppress(OSError):
             self._file.close()
         super().close()
-        for number, before in self._handlers.items():
-            signal.signal(number, before)
+        self._restore_handlers()
 
     def write(self, data: memoryview) -> int:  # type: ignore[override]  # what h5py gives
         """Write everything; what cannot be written is kept, and the failure recorded."""
@@ -152,6 +145,17 @@ class PartFile(io.RawIOBase):
     def flush(self) -> None:
         """No-op: writes are unbuffered."""
 
+    def _create(self) -> io.FileIO:
+        _remove_abandoned(self._path)
+        self.part, descriptor = create_part(self._path)
+        file = os.fdopen(descriptor, "r+b", buffering=0)
+        try:
+            lock(file)
+        except OSError:
+            file.close()
+            raise
+        return file
+
     def _raise_failure(self) -> None:
         if self._failure is not None:
             raise output_error(self._path, self._failure) from self._failure
@@ -160,6 +164,8 @@ class PartFile(io.RawIOBase):
         """Defer interrupts and termination to the ends of steps; return the previous handlers."""
         if threading.current_thread() is not threading.main_thread():
             return {}
+        found = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+        handlers: dict[int, _Handler] = {number: before for number, before in found.items() if callable(before)}
 
         def handle(number: int, frame: FrameType | None) -> None:
             if self._in_step:
@@ -167,13 +173,13 @@ class PartFile(io.RawIOBase):
             else:
                 handlers[number](number, frame)
 
-        handlers: dict[int, _Handler] = {}
-        for number in (signal.SIGINT, signal.SIGTERM):
-            before = signal.getsignal(number)
-            if callable(before):
-                handlers[number] = before
-                signal.signal(number, handle)
+        for number in handlers:
+            signal.signal(number, handle)
         return handlers
+
+    def _restore_handlers(self) -> None:
+        for number, before in self._handlers.items():
+            signal.signal(number, before)
 
 
 def _remove_abandoned(path: Path) -> None:

@@ -67,10 +67,10 @@ class RunWriter:
         try:
             with self._disk.step():
                 self._create()
+            return self
         except BaseException:
             self._disk.discard(self._close)
             raise
-        return self
 
     def __exit__(
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
@@ -137,9 +137,9 @@ class RunWriter:
             for table in self._tables.values():
                 table.flush()
             self._close()  # flushes
-        self._finished = True  # the part is complete and is kept from here on
         try:
             with self._disk.step():  # an interrupt waits until the part has its name
+                self._finished = True  # the part is complete and is kept from here on
                 self._disk.publish(self._overwrite)
         finally:
             self._disk.close()
