@@ -18,6 +18,7 @@ from stseg import __version__
 from stseg.commands.standard_error import without_library_messages
 from stseg.commands.termination import INTERRUPTED, TERMINATED, Termination
 from stseg.errors import ConfigError, StsegError
+from stseg.garbage import collect_rarely
 from stseg.io.machine import address_space
 from stseg.io.names import printable
 
@@ -60,6 +61,7 @@ def command() -> NoReturn:
                     stream.flush()
             os._exit(status)
 
+    collect_rarely()
     atexit.register(leave)  # the first to be registered is the last to be called
     status = main()
     if status in (INTERRUPTED, TERMINATED):
