@@ -17,8 +17,8 @@ from cyclopts import App, CycloptsError
 from stseg import __version__
 from stseg.commands.standard_error import without_library_messages
 from stseg.commands.termination import INTERRUPTED, TERMINATED, Termination
+from stseg.engine.garbage import collect_rarely
 from stseg.errors import ConfigError, StsegError
-from stseg.garbage import collect_rarely
 from stseg.io.machine import address_space
 from stseg.io.names import printable
 

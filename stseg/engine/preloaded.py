@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from stseg.accelerate import take_kept_kernels
 from stseg.engine import assembly, workers
-from stseg.garbage import collect_rarely
+from stseg.engine.garbage import collect_rarely
 
 __all__ = ["assembly", "workers"]
 
