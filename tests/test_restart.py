@@ -107,6 +107,24 @@ def test_more_candidates_have_the_evidence_of_a_pool_that_is_made_whole(seed: in
     )
 
 
+def test_more_candidates_have_the_pixels_of_a_pool_that_is_made_whole() -> None:
+    ground = standing_apart(np.random.default_rng(3), 5, 0.5)
+    asked = Detector(room(), ["pixels"] * 4, FEW_HEIGHTS, BODY)
+    prior = Prior.of(expecting(*ground[:2]), asked.config, asked.body, asked.border)
+    seen = asked.observe(likelihoods(room().cameras, people(*ground)))
+    before = MapEstimate.of_search(
+        FrameEvidence(asked.views, seen, prior, asked.parameters), prior.pool(), np.arange(2)
+    )
+    fresh = lattice_candidates(before, asked.lattice_ground)
+    found = before.with_more(fresh.at([0])).with_more(fresh.at([1])).problem
+    whole = MapEstimate.of_search(before.evidence, before.pool.joined_with(fresh.at([0, 1])), before.members).problem
+    for table, made_whole in zip(found.pixels, whole.pixels, strict=True):
+        np.testing.assert_array_equal(table, made_whole)
+    for name in ("size_prior", "birth_cost", "track_gain", "ground", "breadth"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(whole, name))
+    assert len(found.ground) == 4
+
+
 def test_sure_members_are_not_sought_again() -> None:
     seen = [boxes(camera, people((-1, -1), (1, 1))) for camera in room().cameras]
     before = of_tracks(seen, expecting((-1, -1), (1, 1)))

@@ -27,6 +27,7 @@ from stseg.accelerate import kernel
 from stseg.arrays import Flags, Floats, Ints
 from stseg.config import BodyConfig, ErrorRateConfig
 from stseg.detection.views import BoxView, PixelView, ViewObservation
+from stseg.model.candidates import Candidates
 from stseg.model.outlines import Spans
 from stseg.model.predicted_tracks import PredictedTracks
 
@@ -90,8 +91,11 @@ class KnockedViews:
         observations: Sequence[ViewObservation | None],
     ) -> None:
         """Count the next frame, before it is explained: what views show of the people whom tracks predict."""
+        detected = predicted.existence > 0
+        ground, heights = predicted.ground[detected], predicted.sizes.height[detected]
+        bodies = Candidates(ground, heights, self._body.width_of(heights))
         expected = [
-            _ExpectedPeople(predicted, view, self._body, None if seen is None else view.foreground(seen))
+            _ExpectedPeople(bodies, view, None if seen is None else view.foreground(seen))
             for view, seen in zip(views, observations, strict=True)
         ]
         number = np.array([len(people) for people in expected])
@@ -130,12 +134,9 @@ def _mean(sums: Floats) -> Floats:
 class _ExpectedPeople:
     """People whom tracks predict in one view, whole, and its foreground, bool (v, u); nobody where it is blind."""
 
-    def __init__(
-        self, predicted: PredictedTracks, view: BoxView | PixelView, body: BodyConfig, foreground: Flags | None
-    ) -> None:
-        detected = (predicted.existence > 0) & (foreground is not None)
-        ground, heights = predicted.ground[detected], predicted.sizes.height[detected]
-        first, spans, area = view.whole_outlines(ground, heights, body.width_of(heights))
+    def __init__(self, bodies: Candidates, view: BoxView | PixelView, foreground: Flags | None) -> None:
+        here = bodies if foreground is not None else bodies.at(np.zeros(0, np.int64))
+        first, spans, area = view.whole_outlines(here.ground, here.height, here.width)
         pixels = np.maximum(spans[..., 1] - spans[..., 0], 0).sum(1)
         whole = (first >= 0) & (pixels > _WHOLE * area)
         self._first, self._spans, self._pixels = first[whole], spans[whole], pixels[whole]

@@ -58,11 +58,12 @@ def _probes(heights: Floats) -> list[int]:
 
 def _add_pixels(shown: Sequence[tuple[PixelView, OpenPixels]], probes: Sequence[int], score: Floats) -> None:
     """Add what pixels say of the lattice's pillars to score (height, cell); -inf where a height is not worth a look."""
-    probed = np.isin(np.arange(len(score)), probes)
+    others = np.delete(np.arange(len(score)), probes)
     for view, pixels in shown:
-        view.add_lattice_score(pixels, np.flatnonzero(probed), view.lattice_cells, score)
-    hopeless = score[probed].max(0) <= _HOPELESS
+        view.add_lattice_score(pixels, np.array(probes), view.lattice_cells, score)
+    hopeless = score[probes].max(0) <= _HOPELESS
     worth = np.flatnonzero(~hopeless)
     for view, pixels in shown:
-        view.add_lattice_score(pixels, np.flatnonzero(~probed), worth, score)
-    score[np.ix_(~probed, hopeless)] = -np.inf
+        view.add_lattice_score(pixels, others, worth, score)
+    for height in others:
+        score[height, hopeless] = -np.inf

@@ -19,7 +19,7 @@ from stseg.detection.blob_scale import blob_scales
 from stseg.detection.body_size import measure
 from stseg.detection.evidence import ProjectedBodies, box_evidence, pixel_evidence, stacked_rasters
 from stseg.detection.prior import Prior
-from stseg.detection.problem import BoxEvidence, Parameters, Problem
+from stseg.detection.problem import Parameters, Problem
 from stseg.detection.refine import refine, refine_places
 from stseg.detection.search import search
 from stseg.detection.set_scores import fill_assignments, fill_set_scores
@@ -159,7 +159,7 @@ class MapEstimate:
         """The same members among more candidates, which come after those of this estimate."""
         evidence, pool = self.evidence, self.pool.joined_with(more)
         bodies = self.bodies.joined_with(ProjectedBodies.of(evidence.views, more))
-        problem = _problem(evidence, pool, bodies, self.problem.boxes)
+        problem = _problem(evidence, pool, bodies, self.problem)
         return MapEstimate(evidence, pool, bodies, problem, self.members)
 
     def searched_with(self, more: Candidates, start: Ints) -> MapEstimate:
@@ -329,22 +329,31 @@ def _keep_apart(ground: Floats, order: Ints, apart: float, standing: Ints, count
     return count
 
 
-def _problem(evidence: FrameEvidence, pool: Candidates, bodies: ProjectedBodies, known: BoxEvidence | None) -> Problem:
+def _problem(evidence: FrameEvidence, pool: Candidates, bodies: ProjectedBodies, known: Problem | None) -> Problem:
     """All that is known of the candidates, as the search kernels read it; `known` is that of the first ones."""
     views, observations, prior = evidence.views, evidence.observations, evidence.prior
     shown = any(isinstance(view, PixelView) for view in views)  # boxes show no widths
-    boxes, pixels = (
-        box_evidence(views, observations, bodies, known),
-        pixel_evidence(views, evidence.rasters, evidence.scales, pool),
-    )
+    more = pool if known is None else pool.after(len(known.ground))
+    boxes = box_evidence(views, observations, bodies, None if known is None else known.boxes)
+    pixels = pixel_evidence(views, evidence.rasters, evidence.scales, more)
+    size_prior = prior.log_size(more.height, more.width) if shown else prior.log_height(more.height)
+    birth_cost, track_gain = prior.birth_cost(more.ground), prior.track_log_ratio(more)
+    common = evidence.parameters.common_width
+    breadth = np.maximum(more.width / common, 1.0) if shown else np.ones(len(more))
+    if known is not None:
+        pixels = known.pixels.joined_with(pixels)
+        size_prior = np.concatenate([known.size_prior, size_prior])
+        birth_cost = np.concatenate([known.birth_cost, birth_cost])
+        track_gain = np.concatenate([known.track_gain, track_gain])
+        breadth = np.concatenate([known.breadth, breadth])
     return Problem(
         boxes=boxes,
         pixels=pixels,
-        size_prior=prior.log_size(pool.height, pool.width) if shown else prior.log_height(pool.height),
-        birth_cost=prior.birth_cost(pool.ground),
-        track_gain=prior.track_log_ratio(pool),
+        size_prior=size_prior,
+        birth_cost=birth_cost,
+        track_gain=track_gain,
         ground=pool.ground,
-        breadth=np.maximum(pool.width / evidence.parameters.common_width, 1.0) if shown else np.ones(len(pool)),
+        breadth=breadth,
         parameters=evidence.parameters,
         assigned=np.empty(max(pixels.raster[:1].size, boxes.match.shape[2], len(prior.predicted), 1), np.int64),
         view_evidence=np.zeros((len(views), len(pool) + 1)),

@@ -87,6 +87,17 @@ class PixelEvidence(NamedTuple):
     area: Floats
     order: Floats
 
+    def joined_with(self, other: PixelEvidence) -> PixelEvidence:
+        """The evidence for these candidates, then for those of the other, by the same pixels."""
+        views, number = self.first.shape
+        every, tall = number + other.first.shape[1], max(self.spans.shape[2], other.spans.shape[2])
+        spans = np.zeros((views, every, tall, 2), np.int16)
+        spans[:, :number, : self.spans.shape[2]] = self.spans
+        spans[:, number:, : other.spans.shape[2]] = other.spans
+        first = np.concatenate([self.first, other.first], 1)
+        area, order = np.concatenate([self.area, other.area], 1), np.concatenate([self.order, other.order], 1)
+        return PixelEvidence(self.raster, self.scale, first, spans, area, order)
+
 
 class Problem(NamedTuple):
     """The candidates of a frame and all that is known of them.

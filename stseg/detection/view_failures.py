@@ -109,12 +109,13 @@ class ViewFailures:
     ) -> bool:
         """Count one frame by its explanation; whether more views are excluded from it now."""
         people = explanation.people
-        shows = np.nan_to_num(people.view_evidence) >= _SHOWN
+        own = np.nan_to_num(people.view_evidence)
+        shows = own >= _SHOWN
+        shown = shows.sum(0)
         for k, (view, observation) in enumerate(zip(views, observations, strict=True)):
             if observation is None:
                 continue
-            without = people.evidence - np.nan_to_num(people.view_evidence[k])
-            sure = (without >= self._level.minimum_evidence) & (shows.sum(0) - shows[k] >= _OTHERS)
+            sure = (people.evidence - own[k] >= self._level.minimum_evidence) & (shown - shows[k] >= _OTHERS)
             self._count(k, *informedness(explanation.pixel_assignment[k], sure, view.foreground(observation)))
         begins = self.failing & ~self.excluded
         self.excluded |= begins
@@ -137,6 +138,8 @@ class ViewFailures:
 
     def _usual_of_others(self, k: int) -> float:
         """The median of the usual informedness of sound views but view k, 0 where too little is known."""
+        if len(self.failing) <= _COMPARED:
+            return 0.0
         long = self._frames >= _LONG * self._rate
         sound = ~self.failing & ~self.knocks.knocked & long
         sound[k] = False

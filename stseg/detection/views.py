@@ -55,6 +55,11 @@ class ViewObservation:
     raster: Singles
 
     @cached_property
+    def is_foreground(self) -> Flags:
+        """Raster pixels that are foreground rather than not, bool (v, u)."""
+        return np.asarray(self.raster > 0)
+
+    @cached_property
     def label_values(self) -> Singles:
         """Log-likelihood of each pixel inside a pillar beside outside, if open to the person: float32 (v, u), nats."""
         values = np.empty_like(self.raster)
@@ -204,7 +209,7 @@ class PixelView(View):
 
     def foreground(self, observation: ViewObservation) -> Flags:
         """Raster pixels that are foreground rather than not, bool (v, u)."""
-        return np.asarray(observation.raster > 0)
+        return observation.is_foreground
 
     def open_pixels(self, observation: ViewObservation, unexplained: Flags) -> OpenPixels:
         """The unexplained pixels of a frame, bool (v, u)."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.ndimage import distance_transform_edt
@@ -40,14 +41,25 @@ class Border:
         cells = np.asarray(distance_transform_edt(inside), float)[1:-1, 1:-1] if not inside.all() else _NOWHERE
         return cls(np.where(area, np.maximum((cells - 0.5) * grid.cell, _AT_DOOR), 0.0), grid)
 
+    @cached_property
+    def _framed(self) -> Floats:
+        """The distances, and after the last row and column, which also stand before the first, those beyond: 0."""
+        return np.pad(self.distance, ((0, 1), (0, 1)))
+
+    @cached_property
+    def _corner(self) -> Floats:
+        return np.array([self.grid.x[0], self.grid.y[0]])
+
+    @cached_property
+    def _beyond(self) -> Floats:
+        """Column and row behind the last ones."""
+        return np.array(self.distance.shape[::-1], float)
+
     def away(self, ground: Floats) -> Floats:
         """Distance of ground points (n, 2) from the border, metres, float64 (n,); 0 beyond it."""
-        corner = np.array([self.grid.x[0], self.grid.y[0]])
-        cell = np.floor((ground - corner) / self.grid.cell).astype(int)
-        rows, columns = self.distance.shape
-        within = ((cell >= 0) & (cell < [columns, rows])).all(1)
-        column, row = cell[:, 0].clip(0, columns - 1), cell[:, 1].clip(0, rows - 1)
-        return np.where(within, self.distance[row, column], 0.0)
+        cell = np.floor((ground - self._corner) / self.grid.cell)
+        column, row = np.minimum(np.maximum(cell, -1.0), self._beyond).astype(int).T
+        return np.asarray(self._framed[row, column])
 
     def inside(self, ground: Floats, width: float) -> Floats:
         """How far inside ground points (n, 2) are: 0 at the border, 1 from `width` metres on, float64 (n,)."""

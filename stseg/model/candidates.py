@@ -35,6 +35,10 @@ class Candidates:
                 kept.append(i)
         return every.at(kept)
 
+    def after(self, number: int) -> Candidates:
+        """All candidates but the first ones."""
+        return Candidates(self.ground[number:], self.height[number:], self.width[number:])
+
     def at(self, chosen: Sequence[int] | Ints) -> Candidates:
         """The chosen candidates, in that order."""
         index = np.asarray(chosen, int)
