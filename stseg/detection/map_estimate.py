@@ -309,6 +309,8 @@ class MapEstimate:
     def _box_of_each(self) -> Ints:
         """The box of each member in each view, int64 (view, member), -1 for none."""
         box = np.full((len(self.evidence.views), len(self.members)), -1, np.int64)
+        if not len(self.problem.boxes.boxes):
+            return box
         for row, assigned in zip(box, self.box_assignment, strict=True):
             taken = np.flatnonzero(assigned >= 0)
             row[assigned[taken]] = taken

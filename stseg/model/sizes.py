@@ -83,8 +83,11 @@ def log_heavy_tailed(deviation: Floats) -> Floats:
     A Gaussian, with tails of a power law (its exponent, 4, makes the density smooth): coats, prams and children are far
     out more often than a Gaussian allows. Ten spreads cost 8 nats, not 50.
     """
-    tail = 0.5 * _TAIL**2 + _TAIL**2 * np.log(np.maximum(np.abs(deviation), _TAIL) / _TAIL)
-    return np.where(np.abs(deviation) < _TAIL, -0.5 * deviation**2, -tail)
+    away, near = np.abs(deviation), -0.5 * deviation**2
+    if (away < _TAIL).all():
+        return np.asarray(near)
+    tail = 0.5 * _TAIL**2 + _TAIL**2 * np.log(np.maximum(away, _TAIL) / _TAIL)
+    return np.where(away < _TAIL, near, -tail)
 
 
 _LEAST_PRECISION = 1e-6
