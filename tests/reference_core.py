@@ -86,11 +86,21 @@ def set_score(members: Sequence[int], problem: Problem) -> float:
     return float(total)
 
 
+def left_by_all(boxes: BoxEvidence) -> Floats:
+    """Share of the first's pillar that the second leaves, float64 (view, candidate, candidate)."""
+    views, candidates = boxes.inside.shape
+    left = np.ones((views * candidates, candidates))
+    for row in range(len(left)):
+        own = slice(boxes.hiders.start[row], boxes.hiders.start[row + 1])
+        left[row, boxes.hiders.item[own]] = boxes.hiders.value[own]
+    return left.reshape(views, candidates, candidates)
+
+
 def _boxes_of_view(view: int, members: Sequence[int], boxes: BoxEvidence, parameters: Parameters) -> float:
     total = 0.0
     gains: list[tuple[float, int, int]] = []
     for j in members:
-        visible = boxes.inside[view, j] * math.prod(1 - boxes.cover[view, j, k] for k in members)
+        visible = boxes.inside[view, j] * math.prod(left_by_all(boxes)[view, j, k] for k in members)
         share = (visible - parameters.hidden_visibility) / (parameters.full_visibility - parameters.hidden_visibility)
         found = min(max(share, parameters.hidden_detection_rate), 1.0)
         missing = math.log(1 - (1 - parameters.box_miss_rate) * found)
@@ -138,7 +148,8 @@ def touch(i: int, j: int, problem: Problem) -> bool:
     gains = problem.birth_cost[[i, j], None] + problem.track_gain[[i, j]]
     worth = parameters.box_log_ratio + boxes.match[:, [i, j]] - math.log(parameters.box_miss_rate)
     shared = [(worth[view, :, :number] > 0).all(0).any() for view, number in enumerate(boxes.boxes)]
-    hidden = (boxes.cover[:, i, j] > 0) | (boxes.cover[:, j, i] > 0)
+    left = left_by_all(boxes)
+    hidden = (left[:, i, j] < 1) | (left[:, j, i] < 1)
     overlap = [(covered(pixels, view, i) & covered(pixels, view, j)).any() for view in range(len(pixels.raster))]
     return bool((gains > 0).all(0).any() or any(shared) or hidden.any() or any(overlap))
 

@@ -109,6 +109,14 @@ def test_duplicates_are_dropped_in_order() -> None:
     assert len(pool((0.0, 0.0), (0.05, 0.0)).joined_apart(pool(), 0.25)) == 2
 
 
+def test_who_is_in_a_pool_already_is_not_new_to_it() -> None:
+    known = pool((0.0, 0.0), (1.0, 0.0))
+    taller = Candidates(known.ground, known.height + np.array([0.0, 0.1]), known.width)
+    np.testing.assert_array_equal(taller.new_to(known).ground, [[1.0, 0.0]])
+    assert len(known.new_to(known)) == 0
+    assert len(known.new_to(pool())) == 2
+
+
 @pytest.mark.parametrize("kind", ("boxes", "pixels"))
 def test_the_pass_takes_what_is_proposed_and_drops_what_is_nobody(kind: str) -> None:
     frame_pass = Detector(RIG, [kind] * 4, FEW_HEIGHTS, BODY)

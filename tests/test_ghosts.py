@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
@@ -31,6 +32,7 @@ from scipy.optimize import linear_sum_assignment
 from strategies import numbers
 
 from stseg.arrays import Floats, Ints, ViewEvidence
+from stseg.detection.box_sharing import box_gain, forget_linked, known_box_gain
 from stseg.detection.detector import Detector
 from stseg.detection.gains import (
     clear_assignment,
@@ -40,6 +42,8 @@ from stseg.detection.gains import (
     withdraw,
 )
 from stseg.detection.groups import fill_groups, fill_interactions
+from stseg.detection.lists import Lists, no_lists
+from stseg.detection.occlusion import hiders_of
 from stseg.detection.problem import BoxEvidence, Parameters, PixelEvidence, Problem
 from stseg.detection.scoring import box_score, pixel_score, set_score
 from stseg.detection.search import ENUMERATED, search
@@ -48,11 +52,11 @@ from stseg.detection.sharing import sharing_of
 from stseg.detection.track_sharing import assign_track, assign_tracks, gain_of_track, track_sharing
 from stseg.geometry import Camera, Rig
 from stseg.geometry.bodies import BodyTable
-from stseg.model.box_fit import TOLERANCE, fill_cover, fill_inside, fill_match, half_square
+from stseg.model.box_fit import TOLERANCE, fill_inside, fill_match, half_square
 from stseg.model.box_noise import FIRST
 from stseg.model.outlines import outlines, sums_inside
 from stseg.model.people import Explanation
-from stseg.model.pillar_index import PillarIndex, raise_to_best_match
+from stseg.model.pillar_index import PillarIndex, fill_fits
 from stseg.model.predicted_tracks import no_tracks
 
 WIDTH, HEIGHT = 128.0, 96.0
@@ -91,7 +95,11 @@ def test_matches_by_definition(bodies: Floats, found: list[Floats], seed: int) -
     match, best = np.empty((len(bodies), len(edges))), np.full(len(bodies), -np.inf)
     fill_match(bodies, edges, tolerance, belief, WIDTH, HEIGHT, match)
     index = PillarIndex.of(bodies, (int(WIDTH), int(HEIGHT)))
-    raise_to_best_match(index, bodies, edges, tolerance, belief, WIDTH, HEIGHT, -30.0, best)
+    pillar, fit = np.empty(len(bodies), np.int32), np.empty(len(bodies))
+    for one in zip(edges, tolerance, belief, strict=True):
+        number = fill_fits(index, bodies, *one, WIDTH, HEIGHT, -30.0, pillar, fit)
+        assert (fit[:number] > -30.0).all()
+        np.maximum.at(best, pillar[:number], fit[:number])
     for i, body in enumerate(bodies):
         costs = [
             np.inf if np.isnan(body).any() else reference.half_square(body, *one, WIDTH, HEIGHT)
@@ -107,15 +115,18 @@ def test_matches_by_definition(bodies: Floats, found: list[Floats], seed: int) -
 def test_inside_and_cover_by_definition(bodies: Floats, seed: int) -> None:
     bodies[seed % len(bodies)] = np.nan if seed % 3 == 0 else bodies[0]
     distance = np.random.default_rng(seed).uniform(2, 3, len(bodies))
-    inside, cover = np.empty(len(bodies)), np.empty((len(bodies),) * 2)
+    inside, known, everyone = np.empty(len(bodies)), seed % (len(bodies) + 1), range(len(bodies))
     fill_inside(bodies, WIDTH, HEIGHT, inside)
-    known = seed % (len(bodies) + 1)
-    fill_cover(bodies[:known], distance[:known], WIDTH, HEIGHT, 0, cover[:known, :known])
-    fill_cover(bodies, distance, WIDTH, HEIGHT, known, cover)
-    everyone = range(len(bodies))
+    views, away, sizes = np.stack([bodies] * 3), np.stack([distance] * 3), np.array([[WIDTH, HEIGHT]] * 3)
+    blind = np.array([False, True, False])
+    before = hiders_of(views[:, :known].copy(), away[:, :known].copy(), sizes, blind, no_lists(), 0)
+    hiders = hiders_of(views, away, sizes, blind, before, known)
+    left = reference.left_by_all(BoxEvidence(np.empty(0), np.empty(0), hiders, np.empty((3, len(bodies))), inside))
     np.testing.assert_allclose(inside, [reference.inside(b, WIDTH, HEIGHT) for b in bodies], atol=1e-12)
     hidden = [[reference.cover(bodies, distance, WIDTH, HEIGHT, i, k) for k in everyone] for i in everyone]
-    np.testing.assert_allclose(cover, hidden, atol=1e-12)
+    nobody = np.zeros_like(hidden)
+    np.testing.assert_allclose(1 - left, np.stack([hidden, nobody, hidden]), atol=1e-12)
+    assert all((np.diff(hiders.item[a:b]) > 0).all() for a, b in itertools.pairwise(hiders.start))
 
 
 @pytest.mark.parametrize("step", [1, 3])
@@ -205,6 +216,13 @@ class CraftedFrame:
         return sorted(room[:count].tolist())
 
 
+def hiding(cover: Floats) -> Lists:
+    """Lists of those who cover a part of each, cover (view, candidate, candidate)."""
+    rows = cover.reshape(-1, cover.shape[2])
+    number, item = np.nonzero(rows)
+    return Lists(np.searchsorted(number, np.arange(len(rows) + 1)), item, 1 - rows[number, item])
+
+
 def random_frame(seed: int, candidates: int, walkers: int = 0) -> CraftedFrame:
     """Two views with boxes, two with pixels; candidates that share boxes, hide each other and crowd."""
     rng = np.random.default_rng(seed)
@@ -213,7 +231,9 @@ def random_frame(seed: int, candidates: int, walkers: int = 0) -> CraftedFrame:
     match[rng.random(match.shape) < 0.5] = -np.inf
     cover = rng.uniform(0, 1, (views, candidates, candidates)) * (rng.random((views, candidates, candidates)) < 0.3)
     cover[:, np.arange(candidates), np.arange(candidates)] = 0
-    evidence = BoxEvidence(match, np.array([most, 2]), cover, rng.uniform(0.3, 1, (views, candidates)))
+    evidence = BoxEvidence(
+        match, np.array([most, 2]), hiding(cover), rng.uniform(0.3, 1, (views, candidates)), np.ones(candidates)
+    )
     start = rng.integers(0, columns - 2, (views, candidates, 4))
     stop = np.minimum(start + rng.integers(0, 6, start.shape), columns)
     first = rng.integers(-1, rows - 1, (views, candidates))
@@ -251,8 +271,8 @@ def apart(frame: CraftedFrame, size: int) -> CraftedFrame:
     match = np.full((*frame.boxes.match.shape[:2], most * rooms), -np.inf)
     for i, k in enumerate(room.tolist()):
         match[:, i, k * most : (k + 1) * most] = frame.boxes.match[:, i]
-    cover = frame.boxes.cover * (room[:, None] == room)
-    boxes = frame.boxes._replace(match=match, cover=cover, boxes=np.full(len(match), most * rooms))
+    cover = (1 - reference.left_by_all(frame.boxes)) * (room[:, None] == room)
+    boxes = frame.boxes._replace(match=match, hiders=hiding(cover), boxes=np.full(len(match), most * rooms))
     known = np.full((len(room), rooms * frame.known.shape[1]), -50.0)
     for walker, likes in enumerate(frame.known.T):
         known[np.arange(len(room)), walker * rooms + room] = likes
@@ -312,7 +332,9 @@ def test_evidence_of_all_views_is_assigned_as_that_of_each(seed: int) -> None:
 
 def test_a_box_speaks_for_one_person() -> None:
     one = random_frame(0, 2)
-    boxes_only = BoxEvidence(np.zeros((1, 2, 1)), np.array([1]), np.zeros((1, 2, 2)), np.ones((1, 2)))
+    boxes_only = BoxEvidence(
+        np.zeros((1, 2, 1)), np.array([1]), hiding(np.zeros((1, 2, 2))), np.ones((1, 2)), np.ones(2)
+    )
     blank = one.pixels._replace(raster=np.zeros_like(one.pixels.raster))
     frame = strangers(boxes_only, blank)
     assert frame.score([0]) - frame.score([]) == pytest.approx(TERMS.prior_log_odds + TERMS.box_log_ratio)
@@ -324,7 +346,7 @@ def test_a_pixel_belongs_to_the_nearest_body() -> None:
     raster = np.array([[[1, 1, 1, 1, -5, -5]]], np.float32)
     first, area, away = np.zeros((1, 2), np.int64), np.full((1, 2), 4.0), np.array([[3.0, 2.0]])
     pixels = PixelEvidence(raster, np.zeros_like(raster), first, spans, area, away)
-    none = BoxEvidence(np.zeros((0, 2, 0)), np.zeros(0, np.int64), np.zeros((0, 2, 2)), np.zeros((0, 2)))
+    none = BoxEvidence(np.zeros((0, 2, 0)), np.zeros(0, np.int64), no_lists(), np.zeros((0, 2)), np.ones(2))
     frame = strangers(none, pixels)
     near = TERMS.prior_log_odds + TERMS.effective_observations * (1 + 1 - 5 - 5) / 4
     assert frame.score([1]) == pytest.approx(near)
@@ -338,7 +360,7 @@ def test_pixels_weigh_no_more_than_in_the_largest_body_that_explains_them() -> N
     spans = np.array([[[[0, 8]], [[0, 2]]]], np.int16)
     raster, scale = np.ones((1, 1, 8), np.float32), np.full((1, 1, 8), 8.0, np.float32)
     first, area, away = np.zeros((1, 2), np.int64), np.array([[8.0, 2.0]]), np.array([[2.0, 6.0]])
-    none = BoxEvidence(np.zeros((0, 2, 0)), np.zeros(0, np.int64), np.zeros((0, 2, 2)), np.zeros((0, 2)))
+    none = BoxEvidence(np.zeros((0, 2, 0)), np.zeros(0, np.int64), no_lists(), np.zeros((0, 2)), np.ones(2))
     frame = strangers(none, PixelEvidence(raster, scale, first, spans, area, away))
     near, far = frame.score([0]) - TERMS.prior_log_odds, frame.score([1]) - TERMS.prior_log_odds
     assert (near, far) == pytest.approx((TERMS.effective_observations, TERMS.effective_observations / 4))
@@ -401,6 +423,23 @@ def test_what_one_more_adds_is_the_difference_of_scores(seed: int, walkers: int)
 
 
 @pytest.mark.parametrize("seed", range(20))
+def test_what_boxes_are_known_to_say_is_what_they_say_of_the_set(seed: int) -> None:
+    """Members come and go, and only what depends on each is forgotten."""
+    problem, rng = random_frame(seed, 8).problem(), np.random.default_rng(seed)
+    sharing, inside, kept = sharing_of(problem).boxes, np.zeros(8, bool), 0
+    for toggled in rng.integers(0, 8, 12):
+        for i in range(8):
+            others = inside & (np.arange(8) != i)
+            fresh = box_gain(i, others.copy(), sharing, problem.parameters)
+            assert known_box_gain(i, others, sharing, problem.parameters) == pytest.approx(fresh, abs=1e-12)
+        member, inside[toggled] = inside[toggled], False
+        forget_linked(int(toggled), inside, sharing)
+        inside[toggled] = not member
+        kept += np.count_nonzero(sharing.is_known)
+    assert kept > 0
+
+
+@pytest.mark.parametrize("seed", range(20))
 def test_tracks_assigned_one_by_one_are_those_of_the_greatest_sum(seed: int) -> None:
     rng = np.random.default_rng(seed)
     gain, birth_cost = rng.normal(-3, 4, (7, 5)), rng.uniform(0, 5, 7)
@@ -450,7 +489,7 @@ def test_groups_are_those_of_the_touching_and_their_scores_add_up(seed: int) -> 
     np.testing.assert_array_equal(
         touch, [[i == j or reference.touch(i, j, problem) for j in range(9)] for i in range(9)]
     )
-    number = fill_groups(touch, group)
+    number = fill_groups(problem, sharing_of(problem), group)
     assert number == len(set(group.tolist())) >= 3
     assert not touch[group[:, None] != group].any()
     rng = np.random.default_rng(seed)

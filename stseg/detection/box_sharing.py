@@ -41,11 +41,14 @@ class BoxSharing(NamedTuple):
     fitting
         The candidates of each box.
     hidden
-        Candidates of whom one hides a part.
+        Candidates of whom one hides a part, with the share that is left.
     hiders
         Candidates who hide a part of one, with the share that they leave.
-    visible : float64 (view * candidate,)
-        Share of the candidate's pillar inside the image.
+    visible, missing : float64 (view * candidate,)
+        Share of the candidate's pillar inside the image, and the cost of a missing box where nobody hides it, nats.
+    is_known : bool (view * candidate,), before, after : float64 (view * candidate,)
+        Whether it is known what the view says beside the set, less the candidate, of those whom the candidate is linked
+        to, without and with the candidate, nats.
     linked : int64 (candidate + 1,), reached : bool (candidate,), pairs
         Scratch; nobody is reached before and after.
     """
@@ -57,6 +60,10 @@ class BoxSharing(NamedTuple):
     hidden: Lists
     hiders: Lists
     visible: Floats
+    missing: Floats
+    is_known: Flags
+    before: Floats
+    after: Floats
     linked: Ints
     reached: Flags
     pairs: Pairs
@@ -68,20 +75,16 @@ def box_sharing(evidence: BoxEvidence, parameters: Parameters) -> BoxSharing:
     views, candidates, boxes = evidence.match.shape
     threshold = np.log(parameters.box_miss_rate) - parameters.box_log_ratio
     fit, fitted = np.zeros(views * candidates, np.int64), np.zeros(views * boxes, np.int64)
-    hide, hidden_by = np.zeros(views * candidates, np.int64), np.zeros(views * candidates, np.int64)
+    missing = np.empty(views * candidates)
     for view in range(views):
         for i in range(candidates):
             row = view * candidates + i
+            missing[row] = missing_by_share(evidence.inside[view, i], parameters)
             for b in range(evidence.boxes[view]):
                 if evidence.match[view, i, b] > threshold:
                     fit[row] += 1
                     fitted[view * boxes + b] += 1
-            for j in range(candidates):
-                if evidence.cover[view, i, j] > 0.0:
-                    hidden_by[row] += 1
-                    hide[view * candidates + j] += 1
     (fits, fit), (fitting, fitted) = lists_of(fit), lists_of(fitted)
-    (hidden, hide), (hiders, hidden_by) = lists_of(hide), lists_of(hidden_by)
     for view in range(views):
         for i in range(candidates):
             row = view * candidates + i
@@ -90,19 +93,32 @@ def box_sharing(evidence: BoxEvidence, parameters: Parameters) -> BoxSharing:
                     gain = parameters.box_log_ratio + evidence.match[view, i, b]
                     append(fits, fit, row, b, gain)
                     append(fitting, fitted, view * boxes + b, i, gain)
-            for j in range(candidates):
-                if evidence.cover[view, i, j] > 0.0:
-                    append(hidden, hide, view * candidates + j, i, 1.0 - evidence.cover[view, i, j])
-                    append(hiders, hidden_by, row, j, 1.0 - evidence.cover[view, i, j])
     most = len(fits.item) + 1
     pairs = Pairs(
         np.empty(most), np.empty(most, np.int64), np.empty(most, np.int64),
         np.zeros(candidates, np.bool_), np.zeros(boxes, np.bool_),
     )  # fmt: skip
     return BoxSharing(
-        views, boxes, fits, fitting, hidden, hiders, evidence.inside.copy().reshape(-1),
-        np.empty(candidates + 1, np.int64), np.zeros(candidates, np.bool_), pairs,
+        views, boxes, fits, fitting, _hidden_by(evidence.hiders, views, candidates), evidence.hiders,
+        evidence.inside.copy().reshape(-1), missing, np.zeros(views * candidates, np.bool_),
+        np.empty(views * candidates), np.empty(views * candidates), np.empty(candidates + 1, np.int64),
+        np.zeros(candidates, np.bool_), pairs,
     )  # fmt: skip
+
+
+@kernel
+def _hidden_by(hiders: Lists, views: int, candidates: int) -> Lists:
+    """Whom each candidate hides, rising, from the lists of those who hide each."""
+    number = np.zeros(views * candidates, np.int64)
+    for view in range(views):
+        for k in range(hiders.start[view * candidates], hiders.start[(view + 1) * candidates]):
+            number[view * candidates + hiders.item[k]] += 1
+    hidden, place = lists_of(number)
+    for view in range(views):
+        for i in range(candidates):
+            for k in range(hiders.start[view * candidates + i], hiders.start[view * candidates + i + 1]):
+                append(hidden, place, view * candidates + hiders.item[k], i, hiders.value[k])
+    return hidden
 
 
 @part
@@ -110,12 +126,77 @@ def box_gain(i: int, inside: Flags, sharing: BoxSharing, parameters: Parameters)
     """What all views with boxes say of candidate i beside a set, inside (candidate,), that i is not of: nats."""
     total = 0.0
     for view in range(sharing.views):
-        number = _link(view, i, inside, sharing)
-        total -= _score_of_linked(view, 1, number, inside, sharing, parameters)
-        inside[i] = True
-        total += _score_of_linked(view, 0, number, inside, sharing, parameters)
-        inside[i] = False
+        before, after = _linked_scores(view, i, inside, sharing, parameters)
+        total -= before
+        total += after
     return total
+
+
+@part
+def known_box_gain(i: int, inside: Flags, sharing: BoxSharing, parameters: Parameters) -> float:
+    """The same of the set, inside (candidate,), less i, by what is known of it."""
+    total, candidates = 0.0, len(sharing.reached)
+    for view in range(sharing.views):
+        row = view * candidates + i
+        if not sharing.is_known[row]:
+            sharing.before[row], sharing.after[row] = _linked_scores(view, i, inside, sharing, parameters)
+            sharing.is_known[row] = True
+        total -= sharing.before[row]
+        total += sharing.after[row]
+    return total
+
+
+@part
+def forget(sharing: BoxSharing) -> None:
+    """Know nothing of a set."""
+    for row in range(len(sharing.is_known)):
+        sharing.is_known[row] = False
+
+
+@part
+def forget_linked(i: int, inside: Flags, sharing: BoxSharing) -> None:
+    """Forget what depends on whether candidate i is in the set, inside (candidate,), that i is not of.
+
+    That is what views say of all who fit the boxes, or hide a part, of i and of the members that i is linked to, and of
+    those whom i hides.
+    """
+    candidates, fits, fitting, hiders = len(sharing.reached), sharing.fits, sharing.fitting, sharing.hiders
+    for view in range(sharing.views):
+        first = view * candidates
+        for k in range(sharing.hidden.start[first + i], sharing.hidden.start[first + i + 1]):
+            sharing.is_known[first + sharing.hidden.item[k]] = False
+        for a in range(_link(view, i, inside, sharing)):
+            row = first + sharing.linked[a]
+            for k in range(hiders.start[row], hiders.start[row + 1]):
+                sharing.is_known[first + hiders.item[k]] = False
+            for k in range(fits.start[row], fits.start[row + 1]):
+                box = view * sharing.boxes + fits.item[k]
+                for m in range(fitting.start[box], fitting.start[box + 1]):
+                    sharing.is_known[first + fitting.item[m]] = False
+
+
+@part
+def _linked_scores(
+    view: int, i: int, inside: Flags, sharing: BoxSharing, parameters: Parameters
+) -> tuple[float, float]:
+    """What a view says of those whom candidate i is linked to, without and with i, nats."""
+    number = _link(view, i, inside, sharing)
+    if number == 1:
+        return 0.0, _score_alone(view * len(sharing.reached) + i, inside, sharing, parameters)
+    before = _score_of_linked(view, 1, number, inside, sharing, parameters)
+    inside[i] = True
+    after = _score_of_linked(view, 0, number, inside, sharing, parameters)
+    inside[i] = False
+    return before, after
+
+
+@part
+def _score_alone(row: int, inside: Flags, sharing: BoxSharing, parameters: Parameters) -> float:
+    """What a view says of a candidate whom no box and no occlusion links to a member, nats."""
+    missing, best = _missing(row, inside, sharing, parameters), 0.0
+    for k in range(sharing.fits.start[row], sharing.fits.start[row + 1]):
+        best = max(best, sharing.fits.value[k] - missing)
+    return float(missing + best)
 
 
 @part
@@ -154,7 +235,7 @@ def _score_of_linked(
     fits, pairs = sharing.fits, sharing.pairs
     for a in range(first, number):
         row = view * candidates + sharing.linked[a]
-        missing = missing_by_share(_visible(row, inside, sharing), parameters)
+        missing = _missing(row, inside, sharing, parameters)
         total += missing
         for k in range(fits.start[row], fits.start[row + 1]):
             if fits.value[k] > missing:
@@ -165,13 +246,14 @@ def _score_of_linked(
 
 
 @part
-def _visible(row: int, inside: Flags, sharing: BoxSharing) -> float:
-    """Share of a candidate's pillar in the image and not behind a member's, 0..1."""
-    visible = sharing.visible[row]
+def _missing(row: int, inside: Flags, sharing: BoxSharing, parameters: Parameters) -> float:
+    """Cost of a missing box of a candidate, of whom members may hide a part, nats."""
+    visible, is_hidden = sharing.visible[row], False
     for k in range(sharing.hiders.start[row], sharing.hiders.start[row + 1]):
         if inside[sharing.hiders.item[k]]:
             visible *= sharing.hiders.value[k]
-    return float(visible)
+            is_hidden = True
+    return missing_by_share(visible, parameters) if is_hidden else float(sharing.missing[row])
 
 
 @part

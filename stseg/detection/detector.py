@@ -225,7 +225,7 @@ class Detector:
     def _searched(self, estimate: MapEstimate, proposed: Candidates | None) -> MapEstimate:
         """The whole search, from the predicted tracks on."""
         for _ in range(self.config.search_rounds):
-            fresh = lattice_candidates(estimate, self.lattice_ground)
+            fresh = lattice_candidates(estimate, self.lattice_ground).new_to(estimate.pool)
             if proposed is not None:
                 fresh, proposed = fresh.joined_apart(proposed, self.config.lattice_spacing), None
             moved = self._moved(estimate)

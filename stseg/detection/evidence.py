@@ -9,9 +9,11 @@ import numpy as np
 from scipy.ndimage import maximum_filter
 
 from stseg.arrays import Floats, Singles
+from stseg.detection.lists import no_lists
+from stseg.detection.occlusion import hiders_of
 from stseg.detection.problem import BoxEvidence, PixelEvidence
 from stseg.detection.views import BoxView, PixelView, View, ViewObservation
-from stseg.model.box_fit import fill_cover, fill_inside, fill_match
+from stseg.model.box_fit import fill_inside, fill_match
 from stseg.model.candidates import Candidates
 
 MOST = 250
@@ -74,33 +76,24 @@ def box_evidence(
     chosen = [
         (view, observation) for view, observation in zip(views, observations, strict=True) if isinstance(view, BoxView)
     ]
-    evidence = _empty_evidence([observation for _, observation in chosen], bodies.edges.shape[1])
-    first = 0
+    sizes = np.array([view.camera.size for view, _ in chosen], float).reshape(-1, 2)
+    boxes = np.array([len(observation.edges) if observation else 0 for _, observation in chosen], np.int64)
+    candidates, first = bodies.edges.shape[1], 0 if known is None else known.inside.shape[1]
+    match = np.full((len(chosen), candidates, boxes.max(initial=0)), -np.inf)
+    inside = np.zeros((len(chosen), candidates))
     if known is not None:
-        first = known.inside.shape[1]
-        evidence.match[:, :first], evidence.inside[:, :first] = known.match, known.inside
-        evidence.cover[:, :first, :first] = known.cover
-    for k, (view, observation) in enumerate(chosen):
+        match[:, :first], inside[:, :first] = known.match, known.inside
+    for k, (_, observation) in enumerate(chosen):
         if observation is not None:
-            width, height = map(float, view.camera.size)
-            edges, match = bodies.edges[k], evidence.match[k, first:, : len(observation.edges)]
+            edges, own, (width, height) = bodies.edges[k, first:], match[k, first:], sizes[k].tolist()
             fill_match(
-                edges[first:], observation.edges, observation.tolerance, observation.belief, width, height, match
-            )
-            fill_inside(edges[first:], width, height, evidence.inside[k, first:])
-            fill_cover(edges, bodies.distance[k], width, height, first, evidence.cover[k])
-    return evidence
-
-
-def _empty_evidence(observations: Sequence[ViewObservation | None], candidates: int) -> BoxEvidence:
-    """Evidence of views in none of which a candidate is seen."""
-    boxes = np.array([len(observation.edges) if observation else 0 for observation in observations], np.int64)
-    return BoxEvidence(
-        np.full((len(boxes), candidates, boxes.max(initial=0)), -np.inf),
-        boxes,
-        np.zeros((len(boxes), candidates, candidates)),
-        np.zeros((len(boxes), candidates)),
-    )
+                edges, observation.edges, observation.tolerance, observation.belief, width, height,
+                own[:, : len(observation.edges)],
+            )  # fmt: skip
+            fill_inside(edges, width, height, inside[k, first:])
+    is_blind = np.array([observation is None for _, observation in chosen], bool)
+    hiders = hiders_of(bodies.edges, bodies.distance, sizes, is_blind, known.hiders if known else no_lists(), first)
+    return BoxEvidence(match, boxes, hiders, inside, np.ones(candidates))
 
 
 def stacked_rasters(views: Sequence[View], own: Sequence[Singles | None]) -> Singles:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from stseg.accelerate import kernel, part
 from stseg.arrays import Flags, Ints
-from stseg.detection.box_sharing import box_gain
+from stseg.detection.box_sharing import box_gain, known_box_gain
 from stseg.detection.problem import Parameters, PixelAssignment, PixelEvidence, Problem
 from stseg.detection.scoring import crowd
 from stseg.detection.sharing import Sharing
@@ -90,8 +90,17 @@ def gain_of(
     assigned
         The set's, from `fill_assignment`.
     sharing
-        Its tracks are assigned to the set.
+        Its tracks are assigned to the set, and what is known of boxes is that of the set, or of the set and i.
     """
+    gain = unpaired_gain(i, members, count, assigned, problem) + gain_of_track(i, sharing.tracks)
+    return gain + known_box_gain(i, inside, sharing.boxes, problem.parameters)
+
+
+@kernel
+def gain_in_place(
+    i: int, members: Ints, count: int, inside: Flags, assigned: PixelAssignment, problem: Problem, sharing: Sharing
+) -> float:
+    """The same where what is known of boxes is that of a set with a further member, whose place i would take."""
     gain = unpaired_gain(i, members, count, assigned, problem) + gain_of_track(i, sharing.tracks)
     return gain + box_gain(i, inside, sharing.boxes, problem.parameters)
 

@@ -15,18 +15,15 @@ from stseg.detection.lists import Lists, append, lists_of
 from stseg.detection.problem import BoxEvidence, PixelEvidence, Problem
 from stseg.detection.repulsion import apart_of_bodies
 from stseg.detection.sharing import Sharing
+from stseg.detection.track_sharing import TrackSharing
 
 
 @kernel
 def fill_interactions(problem: Problem, sharing: Sharing, interacts: Flags) -> None:
     """Fill touch (candidate, candidate), symmetric: whether the gain of one depends on the other."""
-    boxes, tracks, candidates = sharing.boxes, sharing.tracks, len(interacts)
+    boxes, candidates = sharing.boxes, len(interacts)
     interacts[:] = False
-    followers, place = lists_of(np.bincount(tracks.may.item, minlength=len(tracks.holder)))
-    for i in range(candidates):
-        for k in range(tracks.may.start[i], tracks.may.start[i + 1]):
-            append(followers, place, tracks.may.item[k], i, tracks.may.value[k])
-    _join_lists(followers, interacts)
+    _join_lists(_followers(sharing.tracks), interacts)
     _join_lists(boxes.fitting, interacts)
     for view in range(boxes.views):
         for i in range(candidates):
@@ -39,6 +36,16 @@ def fill_interactions(problem: Problem, sharing: Sharing, interacts: Flags) -> N
         for j in range(i):
             if not interacts[i, j]:
                 interacts[i, j] = interacts[j, i] = _overlap_on_ground(i, j, problem) or _overlap(i, j, problem.pixels)
+
+
+@kernel
+def _followers(tracks: TrackSharing) -> Lists:
+    """The candidates who may continue each track."""
+    followers, place = lists_of(np.bincount(tracks.may.item, minlength=len(tracks.holder)))
+    for i in range(len(tracks.may.start) - 1):
+        for k in range(tracks.may.start[i], tracks.may.start[i + 1]):
+            append(followers, place, tracks.may.item[k], i, tracks.may.value[k])
+    return followers
 
 
 @part
@@ -80,24 +87,61 @@ def _overlap(i: int, j: int, pixels: PixelEvidence) -> bool:
 
 
 @kernel
-def fill_groups(interacts: Flags, group: Ints) -> int:
-    """Fill group (candidate,) with numbers from 0, in the order of their first candidates; returns how many."""
+def fill_groups(problem: Problem, sharing: Sharing, group: Ints) -> int:
+    """Fill group (candidate,) with numbers from 0, in the order of their first candidates; returns how many.
+
+    Candidates are compared on the ground and in pixels only where lists have not brought them together before.
+    """
+    boxes, tracks, candidates = sharing.boxes, sharing.tracks, len(group)
+    followers, known = _followers(tracks), np.zeros(len(boxes.fitting.start) + len(tracks.holder), np.bool_)
     group[:] = -1
-    waiting = np.empty(len(group), np.int64)
+    waiting = np.empty(candidates, np.int64)
     found = 0
-    for first in range(len(group)):
+    for first in range(candidates):
         if group[first] >= 0:
             continue
         group[first], waiting[0], left = found, first, 1
         while left > 0:
             left -= 1
             i = waiting[left]
-            for j in range(len(group)):
-                if interacts[i, j] and group[j] < 0:
+            for k in range(tracks.may.start[i], tracks.may.start[i + 1]):
+                track = tracks.may.item[k]
+                left = _take_row(followers, track, known, len(known) - 1 - track, found, group, waiting, left)
+            for view in range(boxes.views):
+                row = view * candidates + i
+                for k in range(boxes.fits.start[row], boxes.fits.start[row + 1]):
+                    box = view * boxes.boxes + boxes.fits.item[k]
+                    left = _take_row(boxes.fitting, box, known, box, found, group, waiting, left)
+                left = _take(boxes.hidden, row, found, group, waiting, left)
+                left = _take(boxes.hiders, row, found, group, waiting, left)
+            for j in range(candidates):
+                if group[j] < 0 and (_overlap_on_ground(i, j, problem) or _overlap(i, j, problem.pixels)):
                     group[j], waiting[left] = found, j
                     left += 1
         found += 1
     return found
+
+
+@part
+def _take_row(
+    lists: Lists, row: int, known: Flags, place: int, found: int, group: Ints, waiting: Ints, left: int
+) -> int:
+    """`_take` a row of lists whose candidates all interact, if it was not taken before: known (place,) says so."""
+    if known[place]:
+        return left
+    known[place] = True
+    return _take(lists, row, found, group, waiting, left)
+
+
+@part
+def _take(lists: Lists, row: int, found: int, group: Ints, waiting: Ints, left: int) -> int:
+    """Take the candidates of a row of lists into a group; returns how many are waiting then."""
+    for k in range(lists.start[row], lists.start[row + 1]):
+        j = lists.item[k]
+        if group[j] < 0:
+            group[j], waiting[left] = found, j
+            left += 1
+    return left
 
 
 @kernel
@@ -118,7 +162,7 @@ def restricted(problem: Problem, own: Ints) -> Problem:
             for k in range(number[view]):
                 match[view, i, k] = boxes.match[view, i, kept[view, k]]
     known = _tracks_of(problem, own)
-    part = BoxEvidence(match, number, boxes.cover, boxes.inside)
+    part = BoxEvidence(match, number, boxes.hiders, boxes.inside, boxes.left)
     return Problem(
         part,
         problem.pixels,

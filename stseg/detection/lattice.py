@@ -10,7 +10,7 @@ from stseg.arrays import Floats
 from stseg.detection.evidence import peaks
 from stseg.detection.map_estimate import MapEstimate
 from stseg.detection.open_pixels import OpenPixels
-from stseg.detection.views import BoxView, PixelView
+from stseg.detection.views import PixelView
 from stseg.geometry import Grid
 from stseg.model.candidates import Candidates
 
@@ -38,12 +38,11 @@ def lattice_candidates(estimate: MapEstimate, lattice_ground: Floats) -> Candida
     heights = np.asarray(body.heights)
     score = np.repeat(evidence.prior.log_height(heights)[:, None], rows * columns, 1)
     shown: list[tuple[PixelView, OpenPixels]] = []
-    for view, observation, free in zip(evidence.views, evidence.observations, unexplained, strict=True):
-        if observation is None:
-            continue
-        if isinstance(view, BoxView):
-            score += view.lattice_score(observation, free)
-        else:
+    seen = zip(evidence.views, evidence.observations, evidence.box_lattices, unexplained, strict=True)
+    for view, observation, boxes, free in seen:
+        if boxes is not None:
+            score += boxes.score(free)
+        elif isinstance(view, PixelView) and observation is not None:
             shown.append((view, view.open_pixels(observation, free)))
     if shown:
         _add_pixels(shown, _probes(heights), score)

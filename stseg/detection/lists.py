@@ -39,3 +39,8 @@ def append(lists: Lists, place: Ints, row: int, item: int, value: float) -> None
     """Add an item to the list of a row, at its next place."""
     lists.item[place[row]], lists.value[place[row]] = item, value
     place[row] += 1
+
+
+def no_lists() -> Lists:
+    """Of no rows."""
+    return Lists(np.zeros(1, np.int64), np.zeros(0, np.int64), np.zeros(0))

@@ -11,9 +11,11 @@ import numpy as np
 
 from stseg.accelerate import kernel, part
 from stseg.arrays import Flags, Ints
+from stseg.detection.box_sharing import forget, forget_linked
 from stseg.detection.gains import (
     clear_assignment,
     fill_assignment,
+    gain_in_place,
     gain_of,
     insert,
     withdraw,
@@ -58,6 +60,7 @@ def local_search(
     assigned : int16 (view, v * u)
         Scratch, -1 everywhere before and after.
     """
+    forget(sharing.boxes)
     for _ in range(SWEEPS):
         grown = _add(members, count, own, inside, assigned, problem, sharing)
         shrunk = _remove(members, grown, -1, inside, inside, assigned, problem, sharing)
@@ -129,6 +132,7 @@ def _withdraw_and_refill(
         if members[a] == i:
             members[a] = members[count - 1]
     inside[i] = False
+    forget(sharing.boxes)
     size = _add(members, count - 1, near, inside, assigned, problem, sharing)
     return size if size > count - 1 else -1
 
@@ -148,6 +152,7 @@ def _insert_and_prune(
 
     Where just one near member is removed, that is a simple replacement, which was tried.
     """
+    forget(sharing.boxes)
     fill_assignment(members, count, problem.pixels, assigned)
     assign_tracks(members, count, sharing.tracks)
     gain = gain_of(i, members, count, inside, assigned, problem, sharing)
@@ -155,6 +160,7 @@ def _insert_and_prune(
     if gain < _HOPELESS:
         return -1
     before = members[:count].copy()
+    forget_linked(i, inside, sharing.boxes)
     members[count], inside[i] = i, True
     left = _remove(members, count + 1, i, interacts[i], inside, assigned, problem, sharing)
     gone = before[~inside[before]]
@@ -192,6 +198,7 @@ def _add(
                 best, best_gain = own[k], gain[k]
         if best < 0:
             break
+        forget_linked(best, inside, sharing.boxes)
         members[count], inside[best] = best, True
         count += 1
         insert(best, problem.pixels, assigned)
@@ -224,6 +231,7 @@ def _remove(
         withdraw(leaving, members, count - 1, problem.pixels, assigned)
         assign_tracks(members, count - 1, sharing.tracks)
         if gain_of(leaving, members, count - 1, inside, assigned, problem, sharing) < -GAINED:
+            forget_linked(leaving, inside, sharing.boxes)
             count -= 1
         else:
             members[a], inside[leaving] = leaving, True
@@ -255,10 +263,13 @@ def _exchange(
         for i in own:
             if inside[i] or i == old or _apart(i, old, problem) > _NEAR:
                 continue
-            gain = gain_of(i, members, count - 1, inside, assigned, problem, sharing)
+            gain = gain_in_place(i, members, count - 1, inside, assigned, problem, sharing)
             if gain > best_gain:
                 best, best_gain = i, gain
         members[count - 1] = members[a]
+        if best != old:
+            forget_linked(old, inside, sharing.boxes)
+            forget_linked(best, inside, sharing.boxes)
         members[a], inside[best] = best, True
         insert(best, problem.pixels, assigned)
         changed = changed or best != old

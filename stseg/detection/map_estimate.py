@@ -17,6 +17,7 @@ from stseg.arrays import Flags, Floats, Ints, Singles
 from stseg.detection.assignment import Assignment
 from stseg.detection.blob_scale import blob_scales
 from stseg.detection.body_size import measure
+from stseg.detection.box_lattice import BoxLattice
 from stseg.detection.evidence import ProjectedBodies, box_evidence, pixel_evidence, stacked_rasters
 from stseg.detection.prior import Prior
 from stseg.detection.problem import Parameters, Problem
@@ -41,6 +42,14 @@ class FrameEvidence:
     def rasters(self) -> Singles:
         """`stacked_rasters` of the views' log-odds."""
         return stacked_rasters(self.views, [None if seen is None else seen.raster for seen in self.observations])
+
+    @cached_property
+    def box_lattices(self) -> list[BoxLattice | None]:
+        """The lattice of each view that delivers boxes beside those of the frame; None where there are none."""
+        return [
+            BoxLattice(view, seen) if isinstance(view, BoxView) and seen is not None else None
+            for view, seen in zip(self.views, self.observations, strict=True)
+        ]
 
     @cached_property
     def scales(self) -> Singles:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from stseg.arrays import Floats, Ints, Singles
 from stseg.config import DetectionConfig
+from stseg.detection.lists import Lists
 from stseg.model.outlines import Spans
 
 PixelAssignment = NDArray[np.int16]
@@ -49,16 +50,20 @@ class BoxEvidence(NamedTuple):
         Log-likelihood of the box given the candidate's pillar, nats, 0 at a perfect fit; -inf where there is no box.
     boxes : int64 (view,)
         Number of boxes of each view.
-    cover : float64 (view, candidate, candidate)
-        Share of the first's pillar that the second hides; 0 where the second is farther away.
+    hiders
+        Candidates who hide a part of one, rising, with the share that they leave; the row of a candidate in a view is
+        view * candidates + candidate.
     inside : float64 (view, candidate)
         Share of the candidate's pillar inside the image.
+    left : float64 (candidate,)
+        Scratch, 1 before and after: the share that each candidate leaves of one of them.
     """
 
     match: Floats
     boxes: Ints
-    cover: Floats
+    hiders: Lists
     inside: Floats
+    left: Floats
 
 
 class PixelEvidence(NamedTuple):

@@ -54,7 +54,7 @@ def _from_sure_members(estimate: MapEstimate, lattice_ground: Floats) -> MapEsti
     sure = estimate.members[estimate.losses >= _DOUBTFUL]
     if len(sure) == len(estimate.members):
         return estimate
-    fresh = lattice_candidates(estimate.with_members(sure), lattice_ground)
+    fresh = lattice_candidates(estimate.with_members(sure), lattice_ground).new_to(estimate.pool)
     found = estimate.searched_with(fresh, sure)
     exact, known = found.refined().pool, len(found.pool)
     return found.searched_with(exact, np.arange(known, known + len(exact)))

@@ -8,7 +8,7 @@ import numpy as np
 
 from stseg.arrays import Floats, Ints
 from stseg.detection.map_estimate import MapEstimate, RefinedPeople
-from stseg.detection.problem import Problem
+from stseg.detection.problem import BoxEvidence, Problem
 from stseg.detection.residual import reprojection_residuals
 from stseg.detection.views import BoxView, PixelView, View
 from stseg.model.candidates import Candidates
@@ -85,9 +85,18 @@ def _visibility(estimate: MapEstimate) -> Floats:
     for row, view in zip(visibility, estimate.evidence.views, strict=True):
         if isinstance(view, BoxView):
             k = next(boxes)
-            cover = evidence.cover[k][np.ix_(members, members)]
-            row[:] = view.found_share(evidence.inside[k][members] * np.prod(1.0 - cover, axis=1))
+            row[:] = view.found_share(evidence.inside[k][members] * np.prod(_left(evidence, k, members), axis=1))
     return visibility
+
+
+def _left(evidence: BoxEvidence, view: int, members: Ints) -> Floats:
+    """Share of each member's pillar that each other member leaves in a view with boxes, float64 (member, member)."""
+    hiders, candidates = evidence.hiders, evidence.inside.shape[1]
+    left = np.ones((len(members), candidates))
+    for row, i in zip(left, (view * candidates + members).tolist(), strict=True):
+        own = slice(*hiders.start[i : i + 2].tolist())
+        row[hiders.item[own]] = hiders.value[own]
+    return left[:, members]
 
 
 def _ghosts(estimate: MapEstimate) -> People:

@@ -20,6 +20,9 @@ from stseg.detection.problem import BoxEvidence, Parameters, PixelEvidence, Prob
 from stseg.detection.repulsion import apart_of_bodies, pair_cost
 from stseg.linear_assignment import fill_assignment_of_least_cost
 
+_CLEARLY = 1.0 + 1e-9
+"""Ratio of two distances above which rounding errors do not matter."""
+
 
 @kernel
 def set_score(members: Ints, count: int, problem: Problem) -> float:
@@ -77,6 +80,9 @@ def crowding(members: Ints, count: int, problem: Problem) -> float:
 @part
 def crowd(i: int, j: int, problem: Problem) -> float:
     """Cost of one pair, nats."""
+    room = 0.5 * _CLEARLY * problem.parameters.minimum_distance * (problem.breadth[i] + problem.breadth[j])
+    if abs(problem.ground[i, 0] - problem.ground[j, 0]) > room:  # most pairs are decided here
+        return 0.0
     distance = apart_of_bodies(i, j, problem.ground, problem.breadth)
     return float(pair_cost(distance, problem.parameters.minimum_distance, problem.parameters.hard_core))
 
@@ -120,9 +126,14 @@ def missing_box(
 @part
 def _visible(view: int, i: int, members: Ints, count: int, boxes: BoxEvidence) -> float:
     """Share of candidate i's box in the image and not behind a member's, 0..1."""
-    visible = boxes.inside[view, i]
+    visible, hiders, left = boxes.inside[view, i], boxes.hiders, boxes.left
+    row = view * boxes.inside.shape[1] + i
+    for k in range(hiders.start[row], hiders.start[row + 1]):
+        left[hiders.item[k]] = hiders.value[k]
     for b in range(count):
-        visible *= 1.0 - boxes.cover[view, i, members[b]]
+        visible *= left[members[b]]
+    for k in range(hiders.start[row], hiders.start[row + 1]):
+        left[hiders.item[k]] = 1.0
     return float(visible)
 
 

@@ -44,13 +44,15 @@ def _improve(members: Ints, count: int, whole: Problem, shared: Sharing, enumera
     """The search, with what candidates share at hand."""
     problem, sharing = pointed(whole), pointed(shared)
     candidates = len(problem.size_prior)
-    interacts, group = np.empty((candidates, candidates), np.bool_), np.empty(candidates, np.int64)
-    fill_interactions(problem, sharing, interacts)
+    beside = candidates if trades > 0 else 0  # swap moves alone ask who interacts with whom
+    interacts, group = np.empty((beside, beside), np.bool_), np.empty(candidates, np.int64)
+    if trades > 0:
+        fill_interactions(problem, sharing, interacts)
     views, rows, columns = problem.pixels.raster.shape
     assigned, chosen = np.full((views, rows * columns), -1, np.int16), np.empty(candidates + 1, np.int64)
     inside = np.zeros(candidates, np.bool_)
     inside[members[:count]] = True
-    for g in range(fill_groups(interacts, group)):
+    for g in range(fill_groups(problem, sharing, group)):
         own = np.flatnonzero(group == g)
         if len(own) <= enumerated:
             size = _best_of_all_subsets(chosen, own, restricted(whole, own))
@@ -60,7 +62,8 @@ def _improve(members: Ints, count: int, whole: Problem, shared: Sharing, enumera
             for a in range(size):
                 chosen[a] = start[a]
             size = local_search(chosen, size, own, inside, assigned, problem, sharing)
-            size = swap(chosen, size, own, inside, interacts, assigned, trades, problem, sharing)
+            if trades > 0:
+                size = swap(chosen, size, own, inside, interacts, assigned, trades, problem, sharing)
         inside[own] = False
         inside[chosen[:size]] = True
     best = np.flatnonzero(inside)

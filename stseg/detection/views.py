@@ -18,7 +18,7 @@ from stseg.model.box_fit import fill_inside
 from stseg.model.box_noise import FIRST, BoxNoise
 from stseg.model.outlines import Spans, outlines, sums_inside
 from stseg.model.packed_outlines import PackedOutlines
-from stseg.model.pillar_index import PillarIndex, raise_to_best_match
+from stseg.model.pillar_index import PillarIndex
 
 OWN, BACKGROUND = 5.0, -10.0
 """Weights of a person's own pixels and of background inside their pillar (HW12 eq. 27)."""
@@ -28,8 +28,6 @@ _DRAWN = 4096
 """Pillars of the lattice that are drawn at once: until they are packed, each takes as many rows as the tallest."""
 _LEAST_INSIDE = 0.02
 """Share of a body's box in the image below which the view does not see it."""
-_OPTIMISM = 0.3
-"""Cost of a missing box while candidates are sought, nats: occluders are not known yet."""
 
 
 @dataclass(frozen=True)
@@ -168,17 +166,6 @@ class BoxView(View):
             inside[top : bottom + 1, left : right + 1] = True
         return inside
 
-    def lattice_score(self, observation: ViewObservation, unexplained: Flags) -> Floats:
-        """Score of each lattice pillar by the free boxes, nats, float64 (height, cell)."""
-        width, height = map(float, self.camera.size)
-        best = np.full(self.bodies.shape[:2], -np.inf)
-        raise_to_best_match(
-            self.index, self.bodies.reshape(-1, 4), observation.edges[unexplained], observation.tolerance[unexplained],
-            observation.belief[unexplained], width, height, -self.config.box_log_ratio - _OPTIMISM, best.reshape(-1),
-        )  # fmt: skip
-        _take_for_score(best.reshape(-1), self.found.reshape(-1), self.config.box_log_ratio)
-        return best
-
 
 class PixelView(View):
     """A view that delivers a likelihood map."""
@@ -234,13 +221,6 @@ class PixelView(View):
         wide = pillars.width / WIDTH
         sums, area = sums_inside(self.table, pillars.ground, pillars.height, wide, self.step, values, owner)
         return sums * self.config.effective_observations, area / pillars.area_ratio
-
-
-@kernel
-def _take_for_score(best: Floats, found: Floats, log_ratio: float) -> None:
-    """Make scores of log-likelihoods of the best box, best (pillar,), where the view may find (pillar,) the body."""
-    for i in range(len(best)):
-        best[i] = max(log_ratio + best[i], -_OPTIMISM * found[i]) if found[i] > 0 else 0.0
 
 
 @kernel

@@ -107,27 +107,3 @@ def fill_inside(bodies: Floats, width: float, height: float, inside: Floats) -> 
             tall = min(bodies[i, 3], height) - max(bodies[i, 1], 0.0)
             whole = (bodies[i, 2] - bodies[i, 0]) * (bodies[i, 3] - bodies[i, 1])
             inside[i] = max(wide, 0.0) * max(tall, 0.0) / whole
-
-
-@kernel
-def fill_cover(bodies: Floats, distance: Floats, width: float, height: float, known: int, cover: Floats) -> None:
-    """Fill cover (candidate, candidate): share of the first's box, clipped to the image, behind the second's trunk.
-
-    That of the first `known` candidates behind each other is there already.
-    """
-    for i in range(len(bodies)):
-        left, right = max(bodies[i, 0], 0.0), min(bodies[i, 2], width)
-        top, bottom = max(bodies[i, 1], 0.0), min(bodies[i, 3], height)
-        area = max(right - left, 0.0) * max(bottom - top, 0.0)
-        first = known if i < known else 0
-        cover[i, first:] = 0.0
-        if not area > 0:
-            continue
-        for k in range(first, len(bodies)):
-            if not (bodies[k, 2] > left and bodies[k, 0] < right and distance[k] < distance[i] - 0.1):
-                continue
-            inset = 0.1 * (bodies[k, 2] - bodies[k, 0])
-            wide = min(right, bodies[k, 2] - inset) - max(left, bodies[k, 0] + inset)
-            tall = min(bottom, bodies[k, 3]) - max(top, bodies[k, 1])
-            if wide > 0 and tall > 0:
-                cover[i, k] = min(wide * tall / area, 1.0)

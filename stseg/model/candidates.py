@@ -39,6 +39,12 @@ class Candidates:
         """All candidates but the first ones."""
         return Candidates(self.ground[number:], self.height[number:], self.width[number:])
 
+    def new_to(self, pool: Candidates) -> Candidates:
+        """Those of these candidates that are not in a pool, with the same place and size."""
+        same = (self.ground[:, None] == pool.ground).all(2)
+        same &= (self.height[:, None] == pool.height) & (self.width[:, None] == pool.width)
+        return self.at(np.flatnonzero(~same.any(1)))
+
     def at(self, chosen: Sequence[int] | Ints) -> Candidates:
         """The chosen candidates, in that order."""
         index = np.asarray(chosen, int)

@@ -86,43 +86,50 @@ def run_of(index: PillarIndex, kind: int, box: Floats, tolerance: Floats, deviat
 
 
 @kernel
-def raise_to_best_match(
+def fill_fits(
     index: PillarIndex,
     bodies: Floats,
-    boxes: Floats,
+    box: Floats,
     tolerance: Floats,
-    belief: Floats,
+    belief: float,
     width: float,
     height: float,
     least: float,
-    best: Floats,
-) -> None:
-    """Raise best (pillar,) to the log-likelihood of the best of some boxes, where that is above `least`.
+    pillar: Labels,
+    fit: Floats,
+) -> int:
+    """Fill pillar (k,) and fit (k,) with the pillars of which a box has a log-likelihood above `least`, and with that.
 
     Parameters
     ----------
-    bodies : float (pillar, 4), boxes : float64 (box, 4)
+    bodies : float (pillar, 4), box : float64 (4,)
         left, top, right, bottom, pixels.
-    tolerance : float64 (box, 5), belief : float64 (box,)
+    tolerance : float64 (5,), belief
         See `stseg.model.box_noise`.
+
+    Returns
+    -------
+    int
+        How many these are.
     """
-    for b in range(len(boxes)):
-        spare = belief[b] - least
-        if spare <= 0.0:
+    spare, number = belief - least, 0
+    if spare <= 0.0:
+        return 0
+    deviations = math.sqrt(2.0 * spare)
+    top, bottom = box[1], box[3]
+    for kind in range(len(index.tallest)):
+        tall = index.tallest[kind]
+        head, late = _reach(HEAD, tall, tolerance, deviations), _reach(LATE, tall, tolerance, deviations)
+        if tall + head + late < bottom - top:
             continue
-        deviations = math.sqrt(2.0 * spare)
-        top, bottom = boxes[b, 1], boxes[b, 3]
-        for kind in range(len(index.tallest)):
-            tall = index.tallest[kind]
-            head, late = _reach(HEAD, tall, tolerance[b], deviations), _reach(LATE, tall, tolerance[b], deviations)
-            if tall + head + late < bottom - top:
+        early = _reach(EARLY, tall, tolerance, deviations)
+        first, stop = run_of(index, kind, box, tolerance, min(FAR, deviations))
+        for k in range(np.uint64(first), np.uint64(stop)):  # most pillars are decided by their edges
+            if abs(index.top[k] - top) > head or not -late <= index.bottom[k] - bottom <= early:
                 continue
-            early = _reach(EARLY, tall, tolerance[b], deviations)
-            first, stop = run_of(index, kind, boxes[b], tolerance[b], min(FAR, deviations))
-            for k in range(np.uint64(first), np.uint64(stop)):  # most pillars are decided by their edges
-                if abs(index.top[k] - top) > head or not -late <= index.bottom[k] - bottom <= early:
-                    continue
-                i = index.order[k]
-                fit = belief[b] - half_square(bodies[i], boxes[b], tolerance[b], width, height)
-                if fit > least:
-                    best[i] = max(best[i], fit)
+            i = index.order[k]
+            likelihood = belief - half_square(bodies[i], box, tolerance, width, height)
+            if likelihood > least:
+                pillar[number], fit[number] = i, likelihood
+                number += 1
+    return number
