@@ -32,6 +32,7 @@ from scipy.optimize import linear_sum_assignment
 from strategies import numbers
 
 from stseg.arrays import Floats, Ints, ViewEvidence
+from stseg.detection.additions import fill_additions
 from stseg.detection.box_sharing import box_gain, forget_linked, known_box_gain
 from stseg.detection.detector import Detector
 from stseg.detection.gains import (
@@ -121,7 +122,9 @@ def test_inside_and_cover_by_definition(bodies: Floats, seed: int) -> None:
     blind = np.array([False, True, False])
     before = hiders_of(views[:, :known].copy(), away[:, :known].copy(), sizes, blind, no_lists(), 0)
     hiders = hiders_of(views, away, sizes, blind, before, known)
-    left = reference.left_by_all(BoxEvidence(np.empty(0), np.empty(0), hiders, np.empty((3, len(bodies))), inside))
+    left = reference.left_by_all(
+        BoxEvidence(np.empty(0), np.zeros(0, np.int64), hiders, np.empty((3, len(bodies))), inside)
+    )
     np.testing.assert_allclose(inside, [reference.inside(b, WIDTH, HEIGHT) for b in bodies], atol=1e-12)
     hidden = [[reference.cover(bodies, distance, WIDTH, HEIGHT, i, k) for k in everyone] for i in everyone]
     nobody = np.zeros_like(hidden)
@@ -313,6 +316,21 @@ def test_sets_are_scored_as_each_by_itself(seed: int) -> None:
         assert sum(gains[pair] for pair in followed) == pytest.approx(best)
 
 
+@pytest.mark.parametrize("seed", range(20))
+def test_additions_are_to_the_bit_the_sets_with_one_more(seed: int) -> None:
+    frame, rng = scaled(random_frame(seed, 12, 3)), np.random.default_rng(seed)
+    members, others = np.split(rng.permutation(12), [seed % 6])
+    totals, evidence, tracks = np.empty(len(others)), np.empty((len(others), 4)), np.empty(len(others), np.int64)
+    fill_additions(members, others, frame.problem(), totals, evidence, tracks)
+    sets, count = np.column_stack([np.tile(members, (len(others), 1)), others]), len(members)
+    whole = np.empty(len(sets)), np.empty((len(sets), 4, count + 1)), np.empty(sets.shape, np.int64)
+    fill_set_scores(sets, frame.problem(), *whole)
+    for found, by_itself in zip(
+        (totals, evidence, tracks), (whole[0], whole[1][..., -1], whole[2][:, -1]), strict=True
+    ):
+        np.testing.assert_array_equal(found, by_itself)
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_evidence_of_all_views_is_assigned_as_that_of_each(seed: int) -> None:
     frame, members = scaled(random_frame(seed, 6)), np.array([5, 1, 3])
@@ -425,17 +443,17 @@ def test_what_one_more_adds_is_the_difference_of_scores(seed: int, walkers: int)
 @pytest.mark.parametrize("seed", range(20))
 def test_what_boxes_are_known_to_say_is_what_they_say_of_the_set(seed: int) -> None:
     """Members come and go, and only what depends on each is forgotten."""
-    problem, rng = random_frame(seed, 8).problem(), np.random.default_rng(seed)
-    sharing, inside, kept = sharing_of(problem).boxes, np.zeros(8, bool), 0
-    for toggled in rng.integers(0, 8, 12):
-        for i in range(8):
-            others = inside & (np.arange(8) != i)
+    problem, rng = apart(random_frame(seed, 9), 3).problem(), np.random.default_rng(seed)
+    sharing, inside, kept = sharing_of(problem).boxes, np.zeros(9, bool), 0
+    for toggled in rng.integers(0, 9, 12):
+        for i in range(9):
+            others = inside & (np.arange(9) != i)
             fresh = box_gain(i, others.copy(), sharing, problem.parameters)
             assert known_box_gain(i, others, sharing, problem.parameters) == pytest.approx(fresh, abs=1e-12)
         member, inside[toggled] = inside[toggled], False
         forget_linked(int(toggled), inside, sharing)
         inside[toggled] = not member
-        kept += np.count_nonzero(sharing.is_known)
+        kept += int(sharing.is_known.sum())
     assert kept > 0
 
 

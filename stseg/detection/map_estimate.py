@@ -14,6 +14,7 @@ import numpy as np
 
 from stseg.accelerate import kernel
 from stseg.arrays import Flags, Floats, Ints, Singles
+from stseg.detection.additions import fill_additions
 from stseg.detection.assignment import Assignment
 from stseg.detection.blob_scale import blob_scales
 from stseg.detection.body_size import measure
@@ -201,10 +202,10 @@ class MapEstimate:
 
     def additions(self, others: Ints) -> Additions:
         """What each of some candidates outside the set, int64 (m,), would add to it."""
-        sets = np.empty((len(others), len(self.members) + 1), np.int64)
-        sets[:, :-1], sets[:, -1] = self.members, others
-        totals, view_evidence, tracks = self._scores(sets)
-        return Additions(totals - self.members_score.total, view_evidence[..., -1].T, tracks[:, -1])
+        totals, tracks = np.empty(len(others)), np.empty(len(others), np.int64)
+        view_evidence = np.empty((len(others), len(self.evidence.views)))
+        fill_additions(self.members, others, self.problem, totals, view_evidence, tracks)
+        return Additions(totals - self.members_score.total, view_evidence[:, self._row].T, tracks)
 
     @cached_property
     def others(self) -> Ints:

@@ -150,16 +150,22 @@ def fill_levels(
     footprint : int16 (cell, 4)
         Of the whole volume; see `stseg.geometry.sampling`.
     """
+    ground_cells, first_taller = fit.shape[1], np.searchsorted(heights, planes)
+    taller = fit.copy()
+    for h in range(len(heights) - 2, -1, -1):  # the best of all heights from each on
+        for c in range(ground_cells):
+            taller[h, c] = max(taller[h, c], taller[h + 1, c])
+    unfit = level_of_match(0.0, rates.miss, rates.clutter), level_of_match(0.0, rates.miss, rates.near_clutter)
     for k in range(len(cells.cell)):
-        if footprint[cells.cell[k], 2] == 0:
+        cell, place, is_near = np.uint64(cells.cell[k]), np.uint64(cells.place[k]), cells.near[k] >= 0
+        first = first_taller[cell // np.uint64(ground_cells)]
+        best = float(taller[first, place]) if first < len(heights) else -np.inf
+        if footprint[cell, 2] == 0:
             levels[k] = UNSEEN
-            continue
-        place, height, best = cells.place[k], planes[cells.cell[k] // fit.shape[1]], -np.inf
-        for h in range(len(heights)):
-            if heights[h] >= height:
-                best = max(best, float(fit[h, place]))
-        clutter = rates.clutter if cells.near[k] < 0 else rates.near_clutter
-        levels[k] = level_of_match(np.exp(best) if best > -np.inf else 0.0, rates.miss, clutter)
+        elif best > -np.inf:
+            levels[k] = level_of_match(np.exp(best), rates.miss, rates.near_clutter if is_near else rates.clutter)
+        else:
+            levels[k] = unfit[1] if is_near else unfit[0]
 
 
 @kernel

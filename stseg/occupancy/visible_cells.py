@@ -146,15 +146,17 @@ def fill_share(
     distance : float32 (place,)
         Of each ground cell from the camera along the ground, metres.
     """
-    for k in range(len(cells.cell)):
-        left, top, width, height = footprint[cells.cell[k]]
-        nearest, whole = cells.near[k], np.float32(1)
-        if width == 0 or not marked[cells.block[k]]:
+    for b in range(len(cells.start) - 1):
+        if not marked[cells.block[cells.start[b]]]:
             continue
-        if _shows_a_person(shown, left, top, width, height) and not (nearest >= 0 and shown.separate[nearest]):
-            hidden = _hidden_pixels(shown, left, top, width, height, nearest, distance[cells.place[k]])
-            whole -= np.float32(hidden) / np.float32(np.int32(width) * np.int32(height))
-        share[k] = whole
+        for k in range(cells.start[b], cells.start[b + 1]):
+            left, top, width, height = footprint[np.uint64(cells.cell[k])]
+            nearest = cells.near[k]
+            if width == 0 or (nearest >= 0 and shown.separate[nearest]):
+                continue
+            if _shows_a_person(shown, left, top, width, height):
+                hidden = _hidden_pixels(shown, left, top, width, height, nearest, distance[cells.place[k]])
+                share[k] = np.float32(1) - np.float32(hidden) / np.float32(np.int32(width) * np.int32(height))
 
 
 @kernel
