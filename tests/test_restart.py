@@ -112,6 +112,19 @@ def test_more_candidates_have_the_evidence_of_a_pool_that_is_made_whole(seed: in
     )
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_refined_places_are_those_of_a_frame_in_which_none_is_known(seed: int) -> None:
+    """Members who take other boxes, since others are gone, are not where they were."""
+    _, seen, expected = crowd(seed)
+    estimate = of_tracks(seen, expected)
+    estimate.refined()
+    for one in (estimate, estimate.with_members(estimate.members[::2])):
+        anew = replace(one, evidence=replace(one.evidence))
+        found, by_itself = one.refined(), anew.refined()
+        np.testing.assert_array_equal(found.pool.ground, by_itself.pool.ground)
+        np.testing.assert_array_equal(found.covariance, by_itself.covariance)
+
+
 def test_more_candidates_have_the_pixels_of_a_pool_that_is_made_whole() -> None:
     ground = standing_apart(np.random.default_rng(3), 5, 0.5)
     asked = Detector(room(), ["pixels"] * 4, FEW_HEIGHTS, BODY)

@@ -53,6 +53,11 @@ class FrameEvidence:
         ]
 
     @cached_property
+    def patch_scores(self) -> dict[bytes, Floats]:
+        """What `stseg.detection.refine` has found of places and their boxes in this frame."""
+        return {}
+
+    @cached_property
     def scales(self) -> Singles:
         """`stacked_rasters` of the scales of their pixels (`stseg.detection.blob_scale`)."""
         return stacked_rasters(self.views, blob_scales(self.views, self.observations, self.prior.config))
@@ -311,7 +316,7 @@ class MapEstimate:
     def _refined(self, start: Candidates, own: Assignment, track_index: Ints) -> RefinedPeople:
         """People at the means of their posteriors, sought about where they start, by what is assigned to each."""
         views, observations, prior = self.evidence.views, self.evidence.observations, self.evidence.prior
-        places = refine(start, views, observations, own, prior, track_index)
+        places = refine(start, views, observations, own, prior, track_index, self.evidence.patch_scores)
         sizes = measure(places, start.width, views, observations, own, prior.body)
         known = prior.known_sizes(sizes, track_index)
         return RefinedPeople(Candidates(places.ground, sizes.height, known.width), places.covariance, sizes, known)

@@ -52,6 +52,7 @@ def refine(
     own: Assignment,
     prior: Prior,
     track_index: Ints,
+    known: dict[bytes, Floats],
 ) -> RefinedPlaces:
     """The posterior of each person's place and height.
 
@@ -65,24 +66,61 @@ def refine(
         The frame's prior.
     track_index : int64 (n,)
         The predicted track that each person continues, -1 for births.
+    known
+        What boxes said of patches before in this frame, by place and boxes; this adds to it.
 
     Returns
     -------
     RefinedPlaces
         Means and variances.
     """
-    offset, tried = _PATCH, np.asarray(prior.body.heights)
+    tried = np.asarray(prior.body.heights)
     if len(tried) > _FEW_HEIGHTS and not any(isinstance(view, BoxView) for view in views):
         tried = tried[::2]
-    patch = pool.ground[:, None] + offset
-    score = np.tile(prior.log_height(tried)[:, None], (len(pool), 1, len(offset)))
-    pillars = _pillars(views[0], patch, tried, pool.width)
-    for k, (view, observation) in enumerate(zip(views, observations, strict=True)):
-        if observation is not None and len(pool):
-            score += _patch_score(view, observation, own.box[k], own.pixels[k], pillars).reshape(score.shape)
+    patch = pool.ground[:, None] + _PATCH
+    if all(isinstance(view, BoxView) for view in views) and len(pool):
+        score = _known_scores(pool, views, observations, own, prior, tried, known)
+    else:
+        score = _scores(pool, views, observations, own, prior, tried)
     met = np.flatnonzero(track_index >= 0)
     score[met] += prior.predicted.place_log_density(track_index[met], patch[met])[:, None]
     return _posterior(score, patch, tried)
+
+
+def _known_scores(
+    pool: Candidates,
+    views: Sequence[View],
+    observations: Sequence[ViewObservation | None],
+    own: Assignment,
+    prior: Prior,
+    tried: Floats,
+    known: dict[bytes, Floats],
+) -> Floats:
+    """`_scores` of people in views that all deliver boxes: in a frame many keep their place and their boxes."""
+    names = [place.tobytes() + box.tobytes() for place, box in zip(pool.ground, own.box.T, strict=True)]
+    fresh = np.array([j for j, name in enumerate(names) if name not in known], int)
+    if len(fresh):
+        boxes = Assignment(own.box[:, fresh], own.pixels)
+        found = _scores(pool.at(fresh), views, observations, boxes, prior, tried)
+        known.update(zip((names[j] for j in fresh), found, strict=True))
+    return np.stack([known[name] for name in names])
+
+
+def _scores(
+    pool: Candidates,
+    views: Sequence[View],
+    observations: Sequence[ViewObservation | None],
+    own: Assignment,
+    prior: Prior,
+    tried: Floats,
+) -> Floats:
+    """Log-posterior of each person over heights and places of a patch as a birth, float64 (person, height, place)."""
+    score = np.tile(prior.log_height(tried)[:, None], (len(pool), 1, len(_PATCH)))
+    pillars = _pillars(views[0], pool.ground[:, None] + _PATCH, tried, pool.width)
+    for k, (view, observation) in enumerate(zip(views, observations, strict=True)):
+        if observation is not None and len(pool):
+            score += _patch_score(view, observation, own.box[k], own.pixels[k], pillars).reshape(score.shape)
+    return score
 
 
 def refine_places(
