@@ -21,7 +21,7 @@ _UNCOUNTED: dict[str, Any] = {"_nrt": False}
 """No reference is counted for the arguments of an inlined kernel: an option that numba does not document."""
 _PAUSE = 10.0
 """Seconds between notes on compilation."""
-_USUAL = 70
+_USUAL = 80
 """Kernels that Python calls in a run of a rig, about; those that only kernels call are part of these."""
 
 COMPILED = hasattr(numba.njit(lambda: None), "py_func")
@@ -70,26 +70,22 @@ def take_kept_kernels() -> None:
 
 
 class _Notes(event.Listener):
-    """Counts kernels that are compiled, each with those that it calls."""
+    """Notes how many kernels are ready, compiled here or by another process, each with those that it calls."""
 
     def __init__(self, note: Callable[[str], None]) -> None:
-        self._note, self._number, self._within, self._last = note, 0, 0, -_PAUSE
+        self._note, self._last = note, -_PAUSE
 
     def on_start(self, event: Any) -> None:
         """A kernel is to be compiled."""
         del event
-        self._within += 1
         if monotonic() - self._last >= _PAUSE:
             self._last = monotonic()
-            so_far = f"; {self._number} of about {_USUAL} are done" if self._number else ", about a minute of work"
+            ready = sum(bool(one.overloads) for one in Kernel.made)
+            so_far = f"; {ready} of about {_USUAL} are done" if ready else ", about a minute of work"
             self._note(f"compiling kernels, once on this machine{so_far}")
 
     def on_end(self, event: Any) -> None:
         """A kernel is compiled."""
-        del event
-        self._within -= 1
-        if self._within == 0:
-            self._number += 1
 
 
 def _compiled(function: Callable[P, R], **options: Any) -> Callable[P, R]:

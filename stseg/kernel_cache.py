@@ -2,7 +2,7 @@
 
 Kernels are kept in the user's cache folder, so that they outlive an installation and need no writable one. A kernel is
 stale when its file changes, or a file of kernels or constants that its file imports: numba copies both into it. All
-are stale when code is linked, or kept, in another way.
+are stale when code is made, linked, or kept in another way.
 """
 
 from __future__ import annotations
@@ -13,7 +13,8 @@ import re
 import shutil
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from functools import cache
 from hashlib import blake2b
 from pathlib import Path
@@ -22,10 +23,13 @@ from typing import Any, Self
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, NullCache
 from numba.core.runtime.nrt import rtsys
 
+if sys.platform != "win32":
+    import fcntl
+
 _PACKAGE = Path(__file__).parent
 _IMPORTED = re.compile(rb"^from (stseg[\w.]*) import |^import (stseg[\w.]*)", re.MULTILINE)
 _KERNELS = b"from stseg.accelerate import"
-_KEEPING = (_PACKAGE / "kernel_linking.py", _PACKAGE / "kernel_cache.py")
+_KEEPING = tuple(_PACKAGE / name for name in ("kernel_linking.py", "kernel_cache.py", "short_lowering.py"))
 
 
 class KernelFolder:
@@ -89,6 +93,15 @@ class KernelCache(FunctionCache):
         with self._guard_against_spurious_io_errors():
             return self._load_overload(sig, target_context)
 
+    @contextmanager
+    def alone(self) -> Iterator[None]:
+        """Let other processes that want kernels of this file wait; then these find what was made within the body."""
+        with ExitStack() as held:
+            with suppress(OSError):  # some file systems know no locks
+                self._impl.locator.ensure_cache_path()
+                held.enter_context(_locked(self.cache_path))
+            yield
+
     def kept_types(self, codegen: Any) -> list[Any]:
         """Types of the arguments for which machine code of this processor is kept."""
         keys = self._cache_file._load_index()
@@ -101,6 +114,20 @@ def kept_code(function: Callable[..., Any]) -> Any:
         return KernelCache(function)
     except RuntimeError:
         return NullCache()
+
+
+@contextmanager
+def _locked(place: str) -> Iterator[None]:
+    """Hold the lock of a folder, where the system has such locks."""
+    if sys.platform == "win32":
+        yield
+        return
+    opened = os.open(place, os.O_RDONLY)
+    try:
+        fcntl.flock(opened, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(opened)
 
 
 @cache

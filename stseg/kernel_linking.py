@@ -10,15 +10,18 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from functools import cached_property
 from typing import Any, ClassVar
 
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher, cpu_target
+from numba.core.runtime.context import NRTContext
+from numba.core.typed_passes import NativeLowering
 
 from stseg.kernel_cache import KernelCache, kept_code
+from stseg.short_lowering import ShortLowering, references
 
 _KNOWN_OUTSIDE = ("external", "common")
 """Kinds of names that may be asked for."""
@@ -56,7 +59,8 @@ class Kernel(CPUDispatcher):
 
     def compile(self, sig: Any) -> Any:
         """Compile for the types of some arguments, or take the machine code from the cache."""
-        with global_compiler_lock, _nothing_collected(), _optimised_late(cpu_target.target_context.codegen()):
+        alone = self._kept.alone() if isinstance(self._kept, KernelCache) else nullcontext()
+        with global_compiler_lock, alone, _nothing_collected(), _optimised_late(cpu_target.target_context.codegen()):
             self._cache = self._kept
             return super().compile(sig)
 
@@ -141,14 +145,27 @@ def _nothing_collected() -> Iterator[None]:
 @contextmanager
 def _optimised_late(codegen: Any) -> Iterator[None]:
     """Let all code that is made within the body, numba's own functions included, be of that kind."""
-    library, set_environment = codegen._library_class, codegen.set_env
+    set_environment = codegen.set_env
 
     def set_where_known(name: str, environment: Any) -> None:
         if codegen._engine.is_symbol_defined(name):
             set_environment(name, environment)
 
-    codegen._library_class, codegen.set_env = _Library, set_where_known
+    with (
+        _replaced(codegen, "_library_class", _Library),
+        _replaced(codegen, "set_env", set_where_known),
+        _replaced(NativeLowering, "lowering_class", ShortLowering),
+        _replaced(NRTContext, "get_meminfos", references),
+    ):
+        yield
+
+
+@contextmanager
+def _replaced(owner: Any, name: str, value: Any) -> Iterator[None]:
+    """Let an attribute have another value within the body."""
+    before = getattr(owner, name)
+    setattr(owner, name, value)
     try:
         yield
     finally:
-        codegen._library_class, codegen.set_env = library, set_environment
+        setattr(owner, name, before)

@@ -73,3 +73,19 @@ def test_the_cache_holds_the_kernels_that_python_calls(tmp_path: Path) -> None:
     assert second == ["4.9 1 0", "False"]
     assert (empty, ahead) == (["0"], ["1"])
     assert {path.name.split("-")[0] for path in tmp_path.rglob("*.nbi")} == {"scoring.track_score"}
+
+
+@COMPILED
+@pytest.mark.skipif(sys.platform == "win32", reason="no locks of folders")
+def test_of_processes_that_start_together_one_compiles(tmp_path: Path) -> None:
+    started = [
+        subprocess.Popen(
+            [sys.executable, "-c", PROGRAM],
+            env=ENVIRONMENT | {"NUMBA_CACHE_DIR": str(tmp_path)}, stdout=subprocess.PIPE, text=True,
+        )
+        for _ in range(2)
+    ]  # fmt: skip
+    printed = [process.communicate()[0].splitlines() for process in started]
+    assert sorted(len(lines) for lines in printed) == [2, 3]
+    assert sum("compiling" in lines[0] for lines in printed) == 1
+    assert [lines[-2] for lines in printed] == ["4.9 1 0", "4.9 1 0"]

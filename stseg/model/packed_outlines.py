@@ -72,5 +72,5 @@ def _pack(spans: Spans, rows: Ints, packed: Spans) -> None:
     place = 0
     for i in range(len(spans)):
         for k in range(rows[i]):
-            packed[place] = spans[i, k]
+            packed[place, 0], packed[place, 1] = spans[i, k, 0], spans[i, k, 1]
             place += 1
