@@ -135,9 +135,11 @@ class ShortLowering(Lower):
         """The next number, and whether there was one left."""
         place, _, step, left_place = cgutils.unpack_tuple(self.builder, iterator)
         number, left = self.builder.load(place), self.builder.load(left_place)
-        self.builder.store(self.builder.add(number, step), place)
-        self.builder.store(self.builder.sub(left, left.type(1)), left_place)
-        return self._structure(kind, number, self.builder.icmp_signed(">", left, left.type(0)))
+        more = self.builder.icmp_signed(">", left, left.type(0))
+        with self.builder.if_then(more):  # else no loop becomes vector code
+            self.builder.store(self.builder.add(number, step), place)
+            self.builder.store(self.builder.sub(left, left.type(1), flags=["nsw"]), left_place)
+        return self._structure(kind, number, more)
 
     def _structure(self, kind: Any, *values: Any) -> Any:
         """A structure of values."""
