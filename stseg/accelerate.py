@@ -70,22 +70,27 @@ def take_kept_kernels() -> None:
 
 
 class _Notes(event.Listener):
-    """Notes how many kernels are ready, compiled here or by another process, each with those that it calls."""
+    """Notes how many kernels have become ready, compiled here or by another process, each with those that it calls."""
 
     def __init__(self, note: Callable[[str], None]) -> None:
-        self._note, self._last = note, -_PAUSE
+        self._note, self._last, self._before = note, -_PAUSE, _ready()
 
     def on_start(self, event: Any) -> None:
         """A kernel is to be compiled."""
         del event
         if monotonic() - self._last >= _PAUSE:
             self._last = monotonic()
-            ready = sum(bool(one.overloads) for one in Kernel.made)
-            so_far = f"; {ready} of about {_USUAL} are done" if ready else ", about a minute of work"
+            done = _ready() - self._before
+            so_far = f"; {done} of about {_USUAL} are done" if done else ", about a minute of work"
             self._note(f"compiling kernels, once on this machine{so_far}")
 
     def on_end(self, event: Any) -> None:
         """A kernel is compiled."""
+
+
+def _ready() -> int:
+    """Number of kernels for which there is machine code."""
+    return sum(bool(one.overloads) for one in Kernel.made)
 
 
 def _compiled(function: Callable[P, R], **options: Any) -> Callable[P, R]:
