@@ -62,6 +62,7 @@ def command() -> NoReturn:
             os._exit(status)
 
     collect_rarely()
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # matrices are small; its threads wait for work by spinning
     atexit.register(leave)  # the first to be registered is the last to be called
     status = main()
     if status in (INTERRUPTED, TERMINATED):
