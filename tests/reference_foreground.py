@@ -15,15 +15,15 @@ UNIFORM = 256.0**-3
 
 
 def planes_of(mean: Singles, variance: Singles, weight: Singles) -> Singles:
-    """State float32 (v, mode, plane, u) from means (v, u, mode, 3), variances (v, u, mode, ...) and weights."""
+    """State float32 (mode, plane, v, u) from means (v, u, mode, 3), variances (v, u, mode, ...) and weights."""
     spread = variance.reshape(*weight.shape, -1)
     planes = np.concatenate([mean, spread, weight[..., None]], -1)
-    return np.ascontiguousarray(planes.transpose(0, 2, 3, 1), np.float32)
+    return np.ascontiguousarray(planes.transpose(2, 3, 0, 1), np.float32)
 
 
 def modes_of(planes: Singles) -> tuple[Singles, Singles, Singles]:
     """Means, variances and weights of a state, as in `planes_of`."""
-    modes = planes.transpose(0, 3, 1, 2)
+    modes = planes.transpose(2, 3, 0, 1)
     variance = modes[..., 3:-1] if modes.shape[-1] > 5 else modes[..., 3]
     return modes[..., :3], variance, modes[..., -1]
 

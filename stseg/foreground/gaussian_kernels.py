@@ -1,9 +1,10 @@
 """Kernels of the Gaussian mixtures: foreground log-odds of a frame, and the adaptation to it.
 
-The state of a view is one array `modes` float32 (v, mode, plane, u): for each mode of a row of pixels its mean (three
-planes, BGR), its variance (one plane if it is isotropic; two, across and along the ray of its chromaticity), and its
-weight. The strongest mode comes first. So whatever is done to all pixels of a row runs over contiguous memory, several
-pixels at a time; pixels that need branches are treated one by one.
+The state of a view is one array `modes` float32 (mode, plane, v, u): for each mode of a pixel its mean (three planes,
+BGR), its variance (one plane if it is isotropic; two, across and along the ray of its chromaticity), and its weight.
+The strongest mode comes first. So whatever is done to all pixels runs over contiguous memory, several pixels at a time
+and from one row to the next: the state of all views is larger than a processor's cache, and memory that is read in
+order is there in time. Pixels that need branches are treated one by one.
 """
 
 from __future__ import annotations
@@ -64,14 +65,14 @@ def evaluate(image: Bytes, gain: Singles, modes: Singles, priors: Priors, log_od
     )
     for v in range(rows):
         _fill_colour(image[v], colour)
-        own, row = modes[v], log_odds[v]
-        _fill_margin(colour, gain, own[0], priors, margin)
+        row = log_odds[v]
+        _fill_margin(colour, gain, modes, v, priors, margin)
         for u in range(columns):
             row[u] = least
         for u in range(columns):
             if margin[u] > _ZERO:
                 continue
-            lit, dimmed = _densities(u, colour, gain, own, priors)
+            lit, dimmed = _densities(v, u, colour, gain, modes, priors)
             row[u] = none
             if lit + dimmed > _ZERO:
                 row[u] = bounded_log_odds(
@@ -94,30 +95,31 @@ def _fill_colour(row: Bytes, colour: Singles) -> None:
 
 
 @wide_kernel
-def _fill_margin(colour: Singles, gain: Singles, mode: Singles, priors: Priors, margin: Singles) -> None:
-    """Fill margin (u,) of a row: above 0 where the first mode alone puts the log-odds at their lower bound.
+def _fill_margin(colour: Singles, gain: Singles, modes: Singles, v: int, priors: Priors, margin: Singles) -> None:
+    """Fill margin (u,) of row v: above 0 where the first mode alone puts the log-odds at their lower bound.
 
     A sufficient condition, found without exponentials and true of most pixels: exp(-z) >= (1 - z / 8)^8 bounds the
     densities of background and of people on both sides.
     """
-    planes = mode.shape[0]
-    along_plane, weight_plane = planes - 2, planes - 1
+    mode, planes = modes[0], modes.shape[1]
+    blue, green, red, spread = mode[0, v], mode[1, v], mode[2, v], mode[VARIANCE, v]
+    lengthwise, weights = mode[planes - 2, v], mode[planes - 1, v]
     g0, g1, g2 = gain[0], gain[1], gain[2]
     sure, reach = np.float32(1.0 - priors.background_weight), np.float32(1.0 - priors.darkest_shadow)
     confusion = np.float32(priors.shadow_confusion)
     doubt = np.float32(doubt_of(priors.foreground_prior, priors.outlier_rate, priors.shadow_prior))
     for u in range(colour.shape[1]):
-        m0, m1, m2 = g0 * mode[0, u], g1 * mode[1, u], g2 * mode[2, u]
+        m0, m1, m2 = g0 * blue[u], g1 * green[u], g2 * red[u]
         m0 = m0 if m0 < _WHITE else _WHITE
         m1 = m1 if m1 < _WHITE else _WHITE
         m2 = m2 if m2 < _WHITE else _WHITE
-        weight = mode[weight_plane, u]
+        weight = weights[u]
         d0, d1, d2 = colour[0, u] - m0, colour[1, u] - m1, colour[2, u] - m2
         inner = d0 * m0 + d1 * m1 + d2 * m2
         along = inner * inner / (m0 * m0 + m1 * m1 + m2 * m2 + _TINY)
-        across = (d0 * d0 + d1 * d1 + d2 * d2 - along) / mode[VARIANCE, u]
-        along = along / mode[along_plane, u]
-        area, span = _TWO_PI * mode[VARIANCE, u], np.sqrt(_TWO_PI * mode[along_plane, u])
+        across = (d0 * d0 + d1 * d1 + d2 * d2 - along) / spread[u]
+        along = along / lengthwise[u]
+        area, span = _TWO_PI * spread[u], np.sqrt(_TWO_PI * lengthwise[u])
         line = span + reach * _SHORTEST * (m0 + m1 + m2)
         near = _ONE - _SIXTEENTH * (across + along)
         near = near if near > _ZERO else _ZERO
@@ -132,27 +134,29 @@ def _fill_margin(colour: Singles, gain: Singles, mode: Singles, priors: Priors, 
 
 
 @part
-def _densities(u: int, colour: Singles, gain: Singles, modes: Singles, priors: Priors) -> tuple[np.float32, np.float32]:
-    """Densities of column u's colour under the background modes (mode, plane, u): lit, and in shadow."""
+def _densities(
+    v: int, u: int, colour: Singles, gain: Singles, modes: Singles, priors: Priors
+) -> tuple[np.float32, np.float32]:
+    """Densities of pixel (v, u)'s colour under the background modes: lit, and in shadow."""
     x0, x1, x2 = colour[0, u], colour[1, u], colour[2, u]
     weight_plane, along_plane = modes.shape[1] - 1, modes.shape[1] - 2
     darkest = np.float32(priors.darkest_shadow)
     lit, dimmed = _ZERO, _ZERO
     for k in range(modes.shape[0]):
-        weight = modes[k, weight_plane, u]
+        weight = modes[k, weight_plane, v, u]
         if weight < priors.background_weight:
             continue
-        m0 = min(gain[0] * modes[k, 0, u], _WHITE)
-        m1 = min(gain[1] * modes[k, 1, u], _WHITE)
-        m2 = min(gain[2] * modes[k, 2, u], _WHITE)
+        m0 = min(gain[0] * modes[k, 0, v, u], _WHITE)
+        m1 = min(gain[1] * modes[k, 1, v, u], _WHITE)
+        m2 = min(gain[2] * modes[k, 2, v, u], _WHITE)
         brightness = m0 * m0 + m1 * m1 + m2 * m2 + _TINY
         ratio = (x0 * m0 + x1 * m1 + x2 * m2) / brightness
         d0, d1, d2 = x0 - ratio * m0, x1 - ratio * m1, x2 - ratio * m2
-        across = _HALF * (d0 * d0 + d1 * d1 + d2 * d2) / modes[k, VARIANCE, u]
+        across = _HALF * (d0 * d0 + d1 * d1 + d2 * d2) / modes[k, VARIANCE, v, u]
         if across > _FAR:
             continue
-        decay = _HALF * brightness / modes[k, along_plane, u]
-        area, span = _TWO_PI * modes[k, VARIANCE, u], np.sqrt(_TWO_PI * modes[k, along_plane, u])
+        decay = _HALF * brightness / modes[k, along_plane, v, u]
+        area, span = _TWO_PI * modes[k, VARIANCE, v, u], np.sqrt(_TWO_PI * modes[k, along_plane, v, u])
         along = decay * (ratio - _ONE) * (ratio - _ONE)
         if across + along < _FAR:
             lit += weight * np.exp(-across - along) / (area * span)
@@ -186,26 +190,26 @@ def update(
         Probability that each pixel shows a person.
     fast, slow
         Learning rates of background, and of what moved in.
-    modes : float32 (v, mode, plane, u)
+    modes : float32 (mode, plane, v, u)
     """
-    columns, count, planes = image.shape[1], modes.shape[1], modes.shape[2]
+    columns, count, planes = image.shape[1], modes.shape[0], modes.shape[1]
     colour, offset = np.empty((3, columns), np.float32), np.empty((count, 2, columns), np.float32)
     nearest, rate = np.empty(columns, np.int32), np.empty(columns, np.float32)
     for v in range(first, image.shape[0], step):
         _fill_colour(image[v], colour)
-        used = _used(modes[v])
+        used = _used(modes, v)
         for k in range(used):
-            _fill_along(colour, gain, modes[v, k], offset[k, 1])
-            _fill_across(colour, gain, modes[v, k], offset[k, 1], offset[k, 0])
-        _match(offset, modes[v, :used], constants.match_distance, nearest)
+            _fill_along(colour, gain, modes[k], v, offset[k, 1])
+            _fill_across(colour, gain, modes[k], v, offset[k, 1], offset[k, 0])
+        _match(offset, modes[:used], v, constants.match_distance, nearest)
         rate[:] = _ZERO
         for k in range(used):
-            _fill_rate(nearest, np.int32(k), modes[v, k, planes - 1], likelihood[v], fast, slow, constants, rate)
+            _fill_rate(nearest, np.int32(k), modes[k, planes - 1, v], likelihood[v], fast, slow, constants, rate)
         for k in range(used):
-            _adapt(colour, gain, nearest, np.int32(k), offset[k], rate, constants, modes[v, k])
+            _adapt(colour, gain, nearest, np.int32(k), offset[k], rate, constants, modes[k], v)
         for u in range(columns):
             if nearest[u] < 0 and likelihood[v, u] >= _HALF:
-                _begin(u, colour, gain, slow, constants, modes[v])
+                _begin(v, u, colour, gain, slow, constants, modes)
 
 
 # Loops that write one array and read at most eight become vector code: beyond that the compiler does not prove that the
@@ -213,11 +217,12 @@ def update(
 
 
 @wide_kernel
-def _fill_along(colour: Singles, gain: Singles, mode: Singles, along: Singles) -> None:
-    """Fill along (u,): squared distance of each colour from a mode along the ray of its chromaticity, grey levels."""
+def _fill_along(colour: Singles, gain: Singles, mode: Singles, v: int, along: Singles) -> None:
+    """Fill along (u,): squared distance of row v from a mode along the ray of its chromaticity, grey levels."""
     g0, g1, g2 = gain[0], gain[1], gain[2]
+    blue, green, red = mode[0, v], mode[1, v], mode[2, v]
     for u in range(len(along)):
-        m0, m1, m2 = g0 * mode[0, u], g1 * mode[1, u], g2 * mode[2, u]
+        m0, m1, m2 = g0 * blue[u], g1 * green[u], g2 * red[u]
         m0 = m0 if m0 < _WHITE else _WHITE
         m1 = m1 if m1 < _WHITE else _WHITE
         m2 = m2 if m2 < _WHITE else _WHITE
@@ -226,11 +231,12 @@ def _fill_along(colour: Singles, gain: Singles, mode: Singles, along: Singles) -
 
 
 @wide_kernel
-def _fill_across(colour: Singles, gain: Singles, mode: Singles, along: Singles, across: Singles) -> None:
-    """Fill across (u,): the rest of each colour's squared distance from the mode."""
+def _fill_across(colour: Singles, gain: Singles, mode: Singles, v: int, along: Singles, across: Singles) -> None:
+    """Fill across (u,): the rest of the squared distance."""
     g0, g1, g2 = gain[0], gain[1], gain[2]
+    blue, green, red = mode[0, v], mode[1, v], mode[2, v]
     for u in range(len(across)):
-        m0, m1, m2 = g0 * mode[0, u], g1 * mode[1, u], g2 * mode[2, u]
+        m0, m1, m2 = g0 * blue[u], g1 * green[u], g2 * red[u]
         m0 = m0 if m0 < _WHITE else _WHITE
         m1 = m1 if m1 < _WHITE else _WHITE
         m2 = m2 if m2 < _WHITE else _WHITE
@@ -240,29 +246,29 @@ def _fill_across(colour: Singles, gain: Singles, mode: Singles, along: Singles, 
 
 
 @wide_kernel
-def _used(modes: Singles) -> int:
-    """How many of a row's modes (mode, plane, u) are in use, up to the last that has any weight."""
-    weight = modes.shape[1] - 1
+def _used(modes: Singles, v: int) -> int:
+    """How many of the modes of row v are in use, up to the last that has any weight."""
     for k in range(modes.shape[0] - 1, 0, -1):
-        highest = _ZERO
-        for u in range(modes.shape[2]):
-            highest = modes[k, weight, u] if modes[k, weight, u] > highest else highest
+        weight, highest = modes[k, modes.shape[1] - 1, v], _ZERO
+        for u in range(len(weight)):
+            highest = weight[u] if weight[u] > highest else highest
         if highest > _ZERO:
             return k + 1
     return 1
 
 
 @wide_kernel
-def _match(offset: Singles, modes: Singles, match_distance: np.float32, nearest: Labels) -> None:
-    """Fill nearest (u,) with the mode of least Mahalanobis distance within `match_distance`, -1 for none."""
-    count, planes, columns = modes.shape
+def _match(offset: Singles, modes: Singles, v: int, match_distance: np.float32, nearest: Labels) -> None:
+    """Fill nearest (u,) of row v with the mode of least Mahalanobis distance within `match_distance`, -1 for none."""
+    count, planes, _, columns = modes.shape
     best, length = np.empty(columns, np.float32), np.empty(columns, np.float32)
     best[:], nearest[:] = match_distance * match_distance, -1
     for k in range(count):
-        across, along, mode, own = offset[k, 0], offset[k, 1], modes[k], np.int32(k)
+        across, along, own = offset[k, 0], offset[k, 1], np.int32(k)
+        spread, lengthwise, weight = modes[k, VARIANCE, v], modes[k, planes - 2, v], modes[k, planes - 1, v]
         for u in range(columns):
-            distance = across[u] / mode[VARIANCE, u] + along[u] / mode[planes - 2, u]
-            length[u] = distance if mode[planes - 1, u] > _ZERO else _NEVER
+            distance = across[u] / spread[u] + along[u] / lengthwise[u]
+            length[u] = distance if weight[u] > _ZERO else _NEVER
         for u in range(columns):
             nearest[u] = own if length[u] <= best[u] else nearest[u]
         for u in range(columns):
@@ -297,10 +303,11 @@ def _adapt(
     rate: Singles,
     constants: Adaptation,
     mode: Singles,
+    v: int,
 ) -> None:
-    """Move mode `own` (plane, u) towards the colours that it matches; elsewhere its weight falls."""
-    planes, columns = mode.shape
-    pace, weight = np.empty(columns, np.float32), mode[planes - 1]
+    """Move mode `own` (plane, v, u) towards the colours of row v that it matches; elsewhere its weight falls."""
+    planes, _, columns = mode.shape
+    pace, weight = np.empty(columns, np.float32), mode[planes - 1, v]
     for u in range(columns):
         weight[u] = weight[u] * (_ONE - rate[u]) + (rate[u] if nearest[u] == own else _ZERO)
     for u in range(columns):
@@ -308,16 +315,16 @@ def _adapt(
         share = share if share < _ONE else _ONE
         pace[u] = share if nearest[u] == own else _ZERO
     for c in range(3):
-        mean, shown = mode[c], colour[c]
+        mean, shown = mode[c, v], colour[c]
         for u in range(columns):
             value = gain[c] * mean[u]
             value = value if value < _WHITE else _WHITE
             mean[u] += pace[u] * (shown[u] - value) / gain[c]
     if planes == VARIANCE + 2:
-        _spread(offset[0], offset[1], _THIRD, _THIRD, pace, constants.least_across_sd, mode[VARIANCE])
+        _spread(offset[0], offset[1], _THIRD, _THIRD, pace, constants.least_across_sd, mode[VARIANCE, v])
     else:
-        _spread(offset[0], offset[1], _HALF, _ZERO, pace, constants.least_across_sd, mode[VARIANCE])
-        _spread(offset[0], offset[1], _ZERO, _ONE, pace, constants.least_along_sd, mode[VARIANCE + 1])
+        _spread(offset[0], offset[1], _HALF, _ZERO, pace, constants.least_across_sd, mode[VARIANCE, v])
+        _spread(offset[0], offset[1], _ZERO, _ONE, pace, constants.least_along_sd, mode[VARIANCE + 1, v])
 
 
 @wide_kernel
@@ -339,38 +346,41 @@ def _spread(
 
 
 @wide_kernel
-def _begin(u: int, colour: Singles, gain: Singles, slow: np.float32, constants: Adaptation, modes: Singles) -> None:
-    """Put a new mode of column u's colour in the place of the weakest, unless all are background."""
+def _begin(
+    v: int, u: int, colour: Singles, gain: Singles, slow: np.float32, constants: Adaptation, modes: Singles
+) -> None:
+    """Put a new mode of pixel (v, u)'s colour in the place of the weakest, unless all are background."""
     planes = modes.shape[1]
     weakest = 0
     for k in range(modes.shape[0]):
-        if modes[k, planes - 1, u] < modes[weakest, planes - 1, u]:
+        if modes[k, planes - 1, v, u] < modes[weakest, planes - 1, v, u]:
             weakest = k
-    if modes[weakest, planes - 1, u] >= constants.background_weight:
+    if modes[weakest, planes - 1, v, u] >= constants.background_weight:
         return
     for k in range(modes.shape[0]):
-        modes[k, planes - 1, u] *= _ONE - slow
+        modes[k, planes - 1, v, u] *= _ONE - slow
     for c in range(3):
-        modes[weakest, c, u] = colour[c, u] / gain[c]
+        modes[weakest, c, v, u] = colour[c, u] / gain[c]
     for c in range(VARIANCE, planes - 1):
-        modes[weakest, c, u] = constants.initial_sd * constants.initial_sd
-    modes[weakest, planes - 1, u] = slow
+        modes[weakest, c, v, u] = constants.initial_sd * constants.initial_sd
+    modes[weakest, planes - 1, v, u] = slow
 
 
 @wide_kernel
 def put_strongest_first(first: int, step: int, modes: Singles) -> None:
-    """Exchange modes (v, mode, plane, u) of every `step`-th row so that none is stronger than the first."""
-    rows, count, planes, columns = modes.shape
+    """Exchange modes (mode, plane, v, u) of every `step`-th row so that none is stronger than the first."""
+    count, planes, rows, columns = modes.shape
     for v in range(first, rows, step):
         for k in range(1, count):
+            own, strongest = modes[k, planes - 1, v], modes[0, planes - 1, v]
             higher = 0
             for u in range(columns):
-                higher += 1 if modes[v, k, planes - 1, u] > modes[v, 0, planes - 1, u] else 0
+                higher += 1 if own[u] > strongest[u] else 0
             if higher == 0:
                 continue
             for u in range(columns):
-                if modes[v, k, planes - 1, u] > modes[v, 0, planes - 1, u]:
+                if own[u] > strongest[u]:
                     for c in range(planes):
-                        weaker = modes[v, 0, c, u]
-                        modes[v, 0, c, u] = modes[v, k, c, u]
-                        modes[v, k, c, u] = weaker
+                        weaker = modes[0, c, v, u]
+                        modes[0, c, v, u] = modes[k, c, v, u]
+                        modes[k, c, v, u] = weaker

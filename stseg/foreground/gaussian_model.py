@@ -27,7 +27,7 @@ _MEAN = slice(MEAN, VARIANCE)
 
 
 class GaussianModel(PixelModel):
-    """A mixture of Gaussians per pixel; state `modes` float32 (v, mode, plane, u), see `gaussian_kernels`."""
+    """A mixture of Gaussians per pixel; state `modes` float32 (mode, plane, v, u), see `gaussian_kernels`."""
 
     variances: ClassVar[int]
     """Variances of a mode: 1 if it is isotropic, 2 if across and along the ray of its chromaticity."""
@@ -36,8 +36,8 @@ class GaussianModel(PixelModel):
         super().__init__(size, frame_rate, config)
         self.config = config
         self._priors = Priors.of(config)
-        self.modes = np.zeros((size[1], config.modes, VARIANCE + self.variances + 1, size[0]), np.float32)
-        self.modes[:, :, VARIANCE:-1] = config.initial_sd**2
+        self.modes = np.zeros((config.modes, VARIANCE + self.variances + 1, size[1], size[0]), np.float32)
+        self.modes[:, VARIANCE:-1] = config.initial_sd**2
 
     @abstractmethod
     def _least_sds(self) -> tuple[float, float]:
@@ -45,18 +45,18 @@ class GaussianModel(PixelModel):
 
     def relight(self, gain: Singles) -> None:
         """Multiply all that was learned by gains float32 (v, u, 3), after a change of light."""
-        self.modes[:, :, _MEAN] *= gain.transpose(0, 2, 1)[:, None]
+        self.modes[:, _MEAN] *= gain.transpose(2, 0, 1)
 
     def _background_sample(self, step: int) -> Singles:
-        return np.asarray(self.modes[::step, 0, _MEAN, ::step].transpose(0, 2, 1))
+        return np.asarray(self.modes[0, _MEAN, ::step, ::step].transpose(1, 2, 0))
 
     def _start(self, frames: NDArray[np.uint8]) -> None:
         config = self.config
         colour, spread = commonest_colours(frames, config.match_distance * config.minimum_sd)
-        self.modes[:, :, -1] = 0
-        self.modes[:, 0, _MEAN] = colour.transpose(0, 2, 1)
-        self.modes[:, 0, VARIANCE:-1] = np.maximum(spread, config.minimum_sd**2)[:, None]
-        self.modes[:, 0, -1] = 1
+        self.modes[:, -1] = 0
+        self.modes[0, _MEAN] = colour.transpose(2, 0, 1)
+        self.modes[0, VARIANCE:-1] = np.maximum(spread, config.minimum_sd**2)
+        self.modes[0, -1] = 1
         if self.variances == 2:
             self._separate_variances(frames)
 
@@ -65,7 +65,7 @@ class GaussianModel(PixelModel):
         certain, rate = np.ones(frames.shape[1:3], np.float32), 1.0 / len(frames)
         for frame in frames:
             self._update(frame, np.ones(3), certain, (rate, rate), 0, 1)
-        self.modes[:, :, -1], self.modes[:, 0, -1] = 0, 1
+        self.modes[:, -1], self.modes[0, -1] = 0, 1
 
     def _learn_empty(self, image: Bytes, gain: Floats) -> None:
         rate = 1.0 / (self._frames_learned + 1)
