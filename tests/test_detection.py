@@ -70,7 +70,7 @@ def test_the_kernel_is_the_definition(likelihood: Singles, pillars: Pillars, out
         rng.dirichlet(np.ones(n)) for n in (pillars.middle.shape[1] - pillars.base, len(widths))
     )
     sums = np.empty((likelihood.shape[0] + 1, likelihood.shape[1] + 1), np.uint32)
-    fill_sums(likelihood, sums)
+    fill_sums(likelihood, 0, 0, sums)
     found = np.empty(1)
     fill_chance(
         sums, pillars.upright, pillars.edge, pillars.middle, pillars.half, pillars.base, widths, height_share,

@@ -48,14 +48,13 @@ def teach(
     view: int, shown: reference.Shown, near: Ints, inside: Flags, trusted: Flags, rates: list[ErrorRates], looks: float
 ) -> tuple[Floats, Floats]:
     """What the kernel counts of one of several views of equal weight."""
-    of_cells, views = np.zeros(inside.size, np.int32), len(rates)
+    views, every = len(rates), np.tile(near.ravel(), len(inside)).astype(np.int32)
     terms = FrameTerms(
-        of_cells, of_cells, np.ones((views, 1), bool), np.array([own.ravel() for own in shown.levels]),
-        np.array([own.ravel() for own in shown.share]), np.ones((1, views), bool), np.zeros(views, np.int16),
+        np.array([own.ravel() for own in shown.levels]), np.array([own.ravel() for own in shown.share]), every,
         np.array([log_odds_terms(rate) for rate in rates]), np.ones(views, np.float32),
         np.ones((views, len(trusted)), np.float32),
     )  # fmt: skip
-    sums = Sums.of(terms, np.tile(near.ravel(), len(inside)).astype(np.int32))
+    sums = Sums.of(terms)
     errors, seen = np.full((2, views, 3), np.nan)
     number, by_all = np.ones(inside.size), np.tile(trusted, (views, 1))
     fill_counts(terms, sums, inside.ravel(), number, by_all, np.array(rates), looks, PRIOR, errors, seen)

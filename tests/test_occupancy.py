@@ -187,7 +187,8 @@ def test_likelihood_per_plane_by_definition(seed: int) -> None:
     footprint[2, 5] = 0
     every = np.arange(levels.size, dtype=np.int32)
     person = np.tile(near.ravel(), 4).astype(np.int32)
-    listed = ShownCells(every, every % 16, every, every, np.zeros_like(every), person, np.ones(levels.size))
+    unseen = np.zeros((1, levels.size), np.int16)
+    listed = ShownCells(every, every % 16, every, every, unseen, person, np.ones(levels.size))
     fill_levels(fit, tried, grid.heights, listed, footprint.reshape(-1, 4), rates, levels.reshape(-1))
     for cell, (y, x) in enumerate(np.ndindex(4, 4)):
         free = [b for b in range(len(found)) if box_owner[b] in (-1, near[y, x])]

@@ -95,7 +95,7 @@ class DetectionProbability:
     def chance(self, pillars: Pillars, seen: Singles) -> Floats:
         """p(F_i | X) of one view (eq. 6), float64 (place,); nan where it does not see the pillar."""
         sums = np.empty((seen.shape[0] + 1, seen.shape[1] + 1), np.uint32)
-        fill_sums(seen, sums)
+        fill_sums(seen, 0, 0, sums)
         chance = np.empty(len(pillars.edge))
         fill_chance(
             sums, pillars.upright, pillars.edge, pillars.middle, pillars.half, pillars.base, self.widths,

@@ -8,7 +8,7 @@ import numpy as np
 
 from stseg.arrays import Singles
 from stseg.geometry.sampling import Sampling
-from stseg.geometry.summed_area import Levels, Sums, fill_means, fill_points, fill_sums, level_of
+from stseg.geometry.summed_area import Levels, Sums, fill_means, fill_points, fill_sums
 
 
 class SumTable(NamedTuple):
@@ -39,9 +39,7 @@ class CellMeans:
     def sum_table(self, view: int, likelihood: Singles) -> SumTable:
         """Sums over the part of a view's map (v, u) that cells cover."""
         rows, columns = self.regions[view]
-        covered = likelihood[rows, columns]
-        fill_sums(covered, self._sums[view])
-        lowest = int(level_of(covered.min(initial=np.inf)))
+        lowest = fill_sums(likelihood, columns.start, rows.start, self._sums[view])
         return SumTable(self._sums[view], columns.start, rows.start, lowest)
 
     def levels(self, view: int, likelihood: Singles) -> Levels:

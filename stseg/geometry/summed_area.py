@@ -33,27 +33,38 @@ def level_of(likelihood: np.float32) -> np.int32:
 
 
 @kernel
-def fill_sums(likelihood: Singles, sums: Sums) -> None:
-    """Fill sums (v + 1, u + 1): the levels of all pixels above and to the left, whose first row and column are 0.
+def fill_sums(likelihood: Singles, left: int, top: int, sums: Sums) -> int:
+    """Fill sums (v + 1, u + 1), whose first row and column are 0: the levels of all pixels above and to the left.
 
     Parameters
     ----------
-    likelihood : float32 (v, u)
+    likelihood : float32 (rows, columns)
         0..1.
+    left, top
+        Where the part of it begins that is summed.
+
+    Returns
+    -------
+    int
+        The lowest level of that part; TOP where there is none.
     """
-    rows, columns = likelihood.shape
+    columns = sums.shape[1] - 1
+    row, lowest = np.empty(columns, np.uint32), np.full(columns, TOP, np.uint32)
     sums[0] = 0
-    sums[:, 0] = 0
-    row = np.empty(columns, np.uint32)
-    for v in range(rows):
+    for v in range(len(sums) - 1):
+        here = likelihood[top + v, left : left + columns]  # of whole rows: a strided part would be no vector code
         for u in range(columns):
-            row[u] = level_of(likelihood[v, u])
+            row[u] = level_of(here[u])
+        for u in range(columns):
+            lowest[u] = min(lowest[u], row[u])
         total = np.uint32(0)
         for u in range(columns):
             total += row[u]
             row[u] = total
+        sums[v + 1, 0] = 0
         for u in range(columns):
             sums[v + 1, u + 1] = sums[v, u + 1] + row[u]
+    return int(lowest.min()) if columns > 0 else TOP
 
 
 @kernel

@@ -27,9 +27,9 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from stseg.accelerate import kernel, part
-from stseg.arrays import Flags, Labels, Singles
-from stseg.geometry.summed_area import TOP, UNSEEN, Levels
+from stseg.accelerate import kernel, part, wide_kernel
+from stseg.arrays import Labels, Singles
+from stseg.geometry.summed_area import TOP, Levels
 
 
 class ErrorRates(NamedTuple):
@@ -53,23 +53,14 @@ class ErrorRates(NamedTuple):
 class FrameTerms(NamedTuple):
     """What the views of a frame add to its sums at cells (n,).
 
-    In the blocks of cells where a view shows something its levels are given cell by cell. In all others it sees its
-    empty level, and all of each footprint.
-
     Attributes
     ----------
-    view_set : int32 (n,), block : int32 (n,)
-        The set of views that see each cell, and its block.
-    shown : bool (view, block)
-        Whether the view's levels are given there.
     levels : int16 (view, n)
-        Mean likelihood of each cell, or UNSEEN; undefined where not given.
+        Mean likelihood of each cell, or UNSEEN.
     share : float32 (view, n)
-        a_i, 0..1: visible share of the footprint; undefined where the level is, or is UNSEEN.
-    seen : bool (set, view)
-        The views of each set that are not blind.
-    empty : int16 (view,)
-        The level where nothing is shown.
+        a_i, 0..1: visible share of the footprint; of any value where the level is UNSEEN.
+    near : int32 (n,)
+        The person near each cell, -1 for none.
     terms : float32 (view, 2, TOP + 1)
         The term of each level near no person, and within reach of a person, nats.
     weight : float32 (view,)
@@ -78,66 +69,48 @@ class FrameTerms(NamedTuple):
         Further factor of the terms near each person, 0..1, which does not reduce the view's count.
     """
 
-    view_set: Labels
-    block: Labels
-    shown: Flags
     levels: Levels
     share: Singles
-    seen: Flags
-    empty: Levels
+    near: Labels
     terms: Singles
     weight: Singles
     confidence: Singles
 
 
 class Sums(NamedTuple):
-    """Sums over the views of a frame, of runs of cells that all views see alike.
+    """Sums over the views of a frame at cells (n,).
 
     Attributes
     ----------
-    start : int32 (run + 1,)
-        First cell of each run, and behind the last one the number of cells.
-    near : int32 (run,)
-        The person near the cells of each run, -1 for none; each cell near a person is a run.
-    is_empty : bool (run,)
-        Whether every view sees its empty level there, and all of the footprints.
-    weighted, weights, shares : float32 (run,)
+    weighted, weights, shares : float32 (n,)
         Sums of w_i a_i times term, of w_i a_i, and of a_i.
     """
 
-    start: Labels
-    near: Labels
-    is_empty: Flags
     weighted: Singles
     weights: Singles
     shares: Singles
 
     @classmethod
-    def of(cls, views: FrameTerms, near: Labels) -> Self:
-        """Of all views at cells; near int32 (n,) is the person near each, -1 for none."""
-        start = np.empty(len(near) + 1, np.int32)
-        runs = fill_runs(views, near, start)
-        start = start[: runs + 1].copy()
-        sums = cls(start, near[start[:-1]], np.empty(runs, bool), *np.empty((3, runs), np.float32))
+    def of(cls, views: FrameTerms) -> Self:
+        """Of all views."""
+        sums = cls(*np.zeros((3, len(views.near)), np.float32))
         fill_sums(views, sums)
         return sums
 
-    def total(self, held: Flags, observations: float, priors: tuple[float, float]) -> Singles:
-        """k n_vis sum_i w_i term_i and the prior of each cell, nats, float32 (n,).
+    def total(self, near: Labels, observations: float, priors: tuple[float, float]) -> Singles:
+        """k n_vis sum_i w_i term_i and the prior of each cell, nats, float32 (n,); where all are hidden the prior.
 
         Parameters
         ----------
-        held : bool (n,)
-            Whether a view's image holds the cell; nan where none does. Where all are hidden it is the prior.
+        near : int32 (n,)
+            The person near each cell, -1 for none.
         observations
             k.
         priors
             log(pi / (1 - pi)) near no person, and within reach of a person.
         """
-        of_run = np.empty(len(self.near), np.float32)
-        fill_total(self, np.float32(observations), np.float32(priors[0]), np.float32(priors[1]), of_run)
-        total = np.repeat(of_run, np.diff(self.start))
-        total[~held] = np.nan
+        total = np.empty(len(near), np.float32)
+        fill_total(self, near, np.float32(observations), np.float32(priors[0]), np.float32(priors[1]), total)
         return total
 
 
@@ -163,68 +136,42 @@ def synergy_terms(floor: float) -> Singles:
     return np.tile(np.log(np.maximum(likelihood, floor)).astype(np.float32), (2, 1))
 
 
-@part
-def level_and_share(views: FrameTerms, i: int, c: int) -> tuple[int, np.float32]:
-    """What view i sees of cell c; the level is UNSEEN where it does not see the cell."""
-    if views.shown[i, views.block[c]]:
-        return int(views.levels[i, c]), views.share[i, c]
-    return int(views.empty[i]) if views.seen[views.view_set[c], i] else UNSEEN, np.float32(1)
-
-
-@kernel
-def fill_runs(views: FrameTerms, near: Labels, start: Labels) -> int:
-    """Fill start (n + 1,) with the runs of cells of a block that all views see alike; their number."""
-    shown, number, runs = np.empty(len(views.weight), np.int64), 0, 0
-    for c in range(len(near)):
-        if c > 0 and views.block[c] == views.block[c - 1]:
-            alike = views.view_set[c] == views.view_set[c - 1] and near[c] < 0 and near[c - 1] < 0
-            for k in range(number):
-                alike = alike and _is_seen_alike(views, shown[k], c)
-            if alike:
-                continue
-        else:
-            number = 0
-            for i in range(len(shown)):
-                if views.shown[i, views.block[c]]:
-                    shown[number] = i
-                    number += 1
-        start[runs] = c
-        runs += 1
-    start[runs] = len(near)
-    return runs
-
-
-@part
-def _is_seen_alike(views: FrameTerms, i: int, c: int) -> bool:
-    """Whether view i, which shows something in their block, sees cell c as it sees the one before."""
-    level = views.levels[i, c]
-    return bool(level == views.levels[i, c - 1] and (level < 0 or views.share[i, c] == views.share[i, c - 1]))
-
-
 @kernel
 def fill_sums(views: FrameTerms, sums: Sums) -> None:
-    """Fill the sums of runs, whose start and persons are given."""
-    for r in range(len(sums.near)):
-        person, weighted, weights, shares = sums.near[r], np.float32(0), np.float32(0), np.float32(0)
-        sums.is_empty[r] = person < 0
-        for i in range(len(views.weight)):
-            level, share = level_and_share(views, i, sums.start[r])
-            if level >= 0:
-                sums.is_empty[r] &= level == views.empty[i] and share == 1
-                weight = views.weight[i] * share
-                if person < 0:
-                    weighted += weight * views.terms[i, 0, level]
-                else:
-                    weighted += weight * views.confidence[i, person] * views.terms[i, 1, level]
-                weights += weight
-                shares += share
-        sums.weighted[r], sums.weights[r], sums.shares[r] = weighted, weights, shares
+    """Add what all views see to sums, 0 before."""
+    term = np.empty(len(views.near), np.float32)
+    for i in range(len(views.weight)):
+        weight, levels, shares, terms = views.weight[i], views.levels[i], views.share[i], views.terms[i, 0]
+        for c in range(len(term)):  # a loop of its own, so that the other becomes vector code
+            term[c] = terms[np.uint32(levels[c])] if levels[c] >= 0 else np.float32(0)
+        for c in range(len(term)):
+            share = shares[c] if levels[c] >= 0 else np.float32(0)
+            sums.weighted[c] += weight * share * term[c]
+            sums.weights[c] += weight * share
+            sums.shares[c] += share
+    for c in range(len(term)):
+        if views.near[c] >= 0:
+            sums.weighted[c] = _weighted_near_person(views, c)
 
 
-@kernel
-def fill_total(sums: Sums, observations: np.float32, prior: np.float32, near_prior: np.float32, total: Singles) -> None:
-    """Fill total (run,); see `Sums.total`."""
-    for r in range(len(sums.near)):
-        total[r] = prior if sums.near[r] < 0 else near_prior
-        if sums.weights[r] > 0:
-            total[r] += observations * sums.shares[r] * sums.weighted[r] / sums.weights[r]
+@part
+def _weighted_near_person(views: FrameTerms, c: int) -> np.float32:
+    """Sum of w_i a_i times term of a cell within reach of a person."""
+    weighted = np.float32(0)
+    for i in range(len(views.weight)):
+        level = views.levels[i, c]
+        if level >= 0:
+            weight = views.weight[i] * views.share[i, c]
+            weighted += weight * views.confidence[i, views.near[c]] * views.terms[i, 1, level]
+    return weighted
+
+
+@wide_kernel
+def fill_total(
+    sums: Sums, near: Labels, observations: np.float32, prior: np.float32, near_prior: np.float32, total: Singles
+) -> None:
+    """Fill total (n,); see `Sums.total`."""
+    for c in range(len(near)):
+        weight = sums.weights[c] if sums.weights[c] > 0 else np.float32(1)
+        mean = observations * sums.shares[c] * sums.weighted[c] / weight
+        total[c] = (prior if near[c] < 0 else near_prior) + (mean if sums.weights[c] > 0 else np.float32(0))

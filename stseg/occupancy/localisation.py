@@ -15,7 +15,6 @@ from stseg.errors import SourceError
 from stseg.geometry import Rig
 from stseg.geometry.cell_means import CellMeans
 from stseg.geometry.sampling import Sampling, SamplingKind
-from stseg.geometry.summed_area import Levels
 from stseg.occupancy.clutter import clutter, clutter_side, clutter_weights
 from stseg.occupancy.fusion import ErrorRates, FrameTerms, Sums, log_odds_terms, synergy_terms
 
@@ -107,8 +106,11 @@ class Localiser:
         levels = [self._means.levels(i, view).reshape(-1) for i, view in enumerate(maps) if view is not None]
         sighted = [i for i, view in enumerate(maps) if view is not None]
         every = np.array(levels, np.int16).reshape(len(sighted), -1)
-        sums = Sums.of(_all_shown(every, terms[sighted], weights[sighted].astype(np.float32)), self._no_person)
-        total = sums.total(self._views.reshape(-1) > 0, 1.0, (prior, prior))
+        share, nobody = np.ones(every.shape, np.float32), np.ones((len(sighted), 0), np.float32)
+        weight = weights[sighted].astype(np.float32)
+        sums = Sums.of(FrameTerms(every, share, self._no_person, terms[sighted], weight, nobody))
+        total = sums.total(self._no_person, 1.0, (prior, prior))
+        total[self._views.reshape(-1) == 0] = np.nan
         return total.reshape(self._views.shape)
 
     def _require(self, maps: Maps) -> None:
@@ -118,12 +120,3 @@ class Localiser:
         for camera, view in zip(cameras, maps, strict=True):
             if view is not None and view.shape != camera.size[::-1]:
                 raise SourceError(f"camera {camera.name}", "shape of the map", view.shape, f"{camera.size[::-1]}")
-
-
-def _all_shown(levels: Levels, terms: Singles, weights: Singles) -> FrameTerms:
-    """Views that show something everywhere, near nobody: levels int16 (view, cell)."""
-    views, cells = levels.shape
-    nothing, confidence = np.zeros(cells, np.int32), np.ones((views, 0), np.float32)
-    shown, seen, empty = np.ones((views, 1), bool), np.ones((1, views), bool), np.zeros(views, np.int16)
-    share = np.ones(levels.shape, np.float32)
-    return FrameTerms(nothing, nothing, shown, levels, share, seen, empty, terms, weights, confidence)

@@ -30,7 +30,7 @@ from stseg.config import ErrorRateConfig
 from stseg.geometry import Grid
 from stseg.geometry.bodies import PROFILE
 from stseg.geometry.summed_area import TOP
-from stseg.occupancy.fusion import ErrorRates, FrameTerms, Sums, level_and_share
+from stseg.occupancy.fusion import ErrorRates, FrameTerms, Sums
 
 MISS, CLUTTER, NEAR_CLUTTER = 0, 1, 2
 _FIRST_FILLED = 0.5
@@ -140,52 +140,43 @@ def fill_counts(
     """
     errors[:], seen[:] = 0.0, 0.0
     wrong, empty, all_wrong, all_empty = np.zeros((4, len(views.weight)))
-    odds, odds_of_set, is_known = (
-        np.empty(len(views.weight)),
-        np.empty(views.seen.shape),
-        np.zeros(len(views.seen), np.bool_),
-    )
-    for r in range(len(sums.near)):
-        c = sums.start[r]
-        own = views.view_set[c]
-        if sums.near[r] >= 0:
-            _count_beside_person(views, sums.near[r], c, inside[c], trusted, rates, errors, seen)
+    last = -1
+    for c in range(len(views.near)):
+        if views.near[c] >= 0:
+            _count_beside_person(views, c, inside[c], trusted, rates, errors, seen)
             continue
-        if not sums.is_empty[r]:
-            _fill_odds(views, sums, r, observations, prior, odds)
-        elif not is_known[own]:
-            _fill_odds(views, sums, r, observations, prior, odds_of_set[own])
-            is_known[own] = True
-        for i in range(len(wrong)):
-            level, share = level_and_share(views, i, c)
-            wrong[i], empty[i] = 0.0, 0.0
-            if level >= 0 and share > 0.0:
-                empty[i] = number[c] * share / (1.0 + (odds_of_set[own, i] if sums.is_empty[r] else odds[i]))
-                wrong[i] = _error_posterior(rates[i, CLUTTER], level / TOP) * empty[i]
-        for _ in range(c, sums.start[r + 1]):
+        if last < 0 or number[c] != number[last] or not _are_seen_alike(views, c, last):
+            last = c
             for i in range(len(wrong)):
-                all_wrong[i] += wrong[i]
-                all_empty[i] += empty[i]
+                level, share = views.levels[i, c], views.share[i, c]
+                wrong[i], empty[i] = 0.0, 0.0
+                if level >= 0 and share > 0.0:
+                    empty[i] = number[c] * share / (1.0 + _occupied_odds(views, sums, i, c, observations, prior))
+                    wrong[i] = _error_posterior(rates[i, CLUTTER], level / TOP) * empty[i]
+        for i in range(len(wrong)):
+            all_wrong[i] += wrong[i]
+            all_empty[i] += empty[i]
     errors[:, CLUTTER], seen[:, CLUTTER] = all_wrong, all_empty
 
 
 @part
-def _fill_odds(views: FrameTerms, sums: Sums, r: int, observations: float, prior: float, odds: Floats) -> None:
-    """Fill odds (view,) of the views that see the cells of a run with `_occupied_odds`."""
-    for i in range(len(odds)):
-        level, share = level_and_share(views, i, sums.start[r])
-        if level >= 0 and share > 0.0:
-            odds[i] = _occupied_odds(views, sums, i, r, level, share, observations, prior)
+def _are_seen_alike(views: FrameTerms, one: int, other: int) -> bool:
+    """Whether all views see two cells alike, which saves exponentials."""
+    for i in range(len(views.weight)):
+        level = views.levels[i, one]
+        if level != views.levels[i, other] or (level >= 0 and views.share[i, one] != views.share[i, other]):
+            return False
+    return True
 
 
 @part
 def _count_beside_person(
-    views: FrameTerms, person: int, c: int, is_inside: bool, trusted: Flags, rates: Floats, errors: Floats, seen: Floats
+    views: FrameTerms, c: int, is_inside: bool, trusted: Flags, rates: Floats, errors: Floats, seen: Floats
 ) -> None:
     """Count a cell within reach of a person."""
     for i in range(len(views.weight)):
-        level, share = level_and_share(views, i, c)
-        if level >= 0 and share > 0.0 and trusted[i, person]:
+        level, share = views.levels[i, c], views.share[i, c]
+        if level >= 0 and share > 0.0 and trusted[i, views.near[c]]:
             likelihood = level / TOP
             rate, error_likelihood = (MISS, 1.0 - likelihood) if is_inside else (NEAR_CLUTTER, likelihood)
             errors[i, rate] += _error_posterior(rates[i, rate], error_likelihood) * share
@@ -193,12 +184,11 @@ def _count_beside_person(
 
 
 @part
-def _occupied_odds(
-    views: FrameTerms, sums: Sums, i: int, r: int, level: int, share: np.float32, observations: float, prior: float
-) -> float:
-    """Odds that the cells of a run near no person are occupied, by all views but one."""
-    rest, others = sums.weights[r] - views.weight[i] * share, prior
-    if rest > _LEAST_WEIGHT * views.weight[i]:
-        own = views.weight[i] * share * views.terms[i, 0, level]
-        others += observations * (sums.shares[r] - share) * (sums.weighted[r] - own) / rest
+def _occupied_odds(views: FrameTerms, sums: Sums, i: int, c: int, observations: float, prior: float) -> float:
+    """Odds that a cell near no person is occupied, by all views but one that sees it."""
+    weight, share, others = views.weight[i], views.share[i, c], prior
+    rest = sums.weights[c] - weight * share
+    if rest > _LEAST_WEIGHT * weight:
+        own = weight * share * views.terms[i, 0, views.levels[i, c]]
+        others += observations * (sums.shares[c] - share) * (sums.weighted[c] - own) / rest
     return float(np.exp(min(max(others, -30.0), 30.0)))

@@ -22,7 +22,7 @@ from stseg.accelerate import kernel
 from stseg.arrays import Bytes, Flags, Floats, Ints, Labels
 from stseg.geometry.cell_means import SumTable
 from stseg.geometry.sampling import Footprints
-from stseg.geometry.summed_area import sum_of
+from stseg.geometry.summed_area import UNSEEN, Levels, sum_of
 
 SIDE = 4
 """Cells along the side of a block."""
@@ -65,12 +65,12 @@ class ShownCells(NamedTuple):
         Index in the flattened volume.
     place : int32 (n,)
         Index in the flattened ground.
-    block : int32 (n + k,)
-        Index of its block among those of all planes; of the others that behind the last.
+    block : int32 (b,)
+        The blocks that have any, as indices among those of all planes.
     start : int32 (b + 1,)
-        First cell of each block that has any, and n behind the last one.
-    view_set : int32 (n + k,)
-        The set of views that see it.
+        First cell of each block, and n behind the last one.
+    unseen : int16 (view, n + k)
+        UNSEEN where the view does not see it, else 0.
     near : int32 (n + k,)
         The person near each, -1 for none.
     number : float64 (n + k,)
@@ -81,7 +81,7 @@ class ShownCells(NamedTuple):
     place: Labels
     block: Labels
     start: Labels
-    view_set: Labels
+    unseen: Levels
     near: Labels
     number: Floats
 
@@ -94,14 +94,14 @@ class _MarkedCells(NamedTuple):
     place: Labels
     block: Labels
     start: Labels
-    view_set: Labels
+    unseen: Levels
     number: Floats
 
     @classmethod
     def none(cls) -> Self:
         """Before the first frame."""
         nothing = np.zeros(0, np.int32)
-        return cls(np.zeros(0, bool), nothing, nothing, nothing, nothing, nothing, np.zeros(0))
+        return cls(np.zeros(0, bool), nothing, nothing, nothing, nothing, np.zeros((0, 0), np.int16), np.zeros(0))
 
 
 class CellTables:
@@ -156,26 +156,21 @@ class CellTables:
             marked = np.ones_like(marked)
         if not np.array_equal(marked, self._last.marked):
             self._last = self._cells_of(marked, views)
-        _, cell, place, block, start, view_set, number = self._last
+        _, cell, place, block, start, unseen, number = self._last
         person = np.full(len(number), -1, np.int32)
-        np.take(near.reshape(-1).astype(np.int32), place, out=person[: len(place)])
-        return ShownCells(cell, place, block, start, view_set, person, number)
+        np.take(near.reshape(-1).astype(np.int32), place, out=person[: len(place)], mode="clip")  # no copy of `out`
+        return ShownCells(cell, place, block, start, unseen, person, number)
 
     def _cells_of(self, marked: Flags, views: Bytes) -> _MarkedCells:
         sets, most = self.sets, int(marked.sum()) * SIDE**2
-        representatives = len(sets.size)
-        cell, place = np.empty((2, most), np.int32)
-        block, view_set = np.empty((2, most + representatives), np.int32)
-        number = np.ones(most + representatives)
+        cell, place, block, view_set = np.empty((4, most), np.int32)
         others = sets.size.copy()
         count = _fill_cells(marked, views, sets.of_cell, cell, place, block, view_set, others)
-        every = count + representatives
-        block[count:every], view_set[count:every] = marked.size, np.arange(representatives)
-        number[count:every] = others
         start = np.append(np.flatnonzero(np.diff(block[:count], prepend=-1)), count).astype(np.int32)
-        return _MarkedCells(
-            marked.copy(), cell[:count], place[:count], block[:every], start, view_set[:every], number[:every]
-        )
+        seen = np.concatenate([sets.seen[view_set[:count]], sets.seen])
+        unseen = np.where(np.ascontiguousarray(seen.T), np.int16(0), np.int16(UNSEEN))
+        number = np.concatenate([np.ones(count), others])
+        return _MarkedCells(marked.copy(), cell[:count], place[:count], block[start[:-1]], start, unseen, number)
 
 
 @kernel

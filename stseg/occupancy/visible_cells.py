@@ -55,13 +55,21 @@ class PixelAssignment(NamedTuple):
 @kernel
 def fill_occupied(raster: NDArray[np.int16], occupied: Labels) -> None:
     """Fill occupied (v + 1, u + 1); see `PixelAssignment`."""
+    row = np.empty(raster.shape[1], np.int32)
     occupied[0] = 0
     for v in range(raster.shape[0]):
-        here = 0
+        shown, most, here = raster[v], np.int16(-1), np.int32(0)
+        for u in range(len(row)):
+            most = max(most, shown[u])
+        if most < 0:  # as most rows of most views are
+            occupied[v + 1] = occupied[v]
+            continue
+        for u in range(len(row)):
+            here += np.int32(shown[u] >= 0)
+            row[u] = here
         occupied[v + 1, 0] = 0
-        for u in range(raster.shape[1]):
-            here += 1 if raster[v, u] >= 0 else 0
-            occupied[v + 1, u + 1] = occupied[v, u + 1] + here
+        for u in range(len(row)):
+            occupied[v + 1, u + 1] = occupied[v, u + 1] + row[u]
 
 
 @part
@@ -147,7 +155,7 @@ def fill_share(
         Of each ground cell from the camera along the ground, metres.
     """
     for b in range(len(cells.start) - 1):
-        if not marked[cells.block[cells.start[b]]]:
+        if not marked[cells.block[b]]:
             continue
         for k in range(cells.start[b], cells.start[b + 1]):
             left, top, width, height = footprint[np.uint64(cells.cell[k])]
@@ -178,7 +186,7 @@ def fill_map(
     shows a person.
     """
     for b in range(len(cells.start) - 1):
-        block = np.uint64(cells.block[cells.start[b]])
+        block = np.uint64(cells.block[b])
         if marked[block]:
             for k in range(cells.start[b], cells.start[b + 1]):
                 levels[k], share[k] = _level_and_share(cells, k, people[block], footprint, table, shown, distance)

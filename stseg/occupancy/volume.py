@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +17,7 @@ from stseg.geometry.cell_means import CellMeans, SumTable
 from stseg.geometry.filled_cells import inside_bodies
 from stseg.geometry.nearest_person import nearest_person
 from stseg.geometry.sampling import Sampling
-from stseg.geometry.summed_area import Levels
+from stseg.geometry.summed_area import UNSEEN, Levels
 from stseg.model.box_likelihood import box_likelihood
 from stseg.model.box_noise import FIRST, BoxNoise
 from stseg.model.people import Explanation
@@ -135,7 +136,7 @@ class Occupancy:
         cells = self._tables.shown(everywhere, near, self.views)
         weights = clutter_weights(np.array([self._clutter(i, view) for i, view in enumerate(seen)]))
         terms = self._terms(views, marked, cells, explanation, rates, weights.astype(np.float32))
-        return _Fused(cells, near, terms, Sums.of(terms, cells.near))
+        return _Fused(cells, near, terms, Sums.of(terms))
 
     def _prepared(
         self, i: int, view: Boxes | Singles, explanation: Explanation, near: Ints, noise: BoxNoise
@@ -174,24 +175,21 @@ class Occupancy:
         weights: Singles,
     ) -> FrameTerms:
         """Terms of the views at the cells that are fused one by one, and at the representatives of the others."""
-        number, blocks = len(views), marked[0].size
-        shown = np.zeros((number, blocks + 1), bool)
-        levels, share = np.empty((number, len(cells.cell)), np.int16), np.empty((number, len(cells.cell)), np.float32)
-        confidence, empty = np.ones((number, len(explanation.people)), np.float32), np.zeros(number, np.int16)
+        levels, share = np.full_like(cells.unseen, UNSEEN), np.ones(cells.unseen.shape, np.float32)
+        confidence = np.ones((len(views), len(explanation.people)), np.float32)
         for i, view in enumerate(views):
             if view is None:
                 continue
-            shown[i, :blocks] = marked[i].reshape(-1) if view.fit is None else True
-            self._fill_view(i, view, marked[i].reshape(-1), cells, rates[i], levels[i], share[i])
             if view.table is not None:
-                empty[i] = view.table.lowest
+                empty = view.table.lowest
             else:
-                empty[i] = level_of_match(0.0, rates[i].miss, rates[i].clutter)
+                empty = int(level_of_match(0.0, rates[i].miss, rates[i].clutter))
                 missing = np.where(view.shown.separate[:-1], 1.0, explanation.people.visibility[i])
                 confidence[i] = missing.astype(np.float32)
-        seen = self._tables.sets.seen & np.array([view is not None for view in views])
+            np.bitwise_or(cells.unseen[i], np.int16(empty), out=levels[i])  # all bits of UNSEEN are set
+            self._fill_view(i, view, marked[i].reshape(-1), cells, rates[i], levels[i], share[i])
         terms = np.stack([log_odds_terms(one) for one in rates])
-        return FrameTerms(cells.view_set, cells.block, shown, levels, share, seen, empty, terms, weights, confidence)
+        return FrameTerms(levels, share, cells.near, terms, weights, confidence)
 
     def _fill_view(
         self,
@@ -203,7 +201,7 @@ class Occupancy:
         levels: Levels,
         share: Singles,
     ) -> None:
-        """Fill levels and share (n,) of a view at the cells that are fused one by one."""
+        """Fill levels and share (n + k,), the empty level and 1 before, of a view at the cells fused one by one."""
         footprint, distance = self.sampling.footprint[i].reshape(-1, 4), self.sampling.distance[i].reshape(-1)
         if view.table is not None:
             people = view.people.reshape(-1)
@@ -214,11 +212,10 @@ class Occupancy:
             fill_levels(view.fit, self.heights, self.rig.grid.heights, cells, footprint, rates, levels)
 
     def _volume(self, fused: _Fused) -> SparseVolume:
-        cells, sets = fused.cells, self._tables.sets
-        held = np.append(np.ones(len(cells.cell), bool), sets.seen.any(1))
-        observations, priors = self.config.effective_observations, (self.prior, _NEAR_PRIOR)
-        total = fused.sums.total(held, observations, priors)
-        return SparseVolume(sets.of_cell, total[len(cells.cell) :], cells.cell, total[: len(cells.cell)])
+        cell, sets = fused.cells.cell, self._tables.sets
+        total = fused.sums.total(fused.cells.near, self.config.effective_observations, (self.prior, _NEAR_PRIOR))
+        empty = np.where(sets.seen.any(1), total[len(cell) :], np.float32(np.nan))
+        return SparseVolume(sets.of_cell, empty, cell, total[: len(cell)])
 
     def _learn(self, calibration: RateCalibration, fused: _Fused, explanation: Explanation) -> None:
         people, grid, cells, config = explanation.people, self.rig.grid, fused.cells, calibration.config
@@ -251,7 +248,7 @@ class Occupancy:
         occupied = np.empty((raster.shape[0] + 1, raster.shape[1] + 1), np.int32)
         fill_occupied(raster, occupied)
         return PixelAssignment(
-            raster, occupied, step, np.arange(height) // step, np.arange(width) // step, distance, separate
+            raster, occupied, step, _raster_lines(height, step), _raster_lines(width, step), distance, separate
         )
 
     def _pillars_of(self, i: int) -> tuple[Singles, PillarIndex]:
@@ -299,3 +296,9 @@ def _first_rates(kind: str, detection: DetectionConfig) -> ErrorRates:
         clutter_rate = (1 - detection.box_miss_rate) / float(np.exp(detection.box_log_ratio))
         return ErrorRates(detection.box_miss_rate, clutter_rate, clutter_rate)
     return ErrorRates(detection.pixel_miss_rate, detection.pixel_clutter_rate, detection.pixel_clutter_rate)
+
+
+@lru_cache(maxsize=64)
+def _raster_lines(lines: int, step: int) -> Ints:
+    """Raster row or column of each row or column of an image; not to be written to."""
+    return np.arange(lines) // step
