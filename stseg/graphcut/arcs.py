@@ -47,10 +47,12 @@ def _open_nodes(reduced: Reduction) -> tuple[Labels, Bytes, Lattice, Labels]:
 
 def _bridge_buffer(reduced: Reduction, middle: int, number: int) -> Bridges:
     """Buffer for the bridges: all arcs of the nodes within an edge in time of `middle`."""
+    if middle == 0:
+        return Bridges(number, *np.empty((3, 0), np.int32))
     lattice = reduced.lattice
     reach = lattice.frame + abs(lattice.forward).max(initial=0)
     first, last = np.searchsorted(reduced.left, (middle - reach, middle + reach))
-    size = int(last - first) * len(reduced.capacity) if middle > 0 else 0
+    size = int(last - first) * len(reduced.capacity)
     return Bridges(number, *(np.empty(size, np.int32) for _ in range(3)))
 
 

@@ -9,11 +9,12 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 from stseg.accelerate import kernel
-from stseg.arrays import Flags, Ints, Labels
+from stseg.arrays import Bytes, Flags, Ints, Labels
 from stseg.graphcut.energy import Energy
-from stseg.graphcut.lattice import Lattice, neighbour
+from stseg.graphcut.lattice import Lattice, neighbour, nodes_of
+from stseg.graphcut.sign_sets import GUARD
 
-_OUTSIDE, _FIRST = 1, 2
+_OUTSIDE = -1
 
 
 @dataclass(frozen=True)
@@ -55,36 +56,38 @@ class CellSubset:
 def subset(energy: Energy, inside: Flags) -> CellSubset:
     """Subgraph of the cells that are inside, bool (time, plane, y, x)."""
     cell = np.flatnonzero(inside)
-    index = np.full(inside.shape, _OUTSIDE, np.int32)
-    index.flat[cell] = np.arange(_FIRST, _FIRST + len(cell))
-    code = energy.spread(index)
+    nodes, number = nodes_of(cell, inside.shape), np.full(len(energy.signs.state), _OUTSIDE, np.int32)
+    number[nodes] = np.arange(len(cell))
     start, end, weight = (np.empty(len(energy.offsets) * len(cell), np.int64) for _ in range(3))
     border = np.zeros(len(cell), np.int64)
-    nodes = np.flatnonzero(code >= _FIRST)  # in the order of the cells
-    edges = _fill_edges(nodes, code, energy.lattice, energy.capacity, start, end, weight, border)
+    edges = _fill_edges(nodes, number, energy.signs.state, energy.lattice, energy.capacity, start, end, weight, border)
     return CellSubset(cell, start[:edges], end[:edges], weight[:edges], border)
 
 
 @kernel
 def _fill_edges(
-    nodes: Ints, code: Labels, lattice: Lattice, capacity: Labels, start: Ints, end: Ints, weight: Ints, border: Ints
-) -> int:
+    nodes: Ints, number: Labels, sign: Bytes, lattice: Lattice, capacity: Labels, start: Ints, end: Ints, weight: Ints,
+    border: Ints,
+) -> int:  # fmt: skip
     """Fill edges and border capacities; the number of edges.
 
     Parameters
     ----------
     nodes : int64 (n,)
         Nodes of the cells, ascending.
-    code : int32 (node,)
-        0 for guards, _OUTSIDE for other cells, _FIRST plus the index of a cell.
+    number : int32 (node,)
+        Index of each in `nodes`; _OUTSIDE for others.
+    sign : uint8 (node,)
+        Of `stseg.graphcut.sign_sets`, by which guards are known.
     """
     edges = 0
     for p in range(len(nodes)):
         for slot in range(2 * len(capacity)):
-            q = code[neighbour(nodes[p], slot, lattice)]
+            to = neighbour(nodes[p], slot, lattice)
+            q = number[to]
             if q == _OUTSIDE:
-                border[p] += capacity[slot // 2]
-            elif q >= _FIRST and slot % 2 == 0:
-                start[edges], end[edges], weight[edges] = p, q - _FIRST, capacity[slot // 2]
+                border[p] += capacity[slot // 2] if sign[to] != GUARD else 0
+            elif slot % 2 == 0:
+                start[edges], end[edges], weight[edges] = p, q, capacity[slot // 2]
                 edges += 1
     return edges

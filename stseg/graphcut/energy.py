@@ -17,11 +17,10 @@ import numpy as np
 from stseg.accelerate import kernel
 from stseg.arrays import AnyArray, Bytes, Flags, Ints, Labels
 from stseg.graphcut.lattice import Lattice, lattice_of, neighbour, spread
-from stseg.graphcut.sign_sets import SignSets, sign_sets
+from stseg.graphcut.sign_sets import GUARD, SignSets, sign_sets
 
 QUANTUM = 1e-3
 """One unit of capacity, nats."""
-_FREE, _OCCUPIED = 1, 2
 
 
 @dataclass(frozen=True)
@@ -65,9 +64,7 @@ class Energy:
     def of(self, labels: Labels | Flags) -> int:
         """Energy of a labelling (time, plane, y, x) relative to all 0; labels bool or 0 / 1."""
         occupied = labels != 0
-        state = self.spread(np.where(occupied, np.uint8(_OCCUPIED), np.uint8(_FREE)))
-        border = _border_capacity(np.flatnonzero(state == _OCCUPIED), state, self.lattice, self.capacity)
-        return border - int(self.unary[occupied].sum(dtype=np.int64))
+        return int(_energy(self.unary, occupied, spread(occupied), self.signs.state, self.lattice, self.capacity))
 
     def edge_values(self, volume: AnyArray) -> Iterator[tuple[AnyArray, AnyArray]]:
         """Values of a volume (time, plane, y, x) at both ends of all edges, offset by offset."""
@@ -93,13 +90,23 @@ class Energy:
 
 
 @kernel
-def _border_capacity(nodes: Ints, state: Bytes, lattice: Lattice, capacity: Labels) -> int:
-    """Sum of the capacities between the occupied nodes (k,) and free ones; `state` (node,) is 0 at guards."""
+def _energy(
+    unary: Labels, occupied: Flags, at_node: Flags, sign: Bytes, lattice: Lattice, capacity: Labels
+) -> int:  # fmt: skip
+    """Energy of the occupied cells (time, plane, y, x), at_node (node,); `sign` (node,) knows the guards."""
+    frames, planes, rows, columns = unary.shape
     total = 0
-    for node in nodes:
-        for slot in range(2 * len(capacity)):
-            if state[neighbour(node, slot, lattice)] == _FREE:
-                total += capacity[slot // 2]
+    for t in range(frames):
+        for p in range(planes):
+            for y in range(rows):
+                first = ((t * (planes + 1) + p + 1) * (rows + 1) + y + 1) * (columns + 1) + 1
+                for x in range(columns):
+                    if occupied[t, p, y, x]:
+                        total -= unary[t, p, y, x]
+                        for slot in range(2 * len(capacity)):
+                            to = neighbour(first + x, slot, lattice)
+                            if sign[to] != GUARD and not at_node[to]:
+                                total += capacity[slot // 2]
     return total
 
 

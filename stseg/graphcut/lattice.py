@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stseg.accelerate import part
+from stseg.accelerate import kernel, part
 from stseg.arrays import AnyArray, Ints, Labels
 
 
@@ -37,27 +37,34 @@ class Lattice(NamedTuple):
 
 def lattice_of(shape: tuple[int, ...], offsets: Ints, successor: Labels) -> Lattice:
     """Lattice of a grid of some shape (time, plane, y, x) with the neighbours of `stseg.graphcut.energy.Energy`."""
-    frames, planes, rows, columns = shape
+    _, planes, rows, columns = shape
     row, plane = columns + 1, (rows + 1) * (columns + 1)
-    frame = (planes + 1) * plane
     step = offsets[:, 1:] @ (plane, row, 1)
-    spatial = int((offsets[:, 0] == 0).sum())
-    time, y, x = np.nonzero(successor >= 0)
-    to_y, to_x = np.divmod(successor[time, y, x], columns)
-    step_in_time = frame + (to_y - y) * row + to_x - x
-    to_next, to_previous = (np.zeros((frames, 1, rows, columns), np.int32) for _ in range(2))
-    to_next[time, 0, y, x] = step_in_time
-    to_previous[time + 1, 0, to_y, to_x] = -step_in_time
-    forward, backward = (spread(np.broadcast_to(table, shape)) for table in (to_next, to_previous))
-    return Lattice(np.stack([step, -step], 1).ravel().astype(np.int32), forward, backward, 2 * spatial, frame)
+    steps, spatial = np.stack([step, -step], 1).ravel().astype(np.int32), 2 * int((offsets[:, 0] == 0).sum())
+    forward, backward = np.zeros((2, _number(shape)), np.int32)
+    _fill_steps(successor, planes, forward, backward)
+    return Lattice(steps, forward, backward, spatial, (planes + 1) * plane)
+
+
+@kernel
+def _fill_steps(successor: Labels, planes: int, forward: Labels, backward: Labels) -> None:
+    """Fill differences of node numbers in time (node,), 0 before, by successors (time - 1, y, x)."""
+    frames, rows, columns = successor.shape
+    row, plane = columns + 1, (rows + 1) * (columns + 1)
+    for t in range(frames):
+        for y in range(rows):
+            for x in range(columns):
+                to = successor[t, y, x]
+                if to >= 0:
+                    step = (planes + 1) * plane + (to // columns - y) * row + to % columns - x
+                    for p in range(planes):
+                        node = (t * (planes + 1) + p + 1) * plane + (y + 1) * row + x + 1
+                        forward[node], backward[node + step] = step, -step
 
 
 def spread(volume: AnyArray) -> AnyArray:
     """Values of cells (time, plane, y, x) at their nodes, 0 at guards; (node,)."""
-    frames, planes, rows, columns = volume.shape
-    # Guards behind the last frame, as far as the last cell's neighbours reach.
-    row, plane = columns + 1, (rows + 1) * (columns + 1)
-    nodes = np.zeros(frames * (planes + 1) * plane + plane + row + 1, volume.dtype)
+    nodes = np.zeros(_number(volume.shape), volume.dtype)
     cells(nodes, volume.shape)[:] = volume
     return nodes
 
@@ -69,14 +76,29 @@ def cells(nodes: AnyArray, shape: tuple[int, ...]) -> AnyArray:
     return nodes[: np.prod(guarded)].reshape(guarded)[:, 1:, 1:, 1:]
 
 
+def nodes_of(cell: Ints, shape: tuple[int, ...]) -> Ints:
+    """Nodes of cells (k,) of the flattened grid."""
+    _, planes, rows, columns = shape
+    t, p, y, x = np.unravel_index(cell, shape)
+    return np.asarray(((t * (planes + 1) + p + 1) * (rows + 1) + y + 1) * (columns + 1) + x + 1)
+
+
+def _number(shape: tuple[int, ...]) -> int:
+    """Number of nodes, with guards behind the last frame as far as the last cell's neighbours reach."""
+    frames, planes, rows, columns = shape
+    row, plane = columns + 1, (rows + 1) * (columns + 1)
+    return (frames * (planes + 1) + 1) * plane + row + 1
+
+
 @part
 def neighbour(node: int, slot: int, lattice: Lattice) -> int:
     """Node at the end of an arc; 0, a guard, for an arc in time without an end."""
-    to = node + int(lattice.steps[slot])
+    # Unsigned places: none is negative, which is not asked here.
+    to = node + int(lattice.steps[np.uint64(slot)])
     if slot < lattice.spatial:
         return to
     if slot & 1:
-        step_in_time = int(lattice.backward[to])
+        step_in_time = int(lattice.backward[np.uint64(to)])
         return to + step_in_time if step_in_time != 0 else 0
-    step_in_time = int(lattice.forward[node])
+    step_in_time = int(lattice.forward[np.uint64(node)])
     return to + step_in_time if step_in_time != 0 else 0

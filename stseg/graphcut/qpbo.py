@@ -106,6 +106,8 @@ def _roof_dual(energy: QuadraticEnergy, cut: Callable[..., Flags]) -> tuple[Flag
 
 def _components(energy: QuadraticEnergy, open_: Flags) -> list[Ints]:
     """Connected components of the open nodes."""
+    if not open_.any():
+        return []
     inner = open_[energy.start] & open_[energy.end] & (energy.weight != 0)
     size = len(open_)
     graph = csr_array((np.ones(int(inner.sum()), bool), (energy.start[inner], energy.end[inner])), shape=(size, size))

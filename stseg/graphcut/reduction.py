@@ -86,11 +86,11 @@ def _decide_nodes(
             top -= 1
             node = stack[top]
             for slot in range(len(capacity)):
-                to = neighbour(node, slot, lattice)
+                to = np.uint64(neighbour(node, slot, lattice))
                 if state[to] == OPEN:
                     undecided[to] -= capacity[slot]
                     gain[to] += capacity[slot] if state[node] == OCCUPIED else -capacity[slot]
-                    if _is_decided(to, gain, undecided):
+                    if _is_decided(int(to), gain, undecided):
                         state[to] = OCCUPIED if gain[to] > 0 else EMPTY
                         stack[top] = to
                         top += 1
@@ -107,7 +107,7 @@ def _sum_neighbours(
 ) -> None:  # fmt: skip
     undecided[node] = 0
     for slot in range(len(capacity)):
-        there = state[neighbour(node, slot, lattice)]
+        there = state[np.uint64(neighbour(node, slot, lattice))]
         if there == OPEN:
             undecided[node] += capacity[slot]
         elif there == OCCUPIED:

@@ -13,7 +13,7 @@ import numpy as np
 
 from stseg.accelerate import kernel, part
 from stseg.arrays import Bytes, Flags, Labels
-from stseg.graphcut.lattice import Lattice, cells, neighbour
+from stseg.graphcut.lattice import Lattice, neighbour
 
 GUARD, OPEN, OCCUPIED, EMPTY = 0, 1, 2, 3
 """States of a node: no cell, undecided, label 1, label 0."""
@@ -39,16 +39,15 @@ def sign_sets(unary: Labels, lattice: Lattice, capacity: Labels, present: Flags 
     """The greatest sets of an energy; unary, capacity and present as of `stseg.graphcut.energy.Energy`."""
     arcs, shape, nodes = np.repeat(capacity, 2), unary.shape, len(lattice.forward)
     state, margin = np.zeros(nodes, np.uint8), np.zeros(nodes, np.int32)
-    weak = _fill_sets(unary, int(arcs.sum()), cells(state, shape), cells(margin, shape))
-    if present is not None:
-        cells(state, shape)[..., ~present] = GUARD
+    present = np.ones(shape[2:], bool) if present is None else present
+    weak = _fill_sets(unary, present, int(arcs.sum()), state, margin)
     _decide_sets(margin, state, lattice, arcs, np.empty(nodes, np.int32))
     return SignSets(state, weak)
 
 
 @kernel
-def _fill_sets(unary: Labels, most: int, state: Bytes, margin: Labels) -> int:
-    """Fill the sets of all cells by sign, and their unary magnitudes, (time, plane, y, x); number of weak ones.
+def _fill_sets(unary: Labels, present: Flags, most: int, state: Bytes, margin: Labels) -> int:
+    """Fill the sets of all cells by sign, and their unary magnitudes, (node,); number of weak ones.
 
     Of several minima the smallest source set is wanted, so a tie decides for label 0 only.
     """
@@ -57,11 +56,12 @@ def _fill_sets(unary: Labels, most: int, state: Bytes, margin: Labels) -> int:
     for t in range(frames):
         for p in range(planes):
             for y in range(rows):
+                first = ((t * (planes + 1) + p + 1) * (rows + 1) + y + 1) * (columns + 1) + 1
+                gain, own, left = unary[t, p, y], state[first : first + columns], margin[first : first + columns]
                 for x in range(columns):
-                    gain = unary[t, p, y, x]
-                    state[t, p, y, x] = OCCUPIED if gain > 0 else EMPTY
-                    margin[t, p, y, x] = gain - 1 if gain > 0 else -gain
-                    weak += 1 if -most < gain <= 0 else 0
+                    own[x] = (OCCUPIED if gain[x] > 0 else EMPTY) if present[y, x] else GUARD
+                    left[x] = gain[x] - 1 if gain[x] > 0 else -gain[x]
+                    weak += 1 if -most < gain[x] <= 0 else 0
     return weak
 
 
@@ -74,12 +74,12 @@ def _decide_sets(margin: Labels, state: Bytes, lattice: Lattice, capacity: Label
     for node in range(len(state)):
         if state[node] == OCCUPIED:
             for slot in range(len(capacity)):
-                to = neighbour(node, slot, lattice)
+                to = np.uint64(neighbour(node, slot, lattice))
                 if state[to] == OPEN or state[to] == EMPTY:
                     margin[node] -= capacity[slot]
                     margin[to] -= capacity[slot]
                     if state[to] == EMPTY and margin[to] < 0:
-                        _remove_from_set(to, margin, state, lattice, capacity, stack)
+                        _remove_from_set(int(to), margin, state, lattice, capacity, stack)
     for node in range(len(state)):
         if state[node] == OCCUPIED and margin[node] < 0:
             _remove_from_set(node, margin, state, lattice, capacity, stack)
@@ -98,7 +98,7 @@ def _remove_from_set(
         top -= 1
         taken = stack[top]
         for slot in range(len(capacity)):
-            to = neighbour(taken, slot, lattice)
+            to = np.uint64(neighbour(taken, slot, lattice))
             if state[to] == side:
                 margin[to] -= capacity[slot]
                 if margin[to] < 0:

@@ -90,8 +90,8 @@ def fill_measures(
     ground: Floats,
     heights: Floats,
     found: Measures,
-) -> None:
-    """Fill the measures of blobs, 0 everywhere before.
+) -> bool:
+    """Fill the measures of blobs, 0 everywhere before; whether any two blobs are beside each other.
 
     Parameters
     ----------
@@ -105,11 +105,12 @@ def fill_measures(
         Metres.
     """
     weight = np.zeros(cells.shape)
-    total, occupied = np.zeros(len(track)), np.zeros(len(track))
+    total, occupied, meet = np.zeros(len(track)), np.zeros(len(track)), False
     for y in range(cells.shape[0]):
         for x in range(cells.shape[1]):
             if cells[y, x] > 0:
                 b = cells[y, x] - 1
+                meet = meet or _is_beside_another(cells, y, x)
                 weight[y, x] = _FAINT
                 for z in range(len(heights)):
                     if label[z, y, x] == track[b]:
@@ -135,3 +136,15 @@ def fill_measures(
                 found.covariance[b, 0, 1] += share * dx * dy
                 found.covariance[b, 1, 0] += share * dx * dy
                 found.covariance[b, 1, 1] += share * dy * dy
+    return meet
+
+
+@part
+def _is_beside_another(cells: Labels, y: int, x: int) -> bool:
+    """Whether one of the four neighbours before a blob's cell, of all eight, is of another blob."""
+    for down, right in ((-1, -1), (-1, 0), (-1, 1), (0, -1)):
+        if y + down >= 0 and 0 <= x + right < cells.shape[1]:
+            other = cells[y + down, x + right]
+            if other > 0 and other != cells[y, x]:
+                return True
+    return False

@@ -59,6 +59,8 @@ def find_blobs(
 
 def _in_ground_order(taken: Flags, place: Ints) -> tuple[Labels, int]:
     """Components of what is taken on a sheet (row, column), from 1 in the order of their first ground cells."""
+    if not taken.any():
+        return np.zeros(taken.shape, np.int32), 0
     found, number = connected(taken, _EIGHT)
     component: Labels = np.asarray(found, np.int32)
     if number < 2:
@@ -102,19 +104,17 @@ def _joined(blobs: Blobs, person: Ints, ground: Floats, track: Ints, grid: Grid)
 def _measured(cells: Labels, track: Ints, person: Ints, label: Labels, log_odds: Singles, patches: Patches) -> Blobs:
     n, grid = len(track), patches.grid
     found = Measures(np.zeros((n, 2)), np.zeros((n, 2, 2)), np.zeros(n), np.zeros(n), np.zeros(n))
-    fill_measures(cells, track, label, log_odds, patches.ground, grid.heights, found)
+    meet = fill_measures(cells, track, label, log_odds, patches.ground, grid.heights, found)
     covariance = found.covariance + np.eye(2) * grid.cell**2 / 12
     extent = found.cells * grid.cell**2
     return Blobs(
         patches.on_ground(cells), track, person, found.ground, covariance, extent, found.height, found.mass,
-        _touches(cells, n),
+        _touches(cells, n) if meet else np.zeros((0, 2), np.int64),
     )  # fmt: skip
 
 
 def _touches(cells: Labels, number: int) -> Ints:
     """Pairs of blobs, from 0, in one connected component of the ground, int64 (k, 2)."""
-    if number < 2:
-        return np.zeros((0, 2), np.int64)
     taken = cells > 0
     component = connected(taken, _EIGHT)[0][taken]
     members = np.unique(component.astype(np.int64) * (number + 1) + cells[taken])

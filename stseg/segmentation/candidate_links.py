@@ -23,6 +23,8 @@ _ABSENCE = 4.0
 """Cost of a frame without a candidate inside a path, nats per second."""
 _GATE = 13.8
 """Squared Mahalanobis distance of a link that one step in a thousand exceeds."""
+_USUAL = 32
+"""Links of a candidate for which there is room at first."""
 _OUT_OF_SHAPE = -4.0
 """Least log-ratio of two heights, nats: people stoop and sit."""
 Links = tuple[Ints, Ints, Floats]
@@ -97,10 +99,13 @@ class LinkModel:
         """Pairs within a patience and the gate: a window's pairs would take more memory than its volume."""
         span = max(1, round(self.patience * self.frame_rate))
         noise, speed = 2 * self.motion.position_noise**2, self.motion.speed_spread / self.frame_rate
-        number = _fill_near(found.frame, found.ground, found.covariance, span, noise, speed, np.empty((0, 2), np.int64))
-        pair = np.empty((number, 2), np.int64)
-        _fill_near(found.frame, found.ground, found.covariance, span, noise, speed, pair)
-        start, end = pair.T
+        number = _USUAL * len(found)
+        while True:
+            pair = np.empty((number, 2), np.int64)
+            number = _fill_near(found.frame, found.ground, found.covariance, span, noise, speed, pair)
+            if number <= len(pair):
+                break
+        start, end = pair[:number].T
         return start, end
 
     def _height_ratio(self, found: WindowCandidates, start: Ints, end: Ints) -> Floats:

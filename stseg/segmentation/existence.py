@@ -19,7 +19,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -62,6 +64,16 @@ class Existence:
     gap: float
 
 
+class _Solution(NamedTuple):
+    """A decision, the links on its paths, the bound of `Existence`, and its energy, nats."""
+
+    real: Flags
+    successor: Ints
+    links: Links
+    gap: float
+    energy: float
+
+
 @dataclass(frozen=True)
 class ExistenceModel:
     """Terms of the energy for one scene.
@@ -87,13 +99,16 @@ class ExistenceModel:
             return Existence(np.zeros(0, bool), np.zeros(0, np.int64), np.zeros(0), 0.0)
         gain, birth, death = self._gains(found)
         links, exclusions = self.links.between(found, birth, death), self._exclusions(found)
-        best, energy = _solve(gain, links, exclusions, np.zeros(n, bool), cut)
+        best = _solve(gain, links, exclusions, np.zeros(n, bool), cut)
         for _ in range(_ROUNDS):
-            other, its_energy = _solve(gain, links, exclusions, _excluded(best.real, exclusions), cut)
-            if its_energy >= energy:
+            excluded = _excluded(best.real, exclusions)
+            if not excluded.any():
                 break
-            best, energy = other, its_energy
-        return best
+            other = _solve(gain, links, exclusions, excluded, cut)
+            if other.energy >= best.energy:
+                break
+            best = other
+        return Existence(best.real, best.successor, path_marginals(gain, *best.links), best.gap)
 
     def _gains(self, found: WindowCandidates) -> tuple[Floats, Floats, Floats]:
         """g, and in it the costs of birth and death, nats, float64 (n,) each."""
@@ -106,17 +121,21 @@ class ExistenceModel:
     def _exclusions(self, found: WindowCandidates) -> Exclusions:
         """Pairs of one frame that share their evidence; two people of the detector do not."""
         ends = np.searchsorted(found.frame, np.arange(found.frame[-1] + 2))
-        pairs = [first + np.stack(np.triu_indices(stop - first, 1)) for first, stop in pairwise(ends.tolist())]
+        pairs = [first + _pairs(stop - first) for first, stop in pairwise(ends.tolist())]
         one, other = np.concatenate(pairs, axis=1)
         near = np.hypot(*(found.ground[one] - found.ground[other]).T) < self.reach
         kept = near & ~((found.track[one] > 0) & (found.track[other] > 0))
         return one[kept].astype(np.int64), other[kept].astype(np.int64)
 
 
-def _solve(
-    gain: Floats, links: Links, exclusions: Exclusions, barred: Flags, cut: Callable[..., Flags]
-) -> tuple[Existence, float]:
-    """The candidates of least energy on the best paths that avoid those that are barred; and their energy, nats."""
+@lru_cache(maxsize=256)
+def _pairs(number: int) -> Ints:
+    """All pairs of some candidates, int64 (2, pair); not to be written to."""
+    return np.stack(np.triu_indices(number, 1))
+
+
+def _solve(gain: Floats, links: Links, exclusions: Exclusions, barred: Flags, cut: Callable[..., Flags]) -> _Solution:
+    """The candidates of least energy on the best paths that avoid those that are barred."""
     start, end, bonus = links
     allowed = ~(barred[start] | barred[end])
     start, end, bonus = start[allowed], end[allowed], bonus[allowed]
@@ -133,7 +152,7 @@ def _solve(
     least: QuadraticMinimum = minimise(energy, cut)
     real = least.labels
     value = -gain[real].sum() - bonus[real[start] & real[end]].sum()
-    return Existence(real, successor, path_marginals(gain, start, end, bonus), least.gap * QUANTUM), float(value)
+    return _Solution(real, successor, (start, end, bonus), least.gap * QUANTUM, float(value))
 
 
 def _excluded(real: Flags, exclusions: Exclusions) -> Flags:

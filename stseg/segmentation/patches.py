@@ -121,12 +121,10 @@ class Patches:
 
     def on_ground(self, values: AnyArray) -> AnyArray:
         """Values on the sheet (..., row, column) at their ground cells (..., y, x), 0 outside the patches."""
-        ground = np.zeros((*values.shape[:-2], *self.grid.shape[1:]), values.dtype)
-        inside = self.place >= 0
-        ground.reshape(*values.shape[:-2], ground.shape[-2] * ground.shape[-1])[..., self.place[inside]] = values[
-            ..., inside
-        ]
-        return ground
+        on_sheet = values.reshape(*values.shape[:-2], self.place.size)[..., self.on_sheet_at]
+        outside = self.on_sheet_at < 0
+        on_sheet[..., outside] = 0
+        return on_sheet.reshape(*values.shape[:-2], *self.grid.shape[1:])
 
     def log_odds(self, volume: SparseVolume) -> Singles:
         """A frame's log-odds on the sheet, float32 (plane, row, column), nats; nan where no view sees the cell."""
@@ -211,7 +209,10 @@ def _fill_sheet(
     for z in range(planes):
         for k in range(len(place)):
             sheet[z, k] = empty[of_cell[z * ground + place[k]]] if place[k] >= 0 else between
+    z = 0
     for c in range(len(cell)):
-        k = index[cell[c] % ground]
+        if not 0 <= cell[c] - z * ground < ground:  # seldom: cells come plane by plane
+            z = cell[c] // ground
+        k = index[cell[c] - z * ground]
         if k >= 0:
-            sheet[cell[c] // ground, k] = value[c]
+            sheet[z, k] = value[c]

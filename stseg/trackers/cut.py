@@ -186,8 +186,8 @@ class CutTracker:
         rows = []
         for k, cells in zip(kept, named, strict=True):
             identity = np.append(0, decision.identity[k])
-            plane, down, across = np.nonzero(label[k])
-            place = patches.place[down, across]
+            plane, sheet = np.divmod(np.flatnonzero(label[k]), patches.place.size)
+            place = patches.place.reshape(-1)[sheet]
             cells.reshape(len(cells), -1)[plane, place] = identity[blobs[k].cells.reshape(-1)[place]]
             rows.append(self._rows(held[k].fused, blobs[k], decision.identity[k]))
         frames = [held[k].fused for k in kept]

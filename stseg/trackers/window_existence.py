@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import count
 
 import numpy as np
@@ -36,6 +37,11 @@ class TrackedFrame:
 
     fused: FusedFrame
     tracks: Ints
+
+    @cached_property
+    def candidates(self) -> People:
+        """Its people, then its ghosts: several windows ask for them."""
+        return _joined(self.fused.people, self.fused.ghosts)
 
     def detections(self) -> DetectionHistory:
         """Its detections."""
@@ -82,7 +88,7 @@ class WindowExistence:
         """One frame with the candidates that have a track as people, the others as ghosts; evidence of the window."""
         fused, number = one.fused, len(one.tracks)
         real = tracks > 0
-        every = replace(_joined(fused.people, fused.ghosts), evidence=log_odds)
+        every = replace(one.candidates, evidence=log_odds)
         people, ghosts = _at(every, np.flatnonzero(real)), _at(every, np.flatnonzero(~real))
         if not real[:number].all() or real[number:].any():
             added = _at(every, number + np.flatnonzero(real[number:]))
@@ -105,7 +111,7 @@ class WindowExistence:
 
 
 def _candidates(frames: Sequence[TrackedFrame]) -> WindowCandidates:
-    every = [_joined(one.fused.people, one.fused.ghosts) for one in frames]
+    every = [one.candidates for one in frames]
     tracks = [np.append(one.tracks, np.zeros(len(one.fused.ghosts), np.int64)) for one in frames]
     frame = np.repeat(np.arange(len(frames)), [len(one) for one in every])
 

@@ -8,7 +8,6 @@ just crossed.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -44,8 +43,7 @@ class Measurement(NamedTuple):
     variance: float
 
 
-@dataclass(frozen=True)
-class TrackState:
+class TrackState(NamedTuple):
     """State of one track at its last detection.
 
     Attributes
@@ -75,8 +73,7 @@ class TrackState:
     def predicted(self, seconds: float, model: MotionConfig) -> TrackState:
         """The state some seconds after the last detection."""
         motion = transition(seconds)
-        return replace(
-            self,
+        return self._replace(
             state=motion @ self.state,
             covariance=motion @ self.covariance @ motion.T + process_noise(seconds, model),
             height_variance=self.height_variance + _GROWTH**2 * seconds,
@@ -177,7 +174,7 @@ class TrackFilter:
             )
             if before.track == 0:
                 self.issued += 1
-                detected[-1] = replace(detected[-1], track=self.issued)
+                detected[-1] = detected[-1]._replace(track=self.issued)
             names[j] = detected[-1].track
         missed = self._undetected(frame, people)
         standing = [track.state[:2] for track in detected] + [predicted[k].state[:2] for k in missed]
@@ -214,7 +211,7 @@ class TrackFilter:
     def _predicted(self, track: TrackState, frame: int) -> TrackState:
         seconds = (frame - track.last_seen) / self.frame_rate
         undetected = seconds - 1 / self.frame_rate
-        return replace(track.predicted(seconds, self.motion), odds=track.odds - _DECAY * undetected)
+        return track.predicted(seconds, self.motion)._replace(odds=track.odds - _DECAY * undetected)
 
     def _tentative(self, frame: int, ghosts: People, standing: Floats) -> list[TrackState]:
         """Tentative tracks of rejected candidates: evidence adds up if the next frame shows them again.
@@ -223,7 +220,7 @@ class TrackFilter:
         """
         near = distances(ghosts.ground, standing).min(1, initial=np.inf) < _EXCLUSION
         return [
-            replace(self._birth(frame, ghosts, j), odds=float(ghosts.evidence[j]) - _REPEATED)
+            self._birth(frame, ghosts, j)._replace(odds=float(ghosts.evidence[j]) - _REPEATED)
             for j in np.flatnonzero(~near & (ghosts.evidence > _LEAST_EVIDENCE)).tolist()
         ]
 
