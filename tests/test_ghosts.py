@@ -161,8 +161,8 @@ def test_sums_inside_are_those_of_the_outlines(seed: int, step: int) -> None:
         chance.uniform(0.8, 1.3, many),
     )
     shape = (-(-96 // step), -(-128 // step))
-    values, owner = chance.normal(size=shape).astype(np.float32), chance.integers(-1, 3, shape)
-    sums, whole = sums_inside(table, ground, heights, widths, step, values, owner)
+    values, owner = chance.normal(size=shape).astype(np.float32), chance.integers(-1, 3, shape, np.int16)
+    sums, whole = sums_inside(table, ground, heights, widths, step, values, owner, np.arange(2))
     for person in range(2):
         first, spans, area = outlines(table, ground[person], heights[person], step, shape, widths[person])
         shown = np.where((owner < 0) | (owner == person), values, 0).astype(float)
@@ -335,8 +335,8 @@ def test_additions_are_to_the_bit_the_sets_with_one_more(seed: int) -> None:
 def test_evidence_of_all_views_is_assigned_as_that_of_each(seed: int) -> None:
     frame, members = scaled(random_frame(seed, 6)), np.array([5, 1, 3])
     problem = frame.problem()
-    boxes, pixels = np.empty((2, 4), np.int64), np.empty((2, frame.pixels.raster[0].size), np.int64)
-    fill_assignments(members, problem, boxes, pixels)
+    boxes, pixels = np.empty((2, 4), np.int64), np.empty((2, frame.pixels.raster[0].size), np.int16)
+    fill_assignments(members, problem, np.array([frame.pixels.raster.shape[1:]] * 2), boxes, pixels.reshape(-1))
     for view in range(2):
         own, parts = np.full(4, -1), np.empty(3)
         box_score(view, members, 3, frame.boxes, TERMS, own, parts)

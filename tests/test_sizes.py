@@ -46,7 +46,9 @@ def at(ground: Floats) -> RefinedPlaces:
 
 def open_to_one(*views: Flags) -> Assignment:
     """Of a single person, the pixels that are open to them in each view."""
-    return Assignment(np.full((len(views), 1), -1), [np.where(pixels, -1, 1) for pixels in views])
+    return Assignment.of_all(
+        np.full((len(views), 1), -1), [np.where(pixels, -1, 1).astype(np.int16) for pixels in views]
+    )
 
 
 def everything(view: PixelView) -> Assignment:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stseg.arrays import Ints
+from stseg.arrays import Ints, Shorts
 
 WORST = -8.0
 """Least log-likelihood of a box in a person's posterior, nats: beyond it the assignment itself is in doubt."""
@@ -21,16 +21,22 @@ class Assignment:
     ----------
     box : int64 (view, person)
         The box of each; -1 for none, and in views with pixels.
-    pixels : sequence of int64 (v, u), one a view
-        The person whom each raster pixel is assigned to, -1 for none: those are open to everybody. Not read for views
-        with boxes.
+    pixels : sequence of int16 (v, u), one a view
+        The number of the person whom each raster pixel is assigned to, -1 for none: those are open to everybody. Not
+        read for views with boxes.
+    number : int64 (person,)
+        The number of each, by which pixels name them; others have numbers, too.
     """
 
     box: Ints
-    pixels: Sequence[Ints]
+    pixels: Sequence[Shorts]
+    number: Ints
+
+    @classmethod
+    def of_all(cls, box: Ints, pixels: Sequence[Shorts]) -> Assignment:
+        """What is assigned to people who are numbered as they stand."""
+        return cls(box, pixels, np.arange(box.shape[1]))
 
     def of(self, chosen: Ints) -> Assignment:
-        """What is assigned to some of the people, int64 (k,), who count from 0; others are all person k."""
-        number = np.full(self.box.shape[1] + 1, len(chosen))
-        number[chosen], number[-1] = np.arange(len(chosen)), -1
-        return Assignment(self.box[:, chosen], [number[person] for person in self.pixels])
+        """What is assigned to some of the people, int64 (k,)."""
+        return Assignment(self.box[:, chosen], self.pixels, self.number[chosen])

@@ -24,7 +24,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stseg.arrays import Floats, Ints, Singles
+from stseg.arrays import Floats, Ints, Shorts, Singles
 from stseg.config import BodyConfig
 from stseg.detection.assignment import Assignment
 from stseg.detection.refine import RefinedPlaces
@@ -67,9 +67,9 @@ def measure(
     if not measured or not len(width):
         return replace(found, height=places.height, height_variance=places.height_variance)
     each, all_steps = (len(width), 1), (1, _STEPS)
-    score = _score(places.ground, np.tile(_HEIGHTS, each), np.tile(width[:, None], all_steps), measured)
+    score = _score(places.ground, np.tile(_HEIGHTS, each), np.tile(width[:, None], all_steps), measured, own.number)
     height, height_variance = _posterior(_HEIGHTS, score, body.height_mean, body.height_spread)
-    score = _score(places.ground, np.tile(height[:, None], all_steps), np.tile(_WIDTHS, each), measured)
+    score = _score(places.ground, np.tile(height[:, None], all_steps), np.tile(_WIDTHS, each), measured, own.number)
     return Sizes(
         height, height_variance, *_posterior(_WIDTHS, score, body.width_of(height[:, None]), body.width_spread)
     )
@@ -80,7 +80,7 @@ class _PixelLabels(NamedTuple):
 
     view: PixelView
     values: Singles
-    owner: Ints
+    owner: Shorts
 
 
 def _posterior(lattice: Floats, score: Floats, mean: Floats | float, spread: float) -> tuple[Floats, Floats]:
@@ -98,11 +98,11 @@ def _posterior(lattice: Floats, score: Floats, mean: Floats | float, spread: flo
     return np.where(seen, size, np.ravel(mean)), np.where(seen, variance, spread**2)
 
 
-def _score(ground: Floats, heights: Floats, widths: Floats, measured: Sequence[_PixelLabels]) -> Floats:
+def _score(ground: Floats, heights: Floats, widths: Floats, measured: Sequence[_PixelLabels], number: Ints) -> Floats:
     """Log-likelihood in all views of people's pillars at their places (person, 2), nats, float64 (person, pillar)."""
     score, everywhere = np.zeros(heights.shape), np.repeat(ground[:, None], _STEPS, 1)
     pillars = measured[0].view.tried(everywhere, heights, widths)
     for view, values, owner in measured:
-        sums, area = view.open_sums(values, owner, pillars)
+        sums, area = view.open_sums(values, owner, number, pillars)
         score += sums / np.maximum(area.mean(1, keepdims=True), 1.0)
     return score

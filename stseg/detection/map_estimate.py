@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from stseg.accelerate import kernel
-from stseg.arrays import Flags, Floats, Ints, Singles
+from stseg.arrays import Flags, Floats, Ints, Shorts, Singles
 from stseg.detection.additions import fill_additions
 from stseg.detection.assignment import Assignment
 from stseg.detection.blob_scale import blob_scales
@@ -247,25 +247,27 @@ class MapEstimate:
         return [boxes for boxes, _ in self._assignments]
 
     @cached_property
-    def pixel_assignment(self) -> list[Ints]:
-        """For each view the member whom each raster pixel is assigned to, int64 (v, u); -1 for none."""
+    def pixel_assignment(self) -> list[Shorts]:
+        """For each view the member whom each raster pixel is assigned to, int16 (v, u); -1 for none."""
         return [pixels for _, pixels in self._assignments]
 
     @cached_property
-    def _assignments(self) -> list[tuple[Ints, Ints]]:
+    def _assignments(self) -> list[tuple[Ints, Shorts]]:
         """Boxes and pixels of each view."""
-        problem, raster = self.problem, self.problem.pixels.raster
-        of_boxes = np.empty(problem.boxes.match.shape[::2], np.int64)
-        of_pixels = np.empty((len(raster), raster[:1].size), np.int64)
-        fill_assignments(self.members, problem, of_boxes, of_pixels)
-        assigned, box_rows, pixel_rows = [], iter(of_boxes), iter(of_pixels.reshape(raster.shape))
-        for view, observation in zip(self.evidence.views, self.evidence.observations, strict=True):
+        views, observations = self.evidence.views, self.evidence.observations
+        shapes = np.array([view.shape for view in views if isinstance(view, PixelView)], np.int64).reshape(-1, 2)
+        of_boxes = np.empty(self.problem.boxes.match.shape[::2], np.int64)
+        owners = np.empty(int(shapes.prod(1).sum()), np.int16)
+        fill_assignments(self.members, self.problem, shapes, of_boxes, owners)
+        assigned, box_rows, start = [], iter(of_boxes), 0
+        for view, observation in zip(views, observations, strict=True):
             boxes = np.full(len(observation.edges) if observation else 0, -1, np.int64)
             if isinstance(view, BoxView):
-                pixels = np.full(view.shape, -1, np.int64)
+                pixels = np.full(view.shape, -1, np.int16)
                 boxes[:] = next(box_rows)[: len(boxes)]
             else:
-                pixels = np.ascontiguousarray(next(pixel_rows)[: view.shape[0], : view.shape[1]])
+                stop = start + view.shape[0] * view.shape[1]
+                pixels, start = owners[start:stop].reshape(view.shape), stop
             assigned.append((boxes, pixels))
         return assigned
 
@@ -284,7 +286,7 @@ class MapEstimate:
     def moved(self) -> Candidates:
         """The members at the means of their places, each at the size that it has."""
         evidence, pool = self.evidence, self.pool.at(self.members)
-        own = Assignment(self._box_of_each(), self.pixel_assignment)
+        own = Assignment.of_all(self._box_of_each(), self.pixel_assignment)
         places = refine_places(pool, evidence.views, evidence.observations, own, evidence.prior, self.track_index)
         return Candidates(places.ground, pool.height, pool.width)
 
@@ -294,7 +296,7 @@ class MapEstimate:
         Their sizes are those of their tracks where all views show pixels: a size errs alike in frames that follow each
         other, so few of them need to measure it. Boxes show heights and places together.
         """
-        evidence, own = self.evidence, Assignment(self._box_of_each(), self.pixel_assignment)
+        evidence, own = self.evidence, Assignment.of_all(self._box_of_each(), self.pixel_assignment)
         if any(isinstance(view, BoxView) for view in evidence.views):
             return self._refined(start, own, self.track_index)
         places = refine_places(start, evidence.views, evidence.observations, own, evidence.prior, self.track_index)
@@ -309,8 +311,7 @@ class MapEstimate:
 
     def some_refined(self, chosen: Ints) -> RefinedPeople:
         """Some of the members, int64 (k,) counted from 0, at the means of their posteriors."""
-        own = Assignment(self._box_of_each(), self.pixel_assignment)
-        own = own if len(chosen) == len(self.members) else own.of(chosen)
+        own = Assignment.of_all(self._box_of_each(), self.pixel_assignment).of(chosen)
         return self._refined(self.pool.at(self.members[chosen]), own, self.track_index[chosen])
 
     def _refined(self, start: Candidates, own: Assignment, track_index: Ints) -> RefinedPeople:

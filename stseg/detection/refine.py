@@ -100,8 +100,7 @@ def _known_scores(
     names = [place.tobytes() + box.tobytes() for place, box in zip(pool.ground, own.box.T, strict=True)]
     fresh = np.array([j for j, name in enumerate(names) if name not in known], int)
     if len(fresh):
-        boxes = Assignment(own.box[:, fresh], own.pixels)
-        found = _scores(pool.at(fresh), views, observations, boxes, prior, tried)
+        found = _scores(pool.at(fresh), views, observations, own.of(fresh), prior, tried)
         known.update(zip((names[j] for j in fresh), found, strict=True))
     return np.stack([known[name] for name in names])
 
@@ -119,7 +118,7 @@ def _scores(
     pillars = _pillars(views[0], pool.ground[:, None] + _PATCH, tried, pool.width)
     for k, (view, observation) in enumerate(zip(views, observations, strict=True)):
         if observation is not None and len(pool):
-            score += _patch_score(view, observation, own.box[k], own.pixels[k], pillars).reshape(score.shape)
+            score += _patch_score(view, observation, own, k, pillars).reshape(score.shape)
     return score
 
 
@@ -138,7 +137,7 @@ def refine_places(
     pillars = views[0].tried(patch, tall, wide)
     for k, (view, observation) in enumerate(zip(views, observations, strict=True)):
         if isinstance(view, PixelView) and observation is not None and len(pool):
-            sums, area = view.open_sums(observation.raster, own.pixels[k], pillars)
+            sums, area = view.open_sums(observation.raster, own.pixels[k], own.number, pillars)
             score += np.divide(sums, area, out=np.zeros_like(sums), where=area > 0)
     met = np.flatnonzero(track_index >= 0)
     score[met] += prior.predicted.place_log_density(track_index[met], patch[met])
@@ -171,19 +170,19 @@ def _pillars(view: View, patch: Floats, tried: Floats, width: Floats) -> TriedPi
     return view.tried(everywhere, tall, np.repeat(width[:, None], tall.shape[1], 1))
 
 
-def _patch_score(view: View, observation: ViewObservation, box: Ints, owner: Ints, pillars: TriedPillars) -> Floats:
-    """Log-likelihood of pillars in one view, nats, float64 (person, pillar)."""
+def _patch_score(view: View, observation: ViewObservation, own: Assignment, k: int, pillars: TriedPillars) -> Floats:
+    """Log-likelihood of pillars in view k, nats, float64 (person, pillar)."""
     if isinstance(view, PixelView):
-        sums, area = view.open_sums(observation.raster, owner, pillars)
+        sums, area = view.open_sums(observation.raster, own.pixels[k], own.number, pillars)
         return np.divide(sums, area, out=np.zeros_like(sums), where=area > 0)
     score = np.zeros_like(pillars.height)
     columns, rows = map(float, view.camera.size)
-    shown = np.flatnonzero(box >= 0)
+    shown = np.flatnonzero(own.box[k] >= 0)
     bodies = view.table.boxes_of(pillars.ground[shown].reshape(-1, 2), pillars.height[shown].reshape(-1))
-    match, own = np.empty((len(shown), score.shape[1])), box[shown]
+    match, box = np.empty((len(shown), score.shape[1])), own.box[k, shown]
     fill_own_match(
-        bodies.reshape(*match.shape, 4), observation.edges[own], observation.tolerance[own],
-        observation.belief[own], columns, rows, match,
+        bodies.reshape(*match.shape, 4), observation.edges[box], observation.tolerance[box],
+        observation.belief[box], columns, rows, match,
     )  # fmt: skip
     score[shown] = np.maximum(match, WORST)
     return score

@@ -106,9 +106,9 @@ def _by_pixels(people: Candidates, j: int, right: Floats, view: PixelView, obser
     count = len(_SHIFTS)
     places = people.ground[j] + _SHIFTS[:, None] * right
     heights, widths = np.full(count, people.height[j]), np.full(count, people.width[j])
-    unassigned = np.full(view.shape, -1, np.int64)
+    unassigned, anybody = np.full(view.shape, -1, np.int16), np.zeros(1, np.int64)
     pillars = view.tried(places[None], heights[None], widths[None])
-    sums, area = view.open_sums(observation.raster, unassigned, pillars)
+    sums, area = view.open_sums(observation.raster, unassigned, anybody, pillars)
     score = sums[0] / np.maximum(area[0], 1.0)
     weight = np.exp(score - score.max())
     return float(weight @ _SHIFTS / weight.sum())

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from stseg.arrays import Floats, Ints
+from stseg.arrays import Floats, Ints, Shorts
 from stseg.detection.map_estimate import MapEstimate, RefinedPeople
 from stseg.detection.problem import BoxEvidence, Problem
 from stseg.detection.residual import reprojection_residuals
@@ -42,7 +42,7 @@ def explanation_by(estimate: MapEstimate, refined: RefinedPeople) -> Explanation
     return Explanation(
         people,
         _ghosts(estimate),
-        tuple(pixels.astype(np.int16) for pixels in assigned),
+        tuple(assigned),
         tuple(view.step for view in views),
         tuple(estimate.box_assignment),
         np.full(len(views), np.nan),
@@ -113,9 +113,9 @@ def _ghosts(estimate: MapEstimate) -> People:
     )  # fmt: skip
 
 
-def _painted(view: View, people: Candidates) -> Ints:
-    """The person whose body is nearest at each raster pixel of a view, int64 (v, u); -1 for none."""
+def _painted(view: View, people: Candidates) -> Shorts:
+    """The person whose body is nearest at each raster pixel of a view, int16 (v, u); -1 for none."""
     first, spans, _ = view.outlines(people.ground, people.height, people.width)
-    assigned = np.full(view.shape, -1, np.int64)
+    assigned = np.full(view.shape, -1, np.int16)
     paint(np.argsort(-view.distance(people.ground), kind="stable"), first, spans, assigned)
     return assigned

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from stseg.accelerate import kernel
-from stseg.arrays import Floats, Ints
-from stseg.detection.problem import Problem
-from stseg.detection.scoring import box_score, pixel_score, set_score, track_score
+from stseg.arrays import Floats, Ints, Shorts
+from stseg.detection.problem import PixelEvidence, Problem
+from stseg.detection.scoring import box_score, set_score, track_score
 from stseg.pointed_tuples import pointed
 
 
@@ -40,16 +42,38 @@ def fill_set_scores(sets: Ints, whole: Problem, totals: Floats, view_evidence: F
 
 
 @kernel
-def fill_assignments(members: Ints, whole: Problem, boxes: Ints, pixels: Ints) -> None:
-    """Assign the evidence of all views to the members, int64 (n,).
+def fill_assignments(members: Ints, whole: Problem, shapes: Ints, boxes: Ints, owners: Shorts) -> None:
+    """Assign the evidence of all views to the members, int64 (n,), by their places in `members`, -1 for none.
 
-    Fills boxes (view, box) and pixels (view, v * u), of views that have such, with places in `members`, -1 for none.
+    Parameters
+    ----------
+    shapes : int64 (view, 2)
+        Rows and columns of the views that deliver pixels.
+    boxes : int64 (view, box)
+        Filled for the views that deliver boxes.
+    owners : int16 (pixel,)
+        Filled for the pixels of these views, one view after the other.
     """
     problem, count = pointed(whole), len(members)
-    parts = problem.view_evidence[0]
     boxes[:] = -1
-    pixels[:] = -1
     for view in range(len(boxes)):
-        box_score(view, members, count, problem.boxes, problem.parameters, boxes[view], parts)
-    for view in range(len(pixels)):
-        pixel_score(view, members, count, problem.pixels, problem.parameters, pixels[view], parts)
+        box_score(view, members, count, problem.boxes, problem.parameters, boxes[view], problem.view_evidence[0])
+    owners[:] = -1
+    start = 0
+    for view in range(len(shapes)):
+        rows, columns = shapes[view]
+        _fill_owners(view, members, problem.pixels, columns, owners[start : start + rows * columns])
+        start += rows * columns
+
+
+@kernel
+def _fill_owners(view: int, members: Ints, pixels: PixelEvidence, columns: int, owners: Shorts) -> None:
+    """Assign the pixels of a view (v * u,) that has so many columns to the nearest member whose outline covers them."""
+    rows = len(owners) // columns
+    for a in np.argsort(pixels.order[view][members], kind="mergesort"):
+        first, spans = pixels.first[view, members[a]], pixels.spans[view, members[a]]
+        for k in range(min(len(spans), rows - first) if first >= 0 else 0):
+            line = (first + k) * columns
+            for u in range(spans[k, 0], spans[k, 1]):
+                if owners[line + u] < 0:
+                    owners[line + u] = a

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from stseg.accelerate import kernel, wide_kernel
-from stseg.arrays import Boxes, Flags, Floats, Ints, Singles
+from stseg.arrays import Boxes, Flags, Floats, Ints, Shorts, Singles
 from stseg.config import BodyConfig, DetectionConfig
 from stseg.detection.open_pixels import OpenPixels, add_means, strip_boxes
 from stseg.geometry import Camera, Grid
@@ -213,13 +213,13 @@ class PixelView(View):
         """Add to score (height, cell), nats, what unexplained pixels say of pillars of some heights at some cells."""
         add_means(pixels, self._strips, self.lattice, heights, cells, self.config.effective_observations, score)
 
-    def open_sums(self, values: Singles, owner: Ints, pillars: TriedPillars) -> tuple[Floats, Floats]:
+    def open_sums(self, values: Singles, owner: Shorts, number: Ints, pillars: TriedPillars) -> tuple[Floats, Floats]:
         """Weighted sums of the pixels open to each person inside their pillars, and the pillars' fair areas.
 
         Both float64 (person, pillar); see `stseg.model.outlines.sums_inside`.
         """
         wide = pillars.width / WIDTH
-        sums, area = sums_inside(self.table, pillars.ground, pillars.height, wide, self.step, values, owner)
+        sums, area = sums_inside(self.table, pillars.ground, pillars.height, wide, self.step, values, owner, number)
         return sums * self.config.effective_observations, area / pillars.area_ratio
 
 

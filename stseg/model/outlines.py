@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stseg.accelerate import kernel, part
-from stseg.arrays import Floats, Ints, Singles
+from stseg.arrays import Floats, Ints, Shorts, Singles
 from stseg.geometry.bodies import LEVELS, SILHOUETTE, BodyTable, fill_discs
 
 # Innermost loops have unsigned places: whether one is negative, and counts from the end, is not asked there.
@@ -59,7 +59,7 @@ def outlines(
 
 
 @kernel
-def paint(order: Ints, first: Ints, spans: Spans, assigned: Ints) -> None:
+def paint(order: Ints, first: Ints, spans: Spans, assigned: Shorts) -> None:
     """Write the numbers of outlines into assigned (v, u), one after the other in an order: the last one shows."""
     for j in order:
         if first[j] >= 0:
@@ -68,7 +68,14 @@ def paint(order: Ints, first: Ints, spans: Spans, assigned: Ints) -> None:
 
 
 def sums_inside(
-    table: BodyTable, ground: Floats, heights: Floats, widths: Floats, step: int, values: Singles, owner: Ints
+    table: BodyTable,
+    ground: Floats,
+    heights: Floats,
+    widths: Floats,
+    step: int,
+    values: Singles,
+    owner: Shorts,
+    number: Ints,
 ) -> tuple[Floats, Floats]:
     """Sums of a map inside outlines of pillars, several for each person: quicker than outlines that are kept.
 
@@ -82,8 +89,10 @@ def sums_inside(
         Metres, and beside the silhouette of `geometry.bodies`.
     values : float32 (v, u)
         On the raster.
-    owner : int64 (v, u)
-        The person that each pixel is assigned to, -1 for none. Own and unassigned pixels count.
+    owner : int16 (v, u)
+        Number of the person that each pixel is assigned to, -1 for none. Own and unassigned pixels count.
+    number : int64 (person,)
+        The number of each.
 
     Returns
     -------
@@ -93,8 +102,9 @@ def sums_inside(
     sums, area = np.zeros(heights.shape), np.zeros(heights.shape)
     lattice = _lattice(table, ground).reshape(ground.shape)
     _fill_sums(
-        table.pixel, lattice, heights, widths, LEVELS[1], table.step, SILHOUETTE, float(step), values, owner, sums, area
-    )
+        table.pixel, lattice, heights, widths, LEVELS[1], table.step, SILHOUETTE, float(step), values, owner, number,
+        sums, area,
+    )  # fmt: skip
     return sums, area
 
 
@@ -124,11 +134,10 @@ def _fill_outlines(
     low, high = np.empty(rows), np.empty(rows)
     for i in range(len(lattice)):
         fill_discs(pixel, lattice[i, 0], lattice[i, 1], heights[i], level_step, step, profile, discs)
-        if not _seen(discs):
-            continue
-        area[i] = _to_raster(discs, raster_step, widths[i])
-        top, bottom = _draw(discs, drawn, low, high)
-        _store(low, high, top, bottom, columns, i, first, count, spans)
+        if _seen(discs):
+            area[i] = _fill_drawn(discs, raster_step, widths[i], drawn)
+            top, bottom = _draw(drawn, low, high)
+            _store(low, high, top, bottom, columns, i, first, count, spans)
 
 
 @kernel
@@ -142,46 +151,45 @@ def _fill_sums(
     profile: Floats,
     raster_step: float,
     values: Singles,
-    owner: Ints,
+    owner: Shorts,
+    number: Ints,
     sums: Floats,
     area: Floats,
 ) -> None:
     people, pillars = heights.shape
     rows, columns = values.shape
-    discs, drawn = np.empty((pillars, len(profile), 6)), np.empty((len(profile), 6))
+    discs, drawn = np.empty((len(profile), 6)), np.empty((pillars, len(profile), 6))
     low, high, left_of = np.empty(rows), np.empty(rows), np.empty((rows, columns + 1))
     for j in range(people):
         for i in range(pillars):
-            x, y = lattice[j, i]
-            fill_discs(pixel, x, y, heights[j, i], level_step, step, profile, discs[i])
-            if _seen(discs[i]):
-                area[j, i] = _to_raster(discs[i], raster_step, widths[j, i])
-        _fill_left_of(values, owner, j, _window(discs, area[j], rows, columns), left_of)
+            fill_discs(pixel, lattice[j, i, 0], lattice[j, i, 1], heights[j, i], level_step, step, profile, discs)
+            if _seen(discs):
+                area[j, i] = _fill_drawn(discs, raster_step, widths[j, i], drawn[i])
+        _fill_left_of(values, owner, number[j], _window(drawn, area[j], rows, columns), left_of)
         for i in range(pillars):
             if area[j, i] > 0:
-                top, bottom = _draw(discs[i], drawn, low, high)
+                top, bottom = _draw(drawn[i], low, high)
                 sums[j, i] = _between(left_of, low, high, top, bottom)
 
 
-@kernel
-def _window(discs: Floats, area: Floats, rows: int, columns: int) -> tuple[int, int, int, int]:
-    """Rows from and to (excluded), then columns, that hold all of the pillars' discs (pillar, disc, 6) on the raster.
+@part
+def _window(drawn: Floats, area: Floats, rows: int, columns: int) -> tuple[int, int, int, int]:
+    """Rows from and to (excluded), then columns, that hold all of the pillars' drawn discs (pillar, disc, 6).
 
     What joins them lies within.
     """
     top, bottom, left, right = np.inf, -np.inf, np.inf, -np.inf
-    for i in range(len(discs)):
-        if area[i] > 0:
-            for u, v, uu, uv, vu, vv in discs[i]:
-                wide, tall = math.sqrt(uu * uu + uv * uv), math.sqrt(vu * vu + vv * vv)
-                top, bottom = min(top, v - tall), max(bottom, v + tall)
-                left, right = min(left, u - wide), max(right, u + wide)
+    for i in range(len(drawn)):
+        for k in range(drawn.shape[1] if area[i] > 0 else 0):
+            u, v, wide, tall = drawn[i, k, 0], drawn[i, k, 1], drawn[i, k, 4], drawn[i, k, 5]
+            top, bottom = min(top, v - tall), max(bottom, v + tall)
+            left, right = min(left, u - wide), max(right, u + wide)
     if top > bottom:
         return 0, 0, 0, 0
     return _from(top, rows), _from(bottom + 2, rows), _from(left, columns), _from(right + 2, columns)
 
 
-@kernel
+@part
 def _from(place: float, most: int) -> int:
     """The pixel at or before a place, 0..most: beside a camera places lie beyond what a whole number can hold."""
     return int(min(max(place, 0.0), float(most)))
@@ -189,7 +197,7 @@ def _from(place: float, most: int) -> int:
 
 @kernel
 def _fill_left_of(
-    values: Singles, owner: Ints, person: int, window: tuple[int, int, int, int], left_of: Floats
+    values: Singles, owner: Shorts, person: int, window: tuple[int, int, int, int], left_of: Floats
 ) -> None:
     """Fill left_of (v, u + 1), inside a window, with cumulative sums along rows of a person's open pixels."""
     top, bottom, left, right = window
@@ -202,7 +210,7 @@ def _fill_left_of(
             sums[u + 1] = total
 
 
-@kernel
+@part
 def _between(left_of: Floats, low: Floats, high: Floats, top: int, bottom: int) -> float:
     """Sum from column low to high (row,) of the rows from `top` to before `bottom`, from sums along rows."""
     total = 0.0
@@ -216,31 +224,43 @@ def _between(left_of: Floats, low: Floats, high: Floats, top: int, bottom: int) 
     return total
 
 
-@kernel
+@part
 def _seen(discs: Floats) -> bool:
     """Whether the view sees all of a pillar's discs."""
     total = 0.0
-    for disc in discs:
-        total += disc[0] + disc[2] + disc[3]
+    for k in range(len(discs)):
+        total += discs[k, 0] + discs[k, 2] + discs[k, 3]
     return not np.isnan(total)
 
 
-@kernel
-def _to_raster(discs: Floats, raster_step: float, width: float) -> float:
-    """Take discs from image pixels to the raster's, as wide as asked; the area of the whole outline."""
-    for disc in discs:
-        for axis in range(2):
-            disc[axis] = disc[axis] / raster_step + (0.5 / raster_step - 0.5)
-        for side in range(2, 6):
-            disc[side] *= width / raster_step
-    return float(_whole_area(discs))
+@part
+def _fill_drawn(discs: Floats, raster_step: float, width: float, drawn: Floats) -> float:
+    """Fill drawn (k, 6) with each disc's centre u, v, slope, half widths, half height; the area of the whole outline.
+
+    Discs are taken from image pixels to the raster's, as wide as asked. The slope is that of the ellipse's middle from
+    row to row, the first half width that of its middle row, the second that of its shadow on the u axis. The area is
+    that of trapezoids along the pillar's axis plus half a disc at either end.
+    """
+    scale, shift = width / raster_step, 0.5 / raster_step - 0.5
+    total, first, last = 0.0, 0.0, 0.0
+    for k in range(len(discs)):
+        uu, uv, vu, vv = discs[k, 2] * scale, discs[k, 3] * scale, discs[k, 4] * scale, discs[k, 5] * scale
+        tall, wide = math.sqrt(vu * vu + vv * vv), math.sqrt(uu * uu + uv * uv)
+        turned = abs(uu * vv - uv * vu)
+        drawn[k, 0], drawn[k, 1] = discs[k, 0] / raster_step + shift, discs[k, 1] / raster_step + shift
+        drawn[k, 2], drawn[k, 3] = (uu * vu + uv * vv) / (tall * tall + 1e-12), turned / (tall + 1e-12)
+        drawn[k, 4], drawn[k, 5] = wide, tall
+        if k > 0:
+            across, down = drawn[k, 0] - drawn[k - 1, 0], drawn[k, 1] - drawn[k - 1, 1]
+            total += math.sqrt(across * across + down * down) * (wide + drawn[k - 1, 4])
+        first, last = first if k > 0 else turned, turned
+    return max(total + 0.5 * np.pi * first + 0.5 * np.pi * last, 1.0)
 
 
-@kernel
-def _draw(discs: Floats, drawn: Floats, low: Floats, high: Floats) -> tuple[int, int]:
+@part
+def _draw(drawn: Floats, low: Floats, high: Floats) -> tuple[int, int]:
     """Fill low and high (row,) with the outline's first and last column from row `top` to before `bottom`."""
     rows = len(low)
-    _fill_drawn(discs, drawn)
     least, most = drawn[0, 1], drawn[0, 1]
     for k in range(len(drawn)):
         least, most = min(least, drawn[k, 1] - drawn[k, 5]), max(most, drawn[k, 1] + drawn[k, 5])
@@ -249,22 +269,6 @@ def _draw(discs: Floats, drawn: Floats, low: Floats, high: Floats) -> tuple[int,
     for k in range(len(drawn)):
         _widen(drawn, k, rows, low, high)
     return top, bottom
-
-
-@part
-def _fill_drawn(discs: Floats, drawn: Floats) -> None:
-    """Fill drawn (k, 6) with each disc's centre u, v, slope, half widths, half height.
-
-    The slope is that of the ellipse's middle from row to row, the first half width that of its middle row, the second
-    that of its shadow on the u axis.
-    """
-    for k in range(len(discs)):
-        u, v, uu, uv, vu, vv = discs[k, 0], discs[k, 1], discs[k, 2], discs[k, 3], discs[k, 4], discs[k, 5]
-        tall = math.sqrt(vu * vu + vv * vv)
-        drawn[k, 0], drawn[k, 1] = u, v
-        drawn[k, 2] = (uu * vu + uv * vv) / (tall * tall + 1e-12)
-        drawn[k, 3] = abs(uu * vv - uv * vu) / (tall + 1e-12)
-        drawn[k, 4], drawn[k, 5] = math.sqrt(uu * uu + uv * uv), tall
 
 
 @part
@@ -287,23 +291,7 @@ def _widen(drawn: Floats, k: int, rows: int, low: Floats, high: Floats) -> None:
         low[at], high[at] = min(low[at], middle - half), max(high[at], middle + half)
 
 
-@kernel
-def _whole_area(discs: Floats) -> float:
-    """Pixels of the outline as trapezoids along its axis plus half a disc at either end."""
-    total = 0.0
-    before = 0.0
-    for k in range(len(discs)):
-        wide = math.sqrt(discs[k, 2] * discs[k, 2] + discs[k, 3] * discs[k, 3])
-        if k > 0:
-            across, down = discs[k, 0] - discs[k - 1, 0], discs[k, 1] - discs[k - 1, 1]
-            total += math.sqrt(across * across + down * down) * (wide + before)
-        before = wide
-    for k in (0, len(discs) - 1):
-        total += 0.5 * np.pi * abs(discs[k, 2] * discs[k, 5] - discs[k, 3] * discs[k, 4])
-    return max(total, 1.0)
-
-
-@kernel
+@part
 def _store(
     low: Floats, high: Floats, top: int, bottom: int, columns: int, i: int, first: Ints, count: Ints, spans: Spans
 ) -> None:
