@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 from scenes import BODY, FEW_HEIGHTS, likelihoods, people, rig_of, room
 
 from stseg.arrays import Floats, Singles
-from stseg.detection.blob_scale import blob_scales
 from stseg.detection.detector import Detector
+from stseg.detection.prior import Prior
 from stseg.detection.views import PixelView, ViewObservation
 from stseg.model.predicted_tracks import no_tracks
 
@@ -20,13 +22,14 @@ def asked(cameras: int) -> Detector:
 
 
 def scales_by_definition(detector: Detector, observations: list[ViewObservation]) -> list[Singles]:
-    views = [view for view in detector.views if isinstance(view, PixelView)]
+    views, lattice = [view for view in detector.views if isinstance(view, PixelView)], detector.pixel_lattice.outlines
     cells = len(detector.lattice_ground.reshape(-1, 2))
     mean = np.zeros((len(views), cells))
     inside: list[list[np.ndarray]] = []
+    common = [slice((3 * k + 1) * cells, (3 * k + 2) * cells) for k in range(len(views))]
     for k, (view, observation) in enumerate(zip(views, observations, strict=True)):
-        first, area = view.lattice.first[cells : 2 * cells], view.lattice.area[cells : 2 * cells]
-        spans = [view.lattice.spans[slice(*view.lattice.start[i : i + 2])] for i in range(cells, 2 * cells)]
+        first, area = lattice.first[common[k]], lattice.area[common[k]]
+        spans = [lattice.spans[slice(*lattice.start[i : i + 2])] for i in range(common[k].start, common[k].stop)]
         shown = np.zeros((cells, *view.shape), bool)
         for cell in range(cells):
             for row, (left, right) in enumerate(spans[cell]):
@@ -38,18 +41,22 @@ def scales_by_definition(detector: Detector, observations: list[ViewObservation]
     worth = config.prior_log_odds + config.effective_observations * mean.sum(0) > 0
     certain = np.log((1 - config.pixel_miss_rate) / config.pixel_clutter_rate)
     scales = []
-    for k, view in enumerate(views):
-        explained: Floats = view.lattice.area[cells : 2 * cells] * mean[k] / certain
+    for k in range(len(views)):
+        explained: Floats = lattice.area[common[k]] * mean[k] / certain
         every = [own * value for own, value in zip(inside[k], explained, strict=True)]
         scales.append(np.max([*(one for one, held in zip(every, worth, strict=True) if held), 0 * every[0]], axis=0))
     return scales
+
+
+def scales(detector: Detector, observations: Sequence[ViewObservation | None]) -> Singles:
+    return detector.evidence(observations, Prior.of(None, FEW_HEIGHTS, BODY, detector.border)).scales
 
 
 @pytest.mark.parametrize("cameras", [1, 2])
 def test_scale_is_what_the_largest_body_explains(cameras: int) -> None:
     detector = asked(cameras)
     observations = [one for one in detector.observe(likelihoods(room().cameras[:cameras], CROWD)) if one is not None]
-    found = blob_scales(detector.views, observations, detector.config)
+    found = scales(detector, observations)
     for scale, expected in zip(found, scales_by_definition(detector, observations), strict=True):
         np.testing.assert_allclose(scale, expected, rtol=1e-4, atol=1e-3)
         assert scale.max() > 0
@@ -58,8 +65,7 @@ def test_scale_is_what_the_largest_body_explains(cameras: int) -> None:
 def test_a_blind_view_and_an_empty_one_have_no_scale() -> None:
     detector = asked(2)
     nothing = np.zeros(room().cameras[0].size[::-1], np.float32)
-    scales = blob_scales(detector.views, [None, detector.observe([nothing, nothing])[1]], detector.config)
-    assert not any(scale.any() for scale in scales)
+    assert not scales(detector, [None, detector.observe([nothing, nothing])[1]]).any()
 
 
 @pytest.mark.parametrize("place", [(-1.0, 0.0), (-0.5, 0.5), (0.5, -0.5), (0.5, 0.0)])

@@ -26,7 +26,8 @@ from scenes import (
 
 from stseg.arrays import Floats, ViewEvidence
 from stseg.detection.detector import Detector
-from stseg.detection.views import BoxView
+from stseg.detection.pixel_lattice import OpenPixels, fill_scores
+from stseg.detection.prior import Prior
 from stseg.engine.committed_frames import CommittedFrames
 from stseg.engine.pipeline import Pipeline
 from stseg.engine.session import run_session
@@ -159,13 +160,15 @@ def test_the_moving_ghost_is_borne_out_by_both_views() -> None:
     """It was there to be picked up: taken by itself it is worth a person, in nearly every frame."""
     rig, worth = facing_pair(), 0
     frame_pass = Detector(rig, ["pixels"] * 2, FEW_HEIGHTS, BODY)
+    nothing_known = Prior.of(None, FEW_HEIGHTS, BODY, frame_pass.border)
     ground = frame_pass.lattice_ground.reshape(-1, 2)
     for frame in range(FRAMES):
-        seen, said = show("pixels", rig.cameras, strollers(frame)), np.zeros((3, len(ground)))
-        for view, shown in zip(frame_pass.views, seen, strict=True):
-            assert not isinstance(view, BoxView)
-            pixels = view.open_pixels(view.observe(shown), np.ones(view.shape, bool))
-            view.add_lattice_score(pixels, np.array([1]), view.lattice_cells, said)
+        seen, said = frame_pass.observe(show("pixels", rig.cameras, strollers(frame))), np.zeros((3, len(ground)))
+        evidence, lattice = frame_pass.evidence(seen, nothing_known), frame_pass.pixel_lattice
+        nobody = np.full(int(lattice.shapes.prod(1).sum()), -1, np.int16)
+        pixels = OpenPixels.of(evidence.rasters, nobody, lattice, evidence.extremes)
+        weight = FEW_HEIGHTS.effective_observations
+        fill_scores(pixels, lattice, np.array([1]), np.zeros(0, np.int64), -np.inf, weight, said)
         here = distances(ground, crossings(strollers(frame), rig)).min(1) < 0.3
         worth += said[1, here].max() > -FEW_HEIGHTS.prior_log_odds
     assert worth > 0.8 * FRAMES

@@ -201,10 +201,12 @@ class CraftedFrame:
         """The frame as the kernels take it."""
         views = len(self.boxes.boxes) + len(self.pixels.raster)
         owner = np.empty(max(self.pixels.raster[0].size, self.boxes.match.shape[2], self.known.shape[1]), np.int64)
+        nobody = np.full((len(self.pixels.raster), self.pixels.raster[0].size), -1, np.int16)
         parts = np.zeros((views, len(self.own) + 1))
         return Problem(
-            self.boxes, self.pixels, self.own, self.newcomer, self.known, self.ground, self.breadth, TERMS, owner, parts
-        )
+            self.boxes, self.pixels, self.own, self.newcomer, self.known, self.ground, self.breadth, TERMS, owner,
+            nobody, parts,
+        )  # fmt: skip
 
     def score(self, members: Sequence[int] | Ints) -> float:
         """The fast score of a set."""

@@ -14,7 +14,7 @@ from scenes import BODY, FEW_HEIGHTS, boxes, expecting, likelihoods, room
 
 from stseg.arrays import Floats, Singles, ViewEvidence
 from stseg.detection.detector import Detector
-from stseg.detection.map_estimate import FrameEvidence, MapEstimate
+from stseg.detection.map_estimate import MapEstimate
 from stseg.detection.merging import merged
 from stseg.detection.prior import Prior
 from stseg.detection.result import explanation
@@ -49,7 +49,7 @@ def members_at(ground: Floats, seen: list[Singles]) -> MapEstimate:
     """An estimate whose members are people of mean size at ground (n, 2)."""
     asked = detector()
     prior = Prior.of(None, asked.config, asked.body, asked.border)
-    evidence = FrameEvidence(asked.views, asked.observe(seen), prior, asked.parameters)
+    evidence = asked.evidence(asked.observe(seen), prior)
     pool = Candidates(ground, np.full(len(ground), 1.7), np.full(len(ground), BODY.width_mean))
     members = np.arange(len(ground))
     return MapEstimate.of_search(evidence, pool, members).with_members(members)
@@ -113,7 +113,7 @@ def test_members_far_apart_and_members_in_boxes_are_left_alone() -> None:
     asked = detector(*["boxes"] * 4)
     seen = [boxes(camera, np.column_stack([pair(0.5), [1.7, 1.7]])) for camera in room().cameras]
     prior = Prior.of(None, asked.config, asked.body, asked.border)
-    evidence = FrameEvidence(asked.views, asked.observe(seen), prior, asked.parameters)
+    evidence = asked.evidence(asked.observe(seen), prior)
     near = MapEstimate.of_search(evidence, Candidates(pair(0.5), np.full(2, 1.7), np.full(2, 0.42)), np.arange(2))
     assert len(near.members) == 2
     assert merged(near) is near

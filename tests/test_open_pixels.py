@@ -1,4 +1,4 @@
-"""Means over a lattice's pillars: the same with strips of nothing but background left out, and by definition."""
+"""What unexplained pixels say of a lattice's pillars: as by definition, or nothing where it is too little to matter."""
 
 from __future__ import annotations
 
@@ -6,52 +6,76 @@ import numpy as np
 import pytest
 from scenes import BODY, FEW_HEIGHTS, corner_cameras, rig_of
 
-from stseg.arrays import Floats
+from stseg.arrays import Floats, Shorts, Singles
 from stseg.detection.detector import Detector
-from stseg.detection.open_pixels import OpenPixels, add_means, strip_boxes
-from stseg.detection.views import PixelView
+from stseg.detection.pixel_lattice import OpenPixels, fill_scores
 
 BACKGROUND = np.float32(-2.2)
 DETECTOR = Detector(rig_of(corner_cameras(), cell=0.5, planes=3), ["pixels"] * 4, FEW_HEIGHTS, BODY)
+LATTICE = DETECTOR.pixel_lattice
 CELLS = DETECTOR.lattice_ground[..., 0].size
+WEIGHT, BEFORE = 0.5, 4.2
 
 
-def by_definition(view: PixelView, raster: Floats, heights: list[int]) -> Floats:
-    """Mean log-odds of the open pixels over each outline, those outside the raster included."""
-    outlines, mean = view.lattice, np.zeros((3, CELLS))
-    for height in heights:
-        for cell in range(CELLS):
-            i = height * CELLS + cell
+def nothing() -> Singles:
+    return np.full((4, *LATTICE.shapes.max(0)), BACKGROUND)
+
+
+def scene(seed: int) -> tuple[Singles, Shorts]:
+    """Log-odds of background with some foreground in it, and somebody who explains pixels beside that."""
+    rng = np.random.default_rng(seed)
+    rasters, owner = nothing(), np.full((4, *LATTICE.shapes.max(0)), -1, np.int16)
+    row, column = rasters.shape[1] // 2, rasters.shape[2] // 2
+    rasters[:, row : row + 9, column : column + 5] = rng.normal(1, 1, (4, 9, 5)).clip(-2, 2)
+    owner[:, row - 6 : row, column + 4 : column + 9] = 0
+    parts = [own[: shape[0], : shape[1]].reshape(-1) for own, shape in zip(owner, LATTICE.shapes, strict=True)]
+    return rasters, np.concatenate(parts)
+
+
+def by_definition(rasters: Singles, owner: Shorts) -> Floats:
+    """Sums over all views of the mean log-odds of open pixels over each outline, (height, cell)."""
+    outlines, mean, start = LATTICE.outlines, np.zeros((4, 3 * CELLS)), 0
+    for view, (rows, columns) in enumerate(LATTICE.shapes.tolist()):
+        own = owner[start : start + rows * columns].reshape(rows, columns)
+        shown = np.where(own < 0, rasters[view, :rows, :columns], 0.0).astype(float)
+        start += rows * columns
+        for pillar in range(3 * CELLS):
+            i = view * 3 * CELLS + pillar
             spans = outlines.spans[outlines.start[i] : outlines.start[i + 1]]
-            total = sum(raster[outlines.first[i] + k, a:b].sum() for k, (a, b) in enumerate(spans.tolist()))
-            mean[height, cell] = total / outlines.area[i] if len(spans) else 0.0
-    return mean
+            total = sum(shown[outlines.first[i] + k, a:b].sum() for k, (a, b) in enumerate(spans.tolist()))
+            mean[view, pillar] = total / outlines.area[i] if len(spans) else 0.0
+    return np.asarray(BEFORE + WEIGHT * mean.sum(0).reshape(3, CELLS))
 
 
-@pytest.mark.parametrize("view", DETECTOR.views)
-def test_means_by_definition(view: PixelView) -> None:
-    rng = np.random.default_rng(7)
-    raster, free = np.full(view.shape, BACKGROUND), np.ones(view.shape, bool)
-    row, column = view.shape[0] // 2, view.shape[1] // 2
-    raster[row : row + 5, column : column + 3] = rng.normal(0, 2, (5, 3)).clip(-2, 2)
-    free[row - 6 : row, column + 4 : column + 9] = False
-    pixels, strips = OpenPixels.of(raster, free), strip_boxes(view.lattice, CELLS)
-    score = np.zeros((3, CELLS))
-    add_means(pixels, strips, view.lattice, np.array([0, 2]), np.arange(CELLS), 0.5, score)
-    open_raster = np.where(free, raster, 0.0).astype(float)
-    np.testing.assert_allclose(score, 0.5 * by_definition(view, open_raster, [0, 2]), atol=1e-9)
+def scores(rasters: Singles, owner: Shorts, hopeless: float) -> Floats:
+    extremes = np.tile([rasters.min(), rasters.max()], (4, 1)).astype(float)
+    score = np.full((3, CELLS), BEFORE)
+    pixels = OpenPixels.of(rasters, owner, LATTICE, extremes)
+    fill_scores(pixels, LATTICE, np.array([1]), np.array([0, 2]), hopeless, WEIGHT, score)
+    return score
 
 
-@pytest.mark.parametrize("view", DETECTOR.views[:1])
-def test_strips_where_something_is_shown_are_summed(view: PixelView) -> None:
-    """Each pixel inside some outline is noticed, whether it is foreground or somebody's."""
-    strips, nothing = strip_boxes(view.lattice, CELLS), np.full(view.shape, BACKGROUND)
-    every = np.arange(CELLS)
-    for shown in (False, True):
-        raster, free = nothing.copy(), np.ones(view.shape, bool)
-        (raster if shown else free)[view.shape[0] // 2, view.shape[1] // 2] = 1 if shown else False
-        said, silent = np.zeros((2, 3, CELLS))
-        add_means(OpenPixels.of(raster, free), strips, view.lattice, np.arange(3), every, 1.0, said)
-        add_means(OpenPixels.of(nothing, np.ones_like(free)), strips, view.lattice, np.arange(3), every, 1.0, silent)
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("hopeless", [-np.inf, -1.0])
+def test_scores_by_definition_where_they_matter(seed: int, hopeless: float) -> None:
+    found, expected = scores(*scene(seed), hopeless), by_definition(*scene(seed))
+    known = np.isfinite(found)
+    np.testing.assert_allclose(found[known], expected[known], atol=1e-9)
+    worth = expected[1] > hopeless
+    assert known[1, worth].all()
+    assert known[:, worth][expected[:, worth] > 0].all()
+    assert not known[::2, ~worth].any()
+    assert (expected > 0).any()
+
+
+def test_whatever_is_shown_is_noticed() -> None:
+    """Each pixel inside some outline counts, whether it is foreground or somebody's."""
+    nobody = np.full(int(LATTICE.shapes.prod(1).sum()), -1, np.int16)
+    silent = scores(nothing(), nobody, -np.inf)[1]
+    row, column = LATTICE.shapes[0] // 2
+    bright, explained = nothing(), nobody.copy()
+    bright[0, row, column] = 1
+    explained[row * LATTICE.shapes[0, 1] + column] = 0
+    for said in (scores(bright, nobody, -np.inf)[1], scores(nothing(), explained, -np.inf)[1]):
         assert 0 < (said != silent).sum() < said.size / 2
         assert (said >= silent).all()

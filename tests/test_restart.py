@@ -13,7 +13,7 @@ from scenes import BODY, FEW_HEIGHTS, boxes, expecting, likelihoods, people, roo
 from stseg.arrays import Boxes, Floats, Ints
 from stseg.detection.detector import Detector
 from stseg.detection.lattice import lattice_candidates
-from stseg.detection.map_estimate import FrameEvidence, MapEstimate
+from stseg.detection.map_estimate import MapEstimate
 from stseg.detection.prior import Prior
 from stseg.detection.restart import restarted
 from stseg.evaluation.matching import distances, match
@@ -54,7 +54,7 @@ def of_tracks(seen: Sequence[Boxes | None], expected: PredictedTracks) -> MapEst
     """The best set of the predicted tracks alone."""
     asked = detector()
     prior = Prior.of(expected, asked.config, asked.body, asked.border)
-    evidence = FrameEvidence(asked.views, asked.observe(seen), prior, asked.parameters)
+    evidence = asked.evidence(asked.observe(seen), prior)
     return MapEstimate.of_search(evidence, prior.pool(), np.arange(len(expected)))
 
 
@@ -130,9 +130,7 @@ def test_more_candidates_have_the_pixels_of_a_pool_that_is_made_whole() -> None:
     asked = Detector(room(), ["pixels"] * 4, FEW_HEIGHTS, BODY)
     prior = Prior.of(expecting(*ground[:2]), asked.config, asked.body, asked.border)
     seen = asked.observe(likelihoods(room().cameras, people(*ground)))
-    before = MapEstimate.of_search(
-        FrameEvidence(asked.views, seen, prior, asked.parameters), prior.pool(), np.arange(2)
-    )
+    before = MapEstimate.of_search(asked.evidence(seen, prior), prior.pool(), np.arange(2))
     fresh = lattice_candidates(before, asked.lattice_ground)
     found = before.with_more(fresh.at([0])).with_more(fresh.at([1])).problem
     whole = MapEstimate.of_search(before.evidence, before.pool.joined_with(fresh.at([0, 1])), before.members).problem

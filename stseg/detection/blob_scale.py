@@ -9,48 +9,71 @@ person, the one with the greatest sum of log-odds, counted in pixels that are ce
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from stseg.accelerate import kernel
-from stseg.arrays import Floats, Ints, Singles
-from stseg.config import DetectionConfig
-from stseg.detection.views import BoxView, PixelView, ViewObservation
-from stseg.model.packed_outlines import PackedOutlines
+from stseg.arrays import Floats, Singles
+from stseg.config import BodyConfig, DetectionConfig
+from stseg.detection.pixel_lattice import OpenPixels, PixelLattice, add_said
+from stseg.pointed_tuples import pointed
 
 
 def blob_scales(
-    views: Sequence[BoxView | PixelView], observations: Sequence[ViewObservation | None], config: DetectionConfig
-) -> list[Singles]:
-    """Raster pixels of the largest body that explains each pixel, float32 (v, u) a view; 0 where none does.
+    rasters: Singles, extremes: Floats, lattice: PixelLattice, config: DetectionConfig, body: BodyConfig
+) -> Singles:
+    """Raster pixels of the largest body that explains each pixel, float32 (view, v, u); 0 where none does.
 
-    Those of views with boxes are empty.
+    Parameters
+    ----------
+    rasters : float32 (view, v, u)
+        Log-odds of the views that deliver pixels, zero beyond each, and where a view is blind: nats.
+    extremes : float64 (view, 2)
+        The lowest and the highest of them.
+    lattice
+        The pillars of bodies.
     """
-    scales = [np.zeros(view.shape if isinstance(view, PixelView) else (0, 0), np.float32) for view in views]
-    shown = [
-        (view, scale, view.common_means(observation))
-        for view, observation, scale in zip(views, observations, scales, strict=True)
-        if isinstance(view, PixelView) and observation is not None
-    ]
-    if shown:
-        evidence = config.effective_observations * np.sum([mean for _, _, mean in shown], axis=0)
-        worth = np.flatnonzero(config.prior_log_odds + evidence > 0)
-        certain = np.log((1 - config.pixel_miss_rate) / config.pixel_clutter_rate)
-        for view, scale, mean in shown:
-            pillars = view.common * len(mean) + worth
-            _raise_inside(scale, view.lattice, pillars, view.lattice.area[pillars] * mean[worth] / certain)
-    return scales
+    scale = np.zeros(rasters.shape, np.float32)
+    nobody = np.full(int(lattice.shapes.prod(1).sum()), -1, np.int16)
+    certain = float(np.log((1 - config.pixel_miss_rate) / config.pixel_clutter_rate))
+    _fill_scales(
+        OpenPixels.of(rasters, nobody, lattice, extremes), lattice, len(body.heights), config.effective_observations,
+        config.prior_log_odds, certain, scale,
+    )  # fmt: skip
+    return scale
 
 
 @kernel
-def _raise_inside(scale: Singles, outlines: PackedOutlines, pillars: Ints, explained: Floats) -> None:
-    """Raise scale (v, u) inside outlines to what each of some pillars (n,) explains (n,)."""
-    for n in range(len(pillars)):
-        i, value = pillars[n], np.float32(explained[n])
-        row = outlines.first[i]
-        for k in range(outlines.start[i], outlines.start[i + 1]):
-            line = scale[row, outlines.spans[k, 0] : outlines.spans[k, 1]]
-            for u in range(len(line)):
-                line[u] = value if value > line[u] else line[u]
-            row += 1
+def _fill_scales(
+    every_pixel: OpenPixels,
+    every_pillar: PixelLattice,
+    heights: int,
+    weight: float,
+    prior: float,
+    certain: float,
+    scale: Singles,
+) -> None:
+    """Raise scale (view, v, u) inside common bodies that are worth a person to what each explains."""
+    pixels, lattice = pointed(every_pixel), pointed(every_pillar)
+    views = len(every_pillar.shapes)
+    said, every = np.empty(views), len(every_pillar.outlines.first) // max(views, 1)
+    cells = every // heights
+    for cell in range(cells):
+        pillar = heights // 2 * cells + cell
+        if add_said(prior, 0.0, pillar, cell, every, pixels, lattice, weight, said) > -np.inf:
+            total = 0.0
+            for view in range(views):
+                total += said[view] / weight
+            for view in range(views if prior + weight * total > 0 else 0):
+                _raise_inside(view, view * every + pillar, said[view] / weight, certain, lattice, scale)
+
+
+@kernel
+def _raise_inside(view: int, i: int, mean: float, certain: float, lattice: PixelLattice, scale: Singles) -> None:
+    """Raise scale (view, v, u) inside the i-th pillar of all to the pixels that it explains."""
+    outlines = lattice.outlines
+    value, row = np.float32(outlines.area[i] * mean / certain), outlines.first[i]
+    for k in range(outlines.start[i], outlines.start[i + 1]):
+        line = scale[view, row, outlines.spans[k, 0] : outlines.spans[k, 1]]
+        for u in range(len(line)):
+            line[u] = value if value > line[u] else line[u]
+        row += 1

@@ -21,6 +21,7 @@ from stseg.detection.key_frames import followed, key_frame_interval
 from stseg.detection.lattice import lattice, lattice_candidates
 from stseg.detection.map_estimate import FrameEvidence, MapEstimate
 from stseg.detection.merging import merged
+from stseg.detection.pixel_lattice import PixelLattice
 from stseg.detection.population_calibration import PopulationCalibration
 from stseg.detection.prior import Prior
 from stseg.detection.problem import Parameters
@@ -84,6 +85,7 @@ class Detector:
             else PixelView(camera, grid, flat, config, body)
             for camera, kind in zip(rig.cameras, kinds, strict=True)
         ]
+        self.pixel_lattice = PixelLattice.of(self.views, flat, body)
         core = config.minimum_distance - CORE if "pixels" in kinds else 0.0
         self.parameters = Parameters.of(config, core, body.width_mean)
         self.border = Border.of(rig)
@@ -207,9 +209,12 @@ class Detector:
     ) -> MapEstimate:
         """The best set of the predicted tracks alone."""
         prior = Prior.of(predicted, self.config, body, self.border)
-        evidence = FrameEvidence(self.views, observations, prior, self.parameters)
         tracked = prior.pool()
-        return MapEstimate.of_search(evidence, tracked, np.arange(len(tracked)))
+        return MapEstimate.of_search(self.evidence(observations, prior), tracked, np.arange(len(tracked)))
+
+    def evidence(self, observations: Sequence[ViewObservation | None], prior: Prior) -> FrameEvidence:
+        """What a frame is judged by."""
+        return FrameEvidence(self.views, observations, prior, self.parameters, self.pixel_lattice)
 
     def _searched_afresh(self, found: MapEstimate) -> MapEstimate:
         """The search from whom it finds where no track is known.

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import maximum_filter
 
 from stseg.arrays import Floats, Singles
 from stseg.detection.lists import no_lists
@@ -18,17 +17,23 @@ from stseg.model.candidates import Candidates
 
 MOST = 250
 """Most candidates that one round adds."""
+_AROUND = np.indices((3, 3)).reshape(2, 9)
+"""Rows and columns of a place and its neighbours, from the first of them on."""
 _LEAST_SCORE = 0.0
 """Score above which a peak of the lattice is a candidate, nats."""
 
 
 def peaks(score: Floats, lattice_ground: Floats, heights: Floats, widths: Floats) -> Candidates:
     """Local maxima of a lattice score (height, y, x) over the ground (y, x, 2), best first."""
-    best, tallest = score.max(0), score.argmax(0)
-    rows, columns = np.nonzero((best == maximum_filter(best, 3)) & (best > _LEAST_SCORE))
+    best = score.max(0)
+    rows, columns = np.nonzero(best > _LEAST_SCORE)  # few places, so these alone are compared with their neighbours
+    framed = np.pad(best, 1, constant_values=-np.inf)
+    around = framed[rows[:, None] + _AROUND[0], columns[:, None] + _AROUND[1]]
+    highest = best[rows, columns] == around.max(1, initial=-np.inf)
+    rows, columns = rows[highest], columns[highest]
     order = np.argsort(-best[rows, columns], kind="stable")[:MOST]
     rows, columns = rows[order], columns[order]
-    chosen = tallest[rows, columns]
+    chosen = score[:, rows, columns].argmax(0)
     return Candidates(lattice_ground[rows, columns], heights[chosen], widths[chosen])
 
 

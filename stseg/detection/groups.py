@@ -173,6 +173,7 @@ def restricted(problem: Problem, own: Ints) -> Problem:
         problem.breadth,
         problem.parameters,
         problem.assigned,
+        problem.owner,
         problem.view_evidence,
     )
 

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from stseg.arrays import Floats
 from stseg.detection.evidence import peaks
 from stseg.detection.map_estimate import MapEstimate
-from stseg.detection.open_pixels import OpenPixels
-from stseg.detection.views import PixelView
+from stseg.detection.pixel_lattice import OpenPixels, fill_scores
 from stseg.geometry import Grid
 from stseg.model.candidates import Candidates
 
@@ -33,36 +30,22 @@ def lattice_candidates(estimate: MapEstimate, lattice_ground: Floats) -> Candida
     Pixels are summed at one or two heights first, and at the others only where those are not all hopeless.
     `lattice_ground` float64 (y, x, 2) is that of the views, metres.
     """
-    evidence, unexplained = estimate.evidence, estimate.unexplained()
-    body, (rows, columns) = evidence.prior.body, lattice_ground.shape[:2]
-    heights = np.asarray(body.heights)
-    score = np.repeat(evidence.prior.log_height(heights)[:, None], rows * columns, 1)
-    shown: list[tuple[PixelView, OpenPixels]] = []
-    seen = zip(evidence.views, evidence.observations, evidence.box_lattices, unexplained, strict=True)
-    for view, observation, boxes, free in seen:
+    evidence = estimate.evidence
+    prior, (rows, columns) = evidence.prior, lattice_ground.shape[:2]
+    heights = np.asarray(prior.body.heights)
+    score = np.repeat(prior.log_height(heights)[:, None], rows * columns, 1)
+    for boxes, assigned in zip(evidence.box_lattices, estimate.box_assignment, strict=True):
         if boxes is not None:
-            score += boxes.score(free)
-        elif isinstance(view, PixelView) and observation is not None:
-            shown.append((view, view.open_pixels(observation, free)))
-    if shown:
-        _add_pixels(shown, _probes(heights), score)
-    return peaks(score.reshape(-1, rows, columns), lattice_ground, heights, body.width_of(heights))
+            score += boxes.score(assigned < 0)
+    if len(evidence.rasters):
+        pixels = OpenPixels.of(evidence.rasters, estimate.owners, evidence.lattice, evidence.extremes)
+        probes = _probes(heights)
+        others, weight = np.delete(np.arange(len(heights)), probes), prior.config.effective_observations
+        fill_scores(pixels, evidence.lattice, np.array(probes), others, _HOPELESS, weight, score)
+    return peaks(score.reshape(-1, rows, columns), lattice_ground, heights, prior.body.width_of(heights))
 
 
 def _probes(heights: Floats) -> list[int]:
     """Heights that show whether a place is worth a look: the middle one, and a small one where they differ much."""
     middle, small = len(heights) // 2, len(heights) // 4
     return [middle, small] if heights[small] < _ALIKE * heights[middle] else [middle]
-
-
-def _add_pixels(shown: Sequence[tuple[PixelView, OpenPixels]], probes: Sequence[int], score: Floats) -> None:
-    """Add what pixels say of the lattice's pillars to score (height, cell); -inf where a height is not worth a look."""
-    others = np.delete(np.arange(len(score)), probes)
-    for view, pixels in shown:
-        view.add_lattice_score(pixels, np.array(probes), view.lattice_cells, score)
-    hopeless = score[probes].max(0) <= _HOPELESS
-    worth = np.flatnonzero(~hopeless)
-    for view, pixels in shown:
-        view.add_lattice_score(pixels, others, worth, score)
-    for height in others:
-        score[height, hopeless] = -np.inf

@@ -185,6 +185,11 @@ def _add(
     sharing: Sharing,
 ) -> int:
     """Add the best candidate while one helps; gains seldom rise, so candidates far below the best are tried once."""
+    outside = 0
+    for i in own:
+        outside += not inside[i]
+    if outside == 0:
+        return count
     gain = np.full(len(own), np.inf)
     fill_assignment(members, count, problem.pixels, assigned)
     assign_tracks(members, count, sharing.tracks)
@@ -256,12 +261,14 @@ def _exchange(
     fill_assignment(members, count, problem.pixels, assigned)
     for a in range(count):
         old = members[a]
+        if not _has_rival(old, own, inside, problem):
+            continue
         members[a], inside[old] = members[count - 1], False
         withdraw(old, members, count - 1, problem.pixels, assigned)
         assign_tracks(members, count - 1, sharing.tracks)
         best, best_gain = old, gain_of(old, members, count - 1, inside, assigned, problem, sharing) + GAINED
         for i in own:
-            if inside[i] or i == old or _apart(i, old, problem) > _NEAR:
+            if i == old or not _may_replace(i, old, inside, problem):
                 continue
             gain = gain_in_place(i, members, count - 1, inside, assigned, problem, sharing)
             if gain > best_gain:
@@ -275,3 +282,18 @@ def _exchange(
         changed = changed or best != old
     clear_assignment(members, count, problem.pixels, assigned)
     return changed
+
+
+@part
+def _has_rival(old: int, own: Ints, inside: Flags, problem: Problem) -> bool:
+    """Whether any candidate may replace a member."""
+    found = False
+    for i in own:
+        found = found or _may_replace(i, old, inside, problem)
+    return found
+
+
+@part
+def _may_replace(i: int, old: int, inside: Flags, problem: Problem) -> bool:
+    """Whether a candidate is outside the set and near a member."""
+    return not inside[i] and _apart(i, old, problem) <= _NEAR

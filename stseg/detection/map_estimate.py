@@ -13,13 +13,14 @@ from functools import cached_property
 import numpy as np
 
 from stseg.accelerate import kernel
-from stseg.arrays import Flags, Floats, Ints, Shorts, Singles
+from stseg.arrays import Floats, Ints, Shorts, Singles
 from stseg.detection.additions import fill_additions
 from stseg.detection.assignment import Assignment
 from stseg.detection.blob_scale import blob_scales
 from stseg.detection.body_size import measure
 from stseg.detection.box_lattice import BoxLattice
 from stseg.detection.evidence import ProjectedBodies, box_evidence, pixel_evidence, stacked_rasters
+from stseg.detection.pixel_lattice import PixelLattice
 from stseg.detection.prior import Prior
 from stseg.detection.problem import Parameters, Problem
 from stseg.detection.refine import refine, refine_places
@@ -32,17 +33,33 @@ from stseg.model.sizes import Sizes
 
 @dataclass(frozen=True)
 class FrameEvidence:
-    """What stays the same in all rounds of a frame: views, their observations (None where blind), and the prior."""
+    """What stays the same in all rounds of a frame: views, their observations (None where blind), and the prior.
+
+    `lattice` has the birth lattice's pillars in the views that deliver pixels.
+    """
 
     views: Sequence[BoxView | PixelView]
     observations: Sequence[ViewObservation | None]
     prior: Prior
     parameters: Parameters
+    lattice: PixelLattice
+
+    @cached_property
+    def extremes(self) -> Floats:
+        """The lowest and the highest log-odds of each view that delivers pixels, 0 where it is blind: (view, 2)."""
+        pairs = zip(self.views, self.observations, strict=True)
+        own = [seen.extremes if seen else (0.0, 0.0) for view, seen in pairs if isinstance(view, PixelView)]
+        return np.array(own).reshape(-1, 2)
 
     @cached_property
     def rasters(self) -> Singles:
         """`stacked_rasters` of the views' log-odds."""
         return stacked_rasters(self.views, [None if seen is None else seen.raster for seen in self.observations])
+
+    @cached_property
+    def owner(self) -> Shorts:
+        """Scratch of searches, -1 before and after: the candidate whom each pixel of the rasters is assigned to."""
+        return np.full((len(self.rasters), self.rasters[:1].size), -1, np.int16)
 
     @cached_property
     def box_lattices(self) -> list[BoxLattice | None]:
@@ -59,8 +76,8 @@ class FrameEvidence:
 
     @cached_property
     def scales(self) -> Singles:
-        """`stacked_rasters` of the scales of their pixels (`stseg.detection.blob_scale`)."""
-        return stacked_rasters(self.views, blob_scales(self.views, self.observations, self.prior.config))
+        """Scales of their pixels (`stseg.detection.blob_scale`)."""
+        return blob_scales(self.rasters, self.extremes, self.lattice, self.prior.config, self.prior.body)
 
 
 @dataclass(frozen=True)
@@ -244,44 +261,44 @@ class MapEstimate:
     @cached_property
     def box_assignment(self) -> list[Ints]:
         """For each view the member whom each box is assigned to, int64 (box,); -1 for none."""
-        return [boxes for boxes, _ in self._assignments]
+        rows = iter(self._assignments[0])
+        pairs = zip(self.evidence.views, self.evidence.observations, strict=True)
+        return [
+            next(rows)[: len(seen.edges) if seen else 0] if isinstance(view, BoxView) else np.zeros(0, np.int64)
+            for view, seen in pairs
+        ]
 
     @cached_property
     def pixel_assignment(self) -> list[Shorts]:
         """For each view the member whom each raster pixel is assigned to, int16 (v, u); -1 for none."""
-        return [pixels for _, pixels in self._assignments]
+        assigned, start = [], 0
+        for view in self.evidence.views:
+            if isinstance(view, PixelView):
+                stop = start + view.shape[0] * view.shape[1]
+                assigned.append(self.owners[start:stop].reshape(view.shape))
+                start = stop
+            else:
+                assigned.append(np.full(view.shape, -1, np.int16))
+        return assigned
+
+    @property
+    def owners(self) -> Shorts:
+        """The member whom each raster pixel is assigned to, of all views with pixels one after the other: (pixel,)."""
+        return self._assignments[1]
 
     @cached_property
-    def _assignments(self) -> list[tuple[Ints, Shorts]]:
-        """Boxes and pixels of each view."""
-        views, observations = self.evidence.views, self.evidence.observations
-        shapes = np.array([view.shape for view in views if isinstance(view, PixelView)], np.int64).reshape(-1, 2)
-        of_boxes = np.empty(self.problem.boxes.match.shape[::2], np.int64)
+    def _assignments(self) -> tuple[Ints, Shorts]:
+        """Boxes and pixels of all views that have such."""
+        shapes = self.evidence.lattice.shapes
+        boxes = np.empty(self.problem.boxes.match.shape[::2], np.int64)
         owners = np.empty(int(shapes.prod(1).sum()), np.int16)
-        fill_assignments(self.members, self.problem, shapes, of_boxes, owners)
-        assigned, box_rows, start = [], iter(of_boxes), 0
-        for view, observation in zip(views, observations, strict=True):
-            boxes = np.full(len(observation.edges) if observation else 0, -1, np.int64)
-            if isinstance(view, BoxView):
-                pixels = np.full(view.shape, -1, np.int16)
-                boxes[:] = next(box_rows)[: len(boxes)]
-            else:
-                stop = start + view.shape[0] * view.shape[1]
-                pixels, start = owners[start:stop].reshape(view.shape), stop
-            assigned.append((boxes, pixels))
-        return assigned
+        fill_assignments(self.members, self.problem, shapes, boxes, owners)
+        return boxes, owners
 
     @property
     def track_index(self) -> Ints:
         """The predicted track that each member continues, int64 (member,); -1 for births."""
         return self.members_score.track_index
-
-    def unexplained(self) -> list[Flags]:
-        """For each view the boxes, or the pixels, that are assigned to no member."""
-        return [
-            (pixels if isinstance(view, PixelView) else boxes) < 0
-            for view, (boxes, pixels) in zip(self.evidence.views, self._assignments, strict=True)
-        ]
 
     def moved(self) -> Candidates:
         """The members at the means of their places, each at the size that it has."""
@@ -374,5 +391,6 @@ def _problem(evidence: FrameEvidence, pool: Candidates, bodies: ProjectedBodies,
         breadth=breadth,
         parameters=evidence.parameters,
         assigned=np.empty(max(pixels.raster[:1].size, boxes.match.shape[2], len(prior.predicted), 1), np.int64),
+        owner=evidence.owner,
         view_evidence=np.zeros((len(views), len(pool) + 1)),
     )

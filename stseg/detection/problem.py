@@ -126,6 +126,8 @@ class Problem(NamedTuple):
     assigned : int64 (at least boxes, at least v * u, at least tracks)
         Scratch: after a view was scored, the place in the set of the member whom each box or pixel is assigned to, -1
         for none; after the tracks were scored, of the member who continues each track.
+    owner : int16 (view, v * u)
+        Scratch, -1 before and after: the candidate whom each pixel is assigned to while sets are searched.
     view_evidence : float64 (view, candidate + 1)
         Scratch: after a set was scored, what each view says of each of its members, nats; views with boxes first.
     """
@@ -139,4 +141,5 @@ class Problem(NamedTuple):
     breadth: Floats
     parameters: Parameters
     assigned: Ints
+    owner: PixelAssignment
     view_evidence: Floats

@@ -48,9 +48,7 @@ def _improve(members: Ints, count: int, whole: Problem, shared: Sharing, enumera
     interacts, group = np.empty((beside, beside), np.bool_), np.empty(candidates, np.int64)
     if trades > 0:
         fill_interactions(problem, sharing, interacts)
-    views, rows, columns = problem.pixels.raster.shape
-    assigned, chosen = np.full((views, rows * columns), -1, np.int16), np.empty(candidates + 1, np.int64)
-    inside = np.zeros(candidates, np.bool_)
+    chosen, inside = np.empty(candidates + 1, np.int64), np.zeros(candidates, np.bool_)
     inside[members[:count]] = True
     for g in range(fill_groups(problem, sharing, group)):
         own = np.flatnonzero(group == g)
@@ -61,9 +59,9 @@ def _improve(members: Ints, count: int, whole: Problem, shared: Sharing, enumera
             size = len(start)
             for a in range(size):
                 chosen[a] = start[a]
-            size = local_search(chosen, size, own, inside, assigned, problem, sharing)
+            size = local_search(chosen, size, own, inside, problem.owner, problem, sharing)
             if trades > 0:
-                size = swap(chosen, size, own, inside, interacts, assigned, trades, problem, sharing)
+                size = swap(chosen, size, own, inside, interacts, problem.owner, trades, problem, sharing)
         inside[own] = False
         inside[chosen[:size]] = True
     best = np.flatnonzero(inside)

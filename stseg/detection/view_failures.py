@@ -170,12 +170,14 @@ def informedness(assignment: NDArray[np.int16], sure: Flags, foreground: Flags) 
 @kernel
 def _fill_counts(assignment: NDArray[np.int16], sure: Flags, foreground: Flags, people: Ints, rest: Ints) -> None:
     """Fill the pixels, and the foreground ones, of each person who is sure (person, 2), and of nobody (2,)."""
+    number, shown = 0, 0
     for v in range(assignment.shape[0]):
         for u in range(assignment.shape[1]):
             person = assignment[v, u]
             if person < 0:
-                rest[0] += 1
-                rest[1] += foreground[v, u]
+                number += 1
+                shown += foreground[v, u]
             elif sure[person]:
                 people[person, 0] += 1
                 people[person, 1] += foreground[v, u]
+    rest[0], rest[1] = number, shown

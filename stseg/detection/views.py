@@ -11,21 +11,17 @@ import numpy as np
 from stseg.accelerate import kernel, wide_kernel
 from stseg.arrays import Boxes, Flags, Floats, Ints, Shorts, Singles
 from stseg.config import BodyConfig, DetectionConfig
-from stseg.detection.open_pixels import OpenPixels, add_means, strip_boxes
 from stseg.geometry import Camera, Grid
 from stseg.geometry.bodies import WIDTH, BodyTable
 from stseg.model.box_fit import fill_inside
 from stseg.model.box_noise import FIRST, BoxNoise
 from stseg.model.outlines import Spans, outlines, sums_inside
-from stseg.model.packed_outlines import PackedOutlines
 from stseg.model.pillar_index import PillarIndex
 
 OWN, BACKGROUND = 5.0, -10.0
 """Weights of a person's own pixels and of background inside their pillar (HW12 eq. 27)."""
 _BODY_ROWS = 30
 """Rows of a body on a raster: enough for its outline, few enough for speed."""
-_DRAWN = 4096
-"""Pillars of the lattice that are drawn at once: until they are packed, each takes as many rows as the tallest."""
 _LEAST_INSIDE = 0.02
 """Share of a body's box in the image below which the view does not see it."""
 
@@ -56,6 +52,11 @@ class ViewObservation:
     def is_foreground(self) -> Flags:
         """Raster pixels that are foreground rather than not, bool (v, u)."""
         return np.asarray(self.raster > 0)
+
+    @cached_property
+    def extremes(self) -> tuple[float, float]:
+        """The lowest and the highest log-odds, nats."""
+        return float(self.raster.min(initial=np.inf)), float(self.raster.max(initial=-np.inf))
 
     @cached_property
     def label_values(self) -> Singles:
@@ -170,18 +171,6 @@ class BoxView(View):
 class PixelView(View):
     """A view that delivers a likelihood map."""
 
-    def __init__(
-        self, camera: Camera, grid: Grid, lattice_ground: Floats, config: DetectionConfig, body: BodyConfig
-    ) -> None:
-        super().__init__(camera, grid, lattice_ground, config, body)
-        heights = np.repeat(np.asarray(body.heights), len(lattice_ground))
-        places = np.tile(lattice_ground, (len(body.heights), 1))
-        widths = body.width_of(heights)
-        parts = [slice(begin, begin + _DRAWN) for begin in range(0, len(heights), _DRAWN)]
-        self.lattice = PackedOutlines.of(self.outlines(places[own], heights[own], widths[own]) for own in parts)
-        self.lattice_cells, self.common = np.arange(len(lattice_ground)), len(body.heights) // 2
-        self._strips = strip_boxes(self.lattice, len(lattice_ground))
-
     def observe(self, seen: Boxes | Singles | None, sharpness: BoxNoise = FIRST) -> ViewObservation:
         """The frame's log-odds on the raster; all zero where the view is blind."""
         del sharpness
@@ -197,21 +186,6 @@ class PixelView(View):
     def foreground(self, observation: ViewObservation) -> Flags:
         """Raster pixels that are foreground rather than not, bool (v, u)."""
         return observation.is_foreground
-
-    def open_pixels(self, observation: ViewObservation, unexplained: Flags) -> OpenPixels:
-        """The unexplained pixels of a frame, bool (v, u)."""
-        return OpenPixels.of(observation.raster, unexplained)
-
-    def common_means(self, observation: ViewObservation) -> Floats:
-        """Mean log-odds over the lattice's pillars of common height, explained or not: nats, float64 (cell,)."""
-        score = np.zeros((self.common + 1, len(self.lattice_cells)))
-        pixels = self.open_pixels(observation, np.ones(self.shape, bool))
-        self.add_lattice_score(pixels, np.array([self.common]), self.lattice_cells, score)
-        return np.asarray(score[self.common] / self.config.effective_observations)
-
-    def add_lattice_score(self, pixels: OpenPixels, heights: Ints, cells: Ints, score: Floats) -> None:
-        """Add to score (height, cell), nats, what unexplained pixels say of pillars of some heights at some cells."""
-        add_means(pixels, self._strips, self.lattice, heights, cells, self.config.effective_observations, score)
 
     def open_sums(self, values: Singles, owner: Shorts, number: Ints, pillars: TriedPillars) -> tuple[Floats, Floats]:
         """Weighted sums of the pixels open to each person inside their pillars, and the pillars' fair areas.

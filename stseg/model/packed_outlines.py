@@ -38,7 +38,8 @@ class PackedOutlines(NamedTuple):
     @classmethod
     def of(cls, parts: Iterable[tuple[Ints, Spans, Floats]]) -> Self:
         """From consecutive outlines as `outlines` returns them."""
-        firsts, counts, packed, areas, insides = [], [], [], [], []
+        firsts, counts, insides = ([np.zeros(0, np.int64)] for _ in range(3))
+        packed, areas = [np.zeros((0, 2), np.int16)], [np.zeros(0)]
         for first, spans, area in parts:
             rows, inside = np.empty((2, len(spans)), np.int64)
             _count(spans, rows, inside)

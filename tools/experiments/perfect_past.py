@@ -59,7 +59,7 @@ def perfect_past(made: Recorded, every: int) -> PerfectPast:
         people, errors = people + len(true), errors + len(true) + len(found) - 2 * hits
         if hits < max(len(true), len(found)):
             prior = Prior.of(predicted, detector.config, body, detector.border)
-            evidence = FrameEvidence(detector.views, detector.observe(seen), prior, detector.parameters)
+            evidence = detector.evidence(detector.observe(seen), prior)
             chosen = Candidates(found.ground, found.height, found.width)
             wrong += 1
             less_likely += _best_score(evidence, true) < _best_score(evidence, chosen.ground)
