@@ -11,9 +11,14 @@ from reference_identities import crossings, greatest_score, score
 from strollers import BORDER, CONFIG, RATE, rows_of, runs, straight, swapped, visit
 
 from stseg.arrays import Floats, Ints, Rows
-from stseg.tracking.identities import search, step_kernels
+from stseg.tracking.identities import search
+from stseg.tracking.identities.alternatives import Alternatives
+from stseg.tracking.identities.choice import choose_distinct
 from stseg.tracking.identities.crossings import crossing, crossings_of
+from stseg.tracking.identities.hypotheses import Hypotheses
 from stseg.tracking.identities.observations import Observations, observe
+from stseg.tracking.identities.pasts import Pasts
+from stseg.tracking.identities.present_names import empty_present
 from stseg.tracking.identities.search import SearchLimits, search_identities
 from stseg.tracking.identities.size_model import MeasuredSizes, SizeModel, SizePrior, learn_sizes
 from stseg.tracking.isolated_tracklets import isolated_tracklets
@@ -51,8 +56,9 @@ def test_who_stand_beside_each_other_do_not_pass_through_each_other(away: float)
     stay, pass_by = (crossings(seen, names, 1, CONFIG.motion) for names in ([0, 1, 0, 1], [0, 1, 1, 0]))
     assert stay == 0.0
     assert pass_by > 0.5
-    own = crossings_of(0, 2, 4, seen.ground, seen.variance, CONFIG.motion.speed_spread / RATE / 4, seen.room)
-    last = np.array([0, 1])
+    bend = (CONFIG.motion.speed_spread / RATE / 4) ** 2
+    own = crossings_of(0, 2, 4, seen.ground, seen.variance, bend, seen.room)
+    last = np.array([0, 1, -1])
     assert crossing(0, 0, 1, 1, last, own) == 0.0
     assert crossing(0, 1, 1, 0, last, own) == pytest.approx(pass_by, abs=1e-4)
     assert crossing(0, 1, 1, 2, last, own) == 0.0  # somebody new has no past
@@ -91,23 +97,23 @@ def test_what_comes_later_counts_where_a_track_is_certain() -> None:
 def test_hypotheses_that_differ_in_the_frame_of_a_birth_are_one(
     names: list[list[int]], columns: list[int], distinct: int
 ) -> None:
-    name, birth = np.array(names), np.array([0, 0, 2, 3, 4])
-    change = np.array([[h, -1, -1, -1, -1] for h in range(2)])
-    value, column, none = np.array([2.0, 1.0]), np.array(columns)[:, None], np.zeros(2, np.int64)
-    same = np.zeros_like(name)
-    parent, chosen, given, keys = none.copy(), np.zeros((2, 1), np.int64), np.zeros((2, 1), np.int64), none.copy()
-    number = step_kernels.choose_distinct(
-        np.arange(2), change, value, column, name, same, birth, none, 4, -np.inf, parent, chosen, given, np.zeros(2),
-        keys,
+    seen = seen_of(rows_of({1: (straight(-3, 0, 0.5, 0), 1.7, range(5))})).rows()
+    seen.birth[:] = np.array([1 << 40, 1 << 40, 3 << 40, 5 << 40, 7 << 40])
+    held, pasts = Hypotheses.empty(2, 2, 0), Pasts.empty(4, 1)
+    held.past[:], pasts.name[:], pasts.last[:] = [[0, 1], [2, 3]], np.ravel(names), 0
+    change, value = np.array([[h, -1, -1, -1, -1] for h in range(2)]), np.array([2.0, 1.0])
+    chosen, mark = np.empty(2, np.int64), np.zeros(2, np.int64)
+    number = choose_distinct(
+        held, pasts, np.array(columns)[:, None], 4, seen, mark, Alternatives(change, value), 2, 60.0, empty_present(2),
+        chosen,
     )  # fmt: skip
-    assert number == distinct
-    assert given[0, 0] == name[0, columns[0]]
+    assert chosen[:number].tolist() == [0, 1][:distinct]
 
 
 def test_births_within_a_second_of_a_track_are_one() -> None:
     rows = rows_of({1: (straight(-3, 0, 0.5, 0), 1.7, range(20)), 2: (straight(3, 0, 0.5, 0), 1.7, range(20))})
     seen = seen_of(rows)
-    birth, track = seen.birth, rows["id"][seen.order]
+    birth, track = seen.birth(), rows["id"][seen.order]
     second = np.repeat(np.floor(seen.seconds), np.diff(seen.start))
     assert len(np.unique(birth)) == len(np.unique(np.stack([track, second]), axis=1).T) == 6
     for one in np.unique(birth):

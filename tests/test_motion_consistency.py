@@ -13,7 +13,7 @@ import pytest
 from stseg.arrays import Floats
 from stseg.config import MotionConfig
 from stseg.trackers.kalman_filters import corrected, initial, innovations, predicted
-from stseg.tracking.identities import step_kernels
+from stseg.tracking.identities.pasts import correct_place, predicted_variance
 from stseg.tracking.motion_model import process_noise, transition
 from stseg.tracking.smoother import smoothed_path
 from stseg.tracking.track_filter import Measurement, TrackState
@@ -68,12 +68,12 @@ def of_the_kalman_tracker(measured: Floats, noise: Floats) -> list[float]:
 
 def of_the_identity_search(measured: Floats, noise: Floats) -> list[float]:
     variance, turn = float(noise[0, 0]), MOTION.velocity_noise**2
-    state, covariance = np.append(measured[0], [0.0, 0.0]), np.array([variance, 0.0, MOTION.speed_spread**2])
+    state, covariance = np.append(measured[:1], [[0.0, 0.0]], 1), np.array([[variance, 0.0, MOTION.speed_spread**2]])
     found = []
     for place in measured[1:]:
-        total = step_kernels.predicted_variance(covariance, SECONDS, turn) + variance
-        found.append(float(((place - state[:2] - SECONDS * state[2:]) ** 2).sum() / total))
-        step_kernels._correct(state, covariance, SECONDS, place, variance, turn)
+        total = predicted_variance(covariance, 0, SECONDS, turn) + variance
+        found.append(float(((place - state[0, :2] - SECONDS * state[0, 2:]) ** 2).sum() / total))
+        correct_place(state, covariance, 0, SECONDS, place[None], noise[:1, 0], 0, turn)
     return found
 
 

@@ -14,7 +14,7 @@ from stseg.io.runfile.runs import Run
 from stseg.tracking.answered_constraints import answered_rows
 from stseg.tracking.corrections import Answer
 from stseg.tracking.doubts import Doubt, find_doubts
-from stseg.tracking.identities.step_kernels import CONTRADICTION
+from stseg.tracking.identities.costs import CONTRADICTION
 
 _AROUND = 10.0
 """Time before and after a decision in which identities are solved with it, and with the opposite one, seconds."""

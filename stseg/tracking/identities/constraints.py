@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from stseg.accelerate import kernel, part
 from stseg.arrays import Flags, Ints
 
 
@@ -99,13 +101,6 @@ class KnownPeople:
         np.maximum.at(last, person, observation)
         return cls(observation, person, other, first, last)
 
-    def within(self, first: int, stop: int) -> list[tuple[int, int]]:
-        """Observations from `first` to before `stop`, and the person of each."""
-        if not len(self.observation):
-            return []
-        start, end = np.searchsorted(self.observation, (first, stop))
-        return list(zip(self.observation[start:end].tolist(), self.person[start:end].tolist(), strict=True))
-
     def decided(self, frame: Ints) -> Ints:
         """Frames in which an observation must, or must not, have an identity; frame (n,) is of all observations."""
         here, begin = frame[self.observation], frame[self.first]
@@ -118,11 +113,61 @@ class KnownPeople:
         change = np.repeat([1, -1], len(self.first))
         return int(np.cumsum(change[np.lexsort((change, ends))]).max(initial=0))
 
-    def awaited(self, first: int) -> Flags:
-        """People who were observed before an observation, and are to be observed again, bool (person,)."""
-        return np.asarray((self.first < first) & (self.last >= first))
+    def bound(self, start: Ints) -> BoundPeople:
+        """The same for kernels; start (frame + 1,) is the first observation of each frame."""
+        others = np.where(self.other, self.first, -1).max(axis=1, initial=-1)
+        return BoundPeople(
+            self.observation, self.person, np.searchsorted(self.observation, start), self.other, self.first, self.last,
+            np.maximum(self.last, others),
+        )  # fmt: skip
 
-    def binding(self, first: int) -> Flags:
-        """People observed before an observation whose identity matters from then on, bool (person,)."""
-        to_come = (self.other & (self.first >= first)).any(axis=1)
-        return np.asarray((self.first < first) & ((self.last >= first) | to_come))
+
+class BoundPeople(NamedTuple):
+    """People whom constraints know.
+
+    Attributes
+    ----------
+    observation, person, other, first, last
+        As of `KnownPeople`.
+    start : int64 (frame + 1,)
+        The first of the named observations from each frame on.
+    binding : int64 (person,)
+        The last observation for which it matters who somebody is.
+    """
+
+    observation: Ints
+    person: Ints
+    start: Ints
+    other: Flags
+    first: Ints
+    last: Ints
+    binding: Ints
+
+
+@part
+def is_awaited(people: BoundPeople, bound: Ints, h: int, name: int, first: int) -> bool:
+    """Whether an identity must be observed again, from an observation on; bound (hypothesis, person) is who all are."""
+    for person in range(bound.shape[1]):
+        if bound[h, person] == name and people.first[person] < first <= people.last[person]:
+            return True
+    return False
+
+
+@kernel
+def binding_people(people: BoundPeople, first: int) -> Ints:
+    """People observed before an observation whose identity matters from then on."""
+    found, number = np.empty(len(people.first), np.int64), 0
+    for person in range(len(found)):
+        if people.first[person] < first <= people.binding[person]:
+            found[number] = person
+            number += 1
+    return found[:number]
+
+
+@part
+def mark_of(bound: Ints, h: int, binding: Ints) -> int:
+    """A number that differs where hypotheses differ in who some people are; bound (hypothesis, person)."""
+    mark = 0
+    for person in binding:
+        mark = (mark * 1_000_003 + bound[h, person] + 2) % 2_147_483_647
+    return mark

@@ -46,8 +46,9 @@ class Crossings(NamedTuple):
     cost: Floats
 
 
+@kernel
 def crossings_of(
-    before: int, first: int, stop: int, ground: Floats, variance: Floats, bend: float, room: float
+    before: int, first: int, stop: int, ground: Floats, variance: Floats, bend_square: float, room: float
 ) -> Crossings:
     """Crossings between the rows from `before` and those from `first` to before `stop`.
 
@@ -57,72 +58,88 @@ def crossings_of(
         Rows.
     ground : float64 (n, 2), variance : float64 (n,)
         Places of rows in metres, and the variance of each coordinate.
-    bend
-        Distance of a walk from the straight path, metres (standard deviation).
+    bend_square
+        Square of the distance of a walk from the straight path (variance), square metres.
     room
         Distance below which two bodies overlap, metres.
     """
-    then, now = np.empty((first - before,) * 2, np.int64), np.empty((stop - first,) * 2, np.int64)
-    cost = np.empty((_number_near_pairs(ground[first:stop], now), _number_near_pairs(ground[before:first], then)))
-    spread = (variance[before:stop] + bend**2) / 2.0  # of one person, half from each frame
-    earlier = first - before
-    _fill_crossings(then, now, ground[before:first], ground[first:stop], spread[:earlier], spread[earlier:], room, cost)
+    then, now = np.empty((first - before, first - before), np.int64), np.empty((stop - first, stop - first), np.int64)
+    cost = np.empty((_number_near_pairs(ground, first, now), _number_near_pairs(ground, before, then)))
+    if cost.size:
+        _fill_crossings(then, now, ground, variance, before, first, bend_square, room, cost)
     return Crossings(before, then, now, cost)
 
 
 @part
-def crossing(i: int, slot: int, j: int, other: int, last: Ints, crossings: Crossings) -> float:
-    """Cost of rows i and j of a frame as those of two slots whose last rows are last (slot,), nats."""
-    if slot >= len(last) or other >= len(last) or crossings.now[i, j] < 0:
+def crossing(i: int, one: int, j: int, other: int, last: Ints, crossings: Crossings) -> float:
+    """Cost of rows i and j of a frame as those of two identities whose last rows are last (identity,), nats."""
+    if crossings.now[i, j] < 0:
         return 0.0
-    p, q = last[slot] - crossings.before, last[other] - crossings.before
+    p, q = last[one] - crossings.before, last[other] - crossings.before
     if p < 0 or q < 0 or crossings.then[p, q] < 0:
         return 0.0
     return float(crossings.cost[crossings.now[i, j], crossings.then[p, q]])
 
 
 @part
-def crossings_with_others(i: int, slot: int, spared: int, column: Ints, last: Ints, crossings: Crossings) -> float:
-    """Cost of row i as that of a slot, beside all rows but one and their columns (row,), nats."""
+def crossings_with_others(i: int, one: int, spared: int, own: Ints, last: Ints, crossings: Crossings) -> float:
+    """Cost of row i as that of an identity, beside all rows but one and their identities (row,), nats."""
     total = 0.0
-    for k in range(len(column)):
+    for k in range(len(own)):
         if k not in (i, spared):
-            total += crossing(i, slot, k, column[k], last, crossings)
+            total += crossing(i, one, k, own[k], last, crossings)
     return total
 
 
-@kernel
-def _number_near_pairs(ground: Floats, pair: Ints) -> int:
+@part
+def _number_near_pairs(ground: Floats, first: int, pair: Ints) -> int:
+    """Number the ordered pairs of near rows from `first` on, pair (row, row); how many there are."""
     number = 0
-    for i in range(len(ground)):
-        for j in range(len(ground)):
+    for i in range(len(pair)):
+        for j in range(len(pair)):
             pair[i, j] = -1
-            if i != j and math.hypot(ground[i, 0] - ground[j, 0], ground[i, 1] - ground[j, 1]) < _NEAR:
-                pair[i, j] = number
-                number += 1
+            if i != j:
+                x, y = ground[first + i, 0] - ground[first + j, 0], ground[first + i, 1] - ground[first + j, 1]
+                if math.hypot(x, y) < _NEAR:
+                    pair[i, j] = number
+                    number += 1
     return number
 
 
-@kernel
+@part
 def _fill_crossings(
-    then: Ints, now: Ints, ground_then: Floats, ground: Floats, spread_then: Floats, spread: Floats, room: float,
+    then: Ints, now: Ints, ground: Floats, variance: Floats, before: int, first: int, bend_square: float, room: float,
     cost: Floats,
 ) -> None:  # fmt: skip
-    for p, q in np.argwhere(then >= 0):
-        for i, j in np.argwhere(now >= 0):
-            deviation = math.sqrt(spread_then[p] + spread_then[q] + spread[i] + spread[j])
-            ends, least = _approach(ground_then[p] - ground_then[q], ground[i] - ground[j])
-            cost[now[i, j], then[p, q]] = math.log(_apart(ends, deviation, room) / _apart(least, deviation, room))
+    for p in range(before, first):
+        for q in range(before, first):
+            if then[p - before, q - before] >= 0:
+                pair, spread = then[p - before, q - before], _spread(variance, p, q, 0.0, bend_square)
+                x, y = ground[p, 0] - ground[q, 0], ground[p, 1] - ground[q, 1]
+                for i in range(first, first + len(now)):
+                    for j in range(first, first + len(now)):
+                        if now[i - first, j - first] >= 0:
+                            deviation = math.sqrt(_spread(variance, i, j, spread, bend_square))
+                            later_x, later_y = ground[i, 0] - ground[j, 0], ground[i, 1] - ground[j, 1]
+                            ends, least = _approach(x, y, later_x, later_y)
+                            ratio = _apart(ends, deviation, room) / _apart(least, deviation, room)
+                            cost[now[i - first, j - first], pair] = math.log(ratio)
 
 
 @part
-def _approach(start: Floats, stop: Floats) -> tuple[float, float]:
+def _spread(variance: Floats, one: int, other: int, before: float, bend_square: float) -> float:
+    """Variance of two people in one of both frames, added to that before: half of each person's from each frame."""
+    return float(before + (variance[one] + bend_square) / 2.0 + (variance[other] + bend_square) / 2.0)
+
+
+@part
+def _approach(x: float, y: float, later_x: float, later_y: float) -> tuple[float, float]:
     """Shorter length of two vectors, and least length on the straight path between them."""
-    step_x, step_y = stop[0] - start[0], stop[1] - start[1]
+    step_x, step_y = later_x - x, later_y - y
     square = step_x * step_x + step_y * step_y
-    share = 0.0 if square == 0.0 else min(max(-(start[0] * step_x + start[1] * step_y) / square, 0.0), 1.0)
-    ends = min(math.hypot(start[0], start[1]), math.hypot(stop[0], stop[1]))
-    return ends, min(math.hypot(start[0] + share * step_x, start[1] + share * step_y), ends)
+    share = 0.0 if square == 0.0 else min(max(-(x * step_x + y * step_y) / square, 0.0), 1.0)
+    ends = min(math.hypot(x, y), math.hypot(later_x, later_y))
+    return ends, min(math.hypot(x + share * step_x, y + share * step_y), ends)
 
 
 @part

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,6 +21,28 @@ _ONE_BIRTH = 1.0
 """Time within which it does not matter in which frame of a track somebody begins, seconds."""
 _LEAST = 0.05
 """Least error of a place, metres (standard deviation)."""
+
+
+class ObservedRows(NamedTuple):
+    """Rows of a run for kernels.
+
+    Attributes
+    ----------
+    ground, variance, previous, certain, inside, precision, information
+        As of `Observations`.
+    birth, sign : int64 (n,)
+        Numbers drawn at random for each birth, and for each row, of 62 bits.
+    """
+
+    ground: Floats
+    variance: Floats
+    previous: Ints
+    certain: Flags
+    inside: Floats
+    precision: Floats
+    information: Floats
+    birth: Ints
+    sign: Ints
 
 
 @dataclass(frozen=True)
@@ -62,12 +84,19 @@ class Observations:
     information: Floats
     room: float
 
-    @cached_property
     def birth(self) -> Ints:
         """A number of each filter track and second, of which births are one, int64 (n,)."""
         second = np.repeat(self.seconds // _ONE_BIRTH, np.diff(self.start))
         track = _heads(self.previous, self.previous >= 0)
         return np.asarray(np.unique(np.stack([track, second]), axis=1, return_inverse=True)[1].reshape(-1), np.int64)
+
+    def rows(self) -> ObservedRows:
+        """What kernels know of them."""
+        drawn = np.random.default_rng(0).integers(1 << 61, size=(2, len(self.order))) * 2 + 1
+        return ObservedRows(
+            self.ground, self.variance, self.previous, self.certain, self.inside, self.precision, self.information,
+            drawn[0][self.birth()], drawn[1],
+        )  # fmt: skip
 
     def foreseen(self) -> Observations:
         """The same, with what a part of a track that is certainly one person's tells said by its first observation.

@@ -8,16 +8,18 @@ the best K. Names become final after a lag, so memory does not grow.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
-from stseg.arrays import Flags, Floats, Ints
+from stseg.arrays import Ints
 from stseg.config import MotionConfig
-from stseg.tracking.identities import step_kernels
+from stseg.tracking.identities.beam import Frames, extend_beam
 from stseg.tracking.identities.constraints import Constraints, KnownPeople
-from stseg.tracking.identities.crossings import Crossings, crossings_of
 from stseg.tracking.identities.hypotheses import Hypotheses
 from stseg.tracking.identities.observations import Observations
+from stseg.tracking.identities.pasts import Pasts
+from stseg.tracking.identities.rules import Rules
 from stseg.tracking.identities.size_model import SizeModel
 
 _BIRTH = 6.0
@@ -32,6 +34,8 @@ FREELY = Constraints.of([], [])
 """No constraint."""
 _SPARE = 16
 """Slots for people out of sight."""
+_BLOCK = 256
+"""Frames that hypotheses are extended by at a time."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +57,29 @@ class SearchLimits:
     lag: float
 
 
+class _Choices(NamedTuple):
+    """The hypotheses after each of some frames.
+
+    Attributes
+    ----------
+    number : int64 (frame,)
+    parent : int64 (frame, hypothesis)
+        The hypothesis before.
+    names : int64 (frame, hypothesis, row)
+        Of the frame's rows.
+    """
+
+    number: Ints
+    parent: Ints
+    names: Ints
+
+    @classmethod
+    def empty(cls, frames: int, hypotheses: int, rows: int) -> _Choices:
+        """Room for them."""
+        shape = frames, hypotheses
+        return cls(np.empty(frames, np.int64), np.empty(shape, np.int64), np.empty((*shape, rows), np.int64))
+
+
 @dataclass
 class _Step:
     """The choices of one frame: parent (k,) and names (k, row), and the frame's observations and time."""
@@ -70,6 +97,13 @@ class _History:
     name: Ints
     steps: list[_Step] = field(default_factory=list)
 
+    def add(self, choices: _Choices, seen: Observations, begin: int) -> None:
+        """Add the choices of the next frames, from the one of number `begin` on."""
+        for k, number in enumerate(choices.number.tolist()):
+            first, stop = seen.start[begin + k : begin + k + 2].tolist()
+            names = choices.names[k, :number, : stop - first]
+            self.steps.append(_Step(choices.parent[k, :number], names, first, float(seen.seconds[begin + k])))
+
     def decide(self, until: float, number: int) -> Ints:
         """Make names up to a time final, by the best hypothesis; which of the `number` hypotheses agree, int64 (k,)."""
         late = sum(step.seconds > until for step in self.steps)
@@ -81,6 +115,9 @@ class _History:
             self.name[step.first : step.first + step.names.shape[1]] = step.names[best]
             best = int(step.parent[best])
         self.steps = self.steps[len(self.steps) - late :]
+        if self.steps:
+            last = self.steps[-1]
+            last.parent, last.names = last.parent[agree], last.names[agree]
         return agree
 
 
@@ -123,97 +160,40 @@ def search_identities(
     # Where it is known who somebody is, who seemed certain may have to give way.
     seen = replace(seen, certain=seen.certain & ~np.isin(frame, known.decided(frame))).foreseen()
     slots = int(np.diff(seen.start).max(initial=0)) + _SPARE + known.most_open()
-    held = Hypotheses.empty(1, 0, len(sizes.spread), len(known.first))
-    history = _History(np.full(len(seen.order), -1))
-    for k, now in enumerate(seen.seconds.tolist()):
-        held = held.with_room(int(seen.start[k + 1] - seen.start[k]), slots)
-        held, step = _extended(held, seen, k, sizes, motion, limits, known)
-        history.steps.append(step)
-        if now - history.steps[0].seconds > 2 * limits.lag:
-            agree = history.decide(now - limits.lag, len(held.score))
-            history.steps[-1].parent, history.steps[-1].names = step.parent[agree], step.names[agree]
-            held = held.at(agree)
-    history.decide(np.inf, len(held.score))
-    return Solution(history.name, float(held.score[0]))
-
-
-def _extended(
-    held: Hypotheses, seen: Observations, k: int, sizes: SizeModel, motion: MotionConfig, limits: SearchLimits,
-    known: KnownPeople,
-) -> tuple[Hypotheses, _Step]:  # fmt: skip
-    """The best hypotheses after one more frame, the k-th, and how they were chosen."""
-    first, stop, now = int(seen.start[k]), int(seen.start[k + 1]), float(seen.seconds[k])
-    turn, pace = motion.velocity_noise**2, motion.speed_spread**2
-    number, slots = held.name.shape
-    rows = stop - first
-    step_kernels.end_identities(
-        held.name, held.last, held.seconds, now, limits.longest, seen.inside, _BIRTH,
-        _awaited(held, known, first), held.score,
-    )  # fmt: skip
-    cost = np.empty((number, rows, slots + rows))
-    step_kernels.fill_costs(
-        held.name, held.last, held.seconds, held.state, held.covariance, held.precision, held.information, first, now,
-        seen.ground, seen.variance, seen.previous, seen.certain, seen.inside, seen.precision, seen.information,
-        sizes.spread, sizes.most_against * sizes.noise, turn, _BIRTH, _ABSENCE, _LEAST_PLACE, cost,
-    )  # fmt: skip
-    _impose(held, known, first, stop, cost)
-    column, total = np.empty((number, rows), np.int64), np.empty(number)
-    step_kernels.fill_best_assignments(cost, column, total)
-    most = number * (1 + rows * (slots + 1) + rows * (rows - 1) // 2)
-    change, value = np.empty((most, 5), np.int64), np.empty(most)
-    crossings = _crossings(seen, k, motion)
-    found = step_kernels.fill_alternatives(
-        cost, column, held.score - total, held.last, crossings, _ALTERNATIVE_LOSS, change, value
+    most = limits.hypotheses
+    held, spare = (
+        (Hypotheses.empty(most, slots, len(known.first)), Pasts.empty(2 * most * slots, len(sizes.spread)))
+        for _ in range(2)
     )
-    ordered = np.argsort(-value[:found], kind="stable")
-    kept = limits.hypotheses
-    parent, score, keys = np.empty(kept, np.int64), np.empty(kept), np.empty(kept, np.int64)
-    chosen, names = np.empty((kept, rows), np.int64), np.empty((kept, rows), np.int64)
-    kept = step_kernels.choose_distinct(
-        ordered, change, value, column, held.name, held.last, seen.birth, _marks(held, known, first), first,
-        float(value[ordered[0]]) - _BEAM_LOSS, parent, chosen, names, score, keys,
+    beam = _frames(seen, motion), seen.rows(), known.bound(seen.start), _rules(sizes, motion, limits)
+    history, number, size, begin = _History(np.full(len(seen.order), -1)), 1, 0, 0
+    while begin < len(seen.seconds):
+        since = history.steps[0].seconds if history.steps else seen.seconds[begin]
+        late = np.flatnonzero(seen.seconds[begin : begin + _BLOCK] - since > 2 * limits.lag)[:1]
+        stop = min(begin + int(late.min(initial=_BLOCK - 1)) + 1, len(seen.seconds))
+        choices = _Choices.empty(stop - begin, most, int(np.diff(seen.start).max()))
+        number, size = extend_beam(begin, *beam, *held, *spare, number, size, *choices)
+        history.add(choices, seen, begin)
+        held, spare = (spare, held) if (stop - begin) % 2 else (held, spare)
+        if len(late):
+            agree = history.decide(float(seen.seconds[stop - 1]) - limits.lag, number)
+            held[0].keep(agree)
+            number = len(agree)
+        begin = stop
+    history.decide(np.inf, number)
+    return Solution(history.name, float(held[0].score[0]))
+
+
+def _frames(seen: Observations, motion: MotionConfig) -> Frames:
+    """The frames of some observations."""
+    steps = np.diff(seen.seconds, prepend=seen.seconds[:1]).tolist()
+    bend = np.array([(motion.speed_spread * step / 4.0) ** 2 for step in steps])
+    return Frames(seen.start, seen.seconds, bend, seen.room)
+
+
+def _rules(sizes: SizeModel, motion: MotionConfig, limits: SearchLimits) -> Rules:
+    """The constants of the search."""
+    return Rules(
+        _BIRTH, _ABSENCE, _LEAST_PLACE, limits.longest, _ALTERNATIVE_LOSS, _BEAM_LOSS, motion.velocity_noise**2,
+        motion.speed_spread**2, sizes.spread, sizes.most_against * sizes.noise,
     )  # fmt: skip
-    new = held.at(parent[:kept])
-    new.score[:] = score[:kept]
-    step_kernels.update_identities(
-        chosen[:kept], new.name, new.last, new.seconds, new.state, new.covariance, new.precision, new.information,
-        first, now, seen.ground, seen.variance, seen.precision, seen.information, turn, pace,
-    )  # fmt: skip
-    for observation, person in known.within(first, stop):
-        new.bound[:, person] = names[:kept, observation - first]
-    return new, _Step(parent[:kept], names[:kept], first, now)
-
-
-def _crossings(seen: Observations, k: int, motion: MotionConfig) -> Crossings:
-    """Crossings between the frame before and the k-th."""
-    earlier = max(k - 1, 0)
-    before, first, stop = (int(seen.start[frame]) for frame in (earlier, k, k + 1))
-    bend = motion.speed_spread * float(seen.seconds[k] - seen.seconds[earlier]) / 4.0
-    return crossings_of(before, first, stop, seen.ground, seen.variance, bend, seen.room)
-
-
-def _impose(held: Hypotheses, known: KnownPeople, first: int, stop: int, cost: Floats) -> None:
-    """Impose on the cost of a frame who its observations are, and who they are not."""
-    for observation, person in known.within(first, stop):
-        if known.first[person] < first:
-            step_kernels.impose_identity(held.name, held.bound[:, person].copy(), observation - first, True, cost)
-            continue
-        for other in np.flatnonzero(known.other[person] & (known.first < first)).tolist():
-            step_kernels.impose_identity(held.name, held.bound[:, other].copy(), observation - first, False, cost)
-
-
-def _awaited(held: Hypotheses, known: KnownPeople, first: int) -> Flags:
-    """Which slots hold an identity that a later observation must have, bool (hypothesis, slot)."""
-    if not len(known.first):
-        return np.zeros(held.name.shape, bool)
-    bound = held.bound[:, None, known.awaited(first)]
-    return np.asarray((held.name[:, :, None] == bound).any(axis=2) & (held.name >= 0))
-
-
-def _marks(held: Hypotheses, known: KnownPeople, first: int) -> Ints:
-    """A number that differs where hypotheses differ in who known people are, int64 (hypothesis,)."""
-    mark = np.zeros(len(held.score), np.int64)
-    binding = known.binding(first) if len(known.first) else known.first
-    for person in np.flatnonzero(binding).tolist():
-        mark = (mark * 1_000_003 + held.bound[:, person] + 2) % 2_147_483_647
-    return mark
