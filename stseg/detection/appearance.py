@@ -105,9 +105,13 @@ def _add_colours(
     the pixel in its middle counts.
     """
     for v in range(assigned.shape[0]):
-        row = min(v * step + step // 2, image.shape[0] - 1)
-        for u in range(assigned.shape[1]):
-            person = assigned[v, u]
+        row, here, most = min(v * step + step // 2, image.shape[0] - 1), assigned[v], np.int16(-1)
+        for u in range(len(here)):
+            most = max(most, here[u])
+        if most < 0:  # as in most rows of most views
+            continue
+        for u in range(len(here)):
+            person = here[u]
             if person < 0 or not apart[person]:
                 continue
             column = min(u * step + step // 2, image.shape[1] - 1)
