@@ -15,6 +15,7 @@ evidence supports them, and boxes at the border of the image, which are cut ther
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 
@@ -50,6 +51,14 @@ class BoxNoiseCalibration:
     @property
     def noise(self) -> BoxNoise:
         """The noise by all frames so far."""
+        return self._estimated() if self.seen.any() else self._first
+
+    @cached_property
+    def _first(self) -> BoxNoise:
+        """The noise before any box is counted; that of a rig without boxes in all of its frames."""
+        return self._estimated()
+
+    def _estimated(self) -> BoxNoise:
         weight, first = self.config.prior_weight, FIRST.spread**2
         both = FIRST.spread[:, LATE] + FIRST.spread[:, EARLY]
         first[:, LATE:] *= FIRST.spread[:, LATE:] / both[:, None]

@@ -9,6 +9,13 @@ from stseg.arrays import Floats, Ints, Labels
 from stseg.geometry.nearest_person import nearest_person
 
 
+def same_tracks(one: Ints, other: Ints) -> tuple[Ints, Ints]:
+    """Where tracks that two frames share stand in each, by rising track; a frame has each but once."""
+    first, second = np.nonzero(one[:, None] == other)
+    order = np.argsort(one[first])
+    return first[order], second[order]
+
+
 def motion_field(
     ground_now: Floats,
     ground_next: Floats,
@@ -39,7 +46,7 @@ def motion_field(
         (dy, dx); zero out of reach of tracks detected in both frames.
     """
     motion = np.zeros(ground.shape, np.int64)
-    _, now, later = np.intersect1d(track_now, track_next, return_indices=True)
+    now, later = same_tracks(track_now, track_next)
     if not len(now):
         return motion
     start = ground_now[now]

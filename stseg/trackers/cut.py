@@ -21,10 +21,10 @@ from stseg.model.blobs import Blobs
 from stseg.model.predicted_tracks import PredictedTracks
 from stseg.model.tables import WINDOW
 from stseg.segmentation.blobs import find_blobs
-from stseg.segmentation.cell_motion import motion_field
+from stseg.segmentation.cell_motion import motion_field, same_tracks
 from stseg.segmentation.energy import build_energy
 from stseg.segmentation.labelling import WindowDetections, WindowLabels, label_cells
-from stseg.segmentation.patches import Patches, mark_places, no_squares, people_squares
+from stseg.segmentation.patches import Patches, mark_places, people_squares
 from stseg.segmentation.unary import BodyShape
 from stseg.trackers.protocol import Commit, FrameObservations, FusedFrame
 from stseg.trackers.rows import event_rows, trajectory_rows, views_at
@@ -134,14 +134,14 @@ class CutTracker:
 
     def _squares(self, held: list[TrackedFrame]) -> Flags:
         """Squares of the ground where somebody is, or log-odds are above 0."""
-        grid, reach = self.rig.grid, self.config.occupancy.person_radius
-        squares = no_squares(grid)
+        grid, ahead = self.rig.grid, []
         for now, then in zip(held, [*held[1:], held[-1]], strict=True):
-            mark_places(squares, now.fused.volume.occupied_places(), grid)
-            ahead = now.fused.people.ground.copy()
-            _, own, later = np.intersect1d(now.tracks, then.tracks, return_indices=True)
-            ahead[own] = then.fused.people.ground[later]
-            squares |= people_squares(grid, now.fused.people.ground, ahead, reach)
+            own, later = same_tracks(now.tracks, then.tracks)
+            ahead.append(now.fused.people.ground.copy())
+            ahead[-1][own] = then.fused.people.ground[later]
+        here = np.concatenate([one.fused.people.ground for one in held])
+        squares = people_squares(grid, here, np.concatenate(ahead), self.config.occupancy.person_radius)
+        mark_places(squares, np.concatenate([one.fused.volume.occupied_places() for one in held]), grid)
         return squares
 
     def _energy(self, held: list[TrackedFrame], patches: Patches, log_odds: Singles) -> Energy:
