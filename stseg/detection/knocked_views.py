@@ -52,6 +52,7 @@ _WHOLE = 0.9
 _REACH, _STEP = 30, 2
 """Greatest shift, about a body's height, and distance between those that are tried, raster pixels."""
 _ALONG = np.arange(-_REACH, _REACH + 1, _STEP)
+_IN_PLACE = np.zeros((1, 2), np.int64)
 _SHIFTS = np.stack(np.meshgrid(_ALONG, _ALONG, indexing="ij"), -1).reshape(-1, 2)
 
 
@@ -137,31 +138,37 @@ class _ExpectedPeople:
     def __init__(self, bodies: Candidates, view: BoxView | PixelView, foreground: Flags | None) -> None:
         here = bodies if foreground is not None else bodies.at(np.zeros(0, np.int64))
         first, spans, area = view.whole_outlines(here.ground, here.height, here.width)
-        pixels = np.maximum(spans[..., 1] - spans[..., 0], 0).sum(1)
-        whole = (first >= 0) & (pixels > _WHOLE * area)
-        self._first, self._spans, self._pixels = first[whole], spans[whole], pixels[whole]
-        self._foreground = np.zeros((0, 0), bool) if foreground is None else foreground
-        self.shown = self._shares(np.zeros((1, 2), np.int64))[0]
+        self._outlines = first, spans, np.zeros((0, 0), bool) if foreground is None else foreground
+        found, pixels = self._found(_IN_PLACE)
+        self._whole = np.flatnonzero(pixels > _WHOLE * area)
+        self.shown = found[0, self._whole] / pixels[self._whole]
 
     def __len__(self) -> int:
-        return len(self._first)
+        return len(self._whole)
 
-    def _shares(self, shifts: Ints) -> Floats:
-        """Share of each outline that is foreground by shifts (n, 2) along v and u, float64 (n, person)."""
-        found = np.zeros((len(shifts), len(self)), np.int64)
-        _fill_found(self._first, self._spans, self._foreground, shifts, found)
-        return np.asarray(found / self._pixels)
+    def _found(self, shifts: Ints) -> tuple[Ints, Ints]:
+        """Foreground pixels inside outlines by shifts (n, 2) along v and u, int64 (n, body), and all pixels (body,)."""
+        number = len(self._outlines[0])
+        found, pixels = np.empty((len(shifts), number), np.int64), np.empty(number, np.int64)
+        _fill_found(*self._outlines, shifts, found, pixels)
+        return found, pixels
 
     def gain(self) -> float:
         """What the best shift gains by all people."""
-        gains = (self._shares(_SHIFTS) - self.shown).clip(-_MOST_GAIN, _MOST_GAIN)
+        found, pixels = self._found(_SHIFTS)
+        gains = ((found / np.maximum(pixels, 1))[:, self._whole] - self.shown).clip(-_MOST_GAIN, _MOST_GAIN)
         return float(gains.sum(1).max())
 
 
 @kernel
-def _fill_found(first: Ints, spans: Spans, foreground: Flags, shifts: Ints, found: Ints) -> None:
-    """Fill found (n, person) with the foreground pixels inside outlines (person,) by shifts (n, 2)."""
+def _fill_found(first: Ints, spans: Spans, foreground: Flags, shifts: Ints, found: Ints, pixels: Ints) -> None:
+    """Fill found (n, body) with the foreground pixels inside outlines (body,) by shifts (n, 2), and pixels with all."""
     rows, columns = foreground.shape
+    found[:] = 0
+    for j in range(len(first)):
+        pixels[j] = 0
+        for k in range(spans.shape[1]):
+            pixels[j] += max(spans[j, k, 1] - spans[j, k, 0], 0)
     for i in range(len(shifts)):
         for j in range(len(first)):
             for k in range(spans.shape[1]):

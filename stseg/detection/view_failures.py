@@ -159,6 +159,8 @@ def informedness(assignment: NDArray[np.int16], sure: Flags, foreground: Flags) 
         Who counts; others' pixels do not.
     foreground : bool (v, u)
     """
+    if not sure.any():
+        return 0, 0.0
     people, rest = np.zeros((len(sure), 2), np.int64), np.zeros(2, np.int64)
     _fill_counts(assignment, sure, foreground, people, rest)
     shown = people[people[:, 0] > 0]

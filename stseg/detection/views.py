@@ -174,13 +174,12 @@ class PixelView(View):
     def observe(self, seen: Boxes | Singles | None, sharpness: BoxNoise = FIRST) -> ViewObservation:
         """The frame's log-odds on the raster; all zero where the view is blind."""
         del sharpness
-        raster = np.zeros(self.shape, np.float32)
+        raster = np.empty(self.shape, np.float32)
         if isinstance(seen, np.ndarray):
-            mean = seen if self.step == 1 else np.empty(self.shape, np.float32)
-            if self.step > 1:
-                _fill_means(seen, self.step, mean)
             miss, clutter = self.config.pixel_miss_rate, self.config.pixel_clutter_rate
-            _fill_log_odds(mean, np.float32(miss), np.float32(clutter), raster)
+            _fill_log_odds(seen, self.step, np.float32(miss), np.float32(clutter), raster)
+        else:
+            raster[:] = 0.0
         return ViewObservation(np.zeros((0, 4)), np.zeros(0), np.zeros((0, 5)), np.zeros(0), raster)
 
     def foreground(self, observation: ViewObservation) -> Flags:
@@ -197,45 +196,51 @@ class PixelView(View):
         return sums * self.config.effective_observations, area / pillars.area_ratio
 
 
-@kernel
-def _fill_log_odds(mean: Singles, miss: np.float32, clutter: np.float32, raster: Singles) -> None:
-    """Fill raster (v, u) with log((1 - m) L + m (1 - L)) - log(b L + (1 - b)(1 - L)); most L are the same."""
+@wide_kernel
+def _fill_log_odds(
+    likelihood: Singles, step: int, miss: np.float32, clutter: np.float32, raster: Singles
+) -> None:
+    """Fill raster (v, u) with log((1 - m) L + m (1 - L)) - log(b L + (1 - b)(1 - L)); most L are the same.
+
+    L is the mean over a square of `step` pixels of the likelihood; those at the border may be smaller.
+    """
     one, last, value = np.float32(1), np.float32(-1), np.float32(0)
-    for v in range(mean.shape[0]):
-        for u in range(mean.shape[1]):
-            share = mean[v, u]
-            if share != last:
-                body = (one - miss) * share + miss * (one - share)
-                empty = clutter * share + (one - clutter) * (one - share)
-                last, value = share, np.float32(np.log(body / empty))
+    down, mean = np.empty(likelihood.shape[1], np.float32), np.empty(raster.shape[1], np.float32)
+    for v in range(raster.shape[0]):
+        if step > 1:
+            _fill_means(likelihood[v * step : (v + 1) * step], step, down, mean)
+        shares = mean if step > 1 else likelihood[v]
+        for u in range(raster.shape[1]):
+            if shares[u] != last:
+                last = shares[u]
+                body = (one - miss) * last + miss * (one - last)
+                empty = clutter * last + (one - clutter) * (one - last)
+                value = np.float32(np.log(body / empty))
             raster[v, u] = value
 
 
 @wide_kernel
-def _fill_means(likelihood: Singles, step: int, mean: Singles) -> None:
-    """Fill mean (v, u) with the means over squares of `step` pixels; those at the border may be smaller."""
-    height, width = likelihood.shape
-    down, whole = np.empty(width, np.float32), width // step
-    for v in range(mean.shape[0]):
-        top, bottom = v * step, min((v + 1) * step, height)
+def _fill_means(rows: Singles, step: int, down: Singles, mean: Singles) -> None:
+    """Fill mean (u,) with the means over squares of rows (v, u'), and down (u',) with the sums of its columns."""
+    width, whole = rows.shape[1], rows.shape[1] // step
+    for column in range(width):
+        down[column] = rows[0, column]
+    for row in range(1, len(rows)):
         for column in range(width):
-            down[column] = likelihood[top, column]
-        for row in range(top + 1, bottom):
-            for column in range(width):
-                down[column] += likelihood[row, column]
-        if step == 2:
-            _fill_pairs(down, np.float32(2 * (bottom - top)), mean[v, :whole])
-        else:
-            for u in range(whole):
-                total = down[u * step]
-                for shift in range(1, step):
-                    total += down[u * step + shift]
-                mean[v, u] = total / np.float32((bottom - top) * step)
-        if whole < mean.shape[1]:
-            total = np.float32(0)
-            for column in range(whole * step, width):
-                total += down[column]
-            mean[v, whole] = total / np.float32((bottom - top) * (width - whole * step))
+            down[column] += rows[row, column]
+    if step == 2:
+        _fill_pairs(down, np.float32(2 * len(rows)), mean[:whole])
+    else:
+        for u in range(whole):
+            total = down[u * step]
+            for shift in range(1, step):
+                total += down[u * step + shift]
+            mean[u] = total / np.float32(len(rows) * step)
+    if whole < len(mean):
+        total = np.float32(0)
+        for column in range(whole * step, width):
+            total += down[column]
+        mean[whole] = total / np.float32(len(rows) * (width - whole * step))
 
 
 @wide_kernel

@@ -78,8 +78,8 @@ class BodyTable:
     def boxes_of(self, ground: Floats, heights: Floats) -> Floats:
         """Boxes of pillars with a height each, ground (n, 2) and heights (n,) in metres; float64 (n, 4), pixels."""
         filled = np.full((len(ground), 4), np.nan)
-        lattice = (np.asarray(ground, float) - self.origin) / self.step
-        _fill_boxes(self.pixel, lattice, np.asarray(heights, float), LEVELS[1], self.step, PROFILE, filled)
+        place, tall = np.ascontiguousarray(ground, float), np.asarray(heights, float)
+        _fill_boxes(self.pixel, place, self.origin, tall, LEVELS[1], self.step, PROFILE, filled)
         return filled
 
     def discs(self, ground: Floats, height: float) -> Floats:
@@ -124,7 +124,8 @@ def fill_discs(
 @kernel
 def _fill_boxes(
     pixel: Singles,
-    lattice: Floats,
+    ground: Floats,
+    origin: tuple[float, float],
     heights: Floats,
     level_step: float,
     step: float,
@@ -132,8 +133,9 @@ def _fill_boxes(
     filled: Floats,
 ) -> None:
     discs = np.empty((len(profile), 6))
-    for i in range(len(lattice)):
-        fill_discs(pixel, lattice[i, 0], lattice[i, 1], heights[i], level_step, step, profile, discs)
+    for i in range(len(ground)):
+        x, y = (ground[i, 0] - origin[0]) / step, (ground[i, 1] - origin[1]) / step
+        fill_discs(pixel, x, y, heights[i], level_step, step, profile, discs)
         left, top, right, bottom = np.inf, np.inf, -np.inf, -np.inf
         seen = True
         for k in range(len(profile)):

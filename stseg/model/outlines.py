@@ -49,10 +49,9 @@ def outlines(
     first, count = np.full(len(ground), -1, np.int64), np.zeros(len(ground), np.int64)
     area = np.zeros(len(ground))
     wide = np.ones(len(ground)) if widths is None else widths
-    lattice = _lattice(table, ground)
     spans = np.zeros((len(ground), shape[0], 2), np.int16)
     _fill_outlines(
-        table.pixel, lattice, heights, wide, LEVELS[1], table.step, SILHOUETTE, float(step), shape[1], first, count,
+        table.pixel, np.ascontiguousarray(ground, float), table.origin, heights, wide, LEVELS[1], table.step, SILHOUETTE, float(step), shape[1], first, count,
         spans, area,
     )  # fmt: skip
     return first, spans[:, : max(int(count.max(initial=0)), 1)].copy(), area
@@ -100,23 +99,18 @@ def sums_inside(
         Of what counts, and pixels of the whole outline; both 0 where the view does not see the pillar.
     """
     sums, area = np.zeros(heights.shape), np.zeros(heights.shape)
-    lattice = _lattice(table, ground).reshape(ground.shape)
     _fill_sums(
-        table.pixel, lattice, heights, widths, LEVELS[1], table.step, SILHOUETTE, float(step), values, owner, number,
-        sums, area,
+        table.pixel, ground, table.origin, heights, widths, LEVELS[1], table.step, SILHOUETTE, float(step), values,
+        owner, number, sums, area,
     )  # fmt: skip
     return sums, area
-
-
-def _lattice(table: BodyTable, ground: Floats) -> Floats:
-    """Ground points in steps of the table's lattice."""
-    return np.asarray((np.asarray(ground, float).reshape(-1, 2) - table.origin) / table.step)
 
 
 @kernel
 def _fill_outlines(
     pixel: Singles,
-    lattice: Floats,
+    ground: Floats,
+    origin: tuple[float, float],
     heights: Floats,
     widths: Floats,
     level_step: float,
@@ -132,8 +126,9 @@ def _fill_outlines(
     rows = spans.shape[1]
     discs, drawn = np.empty((len(profile), 6)), np.empty((len(profile), 6))
     low, high = np.empty(rows), np.empty(rows)
-    for i in range(len(lattice)):
-        fill_discs(pixel, lattice[i, 0], lattice[i, 1], heights[i], level_step, step, profile, discs)
+    for i in range(len(ground)):
+        x, y = (ground[i, 0] - origin[0]) / step, (ground[i, 1] - origin[1]) / step
+        fill_discs(pixel, x, y, heights[i], level_step, step, profile, discs)
         if _seen(discs):
             area[i] = _fill_drawn(discs, raster_step, widths[i], drawn)
             top, bottom = _draw(drawn, low, high)
@@ -143,7 +138,8 @@ def _fill_outlines(
 @kernel
 def _fill_sums(
     pixel: Singles,
-    lattice: Floats,
+    ground: Floats,
+    origin: tuple[float, float],
     heights: Floats,
     widths: Floats,
     level_step: float,
@@ -162,7 +158,8 @@ def _fill_sums(
     low, high, left_of = np.empty(rows), np.empty(rows), np.empty((rows, columns + 1))
     for j in range(people):
         for i in range(pillars):
-            fill_discs(pixel, lattice[j, i, 0], lattice[j, i, 1], heights[j, i], level_step, step, profile, discs)
+            x, y = (ground[j, i, 0] - origin[0]) / step, (ground[j, i, 1] - origin[1]) / step
+            fill_discs(pixel, x, y, heights[j, i], level_step, step, profile, discs)
             if _seen(discs):
                 area[j, i] = _fill_drawn(discs, raster_step, widths[j, i], drawn[i])
         _fill_left_of(values, owner, number[j], _window(drawn, area[j], rows, columns), left_of)
