@@ -44,7 +44,7 @@ def by_definition(rasters: Singles, owner: Shorts) -> Floats:
             spans = outlines.spans[outlines.start[i] : outlines.start[i + 1]]
             total = sum(shown[outlines.first[i] + k, a:b].sum() for k, (a, b) in enumerate(spans.tolist()))
             mean[view, pillar] = total / outlines.area[i] if len(spans) else 0.0
-    return np.asarray(BEFORE + WEIGHT * mean.sum(0).reshape(3, CELLS))
+    return np.asarray(BEFORE + WEIGHT * mean.sum(0).reshape(CELLS, 3).T)
 
 
 def scores(rasters: Singles, owner: Shorts, hopeless: float) -> Floats:

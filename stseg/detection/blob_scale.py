@@ -14,7 +14,7 @@ import numpy as np
 from stseg.accelerate import kernel
 from stseg.arrays import Floats, Singles
 from stseg.config import BodyConfig, DetectionConfig
-from stseg.detection.pixel_lattice import OpenPixels, PixelLattice, add_said
+from stseg.detection.pixel_lattice import OpenPixels, PixelLattice, add_said, fill_around
 from stseg.pointed_tuples import pointed
 
 
@@ -55,11 +55,12 @@ def _fill_scales(
     """Raise scale (view, v, u) inside common bodies that are worth a person to what each explains."""
     pixels, lattice = pointed(every_pixel), pointed(every_pillar)
     views = len(every_pillar.shapes)
-    said, every = np.empty(views), len(every_pillar.outlines.first) // max(views, 1)
+    (more, said), every = np.empty((2, views)), len(every_pillar.outlines.first) // max(views, 1)
     cells = every // heights
     for cell in range(cells):
-        pillar = heights // 2 * cells + cell
-        if add_said(prior, 0.0, pillar, cell, every, pixels, lattice, weight, said) > -np.inf:
+        pillar = cell * heights + heights // 2
+        fill_around(cell, pixels, lattice, more)
+        if add_said(prior, 0.0, pillar, cell, every, pixels, lattice, weight, more, said) > -np.inf:
             total = 0.0
             for view in range(views):
                 total += said[view] / weight

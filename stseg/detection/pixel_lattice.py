@@ -41,9 +41,9 @@ class PixelLattice(NamedTuple):
     Attributes
     ----------
     outlines
-        Of the pillars (view * height * cell,); areas are fair ones.
-    boxes : int16 (view * height * cell, 4)
-        left, top, right, bottom of the box around each outline, raster pixels.
+        Of the pillars (view * cell * height,), which are asked for cell by cell; areas are fair ones.
+    boxes : int16 (view, cell, 4)
+        left, top, right, bottom of the box around the outlines of all heights, raster pixels.
     strips : int16 (view, strip, 4)
         The same around the outlines of a strip's cells.
     shapes : int64 (view, 2)
@@ -64,9 +64,9 @@ class PixelLattice(NamedTuple):
         """The pillars of the configured heights at places (cell, 2), metres."""
         chosen = [view for view in views if isinstance(view, PixelView)]
         outlines = PackedOutlines.of(_drawn(chosen, lattice_ground, body))
-        boxes = np.zeros((len(outlines.first), 4), np.int16)
+        boxes = np.zeros((len(chosen), len(lattice_ground), 4), np.int16)
         strips = np.zeros((len(chosen), -(-len(lattice_ground) // _STRIP), 4), np.int16)
-        boxes[:, :2] = strips[..., :2] = np.iinfo(np.int16).max
+        boxes[..., :2] = strips[..., :2] = np.iinfo(np.int16).max
         _fill_boxes(outlines, len(body.heights), len(lattice_ground), boxes, strips)
         shapes = np.array([view.shape for view in chosen], np.int64).reshape(-1, 2)
         rows, columns = shapes.max(0, initial=0)
@@ -78,8 +78,8 @@ def _drawn(
     views: Sequence[PixelView], lattice_ground: Floats, body: BodyConfig
 ) -> Iterator[tuple[Ints, Spans, Floats]]:
     """Outlines of all pillars, one view after the other."""
-    heights = np.repeat(np.asarray(body.heights), len(lattice_ground))
-    places, widths = np.tile(lattice_ground, (len(body.heights), 1)), body.width_of(heights)
+    heights = np.tile(np.asarray(body.heights), len(lattice_ground))
+    places, widths = np.repeat(lattice_ground, len(body.heights), 0), body.width_of(heights)
     for view in views:
         for begin in range(0, len(heights), _DRAWN):
             own = slice(begin, begin + _DRAWN)
@@ -133,9 +133,10 @@ class OpenPixels(NamedTuple):
 
 @kernel
 def _fill_boxes(outlines: PackedOutlines, heights: int, cells: int, boxes: Shorts, strips: Shorts) -> None:
-    """Widen boxes (view * height * cell, 4) and strips (view, strip, 4), empty before, around the outlines."""
+    """Widen boxes (view, cell, 4) and strips (view, strip, 4), empty before, around the outlines."""
     for i in range(len(outlines.first)):
-        box, strip, row = boxes[i], strips[i // (heights * cells), i % cells // _STRIP], outlines.first[i]
+        view, cell, row = i // (heights * cells), i // heights % cells, outlines.first[i]
+        box, strip = boxes[view, cell], strips[view, cell // _STRIP]
         for k in range(outlines.start[i], outlines.start[i + 1]):
             left, right = outlines.spans[k]
             if right > left:
@@ -210,36 +211,45 @@ def fill_scores(
     a pillar is worth nothing.
     """
     pixels, lattice = pointed(every_pixel), pointed(every_pillar)
-    parts = np.empty(len(every_pillar.shapes))
+    more, parts = np.empty((2, len(every_pillar.shapes)))
     for cell in range(score.shape[1]):
         best = -np.inf
+        fill_around(cell, pixels, lattice, more)
         for height in probes:
-            pillar = height * score.shape[1] + cell
+            pillar = cell * len(score) + height
             score[height, cell] = add_said(
-                score[height, cell], hopeless, pillar, cell, score.size, pixels, lattice, weight, parts
+                score[height, cell], hopeless, pillar, cell, score.size, pixels, lattice, weight, more, parts
             )
             best = max(best, score[height, cell])
         for height in others:
-            pillar, before = height * score.shape[1] + cell, score[height, cell]
+            pillar, before = cell * len(score) + height, score[height, cell]
             score[height, cell] = (
-                add_said(before, 0.0, pillar, cell, score.size, pixels, lattice, weight, parts)
+                add_said(before, 0.0, pillar, cell, score.size, pixels, lattice, weight, more, parts)
                 if best > hopeless
                 else -np.inf
             )
 
 
 @part
+def fill_around(cell: int, pixels: OpenPixels, lattice: PixelLattice, more: Floats) -> None:
+    """Fill more (view,) with a bound of what pixels around a cell's outlines have more than the lowest, nats."""
+    for view in range(len(more)):
+        is_seen = lattice.boxes[view, cell, 2] > 0
+        more[view] = _inside(view, cell, lattice.boxes[view], pixels.above) * (1 / _SHADES) if is_seen else 0.0
+
+
+@part
 def add_said(
     before: float, least: float, pillar: int, cell: int, every: int, pixels: OpenPixels, lattice: PixelLattice,
-    weight: float, parts: Floats,
+    weight: float, more: Floats, parts: Floats,
 ) -> float:  # fmt: skip
     """A score with what all views say of a pillar, of so many in each view; -inf where that is not above the least.
 
-    Fills parts (view,) with what each says, nats.
+    `more` is that of `fill_around`. Fills parts (view,) with what each says, nats.
     """
     most = before
     for view in range(len(parts)):
-        parts[view] = _most(view, view * every + pillar, pixels, lattice, weight)
+        parts[view] = _most(view, view * every + pillar, pixels, lattice, weight, more[view])
         most += parts[view]
     total = before
     for view in range(len(parts)):
@@ -253,12 +263,11 @@ def add_said(
 
 
 @part
-def _most(view: int, i: int, pixels: OpenPixels, lattice: PixelLattice, weight: float) -> float:
+def _most(view: int, i: int, pixels: OpenPixels, lattice: PixelLattice, weight: float, more: float) -> float:
     """The most that a view may say of the i-th pillar of all, nats."""
     inside, lowest = lattice.outlines.inside[i], pixels.extremes[view, 0]
     if inside == 0:
         return 0.0
-    more = _inside(view, i, lattice.boxes, pixels.above) * (1 / _SHADES)
     most = inside * lowest + min(more, inside * (max(pixels.extremes[view, 1], 0.0) - lowest))
     return float(weight * most / lattice.outlines.area[i])
 

@@ -197,9 +197,7 @@ class PixelView(View):
 
 
 @wide_kernel
-def _fill_log_odds(
-    likelihood: Singles, step: int, miss: np.float32, clutter: np.float32, raster: Singles
-) -> None:
+def _fill_log_odds(likelihood: Singles, step: int, miss: np.float32, clutter: np.float32, raster: Singles) -> None:
     """Fill raster (v, u) with log((1 - m) L + m (1 - L)) - log(b L + (1 - b)(1 - L)); most L are the same.
 
     L is the mean over a square of `step` pixels of the likelihood; those at the border may be smaller.

@@ -50,9 +50,10 @@ def outlines(
     area = np.zeros(len(ground))
     wide = np.ones(len(ground)) if widths is None else widths
     spans = np.zeros((len(ground), shape[0], 2), np.int16)
+    place = np.ascontiguousarray(ground, float)
     _fill_outlines(
-        table.pixel, np.ascontiguousarray(ground, float), table.origin, heights, wide, LEVELS[1], table.step, SILHOUETTE, float(step), shape[1], first, count,
-        spans, area,
+        table.pixel, place, table.origin, heights, wide, LEVELS[1], table.step, SILHOUETTE, float(step), shape[1],
+        first, count, spans, area,
     )  # fmt: skip
     return first, spans[:, : max(int(count.max(initial=0)), 1)].copy(), area
 
