@@ -81,7 +81,9 @@ def box_evidence(
     chosen = [
         (view, observation) for view, observation in zip(views, observations, strict=True) if isinstance(view, BoxView)
     ]
-    sizes = np.array([view.camera.size for view, _ in chosen], float).reshape(-1, 2)
+    if not chosen:
+        return _no_boxes(bodies.edges.shape[1])
+    sizes = np.array([view.camera.size for view, _ in chosen], float)
     boxes = np.array([len(observation.edges) if observation else 0 for _, observation in chosen], np.int64)
     candidates, first = bodies.edges.shape[1], 0 if known is None else known.inside.shape[1]
     match = np.full((len(chosen), candidates, boxes.max(initial=0)), -np.inf)
@@ -99,6 +101,12 @@ def box_evidence(
     is_blind = np.array([observation is None for _, observation in chosen], bool)
     hiders = hiders_of(bodies.edges, bodies.distance, sizes, is_blind, known.hiders if known else no_lists(), first)
     return BoxEvidence(match, boxes, hiders, inside, np.ones(candidates))
+
+
+def _no_boxes(candidates: int) -> BoxEvidence:
+    """Evidence where no view delivers boxes."""
+    nothing = np.zeros((0, candidates))
+    return BoxEvidence(np.zeros((0, candidates, 0)), np.zeros(0, np.int64), no_lists(), nothing, np.ones(candidates))
 
 
 def stacked_rasters(views: Sequence[View], own: Sequence[Singles | None]) -> Singles:

@@ -156,18 +156,19 @@ def _fill_sums(
     people, pillars = heights.shape
     rows, columns = values.shape
     discs, drawn = np.empty((len(profile), 6)), np.empty((pillars, len(profile), 6))
-    low, high, left_of = np.empty(rows), np.empty(rows), np.empty((rows, columns + 1))
+    low, high, left_of = np.empty(rows), np.empty(rows), np.empty(rows * (columns + 1))
     for j in range(people):
         for i in range(pillars):
             x, y = (ground[j, i, 0] - origin[0]) / step, (ground[j, i, 1] - origin[1]) / step
             fill_discs(pixel, x, y, heights[j, i], level_step, step, profile, discs)
             if _seen(discs):
                 area[j, i] = _fill_drawn(discs, raster_step, widths[j, i], drawn[i])
-        _fill_left_of(values, owner, number[j], _window(drawn, area[j], rows, columns), left_of)
+        window = _window(drawn, area[j], rows, columns)
+        _fill_left_of(values, owner, number[j], window, left_of)
         for i in range(pillars):
             if area[j, i] > 0:
                 top, bottom = _draw(drawn[i], low, high)
-                sums[j, i] = _between(left_of, low, high, top, bottom)
+                sums[j, i] = _between(left_of, window, low, high, top, bottom, columns)
 
 
 @part
@@ -193,32 +194,40 @@ def _from(place: float, most: int) -> int:
     return int(min(max(place, 0.0), float(most)))
 
 
-@kernel
+@part
 def _fill_left_of(
     values: Singles, owner: Shorts, person: int, window: tuple[int, int, int, int], left_of: Floats
 ) -> None:
-    """Fill left_of (v, u + 1), inside a window, with cumulative sums along rows of a person's open pixels."""
+    """Fill left_of with cumulative sums along the rows of a window of a person's open pixels, one row after the other.
+
+    They lie side by side, since memory that was not used of late is slow.
+    """
     top, bottom, left, right = window
+    place = np.uint64(0)
     for row in range(top, bottom):
-        total = 0.0
-        shown, whose, sums = values[row, left:right], owner[row, left:right], left_of[row, left : right + 1]
-        sums[0] = 0.0
+        total, left_of[place] = 0.0, 0.0
+        shown, whose = values[row, left:right], owner[row, left:right]
         for u in range(len(shown)):
             total += float(shown[u]) if whose[u] < 0 or whose[u] == person else 0.0
-            sums[u + 1] = total
+            place += np.uint64(1)
+            left_of[place] = total
+        place += np.uint64(1)
 
 
 @part
-def _between(left_of: Floats, low: Floats, high: Floats, top: int, bottom: int) -> float:
-    """Sum from column low to high (row,) of the rows from `top` to before `bottom`, from sums along rows."""
+def _between(
+    left_of: Floats, window: tuple[int, int, int, int], low: Floats, high: Floats, top: int, bottom: int, columns: int
+) -> float:
+    """Sum from column low to high (row,) of the rows from `top` to before `bottom`, from sums along a window's rows."""
     total = 0.0
-    columns = left_of.shape[1] - 1
+    first, _, left, right = window
     for row in range(top, bottom):
         at = np.uint64(row)
         if low[at] <= high[at]:
             start, stop = _from(np.ceil(low[at]), columns), _from(np.floor(high[at]) + 1, columns)
             if start < stop:
-                total += left_of[at, np.uint64(stop)] - left_of[at, np.uint64(start)]
+                line = (row - first) * (right - left + 1) - left
+                total += left_of[np.uint64(line + stop)] - left_of[np.uint64(line + start)]
     return total
 
 
