@@ -21,19 +21,18 @@ from stseg.pointed_tuples import pointed
 def blob_scales(
     rasters: Singles, extremes: Floats, lattice: PixelLattice, config: DetectionConfig, body: BodyConfig
 ) -> Singles:
-    """Raster pixels of the largest body that explains each pixel, float32 (view, v, u); 0 where none does.
+    """Raster pixels of the largest body that explains each pixel, float32 (view, v, u); 0 where none does, on rasters.
 
     Parameters
     ----------
     rasters : float32 (view, v, u)
-        Log-odds of the views that deliver pixels, zero beyond each, and where a view is blind: nats.
+        Log-odds of the views that deliver pixels, zero where a view is blind: nats.
     extremes : float64 (view, 2)
         The lowest and the highest of them.
     lattice
         The pillars of bodies.
     """
-    scale = np.zeros(rasters.shape, np.float32)
-    nobody = np.full(int(lattice.shapes.prod(1).sum()), -1, np.int16)
+    scale, nobody = np.empty(rasters.shape, np.float32), lattice.nobody.reshape(-1)
     certain = float(np.log((1 - config.pixel_miss_rate) / config.pixel_clutter_rate))
     _fill_scales(
         OpenPixels.of(rasters, nobody, lattice, extremes), lattice, len(body.heights), config.effective_observations,
@@ -52,9 +51,14 @@ def _fill_scales(
     certain: float,
     scale: Singles,
 ) -> None:
-    """Raise scale (view, v, u) inside common bodies that are worth a person to what each explains."""
+    """Fill scale (view, v, u) inside common bodies that are worth a person with what each explains, 0 elsewhere."""
     pixels, lattice = pointed(every_pixel), pointed(every_pillar)
     views = len(every_pillar.shapes)
+    for view in range(views):
+        for row in range(every_pillar.shapes[view, 0]):
+            line = scale[view, row, : every_pillar.shapes[view, 1]]
+            for u in range(len(line)):
+                line[u] = 0.0
     (more, said), every = np.empty((2, views)), len(every_pillar.outlines.first) // max(views, 1)
     cells = every // heights
     for cell in range(cells):

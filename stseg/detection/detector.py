@@ -51,6 +51,8 @@ _SEEN = 2.0
 class Detector:
     """The detector of one rig: lattice and tables are made once, frames are explained one by one.
 
+    Its kernels share memory that is asked for once, so threads explain no frames at the same time.
+
     Parameters
     ----------
     rig

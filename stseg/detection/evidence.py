@@ -110,13 +110,12 @@ def _no_boxes(candidates: int) -> BoxEvidence:
 
 
 def stacked_rasters(views: Sequence[View], own: Sequence[Singles | None]) -> Singles:
-    """Rasters of all views that deliver pixels, float32 (view, v, u); zero beyond each, and where a view is blind."""
+    """Rasters of all views that deliver pixels, float32 (view, v, u); zero where a view is blind, unset beyond each."""
     chosen = [(view, seen) for view, seen in zip(views, own, strict=True) if isinstance(view, PixelView)]
     shapes = np.array([view.shape for view, _ in chosen], int).reshape(-1, 2)
-    rasters = np.zeros((len(chosen), *shapes.max(0, initial=0)), np.float32)
+    rasters = np.empty((len(chosen), *shapes.max(0, initial=0)), np.float32)
     for raster, (view, seen) in zip(rasters, chosen, strict=True):
-        if seen is not None:
-            raster[: view.shape[0], : view.shape[1]] = seen
+        raster[: view.shape[0], : view.shape[1]] = 0.0 if seen is None else seen
     return rasters
 
 

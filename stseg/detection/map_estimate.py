@@ -57,9 +57,10 @@ class FrameEvidence:
         return stacked_rasters(self.views, [None if seen is None else seen.raster for seen in self.observations])
 
     @cached_property
-    def owner(self) -> Shorts:
-        """Scratch of searches, -1 before and after: the candidate whom each pixel of the rasters is assigned to."""
-        return np.full((len(self.rasters), self.rasters[:1].size), -1, np.int16)
+    def assigned(self) -> Ints:
+        """Scratch of scores; see `Problem`."""
+        boxes = max((len(seen.edges) for seen in self.observations if seen), default=0)
+        return np.empty(max(self.rasters[:1].size, boxes, len(self.prior.predicted), 1), np.int64)
 
     @cached_property
     def box_lattices(self) -> list[BoxLattice | None]:
@@ -390,7 +391,7 @@ def _problem(evidence: FrameEvidence, pool: Candidates, bodies: ProjectedBodies,
         ground=pool.ground,
         breadth=breadth,
         parameters=evidence.parameters,
-        assigned=np.empty(max(pixels.raster[:1].size, boxes.match.shape[2], len(prior.predicted), 1), np.int64),
-        owner=evidence.owner,
+        assigned=evidence.assigned,
+        owner=evidence.lattice.nobody,
         view_evidence=np.zeros((len(views), len(pool) + 1)),
     )

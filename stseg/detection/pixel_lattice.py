@@ -48,6 +48,8 @@ class PixelLattice(NamedTuple):
         The same around the outlines of a strip's cells.
     shapes : int64 (view, 2)
         Rows and columns of the rasters.
+    nobody : int16 (view, v * u)
+        Owners of the pixels of rasters, -1, but while a search uses them.
     above, left_of
         Scratch of `OpenPixels`, whose memory would have to be asked for anew in each frame.
     """
@@ -56,6 +58,7 @@ class PixelLattice(NamedTuple):
     boxes: Shorts
     strips: Shorts
     shapes: Ints
+    nobody: Shorts
     above: Labels
     left_of: Floats
 
@@ -71,7 +74,8 @@ class PixelLattice(NamedTuple):
         shapes = np.array([view.shape for view in chosen], np.int64).reshape(-1, 2)
         rows, columns = shapes.max(0, initial=0)
         above = np.empty((len(chosen), rows + 1, columns + 1), np.int32)
-        return cls(outlines, boxes, strips, shapes, above, np.empty((len(chosen), rows, columns + 1)))
+        nobody = np.full((len(chosen), rows * columns), -1, np.int16)
+        return cls(outlines, boxes, strips, shapes, nobody, above, np.empty((len(chosen), rows, columns + 1)))
 
 
 def _drawn(
