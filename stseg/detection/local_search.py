@@ -257,6 +257,11 @@ def _exchange(
     sharing: Sharing,
 ) -> bool:
     """Replace each member by the near candidate that raises the score most."""
+    rivals = 0
+    for a in range(count):
+        rivals += _has_rival(members[a], own, inside, problem)
+    if rivals == 0:
+        return False
     changed = False
     fill_assignment(members, count, problem.pixels, assigned)
     for a in range(count):
