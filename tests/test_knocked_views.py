@@ -59,14 +59,15 @@ def test_found_is_the_foreground_inside_shifted_outlines(seed: int) -> None:
     foreground, first = rng.random((9, 11)) < 0.5, rng.integers(0, 5, 3)
     left = rng.integers(0, 8, (3, 4))
     spans = np.stack([left, left + rng.integers(0, 4, left.shape)], -1).astype(np.int16)
-    shifts, found = rng.integers(-6, 7, (5, 2)), np.zeros((5, 3), np.int64)
-    _fill_found(first, spans, foreground, shifts, found)
+    shifts, found, pixels = rng.integers(-6, 7, (5, 2)), np.empty((5, 3), np.int64), np.empty(3, np.int64)
+    _fill_found(first, spans, foreground, shifts, found, pixels)
     outlines = np.zeros((3, 29, 31), bool)
     for j, row, (start, stop) in ((j, row, spans[j, row]) for j in range(3) for row in range(4)):
         outlines[j, 10 + first[j] + row, 10 + start : 10 + stop] = True
     padded = np.pad(foreground, 10)
     expected = [[(np.roll(own, shift, (0, 1)) & padded).sum() for own in outlines] for shift in shifts]
     assert found.tolist() == expected
+    assert pixels.tolist() == outlines.sum((1, 2)).tolist()
 
 
 @pytest.mark.parametrize("kind", KINDS)
