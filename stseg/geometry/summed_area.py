@@ -64,7 +64,10 @@ def fill_sums(likelihood: Singles, left: int, top: int, sums: Sums) -> int:
         sums[v + 1, 0] = 0
         for u in range(columns):
             sums[v + 1, u + 1] = sums[v, u + 1] + row[u]
-    return int(lowest.min()) if columns > 0 else TOP
+    least = np.uint32(TOP)
+    for u in range(columns):
+        least = min(least, lowest[u])
+    return int(least)
 
 
 @kernel

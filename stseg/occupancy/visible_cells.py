@@ -58,18 +58,15 @@ def fill_occupied(raster: NDArray[np.int16], occupied: Labels) -> None:
     row = np.empty(raster.shape[1], np.int32)
     occupied[0] = 0
     for v in range(raster.shape[0]):
-        shown, most, here = raster[v], np.int16(-1), np.int32(0)
+        most, here = np.int16(-1), np.int32(0)
         for u in range(len(row)):
-            most = max(most, shown[u])
-        if most < 0:  # as most rows of most views are
-            occupied[v + 1] = occupied[v]
-            continue
-        for u in range(len(row)):
-            here += np.int32(shown[u] >= 0)
+            most = max(most, raster[v, u])
+        for u in range(len(row) if most >= 0 else 0):
+            here += np.int32(raster[v, u] >= 0)
             row[u] = here
         occupied[v + 1, 0] = 0
         for u in range(len(row)):
-            occupied[v + 1, u + 1] = occupied[v, u + 1] + row[u]
+            occupied[v + 1, u + 1] = occupied[v, u + 1] + (row[u] if most >= 0 else 0)
 
 
 @part
