@@ -15,7 +15,7 @@ from stseg.config import MotionConfig
 from stseg.trackers.kalman_filters import corrected, initial, innovations, predicted
 from stseg.tracking.identities.pasts import correct_place, predicted_variance
 from stseg.tracking.motion_model import process_noise, transition
-from stseg.tracking.smoother import smoothed_path
+from stseg.tracking.smoother import smoothed_paths
 from stseg.tracking.track_filter import Measurement, TrackState
 
 MOTION = MotionConfig()
@@ -99,7 +99,7 @@ def test_smoothed_places_err_by_as_much_as_claimed() -> None:
         np.asarray(np.arange(STEPS) * SECONDS, np.float64),
         np.asarray(np.tile(NOISE, (STEPS, 1, 1)), np.float64),
     )
-    paths = [smoothed_path(seconds, path, noise, MOTION) for path in measured]
+    paths = [smoothed_paths(seconds, path, noise, [np.arange(STEPS)], MOTION) for path in measured]
     squares = [
         [square(*one) for one in zip(path[0] - real, path[1], strict=True)]
         for path, real in zip(paths, true, strict=True)

@@ -11,7 +11,7 @@ from strategies import numbers
 from stseg.arrays import Floats, Ints
 from stseg.config import MotionConfig
 from stseg.model.tables import TRAJECTORY
-from stseg.tracking.smoother import smooth_places, smoothed_path
+from stseg.tracking.smoother import smooth_places, smoothed_paths
 
 RATE = 8.0
 MOTION = MotionConfig()
@@ -54,7 +54,7 @@ def measured(draw: st.DrawFn) -> tuple[Ints, Floats, Floats]:
 @given(measured())
 def test_a_path_is_what_all_its_measurements_say_at_once(path: tuple[Ints, Floats, Floats]) -> None:
     frames, ground, noise = path
-    places, spread = smoothed_path(frames / RATE, ground, noise, MOTION)
+    places, spread = smoothed_paths(frames / RATE, ground, noise, [np.arange(len(frames))], MOTION)
     expected, covariance = conditioned(frames / RATE, ground, noise)
     np.testing.assert_allclose(places, expected, atol=1e-9, rtol=0)
     np.testing.assert_allclose(spread, covariance, atol=1e-9, rtol=0)
@@ -64,14 +64,14 @@ def test_a_path_is_what_all_its_measurements_say_at_once(path: tuple[Ints, Float
 @given(measured())
 def test_smoothing_never_knows_less(path: tuple[Ints, Floats, Floats]) -> None:
     frames, ground, noise = path
-    _, spread = smoothed_path(frames / RATE, ground, noise, MOTION)
+    _, spread = smoothed_paths(frames / RATE, ground, noise, [np.arange(len(frames))], MOTION)
     assert (np.linalg.eigvalsh(spread) > 0).all()
     assert (np.linalg.eigvalsh(noise - spread) > -1e-9).all()
 
 
 def test_a_single_measurement_stays_what_it_is() -> None:
     ground, noise = np.array([[1.0, 2.0]]), np.array([[[0.02, 0.01], [0.01, 0.03]]])
-    places, spread = smoothed_path(np.array([3.0]), ground, noise, MOTION)
+    places, spread = smoothed_paths(np.array([3.0]), ground, noise, [np.arange(1)], MOTION)
     np.testing.assert_array_equal(places, ground)
     np.testing.assert_array_equal(spread, noise)
 
@@ -103,6 +103,20 @@ def test_a_noisy_walk_gets_nearer_to_the_truth(seed: int) -> None:
         )
         assert now < share * raw
         assert (smoothed["xx"][own] < 0.1**2).all()
+
+
+@settings(deadline=None)
+@given(measured(), measured())
+def test_paths_smoothed_at_once_are_as_each_alone(
+    one: tuple[Ints, Floats, Floats], other: tuple[Ints, Floats, Floats]
+) -> None:
+    frames, ground, noise = (np.concatenate(pair) for pair in zip(one, other, strict=True))
+    tracks = np.split(np.arange(len(frames)), [len(one[0])])
+    both = smoothed_paths(frames / RATE, ground, noise, tracks, MOTION)
+    for rows in tracks:
+        alone = smoothed_paths(frames[rows] / RATE, ground[rows], noise[rows], [np.arange(len(rows))], MOTION)
+        np.testing.assert_array_equal(both[0][rows], alone[0])
+        np.testing.assert_array_equal(both[1][rows], alone[1])
 
 
 def test_nobody_at_all() -> None:
