@@ -6,6 +6,7 @@ import numpy as np
 
 from stseg.arrays import Flags, Ints, Rows
 from stseg.model.tables import EVENT
+from stseg.tracking.near_rows import near_rows
 
 _ONE_PLACE = 0.12
 """Distance of two tracks in one place, metres: half a body's depth, for places of people in touch err."""
@@ -41,16 +42,7 @@ def coincident(trajectory: Rows, frame_rate: float, shortest: float) -> tuple[Fl
 
 def _near_pairs(trajectory: Rows) -> Ints:
     """Rows of two tracks in one place, int64 (k, 2), the lower id first; sorted by ids, then frame."""
-    order = np.lexsort((trajectory["id"], trajectory["frame"]))
-    frame, x, y = (trajectory[name][order] for name in ("frame", "x", "y"))
-    pairs = [np.zeros((0, 2), np.int64)]
-    for step in range(1, len(order)):
-        same = frame[step:] == frame[:-step]
-        if not same.any():
-            break
-        near = np.flatnonzero(same & (np.hypot(x[step:] - x[:-step], y[step:] - y[:-step]) < _ONE_PLACE))
-        pairs.append(np.column_stack([order[near], order[near + step]]))
-    found = np.concatenate(pairs)
+    found, _ = near_rows(trajectory, _ONE_PLACE)
     names = trajectory["id"][found]
     return found[np.lexsort((trajectory["frame"][found[:, 0]], names[:, 1], names[:, 0]))]
 

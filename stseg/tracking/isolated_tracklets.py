@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from stseg.arrays import Ints, Rows
-from stseg.tracking.assignment import distances
+from stseg.tracking.near_rows import near_rows
 
 _ENCOUNTER_DISTANCE = 0.6
 """Distance of an encounter, metres."""
@@ -39,20 +39,13 @@ def _keys(track: Ints, frame: Ints) -> Ints:
 
 def _meetings(trajectory: Rows, frame_rate: float) -> tuple[Ints, Ints]:
     """Tracks and frames of the closest approach of each encounter."""
-    close: dict[tuple[int, int], list[tuple[int, float]]] = {}
-    order = np.argsort(trajectory["frame"], kind="stable")
-    for rows in np.split(order, np.flatnonzero(np.diff(trajectory["frame"][order])) + 1):
-        ground = np.column_stack([trajectory["x"][rows], trajectory["y"][rows]])
-        away = distances(ground, ground)
-        for a, b in np.argwhere(np.triu(away < _ENCOUNTER_DISTANCE, 1)):
-            one, other = sorted((int(trajectory["id"][rows[a]]), int(trajectory["id"][rows[b]])))
-            close.setdefault((one, other), []).append((int(trajectory["frame"][rows[0]]), float(away[a, b])))
-    track: list[int] = []
-    frame: list[int] = []
-    for pair, seen in close.items():
-        when = np.array([f for f, _ in seen])
-        for part in np.split(np.arange(len(seen)), np.flatnonzero(np.diff(when) > frame_rate) + 1):
-            nearest = min(part, key=lambda k: seen[k][1])
-            track += pair
-            frame += [seen[nearest][0]] * 2
-    return np.array(track, np.int64), np.array(frame, np.int64)
+    pairs, away = near_rows(trajectory, _ENCOUNTER_DISTANCE)
+    track, frame = trajectory["id"][pairs], trajectory["frame"][pairs[:, 0]]
+    order = np.lexsort((frame, track[:, 1], track[:, 0]))
+    track, frame, away = track[order], frame[order], away[order]
+    encounter = np.cumsum(
+        (np.diff(track, axis=0, prepend=-1) != 0).any(axis=1) | (np.diff(frame, prepend=0) > frame_rate)
+    )
+    nearest = np.lexsort((frame, away, encounter))
+    nearest = nearest[np.diff(encounter[nearest], prepend=0) > 0]
+    return track[nearest].reshape(-1), np.repeat(frame[nearest], 2)

@@ -10,8 +10,8 @@ import numpy as np
 from stseg.arrays import Flags, Floats, Ints, Rows
 from stseg.config import Config
 from stseg.model.border import Border
-from stseg.tracking.assignment import distances
 from stseg.tracking.identities.size_model import SizeModel
+from stseg.tracking.near_rows import near_rows
 
 _EXCHANGE_DISTANCE = 0.8
 """Distance below which the filter may have exchanged two tracks, metres."""
@@ -151,7 +151,7 @@ def observe(
     alike = 1.0 + 2.0 * _LASTING * frame_rate
     return Observations(
         order, start, frames / frame_rate, ground, np.maximum(alike * (rows["xx"] + rows["yy"]) / 2, _LEAST**2),
-        previous, _certain(rows, ground, start, previous), border.inside(ground, config.detection.border_width),
+        previous, _certain(rows, previous), border.inside(ground, config.detection.border_width),
         precision, information, config.detection.minimum_distance,
     )  # fmt: skip
 
@@ -172,12 +172,9 @@ def _previous(rows: Rows) -> Ints:
     return previous
 
 
-def _certain(rows: Rows, ground: Floats, start: Ints, previous: Ints) -> Flags:
+def _certain(rows: Rows, previous: Ints) -> Flags:
     """Rows that follow their track in the very next frame, with nobody near in either."""
     alone = np.ones(len(rows), bool)
-    for first, stop in zip(start[:-1].tolist(), start[1:].tolist(), strict=True):
-        away = distances(ground[first:stop], ground[first:stop])
-        np.fill_diagonal(away, np.inf)
-        alone[first:stop] = (away >= _EXCHANGE_DISTANCE).all(axis=1)
+    alone[near_rows(rows, _EXCHANGE_DISTANCE)[0]] = False
     follows = (previous >= 0) & (rows["frame"] - rows["frame"][previous] == 1)
     return np.asarray(alone & alone[previous] & follows)

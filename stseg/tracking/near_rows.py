@@ -1,0 +1,36 @@
+"""Pairs of people who stand near each other in one frame, found at once in all frames of a run."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stseg.arrays import Floats, Ints, Rows
+
+
+def near_rows(trajectory: Rows, distance: float) -> tuple[Ints, Floats]:
+    """Pairs of rows of one frame whose places are less than a distance apart.
+
+    Parameters
+    ----------
+    trajectory : TRAJECTORY (n,)
+        In any order.
+    distance
+        Metres.
+
+    Returns
+    -------
+    int64 (k, 2), float64 (k,)
+        The rows of each pair, that of the lower id first, and how far apart they are; in no order.
+    """
+    order = np.lexsort((trajectory["id"], trajectory["frame"]))
+    frame, x, y = (trajectory[name][order] for name in ("frame", "x", "y"))
+    pairs, apart = [np.zeros((0, 2), np.int64)], [np.zeros(0)]
+    for step in range(1, len(order)):
+        same = frame[step:] == frame[:-step]
+        if not same.any():
+            break
+        away = np.hypot(x[step:] - x[:-step], y[step:] - y[:-step])
+        near = np.flatnonzero(same & (away < distance))
+        pairs.append(np.column_stack([order[near], order[near + step]]))
+        apart.append(away[near])
+    return np.concatenate(pairs), np.concatenate(apart)
