@@ -8,7 +8,7 @@ from strollers import BORDER, CONFIG, RATE, Path, rows_of, straight, swapped, vi
 
 from stseg.arrays import Floats, Ints, Rows
 from stseg.model.tables import APPEARANCE, COLOURS, FEATURES
-from stseg.tracking.identities.appearance_model import LearnedAppearance, learn_appearance
+from stseg.tracking.identities.appearance_model import LearnedAppearance, learn_appearance, row_looks
 from stseg.tracking.identities.global_association import associate_globally
 from stseg.tracking.identities.size_model import MeasuredSizes
 from stseg.tracking.isolated_tracklets import isolated_tracklets
@@ -46,7 +46,8 @@ def appearance(rows: Rows, true: Ints, noise: float, differ: float, seed: int, n
 
 
 def learned(rows: Rows, looks: Rows, person: Ints | None = None) -> LearnedAppearance:
-    return learn_appearance(rows, looks, isolated_tracklets(rows, RATE), rows["id"] if person is None else person, RATE)
+    tracklets, person = isolated_tracklets(rows, RATE), rows["id"] if person is None else person
+    return learn_appearance(rows["frame"], row_looks(rows, looks), tracklets, person, RATE)
 
 
 def distance(value: Floats, a: Ints, b: Ints) -> float:

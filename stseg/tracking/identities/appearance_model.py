@@ -58,14 +58,16 @@ class LearnedAppearance:
 
 
 def learn_appearance(
-    trajectory: Rows, appearance: Rows, tracklets: Sequence[Ints], person: Ints, frame_rate: float
+    frame: Ints, looks: Sequence[Floats], tracklets: Sequence[Ints], person: Ints, frame_rate: float
 ) -> LearnedAppearance:
     """Learn how much the appearance of a recording's people tells of identity.
 
     Parameters
     ----------
-    trajectory : TRAJECTORY (n,)
-    appearance : APPEARANCE (l,)
+    frame : int64 (n,)
+        Frame of each row of a trajectory.
+    looks : of float64 (n, k)
+        Features and colours of each row, see `row_looks`.
     tracklets
         Rows of each isolated tracklet, in the order of time.
     person : int64 (n,)
@@ -74,14 +76,18 @@ def learn_appearance(
         Frames per second.
     """
 
-    def learned(name: str) -> LearnedAppearance:
-        value = row_means(trajectory, appearance, name)
-        halves = _halves(trajectory["frame"], person, np.isfinite(value[:, 0]))
-        return _learned(value, trajectory["frame"], tracklets, halves, frame_rate)
+    def learned(value: Floats) -> LearnedAppearance:
+        halves = _halves(frame, person, np.isfinite(value[:, 0]))
+        return _learned(value, frame, tracklets, halves, frame_rate)
 
-    found = [learned(name) for name in ("features", "colours")]
+    found = [learned(value) for value in looks]
     value = np.concatenate([one.value for one in found], axis=1)
     return LearnedAppearance(value, SizeModel.joined([one.model for one in found]), found[-1].colours)
+
+
+def row_looks(trajectory: Rows, appearance: Rows) -> list[Floats]:
+    """Features and colours of each row, see `row_means`."""
+    return [row_means(trajectory, appearance, name) for name in ("features", "colours")]
 
 
 def row_means(trajectory: Rows, appearance: Rows, name: str) -> Floats:

@@ -11,7 +11,7 @@ from stseg.arrays import Ints, Rows
 from stseg.config import Config, MotionConfig
 from stseg.model.border import Border
 from stseg.model.tables import KNOWN
-from stseg.tracking.identities.appearance_model import LearnedAppearance, learn_appearance
+from stseg.tracking.identities.appearance_model import LearnedAppearance, learn_appearance, row_looks
 from stseg.tracking.identities.constraints import Constraints
 from stseg.tracking.identities.discriminant_axes import Axes
 from stseg.tracking.identities.observations import Observations, observe
@@ -88,10 +88,11 @@ class IdentityProblem:
             return cls(seen, joined, config.motion, limits, frame_rate, learned.colours)
 
         def learned(person: Ints) -> LearnedAppearance:
-            return learn_appearance(trajectory, appearance, tracklets, person, frame_rate)
+            return learn_appearance(trajectory["frame"], looks, tracklets, person, frame_rate)
 
         if not len(appearance):
             return problem(LearnedAppearance.nothing(len(trajectory)))
+        looks = row_looks(trajectory, appearance)
         # Tracklets are right, but looks outlast them; identities last, and with appearance few are wrong.
         draft = problem(learned(_tracklet_of(tracklets))).with_hypotheses(-(-own.hypotheses // _DRAFT))
         return problem(learned(draft.solve(constraints)))

@@ -162,13 +162,18 @@ def frame_errors(
     lags = np.arange(1, max(round(_LONGEST * frame_rate), 1) + 1)
     total, count = np.zeros((len(sizes), len(lags))), np.zeros(len(lags))
     for rows in tracklets:
-        own = frame[rows]
-        after = np.searchsorted(own, own + lags[:, None]).clip(max=len(rows) - 1)
-        paired = own[after] - own == lags[:, None]
-        for k, (later, pairs) in enumerate(zip(after, paired, strict=True)):
-            difference = sizes[:, rows[later[pairs]]] - sizes[:, rows[pairs]]
-            total[:, k] += 0.5 * (difference**2).sum(axis=1)
-        count += paired.sum(axis=1)
+        own, value = frame[rows], sizes[:, rows]
+        if own[-1] - own[0] == len(own) - 1:  # in every frame: most are
+            number = np.maximum(len(own) - lags, 0)
+            pairs = [(value[:, lag:], value[:, :-lag]) for lag in lags[number > 0].tolist()]
+        else:
+            after = np.searchsorted(own, own + lags[:, None]).clip(max=len(rows) - 1)
+            paired = own[after] - own == lags[:, None]
+            number = paired.sum(axis=1)
+            pairs = [(value[:, later[which]], value[:, which]) for later, which in zip(after, paired, strict=True)]
+        for k, (later, earlier) in enumerate(pairs):
+            total[:, k] += 0.5 * ((later - earlier) ** 2).sum(axis=1)
+        count += number
     expected = prior.noise**2 * (1.0 - np.exp(-lags / frame_rate / _PRIOR_LASTING))
     differences = (total + _PRIOR_FRAMES * expected) / (count + _PRIOR_FRAMES)
     noise = differences.max(axis=1)
