@@ -27,7 +27,8 @@ def peaks(score: Floats, lattice_ground: Floats, heights: Floats, widths: Floats
     """Local maxima of a lattice score (height, y, x) over the ground (y, x, 2), best first."""
     best = score.max(0)
     rows, columns = np.nonzero(best > _LEAST_SCORE)  # few places, so these alone are compared with their neighbours
-    framed = np.pad(best, 1, constant_values=-np.inf)
+    framed = np.full((best.shape[0] + 2, best.shape[1] + 2), -np.inf)
+    framed[1:-1, 1:-1] = best
     around = framed[rows[:, None] + _AROUND[0], columns[:, None] + _AROUND[1]]
     highest = best[rows, columns] == around.max(1, initial=-np.inf)
     rows, columns = rows[highest], columns[highest]
