@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import zlib
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -55,12 +56,46 @@ def packed_frame(values: AnyArray) -> PackedFrame:
     """A frame (plane, y, x), of the type in the file, as HDF5's filters shuffle and deflate unpack it."""
     whole = np.ascontiguousarray(values).reshape(-1)
     used = np.bitwise_or.reduce(whole.view(f"u{whole.itemsize}"), keepdims=True).view(np.uint8) != 0
+    by_significance = zip(whole.reshape(-1, 1).view(np.uint8).T, used.tolist(), strict=True)
+    return _packed([own.tobytes() if is_used else bytes(len(own)) for own, is_used in by_significance])
+
+
+def _packed(by_significance: Sequence[bytes]) -> PackedFrame:
+    """The bytes of each significance, the least first, packed."""
     blocks, checksum = [_HEADER], 1
-    for own, is_used in zip(whole.reshape(-1, 1).view(np.uint8).T, used.tolist(), strict=True):
-        shown = own.tobytes() if is_used else bytes(len(own))
-        blocks.append(_blocks(shown) if is_used else _blocks_of_zeros(len(own)))
-        checksum = zlib.adler32(shown, checksum)
+    for own in by_significance:
+        blocks.append(_blocks_of_zeros(len(own)) if own == bytes(len(own)) else _blocks(own))
+        checksum = zlib.adler32(own, checksum)
     return PackedFrame(0, b"".join([*blocks, _END, checksum.to_bytes(4, "big")]))
+
+
+def renamed_label(packed: PackedFrame, cells: int, names: Labels) -> PackedFrame | None:
+    """The labels that `packed_frame` packed, under other names and packed again.
+
+    Parameters
+    ----------
+    packed
+        The labels of a frame.
+    cells
+        Their number.
+    names : int32 (256,)
+        New names of the labels 0 to 255.
+
+    Returns
+    -------
+    PackedFrame or None
+        None where labels are greater, or packed otherwise.
+    """
+    try:
+        label = zlib.decompressobj().decompress(packed.data, cells)
+    except zlib.error:
+        return None
+    above = bytes(3 * cells)
+    rest = 3 * _blocks_of_zeros(cells) + _END + zlib.adler32(above, zlib.adler32(label)).to_bytes(4, "big")
+    if packed.filters or len(label) != cells or not packed.data.endswith(rest):
+        return None
+    tables = names.astype("<i4").view(np.uint8).reshape(-1, 4).T
+    return _packed([label.translate(own.tobytes()) if own.any() else bytes(cells) for own in tables])
 
 
 def _blocks(values: bytes) -> bytes:

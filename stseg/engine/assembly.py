@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
@@ -18,7 +19,7 @@ from stseg.engine.segments import Segment
 from stseg.io.config_file import format_config
 from stseg.io.recording.time_alignment import with_alignment
 from stseg.io.runfile import layout
-from stseg.io.runfile.packed_frames import PackedFrame, packed_frame, unpacked_label
+from stseg.io.runfile.packed_frames import PackedFrame, packed_frame, renamed_label, unpacked_label
 from stseg.io.runfile.runs import Run, RunWriter, read_run
 from stseg.model.tables import APPEARANCE, Tracks
 from stseg.trackers import find_tracker
@@ -26,6 +27,8 @@ from stseg.tracking.stitching import SegmentTracks, StitchedTracks, Stitcher, re
 
 _BLOCK = 64
 """Frames of the volume read at a time."""
+_FEW = 256
+"""Names of a segment that are renamed as they are packed."""
 _COPIED = ("ghosts", "windows", "rates", "shifts", "timings", "appearance")
 """Tables of the segments that the run file takes unchanged."""
 
@@ -155,13 +158,23 @@ def _append_labels(part: _SegmentRows, writer: RunWriter, packers: Executor) -> 
     rows, identity = part.rows[order], part.identity[order]
 
     def renamed(frame: int, label: PackedFrame) -> PackedFrame:
-        first, stop = rows["frame"].searchsorted([frame, frame + 1])
-        own, names = rows[first:stop], identity[first:stop]
-        if (own["id"] == names).all():
-            return label
-        cells = unpacked_label(label, part.run.views.shape)
-        rename_labels(cells[None], np.array([frame]), own, names)
-        return packed_frame(cells)
+        own = slice(*rows["frame"].searchsorted([frame, frame + 1]))
+        return _renamed(label, part.run.views.shape, rows[own], identity[own])
 
     for frames, label in part.run.read_packed_frames(layout.LABEL, _BLOCK):
         writer.append_packed_labels(list(packers.map(renamed, frames.tolist(), label)))
+
+
+def _renamed(label: PackedFrame, shape: tuple[int, ...], rows: Rows, identity: Ints) -> PackedFrame:
+    """The labels of a frame, which are names of a segment, as the run's track ids; rows of the frame."""
+    if (rows["id"] == identity).all():
+        return label
+    if rows["id"].max() < _FEW:
+        names = np.zeros(_FEW, np.int32)
+        names[rows["id"]] = identity
+        few = renamed_label(label, math.prod(shape), names)
+        if few is not None:
+            return few
+    cells = unpacked_label(label, shape)
+    rename_labels(cells[None], rows["frame"][:1], rows, identity)
+    return packed_frame(cells)
