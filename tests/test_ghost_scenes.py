@@ -26,7 +26,8 @@ from scenes import (
 
 from stseg.arrays import Floats, ViewEvidence
 from stseg.detection.detector import Detector
-from stseg.detection.pixel_lattice import OpenPixels, fill_scores
+from stseg.detection.open_pixels import OpenPixels
+from stseg.detection.pillar_evidence import fill_scores
 from stseg.detection.prior import Prior
 from stseg.engine.committed_frames import CommittedFrames
 from stseg.engine.pipeline import Pipeline

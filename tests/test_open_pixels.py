@@ -8,7 +8,8 @@ from scenes import BODY, FEW_HEIGHTS, corner_cameras, rig_of
 
 from stseg.arrays import Floats, Shorts, Singles
 from stseg.detection.detector import Detector
-from stseg.detection.pixel_lattice import OpenPixels, fill_scores
+from stseg.detection.open_pixels import OpenPixels
+from stseg.detection.pillar_evidence import fill_scores
 
 BACKGROUND = np.float32(-2.2)
 DETECTOR = Detector(rig_of(corner_cameras(), cell=0.5, planes=3), ["pixels"] * 4, FEW_HEIGHTS, BODY)

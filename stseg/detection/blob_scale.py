@@ -14,7 +14,9 @@ import numpy as np
 from stseg.accelerate import kernel
 from stseg.arrays import Floats, Singles
 from stseg.config import BodyConfig, DetectionConfig
-from stseg.detection.pixel_lattice import OpenPixels, PixelLattice, add_said, fill_around
+from stseg.detection.open_pixels import OpenPixels
+from stseg.detection.pillar_evidence import add_pillar_evidence, fill_around
+from stseg.detection.pixel_lattice import PixelLattice
 from stseg.pointed_tuples import pointed
 
 
@@ -64,7 +66,7 @@ def _fill_scales(
     for cell in range(cells):
         pillar = cell * heights + heights // 2
         fill_around(cell, pixels, lattice, more)
-        if add_said(prior, 0.0, pillar, cell, every, pixels, lattice, weight, more, said) > -np.inf:
+        if add_pillar_evidence(prior, 0.0, pillar, cell, every, pixels, lattice, weight, more, said) > -np.inf:
             total = 0.0
             for view in range(views):
                 total += said[view] / weight

@@ -7,7 +7,8 @@ import numpy as np
 from stseg.arrays import Floats
 from stseg.detection.evidence import peaks
 from stseg.detection.map_estimate import MapEstimate
-from stseg.detection.pixel_lattice import OpenPixels, fill_scores
+from stseg.detection.open_pixels import OpenPixels
+from stseg.detection.pillar_evidence import fill_scores
 from stseg.geometry import Grid
 from stseg.model.candidates import Candidates
 

@@ -13,16 +13,16 @@ from stseg.arrays import Flags, Floats, Ints
 from stseg.detection.lists import Lists
 
 _CLEARANCE = 0.1
-"""Who is not nearer to the camera by more hides nobody, metres."""
+"""Least difference of distances from the camera at which one body occludes another, metres."""
 _INSET = 0.1
-"""Share of a box's width at either side that is no trunk and hides nothing."""
+"""Share of a box's width at either side that is no trunk and occludes nothing."""
 
 
 @kernel
 def hiders_of(
     bodies: Floats, distance: Floats, sizes: Floats, is_blind: Flags, known: Lists, known_candidates: int
 ) -> Lists:
-    """Candidates who hide a part of one, rising, with the share that they leave of the box inside the image.
+    """Occluders of each candidate, rising, with the share that each leaves visible of the box inside the image.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ def hiders_of(
     sizes : float64 (view, 2)
         Width and height of the images, pixels.
     is_blind : bool (view,)
-        Views in which nobody hides anybody.
+        Views without occlusion.
     known, known_candidates
         The lists of the first candidates, and how many these are.
 
@@ -64,7 +64,7 @@ def hiders_of(
 def _add_hiders(
     i: int, first: int, bodies: Floats, distance: Floats, size: Floats, item: Ints, value: Floats, number: int
 ) -> int:
-    """Add to the first `number` items those of the candidates from `first` on who hide a part of i; their number."""
+    """Add to the first `number` items the occluders of i among the candidates from `first` on; their number."""
     left, right = max(bodies[i, 0], 0.0), min(bodies[i, 2], size[0])
     top, bottom = max(bodies[i, 1], 0.0), min(bodies[i, 3], size[1])
     area = max(right - left, 0.0) * max(bottom - top, 0.0)
