@@ -153,8 +153,8 @@ def _fill_alternatives(
 @part
 def _impose(bound: Ints, h: int, people: BoundPeople, k: int, first: int, one: Extension, identities: int) -> None:
     """Impose on the costs who the rows of the k-th frame are, and are not, by who is bound (hypothesis, person)."""
-    for told in range(people.start[k], people.start[k + 1]):
-        person, row = people.person[told], people.observation[told] - first
+    for j in range(people.start[k], people.start[k + 1]):
+        person, row = people.person[j], people.observation[j] - first
         if people.first[person] < first:
             impose_identity(one, identities, bound[h, person], row, True)
             continue
@@ -184,6 +184,6 @@ def _fill_names(held: Hypotheses, pasts: Pasts, h: int, slot: Ints, n: int, firs
 @kernel
 def _bind(fresh: Hypotheses, people: BoundPeople, k: int, first: int, name: Ints) -> None:
     """Note who known people are by the names (hypothesis, row) of the rows of the k-th frame."""
-    for told in range(people.start[k], people.start[k + 1]):
+    for j in range(people.start[k], people.start[k + 1]):
         for n in range(len(name)):
-            fresh.bound[n, people.person[told]] = name[n, people.observation[told] - first]
+            fresh.bound[n, people.person[j]] = name[n, people.observation[j] - first]

@@ -48,11 +48,11 @@ def row_costs(pasts: Pasts, size: int, first: int, rows: int, now: float, seen: 
     costs.follower[:] = -1
     alone = np.empty((rows, sizes))
     for i in range(rows):
-        r, told = first + i, 0.0
+        r, evidence = first + i, 0.0
         for d in range(sizes):
             alone[i, d] = size_evidence(seen.precision[r, d], seen.information[r, d], rules.spread[d])
-            told += alone[i, d]
-        costs.begun[i] = rules.birth * seen.inside[r] - told
+            evidence += alone[i, d]
+        costs.begun[i] = rules.birth * seen.inside[r] - evidence
     for p in range(size):
         _fill_costs(pasts, p, first, now, seen, rules, alone, costs)
     return costs
@@ -83,7 +83,7 @@ def _fill_costs(
                 continue
             both = pasts.precision[p, d] + seen.precision[r, d]
             together = size_evidence(both, pasts.information[p, d] + seen.information[r, d], rules.spread[d])
-            gain += max(together - pasts.told[p, d], alone[i, d] - rules.most_against[d] * seen.precision[r, d])
+            gain += max(together - pasts.evidence[p, d], alone[i, d] - rules.most_against[d] * seen.precision[r, d])
         costs.cost[p, i] = -gain
         if seen.certain[r]:
             costs.follower[p] = i

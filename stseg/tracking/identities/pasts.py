@@ -31,8 +31,8 @@ class Pasts(NamedTuple):
         Of either axis: place, place and velocity, velocity.
     precision, information : float64 (past, size)
         Sums over the identity's observations.
-    told : float64 (past, size)
-        What these sums say of one person, see `size_evidence`.
+    evidence : float64 (past, size)
+        Of these sums for one person, nats; see `size_evidence`.
     """
 
     name: Ints
@@ -42,7 +42,7 @@ class Pasts(NamedTuple):
     covariance: Floats
     precision: Floats
     information: Floats
-    told: Floats
+    evidence: Floats
 
     @classmethod
     def empty(cls, number: int, sizes: int) -> Pasts:
@@ -77,7 +77,7 @@ def begin_past(pasts: Pasts, p: int, r: int, now: float, seen: ObservedRows, rul
     pasts.covariance[p, 0], pasts.covariance[p, 1], pasts.covariance[p, 2] = seen.variance[r], 0.0, rules.pace
     for d in range(pasts.precision.shape[1]):
         pasts.precision[p, d], pasts.information[p, d] = seen.precision[r, d], seen.information[r, d]
-        pasts.told[p, d] = size_evidence(seen.precision[r, d], seen.information[r, d], rules.spread[d])
+        pasts.evidence[p, d] = size_evidence(seen.precision[r, d], seen.information[r, d], rules.spread[d])
 
 
 @part
@@ -90,7 +90,7 @@ def keep_past(pasts: Pasts, p: int, fresh: Pasts, q: int) -> None:
         fresh.covariance[q, k] = pasts.covariance[p, k]
     for d in range(pasts.precision.shape[1]):
         fresh.precision[q, d], fresh.information[q, d] = pasts.precision[p, d], pasts.information[p, d]
-        fresh.told[q, d] = pasts.told[p, d]
+        fresh.evidence[q, d] = pasts.evidence[p, d]
 
 
 @part
@@ -102,7 +102,7 @@ def continue_past(pasts: Pasts, q: int, r: int, now: float, seen: ObservedRows, 
         if seen.precision[r, d] != 0.0:
             pasts.precision[q, d] += seen.precision[r, d]
             pasts.information[q, d] += seen.information[r, d]
-            pasts.told[q, d] = size_evidence(pasts.precision[q, d], pasts.information[q, d], rules.spread[d])
+            pasts.evidence[q, d] = size_evidence(pasts.precision[q, d], pasts.information[q, d], rules.spread[d])
 
 
 @part
