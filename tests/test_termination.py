@@ -170,7 +170,8 @@ def test_a_run_that_goes_on_is_asked_first_and_ended_then(tmp_path: Path) -> Non
         start = time.monotonic()
         running.send_signal(signal.SIGINT)
         assert running.stderr is not None
-        assert running.stderr.readline() == "stseg: finishing; once more to stop at once\n"
+        first = running.stderr.readline()
+        assert first == "stseg: finishing; once more to stop at once\n", first + running.stderr.read()
         assert time.monotonic() - start < _SECONDS
         ended, said, seconds = ended_by(running, signal.SIGINT)
     assert (ended, said) == (130, "stseg: interrupted")
