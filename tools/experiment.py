@@ -14,6 +14,7 @@ pixels      share of pixels of people that carry the right label, from film to l
 points      calibration of the probability of track points
 returns     who comes back: returns that are recognised, and wrong ones, at each least probability
 rig         error of a rig against the true one, on the ground and at head height
+same        do two commits give the same bits?
 scaling     CPU time of a frame over area, views, people and pixels, with exponents
 sizes       error of heights and widths of tracks, and their spread along a track
 spoil       what spoiled masks and boxes cost, by kinds, strengths, views and crowds
@@ -41,6 +42,7 @@ EXPERIMENTS = (
     "points",
     "returns",
     "rig",
+    "same",
     "scaling",
     "sizes",
     "spoil",

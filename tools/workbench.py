@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 import subprocess
 import sys
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -26,12 +27,12 @@ class Bench:
         """A path written with $DATA or $WORK."""
         return Path(self._filled(text))
 
-    def do(self, command: str) -> str:
-        """Run a command and return what it printed; stop where it fails."""
+    def do(self, command: str, folder: Path = ROOT, environment: Mapping[str, str] | None = None) -> str:
+        """Run a command in a folder and return what it printed; stop where it fails."""
         print(f"$ {command}", flush=True)
         program, *arguments = shlex.split(command)
         words = [*_PROGRAMS[program], *(word for argument in arguments for word in self._words(argument))]
-        process = subprocess.run(words, stdout=subprocess.PIPE, text=True, cwd=ROOT, check=False)
+        process = subprocess.run(words, stdout=subprocess.PIPE, text=True, cwd=folder, env=environment, check=False)
         if process.returncode:
             sys.exit(f"exit status {process.returncode} of: {command}")
         return process.stdout
