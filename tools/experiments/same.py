@@ -79,8 +79,8 @@ _ALL = (
     _of_results("pom", "0:30", "0:30"),
     Recorded("film", "$WORK/film/rig.toml", "0:1200", "0:40", inputs=(_FILM,)),
     _of_results("uu4", "0:60", "0:20", "--tracker kalman", "_kalman"),
-    _of_results("uu4", "0:30", "0:10", "--tracker particles", "_particles"),
-    _of_results("uu4", "0:30", "0:10", "--tracker belief", "_belief"),
+    _of_results("uu4_colour", "0:30", "0:10", "--tracker particles", "_particles"),
+    _of_results("uu4_colour", "0:30", "0:10", "--tracker belief", "_belief"),
     _of_results("uu4", "0:60", "0:20", "--tracker frames", "_frames"),
 )
 
