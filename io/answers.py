@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from stseg.errors import FormatError
-from stseg.io import limits
-from stseg.io.bounded_files import read_text
-from stseg.io.names import EXPECTED_TITLE, is_title
-from stseg.io.numbers import parse_whole
 from stseg.io.toml.text import one_of, shown
+from stseg.io.untrusted import limits
+from stseg.io.untrusted.bounded_files import read_text
+from stseg.io.untrusted.names import EXPECTED_TITLE, is_title
+from stseg.io.untrusted.numbers import parse_whole
 
 COLUMNS = ("action", "frame", "id", "other", "name")
 

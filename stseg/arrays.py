@@ -22,7 +22,7 @@ Shorts = NDArray[np.int16]
 Bytes = NDArray[np.uint8]
 Flags = NDArray[np.bool_]
 Rows = NDArray[np.void]
-"""A structured array; its dtype is one of those in `stseg.model.tables`."""
+"""A structured array; its dtype is one of those in `stseg.records.tables`."""
 AnyArray = NDArray[Any]
 
 

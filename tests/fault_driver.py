@@ -1,7 +1,7 @@
 """A run in a child process whose calls of the system fail, write half, or are its last.
 
 A wrapper counts the calls that write (open, write, fsync, rename, link, mkdir, unlink) and lets one of them fail, or
-kills the process. `tests/test_faults.py` tries some calls, `tools/faults.py` all.
+kills the process. `tests/attacks/test_faults.py` tries some calls, `tools/faults.py` all.
 """
 
 from __future__ import annotations

@@ -10,12 +10,12 @@ import numpy as np
 from reference_track_filter import best_pairs
 
 from stseg.arrays import Boxes, Flags, Floats, Ints, Labels, Singles
+from stseg.bodies.box_fit import GRAIN, TOLERANCE
 from stseg.detection.problem import BoxEvidence, Parameters, PixelEvidence, Problem
 from stseg.graphcut.energy import Energy
-from stseg.model.box_fit import GRAIN, TOLERANCE
-from stseg.model.people import Explanation
 from stseg.occupancy.fusion import ErrorRates
 from stseg.occupancy.visible_cells import SHOULDER
+from stseg.records.people import Explanation
 
 Edge = tuple[int, int, int]
 """Two cells of a flattened volume, and the capacity between them."""

@@ -9,8 +9,8 @@ import cv2
 import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints, Singles
-from stseg.detection.mean_shift import _REACH, _SAME, _STEPS, _STILL
-from stseg.detection.pillar_strips import Pillars
+from stseg.baselines.huang_wang_2012.mean_shift import _REACH, _SAME, _STEPS, _STILL
+from stseg.baselines.huang_wang_2012.pillar_strips import Pillars
 from stseg.geometry import Camera
 
 _FINE, _BITS, _DISCS, _POINTS = 4, 6, 30, 32

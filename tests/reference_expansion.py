@@ -10,8 +10,8 @@ import numpy as np
 
 from stseg.arrays import Floats, Ints
 from stseg.graphcut.expansion import LabelEnergy
-from stseg.model.predicted_places import PredictedPlaces
-from stseg.segmentation.unary import BodyShape
+from stseg.records.predicted_places import PredictedPlaces
+from stseg.segmentation.label_energy import BodyShape
 
 
 def costs(energy: LabelEnergy) -> list[dict[int, int]]:

@@ -29,7 +29,7 @@ def modes_of(planes: Singles) -> tuple[Singles, Singles, Singles]:
 
 
 def mode_densities(x: Floats, mu: Floats, var: float, darkest: float) -> tuple[float, float]:
-    """N(x; mu, var I) and D(x; mu, var) of `stseg.foreground.mixture`."""
+    """N(x; mu, var I) and D(x; mu, var) of `stseg.foreground.background.mixture`."""
     lit = math.exp(-((x - mu) @ (x - mu)) / (2 * var)) / (2 * math.pi * var) ** 1.5
     ratio = float(np.clip((x @ mu) / (mu @ mu), darkest, 1))
     residual = x - ratio * mu
@@ -104,7 +104,7 @@ def gaussian(distance: float, var: float) -> float:
 
 
 def chromatic_densities(x: Floats, mu: Floats, across: float, along: float, darkest: float) -> tuple[float, float]:
-    """N and D of `stseg.foreground.chromatic`."""
+    """N and D of `stseg.foreground.background.chromatic`."""
     ratio, off, length = polar(x, mu)
     disc = gaussian(off, across) / (2 * math.pi * across)
     lit = disc * gaussian((ratio - 1) * length, along) / math.sqrt(2 * math.pi * along)
@@ -167,7 +167,7 @@ def chromatic_updated(
 def codeword_densities(
     x: Floats, mu: Floats, low: float, high: float, config: CodebookConfig
 ) -> tuple[float, float, float]:
-    """Densities of a codeword as it was seen, in shadow and in highlight, of `stseg.foreground.codebook`."""
+    """Densities of a codeword as it was seen, in shadow and in highlight, of `stseg.foreground.background.codebook`."""
     ratio, off, length = polar(x, mu)
     var, span = config.channel_sd**2, math.sqrt(2 * math.pi) * config.channel_sd
     disc = gaussian(off, var) / (2 * math.pi * var)

@@ -10,8 +10,8 @@ from scipy.stats import norm
 
 from stseg.arrays import Floats
 from stseg.config import MotionConfig
-from stseg.tracking.identities.observations import Observations
-from stseg.tracking.motion_model import process_noise, transition
+from stseg.identities.evidence.observations import Observations
+from stseg.tracking.filter.motion_model import process_noise, transition
 
 BIRTH, ABSENCE, LEAST, NEAR = 6.0, 1.0, -25.0, 1.0
 

@@ -7,9 +7,9 @@ from itertools import product
 import numpy as np
 
 from stseg.arrays import Bytes, Floats, Ints, Labels, Singles
+from stseg.baselines.kim_davis_2006.bodies import HALF_WIDTH, LOOSENESS, PARTS
+from stseg.baselines.kim_davis_2006.colours import BINS, CHROMA_SPAN, SPREAD
 from stseg.geometry import Camera
-from stseg.trackers.particles.bodies import HALF_WIDTH, LOOSENESS, PARTS
-from stseg.trackers.particles.colours import BINS, CHROMA_SPAN, SPREAD
 
 
 def density(colour: Bytes, samples: Bytes) -> float:

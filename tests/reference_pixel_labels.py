@@ -9,7 +9,7 @@ import numpy as np
 
 from stseg.arrays import Bytes, Flags, Floats, Ints, Singles
 from stseg.config import LabelConfig
-from stseg.labels.label_likelihood import LabelLikelihood
+from stseg.pixel_labels.label_likelihood import LabelLikelihood
 
 
 def nearest_shares(drawn: Sequence[Flags], distance: Floats) -> Floats:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from stseg.arrays import Floats, Ints, Singles
-from stseg.simulation.body import Bodies
+from stseg.simulation.rendering.body import Bodies
 
 
 def hits(rays: Singles, eye: Floats, bodies: Bodies) -> Floats:

@@ -11,7 +11,7 @@ from stseg.geometry import Camera, Grid, Rig
 from stseg.io.recording.recording import CameraSource, Recording, Source
 from stseg.io.runfile.layout import STEP, ghost_type
 from stseg.io.runfile.runs import RunWriter
-from stseg.model.tables import BOX, EVENT, RATES, TIMING, TRAJECTORY, WINDOW, Tracks
+from stseg.records.tables import BOX, EVENT, RATES, TIMING, TRAJECTORY, WINDOW, Tracks
 
 FRAMES = np.arange(10, 16)
 CONFIG = "[detection]\nprior_log_odds = -3.0\n"

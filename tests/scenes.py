@@ -15,13 +15,13 @@ import numpy as np
 from reference_track_filter import best_pairs
 
 from stseg.arrays import Boxes, Bytes, Floats, Observation, Rows, Singles
+from stseg.bodies.pillars import PROFILE, SILHOUETTE
 from stseg.config import BodyConfig, Config, DetectionConfig
 from stseg.geometry import Camera, Grid, Lens, Rig
-from stseg.geometry.bodies import PROFILE, SILHOUETTE
-from stseg.model.people import People
-from stseg.model.predicted_tracks import PredictedTracks, no_tracks
-from stseg.model.sizes import Sizes
-from stseg.model.tables import TRAJECTORY
+from stseg.records.people import People
+from stseg.records.predicted_tracks import PredictedTracks, no_tracks
+from stseg.records.sizes import Sizes
+from stseg.records.tables import TRAJECTORY
 
 SIZE = (128, 96)
 FOCAL = 75.0

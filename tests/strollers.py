@@ -11,8 +11,8 @@ from strategies import numbers
 from stseg.arrays import Rows
 from stseg.config import Config
 from stseg.geometry import Grid
-from stseg.model.border import Border
-from stseg.model.tables import TRAJECTORY
+from stseg.records.border import Border
+from stseg.records.tables import TRAJECTORY
 
 RATE = 8.0
 CONFIG = Config()

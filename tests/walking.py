@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stseg.arrays import Floats
-from stseg.calibration.endpoints import Endpoints
-from stseg.calibration.solution import CalibrationInput
+from stseg.calibration.automatic.endpoints import Endpoints
+from stseg.calibration.automatic.solution import CalibrationInput
 from stseg.geometry import Rig
 from stseg.simulation import SceneSpec
-from stseg.simulation.cameras import build_rig
+from stseg.simulation.rendering.cameras import build_rig
 
 TOE = 0.1
 """Metres by which lowest points are nearer than axes."""

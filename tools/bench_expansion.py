@@ -18,14 +18,14 @@ import maxflow
 import numpy as np
 from bench_cut import Row, print_table
 
-from stseg.accelerate import kernel
 from stseg.arrays import Floats, Ints, Labels, Singles
 from stseg.graphcut.cell_subset import subset
 from stseg.graphcut.cut import minimum_cut
 from stseg.graphcut.energy import Energy
 from stseg.graphcut.expansion import LabelEnergy, expand
+from stseg.kernels.accelerate import kernel
 from stseg.segmentation.cell_motion import successor_cells
-from stseg.segmentation.energy import neighbourhood
+from stseg.segmentation.cut_energy import neighbourhood
 
 SHAPE = (15, 10, 100, 100)
 CELL, RISE, STEP = 0.10, 0.20, 1 / 15  # metres, metres, seconds

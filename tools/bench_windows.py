@@ -18,7 +18,7 @@ from stseg.graphcut.energy import QUANTUM, Energy
 from stseg.graphcut.solvers import Solver
 from stseg.graphcut.sparse import sparse_cut
 from stseg.segmentation.cell_motion import successor_cells
-from stseg.segmentation.energy import neighbourhood
+from stseg.segmentation.cut_energy import neighbourhood
 
 SHAPE = (15, 10, 100, 100)
 _CELL, _RISE, _FRAME = 0.1, 0.2, 1 / 15  # metres, metres, seconds

@@ -12,7 +12,7 @@ from workbench import Bench
 
 from stseg.arrays import Boxes, Observation, Rows, ViewEvidence
 from stseg.config import Config
-from stseg.engine.backgrounds import make_foregrounds
+from stseg.engine.offline.backgrounds import make_foregrounds
 from stseg.engine.pipeline import Pipeline
 from stseg.engine.session import run_session
 from stseg.evaluation import evaluate

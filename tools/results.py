@@ -41,10 +41,10 @@ from result_sets import SETS, ResultSet
 from result_variants import VARIANTS, Variant
 from workbench import ROOT, Bench, commit
 
-from stseg import __version__
 from stseg.io.config_file import read_config
 from stseg.io.runfile.runs import Run, read_run
 from stseg.io.track_csv import read_tracks_csv
+from stseg.version import __version__
 
 STORE, PAGE = ROOT / "docs" / "results.json", ROOT / "docs" / "development" / "measurements.md"
 SPREAD = ("MODA", "IDF1", "MOTA", "IDSW")

@@ -10,8 +10,8 @@ import numpy as np
 from stseg.arrays import Floats
 from stseg.errors import CalibrationError, FormatError, InputError
 from stseg.geometry import Lens
-from stseg.io import limits
 from stseg.io.toml.table import Table
+from stseg.io.untrusted import limits
 
 MOST_DISTORTION = 8
 """Coefficients that a lens may have: k1, k2, p1, p2, k3, and k4, k5, k6 of the rational form."""

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 from stseg.errors import CalibrationError, ConfigError, FormatError
-from stseg.io import limits
 from stseg.io.calibrations.foreign_camera import ForeignCamera
 from stseg.io.calibrations.opencv_xml import read_opencv_xml
 from stseg.io.calibrations.pom import read_pom
@@ -17,8 +16,9 @@ from stseg.io.calibrations.projection import read_projection
 from stseg.io.calibrations.structured import read_kalibr_yaml, read_krt_json, read_nvidia_json, read_pose_toml
 from stseg.io.calibrations.tsai import read_tsai_xml
 from stseg.io.calibrations.world_frame import World
-from stseg.io.names import EXPECTED, is_name
 from stseg.io.toml.text import shown
+from stseg.io.untrusted import limits
+from stseg.io.untrusted.names import EXPECTED, is_name
 
 
 @dataclass(frozen=True, slots=True)

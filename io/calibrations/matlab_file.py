@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from stseg.arrays import Floats
-from stseg.io import limits
+from stseg.io.untrusted import limits
 
 _HEADER = 128
 _COMPRESSED, _MATRIX, _NAME, _SIZES = 15, 14, 1, 5

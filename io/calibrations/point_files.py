@@ -11,11 +11,11 @@ import numpy as np
 
 from stseg.arrays import Floats, Ints
 from stseg.errors import FormatError
-from stseg.io import limits
-from stseg.io.bounded_files import require_regular
-from stseg.io.names import EXPECTED, is_name
-from stseg.io.numbers import parse_number
 from stseg.io.toml.text import shown
+from stseg.io.untrusted import limits
+from stseg.io.untrusted.bounded_files import require_regular
+from stseg.io.untrusted.names import EXPECTED, is_name
+from stseg.io.untrusted.numbers import parse_number
 
 _NEEDED = ("camera", "u", "v", "x", "y")
 

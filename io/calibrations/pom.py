@@ -14,9 +14,9 @@ import numpy as np
 from stseg.arrays import Floats
 from stseg.errors import CalibrationError, FormatError
 from stseg.geometry.fits import fit_vertical, homogeneous
-from stseg.io.bounded_files import read_text
 from stseg.io.calibrations.foreign_camera import ForeignCamera
-from stseg.io.numbers import parse_numbers
+from stseg.io.untrusted.bounded_files import read_text
+from stseg.io.untrusted.numbers import parse_numbers
 
 _EXPECTED = "two 3x3 matrices, image to ground plane and image to head plane, a row a line"
 _SAMPLES = 9  # pixels along each side of the image at which the head plane is sampled

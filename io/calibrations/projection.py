@@ -10,13 +10,13 @@ import numpy as np
 
 from stseg.arrays import AnyArray, Floats
 from stseg.errors import FormatError
-from stseg.io import limits
-from stseg.io.bounded_files import read_bytes, read_text
 from stseg.io.calibrations.foreign_camera import ForeignCamera
 from stseg.io.calibrations.matlab_file import parse_mat
-from stseg.io.numbers import parse_numbers
-from stseg.io.numpy_files import read_npy, read_npz
-from stseg.io.runfile.safe_hdf5 import open_hdf5, read_whole
+from stseg.io.untrusted import limits
+from stseg.io.untrusted.bounded_files import read_bytes, read_text
+from stseg.io.untrusted.numbers import parse_numbers
+from stseg.io.untrusted.numpy_files import read_npy, read_npz
+from stseg.io.untrusted.safe_hdf5 import open_hdf5, read_whole
 
 _EXPECTED = "one 3x4 projection matrix"
 

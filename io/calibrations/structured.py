@@ -10,14 +10,14 @@ from scipy.spatial.transform import Rotation
 
 from stseg.arrays import Floats
 from stseg.errors import FormatError
-from stseg.io import limits
-from stseg.io.bounded_files import parse_json, read_text
 from stseg.io.calibrations.foreign_camera import ForeignCamera, ForeignTable, camera_from_pose
 from stseg.io.extras import load_extra
-from stseg.io.names import printable
-from stseg.io.numbers import parse_whole
 from stseg.io.toml.table import ANY
 from stseg.io.toml.text import parse_toml
+from stseg.io.untrusted import limits
+from stseg.io.untrusted.bounded_files import parse_json, read_text
+from stseg.io.untrusted.names import printable
+from stseg.io.untrusted.numbers import parse_whole
 
 _LONGEST_YAML, _DEEPEST_YAML = 1 << 18, 50
 """Characters, and nested brackets: PyYAML needs a time that grows with the square of these."""

@@ -17,11 +17,11 @@ from scipy.spatial.transform import Rotation
 
 from stseg.arrays import Floats
 from stseg.errors import FormatError
-from stseg.io import limits
 from stseg.io.calibrations.foreign_camera import ForeignCamera, camera_from_pose
-from stseg.io.calibrations.safe_xml import parse_xml
-from stseg.io.names import printable
-from stseg.io.numbers import parse_numbers
+from stseg.io.untrusted import limits
+from stseg.io.untrusted.names import printable
+from stseg.io.untrusted.numbers import parse_numbers
+from stseg.io.untrusted.safe_xml import parse_xml
 
 _BEFORE_TURN = 0.9
 """Share of the radius at which the cubic turns round up to which it is followed."""

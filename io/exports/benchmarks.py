@@ -11,7 +11,7 @@ import numpy as np
 
 from stseg.arrays import Ints, Rows
 from stseg.geometry import Grid
-from stseg.io.runfile.run_reader import Run
+from stseg.io.runfile.reading.run_reader import Run
 
 WILDTRACK_STEP = 0.025
 """Distance of neighbouring positions of WILDTRACK's grid, metres."""

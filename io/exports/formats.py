@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from stseg.io.exports import benchmarks, geographic, movement, pedestrians, tables
-from stseg.io.runfile.run_reader import Run
+from stseg.io.runfile.reading.run_reader import Run
 
 
 @dataclass(frozen=True, slots=True)

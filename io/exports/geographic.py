@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from stseg.arrays import Rows
-from stseg.io.runfile.run_reader import Run
+from stseg.io.runfile.reading.run_reader import Run
 
 BEGINNING = datetime(1970, 1, 1, tzinfo=UTC)
 """What stands for the first frame of the recording: run files do not say at what time of day it was."""

@@ -17,7 +17,7 @@ import numpy as np
 
 from stseg.arrays import Floats, Rows
 from stseg.io.extras import load_extra
-from stseg.io.runfile.run_reader import Run
+from stseg.io.runfile.reading.run_reader import Run
 
 _LONGEST_CHUNK = 4096  # frames
 

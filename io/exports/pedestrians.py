@@ -10,7 +10,7 @@ import numpy as np
 
 from stseg.arrays import Floats, Rows
 from stseg.io.runfile import layout
-from stseg.io.runfile.run_reader import Run
+from stseg.io.runfile.reading.run_reader import Run
 
 _JUPEDSIM_VERSION = 2  # PedPy refuses the area of version 3; JuPedSim reads both
 _STILL = 1e-6  # metres

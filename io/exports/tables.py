@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from stseg.io.extras import load_extra
-from stseg.io.runfile.run_reader import Run
+from stseg.io.runfile.reading.run_reader import Run
 from stseg.io.track_csv import write_tracks_csv
 
 _UNITS = {

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from stseg.arrays import Rows
-from stseg.io import limits
-from stseg.io.numbers import parse_whole
 from stseg.io.outputs.whole_files import output_error, replacing
-from stseg.model.tables import CORRECTION
+from stseg.io.untrusted import limits
+from stseg.io.untrusted.numbers import parse_whole
+from stseg.records.tables import CORRECTION
 
 COLUMNS = ("decided", "first", "last", "id", "corrected_id")
 

@@ -11,7 +11,7 @@ from typing import NamedTuple, Protocol
 
 import cv2
 
-import stseg.io.recording.ffmpeg  # noqa: F401  # quietens FFmpeg before its first use
+import stseg.io.recording.video.ffmpeg  # noqa: F401  # quietens FFmpeg before its first use
 from stseg.arrays import AnyArray
 from stseg.config import LiveConfig
 from stseg.errors import SourceError

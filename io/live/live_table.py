@@ -11,10 +11,10 @@ from typing import Self, TextIO
 import numpy as np
 
 from stseg.arrays import Rows
-from stseg.io import limits
-from stseg.io.numbers import parse_number, parse_numbers, parse_whole
 from stseg.io.outputs.whole_files import output_error, replacing
-from stseg.model.tables import TRAJECTORY
+from stseg.io.untrusted import limits
+from stseg.io.untrusted.numbers import parse_number, parse_numbers, parse_whole
+from stseg.records.tables import TRAJECTORY
 
 _COLUMNS = ("frame", "time", "id", "x", "y", "height", "score")
 

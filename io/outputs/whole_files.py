@@ -16,7 +16,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from stseg.errors import OutputError
-from stseg.io.bounded_files import is_regular
+from stseg.io.untrusted.bounded_files import is_regular
 
 _ABANDONED = 3600.0
 """Time without a change after which an unlocked part belongs to a killed process, seconds."""

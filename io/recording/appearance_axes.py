@@ -6,10 +6,10 @@ import numpy as np
 
 from stseg.arrays import Floats, Singles
 from stseg.errors import FormatError
-from stseg.io.recording.detections.source_detections import read_source
+from stseg.io.detections.source_detections import read_source
 from stseg.io.recording.recording import Recording
-from stseg.model.principal_axes import principal_axes
-from stseg.model.tables import FEATURES
+from stseg.records.principal_axes import principal_axes
+from stseg.records.tables import FEATURES
 
 _BOXES = 20_000
 """Most boxes of a camera from which axes are learned."""

@@ -11,9 +11,9 @@ from PIL import Image
 
 from stseg.arrays import AnyArray, Bytes, Observation
 from stseg.errors import SourceError
-from stseg.io.bounded_files import read_bytes
 from stseg.io.recording.indexed_png import declares_more, decode_indexed, stores_numbers
 from stseg.io.recording.recording import SourceKind
+from stseg.io.untrusted.bounded_files import read_bytes
 
 # Video codecs leave a trace of colour on grey; real colour pictures have far more.
 _GREY_SPREAD = 32

@@ -26,7 +26,7 @@ class Source:
     kind
         video: colour frames of a video file. images: colour frames, a folder or pattern. masks: likelihoods 0..255, a
         video, folder or pattern. instances: indexed images, one value an instance, 0 background, a folder or pattern.
-        boxes: a detector's boxes, in any format of `stseg.io.recording.detections.formats`; such files can be instances
+        boxes: a detector's boxes, in any format of `stseg.io.detections.formats`; such files can be instances
         too, where they hold masks.
     path
         File, folder or pattern (`frame_*.png`, `hour_*.mp4`), already relative to the rig file's folder; of a live

@@ -16,10 +16,8 @@ import numpy as np
 
 from stseg.errors import CalibrationError, OutputError, RigError
 from stseg.geometry import Camera, Grid, Lens, Rig
-from stseg.io import limits
-from stseg.io.bounded_files import read_text
+from stseg.io.detections.tables import COLUMNS
 from stseg.io.outputs.whole_files import replacing
-from stseg.io.recording.detections.tables import COLUMNS
 from stseg.io.recording.recording import (
     SOURCE_KINDS,
     BodyPrior,
@@ -32,6 +30,8 @@ from stseg.io.recording.recording import (
 from stseg.io.recording.rig_text import FORMAT, format_rig
 from stseg.io.toml.table import ANY, Table
 from stseg.io.toml.text import parse_toml
+from stseg.io.untrusted import limits
+from stseg.io.untrusted.bounded_files import read_text
 
 _ON_MISSING: tuple[Literal["error", "blind"], ...] = ("error", "blind")
 _CLOCKS: tuple[ClockSource, ...] = ("auto", "stamps", "count")

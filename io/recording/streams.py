@@ -10,11 +10,11 @@ import numpy as np
 from stseg.arrays import Boxes, Floats, Observation
 from stseg.errors import SourceError
 from stseg.geometry import Camera
-from stseg.io.recording.detections.source_detections import instance_image, read_source
+from stseg.io.detections.source_detections import instance_image, read_source
 from stseg.io.recording.image_stream import ImageStream, is_detection_file, is_image_source
 from stseg.io.recording.recording import Source, mask_passwords
 from stseg.io.recording.source_files import source_parts
-from stseg.io.recording.video_stream import VideoStream
+from stseg.io.recording.video.video_stream import VideoStream
 
 
 class Stream(Protocol):

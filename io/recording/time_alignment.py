@@ -5,7 +5,7 @@ frame k - offset. Where the time stamps of its files are trusted, it shows it in
 and is blind where there is none near. Unless the rig decides (`clock`), stamps are trusted as follows:
 
 1. Stamps within half a frame of the frame numbers: both agree, frames are counted.
-2. Stamps that vary come from a clock and are trusted. (AVI has none, see `stseg.io.recording.time_stamps`.)
+2. Stamps that vary come from a clock and are trusted. (AVI has none, see `stseg.io.recording.video.time_stamps`.)
 3. Stamps of another constant rate may come from a header. They are trusted where another camera keeps the rig's rate
    by rule 1 or 2, unless this camera has as many frames as that one: then its header is wrong.
 4. Otherwise frames are counted.
@@ -22,7 +22,13 @@ from stseg.arrays import Flags, Floats, Ints
 from stseg.errors import SourceError
 from stseg.io.recording.recording import CameraSource, Recording
 from stseg.io.recording.source_files import source_parts
-from stseg.io.recording.time_stamps import TimeStamps, concatenate_files, have_stamps, interpret_stamps, require_starts
+from stseg.io.recording.video.time_stamps import (
+    TimeStamps,
+    concatenate_files,
+    have_stamps,
+    interpret_stamps,
+    require_starts,
+)
 
 _JITTER = 0.5
 """Hysteresis, ticks: how much farther than the last frame a new one may lie and still replace it. Without it a camera

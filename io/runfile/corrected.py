@@ -11,11 +11,11 @@ import numpy as np
 
 from stseg.arrays import Ints, Rows
 from stseg.errors import FormatError
-from stseg.io import limits
 from stseg.io.outputs.whole_files import replacing
 from stseg.io.runfile import layout
-from stseg.io.runfile.safe_hdf5 import hdf5_file
-from stseg.model.tables import Tracks
+from stseg.io.untrusted import limits
+from stseg.io.untrusted.safe_hdf5 import hdf5_file
+from stseg.records.tables import Tracks
 
 NAMES = "names"
 ANSWERS = "answers"

@@ -14,7 +14,7 @@ import numpy as np
 
 from stseg.arrays import Floats
 from stseg.geometry import Grid
-from stseg.model.tables import (
+from stseg.records.tables import (
     ANSWERED,
     APPEARANCE,
     BOX,

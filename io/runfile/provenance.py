@@ -15,17 +15,17 @@ from typing import Any
 import h5py
 import numpy as np
 
-from stseg import __version__
 from stseg.arrays import Ints, Rows
 from stseg.errors import SourceError
-from stseg.io import limits
-from stseg.io.names import printable
 from stseg.io.recording.recording import Recording, Source, mask_passwords
 from stseg.io.recording.rig_text import format_rig
 from stseg.io.recording.source_files import source_files
-from stseg.io.runfile.safe_hdf5 import read_whole
-from stseg.io.runfile.texts import read_attribute, read_text
+from stseg.io.runfile.reading.texts import read_attribute, read_text
 from stseg.io.toml.text import parse_toml
+from stseg.io.untrusted import limits
+from stseg.io.untrusted.names import printable
+from stseg.io.untrusted.safe_hdf5 import read_whole
+from stseg.version import __version__
 
 _PACKAGES = ("numpy", "scipy", "numba", "h5py", "opencv-python-headless", "PyMaxflow")
 _TEXT = h5py.string_dtype()

@@ -16,8 +16,8 @@ from stseg.io.outputs.whole_files import require_new
 from stseg.io.recording.recording import Recording
 from stseg.io.runfile import layout
 from stseg.io.runfile.packed_frames import PackedFrame, packed_frame
-from stseg.io.runfile.part_file import PartFile
 from stseg.io.runfile.provenance import gather_provenance, write_provenance
+from stseg.io.runfile.unfinished.part_file import PartFile
 
 _LARGEST = 65536.0  # nats
 _HELD_ROWS = 4096  # of one table, before they are written

@@ -13,8 +13,8 @@ from types import NoneType, UnionType
 from typing import Any, Literal, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
 from stseg.errors import ConfigError
-from stseg.io.numbers import finite_number
 from stseg.io.toml.text import one_of, shown, toml_string
+from stseg.io.untrusted.numbers import finite_number
 
 T = TypeVar("T")
 

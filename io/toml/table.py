@@ -11,10 +11,10 @@ import numpy as np
 
 from stseg.arrays import Floats
 from stseg.errors import InputError, RigError
-from stseg.io import limits
-from stseg.io.names import EXPECTED, is_name, is_path
-from stseg.io.numbers import finite_number
 from stseg.io.toml.text import one_of, shown
+from stseg.io.untrusted import limits
+from stseg.io.untrusted.names import EXPECTED, is_name, is_path
+from stseg.io.untrusted.numbers import finite_number
 
 ANY = -1
 """In a shape: any number of rows."""
@@ -65,7 +65,7 @@ class Table:
         return value
 
     def name(self, name: str) -> str:
-        """The name of a camera or scene, see `stseg.io.names`."""
+        """The name of a camera or scene, see `stseg.io.untrusted.names`."""
         value = self.text(name)
         if not is_name(value):
             raise self.error(name, shown(value), EXPECTED)

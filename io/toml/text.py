@@ -10,7 +10,7 @@ from difflib import get_close_matches
 from reprlib import Repr
 from typing import Any
 
-from stseg.io import limits
+from stseg.io.untrusted import limits
 
 _SHOWN = 60
 _REPR = Repr()

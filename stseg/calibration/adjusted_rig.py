@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stseg.arrays import Floats, Ints
+from stseg.calibration.automatic.solution import Solution
 from stseg.calibration.pinhole import CENTRE, CLOCK, FOCAL, SIZE, as_camera, height_of_head, moved, on_plane
-from stseg.calibration.solution import Solution
 from stseg.geometry import Camera, Grid
 
 _MARGIN = 0.5

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints
-from stseg.calibration.correspondence import Correspondences
+from stseg.calibration.automatic.correspondence import Correspondences
 from stseg.calibration.pinhole import CENTRE, CLOCK, FOCAL, MIDDLE, RADIAL, SIZE, moved, project
 
 _STEPS = np.array([1e-5] * 5 + [1e-5] * 3 + [1e-4] * 3 + [1e-3])

@@ -11,16 +11,16 @@ from rich.table import Table
 
 from stseg.arrays import Bytes, Floats, Observation
 from stseg.geometry import Camera, Grid
+from stseg.io.detections.source_detections import SourceDetections, read_source
 from stseg.io.outputs.output_files import make_folder, write_file
-from stseg.io.recording.detections.source_detections import SourceDetections, read_source
 from stseg.io.recording.frames import open_frames
 from stseg.io.recording.image_stream import is_detection_file
 from stseg.io.recording.recording import CameraSource, Recording
 from stseg.io.recording.rigs import read_rig
-from stseg.report.canvas import outline
 from stseg.report.figures import backdrop
-from stseg.report.ground_grid import grid_picture
-from stseg.report.html import png_bytes
+from stseg.report.page.html import png_bytes
+from stseg.report.pictures.canvas import outline
+from stseg.report.pictures.ground_grid import grid_picture
 
 _NAMES = ("camera", "recognised", "frames", "boxes", "a frame", "height px", "score", "feet in area", "classes")
 _WIDTH = 1280

@@ -14,13 +14,13 @@ from typing import NoReturn
 
 from cyclopts import App, CycloptsError
 
-from stseg import __version__
-from stseg.commands.standard_error import without_library_messages
-from stseg.commands.termination import INTERRUPTED, TERMINATED, Termination
-from stseg.engine.garbage import collect_rarely
+from stseg.commands.terminal.standard_error import without_library_messages
+from stseg.commands.terminal.termination import INTERRUPTED, TERMINATED, Termination
+from stseg.engine.workers.garbage import collect_rarely
 from stseg.errors import ConfigError, StsegError
 from stseg.io.machine import address_space
-from stseg.io.names import printable
+from stseg.io.untrusted.names import printable
+from stseg.version import __version__
 
 COMMANDS = {
     "demo": ("stseg.commands.demo:demo", "Render a small scene, track it, score it, write the report."),
@@ -35,8 +35,8 @@ COMMANDS = {
     "plan": ("stseg.commands.plan:plan", "Estimate the time of a run and the size of its file."),
     "config": ("stseg.commands.config:config", "Print the configuration with the meaning of every key."),
     "labels": ("stseg.commands.labels:labels", "Write per-pixel track-id images."),
-    "calibrate": ("stseg.commands.calibrate:app", "Make a rig file, or check one."),
-    "completion": ("stseg.commands.completion:completion", "Print the completion script of a shell."),
+    "calibrate": ("stseg.commands.calibrate.app:app", "Make a rig file, or check one."),
+    "completion": ("stseg.commands.terminal.completion:completion", "Print the completion script of a shell."),
     "simulate": ("stseg.commands.simulate:simulate", "Render a scene with ground truth."),
 }
 """Location of each command, and its line in `stseg --help`."""

@@ -12,11 +12,11 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from stseg.config.effect import require_effect
-from stseg.engine.forecast import Forecast, forecast
-from stseg.engine.frame_range import FrameRange, resolve_frames
-from stseg.engine.job import Job
+from stseg.engine.offline.forecast import Forecast, forecast
+from stseg.engine.offline.frame_range import FrameRange, resolve_frames
+from stseg.engine.offline.job import Job
 from stseg.engine.rig_body import with_body_of
-from stseg.engine.workforce import Workforce
+from stseg.engine.workers.workforce import Workforce
 from stseg.io.config_file import read_config
 from stseg.io.recording.recording import Recording
 from stseg.io.recording.rigs import read_rig

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from stseg.engine.worker_processes import prepare_workers
+from stseg.engine.workers.worker_processes import prepare_workers
 from stseg.errors import ConfigError
 from stseg.io.runfile.layout import VolumeKind
 
@@ -84,11 +84,11 @@ def run(
     """
     if scheduler is None and not follow:
         prepare_workers(workers)  # they import the stages while this process does: nothing is imported before
-    from stseg.commands.progress import TerminalReporter
-    from stseg.engine.frame_range import FrameRange
+    from stseg.commands.terminal.progress import TerminalReporter
+    from stseg.engine.offline.frame_range import FrameRange
+    from stseg.engine.offline.warnings import rig_warnings
     from stseg.engine.track import track_recording
-    from stseg.engine.warnings import rig_warnings
-    from stseg.engine.workforce import Workforce
+    from stseg.engine.workers.workforce import Workforce
     from stseg.io.config_file import read_config
     from stseg.io.recording.rigs import read_rig
 
@@ -102,7 +102,7 @@ def run(
     if receiver is not None and not follow:
         raise ConfigError("--publish", "", "that alone", "--follow with it; stseg export writes finished runs")
     if follow:
-        from stseg.engine.following import follow_recording
+        from stseg.engine.live.following import follow_recording
 
         _require_alone(workers, scheduler, labels, known)
         followed = follow_recording(
@@ -112,9 +112,9 @@ def run(
         print(nothing if followed is None else f"{_summary(followed.run)}{followed.delay}")
         return
     if labels is not None:
-        from stseg.engine.pixel_labels import require_pixels, write_labels
+        from stseg.engine.offline.pixel_labels import require_pixels, write_labels
         from stseg.io.outputs.label_images import require_label_folder
-        from stseg.report.colours import track_palette
+        from stseg.report.pictures.colours import track_palette
 
         require_pixels(recording)
         require_label_folder(labels, overwrite)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from stseg.arrays import Ints
-from stseg.engine.frame_range import FrameRange
+from stseg.engine.offline.frame_range import FrameRange
 from stseg.errors import ConfigError
 from stseg.io.runfile.runs import Run
 

@@ -12,13 +12,13 @@ from rich.console import Console
 from rich.progress import Progress
 
 from stseg.errors import ConfigError
-from stseg.io import limits
-from stseg.io.numbers import parse_whole
 from stseg.io.outputs.simulated_scene import rig_name, write_scene
 from stseg.io.recording.recording import BodyPrior
 from stseg.io.toml.text import shown
+from stseg.io.untrusted import limits
+from stseg.io.untrusted.numbers import parse_whole
 from stseg.simulation import NAMED, Film, SceneSpec, Spoil, SpoiledFilm
-from stseg.simulation.spoil import STRENGTHS
+from stseg.simulation.spoiling.spoil import STRENGTHS
 
 
 def simulate(

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stseg.arrays import Floats
-from stseg.settings import require
+from stseg.config.ranges import require
 
 _TALLEST = 2.2
 """Metres; taller pillars reach above most grids."""

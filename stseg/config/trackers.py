@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from stseg.settings import require
+from stseg.config.ranges import require
 
 
 @dataclass(frozen=True)

@@ -6,12 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from stseg.accelerate import wide_kernel
 from stseg.arrays import Boxes, Bytes, Flags, Floats, Ints, Observation, Rows, Singles, ViewEvidence
+from stseg.bodies.pillars import BodyTable
 from stseg.detection.problem import PixelAssignment
-from stseg.geometry.bodies import BodyTable
-from stseg.model.people import Explanation
-from stseg.model.tables import APPEARANCE, FEATURES
+from stseg.kernels.accelerate import wide_kernel
+from stseg.records.people import Explanation
+from stseg.records.tables import APPEARANCE, FEATURES
 
 _APART = 0.5
 """Share of a body that a view must see."""
@@ -40,7 +40,7 @@ def appearance_rows(
     tables
         Projected bodies of each view.
     axes : float64 (feature, FEATURES), or None
-        By which features of boxes are reduced (`stseg.model.principal_axes`); None to leave them out.
+        By which features of boxes are reduced (`stseg.records.principal_axes`); None to leave them out.
     observations, evidence
         Of each view, in the rig's order.
     images

@@ -14,31 +14,31 @@ from dataclasses import replace
 import numpy as np
 
 from stseg.arrays import Flags, Ints, ViewEvidence
+from stseg.bodies.box_noise import BoxNoise
+from stseg.bodies.views import BoxView, PixelView, ViewObservation
 from stseg.config import BodyConfig, DetectionConfig, ErrorRateConfig
-from stseg.detection.box_noise_calibration import BoxNoiseCalibration
-from stseg.detection.calibrations import Calibrations
+from stseg.detection.evidence.birth_lattice import lattice, lattice_candidates
+from stseg.detection.evidence.pixel_lattice import PixelLattice
 from stseg.detection.key_frames import followed, key_frame_interval
-from stseg.detection.lattice import lattice, lattice_candidates
-from stseg.detection.map_estimate import FrameEvidence, MapEstimate
-from stseg.detection.merging import merged
-from stseg.detection.pixel_lattice import PixelLattice
-from stseg.detection.population_calibration import PopulationCalibration
 from stseg.detection.prior import Prior
 from stseg.detection.problem import Parameters
-from stseg.detection.repulsion import CORE
-from stseg.detection.residual import nearest_people, reprojection_residuals
-from stseg.detection.restart import better, is_doubtful, restarted
 from stseg.detection.result import explanation
-from stseg.detection.rim import RimCalibration
-from stseg.detection.search import ENUMERATED
-from stseg.detection.view_failures import ViewFailures
-from stseg.detection.views import BoxView, PixelView, ViewObservation
+from stseg.detection.score.repulsion import CORE
+from stseg.detection.search.map_estimate import FrameEvidence, MapEstimate
+from stseg.detection.search.merging import merged
+from stseg.detection.search.restart import better, is_doubtful, restarted
+from stseg.detection.search.search import ENUMERATED
 from stseg.geometry import Rig
-from stseg.model.border import Border
-from stseg.model.box_noise import BoxNoise
-from stseg.model.candidates import Candidates
-from stseg.model.people import Explanation
-from stseg.model.predicted_tracks import PredictedTracks
+from stseg.noise.box_noise_estimate import BoxNoiseCalibration
+from stseg.noise.estimates import Calibrations
+from stseg.noise.population_estimate import PopulationCalibration
+from stseg.noise.rim_estimate import RimCalibration
+from stseg.records.border import Border
+from stseg.records.candidates import Candidates
+from stseg.records.people import Explanation
+from stseg.records.predicted_tracks import PredictedTracks
+from stseg.view_health.reprojection_residuals import nearest_people, reprojection_residuals
+from stseg.view_health.view_failures import ViewFailures
 
 _NEARLY = -15.0
 """Gain above which an alternative is fitted to its pixels, nats: what the right place and size may add."""

@@ -22,11 +22,11 @@ import numpy as np
 
 from stseg.arrays import Floats
 from stseg.config import DetectionConfig
-from stseg.detection.lattice import lattice_candidates
-from stseg.detection.map_estimate import MapEstimate
+from stseg.detection.evidence.birth_lattice import lattice_candidates
 from stseg.detection.result import explanation_by
-from stseg.model.candidates import Candidates
-from stseg.model.people import Explanation
+from stseg.detection.search.map_estimate import MapEstimate
+from stseg.records.candidates import Candidates
+from stseg.records.people import Explanation
 
 _SURE = 3.0
 """Least difference of score between a decision and its opposite, nats: 20 to 1."""

@@ -8,10 +8,10 @@ import numpy as np
 
 from stseg.arrays import Floats, Ints
 from stseg.config import BodyConfig, DetectionConfig
-from stseg.model.border import Border
-from stseg.model.candidates import Candidates
-from stseg.model.predicted_tracks import PredictedTracks, no_tracks
-from stseg.model.sizes import Sizes, log_heavy_tailed
+from stseg.records.border import Border
+from stseg.records.candidates import Candidates
+from stseg.records.predicted_tracks import PredictedTracks, no_tracks
+from stseg.records.sizes import Sizes, log_heavy_tailed
 
 
 @dataclass(frozen=True)

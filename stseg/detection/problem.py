@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stseg.arrays import Floats, Ints, Singles
+from stseg.bodies.outlines import Spans
 from stseg.config import DetectionConfig
-from stseg.detection.lists import Lists
-from stseg.model.outlines import Spans
+from stseg.detection.evidence.ragged_lists import Lists
 
 PixelAssignment = NDArray[np.int16]
 """int16 (view, v * u): the candidate whom each raster pixel is assigned to, -1 for none. Small, for speed."""
@@ -74,7 +74,7 @@ class PixelEvidence(NamedTuple):
     raster : float32 (view, v, u)
         Log-odds of foreground, nats.
     scale : float32 (view, v, u)
-        Raster pixels of the largest body that explains each pixel (`stseg.detection.blob_scale`); 0 where none does.
+        Raster pixels of the largest body that explains each pixel (`blob_scale`); 0 where none does.
     first : int64 (view, candidate)
         First raster row of each candidate's outline; -1 where the view does not see it.
     spans : int16 (view, candidate, row, 2)

@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 
 from stseg.arrays import Floats, Ints, Shorts
-from stseg.detection.map_estimate import MapEstimate, RefinedPeople
+from stseg.bodies.outlines import paint
+from stseg.bodies.views import BoxView, PixelView, View
 from stseg.detection.problem import BoxEvidence, Problem
-from stseg.detection.residual import reprojection_residuals
-from stseg.detection.views import BoxView, PixelView, View
-from stseg.model.candidates import Candidates
-from stseg.model.outlines import paint
-from stseg.model.people import Explanation, People
-from stseg.model.sizes import Sizes
+from stseg.detection.search.map_estimate import MapEstimate, RefinedPeople
+from stseg.records.candidates import Candidates
+from stseg.records.people import Explanation, People
+from stseg.records.sizes import Sizes
+from stseg.view_health.reprojection_residuals import reprojection_residuals
 
 
 def explanation(estimate: MapEstimate) -> Explanation:

@@ -10,10 +10,10 @@ import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints, Labels, Rows, Singles
 from stseg.engine.stopwatch import Stopwatch
-from stseg.model.people import Explanation, People
-from stseg.model.sparse_volume import SparseVolume
-from stseg.model.tables import CANDIDATE, RATES
-from stseg.occupancy.rate_calibration import RateCalibration
+from stseg.occupancy.rate_estimate import RateCalibration
+from stseg.records.people import Explanation, People
+from stseg.records.sparse_volume import SparseVolume
+from stseg.records.tables import CANDIDATE, RATES
 from stseg.trackers import Commit
 
 

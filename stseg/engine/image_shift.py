@@ -7,10 +7,10 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from stseg.arrays import Rows
-from stseg.calibration.knock_detection import background_shift
 from stseg.engine.session import FrameSet
 from stseg.foreground.view_foreground import ViewForeground
-from stseg.model.tables import SHIFT
+from stseg.records.tables import SHIFT
+from stseg.view_health.knock_detection import background_shift
 
 _PERIOD = 2.0
 """Time between measurements, seconds."""

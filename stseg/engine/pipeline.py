@@ -14,23 +14,23 @@ from dataclasses import replace
 import numpy as np
 
 from stseg.arrays import Floats, Ints, Observation, Rows, ViewEvidence
+from stseg.baselines.huang_wang_2012.proposals import Proposals
+from stseg.bodies.pillars import BodyTable
 from stseg.config import Config
 from stseg.detection.appearance import appearance_rows
 from stseg.detection.detector import Detector
-from stseg.detection.proposals import Proposals
 from stseg.geometry import Rig
-from stseg.geometry.bodies import BodyTable
-from stseg.model.border import Border
-from stseg.model.people import Explanation
-from stseg.model.tables import APPEARANCE, Tracks
+from stseg.identities.identity_problem import NOBODY, IdentityProblem
+from stseg.identities.search.beam_search import FREELY
+from stseg.identities.search.constraints import Constraints
 from stseg.occupancy.volume import Occupancy
+from stseg.records.border import Border
+from stseg.records.people import Explanation
+from stseg.records.tables import APPEARANCE, Tracks
 from stseg.trackers import find_tracker
 from stseg.trackers.protocol import Tracker
-from stseg.tracking.final_tracks import FinalTracks, bridged_rows, committed_tracks, final_tracks
-from stseg.tracking.identities.constraints import Constraints
-from stseg.tracking.identities.identity_problem import NOBODY, IdentityProblem
-from stseg.tracking.identities.search import FREELY
-from stseg.tracking.track_boxes import box_rows
+from stseg.trajectories.final_tracks import FinalTracks, bridged_rows, committed_tracks, final_tracks
+from stseg.trajectories.track_boxes import box_rows
 
 
 class Pipeline:

@@ -10,8 +10,8 @@ import numpy as np
 
 from stseg.config import BodyConfig, Config, DetectionConfig
 from stseg.errors import ConfigError
-from stseg.io import limits
 from stseg.io.recording.recording import Recording
+from stseg.io.untrusted import limits
 
 _DEFAULT = BodyConfig()
 _TRIED = np.linspace(-2.0, 2.0, 7)

@@ -18,16 +18,16 @@ from contextlib import ExitStack
 from typing import NamedTuple, Protocol
 
 from stseg.arrays import Observation, Singles, ViewEvidence
+from stseg.bodies.box_noise import BoxNoise
 from stseg.engine.area import within_area
 from stseg.engine.committed_frames import CommittedFrames, FrameRecord, FusedEvidence, committed_frames, rate_rows
-from stseg.engine.excluded_views import ExcludedViews
-from stseg.engine.frozen_views import FrozenViews
 from stseg.engine.pipeline import Pipeline
 from stseg.engine.stopwatch import Stopwatch
 from stseg.foreground.view_foreground import ViewForeground
-from stseg.model.box_noise import BoxNoise
-from stseg.model.people import Explanation
+from stseg.records.people import Explanation
 from stseg.trackers import Commit, FrameObservations, FusedFrame
+from stseg.view_health.excluded_views import ExcludedViews
+from stseg.view_health.frozen_views import FrozenViews
 
 _AHEAD = 2
 """Frames whose foreground is made before their detection."""

@@ -11,7 +11,7 @@ from time import perf_counter
 import numpy as np
 
 from stseg.arrays import Rows
-from stseg.model.tables import TIMING
+from stseg.records.tables import TIMING
 
 
 @dataclass

@@ -9,17 +9,17 @@ from contextlib import contextmanager
 from pathlib import Path
 from tempfile import mkdtemp
 
-from stseg.accelerate import compilation_noted
 from stseg.config import Config
 from stseg.config.effect import require_effect
-from stseg.engine.assembly import FinishedSegment, assemble
-from stseg.engine.frame_range import FrameRange, resolve_frames
-from stseg.engine.job import Job
-from stseg.engine.known import digest, read_known
+from stseg.engine.offline.assembly import FinishedSegment, assemble
+from stseg.engine.offline.frame_range import FrameRange, resolve_frames
+from stseg.engine.offline.job import Job
+from stseg.engine.offline.known import digest, read_known
 from stseg.engine.reporter import LogReporter, Progress, Reporter
 from stseg.engine.rig_body import with_body_of
-from stseg.engine.workforce import Workforce
+from stseg.engine.workers.workforce import Workforce
 from stseg.errors import ConfigError
+from stseg.identities.identity_problem import NOBODY
 from stseg.io.config_file import format_config, read_config
 from stseg.io.recording.recording import Recording
 from stseg.io.recording.rigs import read_rig
@@ -27,8 +27,8 @@ from stseg.io.recording.stream_index import StreamIndex, index_streams
 from stseg.io.runfile.layout import VolumeKind
 from stseg.io.runfile.provenance import gather_provenance, run_request
 from stseg.io.runfile.runs import Run, read_run
-from stseg.io.runfile.work_folder import WorkFolder
-from stseg.tracking.identities.identity_problem import NOBODY
+from stseg.io.runfile.unfinished.work_folder import WorkFolder
+from stseg.kernels.accelerate import compilation_noted
 
 
 def track(
@@ -121,7 +121,7 @@ def track_recording(
     Parameters
     ----------
     recording, config, tracker, volume
-        The input, see `stseg.engine.job.Job`.
+        The input, see `stseg.engine.offline.job.Job`.
     output
         The run file.
     frames

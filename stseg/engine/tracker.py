@@ -19,7 +19,7 @@ from stseg.geometry import Rig
 from stseg.geometry.reduction import greatest_reduction
 from stseg.io.recording.frames import FrameSet
 from stseg.io.recording.pictures import reduced_view
-from stseg.model.tables import APPEARANCE, EVENT, TRAJECTORY, Tracks
+from stseg.records.tables import APPEARANCE, EVENT, TRAJECTORY, Tracks
 
 
 class Tracker:

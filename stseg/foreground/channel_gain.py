@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from stseg.accelerate import kernel
 from stseg.arrays import Bytes, Floats, Ints, Singles
+from stseg.kernels.accelerate import kernel
 
 STRIDE = 4
 """Pixels from one sample to the next along u and v; a sixteenth of all pixels is ample for one number."""

@@ -22,11 +22,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.ndimage import gaussian_filter, minimum_filter
 
-from stseg.accelerate import kernel
 from stseg.arrays import Bytes, Flags, Singles
 from stseg.config import IlluminationConfig
-from stseg.foreground.background import Background
+from stseg.foreground.background.model import Background
 from stseg.foreground.gain_field import gain_field
+from stseg.kernels.accelerate import kernel
 
 _STEP = 4  # pixels; a sixteenth of them are ample for a share
 _FAINT = 0.25  # of the rise that is a change: from there on a smooth field is tried

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from stseg.accelerate import kernel
 from stseg.arrays import Boxes, Ints
 from stseg.errors import SourceError
+from stseg.kernels.accelerate import kernel
 
 
 def instance_boxes(instances: NDArray[np.uint16]) -> Boxes:

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from stseg.accelerate import wide_kernel
 from stseg.arrays import Singles
-from stseg.foreground.posterior import CERTAIN
+from stseg.foreground.background.posterior import CERTAIN
+from stseg.kernels.accelerate import wide_kernel
 
 _NEAR_BOUND = np.float32(1e-5 - CERTAIN)  # means of certain background are the bound but for rounding
 

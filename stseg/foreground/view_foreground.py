@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from stseg.accelerate import wide_kernel
 from stseg.arrays import Boxes, Observation, Singles, ViewEvidence
 from stseg.foreground.illumination import IlluminationMonitor, LightChange
 from stseg.foreground.instances import instance_boxes
 from stseg.foreground.masks import mask_likelihood
+from stseg.kernels.accelerate import wide_kernel
 
 
 class ViewForeground:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from stseg.accelerate import kernel
 from stseg.arrays import Floats, Ints
+from stseg.kernels.accelerate import kernel
 
 
 def nearest_person(ground: Floats, people_ground: Floats, reach: float) -> Ints:

@@ -6,9 +6,9 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from stseg.accelerate import part
 from stseg.arrays import Floats
 from stseg.geometry.lens import Lens
+from stseg.kernels.accelerate import part
 
 
 class LensTerms(NamedTuple):

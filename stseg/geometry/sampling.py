@@ -18,11 +18,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from stseg.accelerate import kernel, part
 from stseg.arrays import Bytes, Flags, Floats, Singles
 from stseg.geometry import Camera, Rig
 from stseg.geometry.projection import LensTerms, pixel_of
 from stseg.geometry.summed_area import LARGEST_SIDE
+from stseg.kernels.accelerate import kernel, part
 
 SamplingKind = Literal["footprint", "point"]
 Footprints = NDArray[np.int16]

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from stseg.accelerate import kernel
 from stseg.arrays import Singles
+from stseg.kernels.accelerate import kernel
 
 TOP = 4095
 """The level of likelihood 1."""

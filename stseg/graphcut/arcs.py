@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from stseg.accelerate import part
 from stseg.arrays import AnyArray, Bytes, Ints, Labels
 from stseg.graphcut.graph import Graph
 from stseg.graphcut.lattice import Lattice, neighbour
 from stseg.graphcut.parallel_max_flow import Bridges
 from stseg.graphcut.reduction import Reduction
 from stseg.graphcut.sign_sets import OPEN
+from stseg.kernels.accelerate import part
 
 
 def in_rows(reduced: Reduction, middle: int) -> tuple[Graph, Bridges]:

@@ -8,11 +8,11 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
-from stseg.accelerate import kernel
 from stseg.arrays import Bytes, Flags, Ints, Labels
 from stseg.graphcut.energy import Energy
 from stseg.graphcut.lattice import Lattice, neighbour, nodes_of
 from stseg.graphcut.sign_sets import GUARD
+from stseg.kernels.accelerate import kernel
 
 _OUTSIDE = -1
 

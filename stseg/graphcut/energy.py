@@ -14,10 +14,10 @@ from functools import cached_property
 
 import numpy as np
 
-from stseg.accelerate import kernel
 from stseg.arrays import AnyArray, Bytes, Flags, Ints, Labels
 from stseg.graphcut.lattice import Lattice, lattice_of, neighbour, spread
 from stseg.graphcut.sign_sets import GUARD, SignSets, sign_sets
+from stseg.kernels.accelerate import kernel
 
 QUANTUM = 1e-3
 """One unit of capacity, nats."""

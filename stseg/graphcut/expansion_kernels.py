@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from stseg.accelerate import kernel
 from stseg.arrays import Ints
+from stseg.kernels.accelerate import kernel
 
 
 class Neighbours(NamedTuple):

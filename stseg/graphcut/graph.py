@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from stseg.accelerate import part
 from stseg.arrays import AnyArray, Labels
 from stseg.graphcut.lattice import Lattice, neighbour
+from stseg.kernels.accelerate import part
 
 
 class Graph(NamedTuple):

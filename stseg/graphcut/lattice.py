@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stseg.accelerate import kernel, part
 from stseg.arrays import AnyArray, Ints, Labels
+from stseg.kernels.accelerate import kernel, part
 
 
 class Lattice(NamedTuple):

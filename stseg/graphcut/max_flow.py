@@ -15,9 +15,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stseg.accelerate import part
 from stseg.arrays import Bytes, Ints, Labels
 from stseg.graphcut.graph import Graph, first_arc, head_of, sister_of
+from stseg.kernels.accelerate import part
 
 NO_ARC, TERMINAL, ORPHAN = -1, -2, -3
 """Codes in place of the arc to the parent: free node; root; orphan."""

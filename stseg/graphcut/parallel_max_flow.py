@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stseg.accelerate import part
 from stseg.arrays import Flags, Labels
 from stseg.graphcut.graph import Graph
 from stseg.graphcut.max_flow import (
@@ -22,6 +21,7 @@ from stseg.graphcut.max_flow import (
     push_adjacent,
     search,
 )
+from stseg.kernels.accelerate import part
 
 
 class Bridges(NamedTuple):

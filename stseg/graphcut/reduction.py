@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stseg.accelerate import part
 from stseg.arrays import Bytes, Flags, Labels
 from stseg.graphcut.energy import Energy
 from stseg.graphcut.lattice import Lattice, cells, neighbour, spread
 from stseg.graphcut.sign_sets import EMPTY, OCCUPIED, OPEN
+from stseg.kernels.accelerate import part
 
 HOPELESS = 0.9
 """Share of cells with weak unary terms from which too few could be decided to pay for the reduction."""

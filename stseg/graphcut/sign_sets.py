@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stseg.accelerate import kernel, part
 from stseg.arrays import Bytes, Flags, Labels
 from stseg.graphcut.lattice import Lattice, neighbour
+from stseg.kernels.accelerate import kernel, part
 
 GUARD, OPEN, OCCUPIED, EMPTY = 0, 1, 2, 3
 """States of a node: no cell, undecided, label 1, label 0."""

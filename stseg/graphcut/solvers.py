@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
-from stseg.accelerate import COMPILED
 from stseg.arrays import Flags
 from stseg.graphcut import pymaxflow
 from stseg.graphcut.cut import Cut, minimum_cut
 from stseg.graphcut.energy import Energy
 from stseg.graphcut.sparse import sparse_cut
+from stseg.kernels.accelerate import COMPILED
 
 
 class Solver(NamedTuple):

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from stseg.accelerate import kernel
 from stseg.arrays import Flags, Ints, Labels
 from stseg.graphcut.graph import Graph
 from stseg.graphcut.parallel_max_flow import solve
+from stseg.kernels.accelerate import kernel
 
 MOST = 1 << 29
 """Greatest sum of the capacities of one node, quanta."""

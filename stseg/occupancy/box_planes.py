@@ -10,7 +10,7 @@ The likelihood ratio is r = m + M (1 - m) / b. L(X, Z) is the likelihood that gi
     ((1 - m) L + m (1 - L)) / (b L + (1 - b) (1 - L)) = r,
 
 with b' for b within reach of a person. The ray of an empty cell then meets foreground with a probability of about M
-(the E step of `stseg.occupancy.rate_calibration`), so b and b' converge to the means of M from any first guess.
+(the E step of `stseg.occupancy.rate_estimate`), so b and b' converge to the means of M from any first guess.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from stseg.accelerate import kernel
 from stseg.arrays import Flags, Floats, Ints, Singles
+from stseg.bodies.box_fit import FAR, half_square
+from stseg.bodies.pillar_index import PillarIndex, run_of
 from stseg.geometry.sampling import Footprints
 from stseg.geometry.summed_area import TOP, UNSEEN, Levels
-from stseg.model.box_fit import FAR, half_square
-from stseg.model.pillar_index import PillarIndex, run_of
+from stseg.kernels.accelerate import kernel
 from stseg.occupancy.fusion import ErrorRates
 from stseg.occupancy.shown_cells import ShownCells
 
@@ -37,7 +37,7 @@ class ViewBoxes(NamedTuple):
     edges : float64 (box, 4)
         left, top, right, bottom, pixels, within the image.
     tolerance : float64 (box, 5), belief : float64 (box,)
-        See `stseg.model.box_noise`.
+        See `stseg.bodies.box_noise`.
     person : int64 (box,)
         The person that each box is assigned to, -1 for none.
     width, height

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from stseg.accelerate import kernel
 from stseg.arrays import Floats, Singles
+from stseg.kernels.accelerate import kernel
 
 
 def clutter(likelihood: Singles, side: int) -> float:

@@ -27,9 +27,9 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from stseg.accelerate import kernel, part, wide_kernel
 from stseg.arrays import Labels, Singles
 from stseg.geometry.summed_area import TOP, Levels
+from stseg.kernels.accelerate import kernel, part, wide_kernel
 
 
 class ErrorRates(NamedTuple):

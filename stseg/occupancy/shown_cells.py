@@ -18,11 +18,11 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from stseg.accelerate import kernel
 from stseg.arrays import Bytes, Flags, Floats, Ints, Labels
 from stseg.geometry.cell_means import SumTable
 from stseg.geometry.sampling import Footprints
 from stseg.geometry.summed_area import UNSEEN, Levels, sum_of
+from stseg.kernels.accelerate import kernel
 
 SIDE = 4
 """Cells along the side of a block."""

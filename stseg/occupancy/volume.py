@@ -10,25 +10,25 @@ import numpy as np
 from scipy.special import logit
 
 from stseg.arrays import Boxes, Bytes, Flags, Floats, Ints, Singles, ViewEvidence
+from stseg.bodies.box_likelihood import box_likelihood
+from stseg.bodies.box_noise import FIRST, BoxNoise
+from stseg.bodies.filled_cells import inside_bodies
+from stseg.bodies.pillar_index import PillarIndex
+from stseg.bodies.pillars import BodyTable
 from stseg.config import BodyConfig, DetectionConfig, ErrorRateConfig, OccupancyConfig
 from stseg.geometry import Rig
-from stseg.geometry.bodies import BodyTable
 from stseg.geometry.cell_means import CellMeans, SumTable
-from stseg.geometry.filled_cells import inside_bodies
 from stseg.geometry.nearest_person import nearest_person
 from stseg.geometry.sampling import Sampling
 from stseg.geometry.summed_area import UNSEEN, Levels
-from stseg.model.box_likelihood import box_likelihood
-from stseg.model.box_noise import FIRST, BoxNoise
-from stseg.model.people import Explanation
-from stseg.model.pillar_index import PillarIndex
-from stseg.model.sparse_volume import SparseVolume
 from stseg.occupancy.box_planes import CellsByPerson, ViewBoxes, fill_fit, fill_levels, level_of_match, mark_fit
 from stseg.occupancy.clutter import clutter, clutter_side, clutter_weights
 from stseg.occupancy.fusion import ErrorRates, FrameTerms, Sums, log_odds_terms
-from stseg.occupancy.rate_calibration import RateCalibration, cells_per_person, fill_counts
+from stseg.occupancy.rate_estimate import RateCalibration, cells_per_person, fill_counts
 from stseg.occupancy.shown_cells import CellTables, ShownCells, mark_columns, mark_map
 from stseg.occupancy.visible_cells import PixelAssignment, fill_map, fill_occupied, fill_share, mark_people
+from stseg.records.people import Explanation
+from stseg.records.sparse_volume import SparseVolume
 
 _MAP_STEP = 8
 _NEAR_PRIOR = 0.0

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stseg.accelerate import kernel, part
 from stseg.arrays import Floats, Ints, Labels, Singles
+from stseg.kernels.accelerate import kernel, part
 
 _FAINT = np.float32(1e-6)
 """Mass of a cell without evidence, nats."""
@@ -15,7 +15,7 @@ _ZERO = np.float32(0)
 
 
 class Measures(NamedTuple):
-    """Measures of the blobs (n,) of a frame, as of `stseg.model.blobs.Blobs`.
+    """Measures of the blobs (n,) of a frame, as of `stseg.records.blobs.Blobs`.
 
     Attributes
     ----------

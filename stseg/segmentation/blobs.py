@@ -9,7 +9,7 @@ from scipy.ndimage import label as connected
 
 from stseg.arrays import Flags, Floats, Ints, Labels, Singles
 from stseg.geometry import Grid
-from stseg.model.blobs import UNASSIGNED, Blobs
+from stseg.records.blobs import UNASSIGNED, Blobs
 from stseg.segmentation.blob_measures import Measures, fill_ground_labels, fill_measures, fill_nearest
 from stseg.segmentation.patches import Patches
 

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stseg.accelerate import kernel
 from stseg.arrays import Floats, Ints
 from stseg.config import BodyConfig, MotionConfig
-from stseg.model.sizes import log_heavy_tailed
+from stseg.kernels.accelerate import kernel
+from stseg.records.sizes import log_heavy_tailed
 
 _RESOLUTION = 0.1
 """s: standard deviation of the place of a detection, to which the prior log-odds refer, metres."""

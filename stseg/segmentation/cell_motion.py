@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from stseg.accelerate import kernel
 from stseg.arrays import Floats, Ints, Labels
 from stseg.geometry.nearest_person import nearest_person
+from stseg.kernels.accelerate import kernel
 
 
 def same_tracks(one: Ints, other: Ints) -> tuple[Ints, Ints]:

@@ -29,8 +29,8 @@ from stseg.arrays import Flags, Floats, Ints
 from stseg.config import BodyConfig, DetectionConfig
 from stseg.graphcut.energy import QUANTUM
 from stseg.graphcut.qpbo import QuadraticEnergy, QuadraticMinimum, minimise
-from stseg.model.border import Border
-from stseg.model.sizes import log_heavy_tailed
+from stseg.records.border import Border
+from stseg.records.sizes import log_heavy_tailed
 from stseg.segmentation.candidate_links import LinkModel, Links, WindowCandidates
 from stseg.segmentation.paths import best_paths, path_marginals
 

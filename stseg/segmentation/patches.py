@@ -23,10 +23,10 @@ import numpy as np
 from scipy.ndimage import binary_dilation, binary_erosion, find_objects
 from scipy.ndimage import label as connected
 
-from stseg.accelerate import kernel
 from stseg.arrays import AnyArray, Flags, Floats, Ints, Labels, Singles
 from stseg.geometry import Grid
-from stseg.model.sparse_volume import SparseVolume
+from stseg.kernels.accelerate import kernel
+from stseg.records.sparse_volume import SparseVolume
 from stseg.segmentation.cell_motion import successor_cells
 
 SIDE = 8

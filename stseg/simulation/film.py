@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 from stseg.arrays import Bytes, Rows
 from stseg.geometry import Rig
-from stseg.simulation.body import pose, upright_cylinders
-from stseg.simulation.cameras import build_rig, turns
-from stseg.simulation.crowd import walk_freely
-from stseg.simulation.render import RenderedView, Viewer
+from stseg.simulation.crowd.script import walk_routes
+from stseg.simulation.crowd.social_forces import walk_freely
+from stseg.simulation.rendering.body import pose, upright_cylinders
+from stseg.simulation.rendering.cameras import build_rig, turns
+from stseg.simulation.rendering.render import RenderedView, Viewer
 from stseg.simulation.scene import Kind, SceneSpec
-from stseg.simulation.script import walk_routes
 
 EMPTY_FRAMES = 40
 """Length of the films of the empty room; they end just before the first frame."""
@@ -27,7 +27,7 @@ class SimulatedFrame:
     frame
         From 0.
     truth : TRUTH (n,)
-        People inside the area, see `stseg.simulation.crowd`.
+        People inside the area, see `stseg.simulation.crowd.social_forces`.
     views
         One a camera, in the rig's order.
     """

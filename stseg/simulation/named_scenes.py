@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from stseg.simulation.encounters import BORDER, CROSSING, meeting
-from stseg.simulation.routes import Route
+from stseg.simulation.crowd.encounters import BORDER, CROSSING, meeting
+from stseg.simulation.crowd.routes import Route
 from stseg.simulation.scene import SceneSpec
 
 _DENSE = SceneSpec(

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 from stseg.errors import ConfigError
-from stseg.simulation.illumination import Lamp
-from stseg.simulation.routes import Route
+from stseg.simulation.crowd.routes import Route
+from stseg.simulation.rendering.illumination import Lamp
 
 Kind = Literal["video", "masks", "boxes"]
 KINDS: tuple[Kind, ...] = ("video", "masks", "boxes")

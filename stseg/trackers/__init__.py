@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from stseg.baselines.du_piater_2006 import BeliefTracker
+from stseg.baselines.huang_wang_2012.kalman import KalmanTracker
+from stseg.baselines.kim_davis_2006 import ParticleTracker
 from stseg.errors import ConfigError
-from stseg.trackers.belief import BeliefTracker
 from stseg.trackers.cut import CutTracker
 from stseg.trackers.frames import FrameTracker
-from stseg.trackers.kalman import KalmanTracker
-from stseg.trackers.particles import ParticleTracker
 from stseg.trackers.protocol import Commit, FrameObservations, FusedFrame, Tracker
 
 TRACKERS: dict[str, type[Tracker]] = {

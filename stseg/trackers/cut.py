@@ -17,23 +17,23 @@ from stseg.geometry.sampling import Sampling
 from stseg.graphcut.energy import QUANTUM, Energy
 from stseg.graphcut.reduction import greatest_empty_set
 from stseg.graphcut.solvers import SOLVERS, find_solver
-from stseg.model.blobs import Blobs
-from stseg.model.predicted_tracks import PredictedTracks
-from stseg.model.tables import WINDOW
+from stseg.records.blobs import Blobs
+from stseg.records.predicted_tracks import PredictedTracks
+from stseg.records.tables import WINDOW
 from stseg.segmentation.blobs import find_blobs
+from stseg.segmentation.cell_labelling import WindowDetections, WindowLabels, label_cells
 from stseg.segmentation.cell_motion import motion_field, same_tracks
-from stseg.segmentation.energy import build_energy
-from stseg.segmentation.labelling import WindowDetections, WindowLabels, label_cells
+from stseg.segmentation.cut_energy import build_energy
+from stseg.segmentation.label_energy import BodyShape
 from stseg.segmentation.patches import Patches, mark_places, people_squares
-from stseg.segmentation.unary import BodyShape
 from stseg.trackers.protocol import Commit, FrameObservations, FusedFrame
 from stseg.trackers.rows import event_rows, trajectory_rows, views_at
 from stseg.trackers.window_existence import TrackedFrame, WindowExistence
-from stseg.tracking.prediction import earlier_detections, predicted_places, together
-from stseg.tracking.track_filter import TrackFilter
-from stseg.tracking.tracklets import form_tracklets
-from stseg.tracking.window_association import TrackAssociation, WindowAssignment
-from stseg.tracking.windows import LONGEST, Window, windows
+from stseg.tracking.filter.prediction import earlier_detections, predicted_places, together
+from stseg.tracking.filter.track_filter import TrackFilter
+from stseg.tracking.windows.tracklets import form_tracklets
+from stseg.tracking.windows.window_association import TrackAssociation, WindowAssignment
+from stseg.tracking.windows.windows import LONGEST, Window, windows
 
 _ENDLESS = 1 << 62
 """Stop frame of a run whose end is not known yet."""

@@ -8,10 +8,10 @@ import numpy as np
 
 from stseg.config import Config
 from stseg.geometry import Rig
-from stseg.model.predicted_tracks import PredictedTracks
+from stseg.records.predicted_tracks import PredictedTracks
 from stseg.trackers.framewise import FramewiseTracker
 from stseg.trackers.protocol import Commit, FrameObservations, FusedFrame
-from stseg.tracking.track_filter import TrackFilter
+from stseg.tracking.filter.track_filter import TrackFilter
 
 
 class FrameTracker(FramewiseTracker):

@@ -8,7 +8,7 @@ from stseg.arrays import Floats, Ints
 from stseg.config import Config
 from stseg.geometry import Rig
 from stseg.geometry.sampling import Sampling
-from stseg.model.tables import WINDOW
+from stseg.records.tables import WINDOW
 from stseg.trackers.nearest_cells import reached_cells
 from stseg.trackers.protocol import Commit, FusedFrame
 from stseg.trackers.rows import Event, event_rows, trajectory_rows, views_at

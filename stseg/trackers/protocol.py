@@ -9,9 +9,9 @@ from typing import ClassVar, Protocol
 from stseg.arrays import Labels, Observation, Rows, Singles, ViewEvidence
 from stseg.config import Config
 from stseg.geometry import Rig
-from stseg.model.people import People
-from stseg.model.predicted_tracks import PredictedTracks
-from stseg.model.sparse_volume import SparseVolume
+from stseg.records.people import People
+from stseg.records.predicted_tracks import PredictedTracks
+from stseg.records.sparse_volume import SparseVolume
 
 STAYING, FORGETTING = 1.0, 4.0
 """Existence of a track in trackers that do not estimate it: log-odds that a track detected in one frame is detected in
@@ -57,7 +57,7 @@ class FrameObservations:
     Attributes
     ----------
     observations
-        Raw data of each camera; `stseg.trackers.colour_views` extracts colour.
+        Raw data of each camera; `stseg.baselines.colour_views` extracts colour.
     evidence
         Foreground of each view: boxes, a likelihood map float32 (v, u), or None for a blind view.
     """
@@ -77,7 +77,7 @@ class Commit:
     label : int32 (time, plane, y, x)
         Track ids, 0 for background.
     trajectory, events, windows
-        Rows of `stseg.model.tables`: TRAJECTORY, EVENT, WINDOW.
+        Rows of `stseg.records.tables`: TRAJECTORY, EVENT, WINDOW.
     """
 
     frames: list[FusedFrame]

@@ -6,7 +6,7 @@ import numpy as np
 
 from stseg.arrays import Bytes, Floats, Ints, Rows
 from stseg.geometry import Grid
-from stseg.model.tables import EVENT, TRAJECTORY
+from stseg.records.tables import EVENT, TRAJECTORY
 
 Event = tuple[int, str, int, int, str]
 """frame, kind, id, other id, reason."""

@@ -15,13 +15,13 @@ from stseg.config import Config
 from stseg.geometry import Rig
 from stseg.geometry.nearest_person import nearest_person
 from stseg.graphcut.solvers import Solver
-from stseg.model.border import Border
-from stseg.model.people import People
-from stseg.model.sparse_volume import SparseVolume
+from stseg.records.border import Border
+from stseg.records.people import People
+from stseg.records.sparse_volume import SparseVolume
 from stseg.segmentation.candidate_links import LinkModel, WindowCandidates
 from stseg.segmentation.existence import Existence, ExistenceModel
 from stseg.trackers.protocol import FusedFrame
-from stseg.tracking.prediction import DetectionHistory
+from stseg.tracking.filter.prediction import DetectionHistory
 
 _SURE = 12.0
 """Least log-odds of people whom the window alone finds, nats: 40 m x 40 m have e^12 places and heights to try."""

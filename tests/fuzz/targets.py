@@ -15,11 +15,12 @@ from fuzz.detection_files import BOXES
 from fuzz.detection_targets import CAMERA, DETECTION_TARGETS, frames
 from fuzz.hdf5_mutations import mutated_objects
 from fuzz.target import Target, plain
-from stseg.calibration.point_fit import Points, fit_points
-from stseg.commands.calibrate_page import calibrate_page
+from stseg.calibration.points.point_fit import Points, fit_points
+from stseg.commands.calibrate.page import calibrate_page
 from stseg.commands.correct import correct
 from stseg.commands.measure import measure
 from stseg.commands.review import review
+from stseg.identities.review.corrections import ACTIONS, Answer, solve_corrections
 from stseg.io.answers import read_answers, read_names
 from stseg.io.areas import read_lines, read_polygons
 from stseg.io.calibrations.formats import FORMATS, ImportOptions, read_cameras
@@ -33,13 +34,12 @@ from stseg.io.outputs.whole_files import replacing
 from stseg.io.recording.pictures import read_picture
 from stseg.io.recording.recording import Source
 from stseg.io.recording.rigs import parse_rig, read_rig
-from stseg.io.recording.video_stream import VideoStream
+from stseg.io.recording.video.video_stream import VideoStream
 from stseg.io.runfile.runs import read_run
-from stseg.io.runfile.work_folder import WorkFolder
+from stseg.io.runfile.unfinished.work_folder import WorkFolder
 from stseg.io.track_csv import read_tracks_csv
 from stseg.measures.areas import Line, Zone
-from stseg.model.tables import Tracks
-from stseg.tracking.corrections import ACTIONS, Answer, solve_corrections
+from stseg.records.tables import Tracks
 
 _GROUND = np.array([[0.1, 0.1], [0.3, 0.2], [5.0, 5.0]])
 OPTIONS = ImportOptions((64, 48), "m", 1.75)

@@ -31,13 +31,13 @@ from stseg.geometry.nearest_person import nearest_person
 from stseg.graphcut.energy import Energy
 from stseg.io.config_file import read_config
 from stseg.io.recording.recording import Recording
-from stseg.model.blobs import UNASSIGNED
-from stseg.segmentation.labelling import WindowLabels
+from stseg.records.blobs import UNASSIGNED
+from stseg.segmentation.cell_labelling import WindowLabels
 from stseg.segmentation.patches import Patches
 from stseg.trackers import TRACKERS
 from stseg.trackers.cut import CutTracker
 from stseg.trackers.window_existence import TrackedFrame
-from stseg.tracking.windows import Window
+from stseg.tracking.windows.windows import Window
 
 METHODS = ("threshold", "frames", "two labels", "cut")
 DEFAULT_SETS = ("uu4", "cmc1", "cmc2", "wildtrack", "crossing_boxes", "border_boxes")

@@ -21,17 +21,17 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from stseg.arrays import Ints, Rows
-from stseg.engine.correction import CorrectedTracks, corrected_tracks
-from stseg.engine.doubtful_decisions import doubtful_decisions
+from stseg.engine.offline.correction import CorrectedTracks, corrected_tracks
+from stseg.engine.offline.doubtful_decisions import doubtful_decisions
 from stseg.errors import InputError
 from stseg.evaluation import evaluate
 from stseg.evaluation.matching import distances, match
 from stseg.evaluation.scores import Scores
+from stseg.identities.review.corrections import Answer
+from stseg.identities.review.doubts import Doubt
 from stseg.io.runfile.corrected import write_corrected
 from stseg.io.runfile.runs import Run, read_run
 from stseg.io.track_csv import read_tracks_csv
-from stseg.tracking.corrections import Answer
-from stseg.tracking.doubts import Doubt
 
 GATE = 0.5
 """Greatest distance of a track from its person, metres."""

@@ -23,7 +23,7 @@ from scipy.special import expit, logit
 
 from stseg.arrays import Flags, Floats
 from stseg.io.runfile.runs import Run, read_run
-from stseg.model.cell_reliability import doubtful_cells, filled_cells
+from stseg.records.cell_reliability import doubtful_cells, filled_cells
 
 BINS = 10
 _SUREST = 1e-6

@@ -22,11 +22,11 @@ import numpy as np
 from stseg.arrays import Flags, Ints, Rows
 from stseg.config import Config
 from stseg.geometry import Grid
-from stseg.model.border import Border
-from stseg.model.tables import APPEARANCE, COLOURS, EVENT, TRAJECTORY
+from stseg.records.border import Border
+from stseg.records.tables import APPEARANCE, COLOURS, EVENT, TRAJECTORY
 from stseg.simulation import SceneSpec
-from stseg.simulation.crowd import walk_freely
-from stseg.tracking.final_tracks import final_tracks
+from stseg.simulation.crowd.social_forces import walk_freely
+from stseg.trajectories.final_tracks import final_tracks
 
 _RATE, _SIDE = 5.0, 7.0
 """Frames per second; side of the area, metres."""

@@ -19,8 +19,8 @@ from workbench import ROOT, Bench
 
 from stseg.config import Config
 from stseg.io.recording.recording import Recording
-from stseg.model.border import Border
-from stseg.tracking.final_tracks import final_tracks
+from stseg.records.border import Border
+from stseg.trajectories.final_tracks import final_tracks
 
 _SHOWN = ("MODA", "IDF1", "IDSW")
 

@@ -29,9 +29,9 @@ from scipy.optimize import linear_sum_assignment
 from workbench import ROOT, Bench
 
 from stseg.arrays import Flags, Floats, Ints, Labels, Rows, Singles
+from stseg.bodies.filled_cells import inside_bodies
 from stseg.config import Config
 from stseg.geometry import Grid
-from stseg.geometry.filled_cells import inside_bodies
 from stseg.geometry.nearest_person import nearest_person
 from stseg.io.runfile.runs import read_run
 from stseg.io.track_csv import read_tracks_csv

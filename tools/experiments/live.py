@@ -20,9 +20,9 @@ from stseg.evaluation import evaluate
 from stseg.io.config_file import parse_config
 from stseg.io.runfile.runs import Run, read_run
 from stseg.io.track_csv import read_tracks_csv
-from stseg.model.border import Border
-from stseg.model.tables import CORRECTION, TRAJECTORY
-from stseg.tracking.live_corrections import LiveCorrections, corrected, renamed
+from stseg.records.border import Border
+from stseg.records.tables import CORRECTION, TRAJECTORY
+from stseg.trajectories.live_corrections import LiveCorrections, corrected, renamed
 
 _WINDOW = 2.0
 """Seconds."""

@@ -14,16 +14,16 @@ from experiments.target_trials import Recorded
 from stseg.arrays import Boxes, Floats, ViewEvidence
 from stseg.config import Config
 from stseg.detection.detector import Detector
-from stseg.detection.map_estimate import FrameEvidence, MapEstimate
 from stseg.detection.prior import Prior
+from stseg.detection.search.map_estimate import FrameEvidence, MapEstimate
 from stseg.engine.tracker import Tracker
 from stseg.evaluation.matching import distances, match
 from stseg.geometry import Rig
 from stseg.io.recording.frames import FrameSet
 from stseg.io.recording.pictures import reduced_view
-from stseg.model.candidates import Candidates
-from stseg.model.predicted_tracks import PredictedTracks
-from stseg.model.sizes import Sizes
+from stseg.records.candidates import Candidates
+from stseg.records.predicted_tracks import PredictedTracks
+from stseg.records.sizes import Sizes
 
 _GATE = 0.5
 """Metres within which a detection is a person."""

@@ -12,15 +12,15 @@ import numpy as np
 from scipy.ndimage import label
 
 from stseg.arrays import Boxes, Flags, Floats, Ints, Rows, Singles
+from stseg.baselines.khan_shah_2009.synergy_map import Localiser
 from stseg.config import Config, ParticleConfig, TrackingConfig
-from stseg.engine.backgrounds import make_foregrounds
+from stseg.engine.offline.backgrounds import make_foregrounds
 from stseg.foreground import box_likelihood
 from stseg.geometry import Grid, Rig
 from stseg.io.recording.frames import open_frames
 from stseg.io.recording.recording import Recording
 from stseg.io.track_csv import POSITION
-from stseg.occupancy.localisation import Localiser
-from stseg.tracking.assignment import assign, distances
+from stseg.tracking.filter.assignment import assign, distances
 
 LEVELS = (-0.1, -0.2, -0.3, -0.4, -0.5, -0.7, -1.0, -1.4, -2.0)
 """Thresholds that are tried, nats a plane."""

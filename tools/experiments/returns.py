@@ -17,13 +17,13 @@ from pathlib import Path
 import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints, Rows
-from stseg.engine.correction import rows_with_ids
+from stseg.engine.offline.correction import rows_with_ids
 from stseg.engine.pipeline import identity_problem
+from stseg.identities.evidence.returns import find_returns
+from stseg.identities.evidence.visits import Visits
 from stseg.io.config_file import parse_config
 from stseg.io.runfile.runs import read_run
 from stseg.io.track_csv import read_tracks_csv
-from stseg.tracking.identities.returns import find_returns
-from stseg.tracking.identities.visits import Visits
 
 _LEVELS = (0.5, 0.8, 0.9, 0.95, 0.99, 0.999)
 _GATE = 0.5

@@ -25,7 +25,7 @@ from stseg import Tracker
 from stseg.arrays import Bytes, Floats, Observation
 from stseg.geometry import Rig
 from stseg.simulation import NAMED, Film
-from stseg.simulation.render import RenderedView
+from stseg.simulation.rendering.render import RenderedView
 
 Axes = dict[str, tuple[str, tuple[int, ...]]]
 

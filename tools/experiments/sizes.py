@@ -16,8 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from stseg.arrays import Floats, Rows
-from stseg.io.runfile.run_reader import read_run
-from stseg.tracking.assignment import assign, distances
+from stseg.io.runfile.reading.run_reader import read_run
+from stseg.tracking.filter.assignment import assign, distances
 
 LEAST = 10
 """People seen in fewer frames are left out of the figures."""

@@ -27,9 +27,9 @@ from stseg.evaluation import evaluate
 from stseg.io.runfile.runs import read_run
 from stseg.io.track_csv import read_tracks_csv
 from stseg.simulation import Spoil
-from stseg.simulation.spoil import STRENGTHS
-from stseg.simulation.spoiled_boxes import BOX_KINDS
-from stseg.simulation.spoiled_masks import MASK_KINDS
+from stseg.simulation.spoiling.spoil import STRENGTHS
+from stseg.simulation.spoiling.spoiled_boxes import BOX_KINDS
+from stseg.simulation.spoiling.spoiled_masks import MASK_KINDS
 
 EVIDENCE = (-10.0, -5.0, 0.0)
 """Bounds of the classes of a rejected candidate's evidence, nats."""

@@ -1,0 +1,151 @@
+"""Annotations: CVAT XML, Label Studio JSON and VIA JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from stseg.errors import FormatError
+from stseg.io.detections.frame_names import listed_frames
+from stseg.io.detections.json_files import require
+from stseg.io.detections.masks import Polygons, flat_polygons
+from stseg.io.detections.record import DetectionList, Detections, Request, number
+from stseg.io.untrusted import limits
+from stseg.io.untrusted.safe_xml import parse_xml
+
+
+def read_cvat(request: Request) -> Detections:
+    """Boxes, polygons and masks of CVAT's XML 1.1, of a video or of images; shapes outside the image are left out."""
+    root = parse_xml(request.path, "CVAT's XML: <annotations>")
+    if root.tag != "annotations":
+        raise FormatError(request.path, "", f"<{root.tag}>", "CVAT's XML: <annotations>")
+    found, images = DetectionList(request.path), root.findall("image")
+    if images:
+        frames, count = listed_frames([image.get("name", "") for image in images])
+        for image, frame in zip(images, frames.tolist(), strict=True):
+            for shape in image:
+                _add_shape(request.path, found, f"image {image.get('name')}", frame, shape, shape.get("label", ""))
+        return found.done(count)
+    for track in root.findall("track"):
+        for shape in track:
+            if shape.get("outside") != "1":
+                place = f"track {track.get('id')}, frame {shape.get('frame')}"
+                frame = int(number(request.path, place, "frame", shape.get("frame", "")))
+                _add_shape(request.path, found, place, frame, shape, track.get("label", ""))
+    size = root.findtext("meta/task/size") or root.findtext("meta/job/size")
+    return found.done(int(number(request.path, "meta", "size", size)) if size else None)
+
+
+def _add_shape(path: Path, found: DetectionList, place: str, frame: int, shape: Any, label: str) -> None:
+    if shape.tag == "box":
+        corners = [shape.get(key, "") for key in ("xtl", "ytl", "xbr", "ybr")]
+        found.add_corners(place, frame, corners, label=label)
+    elif shape.tag == "polygon":
+        flat = [number(path, place, "points", word) for word in shape.get("points", "").replace(";", ",").split(",")]
+        mask = _polygon(path, place, flat)
+        found.add(place, frame, mask.box(), label=label, mask=mask)
+
+
+def _polygon(path: Path, place: str, flat: list[float]) -> Polygons:
+    try:
+        return flat_polygons([flat])
+    except ValueError as error:
+        raise FormatError(path, place, str(error), "u,v of 3 or more points") from error
+
+
+def is_label_studio(data: Any) -> bool:
+    """Whether parsed JSON is a list of Label Studio's tasks."""
+    return isinstance(data, list) and bool(data) and isinstance(data[0], dict) and "annotations" in data[0]
+
+
+def read_label_studio(request: Request, data: Any) -> Detections:
+    """Rectangles and polygons of images, one task a frame, or rectangles of one video, straight between keyframes."""
+    found = DetectionList(request.path)
+    results = [list(_label_studio_results(request.path, k, task)) for k, task in enumerate(data)]
+    videos = [one for rows in results for one in rows if one.get("type") == "videorectangle"]
+    if videos:
+        for index, one in enumerate(videos):
+            _add_video_track(request, found, f"result {index}", one["value"])
+        return found.done(max((int(one["value"].get("framesCount", 0)) for one in videos), default=0) or None)
+    names = [str(next(iter(task.get("data", {}).values()), k)) for k, task in enumerate(data)]
+    frames, count = listed_frames(names)
+    for k, (rows, frame) in enumerate(zip(results, frames.tolist(), strict=True)):
+        for index, one in enumerate(rows):
+            _add_result(request, found, f"task {k}, result {index}", frame, one)
+    return found.done(count)
+
+
+def _label_studio_results(path: Path, index: int, task: Any) -> Iterator[Any]:
+    for annotation in require(path, f"task {index}", task, "annotations"):
+        yield from require(path, f"task {index}", annotation, "result")
+
+
+def _add_result(request: Request, found: DetectionList, place: str, frame: int, one: Any) -> None:
+    value, (width, height) = one.get("value", {}), request.size
+    if one.get("type") == "rectanglelabels":
+        x, y, wide, tall = (
+            number(request.path, place, key, require(request.path, place, value, key)) / 100 for key in _PERCENT
+        )
+        label = str(next(iter(value.get("rectanglelabels", [])), ""))
+        found.add(place, frame, (x * width, y * height, wide * width, tall * height), label=label)
+    elif one.get("type") == "polygonlabels":
+        points = np.array(value["points"], float) / 100 * [width, height]
+        mask = _polygon(request.path, place, points.ravel().tolist())
+        found.add(place, frame, mask.box(), label=str(next(iter(value.get("polygonlabels", [])), "")), mask=mask)
+
+
+_PERCENT = ("x", "y", "width", "height")
+
+
+def _add_video_track(request: Request, found: DetectionList, place: str, value: Any) -> None:
+    """One video rectangle: frames count from 1 there; between two keyframes it is enabled in, it moves straight."""
+    steps = require(request.path, place, value, "sequence")
+    label, size = str(next(iter(value.get("labels", [])), "")), np.array(request.size * 2)
+    table = np.array(
+        [[number(request.path, place, key, require(request.path, place, step, key)) for key in ("frame", *_PERCENT)]
+         for step in steps]
+    ).reshape(-1, 5)  # fmt: skip
+    if (np.diff(table[:, 0]) <= 0).any() or table[-1:, 0].sum() - table[:1, 0].sum() > limits.INTERPOLATED - len(found):
+        expected = f"rising frames, and at most {limits.INTERPOLATED} boxes between all keyframes"
+        raise FormatError(request.path, place, "keyframes that do not rise, or are far apart", expected)
+    on = [bool(step.get("enabled", True)) for step in steps]
+    for k in range(len(steps)):
+        stop = table[k + 1, 0] if on[k] and k + 1 < len(steps) else table[k, 0] + 1
+        frames = np.arange(table[k, 0], stop)
+        boxes = np.stack([np.interp(frames, table[:, 0], column) / 100 for column in table[:, 1:].T], -1) * size
+        for frame, box in zip(frames.tolist(), boxes.tolist(), strict=True):
+            found.add(place, int(frame) - 1, box, label=label)
+
+
+def is_via(data: Any) -> bool:
+    """Whether parsed JSON is a project or export of the VGG Image Annotator."""
+    images = data.get("_via_img_metadata", data) if isinstance(data, dict) else None
+    return (
+        isinstance(images, dict)
+        and bool(images)
+        and all(isinstance(one, dict) and "filename" in one and "regions" in one for one in images.values())
+    )
+
+
+def read_via(request: Request, data: Any) -> Detections:
+    """Rectangles and polygons of the VGG Image Annotator (VIA 2), one image a frame."""
+    images = list(data.get("_via_img_metadata", data).values())
+    frames, count = listed_frames([str(image["filename"]) for image in images])
+    found = DetectionList(request.path)
+    for image, frame in zip(images, frames.tolist(), strict=True):
+        regions = image["regions"]
+        for index, region in enumerate(regions.values() if isinstance(regions, dict) else regions):
+            place = f"{image['filename']}, region {index}"
+            shape = require(request.path, place, region, "shape_attributes")
+            label = str(next((v for v in region.get("region_attributes", {}).values() if isinstance(v, str)), ""))
+            if shape.get("name") == "rect":
+                box = [require(request.path, place, shape, key) for key in _PERCENT]
+                found.add(place, frame, box, label=label)
+            elif shape.get("name") == "polygon":
+                points = np.column_stack([require(request.path, place, shape, f"all_points_{a}") for a in "xy"])
+                mask = _polygon(request.path, place, points.ravel().tolist())
+                found.add(place, frame, mask.box(), label=label, mask=mask)
+    return found.done(count)

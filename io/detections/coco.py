@@ -1,0 +1,114 @@
+"""COCO JSON: results of a detector (a list, which Detectron2 and `yolo val` write, too), and annotated data sets."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from fnmatch import fnmatch
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from stseg.arrays import Ints
+from stseg.errors import FormatError, SourceError
+from stseg.io.detections.frame_names import listed_frames
+from stseg.io.detections.json_files import read_json, require
+from stseg.io.detections.masks import Mask, flat_polygons, run_lengths
+from stseg.io.detections.record import DetectionList, Detections, Request
+
+
+def is_results(data: Any) -> bool:
+    """Whether parsed JSON is a list of COCO results."""
+    return (
+        isinstance(data, list)
+        and bool(data)
+        and isinstance(data[0], dict)
+        and "image_id" in data[0]
+        and ("bbox" in data[0] or "segmentation" in data[0])
+    )
+
+
+def is_dataset(data: Any) -> bool:
+    """Whether parsed JSON is a COCO data set."""
+    return isinstance(data, dict) and "images" in data and "annotations" in data
+
+
+def read_results(request: Request, data: Any) -> Detections:
+    """Detections of COCO results, with the image list where the rig names one."""
+    if request.image_list is None:
+        return _collect(request, data, None, {})
+    listed = read_json(request.image_list)
+    if not (isinstance(listed, dict) and isinstance(listed.get("images"), list)):
+        raise FormatError(
+            request.image_list, "images", "nothing", "the images of COCO results: id and file_name of each"
+        )
+    return _collect(request, data, listed["images"], _categories(request.image_list, listed))
+
+
+def read_dataset(request: Request, data: Any) -> Detections:
+    """Detections of a COCO data set: its annotations that are no crowds."""
+    single = [one for one in data["annotations"] if not (isinstance(one, dict) and one.get("iscrowd"))]
+    return _collect(request, single, data["images"], _categories(request.path, data))
+
+
+def _collect(request: Request, rows: Sequence[Any], images: Any, categories: Mapping[Any, str]) -> Detections:
+    frame_of, frames = _frames(request, images) if images is not None else ({}, None)
+    others = {one.get("id") for one in images or ()} - set(frame_of)
+    found = DetectionList(request.path)
+    for index, row in enumerate(rows):
+        place = f"detection {index}"
+        image = require(request.path, place, row, "image_id")
+        if images is None:
+            frame = _own_number(request.path, place, image)
+        elif image in frame_of:
+            frame = frame_of[image]
+        elif image in others:
+            continue
+        else:
+            raise FormatError(request.path, place, f"image_id {image!r}", "the id of an image in the image list")
+        category = row.get("category_id", "")
+        mask = _mask(request.path, place, row.get("segmentation"))
+        box = row.get("bbox") or (mask.box() if mask is not None else require(request.path, place, row, "bbox"))
+        found.add(place, frame, box, row.get("score", 1.0), categories.get(category, str(category)), mask)
+    return found.done(frames)
+
+
+def _frames(request: Request, images: Any) -> tuple[dict[Any, int], int | None]:
+    """Frame of each image id among the selected images, and their number."""
+    chosen = [
+        (require(request.path, f"image {k}", one, "id"), str(one.get("file_name", "")))
+        for k, one in enumerate(images)
+        if not request.select or fnmatch(str(one.get("file_name", "")), request.select)
+    ]
+    if not chosen:
+        raise SourceError(request.path, "select", f"no image like {request.select!r}", "a pattern of image names")
+    frames, count = listed_frames([name for _, name in chosen])
+    return dict(zip((image for image, _ in chosen), frames.tolist(), strict=True)), count
+
+
+def _own_number(path: Path, place: str, image: Any) -> int:
+    """The frame of a result without an image list: the number that its image id is, or ends with."""
+    if isinstance(image, int):
+        return image
+    numbers: Ints | None = listed_frames([str(image)])[0] if not str(image).isdigit() else np.array([int(image)])
+    if numbers is None:
+        raise FormatError(path, place, f"image_id {image!r}", "a number, or `images` in the rig: the image list")
+    return int(numbers[0])
+
+
+def _categories(path: Path, data: Mapping[str, Any]) -> dict[Any, str]:
+    return {
+        require(path, f"category {k}", one, "id"): str(one.get("name", one["id"]))
+        for k, one in enumerate(data.get("categories", []))
+    }
+
+
+def _mask(path: Path, place: str, segmentation: Any) -> Mask | None:
+    if not segmentation:
+        return None
+    try:
+        if isinstance(segmentation, dict):
+            return run_lengths(segmentation["size"], segmentation["counts"])
+        return flat_polygons(segmentation)
+    except (ValueError, TypeError, KeyError) as error:
+        raise FormatError(path, place, f"a segmentation: {error}"[:100], "polygons, or run lengths") from error

@@ -1,0 +1,154 @@
+"""The detections of a camera's source: read in any known format, filtered, and counted from frame 0."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stseg.arrays import Flags, Floats, Ints
+from stseg.errors import FormatError, SourceError
+from stseg.io.detections.appearance_files import read_features
+from stseg.io.detections.box_files import BoxTable, read_boxes
+from stseg.io.detections.formats import read_detections
+from stseg.io.detections.masks import Polygons
+from stseg.io.detections.record import Detections, Request
+from stseg.io.recording.recording import Source
+
+
+@dataclass(frozen=True)
+class SourceDetections:
+    """Detections of one source.
+
+    Attributes
+    ----------
+    format
+        The recognised format.
+    read
+        All detections, frames as the source counts them.
+    kept
+        Those of the wanted classes and scores, frames counted from 0.
+    frames
+        Number of frames.
+    """
+
+    format: str
+    read: Detections
+    kept: Detections
+    frames: int
+
+    @property
+    def table(self) -> BoxTable:
+        """The kept boxes by frame."""
+        order = np.argsort(self.kept.frame, kind="stable")
+        own = self.kept.of(order)
+        return BoxTable(self.frames, own.frame, own.pixel, own.score, order, own.features)
+
+
+def read_source(source: Source, size: tuple[int, int]) -> SourceDetections:
+    """Read a source of boxes, or of instances that are no images.
+
+    Parameters
+    ----------
+    source
+        Its path may be any format of `stseg.io.detections.formats`.
+    size
+        Width and height of the camera's image, pixels.
+
+    Raises
+    ------
+    SourceError, FormatError
+        Where it cannot be read, or has no detections.
+    """
+    return _read(source, size, _stamp(source.path, *([source.appearance] if source.appearance else [])))
+
+
+def _stamp(*paths: Path) -> tuple[int, int]:
+    """Changes where one of the files does, so that nothing stale is kept."""
+    try:
+        found = [file.stat() for path in paths for file in (path.iterdir() if path.is_dir() else [path])]
+    except OSError:
+        return 0, 0
+    return max((one.st_mtime_ns for one in found), default=0), sum(one.st_size for one in found)
+
+
+@lru_cache(maxsize=64)
+def _read(source: Source, size: tuple[int, int], _stamp_of_file: tuple[int, int]) -> SourceDetections:
+    request = Request(
+        source.path,
+        size,
+        source.view,
+        source.select,
+        source.image_list,
+        dict(source.columns) if source.columns else None,
+    )
+    recognised = read_detections(request)
+    if recognised is None:
+        if source.classes:
+            raise SourceError(source.path, "classes", ", ".join(source.classes), "detections that have classes")
+        table = read_boxes(source.path, source.first_frame, source.frames)
+        found = Detections(table.frame + source.first_frame, table.pixel, table.score)
+        found = _with_features(found, table.row, source)
+        kept = found.of(found.score >= source.least_score)
+        return SourceDetections(
+            "boxes as text", found, replace(kept, frame=kept.frame - source.first_frame), table.frames
+        )
+    name, found = recognised
+    found = _with_features(found, np.arange(len(found)), source)
+    kept = found.of(_wanted(found, source.classes, source.least_score))
+    kept = replace(kept, frame=kept.frame - source.first_frame)
+    return SourceDetections(name, found, kept, _length(source, found, kept))
+
+
+def _with_features(found: Detections, row: Ints, source: Source) -> Detections:
+    """The detections with the appearance features that stand in `row` of the source's file of them."""
+    if source.appearance is None:
+        return found
+    return replace(found, features=read_features(source.appearance, len(found))[row])
+
+
+def _wanted(found: Detections, classes: Sequence[str], least_score: float) -> Flags:
+    wanted: Flags = np.asarray(found.score >= least_score)
+    if classes:
+        lower = {name.lower() for name in classes}
+        wanted &= np.array([label.lower() in lower for label in found.label] or [False] * len(found), bool)
+    return wanted
+
+
+def _length(source: Source, found: Detections, kept: Detections) -> int:
+    """Number of frames: the rig's, the source's, or up to the last frame with a detection."""
+    if len(kept) and int(kept.frame.min()) < 0:
+        found_frame = f"frame {int(kept.frame.min()) + source.first_frame}"
+        raise FormatError(source.path, "", found_frame, f"a frame from first_frame = {source.first_frame} on")
+    length = source.frames or (found.frames - source.first_frame if found.frames is not None else None)
+    if length is None:
+        if not len(kept):
+            classes = ", ".join(f"{name} ({count})" for name, count in found.classes().items())
+            wanted = f"no detections of {', '.join(source.classes)}" if source.classes else "no detections"
+            raise SourceError(source.path, "", f"{wanted}; classes are {classes or 'not given'}", "some detections")
+        return int(found.frame.max()) - source.first_frame + 1
+    if len(kept) and int(kept.frame.max()) >= length:
+        found_frame = f"frame {int(kept.frame.max()) + source.first_frame}"
+        raise FormatError(source.path, "", found_frame, f"a frame below {length + source.first_frame}")
+    return length
+
+
+def instance_image(found: Detections, rows: Sequence[int], size: tuple[int, int]) -> NDArray[np.uint16]:
+    """Masks of one frame as an instance image, the best score on top; detections without a mask are filled boxes."""
+    image = np.zeros(size[::-1], np.uint16)
+    for value, k in enumerate(sorted(rows, key=lambda row: float(found.score[row])), 1):
+        mask = found.mask[k] if found.mask else None
+        image[(mask or _box(found.pixel[k], size)).draw(size) > 0] = value
+    return image
+
+
+def _box(pixel: Floats, size: tuple[int, int]) -> Polygons:
+    """The outline of a box, cut off beyond the image."""
+    left, top, width, height = pixel.tolist()
+    left, right = np.clip([left, left + width], -1, size[0])
+    top, bottom = np.clip([top, top + height], -1, size[1])
+    return Polygons((np.array([[left, top], [right, top], [right, bottom], [left, bottom]]),))

@@ -1,0 +1,103 @@
+"""CSV and Parquet tables of boxes with columns of any names."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping, Sequence
+from itertools import islice
+from typing import Any
+
+from stseg.errors import FormatError, SourceError
+from stseg.io.detections.record import DetectionList, Detections, Request, number
+from stseg.io.extras import load_extra
+from stseg.io.toml.text import one_of
+from stseg.io.untrusted import limits
+
+COLUMNS = ("frame", "left", "top", "width", "height", "right", "bottom", "x", "y", "score", "class")
+"""Our names of columns; x and y are the middle of a box."""
+_SYNONYMS = {
+    "frame": ("frame_id", "frame_number", "frame_idx", "image", "t"),
+    "left": ("x1", "xmin", "bb_left", "xtl", "min_x"),
+    "top": ("y1", "ymin", "bb_top", "ytl", "min_y"),
+    "right": ("x2", "xmax", "xbr", "max_x"),
+    "bottom": ("y2", "ymax", "ybr", "max_y"),
+    "width": ("w", "bb_width"),
+    "height": ("h", "bb_height"),
+    "x": ("cx", "x_center", "xc", "center_x"),
+    "y": ("cy", "y_center", "yc", "center_y"),
+    "score": ("conf", "confidence", "probability"),
+    "class": ("label", "category", "name", "class_name"),
+}
+CLASS_NAMES = frozenset(("class", *_SYNONYMS["class"]))
+_FORMS = (("left", "top", "width", "height"), ("left", "top", "right", "bottom"), ("x", "y", "width", "height"))
+
+
+def read_csv(request: Request) -> Detections:
+    """Boxes of a CSV file with a header."""
+    try:
+        with request.path.open(encoding="utf-8-sig", newline="") as lines:
+            rows = list(islice(csv.reader(lines, skipinitialspace=True), limits.ROWS))
+    except OSError as error:
+        raise SourceError(request.path, "", error.strerror or error, "a file of boxes") from error
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise FormatError(request.path, "", error, "CSV in UTF-8") from error
+    header = [name.strip() for name in rows[0]] if rows else []
+    places = ((f"line {line}", row) for line, row in enumerate(rows[1:], 2) if any(map(str.strip, row)))
+    return _collect(request, header, [(place, row) for place, row in places])
+
+
+def read_parquet(request: Request) -> Detections:
+    """Boxes of a Parquet file."""
+    parquet = load_extra("pyarrow.parquet", "parquet")
+    try:
+        with parquet.ParquetFile(request.path, memory_map=True) as file:
+            header = list(file.schema_arrow.names)
+            if file.metadata.num_rows > limits.ROWS:
+                raise ValueError(f"{file.metadata.num_rows} rows, more than {limits.ROWS}")
+            wanted = sorted(set(known_columns(header, request.columns).values()))
+            table = file.read([header[k] for k in wanted])
+    except (OSError, ValueError, RuntimeError, load_extra("pyarrow", "parquet").ArrowException) as error:
+        raise FormatError(request.path, "", f"no Parquet ({error})"[:100], "a Parquet file") from error
+    columns = [column.to_pylist() for column in table.columns]
+    rows = [(f"row {k}", row) for k, row in enumerate(zip(*columns, strict=True))]
+    return _collect(request, table.column_names, rows)
+
+
+def known_columns(header: Sequence[str], columns: Mapping[str, str] | None) -> dict[str, int]:
+    """Where our columns stand in a header, by the rig's mapping, our names, and the usual other names."""
+    lower = [name.lower() for name in header]
+    found: dict[str, int] = {}
+    for own in COLUMNS:
+        for name in [columns[own]] if columns and own in columns else [own, *_SYNONYMS.get(own, ())]:
+            if name in header or name.lower() in lower:
+                found[own] = header.index(name) if name in header else lower.index(name.lower())
+                break
+    return found
+
+
+def _collect(request: Request, header: Sequence[str], rows: Sequence[tuple[str, Sequence[Any]]]) -> Detections:
+    at = known_columns(header, request.columns)
+    for own, name in (request.columns or {}).items():
+        if own not in at:
+            raise FormatError(request.path, f"columns.{own}", f"no column {name}", one_of(name, list(header)))
+    form = next((form for form in _FORMS if all(name in at for name in form)), None)
+    if form is None or "frame" not in at:
+        raise FormatError(
+            request.path, "header", f"the columns {', '.join(header)}"[:200],
+            "frame, left, top, width, height (or right, bottom; or x, y of the middle), or `columns` in the rig",
+        )  # fmt: skip
+    found = DetectionList(request.path)
+    for place, row in rows:
+        if len(row) < len(header):
+            raise FormatError(request.path, place, f"{len(row)} fields", f"{len(header)}")
+        frame = number(request.path, place, "frame", row[at["frame"]])
+        if not float(frame).is_integer():
+            raise FormatError(request.path, place, f"frame {frame:g}", "a whole number")
+        box = [number(request.path, place, name, row[at[name]]) for name in form]
+        if form[2] == "right":
+            box[2:] = box[2] - box[0], box[3] - box[1]
+        elif form[0] == "x":
+            box[:2] = box[0] - box[2] / 2, box[1] - box[3] / 2
+        score = row[at["score"]] if "score" in at else 1.0
+        found.add(place, int(frame), box, score, str(row[at["class"]]).strip() if "class" in at else "")
+    return found.done()

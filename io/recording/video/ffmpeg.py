@@ -1,0 +1,92 @@
+"""Local video files for FFmpeg, as files and nothing else.
+
+FFmpeg takes a path for an address: what stands before a colon is a protocol, and playlists name other files and hosts.
+So a path is given as `file:PATH`, the protocol of files is the only one allowed, and what is text, as all playlists and
+session descriptions are, is refused: no container of video is text.
+"""
+
+from __future__ import annotations
+
+import os
+import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from threading import Lock
+
+# Silences FFmpeg, which reads this at its first use; failures raise SourceError instead.
+os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
+
+import cv2
+
+from stseg.errors import SourceError
+from stseg.io.untrusted import limits
+
+cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+
+_OPTIONS, _FILES_ONLY = "OPENCV_FFMPEG_CAPTURE_OPTIONS", "protocol_whitelist;file"
+_opening = Lock()
+
+_HEAD = 512
+_TEXT_VIDEO = b"YUV4MPEG2"
+"""The one video format whose header is text."""
+
+
+def open_video(path: Path, key: str) -> cv2.VideoCapture:
+    """A local video file, open.
+
+    Raises
+    ------
+    SourceError
+        Where it is no regular file, text, nothing that FFmpeg opens, or of larger frames than are read.
+    """
+    try:
+        descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
+    except (OSError, ValueError) as error:
+        found = "no such file" if isinstance(error, FileNotFoundError) else getattr(error, "strerror", None) or error
+        raise SourceError(path, key, found, "a video") from error
+    try:
+        if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+            raise SourceError(path, key, "no regular file", "a video")
+        head = os.pread(descriptor, _HEAD, 0)
+        if _is_text(head):
+            raise SourceError(path, key, "a text, such as a playlist", "a video that FFmpeg decodes")
+        with _files_only():
+            capture = cv2.VideoCapture(_address(path, descriptor), cv2.CAP_FFMPEG)
+    finally:
+        os.close(descriptor)
+    size = tuple(capture.get(side) for side in (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT))
+    if size[0] * size[1] > limits.PIXELS or max(size) > limits.SIDE:
+        capture.release()
+        raise SourceError(path, key, f"frames of {size[0]:g}x{size[1]:g}", f"at most {limits.PIXELS:.0e} pixels")
+    return capture
+
+
+@contextmanager
+def _files_only() -> Iterator[None]:
+    """FFmpeg opens nothing but files meanwhile; OpenCV takes its options from the environment alone."""
+    with _opening:
+        given = os.environ.get(_OPTIONS)
+        os.environ[_OPTIONS] = _FILES_ONLY
+        try:
+            yield
+        finally:
+            os.environ.pop(_OPTIONS)
+            if given is not None:
+                os.environ[_OPTIONS] = given
+
+
+def _address(path: Path, descriptor: int) -> str:
+    """The path as FFmpeg opens it; one that is no UTF-8 by its descriptor, which stays open meanwhile."""
+    text = str(path.absolute())
+    try:
+        text.encode("utf-8")
+    except UnicodeEncodeError:
+        return f"file:/proc/self/fd/{descriptor}"
+    return f"file:{text}"
+
+
+def _is_text(head: bytes) -> bool:
+    printable = set(range(0x20, 0x7F)) | {0x09, 0x0A, 0x0D}
+    head = head.removeprefix(b"\xef\xbb\xbf")
+    return bool(head) and not head.startswith(_TEXT_VIDEO) and set(head) <= printable

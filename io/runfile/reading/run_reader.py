@@ -1,0 +1,356 @@
+"""Reader of run files: the layout is checked on opening, tables are read on demand."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, cast
+
+import h5py
+import numpy as np
+
+from stseg.arrays import Bytes, Floats, Ints, Labels, Rows, Singles
+from stseg.errors import FormatError
+from stseg.io.extras import load_extra
+from stseg.io.recording.recording import Recording
+from stseg.io.recording.rigs import parse_rig
+from stseg.io.recording.time_alignment import with_alignment
+from stseg.io.runfile import layout
+from stseg.io.runfile.packed_frames import PackedFrame, PackedFrames
+from stseg.io.runfile.provenance import Provenance, read_provenance
+from stseg.io.runfile.reading.cell_probability import learn_reliability
+from stseg.io.runfile.reading.data_frames import to_data_frame
+from stseg.io.runfile.reading.hdf5_reading import format_errors, read_object
+from stseg.io.runfile.reading.layout_checks import LayoutChecks, lacking_columns, require_bounded_volume
+from stseg.io.runfile.reading.texts import read_attribute, read_texts
+from stseg.io.runfile.reading.value_checks import Bounds, require_fit, require_table
+from stseg.io.runfile.reading.volume import RunVolume
+from stseg.io.toml.text import shown
+from stseg.io.untrusted import limits
+from stseg.io.untrusted.names import EXPECTED_TITLE, is_title, printable
+from stseg.io.untrusted.numbers import parse_whole
+from stseg.io.untrusted.safe_hdf5 import open_hdf5, read_whole
+from stseg.records.cell_reliability import CellReliability
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+    from xarray import Dataset
+
+_SCALES = 8 * limits.FRAMES
+"""Bytes of one scale of the volume."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """The contents of a run file.
+
+    Attributes
+    ----------
+    path
+    scene
+        The scene's name.
+    frame_rate
+        Frames per second.
+    cameras
+        Names; tables count cameras from 0.
+    frames : int64 (time,)
+        Numbers of the frames in the recording.
+    heights, ground_y, ground_x : float64 (plane,), (y,), (x,)
+        Centres of the cells, metres.
+    views : uint8 (plane, y, x)
+        Number of views that see each cell.
+    kept
+        Stored part of the volume: "all", cells near "tracks", or "none".
+    given_names
+        Names of tracks in place of the file's own.
+    """
+
+    path: Path
+    scene: str
+    frame_rate: float
+    cameras: tuple[str, ...]
+    frames: Ints
+    heights: Floats
+    ground_y: Floats
+    ground_x: Floats
+    views: Bytes
+    kept: str = "all"
+    given_names: tuple[tuple[int, str], ...] | None = None
+
+    @cached_property
+    def trajectory(self) -> Rows:
+        """TRAJECTORY (n,)."""
+        return self._table("trajectory")
+
+    @cached_property
+    def tracks(self) -> Rows:
+        """TRACK (n,)."""
+        return self._table("tracks")
+
+    @cached_property
+    def boxes(self) -> Rows:
+        """BOX (n,)."""
+        return self._table("boxes")
+
+    @cached_property
+    def events(self) -> Rows:
+        """EVENT (n,)."""
+        return self._table("events")
+
+    @cached_property
+    def ghosts(self) -> Rows:
+        """CANDIDATE (n,) with `parts`, float32 (views,)."""
+        return self._table("ghosts")
+
+    @cached_property
+    def windows(self) -> Rows:
+        """WINDOW (n,)."""
+        return self._table("windows")
+
+    @cached_property
+    def rates(self) -> Rows:
+        """RATES (n,); empty in a file that has none."""
+        return self._table("rates")
+
+    @cached_property
+    def shifts(self) -> Rows:
+        """SHIFT (n,); empty in a file that has none."""
+        return self._table("shifts")
+
+    @cached_property
+    def timings(self) -> Rows:
+        """TIMING (n,)."""
+        return self._table("timings")
+
+    @cached_property
+    def committed(self) -> Rows:
+        """TRAJECTORY (n,) before identities were decided, ids of the filter; empty in a file that has none."""
+        return self._table("committed")
+
+    @cached_property
+    def committed_events(self) -> Rows:
+        """EVENT (n,) before identities were decided; empty in a file that has none."""
+        return self._table("committed_events")
+
+    @cached_property
+    def appearance(self) -> Rows:
+        """APPEARANCE (n,); empty in a file that has none."""
+        return self._table("appearance")
+
+    @cached_property
+    def answered(self) -> Rows:
+        """ANSWERED (n,): what was answered so far (`stseg correct`); empty in a file that has none."""
+        return self._table("answered")
+
+    @cached_property
+    def known(self) -> Rows:
+        """KNOWN (n,): people of earlier recordings (`stseg run --known`); empty in a file that has none."""
+        return self._table("known")
+
+    @cached_property
+    def names(self) -> dict[int, str]:
+        """Names of tracks by id, where they were given (`stseg correct`, or `with_names`)."""
+        if self.given_names is not None:
+            return dict(self.given_names)
+        return read_object(self.path, layout.PROVENANCE, lambda file: _names(file[layout.PROVENANCE]))
+
+    @cached_property
+    def corrected(self) -> bool:
+        """Whether a person's answers changed its identities (`stseg correct`)."""
+        return read_object(self.path, layout.PROVENANCE, lambda file: "answers" in file[layout.PROVENANCE])
+
+    def with_names(self, names: Mapping[int, str]) -> Run:
+        """The run with other names of its tracks."""
+        return replace(self, given_names=tuple(names.items()))
+
+    @cached_property
+    def provenance(self) -> Provenance:
+        """Configuration, rig, versions and sources of the run."""
+        return read_object(self.path, layout.PROVENANCE, lambda file: read_provenance(file[layout.PROVENANCE]))
+
+    @cached_property
+    def recording(self) -> Recording:
+        """The rig with its grid, and the streams, as at the start of the run."""
+        provenance = self.provenance
+        recording = parse_rig(provenance.rig, provenance.rig_path)
+        cameras = tuple(camera.name for camera in recording.rig.cameras)
+        if cameras != self.cameras or recording.rig.grid.shape != self.views.shape:
+            found = f"{len(cameras)} cameras and a grid of {recording.rig.grid.shape}"
+            expected = f"the run's {len(self.cameras)} cameras and {self.views.shape}"
+            raise FormatError(self.path, f"{layout.PROVENANCE}/rig", found, expected)
+        return with_alignment(recording, [provenance.shown.get(name) for name in self.cameras])
+
+    def require_fit(self) -> None:
+        """Raise FormatError where tables of tracks do not fit each other or the frames."""
+        require_fit(self._bounds, self.trajectory, self.boxes, self.tracks)
+
+    @property
+    def detections(self) -> Rows:
+        """CANDIDATE (m,) with `parts`: the detections of each frame by itself, ghosts left out."""
+        rows: Rows = self.ghosts[self.ghosts["status"] == 1]
+        return rows
+
+    @property
+    def volume(self) -> RunVolume:
+        """The volume, read as it is indexed: `run.volume.log_odds[10:20]`, `run.volume.label[0, 2]`."""
+        shape = len(self.frames), len(self.heights), len(self.ground_y), len(self.ground_x)
+        return RunVolume(self.path, shape)
+
+    def volume_dataset(self) -> Dataset:
+        """The volume as a dataset of xarray, read as it is used: log_odds and label (time, plane, y, x), views.
+
+        Raises
+        ------
+        ConfigError
+            Where xarray or h5netcdf is not installed.
+        """
+        xarray = load_extra("xarray", "xarray")
+        load_extra("h5netcdf", "xarray")
+        return cast(
+            "Dataset", xarray.open_dataset(self.path, engine="h5netcdf", group=layout.OCCUPANCY, phony_dims="access")
+        )
+
+    def data_frame(self, table: str) -> DataFrame:
+        """One of the tables as a data frame of pandas, with `time` in seconds where it has frames.
+
+        Parameters
+        ----------
+        table
+            trajectory, tracks, boxes, events, ghosts, windows, rates, shifts or timings. Texts are strings; the
+            evidence of each view for a candidate is one column a view, `parts_CAMERA`.
+
+        Raises
+        ------
+        ConfigError
+            Where pandas is not installed.
+        """
+        if table not in layout.ABOUT:
+            raise ValueError(f"table {table!r} is none of {', '.join(layout.ABOUT)}")
+        return to_data_frame(getattr(self, table), self.frame_rate, self.cameras)
+
+    def read_frame(self, frame: int) -> tuple[Singles, Labels]:
+        """Volume of one frame.
+
+        Parameters
+        ----------
+        frame
+            Its number in the recording; one of `frames`.
+
+        Returns
+        -------
+        log_odds : float32 (plane, y, x)
+            Nats, NaN where no view sees the cell.
+        label : int32 (plane, y, x)
+            Track ids, 0 for background.
+        """
+        index = int(np.searchsorted(self.frames, frame))
+        if index == len(self.frames) or self.frames[index] != frame:
+            raise ValueError(f"frame {frame} is not in {self.path}")
+        return read_object(self.path, layout.OCCUPANCY, lambda file: _volume(file[layout.OCCUPANCY], index))
+
+    @cached_property
+    def cell_reliability(self) -> CellReliability:
+        """How far the volume's log-odds can be believed: their calibration by the run's own tracks."""
+        return learn_reliability(self)
+
+    def read_cell_probability(self, frame: int) -> Singles:
+        """Probability that a body fills each cell of one frame, float32 (plane, y, x), NaN where no view sees the cell.
+
+        Calibrated: of the cells with 0.8, 80 % are filled. Cells alone are judged; labels know of their neighbours,
+        and of other frames.
+        """
+        return self.cell_reliability.of_cells(self.read_frame(frame)[0])
+
+    def read_packed_frames(self, field: layout.Field, number: int) -> Iterator[PackedFrames]:
+        """The log-odds or labels of all frames, `number` at a time, as they are packed."""
+        with format_errors(self.path, layout.OCCUPANCY), open_hdf5(self.path) as file:
+            dataset = file[layout.OCCUPANCY][field.name]
+            for start in range(0, len(self.frames), number):
+                frames = self.frames[start : start + number]
+                yield PackedFrames(frames, [_packed_chunk(dataset, start + k) for k in range(len(frames))])
+
+    def _table(self, name: str) -> Rows:
+        def take(file: h5py.File) -> Rows:
+            if name in layout.ADDED and name not in file:
+                return np.zeros(0, layout.table_types(len(self.cameras))[name])
+            dtype = layout.table_types(len(self.cameras))[name]
+            return _with_added(read_whole(file[name], limits.ROWS * dtype.itemsize), dtype)
+
+        return require_table(self._bounds, name, read_object(self.path, f"/{name}", take))
+
+    @property
+    def _bounds(self) -> Bounds:
+        return Bounds(self.path, self.frames, len(self.cameras))
+
+
+def _packed_chunk(dataset: h5py.Dataset, index: int) -> PackedFrame:
+    return PackedFrame(*dataset.id.read_direct_chunk((index, 0, 0, 0)))
+
+
+def _with_added(rows: Rows, dtype: np.dtype[np.void]) -> Rows:
+    """Rows of a table with the columns that its first files lack."""
+    if rows.dtype == dtype:
+        return rows
+    whole = np.zeros(len(rows), dtype)
+    for name in dtype.names or ():
+        whole[name] = np.nan if name in lacking_columns(rows.dtype, dtype) else rows[name]
+    return whole
+
+
+def read_run(path: Path | str) -> Run:
+    """Open a run file.
+
+    Raises
+    ------
+    FormatError
+        Where it is no run file, of another version, or lacks what `stseg.io.runfile.layout` promises; it names the
+        object.
+    """
+    return read_object(Path(path), "", lambda file: _checked_run(Path(path), file))
+
+
+def read_trajectory(path: Path) -> Rows:
+    """The TRAJECTORY table of a run file; raises as `read_run` does."""
+    return read_run(path).trajectory
+
+
+def _names(group: h5py.Group) -> dict[int, str]:
+    if "names" not in group:
+        return {}
+    pairs = (text.partition(",") for text in read_texts(group["names"]))
+    names = {parse_whole(identity, 1, limits.FRAMES): name for identity, _, name in pairs}
+    if None in names or not all(map(is_title, names.values())):
+        raise ValueError(f"names of tracks other than id,name with {EXPECTED_TITLE}")
+    return {identity: name for identity, name in names.items() if identity is not None}
+
+
+def _volume(group: h5py.Group, index: int) -> tuple[Singles, Labels]:
+    return group["log_odds"][index].astype(np.float32), group["label"][index]
+
+
+def _checked_run(path: Path, file: h5py.File) -> Run:
+    checks = LayoutChecks(path, file)
+    for name in ("format", "format_version"):
+        checks.require_value("/", name, layout.ROOT_ATTRIBUTES[name])
+    cameras = checks.names("/", "cameras")
+    lengths: dict[str, int] = {}
+    for field in layout.FIELDS:
+        checks.require_field(field, lengths)
+    for name, dtype in layout.table_types(len(cameras)).items():
+        if name in file or name not in layout.ADDED:
+            checks.require_dataset(f"/{name}", dtype, 1)
+    checks.require_provenance()
+    entry, group = checks.require("/entry/title"), file[layout.OCCUPANCY]
+    require_bounded_volume(group)
+    arrays = (read_whole(group[name], _SCALES) for name in ("frame", "plane", "y", "x", "views"))
+    frames, heights, ground_y, ground_x, views = arrays
+    checks.require_rising(frames)
+    for name, axis in (("plane", heights), ("y", ground_y), ("x", ground_x)):
+        checks.require_finite(f"{layout.OCCUPANCY}/{name}", axis)
+    kept = read_attribute(group, "kept") if "kept" in group.attrs else layout.KEPT[0]
+    if kept not in layout.KEPT:
+        raise FormatError(path, f"{layout.OCCUPANCY}@kept", shown(kept), f"one of {', '.join(layout.KEPT)}")
+    title = printable(str(read_texts(entry)))[: limits.NAME]
+    return Run(path, title, checks.frame_rate(), cameras, frames, heights, ground_y, ground_x, views, str(kept))

@@ -1,0 +1,56 @@
+"""Time stamps of all streams in an archive of NumPy, read as untrusted."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from stseg.arrays import Floats
+from stseg.io.outputs.whole_files import replacing
+from stseg.io.recording.recording import Recording
+from stseg.io.recording.source_files import source_parts
+from stseg.io.recording.stream_index import StreamIndex, index_from_times
+from stseg.io.untrusted import limits
+from stseg.io.untrusted.numpy_files import read_npz
+
+_STAMPS = 1 << 32
+"""Bytes of all time stamps, unpacked."""
+
+
+def read_stream_times(path: Path, recording: Recording) -> StreamIndex | None:
+    """The stream index of stored time stamps; None where there are none, or not of this recording."""
+    try:
+        stored = read_npz(path, _STAMPS)
+        times = tuple(tuple(_stamps(stored, k, own)) for k, own in enumerate(_counts(stored)))
+    except (OSError, ValueError):
+        return None
+    expected = [len(source_parts(source.source, "")) for source in recording.sources]
+    return index_from_times(recording, times) if list(map(len, times)) == expected else None
+
+
+def write_stream_times(path: Path, streams: StreamIndex) -> None:
+    """Store the time stamps of all streams, whole or not at all."""
+    times = {f"times{k}_{j}": own for k, files in enumerate(streams.times) for j, own in enumerate(files)}
+    files = np.array([len(own) for own in streams.times], np.int64)
+    with replacing(path, overwrite=True) as part, part.open("wb") as file:
+        np.savez_compressed(file, files=files, **times)  # type: ignore[arg-type]
+
+
+def _counts(stored: Any) -> list[int]:
+    """Number of files of each camera; ValueError where the archive does not say it."""
+    files = stored.get("files")
+    if files is None or files.ndim != 1 or files.dtype != np.int64 or not 0 < len(files) <= limits.CAMERAS:
+        raise ValueError("no numbers of files")
+    if (files < 1).any() or files.max() > limits.MEMBERS:
+        raise ValueError("numbers of files that cannot be")
+    return [int(count) for count in files]
+
+
+def _stamps(stored: Any, camera: int, files: int) -> list[Floats]:
+    """The time stamps of one camera's files; ValueError where they are none."""
+    found = [stored.get(f"times{camera}_{file}") for file in range(files)]
+    if any(own is None or own.ndim != 1 or own.dtype != np.float64 or len(own) > limits.FRAMES for own in found):
+        raise ValueError("no time stamps")
+    return [np.array(own, float) for own in found]

@@ -1,0 +1,63 @@
+"""Whole files from outside, read within a bound; pipes and devices are refused rather than waited for."""
+
+from __future__ import annotations
+
+import json
+import os
+import stat
+from pathlib import Path
+
+from stseg.io.untrusted import limits
+
+
+def read_bytes(path: Path, most: int = limits.TEXT_FILE) -> bytes:
+    """The bytes of a regular file.
+
+    Raises
+    ------
+    OSError
+        Where it cannot be read.
+    ValueError
+        Where it is no regular file, or longer than `most`; the message is one line.
+    """
+    with os.fdopen(os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0)), "rb") as file:
+        state = os.fstat(file.fileno())
+        if stat.S_ISDIR(state.st_mode):
+            raise IsADirectoryError(21, "Is a directory")
+        if not stat.S_ISREG(state.st_mode):
+            raise ValueError("what is no regular file")
+        data = file.read(most + 1)
+    if len(data) > most:
+        raise ValueError(f"more than {most} bytes")
+    return data
+
+
+def read_text(path: Path, most: int = limits.TEXT_FILE) -> str:
+    """A text in UTF-8, a byte-order mark left out; raises as `read_bytes` does, and UnicodeDecodeError."""
+    return read_bytes(path, most).decode("utf-8-sig")
+
+
+def require_regular(path: Path) -> None:
+    """Raise OSError where a path is missing or a folder, and ValueError where it is neither file nor folder."""
+    mode = path.stat().st_mode
+    if stat.S_ISDIR(mode):
+        raise IsADirectoryError(21, "Is a directory")
+    if not stat.S_ISREG(mode):
+        raise ValueError("what is no regular file")
+
+
+def parse_json(text: str | bytes) -> object:
+    """A JSON value; ValueError, of one line, for anything else, deep nesting and numbers of thousands of digits."""
+    try:
+        value: object = json.loads(text)
+    except RecursionError as error:
+        raise ValueError("brackets nested too deeply") from error
+    return value
+
+
+def is_regular(path: Path) -> bool:
+    """Whether a path is a regular file and no link."""
+    try:
+        return stat.S_ISREG(os.lstat(path).st_mode)
+    except (OSError, ValueError):
+        return False

@@ -1,0 +1,72 @@
+"""The tracked people and their particles."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stseg.arrays import Flags, Floats, Ints
+from stseg.baselines.kim_davis_2006.appearance import Appearance
+
+
+@dataclass(frozen=True)
+class Crowd:
+    """Tracked people.
+
+    Attributes
+    ----------
+    ids, seen : int64 (n,)
+        Track ids, and the last frame in which each was detected.
+    height : float64 (n,)
+        Metres.
+    ground, covariance : float64 (n, 2), (n, 2, 2)
+        Estimate of the last frame, metres.
+    particles : float64 (particle, n, 2)
+        Joint hypotheses of all places, metres.
+    appearances
+        Colour model of each person.
+    """
+
+    ids: Ints
+    seen: Ints
+    height: Floats
+    ground: Floats
+    covariance: Floats
+    particles: Floats
+    appearances: tuple[Appearance, ...]
+
+    @classmethod
+    def empty(cls, particles: int) -> Crowd:
+        """No people, with a number of particles."""
+        none = np.zeros(0, np.int64)
+        return cls(none, none, np.zeros(0), np.zeros((0, 2)), np.zeros((0, 2, 2)), np.zeros((particles, 0, 2)), ())
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+    @property
+    def reference(self) -> Floats:
+        """q* of every person, float64 (n, part, bin)."""
+        none = np.zeros((0, *Appearance.unknown().reference.shape))
+        return np.concatenate([none, *(one.reference[None] for one in self.appearances)])
+
+    def kept(self, which: Flags) -> Crowd:
+        """The chosen people, bool (n,)."""
+        appearances = tuple(one for one, stays in zip(self.appearances, which, strict=True) if stays)
+        return Crowd(
+            self.ids[which], self.seen[which], self.height[which], self.ground[which], self.covariance[which],
+            self.particles[:, which], appearances,
+        )  # fmt: skip
+
+    def joined_with(self, others: Crowd) -> Crowd:
+        """These, then others, concatenated."""
+        return Crowd(
+            np.append(self.ids, others.ids),
+            np.append(self.seen, others.seen),
+            np.append(self.height, others.height),
+            np.concatenate([self.ground, others.ground]),
+            np.concatenate([self.covariance, others.covariance]),
+            np.concatenate([self.particles, others.particles], 1),
+            self.appearances + others.appearances,
+        )

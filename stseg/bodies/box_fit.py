@@ -1,0 +1,109 @@
+"""Fit of boxes to pillars, and occlusion of pillars by each other.
+
+A box is compared with the box of the pillar, both clipped to the image: its middle, its width, its upper edge, and its
+lower edge, whose tolerance is larger where the box ends early, because nearer people and furniture hide feet. They all
+differ from detector to detector, and are learned (`stseg.noise.box_noise_estimate`).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stseg.arrays import Floats
+from stseg.kernels.accelerate import kernel, part
+
+MIDDLE, WIDE, HEAD, LATE, EARLY = range(5)
+"""Compared quantities of a box: middle, width, upper edge, lower edge below the feet, and above them."""
+TOLERANCE = np.array([0.06, 0.15, 0.045, 0.06, 0.24])
+"""Their standard deviations in a box of score 1 before learning, shares of the body's height."""
+_PIXELS = np.array([2.0, 2.0, 2.0, 2.0, 8.0])
+"""Quantisation of a detector's grid beside them, pixels."""
+GRAIN = _PIXELS / TOLERANCE
+"""The same as pixels added to the height of which tolerances are shares: a sharper detector's grid is finer, too."""
+FAR = 4.5
+"""Offsets of the middle beyond this many tolerances exclude a match."""
+LEAST_HEIGHT = 8.0
+"""Shares are taken of at least this height, pixels."""
+
+
+@part
+def half_square(body: Floats, box: Floats, tolerance: Floats, width: float, height: float) -> float:
+    """Half the squared Mahalanobis distance of a box from a pillar's box, both left, top, right, bottom in pixels.
+
+    `tolerance` float64 (5,) holds standard deviations, shares of the body's height in the image and its grain.
+    """
+    left, right = min(max(body[0], 0.0), width - 1.0), min(max(body[2], 0.0), width - 1.0)
+    if right <= left:
+        return np.inf
+    tall = max(body[3] - body[1], LEAST_HEIGHT)
+    middle = ((left + right) - (box[0] + box[2])) / 2.0 / (tall + GRAIN[MIDDLE]) / tolerance[MIDDLE]
+    if not abs(middle) <= FAR:  # most pairs are decided here
+        return np.inf
+    _, wide, head, feet = _offsets(body, box, width, height)
+    if np.isnan(wide):
+        return np.inf
+    wide /= tolerance[WIDE]
+    head /= tolerance[HEAD]
+    feet /= tolerance[EARLY if feet > 0 else LATE]
+    return float(0.5 * (middle * middle + wide * wide + head * head + feet * feet))
+
+
+@kernel
+def fill_offsets(bodies: Floats, boxes: Floats, width: float, height: float, offsets: Floats) -> None:
+    """Fill offsets (n, 4): how far each box (n, 4) is from its pillar's (n, 4): middle, width, upper and lower edge.
+
+    Shares as the tolerances of `half_square`; nan where the pillar is not in the image.
+    """
+    for i in range(len(bodies)):
+        offsets[i] = _offsets(bodies[i], boxes[i], width, height)
+
+
+@part
+def _offsets(body: Floats, box: Floats, width: float, height: float) -> tuple[float, float, float, float]:
+    left, right = min(max(body[0], 0.0), width - 1.0), min(max(body[2], 0.0), width - 1.0)
+    top, bottom = min(max(body[1], 0.0), height - 1.0), min(max(body[3], 0.0), height - 1.0)
+    if right <= left or bottom <= top:
+        return np.nan, np.nan, np.nan, np.nan
+    tall = max(body[3] - body[1], LEAST_HEIGHT)
+    return (
+        ((left + right) - (box[0] + box[2])) / 2.0 / (tall + GRAIN[MIDDLE]),
+        ((right - left) - (box[2] - box[0])) / (tall + GRAIN[WIDE]),
+        (top - box[1]) / (tall + GRAIN[HEAD]),
+        (bottom - box[3]) / (tall + GRAIN[LATE]),
+    )
+
+
+@kernel
+def fill_match(
+    bodies: Floats, boxes: Floats, tolerance: Floats, belief: Floats, width: float, height: float, match: Floats
+) -> None:
+    """Fill match (candidate, box): log-likelihood of each box (n, 4) given each pillar's box (candidate, 4)."""
+    for i in range(len(bodies)):
+        for b in range(len(boxes)):
+            match[i, b] = -np.inf
+            if not np.isnan(bodies[i, 0]):
+                match[i, b] = belief[b] - half_square(bodies[i], boxes[b], tolerance[b], width, height)
+
+
+@kernel
+def fill_own_match(
+    bodies: Floats, boxes: Floats, tolerance: Floats, belief: Floats, width: float, height: float, match: Floats
+) -> None:
+    """Fill match (n, pillar): log-likelihood of each box (n, 4) given each of its own pillars' boxes (n, pillar, 4)."""
+    for j in range(len(boxes)):
+        for i in range(bodies.shape[1]):
+            match[j, i] = -np.inf
+            if not np.isnan(bodies[j, i, 0]):
+                match[j, i] = belief[j] - half_square(bodies[j, i], boxes[j], tolerance[j], width, height)
+
+
+@kernel
+def fill_inside(bodies: Floats, width: float, height: float, inside: Floats) -> None:
+    """Fill inside (candidate,): the share of each pillar's box (candidate, 4) that lies in the image."""
+    for i in range(len(bodies)):
+        inside[i] = 0.0
+        if not np.isnan(bodies[i, 0]):
+            wide = min(bodies[i, 2], width) - max(bodies[i, 0], 0.0)
+            tall = min(bodies[i, 3], height) - max(bodies[i, 1], 0.0)
+            whole = (bodies[i, 2] - bodies[i, 0]) * (bodies[i, 3] - bodies[i, 1])
+            inside[i] = max(wide, 0.0) * max(tall, 0.0) / whole

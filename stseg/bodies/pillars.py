@@ -1,0 +1,148 @@
+"""Projection of standing bodies into a view: boxes and outlines of pillars, from one table of projected points.
+
+A body is a pillar of revolution: discs whose radius changes with the relative height (feet, trunk, head). A lattice of
+ground points is projected once at some levels; between them pixels are interpolated, linearly in x, y and height, so
+that a lens or a tilt bends the pillar as it bends the image. A disc projects to an ellipse by the Jacobian of that map.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from stseg.arrays import Floats, Singles
+from stseg.geometry.camera import Camera
+from stseg.geometry.grid import Grid
+from stseg.kernels.accelerate import kernel
+
+LEVELS = np.linspace(0.0, 2.2, 12)
+"""Heights at which the lattice is projected, metres."""
+PROFILE = np.array([[0.0, 0.13], [0.25, 0.15], [0.5, 0.21], [0.8, 0.23], [0.88, 0.13], [1.0, 0.08]])
+"""Relative height and radius (metres) of a body's discs, as detectors draw boxes: with a margin above the head."""
+SILHOUETTE = np.array([[0.0, 0.13], [0.25, 0.15], [0.5, 0.20], [0.8, 0.22], [0.86, 0.11], [0.95, 0.10], [1.0, 0.02]])
+"""The same as pixels show it: the head closes at the crown, also where the camera looks down on it."""
+WIDTH = 2 * float(SILHOUETTE[:, 1].max())
+"""Width of that silhouette across shoulders and arms, metres. Wider people are wider at all heights."""
+
+
+@dataclass(frozen=True)
+class BodyTable:
+    """Projected lattice of one view.
+
+    Attributes
+    ----------
+    origin, step
+        Ground position of the first lattice point and the lattice's spacing, metres.
+    pixel : float32 (level, y, x, 2)
+        Pixel of each lattice point at each level; nan where the camera does not see it.
+    size
+        Width and height of the image, pixels.
+    """
+
+    origin: tuple[float, float]
+    step: float
+    pixel: Singles
+    size: tuple[int, int]
+
+    @classmethod
+    def of(cls, camera: Camera, grid: Grid, step: float = 0.12, margin: float = 0.6) -> BodyTable:
+        """The table of `camera` over the grid's rectangle and `margin` metres around it."""
+        x = np.arange(grid.x[0] - margin, grid.x[1] + margin + step, step)
+        y = np.arange(grid.y[0] - margin, grid.y[1] + margin + step, step)
+        ground = np.stack(np.meshgrid(x, y), -1)
+        pixel = np.full((len(LEVELS), len(y), len(x), 2), np.nan, np.float32)
+        for k, level in enumerate(LEVELS):
+            place, ahead = camera.project(ground, float(level))
+            pixel[k] = np.where(ahead[..., None], place, np.nan)
+        return cls((float(x[0]), float(y[0])), step, pixel, camera.size)
+
+    def boxes(self, ground: Floats, heights: Floats) -> Floats:
+        """Boxes of pillars in this view.
+
+        Parameters
+        ----------
+        ground : float64 (n, 2)
+            Places, metres.
+        heights : float64 (h,)
+            Body heights, metres.
+
+        Returns
+        -------
+        float64 (h, n, 4)
+            left, top, right, bottom in pixels, not clipped to the image; nan where the view cannot see the place.
+        """
+        return np.stack([self.boxes_of(ground, np.full(len(ground), height)) for height in heights])
+
+    def boxes_of(self, ground: Floats, heights: Floats) -> Floats:
+        """Boxes of pillars with a height each, ground (n, 2) and heights (n,) in metres; float64 (n, 4), pixels."""
+        filled = np.full((len(ground), 4), np.nan)
+        place, tall = np.ascontiguousarray(ground, float), np.asarray(heights, float)
+        _fill_boxes(self.pixel, place, self.origin, tall, LEVELS[1], self.step, PROFILE, filled)
+        return filled
+
+    def discs(self, ground: Floats, height: float) -> Floats:
+        """The discs of one pillar: centre u, v and the Jacobian times radius (2x2), float64 (disc, 6)."""
+        filled = np.full((len(PROFILE), 6), np.nan)
+        lattice = (np.asarray(ground, float) - self.origin) / self.step
+        fill_discs(self.pixel, lattice[0], lattice[1], height, LEVELS[1], self.step, PROFILE, filled)
+        return filled
+
+
+@kernel
+def fill_discs(
+    pixel: Singles,
+    lattice_x: float,
+    lattice_y: float,
+    height: float,
+    level_step: float,
+    step: float,
+    profile: Floats,
+    filled: Floats,
+) -> None:
+    """Fill filled (disc, 6) with each disc's centre u, v and its Jacobian times radius, pixels."""
+    levels, rows, columns, _ = pixel.shape
+    column = min(max(int(np.floor(lattice_x)), 0), columns - 2)
+    row = min(max(int(np.floor(lattice_y)), 0), rows - 2)
+    a, b = lattice_x - column, lattice_y - row
+    for k in range(len(profile)):
+        z = profile[k, 0] * height / level_step
+        level = min(max(int(np.floor(z)), 0), levels - 2)
+        c = z - level
+        for axis in range(2):
+            p00 = pixel[level, row, column, axis] * (1 - c) + pixel[level + 1, row, column, axis] * c
+            p01 = pixel[level, row, column + 1, axis] * (1 - c) + pixel[level + 1, row, column + 1, axis] * c
+            p10 = pixel[level, row + 1, column, axis] * (1 - c) + pixel[level + 1, row + 1, column, axis] * c
+            p11 = pixel[level, row + 1, column + 1, axis] * (1 - c) + pixel[level + 1, row + 1, column + 1, axis] * c
+            filled[k, axis] = (p00 * (1 - a) + p01 * a) * (1 - b) + (p10 * (1 - a) + p11 * a) * b
+            radius = profile[k, 1] / step
+            filled[k, 2 + 2 * axis] = ((p01 - p00) * (1 - b) + (p11 - p10) * b) * radius
+            filled[k, 3 + 2 * axis] = ((p10 - p00) * (1 - a) + (p11 - p01) * a) * radius
+
+
+@kernel
+def _fill_boxes(
+    pixel: Singles,
+    ground: Floats,
+    origin: tuple[float, float],
+    heights: Floats,
+    level_step: float,
+    step: float,
+    profile: Floats,
+    filled: Floats,
+) -> None:
+    discs = np.empty((len(profile), 6))
+    for i in range(len(ground)):
+        x, y = (ground[i, 0] - origin[0]) / step, (ground[i, 1] - origin[1]) / step
+        fill_discs(pixel, x, y, heights[i], level_step, step, profile, discs)
+        left, top, right, bottom = np.inf, np.inf, -np.inf, -np.inf
+        seen = True
+        for k in range(len(profile)):
+            wide = math.sqrt(discs[k, 2] * discs[k, 2] + discs[k, 3] * discs[k, 3])
+            tall = math.sqrt(discs[k, 4] * discs[k, 4] + discs[k, 5] * discs[k, 5])
+            seen = seen and not np.isnan(wide + tall)
+            left, right = min(left, discs[k, 0] - wide), max(right, discs[k, 0] + wide)
+            top, bottom = min(top, discs[k, 1] - tall), max(bottom, discs[k, 1] + tall)
+        if seen:
+            filled[i, 0], filled[i, 1], filled[i, 2], filled[i, 3] = left, top, right, bottom

@@ -1,0 +1,252 @@
+"""Alternation of correspondence and bundle adjustment: endpoints of all views to cameras on one ground."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from stseg.arrays import Floats, Ints
+from stseg.calibration.automatic.correspondence import Correspondences, match_endpoints
+from stseg.calibration.automatic.endpoint_paths import path_of
+from stseg.calibration.automatic.endpoints import Endpoints
+from stseg.calibration.automatic.floor_features import Marks
+from stseg.calibration.automatic.single_view import FORWARD, axis_of_foot, view_of_upright
+from stseg.calibration.automatic.view_alignment import Alignment, ViewPaths
+from stseg.calibration.automatic.view_merging import MergedViews
+from stseg.calibration.bundle_adjustment import Adjustment, Parameters, Problem, adjust, same_make
+from stseg.calibration.pinhole import CLOCK, height_of_head, moved
+
+_GATES = (0.8, 0.6, 0.5, 0.5, 0.5)
+"""Correspondence gate of each round, metres."""
+ROUNDS = len(_GATES)
+_MOST_POINTS = 1200
+_HEIGHTS = 0.08
+"""Standard deviation of body height between people, metres."""
+_BOB = 0.03
+"""Standard deviation of the head height of one walking person, metres."""
+_LEAST_SPREAD = np.array([[0.02, 0.02], [0.004, 0.003]])
+"""Least standard deviations of feet and heads, along and across, in body lengths."""
+_TRACE = 0.3
+"""Least standard deviation of an endpoint, pixels."""
+_CLOCKS, _SAME_CLOCK = 0.2, 1e-4
+"""Standard deviations of residual clock offsets, of unknown and of known delays, seconds."""
+_MOST_MARKS = 800
+_MARK_PIXELS = 1.5
+"""Standard deviation of a floor feature, pixels: it is located in a plan, where distant ground is stretched."""
+_STEP_SECONDS = 0.5
+"""Duration of a step, within which endpoint errors are correlated, seconds."""
+
+
+@dataclass(frozen=True)
+class CalibrationInput:
+    """Input of the calibration from people.
+
+    Attributes
+    ----------
+    endpoints
+        Endpoints of isolated people, one entry a camera.
+    sizes
+        Width and height of the images, pixels.
+    frame_rate
+        Frames per second of all streams.
+    person_height
+        Mean body height, metres.
+    most_delay
+        Greatest delay of one stream against another, seconds; 0 where all are synchronous.
+    """
+
+    endpoints: tuple[Endpoints, ...]
+    sizes: tuple[tuple[int, int], ...]
+    frame_rate: float
+    person_height: float
+    most_delay: float
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Cameras on one ground.
+
+    Attributes
+    ----------
+    adjustment
+        Result of the last adjustment.
+    problem
+        Its observations.
+    delay : int64 (view,)
+        A stream's own frame = the recording's frame + delay.
+    """
+
+    adjustment: Adjustment
+    problem: Problem
+    delay: Ints
+
+
+def single_view_cameras(views: CalibrationInput, progress: Callable[[], None]) -> list[Floats]:
+    """Self-calibrate each view on a ground of its own, float64 (12,) each."""
+    single_cameras = []
+    for endpoints, size in zip(views.endpoints, views.sizes, strict=True):
+        single_cameras.append(view_of_upright(endpoints, size, views.person_height)[0])
+        progress()
+    return single_cameras
+
+
+def view_paths(views: CalibrationInput, single_cameras: Sequence[Floats]) -> list[ViewPaths]:
+    """Ground paths of each view's people, on its own ground."""
+    paths = []
+    for endpoints, size, view in zip(views.endpoints, views.sizes, single_cameras, strict=True):
+        place = axis_of_foot(view, size, endpoints.foot, FORWARD)
+        paths.append(ViewPaths(endpoints.frame, place[:, 0] + 1j * place[:, 1], path_of(endpoints, views.frame_rate)))
+    return paths
+
+
+def placed_views(single_cameras: Sequence[Floats], merged: MergedViews) -> Floats:
+    """All cameras on the ground of the first view, float64 (view, 12)."""
+    return np.array([_placed(view, merged.placed[k]) for k, view in enumerate(single_cameras)])
+
+
+def _placed(view: Floats, way: Alignment) -> Floats:
+    back = way.inverse
+    shift = np.array([back.shift.real, back.shift.imag])
+    return moved(view, float(np.angle(back.factor)), shift, abs(back.factor))
+
+
+def refine(views: CalibrationInput, start: Floats, delay: Ints, progress: Callable[[], None]) -> Solution:
+    """Alternate correspondence and bundle adjustment, with shrinking gates.
+
+    Parameters
+    ----------
+    views
+        Endpoints and image sizes.
+    start : float64 (view, 12)
+        Initial cameras.
+    delay : int64 (view,)
+        Initial delays: a stream's own frame = the recording's frame + delay.
+    progress
+        Called after each round.
+    """
+    parameters = Parameters(start, np.array([FORWARD, 0.0]), np.zeros((0, 3)))
+    spread = np.array([[0.07, 0.05], [0.03, 0.03]])
+    for gate in _GATES:
+        clock = parameters.views[:, CLOCK] - np.median(parameters.views[:, CLOCK])
+        delay_frames = np.rint(clock * views.frame_rate).astype(np.int64)
+        delay = delay + delay_frames - delay_frames[0]
+        parameters.views[:, CLOCK] -= delay_frames / views.frame_rate
+        solution = _turn(views, parameters, delay, gate, spread)
+        parameters = solution.adjustment.parameters
+        spread = _spread(solution)
+        progress()
+    return solution
+
+
+def _turn(views: CalibrationInput, parameters: Parameters, delay: Ints, gate: float, spread: Floats) -> Solution:
+    ground = [
+        axis_of_foot(view, size, endpoints.foot, float(parameters.toe_offset[0] + 0.5 * parameters.toe_offset[1]))
+        for view, size, endpoints in zip(parameters.views, views.sizes, views.endpoints, strict=True)
+    ]
+    matched = match_endpoints(views.endpoints, delay, ground, gate, views.frame_rate)
+    matched = matched.of(_spread_out(matched))
+    known = len(parameters.points) > 0
+    height = _heights(views, parameters, matched) if known else np.full(len(matched.frame), views.person_height)
+    problem = Problem(
+        np.array(views.sizes),
+        matched,
+        _floored(matched, spread),
+        height,
+        _BOB if known else _HEIGHTS,
+        _redundancy(matched, views),
+        _CLOCKS if views.most_delay else _SAME_CLOCK,
+        same_make(parameters.views, np.array(views.sizes)),
+        np.ones(len(matched.view)),
+    )
+    points = np.column_stack([matched.ground, height])
+    return Solution(adjust(Parameters(parameters.views, parameters.toe_offset, points), problem), problem, delay)
+
+
+def refine_with_marks(views: CalibrationInput, solution: Solution, marks: Marks) -> Solution:
+    """Repeat the adjustment with floor features as additional points."""
+    if not len(marks):
+        return solution
+    problem, parameters = solution.problem, solution.adjustment.parameters
+    fine = marks.of(np.unique(np.linspace(0, len(marks) - 1, min(_MOST_MARKS, len(marks))).astype(np.int64)))
+    joint = _with_marks(problem, fine)
+    points = np.concatenate(
+        [parameters.points, np.column_stack([fine.ground, np.full(len(fine), views.person_height)])]
+    )
+    adjustment = adjust(replace(parameters, points=points), joint)
+    people, observations = len(parameters.points), len(problem.correspondences.view)
+    parameters = replace(adjustment.parameters, points=adjustment.parameters.points[:people])
+    return Solution(
+        replace(adjustment, parameters=parameters, residual=adjustment.residual[:observations]), problem, solution.delay
+    )
+
+
+def _with_marks(problem: Problem, marks: Marks) -> Problem:
+    """The problem with two observations of each floor feature, of which only the foot has weight."""
+    correspondences, count = problem.correspondences, len(marks)
+    pixel = marks.pixel.reshape(-1, 2)
+    foot = np.array([_MARK_PIXELS * np.sqrt(problem.redundancy)] * 2)
+    matched = Correspondences(
+        np.concatenate([correspondences.frame, np.zeros(count, np.int64)]),
+        np.concatenate([correspondences.ground, marks.ground]),
+        np.concatenate([correspondences.velocity, np.zeros((count, 2))]),
+        np.concatenate([correspondences.person, np.full(count, -1, np.int64)]),
+        np.concatenate([correspondences.point, len(correspondences.frame) + np.repeat(np.arange(count), 2)]),
+        np.concatenate([correspondences.view, marks.view.ravel()]),
+        np.concatenate([correspondences.foot, pixel]),
+        np.concatenate([correspondences.head, pixel - [0.0, 1.0]]),  # a person one pixel tall: lengths are pixels
+    )
+    return replace(
+        problem,
+        correspondences=matched,
+        spread=np.concatenate([problem.spread, np.tile([foot, [np.inf, np.inf]], (2 * count, 1, 1))]),
+        height=np.concatenate([problem.height, np.full(count, float(problem.height.mean()))]),
+        body=np.concatenate([problem.body, np.zeros(2 * count)]),
+    )
+
+
+def _spread_out(matched: Correspondences) -> Ints:
+    """Subset of the points for the adjustment, spread over all frames."""
+    return np.unique(np.linspace(0, len(matched.frame) - 1, min(_MOST_POINTS, len(matched.frame))).astype(np.int64))
+
+
+def _heights(views: CalibrationInput, parameters: Parameters, matched: Correspondences) -> Floats:
+    """Body height of each point's track, shrunk towards the mean, metres, float64 (n,)."""
+    observations: list[list[float]] = [[] for _ in range(int(matched.person.max(initial=-1)) + 1)]
+    for view, (size, camera) in enumerate(zip(views.sizes, parameters.views, strict=True)):
+        rows = np.flatnonzero(matched.view == view)
+        heights = height_of_head(camera, size, matched.head[rows], matched.ground[matched.point[rows]])
+        for person, metres in zip(matched.person[matched.point[rows]], heights, strict=True):
+            observations[person].append(metres)
+    mean = np.array([np.nanmedian(several) if np.isfinite(several).any() else np.nan for several in observations])
+    count = np.array([np.isfinite(several).sum() for several in observations])
+    # Shrinkage: with few observations the height stays near the population mean.
+    share = count / (count + 20.0)
+    heights = np.where(np.isfinite(mean), share * mean + (1 - share) * views.person_height, views.person_height)
+    weight = count[matched.person] / np.maximum(np.bincount(matched.person)[matched.person], 1)
+    heights *= views.person_height / np.average(heights[matched.person], weights=np.maximum(weight, 1e-9))
+    return np.asarray(heights[matched.person])
+
+
+def _redundancy(matched: Correspondences, views: CalibrationInput) -> float:
+    """Observations of a person within one step."""
+    frames = max(len(np.unique(matched.frame)), 1)
+    rate = views.frame_rate * frames / max(int(np.ptp(matched.frame)) + 1 if len(matched.frame) else 1, 1)
+    return max(1.0, rate * _STEP_SECONDS)
+
+
+def _floored(matched: Correspondences, spread: Floats) -> Floats:
+    """Standard deviations of each observation, in body lengths, not below the pixel floor."""
+    length = np.hypot(*(matched.foot - matched.head).T)
+    return np.asarray(np.maximum(spread, (_TRACE / length)[:, None, None]))
+
+
+def _spread(solution: Solution) -> Floats:
+    """Robust standard deviation of feet and heads along and across, in body lengths.
+
+    The three parameters of each point reduce the residuals; the degrees of freedom correct for it.
+    """
+    residual = solution.adjustment.residual
+    free = 1.0 - 3 * len(solution.adjustment.parameters.points) / max(4 * len(residual), 1)
+    return np.asarray(np.maximum(1.4826 * np.nanmedian(np.abs(residual), axis=0) / np.sqrt(free), _LEAST_SPREAD))

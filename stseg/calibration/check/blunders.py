@@ -1,0 +1,177 @@
+"""Blunders of a recording rather than of a camera's pose: swapped streams and delayed streams."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+
+from stseg.arrays import Floats
+from stseg.bodies.pillars import BodyTable
+from stseg.calibration.check.box_correspondence import (
+    GATE,
+    BoxCorrespondences,
+    concatenated,
+    match_boxes,
+    mismatch,
+    wholly_visible,
+)
+from stseg.calibration.check.leave_one_out import edge_residuals, locate
+from stseg.calibration.check.verdict import LEAST
+from stseg.geometry import Rig
+
+BoxesByFrame = Mapping[int, Sequence[Floats]]
+"""Boxes of every view, float64 (n, 4), by frame."""
+_BETTER = 1.3
+"""Least ratio of fitting boxes, after swapping two streams to before."""
+_CLOSE = 0.35
+"""Distance, in gates, within which a box fits a person located by all views."""
+_NEARER = 0.75
+"""Share of the misfit that a delay may leave for the stream to count as delayed."""
+
+
+@dataclass(frozen=True)
+class StreamDelay:
+    """A view whose stream is delayed.
+
+    Attributes
+    ----------
+    view
+        Index in the rig.
+    frames
+        Delay in frames; negative where the stream runs early.
+    """
+
+    view: int
+    frames: int
+
+
+def match_frames(
+    rig: Rig, tables: Sequence[BodyTable], boxes_by_frame: BoxesByFrame, frames: Sequence[int]
+) -> BoxCorrespondences:
+    """Correspondences of several frames, see `match_boxes`."""
+    none = BoxCorrespondences(np.zeros(0, np.int64), np.zeros((0, 2)), np.zeros(0), np.zeros((0, len(tables), 4)))
+    return concatenated([none, *(match_boxes(rig, tables, frame, boxes_by_frame[frame]) for frame in frames)])
+
+
+def find_swapped_streams(
+    rig: Rig,
+    tables: Sequence[BodyTable],
+    boxes_by_frame: BoxesByFrame,
+    frames: Sequence[int],
+    people: BoxCorrespondences,
+) -> tuple[int, int] | None:
+    """Two views whose streams fit far better when swapped: the best pair with images of one size.
+
+    Parameters
+    ----------
+    rig
+    tables
+        See `tables_of`.
+    boxes_by_frame
+    frames
+        Frames to use.
+    people
+        Correspondences in those frames under the rig as it is.
+
+    Returns
+    -------
+    (view, view), or None
+    """
+    best, pair = _BETTER * max(_fitting_boxes(tables, people), LEAST), None
+    for first, second in combinations(range(len(tables)), 2):
+        if rig.cameras[first].size != rig.cameras[second].size:
+            continue
+        order = list(range(len(tables)))
+        order[first], order[second] = second, first
+        turned = {frame: [boxes_by_frame[frame][view] for view in order] for frame in frames}
+        fits = _fitting_boxes(tables, match_frames(rig, tables, turned, frames))
+        if fits > best:
+            best, pair = fits, (first, second)
+    return pair
+
+
+def _fitting_boxes(tables: Sequence[BodyTable], people: BoxCorrespondences) -> int:
+    """Number of boxes close to their person's body as located by all views."""
+    views = len(tables)
+    located = locate(people, tables, range(views), min(3, views))
+    measured = np.isfinite(located.height)
+    count = 0
+    for view, table in enumerate(tables):
+        residual, known, pixel_height = edge_residuals(
+            table, located.ground[measured], located.height[measured], people.box[measured, view]
+        )
+        with np.errstate(invalid="ignore"):
+            off = np.hypot(residual[:, 0], residual[:, 1]) / pixel_height
+            count += int((known[:, :2].all(axis=1) & (off < _CLOSE * GATE)).sum())
+    return count
+
+
+def find_stream_delay(
+    tables: Sequence[BodyTable], boxes_by_frame: BoxesByFrame, people: BoxCorrespondences, most: int
+) -> StreamDelay | None:
+    """The view whose boxes fit the others best at a different time; None where each fits best undelayed.
+
+    Parameters
+    ----------
+    tables
+    boxes_by_frame
+        Boxes of all frames, without gaps.
+    people
+        Correspondences in some of them.
+    most
+        Largest delay in either direction, frames.
+    """
+    clearest, found = _NEARER, None
+    shifts = range(-most, most + 1)
+    for view in range(len(tables)):
+        others = [other for other in range(len(tables)) if other != view]
+        located = locate(people, tables, others, min(2, len(others)))
+        known = replace(people, ground=located.ground, height=located.height)
+        misfit = np.array([_misfit(tables[view], view, boxes_by_frame, known, shift) for shift in shifts])
+        if not np.isfinite(misfit).all():
+            continue
+        best = int(misfit.argmin())
+        if misfit[best] < clearest * misfit[most]:
+            clearest, found = float(misfit[best] / misfit[most]), StreamDelay(view, shifts[best])
+    return found
+
+
+def without_delay(boxes_by_frame: BoxesByFrame, one: StreamDelay, size: int) -> dict[int, list[Floats]]:
+    """The boxes with one view's delay undone; no boxes where its stream has ended."""
+    nothing = [np.zeros((0, 4))] * size
+    return {
+        frame: [
+            boxes_by_frame.get(frame + one.frames, nothing)[view] if view == one.view else own
+            for view, own in enumerate(boxes)
+        ]
+        for frame, boxes in boxes_by_frame.items()
+    }
+
+
+def _misfit(table: BodyTable, view: int, boxes_by_frame: BoxesByFrame, people: BoxCorrespondences, shift: int) -> float:
+    """Scatter of the nearest boxes `shift` frames later around a plane over the ground, in body heights.
+
+    The plane is removed because a displaced or turned camera has one too, whatever its delay.
+    """
+    inside = wholly_visible(table, people.ground, people.height)
+    offsets, places = [np.zeros((0, 2))], [np.zeros((0, 2))]
+    for frame in np.unique(people.frame[inside]).tolist():
+        own = np.flatnonzero(inside & (people.frame == frame))
+        boxes = boxes_by_frame.get(frame + shift)
+        if boxes is None or not len(boxes[view]):
+            continue
+        apart = mismatch(table, people.ground[own], people.height[own], boxes[view])
+        met = np.isfinite(apart.min(axis=1))
+        nearest = boxes[view][apart.argmin(axis=1)[met]]
+        residual, _, pixel_height = edge_residuals(table, people.ground[own[met]], people.height[own[met]], nearest)
+        offsets.append(residual[:, :2] / pixel_height[:, None])
+        places.append(people.ground[own[met]])
+    together, ground = np.concatenate(offsets), np.concatenate(places)
+    if len(together) < LEAST:
+        return np.nan
+    basis = np.column_stack([np.ones(len(ground)), ground])
+    rest = together - basis @ np.linalg.lstsq(basis, together)[0]
+    return float(np.median(np.hypot(*rest.T)))

@@ -1,0 +1,196 @@
+"""Correspondence of boxes between views: people on the ground, and the box of each in every view.
+
+Every box proposes a ground point: under its feet or, since these may be hidden, under its head at a common height. Each
+candidate is compared with the boxes of the other views, and candidates are selected greedily by the number and quality
+of confirmations. Gates are wide (half a metre), so that a displaced view still takes part.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from stseg.arrays import Flags, Floats, Ints
+from stseg.bodies.pillars import BodyTable
+from stseg.geometry import Camera, Grid, Rig
+
+_COMMON = 1.70
+"""Height assumed for a head whose feet may be hidden, metres."""
+_SHORTEST, _TALLEST = 1.35, 2.10
+GATE = 0.35
+"""Association gate: distance of a box's middle and top from the body's, in body heights (about 0.6 m)."""
+_HIDDEN = 0.6
+"""Share of a body's height that may be hidden at the feet."""
+_WIDTHS = (0.4, 2.0)
+"""Least and greatest width of a single person's box, in body widths."""
+_BORDER = 2.0
+"""Distance from the image border within which a box counts as cut, pixels."""
+_MARGIN = 0.5
+"""Margin around the area in which candidates are kept, metres."""
+
+
+@dataclass(frozen=True)
+class BoxCorrespondences:
+    """People of some frames with the box of each in every view.
+
+    Attributes
+    ----------
+    frame : int64 (n,)
+    ground : float64 (n, 2)
+        Metres.
+    height : float64 (n,)
+        Metres.
+    box : float64 (n, view, 4)
+        left, top, right, bottom in pixels; nan where a view has no box of the person.
+    """
+
+    frame: Ints
+    ground: Floats
+    height: Floats
+    box: Floats
+
+    def __len__(self) -> int:
+        return len(self.frame)
+
+    @property
+    def seen(self) -> Flags:
+        """Whether each view has a box of each person, bool (n, view)."""
+        return np.asarray(np.isfinite(self.box[..., 0]))
+
+
+def tables_of(rig: Rig) -> list[BodyTable]:
+    """Body tables of all views, with a margin around the grid."""
+    return [BodyTable.of(camera, rig.grid, margin=1.5) for camera in rig.cameras]
+
+
+def match_boxes(rig: Rig, tables: Sequence[BodyTable], frame: int, boxes: Sequence[Floats]) -> BoxCorrespondences:
+    """Match the boxes of one frame between views; people seen by at least two are kept.
+
+    Parameters
+    ----------
+    rig
+    tables
+        See `tables_of`.
+    frame
+        Frame number.
+    boxes
+        For each view float64 (b, 4), left, top, right, bottom in pixels.
+    """
+    ground, height = _candidates(rig, boxes)
+    views = len(boxes)
+    residual, which = np.full((len(ground), views), np.inf), np.full((len(ground), views), -1)
+    for view, (table, own) in enumerate(zip(tables, boxes, strict=True)):
+        if len(own) and len(ground):
+            apart = mismatch(table, ground, height, own)
+            which[:, view], residual[:, view] = apart.argmin(axis=1), apart.min(axis=1)
+    selected = _greedy_selection(residual, which)
+    box = np.full((len(selected), views, 4), np.nan)
+    for row, (candidate, confirmed) in enumerate(selected):
+        for view in confirmed.tolist():
+            box[row, view] = boxes[view][which[candidate, view]]
+    chosen = np.array([candidate for candidate, _ in selected], np.int64)
+    return BoxCorrespondences(np.full(len(selected), frame, np.int64), ground[chosen], height[chosen], box)
+
+
+def concatenated(found: Sequence[BoxCorrespondences]) -> BoxCorrespondences:
+    """Concatenate the correspondences of one or more frames."""
+    parts = [(one.frame, one.ground, one.height, one.box) for one in found]
+    return BoxCorrespondences(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+
+
+def mismatch(table: BodyTable, ground: Floats, height: Floats, boxes: Floats) -> Floats:
+    """Distance between boxes and bodies in one view, in gates; infinite from 1 on.
+
+    Parameters
+    ----------
+    table
+        The view.
+    ground : float64 (n, 2), height : float64 (n,)
+        Metres.
+    boxes : float64 (b, 4)
+        Pixels.
+
+    Returns
+    -------
+    float64 (n, b)
+    """
+    body = table.boxes_of(ground, height)
+    pixel_height = (body[:, 3] - body[:, 1])[:, None]
+    wide = (body[:, 2] - body[:, 0])[:, None]
+    with np.errstate(invalid="ignore"):
+        middle = np.abs(body[:, None, [0, 2]].mean(-1) - boxes[None, :, [0, 2]].mean(-1)) / pixel_height
+        top = np.abs(body[:, None, 1] - boxes[None, :, 1]) / pixel_height
+        early = (body[:, None, 3] - boxes[None, :, 3]) / pixel_height
+        widths = (boxes[:, 2] - boxes[:, 0])[None] / wide
+        off = np.hypot(middle, top) / GATE
+        fits = (off < 1) & (early < _HIDDEN) & (early > -GATE) & (widths > _WIDTHS[0]) & (widths < _WIDTHS[1])
+    inside = _inside(body, table.size)[:, None]
+    return np.where(fits & inside, off, np.inf)
+
+
+def wholly_visible(table: BodyTable, ground: Floats, height: Floats) -> Flags:
+    """Whether a body is wholly inside a view's image, bool (n,)."""
+    body = table.boxes_of(ground, height)
+    with np.errstate(invalid="ignore"):
+        return np.asarray((body[:, :2] > 1).all(axis=1) & (body[:, 2:] < np.array(table.size) - 2).all(axis=1))
+
+
+def _inside(body: Floats, size: tuple[int, int]) -> Flags:
+    """Whether head and sides are inside the image, bool (n,)."""
+    with np.errstate(invalid="ignore"):
+        return np.asarray((body[:, 0] > 0) & (body[:, 2] < size[0] - 1) & (body[:, 1] > 0) & (body[:, 1] < size[1] - 1))
+
+
+def _candidates(rig: Rig, boxes: Sequence[Floats]) -> tuple[Floats, Floats]:
+    """Candidate ground points and heights of the boxes, float64 (n, 2) and (n,)."""
+    grounds, heights = [np.zeros((0, 2))], [np.zeros(0)]
+    for camera, own in zip(rig.cameras, boxes, strict=True):
+        if not len(own):
+            continue
+        middle = own[:, [0, 2]].mean(axis=1)
+        whole = own[:, 3] < camera.size[1] - 1 - _BORDER
+        foot = camera.back_project(np.stack([middle, own[:, 3]], -1))
+        height = np.where(whole, height_of(camera, foot, middle, own[:, 1]), np.nan)
+        by_head = camera.back_project(np.stack([middle, own[:, 1]], -1), _COMMON)
+        grounds += [foot, by_head]
+        heights += [height, np.full(len(own), _COMMON)]
+    ground, height = np.concatenate(grounds), np.concatenate(heights)
+    with np.errstate(invalid="ignore"):
+        kept = (height > _SHORTEST) & (height < _TALLEST) & _in_area(ground, rig.grid)
+    return ground[kept], height[kept]
+
+
+def height_of(camera: Camera, ground: Floats, u: Floats, top: Floats) -> Floats:
+    """Height of a person at a ground point with the head at row `top`, metres, float64 (n,)."""
+    head = np.stack([u, top], -1)
+    ideal = head if camera.lens is None else camera.lens.undistort(head)
+    foot = np.concatenate([ground, np.ones((len(ground), 1))], 1) @ camera.ground.T
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(
+            (foot[:, 1] - ideal[:, 1] * foot[:, 2]) / (ideal[:, 1] * camera.vertical[2] - camera.vertical[1])
+        )
+
+
+def _in_area(ground: Floats, grid: Grid) -> Flags:
+    x, y = ground[:, 0], ground[:, 1]
+    return np.asarray(
+        (x > grid.x[0] - _MARGIN) & (x < grid.x[1] + _MARGIN) & (y > grid.y[0] - _MARGIN) & (y < grid.y[1] + _MARGIN)
+    )
+
+
+def _greedy_selection(residual: Floats, which: Ints) -> list[tuple[int, Ints]]:
+    """Greedy selection of candidates, the best confirmed first, with the views that confirm each; no box twice."""
+    score = np.where(residual < 1, 1 - np.minimum(residual, 1) ** 2, 0.0)
+    selected: list[tuple[int, Ints]] = []
+    while True:
+        total = np.where((score > 0).sum(axis=1) > 1, score.sum(axis=1), 0.0)
+        if not total.any():
+            return selected
+        best = int(total.argmax())
+        confirmed = np.flatnonzero(score[best] > 0)
+        selected.append((best, confirmed))
+        for view in confirmed.tolist():
+            score[which[:, view] == which[best, view], view] = 0
+        score[best] = 0

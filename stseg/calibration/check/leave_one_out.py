@@ -1,0 +1,113 @@
+"""Leave-one-out residuals: boxes of one view against people located by the other views.
+
+Ground point and height of a person are a robust least-squares fit (Cauchy loss) to the middle, upper and lower edges of
+its boxes, in standard deviations of a box's edges. Residuals in the view that was left out are metres at the person,
+across the line of sight, so that near and far views are comparable.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from stseg.arrays import Flags, Floats
+from stseg.bodies.pillars import BodyTable
+from stseg.calibration.check.box_correspondence import BoxCorrespondences
+
+_SIDE, _HEAD, _FEET, _PIXELS = 0.06, 0.045, 0.06, 2.0
+"""Standard deviations of a box's middle, upper and lower edge as shares of the body's height, and pixels added to each
+(a detector's grid, a blob's fringe)."""
+_HEIGHT, _HEIGHT_SPREAD = 1.70, 0.15
+_ROUNDS = 6
+_STEP = 0.02
+"""Step of the finite differences, metres."""
+
+
+@dataclass(frozen=True)
+class GroundEstimate:
+    """Ground points and heights estimated from some of the views.
+
+    Attributes
+    ----------
+    ground : float64 (n, 2)
+        Metres; nan where too few views see the person.
+    height : float64 (n,)
+        Metres.
+    """
+
+    ground: Floats
+    height: Floats
+
+
+def locate(people: BoxCorrespondences, tables: Sequence[BodyTable], views: Sequence[int], least: int) -> GroundEstimate:
+    """Locate people from the given views, where at least `least` of them have a box of the person."""
+    ground, height = people.ground.copy(), np.clip(people.height, 1.4, 2.0)
+    boxes = people.box[:, list(views)]
+    chosen = [tables[view] for view in views]
+    enough = np.isfinite(boxes[..., 0]).sum(axis=1) >= least
+    for _ in range(_ROUNDS):
+        here = np.column_stack([ground, height])
+        residual = _edge_residuals(chosen, boxes, here)
+        slope = np.stack(
+            [
+                (_edge_residuals(chosen, boxes, here + move) - _edge_residuals(chosen, boxes, here - move))
+                / (2 * _STEP)
+                for move in _STEP * np.eye(3)
+            ],
+            -1,
+        )
+        weight = np.where(
+            np.isfinite(residual) & np.isfinite(slope).all(-1), 1 / (1 + np.nan_to_num(residual) ** 2 / 4), 0.0
+        )
+        residual, slope = np.nan_to_num(residual), np.nan_to_num(slope)
+        normal = np.einsum("nk,nka,nkb->nab", weight, slope, slope) + 1e-6 * np.eye(3)
+        normal[:, 2, 2] += 1 / _HEIGHT_SPREAD**2
+        push = np.einsum("nk,nka,nk->na", weight, slope, residual)
+        push[:, 2] += (height - _HEIGHT) / _HEIGHT_SPREAD**2
+        step = np.clip(-np.linalg.solve(normal, push[..., None])[..., 0], -0.5, 0.5)
+        ground, height = ground + step[:, :2], np.clip(height + step[:, 2], 1.2, 2.2)
+    return GroundEstimate(np.where(enough[:, None], ground, np.nan), np.where(enough, height, np.nan))
+
+
+def _edge_residuals(tables: Sequence[BodyTable], boxes: Floats, here: Floats) -> Floats:
+    """Normalised residuals of middle, upper and lower edges in all views, float64 (n, 3 view); nan where unknown."""
+    parts = []
+    for k, table in enumerate(tables):
+        residual, known, pixel_height = edge_residuals(table, here[:, :2], here[:, 2], boxes[:, k])
+        spread = np.stack([_SIDE * pixel_height, _HEAD * pixel_height, _FEET * pixel_height], -1) + _PIXELS
+        parts.append(np.where(known, residual / spread, np.nan))
+    return np.concatenate(parts, axis=1)
+
+
+def edge_residuals(table: BodyTable, ground: Floats, height: Floats, box: Floats) -> tuple[Floats, Flags, Floats]:
+    """Residuals of boxes against predicted bodies in one view.
+
+    Parameters
+    ----------
+    table
+    ground : float64 (n, 2), height : float64 (n,)
+        Metres.
+    box : float64 (n, 4)
+        left, top, right, bottom, pixels.
+
+    Returns
+    -------
+    residual : float64 (n, 3)
+        Box minus body, pixels: middle (right positive), upper edge and lower edge (down positive).
+    known : bool (n, 3)
+        Where the image's border cuts neither box nor body.
+    pixel_height : float64 (n,)
+        Height of the body, pixels.
+    """
+    body = table.boxes_of(ground, height)
+    width, rows = table.size
+    with np.errstate(invalid="ignore"):
+        middle = box[:, [0, 2]].mean(1) - body[:, [0, 2]].mean(1)
+        residual = np.stack([middle, box[:, 1] - body[:, 1], box[:, 3] - body[:, 3]], -1)
+        sides = (np.minimum(box[:, 0], body[:, 0]) > 1) & (np.maximum(box[:, 2], body[:, 2]) < width - 2)
+        head = np.minimum(box[:, 1], body[:, 1]) > 1
+        feet = np.maximum(box[:, 3], body[:, 3]) < rows - 2
+    known = np.stack([sides, head, feet], -1) & np.isfinite(residual)
+    return residual, known, body[:, 3] - body[:, 1]

@@ -1,0 +1,174 @@
+"""Check of a rig against the boxes of its recording, and the verdict as text."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from stseg.bodies.pillars import BodyTable
+from stseg.calibration.check.blunders import (
+    BoxesByFrame,
+    StreamDelay,
+    find_stream_delay,
+    find_swapped_streams,
+    match_frames,
+    without_delay,
+)
+from stseg.calibration.check.box_correspondence import BoxCorrespondences, tables_of, wholly_visible
+from stseg.calibration.check.verdict import LEAST, Disagreement, Verdict, judge
+from stseg.geometry import Rig
+
+_MOST = 80
+"""Greatest number of frames in use, evenly spread."""
+_LATE = 1.0
+"""Largest stream delay that is tested, seconds."""
+_FAR = 1.5
+"""Displacement, in cells, from which swapped streams are tested."""
+_LOST = 0.6
+"""Share of the median confirmation rate below which a view counts as lost."""
+
+
+@dataclass(frozen=True)
+class Check:
+    """Result of a rig check.
+
+    Attributes
+    ----------
+    verdict
+        Disagreement of each view with the others.
+    confirmed : tuple of float
+        Share of the people inside each view's image (by the others) that it has a box of; nan where there are few.
+    lost : tuple of int
+        Views that confirm almost no person of the others.
+    swapped
+        Two views whose streams are swapped.
+    delays
+        Delayed streams; the verdict holds with their delays undone.
+    people
+        Number of people (a person in a frame counts once) that two views or more show.
+    """
+
+    verdict: Verdict
+    confirmed: tuple[float, ...]
+    lost: tuple[int, ...]
+    swapped: tuple[int, int] | None
+    delays: tuple[StreamDelay, ...]
+    people: int
+
+    @property
+    def sound(self) -> bool:
+        """Whether no fault was found."""
+        return not (self.verdict.named or self.verdict.unresolved or self.lost or self.swapped or self.delays)
+
+
+def check_rig(rig: Rig, boxes_by_frame: BoxesByFrame) -> Check:
+    """Compare each view with the others.
+
+    Parameters
+    ----------
+    rig
+    boxes_by_frame
+        Boxes of every view in consecutive frames, see `isolated_boxes`.
+    """
+    tables, frames = tables_of(rig), spread(sorted(boxes_by_frame))
+    people = match_frames(rig, tables, boxes_by_frame, frames)
+    share = confirmations(tables, people)
+    lost = tuple(int(view) for view in np.flatnonzero(share < _LOST * np.nanmedian(share))) if _known(share) else ()
+    verdict = judge(rig, tables, people)
+    far = any(one.off > _FAR * rig.grid.cell for one in verdict.named)
+    swapped = (
+        find_swapped_streams(rig, tables, boxes_by_frame, frames, people) if lost or far or not _known(share) else None
+    )
+    if swapped is not None:
+        return Check(Verdict((None,) * len(tables), (), None), tuple(share.tolist()), (), swapped, (), len(people))
+    shifted: list[StreamDelay] = []
+    most = max(1, round(_LATE * rig.frame_rate))
+    while (
+        len(shifted) < len(tables) // 2 and (one := find_stream_delay(tables, boxes_by_frame, people, most)) is not None
+    ):
+        shifted.append(one)
+        boxes_by_frame = without_delay(boxes_by_frame, one, len(tables))
+        people = match_frames(rig, tables, boxes_by_frame, frames)
+    if shifted:
+        verdict, share = judge(rig, tables, people), confirmations(tables, people)
+    return Check(verdict, tuple(share.tolist()), lost, None, tuple(shifted), len(people))
+
+
+def spread(frames: Sequence[int]) -> list[int]:
+    """At most `_MOST` frames, evenly spread."""
+    if len(frames) <= _MOST:
+        return list(frames)
+    return [frames[k] for k in np.rint(np.linspace(0, len(frames) - 1, _MOST)).astype(int)]
+
+
+def confirmations(
+    tables: Sequence[BodyTable], people: BoxCorrespondences
+) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+    """Confirmation rate of each view: share of people seen by two others that it shows; nan where there are few."""
+    share = np.full(len(tables), np.nan)
+    for view, table in enumerate(tables):
+        inside = wholly_visible(table, people.ground, people.height)
+        others = np.delete(people.seen, view, axis=1).sum(axis=1) >= min(2, len(tables) - 1)
+        if (inside & others).sum() >= LEAST:
+            share[view] = people.seen[inside & others, view].mean()
+    return share
+
+
+def _known(share: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> bool:
+    return bool(np.isfinite(share).sum() > 1)
+
+
+def verdict_text(rig: Rig, check: Check) -> list[str]:
+    """The verdict as sentences; the first says whether the rig is sound."""
+    names = [camera.name for camera in rig.cameras]
+    sentences = []
+    if check.swapped is not None:
+        pair = " and ".join(names[view] for view in check.swapped)
+        sentences.append(f"{pair} seem to be swapped: their frames fit far better the other way round")
+    for one in check.delays:
+        side = "late" if one.frames > 0 else "early"
+        sentences.append(
+            f"{names[one.view]} runs {abs(one.frames)} frames {side}: add {-one.frames} to its offset in the rig file"
+        )
+    sentences += [disagreement_text(names[one.view], one) for one in check.verdict.named if one.view not in check.lost]
+    for view in check.lost:
+        if check.swapped is None:
+            usual = 100 * float(np.nanmedian(check.confirmed))
+            sentences.append(
+                f"{names[view]} shows only {100 * check.confirmed[view]:.0f} % of the people whom others see within "
+                f"its image (usual: {usual:.0f} %): it is off by more than half a metre, blind, or not this camera's "
+                "stream"
+            )
+    if check.verdict.unresolved is not None:
+        first_view, second_view = check.verdict.unresolved
+        sentences.append(
+            f"{names[first_view.view]} and {names[second_view.view]} disagree by {100 * first_view.off:.0f} cm: two "
+            "views alone do not tell which of them is off"
+        )
+    silent = [name for name, one in zip(names, check.verdict.views, strict=True) if one is None]
+    if silent and check.swapped is None:
+        sentences.append(f"too few people stand alone before {', '.join(silent)} to judge (fewer than {LEAST})")
+    if not sentences:
+        worst = max((one for one in check.verdict.views if one is not None), key=lambda one: one.off)
+        sentences.append(
+            f"the views agree: none is off by more than a cell ({100 * rig.grid.cell:.0f} cm); "
+            f"{names[worst.view]} most, by {100 * worst.off:.0f} cm"
+        )
+    return sentences
+
+
+def disagreement_text(name: str, one: Disagreement) -> str:
+    """Sentence on a displaced view."""
+    feet = f"feet {100 * one.feet:.0f} cm ({one.pixels:.0f} px, {100 * one.ground:.0f} cm on the ground)"
+    ways = []
+    if abs(one.right) > 0.03:
+        ways.append(f"{100 * abs(one.right):.0f} cm to the {'right' if one.right > 0 else 'left'}")
+    if abs(one.down) > 0.03:
+        ways.append(f"{100 * abs(one.down):.0f} cm {'down' if one.down > 0 else 'up'}")
+    where = f", on the whole {' and '.join(ways)}" if ways else ", in different directions (turned?)"
+    return (
+        f"{name} is off: of {one.people} people it shows {feet} and heads {100 * one.heads:.0f} cm "
+        f"from where the others say{where}"
+    )

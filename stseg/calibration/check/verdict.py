@@ -1,0 +1,295 @@
+"""Disagreement of each view with the others, and which views are displaced.
+
+Leave-one-out residuals are smoothed over the ground by a plane for the middle, the heads and the feet each, which shows
+a turned or tilted camera as well as a shifted one. A component common to all views (a box's edges lie beyond a body's)
+is removed. A view is reported when it is off by more than a cell and when correcting it, among the most displaced ones,
+makes all views agree best; the others are judged after the correction.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from stseg.arrays import Floats
+from stseg.bodies.pillars import BodyTable
+from stseg.calibration.check.box_correspondence import BoxCorrespondences, wholly_visible
+from stseg.calibration.check.leave_one_out import edge_residuals, locate
+from stseg.geometry import Camera, Rig
+
+LEAST = 20
+"""Least number of people (a person in a frame counts once) for a statement on a view."""
+_ROUNDS = 15
+_FEET, _HIDDEN = 2, 0.35
+"""Column of the feet, and the weight of a lower edge above them: others and furniture hide feet."""
+_SUSPECTS = 3
+"""Number of the most displaced views that are tried as the cause."""
+
+
+@dataclass(frozen=True)
+class Disagreement:
+    """Disagreement of one view with the others.
+
+    Attributes
+    ----------
+    view
+        Index in the rig.
+    others
+        Number of views it was compared with.
+    people
+        Number of people compared (a person in a frame counts once).
+    confirmed
+        Share of the people inside its image that it shows.
+    feet, heads
+        Root mean square of the smoothed disagreement across the line of sight at feet and heads, metres.
+    right, down
+        Its mean at the feet: the view's people against the others', metres.
+    scatter
+        Robust standard deviation around the smoothed disagreement, metres.
+    ground
+        Root mean square distance of the feet on the ground, metres.
+    pixels
+        The same in the view's image.
+    """
+
+    view: int
+    others: int
+    people: int
+    confirmed: float
+    feet: float
+    heads: float
+    right: float
+    down: float
+    scatter: float
+    ground: float
+    pixels: float
+
+    @property
+    def off(self) -> float:
+        """Displacement likely due to the view itself, the larger of feet and heads, metres.
+
+        Where every view errs by s, one of them and the mean of m others are s sqrt(1 + 1 / m) apart.
+        """
+        return max(self.feet, self.heads) / math.sqrt(1 + 1 / self.others)
+
+
+@dataclass(frozen=True)
+class _RawDisagreement:
+    """Disagreement of one view before the common component is removed.
+
+    Attributes
+    ----------
+    planes
+        Smoothed over the ground.
+    field : float64 (n, 3)
+        The same of each person: middle to the right, head and feet downwards, metres across the line of sight.
+    scale : float64 (n,)
+        Pixels a metre at each person.
+    slope : float64 (n, 2, 2)
+        Ground metres a pixel at each person's feet.
+    """
+
+    view: int
+    others: int
+    confirmed: float
+    planes: _Planes
+    field: Floats
+    scatter: float
+    scale: Floats
+    slope: Floats
+
+    @property
+    def mean(self) -> Floats:
+        return np.asarray(self.field.mean(axis=0))
+
+    def without(self, shared: Floats) -> Disagreement:
+        """The disagreement without the component common to all views (a row of `field`)."""
+        field = self.field - shared
+        feet = field[:, [0, 2]] * self.scale[:, None]
+        moved = (self.slope @ feet[..., None])[..., 0]
+        right, down = field[:, [0, 2]].mean(axis=0).tolist()
+        return Disagreement(
+            view=self.view,
+            others=self.others,
+            people=len(field),
+            confirmed=self.confirmed,
+            feet=_size(field[:, [0, 2]]),
+            heads=_size(field[:, [0, 1]]),
+            right=right,
+            down=down,
+            scatter=self.scatter,
+            ground=_size(moved),
+            pixels=_size(feet),
+        )
+
+
+def _raw_disagreement(
+    camera: Camera, tables: Sequence[BodyTable], people: BoxCorrespondences, view: int, others: Sequence[int]
+) -> _RawDisagreement | None:
+    located = locate(people, tables, others, min(2, len(others)))
+    residual, known, pixel_height = edge_residuals(tables[view], located.ground, located.height, people.box[:, view])
+    with np.errstate(invalid="ignore"):
+        across = np.where(known, residual / pixel_height[:, None] * located.height[:, None], np.nan)
+    inside = wholly_visible(tables[view], located.ground, located.height)
+    measured = np.isfinite(across[:, 0])
+    if measured.sum() < LEAST:
+        return None
+    confirmed = float(people.seen[inside, view].mean()) if inside.any() else 0.0
+    ground = located.ground[measured]
+    planes = _smooth(ground, across[measured])
+    field = planes.at(ground)
+    scatter = 1.4826 * float(np.nanmedian(np.abs(across[measured, 0] - field[:, 0])))
+    slope = np.asarray(np.linalg.inv(_slope(camera, ground)), float)
+    return _RawDisagreement(
+        view, len(others), confirmed, planes, field, scatter, pixel_height[measured] / located.height[measured], slope
+    )
+
+
+@dataclass(frozen=True)
+class _Planes:
+    """Planes over the ground, one for each of several columns.
+
+    Attributes
+    ----------
+    middle : float64 (2,)
+        Metres.
+    found : float64 (3, column)
+        Value at `middle`, slope along x, slope along y.
+    """
+
+    middle: Floats
+    found: Floats
+
+    def at(self, ground: Floats) -> Floats:
+        """Values at places (n, 2), float64 (n, column)."""
+        return np.asarray(np.column_stack([np.ones(len(ground)), ground - self.middle]) @ self.found)
+
+
+def _smooth(ground: Floats, across: Floats) -> _Planes:
+    """Least absolute deviations planes (by reweighting) of middles, heads and feet (n, 3), nan where unknown."""
+    middle = np.median(ground, axis=0)
+    basis = np.column_stack([np.ones(len(ground)), ground - middle])
+    found = np.zeros((3, across.shape[1]))
+    for column in range(across.shape[1]):
+        measured = np.isfinite(across[:, column])
+        if measured.sum() < LEAST:
+            continue
+        own, value, weight = basis[measured], across[measured, column], np.ones(int(measured.sum()))
+        for _ in range(_ROUNDS):
+            normal = (own * weight[:, None]).T @ own + np.diag([0.0, 1e-3, 1e-3])
+            found[:, column] = np.linalg.solve(normal, (own * weight[:, None]).T @ value)
+            rest = value - own @ found[:, column]
+            hidden = _HIDDEN if column == _FEET else 1.0
+            weight = np.where(rest < 0, hidden, 1.0) / np.maximum(np.abs(rest), 0.01)
+    return _Planes(middle, found)
+
+
+def _slope(camera: Camera, ground: Floats) -> Floats:
+    """Jacobian of pixels in the ground point, pixels a metre, float64 (n, 2, 2)."""
+    step = 0.01
+    columns = [
+        (camera.project(ground + move, 0.0)[0] - camera.project(ground - move, 0.0)[0]) / (2 * step)
+        for move in step * np.eye(2)
+    ]
+    return np.stack(columns, -1)
+
+
+def _size(moves: Floats) -> float:
+    return float(np.sqrt(np.mean(np.sum(moves**2, axis=1))))
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Displaced views of a rig.
+
+    Attributes
+    ----------
+    views
+        Disagreement of each view, in the rig's order; None where people are too few.
+    named
+        Displaced views, the worst first.
+    unresolved
+        Two views that disagree where there is no third to decide.
+    """
+
+    views: tuple[Disagreement | None, ...]
+    named: tuple[Disagreement, ...]
+    unresolved: tuple[Disagreement, Disagreement] | None
+
+
+def judge(rig: Rig, tables: Sequence[BodyTable], people: BoxCorrespondences) -> Verdict:
+    """Find the views that are displaced by more than a cell."""
+    first = current = _all_raw_disagreements(rig, tables, people)
+    named: list[Disagreement] = []
+    while len(_known(current)) > 2 and _worst(current) > rig.grid.cell and len(named) < len(rig.cameras) - 2:
+        unnamed = [one for one in _known(current) if one.view not in {other.view for other in named}]
+        suspects = sorted(unnamed, key=lambda one: -one.off)[:_SUSPECTS]
+        trials = []
+        for suspect in suspects:
+            corrected = _corrected(people, tables[suspect.view], current[suspect.view])
+            after = _all_raw_disagreements(rig, tables, corrected)
+            trials.append((_spread(after), suspect, corrected, after))
+        if not trials:
+            break
+        _, worst, people, current = min(trials, key=lambda trial: trial[0])
+        if worst.off <= rig.grid.cell:
+            break
+        named.append(worst)
+    whole = _known(first)
+    unresolved = (whole[0], whole[1]) if len(whole) == 2 and _worst(first) > rig.grid.cell else None
+    return Verdict(tuple(_without_shared(first)), tuple(named), unresolved)
+
+
+def _all_raw_disagreements(
+    rig: Rig, tables: Sequence[BodyTable], people: BoxCorrespondences
+) -> list[_RawDisagreement | None]:
+    views = range(len(rig.cameras))
+    return [
+        _raw_disagreement(rig.cameras[view], tables, people, view, [o for o in views if o != view]) for view in views
+    ]
+
+
+def _without_shared(raw: Sequence[_RawDisagreement | None]) -> list[Disagreement | None]:
+    """Disagreements without the common component, which needs three views or more."""
+    known = [one.mean for one in raw if one is not None]
+    shared = _common(np.array(known)) if len(known) > 2 else np.zeros(3)
+    return [None if one is None else one.without(shared) for one in raw]
+
+
+def _common(means: Floats) -> Floats:
+    """Common component of rows (n, 3): medians of heads and feet, which differ between boxes and bodies.
+
+    Sideways, the smallest value where all have one sign: two cameras that face each other share a displacement.
+    """
+    right = means[:, 0]
+    shared = np.median(means, axis=0)
+    shared[0] = np.abs(right).min() * np.sign(right[0]) if np.abs(np.sign(right).sum()) == len(right) else 0.0
+    return np.asarray(shared)
+
+
+def _known(raw: Sequence[_RawDisagreement | None]) -> list[Disagreement]:
+    return [one for one in _without_shared(raw) if one is not None]
+
+
+def _corrected(people: BoxCorrespondences, table: BodyTable, raw: _RawDisagreement | None) -> BoxCorrespondences:
+    """The correspondences with one view's disagreement removed from its boxes."""
+    if raw is None:
+        return people
+    body = table.boxes_of(people.ground, people.height)
+    scale = (body[:, 3] - body[:, 1]) / people.height
+    right, head, feet = (raw.planes.at(people.ground) * scale[:, None]).T
+    box = people.box.copy()
+    box[:, raw.view] -= np.stack([right, head, right, feet], -1)
+    return replace(people, box=box)
+
+
+def _worst(raw: Sequence[_RawDisagreement | None]) -> float:
+    return max((one.off for one in _known(raw)), default=0.0)
+
+
+def _spread(raw: Sequence[_RawDisagreement | None]) -> float:
+    """Root mean square over the views."""
+    return float(np.sqrt(np.mean([one.off**2 for one in _known(raw)])))

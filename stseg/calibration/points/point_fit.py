@@ -1,0 +1,276 @@
+"""One camera from measured points: robust least squares of its homography and vertical.
+
+The start is the direct linear transform, or MAGSAC++ where its points agree better (Barath et al., CVPR 2020, OpenCV).
+A Cauchy loss on the reprojection errors in the distorted image finds outliers; the result is least squares over the
+inliers.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import cv2
+import numpy as np
+from scipy.optimize import OptimizeResult, least_squares
+
+from stseg.arrays import Flags, Floats
+from stseg.calibration.points.known_intrinsics import Pinhole, fit_pinhole
+from stseg.calibration.points.point_requirements import require_ground, require_right_handed, require_upright
+from stseg.errors import CalibrationError
+from stseg.geometry import Camera, Grid, Lens
+from stseg.geometry.fits import (
+    fit_homography,
+    fit_vertical,
+    focal_of_square_pixels,
+    middle_matrix,
+    vertical_of_matrix,
+)
+
+VerticalFrom = Literal["points", "lens", "square pixels"]
+"""Source of the vertical."""
+_CLICK = 1.0
+"""Least standard deviation of a clicked pixel, pixels."""
+_MAGSAC = 3.0
+"""Greatest noise scale of MAGSAC++, pixels."""
+_OUT = 4.0
+"""Outlier threshold, robust standard deviations."""
+_WORSE = 1.5
+"""Greatest ratio of noise variances, pose to free homography, for the pose to be preferred."""
+_FEW = 5
+"""Number of points up to which none is rejected."""
+
+
+@dataclass(frozen=True)
+class Points:
+    """Measured points and their pixels in one camera.
+
+    Attributes
+    ----------
+    pixel : float64 (n, 2)
+    ground : float64 (n, 2)
+        Metres.
+    height : float64 (n,)
+        Metres above the ground.
+    """
+
+    pixel: Floats
+    ground: Floats
+    height: Floats
+
+    @property
+    def low(self) -> Flags:
+        """Points on the ground, bool (n,)."""
+        return np.asarray(self.height == 0)
+
+
+@dataclass(frozen=True)
+class PointFit:
+    """A fitted camera with its residuals and uncertainty.
+
+    Attributes
+    ----------
+    camera
+    points
+        Input of the fit.
+    vertical_from
+        "lens" (its camera matrix) or "square pixels" (centred principal point) where the points agree with it or too
+        few are above the ground; else "points" above the ground.
+    off_pixel : float64 (n,)
+        Reprojection error of each point, pixels.
+    off_ground : float64 (n,)
+        The same in the plane at the point's height, metres; nan above the horizon.
+    out : bool (n,)
+        Outliers.
+    parameters : float64 (k,), covariance : float64 (k, k)
+        The homography row by row, then the vertical where points determine it; up to scale.
+    """
+
+    camera: Camera
+    points: Points
+    vertical_from: VerticalFrom
+    off_pixel: Floats
+    off_ground: Floats
+    out: Flags
+    parameters: Floats
+    covariance: Floats
+
+    def ground_deviation(self, grid: Grid) -> Floats:
+        """Uncertainty of each ground cell, propagated from the fit's covariance.
+
+        Returns
+        -------
+        float64 (y, x)
+            Standard deviation along the worst direction, metres; nan where the camera does not see the ground.
+        """
+        camera, ground = self.camera, grid.ground
+        pixel, ahead = camera.project(ground, 0.0)
+        seen = ahead & camera.inside(pixel) & grid.inside()
+        deviation = np.full(seen.shape, np.nan)
+        if seen.any():
+            level = np.zeros(int(seen.sum()))
+            by_parameters = _slope(self.parameters, ground[seen], level, camera.lens)
+            moved = np.linalg.solve(_ground_slope(camera, ground[seen]), by_parameters)
+            spread = moved @ self.covariance @ np.swapaxes(moved, 1, 2)
+            deviation[seen] = np.sqrt(np.linalg.eigvalsh(spread)[:, -1])
+        return deviation
+
+
+def fit_points(name: str, size: tuple[int, int], points: Points, lens: Lens | None = None) -> PointFit:
+    """Fit a camera to at least four points on the ground, and optionally points above it.
+
+    Parameters
+    ----------
+    name, size
+        The camera's name, width and height of its image in pixels.
+    points
+        Two or more above the ground determine any camera; with fewer, the camera matrix of the lens is used, or
+        square pixels and a centred principal point are assumed.
+    lens
+        The lens, where it is known.
+
+    Raises
+    ------
+    CalibrationError
+        Where the points determine no camera: fewer than four on the ground, collinear, mirrored, or seen from straight
+        above with no point above the ground.
+    """
+    require_ground(name, points.ground[points.low], points.pixel[points.low])
+    ideal = points.pixel if lens is None else lens.undistort(points.pixel)
+    if not np.isfinite(ideal).all():
+        found = points.pixel[~np.isfinite(ideal).all(axis=1)][0].tolist()
+        raise CalibrationError(f"camera {name}", "points", f"a pixel {found} beyond its lens's field of view", "others")
+    start = _start(points, ideal)
+    high = ~points.low
+    vertical_from: VerticalFrom = "points" if high.sum() > 1 else "lens" if lens is not None else "square pixels"
+    free = start.ravel()
+    if vertical_from == "points":
+        free = np.append(free, fit_vertical(start, points.ground[high], points.height[high], ideal[high]))
+    used = np.ones(len(high), bool) if vertical_from == "points" else points.low
+    scale = np.linalg.norm(start[2])
+    robust = _refined(free / scale, points, used, lens)
+    wrong = _out(np.hypot(*(_project(robust.x, points.ground, points.height, lens) - points.pixel).T), used)
+    used &= ~wrong
+    fitted = _refined(robust.x, points, used, lens, "linear")
+    parameters, covariance = fitted.x, _covariance(fitted.jac, fitted.fun, int(used.sum()))
+    pinhole = fit_pinhole(
+        fitted.x[:9].reshape(3, 3), size, points.ground[used], points.height[used], points.pixel[used], lens
+    )
+    if pinhole is not None and _fits_as_well(pinhole, fitted.fun, len(fitted.x) - 1):
+        parameters, covariance = pinhole.parameters, pinhole.covariance(max(pinhole.noise, _CLICK**2))
+        vertical_from = "square pixels" if lens is None else "lens"
+    ground = parameters[:9].reshape(3, 3)
+    vertical = parameters[9:] if len(parameters) > 9 else _assumed_vertical(name, ground, size, lens)
+    require_right_handed(name, ground, vertical)
+    camera = Camera(name, size, ground, vertical, lens)
+    require_upright(camera)
+    shown, _ = camera.project(points.ground, points.height)
+    off = np.hypot(*(shown - points.pixel).T)
+    out = wrong | _out(off, used)
+    return PointFit(camera, points, vertical_from, off, _off_ground(camera, points), out, parameters, covariance)
+
+
+def _fits_as_well(pinhole: Pinhole, free_miss: Floats, unknowns: int) -> bool:
+    """Whether the pose fits as well as the free homography, per degree of freedom."""
+    count = len(free_miss)
+    free = max(float(np.sum(free_miss**2)) / max(count - unknowns, 1), _CLICK**2)
+    return pinhole.noise <= _WORSE * free
+
+
+def _out(off: Floats, used: Flags) -> Flags:
+    """Outliers against the median of the points in use; none where a camera has few points."""
+    limit = _OUT * max(1.4826 * float(np.median(off[used])), _CLICK)
+    return np.asarray((off > limit) & (used.sum() > _FEW))
+
+
+def _start(points: Points, ideal: Floats) -> Floats:
+    """Initial homography: direct linear transform, or MAGSAC++ where its median error is smaller."""
+    ground, pixel = points.ground[points.low], ideal[points.low]
+    starts = [fit_homography(ground, pixel)]
+    if len(ground) > 4:
+        middle, reach = ground.mean(axis=0), ground.std()
+        found, _ = cv2.findHomography((ground - middle) / reach, pixel, cv2.USAC_MAGSAC, _MAGSAC, maxIters=10_000)
+        if found is not None:
+            unit = np.array([[1 / reach, 0, -middle[0] / reach], [0, 1 / reach, -middle[1] / reach], [0, 0, 1]])
+            starts.append(_ahead(np.asarray(found, float) @ unit, ground))
+    return min(starts, key=lambda homography: float(np.median(_miss(homography, ground, pixel))))
+
+
+def _ahead(homography: Floats, ground: Floats) -> Floats:
+    depth = ground @ homography[2, :2] + homography[2, 2]
+    return homography if np.median(depth) > 0 else -homography
+
+
+def _miss(homography: Floats, ground: Floats, pixel: Floats) -> Floats:
+    image = np.concatenate([ground, np.ones((len(ground), 1))], 1) @ homography.T
+    return np.asarray(np.hypot(*(image[:, :2] / image[:, 2:] - pixel).T))
+
+
+def _assumed_vertical(name: str, ground: Floats, size: tuple[int, int], lens: Lens | None) -> Floats:
+    if lens is not None:
+        return vertical_of_matrix(ground, lens.matrix)
+    focal = focal_of_square_pixels(ground, size)
+    if focal is None:
+        raise CalibrationError(
+            f"camera {name}",
+            "points",
+            "a view that leaves its focal length open, and fewer than two points above the ground",
+            "two or more points with z above 0, such as the top of a door, or --lens",
+        )
+    return vertical_of_matrix(ground, middle_matrix(focal, size))
+
+
+def _refined(
+    start: Floats, points: Points, used: Flags, lens: Lens | None, loss: Literal["cauchy", "linear"] = "cauchy"
+) -> OptimizeResult:
+    """Least-squares (or Cauchy) refinement over the points in use."""
+    ground, height, pixel = points.ground[used], points.height[used], points.pixel[used]
+
+    def miss(parameters: Floats) -> Floats:
+        return (_project(parameters, ground, height, lens) - pixel).ravel()
+
+    spread = 1.4826 * float(np.median(np.abs(miss(start))))
+    return least_squares(miss, start, x_scale="jac", loss=loss, f_scale=max(spread, _CLICK), max_nfev=500)
+
+
+def _project(parameters: Floats, ground: Floats, height: Floats, lens: Lens | None) -> Floats:
+    """Pixels of points under the parameters of `PointFit`, float64 (n, 2)."""
+    image = np.concatenate([ground, np.ones((len(ground), 1))], 1) @ parameters[:9].reshape(3, 3).T
+    if len(parameters) > 9:
+        image = image + height[:, None] * parameters[9:]
+    pixel = image[:, :2] / image[:, 2:]
+    return pixel if lens is None else lens.distort(pixel)[0]
+
+
+def _slope(parameters: Floats, ground: Floats, height: Floats, lens: Lens | None) -> Floats:
+    """Jacobian of pixels in the parameters by finite differences, float64 (n, 2, k)."""
+    step = 1e-6 * np.maximum(np.abs(parameters), 1e-3 * np.abs(parameters).max())
+    columns = []
+    for k, size in enumerate(step):
+        move = np.zeros_like(parameters)
+        move[k] = size
+        later = _project(parameters + move, ground, height, lens)
+        columns.append((later - _project(parameters - move, ground, height, lens)) / (2 * size))
+    return np.stack(columns, -1)
+
+
+def _ground_slope(camera: Camera, ground: Floats) -> Floats:
+    """Jacobian of pixels in the ground point, pixels a metre, float64 (n, 2, 2)."""
+    step = 1e-3
+    columns = [
+        (camera.project(ground + move, 0.0)[0] - camera.project(ground - move, 0.0)[0]) / (2 * step)
+        for move in step * np.eye(2)
+    ]
+    return np.stack(columns, -1)
+
+
+def _covariance(slope: Floats, miss: Floats, count: int) -> Floats:
+    """Covariance of the parameters: noise variance times the pseudo-inverse of J'J (the scale is free)."""
+    free = max(2 * count - (slope.shape[1] - 1), 1)
+    noise = max(float(np.sum(miss**2)) / free, _CLICK**2)
+    return np.asarray(noise * np.linalg.pinv(slope.T @ slope, rcond=1e-14, hermitian=True))
+
+
+def _off_ground(camera: Camera, points: Points) -> Floats:
+    seen = [camera.back_project(pixel, z) for pixel, z in zip(points.pixel, points.height.tolist(), strict=True)]
+    return np.asarray(np.hypot(*(np.array(seen) - points.ground).T))

@@ -1,0 +1,167 @@
+"""`stseg calibrate import`: a rig from another program's calibration."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from stseg.commands.calibrate.scene import SceneOptions, StreamOptions, size_of, words
+from stseg.errors import CalibrationError, ConfigError
+from stseg.geometry import Camera, Rig
+from stseg.geometry.handedness import is_mirrored
+from stseg.io.calibrations.foreign_camera import ForeignCamera
+from stseg.io.calibrations.formats import FORMATS, ImportOptions, help_text, read_cameras
+from stseg.io.calibrations.world_frame import UNITS, Up, World, guess_unit, guess_up, require_height
+from stseg.io.outputs.whole_files import require_new
+from stseg.io.recording.recording import Recording
+from stseg.io.recording.rigs import write_rig
+from stseg.io.toml.text import one_of
+
+
+def import_calibration(
+    format: Annotated[str, Parameter(metavar="FORMAT")],
+    /,
+    *files: Annotated[str, Parameter(metavar="FILE...")],
+    output: Annotated[Path, Parameter(name=["--output", "-o"], metavar="RIG.toml")],
+    scene: SceneOptions,
+    streams: StreamOptions | None = None,
+    size: Annotated[str | None, Parameter(metavar="W,H")] = None,
+    unit: Annotated[str | None, Parameter(metavar="mm|cm|m|METRES")] = None,
+    up: Annotated[Up | None, Parameter(allow_leading_hyphen=True)] = None,
+    mirrored: Annotated[bool, Parameter(negative="")] = False,
+    head: float = 1.75,
+    names: Annotated[str | None, Parameter(metavar="A,B,...")] = None,
+    overwrite: Annotated[bool, Parameter(negative="")] = False,
+) -> None:
+    """Make a rig file from the calibrations of other programs.
+
+    {formats}
+
+    Four cameras with silhouettes, calibrated in millimetres with Z pointing down:
+
+    ```
+    stseg calibrate import opencv cam*/config.xml -o room.toml \\
+        --size 644,486 --unit mm --up=-z --area=-2.5,-4.5,2.5,1.5 --frame-rate 5 \\
+        --source-pattern '{name}/silhouettes.avi' --source-kind masks
+    ```
+
+    Parameters
+    ----------
+    format
+        Format of the calibrations.
+    files
+        The calibrations.
+    output
+        The rig file to write.
+    size
+        Width and height of the images, pixels; not needed where the calibrations hold it.
+    unit
+        Unit of length of the calibrations: mm, cm, m, or metres per unit. Without it, the one that gives plausible
+        camera heights; the choice is printed.
+    up
+        Which of their axes points away from the ground. With -z, X = x, Y = -y, Z = -z; with -y (a camera's own
+        axes), X = x, Y = -z, Z = y. Without it, the one that is upwards in the images.
+    mirrored
+        The calibrations are left-handed: our y is theirs, the other way round.
+    head
+        pom: height of the head plane, metres.
+    names
+        Names of the cameras; without them, those in the calibrations, of the files, or of their folders where all
+        files are called the same.
+    overwrite
+        Replace the rig file if it exists.
+    """
+    require_new(output, overwrite)
+    shared = None if size is None else size_of(size)
+    foreign = _named(_read(format, files, ImportOptions(shared, unit, head)), files, names)
+    world = _world(foreign, unit, up, mirrored)
+    cameras = tuple(world.camera(one, one.name, _size(one, shared)) for one in foreign)
+    rig = Rig(scene.scene or output.stem, scene.frame_rate, scene.grid, cameras)
+    try:
+        write_rig(output, Recording(output, rig, (streams or StreamOptions()).of([camera.name for camera in cameras])))
+    except CalibrationError:
+        _require_front(foreign, rig, world)
+        raise
+    print(_world_line(world, unit, up))
+    for camera in cameras:
+        print(_line(camera))
+    print(f"wrote {output}")
+
+
+import_calibration.__doc__ = (import_calibration.__doc__ or "").replace("{formats}", help_text())
+
+
+def _read(format: str, files: Sequence[str], options: ImportOptions) -> list[ForeignCamera]:
+    """The cameras, as their calibrations have them."""
+    if format not in FORMATS:
+        raise ConfigError("calibrate import", "FORMAT", repr(format), one_of(format, FORMATS))
+    if not files:
+        raise ConfigError("calibrate import", "FILE", "nothing", "one calibration a camera")
+    groups = [[Path(part) for part in file.split("+")] for file in files]
+    return [camera for group in groups for camera in read_cameras(format, group, options)]
+
+
+def _named(cameras: Sequence[ForeignCamera], files: Sequence[str], given: str | None) -> list[ForeignCamera]:
+    if given is not None:
+        names = words("--names", given, len(cameras))
+    elif all(camera.name for camera in cameras):
+        names = [camera.name for camera in cameras]
+    else:
+        names = _file_names([Path(file.partition("+")[0]) for file in files])
+        if len(names) != len(cameras):
+            found = f"{len(cameras)} cameras in {len(names)} files, not all with a name"
+            raise ConfigError("--names", "", found, "a name for each camera")
+    return [replace(camera, name=name) for camera, name in zip(cameras, names, strict=True)]
+
+
+def _file_names(files: Sequence[Path]) -> list[str]:
+    stems = [file.stem for file in files]
+    if len(set(stems)) == len(stems):
+        return stems
+    folders = [file.absolute().parent.name for file in files]
+    if len(set(folders)) == len(folders):
+        return folders
+    raise ConfigError("--names", "", "files and folders that share their names", "a name for each camera")
+
+
+def _world(cameras: Sequence[ForeignCamera], unit: str | None, up: Up | None, mirrored: bool) -> World:
+    upward = up or guess_up(cameras)
+    world = World(unit or guess_unit(cameras, upward, mirrored), upward, mirrored)
+    require_height(cameras, world)
+    return world
+
+
+def _size(camera: ForeignCamera, shared: tuple[int, int] | None) -> tuple[int, int]:
+    if camera.size is None and shared is None:
+        raise ConfigError("--size", "", "nothing", f"width,height of the images: {camera.file} does not say it")
+    if camera.size is not None and shared is not None and camera.size != shared:
+        found = f"{shared[0]},{shared[1]}"
+        raise ConfigError("--size", camera.name, found, f"{camera.size[0]},{camera.size[1]}, as {camera.file} says")
+    return camera.size or shared or (0, 0)
+
+
+def _require_front(foreign: Sequence[ForeignCamera], rig: Rig, world: World) -> None:
+    """Name a mirrored world, in which the cameras that look at the area have it behind them."""
+    if all(is_mirrored(camera, rig.grid) for camera in rig.cameras):
+        found = "a mirrored world, in which the area lies behind every camera"
+        undo = "without --mirrored" if world.mirrored else "--mirrored, where the calibration is left-handed"
+        raise CalibrationError(foreign[0].file, "handedness", found, f"the area before the cameras: {undo}, or --up")
+
+
+def _world_line(world: World, unit: str | None, up: Up | None) -> str:
+    length = f"in {world.unit}" if world.unit in UNITS else f"in units of {world.unit} m"
+    words = [
+        f"{length} ({'given' if unit else 'guessed: --unit'})",
+        f"{world.up} up ({'given' if up else 'guessed: --up'})",
+    ]
+    return f"calibrated {', '.join(words)}{', mirrored' if world.mirrored else ''}"
+
+
+def _line(camera: Camera) -> str:
+    x, y, z = camera.centre
+    height = f"{z:.2f} m above the ground" if z > 0 else f"{-z:.2f} m below the ground: is --up right?"
+    return f"{camera.name}: at ({x:.2f}, {y:.2f}) m, {height}"

@@ -1,0 +1,80 @@
+"""`stseg calibrate lens`: camera matrix and lens from a video of a checkerboard."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from cyclopts import Parameter
+
+from stseg.calibration.points.checkerboard import find_corners, fit_lens
+from stseg.commands.calibrate.scene import numbers
+from stseg.errors import ConfigError
+from stseg.geometry import Camera
+from stseg.io.calibrations.opencv_xml import write_opencv_lens
+from stseg.io.outputs.whole_files import require_new
+from stseg.io.recording.recording import Source
+from stseg.io.recording.streams import open_stream
+from stseg.io.recording.video.video_size import read_video_size
+
+_UNKNOWN = np.array([[1.0, 0, 0, 0], [0, 1.0, 0, 0], [0, 0, 1.0, 1.0]])
+_WORTH = 0.02
+"""Mean movement of the corners that makes a view a new one, in image widths."""
+
+
+def calibrate_lens(
+    video: Path,
+    /,
+    *,
+    board: Annotated[str, Parameter(metavar="COLUMNS,ROWS")],
+    output: Annotated[Path, Parameter(name=["--output", "-o"], metavar="LENS.xml")],
+    square: float = 1.0,
+    every: int = 5,
+    overwrite: Annotated[bool, Parameter(negative="")] = False,
+) -> None:
+    """Find a camera's matrix and lens from a video of a checkerboard that is moved before it.
+
+    Example: stseg calibrate lens cam1_board.mp4 --board 9,6 -o cam1.xml
+
+    Then: stseg calibrate points points.csv --lens '{name}.xml' ... Show the whole board, tilted, near and far, all over
+    the image and into its corners.
+
+    Parameters
+    ----------
+    video
+        The video.
+    board
+        Columns and rows of the board's inner corners (one less than squares).
+    output
+        OpenCV XML with camera_matrix and distortion_coefficients.
+    square
+        Side of a square, in any unit; the lens does not depend on it.
+    every
+        Frames from one that is looked at to the next.
+    overwrite
+        Replace the file if it exists.
+    """
+    require_new(output, overwrite)
+    columns, rows = (int(side) for side in numbers("--board", board, "columns,rows of inner corners", 2))
+    if min(columns, rows) < 3 or every < 1 or not square > 0:
+        raise ConfigError(
+            "--board, --every, --square", "", f"{board}, {every}, {square:g}", "3 or more; 1 or more; above 0"
+        )
+    size = read_video_size(video)
+    stream = open_stream(Source("video", video), Camera.from_projection(video.stem, size, _UNKNOWN))
+    found: list[np.ndarray[tuple[int, ...], np.dtype[np.float64]]] = []
+    try:
+        while isinstance(view := stream.read(), np.ndarray):
+            corners = find_corners(np.asarray(view, np.uint8), (columns, rows))
+            if corners is not None and all(np.abs(corners - one).mean() > _WORTH * size[0] for one in found):
+                found.append(corners)
+            stream.skip(every - 1)
+    finally:
+        stream.close()
+    fit = fit_lens(str(video), found, (columns, rows), square, size)
+    write_opencv_lens(output, fit.matrix, fit.distortion, overwrite)
+    print(
+        f"{output}: focal length {fit.matrix[0, 0]:.1f} ± {fit.focal_deviation:.1f} px, axis at "
+        f"({fit.matrix[0, 2]:.1f}, {fit.matrix[1, 2]:.1f}), {fit.views} views off by {fit.error:.2f} px"
+    )

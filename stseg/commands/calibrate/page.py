@@ -1,0 +1,95 @@
+"""`stseg calibrate page`: a page on which ground points are clicked."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from cyclopts import Parameter
+
+from stseg.arrays import Bytes
+from stseg.commands.calibrate.scene import numbers
+from stseg.errors import ConfigError, SourceError
+from stseg.geometry import Camera
+from stseg.io.outputs.output_files import write_page
+from stseg.io.outputs.whole_files import require_new
+from stseg.io.recording.image_stream import is_image_source
+from stseg.io.recording.pictures import read_colour
+from stseg.io.recording.recording import Source
+from stseg.io.recording.streams import open_stream
+from stseg.io.recording.video.video_size import read_video_size
+from stseg.report.page.calibration_page import FloorPlan, calibration_page
+
+_UNKNOWN = np.array([[1.0, 0, 0, 0], [0, 1.0, 0, 0], [0, 0, 1.0, 1.0]])
+"""A projection that stands for a camera's own until points are clicked."""
+
+
+def calibrate_page(
+    *videos: Annotated[Path, Parameter(metavar="VIDEO...")],
+    output: Annotated[Path, Parameter(name=["--output", "-o"], metavar="POINTS.html")],
+    area: Annotated[str, Parameter(metavar="X0,Y0,X1,Y1", allow_leading_hyphen=True)] = "-5,-5,5,5",
+    frame: int = 0,
+    plan: Annotated[Path | None, Parameter(metavar="PLAN.png")] = None,
+    overwrite: Annotated[bool, Parameter(negative="")] = False,
+) -> None:
+    """Make a page on which you click ground points: the cameras' homographies are solved as you click.
+
+    Example: stseg calibrate page cam*.mp4 -o points.html --area=-3,-3,3,3
+
+    Open it in a browser; it works without a network. Click places of the ground in the views and on the plan, save
+    points.csv, and give it to stseg calibrate points. **The page holds a frame of each camera.**
+
+    Parameters
+    ----------
+    videos
+        One video or picture a camera; file names, or those of their folders, become camera names.
+    output
+        The page.
+    area
+        Ground rectangle of the plan, metres.
+    frame
+        Frame of the videos that is shown.
+    plan
+        Picture of the ground from above that spans the area exactly, y up.
+    overwrite
+        Replace the page if it exists.
+    """
+    require_new(output, overwrite)
+    names = [path.stem for path in videos]
+    if len(set(names)) < len(names):
+        names = [path.absolute().parent.name for path in videos]
+    if not videos or len(set(names)) < len(names):
+        raise ConfigError("calibrate page", "VIDEO", ", ".join(map(str, videos)), "one or more, with different names")
+    x0, y0, x1, y1 = numbers("--area", area, "4 numbers x0,y0,x1,y1", 4)
+    if not (x0 < x1 and y0 < y1):
+        raise ConfigError("--area", "", repr(area), "x0,y0,x1,y1 with x0 below x1 and y0 below y1")
+    frames = [_frame(path, frame) for path in videos]
+    write_page(output, calibration_page(names, frames, (x0, y0, x1, y1), _plan(plan, x1 - x0, y1 - y0)), overwrite)
+    print(f"wrote {output}: {len(frames)} views (it shows camera frames); open it in a browser")
+
+
+def _frame(path: Path, number: int) -> Bytes:
+    """A colour frame of a video, or a picture."""
+    if is_image_source(path):
+        return read_colour(path)
+    camera = Camera.from_projection(path.stem, read_video_size(path), _UNKNOWN)
+    stream = open_stream(Source("video", path), camera)
+    try:
+        view = stream.read() if stream.skip(number) == number else None
+    finally:
+        stream.close()
+    if not isinstance(view, np.ndarray):
+        raise SourceError(path, "--frame", number, "a frame of the video")
+    return np.asarray(view, np.uint8)
+
+
+def _plan(path: Path | None, width: float, height: float) -> FloorPlan | None:
+    if path is None:
+        return None
+    image = read_colour(path)
+    scale, other = image.shape[1] / width, image.shape[0] / height
+    if abs(scale / other - 1) > 0.02:
+        found = f"a picture {image.shape[1]} x {image.shape[0]} for {width:g} x {height:g} m"
+        raise ConfigError("--plan", str(path), found, "a picture that spans --area, with square pixels")
+    return FloorPlan(image, scale)

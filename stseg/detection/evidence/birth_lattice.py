@@ -1,0 +1,52 @@
+"""The birth lattice: places on the ground where the evidence that nobody explains yet may show a further person."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stseg.arrays import Floats
+from stseg.detection.evidence.evidence import peaks
+from stseg.detection.evidence.open_pixels import OpenPixels
+from stseg.detection.evidence.pillar_evidence import fill_scores
+from stseg.detection.search.map_estimate import MapEstimate
+from stseg.geometry import Grid
+from stseg.records.candidates import Candidates
+
+_HOPELESS = -4.0
+"""Where the probed heights are worth less, no other height makes a candidate, nats."""
+_ALIKE = 0.8
+"""Ratio of two heights above which what one pillar shows tells of the other."""
+
+
+def lattice(grid: Grid, spacing: float) -> Floats:
+    """Ground points of a lattice over a grid's rectangle, float64 (y, x, 2), metres."""
+    x = np.arange(grid.x[0] + spacing / 2, grid.x[1], spacing)
+    y = np.arange(grid.y[0] + spacing / 2, grid.y[1], spacing)
+    return np.stack(np.meshgrid(x, y), -1)
+
+
+def lattice_candidates(estimate: MapEstimate, lattice_ground: Floats) -> Candidates:
+    """Peaks of the lattice's score by the evidence that an estimate leaves unexplained.
+
+    Pixels are summed at one or two heights first, and at the others only where those are not all hopeless.
+    `lattice_ground` float64 (y, x, 2) is that of the views, metres.
+    """
+    evidence = estimate.evidence
+    prior, (rows, columns) = evidence.prior, lattice_ground.shape[:2]
+    heights = np.asarray(prior.body.heights)
+    score = np.repeat(prior.log_height(heights)[:, None], rows * columns, 1)
+    for boxes, assigned in zip(evidence.box_lattices, estimate.box_assignment, strict=True):
+        if boxes is not None:
+            score += boxes.score(assigned < 0)
+    if len(evidence.rasters):
+        pixels = OpenPixels.of(evidence.rasters, estimate.owners, evidence.lattice, evidence.extremes)
+        probes = _probes(heights)
+        others, weight = np.delete(np.arange(len(heights)), probes), prior.config.effective_observations
+        fill_scores(pixels, evidence.lattice, np.array(probes), others, _HOPELESS, weight, score)
+    return peaks(score.reshape(-1, rows, columns), lattice_ground, heights, prior.body.width_of(heights))
+
+
+def _probes(heights: Floats) -> list[int]:
+    """Heights that show whether a place is worth a look: the middle one, and a small one where they differ much."""
+    middle, small = len(heights) // 2, len(heights) // 4
+    return [middle, small] if heights[small] < _ALIKE * heights[middle] else [middle]

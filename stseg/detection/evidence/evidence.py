@@ -1,0 +1,135 @@
+"""Evidence of all views for the candidates of a frame, and candidates from a lattice's score."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from stseg.arrays import Floats, Singles
+from stseg.bodies.box_fit import fill_inside, fill_match
+from stseg.bodies.views import BoxView, PixelView, View, ViewObservation
+from stseg.detection.evidence.occlusion import hiders_of
+from stseg.detection.evidence.ragged_lists import no_lists
+from stseg.detection.problem import BoxEvidence, PixelEvidence
+from stseg.records.candidates import Candidates
+
+MOST = 250
+"""Most candidates that one round adds."""
+_AROUND = np.indices((3, 3)).reshape(2, 9)
+"""Rows and columns of a place and its neighbours, from the first of them on."""
+_LEAST_SCORE = 0.0
+"""Score above which a peak of the lattice is a candidate, nats."""
+
+
+def peaks(score: Floats, lattice_ground: Floats, heights: Floats, widths: Floats) -> Candidates:
+    """Local maxima of a lattice score (height, y, x) over the ground (y, x, 2), best first."""
+    best = score.max(0)
+    rows, columns = np.nonzero(best > _LEAST_SCORE)  # few places, so these alone are compared with their neighbours
+    framed = np.full((best.shape[0] + 2, best.shape[1] + 2), -np.inf)
+    framed[1:-1, 1:-1] = best
+    around = framed[rows[:, None] + _AROUND[0], columns[:, None] + _AROUND[1]]
+    highest = best[rows, columns] == around.max(1, initial=-np.inf)
+    rows, columns = rows[highest], columns[highest]
+    order = np.argsort(-best[rows, columns], kind="stable")[:MOST]
+    rows, columns = rows[order], columns[order]
+    chosen = score[:, rows, columns].argmax(0)
+    return Candidates(lattice_ground[rows, columns], heights[chosen], widths[chosen])
+
+
+@dataclass(frozen=True)
+class ProjectedBodies:
+    """Candidates in the views that deliver boxes.
+
+    Attributes
+    ----------
+    edges : float64 (view, candidate, 4)
+        left, top, right, bottom, pixels, not clipped to the image; nan where the view cannot see the place.
+    distance : float64 (view, candidate)
+        Distance from the camera on the ground, metres.
+    """
+
+    edges: Floats
+    distance: Floats
+
+    @classmethod
+    def of(cls, views: Sequence[View], pool: Candidates) -> ProjectedBodies:
+        """The candidates of a pool."""
+        chosen = [view for view in views if isinstance(view, BoxView)]
+        edges, distance = np.empty((len(chosen), len(pool), 4)), np.empty((len(chosen), len(pool)))
+        for k, view in enumerate(chosen):
+            edges[k], distance[k] = view.table.boxes_of(pool.ground, pool.height), view.distance(pool.ground)
+        return cls(edges, distance)
+
+    def joined_with(self, other: ProjectedBodies) -> ProjectedBodies:
+        """These candidates, then the others."""
+        return ProjectedBodies(
+            np.concatenate([self.edges, other.edges], 1), np.concatenate([self.distance, other.distance], 1)
+        )
+
+
+def box_evidence(
+    views: Sequence[View],
+    observations: Sequence[ViewObservation | None],
+    bodies: ProjectedBodies,
+    known: BoxEvidence | None = None,
+) -> BoxEvidence:
+    """Evidence of all views that deliver boxes; a blind one (None) has the candidates outside its image.
+
+    `known` is that of the first candidates, where it was found before: the others alone are compared with the boxes.
+    """
+    chosen = [
+        (view, observation) for view, observation in zip(views, observations, strict=True) if isinstance(view, BoxView)
+    ]
+    if not chosen:
+        return _no_boxes(bodies.edges.shape[1])
+    sizes = np.array([view.camera.size for view, _ in chosen], float)
+    boxes = np.array([len(observation.edges) if observation else 0 for _, observation in chosen], np.int64)
+    candidates, first = bodies.edges.shape[1], 0 if known is None else known.inside.shape[1]
+    match = np.full((len(chosen), candidates, boxes.max(initial=0)), -np.inf)
+    inside = np.zeros((len(chosen), candidates))
+    if known is not None:
+        match[:, :first], inside[:, :first] = known.match, known.inside
+    for k, (_, observation) in enumerate(chosen):
+        if observation is not None:
+            edges, own, (width, height) = bodies.edges[k, first:], match[k, first:], sizes[k].tolist()
+            fill_match(
+                edges, observation.edges, observation.tolerance, observation.belief, width, height,
+                own[:, : len(observation.edges)],
+            )  # fmt: skip
+            fill_inside(edges, width, height, inside[k, first:])
+    is_blind = np.array([observation is None for _, observation in chosen], bool)
+    hiders = hiders_of(bodies.edges, bodies.distance, sizes, is_blind, known.hiders if known else no_lists(), first)
+    return BoxEvidence(match, boxes, hiders, inside, np.ones(candidates))
+
+
+def _no_boxes(candidates: int) -> BoxEvidence:
+    """Evidence where no view delivers boxes."""
+    nothing = np.zeros((0, candidates))
+    return BoxEvidence(np.zeros((0, candidates, 0)), np.zeros(0, np.int64), no_lists(), nothing, np.ones(candidates))
+
+
+def stacked_rasters(views: Sequence[View], own: Sequence[Singles | None]) -> Singles:
+    """Rasters of all views that deliver pixels, float32 (view, v, u); zero where a view is blind, unset beyond each."""
+    chosen = [(view, seen) for view, seen in zip(views, own, strict=True) if isinstance(view, PixelView)]
+    shapes = np.array([view.shape for view, _ in chosen], int).reshape(-1, 2)
+    rasters = np.empty((len(chosen), *shapes.max(0, initial=0)), np.float32)
+    for raster, (view, seen) in zip(rasters, chosen, strict=True):
+        raster[: view.shape[0], : view.shape[1]] = 0.0 if seen is None else seen
+    return rasters
+
+
+def pixel_evidence(views: Sequence[View], rasters: Singles, scales: Singles, pool: Candidates) -> PixelEvidence:
+    """Evidence of all views that deliver pixels, by `stacked_rasters` of their log-odds and scales."""
+    chosen = [view for view in views if isinstance(view, PixelView)]
+    drawn = [view.whole_outlines(pool.ground, pool.height, pool.width) for view in chosen]
+    tall, n = max((spans.shape[1] for _, spans, _ in drawn), default=0), len(pool)
+    first, spans = np.empty((len(chosen), n), np.int64), np.zeros((len(chosen), n, tall, 2), np.int16)
+    area, order = np.empty((len(chosen), n)), np.empty((len(chosen), n))
+    for k, (view, (row, outline, whole)) in enumerate(zip(chosen, drawn, strict=True)):
+        first[k], area[k], order[k] = row, whole, view.distance(pool.ground)
+        spans[k, :, : outline.shape[1]] = outline
+    if chosen:
+        area /= chosen[0].area_ratio(pool.ground, pool.height, pool.width)
+    return PixelEvidence(rasters, scales, first, spans, area, order)

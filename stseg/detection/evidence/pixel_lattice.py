@@ -1,0 +1,92 @@
+"""The pillars of the birth lattice in the views that deliver pixels: their outlines, and the boxes around these."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple, Self
+
+import numpy as np
+
+from stseg.arrays import Floats, Ints, Labels, Shorts
+from stseg.bodies.outlines import Spans
+from stseg.bodies.packed_outlines import PackedOutlines
+from stseg.bodies.views import PixelView, View
+from stseg.config import BodyConfig
+from stseg.kernels.accelerate import kernel
+
+STRIP = 8
+"""Cells of the lattice in a strip."""
+_DRAWN = 4096
+"""Pillars of the lattice that are drawn at once: until they are packed, each takes as many rows as the tallest."""
+
+
+class PixelLattice(NamedTuple):
+    """Pillars of the birth lattice in all views of a rig that deliver pixels.
+
+    Attributes
+    ----------
+    outlines
+        Of the pillars (view * cell * height,), which are asked for cell by cell; areas are fair ones.
+    boxes : int16 (view, cell, 4)
+        left, top, right, bottom of the box around the outlines of all heights, raster pixels.
+    strips : int16 (view, strip, 4)
+        The same around the outlines of a strip's cells.
+    shapes : int64 (view, 2)
+        Rows and columns of the rasters.
+    nobody : int16 (view, v * u)
+        Owners of the pixels of rasters, -1, but while a search uses them.
+    above, left_of
+        Scratch of `stseg.detection.evidence.open_pixels`, whose memory would have to be asked for anew in each frame.
+    """
+
+    outlines: PackedOutlines
+    boxes: Shorts
+    strips: Shorts
+    shapes: Ints
+    nobody: Shorts
+    above: Labels
+    left_of: Floats
+
+    @classmethod
+    def of(cls, views: Sequence[View], lattice_ground: Floats, body: BodyConfig) -> Self:
+        """The pillars of the configured heights at places (cell, 2), metres."""
+        chosen = [view for view in views if isinstance(view, PixelView)]
+        outlines = PackedOutlines.of(_drawn(chosen, lattice_ground, body))
+        boxes = np.zeros((len(chosen), len(lattice_ground), 4), np.int16)
+        strips = np.zeros((len(chosen), -(-len(lattice_ground) // STRIP), 4), np.int16)
+        boxes[..., :2] = strips[..., :2] = np.iinfo(np.int16).max
+        _fill_boxes(outlines, len(body.heights), len(lattice_ground), boxes, strips)
+        shapes = np.array([view.shape for view in chosen], np.int64).reshape(-1, 2)
+        rows, columns = shapes.max(0, initial=0)
+        above = np.empty((len(chosen), rows + 1, columns + 1), np.int32)
+        nobody = np.full((len(chosen), rows * columns), -1, np.int16)
+        return cls(outlines, boxes, strips, shapes, nobody, above, np.empty((len(chosen), rows, columns + 1)))
+
+
+def _drawn(
+    views: Sequence[PixelView], lattice_ground: Floats, body: BodyConfig
+) -> Iterator[tuple[Ints, Spans, Floats]]:
+    """Outlines of all pillars, one view after the other."""
+    heights = np.tile(np.asarray(body.heights), len(lattice_ground))
+    places, widths = np.repeat(lattice_ground, len(body.heights), 0), body.width_of(heights)
+    for view in views:
+        for begin in range(0, len(heights), _DRAWN):
+            own = slice(begin, begin + _DRAWN)
+            yield view.outlines(places[own], heights[own], widths[own])
+
+
+@kernel
+def _fill_boxes(outlines: PackedOutlines, heights: int, cells: int, boxes: Shorts, strips: Shorts) -> None:
+    """Widen boxes (view, cell, 4) and strips (view, strip, 4), empty before, around the outlines."""
+    for i in range(len(outlines.first)):
+        view, cell, row = i // (heights * cells), i // heights % cells, outlines.first[i]
+        box, strip = boxes[view, cell], strips[view, cell // STRIP]
+        for k in range(outlines.start[i], outlines.start[i + 1]):
+            left, right = outlines.spans[k]
+            if right > left:
+                box[0], box[1] = min(box[0], left), min(box[1], row)
+                box[2], box[3] = max(box[2], right), max(box[3], row + 1)
+            row += 1
+        if box[2] > 0:
+            strip[0], strip[1] = min(strip[0], box[0]), min(strip[1], box[1])
+            strip[2], strip[3] = max(strip[2], box[2]), max(strip[3], box[3])

@@ -1,0 +1,108 @@
+"""Body heights and widths, by HW12's refinement (eqs 25 to 28).
+
+E step: the sizes of one person on a lattice around the population's mean, heights first, then widths. Over all that
+the lattice's pillars cover, the person's own pixels speak for a pillar inside it and against it outside, background
+speaks against it inside, other people's pixels say nothing (they may hide anything). A pixel that is foreground with
+probability o is o own and 1 - o background. Less what is the same for all pillars R of the lattice, one view says of
+each
+
+    observations * sum_R (2 o OWN + (1 - o) BACKGROUND) / area of a body of mean size     nats,
+
+the weights those of `stseg.bodies.views`, `observations` the effective number of them in one view.
+
+HW12 averages over R, which never rewards a pillar for covering more of the person. Its weight of the background is
+illegible; here it makes a pixel that is half foreground say nothing, so that edges lie where people's do. Of people in
+boxes alone the height is found with the place (`refine`), and no width: a box's sides show arms and
+strides. M step: the frame is searched again with the sizes found (`stseg.detection.detector`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from stseg.arrays import Floats, Ints, Shorts, Singles
+from stseg.bodies.views import PixelView, View, ViewObservation
+from stseg.config import BodyConfig
+from stseg.detection.score.assignment import Assignment
+from stseg.detection.search.refine import RefinedPlaces
+from stseg.records.sizes import Sizes, log_heavy_tailed
+
+_STEPS = 25
+"""Sizes on the lattice."""
+_HEIGHTS = np.linspace(0.75, 2.19, _STEPS)
+"""Heights of the lattice, metres: children to the tallest."""
+_WIDTHS = np.linspace(0.26, 0.86, _STEPS)
+"""Widths of the lattice, metres: the slim to coats, bags and prams."""
+
+
+def measure(
+    places: RefinedPlaces,
+    width: Floats,
+    views: Sequence[View],
+    observations: Sequence[ViewObservation | None],
+    own: Assignment,
+    body: BodyConfig,
+) -> Sizes:
+    """E step: posteriors of people's sizes after one frame, under the population prior.
+
+    Parameters
+    ----------
+    places
+        Places, and the heights found with them: all that boxes show.
+    width : float64 (n,)
+        So far, metres.
+    own
+        Boxes and pixels assigned to each.
+    """
+    found = Sizes.of_population(len(width), body)
+    measured = [
+        _PixelLabels(view, observation.label_values, owner)
+        for view, observation, owner in zip(views, observations, own.pixels, strict=True)
+        if isinstance(view, PixelView) and observation is not None
+    ]
+    if not measured or not len(width):
+        return replace(found, height=places.height, height_variance=places.height_variance)
+    each, all_steps = (len(width), 1), (1, _STEPS)
+    score = _score(places.ground, np.tile(_HEIGHTS, each), np.tile(width[:, None], all_steps), measured, own.number)
+    height, height_variance = _posterior(_HEIGHTS, score, body.height_mean, body.height_spread)
+    score = _score(places.ground, np.tile(height[:, None], all_steps), np.tile(_WIDTHS, each), measured, own.number)
+    return Sizes(
+        height, height_variance, *_posterior(_WIDTHS, score, body.width_of(height[:, None]), body.width_spread)
+    )
+
+
+class _PixelLabels(NamedTuple):
+    """Label values of one view's pixels, and their assignment, both (v, u)."""
+
+    view: PixelView
+    values: Singles
+    owner: Shorts
+
+
+def _posterior(lattice: Floats, score: Floats, mean: Floats | float, spread: float) -> tuple[Floats, Floats]:
+    """Mean and variance of each person's size on the lattice, from log-likelihoods (person, pillar), nats.
+
+    Those of the population, `mean`, which may be a column of one each, and `spread` squared, where all sizes are as
+    likely.
+    """
+    seen = np.ptp(score, axis=1) > 0
+    score = score + log_heavy_tailed((lattice - mean) / spread)
+    weight = np.exp(score - score.max(1, keepdims=True))
+    weight /= weight.sum(1, keepdims=True)
+    size = weight @ lattice
+    variance = (weight * (lattice - size[:, None]) ** 2).sum(1)
+    return np.where(seen, size, np.ravel(mean)), np.where(seen, variance, spread**2)
+
+
+def _score(ground: Floats, heights: Floats, widths: Floats, measured: Sequence[_PixelLabels], number: Ints) -> Floats:
+    """Log-likelihood in all views of people's pillars at their places (person, 2), nats, float64 (person, pillar)."""
+    score, everywhere = np.zeros(heights.shape), np.repeat(ground[:, None], _STEPS, 1)
+    pillars = measured[0].view.tried(everywhere, heights, widths)
+    for view, values, owner in measured:
+        sums, area = view.open_sums(values, owner, number, pillars)
+        score += sums / np.maximum(area.mean(1, keepdims=True), 1.0)
+    return score

@@ -1,0 +1,188 @@
+"""Refined places: the posterior of each person over a small patch of ground.
+
+The prior is the predicted track, if the person continues one; the evidence is what is assigned to the person alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from stseg.arrays import Floats, Ints
+from stseg.bodies.box_fit import fill_own_match
+from stseg.bodies.views import BoxView, PixelView, TriedPillars, View, ViewObservation
+from stseg.detection.prior import Prior
+from stseg.detection.score.assignment import WORST, Assignment
+from stseg.records.candidates import Candidates
+
+_REACH = 2
+"""Half width of the patch, in its spacings."""
+_SPACING = 0.08
+"""Spacing of the patch, metres: a third of the offset of two lattice places."""
+_AXIS = np.arange(-_REACH, _REACH + 1) * _SPACING
+_PATCH = np.stack(np.meshgrid(_AXIS, _AXIS), -1).reshape(-1, 2)
+_FEW_HEIGHTS = 4
+"""Where pixels tell the height afterwards (`body_size`), every other of more heights is enough here."""
+
+
+@dataclass(frozen=True)
+class RefinedPlaces:
+    """Marginal posteriors of people's places and heights.
+
+    Attributes
+    ----------
+    ground, covariance : float64 (n, 2), (n, 2, 2)
+        Marginalised over height; metres, square metres.
+    height, height_variance : float64 (n,)
+        Marginalised over place, under the population prior; metres, square metres.
+    """
+
+    ground: Floats
+    covariance: Floats
+    height: Floats
+    height_variance: Floats
+
+
+def refine(
+    pool: Candidates,
+    views: Sequence[View],
+    observations: Sequence[ViewObservation | None],
+    own: Assignment,
+    prior: Prior,
+    track_index: Ints,
+    known: dict[bytes, Floats],
+) -> RefinedPlaces:
+    """The posterior of each person's place and height.
+
+    Parameters
+    ----------
+    pool
+        The people.
+    own
+        Boxes and pixels assigned to each.
+    prior
+        The frame's prior.
+    track_index : int64 (n,)
+        The predicted track that each person continues, -1 for births.
+    known
+        What boxes said of patches before in this frame, by place and boxes; this adds to it.
+
+    Returns
+    -------
+    RefinedPlaces
+        Means and variances.
+    """
+    tried = np.asarray(prior.body.heights)
+    if len(tried) > _FEW_HEIGHTS and not any(isinstance(view, BoxView) for view in views):
+        tried = tried[::2]
+    patch = pool.ground[:, None] + _PATCH
+    if all(isinstance(view, BoxView) for view in views) and len(pool):
+        score = _known_scores(pool, views, observations, own, prior, tried, known)
+    else:
+        score = _scores(pool, views, observations, own, prior, tried)
+    met = np.flatnonzero(track_index >= 0)
+    score[met] += prior.predicted.place_log_density(track_index[met], patch[met])[:, None]
+    return _posterior(score, patch, tried)
+
+
+def _known_scores(
+    pool: Candidates,
+    views: Sequence[View],
+    observations: Sequence[ViewObservation | None],
+    own: Assignment,
+    prior: Prior,
+    tried: Floats,
+    known: dict[bytes, Floats],
+) -> Floats:
+    """`_scores` of people in views that all deliver boxes: in a frame many keep their place and their boxes."""
+    names = [place.tobytes() + box.tobytes() for place, box in zip(pool.ground, own.box.T, strict=True)]
+    fresh = np.array([j for j, name in enumerate(names) if name not in known], int)
+    if len(fresh):
+        found = _scores(pool.at(fresh), views, observations, own.of(fresh), prior, tried)
+        known.update(zip((names[j] for j in fresh), found, strict=True))
+    return np.stack([known[name] for name in names])
+
+
+def _scores(
+    pool: Candidates,
+    views: Sequence[View],
+    observations: Sequence[ViewObservation | None],
+    own: Assignment,
+    prior: Prior,
+    tried: Floats,
+) -> Floats:
+    """Log-posterior of each person over heights and places of a patch as a birth, float64 (person, height, place)."""
+    score = np.tile(prior.log_height(tried)[:, None], (len(pool), 1, len(_PATCH)))
+    pillars = _pillars(views[0], pool.ground[:, None] + _PATCH, tried, pool.width)
+    for k, (view, observation) in enumerate(zip(views, observations, strict=True)):
+        if observation is not None and len(pool):
+            score += _patch_score(view, observation, own, k, pillars).reshape(score.shape)
+    return score
+
+
+def refine_places(
+    pool: Candidates,
+    views: Sequence[View],
+    observations: Sequence[ViewObservation | None],
+    own: Assignment,
+    prior: Prior,
+    track_index: Ints,
+) -> RefinedPlaces:
+    """The posterior of each person's place alone, by pixels, at its height in the pool."""
+    patch = pool.ground[:, None] + _PATCH
+    score = np.zeros(patch.shape[:2])
+    tall, wide = (np.repeat(size[:, None], len(_PATCH), 1) for size in (pool.height, pool.width))
+    pillars = views[0].tried(patch, tall, wide)
+    for k, (view, observation) in enumerate(zip(views, observations, strict=True)):
+        if isinstance(view, PixelView) and observation is not None and len(pool):
+            sums, area = view.open_sums(observation.raster, own.pixels[k], own.number, pillars)
+            score += np.divide(sums, area, out=np.zeros_like(sums), where=area > 0)
+    met = np.flatnonzero(track_index >= 0)
+    score[met] += prior.predicted.place_log_density(track_index[met], patch[met])
+    weight = np.exp(score - score.max(1, keepdims=True))
+    weight /= weight.sum(1, keepdims=True)
+    return RefinedPlaces(*_moments(weight, patch), pool.height, np.zeros(len(pool)))
+
+
+def _posterior(score: Floats, patch: Floats, tried: Floats) -> RefinedPlaces:
+    """Means and variances from scores (person, height, place) of patches (person, place, 2), nats and metres."""
+    weight = np.exp(score - score.max((1, 2), keepdims=True))
+    total = weight.reshape(len(score), len(tried) * patch.shape[1]).sum(1)[:, None]
+    place, tall = weight.sum(1) / total, weight.sum(2) / total
+    height = tall @ tried
+    return RefinedPlaces(*_moments(place, patch), height, (tall * (tried - height[:, None]) ** 2).sum(1))
+
+
+def _moments(weight: Floats, patch: Floats) -> tuple[Floats, Floats]:
+    """Means and covariances of places (person, place, 2) by their weights (person, place), metres, square metres."""
+    ground = np.matmul(weight[:, None], patch)[:, 0]
+    spread = patch - ground[:, None]
+    return ground, np.matmul((spread * weight[..., None]).transpose(0, 2, 1), spread) + np.eye(2) * _SPACING**2 / 12
+
+
+def _pillars(view: View, patch: Floats, tried: Floats, width: Floats) -> TriedPillars:
+    """Pillars of all heights that are tried, then of all places of a patch (person, place, 2), for each person."""
+    people, places = patch.shape[:2]
+    everywhere = np.repeat(patch[:, None], len(tried), 1).reshape(people, len(tried) * places, 2)
+    tall = np.tile(np.repeat(tried, places), (people, 1))
+    return view.tried(everywhere, tall, np.repeat(width[:, None], tall.shape[1], 1))
+
+
+def _patch_score(view: View, observation: ViewObservation, own: Assignment, k: int, pillars: TriedPillars) -> Floats:
+    """Log-likelihood of pillars in view k, nats, float64 (person, pillar)."""
+    if isinstance(view, PixelView):
+        sums, area = view.open_sums(observation.raster, own.pixels[k], own.number, pillars)
+        return np.divide(sums, area, out=np.zeros_like(sums), where=area > 0)
+    score = np.zeros_like(pillars.height)
+    columns, rows = map(float, view.camera.size)
+    shown = np.flatnonzero(own.box[k] >= 0)
+    bodies = view.table.boxes_of(pillars.ground[shown].reshape(-1, 2), pillars.height[shown].reshape(-1))
+    match, box = np.empty((len(shown), score.shape[1])), own.box[k, shown]
+    fill_own_match(
+        bodies.reshape(*match.shape, 4), observation.edges[box], observation.tolerance[box],
+        observation.belief[box], columns, rows, match,
+    )  # fmt: skip
+    score[shown] = np.maximum(match, WORST)
+    return score

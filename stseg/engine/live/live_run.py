@@ -1,0 +1,209 @@
+"""Online processing of a recording in progress: frame sets in, finished segments and rows of the live table out.
+
+Every frame set goes to the open segment, and near the end of that segment also to the next one, as its warm-up. Thus
+each frame is read once, and no frame is stored.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from statistics import median
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+
+from stseg.arrays import Rows
+from stseg.engine.committed_frames import CommittedFrames
+from stseg.engine.live.blind_views import BlindViews
+from stseg.engine.live.live_foreground import LiveForegrounds
+from stseg.engine.live.open_segment import OpenSegment
+from stseg.engine.offline.assembly import FinishedSegment
+from stseg.engine.offline.job import Job
+from stseg.engine.offline.segments import Segment
+from stseg.io.live.correction_table import CorrectionTable
+from stseg.io.live.live_frames import LiveFrameSet, now
+from stseg.io.live.live_table import LiveTable
+from stseg.io.live.publishing import Publisher
+from stseg.io.runfile.unfinished.work_folder import WorkFolder
+from stseg.records.border import Border
+from stseg.records.tables import TRAJECTORY
+from stseg.trackers import find_tracker
+from stseg.tracking.windows.windows import window_length
+from stseg.trajectories.live_corrections import LiveCorrections, renamed
+from stseg.trajectories.live_ids import LiveIds, Names
+
+
+@dataclass
+class _Member:
+    """An open segment, the trajectory rows of its warm-up, and the run's ids of its tracks."""
+
+    segment: OpenSegment
+    lead: list[Rows] = field(default_factory=list)
+    names: Names | None = None
+    """None during the warm-up."""
+
+
+class LiveRun:
+    """Online run: distributes frame sets to the open segments and publishes their tracks.
+
+    A context manager: after an error the open segments are discarded.
+
+    Parameters
+    ----------
+    job, folder
+        The job, and the folder of its segments.
+    table, corrections
+        The live table, to which committed track rows are appended, and that of its corrected ids.
+    publisher
+        Sends them on, too; None for nowhere.
+    foregrounds
+        Foreground models of the cameras.
+    finished
+        Finished segments of an interrupted run; those of this run are appended.
+
+    Attributes
+    ----------
+    pipeline
+        The stages, shared by all segments.
+    """
+
+    def __init__(
+        self,
+        job: Job,
+        folder: WorkFolder,
+        table: LiveTable,
+        corrections: CorrectionTable,
+        publisher: Publisher | None,
+        foregrounds: LiveForegrounds,
+        finished: list[FinishedSegment],
+    ) -> None:
+        self.foregrounds, self.finished = foregrounds, finished
+        self._job, self._folder, self._table, self._publisher = job, folder, table, publisher
+        self._corrections = corrections
+        frame_rate = job.recording.rig.frame_rate
+        self._window = window_length(frame_rate, job.config.tracking)[0]
+        warm_up = round(job.config.segments.warm_up * frame_rate)
+        self._names = LiveIds(table.rows, corrections.rows, warm_up + 2 * self._window)
+        self._decided_again = LiveCorrections(frame_rate, Border.of(job.read.read_rig), job.config)
+        self._blind_views = BlindViews([camera.name for camera in job.recording.rig.cameras])
+        self.pipeline = job.pipeline()
+        self._members: list[_Member] = []
+        self._plan: Iterator[Segment] = iter(())
+        self._coming: Segment | None = None
+        self._since, self._stop, self._published = 0, 0, 0
+        self._arrived: dict[int, float] = {}
+        self._delays: list[float] = []
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if error is not None:
+            self._discard()
+
+    @property
+    def delay(self) -> str:
+        """Latency from the arrival of frames to their tracks in the live table, in words; empty without any tracks."""
+        if not self._delays:
+            return ""
+        return f", published {median(self._delays):.1f} s after arrival (median; at most {max(self._delays):.1f} s)"
+
+    def begin(self, plan: Iterator[Segment], since: int) -> None:
+        """Set the plan of segments.
+
+        Parameters
+        ----------
+        plan
+            The segments in their order; the first begins with the first frame set.
+        since
+            First frame of the first background period.
+        """
+        self._plan, self._coming, self._since = plan, next(plan), since
+        self._published = self._coming.first
+
+    def add(self, frame_set: LiveFrameSet) -> None:
+        """Process the next frame set."""
+        self.foregrounds.update(frame_set, self._since)
+        self._blind_views.note(frame_set)
+        self._arrived[frame_set.frame] = frame_set.arrived
+        self._stop = frame_set.frame + 1
+        while self._coming is not None and frame_set.frame >= self._coming.lead:
+            self._open(self._coming)
+            self._coming = next(self._plan, None)
+        for member in self._members:
+            self._take(member, member.segment.add(frame_set), member.segment.segment.stop)
+        if self._members:
+            oldest = self._members[0].segment
+            if oldest.complete and frame_set.frame >= oldest.segment.stop + self._window:
+                self._keep(oldest.segment.stop)
+
+    def finish(self) -> list[FinishedSegment]:
+        """Close the run after its last frame set; all finished segments."""
+        if self._members and self._members[0].segment.segment.first < self._stop:
+            self._take(self._members[0], self._members[0].segment.finish(), self._stop)
+            self._keep(self._stop)
+        self._discard()
+        return self.finished
+
+    def _open(self, segment: Segment) -> None:
+        draft = self._folder.draft(segment.index)
+        self._members.append(
+            _Member(OpenSegment(self._job, segment, self.pipeline, self.foregrounds.snapshot(), draft))
+        )
+
+    def _take(self, member: _Member, steps: list[CommittedFrames], stop: int) -> None:
+        for step in steps:
+            frames = [fused.frame for fused in step.commit.frames]
+            member.segment.write(step, self._blind_views.events(frames))
+            self._publish(member, step, stop)
+
+    def _publish(self, member: _Member, step: CommittedFrames, stop: int) -> None:
+        """Append newly committed track rows to the live table; the warm-up belongs to the segment before."""
+        segment, rows = member.segment.segment, step.commit.trajectory
+        last = step.commit.frames[-1].frame
+        member.lead.append(rows[rows["frame"] < segment.first])
+        if last < segment.first:
+            return
+        if member.names is None:
+            member.names = self._names.begin(np.concatenate([*member.lead, np.zeros(0, TRAJECTORY)]))
+        new = step.within(max(segment.first, self._published), stop)
+        if not new.commit.frames:
+            return
+        rows = self._names.named(new.commit.trajectory, member.names)
+        self._table.append(rows)
+        if self._publisher is not None:
+            self._publisher.append(rows)
+        self._correct(member, rows, new)
+        self._published = new.commit.frames[-1].frame + 1
+        self._delays += [now() - self._arrived.pop(fused.frame) for fused in new.commit.frames]
+
+    def _correct(self, member: _Member, rows: Rows, new: CommittedFrames) -> None:
+        """Decide live ids again with newly published rows, and append what is corrected; some trackers' are final."""
+        if find_tracker(self._job.tracker).final:
+            return
+        found = self._decided_again.decide(rows, new.appearance, self._names.fresh)
+        if not len(found):
+            return
+        self._corrections.append(found)
+        if self._publisher is not None:
+            self._publisher.correct(found)
+        self._names.correct(found)
+        present = set(new.commit.trajectory["id"].tolist())
+        for one in self._members:
+            if one.names is not None:
+                one.names = renamed(one.names, found, present if one is member else ())
+
+    def _keep(self, stop: int) -> None:
+        """Finish the oldest segment before frame `stop`."""
+        member = self._members.pop(0)
+        self.finished.append(FinishedSegment(*member.segment.keep(stop)))
+        self._blind_views.forget(min((other.segment.segment.lead for other in self._members), default=stop))
+
+    def _discard(self) -> None:
+        for member in self._members:
+            member.segment.close()
+        self._members = []

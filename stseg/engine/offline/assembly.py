@@ -1,0 +1,180 @@
+"""Assembly of the run file from the segment files: stitched tracks of the whole run, and the volume with their ids."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Executor, ThreadPoolExecutor
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from stseg.arrays import Ints, Rows
+from stseg.engine.offline.calls import Caller, called_here
+from stseg.engine.offline.job import Job
+from stseg.engine.offline.segments import Segment
+from stseg.engine.pipeline import finished_tracks
+from stseg.io.config_file import format_config
+from stseg.io.recording.time_alignment import with_alignment
+from stseg.io.runfile import layout
+from stseg.io.runfile.packed_frames import PackedFrame, packed_frame, renamed_label, unpacked_label
+from stseg.io.runfile.runs import Run, RunWriter, read_run
+from stseg.records.tables import APPEARANCE, Tracks
+from stseg.trackers import find_tracker
+from stseg.tracking.windows.stitching import SegmentTracks, StitchedTracks, Stitcher, rename_labels
+
+_BLOCK = 64
+"""Frames of the volume read at a time."""
+_FEW = 256
+"""Names of a segment that are renamed as they are packed."""
+_COPIED = ("ghosts", "windows", "rates", "shifts", "timings", "appearance")
+"""Tables of the segments that the run file takes unchanged."""
+
+
+class FinishedSegment(NamedTuple):
+    """A segment and its file."""
+
+    segment: Segment
+    path: Path
+
+
+class _SegmentRows(NamedTuple):
+    """A segment's file, its committed rows, and the run's track id of each row, 0 for none."""
+
+    run: Run
+    rows: Rows
+    identity: Ints
+
+
+class _Association(NamedTuple):
+    """The tracks of a run.
+
+    Attributes
+    ----------
+    joined
+        The tracks of all segments under names of the run.
+    tracks
+    identity : int64 (n,)
+        The track id of each of the joined rows, 0 for none.
+    """
+
+    joined: StitchedTracks
+    tracks: Tracks
+    identity: Ints
+
+
+def assemble(job: Job, finished: Sequence[FinishedSegment], output: Path, call: Caller = called_here) -> Tracks:
+    """Write the run file of a job from its finished segments.
+
+    What takes no track ids is copied while the tracks are associated.
+
+    Parameters
+    ----------
+    job
+        The run.
+    finished
+        All segments of the run, in their order.
+    output
+        Path of the run file; an existing file is replaced.
+    call
+        How the tracks are associated, see `stseg.engine.offline.calls`.
+
+    Returns
+    -------
+    Tracks
+        The tracks of the whole run.
+    """
+    views = read_run(finished[0].path).views
+    config, recording = format_config(job.config), with_alignment(job.recording, job.streams.shown)
+    with (
+        call(_associated, job, finished) as association,
+        RunWriter(output, recording, views, config, overwrite=True, kept=job.volume) as writer,
+    ):
+        for _, path in finished:
+            _copy(read_run(path), writer)
+        joined, tracks, identity = association()
+        with ThreadPoolExecutor(os.cpu_count()) as packers:
+            for part in _segment_rows(finished, joined, identity):
+                _append_labels(part, writer, packers)
+        writer.append("trajectory", tracks.trajectory)
+        if not find_tracker(job.tracker).final:
+            writer.append("committed", joined.committed)
+            writer.append("committed_events", joined.events)
+            writer.append("known", job.known)
+        writer.append("boxes", tracks.boxes)
+        writer.append("events", tracks.events)
+        writer.finish(tracks.summary())
+    return tracks
+
+
+def _associated(job: Job, finished: Sequence[FinishedSegment]) -> _Association:
+    """The tracks of a run from those of its segments."""
+    stitcher = Stitcher(round(job.config.tracking.patience * job.recording.rig.frame_rate))
+    before = finished[0].segment.first if finished else 0
+    appearance = [np.zeros(0, APPEARANCE)]
+    for segment, path in finished:
+        run = read_run(path)
+        stitcher.add(SegmentTracks(segment.first, run.trajectory, run.events, segment.first - before))
+        before = segment.stop
+        appearance.append(run.appearance)
+    joined = stitcher.joined()
+    tracks, identity = finished_tracks(
+        job.read.read_rig, job.config, find_tracker(job.tracker), joined.committed, joined.events,
+        np.concatenate(appearance), job.recording.rig, job.known,
+    )  # fmt: skip
+    return _Association(joined, tracks, identity)
+
+
+def _copy(run: Run, writer: RunWriter) -> None:
+    """Append what the run file takes unchanged of a segment."""
+    for frames, log_odds in run.read_packed_frames(layout.LOG_ODDS, _BLOCK):
+        writer.append_packed_log_odds(frames, log_odds)
+    for table in _COPIED:
+        writer.append(table, np.asarray(getattr(run, table)))
+
+
+def _segment_rows(
+    finished: Sequence[FinishedSegment], joined: StitchedTracks, identity: Ints
+) -> Iterator[_SegmentRows]:
+    """Divide the committed rows and their ids, which are in the order of the segments, among the segments."""
+    first = 0
+    for segment, path in finished:
+        run = read_run(path)
+        stop = first + int((run.trajectory["frame"] >= segment.first).sum())
+        rows = joined.committed[first:stop].copy()
+        rows["id"] = joined.local[first:stop]
+        yield _SegmentRows(run, rows, identity[first:stop])
+        first = stop
+
+
+def _append_labels(part: _SegmentRows, writer: RunWriter, packers: Executor) -> None:
+    """Append a segment's labels, with the run's track ids, to the run file.
+
+    Frames whose tracks keep their ids are copied as they are packed; the others are renamed side by side.
+    """
+    order = np.argsort(part.rows["frame"], kind="stable")
+    rows, identity = part.rows[order], part.identity[order]
+
+    def renamed(frame: int, label: PackedFrame) -> PackedFrame:
+        own = slice(*rows["frame"].searchsorted([frame, frame + 1]))
+        return _renamed(label, part.run.views.shape, rows[own], identity[own])
+
+    for frames, label in part.run.read_packed_frames(layout.LABEL, _BLOCK):
+        writer.append_packed_labels(list(packers.map(renamed, frames.tolist(), label)))
+
+
+def _renamed(label: PackedFrame, shape: tuple[int, ...], rows: Rows, identity: Ints) -> PackedFrame:
+    """The labels of a frame, which are names of a segment, as the run's track ids; rows of the frame."""
+    if (rows["id"] == identity).all():
+        return label
+    if rows["id"].max() < _FEW:
+        names = np.zeros(_FEW, np.int32)
+        names[rows["id"]] = identity
+        few = renamed_label(label, math.prod(shape), names)
+        if few is not None:
+            return few
+    cells = unpacked_label(label, shape)
+    rename_labels(cells[None], rows["frame"][:1], rows, identity)
+    return packed_frame(cells)

@@ -1,0 +1,182 @@
+"""A run under the answers of a person: identities solved again, with the answers as hard constraints."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from stseg.arrays import Ints, Rows
+from stseg.engine.pipeline import associated_tracks
+from stseg.errors import FormatError, InputError
+from stseg.identities.review.answered_constraints import AnsweredRows, answered_rows
+from stseg.identities.review.corrections import Answer, Corrections, solve_corrections
+from stseg.identities.search.constraints import Constraints
+from stseg.io.config_file import parse_config
+from stseg.io.runfile.runs import Run
+from stseg.records.tables import Tracks
+
+_PLACE = [("frame", "<i8"), ("raw_x", "<f8"), ("raw_y", "<f8")]
+
+
+@dataclass(frozen=True)
+class CorrectedTracks:
+    """Tracks under answers.
+
+    Attributes
+    ----------
+    tracks
+    answered : ANSWERED (n,)
+        What was answered so far.
+    new_ids
+        Corrected ids of labels by the run's id and frame, 0 where they are no person.
+    names
+        Names by corrected id.
+    """
+
+    tracks: Tracks
+    answered: Rows
+    new_ids: Callable[[Ints, Ints], Ints]
+    names: dict[int, str]
+
+
+def corrected_tracks(run: Run, answers: Sequence[Answer]) -> CorrectedTracks:
+    """The tracks of a run under answers; each keeps the id of the run's track in which it begins.
+
+    Identities are solved again where the run has the rows that its tracker committed, under answers given before, too.
+    Else ids are exchanged from the frames of the answers on.
+
+    Raises
+    ------
+    InputError
+        For an answer that names no such track or frame, or that contradicts another.
+    """
+    linked = solve_corrections(run.tracks, answers)
+    if not is_solved_again(run):
+        return _renamed(run, linked)
+    old = rows_with_ids(run)
+    answered = answered_before(run) + answered_rows(old, answers, run.frame_rate)
+    kept, constraints = answered.kept
+    config = parse_config(run.provenance.config, f"{run.path}: configuration")
+    rig = run.recording.reduced(config.foreground.body_rows).read_rig
+    tracks, identity = associated_tracks(
+        rig, config, run.committed[kept], run.committed_events, run.appearance, run.recording.rig, constraints,
+        run.known,
+    )  # fmt: skip
+    _require_obeyed(constraints, answered.places, identity)
+    numbers = _numbers(old[kept], identity, np.concatenate([tracks.events["id"], tracks.events["other"]]))
+    solved = Tracks(*(_numbered(rows, numbers) for rows in (tracks.trajectory, tracks.boxes, tracks.events)))
+    new = np.zeros(len(old), np.int64)
+    new[kept] = [numbers.get(one, 0) for one in identity.tolist()]
+    given = run.names | {answer.track: answer.name for answer in answers if answer.action == "name"}
+    return CorrectedTracks(solved, answered.table, _label_ids(old, new), _names(old, new, given))
+
+
+def is_solved_again(run: Run) -> bool:
+    """Whether answers solve the identities of a run again: it has committed rows, and what was answered before."""
+    return len(run.committed) > 0 and (len(run.answered) > 0 or not run.corrected)
+
+
+def answered_before(run: Run) -> AnsweredRows:
+    """What answers said of the committed rows of a run so far; raises FormatError where they name no such rows."""
+    table, number = run.answered, len(run.committed)
+    last = np.maximum(table["row"], table["other"])
+    if (last >= number).any():
+        raise FormatError(run.path, "/answered", f"row {last.max()}", f"rows of /committed, which has {number}")
+    frame = run.committed["frame"]
+    if (frame[table["row"]] > frame[table["other"]]).any():
+        raise FormatError(run.path, "/answered", "a row after its other", "rows in the order of frames")
+    return AnsweredRows.of_table(table, number)
+
+
+def rows_with_ids(run: Run) -> Rows:
+    """Committed rows with the ids of the run's tracks, 0 for none."""
+    return _with_ids_of(run.trajectory, run.committed)
+
+
+def _with_ids_of(trajectory: Rows, committed: Rows) -> Rows:
+    """Committed rows with the ids of the run's tracks, 0 for none; tracks keep the places of their rows as raw ones."""
+    kept, own = np.zeros(len(trajectory), _PLACE), np.zeros(len(committed), _PLACE)
+    for name, _ in _PLACE:
+        kept[name], own[name] = trajectory[name], committed[name]
+    rows = committed.copy()
+    rows["id"] = 0
+    _, index, row = np.intersect1d(kept, own, return_indices=True)
+    rows["id"][row] = trajectory["id"][index]
+    return rows
+
+
+def _require_obeyed(constraints: Constraints, places: Sequence[str], identity: Ints) -> None:
+    """Raise InputError where a constraint on rows that are in tracks is not obeyed."""
+    both = (identity[constraints.earlier] > 0) & (identity[constraints.later] > 0)
+    broken = np.flatnonzero(constraints.violated(identity) & both)
+    if len(broken):
+        raise InputError(places[broken[0]], "answer", "one that contradicts others", "answers that can all be true")
+
+
+def _numbers(old: Rows, identity: Ints, others: Ints) -> dict[int, int]:
+    """The run's id for each identity: that of the first row that has one, a new one where it is taken."""
+    fresh, numbers, taken = int(old["id"].max(initial=0)), dict[int, int](), set[int]()
+    order = np.lexsort((old["id"], old["frame"]))
+    named = order[(identity[order] > 0) & (old["id"][order] > 0)]
+    for row in [*named.tolist(), *order.tolist()]:
+        one, own = int(identity[row]), int(old["id"][row])
+        if one > 0 and one not in numbers:
+            if own == 0 or own in taken:
+                fresh, own = fresh + 1, fresh + 1
+            numbers[one] = own
+            taken.add(own)
+    for one in np.unique(others[others > 0]).tolist():
+        if one not in numbers:
+            fresh += 1
+            numbers[one] = fresh
+    return numbers
+
+
+def _numbered(rows: Rows, numbers: dict[int, int]) -> Rows:
+    """Rows under other ids, in the order of frames and ids."""
+    rows = rows.copy()
+    for name in {"id", "other"} & set(rows.dtype.names or ()):
+        rows[name] = [numbers.get(one, 0) for one in rows[name].tolist()]
+    return np.asarray(rows[np.lexsort((rows["id"], rows["frame"]))])
+
+
+def _label_ids(old: Rows, new: Ints) -> Callable[[Ints, Ints], Ints]:
+    known = np.flatnonzero(old["id"] > 0)
+    span = int(old["frame"].max(initial=0)) + 1
+    key = old["id"][known] * span + old["frame"][known]
+    order = np.argsort(key)
+    key, value = key[order], new[known[order]]
+
+    def new_ids(identity: Ints, frame: Ints) -> Ints:
+        asked = identity * span + np.minimum(frame, span - 1)
+        index = np.searchsorted(key, asked).clip(max=max(len(key) - 1, 0))
+        return np.where(key[index] == asked, value[index], 0) if len(key) else np.zeros(len(identity), np.int64)
+
+    return new_ids
+
+
+def _names(old: Rows, new: Ints, names: dict[int, str]) -> dict[int, str]:
+    """Names by corrected id: that of the first row of the track that was named."""
+    found = dict[int, str]()
+    for identity, name in names.items():
+        own = np.flatnonzero((old["id"] == identity) & (new > 0))
+        if len(own):
+            found[int(new[own[np.argmin(old["frame"][own])]])] = name
+    return found
+
+
+def _renamed(run: Run, linked: Corrections) -> CorrectedTracks:
+    """The run's tracks under the ids of corrected links."""
+
+    def of(rows: Rows) -> Rows:
+        rows = rows.copy()
+        rows["id"] = linked.map(rows["id"], rows["frame"])
+        return np.asarray(rows[rows["id"] > 0])
+
+    trajectory, events = of(run.trajectory), of(run.events)
+    events["other"] = linked.map(events["other"], events["frame"])
+    trajectory = trajectory[np.lexsort((trajectory["id"], trajectory["frame"]))]
+    tracks = Tracks(trajectory, of(run.boxes), events)
+    return CorrectedTracks(tracks, run.answered, linked.map, run.names | linked.names)

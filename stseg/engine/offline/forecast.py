@@ -1,0 +1,113 @@
+"""Forecast of a run's duration and size, from short parts of its recording that are tracked."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from time import perf_counter
+
+from stseg.engine.offline.assembly import FinishedSegment, assemble
+from stseg.engine.offline.job import Job
+from stseg.engine.offline.segment_worker import SegmentWorker
+from stseg.engine.offline.segments import Segment
+
+_SECONDS = 10.0
+"""Duration of all tried parts, seconds."""
+_PLACES = 3
+"""Number of tried parts."""
+_READY = 4
+"""Frames that are tracked first, so that no kernel is compiled while the clock runs."""
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """What a run will cost.
+
+    Attributes
+    ----------
+    frames, segments, workers
+        Of the run, of which each segment is made by one worker.
+    counting, learning, tracking, joining
+        Seconds of work: decoding all streams once, learning backgrounds, making all segments, writing the run file.
+    file_bytes
+        Size of the run file; the folder of segments beside it takes as much until it stands.
+    """
+
+    frames: int
+    segments: int
+    workers: int
+    counting: float
+    learning: float
+    tracking: float
+    joining: float
+    file_bytes: int
+
+    @property
+    def seconds(self) -> float:
+        """From the beginning to the end, by workers that do not slow each other down."""
+        rounds = -(-self.segments // min(self.workers, self.segments))
+        return self.counting + (self.learning + self.tracking) * rounds / self.segments + self.joining
+
+
+def forecast(job: Job, counting: float, workers: int) -> Forecast:
+    """What a job will cost, from parts of it that are tracked now; counting took so many seconds."""
+    work, cuts = SegmentWorker(job), job.segments()
+    frames = sum(segment.stop - segment.first for segment in cuts)
+    parts = list(_parts(job))
+    tried = sum(len(range(part.first, part.stop)) for part in parts)
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        work.make(replace(parts[0], stop=min(parts[0].first + _READY, job.stop)), folder / "ready.h5", _silent)
+        tracking, learning, made, fused = 0.0, [], [], _Count()
+        for part in parts:
+            watch = _Clock()
+            work.foregrounds(part)
+            learning.append(watch.lap())
+            made.append(FinishedSegment(part, work.make(part, folder / f"{part.index}.h5", fused)))
+            tracking += watch.lap()
+        watch = _Clock()
+        assemble(job, made, folder / "run.h5")
+        joining, size = watch.lap(), (folder / "run.h5").stat().st_size
+    # A segment is processed until its last window is solved: much of a short part, and little of a long one.
+    beyond = (fused.calls - tried) / len(parts)
+    processed = sum(segment.stop - segment.lead + beyond for segment in cuts)
+    learned = -(-frames // round(job.config.segments.background_period * job.recording.rig.frame_rate))
+    return Forecast(
+        frames, len(cuts), workers, counting, max(learning) * learned, tracking / fused.calls * processed,
+        joining / tried * frames, round(size / tried * frames),
+    )  # fmt: skip
+
+
+def _parts(job: Job) -> list[Segment]:
+    """Short parts spread over the run, without a warm-up."""
+    total, length = job.stop - job.first, max(1, round(_SECONDS / _PLACES * job.recording.rig.frame_rate))
+    length = min(length, max(1, total // _PLACES))
+    begins = [job.first + (total - length) * place // (_PLACES - 1) for place in range(_PLACES)]
+    return [Segment(k, begin, begin, begin + length) for k, begin in enumerate(begins) if k == 0 or total > _PLACES]
+
+
+class _Clock:
+    """Seconds between laps."""
+
+    def __init__(self) -> None:
+        self._last = perf_counter()
+
+    def lap(self) -> float:
+        """Since the last lap."""
+        last, self._last = self._last, perf_counter()
+        return self._last - last
+
+
+class _Count:
+    """How often it is called: once for each frame that is looked at."""
+
+    def __init__(self) -> None:
+        self.calls = 0
+
+    def __call__(self, _: int) -> None:
+        self.calls += 1
+
+
+def _silent(_: int) -> None:
+    """No progress."""

@@ -1,0 +1,47 @@
+"""A part of a recording, in frames."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from stseg.errors import ConfigError
+from stseg.io.recording.recording import Recording
+from stseg.io.recording.stream_index import StreamIndex
+from stseg.io.toml.text import shown
+from stseg.io.untrusted import limits
+from stseg.io.untrusted.numbers import parse_whole
+
+
+class FrameRange(NamedTuple):
+    """Frames first .. stop - 1; None for the recording's first frame, and for its end."""
+
+    first: int | None
+    stop: int | None
+
+    def __str__(self) -> str:
+        return f"{'' if self.first is None else self.first}:{'' if self.stop is None else self.stop}"
+
+    @classmethod
+    def parse(cls, text: str) -> FrameRange:
+        """The range of a text A:B; raises ConfigError."""
+        head, colon, tail = text.partition(":")
+        first, stop = (parse_whole(part, 0, limits.FRAMES) for part in (head, tail))
+        if not colon or (head and first is None) or (tail and stop is None):
+            raise ConfigError("--frames", "", shown(text), f"A:B, whole numbers up to {limits.FRAMES}, half open")
+        return cls(first, stop)
+
+
+def resolve_frames(frames: FrameRange | None, streams: StreamIndex, recording: Recording) -> tuple[int, int]:
+    """First and stop of a part of a recording; without a range, of all frames that tell where anything stands.
+
+    Raises
+    ------
+    ConfigError
+        Where the range is not within the recording, or is empty.
+    """
+    if frames is None:
+        return streams.multi_view_range(recording)
+    first, stop = frames.first or 0, streams.length if frames.stop is None else frames.stop
+    if not 0 <= first < stop <= streams.length:
+        raise ConfigError("--frames", "", f"'{frames}'", f"a part of the recording's frames, 0:{streams.length}")
+    return first, stop

@@ -1,0 +1,48 @@
+"""People of an earlier run, by whom those of a later one are recognised: `stseg run --known`."""
+
+from __future__ import annotations
+
+from hashlib import blake2b
+from pathlib import Path
+
+import numpy as np
+
+from stseg.arrays import Rows
+from stseg.config import Config
+from stseg.engine.offline.correction import rows_with_ids
+from stseg.errors import ConfigError, FormatError
+from stseg.identities.known_people import known_people
+from stseg.io.runfile.runs import read_run
+from stseg.io.untrusted import limits
+
+_MOST = limits.FRAMES // 2
+"""Greatest id of a known person."""
+
+
+def read_known(path: Path, config: Config) -> Rows:
+    """The people of a run file and those whom it knew from earlier ones, KNOWN (n,).
+
+    Raises
+    ------
+    ConfigError
+        Where the configuration recognises nobody.
+    FormatError
+        Where the file is no run file, or one without the rows that tell of its people.
+    """
+    if config.tracking.return_probability == 1:
+        wanted = "tracking.return_probability below 1 with it, 0.99 for instance"
+        raise ConfigError("--known", "", "that alone", wanted)
+    run = read_run(path)
+    if not len(run.committed):
+        raise FormatError(path, "/committed", "no rows", "those of a run of the tracker cut or frames")
+    own = known_people(rows_with_ids(run), run.appearance)
+    earlier = run.known[~np.isin(run.known["id"], own["id"])]
+    people = np.concatenate([earlier, own])
+    if (greatest := people["id"].max(initial=0)) > _MOST:
+        raise FormatError(path, "/tracks, id", str(greatest), f"ids up to {_MOST}, so that there are some for others")
+    return people
+
+
+def digest(known: Rows) -> str:
+    """What tells known people apart from others, in words."""
+    return f"{len(known)} people, {blake2b(known.tobytes(), digest_size=8).hexdigest()}"

@@ -1,0 +1,148 @@
+"""Images of track ids: for every pixel of every camera, the track that it shows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from stseg.arrays import Bytes, Ints, Observation, Rows, Singles
+from stseg.config import Config
+from stseg.engine.offline.backgrounds import make_foregrounds
+from stseg.engine.reporter import Reporter
+from stseg.errors import SourceError
+from stseg.io.outputs.label_images import LabelImages
+from stseg.io.recording.frames import FrameSet, open_frames
+from stseg.io.recording.recording import Recording
+from stseg.io.runfile.runs import Run
+from stseg.pixel_labels.appearance import Appearance, ColourSums
+from stseg.pixel_labels.placed_people import PlacedPeople
+from stseg.pixel_labels.views import ViewLabels, view_labels
+
+_LEARNING_FRAMES = 200
+"""Frames, about, from which the colours of tracks are learned."""
+
+
+def write_labels(
+    run: Run,
+    config: Config,
+    folder: Path,
+    frames: Ints,
+    palette: Bytes,
+    reporter: Reporter,
+    *,
+    overwrite: bool = False,
+) -> int:
+    """Write the label images of some frames of a run, and count them.
+
+    Parameters
+    ----------
+    run
+        A finished run.
+    config
+        The constants of foreground and labels.
+    folder
+        Folder of the images.
+    frames : int64 (n,)
+        Consecutive frames of the run, one or more.
+    palette : uint8 (256, 3)
+        Colours of the ids, red, green, blue.
+    reporter
+        Receives progress.
+    overwrite
+        Whether the folder may hold files already.
+
+    Raises
+    ------
+    SourceError
+        Where no camera delivers pixels, or a stream cannot be read.
+    OutputError
+    """
+    recording, cameras = run.recording, require_pixels(run.recording)
+    people = _people(run.trajectory, frames)
+    largest = int(run.trajectory["id"].max(initial=0))
+    images = LabelImages(folder, [run.cameras[k] for k in cameras], largest, palette, overwrite)
+    views = view_labels(recording.rig, config.labels, config.body)
+    worn = _appearances(run, views, people, frames, reporter)
+    foregrounds = make_foregrounds(recording, config, int(run.frames[0]), int(run.frames[-1]) + 1)
+    count = 0
+    for frame_set in _frame_sets(run, frames, config.foreground.chosen.memory, reporter):
+        for k in cameras:
+            seen = frame_set.views[k]
+            pixels = foregrounds[k].pixels(seen)
+            if frame_set.frame in people:
+                ids = _ids(views[k], people[frame_set.frame], pixels, seen, worn.get(k))
+                images.write(run.cameras[k], frame_set.frame, ids)
+                count += 1
+    return count
+
+
+def require_pixels(recording: Recording) -> list[int]:
+    """The cameras that deliver pixels; SourceError where none does."""
+    found = [k for k, source in enumerate(recording.sources) if source.source.kind != "boxes"]
+    if not found:
+        raise SourceError(recording.path, "camera, source", "boxes alone", "a camera that delivers pixels")
+    return found
+
+
+def _people(trajectory: Rows, frames: Ints) -> dict[int, Rows]:
+    """The rows of each frame."""
+    order = np.argsort(trajectory["frame"], kind="stable")
+    ends = [np.searchsorted(trajectory["frame"], frames, side, sorter=order) for side in ("left", "right")]
+    parts = zip(frames.tolist(), *(end.tolist() for end in ends), strict=True)
+    return {frame: trajectory[order[first:stop]] for frame, first, stop in parts}
+
+
+def _frame_sets(
+    run: Run, frames: Ints, memory: float, reporter: Reporter, stage: str = "labelling"
+) -> Iterator[FrameSet]:
+    """The frames, and before them as many as a background needs to adapt to the light (`memory`, seconds)."""
+    first, stop = max(int(run.frames[0]), int(frames[0]) - round(memory * run.frame_rate)), int(frames[-1]) + 1
+    with (
+        open_frames(run.recording.without_images(), first, stop) as frame_sets,
+        reporter.progress(stage, stop - first) as advance,
+    ):
+        for frame_set in frame_sets:
+            yield frame_set
+            advance(1)
+
+
+def _appearances(
+    run: Run, views: Sequence[ViewLabels], people: dict[int, Rows], frames: Ints, reporter: Reporter
+) -> dict[int, Appearance]:
+    """Colours of the tracks in each view that delivers colours, learned from frames all over the selection."""
+    tracks = np.unique(np.concatenate([rows["id"] for rows in people.values()])).astype(np.int64)
+    kinds = [source.source.kind for source in run.recording.sources]
+    colours = {k: ColourSums.of(tracks) for k, kind in enumerate(kinds) if kind in ("video", "images")}
+    if not colours or not len(tracks):
+        return {}
+    every = max(len(frames) // _LEARNING_FRAMES, 1)
+    for frame_set in _frame_sets(run, frames, 0.0, reporter, "learning colours"):
+        if (frame_set.frame - int(frames[0])) % every == 0:
+            for k, sums in colours.items():
+                image = _colours(frame_set.views[k])
+                if image is not None:
+                    views[k].learn(_placed(people[frame_set.frame]), image, sums)
+    return {k: sums.appearance() for k, sums in colours.items()}
+
+
+def _ids(
+    view: ViewLabels, people: Rows, pixels: Singles | None, seen: Observation, worn: Appearance | None
+) -> Ints:  # fmt: skip
+    """Ids of the tracks that a view shows, int64 (v, u); all 0 for a blind view."""
+    if pixels is None:
+        return np.zeros(view.camera.size[::-1], np.int64)
+    index = view.label(_placed(people), pixels, _colours(seen), worn)
+    return np.asarray(np.append(0, people["id"])[index], np.int64)
+
+
+def _placed(people: Rows) -> PlacedPeople:
+    covariance = np.stack([people[name] for name in ("xx", "xy", "xy", "yy")], -1).reshape(-1, 2, 2)
+    ground, height = np.stack([people["x"], people["y"]], -1), people["height"].astype(float)
+    return PlacedPeople(ground, covariance, height, people["id"].astype(np.int64))
+
+
+def _colours(seen: Observation) -> Bytes | None:
+    """The image of an observation that has colours."""
+    return np.asarray(seen, np.uint8) if isinstance(seen, np.ndarray) and seen.ndim == 3 else None

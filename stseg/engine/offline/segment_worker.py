@@ -1,0 +1,96 @@
+"""Tracking of one segment: frames in, a segment file out. A segment depends on no other segment."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import Executor, ThreadPoolExecutor
+from contextlib import ExitStack
+from copy import deepcopy
+from pathlib import Path
+
+import numpy as np
+
+from stseg.engine.image_shift import ImageShifts
+from stseg.engine.offline.backgrounds import BackgroundFrames, background_frames, make_foregrounds
+from stseg.engine.offline.job import Job
+from stseg.engine.offline.segment_file import PackedStep, open_segment_file, packed_step, write_step
+from stseg.engine.offline.segments import Segment
+from stseg.engine.session import run_session, two_cores
+from stseg.foreground.view_foreground import ViewForeground
+from stseg.io.recording.frames import open_frames
+from stseg.io.runfile.unfinished.segment_files import keep_segment
+from stseg.records.tables import TRACK
+
+
+class SegmentWorker:
+    """Makes segments of one job, any of them in any order.
+
+    Parameters
+    ----------
+    job
+        The run.
+    cores
+        Processor cores for this worker, asked at each frame; see `run_session`.
+    """
+
+    def __init__(self, job: Job, cores: Callable[[], int] = two_cores) -> None:
+        self.job, self.pipeline, self.cores = job, job.pipeline(), cores
+        self._ends = [*(begin for begin, _ in job.gaps()), job.stop]
+        self._learned = list[ViewForeground]()
+        self._learned_from: BackgroundFrames | None = None
+
+    def make(self, segment: Segment, draft: Path, advance: Callable[[int], None]) -> Path:
+        """Track a segment and write its file.
+
+        Parameters
+        ----------
+        segment
+            Its frames.
+        draft
+            Path of the file while it is written.
+        advance
+            Called with the number of further frames of the segment that were fused.
+
+        Returns
+        -------
+        Path
+            The finished file, whose name has its checksum.
+        """
+        job = self.job
+
+        def fused(frame: int) -> None:
+            advance(int(segment.first <= frame < segment.stop))
+
+        foregrounds = self.foregrounds(segment)
+        shifts = ImageShifts(foregrounds, job.read.factors, job.recording.rig.frame_rate)
+        end = min(end for end in self._ends if end >= segment.stop)
+        with (
+            open_frames(job.read, segment.lead, end, job.streams) as frame_sets,
+            open_segment_file(job, self.pipeline.occupancy.views, draft) as writer,
+            ExitStack() as threads,
+        ):
+            packing: Executor | None = None
+            observed, packed = shifts.measured(frame_sets), deque[PackedStep]()
+            for step in run_session(self.pipeline, foregrounds, observed, segment.lead, fused, self.cores):
+                if packing is None and self.cores() > 1:
+                    packing = threads.enter_context(ThreadPoolExecutor(1, "packing"))
+                packed.append(packed_step(job, step, segment, packing))
+                if len(packed) > 1:  # the last step is packed while the session goes on
+                    write_step(job, packed.popleft(), writer)
+                if step.commit.frames[-1].frame >= segment.stop - 1:
+                    break
+            for one in packed:
+                write_step(job, one, writer)
+            writer.append("shifts", shifts.rows(segment.first, segment.stop))
+            writer.finish(np.zeros(0, TRACK))
+        return keep_segment(draft)
+
+    def foregrounds(self, segment: Segment) -> list[ViewForeground]:
+        """Foreground models at a segment's first frame; the last learned backgrounds are reused where they hold."""
+        job = self.job
+        frames = background_frames(segment, job.config.segments, job.recording.rig.frame_rate, job.first, job.stop)
+        if frames != self._learned_from:
+            self._learned = make_foregrounds(job.read, job.config, job.first, job.stop, segment, job.streams)
+            self._learned_from = frames
+        return deepcopy(self._learned)

@@ -1,0 +1,69 @@
+"""Warnings about a finished run: views that are silent, moved, off or torn, and bodies other than configured."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stseg.arrays import Floats, Ints
+from stseg.io.config_file import parse_config
+from stseg.io.runfile.runs import Run
+from stseg.view_health.body_warnings import body_warnings
+from stseg.view_health.knock_detection import find_knocks
+from stseg.view_health.run_check import find_residual_step, views_off
+from stseg.view_health.silent_views import view_warnings
+
+_MOVED = 1.0
+"""Least shift of an image that counts as a moved camera, pixels."""
+
+
+def run_warnings(run: Run) -> list[str]:
+    """One sentence for everything that a user should look at."""
+    body = parse_config(run.provenance.config, f"{run.path}: the configuration").body
+    return [
+        *view_warnings(run.cameras, run.ghosts, run.frames, run.frame_rate),
+        *body_warnings(run.cameras, run.trajectory, run.rates, body),
+        *rig_warnings(run),
+    ]
+
+
+def rig_warnings(run: Run) -> list[str]:
+    """Cameras that moved, by their images; else by their residuals; else views with a residual above one cell."""
+    frames, residual = _residual_by_window(run)
+    cell = run.recording.rig.grid.cell
+    if moved := _moved(run):
+        return moved
+    if (knock := find_residual_step(residual, cell)) is not None:
+        name, before, after = run.cameras[knock.view], _beside(knock.before), _beside(knock.after)
+        return [
+            f"view {name} was moved about frame {frames[knock.frame]}: it sees people {after} where the views put "
+            f"them, {before} it before"
+        ]
+    if off := views_off(residual, cell):
+        first, *others = (f"{run.cameras[one.view]} sees people {_beside(one.metres)}" for one in off)
+        also = "".join(f", {other} it" for other in others)
+        return [f"view {first} where the views put them{also}; see stseg calibrate check"]
+    return []
+
+
+def _moved(run: Run) -> list[str]:
+    """One sentence for each colour view whose image moved by a pixel or more."""
+    frames, sample = np.unique(run.shifts["frame"], return_inverse=True)
+    shift = np.full((len(frames), len(run.cameras)), np.nan)
+    shift[sample, run.shifts["view"]] = np.hypot(run.shifts["u"], run.shifts["v"])
+    return [
+        f"view {run.cameras[knock.view]} was moved about frame {frames[knock.frame]}: its picture by "
+        f"{knock.before - knock.after:.0f} pixels"
+        for knock in find_knocks(-shift, _MOVED)
+    ]
+
+
+def _residual_by_window(run: Run) -> tuple[Ints, Floats]:
+    """Last frame of each window, and each view's mean reprojection residual in it (window, view), metres."""
+    frames, window = np.unique(run.rates["frame"], return_inverse=True)
+    residual = np.full((len(frames), len(run.cameras)), np.nan)
+    residual[window, run.rates["view"]] = run.rates["aside"]
+    return frames, residual
+
+
+def _beside(metres: float) -> str:
+    return f"{100 * abs(metres):.0f} cm to the {'right' if metres > 0 else 'left'} of"

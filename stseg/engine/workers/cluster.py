@@ -1,0 +1,92 @@
+"""Distributed processing of segments by the workers of a Dask scheduler, on machines with a shared file system.
+
+Recording, rig and output have the same paths on all machines. A worker writes its segment file into the work folder and
+returns only the path; the segment of a worker that dies is assigned to another.
+"""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Callable, Iterator, Sequence
+from functools import lru_cache
+from pathlib import Path
+
+from stseg.engine.offline.job import Job
+from stseg.engine.offline.segment_worker import SegmentWorker
+from stseg.engine.offline.segments import Segment
+from stseg.errors import ConfigError, WorkerError
+
+
+def make_by_cluster(
+    job: Job, missing: Sequence[Segment], draft: Callable[[int], Path], address: str, advance: Callable[[int], None]
+) -> Iterator[tuple[Segment, Path]]:
+    """Process segments by the workers of a scheduler, in the order in which they finish.
+
+    Parameters
+    ----------
+    job, missing
+        The run, and its segments that are not finished.
+    draft
+        Path of a segment's unfinished file, by segment index; in a folder shared by all workers.
+    address
+        Address of the scheduler, such as tcp://10.0.0.5:8786.
+    advance
+        Called with the number of frames fused since the last call.
+
+    Yields
+    ------
+    tuple of Segment and Path
+        A finished segment and its file.
+
+    Raises
+    ------
+    ConfigError
+        Where the package `distributed` or the scheduler is missing.
+    WorkerError
+        Where the workers of a segment die repeatedly.
+    StsegError
+        An error raised by a worker.
+    """
+    try:
+        from distributed import Client, KilledWorker, as_completed
+    except ImportError as error:
+        raise ConfigError("--scheduler", "", "no package distributed", "pip install 'stseg[cluster]'") from error
+    try:
+        client = Client(address, timeout="10s")
+    except (OSError, ValueError) as error:
+        raise ConfigError(
+            "--scheduler", "", f"no scheduler at {address} ({error})", "its address, tcp://HOST:PORT"
+        ) from error
+    with client:
+        shared = client.scatter(pickle.dumps(job), broadcast=True)
+        futures = {
+            client.submit(
+                make_segment, shared, segment, draft(segment.index).absolute(), key=_key(job, segment), pure=False,
+            ): segment
+            for segment in missing
+        }  # fmt: skip
+        for future in as_completed(futures):
+            segment = futures.pop(future)  # released: its file exists, so it is not recomputed if its worker dies
+            try:
+                path = future.result()
+            except KilledWorker as error:
+                frames = f"segment {segment.index}, frames {segment.first} to {segment.stop - 1}"
+                raise WorkerError("--scheduler", frames, str(error), "workers that stay alive") from error
+            advance(segment.stop - segment.first)
+            yield segment, path
+
+
+def make_segment(job: bytes, segment: Segment, draft: Path) -> Path:
+    """Task of a worker: process a segment of a pickled job; the path of its file."""
+    return _worker(job).make(segment, draft, lambda _: None)
+
+
+@lru_cache(1)
+def _worker(job: bytes) -> SegmentWorker:
+    """The worker of a job, kept between its segments."""
+    return SegmentWorker(pickle.loads(job))
+
+
+def _key(job: Job, segment: Segment) -> str:
+    """Key of a segment's task; the scheduler's dashboard shows the part before the first dash as the stage."""
+    return f"segment-{job.recording.rig.name}-{segment.index:05}"

@@ -1,0 +1,207 @@
+"""Parallel processing of segments by worker processes of this machine, with the same results as by one process.
+
+Each worker has a pipe of its own and one segment at a time. Thus a worker that dies loses only that segment, which is
+assigned to another. The last to work share the cores of those that have nothing left to do.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from multiprocessing.connection import Connection, wait
+from multiprocessing.process import BaseProcess
+from pathlib import Path
+
+from stseg.engine.offline.job import Job
+from stseg.engine.offline.segment_worker import SegmentWorker
+from stseg.engine.offline.segments import Segment
+from stseg.engine.workers.worker_processes import CONTEXT
+from stseg.errors import StsegError, WorkerError
+from stseg.io.machine import free_cores
+from stseg.kernels.accelerate import compilation_noted
+
+_TRIES = 3
+"""Number of workers lost by the same segment at which the run fails."""
+
+
+@dataclass
+class _Worker:
+    """A worker process, its pipe, its processor cores, and its current segment."""
+
+    process: BaseProcess
+    pipe: Connection
+    cores: int
+    segment: Segment | None = None
+
+    def send(self, order: object) -> None:
+        """Send it a segment and the path of its file, or a number of cores."""
+        with suppress(OSError):  # a dead worker is replaced once it is found
+            self.pipe.send(order)
+
+
+def make_by_workers(
+    job: Job,
+    missing: Sequence[Segment],
+    draft: Callable[[int], Path],
+    workers: int,
+    advance: Callable[[int], None],
+    note: Callable[[str], None],
+) -> Iterator[tuple[Segment, Path]]:
+    """Process segments by worker processes, in the order in which they finish.
+
+    Parameters
+    ----------
+    job, missing
+        The run, and its segments that are not finished.
+    draft
+        Path of a segment's unfinished file, by segment index.
+    workers
+        Number of processes.
+    advance
+        Called with the number of further frames that were fused.
+    note
+        Called with messages about the work, each once.
+
+    Yields
+    ------
+    tuple of Segment and Path
+        A finished segment and its file.
+
+    Raises
+    ------
+    WorkerError
+        Where the workers of a segment die repeatedly.
+    StsegError
+        An error raised by a worker.
+    """
+    pending, tries, notes = list(missing)[::-1], Counter[int](), set[str]()
+    number = min(workers, len(missing))
+    with _pool(job, number) as pool:
+        while pending or any(worker.segment for worker in pool):
+            for worker in pool:
+                if worker.segment is None and pending:
+                    worker.segment = pending.pop()
+                    worker.send((worker.segment, draft(worker.segment.index)))
+            _share_cores([worker for worker in pool if worker.segment])
+            for worker in _ready(pool):
+                message = _receive(worker)
+                segment = worker.segment
+                if isinstance(message, int):
+                    advance(message)
+                elif isinstance(message, str):
+                    if message not in notes:
+                        note(message)
+                    notes.add(message)
+                elif isinstance(message, Path) and segment is not None:
+                    worker.segment = None
+                    yield segment, message
+                elif isinstance(message, BaseException):
+                    raise message
+                else:
+                    pool[pool.index(worker)] = _start(job, worker.cores)
+                    if segment is not None:
+                        tries[segment.index] += 1
+                        _limit_tries(segment, tries[segment.index], worker.process)
+                        pending.append(segment)
+
+
+def _share_cores(busy: list[_Worker]) -> None:
+    """Give the workers that have a segment all cores of this machine."""
+    for worker in busy:
+        cores = _share(len(busy))
+        if worker.cores != cores:
+            worker.cores = cores
+            worker.send(cores)
+
+
+def _share(workers: int) -> int:
+    """Cores of each of some workers."""
+    return -(-free_cores() // workers)
+
+
+def _ready(pool: list[_Worker]) -> list[_Worker]:
+    """Wait for messages; workers that have sent one, or have died."""
+    ready = wait([worker.pipe for worker in pool])
+    return [worker for worker in pool if worker.pipe in ready]
+
+
+def _receive(worker: _Worker) -> object:
+    """Number of fused frames, a note, the file of a segment, or an error; None from a worker that has died."""
+    try:
+        return worker.pipe.recv()
+    except (EOFError, OSError):
+        worker.process.join()
+        return None
+
+
+def _limit_tries(segment: Segment, tries: int, process: BaseProcess) -> None:
+    """Raise WorkerError where a segment has lost as many workers as are allowed."""
+    if tries == _TRIES:
+        frames = f"segment {segment.index}, frames {segment.first} to {segment.stop - 1}"
+        found = f"{tries} workers died while processing it, the last with status {process.exitcode}"
+        raise WorkerError("--workers", frames, found, "enough memory for each worker, or fewer workers")
+
+
+@contextmanager
+def _pool(job: Job, number: int) -> Iterator[list[_Worker]]:
+    """Worker processes waiting for segments; killed on exit."""
+    pool: list[_Worker] = []
+    try:
+        pool += [_start(job, _share(number)) for _ in range(number)]
+        yield pool
+    finally:
+        for worker in pool:
+            worker.process.kill()
+        for worker in pool:
+            worker.process.join()
+            worker.pipe.close()
+
+
+def _start(job: Job, cores: int) -> _Worker:
+    """Start a worker process."""
+    own, other = CONTEXT.Pipe()
+    process = CONTEXT.Process(target=_main, args=(job, cores, other), daemon=True)
+    process.start()
+    other.close()
+    return _Worker(process, own, cores)
+
+
+class _Orders:
+    """What a worker is to do, by its pipe: segments, and between them or meanwhile the number of its cores."""
+
+    def __init__(self, pipe: Connection, cores: int) -> None:
+        self._pipe, self._cores = pipe, cores
+
+    def cores(self) -> int:
+        """The number of cores by now, while a segment is made."""
+        while self._pipe.poll():
+            self._cores = self._pipe.recv()
+        return self._cores
+
+    def segment(self) -> tuple[Segment, Path]:
+        """The next segment, and the path of its file."""
+        while isinstance(order := self._pipe.recv(), int):
+            self._cores = order
+        segment, draft = order
+        return segment, draft
+
+
+def _main(job: Job, cores: int, pipe: Connection) -> None:
+    """Main loop of a worker process, which ends when its parent closes the pipe or kills it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    orders, worker = _Orders(pipe, cores), None
+    with suppress(EOFError, BrokenPipeError):  # the parent process has ended
+        while True:
+            segment, draft = orders.segment()
+            try:
+                with compilation_noted(pipe.send):
+                    worker = worker or SegmentWorker(job, orders.cores)
+                    pipe.send(worker.make(segment, draft, pipe.send))
+            except StsegError as error:
+                pipe.send(error)
+            except MemoryError:
+                os._exit(1)  # as if the system had killed it, without waiting for its threads: another tries

@@ -1,0 +1,13 @@
+"""What is done once for all workers, in the process that they are forked from: imports, and kernels from the cache."""
+
+from __future__ import annotations
+
+from stseg.engine.offline import assembly
+from stseg.engine.workers import local_workers
+from stseg.engine.workers.garbage import collect_rarely
+from stseg.kernels.accelerate import take_kept_kernels
+
+__all__ = ["assembly", "local_workers"]
+
+collect_rarely()
+take_kept_kernels()

@@ -1,0 +1,45 @@
+"""How many worker processes a run has, and the process that they are forked from.
+
+Both are known here without importing any stage: what forks the workers imports the stages (`preloaded`)
+at the same time as the process of the command does.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+from typing import TYPE_CHECKING
+
+from stseg.io.machine import free_cores, free_memory
+
+if TYPE_CHECKING:  # Windows has no contexts that fork
+    from multiprocessing.context import ForkServerContext, SpawnContext
+
+FORKED = "forkserver" in multiprocessing.get_all_start_methods()
+"""Whether a further process starts at once, with all imports."""
+CONTEXT: ForkServerContext | SpawnContext = (
+    multiprocessing.get_context("forkserver") if FORKED else multiprocessing.get_context("spawn")
+)
+"""Workers are forked from a process that has imported everything and has no threads, where the system can do that."""
+
+_PRELOADED = "stseg.engine.workers.preloaded"
+_MEMORY = 650 * 2**20
+"""Memory that a process of a run is taken to need on a small ground, bytes."""
+_CELL_MEMORY = 350
+"""The same of each cell and view, bytes: tables of footprints and outlines, and the volumes of a window."""
+
+
+def processes_that_fit(cells: int = 0) -> int:
+    """Number of processes of a run for which this machine has cores and free memory, 1 at least.
+
+    `cells` is the number of the volume's cells times that of the views.
+    """
+    return max(1, min(free_cores(), free_memory() // (_MEMORY + cells * _CELL_MEMORY)))
+
+
+def prepare_workers(workers: int | None) -> None:
+    """Begin the imports of workers, where there are several (None: as many as fit), while this process does others."""
+    if FORKED and (processes_that_fit() if workers is None else workers) > 1:
+        from multiprocessing import forkserver
+
+        CONTEXT.set_forkserver_preload([_PRELOADED])
+        forkserver.ensure_running()

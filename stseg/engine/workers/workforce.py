@@ -1,0 +1,87 @@
+"""The processes that make segments: this one, several of this machine, or the workers of a Dask scheduler."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from math import prod
+from pathlib import Path
+
+from stseg.engine.offline.calls import Caller, called_beside, called_here
+from stseg.engine.offline.job import Job
+from stseg.engine.offline.segment_worker import SegmentWorker
+from stseg.engine.offline.segments import Segment
+from stseg.engine.workers.cluster import make_by_cluster
+from stseg.engine.workers.local_workers import make_by_workers
+from stseg.engine.workers.worker_processes import FORKED, prepare_workers, processes_that_fit
+from stseg.errors import ConfigError
+from stseg.io.machine import free_cores
+
+
+@dataclass(frozen=True)
+class Workforce:
+    """Number of processes of this machine, None for as many as it has room for; or the address of a Dask scheduler.
+
+    Raises
+    ------
+    ConfigError
+        Where there is not one process at least.
+    """
+
+    workers: int | None = None
+    scheduler: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.workers is not None and self.workers < 1:
+            raise ConfigError("--workers", "", self.workers, "1 or more processes")
+
+    def processes(self, job: Job) -> int:
+        """Number of processes of this machine."""
+        if self.workers is not None:
+            return self.workers
+        rig = job.recording.rig
+        return processes_that_fit(len(rig.cameras) * prod(rig.grid.shape))
+
+    def prepare(self) -> None:
+        """Make ready what takes time, while the recording is counted."""
+        if self.scheduler is None:
+            prepare_workers(self.workers)
+
+    def caller(self, job: Job, note: Callable[[str], None]) -> Caller:
+        """How a call is made that this process need not wait for; `note` is called with lines about the work."""
+        several = self.scheduler is None and self.processes(job) > 1
+        return partial(called_beside, note) if several and FORKED else called_here
+
+    def make(
+        self,
+        job: Job,
+        missing: Sequence[Segment],
+        draft: Callable[[int], Path],
+        advance: Callable[[int], None],
+        note: Callable[[str], None],
+    ) -> Iterator[tuple[Segment, Path]]:
+        """Segments and their files, in the order in which they are finished.
+
+        Parameters
+        ----------
+        job, missing
+            The run, and its segments that are to be made.
+        draft
+            Gives the path of a segment's unfinished file from its index.
+        advance
+            Called with the number of further frames that were fused.
+        note
+            Called with lines about the work.
+        """
+        if not missing:
+            return
+        workers = min(len(missing), self.processes(job))
+        if self.scheduler is not None:
+            yield from make_by_cluster(job, missing, draft, self.scheduler, advance)
+        elif workers > 1:
+            yield from make_by_workers(job, missing, draft, workers, advance, note)
+        else:
+            worker = SegmentWorker(job, free_cores)
+            for segment in missing:
+                yield segment, worker.make(segment, draft(segment.index), advance)

@@ -1,0 +1,147 @@
+"""How long appearance lasts: the number of frames that make one independent observation of a person.
+
+A turned back stays turned for seconds, a place in the light for longer, so frames are not independent; how many of
+them make one independent observation is learned where it matters. Axes are learned from one half of each person's
+time; then each tracklet of the other half is compared with the person's first half, and with those of the people who
+are there at the same time. Under the true number of frames an observation the log-likelihood ratios of these pairs are
+most probable (Bruemmer and du Preez 2006).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from stseg.arrays import AnyArray, Flags, Floats, Ints
+from stseg.identities.evidence.discriminant_axes import Axes, discriminant_axes
+from stseg.identities.evidence.size_model import evidence
+
+WRONG = 0.1
+"""Share of wrong answers: identities are exchanged, and tracks slip from one person to another."""
+_LEAST_PROBE = 4
+"""Least frames of a tracklet that is compared."""
+_LASTING = 2.0 ** np.arange(0, 13)
+"""Numbers of frames that make one independent observation, of which one is chosen."""
+_LEAST_GAIN = 0.05
+"""Least gain of a pair's mean log-probability that is no chance, nats."""
+
+
+def independent_frames(
+    value: Floats, frame: Ints, tracklets: Sequence[Ints], halves: Sequence[tuple[Ints, Ints]]
+) -> float:
+    """Frames of one independent observation: with this number the pairs of a person and a tracklet are most probable.
+
+    Parameters
+    ----------
+    value : float64 (n, k)
+        Appearance of each row.
+    frame : int64 (n,)
+        Frame of each row.
+    tracklets
+        Rows of each isolated tracklet, in the order of time.
+    halves
+        Rows of the first and the second half of the time of each person.
+
+    Returns
+    -------
+    float
+        Infinite where no number is better than chance.
+    """
+    cost = np.zeros(len(_LASTING))
+    for side in range(2):
+        known = [half[side] for half in halves]
+        axes = discriminant_axes(value, known)
+        probes = _Probes.of(frame, tracklets, [half[1 - side] for half in halves])
+        pairs = _Pairs.of(axes, value, known, probes)
+        cost += [_cost(pairs.ratio(lasting), probes.same) / 2 for lasting in _LASTING.tolist()]
+    best = int(np.argmin(cost))
+    return float(_LASTING[best]) if cost[best] < np.log(2.0) - _LEAST_GAIN else np.inf
+
+
+@dataclass(frozen=True)
+class _Probes:
+    """Parts of tracklets, and of each the people who were there at its time: one is its own.
+
+    Attributes
+    ----------
+    rows
+        Of each part.
+    probe, person : int64 (pair,)
+    same : bool (pair,)
+        Whether the person is the part's own.
+    """
+
+    rows: list[Ints]
+    probe: Ints
+    person: Ints
+    same: Flags
+
+    @classmethod
+    def of(cls, frame: Ints, tracklets: Sequence[Ints], people: Sequence[Ints]) -> _Probes:
+        """Of each tracklet the parts that belong to one person's rows."""
+        owner = np.full(len(frame), -1)
+        for k, rows in enumerate(people):
+            owner[rows] = k
+        owned = np.flatnonzero(owner >= 0)
+        owned = owned[np.argsort(frame[owned], kind="stable")]
+        frames, owners = frame[owned], owner[owned]
+        probes, there, same = list[Ints](), list[Ints](), list[Flags]()
+        for rows in tracklets:
+            mine = rows[owner[rows] >= 0]
+            for k in np.unique(owner[mine]).tolist():
+                own = mine[owner[mine] == k]
+                if len(own) >= _LEAST_PROBE:
+                    between = slice(*np.searchsorted(frames, (frame[own[0]], frame[own[-1]] + 1)))
+                    probes.append(own)
+                    there.append(np.unique(owners[between][np.isin(frames[between], frame[own])]))
+                    same.append(there[-1] == k)
+        probe = np.repeat(np.arange(len(probes)), np.array([len(one) for one in there], np.int64))
+        return cls(probes, probe, _joined(there, np.int64), _joined(same, np.bool_))
+
+
+def _joined(parts: Sequence[AnyArray], kind: type) -> AnyArray:
+    return np.concatenate([np.zeros(0, kind), *parts])
+
+
+@dataclass(frozen=True)
+class _Pairs:
+    """Sums over the rows of the person and of the probe of each pair (pair, d), their numbers, and the axes' spread."""
+
+    person: Floats
+    person_rows: Floats
+    probe: Floats
+    probe_rows: Floats
+    spread: Floats
+
+    @classmethod
+    def of(cls, axes: Axes, value: Floats, people: Sequence[Ints], probes: _Probes) -> _Pairs:
+        """Of rows of each person, and of each probe."""
+        y, size = axes.of(value), len(axes.spread)
+        sums = [np.array([y[rows].sum(axis=0) for rows in part]).reshape(-1, size) for part in (people, probes.rows)]
+        numbers = [np.array([len(rows) for rows in part], float)[:, None] for part in (people, probes.rows)]
+        person, probe = probes.person, probes.probe
+        return cls(sums[0][person], numbers[0][person], sums[1][probe], numbers[1][probe], axes.spread)
+
+    def ratio(self, lasting: float) -> Floats:
+        """Log-likelihood ratio of one person against two for each pair, nats."""
+        both = evidence(
+            (self.probe_rows + self.person_rows) / lasting, (self.probe + self.person) / lasting, self.spread
+        )
+        one = evidence(self.probe_rows / lasting, self.probe / lasting, self.spread)
+        return np.asarray(both - one - evidence(self.person_rows / lasting, self.person / lasting, self.spread))
+
+
+def _cost(ratio: Floats, same: Flags) -> float:
+    """Mean cross-entropy of pairs that are one person and of pairs that are two, nats; ln 2 for no evidence."""
+    one, two = ratio[same], ratio[~same]
+    if not len(one) or not len(two):
+        return float(np.log(2.0))
+    return float(-(_log_probability(one).mean() + _log_probability(-two).mean()) / 2)
+
+
+def _log_probability(ratio: Floats) -> Floats:
+    """Log-probability of an answer of which some are wrong: single wrong ones do not count without bound."""
+    right = 1.0 / (1.0 + np.exp(-np.clip(ratio, -50.0, 50.0)))
+    return np.asarray(np.log(WRONG + (1.0 - 2.0 * WRONG) * right))

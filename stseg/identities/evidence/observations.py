@@ -1,0 +1,180 @@
+"""Observations of the identity search: committed rows in the order of time, with what each says of its person."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from stseg.arrays import Flags, Floats, Ints, Rows
+from stseg.config import Config
+from stseg.identities.evidence.size_model import SizeModel
+from stseg.records.border import Border
+from stseg.tracking.windows.near_rows import near_rows
+
+_EXCHANGE_DISTANCE = 0.8
+"""Distance below which the filter may have exchanged two tracks, metres."""
+_LASTING = 0.4
+"""Correlation time of the error of a place, seconds: frames within it say less than independent ones."""
+_ONE_BIRTH = 1.0
+"""Time within which it does not matter in which frame of a track somebody begins, seconds."""
+_LEAST = 0.05
+"""Least error of a place, metres (standard deviation)."""
+
+
+class ObservedRows(NamedTuple):
+    """Rows of a run for kernels.
+
+    Attributes
+    ----------
+    ground, variance, previous, certain, inside, precision, information
+        As of `Observations`.
+    birth, sign : int64 (n,)
+        Numbers drawn at random for each birth, and for each row, of 62 bits.
+    """
+
+    ground: Floats
+    variance: Floats
+    previous: Ints
+    certain: Flags
+    inside: Floats
+    precision: Floats
+    information: Floats
+    birth: Ints
+    sign: Ints
+
+
+@dataclass(frozen=True)
+class Observations:
+    """Rows of a run, frame by frame.
+
+    Attributes
+    ----------
+    order : int64 (n,)
+        Index of each observation in the trajectory.
+    start : int64 (frame + 1,)
+        First observation of each frame that has rows.
+    seconds : float64 (frame,)
+    ground : float64 (n, 2)
+        Metres.
+    variance : float64 (n,)
+        Of each coordinate, square metres.
+    previous : int64 (n,)
+        The observation before in the same filter track, -1 for none.
+    certain : bool (n,)
+        Whether the observation continues its filter track without doubt: nobody was near.
+    inside : float64 (n,)
+        How far inside the area: 0 at the border, 1 from `detection.border_width` on.
+    precision, information : float64 (n, size)
+        Inverse variance of each size, and that times its deviation from the population's mean.
+    room
+        Distance below which two bodies overlap, metres.
+    """
+
+    order: Ints
+    start: Ints
+    seconds: Floats
+    ground: Floats
+    variance: Floats
+    previous: Ints
+    certain: Flags
+    inside: Floats
+    precision: Floats
+    information: Floats
+    room: float
+
+    def birth(self) -> Ints:
+        """A number of each filter track and second, of which births are one, int64 (n,)."""
+        second = np.repeat(self.seconds // _ONE_BIRTH, np.diff(self.start))
+        track = _heads(self.previous, self.previous >= 0)
+        return np.asarray(np.unique(np.stack([track, second]), axis=1, return_inverse=True)[1].reshape(-1), np.int64)
+
+    def rows(self) -> ObservedRows:
+        """What kernels know of them."""
+        drawn = np.random.default_rng(0).integers(1 << 61, size=(2, len(self.order))) * 2 + 1
+        return ObservedRows(
+            self.ground, self.variance, self.previous, self.certain, self.inside, self.precision, self.information,
+            drawn[0][self.birth()], drawn[1],
+        )  # fmt: skip
+
+    def foreseen(self) -> Observations:
+        """The same, with what a part of a track that is certainly one person's tells said by its first observation.
+
+        The score of a whole hypothesis stays as it is, but decisions are made with what comes after them.
+        """
+        head = _heads(self.previous, self.certain)
+        precision, information = np.zeros_like(self.precision), np.zeros_like(self.information)
+        np.add.at(precision, head, self.precision)
+        np.add.at(information, head, self.information)
+        return replace(self, precision=precision, information=information)
+
+    def between(self, start: int, stop: int) -> Observations:
+        """Those of the frames from `start` to before `stop`; who was observed before is new there."""
+        first, last = int(self.start[start]), int(self.start[stop])
+        part = slice(first, last)
+        previous = np.where(self.previous[part] >= first, self.previous[part] - first, -1)
+        return Observations(
+            self.order[part], self.start[start : stop + 1] - first, self.seconds[start:stop], self.ground[part],
+            self.variance[part], previous, self.certain[part] & (previous >= 0), self.inside[part],
+            self.precision[part], self.information[part], self.room,
+        )  # fmt: skip
+
+
+def observe(
+    trajectory: Rows, sizes: Floats, model: SizeModel, frame_rate: float, border: Border, config: Config
+) -> Observations:
+    """Observations of a trajectory.
+
+    Parameters
+    ----------
+    trajectory : TRAJECTORY (n,)
+        In any order.
+    sizes : float64 (n, size)
+        Of each row, nan where unmeasured.
+    model
+        Their noise and spread.
+    frame_rate
+        Frames per second.
+    border
+        Where people come and go.
+    config
+        The constants of all stages.
+    """
+    order = np.lexsort((trajectory["id"], trajectory["frame"]))
+    rows = trajectory[order]
+    frames, start = np.unique(rows["frame"], return_index=True)
+    ground = np.column_stack([rows["x"], rows["y"]])
+    precision, information = model.evidence(sizes[order], frame_rate)
+    previous = _previous(rows)
+    start = np.append(start, len(rows))
+    alike = 1.0 + 2.0 * _LASTING * frame_rate
+    return Observations(
+        order, start, frames / frame_rate, ground, np.maximum(alike * (rows["xx"] + rows["yy"]) / 2, _LEAST**2),
+        previous, _certain(rows, previous), border.inside(ground, config.detection.border_width),
+        precision, information, config.detection.minimum_distance,
+    )  # fmt: skip
+
+
+def _heads(previous: Ints, follows: Flags) -> Ints:
+    """First observation of the chain of each (n,), in which those that follow are linked to the one before them."""
+    head = np.arange(len(previous))
+    for row in np.flatnonzero(follows).tolist():
+        head[row] = head[previous[row]]
+    return head
+
+
+def _previous(rows: Rows) -> Ints:
+    by_track = np.lexsort((rows["frame"], rows["id"]))
+    previous = np.full(len(rows), -1)
+    same = np.diff(rows["id"][by_track]) == 0
+    previous[by_track[1:][same]] = by_track[:-1][same]
+    return previous
+
+
+def _certain(rows: Rows, previous: Ints) -> Flags:
+    """Rows that follow their track in the very next frame, with nobody near in either."""
+    alone = np.ones(len(rows), bool)
+    alone[near_rows(rows, _EXCHANGE_DISTANCE)[0]] = False
+    follows = (previous >= 0) & (rows["frame"] - rows["frame"][previous] == 1)
+    return np.asarray(alone & alone[previous] & follows)

@@ -1,0 +1,183 @@
+"""Answers about the tracks of a run as constraints on its rows.
+
+Where a swap is said to have happened, two people stand together, and which row is whose is just what is in doubt. So an
+answer about two tracks binds the rows nearest in time in which they stand apart.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from stseg.arrays import Flags, Floats, Ints, Rows
+from stseg.identities.review.corrections import Answer
+from stseg.identities.search.constraints import Constraints
+from stseg.records.tables import ANSWERED
+
+_APART = 0.8
+"""Distance from which on two people stand apart, metres."""
+_LONGEST = 5.0
+"""Longest time before and after the frame of an answer in which rows are looked for, seconds."""
+_SOON = 1.0
+"""Time from there on in which a row apart from everybody is preferred, seconds: later, others may be exchanged."""
+
+
+@dataclass(frozen=True)
+class AnsweredRows:
+    """What answers say of rows.
+
+    Attributes
+    ----------
+    constraints
+        Pairs of rows that are one person, or two.
+    places
+        Where the answer of each constraint stands, for errors.
+    deleted : bool (row,)
+        Rows that are no person.
+    """
+
+    constraints: Constraints
+    places: list[str]
+    deleted: Flags
+
+    @classmethod
+    def of_table(cls, table: Rows, number: int) -> AnsweredRows:
+        """What ANSWERED rows say of so many rows."""
+        pair = table["row"] != table["other"]
+        deleted = np.zeros(number, bool)
+        deleted[table["row"][~pair & (table["same"] == 0)]] = True
+        bound = table[pair]
+        found = Constraints(bound["row"], bound["other"], bound["same"] == 1)
+        return cls(found, ["an answer given before"] * len(found), deleted)
+
+    def __add__(self, more: AnsweredRows) -> AnsweredRows:
+        """Both of two; who is no person by one of them is bound by none."""
+        deleted, both = self.deleted | more.deleted, self.constraints + more.constraints
+        known = ~(deleted[both.earlier] | deleted[both.later])
+        places = [place for place, one in zip([*self.places, *more.places], known, strict=True) if one]
+        return AnsweredRows(both.where(known), places, deleted)
+
+    @property
+    def table(self) -> Rows:
+        """ANSWERED rows that say the same."""
+        gone, bound = np.flatnonzero(self.deleted), self.constraints
+        table = np.zeros(len(bound) + len(gone), ANSWERED)
+        table["row"], table["other"] = np.append(bound.earlier, gone), np.append(bound.later, gone)
+        table["same"][: len(bound)] = bound.same
+        return table
+
+    @property
+    def kept(self) -> tuple[Ints, Constraints]:
+        """Rows that are people, int64 (k,), and the constraints on them, numbered among these."""
+        place = np.where(self.deleted, -1, np.cumsum(~self.deleted) - 1)
+        return np.flatnonzero(~self.deleted), self.constraints.renumbered(place)
+
+
+def answered_rows(rows: Rows, answers: Sequence[Answer], frame_rate: float) -> AnsweredRows:
+    """Constraints and deletions that answers demand; answers were checked by `stseg.identities.review.corrections`.
+
+    Parameters
+    ----------
+    rows : TRAJECTORY (n,)
+        Under the ids that the answers name; 0 for rows of no track.
+    answers
+    frame_rate
+        Frames per second.
+    """
+    tracks = _Tracks(rows, frame_rate)
+    same, other = dict[tuple[int, int], str](), dict[tuple[int, int], str]()
+    deleted = np.zeros(len(rows), bool)
+    for answer in answers:
+        if answer.action == "delete":
+            deleted |= (rows["id"] == answer.track) & (rows["frame"] >= (answer.frame or 0))
+        one, two = tracks.pairs(answer)
+        same |= dict.fromkeys(one, answer.place)
+        other |= dict.fromkeys(two, answer.place)
+    for pairs in (same, other):
+        for pair in [pair for pair in pairs if deleted[list(pair)].any()]:
+            del pairs[pair]
+    return AnsweredRows(Constraints.of(list(same), list(other)), [*same.values(), *other.values()], deleted)
+
+
+class _Tracks:
+    """Rows of each track in the order of time."""
+
+    def __init__(self, rows: Rows, frame_rate: float) -> None:
+        self.rows, self.frame_rate, self.reach = rows, frame_rate, _LONGEST * frame_rate
+        self.of, self.by_frame = _divided(rows["id"], rows["frame"]), _divided(rows["frame"], rows["id"])
+
+    def pairs(self, answer: Answer) -> tuple[list[tuple[int, int]], list[tuple[int, int]]]:
+        """Pairs of rows that are one person by an answer, and pairs that are two."""
+        track, other, frame = answer.track, answer.other, answer.frame
+        if track not in self.of or (other and other not in self.of):
+            return [], []
+        if answer.action == "split" and frame is not None:
+            return [], _known([(self.before(track, 0, frame), self.after(track, 0, frame))])
+        if answer.action in ("join", "keep") and other and self.follow(track, other):
+            ends = [self.ends(track, other)]
+            return (ends, []) if answer.action == "join" else ([], ends)
+        if answer.action in ("swap", "keep") and other and frame is not None:
+            early = self.before(track, other, frame), self.before(other, track, frame)
+            late = self.after(track, other, frame), self.after(other, track, frame)
+            return _known(list(zip(early, late[::-1] if answer.action == "swap" else late, strict=True))), []
+        return [], []
+
+    def follow(self, track: int, other: int) -> bool:
+        """Whether one of two tracks ends before the other begins."""
+        early, late = self.ends(track, other)
+        return bool(self.rows["frame"][early] < self.rows["frame"][late])
+
+    def ends(self, track: int, other: int) -> tuple[int, int]:
+        """Last row of the track that ends first, and first row of the other."""
+        early, late = sorted((self.of[track], self.of[other]), key=lambda rows: int(self.rows["frame"][rows[-1]]))
+        return int(early[-1]), int(late[0])
+
+    def before(self, track: int, other: int, frame: int) -> int | None:
+        """The last row of a track before a frame in which it is apart; None where it has none before."""
+        own = self.of[track][self.rows["frame"][self.of[track]] < frame][::-1]
+        return self._first_apart(self._near(own, frame), other)
+
+    def after(self, track: int, other: int, frame: int) -> int | None:
+        """The first row of a track from a frame on in which it is apart; None where it has none."""
+        own = self.of[track][self.rows["frame"][self.of[track]] >= frame]
+        return self._first_apart(self._near(own, frame), other)
+
+    def _near(self, own: Ints, frame: int) -> Ints:
+        """Those of some rows, the nearest first, that are near a frame; the nearest where the person was away."""
+        near = own[np.abs(self.rows["frame"][own] - frame) <= self.reach]
+        return near if len(near) else own[:1]
+
+    def _first_apart(self, own: Ints, other: int) -> int | None:
+        """The first of some rows in which a track is apart from another, if soon after, from everybody."""
+        if not len(own):
+            return None
+        apart = own[self._distances(own, other) >= _APART]
+        first = apart[0] if len(apart) else own[0]
+        passed = np.abs(self.rows["frame"][own] - self.rows["frame"][first])
+        soon = own[(passed <= _SOON * self.frame_rate) & (np.arange(len(own)) >= np.flatnonzero(own == first)[0])]
+        alone = soon[self._distances(soon, 0) >= _APART]
+        return int(alone[0] if len(alone) else first)
+
+    def _distances(self, own: Ints, other: int) -> Floats:
+        """Distance of rows (n,) from another track in the same frame, or from the nearest (0); inf where alone."""
+        away = np.full(len(own), np.inf)
+        for k, row in enumerate(own.tolist()):
+            here = self.by_frame[int(self.rows["frame"][row])]
+            here = here[(here != row) & ((self.rows["id"][here] == other) | (other == 0))]
+            x, y = (self.rows[name][here] - self.rows[name][row] for name in ("x", "y"))
+            away[k] = np.hypot(x, y).min(initial=np.inf)
+        return away
+
+
+def _divided(key: Ints, order: Ints) -> dict[int, Ints]:
+    """Rows of each key, in an order."""
+    rows = np.lexsort((order, key))
+    keys, first = np.unique(key[rows], return_index=True)
+    return dict(zip(keys.tolist(), np.split(rows, first[1:]) if len(keys) else [], strict=True))
+
+
+def _known(pairs: list[tuple[int | None, int | None]]) -> list[tuple[int, int]]:
+    """Pairs of which both rows exist."""
+    return [(one, two) for one, two in pairs if one is not None and two is not None]

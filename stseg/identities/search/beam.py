@@ -1,0 +1,189 @@
+"""The beam of joint hypotheses, carried on frame by frame.
+
+In every frame each hypothesis is extended by its best assignment of rows to identities, and by those that differ little
+from it (`alternatives`); the best of them are the next hypotheses (`choice`).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from stseg.arrays import Floats, Ints
+from stseg.identities.evidence.costs import RowCosts, row_costs
+from stseg.identities.evidence.crossings import Crossings, crossings_of
+from stseg.identities.evidence.observations import ObservedRows
+from stseg.identities.present_names import empty_present
+from stseg.identities.rules import Rules
+from stseg.identities.search.alternatives import Alternatives, add_alternatives, empty_alternatives
+from stseg.identities.search.choice import choose_distinct
+from stseg.identities.search.constraints import BoundPeople, binding_people, mark_of
+from stseg.identities.search.extension import (
+    Extension,
+    empty_extension,
+    end_identities,
+    fill_cheapest,
+    fill_identities,
+    fill_least,
+    impose_identity,
+)
+from stseg.identities.search.hypotheses import Hypotheses, fill_successors, slots_in_use
+from stseg.identities.search.pasts import Pasts
+from stseg.kernels.accelerate import kernel, part
+from stseg.kernels.pointed_tuples import pointed
+
+_STEP = 4
+"""Slots by which their number changes."""
+
+
+class Frames(NamedTuple):
+    """The frames of a run.
+
+    Attributes
+    ----------
+    start : int64 (frame + 1,)
+        First row of each.
+    seconds : float64 (frame,)
+    bend : float64 (frame,)
+        Variance of a walk, since the frame before, from the straight path, square metres.
+    room
+        Distance below which two bodies overlap, metres.
+    """
+
+    start: Ints
+    seconds: Floats
+    bend: Floats
+    room: float
+
+
+@kernel
+def extend_beam(
+    begin: int, frames: Frames, every_row: ObservedRows, bound_people: BoundPeople, constants: Rules, one: Hypotheses,
+    pasts_of_one: Pasts, other: Hypotheses, pasts_of_other: Pasts, number: int, size: int, counts: Ints, parents: Ints,
+    names: Ints,
+) -> tuple[int, int]:  # fmt: skip
+    """Extend hypotheses by some frames.
+
+    Parameters
+    ----------
+    begin, frames
+        Number of the first of these frames, and all of them.
+    every_row, bound_people, constants
+        All rows, whom constraints know, and the constants of the search.
+    one, pasts_of_one, other, pasts_of_other
+        The hypotheses, and room for as many. After an even number of frames the new ones are in the former.
+    number, size
+        Of the hypotheses, and of their pasts.
+    counts : int64 (k,), parents : int64 (k, hypothesis), names : int64 (k, hypothesis, row)
+        Filled with the number of hypotheses after each of k frames, the one before of each, and the names of its rows.
+
+    Returns
+    -------
+    tuple of int
+        Number of the new hypotheses, and of their pasts.
+    """
+    seen, people, rules = pointed(every_row), pointed(bound_people), pointed(constants)
+    held, pasts, fresh, later_pasts = pointed(one), pointed(pasts_of_one), pointed(other), pointed(pasts_of_other)
+    for step in range(len(counts)):
+        k = begin + step
+        first, stop = frames.start[k], frames.start[k + 1]
+        rows, now = stop - first, frames.seconds[k]
+        slots = -(-(slots_in_use(held.past, number) + rows) // _STEP) * _STEP
+        slots = min(slots, held.past.shape[1])
+        before = frames.start[max(k - 1, 0)]
+        crossings = crossings_of(before, first, stop, seen.ground, seen.variance, frames.bend[k], frames.room)
+        costs = row_costs(pasts, size, first, rows, now, seen, rules)
+        column, extension = np.empty((number, rows), np.int64), empty_extension(slots, first, rows, seen.certain)
+        found, there = empty_alternatives(number, slots, len(extension.doubtful)), empty_present(slots)
+        total = _fill_alternatives(
+            held, pasts, slots, k, frames, costs, seen, people, rules, crossings, extension, column, found
+        )
+        chosen, mark = np.empty(len(fresh.score), np.int64), _marks(number, held, people, first)
+        number = choose_distinct(held, pasts, column, first, seen, mark, found, total, rules.beam_loss, there, chosen)
+        parent, slot = parents[step, :number], np.empty((number, rows), np.int64)
+        for n in range(number):
+            fresh.score[n] = found.value[chosen[n]]
+            parent[n] = found.change[chosen[n], 0]
+            _fill_slots(found.change, chosen[n], column, slot, n)
+            _fill_names(held, pasts, parent[n], slot, n, first, names, step)
+        size = fill_successors(held, pasts, size, parent, slot, slots, first, now, seen, rules, fresh, later_pasts)
+        _bind(fresh, people, k, first, names[step, :number])
+        counts[step] = number
+        held, pasts, fresh, later_pasts = fresh, later_pasts, held, pasts
+    return number, size
+
+
+@kernel
+def _marks(number: int, held: Hypotheses, people: BoundPeople, first: int) -> Ints:
+    """Numbers that differ where hypotheses differ in who people are of whom constraints hold from a row on."""
+    binding, mark = binding_people(people, first), np.empty(number, np.int64)
+    for h in range(number):
+        mark[h] = mark_of(held.bound, h, binding)
+    return mark
+
+
+@kernel
+def _fill_alternatives(
+    held: Hypotheses, pasts: Pasts, slots: int, k: int, frames: Frames, row_costs: RowCosts, seen: ObservedRows,
+    people: BoundPeople, rules: Rules, all_crossings: Crossings, extension: Extension, column: Ints,
+    alternatives: Alternatives,
+) -> int:  # fmt: skip
+    """Fill the alternatives of all hypotheses for the rows of the k-th frame, and count them.
+
+    Fill the slots of the best assignments, column (hypothesis, row), too.
+    """
+    costs, crossings, one, found = pointed(row_costs), pointed(all_crossings), pointed(extension), pointed(alternatives)
+    first, total = frames.start[k], 0
+    for h in range(len(column)):
+        end_identities(held, pasts, h, first, frames.seconds[k], seen, people, rules)
+        identities = fill_identities(held, pasts, h, costs, one)
+        _impose(held.bound, h, people, k, first, one, identities)
+        if not fill_cheapest(one, identities):
+            fill_least(one, identities, slots)
+        cost = 0.0
+        for i in range(column.shape[1]):
+            cost += one.cost[i, one.own[i]]
+            column[h, i] = one.slot[one.own[i]]
+        score = held.score[h] - cost
+        total = add_alternatives(h, one, identities, score, crossings, rules.alternative_loss, total, found)
+    return total
+
+
+@part
+def _impose(bound: Ints, h: int, people: BoundPeople, k: int, first: int, one: Extension, identities: int) -> None:
+    """Impose on the costs who the rows of the k-th frame are, and are not, by who is bound (hypothesis, person)."""
+    for j in range(people.start[k], people.start[k + 1]):
+        person, row = people.person[j], people.observation[j] - first
+        if people.first[person] < first:
+            impose_identity(one, identities, bound[h, person], row, True)
+            continue
+        for other in range(bound.shape[1]):
+            if people.other[person, other] and people.first[other] < first:
+                impose_identity(one, identities, bound[h, other], row, False)
+
+
+@part
+def _fill_slots(change: Ints, alternative: int, best: Ints, slot: Ints, n: int) -> None:
+    """Fill the n-th slots (n, row) by an alternative to a best assignment (hypothesis, row)."""
+    for i in range(slot.shape[1]):
+        slot[n, i] = best[change[alternative, 0], i]
+    for k in (1, 3):
+        if change[alternative, k] >= 0:
+            slot[n, change[alternative, k]] = change[alternative, k + 1]
+
+
+@part
+def _fill_names(held: Hypotheses, pasts: Pasts, h: int, slot: Ints, n: int, first: int, names: Ints, step: int) -> None:
+    """Fill the n-th names (step, n, row) of a frame's rows."""
+    for i in range(slot.shape[1]):
+        s = slot[n, i]
+        names[step, n, i] = pasts.name[held.past[h, s]] if s >= 0 else first + i
+
+
+@kernel
+def _bind(fresh: Hypotheses, people: BoundPeople, k: int, first: int, name: Ints) -> None:
+    """Note who known people are by the names (hypothesis, row) of the rows of the k-th frame."""
+    for j in range(people.start[k], people.start[k + 1]):
+        for n in range(len(name)):
+            fresh.bound[n, people.person[j]] = name[n, people.observation[j] - first]

@@ -1,0 +1,199 @@
+"""Search of identities: a beam of joint hypotheses over the frames of a run (Reid 1979).
+
+In every frame each hypothesis is extended by its exact best assignment of rows to identities, and by all that differ
+from it by one exchange. Of those with equal present names the best is kept (Viterbi over permutations), of all of them
+the best K. Names become final after a lag, so memory does not grow.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from stseg.arrays import Ints
+from stseg.config import MotionConfig
+from stseg.identities.evidence.observations import Observations
+from stseg.identities.evidence.size_model import SizeModel
+from stseg.identities.rules import Rules
+from stseg.identities.search.beam import Frames, extend_beam
+from stseg.identities.search.constraints import Constraints, KnownPeople
+from stseg.identities.search.hypotheses import Hypotheses
+from stseg.identities.search.pasts import Pasts
+
+_BIRTH = 6.0
+"""Cost of a birth or a death inside the area, nats (per square metre)."""
+_ABSENCE = 1.0
+"""Cost of being unseen, nats per second."""
+_LEAST_PLACE = -25.0
+"""Least evidence of a place against an identity, nats."""
+_ALTERNATIVE_LOSS, _BEAM_LOSS = 15.0, 60.0
+"""Greatest loss of an alternative in one frame, and of a hypothesis against the best, nats."""
+FREELY = Constraints.of([], [])
+"""No constraint."""
+_SPARE = 16
+"""Slots for people out of sight."""
+_BLOCK = 256
+"""Frames that hypotheses are extended by at a time."""
+
+
+@dataclass(frozen=True)
+class SearchLimits:
+    """Extent of the search.
+
+    Attributes
+    ----------
+    hypotheses
+        Number that is kept.
+    longest
+        Longest time out of sight, seconds.
+    lag
+        Time after which names are final, seconds.
+    """
+
+    hypotheses: int
+    longest: float
+    lag: float
+
+
+class _Choices(NamedTuple):
+    """The hypotheses after each of some frames.
+
+    Attributes
+    ----------
+    number : int64 (frame,)
+    parent : int64 (frame, hypothesis)
+        The hypothesis before.
+    names : int64 (frame, hypothesis, row)
+        Of the frame's rows.
+    """
+
+    number: Ints
+    parent: Ints
+    names: Ints
+
+    @classmethod
+    def empty(cls, frames: int, hypotheses: int, rows: int) -> _Choices:
+        """Room for them."""
+        shape = frames, hypotheses
+        return cls(np.empty(frames, np.int64), np.empty(shape, np.int64), np.empty((*shape, rows), np.int64))
+
+
+@dataclass
+class _Step:
+    """The choices of one frame: parent (k,) and names (k, row), and the frame's observations and time."""
+
+    parent: Ints
+    names: Ints
+    first: int
+    seconds: float
+
+
+@dataclass
+class _History:
+    """Choices of the latest frames, until names are final."""
+
+    name: Ints
+    steps: list[_Step] = field(default_factory=list)
+
+    def add(self, choices: _Choices, seen: Observations, begin: int) -> None:
+        """Add the choices of the next frames, from the one of number `begin` on."""
+        for k, number in enumerate(choices.number.tolist()):
+            first, stop = seen.start[begin + k : begin + k + 2].tolist()
+            names = choices.names[k, :number, : stop - first]
+            self.steps.append(_Step(choices.parent[k, :number], names, first, float(seen.seconds[begin + k])))
+
+    def decide(self, until: float, number: int) -> Ints:
+        """Make names up to a time final, by the best hypothesis; which of the `number` hypotheses agree, int64 (k,)."""
+        late = sum(step.seconds > until for step in self.steps)
+        ancestor = np.arange(number)
+        for step in self.steps[len(self.steps) - late :][::-1]:
+            ancestor = step.parent[ancestor]
+        agree, best = np.flatnonzero(ancestor == ancestor[0]), int(ancestor[0])
+        for step in self.steps[: len(self.steps) - late][::-1]:
+            self.name[step.first : step.first + step.names.shape[1]] = step.names[best]
+            best = int(step.parent[best])
+        self.steps = self.steps[len(self.steps) - late :]
+        if self.steps:
+            last = self.steps[-1]
+            last.parent, last.names = last.parent[agree], last.names[agree]
+        return agree
+
+
+@dataclass(frozen=True)
+class Solution:
+    """The best hypothesis found.
+
+    Attributes
+    ----------
+    name : int64 (n,)
+        Identity of each observation, named by its first observation.
+    score
+        Nats.
+    """
+
+    name: Ints
+    score: float
+
+
+def search_identities(
+    seen: Observations, sizes: SizeModel, motion: MotionConfig, limits: SearchLimits, constraints: Constraints = FREELY
+) -> Solution:
+    """The most likely identity of each observation.
+
+    Parameters
+    ----------
+    seen
+        The observations.
+    sizes
+        Statistics of the sizes.
+    motion
+        Motion model.
+    limits
+        Extent of the search.
+    constraints
+        Pairs of observations. All are obeyed unless they contradict each other.
+    """
+    frame = np.repeat(np.arange(len(seen.seconds)), np.diff(seen.start))
+    known = KnownPeople.of(constraints, frame)
+    # Where it is known who somebody is, who seemed certain may have to give way.
+    seen = replace(seen, certain=seen.certain & ~np.isin(frame, known.decided(frame))).foreseen()
+    slots = int(np.diff(seen.start).max(initial=0)) + _SPARE + known.most_open()
+    most = limits.hypotheses
+    held, spare = (
+        (Hypotheses.empty(most, slots, len(known.first)), Pasts.empty(2 * most * slots, len(sizes.spread)))
+        for _ in range(2)
+    )
+    beam = _frames(seen, motion), seen.rows(), known.bound(seen.start), _rules(sizes, motion, limits)
+    history, number, size, begin = _History(np.full(len(seen.order), -1)), 1, 0, 0
+    while begin < len(seen.seconds):
+        since = history.steps[0].seconds if history.steps else seen.seconds[begin]
+        late = np.flatnonzero(seen.seconds[begin : begin + _BLOCK] - since > 2 * limits.lag)[:1]
+        stop = min(begin + int(late.min(initial=_BLOCK - 1)) + 1, len(seen.seconds))
+        choices = _Choices.empty(stop - begin, most, int(np.diff(seen.start).max()))
+        number, size = extend_beam(begin, *beam, *held, *spare, number, size, *choices)
+        history.add(choices, seen, begin)
+        held, spare = (spare, held) if (stop - begin) % 2 else (held, spare)
+        if len(late):
+            agree = history.decide(float(seen.seconds[stop - 1]) - limits.lag, number)
+            held[0].keep(agree)
+            number = len(agree)
+        begin = stop
+    history.decide(np.inf, number)
+    return Solution(history.name, float(held[0].score[0]))
+
+
+def _frames(seen: Observations, motion: MotionConfig) -> Frames:
+    """The frames of some observations."""
+    steps = np.diff(seen.seconds, prepend=seen.seconds[:1]).tolist()
+    bend = np.array([(motion.speed_spread * step / 4.0) ** 2 for step in steps])
+    return Frames(seen.start, seen.seconds, bend, seen.room)
+
+
+def _rules(sizes: SizeModel, motion: MotionConfig, limits: SearchLimits) -> Rules:
+    """The constants of the search."""
+    return Rules(
+        _BIRTH, _ABSENCE, _LEAST_PLACE, limits.longest, _ALTERNATIVE_LOSS, _BEAM_LOSS, motion.velocity_noise**2,
+        motion.speed_spread**2, sizes.spread, sizes.most_against * sizes.noise,
+    )  # fmt: skip

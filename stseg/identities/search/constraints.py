@@ -1,0 +1,173 @@
+"""Hard constraints of the identity search: pairs of rows that are one person, or two."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from stseg.arrays import Flags, Ints
+from stseg.kernels.accelerate import kernel, part
+
+
+@dataclass(frozen=True)
+class Constraints:
+    """Pairs of rows of which it is known whether they are one person.
+
+    Attributes
+    ----------
+    earlier, later : int64 (constraint,)
+        Rows; the frame of the first lies before that of the second.
+    same : bool (constraint,)
+        One person, or two.
+    """
+
+    earlier: Ints
+    later: Ints
+    same: Flags
+
+    def __len__(self) -> int:
+        return len(self.same)
+
+    @classmethod
+    def of(cls, same: list[tuple[int, int]], other: list[tuple[int, int]]) -> Constraints:
+        """Pairs that are one person, and pairs that are two."""
+        pairs = np.array([*same, *other], np.int64).reshape(-1, 2)
+        return cls(pairs[:, 0], pairs[:, 1], np.arange(len(pairs)) < len(same))
+
+    def __add__(self, more: Constraints) -> Constraints:
+        """Both of two."""
+        pairs = zip((self.earlier, self.later, self.same), (more.earlier, more.later, more.same), strict=True)
+        return Constraints(*(np.concatenate(pair) for pair in pairs))
+
+    def where(self, chosen: Flags) -> Constraints:
+        """Some of them."""
+        return Constraints(self.earlier[chosen], self.later[chosen], self.same[chosen])
+
+    def renumbered(self, place: Ints) -> Constraints:
+        """The same of rows under other numbers: place (row,) is that of each."""
+        return Constraints(place[self.earlier], place[self.later], self.same)
+
+    def among(self) -> Constraints:
+        """Those of which both rows are there, numbered from 0."""
+        return self.where((self.earlier >= 0) & (self.later >= 0))
+
+    def violated(self, identity: Ints) -> Flags:
+        """Which of them identities (row,) do not obey, bool (constraint,)."""
+        return np.asarray((identity[self.earlier] == identity[self.later]) != self.same)
+
+
+@dataclass(frozen=True)
+class KnownPeople:
+    """Observations that constraints name: those that are one person, and pairs of people that are two.
+
+    Attributes
+    ----------
+    observation, person : int64 (k,)
+        Observations, rising, and the person of each.
+    other : bool (person, person)
+        Who are two; who is there in one frame is, too.
+    first, last : int64 (person,)
+        First and last of the observations.
+    """
+
+    observation: Ints
+    person: Ints
+    other: Flags
+    first: Ints
+    last: Ints
+
+    @classmethod
+    def of(cls, constraints: Constraints, frame: Ints) -> KnownPeople:
+        """People whose observations constraints name; frame (n,) is that of every observation."""
+        pairs = np.stack([constraints.earlier, constraints.later])
+        observation, ends = np.unique(pairs, return_inverse=True)
+        ends = ends.reshape(2, -1)
+        same, number = ends[:, constraints.same], len(observation)
+        graph = coo_array((np.ones(same.shape[1]), (same[0], same[1])), (number, number))
+        people, person = connected_components(graph, directed=False) if number else (0, np.zeros(0, np.int64))
+        person = person.astype(np.int64)
+        other = np.zeros((people, people), bool)
+        apart = person[ends[:, ~constraints.same]]
+        together = np.array(np.nonzero(frame[observation][:, None] == frame[observation]))
+        beside = person[together[:, together[0] != together[1]]]
+        for one, two in (apart, beside):
+            other[one, two] = other[two, one] = True
+        first, last = np.full(people, len(frame)), np.full(people, -1)
+        np.minimum.at(first, person, observation)
+        np.maximum.at(last, person, observation)
+        return cls(observation, person, other, first, last)
+
+    def decided(self, frame: Ints) -> Ints:
+        """Frames in which an observation must, or must not, have an identity; frame (n,) is of all observations."""
+        here, begin = frame[self.observation], frame[self.first]
+        others = (self.other[self.person] & (begin < here[:, None])).any(axis=1)
+        return np.asarray(here[(begin[self.person] < here) | others])
+
+    def most_open(self) -> int:
+        """Most people at once with observations still to come."""
+        ends = np.concatenate([self.first, self.last])
+        change = np.repeat([1, -1], len(self.first))
+        return int(np.cumsum(change[np.lexsort((change, ends))]).max(initial=0))
+
+    def bound(self, start: Ints) -> BoundPeople:
+        """The same for kernels; start (frame + 1,) is the first observation of each frame."""
+        others = np.where(self.other, self.first, -1).max(axis=1, initial=-1)
+        return BoundPeople(
+            self.observation, self.person, np.searchsorted(self.observation, start), self.other, self.first, self.last,
+            np.maximum(self.last, others),
+        )  # fmt: skip
+
+
+class BoundPeople(NamedTuple):
+    """People whom constraints know.
+
+    Attributes
+    ----------
+    observation, person, other, first, last
+        As of `KnownPeople`.
+    start : int64 (frame + 1,)
+        The first of the named observations from each frame on.
+    binding : int64 (person,)
+        The last observation for which it matters who somebody is.
+    """
+
+    observation: Ints
+    person: Ints
+    start: Ints
+    other: Flags
+    first: Ints
+    last: Ints
+    binding: Ints
+
+
+@part
+def is_awaited(people: BoundPeople, bound: Ints, h: int, name: int, first: int) -> bool:
+    """Whether an identity must be observed again, from an observation on; bound (hypothesis, person) is who all are."""
+    for person in range(bound.shape[1]):
+        if bound[h, person] == name and people.first[person] < first <= people.last[person]:
+            return True
+    return False
+
+
+@kernel
+def binding_people(people: BoundPeople, first: int) -> Ints:
+    """People observed before an observation whose identity matters from then on."""
+    found, number = np.empty(len(people.first), np.int64), 0
+    for person in range(len(found)):
+        if people.first[person] < first <= people.binding[person]:
+            found[number] = person
+            number += 1
+    return found[:number]
+
+
+@part
+def mark_of(bound: Ints, h: int, binding: Ints) -> int:
+    """A number that differs where hypotheses differ in who some people are; bound (hypothesis, person)."""
+    mark = 0
+    for person in binding:
+        mark = (mark * 1_000_003 + bound[h, person] + 2) % 2_147_483_647
+    return mark

@@ -1,0 +1,172 @@
+"""Extension of one joint hypothesis by the rows of a frame: what they cost, and the best assignment.
+
+A row is assigned to one of the hypothesis's identities, which are numbered in the order of their slots, or to a new
+one, whose number comes after all of these.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from stseg.arrays import Flags, Floats, Ints
+from stseg.identities.evidence.costs import CONTRADICTION, FORBIDDEN, UNLIKELY, RowCosts
+from stseg.identities.evidence.observations import ObservedRows
+from stseg.identities.rules import Rules
+from stseg.identities.search.constraints import BoundPeople, is_awaited
+from stseg.identities.search.hypotheses import FREE, Hypotheses
+from stseg.identities.search.pasts import Pasts
+from stseg.kernels.accelerate import kernel, part
+from stseg.kernels.linear_assignment import fill_assignment_of_least_cost
+
+
+class Extension(NamedTuple):
+    """The identities of a hypothesis, and the rows of a frame.
+
+    Attributes
+    ----------
+    slot, name, last : int64 (identity + 1,)
+        Slot, first and last row of each; -1 for a new one.
+    cost : float64 (row, identity + 1)
+        Nats.
+    own : int64 (row,)
+        The best assignment.
+    taken : bool (identity + 1,)
+        Whether a row has each identity by the best assignment; never of a new one.
+    doubtful : int64 (k,)
+        Rows that do not certainly follow their track, rising; all others have the identity that they follow, or a new
+        one where there is none, and no other cost is known of them.
+    """
+
+    slot: Ints
+    name: Ints
+    last: Ints
+    cost: Floats
+    own: Ints
+    taken: Flags
+    doubtful: Ints
+
+
+@kernel
+def empty_extension(most: int, first: int, rows: int, certain: Flags) -> Extension:
+    """Room for an extension of at most so many identities by rows from `first` on; certain (n,) is of all rows."""
+    doubtful, number = np.empty(rows, np.int64), 0
+    for i in range(rows):
+        if not certain[first + i]:
+            doubtful[number] = i
+            number += 1
+    return Extension(
+        np.empty(most + 1, np.int64), np.empty(most + 1, np.int64), np.empty(most + 1, np.int64),
+        np.empty((rows, most + 1)), np.empty(rows, np.int64), np.empty(most + 1, np.bool_), doubtful[:number],
+    )  # fmt: skip
+
+
+@part
+def end_identities(
+    held: Hypotheses,
+    pasts: Pasts,
+    h: int,
+    first: int,
+    now: float,
+    seen: ObservedRows,
+    people: BoundPeople,
+    rules: Rules,
+) -> None:
+    """Free the slots of identities that were unseen for too long; each costs its death. Those awaited stay."""
+    for s in range(held.past.shape[1]):
+        p = held.past[h, s]
+        is_over = p >= 0 and now - pasts.seconds[p] > rules.longest
+        if is_over and not is_awaited(people, held.bound, h, pasts.name[p], first):
+            held.score[h] -= rules.birth * seen.inside[pasts.last[p]]
+            held.past[h, s] = FREE
+
+
+@part
+def fill_identities(held: Hypotheses, pasts: Pasts, h: int, costs: RowCosts, one: Extension) -> int:
+    """Fill the identities of a hypothesis, their costs, and the rows that certainly follow; number of identities."""
+    number, own, doubtful = 0, one.own, one.doubtful
+    for i in range(len(own)):
+        own[i] = FREE
+    for s in range(held.past.shape[1]):
+        p = held.past[h, s]
+        if p >= 0:
+            one.slot[number], one.name[number], one.last[number] = s, pasts.name[p], pasts.last[p]
+            one.taken[number] = costs.follower[p] >= 0
+            if costs.follower[p] >= 0:
+                own[costs.follower[p]] = number
+                one.cost[costs.follower[p], number] = costs.cost[p, costs.follower[p]]
+            for i in doubtful:
+                one.cost[i, number] = costs.cost[p, i]
+            number += 1
+    one.slot[number] = one.name[number] = one.last[number] = -1
+    one.taken[number] = False
+    for i in range(len(own)):
+        one.cost[i, number] = costs.begun[i]
+        if own[i] < 0:
+            own[i] = number
+    return number
+
+
+@part
+def impose_identity(one: Extension, identities: int, bound: int, row: int, same: bool) -> None:
+    """Impose on the costs that a row is, or is not, the identity of this name."""
+    cost = one.cost
+    for c in range(identities):
+        if one.name[c] == bound:
+            if same:
+                own = min(cost[row, c], UNLIKELY)
+                for other in range(identities):
+                    cost[row, other] = FORBIDDEN
+                cost[row, c], cost[row, identities] = own, CONTRADICTION
+                break
+            cost[row, c] = FORBIDDEN
+            cost[row, identities] = min(cost[row, identities], CONTRADICTION)
+
+
+@part
+def fill_cheapest(one: Extension, identities: int) -> bool:
+    """Fill the cheapest identity of each doubtful row; whether no other assignment is as cheap.
+
+    It is the best one where each row has one cheapest identity of its own.
+    """
+    cost, taken = one.cost, one.taken
+    for i in one.doubtful:
+        best, ties = 0, False
+        for c in range(1, identities + 1):
+            if cost[i, c] < cost[i, best]:
+                best, ties = c, False
+            elif cost[i, c] == cost[i, best]:
+                ties = True
+        if ties or taken[best]:
+            return False
+        taken[best] = best < identities
+        one.own[i] = best
+    return True
+
+
+@kernel
+def fill_least(one: Extension, identities: int, slots: int) -> None:
+    """Fill the assignment of least cost, found in a table of all slots and a new identity for each row."""
+    rows = len(one.own)
+    table, column = np.empty((rows, slots + rows)), np.empty(rows, np.int64)
+    number, certain = np.empty(slots + rows, np.int64), np.empty(rows, np.bool_)
+    table[:] = FORBIDDEN
+    number[:] = identities
+    certain[:] = True
+    for c in range(identities):
+        number[one.slot[c]] = c
+        one.taken[c] = False
+    for i in one.doubtful:
+        certain[i] = False
+        for c in range(identities):
+            table[i, one.slot[c]] = one.cost[i, c]
+        table[i, slots + i] = one.cost[i, identities]
+    for i in range(rows):
+        if certain[i]:
+            c = one.own[i]
+            table[i, one.slot[c] if c < identities else slots + i] = one.cost[i, c]
+    fill_assignment_of_least_cost(table, column)
+    for i in range(rows):
+        one.own[i] = number[column[i]]
+        one.taken[one.own[i]] = one.own[i] < identities

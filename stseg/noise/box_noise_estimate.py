@@ -1,0 +1,119 @@
+"""Noise of boxes, learned from the frames that are explained: one table for all views.
+
+E step: the offsets of each person's own boxes, over the posterior of the person's place and height. M step: the
+standard deviations that make them most likely, `weight` seconds of one person's box at the first guess among them, and
+what was seen since forgotten at exp(-t / memory), as for the rates of `stseg.occupancy.rate_estimate`. The lower
+edge has two, of one density that is steeper below the feet than above: with S_1, S_2 the sums of squares on either
+side of n boxes,
+
+    sigma_1 = S_1^(1/3) sqrt((S_1^(1/3) + S_2^(1/3)) / n),
+
+the most likely ones of a split normal distribution whose mode is known. People count for a view where the rest of the
+evidence supports them, and boxes at the border of the image, which are cut there, do not count.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+
+from stseg.arrays import Flags, Floats, Ints
+from stseg.bodies.box_fit import EARLY, LATE, TOLERANCE, WIDE, fill_offsets
+from stseg.bodies.box_noise import FIRST, KNOTS, BoxNoise, knots_of
+from stseg.bodies.views import BoxView, View, ViewObservation
+from stseg.config import ErrorRateConfig
+from stseg.records.people import Explanation, People
+
+_POINTS = np.sqrt(3.0) * np.concatenate([np.eye(3), -np.eye(3)])
+"""Places and heights that stand for a posterior: its means and variances are theirs (unscented transform)."""
+
+
+class BoxNoiseCalibration:
+    """Accumulated squared offsets of boxes.
+
+    Parameters
+    ----------
+    frame_rate
+        Frames per second.
+
+    Attributes
+    ----------
+    squares : float64 (knot, 5), seen : float64 (knot,)
+        Squared offsets, of the lower edge on either side of the feet, and boxes; both times seconds.
+    """
+
+    def __init__(self, frame_rate: float, config: ErrorRateConfig) -> None:
+        self.frame_rate, self.config = frame_rate, config
+        self.squares, self.seen = np.zeros_like(FIRST.spread), np.zeros(len(KNOTS))
+
+    @property
+    def noise(self) -> BoxNoise:
+        """The noise by all frames so far."""
+        return self._estimated() if self.seen.any() else self._first
+
+    @cached_property
+    def _first(self) -> BoxNoise:
+        """The noise before any box is counted; that of a rig without boxes in all of its frames."""
+        return self._estimated()
+
+    def _estimated(self) -> BoxNoise:
+        weight, first = self.config.prior_weight, FIRST.spread**2
+        both = FIRST.spread[:, LATE] + FIRST.spread[:, EARLY]
+        first[:, LATE:] *= FIRST.spread[:, LATE:] / both[:, None]
+        squares, count = weight * first + self.squares, (weight + self.seen)[:, None]
+        spread = np.sqrt(squares / count)
+        root = np.cbrt(squares[:, LATE:])
+        spread[:, LATE:] = root * np.sqrt(root.sum(1, keepdims=True) / count)
+        spread[:, WIDE] = FIRST.spread[:, WIDE]
+        return BoxNoise(np.minimum(spread, FIRST.spread))
+
+    def forget_a_frame(self) -> None:
+        """Let earlier frames count less, by the time of one frame."""
+        kept = np.exp(-1.0 / (self.frame_rate * self.config.memory))
+        self.squares *= kept
+        self.seen *= kept
+
+    def learn(
+        self, explanation: Explanation, views: Sequence[View], observations: Sequence[ViewObservation | None]
+    ) -> None:
+        """Count one frame."""
+        self.forget_a_frame()
+        people = explanation.people
+        for k, (view, observation, owner) in enumerate(
+            zip(views, observations, explanation.box_assignment, strict=True)
+        ):
+            if isinstance(view, BoxView) and observation is not None and len(people):
+                trusted = people.evidence - people.view_evidence[k] >= self.config.minimum_evidence
+                box = np.flatnonzero((owner >= 0) & trusted[owner] & _whole(observation.edges, view.camera.size))
+                self._count(observation.score[box], _squares(view, people, owner[box], observation.edges[box]))
+
+    def _count(self, score: Floats, squares: Floats) -> None:
+        lower, share = knots_of(score)
+        for knot, part in ((lower, 1 - share), (lower + 1, share)):
+            np.add.at(self.squares, knot, squares * part[:, None] / self.frame_rate)
+            np.add.at(self.seen, knot, part / self.frame_rate)
+
+
+def _whole(edges: Floats, size: tuple[int, int]) -> Flags:
+    """Boxes that the image's border does not cut."""
+    return np.asarray((edges[:, :2] > 0).all(1) & (edges[:, 2:] < np.array(size) - 1).all(1))
+
+
+def _squares(view: View, people: People, person: Ints, edges: Floats) -> Floats:
+    """Expected squared offsets of people's boxes, float64 (box, 5)."""
+    count, total = len(person), np.zeros((len(person), len(TOLERANCE)))
+    root = np.linalg.cholesky(people.covariance[person])
+    tall = np.sqrt(people.sizes.height_variance[person])
+    width, height = map(float, view.camera.size)
+    for point in _POINTS:
+        ground = people.ground[person] + root @ point[:2]
+        bodies = view.table.boxes_of(ground, people.sizes.height[person] + tall * point[2])
+        offsets = np.empty((count, 4))
+        fill_offsets(bodies, edges, width, height, offsets)
+        squares = np.nan_to_num(offsets**2)
+        total[:, :LATE] += squares[:, :LATE]
+        total[:, LATE] += np.where(offsets[:, LATE] <= 0, squares[:, LATE], 0)
+        total[:, EARLY] += np.where(offsets[:, LATE] > 0, squares[:, LATE], 0)
+    return total / len(_POINTS)

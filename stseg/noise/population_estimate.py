@@ -1,0 +1,94 @@
+"""Population prior of body sizes, learned from the frames that are explained.
+
+Heights h and relative widths r = w / h of people are normal with heavy tails (`stseg.records.sizes`). Each person of a
+frame counts for the time of a frame, times the share of the population's variance that the frame resolved: a size
+that was not seen teaches nothing. The configured mean m_0 and spread s_0 count for `body.prior_weight` seconds w_0 of
+one person, and what was seen is forgotten at exp(-t / memory):
+
+    m = (w_0 m_0 + sum w h) / W,    s^2 = (w_0 (s_0^2 + (m_0 - m)^2) + sum w (h - m)^2) / W,    W = w_0 + sum w,
+
+the posterior means under a normal-inverse-gamma prior (Gelman et al. 2013, section 3.3), with s at least s_0: few
+people are more alike than a population. Only rigs of pixels learn: a detector's box ends where another person begins,
+and says nothing of widths.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from stseg.arrays import Flags, Floats
+from stseg.config import BodyConfig, ErrorRateConfig
+from stseg.records.people import People
+
+
+class PopulationCalibration:
+    """Accumulated sizes of people.
+
+    Parameters
+    ----------
+    body
+        The first guess.
+    frame_rate
+        Frames per second.
+    config
+        How fast is forgotten, and from which evidence on people count.
+
+    Attributes
+    ----------
+    height, relative_width : float64 (3,)
+        Weight, and weighted sums of the size and its square; seconds, metres.
+    """
+
+    def __init__(self, body: BodyConfig, frame_rate: float, config: ErrorRateConfig) -> None:
+        self._first, self._rate, self._config = body, frame_rate, config
+        self.height, self.relative_width = np.zeros(3), np.zeros(3)
+        self._unmeasured = 0
+
+    @property
+    def body(self) -> BodyConfig:
+        """The population by all frames so far."""
+        first = self._first
+        height, height_spread = self._moments(self.height, first.height_mean, first.height_spread)
+        share = 1 / first.height_mean
+        wide, spread = self._moments(self.relative_width, first.width_mean * share, first.width_spread * share)
+        return replace(
+            first,
+            height_mean=height,
+            height_spread=height_spread,
+            width_mean=wide * height,
+            width_spread=max(spread * height, first.width_spread),
+        )
+
+    def let_pass(self) -> None:
+        """Count a frame in which no size was measured: the next that is learned from counts for its time, too."""
+        self._unmeasured += 1
+
+    def learn(self, people: People) -> None:
+        """Count one frame, explained under the present population."""
+        now, sizes = self.body, people.sizes
+        frames, self._unmeasured = 1 + self._unmeasured, 0
+        kept = np.exp(-frames / (self._rate * self._config.memory))
+        trusted = people.evidence >= self._config.minimum_evidence
+        for sums, size, variance, spread in (
+            (self.height, sizes.height, sizes.height_variance, now.height_spread),
+            (self.relative_width, sizes.width / sizes.height, sizes.width_variance, now.width_spread),
+        ):
+            sums *= kept
+            sums += _sums(size, variance / spread**2, trusted) * frames / self._rate
+
+    def _moments(self, sums: Floats, first_mean: float, first_spread: float) -> tuple[float, float]:
+        """Posterior mean and spread of one size."""
+        if not sums[0]:
+            return first_mean, first_spread
+        before = self._first.prior_weight
+        weight, total, squares = sums + before * np.array([1.0, first_mean, first_spread**2 + first_mean**2])
+        mean = total / weight
+        return float(mean), float(max(np.sqrt(squares / weight - mean**2), first_spread))
+
+
+def _sums(size: Floats, unresolved: Floats, trusted: Flags) -> Floats:
+    """Weight, sum and sum of squares of sizes (n,) of which a frame left such shares of the variance open, (3,)."""
+    weight = np.where(trusted, 1.0 - unresolved, 0.0).clip(0.0)
+    return np.array([weight.sum(), weight @ size, weight @ size**2])

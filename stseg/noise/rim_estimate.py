@@ -1,0 +1,188 @@
+"""Rims of silhouettes: background beside foreground, which says less where a segmentation eats the edges of people.
+
+A segmentation that errs along outlines errs alike in all frames of a view: silhouettes come out narrower than bodies,
+and legs and arms vanish. Then a pixel of background next to foreground is no evidence that nobody is there. A share of
+what such pixels say is withdrawn, and learned view by view from people who stand alone: with A pixels of their bodies,
+B of them missing and R of them background on the rim, the share
+
+    w = (B - m A) / R,    within 0 and 1,
+
+leaves as much background as a segmentation misses at the usual rate m (`pixel_miss_rate`). Whole silhouettes have
+background within the outline of a pillar, too: a limb stands beside it. So of each row of an outline as many pixels
+are missing as it has more of background within than of foreground beside, up to half its width on either side.
+
+Bodies are as wide as the configured population: sizes that are measured in eaten silhouettes hide what is missing. A
+short time of one person at the rate m counts beside what is seen, since one look at a person shows what a segmentation
+leaves of them; and a longer one at the mean of all views, whose pictures are mostly segmented alike. What was seen is
+forgotten at exp(-t / memory), as for the noise of boxes. Only rigs of pixels learn.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from stseg.arrays import Floats, Ints, Singles
+from stseg.bodies.outlines import Spans
+from stseg.bodies.views import PixelView, View, ViewObservation
+from stseg.config import BodyConfig, DetectionConfig, ErrorRateConfig
+from stseg.kernels.accelerate import kernel, part
+from stseg.records.people import People
+
+_WHOLE = 0.9
+"""Share of an outline's area that its pixels in the image make up, where the image's border does not cut it."""
+
+
+_PRIOR = 0.25
+"""Weight of the first guess, that nothing is withdrawn: seconds of one person in any view."""
+_ALIKE = 2.0
+"""Weight of the mean of all views in each of them: seconds of one person."""
+
+
+class RimCalibration:
+    """Accumulated background inside people who stand alone.
+
+    Parameters
+    ----------
+    views
+        Number of views.
+    body
+        Sizes of the configured population.
+    miss_rate
+        Usual share of a body that is background, 0..1.
+    frame_rate
+        Frames per second.
+    level
+        How fast is forgotten, and from which evidence on people count.
+
+    Attributes
+    ----------
+    shares : float64 (view, 3)
+        Weight, and weighted sums of the shares of bodies that are missing, and background on the rim; seconds.
+    """
+
+    def __init__(
+        self, views: int, body: BodyConfig, config: DetectionConfig, frame_rate: float, level: ErrorRateConfig
+    ) -> None:
+        self._body, self._miss, self._rate, self._level = body, config.pixel_miss_rate, frame_rate, level
+        self.shares = np.zeros((views, 3))
+        self._unmeasured = 0
+
+    @property
+    def withdrawn(self) -> Floats:
+        """Share of what rim pixels say that is withdrawn, 0..1, float64 (view,)."""
+        weight, missing, rim = (self.shares + _ALIKE * self._mean()).T
+        return np.asarray(((missing - self._miss * weight) / rim).clip(0.0, 1.0))
+
+    def _mean(self) -> Floats:
+        """Shares of all views and the first guess for one second of one person, float64 (3,)."""
+        total = self.shares.sum(0) + _PRIOR * np.array([1.0, self._miss, self._miss])
+        return np.asarray(total / total[0])
+
+    def applied(self, shown: Sequence[ViewObservation | None]) -> list[ViewObservation | None]:
+        """What the views show, less what is withdrawn."""
+        return [
+            None if view is None else without_rim(view, share)
+            for view, share in zip(shown, self.withdrawn.tolist(), strict=True)
+        ]
+
+    def let_pass(self) -> None:
+        """Count a frame that is not measured: the next one counts for its time, too."""
+        self._unmeasured += 1
+
+    def learn(self, people: People, views: Sequence[View], observations: Sequence[ViewObservation | None]) -> None:
+        """Count one frame."""
+        frames, self._unmeasured = 1 + self._unmeasured, 0
+        self.shares *= np.exp(-frames / (self._rate * self._level.memory))
+        for k, (view, observation) in enumerate(zip(views, observations, strict=True)):
+            if isinstance(view, PixelView) and observation is not None and len(people):
+                trusted = people.evidence - people.view_evidence[k] >= self._level.minimum_evidence
+                widths = self._body.width_of(people.height)
+                first, spans, whole = view.whole_outlines(people.ground, people.height, widths)
+                counts = np.zeros((len(people), 3))
+                _fill_counts(first, spans, observation.raster, counts)
+                counted = trusted & (counts[:, 0] > _WHOLE * whole)
+                self.shares[k] += (counts[counted] / counts[counted, :1]).sum(0) * frames / self._rate
+
+
+def without_rim(observation: ViewObservation, withdrawn: float) -> ViewObservation:
+    """An observation of pixels in which background beside foreground says less by a share, 0..1."""
+    if withdrawn <= 0.0:
+        return observation
+    raster = np.empty_like(observation.raster)
+    _fill_without_rim(observation.raster, np.float32(1.0 - withdrawn), raster)
+    return replace(observation, raster=raster)
+
+
+@kernel
+def _on_rim(raster: Singles, v: int, u: int) -> bool:
+    """Whether one of the eight pixels beside a pixel is foreground."""
+    rows, columns = raster.shape
+    for j in range(max(v - 1, 0), min(v + 2, rows)):
+        for i in range(max(u - 1, 0), min(u + 2, columns)):
+            if raster[j, i] > 0:
+                return True
+    return False
+
+
+@kernel
+def _fill_without_rim(raster: Singles, kept: np.float32, weaker: Singles) -> None:
+    """Fill weaker (v, u) with log-odds (v, u), times a share where background lies beside foreground."""
+    rows, columns = raster.shape
+    for v in range(rows):
+        for u in range(columns):
+            value = raster[v, u]
+            weaker[v, u] = value * kept if value < 0 and _on_rim(raster, v, u) else value
+
+
+@kernel
+def _fill_counts(first: Ints, spans: Spans, raster: Singles, counts: Floats) -> None:
+    """Fill counts (n, 3): pixels of each outline (n,), missing among them, and background on the rim of foreground.
+
+    All are 0 for outlines that another one overlaps, and for those that the view does not see.
+    """
+    covered = np.zeros(raster.shape, np.int64)
+    for j in range(len(first)):
+        for v in range(first[j], _end(first[j], spans, raster)):
+            for u in range(spans[j, v - first[j], 0], spans[j, v - first[j], 1]):
+                covered[v, u] += 1
+    for j in range(len(first)):
+        counts[j] = 0.0
+        for v in range(first[j], _end(first[j], spans, raster)):
+            left, right = spans[j, v - first[j], 0], spans[j, v - first[j], 1]
+            if _most(covered[v], left, right) > 1:
+                counts[j] = 0.0
+                break
+            background = 0
+            for u in range(left, right):
+                if raster[v, u] <= 0:
+                    background += 1
+                    counts[j, 2] += _on_rim(raster, v, u)
+            counts[j, 0] += right - left
+            counts[j, 1] += max(background - _foreground_beside(v, left, right, raster, covered), 0)
+
+
+@kernel
+def _end(first: int, spans: Spans, raster: Singles) -> int:
+    """The row after an outline's last one that the raster may have; its first row is -1 where it is not seen."""
+    return min(first + spans.shape[1], raster.shape[0]) if first >= 0 else -1
+
+
+@part
+def _most(covered: Ints, left: int, right: int) -> int:
+    """Most outlines that cover a pixel of columns left..right of a row, covered (u,)."""
+    most = 0
+    for u in range(left, right):
+        most = max(most, covered[u])
+    return most
+
+
+@kernel
+def _foreground_beside(v: int, left: int, right: int, raster: Singles, covered: Ints) -> int:
+    """Pixels of foreground beside columns left..right of a row, within half their number, that no outline covers."""
+    reach, found = (right - left + 1) // 2, 0
+    for u in range(max(left - reach, 0), min(right + reach, raster.shape[1])):
+        found += (u < left or u >= right) and covered[v, u] == 0 and raster[v, u] > 0
+    return found

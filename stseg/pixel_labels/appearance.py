@@ -1,0 +1,151 @@
+"""Appearance of tracks: colours of each slice of a body, learned from pixels that show the track alone.
+
+A body is cut into slices of equal height. The colours of a track j in slice s of a view are Gaussian, N(mu_js, S_js).
+Mean and covariance are learned from pixels that the pillar of j alone covers. They are shrunk to those of all tracks in
+the slice, so that a slice that was hardly seen says nothing. Views are apart: cameras differ in gain.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from stseg.arrays import Bytes, Floats, Ints, Singles
+from stseg.kernels.accelerate import kernel
+from stseg.pixel_labels.label_likelihood import LabelLikelihood
+
+SLICES = 6
+"""Slices of a body: about head, chest, belly, thighs, shins and feet."""
+_CERTAIN = 0.9
+"""Visible share from which a pixel counts as the person's when colours are learned."""
+_NOISE = 4.0
+"""Noise of a sensor, grey levels (standard deviation)."""
+_PIXELS = 100.0
+"""Pixels as which the colours of all tracks count in those of one."""
+
+
+class Appearance(NamedTuple):
+    """Colours of tracks in one view.
+
+    Attributes
+    ----------
+    track : int64 (n,)
+        Ids, ascending.
+    mean : float64 (n, SLICES, 3)
+        mu, grey levels.
+    precision : float64 (n, SLICES, 3, 3)
+        Inverse of S.
+    peak : float64 (n, SLICES)
+        Density at the mean, per grey level cubed.
+    """
+
+    track: Ints
+    mean: Floats
+    precision: Floats
+    peak: Floats
+
+
+class BodyRows(NamedTuple):
+    """Image rows of head and feet of each person, float64 (n,), pixels; they may lie outside the image."""
+
+    head: Floats
+    feet: Floats
+
+
+@dataclass(frozen=True)
+class ColourSums:
+    """Sums over pixels, from which an appearance is learned.
+
+    Attributes
+    ----------
+    track : int64 (n,)
+        Ids, ascending.
+    count : float64 (n, SLICES)
+    first : float64 (n, SLICES, 3)
+        Sums of colours.
+    second : float64 (n, SLICES, 3, 3)
+        Sums of their outer products.
+    """
+
+    track: Ints
+    count: Floats
+    first: Floats
+    second: Floats
+
+    @classmethod
+    def of(cls, track: Ints) -> ColourSums:
+        """Empty sums of some tracks."""
+        n = len(track)
+        return cls(track, np.zeros((n, SLICES)), np.zeros((n, SLICES, 3)), np.zeros((n, SLICES, 3, 3)))
+
+    def add(self, likelihood: LabelLikelihood, rows: BodyRows, track: Ints, image: Bytes) -> None:
+        """Add the pixels of a frame that one person surely covers; image uint8 (v, u, 3) is the window's."""
+        place = np.searchsorted(self.track, track)
+        people, corner = likelihood.people, (likelihood.left, likelihood.top)
+        _add_colours(
+            people.edges, people.first, people.share, corner, rows, place, image, self.count, self.first, self.second
+        )  # fmt: skip
+
+    def appearance(self) -> Appearance:
+        """Means and covariances, shrunk to those of all tracks."""
+        count, first, second = (
+            sums + _PIXELS * _mean_of_all(sums, self.count) for sums in (self.count, self.first, self.second)
+        )
+        mean = first / count[..., None]
+        covariance = second / count[..., None, None] - mean[..., :, None] * mean[..., None, :] + _NOISE**2 * np.eye(3)
+        peak = np.asarray(1 / np.sqrt((2 * np.pi) ** 3 * np.linalg.det(covariance)), float)
+        precision = np.asarray(np.linalg.inv(covariance), float)
+        return Appearance(self.track, mean, precision, peak)
+
+
+def _mean_of_all(sums: Floats, count: Floats) -> Floats:
+    """Sums of each slice over all tracks, for one pixel; grey of any brightness where no pixel was seen."""
+    pixels = count.sum(0).reshape(SLICES, *(1,) * (sums.ndim - 2))
+    unseen = _unseen(sums.shape[2:])
+    return np.where(pixels > 0, sums.sum(0) / np.maximum(pixels, 1.0), unseen)
+
+
+def _unseen(shape: tuple[int, ...]) -> Floats:
+    """Sums for one pixel of any colour: its number, its mean, and the mean of its outer product."""
+    middle, variance = 127.5, 256**2 / 12
+    sums = (np.ones(()), np.full(3, middle), middle**2 + variance * np.eye(3))
+    return np.asarray(sums[len(shape)])
+
+
+@kernel
+def slice_of(v: float, head: float, feet: float) -> int:
+    """Slice of an image row between those of head and feet, pixels; 0 for the head's."""
+    if feet <= head:
+        return 0
+    return int(min(max(SLICES * (v + 0.5 - head) / (feet - head), 0.0), SLICES - 1.0))
+
+
+@kernel
+def _add_colours(
+    edges: Ints,
+    first: Ints,
+    share: Singles,
+    corner: tuple[int, int],
+    rows: BodyRows,
+    place: Ints,
+    image: Bytes,
+    count: Floats,
+    sums: Floats,
+    products: Floats,
+) -> None:
+    """Add colours of pixels that are surely the person's."""
+    for j in range(len(edges)):
+        i, t = first[j], place[j]
+        for v in range(edges[j, 1], edges[j, 3]):
+            s = slice_of(v, rows.head[j], rows.feet[j])
+            for u in range(edges[j, 0], edges[j, 2]):
+                if share[i] >= _CERTAIN:
+                    count[t, s] += 1.0
+                    for a in range(3):
+                        colour = float(image[v - corner[1], u - corner[0], a])
+                        sums[t, s, a] += colour
+                        for b in range(3):
+                            products[t, s, a, b] += colour * float(image[v - corner[1], u - corner[0], b])
+                i += 1

@@ -1,0 +1,92 @@
+"""Pixel labels of each view, frame by frame (Huang and Wang, TCSVT 22(11), 2012, section IV-B)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from stseg.arrays import Bytes, Labels, Singles
+from stseg.bodies.pillars import BodyTable
+from stseg.config import BodyConfig, LabelConfig
+from stseg.geometry import Camera, Rig
+from stseg.graphcut.expansion import expand
+from stseg.pixel_labels.adjacency import edge_costs
+from stseg.pixel_labels.appearance import Appearance, BodyRows, ColourSums
+from stseg.pixel_labels.body_masks import pillar_patches
+from stseg.pixel_labels.colour_ratios import colour_log_ratios
+from stseg.pixel_labels.label_likelihood import LabelLikelihood, visible_shares
+from stseg.pixel_labels.pixel_energy import admissible, most_likely_labels, pixel_energy
+from stseg.pixel_labels.placed_people import PlacedPeople
+
+
+class ViewLabels:
+    """The labels of one view.
+
+    Parameters
+    ----------
+    camera
+        The view.
+    table
+        Its bodies.
+    config, body
+        The constants of the labels; sizes of people.
+    """
+
+    def __init__(self, camera: Camera, table: BodyTable, config: LabelConfig, body: BodyConfig) -> None:
+        self.camera, self.table, self.config, self.body = camera, table, config, body
+
+    def label(
+        self, people: PlacedPeople, foreground: Singles, image: Bytes | None, appearance: Appearance | None = None
+    ) -> Labels:
+        """Person visible at each pixel.
+
+        Parameters
+        ----------
+        people
+            Places and heights of the frame's people.
+        foreground : float32 (v, u)
+            Probability of a person by the view's foreground, 0..1.
+        image : uint8 (v, u, 3)
+            Colours, or None.
+        appearance
+            Colours that the people's tracks wear in this view; None where they are not known.
+
+        Returns
+        -------
+        int32 (v, u)
+            1 + the index of the person, 0 for background.
+        """
+        labels = np.zeros(foreground.shape, np.int32)
+        likelihood = self.label_likelihood(people)
+        colours = None if image is None else np.ascontiguousarray(image[likelihood.window])
+        across, down = edge_costs(colours, likelihood.background.shape, self.config)
+        worn = None
+        if colours is not None and appearance is not None:
+            worn = colour_log_ratios(appearance, likelihood, self.rows(people), people.track, colours)
+        seen = np.ascontiguousarray(foreground[likelihood.window])
+        problem = pixel_energy(likelihood, seen, across, down, self.config, worn)
+        start = most_likely_labels(likelihood).flat[problem.pixel]
+        labels[likelihood.window].flat[problem.pixel] = expand(problem.energy, admissible(problem.energy, start))
+        return labels
+
+    def learn(self, people: PlacedPeople, image: Bytes, sums: ColourSums) -> None:
+        """Add the colours of people whom nobody hides; image uint8 (v, u, 3)."""
+        likelihood = self.label_likelihood(people)
+        sums.add(likelihood, self.rows(people), people.track, np.ascontiguousarray(image[likelihood.window]))
+
+    def rows(self, people: PlacedPeople) -> BodyRows:
+        """Image rows of heads and feet; 0 behind the camera."""
+        pixels = [self.camera.project(people.ground, height)[0] for height in (people.height, 0.0)]
+        head, feet = (np.nan_to_num(pixel[:, 1]) for pixel in pixels)
+        return BodyRows(head, feet)
+
+    def label_likelihood(self, people: PlacedPeople) -> LabelLikelihood:
+        """Prior shares of labels around the people, from their places and heights."""
+        patches = pillar_patches(self.table, people, self.config, self.body)
+        return visible_shares(patches, np.hypot(*(people.ground - self.camera.centre[:2]).T))
+
+
+def view_labels(rig: Rig, config: LabelConfig, body: BodyConfig) -> Sequence[ViewLabels]:
+    """The labels of all views of a rig."""
+    return [ViewLabels(camera, BodyTable.of(camera, rig.grid), config, body) for camera in rig.cameras]

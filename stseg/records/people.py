@@ -1,0 +1,96 @@
+"""Input and result of per-frame detection: view evidence; people, ghosts, and the assignment of boxes and pixels."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stseg.arrays import Boxes, Floats, Ints, ViewEvidence
+from stseg.geometry import Rig
+from stseg.records.sizes import Sizes
+
+
+@dataclass(frozen=True)
+class People:
+    """Candidates with places, sizes and evidence: people, or ghosts.
+
+    Attributes
+    ----------
+    ground : float64 (n, 2)
+        Metres.
+    height, width : float64 (n,)
+        By all frames so far, metres.
+    covariance : float64 (n, 2, 2)
+        Square metres.
+    evidence : float64 (n,)
+        Log-odds of the person by all views and the prior, given the others, nats.
+    view_evidence : float64 (view, n)
+        Part of each view, nats.
+    visibility : float64 (view, n)
+        Share of each body that a view sees past nearer people, 0..1.
+    prior : float64 (n,)
+        Part of the prior, nats.
+    track_index : int64 (n,)
+        The predicted track that each continues, -1 for births.
+    sizes
+        Size posteriors of this frame alone, under the population prior.
+    """
+
+    ground: Floats
+    height: Floats
+    width: Floats
+    covariance: Floats
+    evidence: Floats
+    view_evidence: Floats
+    visibility: Floats
+    prior: Floats
+    track_index: Ints
+    sizes: Sizes
+
+    def __len__(self) -> int:
+        return len(self.ground)
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """Result of per-frame detection.
+
+    Attributes
+    ----------
+    people
+        The accepted candidates.
+    ghosts
+        The rejected candidates.
+    pixel_assignment : tuple of int16 arrays (v, u)
+        For each view the index of the person whose body is nearest at each raster pixel, -1 for none.
+    raster_step : tuple of int
+        Image pixels to a raster pixel of `pixel_assignment`, for each view.
+    box_assignment : tuple of int64 arrays (box,)
+        For each view with boxes the person that each box is assigned to, -1 for none; empty for other views.
+    residual : float64 (view,)
+        Reprojection residual, metres (see `stseg.view_health.reprojection_residuals`); nan where nothing was measured.
+    """
+
+    people: People
+    ghosts: People
+    pixel_assignment: tuple[NDArray[np.int16], ...]
+    raster_step: tuple[int, ...]
+    box_assignment: tuple[Ints, ...]
+    residual: Floats
+
+
+def empty_explanation(rig: Rig, seen: Sequence[ViewEvidence]) -> Explanation:
+    """The explanation of a frame without people: every pixel and every box is unassigned."""
+    none, views = np.zeros(0), len(seen)
+    people = People(
+        np.zeros((0, 2)), none, none, np.zeros((0, 2, 2)), none, np.zeros((views, 0)), np.zeros((views, 0)), none,
+        np.zeros(0, np.int64), Sizes(none, none, none, none),
+    )  # fmt: skip
+    # One raster pixel for the whole image, unassigned.
+    steps = tuple(max(camera.size) for camera in rig.cameras)
+    owner = tuple(np.full((1, 1), -1, np.int16) for _ in steps)
+    boxes = tuple(np.full(len(view) if isinstance(view, Boxes) else 0, -1, np.int64) for view in seen)
+    return Explanation(people, people, owner, steps, boxes, np.full(len(steps), np.nan))

@@ -1,0 +1,122 @@
+"""The page on which ground points are clicked: frames of all cameras, a plan, style and script in one file."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from html import escape
+from importlib.resources import files
+
+import cv2
+import numpy as np
+
+from stseg.arrays import Bytes
+from stseg.report.page.style import STYLE
+
+_WIDEST = 1920
+"""Greatest width of a frame in the page, pixels; points are in the camera's own pixels."""
+_PLAN = 900
+"""Size of a plan without a picture, pixels."""
+
+
+@dataclass(frozen=True)
+class FloorPlan:
+    """A picture of the ground from above, y up.
+
+    Attributes
+    ----------
+    image : uint8 (v, u, 3)
+    scale
+        Pixels a metre.
+    """
+
+    image: Bytes
+    scale: float
+
+
+def calibration_page(
+    names: Sequence[str], frames: Sequence[Bytes], area: tuple[float, float, float, float], plan: FloorPlan | None
+) -> str:
+    """The page's text.
+
+    Parameters
+    ----------
+    names, frames
+        Name and a frame of each camera, uint8 (v, u, 3).
+    area
+        x0, y0, x1, y1 of the plan, metres; a floor plan's picture spans it.
+    plan
+        Drawn below the plan's grid; None for a grid alone.
+    """
+    x0, y0, x1, y1 = area
+    scale = plan.scale if plan is not None else _PLAN / max(x1 - x0, y1 - y0)
+    data = {
+        "area": area,
+        "plan": {
+            "scale": scale,
+            "width": (x1 - x0) * scale,
+            "height": (y1 - y0) * scale,
+            "image": None if plan is None else _jpeg(plan.image),
+        },
+        "cameras": [
+            {"name": name, "width": frame.shape[1], "height": frame.shape[0], "image": _jpeg(frame)}
+            for name, frame in zip(names, frames, strict=True)
+        ],
+    }
+    script = (files("stseg.report.page") / "calibration_page.js").read_text("utf-8")
+    digest = base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
+    text = json.dumps(data, separators=(",", ":")).replace("<", "\\u003c")
+    return _PAGE.format(title=escape("Ground points"), style=STYLE + _STYLE, digest=digest, data=text, script=script)
+
+
+def _jpeg(image: Bytes) -> str:
+    share = min(1.0, _WIDEST / image.shape[1])
+    shown = image if share == 1 else cv2.resize(image, None, fx=share, fy=share, interpolation=cv2.INTER_AREA)
+    _, data = cv2.imencode(".jpg", shown, [cv2.IMWRITE_JPEG_QUALITY, 90])
+    return "data:image/jpeg;base64," + base64.b64encode(np.asarray(data, np.uint8).tobytes()).decode("ascii")
+
+
+_STYLE = """
+#sheets { display: grid; grid-template-columns: repeat(auto-fit, minmax(460px, 1fr)); gap: 16px }
+#sheets figure { margin: 0 } #sheets canvas { width: 100%; cursor: crosshair; border: 1px solid var(--rule) }
+#lens { position: fixed; border: 2px solid #fff; border-radius: 50%; pointer-events: none; z-index: 9 }
+#csv { width: 100%; height: 140px; font-family: monospace } main { max-width: none }
+.tools > * { margin-right: 12px }
+"""
+
+_PAGE = """<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta http-equiv="Content-Security-Policy"
+ content="default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'sha256-{digest}'">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>{title}</title>
+<style>{style}</style>
+</head>
+<body>
+<main>
+<h1>{title}</h1>
+<p>Click a place of the ground in two or more views and on the plan; then <b>N</b> for the next point. The homographies
+are solved as you click and drawn as a grid; a ring shows where the next point helps most. <b>P</b> begins the top of a
+pole above the point, <b>arrows</b> move by a quarter pixel (with shift, one), <b>[ ]</b> choose a point,
+<b>Delete</b> removes it, <b>Ctrl+Z</b> undoes, the wheel zooms. This page shows frames of the cameras and loads
+nothing.</p>
+<p class="tools">point <b id="which"></b> <button id="new">New point (N)</button>
+<button id="raise">Pole (P), m</button><input id="pole" type="number" value="2" step="0.01" size="5" aria-label="pole">
+<button id="undo">Undo</button> <a id="save" download="points.csv">Save points.csv</a></p>
+<div id="sheets"></div>
+<table><thead><tr><th>point</th><th>camera</th><th>off px</th><th>off cm</th></tr></thead>
+<tbody id="residuals"></tbody></table>
+<textarea id="csv" readonly aria-label="points.csv"></textarea>
+<p>Then: <code>stseg calibrate points points.csv -o rig.toml --size W,H --area=... --frame-rate ...</code></p>
+</main>
+<canvas id="lens" width="160" height="160" hidden></canvas>
+<script id="data" type="application/json">{data}</script>
+<script>{script}</script>
+</body>
+</html>
+"""

@@ -1,0 +1,128 @@
+"""Data of the page's script as JSON: sheets, tracks and candidates of a run, thinned to stay small."""
+
+from __future__ import annotations
+
+import base64
+import json
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from stseg.arrays import AnyArray, Bytes, Ints, Rows
+from stseg.geometry import Camera, Rig
+from stseg.records.ghost_reasons import REASONS, ghost_reasons
+from stseg.report.pictures.colours import hex_colour, track_colour
+from stseg.report.pictures.sheets import Sheets
+
+_MOST_PLACES = 250_000  # of tracks
+_MOST_CANDIDATES = 120  # of a frame, those with most evidence
+
+
+def embedded_json(
+    rig: Rig, views: Bytes, trajectory: Rows, candidates: Rows, sheets: Sheets, names: Mapping[int, str]
+) -> str:
+    """The script's data; safe inside a script element.
+
+    Parameters
+    ----------
+    rig
+    views : uint8 (plane, y, x)
+        Number of views that see each cell.
+    trajectory : TRAJECTORY (n,)
+    candidates : rows (n,) with frame, x, y, status, evidence, parts
+    sheets
+        Its frames are those of the slider.
+    names
+        Of tracks, by id.
+    """
+    grid = rig.grid
+    coverage = views.max(axis=0)[::-1]
+    data = {
+        "frameRate": rig.frame_rate,
+        "x": grid.x,
+        "y": grid.y,
+        "polygon": None if grid.polygon is None else np.asarray(grid.polygon, float).tolist(),
+        "heights": np.round(grid.heights, 3).tolist(),
+        "cameras": [camera.name for camera in rig.cameras],
+        "stands": [_ground_position(camera) for camera in rig.cameras],
+        "coverage": {"shape": coverage.shape, "views": _base64(np.ascontiguousarray(coverage))},
+        "frames": sheets.frames.tolist(),
+        "volume": {
+            "shape": sheets.shape,
+            "limit": round(sheets.limit, 3),
+            "sheets": [base64.b64encode(png).decode("ascii") for png in sheets.pngs],
+        },
+        "tracks": _tracks(rig, trajectory, sheets.frames, names),
+        "reasons": REASONS,
+        "candidates": _candidates(candidates, sheets.frames),
+        "ghosts": _ghost_counts(candidates, sheets.frames),
+    }
+    return json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+
+
+def thin_tracks(trajectory: Rows, slider_frames: Ints, most: int = _MOST_PLACES) -> tuple[Rows, int]:
+    """Thin rows for the page, sorted by id and frame, and the stride in frames.
+
+    The ends of every track, the slider's frames and every stride-th frame are kept.
+    """
+    table = trajectory[np.lexsort((trajectory["frame"], trajectory["id"]))]
+    stride = max(1, -(-len(table) // most))
+    first = np.concatenate([[True], table["id"][1:] != table["id"][:-1]])[: len(table)]
+    last = np.roll(first, -1)
+    kept = first | last | (table["frame"] % stride == 0) | np.isin(table["frame"], slider_frames)
+    return table[kept], stride
+
+
+def _tracks(rig: Rig, trajectory: Rows, slider_frames: Ints, names: Mapping[int, str]) -> dict[str, object]:
+    table, stride = thin_tracks(trajectory, slider_frames)
+    (x0, x1), (y0, y1) = rig.grid.x, rig.grid.y
+    quantum = max(0.001, max(x1 - x0, y1 - y0) / 15000)  # metres; places a little outside the ground still fit 16 bits
+    x, y = (np.clip(np.rint(table[name] / quantum), -32768, 32767) for name in ("x", "y"))
+    identities, counts = np.unique(table["id"], return_counts=True)
+    return {
+        "quantum": quantum,
+        "stride": stride,
+        "ids": identities.tolist(),
+        "names": [names.get(int(identity), "") for identity in identities],
+        "counts": counts.tolist(),
+        "colours": [hex_colour(track_colour(int(identity))) for identity in identities],
+        "frame": _base64(table["frame"].astype("<i4")),
+        "x": _base64((x - round(x0 / quantum)).astype("<i2")),
+        "y": _base64((y - round(y0 / quantum)).astype("<i2")),
+    }
+
+
+def _candidates(candidates: Rows, slider_frames: Ints) -> list[list[list[object]]]:
+    """Candidates of each slider frame by evidence: x, y, evidence, reason (-1 for a person) and evidence by view."""
+    shown = candidates[np.isin(candidates["frame"], slider_frames)]
+    found = ghost_reasons(shown)
+    reason = np.full(len(shown), -1)
+    reason[shown["status"] == 0] = found.reason
+    order = np.lexsort((-shown["evidence"], shown["frame"]))
+    shown, reason = shown[order], reason[order]
+    bounds = np.searchsorted(shown["frame"], [*slider_frames.tolist(), np.iinfo(np.int64).max])
+    listed = []
+    for start, stop in zip(bounds[:-1].tolist(), bounds[1:].tolist(), strict=True):
+        part = range(start, min(stop, start + _MOST_CANDIDATES))
+        listed.append([_candidate(shown[k], int(reason[k])) for k in part])
+    return listed
+
+
+def _ghost_counts(candidates: Rows, slider_frames: Ints) -> list[int]:
+    """Number of ghosts of each slider frame, including those that `_candidates` omits."""
+    frames = np.sort(candidates["frame"][candidates["status"] == 0])
+    counts = np.searchsorted(frames, slider_frames, "right") - np.searchsorted(frames, slider_frames)
+    return [int(count) for count in counts]
+
+
+def _candidate(row: np.void, reason: int) -> list[object]:
+    parts = [round(float(part), 1) for part in np.nan_to_num(row["parts"])]
+    return [round(float(row["x"]), 2), round(float(row["y"]), 2), round(float(row["evidence"]), 1), reason, parts]
+
+
+def _ground_position(camera: Camera) -> Sequence[float]:
+    return [round(float(metres), 2) for metres in camera.centre[:2]]
+
+
+def _base64(values: AnyArray) -> str:
+    return base64.b64encode(values.tobytes()).decode("ascii")

@@ -1,0 +1,357 @@
+"""The report as one HTML page: pictures, charts, style and script are inside, and nothing is loaded."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from html import escape
+from importlib.resources import files
+
+import numpy as np
+
+from stseg.arrays import Floats, Rows
+from stseg.records.ghost_reasons import REASONS, GhostReasons
+from stseg.report.busy_times import BusyTime
+from stseg.report.certainty import DOUBTFUL, doubtful_stretches, mean_certainty
+from stseg.report.charts import Span, people_chart, track_chart
+from stseg.report.figures import Figure
+from stseg.report.page.html import MOST_ROWS, bars, chart, figure, figures, note, section, swatch, table, when
+from stseg.report.page.style import STYLE
+
+
+@dataclass(frozen=True)
+class ViewSummary:
+    """Summary of one view.
+
+    Attributes
+    ----------
+    name
+    ground
+        Share of the ground in its view, 0..1.
+    denied
+        Number of ghosts that it has evidence against.
+    nats
+        Median evidence for people in its view, nats; nan without people.
+    """
+
+    name: str
+    ground: float
+    denied: int
+    nats: float
+
+
+@dataclass(frozen=True)
+class Contents:
+    """Contents of the page.
+
+    Attributes
+    ----------
+    title
+    facts
+        Names and values, at the top.
+    answers
+        Questions and answers (HTML), below.
+    warnings
+        Warnings.
+    span
+        The frames of the run.
+    trajectory : TRAJECTORY (n,)
+    tracks : TRACK (m,)
+    events : EVENT (k,)
+    candidates
+        Number of candidates.
+    ghosts
+        Rejected candidates.
+    truth : (t,) with frame, or None
+    kept
+        Kept part of the volume: all, tracks or none.
+    data
+        JSON for the script, see `embedded`.
+    plan, thread, dwell_places, ghost_map, blind_map
+        Figures; the thread is shown where no script runs.
+    view_summaries
+        A row for each view.
+    stages
+        Seconds by stage.
+    slices, cameras
+        Figures of these sections; a section without figures is left out.
+    has_images
+        Whether the cameras' figures show camera images, of which the page warns.
+    names
+        Names of tracks by id.
+    busy, hours
+        Plans of the busiest minutes, and people by the hour; empty of a short run.
+    """
+
+    title: str
+    facts: Sequence[tuple[str, str]]
+    answers: Sequence[tuple[str, str]]
+    warnings: Sequence[str]
+    span: Span
+    trajectory: Rows
+    tracks: Rows
+    events: Rows
+    candidates: int
+    ghosts: GhostReasons
+    truth: Rows | None
+    kept: str
+    data: str
+    plan: Figure
+    thread: Figure
+    dwell_places: Sequence[Figure]
+    ghost_map: Figure
+    blind_map: Figure
+    view_summaries: Sequence[ViewSummary]
+    stages: Sequence[tuple[str, float]]
+    slices: Sequence[Figure]
+    cell_probability: Sequence[tuple[float, float]]
+    cameras: Sequence[Figure]
+    has_images: bool
+    names: Mapping[int, str]
+    busy: Sequence[Figure]
+    hours: Sequence[BusyTime]
+
+    @property
+    def still(self) -> list[Figure]:
+        """The figures of the ground."""
+        return [self.plan, self.thread, *self.dwell_places, self.ghost_map, self.blind_map]
+
+
+def report_page(contents: Contents) -> str:
+    """The page's text. The same contents give the same text."""
+    script = _script()
+    digest = base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
+    return _PAGE.format(
+        title=escape(contents.title),
+        style=STYLE,
+        digest=digest,
+        facts="".join(f"<div><dt>{escape(name)}</dt><dd>{escape(value)}</dd></div>" for name, value in contents.facts),
+        sections="\n".join(filter(None, _sections(contents))),
+        data=contents.data,
+        script=script,
+    )
+
+
+@cache
+def _script() -> str:
+    return "\n".join((files("stseg.report.page") / name).read_text("utf-8") for name in ("zone_drawing.js", "page.js"))
+
+
+def _sections(contents: Contents) -> list[str]:
+    span, tracks = contents.span, contents.tracks
+    counted = "people in each frame" + ("" if contents.truth is None else "; dashed: the truth")
+    return [
+        section("In short", _answers(contents.answers), *(note(escape(words), "warn") for words in contents.warnings)),
+        section("On the ground, and in time", _pair(figure(contents.plan), _thread(contents.thread))),
+        section(
+            "Moment by moment", _MOMENT.format(grey=_GREY[contents.kept], views=_view_heads(contents.view_summaries))
+        ),
+        section(
+            "People over time",
+            chart(people_chart(span, contents.trajectory, contents.truth), counted),
+            _hours(span, contents.hours),
+            figures(contents.busy, "sheets"),
+        ),
+        section("Where people are", figures(contents.dwell_places, "pair")),
+        section("Ghosts removed", _GHOSTS, _pair(figure(contents.ghost_map), _reasons(contents))),
+        section("Where the rig is blind", _pair(figure(contents.blind_map), _view_summaries(contents.view_summaries))),
+        section(
+            "Tracks",
+            chart(
+                track_chart(span, tracks, doubtful_stretches(contents.trajectory), contents.names),
+                f"from first frame to last; pale where a person is less than {100 * DOUBTFUL:.0f} % certain",
+            ),
+            _track_table(span, tracks, mean_certainty(contents.trajectory, tracks), contents.names),
+        ),
+        section("Events", _event_summary(contents), _event_table(span, contents.events)),
+        section("Occupancy", _cells(contents.cell_probability), figures(contents.slices, "sheets")),
+        section("Cameras", _privacy(contents), figures(contents.cameras, "pair")) if contents.cameras else "",
+        section("Time to compute", _stages(contents.stages)),
+    ]
+
+
+_PAGE = """<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta http-equiv="Content-Security-Policy"
+ content="default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'sha256-{digest}'">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>{title}</title>
+<style>{style}</style>
+</head>
+<body>
+<header>
+<h1>{title}</h1>
+<dl>{facts}</dl>
+</header>
+<main>
+{sections}
+</main>
+<div id="time"><button id="play">Play</button><input id="slider" type="range" min="0" step="1" value="0"
+ aria-label="moment"><output id="clock"></output></div>
+<script id="data" type="application/json">{data}</script>
+<script>{script}</script>
+</body>
+</html>
+"""
+
+_MOMENT = """<p class="note">The slider at the foot of the page chooses the moment. Left: people with their paths of
+the last 5 seconds; crosses are candidates that were dropped as ghosts. Red ground is seen by no view, orange by one.
+Right: the evidence for a person in each cell, blue against, orange for; grey cells
+{grey}.</p>
+<div class="pair live"><figure><canvas id="plan"></canvas><figcaption>the plan: draw a
+<button id="draw-zone">zone</button> or a <button id="draw-line">line</button> called
+<input id="area-name" size="12" maxlength="90" aria-label="its name"> <button id="undo-area" hidden>Undo</button>
+<a id="save-areas" download="areas.geojson" hidden>save areas.geojson</a> <output id="drawing"></output>
+</figcaption></figure>
+<figure><canvas id="slice"></canvas><figcaption>occupancy, <select id="plane" aria-label="plane">
+<option value="greatest">the greatest of all planes</option></select></figcaption></figure></div>
+<div class="scroll live"><table><thead><tr><th>candidate</th><th>x, y, m</th><th>evidence, nats</th>{views}
+<th>why it was dropped</th></tr></thead><tbody id="weighed"></tbody></table></div>
+<p class="note">Each view answers whether it sees a person at the place: <b>yes</b>, <b>no</b>, or <b>?</b> where it is
+hidden from it or out of sight. Of very many candidates the 120
+with most evidence are listed. Evidence is in nats: +3 is 20 to 1 for, -3 is 20 to 1 against.</p>"""
+
+_GREY = {
+    "all": "are not seen",
+    "tracks": "are not seen, or farther from all tracks than a metre, which this run did not keep (--volume tracks)",
+    "none": "are not known, since this run kept no volume (--volume none)",
+}
+
+_GHOSTS = note(
+    "A ghost is a place where views seem to agree on a person who is not there, such as where lines of sight to two "
+    "people cross. Every frame is explained by the most probable set of people; candidates outside it are dropped."
+)
+
+
+_SIGHTS = note(
+    "The evidence is the median over the people in the view. Where it is near 0 or below, the others find people that "
+    "this view does not confirm: look at its calibration, and whether it has moved."
+)
+
+
+def _pair(left: str, right: str) -> str:
+    return f'<div class="pair">{left}{right}</div>'
+
+
+def _answers(answers: Sequence[tuple[str, str]]) -> str:
+    return "".join(f"<h3>{escape(question)}</h3><p>{answer}</p>" for question, answer in answers)
+
+
+def _hours(span: Span, hours: Sequence[BusyTime]) -> str:
+    """People by the hour, of a run of more than one."""
+    if len(hours) < 2:
+        return ""
+    rows = [(when(span, one.first), f"{one.mean:.1f}", str(one.most), str(one.come)) for one in hours]
+    return table(("hour from", "people at a time", "at most", "tracks begin"), rows, len(rows))
+
+
+def _thread(fallback: Figure) -> str:
+    """The picture that can be turned, and the still one where no script runs."""
+    return (
+        '<div><figure class="live"><canvas id="thread"></canvas><figcaption>The ground below, time upwards; pale is '
+        'still to come. Drag to turn. Shown: <select id="span" aria-label="span of time"><option value="0">the whole '
+        f"run</option></select></figcaption></figure><noscript>{figure(fallback)}</noscript></div>"
+    )
+
+
+def _view_heads(view_summaries: Sequence[ViewSummary]) -> str:
+    return "".join(f"<th>{escape(summary.name)}</th>" for summary in view_summaries)
+
+
+def _privacy(contents: Contents) -> str:
+    if contents.has_images:
+        return note("This page shows images from the cameras. Share it with care.", "note warn")
+    return note("Drawn from the tracks alone: this page holds no image from a camera.")
+
+
+def _reasons(contents: Contents) -> str:
+    """How many ghosts were removed for each reason, the commonest first, and how many each view denies."""
+    counts, count = contents.ghosts.counts(), len(contents.ghosts.ghosts)
+    ranked = [k for k in np.argsort(-np.array(counts), kind="stable").tolist() if counts[k]]
+    reasons = [(REASONS[k], float(counts[k])) for k in ranked]
+    denied = [(f"{summary.name} sees nobody there", float(summary.denied)) for summary in contents.view_summaries]
+    parts = [note(f"ghosts removed <b>{count}</b> of {contents.candidates} candidates")]
+    if count:
+        parts.append(bars(reasons, count, "{:,.0f}"))
+        parts.append(note("Views that deny them; several may deny the same ghost:"))
+        parts.append(bars(denied, count, "{:,.0f}"))
+    return f"<div>{''.join(parts)}</div>"
+
+
+def _stages(stages: Sequence[tuple[str, float]]) -> str:
+    return bars(stages, sum(seconds for _, seconds in stages), "{:,.1f} s")
+
+
+def _view_summaries(view_summaries: Sequence[ViewSummary]) -> str:
+    rows = [
+        (
+            escape(summary.name),
+            f"{100 * summary.ground:.0f} %",
+            "sees none" if np.isnan(summary.nats) else f"{summary.nats:+.1f}",
+        )
+        for summary in view_summaries
+    ]
+    names = ("view", "of the ground it sees", "evidence for people, nats")
+    return f"<div>{table(names, rows, len(rows))}{_SIGHTS}</div>"
+
+
+def _track_table(span: Span, tracks: Rows, certainty: Floats, names: Mapping[int, str]) -> str:
+    rows = [
+        (
+            swatch(int(row["id"]), names.get(int(row["id"]), "")),
+            when(span, int(row["first"])),
+            when(span, int(row["last"])),
+            f"{row['frames']}",
+            f"{row['height']:.2f}",
+            f"{100 * sure:.1f}",
+        )
+        for row, sure in zip(tracks[:MOST_ROWS], certainty.tolist(), strict=False)
+    ]
+    return table(("track", "first", "last", "frames", "height, m", "certainty, %"), rows, len(tracks))
+
+
+def _cells(cell_probability: Sequence[tuple[float, float]]) -> str:
+    """How far log-odds of cells can be believed; nothing where no volume was kept."""
+    if not cell_probability:
+        return ""
+    cells = [(f"{nats:+g}", f"{100 * probability:.0f} %") for nats, probability in cell_probability]
+    words = note("Log-odds are evidence on single cells. The share of them that people fill, by this run's tracks:")
+    return f"<div>{words}{table(('log-odds, nats', 'cells that people fill'), cells, len(cells))}</div>"
+
+
+def _event_summary(contents: Contents) -> str:
+    """Counts of events by kind; a merge and its split are one encounter."""
+    kinds, counts = np.unique(_without_splits(contents.events)["kind"], return_counts=True)
+    words = [f"{_kind(kind)} <b>{count}</b>" for kind, count in zip(kinds, counts.tolist(), strict=True)]
+    return note(" &middot; ".join(words) or "none")
+
+
+def _without_splits(events: Rows) -> Rows:
+    """Events without splits: the merge row holds the duration of an encounter."""
+    return np.asarray(events[events["kind"] != b"split"])
+
+
+def _kind(kind: bytes) -> str:
+    return "encounter" if kind == b"merge" else escape(kind.decode())
+
+
+def _event_table(span: Span, events: Rows) -> str:
+    events = _without_splits(events)
+    if not len(events):
+        return ""
+    rows = [
+        (
+            when(span, int(row["frame"])),
+            _kind(row["kind"]),
+            swatch(int(row["id"])),
+            swatch(int(row["other"])) if row["other"] else "",
+            escape(row["reason"].decode(errors="replace")),
+        )
+        for row in events[np.argsort(events["frame"], kind="stable")][:MOST_ROWS]
+    ]
+    return table(("frame", "event", "track", "other", "reason"), rows, len(events))

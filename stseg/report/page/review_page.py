@@ -1,0 +1,141 @@
+"""The page that asks about doubtful identities: pictures of each decision, one key for each answer."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from html import escape
+from importlib.resources import files
+
+import cv2
+import numpy as np
+
+from stseg.arrays import AnyArray, Bytes, Observation, Rows
+from stseg.geometry import Camera, Rig
+from stseg.report.figures import backdrop
+from stseg.report.page.style import STYLE
+from stseg.report.pictures.overlay import overlay
+
+_WIDTH, _TALL = 960, 260
+_VIEWS = 2
+"""Views of each decision."""
+
+
+@dataclass(frozen=True)
+class Question:
+    """A question with its answers.
+
+    Attributes
+    ----------
+    text
+        The question, one line.
+    choices
+        Key, words and line of the answers file of each answer.
+    pictures
+        Caption and picture of each moment and view.
+    """
+
+    text: str
+    choices: Sequence[tuple[str, str, str]]
+    pictures: Sequence[tuple[str, Bytes]]
+
+
+def review_page(title: str, questions: Sequence[Question], shows_images: bool) -> str:
+    """The page's text."""
+    script = (files("stseg.report.page") / "review_page.js").read_text("utf-8")
+    digest = base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
+    data = json.dumps([{"choices": one.choices} for one in questions]).replace("<", "\\u003c")
+    items = "\n".join(map(_item, questions))
+    privacy = "This page shows images from the cameras: share it with care." if shows_images else "No camera image."
+    return _PAGE.format(
+        title=escape(title), style=STYLE + _STYLE, digest=digest, items=items, data=data, script=script, privacy=privacy
+    )
+
+
+def _item(question: Question) -> str:
+    shown = "".join(
+        f'<figure><img alt="{escape(words)}" src="{_jpeg(picture)}"><figcaption>{escape(words)}</figcaption></figure>'
+        for words, picture in question.pictures
+    )
+    return f'<section class="item" hidden><h2>{escape(question.text)}</h2><div class="row">{shown}</div></section>'
+
+
+def _jpeg(picture: Bytes) -> str:
+    _, data = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, 80])
+    return "data:image/jpeg;base64," + base64.b64encode(np.asarray(data, np.uint8).tobytes()).decode("ascii")
+
+
+def best_views(rig: Rig, ground: AnyArray) -> list[int]:
+    """The views that show ground points (n, 2) at body height, those first in which they are farthest apart."""
+    scores = []
+    for view, camera in enumerate(rig.cameras):
+        pixel, ahead = camera.project(np.asarray(ground, float), 0.9)
+        seen = float((ahead & camera.inside(pixel)).mean())
+        apart = float(np.ptp(pixel[:, 0])) / camera.size[0] if ahead.all() else 0.0
+        distance = float(np.hypot(*(np.asarray(ground, float).mean(axis=0) - camera.centre[:2])))
+        scores.append((-seen, -apart if len(pixel) > 1 and apart > 0 else distance, view))
+    return [view for *_, view in sorted(scores)][:_VIEWS]
+
+
+def moment_picture(
+    rig: Rig, view: int, trajectory: Rows, frame: int, ids: Sequence[int], seen: Observation, trail: int
+) -> Bytes:
+    """A crop of one view around some tracks in a frame, with pillars and trails."""
+    camera = rig.cameras[view]
+    picture = overlay(camera, rig.grid, backdrop(seen, camera.size), trajectory, frame, trail, _WIDTH)
+    nearest = trajectory[np.isin(trajectory["id"], ids)]
+    nearest = nearest[np.abs(nearest["frame"] - frame) <= trail]
+    return _resized(_crop(picture, camera, nearest) if len(nearest) else picture)
+
+
+def _crop(picture: Bytes, camera: Camera, rows: Rows) -> Bytes:
+    ground = np.stack([rows["x"], rows["y"]], -1)
+    pixel = np.concatenate([camera.project(ground, 0.0)[0], camera.project(ground, 1.9)[0]])
+    pixel = pixel[np.isfinite(pixel).all(axis=1)] * picture.shape[1] / camera.size[0]
+    if not len(pixel):
+        return picture
+    limit = np.array([picture.shape[1], picture.shape[0]])
+    low, high = np.clip(pixel.min(axis=0) - 60, 0, limit - 80), np.clip(pixel.max(axis=0) + 60, 80, limit)
+    (left, top), (right, bottom) = low.astype(int).tolist(), high.astype(int).tolist()
+    return picture[top:bottom, left:right] if right - left > 40 and bottom - top > 40 else picture
+
+
+def _resized(picture: Bytes) -> Bytes:
+    scale = _TALL / picture.shape[0]
+    return np.asarray(cv2.resize(picture, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA), np.uint8)
+
+
+_STYLE = """
+main { max-width: none } .row { display: flex; flex-wrap: wrap; gap: 10px } .row figure { margin: 0 }
+#choices button { margin-right: 12px } #choices .chosen { outline: 3px solid var(--accent) }
+#csv { width: 100%; height: 120px; font-family: monospace }
+"""
+
+_PAGE = """<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta http-equiv="Content-Security-Policy"
+ content="default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'sha256-{digest}'">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>{title}</title>
+<style>{style}</style>
+</head>
+<body>
+<main>
+<h1>{title}</h1>
+<p>The most doubtful decision first. A key answers and goes on; arrows move, Backspace takes an answer back.
+{privacy}</p>
+<p><b id="count"></b> <span id="choices"></span> <a id="save" download="answers.csv">Save answers.csv</a></p>
+{items}
+<textarea id="csv" readonly aria-label="answers.csv"></textarea>
+<p>Then: <code>stseg correct RUN.h5 answers.csv -o corrected.h5</code></p>
+</main>
+<script id="data" type="application/json">{data}</script>
+<script>{script}</script>
+</body>
+</html>
+"""

@@ -1,0 +1,226 @@
+"""Maps of the ground: density of people, dwell time, ghosts, and coverage by the views."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from stseg.arrays import AnyArray, Bytes, Floats, Ints, Rows
+from stseg.geometry import Grid, Rig
+from stseg.report.pictures.canvas import chip, outline, text, text_size
+from stseg.report.pictures.colours import INK, PAPER, QUIET, Colour, mixed
+from stseg.report.pictures.plan import border, draw_cameras
+from stseg.report.pictures.plan_map import PlanMap, rule, scale_bar, sheet
+
+_BINS = 40  # along the longer side of the ground, at most
+_SIDES = (0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)  # metres
+_NEAR = 0.75  # radius of a dwell place, metres
+_WARM = np.array([(252, 251, 250), (150, 206, 254), (60, 140, 240), (38, 54, 190), (48, 18, 96)], float)
+
+
+@dataclass(frozen=True)
+class Bins:
+    """Square bins of the ground.
+
+    Attributes
+    ----------
+    x, y
+        The ground rectangle, metres.
+    side
+        Of a bin, metres.
+    """
+
+    x: tuple[float, float]
+    y: tuple[float, float]
+    side: float
+
+    @classmethod
+    def of(cls, grid: Grid) -> Bins:
+        """Bins of a round side, no finer than the cells."""
+        longest = max(grid.x[1] - grid.x[0], grid.y[1] - grid.y[0])
+        fit = [side for side in _SIDES if side >= grid.cell - 1e-9 and side * _BINS >= longest]
+        return cls(grid.x, grid.y, min(fit, default=longest / _BINS))
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(y, x)."""
+        tall, wide = (int(np.ceil((high - low) / self.side - 1e-9)) for low, high in (self.y, self.x))
+        return max(1, tall), max(1, wide)
+
+    def index(self, rows: Rows) -> Ints:
+        """The flat bin of each row, -1 outside the ground."""
+        u, v = (np.floor((rows[name] - low) / self.side) for name, low in (("x", self.x[0]), ("y", self.y[0])))
+        inside = (u >= 0) & (v >= 0) & (u < self.shape[1]) & (v < self.shape[0])
+        return np.where(inside, v * self.shape[1] + u, -1).astype(np.int64)
+
+    def count(self, index: Ints) -> Floats:
+        """Rows in each bin, float64 (y, x)."""
+        return np.bincount(index[index >= 0], minlength=self.shape[0] * self.shape[1]).reshape(self.shape).astype(float)
+
+
+def density(bins: Bins, rows: Rows, frames: int) -> Floats:
+    """Mean number of rows a frame and square metre, float64 (y, x): of people, or of ghosts."""
+    return bins.count(bins.index(rows)) / (max(frames, 1) * bins.side**2)
+
+
+def dwell(bins: Bins, trajectory: Rows, frame_rate: float) -> Floats:
+    """Mean duration of a stay in each bin, seconds, float64 (y, x); 0 without stays.
+
+    A stay is an unbroken sequence of one track's rows in one bin; a return begins another.
+    """
+    table = trajectory[np.lexsort((trajectory["frame"], trajectory["id"]))]
+    index = bins.index(table)
+    moved = (np.diff(index) != 0) | (np.diff(table["id"]) != 0)
+    begins = np.concatenate([[True], moved])[: len(table)]
+    stays = bins.count(index[begins])
+    return np.asarray(bins.count(index) / np.maximum(stays, 1) / frame_rate, float)
+
+
+@dataclass(frozen=True)
+class DwellPlace:
+    """A place of long stays: position in metres, and the share of all person-time spent near it."""
+
+    x: float
+    y: float
+    share: float
+
+
+def dwell_places(trajectory: Rows, bins: Bins, most: int = 3) -> list[DwellPlace]:
+    """Places with more person-time within `_NEAR` than an even spread would give, the longest first.
+
+    Greedy: the place with most time, then the next in the remaining time.
+    """
+    left = np.stack([trajectory["x"], trajectory["y"]], -1)
+    even = np.pi * _NEAR**2 / ((bins.x[1] - bins.x[0]) * (bins.y[1] - bins.y[0]))
+    found: list[DwellPlace] = []
+    total = max(len(left), 1)
+    while len(left) and len(found) < most:
+        place = _busiest(left, bins)
+        near = np.hypot(*(left - place).T) <= _NEAR
+        share = float(near.sum() / total)
+        if share < max(0.02, 1.5 * even):
+            break
+        x, y = left[near].mean(axis=0).tolist()
+        found.append(DwellPlace(x, y, share))
+        left = left[~near]
+    return found
+
+
+def _busiest(places: Floats, bins: Bins) -> Floats:
+    """The corner of bins around which most places lie."""
+    edges = [np.arange(low, high + bins.side, bins.side) for low, high in (bins.x, bins.y)]
+    counts, *_ = np.histogram2d(places[:, 0], places[:, 1], edges)
+    middles = [(edge[1:] + edge[:-1]) / 2 for edge in edges]
+    reach = int(_NEAR // bins.side)
+    padded = np.pad(counts, reach)
+    sums = np.zeros_like(counts)
+    for u in range(2 * reach + 1):
+        for v in range(2 * reach + 1):
+            if (u - reach) ** 2 + (v - reach) ** 2 <= (_NEAR / bins.side) ** 2:
+                sums += padded[u : u + counts.shape[0], v : v + counts.shape[1]]
+    best = np.unravel_index(int(sums.argmax()), sums.shape)
+    return np.array([middles[0][best[0]], middles[1][best[1]]])
+
+
+def map_of_maps(rig: Rig) -> PlanMap:
+    """The map from metres to pixels of these maps."""
+    return PlanMap.fit(rig.grid, np.zeros((0, 2)), 900, 900)
+
+
+def heat_map(rig: Rig, bins: Bins, values: Floats, title: str, units: str, marks: Sequence[DwellPlace] = ()) -> Bytes:
+    """Heat map of bins from above, y up: white for none, dark for much.
+
+    Parameters
+    ----------
+    rig
+    bins
+    values : float64 (y, x)
+        Zero or more; the colour scale ends at their 99th percentile.
+    title, units
+    marks
+        Places that are lettered A, B, C.
+
+    Returns
+    -------
+    uint8 (v, u, 3)
+        Blue, green, red.
+    """
+    limit = float(np.percentile(values[values > 0], 99)) if (values > 0).any() else 1.0
+    plan = map_of_maps(rig)
+    canvas = sheet(plan, title)
+    paint(canvas, plan, bins, warm_colours(values, limit))
+    _frame(canvas, plan, rig)
+    for letter, mark in zip("ABC", marks, strict=False):
+        u, v = plan.pixel(np.array([mark.x, mark.y])).tolist()
+        chip(canvas, letter, (u, v), INK, 16)
+    _ramp(canvas, plan, limit, units)
+    return canvas
+
+
+def blind_map(rig: Rig, views: Bytes) -> Bytes:
+    """Map of the number of views that see each ground cell at some height: none red, one orange, more lighter."""
+    plan = map_of_maps(rig)
+    canvas = sheet(plan, "Views that see the ground")
+    seen = views.max(axis=0)
+    most = max(len(rig.cameras), int(seen.max()))
+    tones = [_blind_tone(count, most) for count in range(most + 1)]
+    paint(canvas, plan, Bins(rig.grid.x, rig.grid.y, rig.grid.cell), np.array(tones, np.uint8)[seen])
+    _frame(canvas, plan, rig)
+    u, v = 76.0, plan.size[1] - 38.0
+    wide = min(44.0, 460.0 / len(tones))
+    for count, tone in enumerate(tones):
+        canvas[round(v) - 14 : round(v) + 14, round(u) : round(u + wide)] = tone
+        text(canvas, str(count), (u + wide / 2, v), PAPER if count == 0 else INK, 15, (0.5, 0.5))
+        u += wide
+    text(canvas, "views", (u + 10, v), QUIET, 15, (0, 0.5))
+    scale_bar(canvas, plan, (plan.size[0] - 44.0, v))
+    return canvas
+
+
+def paint(canvas: Bytes, plan: PlanMap, bins: Bins, colours: Bytes) -> None:
+    """Paint bins uint8 (y, x, 3) onto a plan."""
+    (left, top), (right, bottom) = (
+        np.rint(plan.pixel(np.array(corner))).astype(int).tolist()
+        for corner in ((bins.x[0], bins.y[1]), (bins.x[1], bins.y[0]))
+    )
+    v, u = np.arange(top, bottom), np.arange(left, right)
+    y = bins.y[1] - (v - top + 0.5) / plan.scale
+    x = bins.x[0] + (u - left + 0.5) / plan.scale
+    row = np.clip(((y - bins.y[0]) / bins.side).astype(int), 0, colours.shape[0] - 1)
+    column = np.clip(((x - bins.x[0]) / bins.side).astype(int), 0, colours.shape[1] - 1)
+    canvas[top:bottom, left:right] = colours[row[:, None], column[None]]
+
+
+def warm_colours(values: AnyArray, limit: float) -> Bytes:
+    """White, orange, red, dark for 0 to `limit`, uint8 (..., 3)."""
+    share = np.clip(np.asarray(values, float) / limit, 0, 1)
+    stops = np.linspace(0, 1, len(_WARM))
+    return np.asarray(np.rint(np.stack([np.interp(share, stops, tone) for tone in _WARM.T], -1)), np.uint8)
+
+
+def _blind_tone(count: int, most: int) -> Colour:
+    if count < 2:
+        return ((60, 60, 190), (120, 190, 250))[count]
+    return mixed((206, 199, 195), (252, 251, 250), (count - 1) / max(most - 1, 1))
+
+
+def _frame(canvas: Bytes, plan: PlanMap, rig: Rig) -> None:
+    rule(canvas, plan)
+    outline(canvas, plan.pixel(border(rig.grid)), mixed(INK, PAPER, 0.35), 2)
+    draw_cameras(canvas, plan, rig.cameras)
+
+
+def _ramp(canvas: Bytes, plan: PlanMap, limit: float, units: str) -> None:
+    """Colour bar below the map."""
+    length, tall, u, v = 260, 16, 76, plan.size[1] - 52
+    canvas[v : v + tall, u : u + length] = warm_colours(np.linspace(0, limit, length), limit)[None]
+    corners = np.array([[u, v], [u + length, v], [u + length, v + tall], [u, v + tall]])
+    outline(canvas, corners, mixed(QUIET, PAPER, 0.5))
+    text(canvas, "0", (u, v + tall + 7), QUIET, 14, (0, 0))
+    words = f"{limit:.2g} or more"
+    text(canvas, words, (u + length, v + tall + 7), QUIET, 14, (0.5, 0))
+    text(canvas, units, (u + length + 16, v + tall / 2), QUIET, 15, (0, 0.5))
+    if u + length + 16 + text_size(units, 15)[0] < plan.size[0] - 320:
+        scale_bar(canvas, plan, (plan.size[0] - 44.0, v + tall / 2))

@@ -1,0 +1,271 @@
+"""The plan view: coverage, cameras and tracks from above."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+
+import cv2
+import numpy as np
+
+from stseg.arrays import AnyArray, Bytes, Floats, Rows
+from stseg.geometry import Camera, Grid, Rig
+from stseg.report.pictures.canvas import chip, chip_size, dashes, disc, fill, outline, stroke, text, text_size
+from stseg.report.pictures.colours import INK, PAPER, QUIET, Colour, mixed, track_colour
+from stseg.report.pictures.labels import place_labels
+from stseg.report.pictures.plan_map import PlanMap, rule, scale_bar, sheet
+
+_NEAR = 0.45  # cameras within this share of the ground's longer side are shown where they stand
+_DARKEST: Colour = (206, 199, 195)  # seen by no view
+_TRUTH: Colour = (84, 76, 70)
+_LABELLED = 24  # tracks, the longest ones
+
+
+def plan_view(
+    rig: Rig,
+    trajectory: Rows,
+    truth: Rows | None = None,
+    coverage: Bytes | None = None,
+    title: str = "",
+    width: int = 1400,
+    height: int = 1500,
+    names: Mapping[int, str] = MappingProxyType({}),
+) -> Bytes:
+    """Draw the ground from above, y up.
+
+    Parameters
+    ----------
+    rig
+        Its rectangle, polygon and cameras.
+    trajectory : TRAJECTORY (n,)
+        Coloured lines: a dot where a track starts, an arrow head and its id where it ends, dashes where it has gaps.
+    truth : (m,) with frame, id, x, y
+        Thin dark dashed lines; None for none.
+    coverage : uint8 (y, x)
+        Number of views that see each ground cell: the more, the lighter. None for plain paper.
+    title
+        Stands above.
+    width, height
+        The largest size of the picture, pixels.
+    names
+        Names of tracks by id, which then stand instead of their ids.
+
+    Returns
+    -------
+    uint8 (v, u, 3)
+        Blue, green, red.
+    """
+    plan = plan_map(rig, width, height)
+    canvas = ground_sheet(plan, rig, coverage, title or rig.name)
+    _draw_tracks(canvas, plan, trajectory)
+    if truth is not None:
+        for _, path in _paths(truth):
+            dashes(canvas, plan.pixel(path), _TRUTH)
+    _label_tracks(canvas, plan, trajectory, names)
+    _legend(canvas, plan, None if coverage is None else int(coverage.max()), truth is not None)
+    return canvas
+
+
+def ground_sheet(plan: PlanMap, rig: Rig, coverage: Bytes | None, title: str) -> Bytes:
+    """The ground without tracks: coverage (see `plan_view`), grid lines, border and cameras."""
+    canvas = sheet(plan, title)
+    if coverage is not None:
+        _shade(canvas, plan, rig.grid, coverage)
+    rule(canvas, plan)
+    outline(canvas, plan.pixel(border(rig.grid)), mixed(INK, PAPER, 0.35), 2)
+    draw_cameras(canvas, plan, rig.cameras)
+    return canvas
+
+
+def plan_map(rig: Rig, width: int = 1400, height: int = 1500) -> PlanMap:
+    """The map from metres to pixels of `plan_view`."""
+    near = [_ground_position(camera, rig.grid) for camera in rig.cameras]
+    places = [place for place in near if place is not None]
+    return PlanMap.fit(rig.grid, np.array(places).reshape(-1, 2), width, height)
+
+
+def _ground_position(camera: Camera, grid: Grid) -> Floats | None:
+    """Ground position of a camera, metres (x, y), None where that is far away."""
+    place = camera.centre[:2]
+    reach = _NEAR * max(grid.x[1] - grid.x[0], grid.y[1] - grid.y[0])
+    low, high = np.array([grid.x[0], grid.y[0]]), np.array([grid.x[1], grid.y[1]])
+    beyond = np.maximum(low - place, place - high).max()
+    return place if beyond <= reach else None
+
+
+def border(grid: Grid) -> Floats:
+    """Corners of the area of interest, metres, float64 (n, 2)."""
+    if grid.polygon is not None:
+        return np.asarray(grid.polygon, float)
+    (x0, x1), (y0, y1) = grid.x, grid.y
+    return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
+
+
+def _shade(canvas: Bytes, plan: PlanMap, grid: Grid, coverage: Bytes) -> None:
+    """Paint the cells; the area outside the rectangle stays paper."""
+    most = max(int(coverage.max()), 1)
+    tones = np.array([_tone(count, most) for count in range(most + 1)], np.uint8)
+    picture = tones[coverage[::-1]]
+    low = np.rint(plan.pixel(np.array([grid.x[0], grid.y[1]]))).astype(int)
+    high = np.rint(plan.pixel(np.array([grid.x[1], grid.y[0]]))).astype(int)
+    size = (int(high[0] - low[0]), int(high[1] - low[1]))
+    canvas[low[1] : high[1], low[0] : high[0]] = cv2.resize(picture, size, interpolation=cv2.INTER_NEAREST)
+
+
+def _tone(count: int, most: int) -> Colour:
+    return mixed(_DARKEST, (252, 251, 250), count / most)
+
+
+def draw_cameras(canvas: Bytes, plan: PlanMap, cameras: Sequence[Camera]) -> None:
+    """Every camera, and its name behind it, below the names that are there already."""
+    named: list[tuple[float, float, int]] = []
+    for camera in cameras:
+        tone, (u, v) = _draw_camera(canvas, plan, camera)
+        width = text_size(camera.name, 15)[0]
+        while any(abs(u - other) < (width + wide) / 2 and abs(v - below) < 20 for other, below, wide in named):
+            v += 20
+        named.append((u, v, width))
+        text(canvas, camera.name, (u, v), tone, 15, (0.5, 0.5))
+
+
+def _draw_camera(canvas: Bytes, plan: PlanMap, camera: Camera) -> tuple[Colour, tuple[float, float]]:
+    """A wedge as wide as the view, pointing where it looks; at the edge of the plan where it stands beyond.
+
+    Returns its colour and where the middle of its name may stand.
+    """
+    position = camera.centre[:2]
+    edge = np.clip(position, [plan.x[0], plan.y[0]], [plan.x[1], plan.y[1]])
+    place, beyond = plan.pixel(edge), bool((edge != position).any())
+    tone = QUIET if beyond else INK
+    sides = _view_directions(camera)
+    if sides is not None:
+        wedge = np.concatenate([place[None], place + 46 * sides])
+        fill(canvas, wedge, tone, 0.16)
+        outline(canvas, wedge, mixed(tone, PAPER, 0.35))
+    disc(canvas, place, 6, PAPER)
+    disc(canvas, place, 4.5, tone)
+    return tone, _name_place(camera.name, place, np.array([0.0, -1.0]) if sides is None else -sides[1], plan)
+
+
+def _name_place(name: str, place: Floats, back: Floats, plan: PlanMap) -> tuple[float, float]:
+    """Middle of a camera's name: behind it, or where that would cover the numbers of the axes, before or beside it."""
+    (wide, tall), space = text_size(name, 15), np.array(plan.size)
+    half = np.array([wide / 2, tall / 2])
+    aside = np.array([-back[1], back[0]])
+    middles = [
+        np.clip(place + way * (14 + wide / 2, 22), (wide / 2 + 4, tall), space - (wide / 2 + 4, tall))
+        for way in (back, -back, aside, -aside)
+    ]
+    free = (middle for middle in middles if not plan.covers_numbers(middle - half, middle + half))
+    u, v = next(free, middles[0]).tolist()
+    return u, v
+
+
+def _view_directions(camera: Camera) -> Floats | None:
+    """Directions on the canvas (v down) of the left, middle and right of the view; None where it looks down.
+
+    float64 (3, 2), unit length.
+    """
+    matrix = camera.projection[:, :3]
+    width, height = camera.size
+    pixel = np.array([[0.0, height / 2], [width / 2, height / 2], [width - 1.0, height / 2]])
+    ideal = pixel if camera.lens is None else camera.lens.undistort(pixel)
+    ray = np.linalg.solve(matrix, np.concatenate([ideal, np.ones((3, 1))], axis=1).T).T
+    length = np.hypot(ray[:, 0], ray[:, 1])
+    if not np.isfinite(ray).all() or (length < 0.2 * np.linalg.norm(ray, axis=1)).any():
+        return None
+    return np.asarray(ray[:, :2] / length[:, None] * (1, -1))
+
+
+def _paths(table: Rows) -> list[tuple[int, Floats]]:
+    """Each id with its places in order of time; a nan stands where frames are missing."""
+    paths = []
+    step = _frame_step(table["frame"])
+    order = np.lexsort((table["frame"], table["id"]))
+    table = table[order]
+    for own in np.split(table, np.flatnonzero(np.diff(table["id"])) + 1):
+        if len(own):
+            places = np.stack([own["x"], own["y"]], -1)
+            gaps = np.flatnonzero(np.diff(own["frame"]) > step) + 1
+            paths.append((int(own["id"][0]), np.insert(places, gaps, np.nan, axis=0)))
+    return paths
+
+
+def _frame_step(frames: AnyArray) -> int:
+    """Frames from one row of a table to the next where nothing is missing: truth may be sparse."""
+    known = np.unique(frames)
+    return int(np.diff(known).min()) if len(known) > 1 else 1
+
+
+def _draw_tracks(canvas: Bytes, plan: PlanMap, trajectory: Rows) -> None:
+    paths = _paths(trajectory)
+    few, some = len(paths) <= 12, len(paths) <= 60
+    width, opacity = (3 if few else 2 if some else 1), (1.0 if some else max(0.2, 0.7 * (60 / len(paths)) ** 0.5))
+    for identity, path in paths:
+        colour, pixel = track_colour(identity), plan.pixel(path)
+        known = pixel[np.isfinite(pixel[:, 0])]
+        if len(known) < len(pixel):
+            dashes(canvas, known, mixed(colour, PAPER, 0.4), 1, 3, 5)
+        stroke(canvas, pixel, colour, width, opacity)
+    size = 1.0 if few else 0.8 if some else 0.5
+    for identity, path in paths:
+        _draw_ends(canvas, plan.pixel(path[np.isfinite(path[:, 0])]), track_colour(identity), size)
+
+
+def _draw_ends(canvas: Bytes, pixel: Floats, colour: Colour, size: float) -> None:
+    """A dot at the start; at the end a head that points where the track was going."""
+    disc(canvas, pixel[0], 7.5 * size, PAPER)
+    disc(canvas, pixel[0], 6 * size, colour)
+    end = pixel[-1]
+    far = np.flatnonzero(np.hypot(*(pixel - end).T) > 12)
+    ahead = end - pixel[far[-1]] if len(far) else np.array([0.0, -1.0])
+    ahead = ahead / np.hypot(*ahead)
+    side = np.array([-ahead[1], ahead[0]])
+    head = end + size * np.array([13 * ahead, -6 * ahead + 8 * side, -2 * ahead, -6 * ahead - 8 * side])
+    outline(canvas, head, PAPER, 3)
+    fill(canvas, head, colour)
+
+
+def _label_tracks(canvas: Bytes, plan: PlanMap, trajectory: Rows, names: Mapping[int, str]) -> None:
+    """Ids beside the ends; of many tracks only the longest."""
+    paths = sorted(_paths(trajectory), key=lambda path: -len(path[1]))[:_LABELLED]
+    size = 14.0 if len(paths) <= 12 else 11.0
+    ends = np.array([plan.pixel(path[-1]) for _, path in paths]).reshape(-1, 2)
+    labels = [names.get(identity, str(identity)) for identity, _ in paths]
+    sizes = [chip_size(label, size) for label in labels]
+    centres = place_labels(ends, sizes, (*plan.corner, *plan.far_corner), 16)
+    for (identity, _), label, (u, v) in zip(paths, labels, centres.tolist(), strict=True):
+        chip(canvas, label, (u, v), track_colour(identity), size)
+
+
+def _legend(canvas: Bytes, plan: PlanMap, most: int | None, has_truth: bool) -> None:
+    """Below the plan: what the tones and marks mean, and a scale bar."""
+    u, v = 76.0, plan.size[1] - 38.0
+    if most is not None:
+        u = _legend_of_tones(canvas, (u, v), most) + 28
+    colour = track_colour(1)
+    line = np.array([[u, v], [u + 46, v]])
+    stroke(canvas, line, colour, 3)
+    _draw_ends(canvas, line, colour, 0.8)
+    text(canvas, "track", (u + 66, v), QUIET, 15, (0, 0.5))
+    u += 66 + text_size("track", 15)[0] + 28
+    if has_truth:
+        dashes(canvas, np.array([[u, v], [u + 46, v]]), _TRUTH)
+        text(canvas, "truth", (u + 56, v), QUIET, 15, (0, 0.5))
+    scale_bar(canvas, plan, (plan.size[0] - 44.0, v))
+
+
+def _legend_of_tones(canvas: Bytes, place: tuple[float, float], most: int) -> float:
+    """A square for each number of views from `place` on; returns where they end."""
+    u, v = place
+    text(canvas, "views", (u, v), QUIET, 15, (0, 0.5))
+    u += text_size("views", 15)[0] + 10
+    wide = min(30.0, 270.0 / (most + 1))
+    for count in range(most + 1):
+        square = np.array([[u, v - 14], [u + wide, v - 14], [u + wide, v + 14], [u, v + 14]])
+        fill(canvas, square, _tone(count, max(most, 1)))
+        outline(canvas, square, mixed(QUIET, PAPER, 0.5))
+        if wide > 20 or count in (0, most):
+            text(canvas, str(count), (u + wide / 2, v), INK, 14, (0.5, 0.5))
+        u += wide
+    return u

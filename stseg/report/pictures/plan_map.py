@@ -1,0 +1,131 @@
+"""Map from metres to pixels of the plan view, and its ruled sheet."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stseg.arrays import AnyArray, Bytes, Floats
+from stseg.geometry import Grid
+from stseg.report.pictures.canvas import blank, outline, stroke, text, text_size
+from stseg.report.pictures.colours import INK, PAPER, QUIET, RULE, Colour
+
+_LEFT, _RIGHT, _TOP, _BOTTOM = 76, 44, 104, 132  # margins for title, labels and legend, pixels
+_NARROWEST = 900  # pixels, for the legend
+_STEPS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)
+
+
+@dataclass(frozen=True)
+class PlanMap:
+    """Metres on the ground to pixels of a plan view; y points up.
+
+    Attributes
+    ----------
+    x, y
+        What is shown, metres.
+    scale
+        Pixels a metre.
+    corner
+        Pixel of the upper left corner (least x, greatest y).
+    size
+        Width and height of the canvas, pixels.
+    """
+
+    x: tuple[float, float]
+    y: tuple[float, float]
+    scale: float
+    corner: tuple[float, float]
+    size: tuple[int, int]
+
+    @classmethod
+    def fit(cls, grid: Grid, places: AnyArray, width: int, height: int) -> PlanMap:
+        """The largest map of the grid's rectangle, and of places (n, 2) beside it, on a canvas of at most that size."""
+        x, y = _bounds(grid, places)
+        space = (width - _LEFT - _RIGHT, height - _TOP - _BOTTOM)
+        scale = min(space[0] / (x[1] - x[0]), space[1] / (y[1] - y[0]))
+        wide, tall = scale * (x[1] - x[0]), scale * (y[1] - y[0])
+        size = (max(round(wide) + _LEFT + _RIGHT, _NARROWEST), round(tall) + _TOP + _BOTTOM)
+        spare = size[0] - _LEFT - _RIGHT - wide
+        return cls(x, y, scale, (_LEFT + spare / 2, float(_TOP)), size)
+
+    def pixel(self, ground: AnyArray) -> Floats:
+        """Pixels of ground points, float64 (..., 2)."""
+        ground = np.asarray(ground, float)
+        u = self.corner[0] + (ground[..., 0] - self.x[0]) * self.scale
+        v = self.corner[1] + (self.y[1] - ground[..., 1]) * self.scale
+        return np.stack([u, v], -1)
+
+    @property
+    def far_corner(self) -> tuple[float, float]:
+        """Pixel of the lower right corner."""
+        u, v = self.pixel(np.array([self.x[1], self.y[0]])).tolist()
+        return u, v
+
+    def covers_numbers(self, low: Floats, high: Floats) -> bool:
+        """Whether a rectangle of the canvas lies on the numbers of `rule`, below and left of the ground."""
+        (left, top), (right, bottom) = self.corner, self.far_corner
+        below = high[1] > bottom + 8 and low[1] < bottom + 34 and low[0] < right + 24 and high[0] > left - 24
+        beside = high[0] > left - 60 and low[0] < left - 8 and low[1] < bottom + 12 and high[1] > top - 12
+        return bool(below or beside)
+
+
+def sheet(plan: PlanMap, title: str) -> Bytes:
+    """An empty plan: white paper and a title."""
+    canvas = blank(*plan.size, PAPER)
+    text(canvas, title, (plan.corner[0], 24), INK, 20, (0, 0), 2)
+    return canvas
+
+
+def rule(canvas: Bytes, plan: PlanMap) -> None:
+    """Grid lines every metre (wider apart where they would crowd), with labels in metres."""
+    step = step_for(plan.scale, 12, 1.0)
+    every = step_for(plan.scale, 56, step)
+    (left, top), (right, bottom) = plan.corner, plan.far_corner
+    for metres in _multiples(plan.x, step):
+        u = plan.pixel(np.array([metres, 0.0]))[0]
+        stroke(canvas, np.array([[u, top], [u, bottom]]), RULE)
+        if _is_multiple(metres, every):
+            text(canvas, f"{metres + 0.0:g}", (u, bottom + 14), QUIET, 15, (0.5, 0))
+    for metres in _multiples(plan.y, step):
+        v = plan.pixel(np.array([0.0, metres]))[1]
+        stroke(canvas, np.array([[left, v], [right, v]]), RULE)
+        if _is_multiple(metres, every):
+            text(canvas, f"{metres + 0.0:g}", (left - 14, v), QUIET, 15, (1, 0.5))
+    outline(canvas, np.array([[left, top], [right, top], [right, bottom], [left, bottom]]), RULE)
+    text(canvas, "x and y, metres", (right, bottom + 42), QUIET, 15, (1, 0))
+
+
+def scale_bar(canvas: Bytes, plan: PlanMap, place: tuple[float, float], colour: Colour = INK) -> None:
+    """A bar of a round number of metres whose right end stands at `place`."""
+    metres = max((step for step in _STEPS if step * plan.scale <= 180), default=_STEPS[0])
+    (u, v), length = place, metres * plan.scale
+    words = f"{metres:g} m"
+    stroke(canvas, np.array([[u - length, v], [u, v]]), colour, 3)
+    for end in (u - length, u):
+        stroke(canvas, np.array([[end, v - 6], [end, v + 6]]), colour, 2)
+    text(canvas, words, (u - length - 12 - text_size(words, 16)[0], v), colour, 16, (0, 0.5))
+
+
+def step_for(scale: float, apart: float, least: float) -> float:
+    """The least round number of metres, `least` or more, that is `apart` pixels long or longer."""
+    return min((step for step in _STEPS if step >= least and step * scale >= apart), default=_STEPS[-1])
+
+
+def _bounds(grid: Grid, places: AnyArray) -> tuple[tuple[float, float], tuple[float, float]]:
+    """The rectangle and a little around it, wider where places lie beyond."""
+    margin = 0.04 * max(grid.x[1] - grid.x[0], grid.y[1] - grid.y[0])
+    spans = []
+    for axis, (low, high) in enumerate((grid.x, grid.y)):
+        own = np.asarray(places, float).reshape(-1, 2)[:, axis]
+        spans.append((min([low, *own]) - margin, max([high, *own]) + margin))
+    return spans[0], spans[1]
+
+
+def _multiples(bounds: tuple[float, float], step: float) -> list[float]:
+    first, last = np.ceil(bounds[0] / step - 1e-9), np.floor(bounds[1] / step + 1e-9)
+    return [float(k * step) for k in np.arange(first, last + 1)]
+
+
+def _is_multiple(metres: float, step: float) -> bool:
+    return abs(metres / step - round(metres / step)) < 1e-6

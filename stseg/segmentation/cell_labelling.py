@@ -1,0 +1,160 @@
+"""Track labels of the occupied cells of a window.
+
+A connected component of the minimum cut with one detected track gets that track's label. A component with several, in
+whatever frames, is divided by expansion moves over the background, the tracks predicted in the window, and UNASSIGNED.
+Cells that the binary cut leaves empty stay empty, exactly: no label of a cell gains more than u, and the smallest
+source set of the greater gains contains those of smaller ones. So only the components need be expanded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+
+from stseg.arrays import Flags, Floats, Ints, Labels
+from stseg.graphcut.cell_subset import CellSubset, subset
+from stseg.graphcut.energy import Energy
+from stseg.graphcut.expansion import expand
+from stseg.graphcut.solvers import Solver
+from stseg.records.blobs import UNASSIGNED
+from stseg.records.predicted_places import PredictedPlaces
+from stseg.segmentation.label_energy import BodyShape, label_energy, track_shares
+
+
+class CellPlaces(Protocol):
+    """Where the cells of a window are: a grid, or patches of one."""
+
+    @property
+    def ground(self) -> Floats:
+        """Centres of the cells, metres, float64 (y, x, 2)."""
+
+    @property
+    def heights(self) -> Floats:
+        """Heights of the planes, metres, float64 (plane,)."""
+
+
+@dataclass(frozen=True)
+class WindowDetections:
+    """Per-frame detections of a window.
+
+    Attributes
+    ----------
+    ground : float64 (n, 2) for each frame
+        Metres.
+    track : int64 (n,) for each frame
+        Track of each detection.
+    """
+
+    ground: Sequence[Floats]
+    track: Sequence[Ints]
+
+
+@dataclass(frozen=True)
+class WindowLabels:
+    """The labels of a window.
+
+    Attributes
+    ----------
+    label : int32 (time, plane, y, x)
+        Track of each cell, UNASSIGNED without one, 0 for background.
+    cells
+        Number of cells divided by expansion moves; 0 where no two tracks touch.
+    """
+
+    label: Labels
+    cells: int
+
+
+def label_cells(
+    energy: Energy,
+    occupied: Flags,
+    detections: WindowDetections,
+    predicted: PredictedPlaces,
+    body: BodyShape,
+    places: CellPlaces,
+    solver: Solver,
+) -> WindowLabels:
+    """Label every occupied cell by a track or as UNASSIGNED.
+
+    Parameters
+    ----------
+    energy, occupied
+        Energy of the window and its minimum cut, bool (time, plane, y, x).
+    detections
+        Of its frames; their tracks are all among those predicted.
+    predicted
+        Places of tracks in its frames.
+    body
+        Extent of a body.
+    solver
+        Of the expansion moves.
+    """
+    subgraph = subset(energy, occupied)
+    if not len(subgraph.cell):
+        return WindowLabels(np.zeros(occupied.shape, np.int32), 0)
+    component = subgraph.components()
+    occupied_by, displaced = _occupants(subgraph, component, occupied, detections, predicted, body.reach, places)
+    count = occupied_by.sum(1)
+    track_ids = np.append(predicted.track, UNASSIGNED)
+    labels = track_ids[np.where(count == 1, np.argmax(np.column_stack([occupied_by, count != 1]), 1), -1)][component]
+    touching = count[component] > 1
+    if touching.any():
+        present = replace(predicted, expected=predicted.expected & ~displaced)
+        labels[touching] = _expanded(energy, subgraph.only(touching), present, body, places, solver)
+    label = np.zeros(occupied.shape, np.int32)
+    label.flat[subgraph.cell] = labels
+    return WindowLabels(label, int(touching.sum()))
+
+
+def _expanded(
+    energy: Energy,
+    subgraph: CellSubset,
+    predicted: PredictedPlaces,
+    body: BodyShape,
+    places: CellPlaces,
+    solver: Solver,
+) -> Ints:
+    """Track of each cell of a subgraph, UNASSIGNED or 0, by expansion moves, int64 (n,)."""
+    frame, plane, y, x = np.unravel_index(subgraph.cell, energy.unary.shape)
+    share = track_shares(frame, places.ground[y, x], places.heights[plane], predicted, body)
+    problem = label_energy(energy.unary.ravel()[subgraph.cell], share, subgraph)
+    track_ids = np.concatenate([[0], predicted.track, [UNASSIGNED]])
+    return np.asarray(track_ids[expand(problem, problem.cheapest_labels(), solver.sparse)])
+
+
+def _occupants(
+    subgraph: CellSubset,
+    component: Ints,
+    occupied: Flags,
+    detections: WindowDetections,
+    predicted: PredictedPlaces,
+    reach: float,
+    places: CellPlaces,
+) -> tuple[Flags, Flags]:
+    """Tracks detected in each component, and tracks detected outside all components in a frame.
+
+    A detection is in the components above the nearest occupied ground cell within half a reach.
+
+    Returns
+    -------
+    bool (component, k), bool (time, k)
+    """
+    occupied_by = np.zeros((int(component.max()) + 1, len(predicted.track)), bool)
+    displaced = np.zeros_like(predicted.expected)
+    volume = np.full(occupied.shape, -1, np.int64)
+    volume.flat[subgraph.cell] = component
+    cell_ground = places.ground
+    for t, (ground, track) in enumerate(zip(detections.ground, detections.track, strict=True)):
+        rows, columns = np.nonzero(occupied[t].any(0))
+        cells_ground = cell_ground[rows, columns]
+        for detection_ground, k in zip(ground, np.searchsorted(predicted.track, track), strict=True):
+            distance = np.hypot(*(cells_ground - detection_ground).T)
+            if distance.min(initial=np.inf) > reach / 2:
+                displaced[t, k] = True
+                continue
+            above = volume[t, :, rows[distance.argmin()], columns[distance.argmin()]]
+            occupied_by[above[above >= 0], k] = True
+    return occupied_by, displaced

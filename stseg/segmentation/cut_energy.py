@@ -1,0 +1,62 @@
+"""Binary energy of a window's occupancy volume (Khan and Shah, TPAMI 31(3), 2009, section 5).
+
+    E(l) = sum_p D_p(l_p) + sum_(p,q) B_pq [l_p != l_q],   D_p(object) - D_p(background) = -u(p),
+    B_pq = lambda exp(-dist(p, q)^2 / (2 s^2))
+
+Neighbours differ by one of a set of offsets (time, plane, y, x). Edges in time follow the motion of the body: a person
+moves several cells between frames, and an edge to the same cell would join the body to empty floor.
+"""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+
+from stseg.arrays import Flags, Ints, Labels, Singles
+from stseg.config import SegmentationConfig
+from stseg.geometry import Grid
+from stseg.graphcut.energy import QUANTUM, Energy
+from stseg.kernels.accelerate import wide_kernel
+
+_MOST_NATS = 30.0
+
+
+def build_energy(
+    log_odds: Singles, successor: Labels, grid: Grid, config: SegmentationConfig, present: Flags | None = None
+) -> Energy:
+    """Energy of a window.
+
+    Parameters
+    ----------
+    log_odds : float32 (time, plane, y, x)
+        u, nats; nan where no view sees the cell: unary term 0.
+    successor : int32 (time - 1, y, x)
+        See `stseg.segmentation.cell_motion.successor_cells`.
+    present : bool (y, x), or None
+        See `stseg.graphcut.energy.Energy`.
+    """
+    unary = np.empty(log_odds.shape, np.int32)
+    _fill_unary(log_odds.reshape(-1), np.float32(_MOST_NATS), np.float32(QUANTUM), unary.reshape(-1))
+    offsets = neighbourhood(config.neighbours)
+    scale = (config.time_distance, grid.top / max(grid.planes - 1, 1), grid.cell, grid.cell)
+    distance = np.sqrt(((offsets * scale) ** 2).sum(1))
+    capacity = config.smoothness * np.exp(-0.5 * (distance / config.distance_scale) ** 2) / QUANTUM
+    return Energy(unary, offsets, np.rint(capacity).astype(np.int32), successor, present)
+
+
+@wide_kernel
+def _fill_unary(log_odds: Singles, most: np.float32, quantum: np.float32, unary: Labels) -> None:
+    """Fill unary (cell,) with log-odds held within `most` nats, in quanta; 0 where there are none."""
+    for i in range(len(unary)):
+        held = log_odds[i]
+        held = held if held < most else most if held == held else np.float32(0)
+        held = held if held > -most else -most
+        unary[i] = np.int32(np.rint(held / quantum))
+
+
+def neighbourhood(neighbours: int) -> Ints:
+    """Half of the offsets (time, plane, y, x) to 8 neighbours, one step along one axis, or to all 80 within a step."""
+    steps = [step for step in product((0, 1), (-1, 0, 1), (-1, 0, 1), (-1, 0, 1)) if step > (0, 0, 0, 0)]
+    most = 1 if neighbours == 8 else 4
+    return np.array([step for step in steps if sum(map(abs, step)) <= most], np.int64)

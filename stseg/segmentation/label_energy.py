@@ -1,0 +1,135 @@
+"""Unary terms of track labels (docs/how-it-works.md, Energy).
+
+    D_p(k) = -u(p) - log share_p(k),     sum_k share_p(k) = 1
+
+u decides whether the cell is occupied, the share by which track. Where one body is near its share is 1: division costs
+nothing, and the labels have the energy of the binary cut.
+
+    share_p(k)  ~  N(p; m_k, S_k + R^2/4) / N(0; 0, R^2/4)  *  exp(-(z_p - h_k)^2 / (2 s^2)) above the head
+
+m_k and S_k are predicted place and covariance of track k in the cell's frame; R^2/4 is the variance of a disc of radius
+R, the reach of a body's cells around its place. An unknown body may be anywhere: UNASSIGNED weighs pi at every cell,
+the prior share of occupied cells.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from stseg.arrays import Flags, Floats, Ints, Labels
+from stseg.graphcut.cell_subset import CellSubset
+from stseg.graphcut.energy import QUANTUM
+from stseg.graphcut.expansion import LabelEnergy
+from stseg.kernels.accelerate import kernel
+from stseg.records.predicted_places import PredictedPlaces
+
+_GATE = 13.8
+"""Gate: squared Mahalanobis distance that one cell of a body in a thousand exceeds."""
+
+
+@dataclass(frozen=True)
+class BodyShape:
+    """Extent of every body.
+
+    Attributes
+    ----------
+    reach
+        R: reach of a body's cells around its place, metres.
+    height_spread
+        s: standard deviation of a head's height, metres.
+    prior_share
+        pi: prior share of occupied cells, 0..1.
+    """
+
+    reach: float
+    height_spread: float
+    prior_share: float
+
+
+def track_shares(
+    frame: Ints,
+    ground: Floats,
+    height: Floats,
+    predicted: PredictedPlaces,
+    body: BodyShape,
+    appearance: Floats | None = None,
+) -> Floats:
+    """Share of each track in each cell, given that the cell is occupied.
+
+    Parameters
+    ----------
+    frame : int64 (n,)
+        Frame of each cell, counted from the window's first.
+    ground, height : float64 (n, 2), (n,)
+        Places and heights of the cells, metres.
+    appearance : float64 (n, k), optional
+        Log-likelihood ratio of a cell's appearance under each track against any body, nats.
+
+    Returns
+    -------
+    float64 (n, k + 1)
+        Of each track and, last, of UNASSIGNED; 0 outside the gate. Rows sum to one.
+    """
+    disc = body.reach**2 / 4
+    spread = predicted.covariance + disc * np.eye(2)
+    log_volume = 0.5 * np.log(np.linalg.det(spread)) - math.log(disc)
+    weight = np.zeros((len(frame), len(predicted.track) + 1)) if appearance is None else _with_unassigned(appearance)
+    precision: Floats = np.asarray(np.linalg.inv(spread), float)
+    _fill_log_weights(
+        frame, ground, height, predicted.expected, predicted.ground, precision, log_volume, predicted.height,
+        body.height_spread, weight,
+    )  # fmt: skip
+    weight[:, -1] = math.log(body.prior_share)
+    share = np.exp(weight - weight.max(1, keepdims=True))
+    return np.asarray(share / share.sum(1, keepdims=True))
+
+
+def label_energy(unary: Ints | Labels, share: Floats, subgraph: CellSubset) -> LabelEnergy:
+    """Energy of the division of a subgraph.
+
+    Parameters
+    ----------
+    unary : int32 or int64 (n,)
+        u of its cells, quanta.
+    share : float64 (n, k + 1)
+        As `track_shares` returns; column j has label j + 1. Labels with share 0 are inadmissible.
+    """
+    cell, column = np.nonzero(share)
+    penalty = np.rint(-np.log(share[cell, column]) / QUANTUM).astype(np.int64)
+    first = np.append(0, np.cumsum(np.bincount(cell, minlength=len(unary))))
+    cost = penalty - unary[cell] + subgraph.border[cell]
+    return LabelEnergy(first, column + 1, cost, subgraph.start, subgraph.end, subgraph.weight)
+
+
+def _with_unassigned(appearance: Floats) -> Floats:
+    return np.column_stack([appearance, np.zeros(len(appearance))])
+
+
+@kernel
+def _fill_log_weights(
+    frame: Ints,
+    ground: Floats,
+    height: Floats,
+    expected: Flags,
+    predicted_ground: Floats,
+    precision: Floats,
+    log_volume: Floats,
+    head_height: Floats,
+    height_spread: float,
+    weight: Floats,
+) -> None:
+    """Add the tracks' log-weights to weight (n, k + 1), nats; -inf outside the gate."""
+    for i in range(len(frame)):
+        t = frame[i]
+        for k in range(predicted_ground.shape[1]):
+            dx, dy = ground[i, 0] - predicted_ground[t, k, 0], ground[i, 1] - predicted_ground[t, k, 1]
+            inverse = precision[t, k]
+            square = inverse[0, 0] * dx * dx + (inverse[0, 1] + inverse[1, 0]) * dx * dy + inverse[1, 1] * dy * dy
+            if not expected[t, k] or square > _GATE:
+                weight[i, k] = -np.inf
+                continue
+            above = max(height[i] - head_height[t, k], 0.0) / height_spread
+            weight[i, k] -= 0.5 * square + log_volume[t, k] + 0.5 * above * above

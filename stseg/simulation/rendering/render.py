@@ -1,0 +1,156 @@
+"""Render one camera's frames of a scene: room, shadows, people and sensor."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stseg.arrays import Boxes, Bytes, Floats, Ints, Singles
+from stseg.geometry import Camera
+from stseg.simulation.crowd.social_forces import Crowd
+from stseg.simulation.random_streams import Topic, random_stream
+from stseg.simulation.rendering.body import Bodies
+from stseg.simulation.rendering.cameras import frame_seed, light_phase, pixel_rays
+from stseg.simulation.rendering.clothes import clothing
+from stseg.simulation.rendering.illumination import lit
+from stseg.simulation.rendering.ray_casting import draw_bodies, pixel_boxes
+from stseg.simulation.rendering.room import render_room
+from stseg.simulation.rendering.sensor import expose
+from stseg.simulation.rendering.shadows import PENUMBRA, darken
+from stseg.simulation.scene import SceneSpec
+from stseg.simulation.spoiling.detector import detect, visible_boxes
+
+LAMP = np.array([0.5, -0.35, 1.0]) / np.linalg.norm([0.5, -0.35, 1.0])
+"""Direction towards the light."""
+
+
+@dataclass(frozen=True, slots=True)
+class RenderedView:
+    """One camera's rendered frame with its ground truth.
+
+    Attributes
+    ----------
+    image : uint8 (v, u, 3)
+        Blue, green, red; black where the scene has no video.
+    instances : uint16 (v, u)
+        Id of the person that each pixel shows, 0 for background; also people just outside the area.
+    boxes
+        Boxes of the simulated detector.
+    """
+
+    image: Bytes
+    instances: NDArray[np.uint16]
+    boxes: Boxes
+
+    @property
+    def mask(self) -> Bytes:
+        """Exact silhouettes of all people, uint8 (v, u), 0 or 255."""
+        return np.where(self.instances > 0, np.uint8(255), np.uint8(0))
+
+
+@dataclass(frozen=True, slots=True)
+class Drawing:
+    """The rendered scene before the sensor model.
+
+    Attributes
+    ----------
+    light : uint8 (v, u, 3)
+        The scene at normal light: no softness, no noise.
+    instances : uint16 (v, u)
+        As in `RenderedView`.
+    silhouettes : int64 (n, 5)
+        See `stseg.simulation.rendering.ray_casting.draw_bodies`.
+    depth : float32 (v, u)
+        Depth in lengths of the pixels' rays, metres.
+    """
+
+    light: Bytes
+    instances: NDArray[np.uint16]
+    silhouettes: Ints
+    depth: Singles
+
+
+class Viewer:
+    """A camera in a scene.
+
+    Parameters
+    ----------
+    spec
+        The scene.
+    camera
+        The view.
+    turn
+        Its place in the ring, see `stseg.simulation.rendering.cameras.turns`.
+    """
+
+    def __init__(self, spec: SceneSpec, camera: Camera, turn: float) -> None:
+        self.camera = camera
+        self._spec, self._turn, self._phase = spec, turn, light_phase(spec, turn)
+        self._rays, self._eye = pixel_rays(camera), camera.centre
+        self.room = render_room(spec, self._rays, self._eye)
+
+    def empty(self, frame: int) -> Bytes:
+        """The camera's frame of the empty room, uint8 (v, u, 3)."""
+        return self._expose(self.room.image, self.room.depth, frame)
+
+    def view(self, crowd: Crowd, bodies: Bodies) -> RenderedView:
+        """The camera's frame of a crowd whose `bodies` are those of `stseg.simulation.rendering.body.pose`."""
+        drawing = self.draw(crowd, bodies)
+        visible = np.empty((len(crowd.id), 5), np.int64)
+        row_of = np.zeros(int(crowd.id.max(initial=0)) + 1, np.int64)
+        row_of[crowd.id] = np.arange(len(crowd.id))
+        visible_boxes(drawing.instances, row_of, visible)
+        rng = random_stream(self._spec.seed, Topic.DETECTOR, *frame_seed(self._turn, crowd.frame))
+        boxes = detect(self.camera, visible, drawing.silhouettes, np.array(self._spec.area) / 2, rng)
+        if "video" not in self._spec.kinds:
+            return RenderedView(np.zeros_like(drawing.light), drawing.instances, boxes)
+        image = self._expose(drawing.light, drawing.depth, crowd.frame)
+        return RenderedView(image, drawing.instances, boxes)
+
+    def draw(self, crowd: Crowd, bodies: Bodies) -> Drawing:
+        """The crowd in the room."""
+        image = self._with_shadows(bodies)
+        depth = self.room.depth.copy()
+        instances = np.zeros(image.shape[:2], np.uint16)
+        silhouettes = np.empty((len(crowd.id), 5), np.int64)
+        paint = np.array([clothing(self._spec.seed, int(person), self._spec.alike) for person in crowd.id])
+        if len(crowd.id):
+            draw_bodies(
+                self._rays,
+                self._eye,
+                pixel_boxes(self.camera, bodies.corners(1.0)),
+                bodies.centre,
+                bodies.form,
+                paint,
+                LAMP,
+                crowd.id.astype(np.uint16),
+                depth,
+                image,
+                instances,
+                silhouettes,
+            )
+        return Drawing(image, instances, silhouettes, depth)
+
+    def _with_shadows(self, bodies: Bodies) -> Bytes:
+        """The room with the people's shadows and without the people."""
+        if self._spec.shadows == 0:
+            return self.room.image.copy()
+        corners = bodies.corners(PENUMBRA)
+        fallen: Floats = corners - corners[..., 2:] / LAMP[2] * LAMP
+        boxes = pixel_boxes(self.camera, fallen).reshape(-1, 4)
+        shade = np.zeros(self.room.image.shape[:2], np.float32)
+        darken(self.room.ground, boxes, bodies.centre.reshape(-1, 3), bodies.form.reshape(-1, 3, 3), LAMP, shade)
+        image = self.room.image.copy()
+        dark = shade > 0
+        image[dark] = np.rint(image[dark] * (1 - self._spec.shadows * shade[dark])[:, None])
+        return image
+
+    def _expose(self, light: Bytes, depth: Singles, frame: int) -> Bytes:
+        rng = random_stream(self._spec.seed, Topic.SENSOR, *frame_seed(self._turn, frame))
+        gain: Singles | float = self._spec.gain(frame, self._phase)
+        if self._spec.lamps:
+            points = self._eye + depth[..., None] * self._rays
+            gain = np.float32(gain) * lit(self._spec.lamps, frame / self._spec.frame_rate, points)
+        return expose(light, gain, self._spec.noise, rng)

@@ -1,0 +1,184 @@
+"""Stitching: tracks of one segment of a recording become those of the next (docs/how-it-works.md, Tracks).
+
+A segment processes the last frames of the one before as its warm-up, so both have tracks there. A track takes the name
+of the earlier track with the same place in most of those frames, one to one; unmatched tracks are born or die at the
+boundary. Encounters near a boundary are decided again by global association. All tracks end at a gap of the recording
+that is longer than patience.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stseg.arrays import Ints, Labels, Rows
+from stseg.records.tables import EVENT, TRAJECTORY
+from stseg.tracking.filter.assignment import assign, distances
+
+_EventRow = tuple[int, bytes, int, int, bytes]
+"""A row of EVENT."""
+_SAME = 0.35
+"""Greatest distance between two segments' places of one person, metres."""
+
+
+@dataclass(frozen=True)
+class SegmentTracks:
+    """The tracks of one segment, under its own names.
+
+    Attributes
+    ----------
+    first
+        First frame that the segment commits.
+    trajectory : TRAJECTORY (n,)
+        Includes its warm-up, the frames before `first`.
+    events : EVENT (m,)
+        Of the frames that it commits.
+    gap
+        Frames before `first` that no camera has; 0 where the segment continues the one before.
+    """
+
+    first: int
+    trajectory: Rows
+    events: Rows
+    gap: int = 0
+
+
+@dataclass(frozen=True)
+class StitchedTracks:
+    """The tracks of all segments, under names of the run.
+
+    Attributes
+    ----------
+    committed : TRAJECTORY (n,)
+    local : int64 (n,)
+        Name of each row in its segment.
+    events : EVENT (m,)
+    """
+
+    committed: Rows
+    local: Ints
+    events: Rows
+
+
+class Stitcher:
+    """Stitches segments in their order.
+
+    Parameters
+    ----------
+    patience
+        Longest undetected interval of a track, frames.
+    """
+
+    def __init__(self, patience: int = 0) -> None:
+        self.issued, self.patience = 0, patience
+        self._joined: list[StitchedTracks] = []
+
+    def add(self, part: SegmentTracks) -> None:
+        """Append the next segment."""
+        lead = part.trajectory[part.trajectory["frame"] < part.first]
+        rows = part.trajectory[part.trajectory["frame"] >= part.first]
+        local = np.unique(np.concatenate([rows["id"], part.events["id"], part.events["other"]]))
+        local = local[local > 0]
+        before = self._tail(lead)
+        named = matches(before, lead)
+        births = [(int(rows["frame"][rows["id"] == i].min()), int(i)) for i in np.unique(lead["id"])
+                  if i not in named and (rows["id"] == i).any()]  # fmt: skip
+        for i in local.tolist():
+            if i not in named:
+                self.issued += 1
+                named[i] = self.issued
+        names = np.zeros(int(local.max(initial=0)) + 1, np.int64)
+        names[local] = [named[i] for i in local.tolist()]
+        committed, events = rows.copy(), part.events.copy()
+        committed["id"] = names[rows["id"]]
+        events["id"], events["other"] = names[events["id"]], names[events["other"]]
+        reason = b"nobody known was near, where a segment begins"
+        added = [(frame, b"birth", names[i], 0, reason) for frame, i in births]
+        added += self._deaths(before, set(committed["id"].tolist()))
+        if part.gap:
+            added += self._ended(part)
+        events = np.concatenate([events, np.array(added, EVENT)])
+        self._joined.append(
+            StitchedTracks(committed, rows["id"].copy(), events[np.argsort(events["frame"], kind="stable")])
+        )
+
+    def joined(self) -> StitchedTracks:
+        """The segments so far."""
+        parts = self._joined or [StitchedTracks(np.zeros(0, TRAJECTORY), np.zeros(0, np.int64), np.zeros(0, EVENT))]
+        return StitchedTracks(
+            *(np.concatenate([getattr(p, name) for p in parts]) for name in ("committed", "local", "events"))
+        )
+
+    def _tail(self, lead: Rows) -> Rows:
+        """Rows of the earlier segments in the frames of a warm-up."""
+        if not self._joined or not len(lead):
+            return np.zeros(0, TRAJECTORY)
+        rows = self._joined[-1].committed
+        return np.asarray(rows[rows["frame"] >= lead["frame"].min()])
+
+    def _ended(self, part: SegmentTracks) -> list[_EventRow]:
+        """Deaths of the tracks that were alive when the gap before a segment began."""
+        rows = np.concatenate([one.committed for one in self._joined[-2:]] or [part.trajectory[:0]])
+        alive = rows[rows["frame"] >= part.first - part.gap - self.patience - 1]
+        events = np.concatenate([one.events for one in self._joined[-2:]] or [part.events[:0]])
+        reason = f"gap: no camera has any of the {part.gap} frames before frame {part.first}"
+        return _deaths(alive, _dead(events), reason)
+
+    def _deaths(self, before: Rows, living: set[int]) -> list[_EventRow]:
+        """Deaths at the boundary: tracks that no track of the segment continues and that have no death event yet."""
+        if not len(before):
+            return []
+        over = living | _dead(self._joined[-1].events)
+        return _deaths(before, over, "not found again where a segment ends")
+
+
+def _dead(events: Rows) -> set[int]:
+    return set(events["id"][events["kind"] == b"death"].tolist())
+
+
+def _deaths(rows: Rows, others: set[int], reason: str) -> list[_EventRow]:
+    """A death event at the last row of each track but those in `others`."""
+    gone = sorted(set(rows["id"].tolist()) - others)
+    return [(int(rows["frame"][rows["id"] == i].max()), b"death", i, 0, reason.encode()) for i in gone]
+
+
+def rename_labels(label: Labels, frames: Ints, rows: Rows, identity: Ints) -> None:
+    """Rename the labels of a part of the volume to identities of the run, in place; dropped tracks become background.
+
+    Parameters
+    ----------
+    label : int32 (time, plane, y, x)
+        Names of the segment, 0 for background.
+    frames : int64 (time,)
+        Increasing.
+    rows : TRAJECTORY (n,)
+        Under names of the segment.
+    identity : int64 (n,)
+        Identity of each row in the run, 0 for a dropped track.
+    """
+    most = max(int(label.max(initial=0)), int(rows["id"].max(initial=0)))
+    order = np.argsort(rows["frame"], kind="stable")
+    bounds = rows["frame"][order].searchsorted([frames, frames + 1])
+    for cells, first, stop in zip(label, *bounds, strict=True):
+        own = order[first:stop]
+        names = np.zeros(most + 1, np.int32)
+        names[rows["id"][own]] = identity[own]
+        cells[...] = names[cells]
+
+
+def matches(before: Rows, lead: Rows) -> dict[int, int]:
+    """The earlier track with the same place, for each matched track of a warm-up."""
+    known, fresh = np.unique(before["id"]), np.unique(lead["id"])
+    shared = np.zeros((len(known), len(fresh)))
+    for frame in np.intersect1d(before["frame"], lead["frame"]).tolist():
+        a, b = before[before["frame"] == frame], lead[lead["frame"] == frame]
+        near = distances(_ground(a), _ground(b)) < _SAME
+        rows, columns = np.nonzero(near)
+        shared[known.searchsorted(a["id"][rows]), fresh.searchsorted(b["id"][columns])] += 1
+    a, b = assign(np.where(shared > 0, -shared, np.inf), 0.0)
+    return dict(zip(fresh[b].tolist(), known[a].tolist(), strict=True))
+
+
+def _ground(rows: Rows) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+    return np.column_stack([rows["x"], rows["y"]])

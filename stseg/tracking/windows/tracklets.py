@@ -1,0 +1,109 @@
+"""Window tracklets: the blobs of one window that belong to one track."""
+
+from __future__ import annotations
+
+from bisect import bisect
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from stseg.arrays import Floats
+from stseg.config import TrackingConfig
+from stseg.records.blobs import UNASSIGNED, Blobs
+from stseg.tracking.filter.assignment import assign, distances
+
+
+@dataclass
+class Tracklet:
+    """A window tracklet, at most one blob a frame: parallel lists, in the order of time.
+
+    Attributes
+    ----------
+    filter_track
+        Track of the filter (`TrackFilter`), 0 if none of the blobs holds a detection.
+    frames
+        Frame numbers of the recording.
+    blobs
+        Index of the blob in each frame.
+    ground : list of float64 (2,)
+        Metres.
+    """
+
+    filter_track: int
+    frames: list[int] = field(default_factory=list)
+    blobs: list[int] = field(default_factory=list)
+    ground: list[Floats] = field(default_factory=list)
+
+    def add(self, frame: int, blob: int, ground: Floats) -> None:
+        """Append a blob of a later frame."""
+        self.frames.append(frame)
+        self.blobs.append(blob)
+        self.ground.append(ground)
+
+    def insert(self, frame: int, blob: int, ground: Floats) -> None:
+        """Insert a blob into a gap."""
+        place = bisect(self.frames, frame)
+        self.frames.insert(place, frame)
+        self.blobs.insert(place, blob)
+        self.ground.insert(place, ground)
+
+    def between(self, frame: int) -> Floats:
+        """Linearly interpolated place in a gap, metres, float64 (2,)."""
+        place = bisect(self.frames, frame)
+        before, after = self.frames[place - 1], self.frames[place]
+        fraction = (frame - before) / (after - before)
+        return np.asarray(self.ground[place - 1] * (1 - fraction) + self.ground[place] * fraction)
+
+    def extend(self, later: Tracklet) -> None:
+        """Append a later tracklet of the same track."""
+        self.filter_track = later.filter_track or self.filter_track
+        self.frames += later.frames
+        self.blobs += later.blobs
+        self.ground += later.ground
+
+    def velocity(self) -> Floats:
+        """Metres per frame over up to four steps at the end, float64 (2,)."""
+        frames, ground = self.frames[-5:], self.ground[-5:]
+        if len(frames) < 2:
+            return np.zeros(2)
+        return np.asarray((ground[-1] - ground[0]) / (frames[-1] - frames[0]))
+
+
+def form_tracklets(blobs: Sequence[Blobs], first: int, config: TrackingConfig) -> list[Tracklet]:
+    """The tracklets of a window.
+
+    Blobs that hold detections of one filter track are one tracklet. A blob without a detection joins the tracklet in
+    whose gap it lies, near the interpolated place, unless another track claims it. So the cut bridges missed
+    detections, and nothing more.
+
+    Parameters
+    ----------
+    blobs
+        Of each frame of the window; `track` holds filter tracks.
+    first
+        The window's first frame.
+    """
+    tracklets: dict[int, Tracklet] = {}
+    for offset, found in enumerate(blobs):
+        for b in np.flatnonzero(found.person >= 0).tolist():
+            track = int(found.track[b])
+            tracklets.setdefault(track, Tracklet(track)).add(first + offset, b, found.ground[b])
+    for offset, found in enumerate(blobs):
+        _bridge(list(tracklets.values()), first + offset, found, config)
+    return list(tracklets.values())
+
+
+def _bridge(tracklets: Sequence[Tracklet], frame: int, found: Blobs, config: TrackingConfig) -> None:
+    """Assign a frame's blobs without a detection to tracklets that have a gap there."""
+    open_ = [one for one in tracklets if one.frames[0] < frame < one.frames[-1] and frame not in one.frames]
+    unheld = np.flatnonzero(found.person < 0)
+    if not open_ or not len(unheld):
+        return
+    predicted = np.array([tracklet.between(frame) for tracklet in open_])
+    away = distances(predicted, found.ground[unheld])
+    track = np.array([tracklet.filter_track for tracklet in open_])
+    others = (found.track[unheld] != UNASSIGNED) & (found.track[unheld] != track[:, None])
+    for row, column in zip(*assign(np.where(others, np.inf, away), config.assignment_distance), strict=True):
+        blob = int(unheld[column])
+        open_[row].insert(frame, blob, found.ground[blob])

@@ -1,0 +1,191 @@
+"""From committed rows to the tracks of the whole run (docs/how-it-works.md, Tracks).
+
+committed rows -> short gaps filled -> global association -> repetitions, short tracks, ghosts dropped -> smoothed
+                  (interpolation)      (identities)          (coincidence)  (pruning)                     (smoother)
+-> people who come back, where that is wanted
+   (returned_tracks)
+
+Global association moves no place: it decides which rows belong to one person, and fills gaps where nobody else stands.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from stseg.arrays import Ints, Rows
+from stseg.config import Config, TrackingConfig
+from stseg.identities.evidence.returns import Return
+from stseg.identities.evidence.size_model import MeasuredSizes
+from stseg.identities.global_association import Link, associate_globally
+from stseg.identities.identity_problem import NOBODY
+from stseg.identities.search.beam_search import FREELY
+from stseg.identities.search.constraints import Constraints
+from stseg.records.border import Border
+from stseg.records.tables import EVENT
+from stseg.tracking.windows.encounters import encounters
+from stseg.trajectories.coincidence import coincident
+from stseg.trajectories.interpolation import apart_from, fill_gaps, interpolated_rows
+from stseg.trajectories.pruning import drop_ghosts, drop_short
+from stseg.trajectories.returned_tracks import renamed_events, renamed_ids, renamed_trajectory, returns_of
+from stseg.trajectories.smoother import smooth_places
+
+_LASTING = 1.0
+"""Time in one place from which two tracks are one person, seconds."""
+
+
+@dataclass(frozen=True)
+class FinalTracks:
+    """The tracks of a run.
+
+    Attributes
+    ----------
+    trajectory : TRAJECTORY (n,)
+        Sorted by frame, then id.
+    events : EVENT (m,)
+        Sorted by frame.
+    identity : int64 (k,)
+        Identity of each committed row, 0 where its track was dropped.
+    """
+
+    trajectory: Rows
+    events: Rows
+    identity: Ints
+
+
+def final_tracks(
+    committed: Rows, events: Rows, appearance: Rows, frame_rate: float, border: Border, config: Config,
+    constraints: Constraints = FREELY, known: Rows = NOBODY,
+) -> FinalTracks:  # fmt: skip
+    """The tracks of a run from its committed TRAJECTORY, EVENT and APPEARANCE rows, under constraints on those rows.
+
+    People of earlier recordings, KNOWN (k,), keep their ids; all others have greater ones.
+    """
+    bridged, sizes = bridged_rows(committed, frame_rate, config)
+    linked = associate_globally(bridged, sizes, appearance, frame_rate, border, config, constraints)
+    bridged["id"] = linked.identity
+    named = linked.identity[: len(committed)]
+    repeats, repeated = coincident(bridged, frame_rate, _LASTING)
+    own = ~repeats[: len(committed)]
+    kept, dropped = _kept(bridged[: len(committed)][own], frame_rate, config.tracking)
+    identity = np.where(np.isin(named, kept) & own, named, 0)
+    met = _met(events, _Names(committed, identity), frame_rate, config.tracking)
+    renamed = _renamed(events, _Names(committed, named), linked.links)
+    every_event = np.concatenate([renamed, met, repeated, dropped])
+    tracks = _without_gaps(bridged[np.isin(bridged["id"], kept) & ~repeats], frame_rate, config.tracking)
+    smoothed = smooth_places(tracks, frame_rate, config.motion)
+    whole = FinalTracks(smoothed, every_event[np.argsort(every_event["frame"], kind="stable")], identity)
+    least = config.tracking.return_probability
+    if least == 1:
+        return whole
+    whole = _beyond(whole, int(known["id"].max(initial=0)))
+    returns = returns_of(linked.problem, whole.identity, bridged, least, constraints, known)
+    return _under_people(whole, returns, frame_rate)
+
+
+def _kept(trajectory: Rows, frame_rate: float, config: TrackingConfig) -> tuple[Ints, Rows]:
+    """Ids of the tracks that are neither short nor ghosts, and an event for each of the others."""
+    long, short = drop_short(trajectory, frame_rate, config)
+    kept, ghosts = drop_ghosts(long, frame_rate, config)
+    return np.unique(kept["id"]), np.concatenate([short, ghosts])
+
+
+def _beyond(whole: FinalTracks, taken: int) -> FinalTracks:
+    """Tracks under ids above those that are taken."""
+    trajectory, events = whole.trajectory.copy(), whole.events.copy()
+    trajectory["id"] += taken
+    for role in ("id", "other"):
+        events[role] += taken * (events[role] > 0)
+    return FinalTracks(trajectory, events, whole.identity + taken * (whole.identity > 0))
+
+
+def _under_people(whole: FinalTracks, returns: Sequence[Return], frame_rate: float) -> FinalTracks:
+    """Tracks of which some are visits of one person."""
+    trajectory = renamed_trajectory(whole.trajectory, returns)
+    events = renamed_events(whole.events, trajectory, returns, frame_rate)
+    return FinalTracks(trajectory, events, renamed_ids(whole.identity, returns))
+
+
+def bridged_rows(committed: Rows, frame_rate: float, config: Config) -> tuple[Rows, MeasuredSizes]:
+    """Committed rows and those that fill their short gaps after them, with the sizes of all."""
+    gaps = interpolated_rows(committed, frame_rate, config.tracking)
+    sizes = MeasuredSizes.of_heights(committed["height"], config).with_unmeasured(len(gaps))
+    return np.concatenate([committed, gaps]), sizes
+
+
+def committed_tracks(committed: Rows, events: Rows, frame_rate: float, config: TrackingConfig) -> FinalTracks:
+    """The tracks of a tracker whose identities and places are final: short ones dropped, short gaps filled."""
+    kept, dropped = drop_short(committed, frame_rate, config)
+    every_event = np.concatenate([events, dropped])
+    identity = np.where(np.isin(committed["id"], kept["id"]), committed["id"], 0)
+    order = np.argsort(every_event["frame"], kind="stable")
+    return FinalTracks(fill_gaps(kept, frame_rate, config), every_event[order], identity)
+
+
+def _without_gaps(tracks: Rows, frame_rate: float, config: TrackingConfig) -> Rows:
+    """Tracks with the gaps filled that global association left, sorted by frame, then id."""
+    filled = apart_from(interpolated_rows(tracks, frame_rate, config), tracks)
+    every = np.concatenate([tracks, filled])
+    return np.asarray(every[np.lexsort((every["id"], every["frame"]))])
+
+
+def _renamed(events: Rows, name_at: _Names, links: Sequence[Link]) -> Rows:
+    """Births, deaths and hand-overs under the final identities: a linked track has neither birth nor death there.
+
+    Where somebody is born or dies beyond the area's border, the event is at the first or last row.
+    """
+    events = events[~np.isin(events["kind"], (b"merge", b"split"))]
+    named = events.copy()
+    for role in ("id", "other"):
+        named[role] = [name_at.name(track, frame) for track, frame in zip(events[role], events["frame"], strict=True)]
+    born, dead = (np.isin(named["kind"], kind) & np.isin(events["id"], name_at.track) for kind in (b"birth", b"death"))
+    first, last = (np.array([at(name) for name in named["id"]]) for at in (name_at.first, name_at.last))
+    named["frame"][born] = np.maximum(named["frame"], first)[born]
+    named["frame"][dead] = np.minimum(named["frame"], last)[dead]
+    refuted = (born & (first < named["frame"])) | (dead & (last > named["frame"]))
+    nowhere = np.isin(named["kind"], (b"birth", b"death")) & ~born & ~dead
+    joined = [(link.frame, b"hand-over", link.identity, link.track, link.reason.encode()) for link in links]
+    return np.concatenate([named[~(refuted | nowhere)], np.array(joined, EVENT)])
+
+
+def _met(events: Rows, name_at: _Names, frame_rate: float, config: TrackingConfig) -> Rows:
+    """Encounters between retained tracks."""
+    known = set(name_at.track.tolist())
+    last = max(name_at.until.values(), default=-1)
+
+    def name(track: int, frame: int) -> int:
+        return name_at.name(track, frame) if track in known else 0
+
+    return encounters(events, name, round(config.separation_time * frame_rate), frame_rate, last)
+
+
+class _Names:
+    """The identity of a track in each frame, and the first and last frame of each identity."""
+
+    def __init__(self, committed: Rows, identity: Ints) -> None:
+        order = np.lexsort((committed["frame"], committed["id"]))
+        self.track, self.frame, self.identity = committed["id"][order], committed["frame"][order], identity[order]
+        names, where = np.unique(identity, return_inverse=True)
+        since, until = np.full(len(names), np.iinfo(np.int64).max), np.full(len(names), -1)
+        np.minimum.at(since, where, committed["frame"])
+        np.maximum.at(until, where, committed["frame"])
+        self.since: dict[int, int] = dict(zip(names.tolist(), since.tolist(), strict=True))
+        self.until: dict[int, int] = dict(zip(names.tolist(), until.tolist(), strict=True))
+
+    def name(self, track: int, frame: int) -> int:
+        """The identity of a track in a frame, or at its last row before; an unknown track keeps its number."""
+        first, stop = self.track.searchsorted([track, track + 1])
+        if first == stop:
+            return int(track)
+        row = int(self.frame[first:stop].searchsorted(frame, side="right")) - 1
+        return int(self.identity[first + max(row, 0)])
+
+    def first(self, identity: int) -> int:
+        """The first frame of an identity; -1 if it has none."""
+        return self.since.get(identity, -1)
+
+    def last(self, identity: int) -> int:
+        """The last frame of an identity; -1 if it has none."""
+        return self.until.get(identity, -1)

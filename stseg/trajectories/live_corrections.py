@@ -1,0 +1,126 @@
+"""Live ids decided again: who was exchanged, and who was lost and found, a short time after it.
+
+Live ids follow the tracker's tracks. Every few seconds the identities of the latest minutes are decided as those of a
+whole run are (`stseg.identities.global_association`), under the ids that were published; where an id holds
+somebody else, its rows are corrected.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Container, Iterator
+from itertools import pairwise
+
+import numpy as np
+
+from stseg.arrays import Ints, Rows
+from stseg.config import Config
+from stseg.identities.global_association import associate_globally
+from stseg.records.border import Border
+from stseg.records.rows_of_tracks import rows_of_tracks
+from stseg.records.tables import APPEARANCE, CORRECTION, TRAJECTORY
+from stseg.trajectories.final_tracks import bridged_rows
+
+
+class LiveCorrections:
+    """Corrections of the ids of a live run, in the order of time.
+
+    Parameters
+    ----------
+    frame_rate
+        Frames per second.
+    border
+        Where people come and go.
+    config
+        The constants of all stages.
+    """
+
+    def __init__(self, frame_rate: float, border: Border, config: Config) -> None:
+        self._rate, self._border, self._config = frame_rate, border, config
+        self._rows, self._appearance = np.zeros(0, TRAJECTORY), np.zeros(0, APPEARANCE)
+        self._due = 0
+
+    def decide(self, rows: Rows, appearance: Rows, fresh: Callable[[], int]) -> Rows:
+        """The corrections that the next rows bring.
+
+        Parameters
+        ----------
+        rows : TRAJECTORY (n,), appearance : APPEARANCE (l,)
+            Committed rows under live ids, with what the detections look like.
+        fresh
+            A new live id.
+
+        Returns
+        -------
+        CORRECTION (k,)
+        """
+        live = self._config.live
+        if not len(rows) or live.correction_interval == 0:
+            return np.zeros(0, CORRECTION)
+        decided = int(rows["frame"].max())
+        since = decided - round(live.correction_memory * self._rate)
+        self._rows = _after(since, np.concatenate([self._rows, rows]))
+        self._appearance = _after(since, np.concatenate([self._appearance, appearance]))
+        if decided < self._due:
+            return np.zeros(0, CORRECTION)
+        self._due = decided + round(live.correction_interval * self._rate)
+        found = self._decided_again(decided, fresh)
+        self._rows = corrected(self._rows, found)
+        return found
+
+    def _decided_again(self, decided: int, fresh: Callable[[], int]) -> Rows:
+        bridged, sizes = bridged_rows(self._rows, self._rate, self._config)
+        linked = associate_globally(bridged, sizes, self._appearance, self._rate, self._border, self._config)
+        identity = linked.identity[: len(self._rows)]
+        known = int(bridged["id"].max())
+        issued = {number: fresh() for number in np.unique(identity[identity > known]).tolist()}
+        named = np.array([issued.get(number, number) for number in identity.tolist()], np.int64)
+        found = [(decided, *one) for one in _differences(self._rows, named)]
+        return np.array(found, CORRECTION)
+
+
+def corrected(rows: Rows, corrections: Rows) -> Rows:
+    """TRAJECTORY rows under corrected ids: those of one decision hold at once, and one decision after another."""
+    named = rows.copy()
+    for decided in np.unique(corrections["decided"]).tolist():
+        before = named["id"].copy()
+        for one in corrections[corrections["decided"] == decided]:
+            own = (before == one["id"]) & (rows["frame"] >= one["first"]) & (rows["frame"] <= one["last"])
+            named["id"][own] = one["corrected"]
+    return named
+
+
+def renamed(names: dict[int, int], corrections: Rows, present: Container[int]) -> dict[int, int]:
+    """Ids of tracks that go on after the corrections of a decision; a lost track is left out where its id is taken.
+
+    Parameters
+    ----------
+    names
+        Id of each track.
+    corrections : CORRECTION (k,)
+    present
+        Tracks of the latest rows.
+    """
+    now = {int(one["id"]): int(one["corrected"]) for one in corrections if one["last"] == one["decided"]}
+    found = {track: now.get(name, name) for track, name in names.items()}
+    taken = {name for track, name in found.items() if track in present}
+    return {track: name for track, name in found.items() if track in present or name not in taken}
+
+
+def _after(since: int, rows: Rows) -> Rows:
+    return np.asarray(rows[rows["frame"] > since])
+
+
+def _differences(rows: Rows, identity: Ints) -> Iterator[tuple[int, int, int, int]]:
+    """First and last frame in which an id holds somebody else, the id, and that of who it holds.
+
+    What lasts to the last row of an id lasts to the last frame of all: the id may go on.
+    """
+    end = int(rows["frame"].max())
+    for own in rows_of_tracks(rows["id"]):
+        ordered = own[np.argsort(rows["frame"][own], kind="stable")]
+        frame, name, held = rows["frame"][ordered], identity[ordered], int(rows["id"][own[0]])
+        edges = [0, *(np.flatnonzero(np.diff(name)) + 1).tolist(), len(own)]
+        for first, stop in pairwise(edges):
+            if name[first] != held:
+                last = end if stop == len(own) else int(frame[stop]) - 1
+                yield int(frame[first]), last, held, int(name[first])

@@ -1,0 +1,89 @@
+"""Tracks of people who come back: one identity for all visits, which the events tell."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from stseg.arrays import Ints, Rows
+from stseg.identities.evidence.returns import Return, find_returns
+from stseg.identities.identity_problem import IdentityProblem
+from stseg.identities.search.constraints import Constraints
+from stseg.records.tables import EVENT
+
+
+def returns_of(
+    problem: IdentityProblem, identity: Ints, bridged: Rows, least: float, constraints: Constraints, known: Rows
+) -> list[Return]:
+    """Visits that are one person's with an earlier one.
+
+    Parameters
+    ----------
+    problem
+        By which identities were decided.
+    identity : int64 (n,)
+        Of each committed row, 0 for none: the first of those in `bridged`.
+    bridged : TRAJECTORY (n + m,)
+        All rows of the problem.
+    least
+        Least probability.
+    constraints
+        Pairs of rows that are one person, or two.
+    known : KNOWN (k,)
+        People of earlier recordings, whose ids are no others'.
+    """
+    visits = problem.visits(np.pad(identity, (0, len(bridged) - len(identity))), bridged["frame"], known)
+    two = [identity[rows[~constraints.same]] for rows in (constraints.earlier, constraints.later)]
+    return find_returns(visits, problem.model.spread, least, np.column_stack(two))
+
+
+def renamed_ids(ids: Ints, returns: Sequence[Return]) -> Ints:
+    """Ids of visits as those of their people."""
+    visit, identity = np.array(sorted((one.visit, one.identity) for one in returns), np.int64).reshape(-1, 2).T
+    if not len(visit):
+        return ids
+    at = np.searchsorted(visit, ids).clip(max=len(visit) - 1)
+    return np.where(visit[at] == ids, identity[at], ids)
+
+
+def renamed_trajectory(trajectory: Rows, returns: Sequence[Return]) -> Rows:
+    """A trajectory under the ids of people, sorted by frame, then id."""
+    named = trajectory.copy()
+    named["id"] = renamed_ids(trajectory["id"], returns)
+    return np.asarray(named[np.lexsort((named["id"], named["frame"]))])
+
+
+def renamed_events(events: Rows, trajectory: Rows, returns: Sequence[Return], frame_rate: float) -> Rows:
+    """Events under the ids of people, and their returns; between visits there is neither birth nor death.
+
+    Parameters
+    ----------
+    events : EVENT (m,)
+    trajectory : TRAJECTORY (n,)
+        Under the ids of people.
+    returns
+    frame_rate
+        Frames per second.
+    """
+    named = events.copy()
+    here = np.isin(events["id"], [name for one in returns for name in (one.visit, one.identity)])
+    for role in ("id", "other"):
+        named[role] = renamed_ids(events[role], returns)
+    ids, start = np.unique(trajectory["id"], return_index=True)
+    first = trajectory["frame"][start]
+    last = np.zeros(len(ids), np.int64)
+    np.maximum.at(last, np.searchsorted(ids, trajectory["id"]), trajectory["frame"])
+    own = np.searchsorted(ids, named["id"]).clip(max=max(len(ids) - 1, 0))
+    between = here & (
+        ((named["kind"] == b"birth") & (named["frame"] > first[own]))
+        | ((named["kind"] == b"death") & (named["frame"] < last[own]))
+    )
+    came = [(one.frame, b"return", one.identity, 0, _reason(one, frame_rate).encode()) for one in returns]
+    every = np.concatenate([named[~between], np.array(came, EVENT)])
+    return np.asarray(every[np.argsort(every["frame"], kind="stable")])
+
+
+def _reason(one: Return, frame_rate: float) -> str:
+    since = f"{one.absence / frame_rate:.1f} s away" if one.absence is not None else "known from an earlier recording"
+    return f"the same person with probability {min(one.probability, 0.9999):.4f}, {since}"

@@ -1,0 +1,102 @@
+"""Fixed-interval smoothing of tracks' places (Rauch, Tung and Striebel 1965).
+
+The motion model is that of the track filter; each row is a measurement with its own covariance. All tracks are smoothed
+at the same time: the first rows of all, then the second rows, and so on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from stseg.arrays import Floats, Ints, Rows
+from stseg.config import MotionConfig
+from stseg.records.rows_of_tracks import rows_of_tracks
+from stseg.tracking.filter.motion_model import process_noise, transition
+
+
+def smooth_places(trajectory: Rows, frame_rate: float, model: MotionConfig) -> Rows:
+    """A copy with smoothed x, y and their covariance; raw_x and raw_y stay the detection's.
+
+    Parameters
+    ----------
+    trajectory : TRAJECTORY (n,)
+        Sorted by frame.
+    frame_rate
+        Frames per second.
+    model
+        Motion model.
+    """
+    smoothed = trajectory.copy()
+    if not len(trajectory):
+        return smoothed
+    places = np.column_stack([trajectory["raw_x"], trajectory["raw_y"]])
+    noise = np.array([[trajectory["xx"], trajectory["xy"]], [trajectory["xy"], trajectory["yy"]]]).transpose(2, 0, 1)
+    tracks = rows_of_tracks(trajectory["id"])
+    ground, covariance = smoothed_paths(trajectory["frame"] / frame_rate, places, noise, tracks, model)
+    smoothed["x"], smoothed["y"] = ground.T
+    smoothed["xx"], smoothed["xy"], smoothed["yy"] = covariance[:, 0, 0], covariance[:, 0, 1], covariance[:, 1, 1]
+    return smoothed
+
+
+def smoothed_paths(
+    seconds: Floats, ground: Floats, noise: Floats, tracks: Sequence[Ints], model: MotionConfig
+) -> tuple[Floats, Floats]:
+    """Smoothed places of tracks.
+
+    Parameters
+    ----------
+    seconds : float64 (n,)
+        Increasing in each track.
+    ground, noise : float64 (n, 2), (n, 2, 2)
+        Measured places and their covariances, metres.
+    tracks
+        Rows of each; every row is of one.
+    model
+        Motion model.
+
+    Returns
+    -------
+    float64 (n, 2), float64 (n, 2, 2)
+        Smoothed places and their covariances.
+    """
+    order, number = _by_turn(tracks)
+    start, first = np.cumsum(number), int(number[0])
+    before = np.arange(first, len(order)) - np.repeat(number[:-1], number[1:])
+    seconds, ground, noise = seconds[order], ground[order][:, :, None], noise[order]
+    motion, turn = _motions(seconds[first:] - seconds[before], model)
+    state, spread = np.zeros((len(order), 4, 1)), np.zeros((len(order), 4, 4))
+    state[:first, :2], spread[:first, :2, :2] = ground[:first], noise[:first]
+    spread[:first, [2, 3], [2, 3]] = model.speed_spread**2
+    predicted, ahead = state.copy(), spread.copy()
+    turns = [(slice(k - n, k - n + m), slice(k, k + m)) for k, n, m in zip(start, number, number[1:], strict=False)]
+    for old, new in turns:
+        own = motion[new.start - first : new.stop - first]
+        predicted[new] = own @ state[old]
+        ahead[new] = own @ spread[old] @ own.transpose(0, 2, 1) + turn[new.start - first : new.stop - first]
+        gain = ahead[new, :, :2] @ np.linalg.inv(ahead[new, :2, :2] + noise[new])
+        state[new] = predicted[new] + gain @ (ground[new] - predicted[new, :2])
+        spread[new] = ahead[new] - gain @ ahead[new, :2]
+    gains = spread[before] @ motion.transpose(0, 2, 1) @ np.linalg.inv(ahead[first:])
+    for old, new in turns[::-1]:
+        gain = gains[new.start - first : new.stop - first]
+        state[old] += gain @ (state[new] - predicted[new])
+        spread[old] += gain @ (spread[new] - ahead[new]) @ gain.transpose(0, 2, 1)
+    places, covariance = np.empty((len(order), 2)), np.empty((len(order), 2, 2))
+    places[order], covariance[order] = state[:, :2, 0], spread[:, :2, :2]
+    return places, covariance
+
+
+def _by_turn(tracks: Sequence[Ints]) -> tuple[Ints, Ints]:
+    """The first rows of all tracks, then their second rows, and so on, each of the longest first; number of each."""
+    longest_first = sorted(tracks, key=len, reverse=True)
+    turn = np.concatenate([np.arange(len(rows)) for rows in longest_first])
+    return np.concatenate(longest_first)[np.argsort(turn, kind="stable")], np.bincount(turn)
+
+
+def _motions(seconds: Floats, model: MotionConfig) -> tuple[Floats, Floats]:
+    """F and Q over some times (n,), float64 (n, 4, 4)."""
+    steps, which = np.unique(seconds, return_inverse=True)
+    motions = np.array([transition(step) for step in steps.tolist()]).reshape(-1, 4, 4)
+    return motions[which], np.array([process_noise(step, model) for step in steps.tolist()]).reshape(-1, 4, 4)[which]

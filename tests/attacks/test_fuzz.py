@@ -1,0 +1,61 @@
+"""A short round of fuzzing with fixed seeds; `python -m tests.fuzz --minutes 60` goes on."""
+
+from __future__ import annotations
+
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from fuzz.runner import fuzz
+from fuzz.target import Target, answer
+from fuzz.targets import TARGETS
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from stseg.io.toml.text import parse_toml, shown
+from stseg.io.untrusted.names import is_name, printable
+from stseg.io.untrusted.numbers import parse_number, parse_whole
+
+FILES = 60
+"""Mutated files of each target."""
+
+
+@pytest.mark.parametrize("target", TARGETS, ids=lambda target: target.name)
+def test_the_valid_file_is_read(tmp_path: Path, target: Target) -> None:
+    path = tmp_path / f"valid{target.suffix}"
+    path.write_bytes(target.valid(tmp_path))
+    assert answer(target, path) == ""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="forks")
+@pytest.mark.parametrize("target", TARGETS, ids=lambda target: target.name)
+def test_mutated_files_are_answered(target: Target) -> None:
+    _, failures = fuzz(target, 1_000_000, time.monotonic() + 20, FILES)
+    assert not failures
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.text(max_size=40))
+def test_numbers_are_those_of_python_or_none(text: str) -> None:
+    number = parse_number(text)
+    assert number != number or number == float(text)
+    whole = parse_whole(text, -100, 100)
+    assert whole is None or whole == int(text)
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.text(max_size=40))
+def test_names_and_errors_are_printable(text: str) -> None:
+    assert printable(text).isprintable()
+    assert shown(text).isprintable()
+    assert not is_name(text) or Path(text).name == text
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.text(st.sampled_from("ab.=[]{}\"'#\n 19-_eE+,"), max_size=60))
+def test_any_text_is_toml_or_one_line(text: str) -> None:
+    try:
+        parse_toml(text)
+    except ValueError as error:
+        assert "\n" not in str(error)

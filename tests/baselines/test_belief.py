@@ -1,0 +1,431 @@
+"""The tracker `belief`: each equation of DP06 against a plain one, and people whom views follow together."""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import reference_belief as plain
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scenes import CONFIG, FRAME_RATE, SIZE, corner_cameras, found, mask, people, room
+from strategies import cameras
+
+from stseg.arrays import Boxes, Bytes, Floats, Observation, Rows
+from stseg.baselines.du_piater_2006 import BeliefTracker
+from stseg.baselines.du_piater_2006.exclusion import exclusion
+from stseg.baselines.du_piater_2006.histogram import BINS, HSV_BINS, PARTS, POINTS, histograms
+from stseg.baselines.du_piater_2006.particles import Motion, Particles, Prediction, fill_origin, systematic
+from stseg.baselines.du_piater_2006.potential import Outlier, Potential
+from stseg.baselines.du_piater_2006.star import Rounds, Star, propagate
+from stseg.baselines.du_piater_2006.target import Target, in_front, target_likelihoods
+from stseg.baselines.du_piater_2006.target_likelihood import TargetLikelihood, squares
+from stseg.baselines.du_piater_2006.view import StarView
+from stseg.config import BeliefConfig, Config
+from stseg.errors import CalibrationError, ConfigError, SourceError
+from stseg.geometry import Camera
+from stseg.geometry.square_pixels import vertical_of_square_pixels
+from stseg.kernels.accelerate import python_form
+from stseg.records.sparse_volume import SparseVolume
+from stseg.trackers import Commit, FrameObservations, FusedFrame, find_tracker
+
+RIG = room()
+VIEWS = [StarView.of(camera, RIG.grid) for camera in RIG.cameras]
+INTERPRETED = python_form(fill_origin) is fill_origin
+MOTION = Motion(1 / FRAME_RATE, 0.5, 0.8)
+FEW = BeliefConfig(particles=30)
+SHIRTS = ((40, 40, 200), (200, 60, 40), (50, 170, 60))
+"""BGR of the clothes of three people."""
+FLOOR = (120, 128, 134)
+
+
+def painted(camera: Camera, standing: Floats, shirts: Sequence[tuple[int, int, int]] = SHIRTS) -> Bytes:
+    """A camera's image of people in plain clothes, the nearest in front."""
+    image = np.full((camera.size[1], camera.size[0], 3), FLOOR, np.uint8)
+    away = np.hypot(*(standing[:, :2] - camera.centre[:2]).T)
+    for k in np.argsort(-away):
+        image[mask(camera, standing[k : k + 1]) > 127] = shirts[k]
+    return image
+
+
+def shown(standing: Floats, shirts: Sequence[tuple[int, int, int]] = SHIRTS) -> FrameObservations:
+    """What the four cameras show of people."""
+    flat = np.full(SIZE[::-1], 0.5, np.float32)
+    return FrameObservations([painted(camera, standing, shirts) for camera in RIG.cameras], [flat] * 4)
+
+
+def images_of(standing: Floats) -> list[Bytes | None]:
+    """The four cameras' images of people."""
+    return [painted(camera, standing) for camera in RIG.cameras]
+
+
+def scene(frame: int, standing: Floats, seen: Floats | None = None) -> FusedFrame:
+    """A frame in which the pass finds these people; occupied where they stand."""
+    volume = SparseVolume.whole(np.full(RIG.grid.shape, 3.0, np.float32))
+    return FusedFrame(frame, found(standing if seen is None else seen), found(people()), volume)
+
+
+def known(standing: Floats, count: int = 30) -> Target:
+    """Somebody of SHIRTS[0] whose colours all views have learned."""
+    rng = np.random.default_rng(3)
+    target = Target.at(1, standing[0, :2], np.eye(2) * 0.03**2, 1.7, 4, count, 0.8, rng)
+    images = [painted(camera, standing[:1]) for camera in RIG.cameras]
+    target.learn(VIEWS, images, standing[0, :2], [np.zeros((0, 4))] * 4, 1.0)
+    return target
+
+
+def spots(data: st.DataObject, n: int) -> Floats:
+    """Points about the room, metres."""
+    return np.array(data.draw(st.lists(st.tuples(*[st.floats(-2, 2)] * 2), min_size=n, max_size=n)))
+
+
+# One node
+
+
+@settings(deadline=None, max_examples=15)
+@given(st.data())
+def test_a_prediction_is_a_mixture(data: st.DataObject) -> None:
+    n, k = data.draw(st.integers(1, 5)), data.draw(st.integers(1, 4))
+    centre, place = spots(data, n), spots(data, k)
+    weight = np.arange(1.0, n + 1) / (n * (n + 1) / 2)
+    axes = np.array([[30.0, 4.0], [-3.0, 12.0]])
+    prediction = Prediction(100 * centre, np.zeros_like(centre), weight, axes, MOTION)
+    covariance = MOTION.place_variance * axes @ axes.T
+    expected = plain.mixture(100 * place, 100 * centre, weight, covariance)
+    np.testing.assert_allclose(prediction.density(100 * place), expected, rtol=1e-9, atol=1e-300)
+
+
+def test_a_prediction_goes_on_at_constant_velocity() -> None:
+    walking = Particles(np.array([[1.0, 2.0]]), np.array([[0.8, -0.4]]), np.ones(1))
+    prediction = Prediction.of(walking, np.eye(2), MOTION)
+    np.testing.assert_allclose(prediction.mean, [1.1, 1.95])
+    drawn = prediction.draw(4000, np.random.default_rng(1))
+    np.testing.assert_allclose(drawn.mean(0), [1.1, 1.95], atol=0.02)
+    np.testing.assert_allclose(np.cov(drawn.T), prediction.covariance, atol=0.003)
+
+
+def test_who_is_ahead_of_what_was_foretold_is_faster() -> None:
+    """The velocity follows the place as the covariance of a random walk of the velocity says."""
+    still = Particles(np.zeros((1, 2)), np.zeros((1, 2)), np.ones(1))
+    prediction = Prediction.of(still, np.eye(2), MOTION)
+    place = np.tile([0.2, 0.0], (4000, 1))
+    settled = prediction.settled(place, np.full(4000, 1 / 4000), np.random.default_rng(2))
+    np.testing.assert_allclose(settled.velocity.mean(0), [MOTION.gain * 0.2, 0.0], atol=0.02)
+    assert settled.velocity[:, 1].var() == pytest.approx(MOTION.velocity_variance, rel=0.1)
+
+
+def test_a_particle_comes_from_one_near_it() -> None:
+    origin = np.empty(300, np.int64)
+    centre, weight = np.array([[0.0, 0.0], [1.0, 0.0], [50.0, 0.0]]), np.array([0.5, 0.25, 0.25])
+    inverse, lot = np.array([1.0, 0.0, 1.0]), (np.arange(300) + 0.5) / 300
+    fill_origin(np.tile([0.5, 0.0], (300, 1)), centre, weight, inverse, lot, origin)
+    assert np.bincount(origin, minlength=3).tolist() == [200, 100, 0]
+    fill_origin(np.tile([49.0, 0.0], (300, 1)), centre, weight, inverse, lot, origin)
+    assert (origin == 2).all()
+
+
+@given(st.lists(st.floats(0.0, 1.0), min_size=1, max_size=8).filter(lambda w: sum(w) > 0.1), st.floats(0, 0.999))
+def test_drawn_as_often_as_the_weight_says(weight: list[float], lot: float) -> None:
+    share = np.array(weight) / sum(weight)
+    often = np.bincount(systematic(share, 40, lot), minlength=len(share))
+    assert np.abs(often - 40 * share).max() < 1 + 1e-6
+
+
+# A view
+
+
+@settings(deadline=None, max_examples=20)
+@given(cameras(lenses=False), st.floats(-1, 1), st.floats(-1, 1))
+def test_the_jacobians_are_slopes_of_the_homography(camera: Camera, x: float, y: float) -> None:
+    view, ground = StarView.of(camera, RIG.grid), np.array([[x, y]])
+    pixel = view.to_pixel(ground)
+    np.testing.assert_allclose(view.to_ground(pixel), ground, atol=1e-8)
+    step = 1e-5
+    moved = np.stack([(view.to_pixel(ground + step * e) - pixel)[0] / step for e in np.eye(2)], 1)
+    np.testing.assert_allclose(view.pixel_slope(ground[0]), moved, rtol=1e-3, atol=1e-2)
+    np.testing.assert_allclose(view.ground_slope(pixel)[0] @ view.pixel_slope(ground[0]), np.eye(2), atol=1e-7)
+
+
+def test_above_the_horizon_there_is_no_ground() -> None:
+    far = VIEWS[0].to_ground(np.array([[64.0, -400.0]]))
+    assert (np.abs(far) > 1e3).all()
+    assert np.isfinite(VIEWS[0].ground_slope(np.array([[64.0, -400.0]]))).all()
+
+
+def test_a_view_shows_those_in_its_image() -> None:
+    assert VIEWS[0].shows(np.zeros(2), 1.7, 0.5)
+    assert not VIEWS[0].shows(np.array([-3.4, -3.3]), 1.7, 0.5)
+
+
+@pytest.mark.parametrize("k", range(4))
+def test_the_vertical_follows_from_the_ground_homography_alone(k: int) -> None:
+    camera = corner_cameras()[k]
+    np.testing.assert_allclose(vertical_of_square_pixels(camera.ground, camera.size), camera.vertical, rtol=1e-6)
+
+
+def test_no_vertical_for_a_homography_that_no_camera_has() -> None:
+    with pytest.raises(CalibrationError, match="square pixels"):
+        vertical_of_square_pixels(np.array([[100.0, 0, 64], [0, 300.0, 48], [0, 0, 1]]), SIZE)
+
+
+# Colours
+
+
+def test_bins_of_colours() -> None:
+    """Colours on the border of two bins may fall in either."""
+    for colour in np.ndindex(8, 8, 8):
+        blue, green, red = ((np.array(colour) * 4 + 0.5) / 32).tolist()
+        nearly = {plain.hsv_bin((blue + off, green, red)) for off in (-1e-9, 1e-9)}
+        assert HSV_BINS[tuple(4 * c for c in colour)] in nearly | {plain.hsv_bin((blue, green, red))}
+
+
+@settings(deadline=None, max_examples=10)
+@given(st.data())
+def test_histograms(data: st.DataObject) -> None:
+    image = np.random.default_rng(data.draw(st.integers(0, 99))).integers(0, 256, (40, 50, 3)).astype(np.uint8)
+    edges = st.floats(-9.7, 45.3)
+    boxes = np.array(data.draw(st.lists(st.tuples(edges, edges, edges, edges), min_size=1, max_size=3)))
+    boxes = np.concatenate([np.minimum(boxes[:, :2], boxes[:, 2:]), np.maximum(boxes[:, :2], boxes[:, 2:]) + 3.1], 1)
+    nearer = np.array([[10.2, 5.1, 30.4, 25.7]])[: data.draw(st.integers(0, 1))]
+    colours, share = histograms(image, boxes, nearer)
+    for k, box in enumerate(boxes):
+        one, seen = plain.histogram(image, box, nearer, POINTS, PARTS, HSV_BINS)
+        np.testing.assert_allclose(colours[k], one, atol=1e-12)
+        np.testing.assert_allclose(share[k], seen, atol=1e-12)
+
+
+def test_a_box_that_is_not_there_shows_nothing() -> None:
+    colours, share = histograms(np.zeros((9, 9, 3), np.uint8), np.full((1, 4), np.nan), np.zeros((0, 4)))
+    assert not colours.any()
+    assert not share.any()
+
+
+def test_squared_distances_of_histograms() -> None:
+    one, other = np.zeros((2, PARTS, BINS)), np.zeros((PARTS, BINS))
+    one[0, :, 3] = other[:, 3] = 1.0
+    one[1, :, 7] = 1.0
+    np.testing.assert_allclose(squares(one, other), [[0.0] * PARTS, [1.0] * PARTS])
+
+
+def test_a_look_prefers_the_target_and_does_not_mind_what_is_hidden() -> None:
+    standing = people((0.0, 0.0), (1.2, -0.6))
+    target = known(standing)
+    colours = target.colours[0]
+    assert colours is not None
+    look = TargetLikelihood(VIEWS[0], painted(RIG.cameras[0], standing), colours, 1.7, np.zeros((0, 4)), FEW)
+    likelihood, share = look.likelihood(np.array([[0.0, 0.0], [1.2, -0.6], [-0.5, 0.9]]))
+    assert likelihood[0] > 100 * likelihood[1:].max()
+    np.testing.assert_allclose(share[0], 1.0)
+    covered = replace(look, nearer=VIEWS[0].boxes(np.zeros((1, 2)), 2.0) + np.array([-9, -9, 9, 9]))
+    unseen, none = covered.likelihood(np.zeros((1, 2)))
+    np.testing.assert_allclose(unseen, covered.hidden)
+    assert none[0] == 0.0
+
+
+def test_who_stands_in_front() -> None:
+    """The first corner camera stands at (-3.5, -3.5)."""
+    boxes = in_front(np.array([[0.5, 0.5], [0.0, 0.0], [1.0, -1.0]]), np.full(3, 1.7), VIEWS[0])
+    np.testing.assert_allclose(boxes[0], VIEWS[0].boxes(np.zeros((1, 2)), 1.7))
+    assert [len(b) for b in boxes] == [1, 0, 0]
+
+
+# Messages
+
+
+@settings(deadline=None, max_examples=15)
+@given(st.data())
+def test_messages_are_sums_over_the_potential(data: st.DataObject) -> None:
+    ground, mapped = spots(data, 3), spots(data, 4)
+    slope: Floats = np.array([[0.3, 0.1], [0.0, 0.2]]) * (1 + np.arange(4))[:, None, None]
+    covariance: Floats = slope @ slope.transpose(0, 2, 1)
+    outlier = Outlier(0.2, np.array([0.3, -0.1]), 1.5)
+    potential = Potential.of(ground, mapped, covariance, outlier)
+    psi = np.array(
+        [
+            [plain.potential(g, m, c, 0.2, outlier.mean, 1.5) for m, c in zip(mapped, covariance, strict=True)]
+            for g in ground
+        ]
+    )
+    seen, weight = np.array([0.1, 0.3, 0.0, 0.2]), np.array([0.5, 0.2, 0.3])
+    np.testing.assert_allclose(potential.to_ground(seen), psi @ seen + 0.4 * outlier.flat)
+    np.testing.assert_allclose(potential.to_view(weight), weight @ psi)
+
+
+def test_a_view_that_sees_nothing_sends_a_flat_message() -> None:
+    ground = np.random.default_rng(0).normal(size=(20, 2))
+    potential = Potential.of(ground, ground[:5], np.tile(np.eye(2), (5, 1, 1)), Outlier(0.1, np.zeros(2), 1.0))
+    assert np.ptp(potential.to_ground(np.zeros(5))) == 0.0
+
+
+@settings(deadline=None, max_examples=15)
+@given(st.data())
+def test_targets_exclude_each_other(data: st.DataObject) -> None:
+    ground, weight = spots(data, 3), np.array([0.2, 0.5, 0.3])
+    others = [Particles(spots(data, 3), np.zeros((3, 2)), weight) for _ in range(2)]
+    told = exclusion(ground, others, 0.3)
+    plainly = [np.prod([plain.exclusion(g, o.place, weight, 0.3) for o in others]) for g in ground]
+    np.testing.assert_allclose(told, plainly, atol=1e-6)
+
+
+def test_a_round_brings_the_ground_to_what_the_views_see() -> None:
+    """The target has gone a step further than it should have; all views see it."""
+    target, standing = known(people((0.0, 0.0))), people((0.25, -0.15))
+    seen = target_likelihoods([target], VIEWS, images_of(standing), MOTION, FEW)
+    star = propagate([target.star], seen, MOTION, FEW, [np.random.default_rng(1)])[0]
+    np.testing.assert_allclose(star.ground.mean, [0.25, -0.15], atol=0.08)
+    assert (star.visibility > 0.9).all()
+    for view, own in zip(VIEWS, star.views, strict=True):
+        assert own is not None
+        np.testing.assert_allclose(view.to_ground(own.mean[None])[0], [0.25, -0.15], atol=0.15)
+        assert own.weight.sum() == pytest.approx(1.0)
+
+
+def test_who_is_hidden_in_one_view_is_led_there_by_the_others() -> None:
+    """The first view's image is blank: its particles go where the others see the target."""
+    target, standing = known(people((0.0, 0.0))), people((0.2, 0.2))
+    images = images_of(standing)
+    images[0] = np.full((*SIZE[::-1], 3), FLOOR, np.uint8)
+    seen = target_likelihoods([target], VIEWS, images, MOTION, FEW)
+    star = propagate([target.star], seen, MOTION, FEW, [np.random.default_rng(1)])[0]
+    hidden = star.views[0]
+    assert hidden is not None
+    assert star.visibility[0] < 0.2
+    np.testing.assert_allclose(VIEWS[0].to_ground(hidden.mean[None])[0], [0.2, 0.2], atol=0.15)
+    np.testing.assert_allclose(star.ground.mean, [0.2, 0.2], atol=0.1)
+
+
+def test_without_any_view_the_ground_goes_on_as_foretold() -> None:
+    walking = Particles(np.tile([0.0, 0.0], (30, 1)), np.tile([0.8, 0.0], (30, 1)), np.full(30, 1 / 30))
+    star = Star(walking, (None,) * 4, np.zeros(4))
+    rounds = Rounds(star, [None] * 4, MOTION, FEW, np.random.default_rng(0))
+    rounds.advance([])
+    moved = rounds.settled()
+    np.testing.assert_allclose(moved.ground.mean, [0.1, 0.0], atol=0.1)
+    assert moved.views == (None,) * 4
+
+
+# The tracker
+
+
+def follow(
+    frames: int, config: Config, walks: Sequence[tuple[float, float, float, float]], found_until: int = 1000
+) -> tuple[list[Commit], BeliefTracker]:
+    """People who walk from x, y by a step a frame; after `found_until` frames the pass finds nobody."""
+    tracker = BeliefTracker(RIG, config, 0)
+    commits: list[Commit] = []
+    for frame in range(frames):
+        standing = people(*((x + frame * dx, y + frame * dy) for x, y, dx, dy in walks))
+        tracker.predict(frame)
+        commits += tracker.add(scene(frame, standing, None if frame < found_until else people()), shown(standing))
+    return commits, tracker
+
+
+def rows_of(commits: Sequence[Commit]) -> Rows:
+    return np.concatenate([commit.trajectory for commit in commits])
+
+
+QUICK = replace(CONFIG, belief=FEW)
+PASSING = ((-0.9, -0.3, 0.1, 0.0), (0.9, 0.3, -0.1, 0.0))
+
+
+def test_two_who_pass_each_other_keep_their_numbers() -> None:
+    frames = 8 if INTERPRETED else 18
+    rows = rows_of(follow(frames, QUICK, PASSING)[0])
+    assert len(rows) == 2 * frames
+    for who, (x, y, dx, _) in enumerate(PASSING, start=1):
+        own = rows[rows["id"] == who]
+        away = np.hypot(own["x"] - (x + dx * own["frame"]), own["y"] - y)
+        assert away.max() < 0.25
+        assert np.median(away) < 0.12
+
+
+def test_the_colours_lead_where_nobody_is_found() -> None:
+    """The pass finds a person in three frames and then no more: they are followed, and then ended with a reason."""
+    patient = replace(CONFIG, belief=replace(FEW, patience=0.5))
+    commits, tracker = follow(9, patient, ((-0.5, 0.2, 0.08, 0.0),), found_until=3)
+    rows, events = rows_of(commits), np.concatenate([commit.events for commit in commits])
+    assert rows["frame"].tolist() == list(range(6))
+    assert np.hypot(rows["x"] - (-0.5 + 0.08 * rows["frame"]), rows["y"] - 0.2).max() < 0.25
+    assert [(e["kind"], e["id"]) for e in events] == [(b"birth", 1), (b"death", 1)]
+    assert events["reason"][1] == b"nobody was found there for 4 frames; its colours were seen"
+    assert not tracker.targets
+
+
+def test_the_same_seed_makes_the_same_tracks() -> None:
+    once, again = (rows_of(follow(4, QUICK, PASSING)[0]) for _ in range(2))
+    np.testing.assert_array_equal(once, again)
+    other = rows_of(follow(4, replace(CONFIG, belief=replace(FEW, seed=5)), PASSING)[0])
+    assert (once["x"] != other["x"]).any()
+
+
+def test_the_order_of_targets_does_not_matter() -> None:
+    standing = people((0.0, 0.0), (0.5, 0.2))
+    targets = [known(standing), known(standing[::-1])]
+    asked = target_likelihoods(targets, VIEWS, images_of(standing), MOTION, FEW)
+    there = propagate([t.star for t in targets], asked, MOTION, FEW, [np.random.default_rng(k) for k in (1, 2)])
+    stars = [t.star for t in targets[::-1]]
+    back = propagate(stars, asked[::-1], MOTION, FEW, [np.random.default_rng(k) for k in (2, 1)])
+    for one, other in zip(there, back[::-1], strict=True):
+        np.testing.assert_array_equal(one.ground.place, other.ground.place)
+
+
+def test_a_tracker_goes_on_after_it_was_put_aside() -> None:
+    commits, tracker = follow(3, QUICK, PASSING)
+    stored = pickle.loads(pickle.dumps(tracker))
+    standing = people((-0.6, -0.3), (0.6, 0.3))
+    one, other = (t.add(scene(3, standing), shown(standing))[0] for t in (tracker, stored))
+    np.testing.assert_array_equal(one.trajectory, other.trajectory)
+    assert commits
+
+
+def test_whom_it_expects() -> None:
+    tracker = BeliefTracker(RIG, QUICK, 0)
+    assert tracker.predict(0) is None
+    for frame in range(3):
+        standing = people((-0.5 + 0.1 * frame, 0.2))
+        tracker.add(scene(frame, standing), shown(standing))
+    expected = tracker.predict(3)
+    assert expected is not None
+    np.testing.assert_allclose(expected.ground, [[-0.2, 0.2]], atol=0.15)
+    assert expected.existence[0] == 1.0
+
+
+def test_each_view_by_itself_is_worse_where_one_sees_nothing() -> None:
+    """The ablation: a view whose picture is blank takes its fused place along; messages do not."""
+    away = {}
+    for way in ("messages", "condensation"):
+        config = replace(FEW, method=way)
+        tracker = BeliefTracker(RIG, replace(CONFIG, belief=config), 0)
+        for frame in range(5 if INTERPRETED else 10):
+            standing = people((-0.8 + 0.12 * frame, 0.2))
+            views: list[Observation] = list(shown(standing).observations)
+            if frame > 1:
+                views[0] = np.full((*SIZE[::-1], 3), FLOOR, np.uint8)
+                views[1] = np.full((*SIZE[::-1], 3), FLOOR, np.uint8)
+            tracker.add(scene(frame, standing), FrameObservations(views, shown(standing).evidence))
+        away[way] = float(np.hypot(*(tracker.targets[0].star.ground.mean - standing[0, :2])))
+    assert away["messages"] < 0.15
+    assert away["condensation"] > away["messages"]
+
+
+@pytest.mark.parametrize("observation", [np.zeros(SIZE[::-1], np.uint8), Boxes(np.zeros((0, 4)), np.zeros(0))])
+def test_without_colour_it_says_what_it_lacks(observation: Observation) -> None:
+    tracker = find_tracker("belief")(RIG, CONFIG, 0)
+    with pytest.raises(SourceError, match=r"--tracker belief.*colour"):
+        tracker.add(scene(0, people((0.0, 0.0))), FrameObservations((observation,) * 4, (None,) * 4))
+
+
+def test_constants_out_of_range_are_refused() -> None:
+    for wrong in (
+        {"particles": 1},
+        {"iterations": 0},
+        {"outlier_rate": 1.0},
+        {"neutral_distance": 0.0},
+        {"colour_weight": 0.0},
+        {"seed": -1},
+    ):
+        with pytest.raises(ConfigError):
+            BeliefConfig(**wrong)

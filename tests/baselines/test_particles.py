@@ -1,0 +1,416 @@
+"""The tracker `particles`: each equation of KD06 against a plain one, and people followed by the colours of clothes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import reference_particles as plain
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scenes import CONFIG, SIZE, corner_cameras, found, looking, mask, people, room
+
+from stseg.arrays import Boxes, Bytes, Floats, Observation, Rows, Singles
+from stseg.baselines.colour_views import colour_views
+from stseg.baselines.kim_davis_2006 import ParticleTracker
+from stseg.baselines.kim_davis_2006.appearance import SAMPLES, Appearance
+from stseg.baselines.kim_davis_2006.axes import HYPOTHESIS_WEIGHT, _middle_of_shortest_half, fill_axes, intersect_axes
+from stseg.baselines.kim_davis_2006.bodies import HALF_WIDTH, PARTS, fill_bodies, fill_boxes
+from stseg.baselines.kim_davis_2006.colours import BINS, FALL, bins_of, fill_density, histogram, normalised
+from stseg.baselines.kim_davis_2006.filter import estimate, resampled, weights
+from stseg.baselines.kim_davis_2006.likelihood import NEUTRAL, add_misfit
+from stseg.baselines.kim_davis_2006.search import search
+from stseg.baselines.kim_davis_2006.segmentation import UNASSIGNED, Canvas, fill_unoccluded, segment
+from stseg.baselines.kim_davis_2006.views import ParticleView
+from stseg.config import Config, ParticleConfig
+from stseg.errors import ConfigError, SourceError
+from stseg.geometry import Camera
+from stseg.kernels.accelerate import python_form
+from stseg.records.sparse_volume import SparseVolume
+from stseg.trackers import Commit, FrameObservations, FusedFrame
+
+RIG = room()
+CAMERA = corner_cameras()[0]
+INTERPRETED = python_form(segment) is segment
+SHIRTS = ((40, 40, 200), (200, 60, 40), (50, 170, 60), (180, 170, 40))
+"""BGR of the clothes of four people."""
+FLOOR = (120, 128, 134)
+
+
+def painted(camera: Camera, standing: Floats, shirts: tuple[tuple[int, int, int], ...] = SHIRTS) -> Bytes:
+    """A camera's image of people in plain clothes, the nearest in front."""
+    image = np.full((camera.size[1], camera.size[0], 3), FLOOR, np.uint8)
+    away = np.hypot(*(standing[:, :2] - camera.centre[:2]).T)
+    for k in np.argsort(-away):
+        image[mask(camera, standing[k : k + 1]) > 127] = shirts[k]
+    return image
+
+
+def shown(standing: Floats, shirts: tuple[tuple[int, int, int], ...] = SHIRTS) -> FrameObservations:
+    """What the four cameras show of people, and perfect foreground."""
+    likelihood = [(mask(camera, standing) / np.float32(255)).astype(np.float32) for camera in RIG.cameras]
+    return FrameObservations([painted(camera, standing, shirts) for camera in RIG.cameras], likelihood)
+
+
+def scene(frame: int, standing: Floats) -> FusedFrame:
+    """A frame in which the pass finds these people."""
+    return FusedFrame(
+        frame, found(standing), found(people()), SparseVolume.whole(np.full(RIG.grid.shape, -3.0, np.float32))
+    )
+
+
+def rows_of(commits: list[Commit]) -> Rows:
+    return np.concatenate([commit.trajectory for commit in commits])
+
+
+def bodies_of(camera: Camera, standing: Floats) -> Floats:
+    bodies = np.zeros((len(standing), 5))
+    fill_bodies(camera.projection, camera.centre, standing[:, :2].copy(), standing[:, 2].copy(), bodies)
+    return bodies
+
+
+def raster(camera: Camera, step: int = 6) -> Singles:
+    """Pixels of a coarse raster, float32 (v, u, 2)."""
+    width, height = camera.size
+    return np.stack(np.meshgrid(np.arange(0, width, step), np.arange(0, height, step)), -1).astype(np.float32)
+
+
+GROUPS = st.integers(0, 2**32 - 1).map(
+    lambda seed: np.column_stack(
+        [np.random.default_rng(seed).uniform(-1.5, 1.5, (3, 2)), np.random.default_rng(seed).uniform(1.5, 1.9, 3)]
+    )
+)
+"""Three people anywhere in the room."""
+
+
+# Colours (eq. 1)
+
+
+def test_normalised_colours_forget_the_light() -> None:
+    dark, bright = np.array([[[20, 40, 60]]], np.uint8), np.array([[[60, 120, 180]]], np.uint8)
+    a, b = normalised(dark)[0, 0].astype(int), normalised(bright)[0, 0].astype(int)
+    assert (a[:2] == b[:2]).all()
+    assert (a[2], b[2]) == (40, 120)
+    assert normalised(np.zeros((1, 1, 3), np.uint8)).tolist() == [[[0, 0, 0]]]
+
+
+@given(st.integers(0, 2**32 - 1))
+@settings(max_examples=20, deadline=None)
+def test_density_is_equation_1(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    colour = rng.integers(90, 130, (3, 4, 3), np.uint8)
+    samples, counts = rng.integers(90, 130, (2, 10, 3), np.uint8), np.array([7, 0])
+    wanted = (rng.random((3, 4)) < 0.7).astype(np.uint8)
+    density = np.full((2, 3, 4), -1, np.float32)
+    fill_density(colour, wanted, np.array([0, 3, 1, 4]), samples, counts, FALL, density)
+    for v, u in np.ndindex(3, 4):
+        asked = wanted[v, u] and u >= 1
+        assert density[0, v, u] == pytest.approx(plain.density(colour[v, u], samples[0, :7]) if asked else -1, rel=1e-4)
+        assert density[1, v, u] == (1 if asked else -1)
+
+
+def test_histograms_share_out_their_samples() -> None:
+    colour = np.array([[0, 0, 0], [0, 0, 0], [255, 255, 255]], np.uint8)
+    shares = histogram(colour)
+    assert shares.sum() == pytest.approx(1)
+    assert shares[0] == pytest.approx(2 / 3)
+    assert bins_of(colour).tolist() == [0, 0, int(np.prod(BINS)) - 1]
+    assert histogram(colour[:0]).sum() == 0
+
+
+# Bodies and segmentation (eqs 2 to 4)
+
+
+@given(GROUPS)
+@settings(max_examples=5 if not INTERPRETED else 2, deadline=None)
+def test_segmentation_is_equations_2_to_4(standing: Floats) -> None:
+    ideal, rng = raster(CAMERA), np.random.default_rng(3)
+    shape = ideal.shape[:2]
+    bodies = bodies_of(CAMERA, standing)
+    density = rng.uniform(0.1, 5.0, (3, len(PARTS), *shape)).astype(np.float32)
+    foreground = (rng.random(shape) < 0.8).astype(np.uint8)
+    canvas = Canvas.of(*shape)
+    everywhere = plain.boxes_everywhere(3, shape)
+    segment(bodies, np.argsort(bodies[:, 4]), everywhere, ideal, foreground, density, HALF_WIDTH, PARTS, canvas)
+    for v, u in zip(*(which.tolist() for which in np.nonzero(foreground)), strict=True):
+        pixel = ideal[v, u].astype(float)
+        label, share = plain.posterior(
+            CAMERA, standing[:, :2], standing[:, 2], pixel, density[:, :, v, u].astype(float)
+        )
+        assert canvas.label[v, u] == label or share == pytest.approx(0.5, abs=0.05)
+        if label >= 0:
+            assert canvas.best[v, u] / (canvas.total[v, u] + canvas.free[v, u]) == pytest.approx(share, abs=1e-3)
+    assert (canvas.label[foreground == 0] == UNASSIGNED).all()
+
+
+def test_boxes_hold_all_that_a_body_may_cover() -> None:
+    standing, ideal = people((0.3, -0.4), (-1.2, 1.1)), raster(CAMERA, 2)
+    bodies, boxes = bodies_of(CAMERA, standing), np.zeros((2, 4), np.int64)
+    fill_boxes(ideal, bodies, np.array([0.0, 0.4]), boxes)
+    for k, person in enumerate(standing):
+        shares = np.array(
+            [
+                [plain.covered(*plain.place(CAMERA, person[:2], person[2], pixel.astype(float))) for pixel in row]
+                for row in ideal[::4, ::4]
+            ]
+        )
+        inside = np.zeros(ideal.shape[:2], bool)
+        inside[slice(*boxes[k, :2]), slice(*boxes[k, 2:])] = True
+        assert (shares[~inside[::4, ::4]] < 0.01).all()
+    far = bodies_of(CAMERA, people((-30.0, -30.0)))
+    fill_boxes(ideal, far, np.zeros(1), boxes[:1])
+    assert (boxes[0, 1::2] <= boxes[0, ::2]).all()  # behind the camera
+
+
+def test_what_is_open_is_in_front() -> None:
+    """Two in line with the camera: of the one behind, no pixel that the other covers is open."""
+    way = -CAMERA.centre[:2] / np.linalg.norm(CAMERA.centre[:2])
+    standing = people(tuple(way * -0.4), tuple(way * 0.4))
+    ideal = raster(CAMERA, 2)
+    bodies, shape = bodies_of(CAMERA, standing), ideal.shape[:2]
+    owner, lone, free = (
+        np.full(shape, UNASSIGNED, np.int32),
+        np.full(shape, UNASSIGNED, np.int32),
+        np.zeros(shape, np.float32),
+    )
+    seen, alone, boxes = np.zeros(2, np.int64), np.zeros(1, np.int64), plain.boxes_everywhere(2, shape)
+    fill_unoccluded(bodies, np.array([0, 1]), boxes, ideal, HALF_WIDTH, PARTS, free, owner, seen)
+    fill_unoccluded(bodies[1:], np.array([0]), boxes[:1], ideal, HALF_WIDTH, PARTS, free, lone, alone)
+    assert seen[1] < 0.6 * alone[0]
+    behind = owner // len(PARTS) == 1
+    assert behind.sum() < (lone >= 0).sum()
+    assert (lone[behind] >= 0).all()
+
+
+# Axes and where they meet (eq. 5)
+
+
+@given(st.lists(st.floats(-5, 5), min_size=3, max_size=25))
+@settings(max_examples=50, deadline=None)
+def test_the_middle_of_the_shortest_half_has_the_least_median_of_squares(distances: list[float]) -> None:
+    given_ = np.array(distances)
+    middle = _middle_of_shortest_half(given_.copy())
+    half = len(distances) // 2
+    assert np.sort(np.abs(given_ - middle))[half] == pytest.approx(plain.median_line(given_), abs=1e-9)
+
+
+@pytest.mark.parametrize("median", [False, True])
+def test_the_axis_of_a_whole_body_passes_through_its_place(median: bool) -> None:
+    for camera in RIG.cameras:
+        standing, ideal = people((0.4, -0.3)), raster(camera, 2)
+        bodies, shape = bodies_of(camera, standing), ideal.shape[:2]
+        canvas, axes, boxes = Canvas.of(*shape), np.zeros((1, 4)), plain.boxes_everywhere(1, shape)
+        foreground = (mask(camera, standing)[::2, ::2] > 127).astype(np.uint8)
+        density = np.full((1, len(PARTS), *shape), 20, np.float32)
+        segment(bodies, np.array([0]), boxes, ideal, foreground, density, HALF_WIDTH, PARTS, canvas)
+        widths = 2 * float(HALF_WIDTH.mean())
+        room_ = np.zeros(foreground.size)
+        fill_axes(bodies, boxes, ideal, canvas, 2.0, widths, camera.ground, camera.vertical, median, room_, axes)
+        feet, _ = camera.project(standing[0, :2], 0.0)
+        expected = plain.ground_line(camera, feet)
+        assert abs(axes[0, :3] @ np.append(standing[0, :2], 1.0)) < (0.08 if median else 0.04)
+        assert abs(abs(axes[0, :2] @ expected[:2]) - 1) < 1e-3
+        assert axes[0, 3] > 0.7
+
+
+def test_the_median_forgets_an_arm() -> None:
+    """A fifth of the pixels lie far to one side."""
+    body = np.concatenate([np.random.default_rng(1).normal(0, 1, 80), np.full(20, 12.0)])
+    assert abs(_middle_of_shortest_half(body.copy())) < 0.5 < body.mean()
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(0, 4))
+@settings(max_examples=30, deadline=None)
+def test_axes_meet_as_equation_5_says(seed: int, views: int) -> None:
+    rng = np.random.default_rng(seed)
+    angle = rng.uniform(0, np.pi, (views, 2))
+    axes = np.stack([np.cos(angle), np.sin(angle), rng.normal(0, 1, (views, 2)), rng.uniform(0, 1, (views, 2))], -1)
+    before = rng.normal(0, 1, (2, 2))
+    ground = before.copy()
+    farthest = intersect_axes(axes, HYPOTHESIS_WEIGHT, ground)
+    for k in range(2):
+        np.testing.assert_allclose(ground[k], plain.meeting(axes[:, k], HYPOTHESIS_WEIGHT, before[k]), atol=1e-9)
+    assert farthest == pytest.approx(np.hypot(*(ground - before).T).max())
+
+
+# Particles (eqs 6 and 7)
+
+
+@given(GROUPS)
+@settings(max_examples=6 if not INTERPRETED else 1, deadline=None)
+def test_misfit_is_equations_6_and_7(standing: Floats) -> None:
+    ideal, rng = raster(CAMERA, 8), np.random.default_rng(5)
+    shape, bodies = ideal.shape[:2], bodies_of(CAMERA, standing)
+    bins = rng.integers(0, int(np.prod(BINS)), shape).astype(np.int32)
+    reference = np.stack([[histogram(rng.integers(0, 255, (50, 3), np.uint8)) for _ in PARTS] for _ in standing])
+    reference[1, 2] = 0.0
+    areas, misfit, counts = np.array([0.06, 0.09, 0.02]) / 64, np.zeros(3), np.zeros(reference.shape[1:])
+    add_misfit(
+        bodies, np.argsort(bodies[:, 4]), plain.boxes_everywhere(3, shape), ideal, bins, reference, areas, HALF_WIDTH,
+        PARTS, np.zeros(shape, np.float32), counts, misfit,
+    )  # fmt: skip
+    expected = plain.misfit(CAMERA, standing[:, :2], standing[:, 2], ideal, bins, reference, areas, NEUTRAL)
+    np.testing.assert_allclose(misfit, expected, atol=1e-6)
+
+
+def test_particles_are_drawn_by_their_weights() -> None:
+    rng = np.random.default_rng(2)
+    particles = np.arange(8.0).reshape(4, 1, 2)
+    weight = weights(np.array([0.0, 0.0, 50.0, 1.0]), 2.0)
+    assert weight.sum() == pytest.approx(1)
+    assert weight[3] / weight[0] == pytest.approx(np.exp(-2.0))
+    drawn = np.concatenate([resampled(particles, weight, rng)[:, 0, 0] for _ in range(500)])
+    for place, expected in zip(particles[:, 0, 0], weight, strict=True):
+        assert (drawn == place).mean() == pytest.approx(expected, abs=0.01)
+    mean, covariance = estimate(particles, weight)
+    assert mean[0, 0] == pytest.approx(particles[:, 0, 0] @ weight)
+    assert covariance[0, 0, 0] == pytest.approx((particles[:, 0, 0] - mean[0, 0]) ** 2 @ weight)
+
+
+def test_appearances_fill_and_are_renewed_slowly() -> None:
+    rng = np.random.default_rng(0)
+    red, blue = np.full((300, 3), (200, 10, 90), np.uint8), np.full((300, 3), (10, 10, 90), np.uint8)
+    one = Appearance.unknown().learned(1, red[:10], 0.1, rng)
+    assert one.known.tolist() == [0, 0, 0]  # too few
+    assert one.reference.sum() == 0
+    full = one.learned(1, red, 0.1, rng)
+    assert full.known.tolist() == [0, SAMPLES, 0]
+    assert full.reference[1].max() == 1
+    later = full
+    for _ in range(5):
+        later = later.learned(1, blue, 0.1, rng)
+    share = (later.samples[1, :, 0] == 10).mean()
+    assert 0.2 < share < 0.6
+    assert full.samples[1, 0, 0] == 200  # nothing is changed in place
+
+
+# The tracker
+
+
+def follow(frames: int, config: Config = CONFIG, shirts: tuple[tuple[int, int, int], ...] = SHIRTS) -> list[Commit]:
+    """Two who pass each other; the pass finds them in the first four frames alone."""
+    tracker, commits = ParticleTracker(RIG, config, 0), []
+    for frame in range(frames):
+        x = -1.2 + 0.1 * frame
+        standing = people((x, -0.3), (-x, 0.3))
+        commits += tracker.add(scene(frame, standing if frame < 4 else people()), shown(standing, shirts))
+    return commits + tracker.finish()
+
+
+QUICK = replace(CONFIG, particles=ParticleConfig(particles=6, raster_columns=64, patience=10.0))
+FRAMES = 6 if INTERPRETED else 16
+
+
+def test_people_are_followed_by_their_colours() -> None:
+    rows = rows_of(follow(FRAMES, QUICK))
+    assert np.unique(rows["id"]).tolist() == [1, 2]
+    assert len(rows) == 2 * FRAMES
+    x = np.where(rows["id"] == 1, -1.2 + 0.1 * rows["frame"], 1.2 - 0.1 * rows["frame"])
+    off = np.hypot(rows["x"] - x, rows["y"] - np.where(rows["id"] == 1, -0.3, 0.3))
+    assert off.mean() < 0.1
+    assert off.max() < 0.35
+    assert (rows["xx"] > 0).all()
+
+
+def test_equal_seeds_make_equal_tracks() -> None:
+    one, same = rows_of(follow(4, QUICK)), rows_of(follow(4, QUICK))
+    other = rows_of(follow(4, replace(QUICK, particles=replace(QUICK.particles, seed=1))))
+    np.testing.assert_array_equal(one, same)
+    assert (one["x"] != other["x"]).any()
+
+
+def test_the_search_goes_to_the_person_from_beside() -> None:
+    standing = people((0.2, 0.1))
+    views = [ParticleView(camera, 64) for camera in RIG.cameras]
+    colour = colour_views(shown(standing), "particles", 0)
+    rng, appearance = np.random.default_rng(0), Appearance.unknown()
+    shirt = normalised(np.array([[SHIRTS[0]]], np.uint8)).reshape(1, 3).repeat(SAMPLES, 0)
+    for part in range(len(PARTS)):
+        appearance = appearance.learned(part, shirt, 0.0, rng)
+    beside = standing[:, :2] + np.array([[0.25, -0.15]])
+    frames = [
+        view.prepare(seen, beside, standing[:, 2], [appearance], np.array([0.6]))
+        for view, seen in zip(views, colour, strict=True)
+        if seen is not None
+    ]
+    for median in (False, True):
+        reached = search(frames, beside, 5, median)
+        assert np.hypot(*(reached - standing[:, :2]).T).max() < 0.06
+    wrong, right = np.zeros(1), np.zeros(1)
+    for frame in frames:
+        frame.add_misfit(beside, appearance.reference[None], wrong)
+        frame.add_misfit(standing[:, :2], appearance.reference[None], right)
+    assert right[0] < wrong[0]
+
+
+def test_who_is_not_found_or_leaves_is_followed_no_longer() -> None:
+    config = replace(QUICK, particles=replace(QUICK.particles, patience=0.5))
+    tracker = ParticleTracker(RIG, config, 0)
+    away, nobody = people((0.0, 0.0)), people()
+    events = []
+    for frame in range(7):
+        commits = tracker.add(scene(frame, away if frame < 2 else nobody), shown(away))
+        events += [(int(e["frame"]), bytes(e["kind"]), bytes(e["reason"])) for e in commits[0].events]
+    assert events == [(0, b"birth", b"found where nobody was followed"), (6, b"death", b"not found for 0.5 s")]
+
+
+def test_who_was_lost_is_known_again_where_somebody_is_found() -> None:
+    """The particles are a metre off; the pass finds somebody in the old clothes where nobody is followed."""
+    standing, tracker = people((-0.5, 0.2)), ParticleTracker(RIG, QUICK, 0)
+    for frame in range(3):
+        tracker.add(scene(frame, standing), shown(standing))
+    away = np.array([1.0, 0.2])
+    tracker.crowd = replace(
+        tracker.crowd, ground=tracker.crowd.ground + away, particles=tracker.crowd.particles + away
+    )  # fmt: skip
+    (commit,) = tracker.add(scene(3, standing), shown(standing))
+    assert commit.trajectory["id"].tolist() == [1]
+    assert np.hypot(commit.trajectory["x"] + 0.5, commit.trajectory["y"] - 0.2)[0] < 0.15
+    assert len(commit.events) == 0
+
+
+def test_without_colour_it_says_what_it_lacks() -> None:
+    standing = people((0.0, 0.0))
+    masks: list[Observation] = [mask(camera, standing) for camera in RIG.cameras]
+    boxes: list[Observation] = [Boxes(np.zeros((0, 4)), np.zeros(0))] * 4
+    for observations, kind in ((masks, "masks"), (boxes, "boxes"), (masks[:2] + boxes[:2], "boxes and masks")):
+        tracker = ParticleTracker(RIG, QUICK, 0)
+        with pytest.raises(SourceError, match=f"particles.*frame 3.*{kind} and no colour"):
+            tracker.add(scene(3, standing), FrameObservations(observations, [None] * 4))
+
+
+def test_one_camera_in_colour_is_enough_and_blind_frames_are_borne() -> None:
+    standing = people((0.0, 0.0))
+    full = shown(standing)
+    tracker = ParticleTracker(RIG, QUICK, 0)
+    alone = FrameObservations(
+        [full.observations[0], mask(RIG.cameras[1], standing), None, None],
+        [full.evidence[0], full.evidence[1], None, None],
+    )
+    blind = FrameObservations([None] * 4, [None] * 4)
+    rows = rows_of([*tracker.add(scene(0, standing), alone), *tracker.add(scene(1, standing), blind)])
+    assert rows["id"].tolist() == [1, 1]
+    assert [view is not None for view in colour_views(alone, "particles", 0)] == [True, False, False, False]
+
+
+def test_settings_out_of_range_are_refused() -> None:
+    for bad in ({"particles": 0}, {"velocity_spread": 0.0}, {"seed": -1}, {"patience": -1.0}):
+        with pytest.raises(ConfigError):
+            ParticleConfig(**bad)
+
+
+def test_a_lens_bends_the_raster_not_the_people() -> None:
+    """The same person through a barrel lens: the axis still passes through their place."""
+    camera = looking("barrel", (-3.5, -3.5, 2.6), distortion=(-0.2, 0.03, 0.0, 0.0, 0.0))
+    view, standing = ParticleView(camera, SIZE[0]), people((0.6, 0.4))
+    silhouette = (mask(camera, standing) / np.float32(255)).astype(np.float32)
+    seen = colour_views(FrameObservations([painted(camera, standing)], [silhouette]), "particles", 0)[0]
+    assert seen is not None
+    frame, axes = (
+        view.prepare(seen, standing[:, :2], standing[:, 2], [Appearance.unknown()], np.array([0.3])),
+        np.zeros((1, 4)),
+    )
+    frame.fill_axes(standing[:, :2], True, axes)
+    assert abs(axes[0, :3] @ np.append(standing[0, :2], 1.0)) < 0.05
+    assert axes[0, 3] > 0.5

@@ -1,0 +1,328 @@
+"""Rigs from people who walk: each part by itself, then the whole way and what it refuses."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from walking import Walking, changed, delayed, walking
+
+from stseg.arrays import Floats, Singles
+from stseg.calibration.adjusted_rig import cameras_of, centred, distance_factor, grid_of, offsets_of, reports_of, scaled
+from stseg.calibration.automatic.auto import calibrate_from_people, sharpen_by_floor
+from stseg.calibration.automatic.auto_diagnosis import require_merged
+from stseg.calibration.automatic.correspondence import match_endpoints
+from stseg.calibration.automatic.endpoint_paths import path_of
+from stseg.calibration.automatic.endpoints import Endpoints, upright_endpoints
+from stseg.calibration.automatic.single_view import view_of_upright
+from stseg.calibration.automatic.solution import Solution, refine
+from stseg.calibration.automatic.view_alignment import ViewPaths, align, mirrored
+from stseg.calibration.automatic.view_merging import align_all, merge_views
+from stseg.calibration.bundle_adjustment import residuals
+from stseg.calibration.pinhole import SIZE, as_camera, height_of_head, looking, moved, on_plane, project
+from stseg.commands.calibrate.auto import calibrate_auto
+from stseg.errors import ConfigError, SourceError
+from stseg.io.recording.rigs import read_rig
+
+IMAGE = (480, 360)
+
+
+def a_view(focal: float = 0.8, pitch: float = 0.4, roll: float = 0.05, k1: float = -0.2) -> Floats:
+    view = np.zeros(SIZE)
+    view[0], view[3], view[4] = np.log(focal), k1, 0.03
+    view[5:8], view[8:11] = looking(pitch, roll), (0.5, -5.0, 2.8)
+    return view
+
+
+def pixels(view: Floats, points: Floats) -> Floats:
+    many = np.ones(len(points))
+    return project(np.tile(view, (len(points), 1)), many * IMAGE[0], many * IMAGE[1], points)
+
+
+SPOTS = np.array([[0.0, 0.0, 0.0], [1.5, 0.5, 1.7], [-1.0, 1.0, 0.9], [0.3, -1.0, 1.7]])
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.floats(0.5, 1.5), st.floats(0.15, 0.7), st.floats(-0.1, 0.1), st.floats(-0.35, 0.1))
+def test_a_pinhole_shows_what_its_camera_shows(focal: float, pitch: float, roll: float, k1: float) -> None:
+    view = a_view(focal, pitch, roll, k1)
+    shown, _ = as_camera(view, "a", IMAGE).project(SPOTS[:, :2], SPOTS[:, 2])
+    np.testing.assert_allclose(pixels(view, SPOTS), shown, atol=1e-6)
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.floats(-3, 3), st.floats(0.5, 2.0))
+def test_a_moved_camera_shows_the_moved_world_as_before(turn: float, scale: float) -> None:
+    view = a_view()
+    about = np.array([[np.cos(turn), -np.sin(turn), 0], [np.sin(turn), np.cos(turn), 0], [0, 0, 1]])
+    world = scale * SPOTS @ about.T + [1.0, -2.0, 0.0]
+    np.testing.assert_allclose(
+        pixels(moved(view, turn, np.array([1.0, -2.0]), scale), world), pixels(view, SPOTS), atol=1e-6
+    )
+
+
+def test_the_ground_and_heights_come_back_from_pixels() -> None:
+    view = a_view()
+    ground = np.array([[0.0, 0.0], [1.0, 0.5], [-1.5, 1.0]])
+    low = pixels(view, np.column_stack([ground, np.zeros(3)]))
+    np.testing.assert_allclose(on_plane(view, IMAGE, low, 0.0), ground, atol=1e-6)
+    high = pixels(view, np.column_stack([ground, [1.5, 1.7, 1.9]]))
+    np.testing.assert_allclose(height_of_head(view, IMAGE, high, ground), [1.5, 1.7, 1.9], atol=1e-6)
+
+
+def painted(*bodies: tuple[float, float, float, float]) -> Singles:
+    """A likelihood map (180, 240) of lines with round endpoints from foot to head, 15 pixels wide."""
+    image = np.zeros((180, 240), np.uint8)
+    for u0, v0, u1, v1 in bodies:
+        cv2.line(image, (int(u0), int(v0)), (int(u1), int(v1)), 255, 15)
+    return np.asarray(image, np.float32) / np.float32(255)
+
+
+def test_ends_of_one_who_stands_free() -> None:
+    ((foot, head),) = upright_endpoints(painted((100, 150, 110, 80)))
+    np.testing.assert_allclose(foot, [99, 157.5], atol=2)
+    np.testing.assert_allclose(head, [111, 72.5], atol=2)
+
+
+@pytest.mark.parametrize(
+    "bodies",
+    [
+        [],
+        [(100, 179, 100, 120)],  # cut by the border
+        [(100, 150, 100, 80), (121, 150, 121, 80)],  # too near to each other
+        [(60, 100, 130, 100)],  # lies
+        [(100, 105, 100, 95)],  # no body
+    ],
+)
+def test_who_is_not_whole_free_and_upright_has_no_ends(bodies: list[tuple[float, float, float, float]]) -> None:
+    assert upright_endpoints(painted(*bodies)).shape == (0, 2, 2)
+
+
+def test_paths_end_where_two_could_be_meant() -> None:
+    frame = np.repeat(np.arange(20), 2)
+    near = np.abs(np.arange(20) - 10.0)[:, None] * [5.0, 0.0] + [0.0, 200.0]
+    foot = np.array([300, 0]) + np.stack([near, near * [-1, 1]], 1).reshape(-1, 2)
+    endpoints = Endpoints(frame, foot, foot - [0, 60])
+    path = path_of(endpoints, 10.0).reshape(20, 2)
+    assert len(set(path[:7, 0])) == len(set(path[:7, 1])) == 1
+    assert not set(path[:7].ravel()) & set(path[14:].ravel())
+
+
+def some_walks(seed: int = 0) -> ViewPaths:
+    scene = walking(2, 2, 30.0, seed)
+    endpoints = scene.views.endpoints[0]
+    ground = scene.rig.cameras[0].back_project(endpoints.foot)
+    return ViewPaths(endpoints.frame, ground[:, 0] + 1j * ground[:, 1], path_of(endpoints, 5.0))
+
+
+@settings(max_examples=3, deadline=None)
+@given(st.floats(-3, 3), st.integers(-8, 8))
+def test_views_are_aligned_by_turn_shift_and_delay(turn: float, delay: int) -> None:
+    a = some_walks()
+    b = ViewPaths(a.frame + delay, np.exp(1j * turn) * a.place + 2 - 1j, a.path)
+    best = align(a, b, 5.0, 10)[0]
+    assert best.delay == delay and best.support > 0.9 * len(a.frame)
+    assert abs(best.factor - np.exp(1j * turn)) < 0.02 and abs(best.shift - (2 - 1j)) < 0.05
+    assert align(a, mirrored(b), 5.0, 10)[0].support < 0.6 * best.support
+
+
+def test_meetings_join_one_row_a_view_and_follow_people() -> None:
+    frame = np.arange(12)
+    pixel = np.zeros((12, 2))
+    endpoints = [Endpoints(frame + late, pixel, pixel - [0, 50]) for late in (0, 3)]
+    ground = np.stack([0.2 * frame, np.zeros(12)], 1)
+    met = match_endpoints(endpoints, np.array([0, 3]), [ground, ground + 0.1], 0.4, 5.0)
+    assert len(met.frame) == 12 and len(met.view) == 24 and set(met.person) == {0}
+    np.testing.assert_allclose(met.velocity[1:-1], np.tile([1.0, 0.0], (10, 1)))
+    assert len(match_endpoints(endpoints, np.array([0, 3]), [ground, ground + 1.0], 0.4, 5.0).frame) == 0
+
+
+def test_one_view_knows_its_lens_and_height_from_upright_people() -> None:
+    scene = walking(1, 3, 40.0, noise=0.0)
+    camera = scene.rig.cameras[0]
+    view, miss = view_of_upright(scene.views.endpoints[0], camera.size, 1.7)
+    assert camera.lens is not None
+    assert np.exp(view[0]) * camera.size[0] == pytest.approx(camera.lens.matrix[0, 0], rel=0.15)
+    assert view[10] == pytest.approx(camera.centre[2], rel=0.1)
+    assert miss < 0.05
+
+
+DELAYS = [0, 4, -3]
+
+
+@pytest.fixture(scope="module")
+def scene() -> Walking:
+    return delayed(walking(), DELAYS)
+
+
+@pytest.fixture(scope="module")
+def solution(scene: Walking) -> Solution:
+    return calibrate_from_people(NAMES, scene.views, lambda: None)
+
+
+NAMES = ["a", "b", "c"]
+
+
+def ground_errors(scene: Walking, solution: Solution) -> tuple[Floats, float]:
+    """Errors on the ground after the best similarity, metres, and its scale."""
+    shown, true = [], []
+    for camera, made in zip(scene.rig.cameras, cameras_of(solution, NAMES), strict=True):
+        ground = scene.rig.grid.ground[::6, ::6].reshape(-1, 2)
+        pixel, ahead = camera.project(ground, 0.0)
+        seen = ahead & camera.inside(pixel)
+        true.append(ground[seen] @ [1, 1j])
+        shown.append(made.back_project(pixel[seen]) @ [1, 1j])
+    x, y = np.concatenate(shown), np.concatenate(true)
+    factor = np.vdot(x - x.mean(), y - y.mean()) / np.vdot(x - x.mean(), x - x.mean())
+    return np.abs(factor * (x - x.mean()) - (y - y.mean())), float(abs(factor))
+
+
+def test_the_whole_way_finds_cameras_clocks_and_scale(scene: Walking, solution: Solution) -> None:
+    assert (solution.delay - solution.delay[0]).tolist() == DELAYS
+    assert offsets_of(solution).tolist() == [-3, -7, 0]
+    error, scale = ground_errors(scene, solution)
+    assert np.median(error) < 0.05 and np.percentile(error, 95) < 0.10
+    assert scale == pytest.approx(1.0, abs=0.02)
+
+
+def test_focal_lengths_are_as_near_as_they_say(scene: Walking, solution: Solution) -> None:
+    for camera, report in zip(scene.rig.cameras, reports_of(solution), strict=True):
+        assert camera.lens is not None
+        assert abs(report.focal - camera.lens.matrix[0, 0]) < 4 * report.focal_spread + 1
+        assert 0 < report.centre_spread < 0.5 and report.foot_pixels < 4 and report.observations > 100
+
+
+def test_the_grid_holds_those_who_walked(solution: Solution) -> None:
+    grid, points = grid_of(solution, 0.1), solution.adjustment.parameters.points
+    for axis, (low, high) in enumerate((grid.x, grid.y)):
+        assert low < np.percentile(points[:, axis], 2) and np.percentile(points[:, axis], 98) < high
+
+
+def test_a_bare_floor_changes_nothing(scene: Walking, solution: Solution) -> None:
+    bare = [np.full((height, width, 3), 120, np.uint8) for width, height in scene.views.sizes]
+    same, marks = sharpen_by_floor(scene.views, solution, bare)
+    assert marks == 0 and same is solution
+
+
+def test_a_turned_and_scaled_solution_misses_what_it_missed(solution: Solution) -> None:
+    turned = scaled(centred(solution), 1.3)
+    for one in (solution, turned):
+        np.testing.assert_allclose(
+            residuals(one.adjustment.parameters, one.problem), solution.adjustment.residual, atol=2e-3
+        )
+
+
+def test_a_delay_that_is_a_frame_wrong_is_mended(scene: Walking, solution: Solution) -> None:
+    wrong = solution.delay + np.array([0, 0, 1])
+    again = refine(scene.views, solution.adjustment.parameters.views.copy(), wrong, lambda: None)
+    assert (again.delay - again.delay[0]).tolist() == DELAYS
+
+
+def test_a_known_distance_fixes_the_scale(solution: Solution) -> None:
+    pixel = np.array([[150.0, 250.0], [300.0, 260.0]])
+    larger = scaled(solution, distance_factor(solution, 1, pixel, 3.0))
+    assert distance_factor(larger, 1, pixel, 3.0) == pytest.approx(1.0)
+    factor = larger.adjustment.parameters.points[0, 2] / solution.adjustment.parameters.points[0, 2]
+    spread = [reports_of(one)[0].centre_spread for one in (solution, larger)]
+    assert spread[1] == pytest.approx(factor * spread[0])
+
+
+def true_walks(scene: Walking) -> list[ViewPaths]:
+    """People on the ground that the true cameras have them on."""
+    paths = []
+    for camera, endpoints in zip(scene.rig.cameras, scene.views.endpoints, strict=True):
+        ground = camera.back_project(endpoints.foot)
+        paths.append(ViewPaths(endpoints.frame, ground[:, 0] + 1j * ground[:, 1], path_of(endpoints, 5.0)))
+    return paths
+
+
+def judge(paths: list[ViewPaths]) -> None:
+    require_merged(NAMES, paths, merge_views(paths, align_all(paths, 5.0, 10, lambda: None)), 5.0, 10)
+
+
+def test_views_of_the_same_people_are_let_pass(scene: Walking) -> None:
+    judge(true_walks(scene))
+
+
+def test_another_time_is_named(scene: Walking) -> None:
+    paths = true_walks(scene)
+    paths[2] = replace(paths[2], frame=paths[2].frame + 500)
+    with pytest.raises(SourceError, match=r"^c: .* at the same time"):
+        judge(paths)
+
+
+def test_a_mirrored_view_is_named(scene: Walking) -> None:
+    paths = true_walks(scene)
+    paths[1] = mirrored(paths[1])
+    with pytest.raises(SourceError, match=r"^b: .* mirror"):
+        judge(paths)
+
+
+def test_people_who_stay_and_people_who_are_few_are_named(scene: Walking) -> None:
+    endpoints = scene.views.endpoints[0]
+    still = Endpoints(endpoints.frame, 0 * endpoints.foot + [200, 300], 0 * endpoints.head + [200, 200])
+    with pytest.raises(SourceError, match=r"^a: .* stay in one place"):
+        calibrate_from_people(NAMES, changed(scene, 0, still).views, lambda: None)
+    with pytest.raises(SourceError, match=r"^a: found 10 isolated people"):
+        calibrate_from_people(NAMES, changed(scene, 0, endpoints.of(np.arange(10))).views, lambda: None)
+
+
+def film(path: Path, endpoints: Endpoints, frames: int) -> None:
+    """A lossless video of masks in which bodies are thick lines."""
+    writer = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, cv2.VideoWriter.fourcc(*"FFV1"), 5.0, IMAGE, False)
+    for frame in range(frames):
+        image = np.zeros(IMAGE[::-1], np.uint8)
+        for k in np.flatnonzero(endpoints.frame == frame):
+            wide = round(0.2 * float(endpoints.length[k]))
+            inwards = (endpoints.foot[k] - endpoints.head[k]) / endpoints.length[k] * wide / 2
+            low, high = (
+                np.rint(endpoints.foot[k] - inwards).astype(int),
+                np.rint(endpoints.head[k] + inwards).astype(int),
+            )
+            cv2.line(image, low.tolist(), high.tolist(), 255, wide)
+        writer.write(image)
+    writer.release()
+
+
+def test_the_command_makes_a_rig_of_videos(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    scene = walking(2, 2, 40.0)
+    videos = [tmp_path / "a.avi", tmp_path / "b.avi"]
+    for video, endpoints in zip(videos, scene.views.endpoints, strict=True):
+        film(video, endpoints, 200)
+    output = tmp_path / "rig.toml"
+    distance = "a,150,250,300,260,3"
+    calibrate_auto(*videos, output=output, frame_rate=5.0, source_kind="masks", most_delay=0.0, distance=distance)
+    recording = read_rig(output)
+    assert [camera.name for camera in recording.rig.cameras] == ["a", "b"]
+    ground = recording.rig.cameras[0].back_project(np.array([[150.0, 250.0], [300.0, 260.0]]))
+    assert np.linalg.norm(ground[1] - ground[0]) == pytest.approx(3.0, abs=0.01)
+    assert "scale: by the distance given" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"distance": "z,1,2,3,4,5"}, "camera,u,v,u,v,metres with a camera of a, b"),
+        ({"distance": "a,1,2,1,2,5"}, "two different pixels"),
+        ({"frame_rate": 0.0}, "--frame-rate"),
+        ({"frames": "9:3"}, "--frames"),
+    ],
+)
+def test_wrong_options_are_named(tmp_path: Path, options: dict[str, str | float], message: str) -> None:
+    for name in ("a", "b"):
+        film(tmp_path / f"{name}.avi", walking(1, 1, 2.0).views.endpoints[0], 3)
+    given = {"frame_rate": 5.0, "source_kind": "masks", **options}
+    with pytest.raises(ConfigError, match=message):
+        calibrate_auto(tmp_path / "a.avi", tmp_path / "b.avi", output=tmp_path / "rig.toml", **given)  # type: ignore[arg-type]
+
+
+def test_videos_need_different_names_and_more_than_one(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="two or more, with different names"):
+        calibrate_auto(tmp_path / "a.avi", output=tmp_path / "rig.toml", frame_rate=5.0)
+    with pytest.raises(SourceError, match="no such file"):
+        calibrate_auto(tmp_path / "a.avi", tmp_path / "b.avi", output=tmp_path / "rig.toml", frame_rate=5.0)

@@ -1,0 +1,230 @@
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from walkabout import SIZE, exchanged, moved, ring, shown, walkers
+
+from stseg.arrays import Boxes, Floats
+from stseg.calibration.check.blunders import match_frames
+from stseg.calibration.check.box_correspondence import tables_of
+from stseg.calibration.check.isolated_boxes import isolated_boxes
+from stseg.calibration.check.leave_one_out import locate
+from stseg.calibration.check.rig_check import Check, check_rig, verdict_text
+from stseg.calibration.coverage import coverage
+from stseg.commands.calibrate.app import app
+from stseg.errors import ConfigError, OutputError
+from stseg.foreground.view_foreground import ViewForeground
+from stseg.geometry import Rig
+from stseg.io.recording.frames import open_frames
+from stseg.io.recording.recording import CameraSource, Recording, Source
+from stseg.io.recording.rigs import read_rig, write_rig
+from stseg.report.pictures.ground_grid import grid_picture
+
+DATA = Path(os.environ.get("STSEG_DATA", Path(__file__).parents[2] / "../shared/data"))
+RIG = ring()
+WALK = walkers(40)
+SHOWN = shown(RIG, WALK)
+
+
+def judged(rig: Rig, boxes: dict[int, list[Floats]] | None = None) -> tuple[Check, list[str]]:
+    check = check_rig(rig, SHOWN if boxes is None else boxes)
+    return check, verdict_text(rig, check)
+
+
+class TestSightings:
+    def test_blobs_are_boxed_and_noise_is_not(self) -> None:
+        likelihood = np.full((480, 640), 0.02, np.float32)
+        likelihood[100:300, 50:110] = 0.99
+        likelihood[400:403, 600:603] = 0.99
+        np.testing.assert_array_equal(isolated_boxes(likelihood, SIZE), [[49.5, 99.5, 109.5, 299.5]])
+
+    def test_boxes_are_edges(self) -> None:
+        boxes = Boxes(np.array([[10.0, 20.0, 30.0, 90.0]]), np.ones(1))
+        np.testing.assert_array_equal(isolated_boxes(boxes, SIZE), [[10, 20, 40, 110]])
+        assert isolated_boxes(None, SIZE).shape == (0, 4)
+
+
+class TestBystanders:
+    def test_people_are_found_where_they_walk(self) -> None:
+        tables = tables_of(RIG)
+        people = match_frames(RIG, tables, SHOWN, range(0, 40, 4))
+        assert 0.8 * 30 <= len(people) <= 33
+        placed = locate(people, tables, range(4), 2)
+        true = WALK[people.frame]
+        off = np.hypot(*np.moveaxis(true[..., :2] - placed.ground[:, None], -1, 0)).min(axis=1)
+        assert np.median(off) < 0.03 and np.quantile(off, 0.9) < 0.1
+        assert people.seen.sum(axis=1).mean() > 3
+
+    def test_nobody_is_found_in_nothing(self) -> None:
+        people = match_frames(RIG, tables_of(RIG), {0: [np.zeros((0, 4))] * 4}, [0])
+        assert len(people) == 0 and people.box.shape == (0, 4, 4)
+
+
+class TestVerdict:
+    def test_a_sound_rig_is_called_sound(self) -> None:
+        check, (words,) = judged(RIG)
+        assert check.sound
+        assert words.startswith("the views agree: none is off by more than a cell (10 cm)")
+
+    @pytest.mark.parametrize(
+        ("view", "kind", "amount"),
+        [
+            (0, "x", 0.4),
+            (1, "y", -0.4),
+            (2, "u", 30.0),
+            (1, "z", 0.25),
+            (0, "yaw", 14.0),
+        ],
+    )
+    def test_the_camera_that_is_off_is_named(self, view: int, kind: str, amount: float) -> None:
+        check, words = judged(moved(RIG, view, kind, amount))
+        assert [one.view for one in check.verdict.named] == [view]
+        assert words[0].startswith(f"cam{view + 1} is off: of ")
+        assert not check.delays and check.swapped is None
+
+    def test_by_how_much(self) -> None:
+        check, words = judged(moved(RIG, 2, "u", 30.0))
+        (one,) = check.verdict.named
+        assert one.pixels == pytest.approx(30.0, rel=0.2)
+        assert one.right < -0.2, "the rig says further right, so people show to the left"
+        assert "to the left" in words[0] and " px" in words[0]
+
+    def test_two_that_are_off_are_named(self) -> None:
+        rig = ring(6)
+        boxes = shown(rig, WALK[:30])
+        check, _ = judged(moved(moved(rig, 1, "u", 35.0), 4, "z", 0.3), boxes)
+        assert {one.view for one in check.verdict.named} == {1, 4}
+
+    def test_of_two_nobody_is_to_blame(self) -> None:
+        rig = replace(RIG, cameras=RIG.cameras[:2])
+        boxes = {frame: views[:2] for frame, views in SHOWN.items()}
+        assert judged(rig, boxes)[0].sound
+        check, words = judged(moved(rig, 0, "z", 0.4), boxes)
+        assert check.verdict.unresolved is not None and not check.verdict.named
+        assert "two views alone do not tell" in words[0]
+
+    def test_too_few_people(self) -> None:
+        _, words = judged(RIG, {frame: SHOWN[frame] for frame in range(4)})
+        assert words == ["too few people stand alone before cam1, cam2, cam3, cam4 to judge (fewer than 20)"]
+
+
+class TestBlunders:
+    @pytest.mark.parametrize(("first", "second"), [(0, 1), (1, 3)])
+    def test_swapped_streams_are_named(self, first: int, second: int) -> None:
+        check, words = judged(exchanged(RIG, first, second))
+        assert check.swapped == (first, second)
+        assert (
+            words[0]
+            == f"cam{first + 1} and cam{second + 1} seem to be swapped: their frames fit far better the other way round"
+        )
+
+    @pytest.mark.parametrize(("view", "frames"), [(0, 2), (2, -3)])
+    def test_a_late_stream_is_named(self, view: int, frames: int) -> None:
+        nothing = [np.zeros((0, 4))] * 4
+        boxes = {
+            frame: [SHOWN.get(frame - frames, nothing)[k] if k == view else own for k, own in enumerate(views)]
+            for frame, views in SHOWN.items()
+        }
+        check, words = judged(RIG, boxes)
+        assert [(one.view, one.frames) for one in check.delays] == [(view, frames)]
+        side = "late" if frames > 0 else "early"
+        assert words == [f"cam{view + 1} runs {abs(frames)} frames {side}: add {-frames} to its offset in the rig file"]
+
+    def test_a_stream_of_something_else_is_named(self) -> None:
+        elsewhere = shown(RIG, walkers(40, 3, seed=77))
+        boxes = {frame: [*views[:3], elsewhere[frame][3]] for frame, views in SHOWN.items()}
+        check, words = judged(RIG, boxes)
+        assert 3 in check.lost
+        assert any("cam4 shows only" in sentence for sentence in words)
+
+
+def test_coverage_counts_views() -> None:
+    seen = coverage(RIG)
+    assert seen.shape == RIG.grid.shape and seen.max() == 4
+    camera = RIG.cameras[0]
+    alone = coverage(replace(RIG, cameras=(camera,)))
+    pixel, ahead = camera.project(RIG.grid.ground[10, 20], 0.0)
+    assert alone[0, 10, 20] == int(ahead and camera.inside(pixel))
+
+
+def test_the_grid_is_drawn_where_the_ground_is() -> None:
+    plain = grid_picture(RIG.cameras[0], replace(RIG.grid, x=(90.0, 95.0), y=(90.0, 95.0)), None, 0, 640)
+    drawn = grid_picture(RIG.cameras[0], RIG.grid, None, 0, 640)
+    changed = (plain != drawn).any(axis=-1)
+    u, v = RIG.cameras[0].project(np.array([2.5, 0.3]), 0.0)[0].round().astype(int)
+    assert changed[v - 2 : v + 3, u - 2 : u + 3].any(), "the border of the area"
+
+
+class TestCommand:
+    @pytest.fixture
+    def rig_file(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+        monkeypatch.chdir(tmp_path)
+        sources = []
+        for k, camera in enumerate(RIG.cameras):
+            lines = ["frame,left,top,width,height"]
+            for frame, views in SHOWN.items():
+                lines += [f"{frame},{a:.2f},{b:.2f},{c - a:.2f},{d - b:.2f}" for a, b, c, d in views[k]]
+            Path(f"{camera.name}.csv").write_text("\n".join(lines))
+            sources.append(CameraSource(Source("boxes", Path(f"{camera.name}.csv"), frames=40)))
+        write_rig("room.toml", Recording(Path("room.toml"), moved(RIG, 2, "u", 30.0), tuple(sources)))
+        return Path("room.toml")
+
+    def check(self, *tokens: str) -> None:
+        app(["check", *tokens], exit_on_error=False, print_error=False, result_action="return_value")
+
+    def test_verdict_page_and_pictures(self, rig_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        self.check(str(rig_file), "-o=check.html", "--pictures=shots")
+        printed = capsys.readouterr().out
+        assert "cam3 is off: of " in printed and "it shows camera frames" in printed
+        assert sorted(path.name for path in Path("shots").iterdir()) == [
+            "coverage.png", *(f"grid_cam{k}.png" for k in (1, 2, 3, 4))
+        ]  # fmt: skip
+        page = Path("check.html").read_text()
+        assert "cam3 is off" in page and page.count("<img") == 5
+        with pytest.raises(OutputError, match=r"check.html: found a file that exists"):
+            self.check(str(rig_file), "-o=check.html")
+
+    def test_as_json_of_some_frames(self, rig_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        self.check(str(rig_file), "--json", "--frames=4:40")
+        found = json.loads(capsys.readouterr().out)
+        assert found["off"] == ["cam3"] and not found["sound"]
+        assert set(found["views"]) == {"cam1", "cam2", "cam3", "cam4"}
+        with pytest.raises(ConfigError, match=r"--frames: found '9'"):
+            self.check(str(rig_file), "--frames=9")
+
+
+class TestRealRigs:
+    """The rigs of the data sets are right; with one camera moved, that camera is named."""
+
+    @staticmethod
+    def uu4(frames: int) -> tuple[Rig, dict[int, list[Floats]]]:
+        folder = (DATA / "uu4").resolve()
+        if not folder.is_dir():
+            pytest.skip("the data set uu4 is not here: set STSEG_DATA to its parent folder")
+        names = sorted(str(path) for path in folder.glob("cam?/config.xml"))
+        source = (f"--source-pattern={folder}/{{name}}/foreground_cropped.avi", "--source-kind=masks", "-o=real.toml")
+        app(
+            ["import", "opencv", *names, "--size=644,486", "--area=-2.5,-4.5,2.5,1.5", "--frame-rate=5", *source],
+            exit_on_error=False, print_error=False, result_action="return_value",
+        )  # fmt: skip
+        recording = read_rig("real.toml")
+        boxes = {}
+        with open_frames(recording, 0, frames) as moments:
+            for moment in moments:
+                maps = [ViewForeground().evidence(view) for view in moment.views]
+                boxes[moment.frame] = [isolated_boxes(one, (644, 486)) for one in maps]
+        return recording.rig, boxes
+
+    def test_uu4(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr("test_calibrate_check.DATA", DATA.resolve())
+        monkeypatch.chdir(tmp_path)
+        rig, boxes = self.uu4(80)
+        assert judged(rig, boxes)[0].sound
+        for view in (3,):
+            check, _ = judged(moved(rig, view, "z", 0.2), boxes)
+            assert [one.view for one in check.verdict.named] == [view]

@@ -1,0 +1,248 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from scenes import looking
+from strategies import BARREL, Pose, poses
+
+from stseg.arrays import Floats
+from stseg.calibration.points.point_fit import PointFit, Points, fit_points
+from stseg.commands.calibrate.app import app
+from stseg.commands.calibrate.points import warnings
+from stseg.errors import CalibrationError, ConfigError, FormatError, InputError
+from stseg.geometry import Camera, Grid
+from stseg.geometry.fits import fit_homography, focal_of_square_pixels, middle_matrix, vertical_of_matrix
+from stseg.io.calibrations.point_files import read_points
+from stseg.io.recording.rigs import read_rig
+
+SIZE = (640, 480)
+GRID = Grid((-2.0, 2.0), (-2.0, 2.0))
+SPREAD = np.array([[-1.5, -1.5], [1.5, -1.4], [1.4, 1.5], [-1.5, 1.3], [0.2, 0.1], [-0.6, 0.9], [0.9, -0.5]])
+DOOR = np.array([[-1.5, -1.5], [1.5, -1.4], [0.9, -0.5]])
+
+
+def camera(turn: float = 0.7, distortion: tuple[float, ...] | None = None) -> Camera:
+    place = (5 * np.cos(turn), 5 * np.sin(turn), 2.6)
+    return looking("cam", place, (0.1, 0.0, 0.3), SIZE, 520.0, distortion)
+
+
+def seen(view: Camera, ground: Floats = SPREAD, high: Floats | None = DOOR) -> Points:
+    """Points on the ground, and others two metres above it."""
+    high = np.zeros((0, 2)) if high is None else high
+    place = np.concatenate([ground, high])
+    height = np.concatenate([np.zeros(len(ground)), np.full(len(high), 2.0)])
+    return Points(view.project(place, height)[0], place, height)
+
+
+def fit(points: Points, view: Camera) -> PointFit:
+    return fit_points("cam", SIZE, points, view.lens)
+
+
+def off(found: Camera, true: Camera) -> float:
+    """Largest distance in the image over the area and a body's height, pixels."""
+    ground = np.stack(np.meshgrid(np.linspace(-2, 2, 5), np.linspace(-2, 2, 5)), -1)
+    apart = [found.project(ground, z)[0] - true.project(ground, z)[0] for z in (0.0, 0.9, 1.8)]
+    return float(np.abs(apart).max())
+
+
+class TestFit:
+    @pytest.mark.parametrize("distortion", [None, BARREL])
+    @pytest.mark.parametrize("high", [DOOR, None])
+    def test_exact_points_give_the_camera_back(self, distortion: tuple[float, ...] | None, high: Floats | None) -> None:
+        true = camera(distortion=distortion)
+        found = fit(seen(true, high=high), true)
+        assert off(found.camera, true) < 1e-4
+        assert found.vertical_from == ("lens" if distortion else "square pixels")
+        assert found.off_pixel.max() < 1e-4 and np.nanmax(found.off_ground) < 1e-6
+        assert not found.out.any()
+
+    def test_a_camera_of_another_kind_is_told_by_points_above_the_ground(self) -> None:
+        square = camera()
+        matrix = np.array(
+            [[1.0, 0.0, 90.0], [0.0, 1.3, -60.0], [0.0, 0.0, 1.0]]
+        )  # a crop, and pixels that are not square
+        true = Camera.from_projection("cam", SIZE, matrix @ square.projection)
+        found = fit(seen(true), true)
+        assert found.vertical_from == "points" and off(found.camera, true) < 1e-3
+
+    @pytest.mark.parametrize("seed", range(6))
+    def test_errors_of_clicks_stay_what_they_are(self, seed: int) -> None:
+        true = camera()
+        points = seen(true)
+        lots = np.random.default_rng(seed)
+        noisy = Points(points.pixel + lots.normal(0, 1, points.pixel.shape), points.ground, points.height)
+        assert off(fit(noisy, true).camera, true) < 12
+
+    @pytest.mark.parametrize("wrong", range(7))
+    def test_one_wrong_point_is_pointed_out_and_does_no_harm(self, wrong: int) -> None:
+        true = camera()
+        ground = np.concatenate([SPREAD, [[0.5, 1.2], [-1.2, -0.3]]])
+        points = seen(true, ground)
+        pixel = points.pixel + np.random.default_rng(5).normal(0, 0.3, points.pixel.shape)
+        pixel[wrong] += (60.0, -45.0)
+        found = fit(Points(pixel, points.ground, points.height), true)
+        assert np.flatnonzero(found.out).tolist() == [wrong]
+        assert off(found.camera, true) < 6
+
+    def test_covariance_is_what_repeated_clicks_scatter_by(self) -> None:
+        true = camera()
+        points, lots = seen(true, high=None), np.random.default_rng(3)
+        places, told = [], []
+        target = np.array([[1.75, 1.75]])
+        pixel = true.project(target, 0.0)[0]
+        row, column = 37, 37
+        for _ in range(60):
+            noisy = Points(points.pixel + lots.normal(0, 1.5, points.pixel.shape), points.ground, points.height)
+            found = fit(noisy, true)
+            places.append(found.camera.back_project(pixel)[0])
+            told.append(found.ground_deviation(GRID)[row, column])
+        scatter = np.sqrt(np.linalg.eigvalsh(np.cov(np.array(places).T))[-1])
+        assert 0.6 < np.median(told) / scatter < 1.6
+
+
+class TestSpread:
+    def test_points_in_a_corner_are_warned_of(self) -> None:
+        true = camera()
+        corner = SPREAD * 0.15 + (-1.4, -1.4)
+        (words,) = warnings(fit(seen(true, corner, None), true), GRID)
+        assert "cam: its points are badly spread" in words and "add points there" in words
+        assert warnings(fit(seen(true), true), GRID) == []
+
+    def test_four_points_show_nothing(self) -> None:
+        words = warnings(fit(seen(camera(), SPREAD[:4]), camera()), GRID)
+        assert any("a fifth" in word for word in words)
+
+
+class TestSquarePixels:
+    @given(poses())
+    def test_focal_length_and_vertical_are_found(self, pose: Pose) -> None:
+        matrix = middle_matrix(pose.matrix[0, 0], SIZE)
+        projection = matrix @ np.column_stack([pose.rotation, pose.translation])
+        homography = fit_homography(SPREAD, Camera.from_projection("c", SIZE, projection).project(SPREAD, 0.0)[0])
+        focal = focal_of_square_pixels(homography, SIZE)
+        assert focal is not None and focal == pytest.approx(matrix[0, 0], rel=1e-4)
+        found = Camera("c", SIZE, homography, vertical_of_matrix(homography, middle_matrix(focal, SIZE)))
+        np.testing.assert_allclose(found.centre, -pose.rotation.T @ pose.translation, rtol=1e-3, atol=1e-3)
+
+    def test_straight_down_tells_nothing(self) -> None:
+        down = looking("cam", (0.0, 1e-9, 4.0), (0.0, 0.0, 0.0), SIZE, 300.0)
+        with pytest.raises(CalibrationError, match=r"leaves its focal length open.*two or more points with z"):
+            fit(seen(down, high=None), down)
+        assert off(fit(seen(down), down).camera, down) < 1e-3
+
+
+def swapped(points: Points, columns: str) -> Points:
+    pixel = points.pixel[:, ::-1] if columns == "uv" else points.pixel
+    ground = points.ground[:, ::-1] if columns == "xy" else points.ground
+    ground = ground * ((1, -1) if columns == "y down" else (1, 1))
+    return Points(pixel, ground, points.height)
+
+
+class TestWrongPoints:
+    @pytest.mark.parametrize("high", [DOOR, None])
+    @pytest.mark.parametrize("columns", ["xy", "y down", "uv"])
+    def test_a_mirrored_camera_is_named(self, columns: str, high: Floats | None) -> None:
+        with pytest.raises(CalibrationError, match=r"camera cam: points: found a mirrored ground"):
+            fit(swapped(seen(camera(), high=high), columns), camera())
+
+    @pytest.mark.parametrize(
+        ("ground", "complaint"),
+        [
+            (SPREAD[:3], r"3 on the ground"),
+            (np.array([[0.1 * k, 0.2 * k - 0.5] for k in range(6)]), r"points on one line on the ground"),
+            (
+                np.array([[0, -1.0], [0, 0], [0, 1], [0, 1.5], [1, 1]]),
+                r"points of which all but one lie on one line on the ground",
+            ),
+        ],
+    )
+    def test_points_that_fix_nothing_are_named(self, ground: Floats, complaint: str) -> None:
+        with pytest.raises(CalibrationError, match=rf"camera cam: points: found {complaint}"):
+            fit(seen(camera(), ground), camera())
+
+
+def table(path: Path, change: Callable[[str, list[float]], list[float]] = lambda _, row: row) -> Path:
+    """The points of four cameras as a CSV file."""
+    lines = ["camera,u,v,x,y,z"]
+    for name, turn in (("a", 0.7), ("b", 2.3), ("c", 3.9), ("d", 5.4)):
+        points = seen(camera(turn))
+        for (u, v), (x, y), z in zip(points.pixel, points.ground, points.height, strict=True):
+            lines.append(",".join([name, *(f"{cell:.3f}" for cell in change(name, [u, v, x, y, z]))]))
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def run(*tokens: str) -> None:
+    options = ("--size=640,480", "--area=-2,-2,2,2", "--frame-rate=25", "--source-pattern={name}.avi", "-o=room.toml")
+    app(["points", *tokens, *options], exit_on_error=False, print_error=False, result_action="return_value")
+
+
+class TestCommand:
+    @pytest.fixture(autouse=True)
+    def _here(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.chdir(tmp_path)
+
+    def test_points_make_a_rig(self, capsys: pytest.CaptureFixture[str]) -> None:
+        table(Path("p.csv"))
+        run("p.csv")
+        cameras = read_rig("room.toml").rig.cameras
+        assert [view.name for view in cameras] == ["a", "b", "c", "d"]
+        assert max(off(view, camera(turn)) for view, turn in zip(cameras, (0.7, 2.3, 3.9, 5.4), strict=True)) < 0.05
+        printed = capsys.readouterr().out
+        assert "off px" in printed and "off cm" in printed
+        assert "square pixels" in printed
+
+    def test_millimetres_are_named_and_taken(self) -> None:
+        table(Path("p.csv"), lambda _, row: [*row[:2], *(1000 * cell for cell in row[2:])])
+        with pytest.raises(CalibrationError, match=r"camera a: --unit m: found a camera 2600 m .*\(--unit mm\)"):
+            run("p.csv")
+        run("p.csv", "--unit=mm")
+        assert off(read_rig("room.toml").rig.cameras[0], camera(0.7)) < 0.05
+
+    def test_lenses_are_used(self) -> None:
+        lens = camera(distortion=BARREL).lens
+        assert lens is not None
+        nodes = (("camera_matrix", lens.matrix), ("distortion_coefficients", lens.distortion))
+        words = [f"<{name}>{' '.join(map(repr, values.ravel().tolist()))}</{name}>" for name, values in nodes]
+        Path("cam.xml").write_text(f"<opencv_storage>{''.join(words)}</opencv_storage>")
+        points = seen(camera(distortion=BARREL), high=None)
+        rows = [f"cam,{u},{v},{x},{y}" for (u, v), (x, y) in zip(points.pixel, points.ground, strict=True)]
+        Path("p.csv").write_text("\n".join(["camera,u,v,x,y", *rows]))
+        run("p.csv", "--lens={name}.xml")
+        assert off(read_rig("room.toml").rig.cameras[0], camera(distortion=BARREL)) < 0.01
+
+    @pytest.mark.parametrize(
+        ("text", "kind", "complaint"),
+        [
+            ("", FormatError, r"p.csv: header: found nothing, expected columns camera,u,v,x,y"),
+            ("camera,u,v,x,y\n", FormatError, r"p.csv: found no points"),
+            ("camera,u,v,x\na,1,2,3\n", FormatError, r"\(no y\)"),
+            ("camera,u,v,x,y\na,1,two,3,4\n", FormatError, r"line 2, column v: found 'two'"),
+            ("camera,u,v,x,y\na,1,2,3\n", FormatError, r"line 2, column y: found ''"),
+            ("camera,u,v,x,y\n,1,2,3,4\n", FormatError, r"line 2, column camera: found nothing"),
+            ("camera,u,v,x,y\na,1,2,3,4\n", CalibrationError, r"camera a: points: found 1 on the ground"),
+        ],
+    )
+    def test_says_what_to_mend(self, text: str, kind: type[InputError], complaint: str) -> None:
+        Path("p.csv").write_text(text)
+        with pytest.raises(kind, match=complaint):
+            run("p.csv")
+        assert not Path("room.toml").exists()
+
+    def test_a_lens_for_each_camera(self) -> None:
+        table(Path("p.csv"))
+        with pytest.raises(ConfigError, match=r"--lens: found 'lens.xml', expected a path with"):
+            run("p.csv", "--lens=lens.xml")
+
+
+def test_points_are_read_as_they_stand(tmp_path: Path) -> None:
+    path = tmp_path / "p.csv"
+    path.write_text("camera, u, v, x, y, z, note\nb,1,2,3,4,,floor\na,5,6,7,8,2.1,door\nb,9,8,7,6,0,floor\n")
+    first, second = read_points(path)
+    assert (first.camera, second.camera) == ("b", "a")
+    assert first.pixel.tolist() == [[1, 2], [9, 8]] and first.line.tolist() == [2, 4]
+    assert second.place.tolist() == [[7, 8, 2.1]]

@@ -1,0 +1,275 @@
+"""The command line: exit statuses, one line for what the user can mend, what `inspect` and `export` give."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from run_files import CONFIG, small_recording, small_trajectory, write_small_run
+
+import stseg
+from stseg.commands.inspect import event_counts_text
+from stseg.commands.main import COMMANDS, main
+from stseg.commands.run_overview import summarise_run
+from stseg.io.runfile.runs import RunWriter, read_run
+from stseg.io.track_csv import read_tracks_csv
+from stseg.records.tables import TRAJECTORY, Tracks
+
+
+@pytest.fixture
+def run_path(tmp_path: Path) -> Path:
+    return write_small_run(tmp_path / "night.h5")
+
+
+def stseg_process(*arguments: str) -> subprocess.CompletedProcess[str]:
+    program = "import sys; from stseg.commands.main import main; sys.exit(main())"
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    return subprocess.run(
+        [sys.executable, "-c", program, *arguments], capture_output=True, text=True, env=environment, check=False
+    )
+
+
+def silent_run(path: Path) -> Path:
+    """A run that found nobody and whose cells no view sees."""
+    recording = small_recording(path.parent)
+    with RunWriter(path, recording, np.zeros((3, 4, 6), np.uint8), CONFIG, overwrite=False) as writer:
+        volume = np.full((1, 3, 4, 6), np.nan, np.float32)
+        writer.append_frames(np.array([0]), volume, np.zeros(volume.shape, np.int32))
+        writer.finish(Tracks(np.zeros(0, TRAJECTORY)).summary())
+    return path
+
+
+# The command line
+
+
+def test_help_names_every_command_and_imports_none() -> None:
+    program = (
+        "import sys; from stseg.commands.main import main; main(['--help']);"
+        "print(*(name for name in ('numba', 'cv2', 'h5py', 'scipy') if name in sys.modules), file=sys.stderr)"
+    )
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    process = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, env=environment, check=True
+    )
+    assert process.stderr.strip() == ""
+    for command in COMMANDS:
+        assert f" {command} " in process.stdout
+
+
+def test_exit_statuses_of_the_program(run_path: Path, tmp_path: Path) -> None:
+    good = stseg_process("inspect", str(run_path))
+    assert (good.returncode, good.stderr) == (0, "")
+    bad = stseg_process("inspect", str(tmp_path / "none.h5"))
+    assert (bad.returncode, bad.stdout) == (2, "")
+    assert bad.stderr == f"stseg: error: {tmp_path / 'none.h5'}: found no such file, expected a run file\n"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["inspekt", "x.h5"], "command line: found 'inspekt', expected one of demo, run, inspect"),
+        (["inspect"], "RUN"),
+        (["inspect", "x.h5", "--jsn"], "--jsn"),
+        (["export", "x.h5", "--to", "docx", "-o", "x.docx"], "--to: found 'docx', expected one of csv, parquet, mot"),
+        (["--colour"], "--colour"),
+    ],
+)
+def test_slips_on_the_command_line_are_one_line(
+    arguments: list[str], told: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(arguments) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("stseg: error: ")
+    assert said.count("\n") == 1
+    assert told in said
+
+
+def test_a_misspelt_command_gets_a_suggestion(capsys: pytest.CaptureFixture[str]) -> None:
+    main(["inspekt"])
+    assert "did you mean inspect?" in capsys.readouterr().err
+
+
+def test_an_interrupt_is_one_line(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    def interrupted(_: Path) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("stseg.commands.inspect.read_run", interrupted)
+    assert main(["inspect", "x.h5"]) == 130
+    assert capsys.readouterr().err == "stseg: interrupted\n"
+
+
+def test_version_and_help_of_a_command(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out == f"{stseg.__version__}\n"
+    assert main(["export", "--help"]) == 0
+    assert "MOTChallenge" in capsys.readouterr().out  # the long text, not the line of the list
+
+
+@pytest.mark.skipif(os.name == "nt", reason="needs a shell's pipe")
+def test_a_reader_that_has_seen_enough_is_no_error(run_path: Path) -> None:
+    program = "import sys; from stseg.commands.main import main; sys.exit(main())"
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    command = [sys.executable, "-c", program, "inspect", "--json", str(run_path)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=environment) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        process.stdout.close()
+        assert process.stderr.read() == b""
+    assert process.returncode == 0
+
+
+# inspect
+
+
+def test_inspect_sums_up_a_run(run_path: Path) -> None:
+    overview = summarise_run(read_run(run_path))
+    assert (overview.frames, overview.first_frame, overview.last_frame, overview.seconds) == (6, 10, 15, 1.2)
+    assert (overview.people_mean, overview.people_most) == (1.5, 2)
+    assert [track["id"] for track in overview.tracks] == [1, 2]
+    assert overview.events == {"birth": 2}
+    assert (overview.candidates_per_frame, overview.ghosts_per_frame) == (3 / 6, 1 / 6)
+    assert overview.seconds_by_stage == {"cut": 3.0, "volume": 1.0}
+    assert list(overview.seconds_by_stage) == ["cut", "volume"]
+    assert (overview.windows, overview.frames_per_window) == (2, 3.0)
+    assert list(overview.rates) == ["left", "right"]
+    assert overview.rates["left"] == pytest.approx({"miss": 0.2, "clutter": 0.025, "beside": 0.4})
+    assert overview.bytes == run_path.stat().st_size
+    assert overview.warnings == ["view right has no evidence on any candidate: is it blind, or its calibration wrong?"]
+
+
+def test_inspect_counts_people_by_the_minute_and_says_why_ghosts_were_dropped(run_path: Path) -> None:
+    overview = summarise_run(read_run(run_path))
+    assert overview.people_per_minute == [1.5]
+    assert overview.track_seconds == pytest.approx({"shortest": 0.6, "median": 0.9, "longest": 1.2})
+    assert overview.ground_by_views == [0, 0, 1]
+    assert overview.ghost_reasons["a view sees nobody there"] == 1 == sum(overview.ghost_reasons.values())
+    assert overview.ghosts_denied_by == {"left": 1, "right": 0}
+
+
+def test_the_keys_of_the_json_are_documented(run_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["inspect", str(run_path), "--json"]) == 0
+    page = (Path(__file__).parents[2] / "docs" / "outputs.md").read_text("utf-8")
+    _, _, listed = page.partition("## What `stseg inspect --json` prints")
+    cells = re.findall(r"^\| (`.*?`) \|", listed, re.MULTILINE)
+    assert re.findall(r"`(\w+)`", " ".join(cells)) == list(json.loads(capsys.readouterr().out))
+
+
+def test_inspect_writes_a_slice(run_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pictures = []
+    texts = ("t=2.2,plane=0.9", "frame=11,plane=0.85", "t=2.4,plane=0.9", "t=2.2,plane=0", "frame=11,plane=all")
+    for k, text in enumerate(texts):
+        output = tmp_path / f"{k}.png"
+        assert main(["inspect", str(run_path), "--slice", text, "-o", str(output)]) == 0
+        pictures.append(output.read_bytes())
+    assert pictures[0] == pictures[1]
+    assert len(set(pictures)) == 4
+    assert all(picture.startswith(b"\x89PNG") for picture in pictures)
+    assert "0.png: frame 11 (2.20 s), 0.90 m" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["--slice", "t=4,plane=0.9"], "--slice t: found 4, expected seconds of the run, 2 to 3"),
+        (["--slice", "t=nan,plane=0.9"], "--slice t: found nan, expected seconds"),
+        (["--slice", "t=2,plane=7"], "--slice plane: found 7, expected a height in metres, 0 to 1.8, or all"),
+        (["--slice", "frame=9,plane=0"], "--slice frame: found 9, expected a frame of the run, 10 to 15"),
+        (["--slice", "t=now,plane=0"], "--slice t: found 'now', expected a number"),
+        (["--slice", "t=2"], "expected t=SECONDS or frame=NUMBER, and plane=METRES or plane=all"),
+        (["--slice", "t=2,t=2,plane=0"], "expected t=SECONDS"),
+    ],
+)
+def test_a_slice_out_of_range_is_told(
+    run_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], told: str
+) -> None:
+    assert main(["inspect", str(run_path), *arguments, "-o", str(tmp_path / "slice.png")]) == 2
+    assert told in capsys.readouterr().err
+    assert not (tmp_path / "slice.png").exists()
+
+
+def test_a_slice_needs_a_file_and_destroys_none(
+    run_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command = ["inspect", str(run_path), "--slice", "t=2,plane=0"]
+    assert main(command) == 2
+    assert "-o SLICE.png with it" in capsys.readouterr().err
+    assert main(["inspect", str(run_path), "-o", str(tmp_path / "a.png")]) == 2
+    (tmp_path / "old.png").write_text("precious")
+    assert main([*command, "-o", str(tmp_path / "old.png")]) == 2
+    assert (tmp_path / "old.png").read_text() == "precious"
+
+
+def test_inspect_on_a_screen(run_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["inspect", str(run_path)]) == 0
+    screen = capsys.readouterr().out
+    for said in ("hall", "10 to 15", "2 birth", "cut 3.0 s (75 %)", "warning: view right", "x 0 to 0.6 m"):
+        assert said in screen
+    assert re.search(r"left +20\.0 +2\.5 +40\.0 +1 *\n", screen)  # of each view, how it errs and what it denies
+
+
+def test_inspect_counts_a_merge_and_its_split_as_one_encounter() -> None:
+    assert event_counts_text({"birth": 3, "merge": 2, "split": 1}) == "3 birth, 2 encounter"
+
+
+def test_inspect_as_json(run_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["inspect", str(run_path), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["cameras"] == ["left", "right"]
+    assert found["tracks"][0]["frames"] == 6
+
+
+def test_inspect_warns_of_an_empty_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    overview = summarise_run(read_run(silent_run(tmp_path / "silent.h5")))
+    assert overview.warnings == ["no person was found", "no view sees any cell"]
+    assert main(["inspect", str(tmp_path / "silent.h5")]) == 0
+    assert "warning: no person was found" in capsys.readouterr().out
+
+
+# export
+
+
+def test_export_to_csv_reads_back(run_path: Path, tmp_path: Path) -> None:
+    assert main(["export", str(run_path), "--to", "csv", "-o", str(tmp_path / "tracks.csv")]) == 0
+    table = read_tracks_csv(tmp_path / "tracks.csv")
+    for name in ("frame", "id"):
+        np.testing.assert_array_equal(table[name], small_trajectory()[name])
+    np.testing.assert_allclose(table["x"], small_trajectory()["x"], atol=1e-4)
+
+
+def test_export_to_pedpy_and_mot(run_path: Path, tmp_path: Path) -> None:
+    assert main(["export", str(run_path), "--to", "pedpy", "-o", str(tmp_path / "tracks.txt")]) == 0
+    lines = (tmp_path / "tracks.txt").read_text().splitlines()
+    assert lines[:3] == ["# framerate: 5.00", "# id frame x/m y/m z/m", "1 10 0.1500 0.2000 0.0000"]
+    assert len(lines) == 2 + len(small_trajectory())
+    assert main(["export", str(run_path), "--to", "mot", "-o", str(tmp_path / "mot.txt")]) == 0
+    lines = (tmp_path / "mot.txt").read_text().splitlines()
+    assert lines[0] == "11,1,-1,-1,-1,-1,1,0.1500,0.2000,0.0000"
+    assert len(lines) == len(small_trajectory())
+
+
+def test_export_destroys_nothing(run_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    target = tmp_path / "tracks.csv"
+    target.write_text("precious")
+    command = ["export", str(run_path), "--to", "csv", "-o", str(target)]
+    assert main(command) == 2
+    assert "exists" in capsys.readouterr().err
+    assert target.read_text() == "precious"
+    assert main([*command, "--overwrite"]) == 0
+    assert target.read_text().startswith("frame,id,x,y")
+    assert main(["export", str(run_path), "--to", "csv", "-o", str(run_path), "--overwrite"]) == 2
+    assert "the run file itself" in capsys.readouterr().err
+    assert len(read_run(run_path).frames) == 6
+
+
+def test_evaluate_takes_a_run_file(run_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    truth = tmp_path / "truth.csv"
+    assert main(["export", str(run_path), "--to", "csv", "-o", str(truth)]) == 0
+    capsys.readouterr()
+    assert main(["evaluate", str(run_path), str(truth), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["MODA"] == 100

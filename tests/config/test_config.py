@@ -1,0 +1,281 @@
+"""The configuration: what is read comes back from its own text, what is wrong is named."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
+from typing import Any, Literal
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from stseg.commands.main import main
+from stseg.config import BodyConfig, Config
+from stseg.config.effect import require_effect
+from stseg.config.keys import USER_KEYS, describe, values
+from stseg.config.ranges import require
+from stseg.config.renamed import RENAMED
+from stseg.errors import ConfigError
+from stseg.io.config_file import describe_config, format_config, parse_config, read_config
+from stseg.io.toml.settings import Given, as_toml, build
+
+TOML = """
+[detection]
+prior_log_odds = -2    # a whole number is a number
+search_rounds = 3
+[body]
+heights = [1.5, 1.75]
+"""
+
+
+@dataclass(frozen=True)
+class Inner:
+    share: float = 0.5
+    pair: tuple[float, float] = (0.0, 1.0)
+    names: tuple[str, ...] = ()
+    limit: int | None = None
+
+    def __post_init__(self) -> None:
+        require(0 <= self.share <= 1, self, "share", "a share from 0 to 1")
+
+
+@dataclass(frozen=True)
+class Outer:
+    kind: Literal["masks", "boxes"] = "masks"
+    quick: bool = False
+    count: int = 3
+    inner: Inner = field(default_factory=Inner)
+
+
+def read(path: Path, text: str, *assignments: str) -> Config:
+    path.write_text(text)
+    return read_config(path, assignments)
+
+
+def wrapped(table: dict[str, Any]) -> dict[str, Any]:
+    return {
+        name: wrapped(value) if isinstance(value, dict) else Given(value, "file.toml") for name, value in table.items()
+    }
+
+
+def test_nothing_given_is_the_default() -> None:
+    assert read_config(None) == Config()
+
+
+def test_a_file_and_assignments_say_what_differs(tmp_path: Path) -> None:
+    config = read(
+        tmp_path / "c.toml",
+        TOML,
+        "detection.prior_log_odds=-1.5",
+        "detection.search_rounds = 5",
+        "detection.search_rounds=6",
+    )
+    expected = replace(Config().detection, prior_log_odds=-1.5, search_rounds=6)
+    assert config == replace(Config(), body=BodyConfig(heights=(1.5, 1.75)), detection=expected)
+    assert isinstance(read(tmp_path / "c.toml", TOML).detection.prior_log_odds, float)
+
+
+def test_the_resolved_text_reads_back_equal(tmp_path: Path) -> None:
+    config = read_config(None, ["detection.prior_log_odds=-1e-3", "body.heights=[1, 1.25]"])
+    text = format_config(config)
+    assert read(tmp_path / "c.toml", text) == config
+    table = tomllib.loads(text)
+    assert list(table) == [stage.name for stage in fields(Config)]
+    for stage in fields(Config):
+        assert list(table[stage.name]) == [key.name for key in fields(getattr(config, stage.name))]
+
+
+finite = st.floats(allow_nan=False, allow_infinity=False)
+
+
+@given(
+    st.builds(
+        Outer,
+        st.sampled_from(("masks", "boxes")),
+        st.booleans(),
+        st.integers(-(2**63), 2**63 - 1),
+        st.builds(
+            Inner,
+            st.floats(0, 1),
+            st.tuples(finite, finite),
+            st.lists(st.text(st.characters(exclude_categories=["Cs"]))).map(tuple),
+            st.none() | st.integers(0, 9),
+        ),
+    )
+)
+def test_any_settings_read_back_equal_from_their_text(settings: Outer) -> None:
+    assert build(Outer, wrapped(tomllib.loads(as_toml(settings))), "file.toml") == settings
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ({"kind": "maps"}, "kind: found 'maps', expected one of masks, boxes"),
+        ({"quick": 1}, "quick: found 1, expected true or false"),
+        ({"count": True}, "count: found True, expected a whole number"),
+        ({"count": 3.0}, "count: found 3.0, expected a whole number"),
+        ({"inner": {"share": "much"}}, "inner.share: found 'much', expected a finite number"),
+        ({"inner": {"share": 10**400}}, "expected a finite number"),
+        ({"inner": {"share": True}}, "inner.share: found True, expected a finite number"),
+        ({"inner": {"share": 1.5}}, "inner.share: found 1.5, expected a share from 0 to 1"),
+        ({"inner": {"pair": [1]}}, "inner.pair: found [1], expected a list of 2, each a finite number"),
+        ({"inner": {"names": ["a", 2]}}, "inner.names: found ['a', 2], expected a list, each a text"),
+        ({"inner": {"limit": "x"}}, "inner.limit: found 'x', expected a whole number"),
+        ({"inner": 3}, "inner: found 3, expected a table"),
+        ({"count": {"a": 3}}, "count: found a table, expected a whole number"),
+        ({"cuont": 3}, "cuont: found an unknown key, expected one of kind, quick, count, inner; did you mean count?"),
+        ({"inner": {"zzz": 3}}, "inner.zzz: found an unknown key, expected one of share, pair, names, limit"),
+    ],
+)
+def test_wrong_values_are_named_with_what_was_expected(table: dict[str, Any], message: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        build(Outer, wrapped(table), "file.toml")
+    assert str(caught.value).startswith("file.toml: ")
+    assert str(caught.value).endswith(message)
+
+
+@pytest.mark.parametrize(
+    ("assignment", "message"),
+    [
+        ("detection.persn=1", "--set: detection.persn: found an unknown key"),
+        ("detectoin.prior_log_odds=1", "did you mean detection?"),
+        ("detection.prior_log_odds", "--set: found 'detection.prior_log_odds', expected section.key=value"),
+        ("prior_log_odds=1", "expected section.key=value"),
+        ("detection.=1", "expected section.key=value"),
+        ("detection.prior_log_odds=high", "--set: detection.prior_log_odds: found 'high', expected a finite number"),
+        (
+            "detection.prior_log_odds=1\nx=2",
+            "--set: detection.prior_log_odds: found '1\\nx=2', expected a finite number",
+        ),
+        ("detection.prior_log_odds.x=1", "--set: detection.prior_log_odds: found a table"),
+        ("detection.prior_log_odds=nan", "--set: detection.prior_log_odds: found nan"),
+    ],
+)
+def test_wrong_assignments_name_the_option(tmp_path: Path, assignment: str, message: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        read(tmp_path / "c.toml", TOML, assignment)
+    assert message in str(caught.value)
+
+
+def test_a_fault_is_laid_where_the_value_was_given(tmp_path: Path) -> None:
+    path = tmp_path / "c.toml"
+    with pytest.raises(ConfigError, match=r"c\.toml: detection\.search_rounds: found 'x'"):
+        read(path, "[detection]\nsearch_rounds = 'x'", "detection.prior_log_odds=1")
+    with pytest.raises(ConfigError, match=r"c\.toml: found what is not TOML"):
+        read(path, "[detection\n")
+    with pytest.raises(ConfigError, match=r"c\.toml: found what is not TOML"):
+        path.write_bytes(b"# \xff")
+        read_config(path)
+    with pytest.raises(ConfigError, match=r"none\.toml: found No such file"):
+        read_config(tmp_path / "none.toml")
+
+
+@pytest.mark.parametrize(
+    ("former", "present"),
+    [("ghosts.person=1", "detection.prior_log_odds"), ("light.rise=1", "illumination.changed_share")],
+)
+def test_a_former_name_is_answered_with_the_present_one(tmp_path: Path, former: str, present: str) -> None:
+    with pytest.raises(
+        ConfigError, match=f"--set: {former.partition('=')[0]}: found a former name, expected {present}"
+    ):
+        read(tmp_path / "c.toml", TOML, former)
+
+
+def test_every_former_name_leads_to_a_present_key() -> None:
+    present = tomllib.loads(format_config(Config()))
+    for name in RENAMED.values():
+        table = present
+        for part in name.split("."):
+            table = table[part]
+
+
+def test_the_configuration_of_an_older_run_file_is_read_by_its_present_names() -> None:
+    assert parse_config("[ghosts]\nperson = -3.0\n", "run.h5").detection.prior_log_odds == -3.0
+
+
+def test_a_text_needs_no_quotes_in_an_assignment() -> None:
+    given_kind = build(Outer, {"kind": Given("boxes", "--set")}, "--set")
+    assert given_kind.kind == "boxes"
+
+
+@pytest.mark.parametrize("wrong", [{"width_mean": 0.05}, {"heights": (1.8, 1.7)}, {"heights": ()}])
+def test_bodies_without_meaning_are_refused(wrong: dict[str, Any]) -> None:
+    with pytest.raises(ConfigError, match=next(iter(wrong))):
+        BodyConfig(**wrong)
+
+
+# What is printed
+
+
+@pytest.mark.parametrize("expert", [False, True])
+@pytest.mark.parametrize("assignments", [(), ("foreground.model=codebook", "body.height_mean=1.2")])
+def test_the_printed_configuration_can_be_given_back(
+    tmp_path: Path, expert: bool, assignments: tuple[str, ...]
+) -> None:
+    config = read_config(None, assignments)
+    assert read(tmp_path / "c.toml", describe_config(config, expert=expert)) == config
+
+
+def test_a_user_sees_few_keys_and_an_expert_all() -> None:
+    few, every = (tomllib.loads(describe_config(Config(), expert=expert)) for expert in (False, True))
+    assert len(USER_KEYS) <= 30
+    assert count(few) == len(USER_KEYS)
+    assert count(every) == len(dict(values(Config())))
+    chosen = tomllib.loads(describe_config(read_config(None, ["foreground.model=codebook"]), expert=False))
+    assert set(chosen["foreground"]) == {"model", "body_rows", "codebook"}
+
+
+def count(table: dict[str, Any]) -> int:
+    return sum(count(value) if isinstance(value, dict) else 1 for value in table.values())
+
+
+def test_every_key_has_a_meaning_of_one_sentence_or_more() -> None:
+    for key, _ in values(Config()):
+        assert describe(key).endswith("."), key
+
+
+# What has no effect
+
+
+@pytest.mark.parametrize(
+    ("assignments", "tracker", "found"),
+    [
+        (
+            ("kalman.patience=3",),
+            "cut",
+            "a value without effect: 3.0, expected --tracker kalman",
+        ),
+        (("foreground.codebook.memory=9",), "cut", "expected foreground.model = codebook"),
+        (("foreground.model=codebook", "foreground.mixture.memory=9"), "cut", "expected foreground.model = mixture"),
+        (("proposals.kernel_radius=1",), "cut", "expected another proposals.source"),
+        (("segmentation.smoothness=1",), "kalman", "expected --tracker cut"),
+        (("tracking.return_probability=0.99",), "kalman", "expected --tracker cut"),
+    ],
+)
+def test_a_value_without_effect_is_refused(assignments: tuple[str, ...], tracker: str, found: str) -> None:
+    with pytest.raises(ConfigError, match=found):
+        require_effect(read_config(None, assignments), tracker)
+
+
+@pytest.mark.parametrize(
+    ("assignments", "tracker"),
+    [
+        (("kalman.patience=3",), "kalman"),
+        (("foreground.model=codebook", "foreground.codebook.memory=9"), "cut"),
+        (("proposals.source=volume", "proposals.kernel_radius=1"), "cut"),
+        (("tracking.return_probability=0.99",), "frames"),
+        (("segmentation.smoothness=1", "kalman.patience=1"), "cut"),  # the default may be given
+    ],
+)
+def test_a_value_with_effect_is_taken(assignments: tuple[str, ...], tracker: str) -> None:
+    require_effect(read_config(None, assignments), tracker)
+
+
+def test_the_command_prints_a_file_that_a_run_takes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["config", "--set", "body.height_mean=1.2", "--expert"]) == 0
+    printed = capsys.readouterr().out
+    assert read(tmp_path / "c.toml", printed) == read_config(None, ["body.height_mean=1.2"])
+    assert main(["config", "--set", "body.height=1"]) == 2
+    assert "did you mean heights?" in capsys.readouterr().err

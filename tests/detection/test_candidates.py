@@ -1,0 +1,158 @@
+"""Where candidates come from: every source finds people, duplicates are one, and the pass takes what is proposed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+import pytest
+from scenes import (
+    BODY,
+    CONFIG,
+    FEW_HEIGHTS,
+    box_moments,
+    boxes,
+    corner_cameras,
+    expecting,
+    likelihoods,
+    mask_moments,
+    no_boxes,
+    people,
+    rig_of,
+    room,
+    standing_at,
+    walkers,
+)
+
+from stseg.arrays import Floats, ViewEvidence
+from stseg.baselines.huang_wang_2012.proposals import Fuse, Proposals, marginal
+from stseg.config import ProposalConfig
+from stseg.detection.detector import Detector
+from stseg.engine.pipeline import Pipeline
+from stseg.engine.session import run_session
+from stseg.errors import InputError
+from stseg.foreground.view_foreground import ViewForeground
+from stseg.occupancy.volume import Occupancy
+from stseg.records.candidates import Candidates
+from stseg.records.people import empty_explanation
+
+Asked = Literal["lattice", "probability", "volume", "both"]
+VIEWS = corner_cameras()
+RIG = rig_of(VIEWS, cell=0.2, planes=5)
+STANDING = people((-1.0, -0.6), (0.9, 0.7), (1.0, -1.1))
+FEW = ProposalConfig(body_sizes=3, lattice_spacing=0.25)
+
+
+def evidence(kind: str, standing: Floats = STANDING) -> list[ViewEvidence]:
+    return [boxes(camera, standing) for camera in VIEWS] if kind == "boxes" else list(likelihoods(VIEWS, standing))
+
+
+def candidates(kind: str, asked: Asked) -> Proposals:
+    return Proposals(RIG, [kind] * 4, replace(CONFIG, proposals=replace(FEW, source=asked)))
+
+
+def fuse(kind: str) -> Fuse:
+    occupancy = Occupancy(RIG, [kind] * 4, CONFIG.occupancy, FEW_HEIGHTS, BODY)
+    return lambda seen, explanation: occupancy.fuse(seen, explanation).dense()
+
+
+def pool(*places: tuple[float, float]) -> Candidates:
+    ones = np.ones(len(places))
+    return Candidates(np.array(places, float).reshape(-1, 2), 1.7 * ones, 0.42 * ones)
+
+
+@pytest.mark.parametrize("kind", ("boxes", "pixels"))
+@pytest.mark.parametrize("asked", ("probability", "volume", "both"))
+def test_each_source_finds_everybody(kind: str, asked: Asked) -> None:
+    found = candidates(kind, asked).of(evidence(kind), fuse(kind))
+    assert found is not None
+    away = np.hypot(*np.moveaxis(found.ground[:, None] - STANDING[:, :2], -1, 0))
+    # What boxes say of a place in a volume reaches far to its sides: their modes are no better than the pass's lattice.
+    assert (away.min(0) < (0.5 if kind == "boxes" and asked == "volume" else 0.25)).all()
+    apart = np.hypot(*np.moveaxis(found.ground[:, None] - found.ground, -1, 0))
+    assert (apart[np.triu_indices(len(found), 1)] >= FEW_HEIGHTS.lattice_spacing).all()
+
+
+def test_the_lattice_alone_proposes_nothing() -> None:
+    assert candidates("pixels", "lattice").of(evidence("pixels"), fuse("pixels")) is None
+
+
+@pytest.mark.parametrize("seen", ([None] * 4, [no_boxes()] * 4, [None, no_boxes(), None, no_boxes()]))
+def test_where_nothing_is_seen_nobody_is_proposed(seen: Sequence[ViewEvidence]) -> None:
+    found = candidates("boxes", "both").of(list(seen), fuse("boxes"))
+    assert found is not None and len(found) == 0
+
+
+def test_both_sources_have_no_duplicates_of_each_other() -> None:
+    seen = evidence("pixels")
+    volume, both = (candidates("pixels", asked).of(seen, fuse("pixels")) for asked in ("volume", "both"))
+    assert volume is not None and both is not None
+    np.testing.assert_array_equal(both.ground[: len(volume)], volume.ground)
+
+
+def test_the_volume_of_an_unexplained_frame_is_filled_where_people_stand() -> None:
+    occupancy = Occupancy(RIG, ["pixels"] * 4, CONFIG.occupancy, FEW_HEIGHTS, BODY)
+    seen = evidence("pixels")
+    filled = marginal(occupancy.fuse(seen, empty_explanation(occupancy.rig, seen)).dense())
+    away = np.hypot(*np.moveaxis(RIG.grid.ground[:, :, None] - STANDING[:, :2], -1, 0)).min(-1)
+    assert filled[away < 0.12].min() > 0.5
+    assert filled[away > 0.8].max() < 0.1
+
+
+def test_duplicates_are_dropped_in_order() -> None:
+    known, other = pool((0.0, 0.0), (1.0, 0.0)), pool((0.1, 0.0), (0.5, 0.5), (0.55, 0.5), (1.0, 0.3))
+    merged = known.joined_apart(other, 0.25)
+    np.testing.assert_array_equal(merged.ground, [[0.0, 0.0], [1.0, 0.0], [0.5, 0.5], [1.0, 0.3]])
+    assert len(pool().joined_apart(known, 0.25)) == 2
+    assert len(pool((0.0, 0.0), (0.05, 0.0)).joined_apart(pool(), 0.25)) == 2
+
+
+def test_who_is_in_a_pool_already_is_not_new_to_it() -> None:
+    known = pool((0.0, 0.0), (1.0, 0.0))
+    taller = Candidates(known.ground, known.height + np.array([0.0, 0.1]), known.width)
+    np.testing.assert_array_equal(taller.new_to(known).ground, [[1.0, 0.0]])
+    assert len(known.new_to(known)) == 0
+    assert len(known.new_to(pool())) == 2
+
+
+@pytest.mark.parametrize("kind", ("boxes", "pixels"))
+def test_the_pass_takes_what_is_proposed_and_drops_what_is_nobody(kind: str) -> None:
+    frame_pass = Detector(RIG, [kind] * 4, FEW_HEIGHTS, BODY)
+    proposed = pool(*(tuple(place) for place in STANDING[:, :2]), (-1.5, 1.5), (0.0, 1.6))
+    plain, given = (frame_pass.explain(evidence(kind), None, asked).people for asked in (None, proposed))
+    assert len(plain) == len(given) == len(STANDING)
+    away = np.hypot(*np.moveaxis(given.ground[:, None] - STANDING[:, :2], -1, 0))
+    assert away.min(1).max() < 0.15
+
+
+def test_who_is_expected_comes_before_who_is_proposed_there() -> None:
+    frame_pass = Detector(RIG, ["pixels"] * 4, FEW_HEIGHTS, BODY)
+    expected = expecting(*STANDING.tolist())
+    proposed = pool(*(tuple(place + 0.05) for place in STANDING[:, :2]))
+    found = frame_pass.explain(evidence("pixels"), expected, proposed).people
+    assert sorted(found.track_index) == [0, 1, 2]
+
+
+@pytest.mark.parametrize("asked", ("probability", "volume", "both"))
+@pytest.mark.parametrize("kind", ("boxes", "pixels"))
+def test_the_pipeline_finds_the_same_people_by_any_source(kind: str, asked: Asked) -> None:
+    rig, truth = room(), walkers(2)
+    moments = list((box_moments if kind == "boxes" else mask_moments)(rig, truth, 0, 2))
+    config = replace(CONFIG, proposals=replace(FEW, source=asked))
+    pipeline = Pipeline(rig, [kind] * 4, config, "frames")
+    rows = np.concatenate(
+        [s.commit.trajectory for s in run_session(pipeline, [ViewForeground()] * 4, moments, 0, lambda _: None)]
+    )
+    for frame in range(2):
+        own, standing = rows[rows["frame"] == frame], standing_at(truth, frame)
+        assert len(own) == len(standing)
+        away = np.hypot(own["x"][:, None] - standing[:, 0], own["y"][:, None] - standing[:, 1])
+        assert away.min(1).max() < 0.3
+
+
+@pytest.mark.parametrize("wrong", ({"unseen_rate": 0.0}, {"body_sizes": 1}, {"kernel_radius": 0.0}))
+def test_constants_without_meaning_are_refused(wrong: dict[str, float]) -> None:
+    with pytest.raises(InputError):
+        ProposalConfig(**wrong)  # type: ignore[arg-type]

@@ -1,0 +1,209 @@
+"""Scenes in which views agree on people who are not there, or hardly see one who is (HW12 figures 4 and 13)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+import pytest
+from scenes import (
+    BODY,
+    CONFIG,
+    FEW_HEIGHTS,
+    Moment,
+    boxes,
+    corner_cameras,
+    expecting,
+    likelihoods,
+    looking,
+    mask,
+    people,
+    rig_of,
+    room,
+)
+
+from stseg.arrays import Floats, ViewEvidence
+from stseg.detection.detector import Detector
+from stseg.detection.evidence.open_pixels import OpenPixels
+from stseg.detection.evidence.pillar_evidence import fill_scores
+from stseg.detection.prior import Prior
+from stseg.engine.committed_frames import CommittedFrames
+from stseg.engine.pipeline import Pipeline
+from stseg.engine.session import run_session
+from stseg.foreground.view_foreground import ViewForeground
+from stseg.geometry import Camera, Rig
+from stseg.records.people import Explanation
+from stseg.records.tables import Tracks
+from stseg.tracking.filter.assignment import assign, distances
+from stseg.tracking.filter.track_filter import TrackFilter
+
+KINDS = ("pixels", "boxes")
+FRAMES = 20
+
+FIGURE_4 = people((-1.0, -1.0), (1.0, 1.0))
+"""HW12 figure 4: two cameras whose lines of sight to two people cross in four places."""
+FIGURE_4_GHOSTS = np.array([[0.5, -1.5], [-1.5, 0.5]])
+"""Where they cross with nobody there, so near to the cameras that the bodies would be small."""
+FIVE = (
+    people((-1.2, -0.3, 1.75), (-0.2, 1.2, 1.6), (0.4, -1.1, 1.8), (1.3, 0.5), (0.3, 0.2, 1.65)),
+    people((1.2, -1.3), (-0.3, -0.6, 1.8), (0.4, 1.4, 1.65), (-1.4, 0.7, 1.75), (-1.1, -1.4, 1.6)),
+)
+"""Five people in the room, who hide each other in most views."""
+
+
+def facing_pair() -> Rig:
+    """The rig of figure 4: one camera looks east, one north."""
+    return rig_of([looking("west", (-4.0, 0.0, 2.2)), looking("south", (0.0, -4.0, 2.2))])
+
+
+@cache
+def pass_of(kind: str, cameras: int) -> Detector:
+    """The pass under the first corner cameras."""
+    return Detector(rig_of(corner_cameras()[:cameras]), [kind] * cameras, FEW_HEIGHTS, BODY)
+
+
+def show(kind: str, cameras: Sequence[Camera], standing: Floats) -> list[ViewEvidence]:
+    """Exact silhouettes, or a box of everybody."""
+    return list(likelihoods(cameras, standing)) if kind == "pixels" else [boxes(c, standing) for c in cameras]
+
+
+def assert_these(explanation: Explanation, standing: Floats, within: float = 0.25) -> None:
+    """Assert that these people and nobody else were found."""
+    found = explanation.people.ground
+    who, _ = assign(distances(standing[:, :2], found), within)
+    assert len(who) == len(standing) == len(found), found
+    assert (explanation.ghosts.evidence < 0).all()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_figure_4(kind: str) -> None:
+    rig = facing_pair()
+    explanation = Detector(rig, [kind] * 2, FEW_HEIGHTS, BODY).explain(show(kind, rig.cameras, FIGURE_4), None)
+    assert_these(explanation, FIGURE_4)
+    if kind == "pixels":  # a box knows how far away its person is, so its lines of sight cross nowhere else
+        assert len(explanation.ghosts) >= 1
+        assert (distances(explanation.ghosts.ground, FIGURE_4_GHOSTS).min(1) < 0.6).all()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("cameras", [2, 3, 4])
+@pytest.mark.parametrize("scene", [0, 1])
+def test_five_people(kind: str, cameras: int, scene: int) -> None:
+    """At once in a first frame, of which nothing is known, and once they are known."""
+    standing, frame_pass = FIVE[scene], pass_of(kind, cameras)
+    seen = show(kind, corner_cameras()[:cameras], standing)
+    first = frame_pass.explain(seen, None)
+    assert_these(first, standing)
+    assert_these(
+        frame_pass.explain(seen, expecting(*(tuple(p) for p in standing + np.array([0.06, -0.05, 0])))), standing
+    )
+    if kind == "pixels" and cameras == 2:
+        assert len(first.ghosts) >= 3
+
+
+# Over time
+
+
+def strollers(frame: int) -> Floats:
+    """Two who walk side by side, north-east, through the rig of figure 4: their ghosts walk with them."""
+    step = 0.05 * frame
+    return people((-1.3 + step, -1.0 + step), (0.4 + step, 0.5 + step))
+
+
+def crossings(standing: Floats, rig: Rig) -> Floats:
+    """Where the lines of sight of the two cameras to two people cross with nobody there, float64 (2, 2)."""
+    west, south = (camera.centre[:2] for camera in rig.cameras)
+    found = []
+    for one, other in ((0, 1), (1, 0)):
+        a, b = standing[one, :2] - west, standing[other, :2] - south
+        share = np.linalg.solve(np.column_stack([a, -b]), south - west)[0]
+        found.append(west + share * a)
+    return np.array(found)
+
+
+@dataclass(frozen=True)
+class Run:
+    """What the whole way made of a scene."""
+
+    steps: list[CommittedFrames]
+    tracks: Tracks
+
+
+@cache
+def moving_ghosts(kind: str) -> Run:
+    """The strollers, from frame 0 on, by the whole pipeline."""
+    rig = facing_pair()
+    pipeline = Pipeline(rig, [kind] * 2, CONFIG, "cut")
+    moments = [
+        Moment(f, tuple((mask if kind == "pixels" else boxes)(camera, strollers(f)) for camera in rig.cameras))
+        for f in range(FRAMES)
+    ]
+    steps = list(run_session(pipeline, [ViewForeground()] * 2, moments, 0, lambda _: None))
+    rows, events = (np.concatenate([getattr(s.commit, name) for s in steps]) for name in ("trajectory", "events"))
+    return Run(steps, pipeline.finished(rows, events, np.concatenate([s.appearance for s in steps]))[0])
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_ghost_that_moves_with_its_makers(kind: str) -> None:
+    """However long it is borne out, it never becomes a track."""
+    run = moving_ghosts(kind)
+    rows = run.tracks.trajectory
+    assert np.unique(rows["id"]).tolist() == [1, 2]
+    assert len(rows) == 2 * FRAMES
+    for row in rows:
+        away = np.hypot(*(strollers(row["frame"])[:, :2] - [row["x"], row["y"]]).T)
+        assert away.min() < 0.3
+
+
+def test_the_moving_ghost_is_borne_out_by_both_views() -> None:
+    """It was there to be picked up: taken by itself it is worth a person, in nearly every frame."""
+    rig, worth = facing_pair(), 0
+    frame_pass = Detector(rig, ["pixels"] * 2, FEW_HEIGHTS, BODY)
+    nothing_known = Prior.of(None, FEW_HEIGHTS, BODY, frame_pass.border)
+    ground = frame_pass.lattice_ground.reshape(-1, 2)
+    for frame in range(FRAMES):
+        seen, said = frame_pass.observe(show("pixels", rig.cameras, strollers(frame))), np.zeros((3, len(ground)))
+        evidence, lattice = frame_pass.evidence(seen, nothing_known), frame_pass.pixel_lattice
+        nobody = np.full(int(lattice.shapes.prod(1).sum()), -1, np.int16)
+        pixels = OpenPixels.of(evidence.rasters, nobody, lattice, evidence.extremes)
+        weight = FEW_HEIGHTS.effective_observations
+        fill_scores(pixels, lattice, np.array([1]), np.zeros(0, np.int64), -np.inf, weight, said)
+        here = distances(ground, crossings(strollers(frame), rig)).min(1) < 0.3
+        worth += said[1, here].max() > -FEW_HEIGHTS.prior_log_odds
+    assert worth > 0.8 * FRAMES
+
+
+def test_a_ghost_is_not_picked_up_by_the_cut_in_later_frames() -> None:
+    """Its cells hold what nobody explains of the evidence, which is nothing: they stay free."""
+    rig, near = facing_pair(), 0.35
+    for step in moving_ghosts("pixels").steps:
+        for scene, label in zip(step.commit.frames, step.commit.label, strict=True):
+            standing = strollers(scene.frame)
+            for ghost in crossings(standing, rig):
+                cells = np.hypot(*np.moveaxis(rig.grid.ground - ghost, -1, 0)) < near
+                cells &= np.hypot(*np.moveaxis(rig.grid.ground[..., None, :] - standing[:, :2], -1, 0)).min(-1) > 0.6
+                assert not label[:, cells].any(), (scene.frame, ghost)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_somebody_hidden_from_all_views_but_one_stays(kind: str) -> None:
+    """Seen by all at first; then three taller people step between them and three of the cameras, and stand there."""
+    rig, follow = room(), TrackFilter(8.0, CONFIG)
+    hidden, who = people((0.0, 0.0, 1.6)), set[int]()
+    for frame in range(FRAMES):
+        side = max(1.2 - 0.1 * frame, 0.0)
+        corners = (-0.45 + side, -0.45 - side), (0.45 + side, -0.44 + side), (0.44 - side, 0.45 + side)
+        nearer = people(*((x, y, 1.9) for x, y in corners))
+        everybody = np.concatenate([hidden, nearer])
+        seen = show(kind, rig.cameras, everybody)
+        if kind == "boxes" and side < 0.2:
+            seen[:3] = [boxes(camera, nearer) for camera in rig.cameras[:3]]
+        found = pass_of(kind, 4).explain(seen, follow.predict(frame))
+        chains = follow.update(frame, found.people, found.ghosts)
+        away = distances(found.people.ground, hidden[:, :2])[:, 0]
+        assert away.min() < 0.25, (frame, found.people.ground)
+        assert len(chains) == 4
+        who.add(int(chains[away.argmin()]))
+    assert len(who) == 1

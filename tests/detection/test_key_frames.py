@@ -1,0 +1,127 @@
+"""Frames between key frames: when the predicted tracks alone are the answer, and that they are a good one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from scenes import BODY, CONFIG, FEW_HEIGHTS, boxes, expecting, likelihoods, people, room, standing_at, walkers
+
+from stseg.arrays import Floats, ViewEvidence
+from stseg.detection.detector import Detector
+from stseg.detection.key_frames import key_frame_interval
+from stseg.geometry import Rig
+from stseg.records.people import Explanation
+from stseg.records.predicted_tracks import PredictedTracks
+from stseg.tracking.filter.track_filter import TrackFilter
+
+KINDS = ("pixels", "boxes")
+RATE = 20.0
+KEY, BETWEEN = 20, 21
+HERE = ((-0.83, 0.31, 1.7), (0.9, -0.62, 1.75))
+
+
+@cache
+def detector(kind: str) -> Detector:
+    return Detector(replace(room(), frame_rate=RATE), [kind] * 4, FEW_HEIGHTS, BODY)
+
+
+def show(kind: str, standing: Floats) -> list[ViewEvidence]:
+    rig: Rig = room()
+    return list(likelihoods(rig.cameras, standing)) if kind == "pixels" else [boxes(c, standing) for c in rig.cameras]
+
+
+def explained(kind: str, frame: int, standing: Floats, predicted: PredictedTracks) -> Explanation:
+    asked = detector(kind)
+    return asked.explain_next(asked.new_calibrations(), frame, show(kind, standing), predicted)
+
+
+def is_searched(explanation: Explanation) -> bool:
+    """Residuals are measured by the whole search alone."""
+    return bool(np.isfinite(explanation.residual).any())
+
+
+@pytest.mark.parametrize(
+    ("rate", "longest", "frames"), [(15, 0.5, 7), (10, 0.5, 5), (3, 0.5, 1), (15, 0, 1), (2, 3, 6)]
+)
+def test_no_more_time_passes_between_key_frames_than_is_asked(rate: float, longest: float, frames: int) -> None:
+    assert key_frame_interval(rate, replace(FEW_HEIGHTS, key_frame_interval=longest)) == frames
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_known_people_are_followed_to_where_a_search_finds_them(kind: str) -> None:
+    standing = people(*HERE)
+    predicted = expecting(*(standing + np.array([0.04, -0.03, 0.0])))
+    between, key = (explained(kind, frame, standing, predicted) for frame in (BETWEEN, KEY))
+    assert is_searched(key)
+    assert not is_searched(between)
+    for explanation in (between, key):
+        who = explanation.people.track_index
+        assert sorted(who.tolist()) == [0, 1]
+        np.testing.assert_allclose(explanation.people.ground, standing[who, :2], atol=0.04)
+        np.testing.assert_allclose(explanation.people.height, standing[who, 2], atol=0.06)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    ("standing", "predicted"),
+    [
+        ((*HERE, (0.1, 1.1)), HERE),
+        (((0.0, 0.0), (0.3, 0.0)), ((0.0, 0.0), (0.3, 0.0))),
+        (HERE, ((HERE[0][0] + 0.22, *HERE[0][1:]), HERE[1])),
+    ],
+    ids=["new", "near", "elsewhere"],
+)
+def test_the_whole_frame_is_searched_where_something_is_open(
+    kind: str, standing: Sequence[Sequence[float]], predicted: Sequence[Sequence[float]]
+) -> None:
+    seen, expected = people(*standing), expecting(*predicted)
+    asked = detector(kind)
+    by_search = asked.explain(show(kind, seen), expected)
+    answer = explained(kind, BETWEEN, seen, expected)
+    assert len(answer.people) == len(standing)
+    np.testing.assert_array_equal(answer.people.ground, by_search.people.ground)
+    np.testing.assert_array_equal(answer.people.sizes.height, by_search.people.sizes.height)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_who_lingers_beyond_the_border_needs_no_search(kind: str) -> None:
+    everybody = (*HERE, (room().grid.x[1] + 0.05, 0.4, 1.75))
+    answer = explained(kind, BETWEEN, people(*everybody), expecting(*everybody))
+    assert not is_searched(answer)
+    who = answer.people.track_index
+    assert sorted(who.tolist()) == [0, 1, 2]
+    np.testing.assert_allclose(answer.people.ground, people(*everybody)[who, :2], atol=0.04)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_who_is_clearly_gone_needs_no_search(kind: str) -> None:
+    answer = explained(kind, BETWEEN, people(*HERE), expecting(*HERE, (1.2, 1.2)))
+    assert sorted(answer.people.track_index.tolist()) == [0, 1]
+    assert not is_searched(answer)
+
+
+def test_an_empty_room_stays_empty() -> None:
+    answer = explained("pixels", BETWEEN, people(), expecting())
+    assert len(answer.people) == 0
+    assert all((owner < 0).all() for owner in answer.pixel_assignment)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_walkers_are_followed_as_by_searches(kind: str) -> None:
+    truth, asked = walkers(24), detector(kind)
+    follow, learned = TrackFilter(RATE, CONFIG), asked.new_calibrations()
+    names, searched = set[int](), 0
+    for frame in range(24):
+        standing = standing_at(truth, frame)
+        answer = asked.explain_next(learned, frame, show(kind, standing), follow.predict(frame))
+        names |= set(follow.update(frame, answer.people, answer.ghosts).tolist())
+        searched += is_searched(answer)
+        away = np.hypot(*(answer.people.ground[:, None] - standing[:, :2]).transpose(2, 0, 1))
+        assert away.shape == (3, 3)
+        assert away.min(0).max() < 0.12
+    assert len(names) == 3
+    assert 3 <= searched < 16

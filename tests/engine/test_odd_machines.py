@@ -1,0 +1,190 @@
+"""Machines that are not as usual: no locks, little memory, a home that cannot be written, other users, odd clocks."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import h5py
+import pytest
+from attacks import write_rig
+from recordings import ALONE, ENVIRONMENT, OPTIONS, assert_same, track, write_recording
+from run_files import write_small_run
+
+from stseg.commands.main import main
+from stseg.detection.score.scoring import set_score
+from stseg.io.outputs.whole_files import create_part, replacing
+from stseg.io.recording.rigs import read_rig
+from stseg.io.runfile.provenance import gather_provenance, run_request
+from stseg.io.runfile.reading.run_reader import read_run
+from stseg.io.runfile.unfinished import locks
+from stseg.io.untrusted.names import printable
+from stseg.kernels.accelerate import python_form
+
+LINUX = pytest.mark.skipif(sys.platform != "linux", reason="a limit or a user of Linux")
+COMPILED = pytest.mark.skipif(python_form(set_score) is set_score, reason="too slow without a compiler")
+YEAR = 3e7
+COMMAND = "import sys; from stseg.commands.main import command; command()"
+AS_NOBODY = """
+import codecs, json, os, sys
+import stseg.commands.export, stseg.commands.inspect
+from stseg.commands.main import main
+for name in ("ascii", "latin-1", "utf-8-sig"):
+    codecs.lookup(name)
+os.setgroups([])
+os.setgid(65534)
+os.setuid(65534)
+for arguments in json.loads(sys.argv[1]):
+    print("status", main(arguments), file=sys.stderr)
+"""
+"""Several commands. Imports come first: this user need not be able to read the libraries."""
+
+
+def lines_of(program: str, *arguments: object, **environment: str) -> tuple[int, list[str]]:
+    """Exit status of a command in a process of its own, and its lines on standard error."""
+    done = subprocess.run(
+        [sys.executable, "-c", program, *map(str, arguments)],
+        env=ENVIRONMENT | environment, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    return done.returncode, done.stderr.splitlines()
+
+
+@COMPILED
+@LINUX
+def test_a_path_that_is_no_utf8_serves(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = tmp_path / os.fsdecode(b"caf\xe9:1")
+    folder.mkdir()
+    rig, run = write_recording(folder), str(folder / "run.h5")
+    assert main(["run", str(rig), "-o", run, *OPTIONS]) == 0
+    assert read_run(Path(run)).provenance.rig_path == rig
+    for to in ("csv", "parquet", "sqlite"):
+        assert main(["export", run, "--to", to, "-o", f"{run}.{to}"]) == 0
+    assert main(["export", run, "--to", "sqlite", "-o", str(tmp_path / "archive.sqlite")]) == 0
+    assert main(["inspect", run]) == 0
+    assert main(["report", run, "-o", f"{run}.html"]) == 0
+    assert main(["export", run, "--to", "duckdb", "-o", f"{run}.duckdb"]) == 2
+    assert capsys.readouterr().err.splitlines() == [
+        f"stseg: error: {printable(run)}.duckdb: found a path that is no UTF-8, expected one that is, for DuckDB"
+    ]
+
+
+@COMPILED
+@pytest.mark.parametrize("code", [errno.ENOLCK, errno.ENOSYS])
+def test_a_file_system_without_locks_serves(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: int) -> None:
+    rig = write_recording(tmp_path)
+    assert track(rig, tmp_path / "locked.h5", "--frames", "0:8") == 0
+    opened = h5py.File.__init__
+
+    def without_locks(file: h5py.File, *arguments: Any, locking: bool | None = None, **options: Any) -> None:
+        if locking is not False and isinstance(arguments[0], (str, Path)):
+            raise OSError(code, "Unable to synchronously open file (unable to lock file)")
+        opened(file, *arguments, locking=locking, **options)
+
+    def refused(*_: object) -> None:
+        raise OSError(code, os.strerror(code))
+
+    monkeypatch.setattr(h5py.File, "__init__", without_locks)
+    monkeypatch.setattr(locks, "flock", refused)
+    assert track(rig, tmp_path / "run.h5", "--frames", "0:8") == 0
+    (tmp_path / "answers.csv").write_text("action,frame,id,other,name\nname,,1,,Ann\n")
+    for arguments in (("export", "--to", "csv"), ("correct", str(tmp_path / "answers.csv"))):
+        command, *more = arguments
+        assert main([command, str(tmp_path / "run.h5"), *more, "-o", str(tmp_path / command)]) == 0
+    monkeypatch.undo()
+    assert_same(tmp_path / "run.h5", tmp_path / "locked.h5")
+
+
+@LINUX
+@pytest.mark.parametrize("mebibytes", [200, 1000])
+def test_too_little_address_space_is_one_line(tmp_path: Path, mebibytes: int) -> None:
+    limit = f"import resource; resource.setrlimit(resource.RLIMIT_AS, ({mebibytes << 20},) * 2);"
+    status, lines = lines_of(limit + COMMAND, "run", write_rig(tmp_path), "-o", tmp_path / "run.h5")
+    said = f"stseg: error: limit of address space (ulimit -v): found {mebibytes} MiB, expected 2048 MiB or more"
+    assert (status, lines) == (2, [said])
+
+
+@LINUX
+def test_a_home_that_cannot_be_written_serves(tmp_path: Path) -> None:
+    run = write_small_run(tmp_path / "run.h5")
+    for arguments in (("export", run, "--to", "csv", "-o", tmp_path / "t.csv"), ("report", run, "-o", tmp_path / "r")):
+        assert lines_of(COMMAND, *arguments, HOME="/proc/nowhere", XDG_CACHE_HOME="", NUMBA_CACHE_DIR="") == (0, [])
+
+
+@pytest.fixture
+def shared() -> Iterator[Path]:
+    """A folder that everybody may enter, and in which everybody may write into `open`."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        (folder / "open").mkdir()
+        folder.chmod(0o755)
+        (folder / "open").chmod(0o1777)
+        yield folder
+
+
+def content_of(folder: Path) -> dict[str, tuple[bytes, int]]:
+    return {str(path): (path.read_bytes(), path.stat().st_mtime_ns) for path in folder.rglob("*") if path.is_file()}
+
+
+@LINUX
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root can become another user")
+def test_files_of_another_user_are_left_alone(shared: Path) -> None:
+    run = write_small_run(shared / "run.h5")
+    (shared / "open" / "t.csv").write_text("precious")
+    secret = write_small_run(shared / "secret.h5")
+    secret.chmod(0o600)
+    before = content_of(shared)
+    tried = {
+        f"export {run} --to csv -o {shared}/t.csv": "Permission denied",
+        f"export {run} --to csv -o {shared}/open/t.csv --overwrite": "not permitted",
+        f"inspect {secret}": f"{secret}: found a file that this user may not read",
+    }
+    _, lines = lines_of(AS_NOBODY, json.dumps([command.split() for command in tried]))
+    assert lines[1::2] == ["status 2"] * len(tried), "\n".join(lines)
+    assert all(what in line for line, what in zip(lines[::2], tried.values(), strict=True)), lines
+    assert content_of(shared) == before
+
+
+@pytest.mark.parametrize("seconds", [-1e11, 0.0, 4e9, 253402300800.0, 1e12])
+def test_any_time_of_change_is_told(tmp_path: Path, seconds: float) -> None:
+    recording = read_rig(write_rig(tmp_path))
+    provenance = gather_provenance(recording, "")
+    provenance.sources["modified"] = seconds
+    assert all("bytes in all, written" in text for text in run_request(recording, provenance)["source"].values())
+
+
+def test_parts_of_a_later_clock_are_removed(tmp_path: Path) -> None:
+    parts = []
+    for hours in (-2, 0, 2):
+        part, descriptor = create_part(tmp_path / "t.csv")
+        os.close(descriptor)
+        os.utime(part, (time.time() + 3600 * hours,) * 2)
+        parts.append(part)
+    with replacing(tmp_path / "t.csv", overwrite=False) as written:
+        written.write_text("new")
+    assert [part.exists() for part in parts] == [False, True, False]
+
+
+@COMPILED
+def test_a_clock_set_back_between_kill_and_resume_changes_nothing(tmp_path: Path) -> None:
+    (tmp_path / "whole").mkdir()
+    rig, night = write_recording(tmp_path), tmp_path / "night.h5"
+    assert track(rig, tmp_path / "whole" / "run.h5") == 0
+    arguments = ["run", str(rig), "-o", str(night), *OPTIONS, *ALONE]
+    with subprocess.Popen([sys.executable, "-c", COMMAND, *arguments], env=ENVIRONMENT) as running:
+        while running.poll() is None and not list(tmp_path.glob("night.h5.segments/segment-*-*.h5")):
+            time.sleep(0.01)
+        running.kill()
+    assert not night.exists()
+    for path in tmp_path.glob("night.h5.segments/*"):
+        os.utime(path, (time.time() + YEAR,) * 2)
+    assert main(arguments) == 0
+    assert_same(night, tmp_path / "whole" / "run.h5")
+    assert not list(tmp_path.glob("night.h5.*"))

@@ -1,0 +1,261 @@
+"""The whole way on a micro recording: three walkers, four cameras, masks and boxes without any noise."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from functools import cache
+from itertools import chain, repeat
+
+import numpy as np
+import pytest
+from scenes import CONFIG, Moment, box_moments, mask_moments, room, walkers
+
+from stseg.arrays import Boxes, Ints, Labels, Rows
+from stseg.detection.score.scoring import set_score
+from stseg.engine.committed_frames import CommittedFrames
+from stseg.engine.pipeline import Pipeline
+from stseg.engine.session import run_session
+from stseg.evaluation import evaluate
+from stseg.foreground.view_foreground import ViewForeground
+from stseg.geometry import Rig
+from stseg.kernels.accelerate import python_form
+from stseg.records.tables import CANDIDATE, RATES, TIMING, Tracks
+
+INTERPRETED = python_form(set_score) is set_score
+"""Without its compiler the recording must be shorter: a frame takes a hundred times as long."""
+FRAMES, MASKED, BLIND = (12, 7, 7) if INTERPRETED else (40, 17, 17)
+RIG = room()
+TRUTH = walkers(40)
+MOMENTS: dict[str, Callable[[Rig, Rows, int, int], Iterator[Moment]]] = {"pixels": mask_moments, "boxes": box_moments}
+
+
+@cache
+def recording(kind: str, stop: int) -> tuple[Moment, ...]:
+    return tuple(MOMENTS[kind](RIG, TRUTH, 0, stop))
+
+
+@dataclass(frozen=True)
+class Run:
+    """Everything that a run gave."""
+
+    steps: list[CommittedFrames]
+    tracks: Tracks
+    identity: Ints
+    advanced: list[int]
+
+    @property
+    def trajectory(self) -> Rows:
+        """All committed rows, before the whole run was looked at."""
+        return np.concatenate([step.commit.trajectory for step in self.steps])
+
+    @property
+    def label(self) -> Labels:
+        """All labels, int32 (time, plane, y, x)."""
+        return np.concatenate([step.commit.label for step in self.steps])
+
+
+def foregrounds() -> list[ViewForeground]:
+    return [ViewForeground() for _ in RIG.cameras]
+
+
+def run(
+    kind: str, moments: Iterable[Moment], tracker: str = "cut", first: int = 0, cores: Iterable[int] = repeat(2)
+) -> Run:
+    pipeline = Pipeline(RIG, [kind] * len(RIG.cameras), CONFIG, tracker)
+    advanced: list[int] = []
+    steps = list(run_session(pipeline, foregrounds(), moments, first, advanced.append, iter(cores).__next__))
+    trajectory = np.concatenate([step.commit.trajectory for step in steps])
+    tracks, identity = pipeline.finished(
+        trajectory,
+        np.concatenate([step.commit.events for step in steps]),
+        np.concatenate([step.appearance for step in steps]),
+    )
+    return Run(steps, tracks, identity, advanced)
+
+
+@cache
+def whole(kind: str, tracker: str) -> Run:
+    stop = FRAMES if kind == "boxes" else MASKED
+    return run(kind, recording(kind, stop), tracker)
+
+
+def assert_equal(one: Run, other: Run) -> None:
+    """Everything but the time it took, bit for bit."""
+    np.testing.assert_array_equal(one.label, other.label)
+    np.testing.assert_array_equal(one.trajectory, other.trajectory)
+    np.testing.assert_array_equal(one.tracks.trajectory, other.tracks.trajectory)
+    np.testing.assert_array_equal(one.tracks.boxes, other.tracks.boxes)
+    np.testing.assert_array_equal(one.tracks.events, other.tracks.events)
+    np.testing.assert_array_equal(one.identity, other.identity)
+    for a, b in zip(one.steps, other.steps, strict=True):
+        np.testing.assert_array_equal(a.candidates, b.candidates)
+        np.testing.assert_array_equal(a.parts, b.parts)
+        np.testing.assert_array_equal(a.commit.events, b.commit.events)
+        np.testing.assert_array_equal(a.commit.windows, b.commit.windows)
+        for x, y in zip(a.commit.frames, b.commit.frames, strict=True):
+            np.testing.assert_array_equal(x.log_odds, y.log_odds)
+
+
+@pytest.mark.parametrize("tracker", ["cut", "frames", "kalman"])
+@pytest.mark.parametrize("kind", ["pixels", "boxes"])
+def test_three_walkers_are_three_tracks(kind: str, tracker: str) -> None:
+    done = whole(kind, tracker)
+    frames = len(done.advanced)
+    truth = TRUTH[TRUTH["frame"] < frames]
+    scores = evaluate(truth, done.tracks.trajectory)
+    assert (scores.tracks, scores.switches, scores.false_alarms, scores.misses) == (3, 0, 0, 0)
+    assert scores.location_mean is not None
+    assert scores.location_mean < (0.05 if kind == "pixels" else 0.1)
+    summary = done.tracks.summary()
+    assert (summary["frames"] == frames).all()
+    assert sorted(np.round(summary["height"], 1)) == pytest.approx([1.6, 1.7, 1.8], abs=0.11)
+    # Labels stand where the walkers are.
+    for t, label in enumerate(done.label):
+        places = truth[truth["frame"] == t]
+        occupied = RIG.grid.ground[(label > 0).any(0)]
+        away = np.hypot(occupied[:, 0, None] - places["x"], occupied[:, 1, None] - places["y"])
+        assert away.min(1).max() < 0.6
+        assert (away.min(0) < 0.3).all()
+
+
+def test_boxes_of_the_tracks_are_those_of_the_people() -> None:
+    done = whole("boxes", "cut")
+    drawn = done.tracks.boxes
+    assert np.unique(drawn["view"]).tolist() == [0, 1, 2, 3]
+    for moment in recording("boxes", FRAMES)[::4]:
+        for view, seen in enumerate(moment.views):
+            own = drawn[(drawn["frame"] == moment.frame) & (drawn["view"] == view)]
+            given = np.column_stack([own["left"], own["top"], own["width"], own["height"]]).astype(float)
+            assert isinstance(seen, Boxes)
+            off = np.abs(given[:, None] - seen.pixel).max(2)
+            assert off.min(1).max() < 5
+
+
+def test_candidates_are_told_for_every_frame() -> None:
+    done = whole("boxes", "cut")
+    for step in done.steps:
+        assert step.candidates.dtype == CANDIDATE
+        assert step.parts.shape == (len(step.candidates), 4)
+        assert step.timings.dtype == TIMING
+        for scene in step.commit.frames:
+            own = step.candidates[step.candidates["frame"] == scene.frame]
+            true = own[own["status"] == 1]
+            np.testing.assert_array_equal(np.column_stack([true["x"], true["y"]]), scene.people.ground)
+            assert (own["evidence"][own["status"] == 0] < 0).all()
+            assert (true["evidence"] > 0).all()
+    timed = np.concatenate([step.timings for step in done.steps])
+    assert {b"foreground", b"ghosts", b"occupancy", b"track"} <= set(timed["stage"].tolist())
+    assert (timed["seconds"] >= 0).all()
+    told = np.concatenate([step.candidates for step in done.steps])
+    assert np.unique(told["frame"]).tolist() == list(range(FRAMES))
+
+
+def test_rates_are_told_for_every_window() -> None:
+    done = whole("boxes", "cut")
+    for step in done.steps:
+        assert step.rates.dtype == RATES
+        assert step.rates["frame"].tolist() == [step.commit.frames[-1].frame] * 4
+        assert step.rates["view"].tolist() == [0, 1, 2, 3]
+    # A perfect detector: it misses less than was guessed, and people's surroundings are told apart from the rest.
+    first, last = done.steps[0].rates, done.steps[-1].rates
+    assert (last["miss"] < first["miss"]).all()
+    assert (last["beside"] > last["clutter"]).all()
+
+
+def test_every_frame_is_committed_once() -> None:
+    done = whole("boxes", "cut")
+    assert done.advanced == list(range(FRAMES))
+    assert [s.frame for step in done.steps for s in step.commit.frames] == list(range(FRAMES))
+
+
+@pytest.mark.parametrize("tracker", ["cut", "frames"])
+def test_the_same_recording_twice(tracker: str) -> None:
+    assert_equal(run("boxes", recording("boxes", FRAMES), tracker), whole("boxes", tracker))
+
+
+@pytest.mark.parametrize("kind", ["boxes", "pixels"])
+@pytest.mark.parametrize("alone", [7, 10_000])
+def test_one_core_alone_or_at_first_gives_the_same(kind: str, alone: int) -> None:
+    stop = FRAMES if kind == "boxes" else MASKED
+    assert_equal(run(kind, recording(kind, stop), cores=chain(repeat(1, alone), repeat(2))), whole(kind, "cut"))
+
+
+def test_moments_may_come_in_chunks() -> None:
+    """A generator that reads ahead, a list, one by one: the result is the same."""
+
+    def chunks(size: int) -> Iterator[Moment]:
+        read = recording("boxes", FRAMES)
+        for start in range(0, FRAMES, size):
+            yield from list(read[start : start + size])
+
+    for size in (1, 6):
+        assert_equal(run("boxes", chunks(size)), whole("boxes", "cut"))
+
+
+@pytest.mark.parametrize("first", [3, 8])
+def test_a_part_keeps_its_frame_numbers(first: int) -> None:
+    stop = min(FRAMES - 1, 17)
+    part = run("boxes", recording("boxes", FRAMES)[first:stop], first=first)
+    assert part.advanced == list(range(first, stop))
+    assert [s.frame for step in part.steps for s in step.commit.frames] == part.advanced
+    rows = part.trajectory
+    assert np.unique(rows["frame"]).tolist() == part.advanced
+    truth = TRUTH[(TRUTH["frame"] >= first) & (TRUTH["frame"] < stop)]
+    scores = evaluate(truth, rows)
+    assert (scores.tracks, scores.switches, scores.false_alarms, scores.misses) == (3, 0, 0, 0)
+
+
+@pytest.mark.parametrize("first", [3, 8])
+def test_where_a_run_began_is_soon_forgotten(first: int) -> None:
+    """A frame's prior comes from the frames before it, so where a run began matters: here, a little.
+
+    Its first frame is explained as any first frame is, by itself.
+    """
+    part = run("boxes", recording("boxes", FRAMES)[first:FRAMES], "frames", first)
+    pipeline = Pipeline(RIG, ["boxes"] * 4, CONFIG, "frames")
+    views = recording("boxes", FRAMES)[first].views
+    alone = pipeline.detector.explain([view for view in views if isinstance(view, Boxes)], None)
+    np.testing.assert_array_equal(part.steps[0].commit.frames[0].people.ground, alone.people.ground)
+    for step, other in zip(part.steps, whole("boxes", "frames").steps[first:], strict=True):
+        places, others = (np.sort(s.commit.frames[0].people.ground, axis=0) for s in (step, other))
+        np.testing.assert_allclose(places, others, atol=0.03)
+
+
+@pytest.mark.parametrize("frames", [1, 7, 8, 9])
+def test_short_recordings(frames: int) -> None:
+    done = run("boxes", recording("boxes", FRAMES)[:frames])
+    assert [s.frame for step in done.steps for s in step.commit.frames] == list(range(frames))
+    assert len(done.trajectory) == 3 * frames
+    shortest = round(CONFIG.tracking.minimum_duration * RIG.frame_rate)
+    assert len(done.tracks.trajectory) == (3 * frames if frames >= shortest else 0)
+    kinds = done.tracks.events["kind"].tolist()
+    assert kinds.count(b"birth") == 3
+    assert kinds.count(b"dropped") == (0 if frames >= shortest else 3)
+    assert (done.identity == (done.trajectory["id"] if frames >= shortest else 0)).all()
+
+
+def test_no_moments_no_steps() -> None:
+    pipeline = Pipeline(RIG, ["boxes"] * 4, CONFIG, "cut")
+    assert list(run_session(pipeline, foregrounds(), [], 0, lambda _: None)) == []
+
+
+def test_an_empty_room() -> None:
+    nobody = TRUTH[:0]
+    for kind in ("pixels", "boxes"):
+        done = run(kind, list(MOMENTS[kind](RIG, nobody, 0, 10)))
+        assert done.advanced == list(range(10))
+        assert len(done.tracks.trajectory) == len(done.tracks.boxes) == len(done.tracks.events) == 0
+        assert not done.label.any()
+
+
+def test_a_camera_that_goes_blind() -> None:
+    """One of four cameras stops in the middle: nobody is lost."""
+    half = BLIND // 2
+    moments = [
+        moment if moment.frame < half else Moment(moment.frame, (*moment.views[:3], None))
+        for moment in recording("boxes", BLIND)
+    ]
+    done = run("boxes", moments)
+    scores = evaluate(TRUTH[TRUTH["frame"] < BLIND], done.tracks.trajectory)
+    assert (scores.tracks, scores.switches, scores.false_alarms, scores.misses) == (3, 0, 0, 0)

@@ -1,0 +1,282 @@
+"""Nothing is lost: runs that are killed, stopped, starved or tampered with go on and end as if nothing had happened."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from recordings import ALONE, ENVIRONMENT, FRAMES, OPTIONS, assert_same, track, write_recording
+from scenes import walkers
+
+from stseg.detection.score.scoring import set_score
+from stseg.evaluation import evaluate
+from stseg.io.runfile.runs import read_run
+from stseg.io.runfile.unfinished.segment_files import checksum
+from stseg.kernels.accelerate import python_form
+
+PROGRAM = """
+import signal, sys, time
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell that runs the tests in its background has it ignored
+from stseg.commands.main import main
+from stseg.engine.offline import segment_worker
+keep_segment = segment_worker.keep_segment
+segment_worker.keep_segment = lambda draft: (time.sleep(0.5), keep_segment(draft))[1]
+sys.exit(main())
+"""
+"""A run on a slow disk, that it is still at work when a signal reaches it on a machine of any speed."""
+pytestmark = pytest.mark.skipif(python_form(set_score) is set_score, reason="too slow without a compiler")
+
+
+@pytest.fixture(scope="module")
+def rig_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_recording(tmp_path_factory.mktemp("recording"))
+
+
+@pytest.fixture(scope="module")
+def undisturbed(rig_path: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("undisturbed") / "run.h5"
+    assert track(rig_path, path) == 0
+    return path
+
+
+@pytest.fixture
+def night(tmp_path: Path) -> Path:
+    return tmp_path / "night.h5"
+
+
+def process(rig: Path, output: Path) -> subprocess.Popen[str]:
+    arguments = [sys.executable, "-c", PROGRAM, "run", str(rig), "-o", str(output), *OPTIONS, *ALONE]
+    return subprocess.Popen(
+        arguments, env=ENVIRONMENT, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )  # fmt: skip
+
+
+def segments_of(output: Path) -> list[Path]:
+    return sorted(output.with_name(f"{output.name}.segments").glob("segment-*-*.h5"))
+
+
+def test_a_run_in_segments_follows_everybody(undisturbed: Path) -> None:
+    run = read_run(undisturbed)
+    scores = evaluate(walkers(FRAMES), run.trajectory)
+    assert (scores.tracks, scores.switches, scores.false_alarms, scores.misses) == (3, 0, 0, 0)
+    assert run.frames.tolist() == list(range(FRAMES))
+    assert sorted(path.name for path in undisturbed.parent.iterdir()) == ["run.h5"]
+    labels = {int(i) for frame in run.frames.tolist() for i in np.unique(run.read_frame(frame)[1])}
+    assert labels == {0, *run.tracks["id"].tolist()}
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
+def test_twenty_kills_lose_nothing(rig_path: Path, undisturbed: Path, night: Path) -> None:
+    """Processes that have everything imported are forked and killed at random moments, until one comes to its end."""
+    driver = f"""
+import os, random, signal, sys, time
+from stseg.commands.main import main
+import stseg.commands.run
+chance, kills = random.Random(7), 0
+while True:
+    child = os.fork()
+    if child == 0:
+        os._exit(main(sys.argv[1:]))
+    limit = chance.uniform(0.0, 1.2) if kills < 20 else 600.0
+    start = time.monotonic()
+    while (done := os.waitpid(child, os.WNOHANG))[0] == 0 and time.monotonic() - start < limit:
+        time.sleep(0.002)
+    if done[0] == 0:
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
+        kills += 1
+    elif kills == 20:
+        assert done[1] == 0, done
+        break
+    else:  # it was quicker than its killer
+        os.remove({str(night)!r})
+print(kills)
+"""
+    arguments = [sys.executable, "-c", driver, "run", str(rig_path), "-o", str(night), *OPTIONS, *ALONE]
+    done = subprocess.run(arguments, env=ENVIRONMENT, capture_output=True, text=True, check=False)
+    assert done.stdout.strip().endswith("20"), done.stderr
+    assert_same(night, undisturbed)
+    assert [path.name for path in night.parent.iterdir()] == [night.name]
+
+
+@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_signal_ends_a_run_cleanly(
+    rig_path: Path, undisturbed: Path, night: Path, number: signal.Signals, status: int
+) -> None:
+    running = process(rig_path, night)
+    while len(segments_of(night)) < 2 and running.poll() is None:
+        time.sleep(0.005)
+    running.send_signal(number)
+    _, messages = running.communicate(timeout=60)
+    assert running.returncode == status
+    assert "the same command goes on from there" in messages
+    assert "Traceback" not in messages
+    kept = segments_of(night)
+    assert kept
+    assert not list(kept[0].parent.glob("*.part"))
+    assert track(rig_path, night) == 0
+    assert_same(night, undisturbed)
+
+
+@pytest.fixture(scope="module")
+def killed(rig_path: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An output of which some segments are done, and no run is at work."""
+    output = tmp_path_factory.mktemp("killed") / "night.h5"
+    running = process(rig_path, output)
+    while len(segments_of(output)) < 3 and running.poll() is None:
+        time.sleep(0.005)
+    running.kill()
+    running.communicate()
+    assert len(segments_of(output)) >= 3
+    return output
+
+
+@pytest.fixture
+def halfway(killed: Path, night: Path) -> Path:
+    """A copy of it."""
+    shutil.copytree(f"{killed}.segments", f"{night}.segments")
+    return night
+
+
+def test_a_flipped_byte_is_noticed_and_its_segment_made_anew(
+    rig_path: Path, undisturbed: Path, halfway: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    first, second, *_ = segments_of(halfway)
+    content = bytearray(second.read_bytes())
+    content[len(content) // 2] ^= 4
+    second.write_bytes(content)
+    assert track(rig_path, halfway) == 0
+    messages = capsys.readouterr().err
+    assert second.name in messages
+    assert first.name not in messages
+    assert_same(halfway, undisturbed)
+
+
+def test_a_half_written_segment_is_nothing(rig_path: Path, undisturbed: Path, halfway: Path) -> None:
+    folder = segments_of(halfway)[0].parent
+    (folder / "segment-00005.h5").write_bytes(b"half")
+    (folder / "segment-00004.h5.part").write_bytes(b"half")
+    assert track(rig_path, halfway) == 0
+    assert_same(halfway, undisturbed)
+
+
+@pytest.mark.parametrize(
+    ("more", "reported"),
+    [
+        (("--set", "detection.prior_log_odds=-3"), "config.detection.prior_log_odds: found -3.0, where .* has -4.0"),
+        (("--tracker", "frames"), "--tracker: found frames, where .* has cut"),
+        (("--frames", "0:30"), "--frames: found 0:30, where .* has all"),
+        (("--volume", "none"), "--volume: found none, where .* has all"),
+    ],
+)
+def test_another_run_is_refused_and_the_difference_named(
+    rig_path: Path, halfway: Path, capsys: pytest.CaptureFixture[str], more: tuple[str, ...], reported: str
+) -> None:
+    kept = [path.name for path in segments_of(halfway)]
+    assert track(rig_path, halfway, *more) == 2
+    messages = capsys.readouterr().err
+    assert re.search(reported, messages), messages
+    assert "delete the folder night.h5.segments" in messages
+    assert [path.name for path in segments_of(halfway)] == kept
+
+
+def test_changed_sources_are_refused(rig_path: Path, halfway: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    source = rig_path.parent / "east.csv"
+    before, state = source.read_text(), source.stat()
+    try:
+        source.write_text(before + "39,1,1,2,2\n")
+        assert track(rig_path, halfway) == 2
+        assert "source.east, frames: found" in capsys.readouterr().err
+    finally:
+        source.write_text(before)
+        os.utime(source, ns=(state.st_atime_ns, state.st_mtime_ns))
+    assert track(rig_path, halfway) == 0
+
+
+def test_a_source_that_vanishes_loses_no_segment(
+    rig_path: Path, undisturbed: Path, halfway: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    source, away = rig_path.parent / "east.csv", rig_path.parent / "away.csv"
+    source.rename(away)
+    try:
+        assert track(rig_path, halfway) == 2
+    finally:
+        away.rename(source)
+    assert "east.csv" in capsys.readouterr().err
+    assert len(segments_of(halfway)) >= 3
+    assert track(rig_path, halfway) == 0
+    assert_same(halfway, undisturbed)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="needs the locks of POSIX systems")
+def test_two_runs_keep_off_one_output(rig_path: Path, night: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    running = process(rig_path, night)
+    while not segments_of(night) and running.poll() is None:
+        time.sleep(0.005)
+    running.send_signal(signal.SIGSTOP)
+    try:
+        assert track(rig_path, night) == 2
+        assert "another run" in capsys.readouterr().err
+    finally:
+        running.send_signal(signal.SIGCONT)
+        running.communicate()
+    assert running.returncode == 0
+
+
+def test_a_full_disk_loses_no_segment(
+    rig_path: Path, undisturbed: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    if not _mount(disk, "400k"):
+        pytest.skip("needs leave to mount a small disk")
+    try:
+        assert track(rig_path, disk / "night.h5") == 2
+        messages = capsys.readouterr().err
+        assert "No space left on device" in messages
+        kept = segments_of(disk / "night.h5")
+        assert kept
+        assert all(checksum(path) in path.name for path in kept)
+        assert _mount(disk, "40m,remount")
+        assert track(rig_path, disk / "night.h5") == 0
+        assert_same(disk / "night.h5", undisturbed)
+    finally:
+        subprocess.run(["umount", str(disk)], check=False)
+
+
+def _mount(folder: Path, size: str) -> bool:
+    if os.name == "nt" or os.geteuid() != 0 or shutil.which("mount") is None:
+        return False
+    done = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", f"size={size}", "none", str(folder)], check=False, capture_output=True
+    )
+    return done.returncode == 0
+
+
+@pytest.mark.parametrize(("volume", "least", "most"), [("none", 1.0, 1.0), ("tracks", 0.1, 0.99), ("all", 0.0, 0.1)])
+def test_the_volume_is_kept_where_it_is_asked_for(
+    rig_path: Path, undisturbed: Path, night: Path, volume: str, least: float, most: float
+) -> None:
+    assert track(rig_path, night, "--volume", volume) == 0
+    run, whole = read_run(night), read_run(undisturbed)
+    assert run.kept == volume
+    np.testing.assert_array_equal(run.trajectory, whole.trajectory)
+    missing = 0.0
+    for frame in run.frames.tolist():
+        log_odds, label = run.read_frame(frame)
+        everything, named = whole.read_frame(frame)
+        here = ~np.isnan(log_odds)
+        np.testing.assert_array_equal(log_odds[here], everything[here])
+        np.testing.assert_array_equal(label, np.zeros_like(named) if volume == "none" else named)
+        assert not np.isnan(log_odds[label > 0]).any()
+        missing += (~here & ~np.isnan(everything)).sum() / (~np.isnan(everything)).sum() / len(run.frames)
+    assert least - 1e-9 <= missing <= most + 1e-9

@@ -1,0 +1,162 @@
+"""Many hands: the result is the same whoever made the segments, and whoever died on the way."""
+
+from __future__ import annotations
+
+import re
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from multiprocessing import active_children
+from multiprocessing.process import BaseProcess
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+from recordings import ENVIRONMENT, assert_same, track, write_recording
+
+from stseg.detection.score.scoring import set_score
+from stseg.kernels.accelerate import python_form
+
+pytestmark = pytest.mark.skipif(python_form(set_score) is set_score, reason="too slow without a compiler")
+
+
+@pytest.fixture(scope="module")
+def rig_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_recording(tmp_path_factory.mktemp("recording"))
+
+
+@pytest.fixture(scope="module")
+def alone(rig_path: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What one process makes."""
+    path = tmp_path_factory.mktemp("alone") / "run.h5"
+    assert track(rig_path, path) == 0
+    return path
+
+
+@pytest.fixture(autouse=True)
+def path_for_children(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PYTHONPATH", ENVIRONMENT["PYTHONPATH"])
+
+
+@pytest.mark.parametrize("workers", [2, 4])
+def test_any_number_of_workers_makes_the_same(rig_path: Path, alone: Path, tmp_path: Path, workers: int) -> None:
+    assert track(rig_path, tmp_path / "run.h5", "--workers", str(workers)) == 0
+    assert_same(tmp_path / "run.h5", alone)
+    assert [path.name for path in tmp_path.iterdir()] == ["run.h5"]
+
+
+def test_a_worker_that_is_killed_is_replaced(rig_path: Path, alone: Path, tmp_path: Path) -> None:
+    over = threading.Event()
+    killed: list[BaseProcess] = []
+
+    def kill() -> None:
+        while not killed and not over.wait(0.02):
+            for child in active_children()[:1]:
+                child.kill()
+                killed.append(child)
+
+    killer = threading.Thread(target=kill)
+    killer.start()
+    try:
+        assert track(rig_path, tmp_path / "run.h5", "--workers", "2") == 0
+    finally:
+        over.set()
+        killer.join()
+    assert len(killed) == 1
+    assert_same(tmp_path / "run.h5", alone)
+
+
+def test_what_a_worker_finds_wrong_is_told_in_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    rig = write_recording(tmp_path)
+    boxes = tmp_path / "east.csv"
+    lines = boxes.read_text().splitlines()
+    boxes.write_text("\n".join(line for line in lines if not line.startswith("39,")) + "\n")
+    rig.write_text(rig.read_text().replace("frames = 40", "frames = 39", 1))
+    assert track(rig, tmp_path / "run.h5", "--workers", "2") == 2
+    told = capsys.readouterr().err
+    assert len(told.splitlines()) == 1
+    assert told.startswith("stseg: error:")
+
+
+def test_no_workers_are_refused(rig_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert track(rig_path, tmp_path / "run.h5", "--workers", "0") == 2
+    assert "--workers: found 0" in capsys.readouterr().err
+
+
+# A cluster on the loopback address
+
+
+class Cluster(NamedTuple):
+    """A scheduler and its worker processes."""
+
+    address: str
+    workers: list[subprocess.Popen[bytes]]
+
+
+@pytest.fixture
+def cluster(tmp_path: Path) -> Iterator[Cluster]:
+    """With two workers."""
+    command = [
+        sys.executable,
+        "-m",
+        "distributed.cli.dask_scheduler",
+        "--host",
+        "127.0.0.1",
+        "--port",
+        "0",
+        "--no-dashboard",
+    ]
+    log = tmp_path / "scheduler.log"
+    with log.open("w") as file:
+        started = [subprocess.Popen(command, stderr=file, stdout=file, env=ENVIRONMENT)]
+    try:
+        deadline = time.monotonic() + 60
+        while not (found := re.search(r"tcp://127\.0\.0\.1:\d+", log.read_text())):
+            assert time.monotonic() < deadline
+            time.sleep(0.1)
+        started += [_cluster_worker(found[0], tmp_path / f"worker{k}") for k in range(2)]
+        yield Cluster(found[0], started[1:])
+    finally:
+        for process in started:
+            process.kill()
+            process.wait()
+
+
+def _cluster_worker(address: str, folder: Path) -> subprocess.Popen[bytes]:
+    folder.mkdir()
+    command = [sys.executable, "-m", "distributed.cli.dask_worker", address, "--host", "127.0.0.1"]
+    command += ["--nthreads", "1", "--no-nanny", "--no-dashboard", "--local-directory", str(folder)]
+    with (folder / "log").open("w") as file:
+        return subprocess.Popen(command, stderr=file, stdout=file, env=ENVIRONMENT)
+
+
+def test_a_cluster_of_which_a_worker_is_killed_makes_the_same(
+    rig_path: Path, alone: Path, tmp_path: Path, cluster: Cluster
+) -> None:
+    output = tmp_path / "run.h5"
+    folder = tmp_path / "run.h5.segments"
+    over = threading.Event()
+
+    def kill() -> None:
+        while not list(folder.glob("segment-*-*.h5")) and not over.wait(0.02):
+            pass
+        cluster.workers[0].kill()
+
+    killer = threading.Thread(target=kill)
+    killer.start()
+    try:
+        assert track(rig_path, output, "--scheduler", cluster.address) == 0
+    finally:
+        over.set()
+        killer.join()
+    assert cluster.workers[0].wait() == -signal.SIGKILL
+    assert cluster.workers[1].poll() is None
+    assert_same(output, alone)
+
+
+def test_a_scheduler_that_is_not_there(rig_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert track(rig_path, tmp_path / "run.h5", "--scheduler", "tcp://127.0.0.1:9") == 2
+    assert "no scheduler at tcp://127.0.0.1:9" in capsys.readouterr().err

@@ -1,0 +1,392 @@
+"""Scores against truth: named small scenes, slow twins, motmetrics, and golden values of the reference scorer."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+import reference_evaluation as reference
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from stseg.arrays import Rows
+from stseg.commands.evaluate import evaluate as command
+from stseg.errors import ConfigError, FormatError
+from stseg.evaluation import evaluate
+from stseg.io.track_csv import POSITION, read_tracks_csv
+from stseg.records.tables import TRAJECTORY
+
+GOLDEN = json.loads((Path(__file__).parents[1] / "golden" / "evaluation.json").read_text(encoding="utf-8"))
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+def table(rows: Iterable[tuple[int, int, float, float] | tuple[int, int, float, float, int]]) -> Rows:
+    """Rows of frame, id, x, y and perhaps flag."""
+    return np.array([row if len(row) == 5 else (*row, 0) for row in rows], POSITION)
+
+
+def walk(identity: int, y: float, frames: Iterable[int]) -> list[tuple[int, int, float, float]]:
+    """Somebody who walks along x at 0.1 m a frame."""
+    return [(frame, identity, 0.1 * frame, y) for frame in frames]
+
+
+TEN = range(10)
+TWO = table(walk(1, 0.0, TEN) + walk(2, 2.0, TEN))
+"""The truth of most scenes: two people, ten frames, 2 m apart."""
+
+
+def crowd(seed: int, people: int = 3, frames: int = 6) -> tuple[Rows, Rows]:
+    """People within reach of each other, tracks that jitter, miss, swap names and invent; no ties."""
+    rng = np.random.default_rng(seed)
+    ground = rng.uniform(0, 1.2, (people, 2))
+    name = np.arange(people) + 7
+    truth, tracks = [(0, 0, *ground[0])], []
+    for frame in range(frames):
+        ground += rng.normal(0, 0.1, ground.shape)
+        if rng.random() < 0.3:
+            name = rng.permutation(name)
+        for person in range(people):
+            if (frame, person) != (0, 0) and rng.random() < 0.85:
+                truth.append((frame, person, *ground[person]))
+            if rng.random() < 0.8:
+                tracks.append((frame, int(name[person]), *(ground[person] + rng.normal(0, 0.2, 2))))
+        if rng.random() < 0.3:
+            tracks.append((frame, 50, *rng.uniform(0, 1.2, 2)))
+    return table(truth), table(tracks)
+
+
+# Named scenes
+
+
+def test_perfect_tracks_score_full_marks_whatever_their_names() -> None:
+    tracks = TWO.copy()
+    tracks["id"] = 90 - tracks["id"]
+    scores = evaluate(TWO, tracks)
+    full = (scores.moda, scores.modp, scores.precision, scores.recall, scores.mota, scores.idf1, scores.hota)
+    assert full == (100,) * 7
+    assert (scores.frames, scores.truths, scores.people, scores.mostly_tracked) == (10, 20, 2, 2)
+    assert (scores.switches, scores.fragments, scores.false_tracks, scores.false_track_frames) == (0, 0, 0, None)
+    assert (scores.motp, scores.location_mean, scores.location_median) == (0, 0, 0)
+
+
+def test_a_tracker_silent_half_the_time_has_missed_half() -> None:
+    scores = evaluate(TWO, TWO[TWO["frame"] < 5])
+    assert (scores.frames, scores.moda, scores.recall, scores.mota) == (10, 50, 50, 50)
+    assert (scores.precision, scores.modp) == (100, 100)
+    assert scores.idf1 == pytest.approx(200 / 3)
+    assert scores.mostly_tracked == 0
+
+
+def test_a_swap_of_two_names_costs_two_switches_and_half_the_identity() -> None:
+    tracks = TWO.copy()
+    late = tracks["frame"] >= 5
+    tracks["id"][late] = 3 - tracks["id"][late]
+    scores = evaluate(TWO, tracks)
+    assert (scores.moda, scores.switches, scores.fragments) == (100, 2, 0)
+    assert (scores.mota, scores.idf1) == (90, 50)
+    assert scores.hota == pytest.approx(100 * np.sqrt(1 / 3))  # every pair shares 5 of 15 frames
+
+
+def test_a_gap_under_one_name_is_a_fragment_and_no_switch() -> None:
+    scores = evaluate(TWO, TWO[(TWO["id"] == 2) | ~np.isin(TWO["frame"], [4, 5])])
+    assert (scores.fragments, scores.switches, scores.misses, scores.mostly_tracked) == (1, 0, 2, 1)
+
+
+def test_a_new_name_after_a_gap_is_a_fragment_and_a_switch() -> None:
+    tracks = TWO[(TWO["id"] == 2) | ~np.isin(TWO["frame"], [4, 5])].copy()
+    tracks["id"][(tracks["id"] == 1) & (tracks["frame"] > 5)] = 8
+    scores = evaluate(TWO, tracks)
+    assert (scores.fragments, scores.switches) == (1, 1)
+
+
+def test_a_false_track_costs_detections_and_is_counted_with_its_length() -> None:
+    scores = evaluate(TWO, np.concatenate([TWO, table(walk(9, 5.0, range(4)))]))
+    assert (scores.false_alarms, scores.false_tracks, scores.false_track_frames) == (4, 1, 4)
+    assert (scores.moda, scores.recall) == (80, 100)
+    assert scores.precision == pytest.approx(100 * 20 / 24)
+
+
+def test_a_track_matched_in_just_half_of_its_frames_is_false() -> None:
+    tracks = table(walk(1, 0.0, range(5)) + walk(1, 5.0, range(5, 10)) + walk(2, 2.0, TEN))
+    assert evaluate(TWO, tracks).false_tracks == 1
+
+
+@pytest.mark.parametrize(("found", "lost", "tracked"), [(1, 1, 1), (2, 0, 1), (8, 0, 1), (9, 0, 2)])
+def test_mostly_is_more_than_four_frames_of_five(found: int, lost: int, tracked: int) -> None:
+    scores = evaluate(TWO, TWO[(TWO["id"] == 2) | (TWO["frame"] < found)])
+    assert (scores.mostly_lost, scores.mostly_tracked) == (lost, tracked)
+
+
+def test_a_pair_is_kept_although_another_comes_nearer() -> None:
+    truth = table(walk(1, 0.0, range(3)))
+    tracks = table([(0, 5, 0.0, 0.3), (1, 5, 0.1, 0.4), (1, 6, 0.1, 0.1), (2, 5, 0.2, 0.2), (2, 6, 0.2, 0.1)])
+    scores = evaluate(truth, tracks)
+    assert scores.switches == 0
+    assert scores.motp == pytest.approx(0.3)
+    assert scores.location_mean == pytest.approx(0.5 / 3)  # each frame by itself takes the nearer
+
+
+def test_more_pairs_are_better_than_nearer_ones() -> None:
+    truth = table([(0, 1, 0.0, 0.0), (0, 2, 0.4, 0.0)])
+    tracks = table([(0, 1, 0.4, 0.0), (0, 2, 0.85, 0.0)])
+    assert evaluate(truth, tracks).hits == 2
+
+
+def test_nobody_cares_about_people_outside_nor_about_their_tracks() -> None:
+    stranger = walk(3, 9.0, TEN)
+    outside = table(stranger + walk(4, 11.0, TEN))  # one follows the stranger, one follows nobody
+    scores = evaluate(np.concatenate([TWO, table(stranger)]), np.concatenate([TWO, outside]), area=(-1, -1, 3, 3))
+    assert (scores.moda, scores.people, scores.tracks, scores.area) == (100, 2, 2, (-1, -1, 3, 3))
+
+
+def test_somebody_just_inside_may_be_found_just_outside() -> None:
+    truth, tracks = table([(0, 1, 0.9, 0.0)]), table([(0, 1, 1.1, 0.0)])
+    assert evaluate(truth, tracks, area=(-1, -1, 1, 1)).moda == 100
+    assert evaluate(tracks, truth, area=(-1, -1, 1, 1)).detections == 0  # and the other way round nobody is judged
+
+
+def test_a_false_track_inside_counts_although_a_stranger_stands_outside() -> None:
+    truth = table([(0, 1, 0.0, 0.0), (0, 2, 1.5, 0.0)])
+    scores = evaluate(truth, table([(0, 1, 0.0, 0.0), (0, 2, 1.5, 0.1), (0, 3, 0.9, 0.6)]), area=(-1, -1, 1, 1))
+    assert (scores.hits, scores.false_alarms) == (1, 1)
+
+
+def test_flagged_rows_are_ignored_only_where_asked() -> None:
+    truth = TWO.copy()
+    truth["flag"][truth["id"] == 2] = 3
+    wrong = TWO.copy()
+    wrong["y"][wrong["id"] == 2] += 0.3
+    assert evaluate(truth, wrong).people == 2
+    scores = evaluate(truth, wrong, ignore_flagged=True)
+    assert (scores.people, scores.tracks, scores.moda, scores.location_mean) == (1, 1, 100, 0)
+
+
+def test_frames_without_truth_count_where_asked_for() -> None:
+    scores = evaluate(TWO, np.concatenate([TWO, table(walk(9, 0.0, range(10, 15)))]), frames=np.arange(15))
+    assert (scores.frames, scores.false_alarms) == (15, 5)
+    assert evaluate(TWO, TWO, frames=np.array([3, 4, 4])).frames == 2
+
+
+def test_nothing_to_judge_is_said_by_none() -> None:
+    nobody, nothing = evaluate(TWO[:0], TWO), evaluate(TWO, TWO[:0])
+    assert (nobody.frames, nobody.moda, nobody.mota, nobody.recall) == (0, None, None, None)
+    assert (nothing.moda, nothing.precision, nothing.location_mean, nothing.hota, nothing.idf1) == (0, None, None, 0, 0)
+    assert nothing.mostly_lost == 2
+
+
+def test_a_trajectory_table_is_taken_as_it_is() -> None:
+    trajectory = np.zeros(len(TWO), TRAJECTORY)
+    for name in ("frame", "id", "x", "y"):
+        trajectory[name] = TWO[name]
+    assert evaluate(TWO, trajectory) == evaluate(TWO, TWO)
+
+
+@pytest.mark.parametrize("gate", [0.0, -1.0, float("nan"), float("inf")])
+def test_a_gate_that_cannot_be_is_refused(gate: float) -> None:
+    with pytest.raises(ConfigError, match="gate"):
+        evaluate(TWO, TWO, gate)
+
+
+def test_tables_that_cannot_be_are_refused() -> None:
+    lost = TWO.copy()
+    lost["y"][3] = np.nan
+    with pytest.raises(FormatError, match="tracks: frame 3, id 1: found a position that is not finite"):
+        evaluate(TWO, lost)
+    with pytest.raises(FormatError, match="truth: frame 0: found id 1 twice"):
+        evaluate(np.concatenate([TWO, TWO[:1]]), TWO)
+    with pytest.raises(ConfigError, match="area"):
+        evaluate(TWO, TWO, area=(1, 0, 0, 1))
+
+
+# Properties and other judges
+
+
+@given(SEEDS)
+@settings(max_examples=25, deadline=None)
+def test_the_slow_definitions_agree(seed: int) -> None:
+    truth, tracks = crowd(seed)
+    scene, scores = reference.scene_of(truth, tracks), evaluate(truth, tracks)
+    counted = reference.clear(scene, 0.5)
+    kept = (scores.mota or 0) / 100 * scores.truths + scores.switches + scores.detections
+    assert kept / 2 == pytest.approx(counted.pop("kept"))
+    assert {name: scores.as_dict()[name] for name in counted} == counted
+    assert scores.idf1 == pytest.approx(100 * reference.idf1(scene, 0.5))
+    assert scores.hota == pytest.approx(100 * reference.hota(scene, 0.5))
+    assert scores.hota_2gate == pytest.approx(100 * reference.hota(scene, 1.0))
+
+
+@given(SEEDS)
+@settings(max_examples=15, deadline=None)
+def test_neither_names_nor_the_order_of_rows_matter(seed: int) -> None:
+    truth, tracks = crowd(seed)
+    rng = np.random.default_rng(seed)
+    renamed = rng.permutation(tracks)
+    renamed["id"] = 1000 - 3 * renamed["id"]
+    one, other = evaluate(truth, tracks).as_dict(), evaluate(rng.permutation(truth), renamed).as_dict()
+    assert one == other
+
+
+@pytest.mark.parametrize("case", GOLDEN)
+def test_the_reference_scorer_agrees_figure_by_figure(
+    case: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    golden = GOLDEN[case]
+    for name in ("truth", "tracks"):
+        (tmp_path / f"{name}.csv").write_text("\n".join(golden[name]) + "\n", encoding="utf-8")
+    command(tmp_path / "tracks.csv", tmp_path / "truth.csv", as_json=True, **_keywords(golden["options"]))
+    answer = json.loads(capsys.readouterr().out)
+    assert answer == golden["scores"]
+    assert list(answer) == list(golden["scores"])
+
+
+def _keywords(options: list[str]) -> dict[str, Any]:
+    """Options of the reference scorer as arguments of the command."""
+    words = [word for option in options for word in option.split("=")]
+    flagged = "--ignore-flagged" in words
+    words = [word for word in words if word != "--ignore-flagged"]
+    values: dict[str, Any] = dict(zip([word[2:] for word in words[::2]], words[1::2], strict=True))
+    if "gate" in values:
+        values["gate"] = float(values["gate"])
+    return {**values, "ignore_flagged": flagged}
+
+
+@pytest.fixture(scope="module")
+def scorer() -> ModuleType:
+    """The reference scorer without the two figures that it asks TrackEval for."""
+    shared = Path(os.environ.get("STSEG_DATA", Path(__file__).parents[2] / "../shared/data")).parent
+    path = shared / "tools" / "score.py"
+    if not path.exists():
+        pytest.skip("the reference scorer is not here")
+    spec = importlib.util.spec_from_file_location("reference_scorer", path)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    module.identity_hota = lambda *_: {}  # type: ignore[attr-defined]
+    return module
+
+
+def test_the_reference_scorer_agrees_on_many_crowds_and_on_ties(scorer: ModuleType) -> None:
+    for seed in range(60):
+        truth, tracks = crowd(seed, people=5, frames=12)
+        for rows in (truth, tracks):
+            rows["flag"] = rows["frame"] % 3 == 1
+            for axis in ("x", "y"):
+                rows[axis] = rows[axis].round(1)  # many distances tie, many lie on the gate
+        area = (0.1, 0.1, 0.9, 1.0) if seed % 2 else None
+        columns = [(rows["frame"], rows["id"], _places(rows), rows["flag"]) for rows in (truth, tracks)]
+        theirs = scorer.score(*columns, 0.3, area and list(area), "2:10", seed % 3 == 0)
+        ours = evaluate(truth, tracks, 0.3, area, np.arange(2, 10), seed % 3 == 0).as_dict()
+        assert {name: ours[name] for name in theirs} == theirs
+
+
+def _places(rows: Rows) -> Any:
+    return np.stack([rows["x"], rows["y"]], -1)
+
+
+def lanes(seed: int) -> tuple[Rows, Rows]:
+    """People so far apart that no track is ever within the gate of two: where all definitions of a switch agree."""
+    rng = np.random.default_rng(seed)
+    truth, tracks = [], []
+    name = np.arange(4)
+    for frame in range(12):
+        name = rng.permutation(name) if rng.random() < 0.3 else name
+        for person in range(4):
+            x, y = rng.uniform(0, 0.3, 2)
+            truth.append((frame, person, x, 2.0 * person + y))
+            if rng.random() < 0.75:
+                tracks.append((frame, int(name[person]) + 10, x + rng.uniform(-0.4, 0.4), 2.0 * person + y + 0.25))
+        if rng.random() < 0.4:
+            tracks.append((frame, 30, 5.0, 5.0))
+    return table(truth), table(tracks)
+
+
+def judged_by_motmetrics(truth: Rows, tracks: Rows, gate: float) -> dict[str, float]:
+    """MOTA, MOTP (mean distance), IDF1 and switches of another library."""
+    motmetrics = pytest.importorskip("motmetrics")
+    judge = motmetrics.MOTAccumulator(auto_id=True)
+    for frame in np.unique(truth["frame"]):
+        here, there = (rows[rows["frame"] == frame] for rows in (truth, tracks))
+        apart = np.hypot(here["x"][:, None] - there["x"], here["y"][:, None] - there["y"])
+        judge.update(here["id"].tolist(), there["id"].tolist(), np.where(apart <= gate, apart, np.nan))
+    figures = motmetrics.metrics.create().compute(judge, metrics=["mota", "motp", "idf1", "num_switches"])
+    return {name: float(value) for name, value in figures.iloc[0].items()}
+
+
+@pytest.mark.filterwarnings("ignore")
+@given(SEEDS)
+@settings(max_examples=8, deadline=None)
+def test_motmetrics_agrees_on_clear(seed: int) -> None:
+    truth, tracks = lanes(seed)
+    ours, theirs = evaluate(truth, tracks), judged_by_motmetrics(truth, tracks, 0.5)
+    assert ours.mota == pytest.approx(100 * theirs["mota"])
+    assert ours.motp == pytest.approx(theirs["motp"])
+    assert ours.switches == theirs["num_switches"]
+
+
+@pytest.mark.filterwarnings("ignore")
+@given(SEEDS)
+@settings(max_examples=8, deadline=None)
+def test_motmetrics_agrees_on_identity(seed: int) -> None:
+    truth, tracks = crowd(seed)
+    assert evaluate(truth, tracks).idf1 == pytest.approx(100 * judged_by_motmetrics(truth, tracks, 0.5)["idf1"])
+
+
+# The command
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> tuple[Path, Path]:
+    """Tracks that miss half, and the truth."""
+    for name, rows in (("tracks", TWO[TWO["frame"] < 5]), ("truth", TWO)):
+        lines = [f"{r['frame']},{r['id']},{r['x']},{r['y']}" for r in rows]
+        (tmp_path / f"{name}.csv").write_text("\n".join(["frame,id,x,y", *lines]), encoding="utf-8")
+    return tmp_path / "tracks.csv", tmp_path / "truth.csv"
+
+
+def test_the_table_says_what_it_was_taken_on(files: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:
+    command(*files, area="-1,-2,8,9")
+    said = capsys.readouterr().out
+    assert "10 frames, gate 0.5 m, x -1 .. 8, y -2 .. 9 m" in said
+    assert "MODA 50.0 %" in said and "misses 10" in said
+    assert len(said.splitlines()) == 6  # nothing is wrapped
+
+
+def test_the_command_line_is_understood(files: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:
+    from cyclopts import App
+
+    app = App(result_action="return_value")
+    app.command(command)
+    for area in (["--area=-1,-1,9,9"], ["--area", "-1,-1,9,9"]):
+        app(["evaluate", *map(str, files), "--frames", "0:5", *area, "--gate", "0.4", "--json", "--ignore-flagged"])
+        answer = json.loads(capsys.readouterr().out)
+        assert (answer["frames"], answer["MODA"], answer["area"], answer["gate_m"]) == (5, 100, [-1, -1, 9, 9], 0.4)
+
+
+@pytest.mark.parametrize("frames", ["5:2", "5:5", "a:b", "1:2:3", "", "3,", ":", "2:"])
+def test_frames_that_make_no_sense_are_refused(files: tuple[Path, Path], frames: str) -> None:
+    with pytest.raises(ConfigError, match="--frames"):
+        command(*files, frames=frames)
+
+
+@pytest.mark.parametrize("area", ["1,2,3", "a,b,c,d", "3,0,1,1", "0,nan,1,1", ""])
+def test_areas_that_make_no_sense_are_refused(files: tuple[Path, Path], area: str) -> None:
+    with pytest.raises(ConfigError, match="--area"):
+        command(*files, area=area)
+
+
+def test_a_run_file_is_read_as_a_run(
+    files: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    runs = ModuleType("stseg.io.runfile.runs")
+    runs.read_trajectory = lambda _: read_tracks_csv(files[1])  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "stseg.io.runfile.runs", runs)
+    command(Path("night.h5"), files[1], as_json=True)
+    assert json.loads(capsys.readouterr().out)["MODA"] == 100

@@ -1,0 +1,475 @@
+"""Background models: what all of them promise, and what sets the chromatic mixture and the codebook apart."""
+
+from __future__ import annotations
+
+from copy import deepcopy
+from dataclasses import replace
+from typing import Any, get_args, get_type_hints
+
+import numpy as np
+import pytest
+import reference_foreground as reference
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from stseg.arrays import Bytes, Singles
+from stseg.config import ChromaticConfig, CodebookConfig, ForegroundConfig, MixtureConfig
+from stseg.errors import ConfigError, SourceError
+from stseg.foreground import Chromatic, Codebook, Mixture, make_background
+from stseg.foreground.background import codebook_kernels, gaussian_kernels
+from stseg.foreground.background.model import Background, PixelModel
+from stseg.foreground.background.registry import MODELS as MODELS_BY_NAME
+from stseg.kernels.accelerate import python_form
+
+FLOOR = (110, 140, 60)  # BGR
+SHIRT = (40, 60, 190)
+SIZE = (7, 6)
+MIDDLE = (3, 3)  # (v, u) of somebody who covers the pixels 2..4 x 2..4
+RATE = 4.0  # frames per second
+
+MODELS: dict[type[PixelModel], type[Any]] = {
+    Mixture: MixtureConfig,
+    Chromatic: ChromaticConfig,
+    Codebook: CodebookConfig,
+}
+every_model = pytest.mark.parametrize("kind", MODELS, ids=lambda kind: kind.__name__)
+
+
+def room(colour: tuple[float, float, float] = FLOOR) -> Bytes:
+    """An empty scene of one colour, uint8 (v, u, 3)."""
+    return np.full((SIZE[1], SIZE[0], 3), np.round(colour), np.uint8)
+
+
+def with_person(image: Bytes, colour: tuple[float, float, float] = SHIRT) -> Bytes:
+    occupied = image.copy()
+    occupied[2:5, 2:5] = np.round(colour)
+    return occupied
+
+
+def noisy(image: Bytes, rng: np.random.Generator, sd: float = 2.0) -> Bytes:
+    return np.asarray(np.clip(np.round(image + rng.normal(0, sd, image.shape)), 0, 255), np.uint8)
+
+
+def taught(kind: type[PixelModel], **constants: float) -> PixelModel:
+    """A model that has seen twenty frames of the empty room."""
+    model = new(kind, **constants)
+    rng = np.random.default_rng(1)
+    for _ in range(20):
+        model.learn(noisy(room(), rng))
+    return model
+
+
+def new(kind: type[PixelModel], **constants: float) -> PixelModel:
+    return kind(SIZE, RATE, MODELS[kind](**constants))
+
+
+def in_shadow(share: float) -> tuple[float, float, float]:
+    return FLOOR[0] * share, FLOOR[1] * share, FLOOR[2] * share
+
+
+# What every model promises
+
+
+@every_model
+def test_the_likelihood_is_a_posterior_with_the_prior_that_is_told(kind: type[PixelModel]) -> None:
+    model: Background = taught(kind, foreground_prior=0.2)
+    assert model.prior == 0.2
+    likelihood = model.likelihood(with_person(room()))
+    assert likelihood.dtype == np.float32
+    assert likelihood[0, 0] < 0.01
+    assert likelihood[MIDDLE] > 0.98
+    assert ((likelihood > 0) & (likelihood < 1)).all()
+
+
+@every_model
+def test_a_person_who_stands_for_a_minute_does_not_fade(kind: type[PixelModel]) -> None:
+    model, rng = taught(kind), np.random.default_rng(4)
+    for _ in range(int(60 * RATE)):
+        likelihood = model.likelihood(noisy(with_person(room()), rng))
+    assert likelihood[MIDDLE] > 0.98
+    assert model.likelihood(room())[MIDDLE] < 0.02  # and leaves no hole behind
+
+
+@every_model
+def test_a_shadow_stays_background_softly_and_teaches_nothing(kind: type[PixelModel]) -> None:
+    model = taught(kind)
+    for _ in range(60):
+        likelihood = model.likelihood(with_person(room(), in_shadow(0.7)))
+    assert 0.02 < likelihood[MIDDLE] < 0.2
+    assert model.likelihood(with_person(room(), in_shadow(0.3)))[MIDDLE] > 0.95  # deeper than any shadow
+    assert model.likelihood(room())[MIDDLE] < 0.02
+
+
+@every_model
+def test_a_part_of_the_scene_may_change_slowly(kind: type[PixelModel]) -> None:
+    changed = (FLOOR[0] + 50, FLOOR[1], FLOOR[2] + 30)
+    assert taught(kind).likelihood(with_person(room(), changed))[MIDDLE] > 0.9  # at once it is somebody
+    model, rng = taught(kind, memory=10.0), np.random.default_rng(5)
+    for done in np.linspace(0, 1, int(120 * RATE)):
+        colour = tuple(a + done * (b - a) for a, b in zip(FLOOR, changed, strict=True))
+        likelihood = model.likelihood(noisy(with_person(room(), (colour[0], colour[1], colour[2])), rng))
+        assert likelihood[MIDDLE] < 0.3
+    assert likelihood[MIDDLE] < 0.05
+
+
+@every_model
+def test_a_chair_that_moved_in_becomes_background_after_the_absorption(kind: type[PixelModel]) -> None:
+    model, rng = taught(kind, absorption_time=20.0, smoothing_radius=0), np.random.default_rng(6)
+    chair = with_person(room())
+    answers = [float(model.likelihood(noisy(chair, rng))[MIDDLE]) for _ in range(int(24 * RATE))]
+    assert min(answers[: int(19 * RATE)]) > 0.9
+    assert max(answers[int(22 * RATE) :]) < 0.1
+    assert model.likelihood(room())[MIDDLE] < 0.1  # its leaving is no ghost
+
+
+@every_model
+def test_light_that_changes_at_once_is_no_person(kind: type[PixelModel]) -> None:
+    scene = np.random.default_rng(5).integers(40, 160, (24, 24, 3)).astype(np.uint8)
+    model = kind((24, 24), RATE)  # type: ignore[call-arg]  # as models have it
+    for _ in range(5):
+        model.learn(scene)
+    for gain in (1.0, 0.6, 1.5):
+        empty = np.clip(np.round(scene * gain * np.array([1.0, 0.95, 1.05])), 0, 255).astype(np.uint8)
+        assert model.likelihood(empty).max() < 0.05
+        assert model.likelihood(with_person(empty, (5, 5, 5)))[MIDDLE] > 0.95
+
+
+@every_model
+def test_flicker_shown_while_learning_is_background(kind: type[PixelModel]) -> None:
+    model = new(kind)
+    for k in range(20):
+        model.learn(room() if k % 2 else room((200, 200, 200)))
+    assert model.likelihood(room()).max() < 0.05
+    assert model.likelihood(room((200, 200, 200))).max() < 0.05
+
+
+@every_model
+def test_the_start_among_people_finds_what_is_behind_them(kind: type[PixelModel]) -> None:
+    rng, frames = np.random.default_rng(3), []
+    for k in range(20):  # 12 of 20 frames are covered, by people of many colours
+        b, g, r = rng.integers(0, 256, 3)
+        frames.append(noisy(room() if k % 5 < 2 else room((b, g, r)), rng))
+    model = new(kind)
+    model.learn_from(frames)
+    likelihood = model.likelihood(with_person(room()))
+    assert likelihood[0, 0] < 0.05
+    assert likelihood[MIDDLE] > 0.95
+
+
+@every_model
+def test_people_take_no_place_from_the_background(kind: type[PixelModel]) -> None:
+    model, rng = taught(kind), np.random.default_rng(8)
+    for _ in range(40):
+        b, g, r = rng.integers(0, 256, 3)
+        model.likelihood(with_person(room(), (b, g, r)))
+    assert model.likelihood(room()).max() < 0.02
+
+
+@every_model
+@pytest.mark.parametrize("level", [0, 255])
+def test_black_and_white_scenes_are_scenes_too(kind: type[PixelModel], level: int) -> None:
+    scenes = [room((level, level, level)) for _ in range(20)]
+    learned, started = new(kind), new(kind)
+    for scene in scenes:
+        learned.learn(scene)
+    started.learn_from(scenes)
+    for model in (learned, started):
+        for _ in range(8):
+            assert model.likelihood(scenes[0]).max() < 0.02
+        assert model.likelihood(with_person(scenes[0]))[MIDDLE] > 0.95
+
+
+@every_model
+def test_a_copy_goes_on_bit_for_bit_and_by_itself(kind: type[PixelModel]) -> None:
+    rng = np.random.default_rng(7)
+    frames = [noisy(with_person(room()) if k % 3 else room(), rng, 4.0) for k in range(24)]
+    whole, first = taught(kind, absorption_time=3.0), taught(kind, absorption_time=3.0)
+    expected = [whole.likelihood(frame) for frame in frames]
+    for frame in frames[:9]:
+        first.likelihood(frame)
+    second = deepcopy(first)
+    for frame in frames[::-1]:
+        first.likelihood(frame)
+    for frame, one in zip(frames[9:], expected[9:], strict=True):
+        np.testing.assert_array_equal(second.likelihood(frame), one)
+
+
+@every_model
+def test_what_a_model_cannot_take_is_refused(kind: type[PixelModel]) -> None:
+    with pytest.raises(SourceError, match="learned nothing"):
+        new(kind).likelihood(room())
+    with pytest.raises(SourceError, match="no frames"):
+        new(kind).learn_from([])
+    with pytest.raises(SourceError, match="image"):
+        taught(kind).likelihood(room()[1:])
+    with pytest.raises(ConfigError, match="frame_rate"):
+        kind(SIZE, 0.0)  # type: ignore[call-arg]  # as models have it
+
+
+def test_every_registered_model_can_be_configured() -> None:
+    named = get_args(get_type_hints(ForegroundConfig)["model"])
+    assert set(named) == {*MODELS_BY_NAME}
+
+
+def test_the_configuration_names_the_model() -> None:
+    config = ForegroundConfig(codebook=CodebookConfig(channel_sd=7.0), mixture=MixtureConfig(memory=9.0))
+    kinds = {name: type(make_background(SIZE, RATE, replace(config, model=name))) for name in ("chromatic", "codebook")}
+    assert kinds == {"chromatic": Chromatic, "codebook": Codebook}
+    mixture = make_background(SIZE, RATE, replace(config, model="mixture"))
+    assert isinstance(mixture, Mixture)
+    assert mixture.config.memory == 9.0
+    codebook = make_background(SIZE, RATE, replace(config, model="codebook"))
+    assert isinstance(codebook, Codebook)
+    assert codebook.config.channel_sd == 7.0
+    assert isinstance(make_background(SIZE, RATE, config), PixelModel)
+
+
+@pytest.mark.parametrize(
+    ("config", "key", "value"),
+    [
+        (ChromaticConfig, "chromatic_sd", 0.0),
+        (CodebookConfig, "codewords", 0),
+        (CodebookConfig, "brightest_highlight", 1.0),
+        (CodebookConfig, "recurrence", 1.0),
+        (CodebookConfig, "absence", 0.0),
+        (CodebookConfig, "channel_sd", 0.0),
+        (CodebookConfig, "memory", 0.0),
+    ],
+)
+def test_constants_out_of_range_are_named(config: type[Any], key: str, value: float) -> None:
+    with pytest.raises(ConfigError, match=key):
+        config(**{key: value})
+
+
+# The chromatic mixture
+
+
+@given(seed=st.integers(0, 10**6))
+def test_the_distance_from_the_ray_is_the_mahalanobis_distance_in_the_chromatic_plane(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    x, mu, sigma = rng.uniform(1, 255, 3), rng.uniform(1, 255, 3), 3.0
+    plane = mu / mu.sum()
+    spread = (np.eye(3) - np.outer(plane, np.ones(3))) / x.sum()  # of noise on x, in x's place of the plane
+    residual = x / x.sum() - plane
+    squared = residual @ np.linalg.pinv(sigma**2 * spread @ spread.T, rcond=1e-9) @ residual
+    assert np.sqrt(squared) == pytest.approx(reference.polar(x, mu)[1] / sigma, rel=1e-5, abs=1e-6)
+
+
+def test_where_light_flickers_a_person_as_bright_as_the_wall_is_found_by_colour() -> None:
+    rng = np.random.default_rng(9)
+    models = [new(Mixture, smoothing_radius=0), new(Chromatic, smoothing_radius=0)]
+    for _ in range(40):
+        light = np.clip(rng.normal(1, 0.1), 0.8, 1.2)
+        flickering = np.where(np.indices((SIZE[1], SIZE[0]))[1][..., None] < 4, light, 1.0)  # no gain of the whole view
+        for model in models:
+            model.learn(noisy(np.round(room() * flickering).astype(np.uint8), rng))
+    alike = (FLOOR[0] - 18, FLOOR[1], FLOOR[2] + 18)
+    mixture, chromatic = (float(model.likelihood(with_person(room(), alike))[3, 2]) for model in models)
+    assert chromatic > 0.9 > 0.5 > mixture
+
+
+def test_a_dark_pixel_has_no_chromaticity_to_speak_of() -> None:
+    dark = new(Chromatic)
+    for _ in range(20):
+        dark.learn(room((7, 9, 4)))
+    assert dark.likelihood(with_person(room((7, 9, 4)), (5, 6, 7)))[MIDDLE] < 0.1
+
+
+def random_modes(rng: np.random.Generator, modes: int) -> tuple[Singles, Singles, Singles]:
+    mean = rng.uniform(5, 250, (3, 4, modes, 3)).astype(np.float32)
+    variance = rng.uniform(6, 400, (3, 4, modes, 2)).astype(np.float32)
+    weight = rng.dirichlet(np.full(modes, 0.4), (3, 4)).astype(np.float32)
+    return mean, variance, weight
+
+
+def near_modes(rng: np.random.Generator, mean: Singles) -> Bytes:
+    """Colours around the modes, in their light, in their shadow, and elsewhere."""
+    ratio = rng.choice([1.2, 1.0, 0.8, 0.55, 0.3], mean.shape[:2])
+    own = mean[:, :, 0] * ratio[:, :, None] + rng.normal(0, 6, (*mean.shape[:2], 3))
+    return np.asarray(np.clip(np.round(own), 0, 255), np.uint8)
+
+
+@settings(max_examples=30, deadline=None)
+@given(seed=st.integers(0, 10**6), modes=st.integers(1, 3))
+def test_the_chromatic_log_odds_are_their_formula(seed: int, modes: int) -> None:
+    rng = np.random.default_rng(seed)
+    state, config = random_modes(rng, modes), ChromaticConfig()
+    image, gain = near_modes(rng, state[0]), rng.uniform(0.8, 1.25, 3)
+    expected = reference.chromatic_log_odds(image, gain, *state, config)
+    log_odds = np.empty(image.shape[:2], np.float32)
+    for function in (gaussian_kernels.evaluate, python_form(gaussian_kernels.evaluate)):
+        priors = gaussian_kernels.Priors.of(config)
+        function(image, gain.astype(np.float32), reference.planes_of(*state), priors, log_odds)
+        np.testing.assert_allclose(log_odds, expected, atol=2e-3)
+
+
+@settings(max_examples=30, deadline=None)
+@given(seed=st.integers(0, 10**6), modes=st.integers(1, 3))
+def test_the_chromatic_modes_learn_by_their_rules(seed: int, modes: int) -> None:
+    rng = np.random.default_rng(seed)
+    state, config = random_modes(rng, modes), ChromaticConfig()
+    image, gain = near_modes(rng, state[0]), rng.uniform(0.8, 1.25, 3).astype(np.float32)
+    likelihood = rng.uniform(0, 1, image.shape[:2]).astype(np.float32)
+    expected = reference.chromatic_updated(image, gain.astype(float), likelihood, 0.05, 0.001, state, config)
+    numbers = config.background_weight, config.match_distance, config.initial_sd, config.chromatic_sd, config.minimum_sd
+    constants = gaussian_kernels.Adaptation(*(np.float32(number) for number in numbers))
+    for function in (gaussian_kernels.update, python_form(gaussian_kernels.update)):
+        found = reference.planes_of(*state)
+        function(image, gain, likelihood, np.float32(0.05), np.float32(0.001), constants, 0, 1, found)
+        for one, other in zip(reference.modes_of(found), expected, strict=True):
+            np.testing.assert_allclose(one, other, rtol=1e-3, atol=1e-3)
+
+
+# The codebook
+
+
+def test_a_slight_highlight_is_softer_than_a_person() -> None:
+    answers = [float(taught(Codebook).likelihood(with_person(room(), in_shadow(r)))[MIDDLE]) for r in (1.15, 1.5)]
+    assert answers[0] < 0.7
+    assert answers[1] > 0.95
+
+
+def test_brightness_between_the_bounds_is_background() -> None:
+    model = new(Codebook)
+    for k in range(20):
+        model.learn(room(in_shadow(0.9 + 0.01 * k)))
+    for share in (0.9, 1.0, 1.09):
+        image = with_person(room(), in_shadow(share))
+        image[0] = SHIRT  # an edge that keeps the view from having one gain
+        assert model.likelihood(image)[MIDDLE] < 0.02
+
+
+def test_somebody_who_comes_and_goes_is_never_absorbed() -> None:
+    model, rng = taught(Codebook, absorption_time=20.0, absence=3.0), np.random.default_rng(10)
+    for second in range(80):  # there for ten seconds, away for five
+        seen = with_person(room()) if second % 15 < 10 else room()
+        for _ in range(int(RATE)):
+            likelihood = model.likelihood(noisy(seen, rng))
+            assert (likelihood[MIDDLE] > 0.9) == (second % 15 < 10)
+
+
+def test_what_was_learned_first_is_never_forgotten() -> None:
+    model = taught(Codebook, absorption_time=5.0, memory=5.0, smoothing_radius=0)
+    for _ in range(int(60 * RATE)):
+        model.likelihood(with_person(room()))
+    assert model.likelihood(with_person(room()))[MIDDLE] < 0.05  # the chair
+    assert model.likelihood(room())[MIDDLE] < 0.05  # the floor below it
+    for _ in range(int(10 * RATE)):
+        model.likelihood(room())
+    assert model.likelihood(with_person(room()))[MIDDLE] > 0.9  # somebody like the chair, after it is gone
+
+
+def test_among_people_a_second_colour_is_background_where_it_keeps_coming() -> None:
+    lamp = (90, 200, 240)
+    for colours, likely in (([0, 1] * 10, False), ([1, 1, 1, 0, 0, 0, 0, 0, 0, 0] * 2, True)):
+        model = new(Codebook)
+        model.learn_from([room(lamp) if lit else room() for lit in colours])
+        assert model.likelihood(room()).max() < 0.05
+        assert (model.likelihood(with_person(room(), lamp))[MIDDLE] > 0.9) == likely
+
+
+Records = tuple[Singles, Singles, Singles, Singles, NDArray[np.int32]]
+NOW = 50
+
+
+def random_book(rng: np.random.Generator, words: int) -> Records:
+    shape = (3, 4, words)
+    mean = rng.uniform(8, 240, (*shape, 3)).astype(np.float32)
+    bounds = np.stack([rng.uniform(0.8, 1, shape), rng.uniform(1, 1.2, shape)], -1).astype(np.float32)
+    frequency = rng.choice([0, 0, 1, 5, 40], shape).astype(np.float32)
+    frequency[:, :, 0] = 7
+    weight = np.where(rng.random(shape) < 0.5, np.minimum(frequency, 20), 0).astype(np.float32)
+    weight[:, :, 0] = 7
+    first = np.where(weight > 0, rng.integers(0, 2, shape) * 5, rng.integers(1, 40, shape))
+    access = np.stack([first, rng.integers(first, NOW)], -1).astype(np.int32)
+    return mean, bounds, frequency, weight, access
+
+
+def book_of(records: Records, longest: NDArray[np.int32], v: int, u: int) -> reference.Book:
+    """A pixel's codewords as the reference has them."""
+    mean, bounds, frequency, weight, access = (part[v, u] for part in records)
+    book: reference.Book = []
+    for k, colour in enumerate(mean.astype(float)):
+        low, high = bounds[k].astype(float) * np.linalg.norm(colour)
+        first, last = access[k].tolist()
+        word = reference.Codeword(
+            colour, low, high, float(frequency[k]), float(weight[k]), int(longest[v, u, k]), first, last
+        )
+        book.append(word if frequency[k] else None)
+    return book
+
+
+def assert_same_book(found: reference.Book, expected: reference.Book) -> None:
+    for one, other in zip(found, expected, strict=True):
+        assert (one is None) == (other is None)
+        if one is not None and other is not None:
+            np.testing.assert_allclose(one.colour, other.colour, rtol=1e-4)
+            numbers = [[w.low, w.high, w.frequency, w.weight, w.longest, w.first, w.last] for w in (one, other)]
+            np.testing.assert_allclose(numbers[0], numbers[1], rtol=1e-3)
+
+
+@settings(max_examples=30, deadline=None)
+@given(seed=st.integers(0, 10**6), words=st.integers(1, 3))
+def test_the_codebooks_log_odds_are_their_formula(seed: int, words: int) -> None:
+    rng = np.random.default_rng(seed)
+    mean, bounds, _, weight, _ = random_book(rng, words)
+    image, gain, config = near_modes(rng, mean), rng.uniform(0.8, 1.25, 3), CodebookConfig()
+    expected = reference.codebook_log_odds(image, gain, mean, bounds, weight, config)
+    log_odds = np.empty(image.shape[:2], np.float32)
+    for function in (codebook_kernels.evaluate, python_form(codebook_kernels.evaluate)):
+        function(
+            image, gain, mean, bounds, weight, config.foreground_prior, config.outlier_rate, config.shadow_prior,
+            config.highlight_prior, config.darkest_shadow, config.brightest_highlight, config.shadow_confusion,
+            config.channel_sd, log_odds,
+        )  # fmt: skip
+        np.testing.assert_allclose(log_odds, expected, atol=5e-3)
+
+
+@settings(max_examples=30, deadline=None)
+@given(seed=st.integers(0, 10**6), words=st.integers(1, 3))
+def test_codewords_of_the_empty_scene_are_learned_by_their_rules(seed: int, words: int) -> None:
+    rng = np.random.default_rng(seed)
+    state = random_book(rng, words)
+    longest = rng.integers(0, 20, state[2].shape).astype(np.int32)
+    image, gain = near_modes(rng, state[0]), rng.uniform(0.8, 1.25, 3).astype(np.float32)
+    for function in (codebook_kernels.teach, python_form(codebook_kernels.teach)):
+        found, runs = copies(state), longest.copy()
+        function(image, gain, NOW, np.float32(15), runs, *found)
+        for v, u in np.ndindex(image.shape[:2]):
+            book = book_of(state, longest, v, u)
+            reference.teach(book, image[v, u].astype(float), gain.astype(float), NOW, 15)
+            assert_same_book(book_of(found, runs, v, u), book)
+
+
+@settings(max_examples=30, deadline=None)
+@given(seed=st.integers(0, 10**6), words=st.integers(1, 3))
+def test_codewords_follow_the_scene_by_their_rules(seed: int, words: int) -> None:
+    rng = np.random.default_rng(seed)
+    state = random_book(rng, words)
+    none = np.zeros(state[2].shape, np.int32)
+    image, gain = near_modes(rng, state[0]), rng.uniform(0.8, 1.25, 3).astype(np.float32)
+    likelihood = rng.uniform(0, 1, image.shape[:2]).astype(np.float32)
+    for function in (codebook_kernels.follow, python_form(codebook_kernels.follow)):
+        found = copies(state)
+        function(image, gain, likelihood, NOW, np.float32(15), np.float32(0.06), 30, 12, *found)
+        for v, u in np.ndindex(image.shape[:2]):
+            book = book_of(state, none, v, u)
+            x, chance = image[v, u].astype(float), float(likelihood[v, u])
+            reference.follow(book, x, gain.astype(float), chance, NOW, 15, 0.06, (30, 12))
+            assert_same_book(book_of(found, none, v, u), book)
+
+
+def copies(records: Records) -> Records:
+    mean, bounds, frequency, weight, access = records
+    return mean.copy(), bounds.copy(), frequency.copy(), weight.copy(), access.copy()
+
+
+def test_a_negative_run_goes_on_from_the_end_to_the_beginning() -> None:
+    longest = np.array([[[9, 2, 2, 5]]], np.int32)
+    access = np.array([[[[1, 20], [3, 19], [4, 18], [1, 20]]]], np.int32)
+    frequency, weight = np.ones((1, 1, 4), np.float32), np.ones((1, 1, 4), np.float32)
+    codebook_kernels.settle(20, 3, longest, frequency, weight, access)
+    np.testing.assert_array_equal(weight[0, 0], [1, 1, 0, 0])  # the first stays; 3, 5 and 5 away
+    np.testing.assert_array_equal(frequency, weight)
+    assert not access.any()

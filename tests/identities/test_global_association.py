@@ -1,0 +1,174 @@
+"""Who is who from the whole run: meetings undone by height and motion, people found again, and the greatest sum."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from strollers import BORDER, CONFIG, RATE, gone, rows_of, runs, swapped, visit
+
+from stseg.arrays import Ints, Rows
+from stseg.identities.evidence.size_model import MeasuredSizes
+from stseg.identities.global_association import GlobalAssociation, _mostly_held, associate_globally
+from stseg.records.tables import APPEARANCE, EVENT, TRAJECTORY
+from stseg.tracking.windows.isolated_tracklets import isolated_tracklets
+
+
+def relinked(rows: Rows) -> GlobalAssociation:
+    sizes = MeasuredSizes.of_heights(rows["height"], CONFIG)
+    return associate_globally(rows, sizes, np.zeros(0, APPEARANCE), RATE, BORDER, CONFIG)
+
+
+def names(rows: Rows, identity: Ints, track: int, frames: range) -> set[int]:
+    """Identities of a track in some frames."""
+    return set(identity[(rows["id"] == track) & np.isin(rows["frame"], frames)].tolist())
+
+
+MET = range(72, 89)
+"""Frames in which two visitors stand together."""
+
+
+# Meetings
+
+
+@pytest.mark.parametrize(("frame", "taller"), [(80, 0.08), (78, 0.15), (80, 0.15), (82, 0.15)])
+def test_height_tells_two_apart_who_swapped_while_they_stood_together(frame: int, taller: float) -> None:
+    true = rows_of({1: (visit(-1), 1.70, range(160)), 2: (visit(1), 1.70 + taller, range(160))}, noise=0.0)
+    told = swapped(true, frame)
+    found = relinked(told)
+    apart = ~np.isin(true["frame"], MET)
+    np.testing.assert_array_equal(found.identity[apart], true["id"][apart])
+    assert sorted(link.identity for link in found.links) == [1, 2]
+    assert all(link.frame in MET and link.track == 3 - link.identity for link in found.links)
+
+
+def test_who_was_followed_rightly_through_a_meeting_stays() -> None:
+    for taller in (0.0, 0.08):
+        rows = rows_of({1: (visit(-1), 1.70, range(160)), 2: (visit(1), 1.70 + taller, range(160))})
+        found = relinked(rows)
+        np.testing.assert_array_equal(found.identity, rows["id"])
+        assert not found.links
+
+
+def test_who_walk_straight_past_each_other_keep_their_tracks() -> None:
+    """The same height: motion tells, and the track that was followed."""
+    rows = rows_of(
+        {
+            1: (lambda t: (-4 + t, -0.15), 1.7, range(64)),
+            2: (lambda t: (4 - t, 0.15), 1.7, range(64)),
+        }
+    )
+    assert len(isolated_tracklets(rows, RATE)) == 4
+    found = relinked(rows)
+    np.testing.assert_array_equal(found.identity, rows["id"])
+    assert not found.links
+
+
+# Out of sight
+
+
+def test_somebody_lost_inside_the_area_is_the_same_afterwards() -> None:
+    rows = gone(2.0)
+    found = relinked(rows)
+    assert set(found.identity.tolist()) == {1}
+    (link,) = found.links
+    assert (link.frame, link.identity, link.track) == (40, 1, 2)
+    assert link.reason.startswith("2.1 s on")
+    assert link.reason.isascii()
+    assert len(link.reason) <= EVENT["reason"].itemsize
+
+
+def test_too_long_is_somebody_else() -> None:
+    rows = gone(CONFIG.tracking.maximum_gap + 0.25)
+    np.testing.assert_array_equal(relinked(rows).identity, rows["id"])
+
+
+def test_another_height_is_somebody_else() -> None:
+    rows = gone(1.0, tall=1.95)
+    np.testing.assert_array_equal(relinked(rows).identity, rows["id"])
+
+
+def test_one_leaves_at_the_border_and_another_comes_in() -> None:
+    rows = rows_of(
+        {
+            1: (lambda t: (2.9 + t, 0.0), 1.65, range(24)),
+            2: (lambda t: (5.9 - 0.9 * (t - 4), 0.2), 1.82, range(32, 56)),
+        }
+    )
+    found = relinked(rows)
+    np.testing.assert_array_equal(found.identity, rows["id"])
+    assert not found.links
+
+
+# Any run
+
+
+@settings(max_examples=100, deadline=None)
+@given(runs(6))
+def test_nobody_is_in_two_places_at_once(rows: Rows) -> None:
+    found = relinked(rows)
+    keys = list(zip(rows["frame"].tolist(), found.identity.tolist(), strict=True))
+    assert len(set(keys)) == len(rows) == len(found.identity)
+    assert (found.identity > 0).all()
+    for link in found.links:
+        at = (rows["frame"] == link.frame) & (rows["id"] == link.track)
+        assert found.identity[at].tolist() == [link.identity]
+        assert (rows["frame"][found.identity == link.identity] < link.frame).any()
+
+
+@settings(max_examples=60, deadline=None)
+@given(runs(5), st.integers(0, 999))
+def test_the_order_of_rows_does_not_matter(rows: Rows, seed: int) -> None:
+    order = np.random.default_rng(seed).permutation(len(rows))
+    one, other = relinked(rows), relinked(rows[order])
+    np.testing.assert_array_equal(one.identity[order], other.identity)
+    assert one.links == other.links
+    assert relinked(rows).links == one.links
+
+
+def test_nobody_at_all() -> None:
+    found = relinked(np.zeros(0, TRAJECTORY))
+    assert len(found.identity) == len(found.links) == 0
+
+
+# Tracklets
+
+
+def test_a_track_is_cut_where_it_met_another_and_where_it_was_unseen() -> None:
+    rows = rows_of(
+        {
+            1: (lambda t: (-4 + t, -0.1), 1.7, range(64)),
+            2: (lambda t: (4 - t, 0.1), 1.8, range(64)),
+        },
+        noise=0.0,
+    )
+    rows = rows[(rows["id"] != 1) | (rows["frame"] < 50) | (rows["frame"] >= 53)]
+    parts = sorted(
+        (int(rows["id"][part[0]]), *rows["frame"][part[[0, -1]]].tolist()) for part in isolated_tracklets(rows, RATE)
+    )
+    assert parts == [(1, 0, 31), (1, 32, 49), (1, 53, 63), (2, 0, 31), (2, 32, 63)]
+
+
+@given(runs(6))
+def test_stretches_hold_every_row_once(rows: Rows) -> None:
+    parts = isolated_tracklets(rows, RATE)
+    assert sorted(row for part in parts for row in part.tolist()) == list(range(len(rows)))
+    for part in parts:
+        own = rows[part]
+        assert len(set(own["id"].tolist())) == 1
+        assert (np.diff(own["frame"]) == 1).all()
+
+
+@given(st.lists(st.tuples(st.integers(1, 3), st.integers(1, 4)), max_size=40), st.sampled_from([0.0, 1.0, 2.5, 4.0]))
+def test_the_track_that_an_identity_holds_is_that_of_most_rows_around(
+    steps: list[tuple[int, int]], reach: float
+) -> None:
+    rows = np.zeros(len(steps), TRAJECTORY)
+    rows["id"], rows["frame"] = [track for track, _ in steps], np.cumsum([step for _, step in steps])
+    held = []
+    for row in rows:
+        around = rows["id"][np.abs(rows["frame"] - row["frame"]) <= reach].tolist()
+        (most,) = [one for one in set(around) if 2 * around.count(one) > len(around)] or [int(row["id"])]
+        held.append(most)
+    assert _mostly_held(rows, reach).tolist() == held

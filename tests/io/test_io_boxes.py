@@ -1,0 +1,131 @@
+"""Box files: both forms, frames without boxes, and lines that are none."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from stseg.errors import FormatError, SourceError
+from stseg.io.detections.box_files import BoxTable, read_boxes
+
+DATA = Path(os.environ.get("STSEG_DATA", Path(__file__).parents[2] / "../shared/data"))
+
+
+def read(folder: Path, text: str, first_frame: int = 0, frames: int | None = None) -> BoxTable:
+    path = folder / "boxes.txt"
+    path.write_text(text, encoding="utf-8")
+    return read_boxes(path, first_frame, frames)
+
+
+def test_csv_columns_come_in_any_order_and_others_are_ignored(tmp_path: Path) -> None:
+    text = 'label,height,width,top,left,score,frame\n"a, b",4,3,2,1,0.5,0\n,40,30,20,10,1,2\n'
+    table = read(tmp_path, text)
+    assert table.frames == 3
+    assert table.at(0).pixel.tolist() == [[1, 2, 3, 4]]
+    assert table.at(0).score.tolist() == [0.5]
+    assert table.at(1).pixel.shape == (0, 4)
+    assert table.at(2).pixel.tolist() == [[10, 20, 30, 40]]
+
+
+def test_boxes_without_scores_are_believed(tmp_path: Path) -> None:
+    table = read(tmp_path, "\ufeffframe, left, top, width, height\n0, 1, 2, 3, 4\n")
+    assert table.at(0).score.tolist() == [1]
+
+
+@pytest.mark.parametrize("separator", [",", " ", ", ", "  "])
+def test_motchallenge_lines(tmp_path: Path, separator: str) -> None:
+    lines = ["2 -1 5.5 6 7 8 0.25 -1 -1 -1", "1 -1 1e0 2 3 4 -1 -1 -1 -1"]
+    table = read(tmp_path, "\n".join(line.replace(" ", separator) for line in lines) + "\n\n", first_frame=1)
+    assert table.frames == 2
+    assert table.at(0).pixel.tolist() == [[1, 2, 3, 4]]
+    assert table.at(0).score.tolist() == [1]
+    assert table.at(1).pixel.tolist() == [[5.5, 6, 7, 8]]
+    assert table.at(1).score.tolist() == [0.25]
+
+
+def test_motchallenge_without_confidence(tmp_path: Path) -> None:
+    assert read(tmp_path, "0,7,1,2,3,4\n").at(0).score.tolist() == [1]
+
+
+def test_frames_says_how_many_have_nothing(tmp_path: Path) -> None:
+    assert read(tmp_path, "0 -1 1 2 3 4 1\n", frames=5).frames == 5
+    assert len(read(tmp_path, "", frames=5).at(4)) == 0
+    assert len(read(tmp_path, "frame,left,top,width,height\n", frames=5).at(0)) == 0
+
+
+@pytest.mark.parametrize(
+    ("line", "reported"),
+    [
+        ("0,1,2,nan,4,0.5", "line 3: found width nan"),
+        ("0,inf,2,3,4,0.5", "line 3: found left inf"),
+        ("0,1,2,-3,4,0.5", "line 3: found width -3"),
+        ("0,1,2,3,-4,0.5", "line 3: found height -4"),
+        ("0,1,x,3,4,0.5", "line 3: found top x, expected a finite number"),
+        ("0,1,2,3,4", "line 3: found 5 fields, expected at least 6"),
+        ("0.5,1,2,3,4,1", "line 3: found frame 0.5"),
+        ("-1,1,2,3,4,1", "line 3: found frame -1"),
+        ("1e15,1,2,3,4,1", "line 3: found frame 1e\\+15"),
+        ("0,1,2,3,4,87", "line 3: found score 87, expected a score of 0..1"),
+        ("0,1,2,3,4,-1", "line 3: found score -1"),
+        ("0,1,2,3,4,", "line 3: found score nothing"),
+    ],
+)
+def test_bad_lines_are_named(tmp_path: Path, line: str, reported: str) -> None:
+    with pytest.raises(FormatError, match=reported):
+        read(tmp_path, f"frame,left,top,width,height,score\n0,1,2,3,4,1\n{line}\n0,1,2,3,4,1\n")
+
+
+@pytest.mark.parametrize(
+    ("text", "reported"),
+    [
+        ("frame,left,top,w,h\n0,1,2,3,4\n", "line 1: found no column width, height"),
+        ("0,10.5,20,30,40,0.9\n", "line 1: found id 10.5.*or a header"),
+        ("0,1,2,3\n", "line 1: found 4 fields"),
+        ("5 -1 1 2 3 4 1\n", "line 1: found frame 5, expected a frame below 3, for there are frames = 3"),
+    ],
+)
+def test_files_of_another_form_are_refused(tmp_path: Path, text: str, reported: str) -> None:
+    with pytest.raises(FormatError, match=reported):
+        read(tmp_path, text, frames=3)
+
+
+def test_what_cannot_be_read_is_said(tmp_path: Path) -> None:
+    with pytest.raises(SourceError, match="found no boxes"):
+        read(tmp_path, "")
+    with pytest.raises(SourceError, match="No such file"):
+        read_boxes(tmp_path / "none.csv")
+    with pytest.raises(SourceError, match="expected a file of boxes"):
+        read_boxes(tmp_path)
+    (tmp_path / "binary").write_bytes(b"\xff\xfe\x00\x80")
+    with pytest.raises(FormatError, match="text file in UTF-8"):
+        read_boxes(tmp_path / "binary")
+
+
+@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    st.lists(st.tuples(st.integers(3, 9), *[st.floats(0, 1e4) for _ in range(4)], st.floats(0, 1)), min_size=1),
+)
+def test_each_box_is_found_in_its_frame_in_the_order_of_the_file(tmp_path: Path, rows: list[tuple[float, ...]]) -> None:
+    header = "frame,left,top,width,height,score\n"
+    table = read(tmp_path, header + "".join(",".join(map(repr, row)) + "\n" for row in rows), first_frame=3)
+    assert table.frames == max(row[0] for row in rows) - 2
+    for frame in range(table.frames):
+        expected = [row[1:] for row in rows if row[0] == frame + 3]
+        found = table.at(frame)
+        np.testing.assert_array_equal(np.column_stack([found.pixel, found.score]), np.reshape(expected, (-1, 5)))
+
+
+@pytest.mark.parametrize(("name", "frames", "boxes"), [("CMC1_Cam1", 261, 1187), ("CMC2_Cam4", 263, 2221)])
+def test_real_detections(name: str, frames: int, boxes: int) -> None:
+    path = DATA / "cmc" / f"DET_{name}.txt"
+    if not path.is_file():
+        pytest.skip("no cmc data")
+    table = read_boxes(path, first_frame=1)
+    assert table.frames == frames
+    assert sum(len(table.at(frame)) for frame in range(frames)) == boxes
+    assert set(table.score) == {1.0}

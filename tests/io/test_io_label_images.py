@@ -1,0 +1,190 @@
+"""Label images on disk, and the command that writes them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from scenes import Moment, box_moments, looking, mask_moments, rig_of, standing_at, walkers
+
+from stseg.arrays import Boxes, Bytes, Rows
+from stseg.commands.main import main
+from stseg.config import LabelConfig
+from stseg.errors import OutputError
+from stseg.geometry import Rig
+from stseg.io.outputs.label_images import LabelImages
+from stseg.io.recording.image_stream import ImageStream
+from stseg.io.recording.recording import CameraSource, Recording, Source
+from stseg.io.runfile.runs import RunWriter
+from stseg.records.tables import Tracks
+
+PALETTE = np.random.default_rng(0).integers(0, 256, (256, 3)).astype(np.uint8)
+FRAMES = 4
+
+
+def two_cameras() -> Rig:
+    return rig_of([looking("west", (-3.5, -3.5, 2.6)), looking("east", (3.5, -3.4, 2.6))])
+
+
+def write_run(path: Path, sources: tuple[CameraSource, ...], tracks: Rows, config: str = "") -> Path:
+    recording = Recording(path.with_name("rig.toml"), two_cameras(), sources)
+    views = np.full(recording.rig.grid.shape, 2, np.uint8)
+    with RunWriter(path, recording, views, config, overwrite=False) as writer:
+        volume = np.zeros((FRAMES, *views.shape), np.float32)
+        writer.append_frames(np.arange(FRAMES), volume, volume.astype(np.int32))
+        writer.append("trajectory", tracks)
+        writer.finish(Tracks(tracks).summary())
+    return path
+
+
+def mask_sources(folder: Path, frame_sets: list[Moment], instances: bool = False) -> tuple[CameraSource, ...]:
+    sources = []
+    for k, camera in enumerate(two_cameras().cameras):
+        own = folder / f"{camera.name}_seen"
+        own.mkdir()
+        for frame_set in frame_sets:
+            seen = np.asarray(frame_set.views[k], np.uint8)
+            cv2.imwrite(str(own / f"{frame_set.frame:03d}.png"), seen // 100 if instances else seen)
+        sources.append(CameraSource(Source("instances" if instances else "masks", own)))
+    return tuple(sources)
+
+
+def read(folder: Path, camera: str) -> list[Bytes]:
+    """The images of one camera, by the reader of instance images."""
+    (own,) = [camera_ for camera_ in two_cameras().cameras if camera_.name == camera]
+    stream = ImageStream(Source("instances", folder / camera), own)
+    images = []
+    while (image := stream.read()) is not None:
+        images.append(image)
+    return images
+
+
+@pytest.fixture
+def run_path(tmp_path: Path) -> Path:
+    frame_sets = list(mask_moments(two_cameras(), walkers(FRAMES), 0, FRAMES))
+    return write_run(tmp_path / "run.h5", mask_sources(tmp_path, frame_sets), walkers(FRAMES))
+
+
+# Files
+
+
+@pytest.mark.parametrize(("largest", "kind"), [(255, 3), (256, 0)])
+def test_ids_are_read_back_and_the_kind_is_that_of_the_largest(tmp_path: Path, largest: int, kind: int) -> None:
+    images = LabelImages(tmp_path / "out", ["west"], largest, PALETTE, overwrite=False)
+    ids = np.random.default_rng(1).integers(0, largest + 1, (96, 128))
+    images.write("west", 7, ids)
+    (path,) = (tmp_path / "out" / "west").iterdir()
+    assert path.name == "000007.png"
+    assert path.read_bytes()[25] == kind  # the colour type of the header: 3 indexed, 0 grey
+    np.testing.assert_array_equal(read(tmp_path / "out", "west")[0], ids)
+    if kind == 3:
+        shown = cv2.imread(str(path), cv2.IMREAD_COLOR)
+        assert shown is not None
+        np.testing.assert_array_equal(shown[..., ::-1], PALETTE[ids])
+
+
+def test_a_folder_with_files_is_refused_and_old_images_go(tmp_path: Path) -> None:
+    images = LabelImages(tmp_path / "out", ["west"], 3, PALETTE, overwrite=False)
+    images.write("west", 99, np.zeros((4, 4), np.int64))
+    with pytest.raises(OutputError, match="files in it"):
+        LabelImages(tmp_path / "out", ["west"], 3, PALETTE, overwrite=False)
+    LabelImages(tmp_path / "out", ["west"], 3, PALETTE, overwrite=True)
+    assert not list((tmp_path / "out" / "west").iterdir())
+
+
+def test_what_cannot_be_written_is_said(tmp_path: Path) -> None:
+    with pytest.raises(OutputError, match="65536"):
+        LabelImages(tmp_path / "out", ["west"], 65536, PALETTE, overwrite=False)
+    with pytest.raises(OutputError, match="camera"):
+        LabelImages(tmp_path / "out", ["../west"], 3, PALETTE, overwrite=False)
+    (tmp_path / "file").write_text("")
+    with pytest.raises(OutputError):
+        LabelImages(tmp_path / "file" / "out", ["west"], 3, PALETTE, overwrite=False)
+
+
+# The command
+
+
+def test_every_frame_of_every_camera_has_an_image_of_ids(run_path: Path, tmp_path: Path) -> None:
+    assert main(["labels", str(run_path), "-o", str(tmp_path / "out")]) == 0
+    for camera in two_cameras().cameras:
+        images = read(tmp_path / "out", camera.name)
+        assert len(images) == FRAMES
+        for frame, image in enumerate(images):
+            assert set(np.unique(image)) <= {0, 11, 12, 13}
+            for (x, y, height), identity in zip(standing_at(walkers(FRAMES), frame), (11, 12, 13), strict=True):
+                pixel, _ = camera.project(np.array([x, y]), 0.6 * height)
+                if camera.inside(pixel):
+                    assert image[round(float(pixel[1])), round(float(pixel[0]))] == identity
+
+
+def test_frames_keep_their_numbers_and_their_labels(run_path: Path, tmp_path: Path) -> None:
+    whole, part = tmp_path / "whole", tmp_path / "part"
+    assert main(["labels", str(run_path), "-o", str(whole)]) == 0
+    assert main(["labels", str(run_path), "-o", str(part), "--frames", "2:"]) == 0
+    assert sorted(path.name for path in (part / "east").iterdir()) == ["000002.png", "000003.png"]
+    for path in part.glob("*/*.png"):
+        assert path.read_bytes() == (whole / path.parent.name / path.name).read_bytes()
+
+
+def test_instances_are_taken_pixel_by_pixel(run_path: Path, tmp_path: Path) -> None:
+    frame_sets = list(mask_moments(two_cameras(), walkers(FRAMES), 0, FRAMES))
+    folder = tmp_path / "instances"
+    folder.mkdir()
+    path = write_run(folder / "run.h5", mask_sources(folder, frame_sets, instances=True), walkers(FRAMES))
+    for source, out in ((run_path, "masks_out"), (path, "instances_out")):
+        assert main(["labels", str(source), "-o", str(tmp_path / out)]) == 0
+    for ours, theirs in zip(
+        read(tmp_path / "masks_out", "west"), read(tmp_path / "instances_out", "west"), strict=True
+    ):
+        assert (ours != theirs).mean() < 0.01
+
+
+def test_a_camera_with_boxes_has_no_images_and_one_that_is_blind_shows_nobody(tmp_path: Path) -> None:
+    frame_sets = list(mask_moments(two_cameras(), walkers(FRAMES), 0, FRAMES))
+    masks, _ = mask_sources(tmp_path, frame_sets[:2])
+    masks = CameraSource(masks.source, on_missing="blind")
+    path = write_run(tmp_path / "run.h5", (masks, box_source(tmp_path / "east.csv")), walkers(FRAMES))
+    assert main(["labels", str(path), "-o", str(tmp_path / "out")]) == 0
+    assert [folder.name for folder in (tmp_path / "out").iterdir()] == ["west"]
+    images = read(tmp_path / "out", "west")
+    assert [image.any() for image in images] == [True, True, False, False]
+
+
+def box_source(path: Path) -> CameraSource:
+    lines = ["frame,left,top,width,height"]
+    for frame_set in box_moments(two_cameras(), walkers(FRAMES), 0, FRAMES):
+        found = frame_set.views[1]
+        assert isinstance(found, Boxes)
+        lines += [f"{frame_set.frame},{','.join(map(str, box))}" for box in found.pixel.tolist()]
+    path.write_text("\n".join(lines) + "\n")
+    return CameraSource(Source("boxes", path, frames=FRAMES))
+
+
+def test_what_the_user_can_mend_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str], run_path: Path) -> None:
+    boxes = tmp_path / "boxes"
+    boxes.mkdir()
+    path = write_run(boxes / "run.h5", (box_source(boxes / "east.csv"),) * 2, walkers(FRAMES))
+    assert main(["labels", str(path), "-o", str(tmp_path / "out")]) == 2
+    assert "found boxes alone, expected a camera that delivers pixels" in capsys.readouterr().err
+    assert main(["labels", str(run_path), "-o", str(tmp_path / "out"), "--frames", "3:9"]) == 2
+    assert "--frames" in capsys.readouterr().err
+    assert main(["labels", str(run_path), "-o", str(tmp_path / "out"), "--set", "labels.samples=0"]) == 2
+    assert "labels.samples: found 0" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_constants_are_those_of_the_run_but_for_what_is_set(tmp_path: Path) -> None:
+    frame_sets = list(mask_moments(two_cameras(), walkers(FRAMES), 0, FRAMES))
+    sources = mask_sources(tmp_path, frame_sets)
+    wide = write_run(tmp_path / "wide.h5", sources, walkers(FRAMES), "[labels]\nposition_noise = 0.5\n")
+    plain = write_run(tmp_path / "plain.h5", sources, walkers(FRAMES))
+    narrow = ("--set", f"labels.position_noise={LabelConfig().position_noise}")
+    for path, options in ((wide, ()), (wide, narrow), (plain, ())):
+        out = str(tmp_path / f"{path.stem}{len(options)}")
+        assert main(["labels", str(path), "-o", out, "--frames", "0:1", *options]) == 0
+    own, back, default = (read(tmp_path / name, "west")[0] for name in ("wide0", "wide2", "plain0"))
+    np.testing.assert_array_equal(back, default)
+    assert (own != default).any()

@@ -1,0 +1,312 @@
+"""Arriving files and live streams as frame sets: files lose no frame, cameras none without a message."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from threading import Event, current_thread
+
+import numpy as np
+import pytest
+from arrivals import FRAMES, PIECE, PLACES, StandIn, arrive, filmed_rig, meanwhile, write_pieces, write_video
+
+from stseg.arrays import AnyArray, Bytes
+from stseg.config import LiveConfig
+from stseg.errors import RigError, SourceError
+from stseg.geometry import Rig
+from stseg.io.live.arriving_files import ArrivingFiles, FileNotes
+from stseg.io.live.followed_cameras import FollowedCameras
+from stseg.io.live.followed_files import FollowedFiles
+from stseg.io.live.live_frames import LiveFrameSet, is_live, now
+from stseg.io.live.live_stream import Capture
+from stseg.io.recording.frames import open_frames
+from stseg.io.recording.recording import CameraSource, Recording, Source, mask_passwords
+from stseg.io.recording.rig_text import format_rig
+from stseg.io.recording.rigs import parse_rig, read_rig
+from stseg.io.recording.stream_index import count_frames
+from stseg.io.recording.video.video_stream import VideoStream
+from stseg.io.runfile.provenance import gather_provenance
+
+QUICK = LiveConfig(
+    file_quiet_time=0.3, stream_timeout=0.5, reconnect_wait=0.02, longest_reconnect_wait=1.0, frame_tolerance=0.1
+)
+
+
+@pytest.fixture(scope="module")
+def arriving(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A rig whose recording has arrived completely."""
+    path = write_pieces(tmp_path_factory.mktemp("arriving"), empty=True)
+    arrive(path.parent, 1, 2, 3, 4)
+    return path
+
+
+def followed(rig: Path, first: int, stop: int | None, notes: FileNotes, say: Callable[[str], None]) -> FollowedFiles:
+    return FollowedFiles(read_rig(rig), first, stop, QUICK, notes, Event(), say)
+
+
+# Files
+
+
+def test_files_are_taken_in_order_once_they_are_complete(tmp_path: Path) -> None:
+    halt, reported = Event(), list[str]()
+    files = ArrivingFiles(tmp_path / "cam_*.mp4", 0.3, halt, reported.append)
+    for number in (9, 10, 11):
+        (tmp_path / f"cam_{number}.mp4").write_bytes(b"whole")
+    begun = time.monotonic()
+    assert [files.next(), files.next()] == [tmp_path / "cam_9.mp4", tmp_path / "cam_10.mp4"]
+    assert time.monotonic() - begun < 0.3
+    growing = meanwhile(partial(_add, tmp_path / "cam_11.mp4"))
+    assert files.next() == tmp_path / "cam_11.mp4"
+    assert not growing.is_alive()
+    assert time.monotonic() - begun > 0.6
+    (tmp_path / "cam_8.mp4").write_bytes(b"late")
+    (tmp_path / "cam_12.mp4").write_bytes(b"")
+    meanwhile(partial(_later, halt, 0.5))
+    assert files.next() is None  # nothing was ever added to it
+    assert [line.split(":")[0] for line in reported] == [str(tmp_path / "cam_8.mp4")]
+
+
+def _add(path: Path) -> None:
+    for _ in range(4):
+        time.sleep(0.1)
+        with path.open("ab") as file:
+            file.write(b"more")
+
+
+def _later(halt: Event, seconds: float) -> None:
+    time.sleep(seconds)
+    halt.set()
+
+
+def test_files_that_arrive_show_what_they_show_afterwards(arriving: Path, tmp_path: Path) -> None:
+    recording = read_rig(arriving)
+    assert count_frames(recording) == FRAMES
+    for first in (0, 13):
+        notes = FileNotes(tmp_path / "files.json")
+        with open_frames(recording, first) as after, followed(arriving, first, FRAMES, notes, print) as frame_sets:
+            for expected, frame_set in zip(after, frame_sets, strict=True):
+                assert frame_set.frame == expected.frame
+                assert now() - 60 < frame_set.arrived < now()
+                np.testing.assert_array_equal(np.stack(frame_set.views), np.stack(expected.views))  # type: ignore[arg-type]
+    assert notes.read["east"] == [(f"east_{k}.avi", PIECE) for k in (1, 2, 3)]
+
+
+def test_files_that_were_read_may_go(tmp_path: Path) -> None:
+    rig = write_pieces(tmp_path, empty=True)
+    arrive(tmp_path, 1, 2, 3)
+    notes = FileNotes(tmp_path / "files.json")
+    with followed(rig, 0, 25, notes, print) as frame_sets:
+        expected = list(frame_sets)[22]
+    for name in PLACES:
+        (tmp_path / "in" / f"{name}_1.avi").unlink()
+    with followed(rig, 22, 23, FileNotes(tmp_path / "files.json"), print) as frame_sets:
+        (frame_set,) = frame_sets
+    np.testing.assert_array_equal(np.stack(frame_set.views), np.stack(expected.views))  # type: ignore[arg-type]
+    with (
+        followed(rig, 5, 23, FileNotes(tmp_path / "files.json"), print) as frame_sets,
+        pytest.raises(SourceError) as error,
+    ):
+        next(frame_sets)
+    assert error.value.expected.startswith("west_1.avi")
+
+
+def test_reading_waits_for_whoever_takes_the_moments(
+    arriving: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    read, whole = list[int](), VideoStream.read
+
+    def counted(stream: VideoStream) -> AnyArray | None:
+        read.append(1)
+        return whole(stream)
+
+    monkeypatch.setattr(VideoStream, "read", counted)
+    with followed(arriving, 0, FRAMES, FileNotes(tmp_path / "files.json"), print) as frame_sets:
+        for count, frame_set in enumerate(frame_sets, 1):
+            if count < 4:
+                time.sleep(0.1)
+                assert len(read) <= (count + 1) * len(PLACES)
+            assert frame_set.frame == count - 1
+    assert count == FRAMES
+
+
+def test_a_file_that_was_not_complete_is_told(tmp_path: Path) -> None:
+    rig = write_pieces(tmp_path, empty=True)
+    arrive(tmp_path, 1)
+    content = (tmp_path / "pieces" / "east_1.avi").read_bytes()
+    (tmp_path / "in" / "east_1.avi").write_bytes(content[: len(content) // 2])
+    with followed(rig, 0, None, FileNotes(tmp_path / "files.json"), print) as frame_sets:
+        next(frame_sets)
+        arrive(tmp_path, 1, 2)
+        with pytest.raises(
+            SourceError, match=rf"{len(content)} bytes, of which only the first .* expected live\.file_quiet_time above"
+        ):
+            list(frame_sets)
+
+
+def test_who_is_waited_for_is_said(tmp_path: Path) -> None:
+    rig, reported = write_pieces(tmp_path, empty=True), list[str]()
+    arrive(tmp_path, 1)
+    (tmp_path / "in" / "east_1.avi").unlink()
+    halt = Event()
+    meanwhile(partial(_later, halt, 1.6))
+    with FollowedFiles(
+        read_rig(rig), 0, None, QUICK, FileNotes(tmp_path / "files.json"), halt, reported.append
+    ) as frame_sets:
+        assert list(frame_sets) == []
+    assert reported == ["waiting for the next file of east, at frame 0"]
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        Source("video", Path("cam.avi")),
+        Source("images", Path("*.png")),
+        Source("video", Path("a*"), more=(Path("b*"),)),
+    ],
+)
+def test_what_cannot_be_followed_is_refused(arriving: Path, source: Source) -> None:
+    recording = read_rig(arriving)
+    assert not is_live(recording)
+    assert is_live(live())
+    with pytest.raises(SourceError, match="by a pattern"):
+        is_live(replace(recording, sources=(CameraSource(source), *recording.sources[1:])))
+
+
+# Live cameras
+
+
+def numbered(number: int, count: int = 200) -> list[Bytes]:
+    """Pictures that tell which they are."""
+    return [np.full((96, 128, 3), (k, number, 0), np.uint8) for k in range(count)]
+
+
+def live(offsets: tuple[int, ...] = (0, 0)) -> Recording:
+    rig = filmed_rig()
+    cameras = rig.cameras[: len(offsets)]
+    sources = (
+        CameraSource(Source("video", Path("live"), address="rtsp://there/live"), None, offset) for offset in offsets
+    )
+    return Recording(Path("rig.toml"), Rig("room", 20.0, rig.grid, cameras), tuple(sources))
+
+
+def opening(*cameras: StandIn) -> Callable[[str, float], Capture]:
+    """Each thread opens its own camera, the same one whenever it does."""
+    own: dict[str, StandIn] = {}
+
+    def open_own(address: str, silence: float) -> Capture:
+        name = current_thread().name
+        names = [f"camera {place}" for place in PLACES]
+        return own.setdefault(name, cameras[names.index(name)]).open(address, silence)
+
+    return open_own
+
+
+def taken(frame_sets: FollowedCameras, count: int) -> list[LiveFrameSet]:
+    return [next(frame_sets) for _ in range(count)]
+
+
+def test_cameras_are_aligned_by_when_their_pictures_arrive() -> None:
+    """The second camera shows everything five frames late, so its offset is -5, and it runs at twice the rate."""
+    cameras = (StandIn(numbered(0), 0.05), StandIn(numbered(1), 0.025))
+    cameras[1].begun = cameras[0].begun
+    with FollowedCameras(live((0, -5)), QUICK, None, Event(), print, opening(*cameras)) as frame_sets:
+        some = taken(frame_sets, 20)
+    assert [frame_set.frame for frame_set in some] == list(range(20))
+    assert frame_sets.dropped == 0
+    shown = np.array([[int(view[0, 0, 0]) for view in frame_set.views if view is not None] for frame_set in some])  # type: ignore[index]
+    assert shown.shape == (20, 2)
+    # Half a frame off at most, and what a busy machine adds.
+    np.testing.assert_allclose(np.median(shown[:, 1] / 2 - shown[:, 0]), 5, atol=1.1)
+    np.testing.assert_allclose(np.median(np.diff(shown, axis=0), 0), [1, 2])
+
+
+def test_a_broken_stream_is_asked_again_with_growing_pauses_and_its_view_is_blind() -> None:
+    steady, breaking = StandIn(numbered(0), 0.05), StandIn(numbered(1), 0.05, breaks=[30], refused=3)
+    reported = list[str]()
+    with FollowedCameras(live(), QUICK, None, Event(), reported.append, opening(steady, breaking)) as frame_sets:
+        some = taken(frame_sets, 50)
+    blind = [k for k, frame_set in enumerate(some) if frame_set.views[1] is None]
+    assert blind
+    assert blind == list(range(blind[0], blind[-1] + 1))
+    assert blind[-1] < 49
+    assert not any(frame_set.dropped for frame_set in some)
+    assert [line.split(";")[0] for line in reported] == [
+        "camera east: no pictures from rtsp://there/live",
+        "camera east: the stream is back",
+    ]
+    pauses = np.diff(breaking.opened[1:])
+    assert (pauses[1:] > 1.5 * pauses[:-1]).all(), pauses
+
+
+def test_what_cannot_be_worked_on_in_time_loses_its_oldest_moments_and_says_so() -> None:
+    small = replace(QUICK, buffer_memory=5 * 2 * 128 * 96 * 3 / 2**20)
+    cameras, halt, reported = (StandIn(numbered(0), 0.05), StandIn(numbered(1), 0.05)), Event(), list[str]()
+    with FollowedCameras(live(), small, None, halt, reported.append, opening(*cameras)) as frame_sets:
+        first = next(frame_sets)
+        time.sleep(1.0)
+        halt.set()
+        rest = list(frame_sets)
+    assert [frame_set.frame for frame_set in (first, *rest)] == list(range(len(rest) + 1))
+    dropped = [frame_set.dropped for frame_set in rest]
+    kept = dropped.count(False)
+    assert dropped == [True] * (len(rest) - kept) + [False] * kept
+    assert 5 <= kept <= 8  # what came while they were taken
+    assert all((view is None) == frame_set.dropped for frame_set in rest for view in frame_set.views)
+    assert frame_sets.dropped == sum(dropped) > 3
+    assert len(reported) == 1
+    assert reported[0].startswith("tracking is slower than the cameras: 1 frame sets dropped so far")
+
+
+def test_a_run_that_goes_on_keeps_its_clock() -> None:
+    with FollowedCameras(
+        live((0,)), QUICK, now() - 100, Event(), print, opening(StandIn(numbered(0), 0.05))
+    ) as frame_sets:
+        assert 2000 < next(frame_sets).frame < 2100
+
+
+def test_pictures_of_another_size_end_the_run() -> None:
+    wrong = StandIn([np.zeros((10, 10, 3), np.uint8)], 0.05)
+    with (
+        FollowedCameras(live((0,)), QUICK, None, Event(), print, opening(wrong)) as frame_sets,
+        pytest.raises(SourceError, match="10x10"),
+    ):
+        next(frame_sets)
+
+
+# What the rig file says of live cameras
+
+
+def test_an_address_in_the_rig_file(tmp_path: Path) -> None:
+    path = tmp_path / "rig.toml"
+    text = format_rig(live(), path).replace("rtsp://there/live", "rtsp://me:secret@there:554/live?channel=1")
+    recording = parse_rig(text, path)
+    assert recording.sources[0].source.address == "rtsp://me:secret@there:554/live?channel=1"
+    assert format_rig(recording, path) == text
+    provenance = gather_provenance(recording, "")
+    assert "secret" not in provenance.rig + str(provenance.sources)
+    assert "rtsp://me:***@there:554/live?channel=1" in provenance.rig
+    with pytest.raises(SourceError, match="--follow") as error:
+        count_frames(recording)
+    assert "secret" not in str(error.value)
+    with pytest.raises(RigError, match="one address"):
+        parse_rig(text.replace('kind = "video"', 'kind = "masks"'), path)
+
+
+def test_only_passwords_are_hidden() -> None:
+    assert mask_passwords('"rtsp://a:b@c/d" "rtsp://c:554/d@e"') == '"rtsp://a:***@c/d" "rtsp://c:554/d@e"'
+
+
+def test_a_broken_video_among_those_that_arrive_is_told(tmp_path: Path) -> None:
+    rig = write_pieces(tmp_path, empty=True)
+    arrive(tmp_path, 1)
+    (tmp_path / "in" / "east_1.avi").write_bytes(b"no video")
+    write_video(tmp_path / "in" / "east_2.avi", numbered(0, 2))
+    with (
+        followed(rig, 0, None, FileNotes(tmp_path / "files.json"), print) as frame_sets,
+        pytest.raises(SourceError) as error,
+    ):
+        next(frame_sets)
+    assert error.value.place.endswith("east_1.avi")

@@ -1,0 +1,529 @@
+"""Run files: contents, atomic writing, and errors for broken files."""
+
+from __future__ import annotations
+
+import gc
+import os
+import signal
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from pathlib import Path
+from types import FrameType
+from typing import TYPE_CHECKING, Any, BinaryIO
+
+import h5py
+import numpy as np
+import pytest
+from run_files import (
+    CONFIG,
+    FRAMES,
+    fill,
+    small_ghosts,
+    small_recording,
+    small_trajectory,
+    small_volume,
+    write_small_run,
+)
+
+from stseg.arrays import Bytes
+from stseg.commands.run_overview import summarise_run
+from stseg.errors import FormatError, OutputError
+from stseg.geometry import Grid
+from stseg.io.outputs.whole_files import create_part, parts_of, replacing
+from stseg.io.recording.rig_text import format_rig
+from stseg.io.runfile import layout
+from stseg.io.runfile.packed_frames import packed_frame
+from stseg.io.runfile.runs import RunWriter, read_run, read_trajectory
+from stseg.io.runfile.unfinished import part_file
+from stseg.records.tables import RATES, TRAJECTORY, Tracks
+
+if TYPE_CHECKING:
+    from _typeshed import TraceFunction
+
+VIEWS: Bytes = np.full((3, 4, 6), 2, np.uint8)
+
+
+@pytest.fixture
+def run_path(tmp_path: Path) -> Path:
+    return write_small_run(tmp_path / "night.h5")
+
+
+def writer_at(path: Path, overwrite: bool = False) -> RunWriter:
+    return RunWriter(path, small_recording(path.parent), VIEWS, CONFIG, overwrite=overwrite)
+
+
+class Hindered:
+    """A file of which every write calls something first."""
+
+    def __init__(self, file: BinaryIO, hinder: Callable[[memoryview], object]) -> None:
+        self._file, self._hinder = file, hinder
+
+    def __getattr__(self, name: str) -> object:
+        return getattr(self._file, name)
+
+    def write(self, data: memoryview) -> int:
+        self._hinder(data)
+        return self._file.write(data)
+
+
+def patch_file(monkeypatch: pytest.MonkeyPatch, hinder: Callable[[memoryview], object]) -> None:
+    fdopen: Callable[..., BinaryIO] = os.fdopen
+    monkeypatch.setattr(os, "fdopen", lambda *given, **how: Hindered(fdopen(*given, **how), hinder))
+    monkeypatch.setattr(part_file, "lock", lambda _: None)
+
+
+# What stands in the file
+
+
+def test_every_table_and_frame_reads_back(run_path: Path) -> None:
+    run, (log_odds, label) = read_run(run_path), small_volume()
+    assert (run.scene, run.frame_rate, run.cameras) == ("hall", 5.0, ("left", "right"))
+    np.testing.assert_array_equal(run.frames, FRAMES)
+    np.testing.assert_array_equal(run.trajectory, small_trajectory())
+    np.testing.assert_array_equal(run.tracks, Tracks(small_trajectory()).summary())
+    np.testing.assert_array_equal(run.ghosts, small_ghosts())
+    np.testing.assert_array_equal(run.views, VIEWS)
+    assert [len(table) for table in (run.boxes, run.events, run.windows, run.rates, run.timings)] == [1, 2, 2, 4, 4]
+    assert run.windows["energy"].tolist() == [12345, 12345]
+    for index, frame in enumerate(FRAMES):
+        read_log_odds, read_label = run.read_frame(int(frame))
+        np.testing.assert_allclose(read_log_odds, log_odds[index], rtol=1e-3)
+        assert read_log_odds.dtype == np.float32
+        np.testing.assert_array_equal(read_label, label[index])
+    np.testing.assert_array_equal(read_trajectory(run_path), small_trajectory())
+
+
+def test_the_provenance_gives_back_the_rig_and_names_the_streams(run_path: Path) -> None:
+    run = read_run(run_path)
+    recording = small_recording(run_path.parent)
+    assert format_rig(run.recording, recording.path) == format_rig(recording, recording.path)
+    assert run.recording.sources == recording.sources
+    assert run.provenance.config == CONFIG
+    assert {"stseg", "python", "numpy", "h5py", "hdf5", "numba"} <= set(run.provenance.versions)
+    left, right = run.provenance.sources
+    assert (left["camera"].decode(), left["files"], left["size"]) == ("left", 1, 5)
+    assert left["modified"] == (run_path.parent / "left.avi").stat().st_mtime
+    assert (right["files"], right["size"]) == (0, 0)
+    assert np.isnan(right["modified"])
+
+
+def test_viewers_find_their_attributes(run_path: Path) -> None:
+    with h5py.File(run_path) as file:
+        assert (file.attrs["NX_class"], file.attrs["format"], file.attrs["default"]) == (
+            "NXroot",
+            "stseg-run",
+            "entry",
+        )
+        group = file[file.attrs["default"]][file["entry"].attrs["default"]]
+        assert group.attrs["NX_class"] == "NXdata"
+        assert list(group.attrs["axes"]) == ["time", "plane", "y", "x"]
+        signals = [group.attrs["signal"], *group.attrs["auxiliary_signals"]]
+        assert signals == ["log_odds", "label"]
+        for signal in signals:
+            dataset = group[signal]
+            assert (dataset.chunks, dataset.compression, dataset.shuffle) == ((1, 3, 4, 6), "gzip", True)
+            assert (dataset.compression_opts, dataset.maxshape[0]) == (1, None)
+            assert [dimension[0].name.rsplit("/")[-1] for dimension in dataset.dims] == list(group.attrs["axes"])
+        assert group["log_odds"].dtype == np.float32
+        assert [group[name].attrs["units"] for name in group.attrs["axes"]] == ["s", "m", "m", "m"]
+        np.testing.assert_allclose(group["time"][:], FRAMES / 5)
+        np.testing.assert_allclose(group["x"][:], [0.05, 0.15, 0.25, 0.35, 0.45, 0.55])
+        np.testing.assert_allclose(group["plane"][:], [0, 0.9, 1.8])
+        assert [dimension[0].name.rsplit("/")[-1] for dimension in group["views"].dims] == ["plane", "y", "x"]
+
+
+def test_pedpy_finds_frame_rate_and_area(run_path: Path) -> None:
+    with h5py.File(run_path) as file:
+        assert file["trajectory"].attrs["fps"] == 5.0
+        assert {"id", "frame", "x", "y"} <= set(file["trajectory"].dtype.names)
+        assert file.attrs["wkt_geometry"] == "POLYGON ((0.0 0.0, 0.6 0.0, 0.6 0.4, 0.0 0.4, 0.0 0.0))"
+    triangle = Grid((0, 1), (0, 1), polygon=np.array([[0, 0], [1, 0], [0, 1.0]]))
+    assert layout.walkable_area(triangle) == "POLYGON ((0.0 0.0, 1.0 0.0, 0.0 1.0, 0.0 0.0))"
+
+
+def test_equal_runs_differ_only_in_timings_and_provenance(tmp_path: Path) -> None:
+    def contents(path: Path) -> dict[str, tuple[bytes, str]]:
+        found = {}
+
+        def take(name: str, item: h5py.Dataset | h5py.Group) -> None:
+            if not name.startswith(("provenance", "timings")):
+                attributes = {key: str(value) for key, value in item.attrs.items() if not isinstance(value, bytes)}
+                value = np.asarray(item[()]) if isinstance(item, h5py.Dataset) else np.zeros(0)
+                plain = value.tobytes() if value.dtype != object else str(value).encode()
+                found[name] = (plain, "" if "REFERENCE_LIST" in attributes else str(sorted(attributes.items())))
+
+        with h5py.File(path) as file:
+            file.visititems(take)
+        return found
+
+    first = contents(write_small_run(tmp_path / "first.h5"))
+    assert len(first) > 12
+    assert contents(write_small_run(tmp_path / "second.h5")) == first
+
+
+def test_a_run_of_no_frames_is_a_run(tmp_path: Path) -> None:
+    with writer_at(tmp_path / "none.h5") as writer:
+        writer.finish(Tracks(np.zeros(0, TRAJECTORY)).summary())
+    run = read_run(tmp_path / "none.h5")
+    assert len(run.frames) == len(run.trajectory) == len(run.tracks) == 0
+    with pytest.raises(ValueError, match="frame 3"):
+        run.read_frame(3)
+
+
+def test_log_odds_are_kept_in_steps_and_finite(tmp_path: Path) -> None:
+    log_odds, label = small_volume(1)
+    log_odds[0, 0, 0, 1:5] = np.inf, -1e6, 0.3, -0.33
+    with writer_at(tmp_path / "far.h5") as writer:
+        writer.append_frames(FRAMES[:1], log_odds, label)
+        writer.finish(Tracks(np.zeros(0, TRAJECTORY)).summary())
+    kept = read_run(tmp_path / "far.h5").read_frame(10)[0][0, 0, :5]
+    np.testing.assert_array_equal(kept, [np.nan, 65536, -65536, 10 / 32, -11 / 32])
+
+
+def test_a_file_with_halves_of_before_is_read(run_path: Path) -> None:
+    with h5py.File(run_path, "r+") as file:
+        group = file[layout.OCCUPANCY]
+        halves = group["log_odds"][:].astype("f2")
+        del group["log_odds"]
+        group["log_odds"] = halves
+    np.testing.assert_array_equal(read_run(run_path).read_frame(12)[0], small_volume()[0][2])
+
+
+def test_many_small_appends_make_one_table(tmp_path: Path) -> None:
+    rows = np.zeros(10_000, TRAJECTORY)
+    rows["frame"], rows["id"] = np.arange(len(rows)), 1
+    with writer_at(tmp_path / "long.h5") as writer:
+        for start in range(0, len(rows), 7):
+            part = rows[start : start + 7].copy()
+            writer.append("trajectory", part)
+            part["frame"] = -1  # the caller may use the array again
+        writer.finish(Tracks(rows[:0]).summary())
+    np.testing.assert_array_equal(read_trajectory(tmp_path / "long.h5"), rows)
+
+
+def test_slips_of_the_caller_are_refused(tmp_path: Path) -> None:
+    log_odds, label = small_volume(2)
+    with writer_at(tmp_path / "slip.h5") as writer:
+        writer.append_frames(np.array([4, 6]), log_odds, label)
+        with pytest.raises(ValueError, match="after frame 6"):
+            writer.append_frames(np.array([6, 7]), log_odds, label)
+        with pytest.raises(ValueError, match="volumes"):
+            writer.append_frames(np.array([8]), log_odds, label)
+        with pytest.raises(ValueError, match="labels of 3 frames for 2"):
+            writer.append_packed_labels([packed_frame(label[0])])
+        with pytest.raises(ValueError, match="rows"):
+            writer.append("ghosts", np.zeros(1, layout.ghost_type(3)))
+    with pytest.raises(ValueError, match="views"):
+        RunWriter(tmp_path / "slip.h5", small_recording(tmp_path), VIEWS[:2], CONFIG, overwrite=False)
+
+
+# Other ids
+
+
+# Whole or not at all
+
+
+def test_an_existing_file_is_refused_before_any_work(run_path: Path) -> None:
+    before = run_path.read_bytes()
+    with pytest.raises(OutputError, match="exists"):
+        writer_at(run_path)
+    assert run_path.read_bytes() == before
+    assert not parts_of(run_path)
+
+
+def test_overwriting_replaces_only_at_the_end(run_path: Path) -> None:
+    before = run_path.read_bytes()
+    with writer_at(run_path, overwrite=True) as writer:
+        fill(writer)
+        assert run_path.read_bytes() == before
+        assert parts_of(run_path)
+        writer.finish(Tracks(small_trajectory()[:0]).summary())
+    assert len(read_run(run_path).tracks) == 0
+    assert not parts_of(run_path)
+
+
+@pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt])
+def test_an_exception_leaves_the_old_file_and_no_part(run_path: Path, error: type[BaseException]) -> None:
+    before = run_path.read_bytes()
+    with pytest.raises(error), writer_at(run_path, overwrite=True) as writer:
+        fill(writer)
+        raise error
+    assert run_path.read_bytes() == before
+    assert not parts_of(run_path)
+
+
+@pytest.fixture
+def interruptible() -> Iterator[None]:
+    """Interrupts as at a terminal: a process in the background of a shell may ignore them."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("interruptible")
+@pytest.mark.parametrize("step", [0, 1, 3, 10, 30, 50, 70, 90, 100, 110])
+def test_an_interrupt_inside_a_write_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: int) -> None:
+    steps = iter(range(1000))
+    patch_file(monkeypatch, lambda _: signal.raise_signal(signal.SIGINT) if next(steps) == step else None)
+    with pytest.raises(KeyboardInterrupt), writer_at(tmp_path / "night.h5") as writer:
+        fill(writer)
+        writer.finish(Tracks(small_trajectory()).summary())
+    assert next(steps) > step
+    assert [file.name for file in tmp_path.iterdir()] == ["left.avi"]
+    gc.collect()  # a file that HDF5 could not close would crash here
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+@pytest.mark.usefixtures("interruptible")
+def test_an_interrupt_at_any_line_leaves_no_part(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Once at each line of the code that makes a part, writes to it and publishes it, and while the system makes it."""
+    reached, interrupted = list[tuple[str, int]](), False
+
+    def interrupt(frame: FrameType, event: str, _: object) -> TraceFunction | None:
+        nonlocal interrupted
+        name = Path(frame.f_code.co_filename).name
+        if name not in ("part_file.py", "whole_files.py"):
+            return None
+        if event == "line" and not interrupted and (name, frame.f_lineno) not in reached:
+            reached.append((name, frame.f_lineno))
+            interrupted = True
+            signal.raise_signal(signal.SIGINT)
+        return interrupt
+
+    def interrupted_open(*arguments: Any) -> int:
+        descriptor = system_open(*arguments)
+        if not reached and str(arguments[0]).endswith(".part"):
+            signal.raise_signal(signal.SIGINT)
+        return descriptor
+
+    def write(trace: TraceFunction | None) -> None:
+        sys.settrace(trace)
+        try:
+            with writer_at(tmp_path / "night.h5", overwrite=True) as writer:
+                fill(writer)
+                writer.finish(Tracks(small_trajectory()).summary())
+        finally:
+            sys.settrace(None)
+            assert not parts_of(tmp_path / "night.h5"), reached[-1:]
+
+    system_open = os.open
+    monkeypatch.setattr(os, "open", interrupted_open)
+    with pytest.raises(KeyboardInterrupt):
+        write(None)
+    interrupted = True
+    while interrupted:
+        interrupted = False
+        with suppress(KeyboardInterrupt):
+            write(interrupt)
+    assert len(reached) > 50
+
+
+def test_the_part_of_a_killed_run_is_removed_and_foreign_files_are_not(tmp_path: Path) -> None:
+    part, descriptor = create_part(tmp_path / "night.h5")
+    os.close(descriptor)
+    (tmp_path / "night.h5.part").write_text("precious")
+    assert len(read_run(write_small_run(tmp_path / "night.h5")).frames) == 6
+    assert not part.exists()
+    assert (tmp_path / "night.h5.part").read_text() == "precious"
+
+
+@pytest.mark.skipif(os.name == "nt", reason="needs the locks of POSIX systems")
+def test_two_runs_into_one_file_are_refused(tmp_path: Path) -> None:
+    with writer_at(tmp_path / "night.h5") as writer:
+        fill(writer)
+        with pytest.raises(OutputError, match="another run"), writer_at(tmp_path / "night.h5"):
+            pass
+        writer.finish(Tracks(small_trajectory()).summary())
+    assert len(read_run(tmp_path / "night.h5").frames) == 6
+
+
+def test_a_file_that_appears_meanwhile_is_not_destroyed(tmp_path: Path) -> None:
+    path = tmp_path / "night.h5"
+    with pytest.raises(OutputError, match=r"kept in .*night\.h5\..*\.part"), writer_at(path) as writer:
+        fill(writer)
+        path.write_text("precious")
+        writer.finish(Tracks(small_trajectory()).summary())
+    assert path.read_text() == "precious"
+    (part,) = parts_of(path)
+    assert len(read_run(part).frames) == 6
+
+
+@pytest.mark.parametrize(
+    ("name", "found"), [("nowhere/night.h5", "no such folder"), (".", "a folder"), ("left.avi/night.h5", "no such")]
+)
+def test_impossible_places_are_refused_before_any_work(tmp_path: Path, name: str, found: str) -> None:
+    small_recording(tmp_path)
+    with pytest.raises(OutputError, match=found):
+        RunWriter(tmp_path / name, small_recording(tmp_path), VIEWS, CONFIG, overwrite=True)
+
+
+def test_a_folder_that_cannot_be_written_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refusing(*_: object) -> int:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(os, "open", refusing)
+    with pytest.raises(OutputError, match="Permission denied"), writer_at(tmp_path / "night.h5"):
+        pass
+
+
+@pytest.mark.parametrize("room", [0, 100, 3000, 8000, 12000, 16000, 20000])
+def test_a_full_disk_is_told_and_leaves_the_old_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, room: int
+) -> None:
+    path, written = tmp_path / "night.h5", 0
+    path.write_text("old")
+
+    def fill_up(data: memoryview) -> None:
+        nonlocal written
+        written += data.nbytes
+        if written > room:
+            raise OSError(28, "No space left on device")
+
+    patch_file(monkeypatch, fill_up)
+    with pytest.raises(OutputError, match="No space left on device"), writer_at(path, overwrite=True) as writer:
+        fill(writer)
+        writer.finish(Tracks(small_trajectory()).summary())
+    assert path.read_text() == "old"
+    assert not parts_of(path)
+    gc.collect()  # a file that HDF5 could not close would crash here
+
+
+def test_what_a_full_disk_did_not_take_is_read_back_and_the_rest_is_zero(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A buffer that is not filled has what lay there in memory before, which HDF5 would take for its own."""
+
+    def fill_up(data: memoryview) -> None:
+        if data.nbytes > 4:
+            raise OSError(28, "No space left on device")
+
+    patch_file(monkeypatch, fill_up)
+    file = part_file.PartFile(tmp_path / "night.h5")
+    for place, data in ((0, b"abcd"), (2, b"CDEFGH"), (10, b"kl")):
+        file.seek(place)
+        assert file.write(memoryview(data)) == len(data)
+    buffer = bytearray(b"?" * 14)
+    file.seek(1)
+    assert file.readinto(memoryview(buffer)) == 14
+    assert bytes(buffer) == b"bCDEFGH\0\0kl\0\0\0"
+    file.discard(lambda: None)
+
+
+def test_text_outputs_replace_only_when_whole(tmp_path: Path) -> None:
+    path = tmp_path / "tracks.csv"
+    path.write_text("old")
+    with pytest.raises(RuntimeError), replacing(path, overwrite=True) as part:
+        part.write_text("new")
+        raise RuntimeError
+    assert path.read_text() == "old"
+    with pytest.raises(OutputError, match=r"tracks\.csv: found gone"), replacing(path, overwrite=True) as part:
+        raise OutputError(part, "", "gone", "a place")
+    with replacing(path, overwrite=True) as part:
+        part.write_text("new")
+    assert [file.read_text() for file in tmp_path.iterdir()] == ["new"]
+
+
+# Broken files
+
+
+def test_what_is_no_run_file_is_told_by_name(tmp_path: Path) -> None:
+    with pytest.raises(FormatError, match="no such file"):
+        read_run(tmp_path / "none.h5")
+    (tmp_path / "text.h5").write_text("frame,id,x,y\n")
+    with pytest.raises(FormatError, match="not HDF5"):
+        read_run(tmp_path / "text.h5")
+    with h5py.File(tmp_path / "other.h5", "w") as file:
+        file["x"] = 1
+    with pytest.raises(FormatError, match="/@format: found nothing"):
+        read_run(tmp_path / "other.h5")
+    with pytest.raises(FormatError):
+        read_run(tmp_path)
+
+
+def test_a_cut_off_file_is_told(run_path: Path) -> None:
+    run_path.write_bytes(run_path.read_bytes()[:-3000])
+    with pytest.raises(FormatError, match="whole run file"):
+        read_run(run_path)
+
+
+def delete(name: str) -> Callable[[h5py.File], object]:
+    return lambda file: file.__delitem__(name)
+
+
+def replace(name: str, values: object) -> Callable[[h5py.File], object]:
+    def edit(file: h5py.File) -> None:
+        del file[name]
+        file[name] = values
+
+    return edit
+
+
+def group_instead(name: str) -> Callable[[h5py.File], object]:
+    def edit(file: h5py.File) -> None:
+        del file[name]
+        file.create_group(name)
+
+    return edit
+
+
+@pytest.mark.parametrize(
+    ("edit", "named"),
+    [
+        (lambda file: file.attrs.__setitem__("format_version", 2), "/@format_version: found"),
+        (lambda file: file.attrs.__setitem__("format", "geff"), "/@format: found 'geff'"),
+        (lambda file: file.attrs.__delitem__("cameras"), "/@cameras: found nothing"),
+        (lambda file: file["trajectory"].attrs.__delitem__("fps"), "/trajectory@fps: found nothing"),
+        (delete("events"), "/events: found nothing"),
+        (delete("entry/occupancy/label"), "/entry/occupancy/label: found nothing"),
+        (delete("provenance"), "/provenance/config: found nothing"),
+        (delete("entry/title"), "/entry/title: found nothing"),
+        (replace("windows", np.zeros((2, 2))), "/windows: found the type float64"),
+        (replace("tracks", np.zeros((2, 2), TRAJECTORY)), "/tracks: found the type"),
+        (replace("entry/occupancy/views", np.zeros((3, 4, 5), "u1")), "/entry/occupancy/views: found the shape"),
+        (replace("entry/occupancy/log_odds", np.zeros((6, 3), "f2")), "/entry/occupancy/log_odds: found 2 dim"),
+        (group_instead("boxes"), "/boxes: found no array"),
+    ],
+)
+def test_what_is_missing_or_wrong_is_named(run_path: Path, edit: Callable[[h5py.File], object], named: str) -> None:
+    with h5py.File(run_path, "r+") as file:
+        edit(file)
+    with pytest.raises(FormatError) as caught:
+        read_run(run_path)
+    assert f"{run_path}: {named}" in str(caught.value)
+
+
+def test_the_first_files_had_no_widths(run_path: Path) -> None:
+    with h5py.File(run_path, "r+") as file:
+        for name in ("trajectory", "tracks"):
+            whole, attributes = file[name][:], dict(file[name].attrs)
+            first = np.zeros(len(whole), np.dtype([column for column in whole.dtype.descr if column[0] != "width"]))
+            for column in first.dtype.names or ():
+                first[column] = whole[column]
+            del file[name]
+            file[name] = first
+            file[name].attrs.update(attributes)
+    run = read_run(run_path)
+    assert np.isnan(run.trajectory["width"]).all()
+    assert np.isnan(run.tracks["width"]).all()
+    np.testing.assert_array_equal(run.trajectory["height"], small_trajectory()["height"])
+
+
+def test_the_first_files_had_no_rates(run_path: Path) -> None:
+    with h5py.File(run_path, "r+") as file:
+        del file["rates"]
+    run = read_run(run_path)
+    assert (len(run.rates), run.rates.dtype) == (0, RATES)
+    assert not len(run.data_frame("rates"))
+    assert (summarise_run(run).rates, len(run.windows)) == ({}, 2)
+
+
+def test_a_broken_chunk_is_told_when_it_is_read(run_path: Path) -> None:
+    with h5py.File(run_path) as file:
+        chunk = file["trajectory"].id.get_chunk_info(0)
+    data = bytearray(run_path.read_bytes())
+    data[chunk.byte_offset : chunk.byte_offset + chunk.size] = bytes(chunk.size)
+    run_path.write_bytes(data)
+    run = read_run(run_path)
+    with pytest.raises(FormatError, match="/trajectory"):
+        _ = run.trajectory

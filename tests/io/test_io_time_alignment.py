@@ -1,0 +1,347 @@
+"""Temporal alignment of cameras: trusted stamps and nearest frames."""
+
+from __future__ import annotations
+
+import pickle
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from films import write_at_rate, write_stamped
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from stseg.arrays import Boxes, Bytes, Floats, Ints, Observation
+from stseg.engine.offline.segments import find_gaps
+from stseg.errors import RigError, SourceError
+from stseg.geometry import Camera, Grid, Rig
+from stseg.io.recording.frames import open_frames, read_camera
+from stseg.io.recording.recording import CameraSource, Recording, Source
+from stseg.io.recording.rigs import read_rig, write_rig
+from stseg.io.recording.stream_index import StreamIndex, index_streams
+from stseg.io.recording.time_alignment import TimeAlignment, align_in_time, coverage, nearest_frames, with_alignment
+from stseg.io.recording.video.time_stamps import concatenate_files, interpret_stamps
+from stseg.io.runfile.provenance import gather_provenance
+from stseg.io.runfile.unfinished.work_folder import WorkFolder
+
+RATE = 10.0
+SIZE = (16, 12)
+NONE = np.zeros(0)
+
+
+def recording(*sources: CameraSource) -> Recording:
+    eye = np.array([[1.0, 0, 0], [0, 1.0, 0], [0, 0, 1.0]])
+    cameras = tuple(Camera(f"cam{k}", SIZE, eye, np.array([0.0, 0.0, -1.0])) for k in range(1, len(sources) + 1))
+    return Recording(Path("rig.toml"), Rig("test", RATE, Grid((0, 1), (0, 1)), cameras), sources)
+
+
+def video(name: str = "a.mp4", **reported: object) -> CameraSource:
+    return replace(CameraSource(Source("video", Path(name))), **reported)  # type: ignore[arg-type]
+
+
+def decided(*cameras: tuple[CameraSource, Floats]) -> TimeAlignment:
+    """The alignment of cameras of one file each with these time stamps, in ticks."""
+    times = [[own / RATE * 1000] for _, own in cameras]
+    return align_in_time(recording(*[source for source, _ in cameras]), times)
+
+
+def every(step: float, frames: int) -> Floats:
+    return np.asarray(np.arange(frames) * step)
+
+
+WAVERING = np.delete(every(1.0, 61), 30)
+"""Sixty frames at the rig's rate, one of which was dropped."""
+
+
+@pytest.fixture(autouse=True)
+def a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """a.mp4, of which nothing but that it is no AVI is asked."""
+    monkeypatch.chdir(tmp_path)
+    Path("a.mp4").touch()
+
+
+# Which frame is nearest
+
+
+@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.lists(st.floats(-0.5, 0.5), min_size=1, max_size=60))
+def test_frames_within_half_a_tick_of_their_numbers_show_them(off: list[float]) -> None:
+    position = np.arange(len(off)) + np.array([0.0, *off[1:]])
+    position = np.maximum.accumulate(position) + 1e-9 * np.arange(len(off))
+    shown = nearest_frames(position, 1.0)
+    assert shown[: len(off)].tolist() == list(range(len(shown[: len(off)])))
+    assert len(off) - 1 <= len(shown) <= len(off) + 1
+
+
+@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.lists(st.floats(0.05, 6.0), min_size=1, max_size=60), st.floats(0.2, 4.0))
+def test_what_is_shown_is_near_and_in_order(steps: list[float], period: float) -> None:
+    position = np.cumsum([0.0, *steps])
+    shown = nearest_frames(position, period)
+    ticks = np.flatnonzero(shown >= 0)
+    assert (np.diff(shown[ticks]) >= 0).all()
+    away = np.abs(position[shown[ticks]] - ticks)
+    least = np.abs(position[:, None] - np.arange(len(shown))).min(axis=0, initial=np.inf)
+    assert (away <= 0.75 * max(1.0, period)).all()
+    assert (away <= least[ticks] + 0.5 * max(1.0, period)).all()
+    assert (least[np.flatnonzero(shown < 0)] > 0.25 * max(1.0, period)).all()
+
+
+@pytest.mark.parametrize(
+    ("step", "expected"),
+    [
+        (0.5, [0, 2, 4, 6, 8, 10]),
+        (0.6, [0, 2, 3, 5, 7, 8]),
+        (1.5, [0, 1, 1, 2, 3, 3]),
+        (3.0, [0, 0, 1, 1, 1, 2]),
+    ],
+)
+def test_other_rates(step: float, expected: list[int]) -> None:
+    assert nearest_frames(every(step, 40), step)[:6].tolist() == expected
+
+
+def test_a_frame_between_two_ticks_is_not_shown_by_turns_twice_and_never() -> None:
+    """A late second frame, then frames that are a little early or late, half-way between ticks."""
+    off = np.random.default_rng(3).uniform(-0.1, 0.1, 500)
+    position = np.append(0.0, np.arange(1, 500) + 0.5 + off[1:])
+    shown = nearest_frames(position, 1.0)
+    assert shown[:499].tolist() in (list(range(499)), [0, *range(2, 500)])
+
+
+def test_dropped_frames_leave_holes() -> None:
+    assert nearest_frames(np.array([0.0, 1, 2, 5, 6, 8]), 1.0).tolist() == [0, 1, 2, -1, -1, 3, 4, -1, 5]
+
+
+# What stamps say
+
+
+@settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.sampled_from([10.0, 15.0, 25.0, 29.97, 30.0]), st.lists(st.integers(1, 400), min_size=2, max_size=8))
+def test_files_join_as_if_they_were_one(rate: float, lengths: list[int]) -> None:
+    """Stamps in whole milliseconds, at the rig's rate or, for 29.97, that of the standard: no border leaves a trace."""
+    true = 30000 / 1001 if rate == 29.97 else rate
+    times = [np.round(np.arange(length) / true * 1000) for length in lengths]
+    stamps = interpret_stamps(times, rate, [Path("x.mkv")] * len(times), NONE)
+    assert stamps is not None
+    assert np.abs(stamps.position - np.arange(sum(lengths))).max() < 0.1
+
+
+def test_a_week_of_hours_does_not_drift() -> None:
+    times = [np.round(every(1000 / RATE, 3600) + 0.3)] * 168
+    stamps = interpret_stamps(times, RATE, [Path("x.mkv")] * 168, NONE)
+    assert stamps is not None
+    assert stamps.fits(np.arange(3600.0 * 168))
+
+
+def test_another_rate_goes_on_over_borders() -> None:
+    times = [every(40.0, 500)] * 3
+    stamps = interpret_stamps(times, RATE, [Path("x.mkv")] * 3, NONE)
+    assert stamps is not None
+    np.testing.assert_allclose(stamps.position, 0.4 * np.arange(1500), atol=1e-6)
+    assert stamps.period == pytest.approx(0.4)
+    assert stamps.steady
+
+
+@pytest.mark.parametrize("times", [[0.0, 100, 100], [0.0, 100, 0], [np.nan] * 3, [0.0, 0.0, 0.0], [0.0, 100, 1e8]])
+def test_stamps_that_do_not_rise_are_none(times: list[float]) -> None:
+    assert interpret_stamps([np.array(times)], RATE, [Path("x.mkv")], NONE) is None
+
+
+def test_starts_leave_gaps_and_cannot_overlap() -> None:
+    files, paths = [every(1.0, 3), every(1.0, 2)], [Path("a"), Path("b")]
+    assert concatenate_files(files, 1.0, RATE, paths, np.array([0.0, 0.7])).tolist() == [0, 1, 2, 7, 8]
+    with pytest.raises(SourceError, match=r"b: starts: found 0\.200 s, when the previous file goes on until 0\.200 s"):
+        concatenate_files(files, 1.0, RATE, paths, np.array([0.0, 0.2]))
+
+
+# What is believed
+
+
+def test_stamps_at_the_rigs_rate_are_those_of_the_numbers() -> None:
+    clock = decided((video(), every(1.0, 60)), (video(), every(1.0, 60) + 0.4 * (np.arange(60) % 2)))
+    assert clock == TimeAlignment((None, None), ())
+
+
+def test_stamps_that_vary_are_believed() -> None:
+    clock = decided((video(), WAVERING), (video(), every(1.0, 61)))
+    assert clock.shown[1] is None
+    assert clock.shown[0] is not None
+    assert np.flatnonzero(clock.shown[0] < 0).tolist() == [30]
+    assert len(clock.notes) == 1
+    assert clock.notes[0].startswith("cam1: the time stamps vary")
+
+
+def test_a_rate_of_all_headers_may_be_wrong() -> None:
+    clock = decided((video(), every(0.5, 60)), (video(), every(0.5, 60)))
+    assert clock.shown == (None, None)
+    reported = "cam1, cam2: the time stamps say 20 frames per second, the rig 10; the frames are counted"
+    assert [note.startswith(reported) for note in clock.notes] == [True]
+
+
+@pytest.mark.parametrize("other", [every(1.0, 60), WAVERING])
+def test_another_rate_is_believed_beside_a_camera_that_keeps_the_rigs(other: Floats) -> None:
+    clock = decided((video(), other), (video(), every(0.5, 120)))
+    assert clock.shown[1] is not None
+    assert clock.shown[1][:60].tolist() == list(range(0, 120, 2))
+    assert any("20 frames per second, the rig 10; each tick shows the nearest frame" in n for n in clock.notes)
+
+
+def test_a_camera_with_as_many_frames_has_a_header_that_is_wrong() -> None:
+    clock = decided((video(), every(1.0, 60)), (video(), every(0.5, 60)))
+    assert clock.shown == (None, None)
+    assert "the frames are counted" in clock.notes[0]
+
+
+def test_clocks_that_drift_apart_are_held_together() -> None:
+    clock = decided((video(), every(1.0, 2000)), (video(), every(1.001, 1998)))
+    assert clock.shown[1] is not None
+    assert (clock.shown[1][:3].tolist(), clock.shown[1][1900]) == ([0, 1, 2], 1898)
+
+
+def test_the_rig_may_say_what_is_believed() -> None:
+    assert decided((video(clock="count"), WAVERING)) == TimeAlignment((None,), ())
+    clock = decided((video(clock="stamps"), every(0.5, 60)))
+    assert clock.shown[0] is not None
+    assert clock.shown[0].tolist() == list(range(0, 60, 2))
+    assert clock.notes == ()
+    with pytest.raises(SourceError, match="camera cam1, clock: found files without time stamps that rise"):
+        decided((video(clock="stamps"), np.full(3, np.nan)))
+
+
+def test_avi_holds_no_times(tmp_path: Path) -> None:
+    path = tmp_path / "a.avi"
+    write_at_rate(path, [np.zeros((12, 16, 3), np.uint8)] * 3, RATE)
+    assert decided((video(str(path)), WAVERING)) == TimeAlignment((None,), ())
+
+
+def test_stamps_that_are_broken_are_told() -> None:
+    clock = decided((video(), np.array([0.0, 1, 1, 2])), (video(), np.full(4, np.nan)))
+    assert clock == TimeAlignment(
+        (None, None), ("cam1: the time stamps do not rise, or jump by a day; the frames are counted",)
+    )
+
+
+@pytest.mark.parametrize("blind", [False, True])
+def test_ends_that_nearly_meet_are_made_to(blind: bool) -> None:
+    missing = "blind" if blind else "error"
+    sources = [video(on_missing=missing), video(on_missing=missing), video(on_missing=missing, offset=2)]
+    clock = decided(*zip(sources, (every(1.0, 60), WAVERING[:55], np.append(WAVERING, [64.0, 65.0])), strict=True))
+    lengths = [None if own is None else len(own) for own in clock.shown]
+    assert lengths == ([None, 56, 66] if blind else [None, 60, 58])
+
+
+@pytest.mark.parametrize(
+    ("starts", "reported"),
+    [((0.0,), "1 starts of 2 files"), ((3.0, 1.0), "starts 3, 1"), ((-1.0, 1.0), "starts -1, 1")],
+)
+def test_starts_are_one_for_each_file(starts: tuple[float, ...], reported: str) -> None:
+    source = CameraSource(Source("video", Path("a"), more=(Path("b"),), starts=starts))
+    with pytest.raises(SourceError, match=rf"camera cam1, source.starts: found {reported}"):
+        align_in_time(recording(source), [[every(100.0, 3), every(100.0, 3)]])
+
+
+# Who sees when
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.lists(st.tuples(st.integers(1, 9), st.integers(-4, 6), st.booleans()), min_size=1, max_size=3))
+def test_seen_is_what_is_not_blind(cameras: list[tuple[int, int, bool]]) -> None:
+    rng = np.random.default_rng(0)
+    sources, length = [], max(1, *(count + offset for count, offset, _ in cameras), 1)
+    for count, offset, timed in cameras:
+        shown = np.where(rng.random(count) < 0.7, np.arange(count), -1) if timed else None
+        sources.append(video(offset=offset, shown=shown))
+    flags = coverage(recording(*sources), [count for count, _, _ in cameras], length)
+    for own, source, (count, offset, _) in zip(flags, sources, cameras, strict=True):
+        for frame in range(length):
+            tick = frame - offset
+            expected = 0 <= tick < count and (source.shown is None or source.shown[tick] >= 0)
+            assert own[frame] == expected
+
+
+def test_gaps_are_what_nobody_sees_for_long() -> None:
+    flags = np.zeros((2, 30), bool)
+    flags[0, 2:8], flags[1, 6:10], flags[1, 15:22], flags[0, 24:29] = True, True, True, True
+    assert find_gaps(flags, 0, 30, 2) == [(10, 15)]
+    assert find_gaps(flags, 0, 30, 1) == [(0, 2), (10, 15), (22, 24)]
+    assert find_gaps(flags, 12, 23, 2) == [(12, 15)]
+    assert find_gaps(flags, 11, 14, 2) == [(11, 14)]
+
+
+# Read from files
+
+
+def shown_number(view: Observation) -> int | None:
+    """The number of the frame that a view shows."""
+    assert not isinstance(view, Boxes)
+    return None if view is None else round(float(view[6, 8, 0]) / 8)
+
+
+def stamped(path: Path, seconds: Floats) -> CameraSource:
+    pictures: list[Bytes] = [np.full((12, 16, 3), 8 * k, np.uint8) for k in range(len(seconds))]
+    write_stamped(path, pictures, seconds.tolist())
+    return CameraSource(Source("video", path))
+
+
+@pytest.fixture
+def uneven(tmp_path: Path) -> Recording:
+    """One camera in time, one that drops frames, one of half the rate."""
+    return recording(
+        stamped(tmp_path / "a.mkv", every(0.1, 20)),
+        stamped(tmp_path / "b.mkv", np.delete(every(0.1, 20), [5, 6, 12])),
+        stamped(tmp_path / "c.mkv", every(0.2, 10)),
+    )
+
+
+def test_frames_are_read_where_they_were_taken(uneven: Recording) -> None:
+    streams = index_streams(uneven)
+    assert streams.length == 20
+    with open_frames(uneven, 0, None, streams) as reader:
+        views = [tuple(map(shown_number, frame_set.views)) for frame_set in reader]
+    dropped = iter(range(17))
+    assert [row[0] for row in views] == list(range(20))
+    assert [row[1] for row in views] == [None if k in (5, 6, 12) else next(dropped) for k in range(20)]
+    assert [row[2] for row in views[::2]] == list(range(10))
+    for first in range(20):
+        with open_frames(uneven, first, min(first + 2, 20), streams) as reader:
+            assert [tuple(map(shown_number, frame_set.views)) for frame_set in reader] == views[first : first + 2]
+    assert [shown_number(view) for view in read_camera(uneven, 1, [4, 6, 13], streams)] == [4, None, 10]
+    assert streams.coverage(uneven).sum(axis=1).tolist() == [20, 17, 19]
+
+
+def test_cameras_that_do_not_end_together_by_their_stamps_are_told_what_to_do(tmp_path: Path) -> None:
+    rec = recording(
+        stamped(tmp_path / "a.mkv", every(0.1, 31)), stamped(tmp_path / "b.mkv", np.delete(every(0.1, 20), 5))
+    )
+    reported = r'cam2: found its end at frame 20.* or on_missing = "blind", or clock = "count" where time stamps'
+    with pytest.raises(SourceError, match=reported):
+        index_streams(rec)
+
+
+def test_what_was_found_of_time_is_kept(uneven: Recording, tmp_path: Path) -> None:
+    streams = index_streams(uneven)
+    with WorkFolder(tmp_path / "run.h5", {}) as folder:
+        folder.keep_streams(streams)
+        kept = folder.streams(uneven)
+    for again in (kept, pickle.loads(pickle.dumps(streams))):
+        assert isinstance(again, StreamIndex)
+        assert (again.length, again.notes) == (streams.length, streams.notes)
+        for one, other in zip(again.shown, streams.shown, strict=True):
+            np.testing.assert_array_equal(none_as_empty(one), none_as_empty(other))
+    assert sorted(gather_provenance(with_alignment(uneven, streams.shown), "").shown) == ["cam2", "cam3"]
+
+
+def none_as_empty(shown: Ints | None) -> Ints:
+    return np.zeros(0, np.int64) if shown is None else shown
+
+
+def test_the_rig_file_says_clock_and_starts(tmp_path: Path) -> None:
+    path = tmp_path / "rig.toml"
+    source = Source("video", tmp_path / "a.mkv", more=(tmp_path / "b.mkv",), starts=(0.0, 3600.5))
+    write_rig(path, recording(CameraSource(source, clock="stamps")))
+    assert read_rig(path).sources[0].source.starts == (0.0, 3600.5)
+    assert read_rig(path).sources[0].clock == "stamps"
+    path.write_text(path.read_text().replace('clock = "stamps"', 'clock = "sundial"'))
+    with pytest.raises(RigError, match="clock"):
+        read_rig(path)

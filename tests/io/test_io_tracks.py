@@ -1,0 +1,123 @@
+"""Tables of positions as CSV."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from stseg.errors import FormatError, OutputError
+from stseg.io.track_csv import POSITION, read_tracks_csv, write_tracks_csv, write_truth_csv
+from stseg.records.tables import TRAJECTORY
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    """A file that is not there yet."""
+    return tmp_path / "tracks.csv"
+
+
+def trajectory(rows: list[tuple[float, float]]) -> np.ndarray:
+    """One person, one row a frame."""
+    table = np.zeros(len(rows), TRAJECTORY)
+    table["frame"], table["id"] = np.arange(len(rows)), 4
+    table["x"], table["y"] = np.array(rows, float).reshape(-1, 2).T
+    table["xx"], table["xy"], table["yy"] = 0.01, -0.0012345, 0.02
+    table["height"], table["score"], table["views"] = 1.754, np.inf, 3
+    return table
+
+
+METRES = st.floats(-1e4, 1e4)
+
+
+@given(rows=st.lists(st.tuples(METRES, METRES), max_size=5))
+@settings(max_examples=25, deadline=None)
+def test_positions_survive_writing_and_reading(
+    tmp_path_factory: pytest.TempPathFactory, rows: list[tuple[float, float]]
+) -> None:
+    path = tmp_path_factory.mktemp("csv") / "tracks.csv"
+    written = trajectory(rows)
+    write_tracks_csv(path, written)
+    read = read_tracks_csv(path)
+    assert read.dtype == POSITION
+    for name in ("frame", "id"):
+        assert read[name].tolist() == written[name].tolist()
+    for name in ("x", "y"):
+        np.testing.assert_allclose(read[name], written[name], rtol=0, atol=1e-4)
+
+
+def test_a_line_is_short_and_readable(path: Path) -> None:
+    write_tracks_csv(path, trajectory([(1 / 3, -2)]))
+    assert path.read_text().splitlines() == [
+        "frame,id,x,y,height,score,xx,xy,yy,views",
+        "0,4,0.3333,-2.0000,1.754,inf,0.01,-0.001234,0.02,3",
+    ]
+
+
+def test_truth_keeps_its_flags(path: Path) -> None:
+    truth = np.array([(3, 1, 0.5, 0.25, 0), (4, 1, 0.5, 0.5, 2)], POSITION)
+    write_truth_csv(path, truth)
+    assert path.read_text().splitlines()[0] == "frame,id,x,y,flag"
+    assert read_tracks_csv(path).tolist() == truth.tolist()
+
+
+def test_columns_may_stand_in_any_order_among_others(path: Path) -> None:
+    path.write_text("\ufeffnote, y ,x,id,frame\n\nhello,2,1,7,12.0\n", encoding="utf-8")
+    assert read_tracks_csv(path).tolist() == [(12, 7, 1.0, 2.0, 0)]
+
+
+def test_an_empty_flag_is_no_flag(path: Path) -> None:
+    path.write_text("frame,id,x,y,flag\n0,1,0,0,\n0,2,0,0,3\n")
+    assert read_tracks_csv(path)["flag"].tolist() == [0, 3]
+
+
+@pytest.mark.parametrize(
+    ("ids", "read"), [("5 3", [5, 3]), ("anna bert", [1, 2]), ("7 07", [1, 2]), ("-4 99999999999999999999", [1, 2])]
+)
+def test_ids_are_numbers_or_names(path: Path, ids: str, read: list[int]) -> None:
+    one, other = ids.split()
+    path.write_text(f"frame,id,x,y\n0,{one},0,0\n0,{other},1,1\n1,{one},0,0\n")
+    assert read_tracks_csv(path)["id"].tolist() == [*read, read[0]]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("frame,id,x,y\n0,1,0,0\n1,1,nan,0\n", "line 3, column x: found 'nan', expected a finite number"),
+        ("frame,id,x,y\n0,1,0,-inf\n", "line 2, column y: found '-inf', expected a finite number"),
+        ("frame,id,x,y\n0,1,here,0\n", "line 2, column x: found 'here'"),
+        ("frame,id,x,y\n0,1,,0\n", "line 2, column x: found ''"),
+        ("frame,id,x,y\n0.5,1,0,0\n", "line 2, column frame: found '0.5', expected a whole number"),
+        ("frame,id,x,y\n1e300,1,0,0\n", "line 2, column frame: found '1e300', expected a finite number"),
+        ("frame,id,x,y\n0,,0,0\n", "line 2, column id: found ''"),
+        ("frame,id,x,y,flag\n0,1,0,0,bad\n", "line 2, column flag: found 'bad'"),
+        ("frame,id,x,y\n0,1,0,0\n\n1,2,0,0\n0,1,2,2\n", "line 5, column id: found '1' again in the same frame"),
+        ("frame,id,x,y\n0,1,0\n", "line 2: found 3 cells, expected 4"),
+        ("frame,id,x\n0,1,0\n", r"header: found frame,id,x, expected columns frame,id,x,y \(no y\)"),
+        ("frame;id;x;y\n0;1;0;0\n", "header: found frame;id;x;y"),
+        ("0,1,0.5,0.5\n", "header: found 0,1,0.5,0.5"),
+        ("", "header: found nothing"),
+    ],
+)
+def test_what_is_wrong_is_named_with_its_place(path: Path, text: str, message: str) -> None:
+    path.write_text(text)
+    with pytest.raises(FormatError, match=f"tracks.csv: {message}"):
+        read_tracks_csv(path)
+
+
+def test_files_that_are_no_text_are_refused(path: Path) -> None:
+    path.write_bytes(b"\x89HDF\r\n\x1a\n\xff\xfe")
+    with pytest.raises(FormatError, match="not text"):
+        read_tracks_csv(path)
+    with pytest.raises(FormatError, match="No such file"):
+        read_tracks_csv(path.with_name("nowhere.csv"))
+    with pytest.raises(FormatError, match="directory"):
+        read_tracks_csv(path.parent)
+
+
+def test_a_place_that_cannot_be_written_is_named(path: Path) -> None:
+    with pytest.raises(OutputError, match="nowhere"):
+        write_tracks_csv(path.parent / "nowhere" / "tracks.csv", trajectory([]))

@@ -1,0 +1,295 @@
+"""What `--publish` sends arrives at a real MQTT broker, by WebSocket and by HTTP; a missing receiver costs nothing."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import socket
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from http.server import BaseHTTPRequestHandler, HTTPServer
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from stseg.arrays import Rows
+from stseg.commands.main import main
+from stseg.errors import ConfigError
+from stseg.io.live.publishing import Publisher
+from stseg.io.live.receivers import receiver_of
+from stseg.records.tables import TRAJECTORY
+
+
+def rows_of(*frames: int) -> Rows:
+    """A person in each of some frames."""
+    rows = np.zeros(len(frames), TRAJECTORY)
+    rows["frame"], rows["id"], rows["x"], rows["y"], rows["height"], rows["score"] = frames, 3, 1.25, -0.5, 1.7, 4
+    return rows
+
+
+EXPECTED = [
+    {"frame": frame, "time": frame / 5, "id": 3, "x": 1.25, "y": -0.5, "height": 1.7, "score": 4.0}
+    for frame in (7, 8, 9)
+]
+
+
+def parsed(bodies: list[bytes]) -> list[object]:
+    return [json.loads(line) for body in bodies for line in body.splitlines()]
+
+
+def wait_for(condition: Callable[[], object], seconds: float = 30) -> None:
+    end = time.monotonic() + seconds
+    while not condition() and time.monotonic() < end:
+        time.sleep(0.02)
+
+
+@pytest.fixture
+def posted() -> Iterator[tuple[str, list[bytes], list[int]]]:
+    """An HTTP server: its address, the bodies that it got, and answers that it still gives before 200."""
+    bodies, answers = list[bytes](), list[int]()
+
+    class Handler(BaseHTTPRequestHandler):
+        def do_POST(self) -> None:
+            body = self.rfile.read(int(self.headers["Content-Length"]))
+            status = answers.pop(0) if answers else 200
+            if status == 200:
+                bodies.append(body)
+            self.send_response(status)
+            self.end_headers()
+
+        def log_message(self, *_: object) -> None:
+            pass
+
+    server = HTTPServer(("127.0.0.1", 0), Handler)
+    thread = threading.Thread(target=server.serve_forever, daemon=True)
+    thread.start()
+    yield f"http://127.0.0.1:{server.server_port}/tracks", bodies, answers
+    server.shutdown()
+    thread.join()
+    server.server_close()
+
+
+def test_rows_arrive_by_http(posted: tuple[str, list[bytes], list[int]]) -> None:
+    address, bodies, _ = posted
+    with Publisher(receiver_of(address), 5.0, pytest.fail) as publisher:
+        publisher.append(rows_of(7, 8))
+        publisher.append(rows_of())
+        publisher.append(rows_of(9))
+    assert [len(body.splitlines()) for body in bodies] == [2, 1]
+    assert parsed(bodies) == EXPECTED
+
+
+def test_a_receiver_that_fails_for_a_while_gets_everything(
+    posted: tuple[str, list[bytes], list[int]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    address, bodies, answers = posted
+    monkeypatch.setattr("stseg.io.live.publishing._RETRY", 0.05)
+    answers += [503, 503]
+    said: list[str] = []
+    with Publisher(receiver_of(address), 5.0, said.append) as publisher:
+        publisher.append(rows_of(7))
+        wait_for(lambda: bodies)
+        publisher.append(rows_of(8, 9))
+    assert parsed(bodies) == EXPECTED
+    assert [line.split(" (")[0] for line in said] == ["publishing waits for its receiver", "publishing goes on"]
+
+
+def test_an_answer_that_is_no_http_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("stseg.io.live.publishing._RETRY", 0.05)
+    said: list[str] = []
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        def answer() -> None:
+            connection, _ = server.accept()
+            with connection:
+                connection.recv(65536)
+                connection.sendall(b"what?\r\n")
+
+        thread = threading.Thread(target=answer, daemon=True)
+        thread.start()
+        with Publisher(receiver_of(f"http://127.0.0.1:{server.getsockname()[1]}/"), 5.0, said.append) as publisher:
+            publisher.append(rows_of(7))
+            wait_for(lambda: said, 5)
+        thread.join(10)
+    assert said[0].startswith("publishing waits for its receiver (") and "\n" not in said[0]
+
+
+def test_a_missing_receiver_delays_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("stseg.io.live.publishing._RETRY", 0.05)
+    monkeypatch.setattr("stseg.io.live.publishing._WAITING", 10)
+    with socket.socket() as unused:
+        unused.bind(("127.0.0.1", 0))
+        said: list[str] = []
+        begun = time.monotonic()
+        with Publisher(receiver_of(f"http://127.0.0.1:{unused.getsockname()[1]}/"), 5.0, said.append) as publisher:
+            for frame in range(30):
+                publisher.append(rows_of(frame))
+            assert time.monotonic() - begun < 2
+    assert time.monotonic() - begun < 10
+    assert said[-1].startswith("30 messages were not published")
+
+
+@pytest.mark.parametrize(
+    "address",
+    [
+        "file:///etc/passwd",
+        "mqtt://host",
+        "mqtt:///topic",
+        "http://",
+        "x",
+        "http://[",
+        "http://a:b/",
+        "ftp://a/b",
+        "ws:///path",
+        "ws://a/b#c",
+    ],
+)
+def test_other_addresses_are_refused(address: str) -> None:
+    with pytest.raises(ConfigError, match=r"expected mqtt://HOST\[:PORT\]/TOPIC"):
+        receiver_of(address)
+
+
+def test_publishing_needs_follow(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "rig.toml").write_text("")
+    assert main(["run", str(tmp_path / "rig.toml"), "-o", "x.h5", "--publish", "http://127.0.0.1:9/"]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+@contextmanager
+def listening_socket(handle: Callable[[Any], None], port: int = 0) -> Iterator[int]:
+    """A WebSocket server that gives each connection to `handle`; its port."""
+    serving = pytest.importorskip("websockets.sync.server")
+    with serving.serve(handle, "127.0.0.1", port) as server:
+        thread = threading.Thread(target=server.serve_forever, daemon=True)
+        thread.start()
+        yield server.socket.getsockname()[1]
+        server.shutdown()
+        thread.join()
+
+
+def test_rows_arrive_at_a_web_socket_that_answers_a_lot() -> None:
+    """More answers to each message than a connection holds unread."""
+    bodies: list[bytes] = []
+    paths: list[str] = []
+
+    def handle(connection: Any) -> None:
+        paths.append(connection.request.path)
+        for text in connection:
+            bodies.append(text.encode())
+            for _ in range(40):
+                connection.send("thank you")
+
+    with (
+        listening_socket(handle) as port,
+        Publisher(receiver_of(f"ws://127.0.0.1:{port}/hall?live=1"), 5.0, pytest.fail) as publisher,
+    ):
+        publisher.append(rows_of(7, 8))
+        publisher.append(rows_of(9))
+        wait_for(lambda: len(bodies) == 2)
+    assert [len(body.splitlines()) for body in bodies] == [2, 1]
+    assert parsed(bodies) == EXPECTED and paths == ["/hall?live=1"]
+
+
+def test_a_web_socket_that_breaks_is_opened_again() -> None:
+    messages: list[str] = []
+    sent, closed = threading.Event(), threading.Event()
+
+    def handle(connection: Any) -> None:
+        for text in connection:
+            messages.append(text)
+            if text == "first":
+                sent.wait(10)
+                connection.close()
+                closed.set()
+
+    with listening_socket(handle) as port:
+        receiver = receiver_of(f"ws://127.0.0.1:{port}/")
+        receiver.send(b"first")
+        sent.set()
+        assert closed.wait(10)
+        with pytest.raises(OSError, match="1000"):
+            receiver.send(b"second")
+        receiver.send(b"second")
+        wait_for(lambda: len(messages) == 2)
+        receiver.close()
+    assert messages == ["first", "second"]
+
+
+def test_a_web_socket_that_comes_late_is_one_line_and_another(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("stseg.io.live.publishing._RETRY", 0.05)
+    said: list[str] = []
+    bodies: list[bytes] = []
+    with socket.socket() as unused:
+        unused.bind(("127.0.0.1", 0))
+        port = unused.getsockname()[1]
+    with Publisher(receiver_of(f"ws://127.0.0.1:{port}/"), 5.0, said.append) as publisher:
+        publisher.append(rows_of(7, 8, 9))
+        wait_for(lambda: said)
+        time.sleep(0.2)
+        with listening_socket(lambda connection: bodies.extend(text.encode() for text in connection), port):
+            wait_for(lambda: bodies and len(said) == 2)
+    assert said[0].startswith("publishing waits for its receiver (") and "refused" in said[0]
+    assert said[1:] == ["publishing goes on"] and parsed(bodies) == EXPECTED
+
+
+def test_a_web_server_that_is_none_of_sockets_is_one_line(
+    posted: tuple[str, list[bytes], list[int]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("websockets.sync.client")
+    monkeypatch.setattr("stseg.io.live.publishing._RETRY", 0.05)
+    said: list[str] = []
+    with Publisher(receiver_of(posted[0].replace("http", "ws")), 5.0, said.append) as publisher:
+        publisher.append(rows_of(7))
+        wait_for(lambda: said)
+    assert said == [
+        "publishing waits for its receiver (did not receive a valid HTTP response)",
+        "1 messages were not published; the live table has their rows",
+    ]
+
+
+def test_without_its_library_a_web_socket_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "websockets.sync.client", None)
+    with pytest.raises(ConfigError, match=r"pip install 'stseg\[websocket\]'"):
+        receiver_of("ws://127.0.0.1/")
+
+
+def test_rows_arrive_at_a_broker() -> None:
+    broker = pytest.importorskip("amqtt.broker")
+    client = pytest.importorskip("amqtt.client")
+    pytest.importorskip("paho.mqtt.client")
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    bodies: list[bytes] = []
+    listening = threading.Event()
+
+    async def serve() -> None:
+        plugins = {"amqtt.plugins.authentication.AnonymousAuthPlugin": {"allow_anonymous": True}}
+        own = broker.Broker(
+            {"listeners": {"default": {"type": "tcp", "bind": f"127.0.0.1:{port}"}}, "plugins": plugins}
+        )
+        await own.start()
+        reader = client.MQTTClient(config={"auto_reconnect": False})
+        await reader.connect(f"mqtt://127.0.0.1:{port}/")
+        await reader.subscribe([("hall/tracks", 1)])
+        listening.set()
+        while len(bodies) < 2:
+            message = await reader.deliver_message(timeout_duration=30)
+            bodies.append(bytes(message.publish_packet.payload.data))
+        await reader.disconnect()
+        await own.shutdown()
+
+    thread = threading.Thread(target=lambda: asyncio.run(serve()), daemon=True)
+    thread.start()
+    assert listening.wait(30)
+    with Publisher(receiver_of(f"mqtt://127.0.0.1:{port}/hall/tracks"), 5.0, pytest.fail) as publisher:
+        publisher.append(rows_of(7, 8))
+        publisher.append(rows_of(9))
+        wait_for(lambda: len(bodies) == 2)
+    thread.join(30)
+    assert parsed(bodies) == EXPECTED

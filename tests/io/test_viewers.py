@@ -1,0 +1,192 @@
+"""A run file as other programs see it: silx, xarray, PedPy, napari, pandas."""
+
+from __future__ import annotations
+
+import sys
+import tomllib
+import warnings
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pandas
+import pedpy
+import pytest
+import shapely
+import silx.io
+import silx.io.nxdata
+import xarray
+from run_files import FRAMES, small_ghosts, small_trajectory, small_volume, write_small_run
+
+from stseg.errors import ConfigError
+from stseg.io.runfile import layout
+from stseg.io.runfile.reading.napari_reader import get_reader, read_layers
+from stseg.io.runfile.runs import read_run
+
+ROOT = Path(__file__).parents[2]
+AXES = {
+    "time": ("s", FRAMES / 5),
+    "plane": ("m", np.array([0, 0.9, 1.8])),
+    "y": ("m", np.array([0.05, 0.15, 0.25, 0.35])),
+    "x": ("m", np.array([0.05, 0.15, 0.25, 0.35, 0.45, 0.55])),
+}
+
+
+@pytest.fixture(scope="module")
+def run_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_small_run(tmp_path_factory.mktemp("run") / "night.h5")
+
+
+# silx view
+
+
+def test_silx_opens_the_file_at_the_volume(run_path: Path) -> None:
+    with silx.io.open(str(run_path)) as file:
+        shown = silx.io.nxdata.get_default(file)
+        assert shown is not None
+        assert shown.is_valid
+        assert shown.group.name == layout.OCCUPANCY
+        assert (shown.signal_dataset_name, shown.signal.shape) == ("log_odds", (6, 3, 4, 6))
+        assert shown.interpretation == "image"
+        assert shown.auxiliary_signals_dataset_names == ["label"]
+        assert shown.axes_dataset_names == list(AXES)
+        for axis, name in zip(shown.axes, AXES, strict=True):
+            units, values = AXES[name]
+            assert axis.attrs["units"] == units
+            assert axis.attrs["long_name"].endswith(f"({units})")  # all that silx writes at the axis
+            np.testing.assert_allclose(axis[()], values)
+        np.testing.assert_array_equal(shown.auxiliary_signals[0][()], small_volume()[1])
+
+
+def test_silx_reads_a_frame_and_a_table_by_their_address(run_path: Path) -> None:
+    frame = silx.io.get_data(f"silx:{run_path}?path={layout.OCCUPANCY}/log_odds&slice=2")
+    np.testing.assert_allclose(frame, small_volume()[0][2], rtol=1e-3)
+    table = silx.io.get_data(f"silx:{run_path}?path=/trajectory")
+    np.testing.assert_array_equal(table["x"], small_trajectory()["x"])
+
+
+# xarray
+
+
+def test_xarray_has_named_axes_with_units_and_selects_by_them(run_path: Path) -> None:
+    with xarray.open_dataset(run_path, group="entry/occupancy", engine="h5netcdf", phony_dims="access") as data:
+        assert data.log_odds.dims == data.label.dims == tuple(AXES)
+        assert data.views.dims == ("plane", "y", "x")
+        assert data.frame.dims == ("time",)
+        for name, (units, values) in AXES.items():
+            assert data[name].attrs["units"] == units
+            np.testing.assert_allclose(data[name], values)
+        log_odds, label = small_volume()
+        np.testing.assert_allclose(data.log_odds, log_odds, rtol=1e-3)
+        assert data.log_odds.attrs["units"] == "nat"
+        place = data.label.sel(time=2.8, x=0.44, y=0.26, plane=1.0, method="nearest")
+        assert int(place) == label[4, 1, 2, 4] == 2
+
+
+# PedPy
+
+
+def test_pedpy_takes_trajectory_and_area_from_the_run_file(run_path: Path) -> None:
+    data = pedpy.load_trajectory_from_ped_data_archive_hdf5(trajectory_file=run_path)
+    assert data.frame_rate == 5.0
+    found = data.data.sort_values(["frame", "id"])
+    for name in ("frame", "id", "x", "y", "score"):
+        np.testing.assert_array_equal(found[name], small_trajectory()[name])
+    area = pedpy.load_walkable_area_from_ped_data_archive_hdf5(trajectory_file=run_path)
+    assert area.polygon.equals(shapely.box(0, 0, 0.6, 0.4))
+    density = pedpy.compute_classic_density(traj_data=data, measurement_area=pedpy.MeasurementArea(area.polygon))
+    np.testing.assert_allclose(density["density"], [1 / 0.24] * 3 + [2 / 0.24] * 3)
+
+
+# pandas
+
+
+def test_tables_as_data_frames(run_path: Path) -> None:
+    run = read_run(run_path)
+    table = run.data_frame("trajectory")
+    assert list(table.columns) == [*(run.trajectory.dtype.names or ()), "time"]
+    np.testing.assert_array_equal(table["x"], run.trajectory["x"])
+    np.testing.assert_allclose(table.groupby("id")["time"].max(), [3.0, 3.0])
+    assert run.data_frame("events")["reason"].tolist() == ["start", "entered"]
+    ghosts = run.data_frame("ghosts")
+    np.testing.assert_array_equal(ghosts["parts_left"], small_ghosts()["parts"][:, 0])
+    assert "parts_right" in ghosts
+    for name in layout.ABOUT:
+        assert isinstance(run.data_frame(name), pandas.DataFrame)
+    with pytest.raises(ValueError, match="table 'people' is none of trajectory"):
+        run.data_frame("people")
+
+
+def test_pandas_is_asked_for_where_it_is_missing(run_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(ConfigError, match=r"pip install 'stseg\[pandas\]'"):
+        read_run(run_path).data_frame("tracks")
+
+
+# napari
+
+
+def test_napari_s_layers_are_in_seconds_and_metres(run_path: Path) -> None:
+    reader = get_reader(str(run_path))
+    assert reader is not None
+    (volume, about, kind), (label, about_label, kind_label), (tracks, about_tracks, kind_tracks) = reader(str(run_path))
+    assert (kind, kind_label, kind_tracks) == ("image", "labels", "tracks")
+    np.testing.assert_allclose(volume[2], small_volume()[0][2], rtol=1e-3)
+    np.testing.assert_array_equal(label[2], small_volume()[1][2])
+    for meta in (about, about_label):
+        for name, index in (("x", -1), ("y", -2), ("plane", -3), ("time", 0)):
+            values = AXES[name][1]
+            assert meta["scale"][index] == pytest.approx(values[1] - values[0])
+            assert meta["translate"][index] == pytest.approx(values[0])
+    for meta in (about, about_label, about_tracks):
+        assert meta["axis_labels"] == tuple(AXES)
+        assert meta["units"] == ("s", "m", "m", "m")
+    low, high = about["contrast_limits"]
+    assert (low, high) == (0.0, pytest.approx(float(np.nanmax(small_volume()[0][3])), rel=1e-3))
+    world = tracks[:, 1:] * about_tracks["scale"] + about_tracks["translate"]
+    expected = np.sort(small_trajectory(), order=["id", "frame"])
+    assert tracks[:, 0].tolist() == about_tracks["features"]["id"].tolist() == expected["id"].tolist()
+    np.testing.assert_allclose(world[:, 0], expected["frame"] / 5)
+    np.testing.assert_allclose(world[:, 2:], np.stack([expected["y"], expected["x"]], -1))
+
+
+def test_napari_is_given_a_frame_at_a_time(run_path: Path) -> None:
+    (volume, _, _), (label, _, _), _ = read_layers(str(run_path))
+    assert isinstance(volume, h5py.Dataset)
+    assert isinstance(label, h5py.Dataset)
+
+
+def test_napari_s_other_files_are_left_to_others(run_path: Path, tmp_path: Path) -> None:
+    (tmp_path / "text.h5").write_text("no HDF5")
+    with h5py.File(tmp_path / "other.h5", "w") as file:
+        file["something"] = 1
+    for path in (tmp_path / "text.h5", tmp_path / "other.h5", tmp_path / "nowhere.h5", tmp_path):
+        assert get_reader(str(path)) is None
+    assert get_reader([str(run_path), str(run_path)]) is None
+
+
+def test_the_manifest_leads_npe2_to_the_reader(run_path: Path) -> None:
+    npe2: Any = imported_npe2()
+    manifest = npe2.PluginManifest.from_file(ROOT / "stseg" / "napari.yaml")
+    manifest.validate_imports()
+    manager = npe2.PluginManager(disable=[])
+    manager.register(manifest)
+    manager.activate("stseg")
+    (contribution,) = manager.iter_compatible_readers([str(run_path)])
+    assert contribution.plugin_name == "stseg"
+    layers = contribution.exec(kwargs={"path": [str(run_path)], "stack": False, "_registry": manager.commands})
+    assert [kind for _, _, kind in layers([str(run_path)], stack=False)] == ["image", "labels", "tracks"]
+
+
+def test_the_package_says_where_its_manifest_is() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
+    assert project["project"]["entry-points"]["napari.manifest"] == {"stseg": "stseg:napari.yaml"}
+    assert "napari.yaml" in project["tool"]["setuptools"]["package-data"]["stseg"]
+
+
+def imported_npe2() -> Any:
+    """npe2, whose models warn of pydantic's changes when they are made."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return pytest.importorskip("npe2", reason="npe2 is not installed")

@@ -1,0 +1,91 @@
+"""Kernels: compiled with all that they call, kept in the cache, called by Python and by kernels alike."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from recordings import ENVIRONMENT
+
+from stseg.arrays import Floats
+from stseg.kernels.accelerate import kernel, python_form
+
+PROGRAM = """
+import sys
+import numpy as np
+from stseg.kernels.accelerate import compilation_noted
+from stseg.detection.score.scoring import track_score
+with compilation_noted(print):
+    gain, taken = np.array([[3.0, 2.0], [2.9, 0.0]]), np.empty(2, np.int64)
+    print(track_score(np.arange(2), 2, gain, np.zeros(2), taken), *taken)
+print("numba.cpython.unicode" in sys.modules)
+"""
+"""Prints notes, the result of a kernel that calls another kernel, and whether what compiling needs was imported."""
+AHEAD = """
+from stseg.kernels.accelerate import take_kept_kernels
+from stseg.detection.score.scoring import track_score
+take_kept_kernels()
+print(len(track_score.signatures))
+"""
+"""Prints how many forms of a kernel were taken from the cache before it was called."""
+
+
+@kernel
+def half(values: Floats, k: int) -> float:
+    if k >= len(values):
+        raise IndexError("beyond")
+    return 0.5 * float(values[k])
+
+
+@kernel
+def sum_of_halves(values: Floats, number: int) -> float:
+    total = 0.0
+    for k in range(number):
+        total += half(values, k)
+    return total
+
+
+COMPILED = pytest.mark.skipif(python_form(half) is half, reason="kernels are not compiled")
+
+
+def test_python_and_kernels_call_the_same_kernel() -> None:
+    values = np.array([1.0, 2.0, 4.0])
+    assert sum_of_halves(values, 3) == 3.5
+    assert half(values, 2) == 2.0
+    for called in (half, sum_of_halves):
+        with pytest.raises(IndexError, match="beyond"):
+            called(values, 4)
+
+
+@COMPILED
+def test_the_cache_holds_the_kernels_that_python_calls(tmp_path: Path) -> None:
+    empty, first, second, ahead = (
+        subprocess.run(
+            [sys.executable, "-c", program],
+            env=ENVIRONMENT | {"NUMBA_CACHE_DIR": str(tmp_path)}, capture_output=True, text=True, check=True,
+        ).stdout.splitlines()
+        for program in (AHEAD, PROGRAM, PROGRAM, AHEAD)
+    )  # fmt: skip
+    assert first == ["compiling kernels, once on this machine, about a minute of work", "4.9 1 0", "True"]
+    assert second == ["4.9 1 0", "False"]
+    assert (empty, ahead) == (["0"], ["1"])
+    assert {path.name.split("-")[0] for path in tmp_path.rglob("*.nbi")} == {"scoring.track_score"}
+
+
+@COMPILED
+@pytest.mark.skipif(sys.platform == "win32", reason="no locks of folders")
+def test_of_processes_that_start_together_one_compiles(tmp_path: Path) -> None:
+    started = [
+        subprocess.Popen(
+            [sys.executable, "-c", PROGRAM],
+            env=ENVIRONMENT | {"NUMBA_CACHE_DIR": str(tmp_path)}, stdout=subprocess.PIPE, text=True,
+        )
+        for _ in range(2)
+    ]  # fmt: skip
+    printed = [process.communicate()[0].splitlines() for process in started]
+    assert sorted(len(lines) for lines in printed) == [2, 3]
+    assert sum("compiling" in lines[0] for lines in printed) == 1
+    assert [lines[-2] for lines in printed] == ["4.9 1 0", "4.9 1 0"]

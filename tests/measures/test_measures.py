@@ -1,0 +1,163 @@
+"""Measures of tracks whose numbers are known by construction."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from run_files import write_small_run
+
+import stseg
+from stseg.arrays import Rows
+from stseg.commands.measure import measure as measure_command
+from stseg.errors import FormatError
+from stseg.geometry import Grid
+from stseg.io.areas import read_lines, read_polygons
+from stseg.measures import Areas, Line, Zone, measure_tracks
+from stseg.records.tables import TRAJECTORY
+
+GRID = Grid((-5.0, 5.0), (-2.0, 2.0), 0.1)
+SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+UP = Line("up", np.array([[0.0, -2.0], [0.0, 2.0]]))
+
+
+def walk(
+    identity: int, x: np.ndarray[tuple[int, ...], np.dtype[np.float64]], y: float = 0.0, score: float = 9.0
+) -> Rows:
+    rows = np.zeros(len(x), TRAJECTORY)
+    rows["frame"], rows["id"], rows["x"], rows["y"], rows["score"] = np.arange(len(x)), identity, x, y, score
+    return rows
+
+
+def test_one_who_walks_through() -> None:
+    """1 m/s from x = -4 to 4 in 8 s at 10 frames a second."""
+    found = measure_tracks(
+        walk(1, np.linspace(-4, 4, 81)), np.arange(81), 10.0, GRID, Areas((Zone("z", (SQUARE,)),), (UP,))
+    )
+    (zone,), (line,), (track,) = found.zones, found.lines, found.tracks
+    assert (zone["entries"], zone["exits"], zone["visits"], zone["most_people"]) == (1, 1, 1, 1)
+    assert zone["median_dwell"] == pytest.approx(2.0, abs=0.11) and zone["area"] == 4
+    assert zone["mean_people"] == pytest.approx(20 / 81, abs=0.02)
+    assert (line["left"], line["right"]) == (0, 1)
+    assert found.crossings["time"][0] == pytest.approx(4.0) and found.crossings["speed"][0] == pytest.approx(1.0)
+    assert track["distance"] == pytest.approx(8.0) and track["mean_speed"] == pytest.approx(1.0)
+    assert not len(found.spacing)
+    row = found.field[(found.field["x"] == 0.25) & (found.field["y"] == 0.25)][0]
+    assert row["flow_x"] == pytest.approx(row["density"] * 1.0, rel=1e-6) and abs(row["flow_y"]) < 1e-9
+
+
+def test_standing_on_a_line_is_no_traffic() -> None:
+    sway = np.concatenate([np.linspace(-2, -0.02, 20), 0.05 * (-1.0) ** np.arange(41), np.linspace(0.02, 2, 20)])
+    assert measure_tracks(walk(1, sway), np.arange(81), 10.0, GRID, Areas((), (UP,))).lines["right"].tolist() == [1]
+    back = np.concatenate([np.linspace(-2, 1, 31), np.linspace(1, -2, 31)])
+    (line,) = measure_tracks(walk(1, back), np.arange(62), 10.0, GRID, Areas((), (UP,))).lines
+    assert (line["left"], line["right"]) == (1, 1)
+
+
+def test_the_way_from_exit_to_entrance_is_nobodys() -> None:
+    """Somebody leaves to the left of a line and comes back on its right a minute later."""
+    first, second = walk(1, np.linspace(-0.5, -2.0, 16)), walk(1, np.linspace(2.0, 0.5, 16))
+    second["frame"] += 600
+    found = measure_tracks(np.concatenate([first, second]), np.arange(700), 10.0, GRID, Areas((), (UP,)))
+    assert not len(found.crossings)
+    (track,) = found.tracks
+    assert (track["first"], track["last"]) == (0, 615)
+    assert track["distance"] == pytest.approx(3.0) and track["seconds"] == pytest.approx(3.2)
+
+
+def test_counts_have_the_uncertainty_of_scores() -> None:
+    still = [walk(k, np.zeros(50), 0.1 * k, score=0.0) for k in range(4)]
+    found = measure_tracks(np.concatenate(still), np.arange(50), 10.0, GRID, Areas((Zone("z", (SQUARE,)),)))
+    assert found.people["people"].tolist() == [4] * 50
+    np.testing.assert_allclose(found.people["expected"], 2.0)
+    np.testing.assert_allclose(found.people["deviation"], 1.0)
+    np.testing.assert_allclose(found.spacing["nearest"], 0.1)
+
+
+def test_short_absences_do_not_end_a_visit_and_holes_are_outside() -> None:
+    x = np.concatenate([np.zeros(20), np.full(5, 1.2), np.zeros(20), np.full(30, 2.0)])
+    zone = Zone("z", (SQUARE, 0.1 * SQUARE + [0.5, 0.5]))
+    found = measure_tracks(walk(1, x), np.arange(75), 10.0, GRID, Areas((zone,)))
+    (visit,) = found.visits
+    assert (visit["first"], visit["last"], bool(visit["entered"]), bool(visit["left"])) == (0, 44, False, True)
+    assert zone.area == pytest.approx(3.96) and zone.contains(np.array([[0.5, 0.5], [0.0, 0.0]])).tolist() == [
+        False,
+        True,
+    ]
+
+
+def test_nothing_is_measured_of_nobody() -> None:
+    found = measure_tracks(np.zeros(0, TRAJECTORY), np.arange(5), 10.0, GRID, Areas((Zone("z", (SQUARE,)),), (UP,)))
+    assert found.people["people"].tolist() == [0] * 5 and not len(found.tracks) and found.field["density"].sum() == 0
+
+
+def feature(kind: str, coordinates: object, name: str = "a") -> dict[str, object]:
+    return {"type": "Feature", "properties": {"name": name}, "geometry": {"type": kind, "coordinates": coordinates}}
+
+
+@pytest.fixture
+def zone_file(tmp_path: Path) -> Path:
+    path = tmp_path / "zones.geojson"
+    ring = [[0, 0], [0.3, 0], [0.3, 0.4], [0, 0.4], [0, 0]]
+    path.write_text(json.dumps({"type": "FeatureCollection", "features": [feature("Polygon", [ring], "left half")]}))
+    return path
+
+
+def test_the_command_writes_tables_and_python_gives_the_same(
+    tmp_path: Path, zone_file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run = write_small_run(tmp_path / "run.h5")
+    line = tmp_path / "line.geojson"
+    line.write_text(json.dumps(feature("LineString", [[0.2, 0], [0.2, 0.4]])))
+    measure_command(run, output=tmp_path / "m", zones=zone_file, lines=line)
+    assert "left half" in capsys.readouterr().out
+    with (tmp_path / "m" / "zones.csv").open() as file:
+        (row,) = csv.DictReader(file)
+    found = stseg.measure(stseg.read_run(run), zone_file, line)
+    assert (
+        float(row["mean_people"]) == pytest.approx(float(found.zones["mean_people"][0])) and row["most_people"] == "1"
+    )
+    assert {path.name for path in (tmp_path / "m").iterdir()} == {
+        *(f"{name}.csv" for name in found.tables()),
+        "flow.png",
+    }
+    pytest.importorskip("pyarrow")
+    from pyarrow import parquet
+
+    measure_command(run, output=tmp_path / "p", format_="parquet")
+    assert parquet.read_table(tmp_path / "p" / "zones.parquet").to_pylist()[0]["zone"] == "ground"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("{", "no JSON"),
+        ("{}", "no Polygon or MultiPolygon, expected GeoJSON with a feature a zone"),
+        (json.dumps(feature("Polygon", [[[0, 0], [1, 1]]])), "a: found 2 points, expected 3 or more"),
+        (json.dumps(feature("Polygon", [["x"]])), "a: found coordinates that are no points"),
+        (json.dumps(feature("Polygon", 7)), "a: found coordinates that are no points"),
+        (json.dumps(feature("Polygon", [[[0, 0], [1, 0], [1, "1"]]])), "a: found coordinates that are no points"),
+        (json.dumps(feature("Polygon", [[[0, 0], [1, 0], [1e300, 1]]])), "a: found coordinates that are no points"),
+        (json.dumps(feature("Polygon", [[[0, 0]] * 20_000])), "a: found 20000 points, expected at most 10000"),
+        (json.dumps(feature("Polygon", [SQUARE.tolist()]) | {"properties": {"name": "\x1b"}}), "1 to 100 printable"),
+        ('{"features": 7}', "no Polygon"),
+        (json.dumps({"features": [feature("Polygon", [SQUARE.tolist()])] * 2}), "name: found 'a' twice"),
+    ],
+)
+def test_malformed_geojson_is_named(tmp_path: Path, text: str, message: str) -> None:
+    path = tmp_path / "zones.geojson"
+    path.write_text(text)
+    with pytest.raises(FormatError, match=message):
+        read_polygons(path)
+    with pytest.raises(FormatError):
+        read_lines(path)
+
+
+def test_a_ring_needs_not_be_closed(tmp_path: Path) -> None:
+    path = tmp_path / "zones.geojson"
+    path.write_text(json.dumps(feature("Polygon", [[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 0], [1, 1], [0, 0]]])))
+    ((_, (open_ring, closed_ring)),) = read_polygons(path)
+    np.testing.assert_array_equal(open_ring, closed_ring)

@@ -1,0 +1,411 @@
+"""The volume of a frame: clutter, sampling, likelihood per plane and fusion by definition, and what they mean."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import reference_core as reference
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scenes import BODY, FEW_HEIGHTS, boxes, corner_cameras, found, likelihoods, looking, no_boxes, people, rig_of, room
+from strategies import numbers, rigs
+
+from stseg.arrays import Boxes, Floats, Ints, Singles, ViewEvidence
+from stseg.bodies.box_fit import TOLERANCE
+from stseg.bodies.pillar_index import PillarIndex
+from stseg.bodies.pillars import BodyTable
+from stseg.config import OccupancyConfig
+from stseg.detection.detector import Detector
+from stseg.geometry import Grid, Rig
+from stseg.geometry.sampling import Sampling, SamplingKind
+from stseg.geometry.summed_area import TOP, UNSEEN
+from stseg.occupancy.box_planes import CellsByPerson, ViewBoxes, fill_fit, fill_levels, plane_likelihood
+from stseg.occupancy.clutter import clutter, clutter_weights
+from stseg.occupancy.fusion import ErrorRates, log_odds_terms
+from stseg.occupancy.shown_cells import SIDE, CellTables, ShownCells
+from stseg.occupancy.volume import Occupancy
+from stseg.records.people import Explanation
+
+COARSE = rig_of(corner_cameras(), cell=0.5, planes=3)
+PIXELS, BOXES = ["pixels"] * 4, ["boxes"] * 4
+CONFIG = OccupancyConfig()
+PRIOR = float(np.log(CONFIG.occupied_share / (1 - CONFIG.occupied_share)))
+RATES = ErrorRates(FEW_HEIGHTS.pixel_miss_rate, FEW_HEIGHTS.pixel_clutter_rate, FEW_HEIGHTS.pixel_clutter_rate)
+
+
+def explained(rig: Rig, standing: Floats, owner: Sequence[Ints] | None = None, step: int = 1) -> Explanation:
+    """An explanation in which these pixels are whose; nobody's where it is not said."""
+    views, nobody = len(rig.cameras), found(people(), views=len(rig.cameras))
+    width, height = rig.cameras[0].size
+    blank = np.full((-(-height // step), -(-width // step)), -1, np.int16)
+    owners = [blank] * views if owner is None else [np.asarray(o, np.int16) for o in owner]
+    free = tuple(np.zeros(0, np.int64) for _ in range(views))
+    return Explanation(
+        found(standing, views=views), nobody, tuple(owners), (step,) * views, free, np.full(views, np.nan)
+    )
+
+
+def flat(value: float) -> Singles:
+    """A map of one likelihood."""
+    return np.full((96, 128), value, np.float32)
+
+
+def noise(seed: int) -> list[Singles]:
+    """A random map for each view, with edges of different strength."""
+    rng = np.random.default_rng(seed)
+    return [(rng.random((96, 128)) ** (k + 1)).astype(np.float32) for k in range(4)]
+
+
+# Clutter
+
+
+@settings(deadline=None)
+@given(st.integers(1, 20), st.integers(1, 20), st.integers(1, 25), st.integers(0, 99))
+def test_clutter_by_definition(height: int, width: int, side: int, seed: int) -> None:
+    likelihood = np.random.default_rng(seed).random((height, width)).astype(np.float32)
+    assert clutter(likelihood, side) == pytest.approx(reference.clutter(likelihood, side), abs=1e-7)
+
+
+def test_clutter_measures_unrest_within_cells() -> None:
+    assert clutter(flat(0.7), 24) == pytest.approx(0.0, abs=1e-7)
+    chequered = flat(0.0)
+    chequered[::2, ::2] = chequered[1::2, 1::2] = 1.0
+    assert clutter(chequered, 24) == pytest.approx(0.5)
+    halves = flat(0.0)
+    halves[:, 64:] = 1.0
+    assert clutter(halves, 32) == pytest.approx(0.0, abs=1e-7)  # the edge runs between the cells
+    assert clutter(halves, 48) > 0.2
+
+
+@given(st.lists(st.none() | numbers(0, 0.5), min_size=1, max_size=6))
+def test_weights_fall_with_clutter_down_to_the_median(clutters: list[float | None]) -> None:
+    given_clutter = np.array([np.nan if c is None else c for c in clutters])
+    weights = clutter_weights(given_clutter)
+    awake = ~np.isnan(given_clutter)
+    assert (weights[~awake] == 0).all()
+    if awake.any():
+        assert weights[awake].mean() == pytest.approx(1.0)
+        floor = max(float(np.median(given_clutter[awake])), 1e-6)
+        share = weights[awake] * np.maximum(given_clutter[awake], floor)
+        np.testing.assert_allclose(share, share[0])
+
+
+def test_a_view_that_sees_nothing_does_not_silence_the_others() -> None:
+    weights = clutter_weights(np.array([0.0, 0.1, 0.1, 0.1]))
+    np.testing.assert_allclose(weights, 1.0)
+    assert clutter_weights(np.array([np.nan, np.nan])).tolist() == [0.0, 0.0]
+
+
+# Sampling
+
+
+KINDS: list[SamplingKind] = ["point", "footprint"]
+
+
+@settings(max_examples=15, deadline=None)
+@given(rigs(most=2), st.sampled_from(KINDS))
+def test_cells_are_looked_up_where_they_project(rig: Rig, kind: SamplingKind) -> None:
+    sampling = Sampling.of(rig, kind)
+    counts = rig.grid.inside()
+    assert sampling.footprint.shape == (len(rig.cameras), *rig.grid.shape, 4)
+    rng = np.random.default_rng(0)
+    for i, camera in enumerate(rig.cameras):
+        for _ in range(40):
+            z, y, x = (int(rng.integers(0, n)) for n in rig.grid.shape)
+            place, ahead = camera.project(rig.grid.ground[y, x], rig.grid.heights[z])
+            box = sampling.footprint[i, z, y, x].astype(int)
+            if ahead and counts[y, x] and camera.inside(place):
+                first, stop = box[:2], box[:2] + box[2:]
+                assert (box[2:] == 1).all() or kind == "footprint"
+                assert (box[2:] >= 1).all()
+                assert (first >= 0).all()
+                assert (stop <= camera.size).all()
+                clipped = (first == 0) | (stop == camera.size)
+                off = np.abs((first + stop - 1) / 2 - place)
+                assert (off[~clipped] <= 0.5 + 1e-9).all()
+                assert (off[box[2:] == 1] <= 0.5 + 1e-9).all() or clipped.any()
+            else:
+                assert (box == 0).all()
+            away = np.hypot(*(rig.grid.ground[y, x] - camera.centre[:2]))
+            assert sampling.distance[i, y, x] == pytest.approx(away, rel=1e-6)
+    np.testing.assert_array_equal(sampling.views(), (sampling.footprint[..., 2] > 0).sum(0))
+
+
+@pytest.mark.parametrize("distortion", [None, (-0.2, 0.03)])
+def test_a_footprint_has_the_spread_of_the_cells_image(distortion: Sequence[float] | None) -> None:
+    camera = looking("near", (-1.5, -1.2, 2.2), size=(640, 480), focal=420.0, distortion=distortion)
+    rig = rig_of([camera], cell=0.1, planes=2)
+    footprint = Sampling.of(rig, "footprint").footprint[0, 1]
+    within = (np.stack(np.meshgrid(*[np.arange(10)] * 2), -1).reshape(-1, 2) - 4.5) / 10 * rig.grid.cell
+    image, _ = camera.project(rig.grid.ground[:, :, None] + within, rig.grid.heights[1])
+    sides = image.std(2) * np.sqrt(12 / 0.99)  # of a box of the same variances; the lattice's is 0.99 of the cell's
+    left_top, right_bottom = footprint[..., :2], footprint[..., :2] + footprint[..., 2:]
+    whole = (left_top > 0).all(-1) & (right_bottom < camera.size).all(-1)
+    assert whole.sum() > 500
+    assert footprint[whole][:, 2:].max() > 20
+    np.testing.assert_allclose(footprint[whole][:, 2:], sides[whole], atol=0.51, rtol=0.02)
+
+
+def test_cells_outside_the_polygon_are_not_seen() -> None:
+    triangle = np.array([[-2.0, -2.0], [2.0, -2.0], [-2.0, 2.0]])
+    rig = replace(COARSE, grid=replace(COARSE.grid, polygon=triangle))
+    views = Sampling.of(rig, "footprint").views()
+    assert (views[:, ~rig.grid.inside()] == 0).all()
+    assert (views[0][rig.grid.inside()] == 4).all()
+
+
+# Likelihood per plane
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.integers(0, 999))
+def test_likelihood_per_plane_by_definition(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    camera = corner_cameras()[seed % 4]
+    grid = Grid((-2, 2), (-2, 2), cell=1.0, top=1.8, planes=4)
+    standing = people(*rng.uniform((-1.8, -1.8, 1.5), (1.8, 1.8, 1.9), (3, 3)))
+    found = boxes(camera, standing)
+    shaken = Boxes(found.pixel + rng.normal(0, 2, found.pixel.shape), rng.uniform(0.2, 1, len(found)))
+    tried = np.array([1.5, 1.65, 1.8])
+    bodies = BodyTable.of(camera, grid).boxes(grid.ground.reshape(-1, 2), tried).reshape(3, 4, 4, 4)
+    box_owner = rng.integers(-1, 2, len(found))
+    near = rng.integers(-1, 2, (4, 4))
+    edges = np.concatenate([shaken.pixel[:, :2], shaken.pixel[:, :2] + shaken.pixel[:, 2:]], 1)
+    edges = edges.clip(0, [camera.size[0] - 1, camera.size[1] - 1] * 2)
+    pillars, height = bodies.reshape(-1, 4).astype(np.float32), np.array([1.7, 1.6, 1.8])
+    prior = -0.5 * ((tried - height[:, None]) / 0.1) ** 2
+    tolerance = np.tile(TOLERANCE, (len(found), 1))
+    view = ViewBoxes(edges, tolerance, np.log(shaken.score), box_owner, 128.0, 96.0)
+    fit = np.empty((3, 16), np.float32)
+    index, cells = PillarIndex.of(pillars, camera.size), CellsByPerson.of(near, 2)
+    fill_fit(index, pillars, prior[0], prior[1:], view, cells, fit)
+    rates, levels = ErrorRates(0.1, 0.2, 0.3), np.empty((4, 16), np.int16)
+    footprint = np.ones((4, 16, 4), np.int16)
+    footprint[2, 5] = 0
+    every = np.arange(levels.size, dtype=np.int32)
+    person = np.tile(near.ravel(), 4).astype(np.int32)
+    unseen = np.zeros((1, levels.size), np.int16)
+    listed = ShownCells(every, every % 16, every, every, unseen, person, np.ones(levels.size))
+    fill_levels(fit, tried, grid.heights, listed, footprint.reshape(-1, 4), rates, levels.reshape(-1))
+    for cell, (y, x) in enumerate(np.ndindex(4, 4)):
+        free = [b for b in range(len(found)) if box_owner[b] in (-1, near[y, x])]
+        clutter_rate = rates.clutter if near[y, x] < 0 else rates.near_clutter
+        for z, plane in enumerate(grid.heights):
+            best = reference.plane_likelihood(
+                bodies[:, y, x].astype(np.float32),
+                tried,
+                plane,
+                float(height[near[y, x] + 1]),
+                0.1,
+                shaken,
+                free,
+                camera.size,
+            )
+            expected = TOP * plane_likelihood(best, rates.miss, clutter_rate) if (z, cell) != (2, 5) else UNSEEN
+            assert levels[z, cell] == pytest.approx(expected, abs=0.6)
+
+
+@pytest.mark.parametrize(("near", "clutter"), [(-1, 0.01), (0, 0.2)])
+def test_a_box_says_as_much_as_its_match_is_worth(near: int, clutter: float) -> None:
+    """The terms of the rates by which L was made give back m + M (1 - m) / b, and an empty cell counts as M."""
+    match, rates = np.linspace(0.05, 0.9, 18).astype(np.float32).reshape(-1, 1, 1), ErrorRates(0.15, 0.01, 0.2)
+    likelihood = np.array([plane_likelihood(float(m), rates.miss, clutter) for m in match.flat]).reshape(match.shape)
+    said = log_odds_terms(rates)[near + 1, np.rint(likelihood * TOP).astype(int)]
+    np.testing.assert_allclose(said, np.log(0.15 + match * 0.85 / clutter), atol=0.02)
+    erring = clutter * likelihood / (clutter * likelihood + (1 - clutter) * (1 - likelihood))
+    np.testing.assert_allclose(erring, match, atol=0.2 * clutter)
+
+
+# Fusion
+
+
+LEVEL = 0.01
+"""Nats: what rounding likelihoods to levels may do to the log-odds of four views."""
+
+
+def rounded(likelihood: Singles) -> Singles:
+    """A map in whole levels."""
+    return np.asarray(np.rint(likelihood * TOP) / TOP, np.float32)
+
+
+def volume_by_definition(
+    rig: Rig, maps: Sequence[Singles | None], explanation: Explanation, kind: SamplingKind
+) -> Floats:
+    """The frame's log-odds, cell by cell."""
+    sides = [max(min(camera.size) // 4, 8) for camera in rig.cameras]
+    unrest = [np.nan if m is None else reference.clutter(m, side) for m, side in zip(maps, sides, strict=True)]
+    weights = clutter_weights(np.array(unrest))
+    sampling, people_at = Sampling.of(rig, kind), explanation.people.ground
+    centres = [camera.centre[:2] for camera in rig.cameras]
+    volume = np.full(rig.grid.shape, np.nan)
+    for z, y, x in np.ndindex(*rig.grid.shape):
+        footprints, place = sampling.footprint[:, z, y, x], rig.grid.ground[y, x]
+        if (footprints[:, 2] == 0).all():
+            continue
+        reached = np.hypot(*(people_at - place).T)
+        near = int(reached.argmin()) if len(people_at) and reached.min() <= CONFIG.person_radius else -1
+        terms, shares, speaking = [], [], []
+        for i, (centre, shown) in enumerate(zip(centres, maps, strict=True)):
+            if shown is None or footprints[i, 2] == 0:
+                continue
+            away, people_away = float(np.hypot(*(place - centre))), np.hypot(*(people_at - centre).T)
+            box = footprints[i].tolist()
+            share, mean = reference.left_to_cell(rounded(shown), box, explanation, i, near, away, people_away)
+            if share > 0:
+                terms.append(reference.log_odds_term(mean, RATES))
+                shares.append(share)
+                speaking.append(weights[i])
+        volume[z, y, x] = PRIOR if near < 0 else 0.0
+        if terms:
+            volume[z, y, x] += CONFIG.effective_observations * reference.fused(terms, speaking, shares)
+    return volume
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("blind", [None, 2])
+@pytest.mark.parametrize("step", [1, 3])
+def test_fusion_by_definition(kind: SamplingKind, blind: int | None, step: int) -> None:
+    standing = people((-0.8, 0.3), (1.0, -0.6))
+    rng = np.random.default_rng(step)
+    shape = (-(-96 // step), -(-128 // step))
+    owner = [np.where(rng.random(shape) < 0.6, -1, rng.integers(0, 2, shape)) for _ in range(4)]
+    explanation = explained(COARSE, standing, owner, step)
+    maps: list[Singles | None] = [*noise(step)]
+    if blind is not None:
+        maps[blind] = None
+    fused = Occupancy(COARSE, PIXELS, replace(CONFIG, sampling=kind), FEW_HEIGHTS, BODY).fuse(maps, explanation).dense()
+    assert fused.dtype == np.float32
+    np.testing.assert_allclose(fused, volume_by_definition(COARSE, maps, explanation, kind), atol=LEVEL)
+
+
+@pytest.mark.parametrize("kind", ["pixels", "boxes"])
+def test_cells_at_which_nothing_is_shown_are_fused_as_all_others(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With every block marked, no cell has a representative; rates are the same up to the order of sums."""
+    rig = rig_of(corner_cameras(), cell=0.1, planes=3)
+    standing = people((-1.6, 0.3), (1.4, -1.6))
+    seen: list[ViewEvidence] = [boxes(one, standing) for one in rig.cameras]
+    if kind == "pixels":
+        seen = [view * (view > 0.5) for view in likelihoods(rig.cameras, standing)]
+    explanation = Detector(rig, [kind] * 4, FEW_HEIGHTS, BODY).explain(seen, None)
+    occupancy = Occupancy(rig, [kind] * 4, CONFIG, FEW_HEIGHTS, BODY)
+    some, every = occupancy.new_calibration(), occupancy.new_calibration()
+    sparse = occupancy.fuse_and_learn(some, seen, explanation)
+    assert 0 < len(sparse.cell) < 0.8 * sparse.of_cell.size
+    monkeypatch.setattr(CellTables, "nothing_marked", lambda self: np.ones(self.reach[0].shape[:3], bool))
+    whole = occupancy.fuse_and_learn(every, seen, explanation)
+    assert len(whole.cell) == (occupancy.views > 0).sum()
+    np.testing.assert_array_equal(sparse.dense(), whole.dense())
+    np.testing.assert_allclose(some.errors, every.errors, rtol=1e-9)
+    np.testing.assert_allclose(some.seen, every.seen, rtol=1e-9)
+    np.testing.assert_array_equal(some.filled, every.filled)
+
+
+@pytest.mark.parametrize("value", [0.0, 0.3, 1.0])
+def test_more_views_are_sharper_evidence(value: float) -> None:
+    """With equal weights u is the plain sum of the views' log-odds and the prior."""
+    rig = rig_of([looking(f"cam{k}", (x, y, 2.6), focal=200.0) for k, (x, y) in enumerate([(-3, -3), (3, -3), (3, 3)])])
+    fused = (
+        Occupancy(rig, PIXELS[:3], CONFIG, FEW_HEIGHTS, BODY).fuse([flat(value)] * 3, explained(rig, people())).dense()
+    )
+    miss, false, _ = RATES
+    one = np.log(((1 - miss) * value + miss * (1 - value)) / (false * value + (1 - false) * (1 - value)))
+    views = Sampling.of(rig, "point").views()
+    assert set(np.unique(views).tolist()) >= {0, 1, 2, 3}
+    np.testing.assert_allclose(
+        fused[views > 0], CONFIG.effective_observations * views[views > 0] * one + PRIOR, atol=LEVEL
+    )
+    assert np.isnan(fused[views == 0]).all()
+
+
+def test_all_blind_leaves_the_prior() -> None:
+    occupancy = Occupancy(COARSE, PIXELS, CONFIG, FEW_HEIGHTS, BODY)
+    fused = occupancy.fuse([None] * 4, explained(COARSE, people())).dense()
+    np.testing.assert_allclose(fused[occupancy.views > 0], PRIOR, rtol=1e-6)
+    assert np.isnan(fused[occupancy.views == 0]).all()
+
+
+def line_of_sight() -> tuple[Rig, Explanation]:
+    """One camera; a person in the middle of the room explains all that it sees."""
+    rig = rig_of([looking("west", (-4.0, 0.0, 2.4))])
+    everything = np.zeros((96, 128), np.int64)
+    return rig, explained(rig, people((0.0, 0.0)), [everything])
+
+
+def test_explained_evidence_does_not_speak_elsewhere() -> None:
+    rig, explanation = line_of_sight()
+    occupancy = Occupancy(rig, PIXELS[:1], CONFIG, FEW_HEIGHTS, BODY)
+    fused = occupancy.fuse([flat(1.0)], explanation).dense()
+    nobodys = occupancy.fuse([flat(0.0)], explained(rig, people())).dense()
+    seen = occupancy.views[0] > 0
+    away = np.hypot(*np.moveaxis(rig.grid.ground, -1, 0))
+    in_front = seen & (rig.grid.ground[..., 0] < -0.5)
+    np.testing.assert_allclose(fused[0][in_front], nobodys[0][in_front], rtol=1e-6)
+    assert (fused[0][in_front] < PRIOR).all()
+    assert (fused[0][seen & (away < 0.3)] > 1.0).all()
+
+
+def test_a_hidden_view_does_not_count() -> None:
+    rig, explanation = line_of_sight()
+    occupancy = Occupancy(rig, PIXELS[:1], CONFIG, FEW_HEIGHTS, BODY)
+    behind = (occupancy.views[0] > 0) & (rig.grid.ground[..., 0] > 0.6)
+    assert behind.any()
+    for value in (0.0, 1.0):
+        fused = occupancy.fuse([flat(value)], explanation).dense()
+        np.testing.assert_allclose(fused[0][behind], PRIOR, rtol=1e-6)
+
+
+def test_a_missing_box_says_less_of_somebody_hidden() -> None:
+    rig = rig_of(corner_cameras()[:1])
+    occupancy = Occupancy(rig, BOXES[:1], CONFIG, FEW_HEIGHTS, BODY)
+    explanation = explained(rig, people((0.0, 0.0)))
+    half = replace(explanation.people, visibility=np.array([[0.5]]))
+    whole_says = occupancy.fuse([no_boxes()], explanation).dense()
+    half_says = occupancy.fuse([no_boxes()], replace(explanation, people=half)).dense()
+    near = np.hypot(*np.moveaxis(rig.grid.ground, -1, 0)) <= CONFIG.person_radius
+    assert (whole_says[0][near] < -CONFIG.effective_observations).all()
+    np.testing.assert_allclose(half_says[0][near], whole_says[0][near] / 2, rtol=1e-5)
+    np.testing.assert_array_equal(half_says[0][~near], whole_says[0][~near])
+
+
+@pytest.mark.parametrize("kind", ["pixels", "boxes"])
+def test_a_person_is_a_column_of_occupied_cells(kind: str) -> None:
+    rig = room()
+    standing = people((-0.8, 0.3), (0.9, -0.6))
+    seen: list[ViewEvidence] = list(likelihoods(rig.cameras, standing))
+    if kind == "boxes":
+        seen = [boxes(camera, standing) for camera in rig.cameras]
+    explanation = Detector(rig, [kind] * 4, FEW_HEIGHTS, BODY).explain(seen, None)
+    fused = Occupancy(rig, [kind] * 4, CONFIG, FEW_HEIGHTS, BODY).fuse(seen, explanation).dense()
+    away = np.hypot(*np.moveaxis(rig.grid.ground[:, :, None] - standing[:, :2], -1, 0)).min(2)
+    assert fused.shape == rig.grid.shape
+    assert (fused[:3, away < 0.15] > 0).all()  # the uppermost plane is above them
+    assert (fused[:, away > 0.6] < 0).all()
+    # A volume from nobody's evidence holds nobody.
+    empty: list[ViewEvidence] = [flat(0.0)] * 4 if kind == "pixels" else [no_boxes()] * 4
+    nobody = Detector(rig, [kind] * 4, FEW_HEIGHTS, BODY).explain(empty, None)
+    assert (Occupancy(rig, [kind] * 4, CONFIG, FEW_HEIGHTS, BODY).fuse(empty, nobody).dense() < PRIOR).all()
+
+
+def test_the_same_frame_twice() -> None:
+    occupancy = Occupancy(COARSE, PIXELS, CONFIG, FEW_HEIGHTS, BODY)
+    explanation = explained(COARSE, people((0.2, 0.3)))
+    first = occupancy.fuse(noise(1), explanation).dense()
+    occupancy.fuse(noise(2), explanation)
+    np.testing.assert_array_equal(first, occupancy.fuse(noise(1), explanation).dense())
+
+
+def test_cells_kept_from_the_frame_before_are_those_of_this_one() -> None:
+    occupancy = Occupancy(COARSE, PIXELS, CONFIG, FEW_HEIGHTS, BODY)
+    kept, marked = CellTables(occupancy.sampling.footprint), occupancy.views[:, ::SIDE, ::SIDE] < 0
+    assert marked.size > 1
+    for block in (0, 0, -1, 0):
+        marked[:] = False
+        marked.reshape(-1)[block] = True  # in place: what is kept is no view of it
+        near = np.full(COARSE.grid.shape[1:], block)
+        fresh = CellTables(occupancy.sampling.footprint).shown(marked, near, occupancy.views)
+        assert len(fresh.cell)
+        for own, other in zip(kept.shown(marked, near, occupancy.views), fresh, strict=True):
+            np.testing.assert_array_equal(own, other)

@@ -1,0 +1,259 @@
+"""Which person each pixel shows."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+import pytest
+import reference_pixel_labels as reference
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scenes import corner_cameras, likelihoods, looking, people, room
+
+from stseg.arrays import Bytes, Floats, Labels, Singles
+from stseg.bodies.outlines import outlines
+from stseg.bodies.pillars import WIDTH, BodyTable
+from stseg.config import BodyConfig, LabelConfig
+from stseg.errors import ConfigError
+from stseg.geometry import Camera
+from stseg.graphcut.energy import QUANTUM
+from stseg.pixel_labels.adjacency import edge_costs
+from stseg.pixel_labels.body_masks import Patches, pillar_patches
+from stseg.pixel_labels.label_likelihood import LabelLikelihood, visible_shares
+from stseg.pixel_labels.pixel_energy import PixelEnergy, most_likely_labels, pixel_energy
+from stseg.pixel_labels.placed_people import PlacedPeople
+from stseg.pixel_labels.views import ViewLabels, view_labels
+
+EXACT = LabelConfig(samples=1, position_noise=1e-3, height_noise=0.0)
+"""One pillar a person, just as the micro-scenes draw them."""
+EXACT_BODY = BodyConfig(width_mean=WIDTH, width_spread=1e-9)
+FEW = LabelConfig(samples=8, position_noise=0.03, height_noise=0.03)
+"""Almost certain ones: the people of the micro-scenes have no arms and legs."""
+BODY = BodyConfig(width_mean=WIDTH, width_spread=0.03)
+
+
+def standing(everybody: Floats, spread: float = 0.0) -> PlacedPeople:
+    covariance = np.tile(spread**2 * np.eye(2), (len(everybody), 1, 1))
+    return PlacedPeople(everybody[:, :2], covariance, everybody[:, 2], np.arange(1, len(everybody) + 1))
+
+
+def labels_in(camera: Camera, everybody: Floats, config: LabelConfig = FEW) -> Labels:
+    """Labels from the exact masks."""
+    view = ViewLabels(camera, BodyTable.of(camera, room().grid), config, BODY)
+    return view.label(standing(everybody), likelihoods([camera], everybody)[0], None)
+
+
+# Pillars
+
+
+def test_one_certain_pillar_is_the_outline() -> None:
+    camera, everybody = corner_cameras()[0], people((0.3, -0.4), (1.2, 1.1, 1.6))
+    table = BodyTable.of(camera, room().grid)
+    patches = pillar_patches(table, standing(everybody), EXACT, EXACT_BODY)
+    first, spans, _ = outlines(table, everybody[:, :2], everybody[:, 2], 1, (96, 128))
+    for j in range(2):
+        outline = np.zeros((96, 128))
+        for k, (start, stop) in enumerate(spans[j]):
+            outline[first[j] + k, start:stop] = 1
+        left, top, right, bottom = patches.edges[j]
+        share = patches.share[patches.first[j] : patches.first[j + 1]].reshape(bottom - top, right - left)
+        assert np.abs(outline[top:bottom, left:right] - share).mean() < 0.005
+        assert outline.sum() == outline[top:bottom, left:right].sum()
+
+
+def test_coverage_falls_off_with_uncertainty() -> None:
+    camera, everybody = corner_cameras()[0], people((0.3, -0.4))
+    table = BodyTable.of(camera, room().grid)
+    sharp, wide = (pillar_patches(table, standing(everybody, spread), FEW, BODY).share for spread in (0.0, 0.2))
+    assert wide.min() >= 0
+    assert wide.max() <= 1 + 1e-6
+    assert sharp.max() == pytest.approx(1.0)
+    assert (wide > 0).sum() > 1.3 * (sharp > 0).sum()
+    assert wide.sum() == pytest.approx(sharp.sum(), rel=0.25)
+
+
+def test_a_person_out_of_view_has_no_patch() -> None:
+    ahead = looking("ahead", (0.0, 0.0, 1.5), target=(2.0, 0.0, 1.0))
+    view = ViewLabels(ahead, BodyTable.of(ahead, room().grid), FEW, BODY)
+    behind = people((-1.5, 0.0))
+    assert len(view.label_likelihood(standing(behind)).people.share) == 0
+    bright = np.ones((96, 128), np.float32)
+    assert not view.label(standing(behind), bright, None).any()
+    assert not view.label(standing(behind[:0]), bright, None).any()
+
+
+# The nearest
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 3))
+@settings(max_examples=20, deadline=None)
+def test_the_product_is_the_mean_over_all_combinations_of_draws(seed: int, count: int) -> None:
+    rng = np.random.default_rng(seed)
+    drawn = [rng.random((3, 2, 3)) < 0.6 for _ in range(count)]
+    distance = rng.random(count)
+    cover = np.concatenate([own.mean(0).ravel() for own in drawn]).astype(np.float32)
+    patches = Patches(np.tile([4, 7, 7, 9], (count, 1)), np.arange(count + 1) * 6, cover)
+    shown = visible_shares(patches, distance)
+    assert (shown.left, shown.top) == (4, 7)
+    np.testing.assert_allclose(reference.dense(shown), reference.nearest_shares(drawn, distance), atol=1e-5)
+
+
+def test_the_most_likely_label_is_the_start() -> None:
+    shown = random_nearest(np.random.default_rng(3), 2, (3, 4))
+    np.testing.assert_array_equal(most_likely_labels(shown), reference.dense(shown).argmax(0))
+
+
+# The adjacency
+
+
+@given(st.integers(0, 2**32 - 1))
+@settings(max_examples=20, deadline=None)
+def test_weights_follow_the_sigmoid_and_are_not_negative(seed: int) -> None:
+    image = np.random.default_rng(seed).integers(0, 60, (3, 4, 3)).astype(np.uint8)
+    config = LabelConfig(boundary_weight=3.0, contrast_limit=40.0, contrast_slope=10.0)
+    across, down = edge_costs(image, (3, 4), config)
+    assert min(across.min(), down.min()) >= 0
+    assert not across[:, -1].any() and not down[-1].any()
+    for v, u in product(range(2), range(3)):
+        for cost, other in ((across, image[v, u + 1]), (down, image[v + 1, u])):
+            assert cost[v, u] * QUANTUM == pytest.approx(reference.adjacency(image[v, u], other, config), abs=QUANTUM)
+
+
+def test_without_colours_all_pairs_cost_the_same() -> None:
+    across, down = edge_costs(None, (3, 4), LabelConfig(boundary_weight=3.0, colourless_factor=0.5))
+    np.testing.assert_array_equal(across * QUANTUM, np.tile([1.5, 1.5, 1.5, 0.0], (3, 1)))
+    np.testing.assert_array_equal(down * QUANTUM, np.repeat([[1.5], [1.5], [0.0]], 4, 1))
+
+
+# The energy
+
+
+def random_nearest(rng: np.random.Generator, count: int, shape: tuple[int, int]) -> LabelLikelihood:
+    """People whose rectangles lie anywhere in a window."""
+    rows, columns = shape
+    top, left = rng.integers(0, rows, count), rng.integers(0, columns, count)
+    edges = np.stack([left, top, rng.integers(left + 1, columns + 1), rng.integers(top + 1, rows + 1)], 1)
+    edges = np.concatenate([edges, [[0, 0, columns, rows]]])[-count:] + np.tile([5, 2], 2)
+    first = np.append(0, np.cumsum((edges[:, 2] - edges[:, 0]) * (edges[:, 3] - edges[:, 1])))
+    share = rng.random(first[-1]).astype(np.float32)
+    return visible_shares(Patches(edges, first, share), rng.random(count))
+
+
+def problem(seed: int, shape: tuple[int, int]) -> tuple[PixelEnergy, LabelLikelihood, Singles, Bytes, LabelConfig]:
+    rng = np.random.default_rng(seed)
+    config = LabelConfig(
+        foreground_weight=float(rng.uniform(0, 4)),
+        boundary_weight=float(rng.uniform(0, 2)),
+        contrast_limit=200.0,
+        contrast_slope=60.0,
+        outlier_rate=0.1,
+    )
+    shown = random_nearest(rng, 2, shape)
+    foreground = rng.random(shown.background.shape).astype(np.float32)
+    image = rng.integers(0, 256, (*shown.background.shape, 3)).astype(np.uint8)
+    ours = pixel_energy(shown, foreground, *edge_costs(image, shown.background.shape, config), config)
+    return ours, shown, foreground, image, config
+
+
+@given(st.integers(0, 2**32 - 1))
+@settings(max_examples=40, deadline=None)
+def test_the_energy_is_that_of_the_paper_and_pruned_labels_cannot_win(seed: int) -> None:
+    ours, shown, foreground, image, config = problem(seed, (2, 3))
+    shares, shape = reference.dense(shown), shown.background.shape
+    empty = reference.energy(np.zeros(shape, int), foreground, image, shares, config)
+    cell = np.repeat(np.arange(ours.energy.cells), np.diff(ours.energy.first))
+    allowed = {(int(ours.pixel[p]), int(label)) for p, label in zip(cell, ours.energy.label, strict=True)}
+    best_of_all = best_allowed = np.inf
+    for flat in product(range(3), repeat=shape[0] * shape[1]):
+        label = np.array(flat)
+        if any(k and reference.dense(shown)[k].flat[p] == 0 and (p, k) not in allowed for p, k in enumerate(flat)):
+            continue  # outside that person's rectangle
+        theirs = reference.energy(label.reshape(shape), foreground, image, shares, config) - empty
+        best_of_all = min(best_of_all, theirs)
+        if all(k == 0 or (p, k) in allowed for p, k in enumerate(flat)):
+            assert ours.energy.of(label[ours.pixel]) * QUANTUM == pytest.approx(theirs, abs=0.03)
+            best_allowed = min(best_allowed, theirs)
+    assert best_allowed == pytest.approx(best_of_all, abs=0.03)
+
+
+# Labels
+
+
+def test_one_person_is_their_silhouette() -> None:
+    camera, everybody = corner_cameras()[1], people((0.2, 0.1))
+    seen, label = likelihoods([camera], everybody)[0], labels_in(camera, everybody)
+    assert (label[seen > 0.8] == 1).all()
+    assert not label[seen < 0.2].any()
+
+
+def test_two_people_side_by_side_are_two_and_the_same_in_every_view() -> None:
+    everybody = people((-0.5, 0.3), (0.6, -0.2, 1.8))
+    views = view_labels(room(), FEW, BODY)
+    for view, seen in zip(views, likelihoods(room().cameras, everybody), strict=True):
+        label = view.label(standing(everybody), seen, None)
+        for j in range(2):
+            alone = likelihoods([view.camera], everybody[j : j + 1])[0] > 0.8
+            other = likelihoods([view.camera], everybody[1 - j : 2 - j])[0] > 0.2
+            assert (label[alone & ~other] == j + 1).mean() > 0.95
+
+
+def test_the_nearer_of_two_hides_the_farther() -> None:
+    """Of pixels that bodies fill, as in the tests above: those at their edges are between two answers."""
+    camera = corner_cameras()[0]
+    everybody = people((-0.6, -0.6), (0.6, 0.62))  # on one line from the corner
+    near, far = (likelihoods([camera], everybody[j : j + 1])[0] for j in range(2))
+    label = labels_in(camera, everybody)
+    both, behind = (near > 0.8) & (far > 0.8), (near < 0.2) & (far > 0.8)
+    assert both.any()
+    assert (label[both] == 1).mean() > 0.95
+    assert (label[behind] == 2).mean() > 0.9
+
+
+def test_foreground_without_a_person_is_background() -> None:
+    camera, everybody = corner_cameras()[2], people((-0.5, -0.5))
+    view = ViewLabels(camera, BodyTable.of(camera, room().grid), FEW, BODY)
+    seen = likelihoods([camera], everybody)[0]
+    blotch = seen.copy()
+    blotch[:20, :20] = 1.0
+    np.testing.assert_array_equal(
+        view.label(standing(everybody), blotch, None), view.label(standing(everybody), seen, None)
+    )
+
+
+def test_similar_colours_fill_holes_and_reject_specks() -> None:
+    camera, everybody = corner_cameras()[0], people((0.0, 0.0))
+    seen = likelihoods([camera], everybody)[0]
+    rows, columns = np.nonzero(seen > 0.5)
+    hole, speck = (round(float(rows.mean())), round(float(columns.mean()))), (int(rows.mean()), columns.max() + 3)
+    seen[hole], seen[speck] = 0.0, 1.0
+    view = ViewLabels(camera, BodyTable.of(camera, room().grid), FEW, BODY)
+    label = view.label(standing(everybody), seen, np.full((96, 128, 3), 80, np.uint8))
+    assert label[hole] == 1
+    assert label[speck] == 0
+
+
+def test_a_border_between_two_people_follows_the_colours() -> None:
+    camera, everybody = corner_cameras()[0], people((-0.1, 0.35), (0.35, -0.1))
+    seen = likelihoods([camera], everybody)[0]
+    near, far = (likelihoods([camera], everybody[j : j + 1])[0] > 0.5 for j in range(2))
+    image = np.full((96, 128, 3), 60, np.uint8)
+    image[near], image[far & ~near] = 20, 200
+    view = ViewLabels(camera, BodyTable.of(camera, room().grid), FEW, BODY)
+    off = everybody + np.array([0.06, -0.06, 0.0])  # to the side, as the camera sees it
+    truth = np.where(near, 1, np.where(far, 2, 0))
+    plain, coloured = (view.label(standing(off, 0.1), seen, colours) for colours in (None, image))
+    assert (coloured != truth).sum() < (plain != truth).sum()
+
+
+def test_the_same_again() -> None:
+    camera, everybody = corner_cameras()[3], people((-0.5, 0.3), (0.3, 0.2))
+    np.testing.assert_array_equal(labels_in(camera, everybody), labels_in(camera, everybody))
+
+
+@pytest.mark.parametrize(
+    "change", [{"contrast_slope": 0.0}, {"position_noise": 0.0}, {"samples": 0}, {"outlier_rate": 1.0}]
+)
+def test_constants_out_of_range(change: dict[str, float]) -> None:
+    with pytest.raises(ConfigError, match=next(iter(change))):
+        LabelConfig(**change)  # type: ignore[arg-type]  # each value has its field's type

@@ -1,0 +1,145 @@
+"""Pages name what is there: links, files, commands, configuration and rig keys, tables; and users' pages stay short."""
+
+from __future__ import annotations
+
+import re
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from stseg.commands.main import COMMANDS
+from stseg.config import Config
+from stseg.config.keys import values
+from stseg.io.calibrations.formats import FORMATS as CALIBRATIONS
+from stseg.io.exports.formats import FORMATS as EXPORTS
+from stseg.io.recording.recording import SOURCE_KINDS
+from stseg.io.recording.rigs import parse_rig
+from stseg.io.runfile import layout
+from stseg.trackers import TRACKERS
+
+ROOT = Path(__file__).parents[2]
+sys.path.append(str(ROOT / "tools"))
+
+import configuration_page  # noqa: E402
+
+DOCS = ROOT / "docs"
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(DOCS.rglob("*.md"))]
+NOT_FOR_USERS = ("how-it-works.md", "glossary.md")
+MOST_WORDS = 12_000
+README, INPUTS, OUTPUTS = (
+    (ROOT / page).read_text("utf-8") for page in ("README.md", "docs/inputs.md", "docs/outputs.md")
+)
+NAMES = [page.relative_to(ROOT).as_posix() for page in PAGES]
+KEYS = dict(values(Config()))
+SECTIONS = {key.partition(".")[0] for key in KEYS}
+
+
+def heading_ids(page: Path) -> set[str]:
+    """Anchors of a page's headings, as GitHub makes them."""
+    titles = re.findall(r"^#+ (.*)$", page.read_text("utf-8"), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=NAMES)
+def test_links_lead_somewhere(page: Path) -> None:
+    for link in re.findall(r"\]\((?!https?:)([^)]+)\)", page.read_text("utf-8")):
+        path, _, anchor = link.partition("#")
+        target = (page.parent / path).resolve() if path else page
+        assert target.exists(), link
+        assert not anchor or anchor in heading_ids(target), link
+
+
+@pytest.mark.parametrize("page", PAGES, ids=NAMES)
+def test_files_and_commands_named_are_there(page: Path) -> None:
+    text = page.read_text("utf-8")
+    assert set(re.findall(r"(?:`|^)stseg (\w+)\b", text, re.MULTILINE)) <= {*COMMANDS, "COMMAND"}
+    for path in re.findall(r"\b(?:stseg|io|tools|tests|docs)/[\w./*-]*\w\.(?:py|md|json|toml)\b", text):
+        assert any(ROOT.glob(path)) or path in _EXAMPLES, path
+
+
+_EXAMPLES = {"stseg/foreground/median.py", "stseg/trackers/nearest.py", "io/exports/NAME.py", "io/calibrations/NAME.py"}
+"""Files that the page on contributing invents."""
+
+
+@pytest.mark.parametrize("page", PAGES, ids=NAMES)
+def test_configuration_keys_named_exist(page: Path) -> None:
+    text = page.read_text("utf-8")
+    named = re.findall(rf"`((?:{'|'.join(SECTIONS)})\.[a-z_.]*[a-z_])", text) + re.findall(r"--set ([\w.]+)=", text)
+    for key in named:
+        assert key in KEYS or any(known.startswith(f"{key}.") for known in KEYS), key
+
+
+def test_the_drawing_of_rooms_shows_all_of_them() -> None:
+    page = (DOCS / "development" / "architecture.md").read_text("utf-8")
+    rooms = {folder.name for folder in (ROOT / "stseg").iterdir() if any(folder.glob("*.py"))}
+    assert {*rooms, "io"} <= set(re.findall(r"\w+", page.partition("```text")[2].partition("```")[0]))
+
+
+def test_every_page_is_reached_from_the_readme() -> None:
+    reached, waiting = set[Path](), [ROOT / "README.md"]
+    while waiting:
+        page = waiting.pop()
+        if page not in reached:
+            reached.add(page)
+            links = re.findall(r"\]\((?!https?:)([^)#]+\.md)", page.read_text("utf-8"))
+            waiting += [(page.parent / link).resolve() for link in links]
+    assert set(PAGES) <= reached
+
+
+def test_the_pages_for_users_are_short() -> None:
+    pages = [page for page in DOCS.glob("*.md") if page.name not in NOT_FOR_USERS]
+    assert sum(len(page.read_text("utf-8").split()) for page in pages) <= MOST_WORDS
+
+
+def test_the_table_of_keys_is_that_of_the_configuration() -> None:
+    page = configuration_page.PAGE.read_text("utf-8")
+    assert page == configuration_page.rewritten(page), "python tools/configuration_page.py writes it anew"
+    assert all(f"| `{name}` |" in page for name in TRACKERS)
+
+
+def test_the_rig_file_shown_is_one() -> None:
+    (text,) = re.findall(r"```toml\n(format.*?)```", INPUTS, re.DOTALL)
+    recording = parse_rig(text, ROOT / "room.toml")
+    assert [camera.name for camera in recording.rig.cameras] == ["cam1", "cam2"]
+    assert {source.source.kind for source in recording.sources} <= set(SOURCE_KINDS)
+    assert all(f"| `{kind}` |" in INPUTS for kind in SOURCE_KINDS)
+    scene = tomllib.loads(text)["scene"]
+    assert {"x", "y", "polygon", "frame_rate"} <= set(scene)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=NAMES)
+def test_cameras_shown_are_as_rig_files_have_them(page: Path) -> None:
+    whole = re.findall(r"```toml\n(format.*?)```", INPUTS, re.DOTALL)[0]
+    head, camera = whole.partition("[[camera]]")[0], whole.rpartition("[[camera]]")[2]
+    for block in re.findall(r"```toml\n(source.*?)```", page.read_text("utf-8"), re.DOTALL):
+        text = f"{head}[[camera]]{camera.partition('source =')[0]}{block}"
+        (source,) = parse_rig(text, ROOT / "room.toml").sources
+        assert source.source.kind in SOURCE_KINDS
+
+
+@pytest.mark.parametrize("page", PAGES, ids=NAMES)
+def test_keys_of_the_rig_file_named_exist(page: Path) -> None:
+    readers = "".join(path.read_text("utf-8") for path in (ROOT / "io" / "recording").rglob("*.py"))
+    known = {*re.findall(r'"(\w+)"', readers), *(key.rpartition(".")[2] for key in KEYS)}
+    assert set(re.findall(r"`(\w+) = ", page.read_text("utf-8"))) <= known
+
+
+def test_every_array_and_column_of_the_run_file_is_described() -> None:
+    for field in layout.FIELDS:
+        assert re.search(rf"^ +.*\b{field.name}\b", OUTPUTS, re.MULTILINE)
+    for name, dtype in layout.table_types(1).items():
+        (row,) = re.findall(rf"^\| `/{name}`.*$", OUTPUTS, re.MULTILINE)
+        assert set(dtype.names or ()) <= set(re.findall(r"\w+", row.partition("|")[2]))
+
+
+def test_every_format_has_a_row() -> None:
+    assert all(f"| `{name}` |" in OUTPUTS for name in EXPORTS)
+    rigs = (DOCS / "rigs.md").read_text("utf-8")
+    assert all(f"`{name}`" in rigs for name in CALIBRATIONS)
+
+
+def test_ci_runs_the_test_command_of_the_readme() -> None:
+    (command,) = re.findall(r"^python3 -m venv .* (-m pytest .*)$", README, re.MULTILINE)
+    assert f'"$bin/python" {command} |' in (ROOT / ".ci" / "run").read_text("utf-8")

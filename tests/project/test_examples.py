@@ -1,0 +1,97 @@
+"""The example of the documentation, on people who are simulated, beside PedPy."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas
+import pedpy
+import pytest
+from run_files import CONFIG, small_recording
+
+from stseg.geometry import Grid
+from stseg.io.runfile.runs import Run, RunWriter, read_run
+from stseg.records.tables import TRAJECTORY, Tracks
+from stseg.simulation import NAMED
+from stseg.simulation.crowd.social_forces import walk_freely
+
+sys.path.append(str(Path(__file__).parents[2] / "docs" / "examples"))
+
+import flow_and_density
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    """Fourteen people who walk about 6 m x 6 m for ten seconds, as a tracker without faults would follow them."""
+    folder, spec = tmp_path_factory.mktemp("run"), replace(NAMED["dense"], seconds=10.0)
+    truth = np.concatenate([crowd.truth(spec.area) for crowd in walk_freely(spec)])
+    trajectory = np.zeros(len(truth), TRAJECTORY)
+    for name in ("frame", "id", "x", "y", "height"):
+        trajectory[name] = truth[name]
+    recording = small_recording(folder)
+    rig = replace(recording.rig, frame_rate=spec.frame_rate, grid=Grid((-3, 3), (-3, 3), 1.0, 1.8, 1))
+    views = np.ones(rig.grid.shape, np.uint8)
+    with RunWriter(folder / "run.h5", replace(recording, rig=rig), views, CONFIG, overwrite=False) as writer:
+        volume = np.zeros((spec.frames, *rig.grid.shape), np.float32)
+        writer.append_frames(np.arange(spec.frames), volume, volume.astype(np.int32))
+        writer.append("trajectory", trajectory)
+        writer.finish(Tracks(trajectory).summary())
+    return read_run(folder / "run.h5")
+
+
+def walked(*places: tuple[float, float]) -> pandas.DataFrame:
+    """One person, a frame a second."""
+    frame = np.arange(len(places))
+    x, y = np.array(places).T
+    return pandas.DataFrame({"frame": frame, "id": 1, "x": x, "y": y, "time": frame.astype(float)})
+
+
+def test_a_line_is_crossed_between_its_ends_and_to_one_side() -> None:
+    start, stop = np.array([0.0, 0.0]), np.array([2.0, 0.0])
+    there_and_back = flow_and_density.crossings(walked((1, -1), (1, 1), (1, -1)), start, stop)
+    assert there_and_back[["time", "direction"]].to_numpy().tolist() == [[1, 1], [2, -1]]
+    assert len(flow_and_density.crossings(walked((3, -1), (3, 1)), start, stop)) == 0
+    assert len(flow_and_density.crossings(walked((1, -2), (1, -1)), start, stop)) == 0
+    other = walked((1, 1), (1, 2)).assign(id=2)
+    assert len(flow_and_density.crossings(pandas.concat([walked((1, -2), (1, -1)), other]), start, stop)) == 0
+
+
+def test_speed_is_that_of_a_steady_walk() -> None:
+    table = walked(*((0.3 * step, 0.4 * step) for step in range(9)))
+    found = flow_and_density.speeds(table, 1.0)
+    np.testing.assert_allclose(found["speed"], 0.5)
+    assert found["frame"].tolist() == list(range(1, 8))
+
+
+def test_the_flow_is_pedpy_s(run: Run) -> None:
+    table = run.data_frame("trajectory")
+    found = flow_and_density.crossings(table, np.array([-3.0, 0.0]), np.array([3.0, 0.0]))
+    line = pedpy.MeasurementLine([(-3, 0), (3, 0)])
+    _, crossing = pedpy.compute_n_t(
+        traj_data=pedpy.load_trajectory_from_ped_data_archive_hdf5(trajectory_file=run.path), measurement_line=line
+    )
+    first = (found.groupby("id")["time"].min() * run.frame_rate).round().astype(int)  # PedPy counts who crosses once
+    first = first[first < run.frames[-1]]  # and not in the last frame
+    assert first.to_dict() == dict(zip(crossing["id"], crossing["frame"], strict=True))
+    assert len(first) > 3
+
+
+def test_speed_and_density_are_those_of_people(run: Run) -> None:
+    table = flow_and_density.speed_over_density(run.data_frame("trajectory"), run.frame_rate, 36.0)
+    assert ((table["mean"] > 0) & (table["mean"] < 2)).all()
+    data = pedpy.load_trajectory_from_ped_data_archive_hdf5(trajectory_file=run.path)
+    area = pedpy.MeasurementArea([(-3, -3), (3, -3), (3, 3), (-3, 3)])
+    density = pedpy.compute_classic_density(traj_data=data, measurement_area=area)["density"]
+    assert table.index.min() - 0.051 <= density.min()
+    assert density.max() <= table.index.max() + 0.051
+
+
+def test_it_prints_both(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
+    flow_and_density.main(str(run.path))
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].startswith("to the left of the line: ")
+    assert lines[3] == "density 1/m2  speed m/s  places   (36.0 m2)"
+    assert len(lines) > 4

@@ -1,0 +1,194 @@
+"""Who may import whom, read from the sources."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+import tomllib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+from recordings import ENVIRONMENT
+
+ROOT = Path(__file__).parents[2]
+
+FOUNDATION = (
+    "version",
+    "errors",
+    "arrays",
+    "kernels",
+    "config",
+    "geometry",
+    "bodies",
+    "records",
+)
+"""Each may import those before it; everything below may import all of them."""
+
+SOLVER = "graphcut"
+"""Minimum cuts and expansion moves: they know nothing of people, and could be a package of their own."""
+
+STAGES: dict[str, set[str]] = {
+    "foreground": set(),
+    "view_health": set(),
+    "noise": {"view_health"},
+    "detection": {"view_health", "noise"},
+    "occupancy": set(),
+    "segmentation": {SOLVER},
+    "tracking": set(),
+    "identities": {"tracking"},
+    "trajectories": {"tracking", "identities"},
+    "pixel_labels": {SOLVER},
+}
+"""In the order of the data: what each may import besides the foundation. What two share is a record of `records`."""
+
+BESIDE = {
+    "trackers": {"segmentation", "tracking", "baselines", SOLVER},
+    "baselines": {"trackers", "tracking", "occupancy"},
+    "evaluation": {"errors", "arrays"},
+    "measures": {"errors", "arrays", "geometry"},
+    "io": {"version", "errors", "arrays", "config", "geometry", "records"},
+    "calibration": {"errors", "arrays", "geometry", "bodies"},
+    "report": {"errors", "arrays", "geometry", "bodies", "records"},
+    "simulation": {"errors", "arrays", "kernels", "geometry"},
+}
+"""Rooms above or beside the stages."""
+
+AT_HOME = {
+    "h5py": ("stseg.io",),
+    "cv2": ("stseg.io", "stseg.report", "stseg.simulation", "stseg.calibration", "stseg.view_health"),
+    "PIL": ("stseg.io",),
+    "numba": ("stseg.kernels",),
+    "maxflow": ("stseg.graphcut.pymaxflow",),
+    "cyclopts": ("stseg.commands",),
+    "rich": ("stseg.commands",),
+    "distributed": ("stseg.engine.workers.cluster",),  # imported where a scheduler is asked for
+    "pandas": ("stseg.io",),  # its types; it is imported where a data frame is asked for
+    "xarray": ("stseg.io",),  # the same
+    "tomllib": ("stseg.io",),
+    "pathlib": ("stseg.kernels", "stseg.io", "stseg.engine", "stseg.commands"),
+}
+"""Libraries, and the only modules that know them."""
+
+NEEDED = ("numpy", "scipy")
+"""Libraries that every module may use."""
+
+
+@dataclass(frozen=True)
+class Module:
+    """A source file of the package."""
+
+    name: str
+    tree: ast.Module
+
+    @property
+    def part(self) -> str:
+        """The part of the package that it belongs to: `stseg.io.recording.rigs` is of `io`."""
+        return f"{self.name}.__init__".split(".")[1]
+
+    def imports(self) -> Iterator[str]:
+        """Full names of what it imports; of `from a import b`, both a and a.b."""
+        for node in ast.walk(self.tree):
+            if isinstance(node, ast.Import):
+                yield from (alias.name for alias in node.names)
+            elif isinstance(node, ast.ImportFrom):
+                assert node.level == 0, f"{self.name} line {node.lineno}: a relative import"
+                yield node.module or ""
+                yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def modules() -> list[Module]:
+    # The link stseg/io is not followed by glob on every Python, so the folder behind it is read by itself.
+    found = {path: ("stseg", *path.relative_to(ROOT / "stseg").parts) for path in (ROOT / "stseg").rglob("*.py")}
+    found = {path: parts for path, parts in found.items() if parts[1] != "io"}
+    found |= {path: ("stseg", "io", *path.relative_to(ROOT / "io").parts) for path in (ROOT / "io").rglob("*.py")}
+    return [
+        Module(".".join(parts).removesuffix(".py").removesuffix(".__init__"), ast.parse(path.read_text("utf-8")))
+        for path, parts in sorted(found.items())
+    ]
+
+
+MODULES = modules()
+
+
+def parts_imported(module: Module) -> set[str]:
+    """Parts of the package that a module imports, its own left out."""
+    parts = {*FOUNDATION, SOLVER, *STAGES, *BESIDE, "engine", "commands"}
+    taken = {name.split(".")[1] for name in module.imports() if name.startswith("stseg.")}
+    assert taken <= parts, f"{module.name} imports {taken - parts}, of which no rule is known"
+    return taken - {module.part}
+
+
+def allowed(part: str) -> set[str]:
+    """What the modules of a part may import."""
+    if part == "__init__":  # the public names, for type checkers; at run time each is imported when it is asked for
+        return {*FOUNDATION, *STAGES, *BESIDE, "engine"}
+    if part == "__main__":
+        return {"commands"}
+    if part in FOUNDATION:
+        return set(FOUNDATION[: FOUNDATION.index(part)])
+    if part == SOLVER:
+        return {"errors", "arrays", "kernels"}
+    if part in STAGES:
+        return {*FOUNDATION, *STAGES[part]}
+    if part in ("trackers", "baselines"):
+        return {*FOUNDATION, *BESIDE[part]}
+    if part == "engine":
+        return {*FOUNDATION, *STAGES, "trackers", "baselines", "calibration", "measures", "io"}
+    if part == "commands":
+        return {*FOUNDATION, *STAGES, *BESIDE, "engine"}
+    return BESIDE[part]
+
+
+@pytest.mark.parametrize("module", MODULES, ids=lambda module: module.name)
+def test_a_module_imports_what_stands_below_it(module: Module) -> None:
+    assert parts_imported(module) <= allowed(module.part)
+
+
+@pytest.mark.parametrize("library", AT_HOME)
+def test_a_library_is_known_where_it_belongs(library: str) -> None:
+    at_home = [module for module in MODULES if library in {name.split(".")[0] for name in module.imports()}]
+    for module in at_home:
+        assert module.name.startswith(AT_HOME[library]), f"{module.name} imports {library}"
+    assert at_home, f"nothing imports {library}"
+
+
+def test_every_other_library_is_numpy_scipy_or_of_python_itself() -> None:
+    known = {*AT_HOME, *NEEDED, *sys.stdlib_module_names, "stseg"}
+    for module in MODULES:
+        assert {name.split(".")[0] for name in module.imports()} <= known, module.name
+
+
+@pytest.mark.parametrize("module", MODULES, ids=lambda module: module.name)
+def test_only_commands_print(module: Module) -> None:
+    called = [node.func for node in ast.walk(module.tree) if isinstance(node, ast.Call)]
+    prints = [name for name in called if isinstance(name, ast.Name) and name.id == "print"]
+    assert module.part == "commands" or not prints
+
+
+def test_no_drawer_for_odds_and_ends() -> None:
+    for module in MODULES:
+        assert not {"utils", "util", "helpers", "misc", "common"} & set(module.name.split("."))
+
+
+def test_io_is_a_linked_folder_without_init() -> None:
+    # With an __init__.py, io would hide Python's own io from type checkers and, without frozen modules, from Python.
+    assert not (ROOT / "io" / "__init__.py").exists()
+    assert (ROOT / "stseg" / "io" / "track_csv.py").samefile(ROOT / "io" / "track_csv.py")
+
+
+def test_pyproject_lists_every_package() -> None:
+    listed = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["setuptools"]["packages"]
+    folders = {path.parent for path in (ROOT / "stseg").rglob("*.py")} | {
+        ROOT / "stseg" / path.parent.relative_to(ROOT) for path in (ROOT / "io").rglob("*.py")
+    }
+    assert sorted(listed) == sorted(".".join(folder.relative_to(ROOT).parts) for folder in folders)
+
+
+def test_a_run_imports_no_library_that_it_does_not_use() -> None:
+    imported = "stseg.commands.terminal.progress, stseg.engine.track, stseg.engine.offline.warnings"
+    started = f"import {imported}, sys; print(*sys.modules)"
+    found = subprocess.run([sys.executable, "-c", started], capture_output=True, text=True, check=True, env=ENVIRONMENT)
+    assert not {"rich", "ssl", "scipy.optimize", "stseg.engine.live.following"} & set(found.stdout.split())

@@ -1,0 +1,171 @@
+"""The film of a run: as many frames as asked, pillars where people are, camera pixels only when asked for."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+import run_files
+
+from stseg.arrays import Bytes, Rows
+from stseg.commands.main import main
+from stseg.errors import OutputError
+from stseg.geometry import Camera, Grid, Rig
+from stseg.io.outputs.video_writer import write_film
+from stseg.io.recording.recording import CameraSource, Recording, Source
+from stseg.io.runfile.runs import RunWriter
+from stseg.records.tables import TRAJECTORY, Tracks
+from stseg.report.pictures.colours import track_colour
+from stseg.report.pictures.film import Film
+from stseg.report.pictures.overlay import OverlayView
+
+VIVID = (20, 240, 160)
+_TURN = np.array([[1, 0, 0], [0, -np.sin(0.4), -np.cos(0.4)], [0, np.cos(0.4), -np.sin(0.4)]])
+_LENS = np.array([[250.0, 0, 159.5], [0, 250.0, 119.5], [0, 0, 1]])
+
+
+def front_camera(name: str, x: float) -> Camera:
+    """Three metres above y = -4, looking along y and down."""
+    return Camera.from_projection(name, (320, 240), _LENS @ np.column_stack([_TURN, -_TURN @ (x, -4.0, 3.0)]))
+
+
+@pytest.fixture
+def recording(tmp_path: Path) -> Recording:
+    """Two cameras whose frames are of one vivid colour."""
+    folder = tmp_path / "frames"
+    folder.mkdir()
+    for frame in range(16):
+        cv2.imwrite(str(folder / f"{frame:03d}.png"), np.full((240, 320, 3), VIVID, np.uint8))
+    rig = Rig("hall", 5.0, Grid((0, 4), (-1, 2), 0.5, 1.8, 3), (front_camera("left", 1), front_camera("right", 3)))
+    return Recording(tmp_path / "rig.toml", rig, (CameraSource(Source("images", folder)),) * 2)
+
+
+def walk() -> Rows:
+    """One person who crosses the ground in frames 10 to 15."""
+    table = np.zeros(6, TRAJECTORY)
+    table["frame"], table["id"], table["height"] = run_files.FRAMES, 1, 1.7
+    table["x"], table["y"] = np.linspace(1.4, 2.6, 6), 0.5
+    return table
+
+
+@pytest.fixture
+def run_path(recording: Recording, tmp_path: Path) -> Path:
+    path, shape = tmp_path / "run.h5", (6, *recording.rig.grid.shape)
+    with RunWriter(path, recording, np.full(shape[1:], 2, np.uint8), "", overwrite=False) as writer:
+        writer.append_frames(run_files.FRAMES, np.zeros(shape, np.float32), np.zeros(shape, np.int32))
+        writer.append("trajectory", walk())
+        writer.finish(Tracks(walk()).summary())
+    return path
+
+
+def frames_of(path: Path) -> list[Bytes]:
+    film = cv2.VideoCapture(str(path))
+    frames: list[Bytes] = []
+    while True:
+        there, frame = film.read()
+        if not there:
+            return frames
+        frames.append(np.asarray(frame, np.uint8))
+
+
+def near(pixel: Bytes, colour: tuple[int, int, int], apart: float) -> bool:
+    return bool(np.abs(pixel.astype(int) - colour).max() <= apart)
+
+
+def test_pillars_and_the_plan_are_drawn_where_people_are(recording: Recording) -> None:
+    rig = recording.rig
+    film = Film(rig, np.full(rig.grid.shape, 2, np.uint8), walk())
+    pictures = [film.picture(frame, (None, None)) for frame in (10, 15)]
+    assert all(picture.shape == (film.size[1], film.size[0], 3) for picture in pictures)
+    assert film.size[0] % 2 == film.size[1] % 2 == 0
+    for picture, row in zip(pictures, walk()[[0, -1]], strict=True):
+        for k, camera in enumerate(rig.cameras):
+            u, v = np.rint(OverlayView(camera, 640).pixel(np.array([row["x"], row["y"]]), 0.0)).astype(int)
+            assert tuple(picture[v, u + 640 * k].tolist()) == track_colour(1)
+    assert not np.array_equal(pictures[0][:, 1280:], pictures[1][:, 1280:])
+    assert (pictures[1][:, 1280:] == track_colour(1)).all(axis=-1).any()
+
+
+def test_the_film_has_the_frames_that_were_asked_for(
+    run_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["report", str(run_path), "--video", str(tmp_path / "a.mp4"), "--camera-images"]) == 0
+    assert "a.mp4: 6 frames" in capsys.readouterr().out
+    whole = frames_of(tmp_path / "a.mp4")
+    assert len(whole) == 6
+    shown = tuple(round(0.85 * tone) for tone in VIVID)
+    assert near(whole[0][400, 20], (shown[0], shown[1], shown[2]), 12)
+    row = walk()[0]
+    body = np.rint(OverlayView(front_camera("left", 1), 640).pixel(np.array([row["x"], row["y"]]), 0.9)).astype(int)
+    assert not near(whole[0][body[1], body[0]], (shown[0], shown[1], shown[2]), 30)  # the pillar
+    assert main(["report", str(run_path), "--video", str(tmp_path / "b.mp4"), "--frames", "12:14"]) == 0
+    assert len(frames_of(tmp_path / "b.mp4")) == 2
+    assert not (tmp_path / "b.mp4.part").exists() and not list(tmp_path.glob("*.part*"))
+
+
+def test_without_the_flag_a_film_holds_no_camera_pixel(run_path: Path, tmp_path: Path) -> None:
+    for path in (tmp_path / "frames").iterdir():
+        path.unlink()
+    assert main(["report", str(run_path), "--video", str(tmp_path / "a.mp4")]) == 0
+    shown = np.array([0.85 * tone for tone in VIVID])
+    assert not any((np.abs(frame - shown).max(axis=-1) < 40).any() for frame in frames_of(tmp_path / "a.mp4"))
+    assert main(["report", str(run_path), "--video", str(tmp_path / "b.mp4"), "--camera-images"]) == 2
+    assert not (tmp_path / "b.mp4").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        ([], "nothing to write"),
+        (["--video", "a.avi"], "found the ending '.avi', expected a name that ends in .mp4"),
+        (["--video", "a.mp4", "--frames", "3:12"], "--frames: found '3:12', expected A:B"),
+        (["--video", "a.mp4", "--frames", "all"], "--frames: found 'all'"),
+        (["--frames", "10:12", "-o", "a.html"], "--video FILM.mp4 with it"),
+        (["--video", "a.mp4", "--pictures", "here"], "--pictures: found here, expected -o"),
+    ],
+)
+def test_slips_are_told_before_any_work(
+    run_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    arguments: list[str],
+    told: str,
+) -> None:
+    monkeypatch.chdir(run_path.parent)
+    before = set(run_path.parent.iterdir())
+    assert main(["report", str(run_path), *arguments]) == 2
+    assert told in capsys.readouterr().err
+    assert set(run_path.parent.iterdir()) == before
+
+
+def test_an_older_film_is_kept_unless_it_may_go(run_path: Path, tmp_path: Path) -> None:
+    (tmp_path / "a.mp4").write_text("precious")
+    assert main(["report", str(run_path), "--video", str(tmp_path / "a.mp4")]) == 2
+    assert (tmp_path / "a.mp4").read_text() == "precious"
+    assert main(["report", str(run_path), "--video", str(tmp_path / "a.mp4"), "--overwrite"]) == 0
+    assert len(frames_of(tmp_path / "a.mp4")) == 6
+
+
+def test_what_goes_wrong_on_the_way_leaves_no_film(tmp_path: Path) -> None:
+    def broken() -> list[Bytes]:
+        raise OutputError("x", "", "trouble", "none")
+
+    with pytest.raises(OutputError):
+        write_film(tmp_path / "a.mp4", (picture for k in range(1) for picture in broken()), 5.0, False)
+    with pytest.raises(OutputError, match="empty"):
+        write_film(tmp_path / "a.mp4", [], 5.0, False)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_rig_of_one_camera_and_of_many_have_films(recording: Recording) -> None:
+    sizes = []
+    for count in (1, 7):
+        cameras = tuple(replace(front_camera("c", 2), name=f"c{k}") for k in range(count))
+        rig = replace(recording.rig, cameras=cameras)
+        film = Film(rig, np.zeros(rig.grid.shape, np.uint8), walk()[:0])
+        assert film.picture(3, (None,) * count).shape == (film.size[1], film.size[0], 3)
+        sizes.append(film.size)
+    assert sizes[0][0] < sizes[1][0] and sizes[1][0] < 3000

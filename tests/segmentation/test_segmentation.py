@@ -1,0 +1,200 @@
+"""Motion field of cells, and blobs of labelled cells."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import reference_blobs
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from strategies import numbers
+
+from stseg.arrays import Flags, Floats
+from stseg.geometry import Grid
+from stseg.geometry.nearest_person import nearest_person
+from stseg.records.blobs import UNASSIGNED, Blobs
+from stseg.segmentation.blob_measures import Measures, fill_ground_labels, fill_measures
+from stseg.segmentation.blobs import find_blobs
+from stseg.segmentation.cell_motion import motion_field
+from stseg.segmentation.patches import Patches
+
+GRID = Grid((0.0, 2.0), (0.0, 1.5), cell=0.1, top=1.8, planes=4)
+
+# Motion
+
+
+def test_cells_near_a_person_move_with_them() -> None:
+    now = np.array([[0.55, 0.55], [1.45, 0.95]])
+    then = np.array([[1.25, 0.85], [0.85, 0.45]])
+    motion = motion_field(now, then, np.array([4, 7]), np.array([7, 4]), 0.25, GRID.cell, GRID.ground)
+    assert motion[5, 5].tolist() == [-1, 3]
+    assert motion[9, 14].tolist() == [-1, -2]
+    assert motion[6, 6].tolist() == [-1, 3]
+    assert not motion[0, 0].any()
+    away = np.hypot(*np.moveaxis(GRID.ground[:, :, None] - now, -1, 0)).min(2)
+    np.testing.assert_array_equal(motion.any(2), away <= 0.25)
+
+
+def test_a_track_not_detected_again_does_not_move() -> None:
+    here = np.array([[0.55, 0.55]])
+    for chains_then in ([], [9]):
+        then = np.tile([[1.0, 1.0]], (len(chains_then), 1))
+        motion = motion_field(here, then, np.array([3]), np.array(chains_then, np.int64), 0.3, GRID.cell, GRID.ground)
+        assert motion.shape == (15, 20, 2)
+        assert not motion.any()
+    assert not motion_field(
+        np.zeros((0, 2)), here, np.zeros(0, np.int64), np.array([3]), 0.3, GRID.cell, GRID.ground
+    ).any()
+
+
+# Blobs
+
+
+def disc(*places: tuple[float, float], radius: float = 0.22, tall: int = 3) -> Flags:
+    """Occupied cells around places, up to the plane `tall`, bool (plane, y, x)."""
+    away = np.hypot(*np.moveaxis(GRID.ground[:, :, None] - np.array(places), -1, 0)).min(2)
+    occupied = np.zeros(GRID.shape, bool)
+    occupied[: tall + 1] = away <= radius
+    return occupied
+
+
+def blobs_of(occupied: Flags, *standing: tuple[float, float], strength: Floats | float = 2.0) -> Blobs:
+    """Blobs of people with tracks 11, 12, ..., the cells within 0.4 m of one given to the nearest of them."""
+    ground = np.array(standing).reshape(-1, 2)
+    log_odds = np.where(occupied, strength, -3.0).astype(np.float32)
+    label = np.where(
+        occupied, np.append(np.arange(len(ground)) + 11, UNASSIGNED)[nearest_person(GRID.ground, ground, 0.4)], 0
+    )
+    return find_blobs(label.astype(np.int32), log_odds, ground, np.arange(len(ground)) + 11, 0.4, Patches.whole(GRID))
+
+
+def test_a_person_is_a_blob() -> None:
+    place = (0.85, 0.75)
+    found = blobs_of(disc(place, tall=2), place)
+    assert (found.person.tolist(), found.track.tolist()) == ([0], [11])
+    np.testing.assert_allclose(found.ground[0], place, atol=1e-9)  # a symmetric mass has its centroid in the middle
+    assert found.extent[0] == pytest.approx((found.cells == 1).sum() * 0.01)
+    assert found.height[0] == pytest.approx(1.2)
+    assert found.mass[0] == pytest.approx(2.0)
+    np.testing.assert_array_equal(found.cells > 0, disc(place).any(0))
+    assert len(found.touches) == 0
+    spread = np.linalg.eigvalsh(found.covariance[0])
+    assert ((spread > 0) & (spread < 0.1**2)).all()
+
+
+def test_the_centroid_follows_the_mass() -> None:
+    place = (0.85, 0.75)
+    heavier = np.where(GRID.ground[..., 0] > 0.85, 6.0, 1.0)
+    found = blobs_of(disc(place), place, strength=heavier)
+    assert found.ground[0, 0] > 0.88
+    assert found.ground[0, 1] == pytest.approx(0.75)
+
+
+def test_touching_people_are_two_blobs() -> None:
+    left, right = (0.65, 0.75), (1.05, 0.75)
+    found = blobs_of(disc(left, right), right, left)
+    assert sorted(found.person.tolist()) == [0, 1]
+    assert found.touches.tolist() == [[0, 1]]
+    for blob, who in enumerate(found.person):
+        x = (right, left)[who][0]
+        cells = GRID.ground[found.cells == blob + 1]
+        assert (np.abs(cells[:, 0] - x) <= 0.2 + 1e-9).all()
+    np.testing.assert_array_equal(found.cells > 0, disc(left, right).any(0))
+
+
+def test_a_component_without_a_detection_is_kept() -> None:
+    found = blobs_of(disc((0.45, 0.75), (1.55, 0.75)), (0.45, 0.75))
+    assert (found.person.tolist(), found.track.tolist()) == ([0, -1], [11, UNASSIGNED])
+    assert len(found.touches) == 0
+    unknown = found.person.tolist().index(-1)
+    np.testing.assert_allclose(found.ground[unknown], (1.55, 0.75), atol=1e-9)
+
+
+def test_a_detection_without_cells_is_a_blob_without_extent() -> None:
+    found = blobs_of(disc((0.45, 0.75)), (0.45, 0.75), (1.8, 0.2))
+    assert found.person.tolist() == [0, 1]
+    assert found.track.tolist() == [11, 12]
+    assert found.ground[1].tolist() == [1.8, 0.2]
+    assert found.extent[0] > found.extent[1] == 0
+    empty = blobs_of(np.zeros(GRID.shape, bool), (0.45, 0.75))
+    assert empty.person.tolist() == [0]
+    assert not empty.cells.any()
+    assert empty.touches.shape == (0, 2)
+
+
+def test_a_track_is_one_blob_unassigned_cells_are_many() -> None:
+    label = np.zeros(GRID.shape, np.int32)
+    label[1, 3, 3], label[1, 3, 8] = 4, 4
+    label[1, 9, 3], label[1, 9, 8] = UNASSIGNED, UNASSIGNED
+    found = find_blobs(
+        label, np.ones(GRID.shape, np.float32), np.zeros((0, 2)), np.zeros(0, np.int64), 0.4, Patches.whole(GRID)
+    )
+    assert found.track.tolist() == [4, UNASSIGNED, UNASSIGNED]
+    assert found.person.tolist() == [-1, -1, -1]
+    np.testing.assert_allclose(found.ground[0], (GRID.ground[3, 3] + GRID.ground[3, 8]) / 2)
+
+
+def test_a_column_belongs_to_the_label_with_most_mass() -> None:
+    label = np.zeros(GRID.shape, np.int32)
+    label[:3, 5, 5], label[3, 5, 5] = 2, 1
+    for strength, whose in ((1.0, 2), (9.0, 1)):
+        log_odds = np.ones(GRID.shape, np.float32)
+        log_odds[3] = strength
+        found = find_blobs(label, log_odds, GRID.ground[5, 5][None], np.array([1]), 0.4, Patches.whole(GRID))
+        assert found.track.tolist() == ([1] if whose == 1 else [2, 1])  # a detection without cells comes last
+        assert found.person.tolist() == ([0] if whose == 1 else [-1, 0])
+        assert found.mass[0] == pytest.approx(strength if whose == 1 else 1.0)
+        assert found.height[0] == pytest.approx(1.8 if whose == 1 else 1.2)
+
+
+def test_a_blob_holds_the_detection_inside_it() -> None:
+    label = disc((0.45, 0.75)).astype(np.int32) * 3
+    for x, held in ((0.45, [0]), (0.85, [0]), (0.95, [-1, 0])):  # its outermost cell is at 0.65
+        found = find_blobs(
+            label, label.astype(np.float32), np.array([[x, 0.75]]), np.array([3]), 0.4, Patches.whole(GRID)
+        )
+        assert found.person.tolist() == held
+
+
+@settings(deadline=None, max_examples=40)
+@given(st.lists(st.tuples(numbers(0, 2), numbers(0, 1.5)), max_size=4), st.integers(0, 999))
+@example([(2.0, 0.0)], 0)
+def test_blobs_partition_the_occupied_cells(standing: list[tuple[float, float]], seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    tracks = rng.permutation(5)[: len(standing)] + 1
+    label = np.where(rng.random(GRID.shape) < 0.08, rng.choice([UNASSIGNED, 1, 2, 3], GRID.shape), 0).astype(np.int32)
+    log_odds = rng.normal(0, 2, GRID.shape).astype(np.float32)
+    log_odds[rng.random(GRID.shape) < 0.1] = np.nan
+    found = find_blobs(label, log_odds, np.array(standing).reshape(-1, 2), tracks, 0.4, Patches.whole(GRID))
+    number = int((found.extent > 0).sum())
+    np.testing.assert_array_equal(found.cells > 0, (label != 0).any(0))
+    assert np.unique(found.cells[found.cells > 0]).tolist() == list(range(1, number + 1))
+    for blob in range(number):
+        assert (label[:, found.cells == blob + 1] == found.track[blob]).any(0).all()
+    known = found.track[:number][found.track[:number] != UNASSIGNED]
+    assert len(np.unique(known)) == len(known)
+    held = found.person >= 0
+    assert sorted(found.person[held].tolist()) == list(range(len(standing)))
+    np.testing.assert_array_equal(found.track[held], tracks[found.person[held]])
+    assert np.isfinite(found.ground).all()
+    assert (np.linalg.eigvalsh(found.covariance) > 0).all()
+    assert found.extent.sum() == pytest.approx((label != 0).any(0).sum() * 0.01)
+
+
+@given(seed=st.integers(0, 2**16))
+@settings(max_examples=20, deadline=None)
+def test_kernels_of_blobs_agree_with_their_plain_form(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    label = random.choice(np.array([0, 0, UNASSIGNED, 2, 5, 9], np.int32), GRID.shape)
+    log_odds = random.normal(0, 3, GRID.shape).astype(np.float32)
+    log_odds[random.random(GRID.shape) < 0.1] = np.nan
+    ground_label = np.zeros(GRID.shape[1:], np.int32)
+    fill_ground_labels(label, log_odds, ground_label)
+    np.testing.assert_array_equal(ground_label, reference_blobs.ground_labels(label, log_odds))
+    track = np.unique(ground_label[ground_label != 0]).astype(np.int64)
+    cells = np.where(ground_label != 0, 1 + track.searchsorted(ground_label), 0).astype(np.int32)
+    n = len(track)
+    found = Measures(np.zeros((n, 2)), np.zeros((n, 2, 2)), np.zeros(n), np.zeros(n), np.zeros(n))
+    fill_measures(cells, track, label, log_odds, GRID.ground, GRID.heights, found)
+    for own, plain in zip(found, reference_blobs.measures(cells, track, label, log_odds, GRID), strict=True):
+        np.testing.assert_allclose(own, plain, rtol=1e-4, atol=1e-5)

@@ -1,0 +1,115 @@
+"""Spoiled masks and boxes: each kind does what it says, the same each time; and what a small corner of them costs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from stseg import Tracker
+from stseg.arrays import Boxes, Bytes
+from stseg.commands.simulate import simulate
+from stseg.errors import ConfigError
+from stseg.evaluation import evaluate
+from stseg.simulation import NAMED, Film, Spoil, SpoiledFilm
+from stseg.simulation.spoiling.spoil import MOST, STRENGTHS, spoiled_boxes, spoiled_mask
+from stseg.simulation.spoiling.spoiled_boxes import BOX_KINDS
+from stseg.simulation.spoiling.spoiled_masks import MASK_KINDS, Moment
+
+MOMENT = Moment(seed=3, camera=0, frame=200, frame_rate=10.0, body_width=20.0)
+PEOPLE = np.zeros((120, 160), np.uint16)
+PEOPLE[30:90, 40:60], PEOPLE[40:100, 100:120] = 1, 2
+MASK = np.where(PEOPLE > 0, 255, 0).astype(np.uint8)
+BOXES = Boxes(np.tile([[10.0, 20.0, 30.0, 90.0]], (400, 1)), np.full(400, 0.8))
+
+
+def spoiled(kind: str, strength: float, moment: Moment = MOMENT) -> Bytes:
+    return spoiled_mask(MASK, PEOPLE, [Spoil(kind, strength)], moment)
+
+
+@pytest.mark.parametrize("kind", MASK_KINDS)
+def test_the_same_frame_errs_in_the_same_way_and_not_at_strength_zero(kind: str) -> None:
+    strong = STRENGTHS[kind][2]
+    np.testing.assert_array_equal(spoiled(kind, strong), spoiled(kind, strong))
+    assert not np.array_equal(spoiled(kind, 1.0 if kind == "flicker" else strong), MASK)
+    if kind != "jpeg":
+        np.testing.assert_array_equal(spoiled(kind, 0.0) if kind != "shadows" else MASK, MASK)
+
+
+def test_silhouettes_grow_and_shrink_by_a_share_of_a_bodys_width() -> None:
+    row = MASK[60, 30:80] > 0
+    wider, narrower = spoiled("dilation", 0.3)[60, 30:80] > 0, spoiled("erosion", 0.3)[60, 30:80] > 0
+    assert (wider.sum() - row.sum(), row.sum() - narrower.sum()) == (6, 6)
+
+
+def test_holes_take_their_share_and_legs_are_cut() -> None:
+    assert (spoiled("holes", 0.25) > 0).sum() == pytest.approx(0.75 * (MASK > 0).sum(), rel=0.02)
+    cut = spoiled("legs", 0.2)
+    assert not cut[78:90, 40:60].any() and cut[30:78, 40:60].all()
+
+
+def test_foreground_without_people_is_added() -> None:
+    for kind in ("shadows", "staying", "rain"):
+        shown = spoiled(kind, STRENGTHS[kind][2])
+        assert (shown >= MASK).all() and (shown > MASK).any()
+    before = replace(MOMENT, frame=0)
+    np.testing.assert_array_equal(spoiled("staying", 4, before), MASK)
+    np.testing.assert_array_equal(spoiled("staying", 4), spoiled("staying", 4, replace(MOMENT, frame=300)))
+
+
+def test_people_flicker_for_half_a_second_each() -> None:
+    gone = [not spoiled("flicker", 0.3, replace(MOMENT, frame=frame))[60, 50] for frame in range(1000)]
+    blinks = np.array(gone).reshape(-1, 5)
+    assert (blinks.all(1) | ~blinks.any(1)).all()
+    assert blinks.any(1).mean() == pytest.approx(0.3, abs=0.1)
+
+
+def test_boxes_jitter_go_missing_and_double() -> None:
+    jittered = spoiled_boxes(BOXES, [Spoil("jitter", 0.1)], MOMENT).pixel
+    assert (jittered[:, 0] - 10).std() == pytest.approx(3.0, rel=0.2)
+    assert (jittered[:, 1] - 20).std() == pytest.approx(9.0, rel=0.2)
+    assert len(spoiled_boxes(BOXES, [Spoil("missed", 0.2)], MOMENT)) == pytest.approx(320, abs=30)
+    assert len(spoiled_boxes(BOXES, [Spoil("doubled", 0.2)], MOMENT)) == pytest.approx(480, abs=30)
+    assert set(BOX_KINDS) | set(MASK_KINDS) == set(STRENGTHS) == set(MOST)
+
+
+def test_a_spoiled_film_keeps_all_but_masks_and_boxes() -> None:
+    film = Film(replace(NAMED["tiny"], seconds=0.2))
+    other = SpoiledFilm(film, [Spoil("dilation", 0.3), Spoil("missed", 1.0)])
+    for plain, wide in zip(film.frame_sets(), other.frame_sets(), strict=True):
+        np.testing.assert_array_equal(plain.truth, wide.truth)
+        for a, b in zip(plain.views, wide.views, strict=True):
+            np.testing.assert_array_equal(a.image, b.image)
+            np.testing.assert_array_equal(a.instances, b.instances)
+            assert not len(b.boxes)
+            assert (b.mask >= a.mask).all()
+
+
+def test_the_command_names_kinds_and_strengths(tmp_path: Path) -> None:
+    simulate(tmp_path / "a", scene="tiny", seconds=0.1, spoil=("legs:0.5", "missed"))
+    simulate(tmp_path / "b", scene="tiny", seconds=0.1)
+    masks = [cv2.VideoCapture(str(tmp_path / name / "cam1_masks.avi")).read()[1] for name in "ab"]
+    assert 0 < (masks[0] > 0).sum() < (masks[1] > 0).sum()
+    for wrong in ("fog", "holes:x", "holes:2", ":1"):
+        with pytest.raises(ConfigError):
+            simulate(tmp_path / "c", scene="tiny", spoil=(wrong,))
+
+
+CORNER = {"dilation": 4.0, "holes": 4.0, "rain": 4.0}
+"""Kinds at middle strength, and how far MODA may lie below 100, percent: one person more or less in ten frames."""
+
+
+@pytest.mark.parametrize("kind", CORNER)
+def test_a_small_crowd_is_followed_through_errors_of_middle_strength(kind: str) -> None:
+    spec = replace(NAMED["demo"], people=3, seconds=1.5)
+    film = SpoiledFilm(Film(spec), [Spoil(kind, STRENGTHS[kind][1])])
+    tracker, results, truth = Tracker(film.rig), [], []
+    for frame_set in film.frame_sets():
+        truth.append(frame_set.truth)
+        results += tracker.add([view.mask for view in frame_set.views])
+    rows = tracker.tracks(results + tracker.finish()).trajectory
+    moda = evaluate(np.concatenate(truth), rows, frames=np.arange(film.frames)).moda
+    assert moda is not None and moda > 100 - CORNER[kind]

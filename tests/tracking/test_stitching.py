@@ -1,0 +1,153 @@
+"""Segments of a recording: how it is divided, and how what they find is joined."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from stseg.arrays import Rows
+from stseg.config import Config, SegmentConfig, TrackingConfig
+from stseg.engine.offline.segments import segments
+from stseg.errors import ConfigError
+from stseg.records.tables import EVENT, TRAJECTORY
+from stseg.tracking.windows.stitching import SegmentTracks, Stitcher, rename_labels
+from stseg.tracking.windows.windows import windows
+
+
+def walk(track: int, frames: range, x: float, speed: float = 0.0) -> Rows:
+    """Somebody who walks along y = 1 + track."""
+    rows = np.zeros(len(frames), TRAJECTORY)
+    rows["frame"], rows["id"] = frames, track
+    rows["x"], rows["y"] = x + speed * np.array(frames), 1.0
+    return rows
+
+
+def events(*told: tuple[int, str, int, int]) -> Rows:
+    return np.array([(frame, kind.encode(), i, other, b"said") for frame, kind, i, other in told], EVENT)
+
+
+# How a recording is divided
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.floats(1.0, 30.0), st.integers(0, 500), st.integers(1, 3000), st.floats(1.0, 60.0), st.integers(0, 10)
+)  # fmt: skip
+def test_segments_partition_the_run(rate: float, first: int, length: int, seconds: float, warm_up: int) -> None:
+    config = Config(segments=SegmentConfig(length=seconds, warm_up=warm_up))
+    parts = segments(rate, config, first, first + length)
+    assert [part.index for part in parts] == list(range(len(parts)))
+    assert [part.first for part in parts] == [first, *(part.stop for part in parts[:-1])]
+    assert parts[-1].stop == first + length
+    assert parts[0].lead == first
+    for part in parts:
+        assert first <= part.lead <= part.first < part.stop
+        assert part.first - part.lead >= min(part.first - first, warm_up * rate) or part.index == 0
+
+
+def test_less_than_two_segments_become_two_of_equal_work() -> None:
+    config = Config(segments=SegmentConfig(length=120.0, warm_up=6.0))
+    for seconds, number in ((70, 1), (80, 2), (239, 2), (250, 3)):
+        parts = segments(10.0, config, 100, 100 + 10 * seconds)
+        assert len(parts) == number
+        if number == 2:
+            assert abs((parts[0].stop - parts[0].lead) - (parts[1].stop - parts[1].lead)) <= 2 * 10
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.floats(1.0, 30.0), st.integers(0, 200), st.integers(100, 1500))
+def test_windows_end_where_segments_do(rate: float, first: int, length: int) -> None:
+    config = Config(segments=SegmentConfig(length=10.0, warm_up=2.0))
+    for part in segments(rate, config, first, first + length):
+        commits = list(windows(rate, TrackingConfig(), part.lead, first + length))
+        ends = {window.commit_stop for window in commits}
+        assert part.stop in ends
+        assert part.first == part.lead or part.first in ends
+
+
+# How segments are joined
+
+
+def test_a_track_keeps_its_name_over_a_seam() -> None:
+    seams = Stitcher()
+    seams.add(
+        SegmentTracks(0, np.concatenate([walk(1, range(20), 0.0), walk(2, range(20), 4.0)]), events((0, "birth", 1, 0)))
+    )
+    later = np.concatenate([walk(1, range(15, 40), 4.1), walk(2, range(15, 40), 0.1)])
+    seams.add(SegmentTracks(20, later, events((25, "merge", 1, 2))))
+    joined = seams.joined()
+    assert joined.committed["frame"].tolist() == [*range(20), *range(20), *range(20, 40), *range(20, 40)]
+    assert joined.committed["id"].tolist() == [1] * 20 + [2] * 20 + [2] * 20 + [1] * 20
+    assert joined.local.tolist() == [1] * 20 + [2] * 20 + [1] * 20 + [2] * 20
+    assert joined.events[["frame", "kind", "id", "other"]].tolist() == [(0, b"birth", 1, 0), (25, b"merge", 2, 1)]
+
+
+def test_whom_nobody_claims_was_born_or_has_died_at_the_seam() -> None:
+    seams = Stitcher()
+    seams.add(SegmentTracks(0, walk(1, range(20), 0.0), events()))
+    seams.add(SegmentTracks(20, walk(1, range(18, 40), 3.0), events()))
+    joined = seams.joined()
+    assert np.unique(joined.committed["id"]).tolist() == [1, 2]
+    assert [(e["frame"], e["kind"], e["id"]) for e in joined.events] == [(19, b"death", 1), (20, b"birth", 2)]
+
+
+def test_who_was_said_to_be_dead_or_born_is_not_told_again() -> None:
+    seams = Stitcher()
+    seams.add(SegmentTracks(0, walk(1, range(19), 0.0), events((18, "death", 1, 0))))
+    seams.add(SegmentTracks(20, walk(1, range(21, 40), 3.0), events((21, "birth", 1, 0))))
+    told = seams.joined().events
+    assert [(e["frame"], e["kind"], e["id"]) for e in told] == [(18, b"death", 1), (21, b"birth", 2)]
+
+
+def test_a_track_of_the_warm_up_alone_leaves_nothing() -> None:
+    seams = Stitcher()
+    seams.add(SegmentTracks(0, walk(1, range(20), 0.0), events()))
+    seams.add(SegmentTracks(20, np.concatenate([walk(1, range(15, 40), 0.0), walk(2, range(15, 19), 5.0)]), events()))
+    assert np.unique(seams.joined().committed["id"]).tolist() == [1]
+    assert len(seams.joined().events) == 0
+
+
+def test_the_track_that_is_shared_longest_wins() -> None:
+    """One to one: two tracks of the warm-up lie near one earlier track."""
+    seams = Stitcher()
+    seams.add(SegmentTracks(0, walk(1, range(20), 0.0), events()))
+    both = np.concatenate([walk(1, range(17, 40), 0.2), walk(2, range(10, 40), -0.2)])
+    seams.add(SegmentTracks(20, both, events()))
+    later = seams.joined()
+    assert later.committed["id"][later.local == 2].tolist()[-1] == 1
+
+
+def test_no_segments() -> None:
+    assert len(Stitcher().joined().committed) == 0
+
+
+# Names in the volume
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    st.lists(st.integers(0, 6), min_size=12, max_size=12),
+    st.lists(st.tuples(st.integers(0, 3), st.integers(1, 6)), unique=True, max_size=12),
+    st.integers(0, 9),
+)
+def test_renaming_maps_every_cell_once(ids: list[int], keys: list[tuple[int, int]], shift: int) -> None:
+    label = np.array(ids, np.int32).reshape(4, 1, 1, 3)
+    frames = np.array([3, 4, 7, 9])
+    rows = np.zeros(len(keys), TRAJECTORY)
+    rows["frame"], rows["id"] = [frames[k] for k, _ in keys], [track for _, track in keys]
+    identity = (rows["id"] * 3 + shift) % 7
+    name_of = dict(zip(zip(rows["frame"].tolist(), rows["id"].tolist(), strict=True), identity.tolist(), strict=True))
+    plain = label.copy()
+    for cell in np.ndindex(label.shape):
+        plain[cell] = name_of.get((int(frames[cell[0]]), int(label[cell])), 0)
+    rename_labels(label, frames, rows, identity)
+    np.testing.assert_array_equal(label, plain)
+
+
+def test_segments_take_time() -> None:
+    with pytest.raises(ConfigError, match="length"):
+        SegmentConfig(length=0.0)
+    with pytest.raises(ConfigError, match="background"):
+        SegmentConfig(background_period=0.0)

@@ -1,0 +1,239 @@
+"""The trackers on crafted scenes: every frame committed once, the same whatever part is run, labels that say who."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scenes import CONFIG, FRAME_RATE, found, people, room
+
+from stseg.arrays import Floats, Rows
+from stseg.errors import ConfigError
+from stseg.geometry.nearest_person import nearest_person
+from stseg.graphcut.energy import QUANTUM
+from stseg.records.sparse_volume import SparseVolume
+from stseg.records.tables import WINDOW
+from stseg.trackers import TRACKERS, Commit, FrameObservations, FusedFrame, Tracker, find_tracker
+from stseg.trackers.rows import event_rows, trajectory_rows, views_at
+from stseg.tracking.windows.windows import window_length, windows
+
+RIG = room()
+COLOURLESS = sorted(set(TRACKERS) - {"particles", "belief"})
+"""Trackers that need no colour; the others have tests of their own."""
+UNSEEN = FrameObservations((None,) * 4, (None,) * 4)
+"""What the cameras showed, for trackers that do not ask."""
+LENGTH, SHARED = window_length(FRAME_RATE, CONFIG.tracking)
+ENDS = LENGTH + LENGTH - SHARED
+"""A run of so many frames ends exactly where its second window ends."""
+
+
+def scene(follow: Tracker, frame: int, *places: tuple[float, float]) -> FusedFrame:
+    """A frame in which people stand at places, metres: cells within 0.3 m are occupied, one corner is unseen."""
+    standing = people(*places)
+    log_odds = np.full(RIG.grid.shape, -3.0, np.float32)
+    log_odds[:, nearest_person(RIG.grid.ground, standing[:, :2], 0.3) >= 0] = 3.0
+    log_odds[:, -1, -1] = np.nan
+    return FusedFrame(frame, found(standing, follow.predict(frame)), found(people()), SparseVolume.whole(log_odds))
+
+
+def crossing(frame: int) -> list[tuple[float, float]]:
+    """Two people who pass each other."""
+    return [(-1.5 + 0.08 * frame, -0.5), (1.5 - 0.08 * frame, 0.4)]
+
+
+def run(tracker: str, first: int, stop: int, rest: bool = True) -> list[Commit]:
+    """What a tracker commits of frames first .. stop - 1 of two people who pass each other."""
+    follow = find_tracker(tracker)(RIG, CONFIG, first)
+    done = [
+        commit for frame in range(first, stop) for commit in follow.add(scene(follow, frame, *crossing(frame)), UNSEEN)
+    ]
+    return done + follow.finish() if rest else done
+
+
+def rows_of(commits: Sequence[Commit]) -> Rows:
+    return np.concatenate([commit.trajectory for commit in commits])
+
+
+@pytest.mark.parametrize("tracker", COLOURLESS)
+@pytest.mark.parametrize("frames", [1, 2, 7, 8, 9, LENGTH, LENGTH + 1, ENDS - 1, ENDS, ENDS + 1, 25])
+@pytest.mark.parametrize("first", [0, 5])
+def test_every_frame_is_committed_once(tracker: str, frames: int, first: int) -> None:
+    commits = run(tracker, first, first + frames)
+    told = [s.frame for commit in commits for s in commit.frames]
+    assert told == list(range(first, first + frames))
+    for commit in commits:
+        assert commit.label.shape == (len(commit.frames), *RIG.grid.shape)
+        assert commit.label.dtype == np.int32
+        assert set(commit.trajectory["frame"]) <= {s.frame for s in commit.frames}
+    rows = rows_of(commits)
+    assert len(rows) == 2 * frames
+    assert len(np.unique(rows["id"])) == 2
+    keys = [(row["frame"], row["id"]) for row in rows]
+    assert keys == sorted(set(keys))
+
+
+@pytest.mark.parametrize("first", [0, 5, 11])
+@pytest.mark.parametrize("frames", [1, 9, ENDS, 30])
+def test_windows_are_those_of_the_run(first: int, frames: int) -> None:
+    rows = np.concatenate([commit.windows for commit in run("cut", first, first + frames)])
+    assert rows.dtype == WINDOW
+    expected = windows(FRAME_RATE, CONFIG.tracking, first, first + frames)
+    ranges = [(w.index, w.solve_first, w.solve_stop, w.commit_first, w.commit_stop) for w in expected]
+    told = rows[["index", "solve_first", "solve_stop", "commit_first", "commit_stop"]].tolist()
+    assert told == ranges
+    assert (rows["energy"] < 0).all()
+    assert (rows["energy_quantum"] == QUANTUM).all()
+
+
+def test_no_frames_no_commits() -> None:
+    for tracker in TRACKERS:
+        assert find_tracker(tracker)(RIG, CONFIG, 3).finish() == []
+
+
+@pytest.mark.parametrize("tracker", COLOURLESS)
+def test_labels_say_who(tracker: str) -> None:
+    for commit in run(tracker, 0, 20):
+        for at, label in zip(commit.frames, commit.label, strict=True):
+            own = commit.trajectory[commit.trajectory["frame"] == at.frame]
+            assert set(np.unique(label).tolist()) == {0, *own["id"].tolist()}
+            for row in own:
+                cells = RIG.grid.ground[(label == row["id"]).any(0)]
+                away = np.hypot(*(cells - (row["x"], row["y"])).T)
+                assert away.max() < 0.45
+                assert row["extent"] == pytest.approx(len(cells) * RIG.grid.cell**2)
+            np.testing.assert_allclose(np.sort(own["y"]), [-0.5, 0.4])
+            # The cut states the log-odds by the whole window, the others those of the frame alone.
+            assert (own["score"] > 6.0).all() if tracker == "cut" else (own["score"] == 6.0).all()
+            np.testing.assert_allclose(own["height"], 1.7)
+            assert (own["views"] == 4).all()
+
+
+@pytest.mark.parametrize("tracker", COLOURLESS)
+def test_ids_stay_and_births_are_told(tracker: str) -> None:
+    commits = run(tracker, 0, 25)
+    for identity in (1, 2):
+        own = rows_of(commits)
+        own = own[own["id"] == identity]
+        assert own["frame"].tolist() == list(range(25))
+        assert np.ptp(own["y"]) == 0.0  # each keeps their lane
+    events = np.concatenate([commit.events for commit in commits])
+    assert [(e["frame"], e["kind"], e["id"]) for e in events] == [(0, b"birth", 1), (0, b"birth", 2)]
+
+
+def test_what_is_committed_early_does_not_change() -> None:
+    """A window is committed as soon as the frame after it comes; what follows does not touch it."""
+    early, whole = run("cut", 0, 17, rest=False), run("cut", 0, 30)
+    assert 0 < len(early) < len(whole)
+    for one, other in zip(early, whole, strict=False):
+        np.testing.assert_array_equal(one.trajectory, other.trajectory)
+        np.testing.assert_array_equal(one.label, other.label)
+        np.testing.assert_array_equal(one.windows, other.windows)
+        np.testing.assert_array_equal(one.events, other.events)
+
+
+def test_who_touches_is_cut_apart() -> None:
+    """Two walk side by side, in one piece of occupied cells; one of them is missed for three frames."""
+    follow = find_tracker("cut")(RIG, CONFIG, 0)
+    commits: list[Commit] = []
+    for frame in range(12):
+        x = -1.0 + 0.1 * frame
+        both = scene(follow, frame, (x, -0.25), (x, 0.3))
+        seen = both if frame not in (4, 5, 6) else scene(follow, frame, (x, -0.25))
+        commits += follow.add(replace(seen, made=both.volume), UNSEEN)
+    commits += follow.finish()
+    rows, labels = rows_of(commits), np.concatenate([commit.label for commit in commits])
+    assert np.unique(rows["id"]).tolist() == [1, 2]
+    assert len(rows) == 24
+    for row in rows:
+        assert abs(row["y"] - (-0.25 if row["id"] == 1 else 0.3)) < 0.15
+        own = RIG.grid.ground[(labels[row["frame"]] == row["id"]).any(0)]
+        assert (own[:, 1] < 0.1).all() if row["id"] == 1 else (own[:, 1] > -0.1).all()
+
+
+@pytest.mark.parametrize("tracker", COLOURLESS)
+def test_frames_without_people(tracker: str) -> None:
+    follow = find_tracker(tracker)(RIG, CONFIG, 0)
+    commits = [commit for frame in range(20) for commit in follow.add(scene(follow, frame), UNSEEN)]
+    commits += follow.finish()
+    assert sum(len(commit.frames) for commit in commits) == 20
+    assert not any(commit.label.any() for commit in commits)
+    assert len(rows_of(commits)) == 0
+    assert len(follow.predict(20) or ()) == 0
+
+
+def test_the_cut_does_not_make_people_of_passing_noise() -> None:
+    """A cell that flickers for one frame is nobody: the pass saw nobody there."""
+    follow = find_tracker("cut")(RIG, CONFIG, 0)
+    commits: list[Commit] = []
+    for frame in range(10):
+        noisy = scene(follow, frame, (-1.0, -1.0))
+        if frame == 4:
+            noisy.log_odds[1, 12, 12] = 4.0
+        commits += follow.add(noisy, UNSEEN)
+    rows = rows_of(commits + follow.finish())
+    assert np.unique(rows["id"]).tolist() == [1]
+    assert len(rows) == 10
+
+
+@pytest.mark.parametrize("tracker", COLOURLESS)
+def test_whom_a_tracker_expects(tracker: str) -> None:
+    """Everybody seen so far, where they are now: what is carried is not what was committed, but what was seen."""
+    follow = find_tracker(tracker)(RIG, CONFIG, 0)
+    assert follow.predict(0) is None
+    for frame in range(LENGTH + 2):
+        follow.add(scene(follow, frame, (-1.5 + 0.1 * frame, 0.2)), UNSEEN)
+        expected = follow.predict(frame + 1)
+        assert expected is not None
+        assert len(expected) == 1
+        if frame > LENGTH:  # by then the velocity is known
+            np.testing.assert_allclose(expected.ground, [[-1.5 + 0.1 * (frame + 1), 0.2]], atol=0.02)
+
+
+def test_an_unknown_tracker_is_refused() -> None:
+    with pytest.raises(ConfigError, match="cut, frames"):
+        find_tracker("magic")(RIG, CONFIG, 0)
+
+
+# Rows
+
+
+def test_nearest_person_within_reach() -> None:
+    standing = np.array([[0.0, 0.0], [1.0, 0.0]])
+    asked = np.array([[[0.1, 0.0], [0.6, 0.0]], [[0.5, 2.0], [1.0, 0.4]]])
+    assert nearest_person(asked, standing, 0.4).tolist() == [[0, 1], [-1, 1]]
+    assert nearest_person(asked, np.zeros((0, 2)), 0.4).tolist() == [[-1, -1], [-1, -1]]
+
+
+def test_rows_are_sorted_by_id() -> None:
+    ground: Floats = np.array([[1.0, 2.0], [3.0, 4.0]])
+    covariance = np.array([[[0.1, 0.02], [0.02, 0.3]]] * 2)
+    ids, height = np.array([9, 4]), np.array([1.7, 1.8])
+    rows = trajectory_rows(7, ids, ground, covariance, height, height / 4, height / 2, height * 3, np.array([2, 3]))
+    assert rows["id"].tolist() == [4, 9]
+    assert rows["frame"].tolist() == [7, 7]
+    assert rows[["x", "y", "z", "xx", "xy", "yy", "views"]].tolist()[0] == (3.0, 4.0, 0.0, 0.1, 0.02, 0.3, 3)
+    np.testing.assert_allclose(rows["height"], [1.8, 1.7], rtol=1e-6)
+    np.testing.assert_allclose(rows["width"], [0.45, 0.425], rtol=1e-6)
+
+
+def test_views_at_places() -> None:
+    views = np.zeros((2, 16, 16), np.uint8)
+    views[1, 3, 5], views[0, 3, 5] = 4, 2
+    place = RIG.grid.ground[3, 5]
+    assert views_at(views, np.array([place, place + 1.0, [50.0, -50.0]]), RIG.grid).tolist() == [4, 0, 0]
+
+
+def test_events_in_rows() -> None:
+    rows = event_rows([(3, "hand-over", 5, 0, "found again after 2 unseen frames")])
+    assert rows.tolist() == [(3, b"hand-over", 5, 0, b"found again after 2 unseen frames")]
+    assert len(event_rows([])) == 0
+
+
+def test_commits_follow_each_other() -> None:
+    commits = run("cut", 3, 30)
+    for before, after in pairwise(commits):
+        assert before.windows["commit_stop"][0] == after.windows["commit_first"][0]
+        assert before.frames[-1].frame + 1 == after.frames[0].frame

@@ -1,0 +1,426 @@
+"""Who is who: windows that cover every frame once, assignments, tracklets, and identities over windows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+import pytest
+import reference_core as reference
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scenes import corner_cameras
+from strategies import numbers
+
+from stseg.arrays import Flags, Rows
+from stseg.bodies.pillars import BodyTable
+from stseg.config import TrackingConfig
+from stseg.geometry import Grid
+from stseg.geometry.nearest_person import nearest_person
+from stseg.records.blobs import UNASSIGNED, Blobs
+from stseg.records.tables import TRAJECTORY
+from stseg.segmentation.blobs import find_blobs
+from stseg.segmentation.patches import Patches
+from stseg.tracking.filter.assignment import assign, distances
+from stseg.tracking.windows.tracklets import Tracklet, form_tracklets
+from stseg.tracking.windows.window_association import TrackAssociation, WindowAssignment
+from stseg.tracking.windows.windows import LONGEST, SHORTEST, Window, window_length, windows
+from stseg.trajectories.interpolation import fill_gaps
+from stseg.trajectories.pruning import drop_ghosts, drop_short
+from stseg.trajectories.track_boxes import box_rows
+
+RATE = 8.0
+CONFIG = TrackingConfig()
+GRID = Grid((-4.0, 4.0), (-4.0, 4.0), cell=0.2, planes=2)
+Path = dict[int, tuple[float, float]]
+"""Where somebody is in each frame, metres; frames that it leaves out did not see them."""
+
+
+# Windows
+
+RUNS = st.tuples(st.integers(0, 200), st.integers(1, 150)).map(lambda run: (run[0], run[0] + run[1]))
+
+
+@settings(max_examples=300)
+@given(RUNS, numbers(0.5, 60), numbers(0.1, 4))
+def test_windows_partition_any_run(run: tuple[int, int], rate: float, seconds: float) -> None:
+    first, stop = run
+    config = TrackingConfig(window=seconds)
+    length, shared = window_length(rate, config)
+    assert SHORTEST <= length <= LONGEST
+    assert 1 <= shared < length
+    parts = list(windows(rate, config, first, stop))
+    assert [f for w in parts for f in range(w.commit_first, w.commit_stop)] == list(range(first, stop))
+    for w in parts:
+        assert first <= w.solve_first <= w.commit_first < w.commit_stop <= w.solve_stop <= stop
+        assert w.solve_stop - w.solve_first <= length
+        # What a window is does not depend on where the run begins or ends.
+        start = w.index * (length - shared)
+        assert (w.solve_first, w.solve_stop) == (max(start, first), min(start + length, stop))
+    for before, after in pairwise(parts):
+        assert after.index == before.index + 1
+        assert after.solve_first < before.solve_stop  # they share frames
+
+
+@settings(max_examples=100)
+@given(RUNS, RUNS, numbers(0.5, 60))
+def test_a_part_is_cut_where_the_whole_is(run: tuple[int, int], other: tuple[int, int], rate: float) -> None:
+    first, stop = run
+    whole = {w.index: w for w in windows(rate, CONFIG, 0, 400)}
+    for w in windows(rate, CONFIG, first, stop):
+        same = whole[w.index]
+        assert w.commit_first in (first, same.commit_first)
+        assert w.commit_stop in (stop, same.commit_stop)
+        if first <= same.solve_first and same.solve_stop < stop:
+            assert w == same
+    ended = list(windows(rate, CONFIG, first, other[1] + first))
+    endless = windows(rate, CONFIG, first, 1 << 40)
+    for w, open_ended in zip(ended[:-1], endless, strict=False):
+        assert w == open_ended
+
+
+# Assignments
+
+
+@settings(deadline=None)
+@given(st.integers(0, 4), st.integers(0, 4), st.integers(0, 999))
+def test_assignment_by_trying_all(rows: int, columns: int, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    cost = rng.uniform(0, 2, (rows, columns))
+    cost[rng.random(cost.shape) < 0.2] = np.inf
+    chosen, given_to = assign(cost, 1.0)
+    assert len(set(chosen.tolist())) == len(chosen) == len(set(given_to.tolist()))
+    assert (cost[chosen, given_to] < 1.0).all()
+    paid = cost[chosen, given_to].sum() + (max(rows, columns) - len(chosen))
+    assert paid == pytest.approx(reference.least_assignment(cost, 1.0))
+
+
+def test_distances() -> None:
+    a, b = np.array([[0.0, 0.0], [3.0, 4.0]]), np.array([[3.0, 4.0], [0.0, 1.0], [3.0, 0.0]])
+    np.testing.assert_allclose(distances(a, b), [[5, 1, 3], [0, np.hypot(3, 3), 4]])
+
+
+def walk(start: Sequence[float], velocity: Sequence[float], frames: range) -> Path:
+    """Constant velocity in metres per second."""
+    dt = 1 / RATE
+    return {f: (start[0] + velocity[0] * f * dt, start[1] + velocity[1] * f * dt) for f in frames}
+
+
+# Pieces
+
+
+def column(places: Sequence[tuple[float, float]]) -> Flags:
+    """Cells within 0.3 m of somebody, bool (plane, y, x)."""
+    occupied = np.zeros(GRID.shape, bool)
+    if places:
+        away = np.hypot(*np.moveaxis(GRID.ground[:, :, None] - np.array(places), -1, 0)).min(2)
+        occupied[:] = away <= 0.3
+    return occupied
+
+
+def blobs_in(
+    paths: Sequence[Path], frame: int, unheld: Sequence[Path] = (), chain: Sequence[int] | None = None
+) -> Blobs:
+    """Blobs of one frame: people of `paths`, and cells along `unheld` where the frame's pass saw nobody."""
+    names = np.array(chain or range(1, len(paths) + 1))[[frame in path for path in paths]]
+    held = np.array([path[frame] for path in paths if frame in path]).reshape(-1, 2)
+    occupied = column([*map(tuple, held), *(path[frame] for path in unheld if frame in path)])
+    owner = np.append(names, UNASSIGNED)[nearest_person(GRID.ground, held, 0.4)]
+    label = np.where(occupied, owner, 0).astype(np.int32)
+    log_odds = np.where(occupied, 2.0, -2.0).astype(np.float32)
+    return find_blobs(label, log_odds, held, names, 0.4, Patches.whole(GRID))
+
+
+def tracklets_of(
+    paths: Sequence[Path], frames: range, unheld: Sequence[Path] = (), chain: Sequence[int] | None = None
+) -> tuple[list[Blobs], list[Tracklet]]:
+    """Blobs and tracklets of some frames; each path is a chain of its own unless `chain` says otherwise."""
+    blobs = [blobs_in(paths, frame, unheld, chain) for frame in frames]
+    return blobs, form_tracklets(blobs, frames[0], CONFIG)
+
+
+FRAMES = range(40, 52)
+
+
+def test_blobs_of_a_chain_are_a_piece() -> None:
+    paths = [walk((-3, -1), (0.4, 0), FRAMES), walk((0, 2), (0.3, -0.1), FRAMES)]
+    blobs, tracklets = tracklets_of(paths, FRAMES)
+    assert sorted(tracklet.filter_track for tracklet in tracklets) == [1, 2]
+    for tracklet in tracklets:
+        assert tracklet.frames == list(FRAMES)
+        for frame, blob, ground in zip(tracklet.frames, tracklet.blobs, tracklet.ground, strict=True):
+            assert np.hypot(*(ground - paths[tracklet.filter_track - 1][frame])) < 0.15
+            assert blobs[frame - FRAMES[0]].person[blob] >= 0
+
+
+def test_the_cut_bridges_what_a_frames_pass_missed() -> None:
+    path = walk((-2, 0), (0.4, 0), FRAMES)
+    seen = {f: p for f, p in path.items() if f not in (44, 45)}
+    _, tracklets = tracklets_of([seen], FRAMES, unheld=[{f: path[f] for f in (44, 45)}])
+    assert [tracklet.frames for tracklet in tracklets] == [list(FRAMES)]
+
+
+def test_a_gap_is_bridged_by_cells_of_the_track_itself() -> None:
+    """Cells that the cut gave to another track are not taken."""
+    path = walk((-2, 0), (0.4, 0), FRAMES)
+    seen = {f: p for f, p in path.items() if f != 45}
+    blobs = [blobs_in([seen], f) for f in FRAMES]
+    for whose, bridged in ((1, True), (UNASSIGNED, True), (2, False)):
+        label = np.where(column([path[45]]), whose, 0).astype(np.int32)
+        nobody = np.zeros((0, 2)), np.zeros(0, np.int64)
+        blobs[5] = find_blobs(label, np.ones(GRID.shape, np.float32), *nobody, 0.4, Patches.whole(GRID))
+        (one,) = form_tracklets(blobs, FRAMES[0], CONFIG)
+        assert (45 in one.frames) == bridged
+
+
+def test_no_piece_begins_or_ends_where_nobody_was_seen() -> None:
+    path = walk((-2, 0), (0.4, 0), FRAMES)
+    seen = {f: p for f, p in path.items() if 42 <= f < 50}
+    rest = {f: p for f, p in path.items() if f not in seen}
+    _, tracklets = tracklets_of([seen], FRAMES, unheld=[rest, dict.fromkeys(FRAMES, (2.0, -3.0))])
+    assert [tracklet.frames for tracklet in tracklets] == [list(range(42, 50))]
+
+
+def test_a_chain_is_one_piece_over_its_gap() -> None:
+    path = walk((-7, 0), (1.0, 0), FRAMES)
+    before = {f: p for f, p in path.items() if f < 45}
+    after = {f: p for f, p in path.items() if f >= 47}
+    _, tracklets = tracklets_of([before, after], FRAMES, chain=[3, 3])
+    assert [(one.filter_track, one.frames) for one in tracklets] == [(3, [*range(40, 45), *range(47, 52)])]
+    _, tracklets = tracklets_of([before, after], FRAMES, chain=[3, 4])  # two who are followed are two
+    assert [tracklet.filter_track for tracklet in tracklets] == [3, 4]
+
+
+def tracklet(chain: int, path: Path) -> Tracklet:
+    made = Tracklet(chain)
+    for frame, place in path.items():
+        made.add(frame, 0, np.array(place))
+    return made
+
+
+def test_velocity_is_that_of_the_end() -> None:
+    turning = tracklet(1, {0: (0.0, 0.0), 1: (0.1, 0.0), 3: (0.3, 0.0), 4: (0.4, 0.0), 5: (0.5, 0.0)})
+    for frame in range(6, 12):
+        turning.add(frame, 0, np.array([0.5, 0.2 * (frame - 5)]))
+    np.testing.assert_allclose(turning.velocity(), [0.0, 0.2])
+    assert not tracklet(1, {3: (1.0, 1.0)}).velocity().any()
+
+
+def test_a_gap_is_filled_in_order_and_on_the_line() -> None:
+    gappy = tracklet(1, {2: (0.0, 0.0), 6: (0.4, 0.8)})
+    np.testing.assert_allclose(gappy.between(3), [0.1, 0.2])
+    gappy.insert(3, 7, np.array([0.1, 0.2]))
+    assert (gappy.frames, gappy.blobs) == ([2, 3, 6], [0, 7, 0])
+    np.testing.assert_allclose(gappy.between(5), [0.3, 0.6])
+
+
+# Identities over windows
+
+HALF = 4
+"""Frames that two windows of these tests share."""
+
+
+def decide(
+    identities: TrackAssociation, paths: Sequence[Path], stop: int, chain: Sequence[int] | None = None
+) -> tuple[list[Window], list[WindowAssignment], dict[tuple[int, int], int]]:
+    """Run windows of eight frames over paths; the identity of each path in each committed frame."""
+    made: list[Window] = []
+    decisions: list[WindowAssignment] = []
+    names: dict[tuple[int, int], int] = {}
+    for index, start in enumerate(range(0, stop - HALF, 8 - HALF)):
+        end = start + 8
+        last = end >= stop
+        commit = (0 if index == 0 else start + 2, stop if last else end - 2)
+        window = Window(index, start, min(end, stop), *commit)
+        frames = range(window.solve_first, window.solve_stop)
+        blobs, tracklets = tracklets_of(paths, frames, chain=chain)
+        decision = identities.decide(window, blobs, tracklets)
+        for frame in range(*commit):
+            found = blobs[frame - start]
+            standing = [k for k, path in enumerate(paths) if frame in path]
+            for blob, person in enumerate(found.person):
+                if person >= 0:
+                    names[standing[person], frame] = int(decision.identity[frame - start][blob])
+        made.append(window)
+        decisions.append(decision)
+    return made, decisions, names
+
+
+def ids_of(names: dict[tuple[int, int], int], path: int) -> list[int]:
+    """Identities of a path, in the order of time, each run of equal ones once."""
+    found = [name for (k, _), name in sorted(names.items()) if k == path]
+    return [name for k, name in enumerate(found) if k == 0 or name != found[k - 1]]
+
+
+def events_of(decisions: Sequence[WindowAssignment], kind: str) -> list[tuple[int, int, int]]:
+    """Frame, id and other id of the events of one kind."""
+    return [(f, i, other) for d in decisions for f, k, i, other, _ in d.events if k == kind]
+
+
+def test_identities_last_over_windows() -> None:
+    frames = range(32)
+    paths = [walk((-3, -1), (0.5, 0), frames), walk((3, 1), (-0.5, 0), frames)]
+    windows_made, decisions, names = decide(TrackAssociation(RATE, CONFIG), paths, 32)
+    assert len(windows_made) == 7
+    assert len(names) == 64
+    assert sorted([ids_of(names, 0), ids_of(names, 1)]) == [[1], [2]]
+    assert events_of(decisions, "birth") == [(0, 1, 0), (0, 2, 0)]
+    assert all(kind == "birth" for d in decisions for _, kind, *_ in d.events)
+    assert all(reason for d in decisions for *_, reason in d.events)
+
+
+def test_identities_follow_the_cells_whatever_the_chains_say() -> None:
+    """Chains that begin anew in each window: what two windows share tells."""
+    frames = range(24)
+    paths = [walk((-3, -1), (0.5, 0), frames), walk((3, 1), (-0.5, 0), frames)]
+    identities = TrackAssociation(RATE, CONFIG)
+    found = []
+    for index, start in enumerate(range(0, 20, 4)):
+        window = Window(index, start, start + 8, start + 2 if index else 0, start + 6)
+        part = range(start, start + 8)
+        blobs, tracklets = tracklets_of(paths, part, chain=[10 * index + 100, 10 * index + 101])
+        decision = identities.decide(window, blobs, tracklets)
+        found.append([int(decision.identity[3][blobs[3].person.tolist().index(k)]) for k in range(2)])
+    assert all(pair == found[0] for pair in found)
+    assert sorted(found[0]) == [1, 2]
+
+
+def test_birth_and_death() -> None:
+    stays = walk((-3, -1), (0.3, 0), range(40))
+    leaves = walk((3, 1), (0.1, 0), range(11))
+    comes = walk((0, 3), (0.2, 0), range(17, 40))
+    _, decisions, names = decide(TrackAssociation(RATE, CONFIG), [stays, leaves, comes], 40)
+    ids = [ids_of(names, k) for k in range(3)]
+    assert [len(i) for i in ids] == [1, 1, 1]
+    assert len({i[0] for i in ids}) == 3
+    assert [(f, i) for f, i, _ in events_of(decisions, "birth")][2:] == [(17, ids[2][0])]
+    assert events_of(decisions, "death") == [(10, ids[1][0], 0)]
+
+
+def test_somebody_unseen_for_a_moment_is_found_again() -> None:
+    path = walk((-3, 0), (0.5, 0), range(40))
+    seen = {f: p for f, p in path.items() if f not in range(13, 19)}
+    _, decisions, names = decide(TrackAssociation(RATE, CONFIG), [seen], 40)
+    assert set(names.values()) == {1}
+    assert events_of(decisions, "hand-over") == [(19, 1, 0)]
+    assert len(events_of(decisions, "birth")) == 1
+    assert not events_of(decisions, "death")
+
+
+def test_merge_and_split() -> None:
+    """Two people come within a step of each other and part."""
+    frames = range(32)
+    near = {f: 0.25 + 0.13 * abs(f - 16) for f in frames}
+    paths: list[Path] = [{f: (-near[f], 0.1) for f in frames}, {f: (near[f], 0.1) for f in frames}]
+    _, decisions, names = decide(TrackAssociation(RATE, CONFIG), paths, 32)
+    assert [len(ids_of(names, k)) for k in range(2)] == [1, 1]
+    merges, splits = events_of(decisions, "merge"), events_of(decisions, "split")
+    assert {(i, other) for _, i, other in [*merges, *splits]} == {(1, 2)}
+    told = [f for (first, *_), (last, *_) in zip(merges, splits, strict=True) for f in range(first, last + 1)]
+    assert told == [f for f in frames if len(blobs_in(paths, f).touches)]
+
+
+def test_events_are_of_committed_frames_in_order() -> None:
+    rng = np.random.default_rng(5)
+    paths = [
+        {
+            f: p
+            for f, p in walk(rng.uniform(-3, 3, 2).tolist(), rng.uniform(-0.5, 0.5, 2).tolist(), range(40)).items()
+            if rng.random() < 0.8
+        }
+        for _ in range(4)
+    ]
+    made, decisions, names = decide(TrackAssociation(RATE, CONFIG), paths, 40)
+    for window, decision in zip(made, decisions, strict=True):
+        assert decision.events == sorted(decision.events)
+        for frame, kind, *_ in decision.events:
+            assert frame < window.commit_stop
+            assert frame >= window.commit_first or kind == "death"
+        assert len(decision.identity) == window.solve_stop - window.solve_first
+        for identity in decision.identity:
+            named = identity[identity > 0]
+            assert len(np.unique(named)) == len(named)  # nobody is in two places
+    assert len(names) == sum(len(path) for path in paths)
+    born = [i for _, i, _ in events_of(decisions, "birth")]
+    assert len(set(born)) == len(born)
+    assert set(names.values()) == set(born)
+
+
+# The last look
+
+
+def rows_of(paths: dict[int, Path]) -> Rows:
+    """TRAJECTORY rows, sorted by frame, then id."""
+    told = sorted((f, i, *place) for i, path in paths.items() for f, place in path.items())
+    rows = np.zeros(len(told), TRAJECTORY)
+    for row, (frame, identity, x, y) in zip(rows, told, strict=True):
+        row["frame"], row["id"], row["x"], row["y"], row["height"] = frame, identity, x, y, 1.7
+        row["raw_x"], row["raw_y"], row["xx"], row["yy"] = x, y, 0.01, 0.01
+    return rows
+
+
+def test_short_tracks_go_with_an_event() -> None:
+    least = round(CONFIG.minimum_duration * RATE)
+    rows = rows_of({1: walk((0, 0), (0, 0), range(5, 5 + least)), 2: walk((2, 0), (0, 0), range(7, 6 + least))})
+    kept, events = drop_short(rows, RATE, CONFIG)
+    assert np.unique(kept["id"]).tolist() == [1]
+    assert len(kept) == least
+    assert [(e["frame"], e["kind"], e["id"], e["other"]) for e in events] == [(7, b"dropped", 2, 0)]
+    assert events["reason"][0]
+    empty, none = drop_short(rows[:0], RATE, CONFIG)
+    assert len(empty) == len(none) == 0
+
+
+def test_tracks_that_most_frames_doubt_go_with_an_event() -> None:
+    """A frame of a short gap says ghost; of a long one nobody knows, so it says nothing."""
+    long = round(CONFIG.interpolation_gap * RATE) + 1
+    seen = {1: [0, 1, 4, 6, 9, 10], 2: [0, 3, 6, 9], 3: [*range(4), *range(4 + long, 8 + long)]}
+    rows = rows_of({i: {f: (float(i), 0.0) for f in frames} for i, frames in seen.items()})
+    kept, events = drop_ghosts(rows[::-1], RATE, CONFIG)
+    assert np.unique(kept["id"]).tolist() == [1, 3]  # of the first, 5 frames of 11 do
+    assert [(e["frame"], e["kind"], e["id"], e["reason"]) for e in events] == [
+        (0, b"dropped", 2, b"6 of 10 frames say ghost")
+    ]
+    empty, none = drop_ghosts(rows[:0], RATE, CONFIG)
+    assert len(empty) == len(none) == 0
+
+
+@given(st.sets(st.integers(0, 30), min_size=2), st.sets(st.integers(0, 30), min_size=1))
+def test_short_gaps_are_filled_on_straight_lines(first: set[int], second: set[int]) -> None:
+    whole = {4: walk((0, 1), (0.5, -0.3), range(31)), 2: walk((3, 3), (0, 0), range(31))}
+    seen = rows_of({i: {f: whole[i][f] for f in frames} for i, frames in ((4, first), (2, second))})
+    filled = fill_gaps(seen, RATE, CONFIG)
+    for i, frames in ((4, first), (2, second)):
+        own = filled[filled["id"] == i]
+        gaps = [range(a + 1, b) for a, b in pairwise(sorted(frames))]
+        short = [f for gap in gaps if len(gap) <= CONFIG.interpolation_gap * RATE for f in gap]
+        assert own["frame"].tolist() == sorted([*frames, *short])
+        for x, y in (("x", "y"), ("raw_x", "raw_y")):
+            np.testing.assert_allclose(
+                np.column_stack([own[x], own[y]]), [whole[i][f] for f in own["frame"]], atol=1e-9
+            )
+        unseen = ~np.isin(own["frame"], list(frames))
+        assert (own["xx"][unseen] > 0.01).all()
+        assert (own["xx"][~unseen] == 0.01).all()
+    keys = [(row["frame"], row["id"]) for row in filled]
+    assert keys == sorted(keys)
+    np.testing.assert_array_equal(fill_gaps(filled, RATE, CONFIG), filled)
+    assert len(fill_gaps(seen[:0], RATE, CONFIG)) == 0
+
+
+def test_boxes_of_tracks_lie_in_the_images() -> None:
+    cameras = corner_cameras()
+    tables = [BodyTable.of(camera, Grid((-2, 2), (-2, 2))) for camera in cameras]
+    rows = rows_of({3: walk((-1.5, -1), (0.5, 0.2), range(6)), 5: {2: (0.0, 0.0)}})
+    boxes = box_rows(tables, rows)
+    keys = [(b["frame"], b["id"], b["view"]) for b in boxes]
+    assert keys == sorted(keys)
+    assert len(set(keys)) == len(keys) == 4 * len(rows)
+    for box in boxes:
+        assert 0 <= box["left"] < box["left"] + box["width"] <= cameras[box["view"]].size[0]
+        assert 0 <= box["top"] < box["top"] + box["height"] <= cameras[box["view"]].size[1]
+    middle = next(b for b in boxes if b["id"] == 5 and b["view"] == 1)
+    pixel, _ = cameras[1].project(np.zeros((1, 2)), 0.9)
+    assert np.abs(pixel[0] - (middle["left"] + middle["width"] / 2, middle["top"] + middle["height"] / 2)).max() < 3
+    assert len(box_rows(tables, rows[:0])) == 0
