@@ -8,13 +8,14 @@ What is learned from a recording, and its frames, are of a `stseg.engine.session
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from importlib import import_module
+from typing import Protocol, cast
 
 import numpy as np
 
-from stseg.arrays import Floats, Ints, Observation, Rows, ViewEvidence
-from stseg.baselines.huang_wang_2012.proposals import Proposals
+from stseg.arrays import Floats, Ints, Observation, Rows, Singles, ViewEvidence
 from stseg.bodies.pillars import BodyTable
 from stseg.config import Config
 from stseg.detection.appearance import appearance_rows
@@ -25,12 +26,26 @@ from stseg.identities.search.beam_search import FREELY
 from stseg.identities.search.constraints import Constraints
 from stseg.occupancy.volume import Occupancy
 from stseg.records.border import Border
+from stseg.records.candidates import Candidates
 from stseg.records.people import Explanation
 from stseg.records.tables import APPEARANCE, Tracks
 from stseg.trackers import find_tracker
-from stseg.trackers.protocol import Tracker
+from stseg.trackers.protocol import TrackingMethod
 from stseg.trajectories.final_tracks import FinalTracks, bridged_rows, committed_tracks, final_tracks
 from stseg.trajectories.track_boxes import box_rows
+
+_HUANG_WANG = "stseg.baselines.huang_wang_2012.proposals:Proposals"
+CANDIDATE_SOURCES = {"volume": _HUANG_WANG, "probability": _HUANG_WANG, "both": _HUANG_WANG}
+"""Module and class of each `proposals.source` beside "lattice", the detector's; imported where it is asked for."""
+
+
+class CandidateSource(Protocol):
+    """Candidates of a frame besides those of the detector."""
+
+    def of(
+        self, seen: Sequence[ViewEvidence], fuse: Callable[[Sequence[ViewEvidence], Explanation], Singles]
+    ) -> Candidates:
+        """Candidates from each view's evidence, and from a volume (plane, y, x) that is fused under an explanation."""
 
 
 class Pipeline:
@@ -57,7 +72,7 @@ class Pipeline:
         body = replace(config.body, heights=config.body.box_heights) if "boxes" in kinds else config.body
         self.detector = Detector(rig, kinds, config.detection, body, config.error_rates)
         self.occupancy = Occupancy(rig, kinds, config.occupancy, config.detection, body, config.error_rates)
-        self.proposals = Proposals(rig, kinds, config)
+        self.proposals = find_candidate_source(rig, kinds, config)
         self.axes = axes
 
     def appearance_rows(
@@ -82,14 +97,22 @@ class Pipeline:
         return finished_tracks(self.rig, self.config, self.tracker, committed, events, appearance, shown)
 
 
-def decides_by_appearance(tracker: type[Tracker], config: Config) -> bool:
+def find_candidate_source(rig: Rig, kinds: Sequence[str], config: Config) -> CandidateSource | None:
+    """The source of candidates that the configuration names; None for the detector's alone."""
+    if config.proposals.source == "lattice":
+        return None
+    module, found = CANDIDATE_SOURCES[config.proposals.source].split(":")
+    return cast(CandidateSource, getattr(import_module(module), found)(rig, kinds, config))
+
+
+def decides_by_appearance(tracker: type[TrackingMethod], config: Config) -> bool:
     """Whether appearance is evidence of identity."""
     return not tracker.final and config.tracking.appearance != "none"
 
 
 def finished_tracks(
-    rig: Rig, config: Config, tracker: type[Tracker], committed: Rows, events: Rows, appearance: Rows, shown: Rig,
-    known: Rows = NOBODY,
+    rig: Rig, config: Config, tracker: type[TrackingMethod], committed: Rows, events: Rows, appearance: Rows,
+    shown: Rig, known: Rows = NOBODY,
 ) -> tuple[Tracks, Ints]:  # fmt: skip
     """The tracks of a whole run, and the track id of each committed row.
 

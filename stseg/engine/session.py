@@ -95,7 +95,8 @@ class Session:
         noise, failures = self._learned.box_noise.noise, self._learned.failures
         frame, predicted = frame_set.frame, self._tracker.predict(frame_set.frame)
         with self.watch.time("ghosts"):
-            proposed = self.pipeline.proposals.of(failures.kept(evidence), self._fuse_with_current_rates)
+            source = self.pipeline.proposals
+            proposed = source.of(failures.kept(evidence), self._fuse_with_current_rates) if source else None
             explanation = self.pipeline.detector.explain_next(self._learned, frame, evidence, predicted, proposed)
         events = self._excluded.events(frame, frame_set.views, evidence, failures)
         used = failures.kept(evidence)

@@ -27,7 +27,7 @@ from stseg.segmentation.cut_energy import build_energy
 from stseg.segmentation.label_energy import BodyShape
 from stseg.segmentation.patches import Patches, mark_places, people_squares
 from stseg.trackers.protocol import Commit, FrameObservations, FusedFrame
-from stseg.trackers.rows import event_rows, trajectory_rows, views_at
+from stseg.trackers.rows import TrackPlaces, event_rows, trajectory_rows, views_at
 from stseg.trackers.window_existence import TrackedFrame, WindowExistence
 from stseg.tracking.filter.prediction import earlier_detections, predicted_places, together
 from stseg.tracking.filter.track_filter import TrackFilter
@@ -207,9 +207,8 @@ class CutTracker:
             height[held], score[held] = people.sizes.height[held_person[held]], people.evidence[held_person[held]]
             width[held] = people.sizes.width[held_person[held]]
         views = views_at(self.views, ground, self.rig.grid)
-        return trajectory_rows(
-            fused.frame, identity[named], ground, covariance, height, width, blobs.extent[named], score, views
-        )
+        tracks = TrackPlaces(identity[named], ground, covariance, height, width, score)
+        return trajectory_rows(fused.frame, tracks, blobs.extent[named], views)
 
 
 def _ranges(window: Window) -> tuple[int, int, int, int, int]:

@@ -1,21 +1,25 @@
-"""Base of trackers that commit every frame at once."""
+"""Trackers that commit every frame at once, without a cut."""
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import numpy as np
 
-from stseg.arrays import Floats, Ints
+from stseg.arrays import Floats, Ints, Labels
 from stseg.config import Config
-from stseg.geometry import Rig
+from stseg.geometry import Grid, Rig
+from stseg.geometry.nearest_person import nearest_person
 from stseg.geometry.sampling import Sampling
+from stseg.records.predicted_tracks import PredictedTracks
 from stseg.records.tables import WINDOW
-from stseg.trackers.nearest_cells import reached_cells
-from stseg.trackers.protocol import Commit, FusedFrame
-from stseg.trackers.rows import Event, event_rows, trajectory_rows, views_at
+from stseg.trackers.protocol import Commit, FrameObservations, FusedFrame
+from stseg.trackers.rows import Event, TrackPlaces, event_rows, trajectory_rows, views_at
+from stseg.tracking.filter.track_filter import TrackFilter
 
 
 class FramewiseTracker:
-    """Commits each frame from the places of its tracks.
+    """Base of trackers that commit each frame from the places of its tracks.
 
     Parameters
     ----------
@@ -33,23 +37,57 @@ class FramewiseTracker:
         """No frame is open."""
         return []
 
-    def commit(
-        self, fused: FusedFrame, ids: Ints, ground: Floats, covariance: Floats, height: Floats, width: Floats,
-        score: Floats, events: list[Event],
-    ) -> Commit:  # fmt: skip
-        """Commit a frame.
-
-        Parameters
-        ----------
-        ids : int64 (n,)
-            Tracks.
-        ground, covariance : float64 (n, 2), (n, 2, 2)
-            Metres, square metres.
-        height, width, score : float64 (n,)
-            Metres, metres, nats.
-        """
-        grid = self.rig.grid
-        label, extent = reached_cells(fused, ground, ids, grid, self.config.occupancy.person_radius)
-        views = views_at(self.cell_views, ground, grid)
-        rows = trajectory_rows(fused.frame, ids, ground, covariance, height, width, extent, score, views)
+    def commit(self, fused: FusedFrame, tracks: TrackPlaces, events: list[Event]) -> Commit:
+        """Commit a frame with its tracks and events."""
+        grid, reach = self.rig.grid, self.config.occupancy.person_radius
+        label, extent = _reached_cells(fused, tracks.ground, tracks.ids, grid, reach)
+        views = views_at(self.cell_views, tracks.ground, grid)
+        rows = trajectory_rows(fused.frame, tracks, extent, views)
         return Commit([fused], label[None], rows, event_rows(events), np.zeros(0, WINDOW))
+
+
+class FrameTracker(FramewiseTracker):
+    """Detections of each frame with their filter tracks: the baseline of the cut."""
+
+    final: ClassVar[bool] = False
+
+    def __init__(self, rig: Rig, config: Config, first: int) -> None:
+        super().__init__(rig, config, first)
+        self.filter = TrackFilter(rig.frame_rate, config)
+
+    def predict(self, frame: int) -> PredictedTracks | None:
+        """Predictions of all tracks for a frame; None for the first."""
+        return self.filter.predict(frame)
+
+    def add(self, fused: FusedFrame, observed: FrameObservations) -> list[Commit]:
+        """Add a frame; it is committed at once."""
+        del observed
+        people, sizes, issued = fused.people, fused.people.sizes, self.filter.issued
+        ids = self.filter.update(fused.frame, people, fused.ghosts)
+        births = [(fused.frame, "birth", int(i), 0, "nobody known was near") for i in np.sort(ids[ids > issued])]
+        tracks = TrackPlaces(ids, people.ground, people.covariance, sizes.height, sizes.width, people.evidence)
+        return [self.commit(fused, tracks, births)]
+
+
+def _reached_cells(fused: FusedFrame, ground: Floats, ids: Ints, grid: Grid, reach: float) -> tuple[Labels, Floats]:
+    """Label the occupied cells of a frame with the nearest track within reach.
+
+    Parameters
+    ----------
+    ground : float64 (n, 2)
+        Places of the tracks, metres.
+    ids : int64 (n,)
+        Track numbers.
+    reach
+        Metres.
+
+    Returns
+    -------
+    int32 (plane, y, x), float64 (n,)
+        Track ids of the cells, 0 for background; ground area of each track, square metres.
+    """
+    nearest = nearest_person(grid.ground, ground, reach)
+    occupied = (fused.log_odds > 0) & (nearest >= 0)
+    label = np.where(occupied, np.append(ids, 0)[nearest], 0).astype(np.int32)
+    cells = np.bincount(nearest[occupied.any(0)], minlength=len(ids))[: len(ids)]
+    return label, np.asarray(cells * grid.cell**2, float)

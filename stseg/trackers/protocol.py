@@ -87,7 +87,7 @@ class Commit:
     windows: Rows
 
 
-class Tracker(Protocol):
+class TrackingMethod(Protocol):
     """Takes frames in order, and returns committed frames as soon as they are final.
 
     Parameters

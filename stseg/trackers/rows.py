@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from stseg.arrays import Bytes, Floats, Ints, Rows
@@ -12,23 +14,38 @@ Event = tuple[int, str, int, int, str]
 """frame, kind, id, other id, reason."""
 
 
-def trajectory_rows(
-    frame: int, ids: Ints, ground: Floats, covariance: Floats, height: Floats, width: Floats, extent: Floats,
-    score: Floats, views: Ints,
-) -> Rows:  # fmt: skip
+class TrackPlaces(NamedTuple):
+    """The n tracks of one frame.
+
+    Attributes
+    ----------
+    ids : int64 (n,)
+        Track numbers.
+    ground, covariance : float64 (n, 2), (n, 2, 2)
+        Metres, square metres.
+    height, width, score : float64 (n,)
+        Metres, metres, nats.
+    """
+
+    ids: Ints
+    ground: Floats
+    covariance: Floats
+    height: Floats
+    width: Floats
+    score: Floats
+
+
+def trajectory_rows(frame: int, tracks: TrackPlaces, extent: Floats, views: Ints) -> Rows:
     """TRAJECTORY rows of one frame, sorted by id.
 
     Parameters
     ----------
-    ids : int64 (n,)
-        Tracks.
-    ground, covariance : float64 (n, 2), (n, 2, 2)
-        Metres, square metres.
-    height, width, extent, score : float64 (n,)
-        Metres, metres, square metres, nats.
+    extent : float64 (n,)
+        Ground area of each track, square metres.
     views : int64 (n,)
         Number of views that see the place.
     """
+    ids, ground, covariance, height, width, score = tracks
     rows = np.zeros(len(ids), TRAJECTORY)
     rows["frame"], rows["id"] = frame, ids
     rows["x"], rows["y"] = ground[:, 0], ground[:, 1]

@@ -15,7 +15,6 @@ from scenes import CONFIG, FRAME_RATE, SIZE, corner_cameras, found, mask, people
 from strategies import cameras
 
 from stseg.arrays import Boxes, Bytes, Floats, Observation, Rows
-from stseg.baselines.du_piater_2006 import BeliefTracker
 from stseg.baselines.du_piater_2006.exclusion import exclusion
 from stseg.baselines.du_piater_2006.histogram import BINS, HSV_BINS, PARTS, POINTS, histograms
 from stseg.baselines.du_piater_2006.particles import Motion, Particles, Prediction, fill_origin, systematic
@@ -23,6 +22,7 @@ from stseg.baselines.du_piater_2006.potential import Outlier, Potential
 from stseg.baselines.du_piater_2006.star import Rounds, Star, propagate
 from stseg.baselines.du_piater_2006.target import Target, in_front, target_likelihoods
 from stseg.baselines.du_piater_2006.target_likelihood import TargetLikelihood, squares
+from stseg.baselines.du_piater_2006.tracker import BeliefTracker
 from stseg.baselines.du_piater_2006.view import StarView
 from stseg.config import BeliefConfig, Config
 from stseg.errors import CalibrationError, ConfigError, SourceError

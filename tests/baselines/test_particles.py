@@ -13,7 +13,6 @@ from scenes import CONFIG, SIZE, corner_cameras, found, looking, mask, people, r
 
 from stseg.arrays import Boxes, Bytes, Floats, Observation, Rows, Singles
 from stseg.baselines.colour_views import colour_views
-from stseg.baselines.kim_davis_2006 import ParticleTracker
 from stseg.baselines.kim_davis_2006.appearance import SAMPLES, Appearance
 from stseg.baselines.kim_davis_2006.axes import HYPOTHESIS_WEIGHT, _middle_of_shortest_half, fill_axes, intersect_axes
 from stseg.baselines.kim_davis_2006.bodies import HALF_WIDTH, PARTS, fill_bodies, fill_boxes
@@ -22,6 +21,7 @@ from stseg.baselines.kim_davis_2006.filter import estimate, resampled, weights
 from stseg.baselines.kim_davis_2006.likelihood import NEUTRAL, add_misfit
 from stseg.baselines.kim_davis_2006.search import search
 from stseg.baselines.kim_davis_2006.segmentation import UNASSIGNED, Canvas, fill_unoccluded, segment
+from stseg.baselines.kim_davis_2006.tracker import ParticleTracker
 from stseg.baselines.kim_davis_2006.views import ParticleView
 from stseg.config import Config, ParticleConfig
 from stseg.errors import ConfigError, SourceError

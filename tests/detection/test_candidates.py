@@ -30,7 +30,7 @@ from stseg.arrays import Floats, ViewEvidence
 from stseg.baselines.huang_wang_2012.proposals import Fuse, Proposals, marginal
 from stseg.config import ProposalConfig
 from stseg.detection.detector import Detector
-from stseg.engine.pipeline import Pipeline
+from stseg.engine.pipeline import Pipeline, find_candidate_source
 from stseg.engine.session import run_session
 from stseg.errors import InputError
 from stseg.foreground.view_foreground import ViewForeground
@@ -67,7 +67,6 @@ def pool(*places: tuple[float, float]) -> Candidates:
 @pytest.mark.parametrize("asked", ("probability", "volume", "both"))
 def test_each_source_finds_everybody(kind: str, asked: Asked) -> None:
     found = candidates(kind, asked).of(evidence(kind), fuse(kind))
-    assert found is not None
     away = np.hypot(*np.moveaxis(found.ground[:, None] - STANDING[:, :2], -1, 0))
     # What boxes say of a place in a volume reaches far to its sides: their modes are no better than the pass's lattice.
     assert (away.min(0) < (0.5 if kind == "boxes" and asked == "volume" else 0.25)).all()
@@ -76,19 +75,18 @@ def test_each_source_finds_everybody(kind: str, asked: Asked) -> None:
 
 
 def test_the_lattice_alone_proposes_nothing() -> None:
-    assert candidates("pixels", "lattice").of(evidence("pixels"), fuse("pixels")) is None
+    assert find_candidate_source(RIG, ["pixels"] * 4, CONFIG) is None
 
 
 @pytest.mark.parametrize("seen", ([None] * 4, [no_boxes()] * 4, [None, no_boxes(), None, no_boxes()]))
 def test_where_nothing_is_seen_nobody_is_proposed(seen: Sequence[ViewEvidence]) -> None:
     found = candidates("boxes", "both").of(list(seen), fuse("boxes"))
-    assert found is not None and len(found) == 0
+    assert len(found) == 0
 
 
 def test_both_sources_have_no_duplicates_of_each_other() -> None:
     seen = evidence("pixels")
     volume, both = (candidates("pixels", asked).of(seen, fuse("pixels")) for asked in ("volume", "both"))
-    assert volume is not None and both is not None
     np.testing.assert_array_equal(both.ground[: len(volume)], volume.ground)
 
 

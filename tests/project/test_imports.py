@@ -45,7 +45,7 @@ STAGES: dict[str, set[str]] = {
 """In the order of the data: what each may import besides the foundation. What two share is a record of `records`."""
 
 BESIDE = {
-    "trackers": {"segmentation", "tracking", "baselines", SOLVER},
+    "trackers": {"segmentation", "tracking", SOLVER},
     "baselines": {"trackers", "tracking", "occupancy"},
     "evaluation": {"errors", "arrays"},
     "measures": {"errors", "arrays", "geometry"},
@@ -54,7 +54,7 @@ BESIDE = {
     "report": {"errors", "arrays", "geometry", "bodies", "records"},
     "simulation": {"errors", "arrays", "kernels", "geometry"},
 }
-"""Rooms above or beside the stages."""
+"""Rooms above or beside the stages. Nothing imports the baselines: registries name them (`stseg.trackers`)."""
 
 AT_HOME = {
     "h5py": ("stseg.io",),
@@ -136,9 +136,9 @@ def allowed(part: str) -> set[str]:
     if part in ("trackers", "baselines"):
         return {*FOUNDATION, *BESIDE[part]}
     if part == "engine":
-        return {*FOUNDATION, *STAGES, "trackers", "baselines", "calibration", "measures", "io"}
+        return {*FOUNDATION, *STAGES, "trackers", "calibration", "measures", "io"}
     if part == "commands":
-        return {*FOUNDATION, *STAGES, *BESIDE, "engine"}
+        return {*FOUNDATION, *STAGES, *BESIDE, "engine"} - {"baselines"}
     return BESIDE[part]
 
 
@@ -192,3 +192,17 @@ def test_a_run_imports_no_library_that_it_does_not_use() -> None:
     started = f"import {imported}, sys; print(*sys.modules)"
     found = subprocess.run([sys.executable, "-c", started], capture_output=True, text=True, check=True, env=ENVIRONMENT)
     assert not {"rich", "ssl", "scipy.optimize", "stseg.engine.live.following"} & set(found.stdout.split())
+
+
+def test_a_default_run_imports_no_baseline() -> None:
+    made = (
+        "import sys, stseg.engine.track, stseg.engine.live.following, stseg.commands.run\n"
+        "from scenes import CONFIG, room\n"
+        "from stseg.engine.pipeline import Pipeline\n"
+        "Pipeline(room(), ['pixels'] * 4, CONFIG, 'cut').tracker(room(), CONFIG, 0)\n"
+        "print(*sys.modules)"
+    )
+    found = subprocess.run([sys.executable, "-c", made], capture_output=True, text=True, check=True, env=ENVIRONMENT)
+    modules = found.stdout.split()
+    assert "stseg.trackers.cut" in modules
+    assert [name for name in modules if name.startswith("stseg.baselines")] == []

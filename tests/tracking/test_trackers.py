@@ -16,8 +16,8 @@ from stseg.geometry.nearest_person import nearest_person
 from stseg.graphcut.energy import QUANTUM
 from stseg.records.sparse_volume import SparseVolume
 from stseg.records.tables import WINDOW
-from stseg.trackers import TRACKERS, Commit, FrameObservations, FusedFrame, Tracker, find_tracker
-from stseg.trackers.rows import event_rows, trajectory_rows, views_at
+from stseg.trackers import TRACKERS, Commit, FrameObservations, FusedFrame, TrackingMethod, find_tracker
+from stseg.trackers.rows import TrackPlaces, event_rows, trajectory_rows, views_at
 from stseg.tracking.windows.windows import window_length, windows
 
 RIG = room()
@@ -30,7 +30,7 @@ ENDS = LENGTH + LENGTH - SHARED
 """A run of so many frames ends exactly where its second window ends."""
 
 
-def scene(follow: Tracker, frame: int, *places: tuple[float, float]) -> FusedFrame:
+def scene(follow: TrackingMethod, frame: int, *places: tuple[float, float]) -> FusedFrame:
     """A frame in which people stand at places, metres: cells within 0.3 m are occupied, one corner is unseen."""
     standing = people(*places)
     log_odds = np.full(RIG.grid.shape, -3.0, np.float32)
@@ -211,7 +211,8 @@ def test_rows_are_sorted_by_id() -> None:
     ground: Floats = np.array([[1.0, 2.0], [3.0, 4.0]])
     covariance = np.array([[[0.1, 0.02], [0.02, 0.3]]] * 2)
     ids, height = np.array([9, 4]), np.array([1.7, 1.8])
-    rows = trajectory_rows(7, ids, ground, covariance, height, height / 4, height / 2, height * 3, np.array([2, 3]))
+    tracks = TrackPlaces(ids, ground, covariance, height, height / 4, height * 3)
+    rows = trajectory_rows(7, tracks, height / 2, np.array([2, 3]))
     assert rows["id"].tolist() == [4, 9]
     assert rows["frame"].tolist() == [7, 7]
     assert rows[["x", "y", "z", "xx", "xy", "yy", "views"]].tolist()[0] == (3.0, 4.0, 0.0, 0.1, 0.02, 0.3, 3)

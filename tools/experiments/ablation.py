@@ -58,7 +58,7 @@ class TwoLabels(CutTracker):
         return WindowLabels(label, 0)
 
 
-TRACKERS["two labels"] = TwoLabels
+TRACKERS["two labels"] = f"{__name__}:TwoLabels"
 
 
 def main() -> None:

@@ -20,7 +20,7 @@ from stseg.records.predicted_tracks import PredictedTracks
 from stseg.records.sizes import Sizes
 from stseg.trackers.framewise import FramewiseTracker
 from stseg.trackers.protocol import FORGETTING, STAYING, Commit, FrameObservations, FusedFrame
-from stseg.trackers.rows import Event
+from stseg.trackers.rows import Event, TrackPlaces
 from stseg.tracking.filter.assignment import assign, distances
 
 _METHODS = {"messages": propagate, "condensation": condense}
@@ -160,7 +160,7 @@ class BeliefTracker(FramewiseTracker):
         covariance: Floats = np.array([target.star.ground.covariance for target in seen]).reshape(-1, 2, 2)
         height, score = (np.array(column, float) for column in ([t.height for t in seen], self._scores(seen)))
         width = np.full(len(seen), self.config.body.width_mean)
-        return self.commit(fused, ids, ground, covariance, height, width, score, events)
+        return self.commit(fused, TrackPlaces(ids, ground, covariance, height, width, score), events)
 
     @staticmethod
     def _scores(seen: list[Target]) -> list[float]:

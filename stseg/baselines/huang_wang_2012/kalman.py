@@ -1,4 +1,4 @@
-"""A Kalman filter for each track over the detections that survive ghost removal (Hwang and Wang 2012, section V.E).
+"""A Kalman filter for each track over the detections that survive ghost removal (Huang and Wang 2012, section V.E).
 
 Frame by frame: filters are predicted, detections within their gates are assigned one to one and correct them, and
 unassigned detections are births. The paper's temporal check, which removes short tracks, is the run's last step
@@ -19,7 +19,7 @@ from stseg.records.predicted_tracks import PredictedTracks
 from stseg.records.sizes import Sizes
 from stseg.trackers.framewise import FramewiseTracker
 from stseg.trackers.protocol import FORGETTING, STAYING, Commit, FrameObservations, FusedFrame
-from stseg.trackers.rows import Event
+from stseg.trackers.rows import Event, TrackPlaces
 from stseg.tracking.filter.assignment import assign
 
 
@@ -102,9 +102,8 @@ class KalmanTracker(FramewiseTracker):
         people = fused.people
         found, which = np.flatnonzero(person >= 0), person[person >= 0]
         ids, ground = self.ids[found], self.filters.state[found, :2]
-        commit = self.commit(
-            fused, ids, ground, self.filters.covariance[found, :2, :2], people.height[which], people.width[which],
-            people.evidence[which], events,
-        )  # fmt: skip
+        covariance, score = self.filters.covariance[found, :2, :2], people.evidence[which]
+        tracks = TrackPlaces(ids, ground, covariance, people.height[which], people.width[which], score)
+        commit = self.commit(fused, tracks, events)
         commit.trajectory["raw_x"], commit.trajectory["raw_y"] = people.ground[which].T
         return commit

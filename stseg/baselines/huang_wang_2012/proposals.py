@@ -50,8 +50,8 @@ class Proposals:
         if self.config.source in ("probability", "both"):
             self.probability = DetectionProbability(rig, self.config, config.body, map_steps(rig, kinds))
 
-    def of(self, seen: Sequence[ViewEvidence], fuse: Fuse) -> Candidates | None:
-        """Candidates of a frame, best first by source; None with `proposals.source = "lattice"`.
+    def of(self, seen: Sequence[ViewEvidence], fuse: Fuse) -> Candidates:
+        """Candidates of a frame, best first by source.
 
         Parameters
         ----------
@@ -60,8 +60,6 @@ class Proposals:
         fuse
             The volume float32 (plane, y, x) of a frame's evidence under an explanation, nats (`stseg.occupancy`).
         """
-        if self.config.source == "lattice":
-            return None
         found = self._pool(np.zeros((0, 2)))
         if self.config.source in ("volume", "both"):
             volume = fuse(seen, empty_explanation(self.rig, seen))

@@ -28,7 +28,7 @@ from stseg.records.predicted_tracks import PredictedTracks
 from stseg.records.sizes import Sizes
 from stseg.trackers.framewise import FramewiseTracker
 from stseg.trackers.protocol import FORGETTING, STAYING, Commit, FrameObservations, FusedFrame
-from stseg.trackers.rows import Event
+from stseg.trackers.rows import Event, TrackPlaces
 from stseg.tracking.filter.assignment import assign, distances
 
 _FLOOR = 0.05
@@ -91,7 +91,8 @@ class ParticleTracker(FramewiseTracker):
         crowd, events = self.crowd, births + deaths
         nats = np.array([evidence.get(int(i), 0.0) for i in crowd.ids])
         width = np.full(len(crowd), self.config.body.width_mean)
-        return [self.commit(fused, crowd.ids, crowd.ground, crowd.covariance, crowd.height, width, nats, events)]
+        tracks = TrackPlaces(crowd.ids, crowd.ground, crowd.covariance, crowd.height, width, nats)
+        return [self.commit(fused, tracks, events)]
 
     def _step(self, frame: int) -> float:
         """Standard deviation of a person's step to a frame, metres."""

@@ -1,1 +1,0 @@
-"""Identities of the whole run: multiple hypotheses of which rows belong to one person."""
