@@ -3,8 +3,7 @@
     python tools/bench_cut.py [--sections synthetic,wide,real,memory] [--seeds 6] [--data ../shared/data]
 
 PyMaxflow builds its graph, solves and reads the labels; stseg does the same from the same energy. Each is the better
-of two calls. Seconds are those of the processor, which other programs on the machine hardly change; with two threads
-they are those of the clock, for both.
+of two calls. Seconds are those of the processor, which other programs on the machine hardly change.
 """
 
 from __future__ import annotations
@@ -23,7 +22,6 @@ from typing import TypeVar
 import numpy as np
 from bench_windows import real, synthetic
 
-from stseg.graphcut.arcs import in_place, in_rows
 from stseg.graphcut.cut import minimum_cut
 from stseg.graphcut.energy import Energy
 from stseg.graphcut.pymaxflow import grid_cut
@@ -63,25 +61,22 @@ def _print_row(row: Row) -> None:
 
 def compare(name: str, energy: Energy) -> Row:
     """Ratios on one window."""
-    theirs, peer, peer_clock = _timed(grid_cut, energy)
-    cut, ours, _ = _timed(lambda window: minimum_cut(window, threads=1), energy)
-    both, _, ours_clock = _timed(minimum_cut, energy)
-    for found in (cut, both):
-        if (found.occupied != theirs.occupied).any():
-            sys.exit(f"bench_cut.py: {name}: labels differ from PyMaxflow's")
+    theirs, peer = _timed(grid_cut, energy)
+    cut, ours = _timed(minimum_cut, energy)
+    if (cut.occupied != theirs.occupied).any():
+        sys.exit(f"bench_cut.py: {name}: labels differ from PyMaxflow's")
     share = 100 * cut.nodes / energy.unary.size
-    figures = {"PyMaxflow ms": 1e3 * peer, "stseg ms": 1e3 * ours, "ratio": peer / ours}
-    return Row(name, {**figures, "ratio, 2 threads": peer_clock / ours_clock, "left %": share})
+    return Row(name, {"PyMaxflow ms": 1e3 * peer, "stseg ms": 1e3 * ours, "ratio": peer / ours, "left %": share})
 
 
-def _timed(solve: Callable[[Energy], T], energy: Energy) -> tuple[T, float, float]:
-    """What is found, and the better of two calls in seconds of the processor and of the clock."""
+def _timed(solve: Callable[[Energy], T], energy: Energy) -> tuple[T, float]:
+    """Result of a call, and the better of two in seconds of the processor."""
     seconds = []
     for _ in range(2):
-        start = time.process_time(), time.perf_counter()
+        start = time.process_time()
         found = solve(energy)
-        seconds.append((time.process_time() - start[0], time.perf_counter() - start[1]))
-    return found, *np.min(seconds, axis=0).tolist()
+        seconds.append(time.process_time() - start)
+    return found, min(seconds)
 
 
 def synthetic_rows(seeds: int, neighbours: int = 8) -> Iterable[Row]:
@@ -125,8 +120,6 @@ def resident(kind: str) -> float:
 SOLVERS: dict[str, Callable[[Energy], object]] = {
     "PyMaxflow MiB": grid_cut,
     "stseg MiB": minimum_cut,
-    "in rows MiB": lambda energy: minimum_cut(energy, storage=in_rows),
-    "in place MiB": lambda energy: minimum_cut(energy, storage=in_place),
 }
 
 

@@ -2,28 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from stseg.arrays import Flags
-from stseg.graphcut.arcs import in_place, in_rows
+from stseg.arrays import AnyArray, Bytes, Flags, Labels
 from stseg.graphcut.energy import Energy
-from stseg.graphcut.graph import Graph
-from stseg.graphcut.lattice import cells
-from stseg.graphcut.parallel_max_flow import Bridges, solve, solve_halves
+from stseg.graphcut.lattice import Lattice, cells, neighbour
+from stseg.graphcut.max_flow import Graph, solve
 from stseg.graphcut.reduction import Reduction, reduce
-from stseg.graphcut.sign_sets import OCCUPIED
+from stseg.graphcut.sign_sets import LABEL_ONE, UNDECIDED
+from stseg.kernels.accelerate import kernel
 
-DENSE = 0.5
-"""Share of undecided cells from which the graph is stored in place: renumbered rows would take twice the memory."""
-TWO_THREADS = 20_000
-"""Undecided nodes from which a second thread gains more time than it costs."""
-_MOST = 16383
-"""Largest capacity: twice as much fits into 16 bits."""
-
-Storage = Callable[[Reduction, int], tuple[Graph, Bridges]]
+GREATEST_CAPACITY = 16383
+"""Quanta: twice as much fits into 16 bits."""
 
 
 @dataclass(frozen=True)
@@ -42,34 +34,49 @@ class Cut:
     nodes: int
 
 
-def minimum_cut(energy: Energy, threads: int = 2, storage: Storage | None = None) -> Cut:
+def minimum_cut(energy: Energy) -> Cut:
     """Labelling of least energy; of several, the one with the fewest cells of label 1.
 
     Parameters
     ----------
     energy
         Capacities of at most 16383 quanta each, and at most 2**30 together.
-    threads
-        1 or 2. The labels do not depend on it.
-    storage
-        Storage of the undecided graph; chosen by its size if None. The labels do not depend on it.
 
     Raises
     ------
     OverflowError
         If a capacity is too large.
     """
-    if energy.capacity.max(initial=0) > _MOST:
-        raise OverflowError(f"a capacity of {energy.capacity.max()} quanta, more than {_MOST}")
+    if energy.capacity.max(initial=0) > GREATEST_CAPACITY:
+        raise OverflowError(f"a capacity of {energy.capacity.max()} quanta, more than {GREATEST_CAPACITY}")
     reduced = reduce(energy)
-    nodes = len(reduced.left)
-    if nodes:
-        arrange = storage or (in_place if nodes > DENSE * energy.unary.size else in_rows)
-        middle = int(reduced.left[nodes // 2]) // reduced.lattice.frame * reduced.lattice.frame
-        if threads == 1 or nodes < TWO_THREADS:
-            graph, _ = arrange(reduced, 0)
-            reached = solve(graph)
-        else:
-            reached = solve_halves(*arrange(reduced, middle))
-        reduced.state[reduced.left[reached if len(reached) == nodes else reached[reduced.left]]] = OCCUPIED
-    return Cut(np.asarray(cells(reduced.state, energy.unary.shape) == OCCUPIED), nodes)
+    if len(reduced.left):
+        reduced.state[reduced.left[solve(_residual_graph(reduced))]] = LABEL_ONE
+    return Cut(np.asarray(cells(reduced.state, energy.unary.shape) == LABEL_ONE), len(reduced.left))
+
+
+def _residual_graph(reduced: Reduction) -> Graph:
+    """Graph of the undecided nodes, renumbered; arcs off the graph have capacity 0 and end at their own node."""
+    size, degree = len(reduced.left), len(reduced.capacity)
+    number = np.empty(len(reduced.state), np.int32)
+    number[reduced.left] = np.arange(size, dtype=np.int32)
+    head, sister = np.empty((2, size * degree), np.int32)
+    residual, first = np.empty(size * degree, np.int16), np.arange(size + 1, dtype=np.int32) * np.int32(degree)
+    _fill_arcs(reduced.left, reduced.state, reduced.lattice, reduced.capacity, number, head, sister, residual)
+    return Graph(residual, reduced.excess.copy(), first, sister, head)
+
+
+@kernel
+def _fill_arcs(
+    left: Labels, state: Bytes, lattice: Lattice, capacity: Labels, number: Labels, head: Labels, sister: Labels,
+    residual: AnyArray,
+) -> None:  # fmt: skip
+    """Fill head, sister and residual of the arcs of the undecided nodes; slots 2 i and 2 i + 1 are opposite."""
+    degree = len(capacity)
+    for k, node in enumerate(left):
+        for slot in range(degree):
+            arc, to = k * degree + slot, neighbour(node, slot, lattice)
+            head[arc], sister[arc], residual[arc] = k, arc, 0
+            if state[to] == UNDECIDED:
+                head[arc], sister[arc] = number[to], number[to] * degree + (slot ^ 1)
+                residual[arc] = capacity[slot]

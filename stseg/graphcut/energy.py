@@ -54,7 +54,7 @@ class Energy:
 
     @cached_property
     def signs(self) -> SignSets:
-        """The cells whose label their sign tells."""
+        """The sets of cells labelled by their sign."""
         return sign_sets(self.unary, self.lattice, self.capacity, self.present)
 
     def spread(self, values: AnyArray) -> AnyArray:

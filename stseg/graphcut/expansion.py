@@ -36,7 +36,7 @@ class LabelEnergy:
     Attributes
     ----------
     first : int64 (n + 1,)
-        Node p may have label[first[p]] .. label[first[p + 1] - 1] or the background, whose cost is 0.
+        Node p may have label[first[p]] .. label[first[p + 1] - 1] or the background at cost 0.
     label : int64 (m,)
         1 or more; ascending for each node.
     cost : int64 (m,)
@@ -81,10 +81,10 @@ def unary_costs(energy: LabelEnergy, labels: Ints) -> Ints:
     """
     costs = np.zeros(energy.cells, np.int64)
     cell = np.repeat(np.arange(energy.cells), np.diff(energy.first))
-    taken = energy.label == labels[cell]
-    costs[cell[taken]] = energy.cost[taken]
-    met = np.bincount(cell[taken], minlength=energy.cells) + (labels == BACKGROUND)
-    if not (met == 1).all():
+    admissible = energy.label == labels[cell]
+    costs[cell[admissible]] = energy.cost[admissible]
+    label_count = np.bincount(cell[admissible], minlength=energy.cells) + (labels == BACKGROUND)
+    if not (label_count == 1).all():
         raise ValueError("a node has an inadmissible label")
     return costs
 

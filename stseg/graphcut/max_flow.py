@@ -1,8 +1,7 @@
 """Maximum flow by two search trees (Boykov and Kolmogorov 2004).
 
-One search tree grows from the source, one from the sink. Where they touch, an augmenting path is saturated; nodes whose
-path to the terminal it cuts are orphans, which find a new parent or become free. Flow may be pushed before the search,
-and arcs may be opened after it: the search continues from its trees.
+One search tree grows from the source, one from the sink. Where they touch, an augmenting path is saturated; nodes
+that it cuts from their terminal are orphans, which find a new parent or become free.
 
 The source stands for label 1: the t-link of a node with `excess` > 0 carries that much from the source, that of a node
 with `excess` < 0 that much to the sink. When no node is active, the source tree holds every node that residual arcs
@@ -15,14 +14,36 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stseg.arrays import Bytes, Ints, Labels
-from stseg.graphcut.graph import Graph, first_arc, head_of, sister_of
-from stseg.kernels.accelerate import part
+from stseg.arrays import AnyArray, Bytes, Flags, Ints, Labels
+from stseg.kernels.accelerate import kernel, part
 
 NO_ARC, TERMINAL, ORPHAN = -1, -2, -3
 """Codes in place of the arc to the parent: free node; root; orphan."""
 SOURCE, SINK = 0, 1
-_FAR = 1 << 30
+_UNBOUNDED = 1 << 30
+"""More than any capacity, quanta, and any path length, arcs."""
+
+
+class Graph(NamedTuple):
+    """A residual graph.
+
+    Attributes
+    ----------
+    residual : int16 or int32 (arc,)
+        Residual capacities (n-links); the arcs of a node are consecutive.
+    excess : int32 (n,)
+        Residual capacity of each t-link: from the source (> 0) or to the sink (< 0).
+    first : int32 (n + 1,)
+        First arc of each node.
+    sister, head : int32 (arc,)
+        Reverse arc of each arc, and the node at its end.
+    """
+
+    residual: AnyArray
+    excess: Labels
+    first: Labels
+    sister: Labels
+    head: Labels
 
 
 class Trees(NamedTuple):
@@ -48,11 +69,11 @@ class Trees(NamedTuple):
 
 
 class Queue(NamedTuple):
-    """Ring buffers of the active nodes and of the orphans of a range of nodes.
+    """Ring buffers of the active nodes and of the orphans.
 
     Attributes
     ----------
-    active_nodes, orphans : int32 (range + 1,)
+    active_nodes, orphans : int32 (n + 1,)
     ends : int64 (5,)
         First and past the last active node; the same of the orphans; the time.
     """
@@ -62,72 +83,78 @@ class Queue(NamedTuple):
     ends: Ints
 
 
-def new_trees(nodes: int) -> Trees:
-    """Empty trees of a graph."""
-    int32s = [np.zeros(nodes, np.int32) for _ in range(3)]
-    return Trees(int32s[0], np.zeros(nodes, np.uint8), int32s[1], int32s[2], np.zeros(nodes, np.uint8))
+def solve(graph: Graph) -> Flags:
+    """Nodes that residual arcs reach from the source at maximum flow, bool (n,); the graph keeps that flow."""
+    nodes = len(graph.excess)
+    parent, timestamp, distance = (np.zeros(nodes, np.int32) for _ in range(3))
+    trees = Trees(parent, np.zeros(nodes, np.uint8), timestamp, distance, np.zeros(nodes, np.uint8))
+    queue = Queue(np.empty(nodes + 1, np.int32), np.empty(nodes + 1, np.int32), np.zeros(5, np.int64))
+    _solve(graph, trees, queue)
+    return np.asarray((trees.tree == SOURCE) & (trees.parent != NO_ARC))
 
 
-def new_queue(nodes: int) -> Queue:
-    """Empty queue for that many nodes."""
-    return Queue(np.empty(nodes + 1, np.int32), np.empty(nodes + 1, np.int32), np.zeros(5, np.int64))
+@kernel
+def _solve(graph: Graph, trees: Trees, queue: Queue) -> None:
+    _push_adjacent(graph)
+    _plant_roots(graph, trees, queue)
+    _search(graph, trees, queue)
 
 
 # Before the search
 
 
 @part
-def push_adjacent(graph: Graph, begin: int, end: int) -> None:
+def _push_adjacent(graph: Graph) -> None:
     """Saturate the paths source, node, neighbour, sink, in one sweep.
 
     Most of the maximum flow takes such paths, and the sweep is faster than the search.
     """
     residual, excess = graph.residual, graph.excess
-    for node in range(begin, end):
+    for node in range(len(excess)):
         left = excess[node]
         if left <= 0:
             continue
-        for arc in range(first_arc(node, graph.first, graph.degree), first_arc(node + 1, graph.first, graph.degree)):
+        for arc in range(graph.first[node], graph.first[node + 1]):
             free_capacity = np.int32(residual[arc])
             if free_capacity == 0:
                 continue
-            to = head_of(arc, node, graph.head, graph.degree, graph.lattice)
+            to = int(graph.head[arc])
             if excess[to] < 0:
                 pushed = min(left, free_capacity, -excess[to])
                 excess[to] += pushed
                 left -= pushed
                 residual[arc] -= pushed
-                residual[sister_of(arc, node, to, graph.sister, graph.degree)] += pushed
+                residual[graph.sister[arc]] += pushed
                 if left == 0:
                     break
         excess[node] = left
 
 
 @part
-def plant_roots(graph: Graph, trees: Trees, queue: Queue, begin: int, end: int) -> None:
+def _plant_roots(graph: Graph, trees: Trees, queue: Queue) -> None:
     """Make each node with excess a root; roots with a residual arc to a free node are active.
 
-    After `push_adjacent` no arc from a source root to a sink root has residual capacity.
+    After `_push_adjacent` no arc from a source root to a sink root has residual capacity.
     """
-    for node in range(begin, end):
+    for node in range(len(graph.excess)):
         trees.parent[node] = TERMINAL if graph.excess[node] != 0 else NO_ARC
         trees.tree[node] = SINK if graph.excess[node] < 0 else SOURCE
         trees.distance[node] = 1
         trees.active[node] = 0
-    for node in range(begin, end):
+    for node in range(len(graph.excess)):
         if graph.excess[node] == 0:
             continue
-        for arc in range(first_arc(node, graph.first, graph.degree), first_arc(node + 1, graph.first, graph.degree)):
-            to = head_of(arc, node, graph.head, graph.degree, graph.lattice)
+        for arc in range(graph.first[node], graph.first[node + 1]):
+            to = int(graph.head[arc])
             if graph.excess[to] == 0:
-                back = sister_of(arc, node, to, graph.sister, graph.degree)
+                back = graph.sister[arc]
                 if graph.residual[arc if graph.excess[node] > 0 else back] > 0:
-                    activate(trees, queue, node)
+                    _activate(trees, queue, node)
                     break
 
 
 @part
-def activate(trees: Trees, queue: Queue, node: int) -> None:
+def _activate(trees: Trees, queue: Queue, node: int) -> None:
     """Append a node to the queue of active nodes, unless it is in it."""
     if trees.active[node] == 0:
         trees.active[node] = 1
@@ -140,7 +167,7 @@ def activate(trees: Trees, queue: Queue, node: int) -> None:
 
 
 @part
-def search(graph: Graph, trees: Trees, queue: Queue) -> None:
+def _search(graph: Graph, trees: Trees, queue: Queue) -> None:
     """Grow, augment and adopt until no node is active."""
     active_nodes, ends, parent, active = queue.active_nodes, queue.ends, trees.parent, trees.active
     while ends[0] != ends[1]:
@@ -167,16 +194,16 @@ def _grow(graph: Graph, trees: Trees, queue: Queue, node: int) -> tuple[int, int
         trees.distance,
     )
     mine = tree[node]
-    for arc in range(first_arc(node, graph.first, graph.degree), first_arc(node + 1, graph.first, graph.degree)):
+    for arc in range(graph.first[node], graph.first[node + 1]):
         if mine == SOURCE and residual[arc] == 0:
             continue
-        to = head_of(arc, node, graph.head, graph.degree, graph.lattice)
-        back = sister_of(arc, node, to, graph.sister, graph.degree)
+        to = int(graph.head[arc])
+        back = graph.sister[arc]
         if mine == SINK and residual[back] == 0:
             continue
         if parent[to] == NO_ARC:
             parent[to], tree[to], timestamp[to], distance[to] = back, mine, timestamp[node], distance[node] + 1
-            activate(trees, queue, to)
+            _activate(trees, queue, to)
         elif tree[to] != mine:
             return (node, arc) if mine == SOURCE else (to, back)
         elif timestamp[to] <= timestamp[node] and distance[to] > distance[node]:
@@ -187,10 +214,10 @@ def _grow(graph: Graph, trees: Trees, queue: Queue, node: int) -> tuple[int, int
 @part
 def _augment(graph: Graph, trees: Trees, queue: Queue, tail: int, bridge: int) -> None:
     """Push the bottleneck of the path through an arc between the trees; nodes below saturated arcs become orphans."""
-    to = head_of(bridge, tail, graph.head, graph.degree, graph.lattice)
+    to = int(graph.head[bridge])
     amount = min(_bottleneck(graph, trees, tail), _bottleneck(graph, trees, to), int(graph.residual[bridge]))
     graph.residual[bridge] -= amount
-    graph.residual[sister_of(bridge, tail, to, graph.sister, graph.degree)] += amount
+    graph.residual[graph.sister[bridge]] += amount
     _push_along_path(graph, trees, queue, tail, amount)
     _push_along_path(graph, trees, queue, to, -amount)
 
@@ -199,11 +226,10 @@ def _augment(graph: Graph, trees: Trees, queue: Queue, tail: int, bridge: int) -
 def _push_along_path(graph: Graph, trees: Trees, queue: Queue, node: int, amount: int) -> None:
     """Add flow to the path between a node and its terminal: from the source, or, if negative, to the sink."""
     residual, excess, parent = graph.residual, graph.excess, trees.parent
-    head, sister, lattice, degree = graph.head, graph.sister, graph.lattice, graph.degree
     while parent[node] >= 0:
         arc = int(parent[node])
-        parent_node = head_of(arc, node, head, degree, lattice)
-        back = sister_of(arc, node, parent_node, sister, degree)
+        parent_node = int(graph.head[arc])
+        back = graph.sister[arc]
         residual[arc] += amount
         residual[back] -= amount
         if residual[back if amount > 0 else arc] == 0:
@@ -217,12 +243,12 @@ def _push_along_path(graph: Graph, trees: Trees, queue: Queue, node: int, amount
 @part
 def _bottleneck(graph: Graph, trees: Trees, node: int) -> int:
     """Residual capacity of the path between a node and its terminal."""
-    least = int(_FAR)
+    least = int(_UNBOUNDED)
     from_source = trees.tree[node] == SOURCE
     arc = trees.parent[node]
     while arc >= 0:
-        parent_node = head_of(arc, node, graph.head, graph.degree, graph.lattice)
-        carries = sister_of(arc, node, parent_node, graph.sister, graph.degree) if from_source else arc
+        parent_node = int(graph.head[arc])
+        carries = graph.sister[arc] if from_source else arc
         least = min(least, int(graph.residual[carries]))
         node, arc = parent_node, trees.parent[parent_node]
     return min(least, int(abs(graph.excess[node])))
@@ -230,7 +256,7 @@ def _bottleneck(graph: Graph, trees: Trees, node: int) -> int:
 
 @part
 def _make_orphan(trees: Trees, queue: Queue, node: int) -> None:
-    """Put a node whose path is saturated at the front of the orphans."""
+    """Put a node behind a saturated arc at the front of the orphans."""
     trees.parent[node] = ORPHAN
     first = queue.ends[2] - 1 if queue.ends[2] > 0 else len(queue.orphans) - 1
     queue.orphans[first] = node
@@ -254,7 +280,7 @@ def _adopt(graph: Graph, trees: Trees, queue: Queue) -> None:
 
 @part
 def _find_parent(graph: Graph, trees: Trees, node: int, time: int) -> tuple[int, int]:
-    """Of the arcs to neighbours connected to the terminal, the one with the shortest path; its arc and path length."""
+    """Arc to the neighbour with the shortest path to the terminal, and the length of that path."""
     residual, parent, tree, timestamp, distance = (
         graph.residual,
         trees.parent,
@@ -263,19 +289,19 @@ def _find_parent(graph: Graph, trees: Trees, node: int, time: int) -> tuple[int,
         trees.distance,
     )
     mine = tree[node]
-    best, least = NO_ARC, _FAR
-    for arc in range(first_arc(node, graph.first, graph.degree), first_arc(node + 1, graph.first, graph.degree)):
+    best, least = NO_ARC, _UNBOUNDED
+    for arc in range(graph.first[node], graph.first[node + 1]):
         if mine == SINK and residual[arc] == 0:
             continue
-        to = head_of(arc, node, graph.head, graph.degree, graph.lattice)
-        if mine == SOURCE and residual[sister_of(arc, node, to, graph.sister, graph.degree)] == 0:
+        to = int(graph.head[arc])
+        if mine == SOURCE and residual[graph.sister[arc]] == 0:
             continue
         if parent[to] == NO_ARC or tree[to] != mine:
             continue
         away, above = 0, to
         while timestamp[above] != time and parent[above] >= 0:
             away += 1
-            above = head_of(parent[above], above, graph.head, graph.degree, graph.lattice)
+            above = int(graph.head[parent[above]])
         if timestamp[above] != time:
             if parent[above] != TERMINAL:
                 continue
@@ -287,7 +313,7 @@ def _find_parent(graph: Graph, trees: Trees, node: int, time: int) -> tuple[int,
         while timestamp[above] != time:
             timestamp[above], distance[above] = time, away
             away -= 1
-            above = head_of(parent[above], above, graph.head, graph.degree, graph.lattice)
+            above = int(graph.head[parent[above]])
     return best, least
 
 
@@ -295,13 +321,13 @@ def _find_parent(graph: Graph, trees: Trees, node: int, time: int) -> tuple[int,
 def _free(graph: Graph, trees: Trees, queue: Queue, node: int) -> None:
     """Free an orphan without a parent: neighbours with a residual arc to it are active, its children orphans."""
     mine = trees.tree[node]
-    for arc in range(first_arc(node, graph.first, graph.degree), first_arc(node + 1, graph.first, graph.degree)):
-        to = head_of(arc, node, graph.head, graph.degree, graph.lattice)
+    for arc in range(graph.first[node], graph.first[node + 1]):
+        to = int(graph.head[arc])
         if trees.parent[to] == NO_ARC or trees.tree[to] != mine:
             continue
-        back = sister_of(arc, node, to, graph.sister, graph.degree)
+        back = graph.sister[arc]
         if graph.residual[back if mine == SOURCE else arc] > 0:
-            activate(trees, queue, to)
+            _activate(trees, queue, to)
         if trees.parent[to] == back:
             trees.parent[to] = ORPHAN
             last = queue.ends[3]

@@ -12,7 +12,7 @@ import numpy as np
 from stseg.arrays import Flags, Ints, Labels
 from stseg.graphcut.cut import Cut
 from stseg.graphcut.energy import Energy
-from stseg.graphcut.sparse import MOST
+from stseg.graphcut.sparse import CAPACITY_LIMIT
 
 
 def grid_cut(energy: Energy) -> Cut:
@@ -39,7 +39,7 @@ def sparse_cut(
     """Minimum cut of a list of edges, as `stseg.graphcut.sparse.sparse_cut`."""
     graph = maxflow.GraphInt(len(unary), len(start))
     nodes = graph.add_nodes(len(unary))
-    gain = unary.clip(-MOST - 1, MOST + 1)
+    gain = unary.clip(-CAPACITY_LIMIT - 1, CAPACITY_LIMIT + 1)
     graph.add_grid_tedges(nodes, (-gain).clip(0), gain.clip(0))
     graph.add_edges(*(np.asarray(part, np.int64) for part in (start, end, backward, forward)))
     graph.maxflow()

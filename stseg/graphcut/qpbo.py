@@ -20,7 +20,7 @@ from scipy.sparse.csgraph import connected_components
 from stseg.arrays import Flags, Ints
 from stseg.graphcut.sparse import sparse_cut
 
-ENUMERATED = 12
+ENUMERATION_LIMIT = 12
 """Largest component of undecided nodes that is enumerated."""
 
 
@@ -72,7 +72,7 @@ def minimise(energy: QuadraticEnergy, cut: Callable[..., Flags] = sparse_cut) ->
     labels, open_, bound = _roof_dual(energy, cut)
     exact = True
     for nodes in _components(energy, open_):
-        if len(nodes) <= ENUMERATED:
+        if len(nodes) <= ENUMERATION_LIMIT:
             _enumerate(energy, labels, nodes)
         else:
             exact = False
@@ -98,9 +98,9 @@ def _roof_dual(energy: QuadraticEnergy, cut: Callable[..., Flags]) -> tuple[Flag
     start, end = np.concatenate([p, n + q, r, s]), np.concatenate([q, n + p, n + s, n + r])
     weight = np.concatenate([a, a, c, c])
     gain = np.concatenate([-unary, unary])
-    taken = cut(gain, start, end, weight, np.zeros_like(weight))
-    doubled = -int(gain[taken].sum()) + int(weight[taken[start] & ~taken[end]].sum()) + int(unary.sum())
-    label, complement = taken[:n], taken[n:]
+    in_source = cut(gain, start, end, weight, np.zeros_like(weight))
+    doubled = -int(gain[in_source].sum()) + int(weight[in_source[start] & ~in_source[end]].sum()) + int(unary.sum())
+    label, complement = in_source[:n], in_source[n:]
     return label & ~complement, np.asarray(label == complement), -(-doubled // 2)
 
 

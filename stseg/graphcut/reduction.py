@@ -1,8 +1,8 @@
-"""Exact reduction of a binary energy: cells whose optimal label is known before the cut.
+"""Exact reduction of a binary energy: optimal labels of cells known before the cut.
 
 First come the sets of `stseg.graphcut.sign_sets`, then persistency: with the capacities to decided neighbours
-added to its unary term, a cell whose unary term outweighs its capacities to undecided neighbours is decided, which may
-decide its neighbours.
+added to its unary term, a cell is decided if that outweighs its capacities to undecided neighbours, which may decide
+its neighbours.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ import numpy as np
 from stseg.arrays import Bytes, Flags, Labels
 from stseg.graphcut.energy import Energy
 from stseg.graphcut.lattice import Lattice, cells, neighbour, spread
-from stseg.graphcut.sign_sets import EMPTY, OCCUPIED, OPEN
+from stseg.graphcut.sign_sets import LABEL_ONE, LABEL_ZERO, UNDECIDED
 from stseg.kernels.accelerate import part
 
-HOPELESS = 0.9
+WEAK_SHARE_LIMIT = 0.9
 """Share of cells with weak unary terms from which too few could be decided to pay for the reduction."""
 
 
@@ -49,21 +49,21 @@ class Reduction:
 def reduce(energy: Energy) -> Reduction:
     """Decide cells by both rules."""
     lattice, capacity, unary = energy.lattice, np.repeat(energy.capacity, 2), spread(energy.unary)
-    if energy.signs.weak > HOPELESS * energy.unary.size:
-        state = energy.spread(np.full(energy.unary.shape, OPEN, np.uint8))
+    if energy.signs.weak > WEAK_SHARE_LIMIT * energy.unary.size:
+        state = energy.spread(np.full(energy.unary.shape, UNDECIDED, np.uint8))
         left = np.flatnonzero(state).astype(np.int32)
         return Reduction(lattice, capacity, state, left, unary[left])
     state = energy.signs.state.copy()
     stack, undecided = (np.empty(len(state), np.int32) for _ in range(2))
-    left = np.flatnonzero(state == OPEN).astype(np.int32)
+    left = np.flatnonzero(state == UNDECIDED).astype(np.int32)
     _decide_nodes(left, unary, undecided, state, lattice, capacity, stack)
-    left = left[state[left] == OPEN]
+    left = left[state[left] == UNDECIDED]
     return Reduction(lattice, capacity, state, left, unary[left])
 
 
 def greatest_empty_set(energy: Energy) -> Flags:
     """The cells that the set rule gives label 0, bool (time, plane, y, x)."""
-    return np.asarray(cells(energy.signs.state, energy.unary.shape) == EMPTY)
+    return np.asarray(cells(energy.signs.state, energy.unary.shape) == LABEL_ZERO)
 
 
 @part
@@ -77,9 +77,9 @@ def _decide_nodes(
     for node in left:
         _sum_neighbours(node, gain, undecided, state, lattice, capacity)
     for first in left:
-        if state[first] != OPEN or not _is_decided(first, gain, undecided):
+        if state[first] != UNDECIDED or not _is_decided(first, gain, undecided):
             continue
-        state[first] = OCCUPIED if gain[first] > 0 else EMPTY
+        state[first] = LABEL_ONE if gain[first] > 0 else LABEL_ZERO
         stack[0] = first
         top = 1
         while top > 0:
@@ -87,11 +87,11 @@ def _decide_nodes(
             node = stack[top]
             for slot in range(len(capacity)):
                 to = np.uint64(neighbour(node, slot, lattice))
-                if state[to] == OPEN:
+                if state[to] == UNDECIDED:
                     undecided[to] -= capacity[slot]
-                    gain[to] += capacity[slot] if state[node] == OCCUPIED else -capacity[slot]
+                    gain[to] += capacity[slot] if state[node] == LABEL_ONE else -capacity[slot]
                     if _is_decided(int(to), gain, undecided):
-                        state[to] = OCCUPIED if gain[to] > 0 else EMPTY
+                        state[to] = LABEL_ONE if gain[to] > 0 else LABEL_ZERO
                         stack[top] = to
                         top += 1
 
@@ -107,10 +107,10 @@ def _sum_neighbours(
 ) -> None:  # fmt: skip
     undecided[node] = 0
     for slot in range(len(capacity)):
-        there = state[np.uint64(neighbour(node, slot, lattice))]
-        if there == OPEN:
+        neighbour_state = state[np.uint64(neighbour(node, slot, lattice))]
+        if neighbour_state == UNDECIDED:
             undecided[node] += capacity[slot]
-        elif there == OCCUPIED:
+        elif neighbour_state == LABEL_ONE:
             gain[node] += capacity[slot]
-        elif there == EMPTY:
+        elif neighbour_state == LABEL_ZERO:
             gain[node] -= capacity[slot]

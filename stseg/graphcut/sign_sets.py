@@ -1,4 +1,4 @@
-"""Cells whose optimal label their sign tells, in sets.
+"""Sets of cells of one sign that have the optimal label of their sign.
 
 Let every cell of a set S have u <= 0 and -u at least the sum of its capacities to cells outside S. Then label 1 for any
 subset of S gains nothing, so all of S has label 0 in the minimum with the smallest source set. The greatest such set is
@@ -15,7 +15,7 @@ from stseg.arrays import Bytes, Flags, Labels
 from stseg.graphcut.lattice import Lattice, neighbour
 from stseg.kernels.accelerate import kernel, part
 
-GUARD, OPEN, OCCUPIED, EMPTY = 0, 1, 2, 3
+GUARD, UNDECIDED, LABEL_ONE, LABEL_ZERO = 0, 1, 2, 3
 """States of a node: no cell, undecided, label 1, label 0."""
 
 
@@ -28,7 +28,7 @@ class SignSets:
     state : uint8 (node,)
         State of each node; not to be written to.
     weak
-        Number of cells with u <= 0 whose unary term is less than all their capacities.
+        Number of cells with u <= 0 and a unary term below the sum of their capacities.
     """
 
     state: Bytes
@@ -57,10 +57,14 @@ def _fill_sets(unary: Labels, present: Flags, most: int, state: Bytes, margin: L
         for p in range(planes):
             for y in range(rows):
                 first = ((t * (planes + 1) + p + 1) * (rows + 1) + y + 1) * (columns + 1) + 1
-                gain, own, left = unary[t, p, y], state[first : first + columns], margin[first : first + columns]
+                gain, side, slack = (
+                    unary[t, p, y],
+                    state[first : first + columns],
+                    margin[first : first + columns],
+                )
                 for x in range(columns):
-                    own[x] = (OCCUPIED if gain[x] > 0 else EMPTY) if present[y, x] else GUARD
-                    left[x] = gain[x] - 1 if gain[x] > 0 else -gain[x]
+                    side[x] = (LABEL_ONE if gain[x] > 0 else LABEL_ZERO) if present[y, x] else GUARD
+                    slack[x] = gain[x] - 1 if gain[x] > 0 else -gain[x]
                     weak += 1 if -most < gain[x] <= 0 else 0
     return weak
 
@@ -72,16 +76,16 @@ def _decide_sets(margin: Labels, state: Bytes, lattice: Lattice, capacity: Label
     `margin` is a node's unary magnitude less its capacities to nodes outside its set.
     """
     for node in range(len(state)):
-        if state[node] == OCCUPIED:
+        if state[node] == LABEL_ONE:
             for slot in range(len(capacity)):
                 to = np.uint64(neighbour(node, slot, lattice))
-                if state[to] == OPEN or state[to] == EMPTY:
+                if state[to] == UNDECIDED or state[to] == LABEL_ZERO:
                     margin[node] -= capacity[slot]
                     margin[to] -= capacity[slot]
-                    if state[to] == EMPTY and margin[to] < 0:
+                    if state[to] == LABEL_ZERO and margin[to] < 0:
                         _remove_from_set(int(to), margin, state, lattice, capacity, stack)
     for node in range(len(state)):
-        if state[node] == OCCUPIED and margin[node] < 0:
+        if state[node] == LABEL_ONE and margin[node] < 0:
             _remove_from_set(node, margin, state, lattice, capacity, stack)
 
 
@@ -91,17 +95,17 @@ def _remove_from_set(
 ) -> None:
     """Remove a node from its set, and all that violate the rule without it."""
     side = state[node]
-    state[node] = OPEN
+    state[node] = UNDECIDED
     stack[0] = node
     top = 1
     while top > 0:
         top -= 1
-        taken = stack[top]
+        node_out = stack[top]
         for slot in range(len(capacity)):
-            to = np.uint64(neighbour(taken, slot, lattice))
+            to = np.uint64(neighbour(node_out, slot, lattice))
             if state[to] == side:
                 margin[to] -= capacity[slot]
                 if margin[to] < 0:
-                    state[to] = OPEN
+                    state[to] = UNDECIDED
                     stack[top] = to
                     top += 1

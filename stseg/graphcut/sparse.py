@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from stseg.arrays import Flags, Ints, Labels
-from stseg.graphcut.graph import Graph
-from stseg.graphcut.parallel_max_flow import solve
+from stseg.graphcut.max_flow import Graph, solve
 from stseg.kernels.accelerate import kernel
 
-MOST = 1 << 29
+CAPACITY_LIMIT = 1 << 29
 """Greatest sum of the capacities of one node, quanta."""
 
 
@@ -35,19 +34,19 @@ def sparse_cut(
     Raises
     ------
     OverflowError
-        If the capacities of a node sum to more than `MOST`.
+        If the capacities of a node sum to more than `CAPACITY_LIMIT`.
     """
     size, edges = len(unary), len(start)
     around = np.bincount(start, forward + backward, size) + np.bincount(end, forward + backward, size)
-    if edges and around.max() > MOST:
-        raise OverflowError(f"capacities of one node sum up to {around.max():.0f} quanta, more than {MOST}")
+    if edges and around.max() > CAPACITY_LIMIT:
+        raise OverflowError(f"capacities of one node sum up to {around.max():.0f} quanta, more than {CAPACITY_LIMIT}")
     # A t-link need not exceed the node's n-links.
-    excess = unary.clip(-MOST - 1, MOST + 1).astype(np.int32)
+    excess = unary.clip(-CAPACITY_LIMIT - 1, CAPACITY_LIMIT + 1).astype(np.int32)
     first = np.zeros(size + 1, np.int32)
     np.cumsum(np.bincount(start, minlength=size) + np.bincount(end, minlength=size), out=first[1:])
     head, sister, residual = (np.empty(2 * edges, np.int32) for _ in range(3))
     _list_arcs(first[:-1].copy(), start, end, forward, backward, head, sister, residual)
-    return solve(Graph(residual, excess, 0, first, sister, head, None))
+    return solve(Graph(residual, excess, first, sister, head))
 
 
 @kernel
@@ -64,9 +63,9 @@ def _list_arcs(
     """Fill the arcs of all nodes; `free` is each node's next free arc."""
     for edge in range(len(start)):
         p, q = start[edge], end[edge]
-        there = free[p]
+        ahead = free[p]
         free[p] += 1
         back = free[q]
         free[q] += 1
-        head[there], sister[there], residual[there] = q, back, forward[edge]
-        head[back], sister[back], residual[back] = p, there, backward[edge]
+        head[ahead], sister[ahead], residual[ahead] = q, back, forward[edge]
+        head[back], sister[back], residual[back] = p, ahead, backward[edge]

@@ -1,4 +1,4 @@
-"""Short tracks and tracks of ghosts are dropped (Hwang and Wang 2012, section V.E)."""
+"""Short tracks and tracks of ghosts are dropped (Huang and Wang 2012, section V.E)."""
 
 from __future__ import annotations
 

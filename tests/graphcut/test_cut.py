@@ -19,16 +19,14 @@ from scipy.sparse.csgraph import maximum_flow
 from stseg.config import SegmentationConfig
 from stseg.errors import ConfigError
 from stseg.geometry import Grid
-from stseg.graphcut import cut as cut_module
 from stseg.graphcut import pymaxflow
-from stseg.graphcut.arcs import in_place, in_rows
-from stseg.graphcut.cut import Storage, minimum_cut
+from stseg.graphcut.cut import minimum_cut
 from stseg.graphcut.energy import QUANTUM, Energy
 from stseg.graphcut.pymaxflow import grid_cut
 from stseg.graphcut.reduction import reduce
-from stseg.graphcut.sign_sets import OCCUPIED, OPEN
+from stseg.graphcut.sign_sets import LABEL_ONE, UNDECIDED
 from stseg.graphcut.solvers import SOLVERS, find_solver
-from stseg.graphcut.sparse import MOST, sparse_cut
+from stseg.graphcut.sparse import CAPACITY_LIMIT, sparse_cut
 from stseg.segmentation.cell_motion import successor_cells
 from stseg.segmentation.cut_energy import build_energy, neighbourhood
 
@@ -36,16 +34,8 @@ ROOT = Path(__file__).parents[2]
 DATA = Path(os.environ.get("STSEG_DATA", ROOT / "../shared/data"))
 TINY = [(1, 1, 3, 4), (2, 1, 2, 3), (2, 2, 1, 3), (3, 1, 2, 2), (2, 2, 3, 1), (1, 3, 2, 2), (4, 1, 1, 3), (12, 1, 1, 1)]
 """Volumes of at most twelve cells, with and without each of the axes."""
-WAYS = [(in_rows, 1), (in_rows, 2), (in_place, 1), (in_place, 2)]
-"""Every path of the solver: how arcs are stored, and the number of threads."""
-PLAIN = os.environ.get("NUMBA_DISABLE_JIT") == "1"
+INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT") == "1"
 """Whether kernels run as plain Python, slowly."""
-
-
-@pytest.fixture
-def always_two(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Two threads even for a handful of nodes."""
-    monkeypatch.setattr(cut_module, "TWO_THREADS", 1)
 
 
 def window(
@@ -136,16 +126,14 @@ def test_a_moving_cell_displaces_the_floor() -> None:
 # The minimum
 
 
-@pytest.mark.usefixtures("always_two")
 @pytest.mark.parametrize("shape", TINY)
 def test_the_cut_is_the_smallest_of_the_minima(shape: tuple[int, ...]) -> None:
-    for seed in range(8 if PLAIN else 24):
+    for seed in range(8 if INTERPRETED else 24):
         energy = window(seed, shape, unary=3, capacity=2, neighbours=(8, 80)[seed % 2])
         least, smallest = reference.least_energy(energy)
-        for storage, threads in WAYS:
-            occupied = minimum_cut(energy, threads, storage).occupied
-            assert energy.of(occupied) == least, seed
-            np.testing.assert_array_equal(occupied, smallest, err_msg=f"seed {seed}")
+        occupied = minimum_cut(energy).occupied
+        assert energy.of(occupied) == least, seed
+        np.testing.assert_array_equal(occupied, smallest, err_msg=f"seed {seed}")
         np.testing.assert_array_equal(grid_cut(energy).occupied, smallest, err_msg=f"PyMaxflow, seed {seed}")
 
 
@@ -161,12 +149,11 @@ def flow_value(energy: Energy) -> int:
     return int(maximum_flow(graph, size, size + 1).flow_value)
 
 
-@pytest.mark.usefixtures("always_two")
 @pytest.mark.parametrize("shape", [(3, 2, 8, 9), (5, 3, 6, 7), (1, 4, 10, 10), (8, 1, 9, 8)])
 @pytest.mark.parametrize("kind", ["whole numbers", "volume", "smooth volume"])
 @pytest.mark.parametrize("neighbours", [8, 80])
 def test_the_cut_is_that_of_other_solvers(shape: tuple[int, ...], kind: str, neighbours: int) -> None:
-    for seed in range(1 if PLAIN else 3):
+    for seed in range(1 if INTERPRETED else 3):
         if kind == "whole numbers":
             energy = window(seed, shape, 6, 2, 2, neighbours)
         else:
@@ -175,11 +162,9 @@ def test_the_cut_is_that_of_other_solvers(shape: tuple[int, ...], kind: str, nei
         expected = grid_cut(energy).occupied
         # Least energy, relative to all background, is the least cut less what all background loses.
         assert energy.of(expected) == flow_value(energy) - int(energy.unary.clip(0).sum())
-        for storage, threads in WAYS:
-            cut = minimum_cut(energy, threads, storage)
-            np.testing.assert_array_equal(cut.occupied, expected)
-            assert cut.nodes <= energy.unary.size
-        np.testing.assert_array_equal(minimum_cut(energy).occupied, expected)
+        cut = minimum_cut(energy)
+        np.testing.assert_array_equal(cut.occupied, expected)
+        assert cut.nodes <= energy.unary.size
 
 
 @settings(deadline=None, max_examples=40)
@@ -187,11 +172,11 @@ def test_the_cut_is_that_of_other_solvers(shape: tuple[int, ...], kind: str, nei
 def test_the_reduction_is_exact(seed: int, strength: int, neighbours: int) -> None:
     energy = window(seed, (3, 2, 4, 5), unary=strength, capacity=4, neighbours=neighbours)
     reduced = reduce(energy)
-    np.testing.assert_array_equal(reduced.left, np.flatnonzero(reduced.state == OPEN))
+    np.testing.assert_array_equal(reduced.left, np.flatnonzero(reduced.state == UNDECIDED))
     expected = grid_cut(energy).occupied
     shape = (3, 3, 5, 6)
     state = reduced.state[: np.prod(shape)].reshape(shape)[:, 1:, 1:, 1:]
-    np.testing.assert_array_equal(state[state != OPEN] == OCCUPIED, expected[state != OPEN])
+    np.testing.assert_array_equal(state[state != UNDECIDED] == LABEL_ONE, expected[state != UNDECIDED])
 
 
 def test_strong_evidence_is_decided_by_the_reduction() -> None:
@@ -264,31 +249,29 @@ def test_sparse_cut_of_extremes() -> None:
     none = np.zeros(0, np.int64)
     assert sparse_cut(np.array([1, 0, -1]), none, none, none, none).tolist() == [True, False, False]
     with pytest.raises(OverflowError, match="capacities"):
-        sparse_cut(endless, start, end, MOST * one, one)
+        sparse_cut(endless, start, end, CAPACITY_LIMIT * one, one)
 
 
 # Threads
 
 
-@pytest.mark.usefixtures("always_two")
-@pytest.mark.parametrize("storage", [in_rows, in_place])
-def test_threads_end_and_agree_every_time(storage: Storage) -> None:
-    """Many windows in a row, so that the memory of one is reused by the next; a race would hang or differ."""
+def test_cuts_in_two_threads_at_once_agree() -> None:
+    """Many windows in a row, so that the memory of one is reused by the next; a race would differ."""
     windows = [smooth_window(seed, (6, 3, 9, 9), smoothness=2.5) for seed in range(3)]
-    alone = [minimum_cut(energy, 1, storage).occupied for energy in windows]
+    alone = [minimum_cut(energy).occupied for energy in windows]
     assert any(reduce(energy).left.size > 200 for energy in windows)
     with ThreadPoolExecutor(2) as callers:
-        for _ in range(3 if PLAIN else 60):
-            asked = [callers.submit(minimum_cut, energy, 2, storage) for energy in windows]
-            for expected, given_back in zip(alone, asked, strict=True):
-                np.testing.assert_array_equal(given_back.result(timeout=60).occupied, expected)
+        for _ in range(3 if INTERPRETED else 60):
+            results = [callers.submit(minimum_cut, energy) for energy in windows]
+            for expected, result in zip(alone, results, strict=True):
+                np.testing.assert_array_equal(result.result(timeout=60).occupied, expected)
 
 
 # Real windows
 
 
 @pytest.mark.skipif(not (DATA / "uu4").exists(), reason="the uu4 set is not at hand")
-@pytest.mark.skipif(PLAIN, reason="too large for plain Python")
+@pytest.mark.skipif(INTERPRETED, reason="too large for plain Python")
 def test_real_windows(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(ROOT / "tools")
     energies = list(importlib.import_module("bench_windows").real("uu4", "0:10", DATA))
@@ -296,10 +279,9 @@ def test_real_windows(monkeypatch: pytest.MonkeyPatch) -> None:
     for energy in energies:
         expected = grid_cut(energy).occupied
         assert expected.any()
-        for storage, threads in WAYS:
-            np.testing.assert_array_equal(minimum_cut(energy, threads, storage).occupied, expected)
+        np.testing.assert_array_equal(minimum_cut(energy).occupied, expected)
 
 
 def test_pymaxflow_is_taken_where_kernels_are_not_compiled() -> None:
-    assert find_solver("stseg") is SOLVERS["pymaxflow" if PLAIN else "stseg"]
+    assert find_solver("stseg") is SOLVERS["pymaxflow" if INTERPRETED else "stseg"]
     assert find_solver("pymaxflow") is SOLVERS["pymaxflow"]

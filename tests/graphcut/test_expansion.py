@@ -36,7 +36,7 @@ def random_energy(seed: int, shape: tuple[int, ...], labels: int, weight: int, a
 def some_start(energy: LabelEnergy, seed: int) -> Ints:
     """Any admissible labelling."""
     rng = np.random.default_rng(seed)
-    return np.array([rng.choice(sorted(own)) for own in reference.costs(energy)])
+    return np.array([rng.choice(sorted(costs)) for costs in reference.costs(energy)])
 
 
 TINY = [(2, 4), (2, 2, 2), (8,), (1, 7)]
@@ -110,8 +110,8 @@ def test_with_one_weight_the_result_is_that_of_aexpansion_grid(admissible: float
             drawn.first, drawn.label, drawn.cost, drawn.start, drawn.end, np.full(len(drawn.start), weight)
         )
         table = np.full((energy.cells, labels + 1), 1e6)
-        for p, own in enumerate(reference.costs(energy)):
-            table[p, list(own)] = list(own.values())
+        for p, costs in enumerate(reference.costs(energy)):
+            table[p, list(costs)] = list(costs.values())
         start = table.argmin(1)
         np.testing.assert_array_equal(start, energy.cheapest_labels())
         differ = weight * (1.0 - np.eye(labels + 1))
@@ -132,8 +132,8 @@ def test_cells_outside_the_binary_cut_never_change() -> None:
     """Cells with label 0 in the binary cut of the best costs stay background."""
     for seed in range(10):
         energy = random_energy(seed, (5, 7), 3, 3, admissible=0.8)
-        best = np.array([max(0, *(-cost for cost in own.values())) for own in reference.costs(energy)])
-        only = np.array([min([own[k] for k in own if k] or [9]) for own in reference.costs(energy)])
+        best = np.array([max(0, *(-cost for cost in costs.values())) for costs in reference.costs(energy)])
+        only = np.array([min([costs[k] for k in costs if k] or [9]) for costs in reference.costs(energy)])
         unary = np.where(best > 0, best, -only)
         inside = sparse_cut(unary, energy.start, energy.end, energy.weight, energy.weight)
         labels = expand(energy, np.where(inside, energy.cheapest_labels(), 0))

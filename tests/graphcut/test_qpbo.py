@@ -41,11 +41,11 @@ def test_the_minimum_is_that_of_all_labellings(seed: int, nodes: int, edges: int
 @given(st.integers(0, 9999))
 def test_the_gap_bounds_what_local_search_misses(seed: int) -> None:
     energy = random_energy(seed, 10, 30, -5, 5)
-    kept, qpbo.ENUMERATED = qpbo.ENUMERATED, 0
+    kept, qpbo.ENUMERATION_LIMIT = qpbo.ENUMERATION_LIMIT, 0
     try:
         found = minimise(energy)
     finally:
-        qpbo.ENUMERATED = kept
+        qpbo.ENUMERATION_LIMIT = kept
     missed = energy.of(found.labels) - least(energy)
     assert 0 <= missed <= found.gap
 

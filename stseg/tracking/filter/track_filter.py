@@ -1,7 +1,7 @@
 """Track states: a constant-velocity Kalman filter for each track, frame by frame.
 
 The prediction is a prior of per-frame detection, which assigns its detections to tracks: detection and data association
-are one decision, and each piece of evidence is used once (Hwang and Wang 2012, section V.E, for the filter;
+are one decision, and each piece of evidence is used once (Huang and Wang 2012, section V.E, for the filter;
 docs/how-it-works.md, Detection, for the prior). A person's height is constant, so it tells two people apart who have
 just crossed.
 """
