@@ -12,7 +12,7 @@ from reference_track_filter import best_pairs
 from stseg.arrays import Boxes, Flags, Floats, Ints, Labels, Singles
 from stseg.bodies.box_fit import GRAIN, TOLERANCE
 from stseg.detection.problem import BoxEvidence, Parameters, PixelEvidence, Problem
-from stseg.graphcut.energy import Energy
+from stseg.graphcut.grid_energy import GridEnergy
 from stseg.occupancy.fusion import ErrorRates
 from stseg.occupancy.visible_cells import SHOULDER
 from stseg.records.people import Explanation
@@ -240,7 +240,7 @@ def left_to_cell(
 # The cut
 
 
-def neighbours(energy: Energy) -> list[Edge]:
+def neighbours(energy: GridEnergy) -> list[Edge]:
     """All edges of a window, cell by cell."""
     frames, planes, rows, columns = energy.unary.shape
     index = np.arange(energy.unary.size).reshape(energy.unary.shape)
@@ -270,14 +270,14 @@ def lead_ahead(motion: Ints) -> Labels:
     return ahead
 
 
-def energy_of(energy: Energy, labels: Flags) -> int:
+def energy_of(energy: GridEnergy, labels: Flags) -> int:
     """E of a labelling, relative to everything background, in quanta."""
     flat, unary = labels.ravel().tolist(), energy.unary.ravel().tolist()
     gained = sum(u for u, occupied in zip(unary, flat, strict=True) if occupied)
     return sum(b for p, q, b in neighbours(energy) if flat[p] != flat[q]) - gained
 
 
-def least_energy(energy: Energy) -> tuple[int, Flags]:
+def least_energy(energy: GridEnergy) -> tuple[int, Flags]:
     """The least energy of all labellings, and the cells that are occupied in every minimum: the smallest object set."""
     size = energy.unary.size
     labels = ((np.arange(2**size)[:, None] >> np.arange(size)) & 1).astype(bool)

@@ -23,7 +23,7 @@ import numpy as np
 from bench_windows import real, synthetic
 
 from stseg.graphcut.cut import minimum_cut
-from stseg.graphcut.energy import Energy
+from stseg.graphcut.grid_energy import GridEnergy
 from stseg.graphcut.pymaxflow import grid_cut
 
 T = TypeVar("T")
@@ -59,7 +59,7 @@ def _print_row(row: Row) -> None:
     print(f"| {row.name} | " + " | ".join(f"{figure:.4g}" for figure in row.figures.values()) + " |", flush=True)
 
 
-def compare(name: str, energy: Energy) -> Row:
+def compare(name: str, energy: GridEnergy) -> Row:
     """Ratios on one window."""
     theirs, peer = _timed(grid_cut, energy)
     cut, ours = _timed(minimum_cut, energy)
@@ -69,7 +69,7 @@ def compare(name: str, energy: Energy) -> Row:
     return Row(name, {"PyMaxflow ms": 1e3 * peer, "stseg ms": 1e3 * ours, "ratio": peer / ours, "left %": share})
 
 
-def _timed(solve: Callable[[Energy], T], energy: Energy) -> tuple[T, float]:
+def _timed(solve: Callable[[GridEnergy], T], energy: GridEnergy) -> tuple[T, float]:
     """Result of a call, and the better of two in seconds of the processor."""
     seconds = []
     for _ in range(2):
@@ -117,7 +117,7 @@ def resident(kind: str) -> float:
     return 0.0
 
 
-SOLVERS: dict[str, Callable[[Energy], object]] = {
+SOLVERS: dict[str, Callable[[GridEnergy], object]] = {
     "PyMaxflow MiB": grid_cut,
     "stseg MiB": minimum_cut,
 }

@@ -21,8 +21,8 @@ from bench_cut import Row, print_table
 from stseg.arrays import Floats, Ints, Labels, Singles
 from stseg.graphcut.cell_subset import subset
 from stseg.graphcut.cut import minimum_cut
-from stseg.graphcut.energy import Energy
 from stseg.graphcut.expansion import LabelEnergy, expand
+from stseg.graphcut.grid_energy import GridEnergy
 from stseg.kernels.accelerate import kernel
 from stseg.segmentation.cell_motion import successor_cells
 from stseg.segmentation.cut_energy import neighbourhood
@@ -80,7 +80,7 @@ def solve(cost: Labels) -> Ints:
     best = np.empty(SHAPE, np.int32)
     _fill_best(cost, best)
     still = successor_cells(np.zeros((SHAPE[0] - 1, *SHAPE[2:], 2), np.int64))
-    window = Energy(best, neighbourhood(8), np.full(4, WEIGHT, np.int32), still)
+    window = GridEnergy(best, neighbourhood(8), np.full(4, WEIGHT, np.int32), still)
     part = subset(window, minimum_cut(window).occupied)
     own = cost.reshape(-1, cost.shape[-1])[part.cell].astype(np.int64)
     more = own[:, 1:] - own[:, :1]

@@ -14,7 +14,7 @@ from workbench import Bench
 from stseg.arrays import Floats, Singles
 from stseg.commands.main import main as stseg
 from stseg.graphcut.cut import Cut, minimum_cut
-from stseg.graphcut.energy import QUANTUM, Energy
+from stseg.graphcut.grid_energy import QUANTUM, GridEnergy
 from stseg.graphcut.solvers import Solver
 from stseg.graphcut.sparse import sparse_cut
 from stseg.segmentation.cell_motion import successor_cells
@@ -25,7 +25,7 @@ _CELL, _RISE, _FRAME = 0.1, 0.2, 1 / 15  # metres, metres, seconds
 _FLOOR = -6.0  # least mean log-likelihood, nats
 
 
-def synthetic(seed: int, level: float, total: float, neighbours: int = 8, shape: tuple[int, ...] = SHAPE) -> Energy:
+def synthetic(seed: int, level: float, total: float, neighbours: int = 8, shape: tuple[int, ...] = SHAPE) -> GridEnergy:
     """A window of people seen as soft silhouettes by a ring of cameras, so that ghosts and rays are as geometry has it.
 
     Parameters
@@ -55,7 +55,7 @@ def synthetic(seed: int, level: float, total: float, neighbours: int = 8, shape:
     capacity = np.rint(weight * total / (2 * weight.sum()) / QUANTUM).astype(np.int32).clip(1)
     still = np.zeros((shape[0] - 1, *shape[2:], 2), np.int64)
     unary = np.rint((volume / cameras - level) / QUANTUM).astype(np.int32)
-    return Energy(unary, offsets, capacity, successor_cells(still))
+    return GridEnergy(unary, offsets, capacity, successor_cells(still))
 
 
 def _walk(rng: np.random.Generator, people: int, shape: tuple[int, ...]) -> Floats:
@@ -89,11 +89,11 @@ def _soft(outside: Floats) -> Floats:
     return np.asarray(1 / (1 + np.exp(np.clip(outside / 0.03, -30, 30))))
 
 
-def real(name: str, frames: str, data: Path) -> Iterator[Energy]:
+def real(name: str, frames: str, data: Path) -> Iterator[GridEnergy]:
     """The windows that a run over these frames of a set of docs/development/measurements.md cuts."""
-    windows: list[Energy] = []
+    windows: list[GridEnergy] = []
 
-    def kept(energy: Energy) -> Cut:
+    def kept(energy: GridEnergy) -> Cut:
         windows.append(energy)
         return minimum_cut(energy)
 

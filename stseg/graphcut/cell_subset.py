@@ -9,7 +9,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 from stseg.arrays import Bytes, Flags, Ints, Labels
-from stseg.graphcut.energy import Energy
+from stseg.graphcut.grid_energy import GridEnergy
 from stseg.graphcut.lattice import Lattice, neighbour, nodes_of
 from stseg.graphcut.sign_sets import GUARD
 from stseg.kernels.accelerate import kernel
@@ -53,7 +53,7 @@ class CellSubset:
         return CellSubset(self.cell[kept], start, end, self.weight[inner], self.border[kept])
 
 
-def subset(energy: Energy, inside: Flags) -> CellSubset:
+def subset(energy: GridEnergy, inside: Flags) -> CellSubset:
     """Subgraph of the cells that are inside, bool (time, plane, y, x)."""
     cell = np.flatnonzero(inside)
     nodes, number = nodes_of(cell, inside.shape), np.full(len(energy.signs.state), _OUTSIDE, np.int32)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stseg.arrays import AnyArray, Bytes, Flags, Labels
-from stseg.graphcut.energy import Energy
+from stseg.graphcut.grid_energy import GridEnergy
 from stseg.graphcut.lattice import Lattice, cells, neighbour
 from stseg.graphcut.max_flow import Graph, solve
 from stseg.graphcut.reduction import Reduction, reduce
@@ -34,7 +34,7 @@ class Cut:
     nodes: int
 
 
-def minimum_cut(energy: Energy) -> Cut:
+def minimum_cut(energy: GridEnergy) -> Cut:
     """Labelling of least energy; of several, the one with the fewest cells of label 1.
 
     Parameters

@@ -36,7 +36,7 @@ class Lattice(NamedTuple):
 
 
 def lattice_of(shape: tuple[int, ...], offsets: Ints, successor: Labels) -> Lattice:
-    """Lattice of a grid of some shape (time, plane, y, x) with the neighbours of `stseg.graphcut.energy.Energy`."""
+    """Lattice of a grid (time, plane, y, x) with the neighbours of a `stseg.graphcut.grid_energy.GridEnergy`."""
     _, planes, rows, columns = shape
     row, plane = columns + 1, (rows + 1) * (columns + 1)
     step = offsets[:, 1:] @ (plane, row, 1)

@@ -11,11 +11,11 @@ import numpy as np
 
 from stseg.arrays import Flags, Ints, Labels
 from stseg.graphcut.cut import Cut
-from stseg.graphcut.energy import Energy
+from stseg.graphcut.grid_energy import GridEnergy
 from stseg.graphcut.sparse import CAPACITY_LIMIT
 
 
-def grid_cut(energy: Energy) -> Cut:
+def grid_cut(energy: GridEnergy) -> Cut:
     """Minimum cut of a grid, as `stseg.graphcut.cut.minimum_cut`: every cell is a node, none is decided before."""
     size = energy.unary.size
     graph = maxflow.GraphInt(size, size * len(energy.offsets))
@@ -46,7 +46,7 @@ def sparse_cut(
     return np.asarray(graph.get_grid_segments(nodes))
 
 
-def _keeps_its_cells(energy: Energy) -> bool:
+def _keeps_its_cells(energy: GridEnergy) -> bool:
     """Whether every edge in time joins a cell to itself: such edges PyMaxflow adds faster as a grid."""
     rows, columns = energy.successor.shape[1:]
     still = np.arange(rows * columns).reshape(rows, columns)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stseg.arrays import Bytes, Flags, Labels
-from stseg.graphcut.energy import Energy
+from stseg.graphcut.grid_energy import GridEnergy
 from stseg.graphcut.lattice import Lattice, cells, neighbour, spread
 from stseg.graphcut.sign_sets import LABEL_ONE, LABEL_ZERO, UNDECIDED
 from stseg.kernels.accelerate import part
@@ -46,7 +46,7 @@ class Reduction:
     excess: Labels
 
 
-def reduce(energy: Energy) -> Reduction:
+def reduce(energy: GridEnergy) -> Reduction:
     """Decide cells by both rules."""
     lattice, capacity, unary = energy.lattice, np.repeat(energy.capacity, 2), spread(energy.unary)
     if energy.signs.weak > WEAK_SHARE_LIMIT * energy.unary.size:
@@ -61,7 +61,7 @@ def reduce(energy: Energy) -> Reduction:
     return Reduction(lattice, capacity, state, left, unary[left])
 
 
-def greatest_empty_set(energy: Energy) -> Flags:
+def greatest_empty_set(energy: GridEnergy) -> Flags:
     """The cells that the set rule gives label 0, bool (time, plane, y, x)."""
     return np.asarray(cells(energy.signs.state, energy.unary.shape) == LABEL_ZERO)
 

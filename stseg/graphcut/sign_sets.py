@@ -36,7 +36,7 @@ class SignSets:
 
 
 def sign_sets(unary: Labels, lattice: Lattice, capacity: Labels, present: Flags | None) -> SignSets:
-    """The greatest sets of an energy; unary, capacity and present as of `stseg.graphcut.energy.Energy`."""
+    """The greatest sets of an energy; unary, capacity and present as of `stseg.graphcut.grid_energy.GridEnergy`."""
     arcs, shape, nodes = np.repeat(capacity, 2), unary.shape, len(lattice.forward)
     state, margin = np.zeros(nodes, np.uint8), np.zeros(nodes, np.int32)
     present = np.ones(shape[2:], bool) if present is None else present

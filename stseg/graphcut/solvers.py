@@ -8,7 +8,7 @@ from typing import NamedTuple
 from stseg.arrays import Flags
 from stseg.graphcut import pymaxflow
 from stseg.graphcut.cut import Cut, minimum_cut
-from stseg.graphcut.energy import Energy
+from stseg.graphcut.grid_energy import GridEnergy
 from stseg.graphcut.sparse import sparse_cut
 from stseg.kernels.accelerate import COMPILED
 
@@ -16,7 +16,7 @@ from stseg.kernels.accelerate import COMPILED
 class Solver(NamedTuple):
     """Minimum cuts of grids, and of lists of edges for expansion moves."""
 
-    grid: Callable[[Energy], Cut]
+    grid: Callable[[GridEnergy], Cut]
     sparse: Callable[..., Flags]
 
 

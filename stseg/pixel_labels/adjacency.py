@@ -15,7 +15,7 @@ import numpy as np
 
 from stseg.arrays import Bytes, Floats, Labels
 from stseg.config import LabelConfig
-from stseg.graphcut.energy import QUANTUM
+from stseg.graphcut.grid_energy import QUANTUM
 from stseg.kernels.accelerate import kernel
 
 _FARTHEST = 3 * 255**2

@@ -15,8 +15,8 @@ import numpy as np
 
 from stseg.arrays import Ints, Labels, Singles
 from stseg.config import LabelConfig
-from stseg.graphcut.energy import QUANTUM
 from stseg.graphcut.expansion import BACKGROUND, LabelEnergy
+from stseg.graphcut.grid_energy import QUANTUM
 from stseg.kernels.accelerate import kernel
 from stseg.pixel_labels.label_likelihood import LabelLikelihood
 

@@ -16,8 +16,8 @@ import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints, Labels
 from stseg.graphcut.cell_subset import CellSubset, subset
-from stseg.graphcut.energy import Energy
 from stseg.graphcut.expansion import expand
+from stseg.graphcut.grid_energy import GridEnergy
 from stseg.graphcut.solvers import Solver
 from stseg.records.blobs import UNASSIGNED
 from stseg.records.predicted_places import PredictedPlaces
@@ -69,7 +69,7 @@ class WindowLabels:
 
 
 def label_cells(
-    energy: Energy,
+    energy: GridEnergy,
     occupied: Flags,
     detections: WindowDetections,
     predicted: PredictedPlaces,
@@ -110,7 +110,7 @@ def label_cells(
 
 
 def _expanded(
-    energy: Energy,
+    energy: GridEnergy,
     subgraph: CellSubset,
     predicted: PredictedPlaces,
     body: BodyShape,

@@ -16,7 +16,7 @@ import numpy as np
 from stseg.arrays import Flags, Ints, Labels, Singles
 from stseg.config import SegmentationConfig
 from stseg.geometry import Grid
-from stseg.graphcut.energy import QUANTUM, Energy
+from stseg.graphcut.grid_energy import QUANTUM, GridEnergy
 from stseg.kernels.accelerate import wide_kernel
 
 _MOST_NATS = 30.0
@@ -24,7 +24,7 @@ _MOST_NATS = 30.0
 
 def build_energy(
     log_odds: Singles, successor: Labels, grid: Grid, config: SegmentationConfig, present: Flags | None = None
-) -> Energy:
+) -> GridEnergy:
     """Energy of a window.
 
     Parameters
@@ -34,7 +34,7 @@ def build_energy(
     successor : int32 (time - 1, y, x)
         See `stseg.segmentation.cell_motion.successor_cells`.
     present : bool (y, x), or None
-        See `stseg.graphcut.energy.Energy`.
+        See `stseg.graphcut.grid_energy.GridEnergy`.
     """
     unary = np.empty(log_odds.shape, np.int32)
     _fill_unary(log_odds.reshape(-1), np.float32(_MOST_NATS), np.float32(QUANTUM), unary.reshape(-1))
@@ -42,7 +42,7 @@ def build_energy(
     scale = (config.time_distance, grid.top / max(grid.planes - 1, 1), grid.cell, grid.cell)
     distance = np.sqrt(((offsets * scale) ** 2).sum(1))
     capacity = config.smoothness * np.exp(-0.5 * (distance / config.distance_scale) ** 2) / QUANTUM
-    return Energy(unary, offsets, np.rint(capacity).astype(np.int32), successor, present)
+    return GridEnergy(unary, offsets, np.rint(capacity).astype(np.int32), successor, present)
 
 
 @wide_kernel

@@ -27,7 +27,7 @@ import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints
 from stseg.config import BodyConfig, DetectionConfig
-from stseg.graphcut.energy import QUANTUM
+from stseg.graphcut.grid_energy import QUANTUM
 from stseg.graphcut.qpbo import QuadraticEnergy, QuadraticMinimum, minimise
 from stseg.records.border import Border
 from stseg.records.sizes import log_heavy_tailed

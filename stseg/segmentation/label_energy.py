@@ -21,8 +21,8 @@ import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints, Labels
 from stseg.graphcut.cell_subset import CellSubset
-from stseg.graphcut.energy import QUANTUM
 from stseg.graphcut.expansion import LabelEnergy
+from stseg.graphcut.grid_energy import QUANTUM
 from stseg.kernels.accelerate import kernel
 from stseg.records.predicted_places import PredictedPlaces
 

@@ -14,7 +14,7 @@ from stseg.arrays import Flags, Ints, Labels, Rows, Singles
 from stseg.config import Config
 from stseg.geometry import Rig
 from stseg.geometry.sampling import Sampling
-from stseg.graphcut.energy import QUANTUM, Energy
+from stseg.graphcut.grid_energy import QUANTUM, GridEnergy
 from stseg.graphcut.reduction import greatest_empty_set
 from stseg.graphcut.solvers import SOLVERS, find_solver
 from stseg.records.blobs import Blobs
@@ -113,7 +113,7 @@ class CutTracker:
         self.committed = window.commit_stop
         return self._commit(window, held, patches, label, blobs, decision, row)
 
-    def _cut_out(self, held: list[TrackedFrame]) -> tuple[Patches, Singles, Energy]:
+    def _cut_out(self, held: list[TrackedFrame]) -> tuple[Patches, Singles, GridEnergy]:
         """Patches of the ground that are enough, and the window's log-odds (time, plane, row, column) and energy there.
 
         See `stseg.segmentation.patches`.
@@ -144,7 +144,7 @@ class CutTracker:
         mark_places(squares, np.concatenate([one.fused.volume.occupied_places() for one in held]), grid)
         return squares
 
-    def _energy(self, held: list[TrackedFrame], patches: Patches, log_odds: Singles) -> Energy:
+    def _energy(self, held: list[TrackedFrame], patches: Patches, log_odds: Singles) -> GridEnergy:
         reach, grid = self.config.occupancy.person_radius, self.rig.grid
         motion = [
             motion_field(
@@ -158,7 +158,7 @@ class CutTracker:
         return build_energy(log_odds, successor, grid, self.config.segmentation, present)
 
     def _divide(
-        self, window: Window, held: list[TrackedFrame], patches: Patches, energy: Energy, occupied: Flags
+        self, window: Window, held: list[TrackedFrame], patches: Patches, energy: GridEnergy, occupied: Flags
     ) -> WindowLabels:
         """Label the occupied cells with the filter tracks of this window and of active tracks."""
         tails = [track.tail for track in self.association.active]

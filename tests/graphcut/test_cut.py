@@ -21,7 +21,7 @@ from stseg.errors import ConfigError
 from stseg.geometry import Grid
 from stseg.graphcut import pymaxflow
 from stseg.graphcut.cut import minimum_cut
-from stseg.graphcut.energy import QUANTUM, Energy
+from stseg.graphcut.grid_energy import QUANTUM, GridEnergy
 from stseg.graphcut.pymaxflow import grid_cut
 from stseg.graphcut.reduction import reduce
 from stseg.graphcut.sign_sets import LABEL_ONE, UNDECIDED
@@ -40,16 +40,16 @@ INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT") == "1"
 
 def window(
     seed: int, shape: tuple[int, ...], unary: int, capacity: int, drift: int = 1, neighbours: int = 8
-) -> Energy:  # fmt: skip
+) -> GridEnergy:  # fmt: skip
     """A random window in small whole numbers, so that minima tie; motion may leave the grid."""
     rng = np.random.default_rng(seed)
     offsets = neighbourhood(neighbours)
     motion = rng.integers(-drift, drift + 1, (shape[0] - 1, *shape[2:], 2))
     values = rng.integers(-unary, unary + 1, shape, np.int32)
-    return Energy(values, offsets, rng.integers(0, capacity + 1, len(offsets), np.int32), successor_cells(motion))
+    return GridEnergy(values, offsets, rng.integers(0, capacity + 1, len(offsets), np.int32), successor_cells(motion))
 
 
-def smooth_window(seed: int, shape: tuple[int, ...], neighbours: int = 8, smoothness: float = 0.8) -> Energy:
+def smooth_window(seed: int, shape: tuple[int, ...], neighbours: int = 8, smoothness: float = 0.8) -> GridEnergy:
     """A random window as occupied volumes are: blobs, weak borders, cells that no view sees, motion of many cells."""
     rng = np.random.default_rng(seed)
     frames, planes, rows, columns = shape
@@ -137,7 +137,7 @@ def test_the_cut_is_the_smallest_of_the_minima(shape: tuple[int, ...]) -> None:
         np.testing.assert_array_equal(grid_cut(energy).occupied, smallest, err_msg=f"PyMaxflow, seed {seed}")
 
 
-def flow_value(energy: Energy) -> int:
+def flow_value(energy: GridEnergy) -> int:
     """The maximum flow from background to object by scipy, quanta."""
     size, unary = energy.unary.size, energy.unary.ravel()
     start, end, capacity = energy.edges()

@@ -17,7 +17,7 @@ from stseg.bodies.pillars import WIDTH, BodyTable
 from stseg.config import BodyConfig, LabelConfig
 from stseg.errors import ConfigError
 from stseg.geometry import Camera
-from stseg.graphcut.energy import QUANTUM
+from stseg.graphcut.grid_energy import QUANTUM
 from stseg.pixel_labels.adjacency import edge_costs
 from stseg.pixel_labels.body_masks import Patches, pillar_patches
 from stseg.pixel_labels.label_likelihood import LabelLikelihood, visible_shares

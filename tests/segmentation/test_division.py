@@ -15,8 +15,8 @@ from stseg.arrays import Flags, Floats, Ints, Labels
 from stseg.config import MotionConfig, SegmentationConfig, TrackingConfig
 from stseg.geometry import Grid
 from stseg.graphcut.cell_subset import CellSubset, subset
-from stseg.graphcut.energy import QUANTUM, Energy
 from stseg.graphcut.expansion import LabelEnergy, expand
+from stseg.graphcut.grid_energy import QUANTUM, GridEnergy
 from stseg.graphcut.solvers import SOLVERS
 from stseg.records.blobs import UNASSIGNED
 from stseg.records.predicted_places import PredictedPlaces
@@ -35,13 +35,13 @@ CONFIG = TrackingConfig()
 # Parts
 
 
-def random_window(seed: int, shape: tuple[int, ...]) -> Energy:
+def random_window(seed: int, shape: tuple[int, ...]) -> GridEnergy:
     rng = np.random.default_rng(seed)
     frames, _, rows, columns = shape
     motion = rng.integers(-2, 3, (frames - 1, rows, columns, 2))
     offsets = neighbourhood(8 if seed % 2 else 80)
     capacity = rng.integers(1, 9, len(offsets)).astype(np.int32)
-    return Energy(rng.integers(-20, 21, shape).astype(np.int32), offsets, capacity, successor_cells(motion))
+    return GridEnergy(rng.integers(-20, 21, shape).astype(np.int32), offsets, capacity, successor_cells(motion))
 
 
 @settings(deadline=None, max_examples=25)
@@ -158,7 +158,7 @@ def bodies(tracks: Floats, radius: float = 0.24) -> Labels:
     return np.repeat(whose[:, None], GRID.planes, 1).astype(np.int32)
 
 
-def window_of(truth: Labels, seed: int = 1) -> Energy:
+def window_of(truth: Labels, seed: int = 1) -> GridEnergy:
     """A window with noisy log-odds of the truth."""
     noise = np.random.default_rng(seed).normal(0, 0.7, truth.shape)
     log_odds = (np.where(truth > 0, 2.5, -2.5) + noise).astype(np.float32)
@@ -167,7 +167,7 @@ def window_of(truth: Labels, seed: int = 1) -> Energy:
 
 
 def divided(
-    energy: Energy, places: PredictedPlaces, seen: Flags | None = None, solver: str = "stseg"
+    energy: GridEnergy, places: PredictedPlaces, seen: Flags | None = None, solver: str = "stseg"
 ) -> tuple[Flags, WindowLabels]:
     """Cut and labels; a track not seen in a frame is still predicted there."""
     seen = places.expected if seen is None else seen

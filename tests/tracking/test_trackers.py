@@ -13,7 +13,7 @@ from scenes import CONFIG, FRAME_RATE, found, people, room
 from stseg.arrays import Floats, Rows
 from stseg.errors import ConfigError
 from stseg.geometry.nearest_person import nearest_person
-from stseg.graphcut.energy import QUANTUM
+from stseg.graphcut.grid_energy import QUANTUM
 from stseg.records.sparse_volume import SparseVolume
 from stseg.records.tables import WINDOW
 from stseg.trackers import TRACKERS, Commit, FrameObservations, FusedFrame, TrackingMethod, find_tracker

@@ -28,7 +28,7 @@ from stseg.arrays import Flags
 from stseg.config import Config
 from stseg.evaluation.scores import Scores
 from stseg.geometry.nearest_person import nearest_person
-from stseg.graphcut.energy import Energy
+from stseg.graphcut.grid_energy import GridEnergy
 from stseg.io.config_file import read_config
 from stseg.io.recording.recording import Recording
 from stseg.records.blobs import UNASSIGNED
@@ -48,7 +48,7 @@ class TwoLabels(CutTracker):
     """The cut without the expansion."""
 
     def _divide(
-        self, window: Window, held: list[TrackedFrame], patches: Patches, energy: Energy, occupied: Flags
+        self, window: Window, held: list[TrackedFrame], patches: Patches, energy: GridEnergy, occupied: Flags
     ) -> WindowLabels:
         del window, energy
         label = np.zeros(occupied.shape, np.int32)

@@ -24,7 +24,7 @@ QUANTUM = 1e-3
 
 
 @dataclass(frozen=True)
-class Energy:
+class GridEnergy:
     """Unary and pairwise terms, quanta.
 
     Attributes
