@@ -12,8 +12,8 @@ from stseg.arrays import Ints, Rows
 from stseg.evaluation import evaluate
 from stseg.io.outputs.output_files import write_file
 from stseg.io.runfile.runs import Run
-from stseg.report.page.html import png_bytes
-from stseg.report.pictures.plan import plan_view
+from stseg.reporting.page.html import png_bytes
+from stseg.reporting.pictures.plan import plan_view
 
 _SHOWN = 3
 _APART = 5  # frames

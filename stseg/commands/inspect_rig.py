@@ -17,10 +17,10 @@ from stseg.io.recording.frames import open_frames
 from stseg.io.recording.image_stream import is_detection_file
 from stseg.io.recording.recording import CameraSource, Recording
 from stseg.io.recording.rigs import read_rig
-from stseg.report.figures import backdrop
-from stseg.report.page.html import png_bytes
-from stseg.report.pictures.canvas import outline
-from stseg.report.pictures.ground_grid import grid_picture
+from stseg.reporting.figures import backdrop
+from stseg.reporting.page.html import png_bytes
+from stseg.reporting.pictures.canvas import outline
+from stseg.reporting.pictures.ground_grid import grid_picture
 
 _NAMES = ("camera", "recognised", "frames", "boxes", "a frame", "height px", "score", "feet in area", "classes")
 _WIDTH = 1280

@@ -12,7 +12,7 @@ from stseg.commands.terminal.progress import TerminalReporter
 from stseg.engine.offline.pixel_labels import write_labels
 from stseg.io.config_file import parse_config
 from stseg.io.runfile.runs import read_run
-from stseg.report.pictures.colours import track_palette
+from stseg.reporting.pictures.colours import track_palette
 
 
 def labels(

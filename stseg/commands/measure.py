@@ -15,8 +15,8 @@ from stseg.io.exports.measure_tables import write_tables
 from stseg.io.outputs.output_files import make_folder, write_file
 from stseg.io.runfile.runs import read_run
 from stseg.measures.measure import Measures
-from stseg.report.page.html import png_bytes
-from stseg.report.pictures.flow_map import flow_map
+from stseg.reporting.page.html import png_bytes
+from stseg.reporting.pictures.flow_map import flow_map
 
 
 def measure(

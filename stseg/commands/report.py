@@ -22,9 +22,9 @@ from stseg.io.recording.frames import open_frames
 from stseg.io.recording.recording import Recording
 from stseg.io.runfile.runs import Run, read_run
 from stseg.io.track_csv import read_tracks_csv
-from stseg.report.figures import Figure, Instant, camera_figures, ground_figures, slice_figures
-from stseg.report.page.html import png_bytes
-from stseg.report.page.page import report_page
+from stseg.reporting.figures import Figure, Instant, camera_figures, ground_figures, slice_figures
+from stseg.reporting.page.html import png_bytes
+from stseg.reporting.page.page import report_page
 
 _MOMENTS = 3  # frames shown by default
 

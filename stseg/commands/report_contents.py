@@ -14,17 +14,17 @@ from stseg.geometry import Camera, Grid
 from stseg.io.runfile.runs import Run
 from stseg.measures.motion import flow_field
 from stseg.records.ghost_reasons import GhostReasons, ghost_reasons, has_evidence
-from stseg.report.busy_times import LONG, busiest_minutes, people_by_hour
-from stseg.report.charts import Span, clock_time
-from stseg.report.figures import Figure, Instant, camera_figures, ground_figures, slice_figures
-from stseg.report.findings import ground_by_views
-from stseg.report.page.answers import answers
-from stseg.report.page.embedded import embedded_json
-from stseg.report.page.page import Contents, ViewSummary
-from stseg.report.pictures.flow_map import flow_map
-from stseg.report.pictures.maps import Bins, DwellPlace, blind_map, density, dwell, dwell_places, heat_map
-from stseg.report.pictures.plan import plan_view
-from stseg.report.pictures.sheets import thin_sheets
+from stseg.reporting.busy_times import LONG, busiest_minutes, people_by_hour
+from stseg.reporting.charts import Span, clock_time
+from stseg.reporting.figures import Figure, Instant, camera_figures, ground_figures, slice_figures
+from stseg.reporting.findings import ground_by_views
+from stseg.reporting.page.answers import answers
+from stseg.reporting.page.embedded import embedded_json
+from stseg.reporting.page.page import Contents, ViewSummary
+from stseg.reporting.pictures.flow_map import flow_map
+from stseg.reporting.pictures.maps import Bins, DwellPlace, blind_map, density, dwell, dwell_places, heat_map
+from stseg.reporting.pictures.plan import plan_view
+from stseg.reporting.pictures.sheets import thin_sheets
 
 _FLOW = 0.5
 """Side of a square of the map of flow, metres."""

@@ -14,7 +14,7 @@ from stseg.commands.run_frames import select_frames
 from stseg.io.outputs.video_writer import write_film
 from stseg.io.recording.frames import open_frames
 from stseg.io.runfile.runs import Run
-from stseg.report.pictures.film import Film
+from stseg.reporting.pictures.film import Film
 
 
 def film(run: Run, output: Path, part: str | None, camera_images: bool, overwrite: bool) -> int:

@@ -17,7 +17,7 @@ from stseg.io.outputs.output_files import write_page
 from stseg.io.outputs.whole_files import require_new
 from stseg.io.recording.frames import open_frames
 from stseg.io.runfile.runs import Run, read_run
-from stseg.report.page.review_page import Question, best_views, moment_picture, review_page
+from stseg.reporting.page.review_page import Question, best_views, moment_picture, review_page
 
 
 def review(

@@ -114,7 +114,7 @@ def run(
     if labels is not None:
         from stseg.engine.offline.pixel_labels import require_pixels, write_labels
         from stseg.io.outputs.label_images import require_label_folder
-        from stseg.report.pictures.colours import track_palette
+        from stseg.reporting.pictures.colours import track_palette
 
         require_pixels(recording)
         require_label_folder(labels, overwrite)

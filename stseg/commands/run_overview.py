@@ -9,7 +9,7 @@ import numpy as np
 from stseg.engine.offline.warnings import run_warnings
 from stseg.io.runfile.runs import Run
 from stseg.records.ghost_reasons import REASONS, ghost_reasons
-from stseg.report.findings import ground_by_views, people_per_minute
+from stseg.reporting.findings import ground_by_views, people_per_minute
 
 _BLIND_SHARE = 0.05  # of the ground that no view sees, from which on it is worth a warning
 

@@ -11,8 +11,8 @@ from stseg.errors import ConfigError
 from stseg.io.outputs.output_files import write_file
 from stseg.io.outputs.whole_files import require_new
 from stseg.io.runfile.runs import Run
-from stseg.report.page.html import png_bytes
-from stseg.report.pictures.slices import marginal_picture, plane_picture
+from stseg.reporting.page.html import png_bytes
+from stseg.reporting.pictures.slices import marginal_picture, plane_picture
 
 _EXPECTED = "t=SECONDS or frame=NUMBER, and plane=METRES or plane=all"
 _WIDTH = 1000  # pixels

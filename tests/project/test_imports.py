@@ -51,14 +51,14 @@ BESIDE = {
     "measures": {"errors", "arrays", "geometry"},
     "io": {"version", "errors", "arrays", "config", "geometry", "records"},
     "calibration": {"errors", "arrays", "geometry", "bodies"},
-    "report": {"errors", "arrays", "geometry", "bodies", "records"},
+    "reporting": {"errors", "arrays", "geometry", "bodies", "records"},
     "simulation": {"errors", "arrays", "kernels", "geometry"},
 }
 """Rooms above or beside the stages. Nothing imports the baselines: registries name them (`stseg.trackers`)."""
 
 AT_HOME = {
     "h5py": ("stseg.io",),
-    "cv2": ("stseg.io", "stseg.report", "stseg.simulation", "stseg.calibration", "stseg.view_health"),
+    "cv2": ("stseg.io", "stseg.reporting", "stseg.simulation", "stseg.calibration", "stseg.view_health"),
     "PIL": ("stseg.io",),
     "numba": ("stseg.kernels",),
     "maxflow": ("stseg.graphcut.pymaxflow",),

@@ -39,7 +39,7 @@ def test_every_module_is_in_the_wheel(wheel: Path) -> None:
     behind_the_link = {f"stseg/{path.relative_to(ROOT).as_posix()}" for path in (ROOT / "io").rglob("*.py")}
     assert {"stseg/io/track_csv.py", "stseg/io/calibrations/opencv_xml.py"} <= behind_the_link
     scripts = {path.relative_to(ROOT).as_posix() for path in (ROOT / "stseg").rglob("*.js")}
-    assert "stseg/report/page/page.js" in scripts
+    assert "stseg/reporting/page/page.js" in scripts
     assert names == own | behind_the_link | scripts | {"stseg/py.typed", "stseg/napari.yaml"}
 
 

@@ -6,8 +6,8 @@ import numpy as np
 
 from stseg.arrays import Rows
 from stseg.records.tables import TRAJECTORY
-from stseg.report.busy_times import busiest_minutes, people_by_hour
-from stseg.report.charts import Span
+from stseg.reporting.busy_times import busiest_minutes, people_by_hour
+from stseg.reporting.charts import Span
 
 
 def stays(*tracks: tuple[int, int]) -> Rows:

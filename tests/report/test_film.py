@@ -18,9 +18,9 @@ from stseg.io.outputs.video_writer import write_film
 from stseg.io.recording.recording import CameraSource, Recording, Source
 from stseg.io.runfile.runs import RunWriter
 from stseg.records.tables import TRAJECTORY, Tracks
-from stseg.report.pictures.colours import track_colour
-from stseg.report.pictures.film import Film
-from stseg.report.pictures.overlay import OverlayView
+from stseg.reporting.pictures.colours import track_colour
+from stseg.reporting.pictures.film import Film
+from stseg.reporting.pictures.overlay import OverlayView
 
 VIVID = (20, 240, 160)
 _TURN = np.array([[1, 0, 0], [0, -np.sin(0.4), -np.cos(0.4)], [0, np.cos(0.4), -np.sin(0.4)]])

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from stseg.arrays import Rows
 from stseg.geometry import Grid, Rig
 from stseg.records.tables import TRAJECTORY
-from stseg.report.pictures.maps import Bins, blind_map, density, dwell, dwell_places, heat_map, warm_colours
-from stseg.report.pictures.plan_map import PlanMap
+from stseg.reporting.pictures.maps import Bins, blind_map, density, dwell, dwell_places, heat_map, warm_colours
+from stseg.reporting.pictures.plan_map import PlanMap
 
 GRID = Grid((0.0, 4.0), (-1.0, 2.0), 0.5, 1.8, 3)
 RIG = Rig("hall", 2.0, GRID, ())

@@ -19,8 +19,8 @@ from stseg.geometry import Grid
 from stseg.io.runfile.layout import ghost_type
 from stseg.io.runfile.runs import RunWriter, read_run
 from stseg.records.tables import EVENT, TRAJECTORY, Tracks
-from stseg.report.page.embedded import embedded_json, thin_tracks
-from stseg.report.pictures.sheets import Sheets, coarse, spread, thin_sheets
+from stseg.reporting.page.embedded import embedded_json, thin_tracks
+from stseg.reporting.pictures.sheets import Sheets, coarse, spread, thin_sheets
 
 GRID = Grid((0.0, 4.0), (-1.0, 2.0), 0.5, 1.8, 3)
 NONE = np.zeros(0, np.int64)

@@ -30,11 +30,11 @@ from stseg.io.outputs.whole_files import require_new
 from stseg.io.recording.frames import open_frames
 from stseg.io.recording.recording import Recording
 from stseg.io.recording.rigs import read_rig
-from stseg.report.figures import Figure, backdrop
-from stseg.report.page.html import figures, note, png_bytes, section, table
-from stseg.report.page.style import STYLE
-from stseg.report.pictures.ground_grid import grid_picture
-from stseg.report.pictures.maps import blind_map
+from stseg.reporting.figures import Figure, backdrop
+from stseg.reporting.page.html import figures, note, png_bytes, section, table
+from stseg.reporting.page.style import STYLE
+from stseg.reporting.pictures.ground_grid import grid_picture
+from stseg.reporting.pictures.maps import blind_map
 
 _FRAMES = 300
 """Default number of frames to read."""

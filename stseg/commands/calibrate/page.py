@@ -19,7 +19,7 @@ from stseg.io.recording.pictures import read_colour
 from stseg.io.recording.recording import Source
 from stseg.io.recording.streams import open_stream
 from stseg.io.recording.video.video_size import read_video_size
-from stseg.report.page.calibration_page import FloorPlan, calibration_page
+from stseg.reporting.page.calibration_page import FloorPlan, calibration_page
 
 _UNKNOWN = np.array([[1.0, 0, 0, 0], [0, 1.0, 0, 0], [0, 0, 1.0, 1.0]])
 """A projection that stands for a camera's own until points are clicked."""

@@ -14,7 +14,7 @@ import numpy as np
 
 from stseg.arrays import AnyArray, Bytes, Ints, Labels, Singles
 from stseg.geometry import Grid
-from stseg.report.pictures.slices import colour_limit
+from stseg.reporting.pictures.slices import colour_limit
 
 ReadFrame = Callable[[int], tuple[Singles, Labels]]
 """The volume of a frame: log_odds and label, both (plane, y, x)."""

@@ -10,10 +10,10 @@ import numpy as np
 
 from stseg.arrays import AnyArray, Boxes, Bytes, Labels, Observation, Rows
 from stseg.geometry import Camera, Rig
-from stseg.report.pictures.overlay import overlay
-from stseg.report.pictures.plan import plan_view
-from stseg.report.pictures.slices import marginal_picture, volume_picture
-from stseg.report.pictures.spacetime import spacetime_picture
+from stseg.reporting.pictures.overlay import overlay
+from stseg.reporting.pictures.plan import plan_view
+from stseg.reporting.pictures.slices import marginal_picture, volume_picture
+from stseg.reporting.pictures.spacetime import spacetime_picture
 
 TRAIL = 5.0
 """Length of a trail, seconds."""

@@ -11,9 +11,9 @@ import numpy as np
 from stseg.arrays import AnyArray, Bytes, Floats, Rows
 from stseg.bodies.pillars import PROFILE
 from stseg.geometry import Camera, Grid
-from stseg.report.pictures.canvas import blank, chip, chip_size, disc, fading_stroke, fill, outline, stroke, text
-from stseg.report.pictures.colours import NIGHT, PAPER, Colour, mixed, track_colour
-from stseg.report.pictures.labels import place_labels
+from stseg.reporting.pictures.canvas import blank, chip, chip_size, disc, fading_stroke, fill, outline, stroke, text
+from stseg.reporting.pictures.colours import NIGHT, PAPER, Colour, mixed, track_colour
+from stseg.reporting.pictures.labels import place_labels
 
 _COMMON_HEIGHT = 1.70  # metres, of a person of unknown height
 _FINE = 4  # sub-pixels a pixel of a pillar's outline

@@ -9,10 +9,10 @@ import numpy as np
 
 from stseg.arrays import AnyArray, Bytes, Floats, Ints, Rows
 from stseg.geometry import Grid, Rig
-from stseg.report.pictures.canvas import chip, outline, text, text_size
-from stseg.report.pictures.colours import INK, PAPER, QUIET, Colour, mixed
-from stseg.report.pictures.plan import border, draw_cameras
-from stseg.report.pictures.plan_map import PlanMap, rule, scale_bar, sheet
+from stseg.reporting.pictures.canvas import chip, outline, text, text_size
+from stseg.reporting.pictures.colours import INK, PAPER, QUIET, Colour, mixed
+from stseg.reporting.pictures.plan import border, draw_cameras
+from stseg.reporting.pictures.plan_map import PlanMap, rule, scale_bar, sheet
 
 _BINS = 40  # along the longer side of the ground, at most
 _SIDES = (0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)  # metres

@@ -8,8 +8,8 @@ import numpy as np
 
 from stseg.arrays import Floats, Rows
 from stseg.records.ghost_reasons import REASONS, GhostReasons
-from stseg.report.charts import Span, clock_time
-from stseg.report.pictures.maps import DwellPlace
+from stseg.reporting.charts import Span, clock_time
+from stseg.reporting.pictures.maps import DwellPlace
 
 
 def answers(

@@ -8,13 +8,13 @@ import numpy as np
 
 from stseg.arrays import Bytes, Observation, Rows
 from stseg.geometry import Rig
-from stseg.report.charts import clock_time
-from stseg.report.figures import TRAIL, backdrop
-from stseg.report.pictures.canvas import blank, chip, chip_size, disc, fading_stroke, text
-from stseg.report.pictures.colours import NIGHT, PAPER, QUIET, track_colour
-from stseg.report.pictures.labels import place_labels
-from stseg.report.pictures.overlay import OverlayView, overlay
-from stseg.report.pictures.plan import ground_sheet, plan_map
+from stseg.reporting.charts import clock_time
+from stseg.reporting.figures import TRAIL, backdrop
+from stseg.reporting.pictures.canvas import blank, chip, chip_size, disc, fading_stroke, text
+from stseg.reporting.pictures.colours import NIGHT, PAPER, QUIET, track_colour
+from stseg.reporting.pictures.labels import place_labels
+from stseg.reporting.pictures.overlay import OverlayView, overlay
+from stseg.reporting.pictures.plan import ground_sheet, plan_map
 
 _WIDEST, _ALL_VIEWS = 960, 1280  # width of a view, and of all views side by side, pixels
 _LEAST_HEIGHT = 720  # of the film, pixels

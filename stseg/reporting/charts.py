@@ -11,8 +11,8 @@ from types import MappingProxyType
 import numpy as np
 
 from stseg.arrays import Floats, Ints, Rows
-from stseg.report.certainty import DoubtfulStretch
-from stseg.report.pictures.colours import hex_colour, track_colour
+from stseg.reporting.certainty import DoubtfulStretch
+from stseg.reporting.pictures.colours import hex_colour, track_colour
 
 _WIDTH, _LEFT, _RIGHT = 1000, 44, 16  # pixels
 _COLUMNS = 900  # steps of a chart, however long the recording

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stseg.arrays import Floats, Ints, Rows
-from stseg.report.charts import Span
+from stseg.reporting.charts import Span
 
 LONG = 600.0
 """Length of a run from which its busiest minutes are shown apart, seconds."""

@@ -8,8 +8,8 @@ import numpy as np
 
 from stseg.arrays import AnyArray, Bytes, Floats
 from stseg.geometry import Grid
-from stseg.report.pictures.canvas import blank, outline, stroke, text, text_size
-from stseg.report.pictures.colours import INK, PAPER, QUIET, RULE, Colour
+from stseg.reporting.pictures.canvas import blank, outline, stroke, text, text_size
+from stseg.reporting.pictures.colours import INK, PAPER, QUIET, RULE, Colour
 
 _LEFT, _RIGHT, _TOP, _BOTTOM = 76, 44, 104, 132  # margins for title, labels and legend, pixels
 _NARROWEST = 900  # pixels, for the legend

@@ -10,9 +10,9 @@ import cv2
 import numpy as np
 
 from stseg.arrays import Bytes
-from stseg.report.charts import Span, clock_time
-from stseg.report.figures import Figure
-from stseg.report.pictures.colours import hex_colour, track_colour
+from stseg.reporting.charts import Span, clock_time
+from stseg.reporting.figures import Figure
+from stseg.reporting.pictures.colours import hex_colour, track_colour
 
 MOST_ROWS = 2000
 """Greatest number of rows of a table; a note counts the others."""

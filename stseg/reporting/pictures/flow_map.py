@@ -8,11 +8,11 @@ import numpy as np
 
 from stseg.arrays import Bytes, Floats, Rows
 from stseg.geometry import Rig
-from stseg.report.pictures.canvas import chip, chip_size, fill, outline, stroke
-from stseg.report.pictures.colours import INK, PAPER, Colour, mixed
-from stseg.report.pictures.labels import place_labels
-from stseg.report.pictures.maps import Bins, heat_map, map_of_maps
-from stseg.report.pictures.plan_map import PlanMap
+from stseg.reporting.pictures.canvas import chip, chip_size, fill, outline, stroke
+from stseg.reporting.pictures.colours import INK, PAPER, Colour, mixed
+from stseg.reporting.pictures.labels import place_labels
+from stseg.reporting.pictures.maps import Bins, heat_map, map_of_maps
+from stseg.reporting.pictures.plan_map import PlanMap
 
 _ZONE: Colour = (150, 110, 40)
 _LINE: Colour = (60, 60, 200)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stseg.arrays import AnyArray, Bytes, Flags, Floats, Ints
-from stseg.report.pictures.colours import PAPER, Colour
+from stseg.reporting.pictures.colours import PAPER, Colour
 
 _SHIFT = 4  # fractional bits of OpenCV's coordinates
 _CAPITALS = 22.0  # height in pixels of OpenCV's capitals at scale 1

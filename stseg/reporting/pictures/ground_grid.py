@@ -6,9 +6,9 @@ import numpy as np
 
 from stseg.arrays import AnyArray, Bytes, Floats
 from stseg.geometry import Camera, Grid
-from stseg.report.pictures.canvas import chip, disc, stroke, text
-from stseg.report.pictures.colours import INK, PAPER, Colour
-from stseg.report.pictures.overlay import OverlayView
+from stseg.reporting.pictures.canvas import chip, disc, stroke, text
+from stseg.reporting.pictures.colours import INK, PAPER, Colour
+from stseg.reporting.pictures.overlay import OverlayView
 
 _LINE: Colour = (255, 196, 64)
 _BORDER: Colour = (64, 220, 255)

@@ -14,12 +14,12 @@ import numpy as np
 
 from stseg.arrays import Floats, Rows
 from stseg.records.ghost_reasons import REASONS, GhostReasons
-from stseg.report.busy_times import BusyTime
-from stseg.report.certainty import DOUBTFUL, doubtful_stretches, mean_certainty
-from stseg.report.charts import Span, people_chart, track_chart
-from stseg.report.figures import Figure
-from stseg.report.page.html import MOST_ROWS, bars, chart, figure, figures, note, section, swatch, table, when
-from stseg.report.page.style import STYLE
+from stseg.reporting.busy_times import BusyTime
+from stseg.reporting.certainty import DOUBTFUL, doubtful_stretches, mean_certainty
+from stseg.reporting.charts import Span, people_chart, track_chart
+from stseg.reporting.figures import Figure
+from stseg.reporting.page.html import MOST_ROWS, bars, chart, figure, figures, note, section, swatch, table, when
+from stseg.reporting.page.style import STYLE
 
 
 @dataclass(frozen=True)
@@ -137,7 +137,9 @@ def report_page(contents: Contents) -> str:
 
 @cache
 def _script() -> str:
-    return "\n".join((files("stseg.report.page") / name).read_text("utf-8") for name in ("zone_drawing.js", "page.js"))
+    return "\n".join(
+        (files("stseg.reporting.page") / name).read_text("utf-8") for name in ("zone_drawing.js", "page.js")
+    )
 
 
 def _sections(contents: Contents) -> list[str]:

@@ -10,8 +10,8 @@ from scipy.ndimage import maximum_filter, minimum_filter
 
 from stseg.arrays import AnyArray, Bytes, Flags, Labels
 from stseg.geometry import Grid
-from stseg.report.pictures.canvas import blank, chip, outline, text
-from stseg.report.pictures.colours import INK, PAPER, QUIET, RULE, track_colour
+from stseg.reporting.pictures.canvas import blank, chip, outline, text
+from stseg.reporting.pictures.colours import INK, PAPER, QUIET, RULE, track_colour
 
 _STOPS = np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
 # blue-ish below 0, nearly white at 0, orange above; blue, green, red

@@ -11,8 +11,8 @@ import numpy as np
 from stseg.arrays import AnyArray, Bytes, Ints, Rows
 from stseg.geometry import Camera, Rig
 from stseg.records.ghost_reasons import REASONS, ghost_reasons
-from stseg.report.pictures.colours import hex_colour, track_colour
-from stseg.report.pictures.sheets import Sheets
+from stseg.reporting.pictures.colours import hex_colour, track_colour
+from stseg.reporting.pictures.sheets import Sheets
 
 _MOST_PLACES = 250_000  # of tracks
 _MOST_CANDIDATES = 120  # of a frame, those with most evidence

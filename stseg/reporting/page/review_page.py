@@ -15,9 +15,9 @@ import numpy as np
 
 from stseg.arrays import AnyArray, Bytes, Observation, Rows
 from stseg.geometry import Camera, Rig
-from stseg.report.figures import backdrop
-from stseg.report.page.style import STYLE
-from stseg.report.pictures.overlay import overlay
+from stseg.reporting.figures import backdrop
+from stseg.reporting.page.style import STYLE
+from stseg.reporting.pictures.overlay import overlay
 
 _WIDTH, _TALL = 960, 260
 _VIEWS = 2
@@ -45,7 +45,7 @@ class Question:
 
 def review_page(title: str, questions: Sequence[Question], shows_images: bool) -> str:
     """The page's text."""
-    script = (files("stseg.report.page") / "review_page.js").read_text("utf-8")
+    script = (files("stseg.reporting.page") / "review_page.js").read_text("utf-8")
     digest = base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
     data = json.dumps([{"choices": one.choices} for one in questions]).replace("<", "\\u003c")
     items = "\n".join(map(_item, questions))

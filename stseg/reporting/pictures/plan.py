@@ -10,10 +10,10 @@ import numpy as np
 
 from stseg.arrays import AnyArray, Bytes, Floats, Rows
 from stseg.geometry import Camera, Grid, Rig
-from stseg.report.pictures.canvas import chip, chip_size, dashes, disc, fill, outline, stroke, text, text_size
-from stseg.report.pictures.colours import INK, PAPER, QUIET, Colour, mixed, track_colour
-from stseg.report.pictures.labels import place_labels
-from stseg.report.pictures.plan_map import PlanMap, rule, scale_bar, sheet
+from stseg.reporting.pictures.canvas import chip, chip_size, dashes, disc, fill, outline, stroke, text, text_size
+from stseg.reporting.pictures.colours import INK, PAPER, QUIET, Colour, mixed, track_colour
+from stseg.reporting.pictures.labels import place_labels
+from stseg.reporting.pictures.plan_map import PlanMap, rule, scale_bar, sheet
 
 _NEAR = 0.45  # cameras within this share of the ground's longer side are shown where they stand
 _DARKEST: Colour = (206, 199, 195)  # seen by no view

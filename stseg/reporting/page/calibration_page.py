@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 
 from stseg.arrays import Bytes
-from stseg.report.page.style import STYLE
+from stseg.reporting.page.style import STYLE
 
 _WIDEST = 1920
 """Greatest width of a frame in the page, pixels; points are in the camera's own pixels."""
@@ -66,7 +66,7 @@ def calibration_page(
             for name, frame in zip(names, frames, strict=True)
         ],
     }
-    script = (files("stseg.report.page") / "calibration_page.js").read_text("utf-8")
+    script = (files("stseg.reporting.page") / "calibration_page.js").read_text("utf-8")
     digest = base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
     text = json.dumps(data, separators=(",", ":")).replace("<", "\\u003c")
     return _PAGE.format(title=escape("Ground points"), style=STYLE + _STYLE, digest=digest, data=text, script=script)
