@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from stseg.arrays import Boxes
     from stseg.config import Config
     from stseg.engine.committed_frames import CommittedFrames
-    from stseg.engine.measure import measure
     from stseg.engine.track import track
     from stseg.engine.tracker import Tracker
     from stseg.errors import InputError, StsegError
@@ -34,6 +33,7 @@ if TYPE_CHECKING:
     from stseg.io.recording.rigs import read_rig, write_rig
     from stseg.io.runfile.runs import Run, read_run
     from stseg.io.track_csv import read_tracks_csv
+    from stseg.tasks.measures import measure
 
 __all__ = [
     "Boxes",
@@ -72,7 +72,7 @@ _HOMES = {
     "stseg.io.track_csv": ("read_tracks_csv",),
     "stseg.arrays": ("Boxes",),
     "stseg.engine.committed_frames": ("CommittedFrames",),
-    "stseg.engine.measure": ("measure",),
+    "stseg.tasks.measures": ("measure",),
     "stseg.engine.track": ("track",),
     "stseg.engine.tracker": ("Tracker",),
     "stseg.io.recording.frames": ("FrameSet",),

@@ -7,7 +7,6 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from stseg.engine.offline.correction import corrected_tracks
 from stseg.errors import ConfigError
 from stseg.identities.review.corrections import ACTIONS, Answer
 from stseg.io.answers import read_answers
@@ -15,6 +14,7 @@ from stseg.io.outputs.whole_files import require_new
 from stseg.io.runfile.corrected import write_corrected
 from stseg.io.runfile.runs import read_run
 from stseg.io.untrusted.bounded_files import read_text
+from stseg.tasks.correction import corrected_tracks
 
 
 def correct(

@@ -12,10 +12,10 @@ from rich.console import Console
 from rich.table import Table
 
 from stseg.commands.inspect_rig import inspect_rig
-from stseg.commands.run_overview import Overview, per, summarise_run
-from stseg.commands.run_slice import write_slice
 from stseg.errors import ConfigError
 from stseg.io.runfile.runs import read_run
+from stseg.tasks.overview import Overview, per, summarise_run
+from stseg.tasks.slices import write_slice
 
 _LONGEST = 8  # tracks on the screen
 _MINUTES = 15  # of the run on the screen

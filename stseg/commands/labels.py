@@ -9,10 +9,10 @@ from cyclopts import Parameter
 
 from stseg.commands.run_frames import select_frames
 from stseg.commands.terminal.progress import TerminalReporter
-from stseg.engine.offline.pixel_labels import write_labels
 from stseg.io.config_file import parse_config
 from stseg.io.runfile.runs import read_run
 from stseg.reporting.pictures.colours import track_palette
+from stseg.tasks.pixel_labels import write_labels
 
 
 def labels(

@@ -9,14 +9,14 @@ from cyclopts import Parameter
 from rich.console import Console
 from rich.table import Table
 
-from stseg.engine.measure import measure as measure_run
-from stseg.engine.measure import read_areas
 from stseg.io.exports.measure_tables import write_tables
 from stseg.io.outputs.output_files import make_folder, write_file
 from stseg.io.runfile.runs import read_run
 from stseg.measures.measure import Measures
 from stseg.reporting.page.html import png_bytes
 from stseg.reporting.pictures.flow_map import flow_map
+from stseg.tasks.measures import measure as measure_run
+from stseg.tasks.measures import read_areas
 
 
 def measure(

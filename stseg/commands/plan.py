@@ -12,7 +12,6 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from stseg.config.effect import require_effect
-from stseg.engine.offline.forecast import Forecast, forecast
 from stseg.engine.offline.frame_range import FrameRange, resolve_frames
 from stseg.engine.offline.job import Job
 from stseg.engine.rig_body import with_body_of
@@ -22,6 +21,7 @@ from stseg.io.recording.recording import Recording
 from stseg.io.recording.rigs import read_rig
 from stseg.io.recording.stream_index import index_streams
 from stseg.io.runfile.layout import VolumeKind
+from stseg.tasks.forecast import Forecast, forecast
 
 
 def plan(

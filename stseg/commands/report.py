@@ -11,7 +11,6 @@ import numpy as np
 from cyclopts import Parameter
 
 from stseg.arrays import Observation, Rows
-from stseg.commands.report_contents import page_contents
 from stseg.commands.report_film import film
 from stseg.errors import ConfigError
 from stseg.io.answers import read_names
@@ -25,6 +24,7 @@ from stseg.io.track_csv import read_tracks_csv
 from stseg.reporting.figures import Figure, Instant, camera_figures, ground_figures, slice_figures
 from stseg.reporting.page.html import png_bytes
 from stseg.reporting.page.page import report_page
+from stseg.tasks.report_contents import page_contents
 
 _MOMENTS = 3  # frames shown by default
 

@@ -10,7 +10,6 @@ import numpy as np
 from cyclopts import Parameter
 
 from stseg.arrays import Observation
-from stseg.engine.offline.doubtful_decisions import doubtful_decisions
 from stseg.errors import ConfigError
 from stseg.identities.review.doubts import Doubt
 from stseg.io.outputs.output_files import write_page
@@ -18,6 +17,7 @@ from stseg.io.outputs.whole_files import require_new
 from stseg.io.recording.frames import open_frames
 from stseg.io.runfile.runs import Run, read_run
 from stseg.reporting.page.review_page import Question, best_views, moment_picture, review_page
+from stseg.tasks.doubtful_decisions import doubtful_decisions
 
 
 def review(

@@ -86,11 +86,11 @@ def run(
         prepare_workers(workers)  # they import the stages while this process does: nothing is imported before
     from stseg.commands.terminal.progress import TerminalReporter
     from stseg.engine.offline.frame_range import FrameRange
-    from stseg.engine.offline.warnings import rig_warnings
     from stseg.engine.track import track_recording
     from stseg.engine.workers.workforce import Workforce
     from stseg.io.config_file import read_config
     from stseg.io.recording.rigs import read_rig
+    from stseg.tasks.warnings import rig_warnings
 
     chosen, workforce = None if frames is None else FrameRange.parse(frames), Workforce(workers, scheduler)
     resolved, recording, reporter = read_config(config, set_), read_rig(rig), TerminalReporter()
@@ -112,9 +112,9 @@ def run(
         print(nothing if followed is None else f"{_summary(followed.run)}{followed.delay}")
         return
     if labels is not None:
-        from stseg.engine.offline.pixel_labels import require_pixels, write_labels
         from stseg.io.outputs.label_images import require_label_folder
         from stseg.reporting.pictures.colours import track_palette
+        from stseg.tasks.pixel_labels import require_pixels, write_labels
 
         require_pixels(recording)
         require_label_folder(labels, overwrite)

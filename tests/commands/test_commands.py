@@ -16,10 +16,10 @@ from run_files import CONFIG, small_recording, small_trajectory, write_small_run
 import stseg
 from stseg.commands.inspect import event_counts_text
 from stseg.commands.main import COMMANDS, main
-from stseg.commands.run_overview import summarise_run
 from stseg.io.runfile.runs import RunWriter, read_run
 from stseg.io.track_csv import read_tracks_csv
 from stseg.records.tables import TRAJECTORY, Tracks
+from stseg.tasks.overview import summarise_run
 
 
 @pytest.fixture

@@ -10,8 +10,8 @@ from recordings import FRAMES, OPTIONS, track, write_recording
 
 from stseg.commands.main import main
 from stseg.detection.score.scoring import set_score
-from stseg.engine.offline.forecast import Forecast
 from stseg.kernels.accelerate import python_form
+from stseg.tasks.forecast import Forecast
 
 pytestmark = pytest.mark.skipif(python_form(set_score) is set_score, reason="too slow without a compiler")
 

@@ -27,7 +27,6 @@ from run_files import (
 )
 
 from stseg.arrays import Bytes
-from stseg.commands.run_overview import summarise_run
 from stseg.errors import FormatError, OutputError
 from stseg.geometry import Grid
 from stseg.io.outputs.whole_files import create_part, parts_of, replacing
@@ -37,6 +36,7 @@ from stseg.io.runfile.packed_frames import packed_frame
 from stseg.io.runfile.runs import RunWriter, read_run, read_trajectory
 from stseg.io.runfile.unfinished import part_file
 from stseg.records.tables import RATES, TRAJECTORY, Tracks
+from stseg.tasks.overview import summarise_run
 
 if TYPE_CHECKING:
     from _typeshed import TraceFunction

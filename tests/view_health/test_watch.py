@@ -11,13 +11,13 @@ from recordings import track, write_recording
 from scenes import BODY, FEW_HEIGHTS, boxes, likelihoods, people, room
 
 from stseg.arrays import Floats, ViewEvidence
-from stseg.commands.run_overview import summarise_run
 from stseg.detection.detector import Detector
 from stseg.detection.score.scoring import set_score
 from stseg.geometry import Camera, Rig
 from stseg.io.recording.rigs import read_rig, write_rig
 from stseg.io.runfile.runs import read_run
 from stseg.kernels.accelerate import python_form
+from stseg.tasks.overview import summarise_run
 from stseg.view_health.run_check import find_residual_step, views_off
 
 CELL = 0.1

@@ -21,8 +21,6 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from stseg.arrays import Ints, Rows
-from stseg.engine.offline.correction import CorrectedTracks, corrected_tracks
-from stseg.engine.offline.doubtful_decisions import doubtful_decisions
 from stseg.errors import InputError
 from stseg.evaluation import evaluate
 from stseg.evaluation.matching import distances, match
@@ -32,6 +30,8 @@ from stseg.identities.review.doubts import Doubt
 from stseg.io.runfile.corrected import write_corrected
 from stseg.io.runfile.runs import Run, read_run
 from stseg.io.track_csv import read_tracks_csv
+from stseg.tasks.correction import CorrectedTracks, corrected_tracks
+from stseg.tasks.doubtful_decisions import doubtful_decisions
 
 GATE = 0.5
 """Greatest distance of a track from its person, metres."""

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints, Rows
-from stseg.engine.offline.correction import rows_with_ids
+from stseg.engine.offline.known import rows_with_ids
 from stseg.engine.pipeline import identity_problem
 from stseg.identities.evidence.returns import find_returns
 from stseg.identities.evidence.visits import Visits

@@ -9,14 +9,14 @@ import numpy as np
 
 from stseg.arrays import Rows
 from stseg.config import Config
-from stseg.engine.offline.correction import rows_with_ids
 from stseg.errors import ConfigError, FormatError
 from stseg.identities.known_people import known_people
-from stseg.io.runfile.runs import read_run
+from stseg.io.runfile.runs import Run, read_run
 from stseg.io.untrusted import limits
 
 _MOST = limits.FRAMES // 2
 """Greatest id of a known person."""
+_PLACE = [("frame", "<i8"), ("raw_x", "<f8"), ("raw_y", "<f8")]
 
 
 def read_known(path: Path, config: Config) -> Rows:
@@ -41,6 +41,24 @@ def read_known(path: Path, config: Config) -> Rows:
     if (greatest := people["id"].max(initial=0)) > _MOST:
         raise FormatError(path, "/tracks, id", str(greatest), f"ids up to {_MOST}, so that there are some for others")
     return people
+
+
+def rows_with_ids(run: Run) -> Rows:
+    """Committed rows with the ids of the run's tracks, 0 for none; tracks keep the places of their rows as raw ones."""
+    rows = run.committed.copy()
+    rows["id"] = 0
+    tracked, committed = (_places(table) for table in (run.trajectory, run.committed))
+    _, index, row = np.intersect1d(tracked, committed, return_indices=True)
+    rows["id"][row] = run.trajectory["id"][index]
+    return rows
+
+
+def _places(table: Rows) -> Rows:
+    """Frame and raw place of each row."""
+    places = np.zeros(len(table), _PLACE)
+    for name, _ in _PLACE:
+        places[name] = table[name]
+    return places
 
 
 def digest(known: Rows) -> str:

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stseg.engine.offline.warnings import run_warnings
 from stseg.io.runfile.runs import Run
 from stseg.records.ghost_reasons import REASONS, ghost_reasons
 from stseg.reporting.findings import ground_by_views, people_per_minute
+from stseg.tasks.warnings import run_warnings
 
 _BLIND_SHARE = 0.05  # of the ground that no view sees, from which on it is worth a warning
 

@@ -7,8 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from stseg.arrays import Rows
-from stseg.commands.run_overview import seconds_by_stage
-from stseg.engine.offline.warnings import run_warnings
 from stseg.evaluation import evaluate
 from stseg.geometry import Camera, Grid
 from stseg.io.runfile.runs import Run
@@ -25,6 +23,8 @@ from stseg.reporting.pictures.flow_map import flow_map
 from stseg.reporting.pictures.maps import Bins, DwellPlace, blind_map, density, dwell, dwell_places, heat_map
 from stseg.reporting.pictures.plan import plan_view
 from stseg.reporting.pictures.sheets import thin_sheets
+from stseg.tasks.overview import seconds_by_stage
+from stseg.tasks.warnings import run_warnings
 
 _FLOW = 0.5
 """Side of a square of the map of flow, metres."""

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from stseg.engine.offline.correction import answered_before, is_solved_again, rows_with_ids
+from stseg.engine.offline.known import rows_with_ids
 from stseg.engine.pipeline import identity_problem
 from stseg.identities.evidence.costs import CONTRADICTION
 from stseg.identities.review.answered_constraints import answered_rows
@@ -15,6 +15,7 @@ from stseg.identities.review.corrections import Answer
 from stseg.identities.review.doubts import Doubt, find_doubts
 from stseg.io.config_file import parse_config
 from stseg.io.runfile.runs import Run
+from stseg.tasks.correction import answered_before, is_solved_again
 
 _AROUND = 10.0
 """Time before and after a decision in which identities are solved with it, and with the opposite one, seconds."""

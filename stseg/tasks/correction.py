@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stseg.arrays import Ints, Rows
+from stseg.engine.offline.known import rows_with_ids
 from stseg.engine.pipeline import associated_tracks
 from stseg.errors import FormatError, InputError
 from stseg.identities.review.answered_constraints import AnsweredRows, answered_rows
@@ -16,8 +17,6 @@ from stseg.identities.search.constraints import Constraints
 from stseg.io.config_file import parse_config
 from stseg.io.runfile.runs import Run
 from stseg.records.tables import Tracks
-
-_PLACE = [("frame", "<i8"), ("raw_x", "<f8"), ("raw_y", "<f8")]
 
 
 @dataclass(frozen=True)
@@ -88,23 +87,6 @@ def answered_before(run: Run) -> AnsweredRows:
     if (frame[table["row"]] > frame[table["other"]]).any():
         raise FormatError(run.path, "/answered", "a row after its other", "rows in the order of frames")
     return AnsweredRows.of_table(table, number)
-
-
-def rows_with_ids(run: Run) -> Rows:
-    """Committed rows with the ids of the run's tracks, 0 for none."""
-    return _with_ids_of(run.trajectory, run.committed)
-
-
-def _with_ids_of(trajectory: Rows, committed: Rows) -> Rows:
-    """Committed rows with the ids of the run's tracks, 0 for none; tracks keep the places of their rows as raw ones."""
-    kept, own = np.zeros(len(trajectory), _PLACE), np.zeros(len(committed), _PLACE)
-    for name, _ in _PLACE:
-        kept[name], own[name] = trajectory[name], committed[name]
-    rows = committed.copy()
-    rows["id"] = 0
-    _, index, row = np.intersect1d(kept, own, return_indices=True)
-    rows["id"][row] = trajectory["id"][index]
-    return rows
 
 
 def _require_obeyed(constraints: Constraints, places: Sequence[str], identity: Ints) -> None:
