@@ -14,11 +14,10 @@ from stseg.arrays import Floats, Ints, Rows
 from stseg.identities.evidence.crossings import crossing, crossings_of
 from stseg.identities.evidence.observations import Observations, observe
 from stseg.identities.evidence.size_model import MeasuredSizes, SizeModel, SizePrior, learn_sizes
-from stseg.identities.present_names import empty_present
 from stseg.identities.search import beam_search as search
 from stseg.identities.search.alternatives import Alternatives
 from stseg.identities.search.beam_search import SearchLimits, search_identities
-from stseg.identities.search.choice import choose_distinct
+from stseg.identities.search.choice import choose_distinct, empty_present
 from stseg.identities.search.hypotheses import Hypotheses
 from stseg.identities.search.pasts import Pasts
 from stseg.tracking.windows.isolated_tracklets import isolated_tracklets

@@ -14,10 +14,9 @@ from stseg.arrays import Floats, Ints
 from stseg.identities.evidence.costs import RowCosts, row_costs
 from stseg.identities.evidence.crossings import Crossings, crossings_of
 from stseg.identities.evidence.observations import ObservedRows
-from stseg.identities.present_names import empty_present
 from stseg.identities.rules import Rules
 from stseg.identities.search.alternatives import Alternatives, add_alternatives, empty_alternatives
-from stseg.identities.search.choice import choose_distinct
+from stseg.identities.search.choice import choose_distinct, empty_present
 from stseg.identities.search.constraints import BoundPeople, binding_people, mark_of
 from stseg.identities.search.extension import (
     Extension,
@@ -95,7 +94,7 @@ def extend_beam(
         crossings = crossings_of(before, first, stop, seen.ground, seen.variance, frames.bend[k], frames.room)
         costs = row_costs(pasts, size, first, rows, now, seen, rules)
         column, extension = np.empty((number, rows), np.int64), empty_extension(slots, first, rows, seen.certain)
-        found, there = empty_alternatives(number, slots, len(extension.doubtful)), empty_present(slots)
+        found, there = empty_alternatives(number, slots, len(extension.doubtful)), empty_present(number, slots)
         total = _fill_alternatives(
             held, pasts, slots, k, frames, costs, seen, people, rules, crossings, extension, column, found
         )

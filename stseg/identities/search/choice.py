@@ -1,48 +1,74 @@
 """The choice of the best hypotheses among alternatives: of those of one key the best alone.
 
+A key tells who is present in a hypothesis, and who is unseen: hypotheses of one key have the same future. It is a sum
+of numbers drawn at random for each birth and each row (Zobrist 1970): of each identity's birth times that of its last
+row. Identities of one birth are the same: hypotheses that differ in nothing but the frame of it are one. Where several
+identities of a hypothesis have one birth, their order tells them apart.
+
 Keys take time, and of many alternatives few are chosen: they are found for the best first, until enough differ.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from stseg.arrays import Ints
 from stseg.identities.evidence.observations import ObservedRows
-from stseg.identities.present_names import KEY_BITS, Present, fill_present, row_share
 from stseg.identities.search.alternatives import Alternatives
 from stseg.identities.search.hypotheses import Hypotheses
 from stseg.identities.search.pasts import Pasts
 from stseg.kernels.accelerate import kernel, part
 from stseg.kernels.pointed_tuples import pointed
 
-_CLASSES = 512
-"""Classes of losses against the best alternative; the last has all that are too great."""
+KEY_BITS = (1 << 63) - 1
+"""Keys have 63 bits, so that they are the same in machine words and as Python's numbers."""
+
+
+class Present(NamedTuple):
+    """People in each hypothesis before a frame, for keys of the hypotheses after it.
+
+    Attributes
+    ----------
+    name, birth : int64 (hypothesis, slot)
+        First row of each identity, -1 for none, and the number of its birth.
+    kin, unseen : int64 (hypothesis, slot)
+        Number of each identity in other hypotheses, too, and its term of the key where it has no row of the frame.
+    key : int64 (hypothesis,)
+        Key by the best assignment; -1 where it is not filled.
+    """
+
+    name: Ints
+    birth: Ints
+    kin: Ints
+    unseen: Ints
+    key: Ints
 
 
 @kernel
 def choose_distinct(
-    held: Hypotheses, pasts: Pasts, column: Ints, first: int, seen: ObservedRows, mark: Ints,
-    alternatives: Alternatives, total: int, most_loss: float, before: Present, chosen: Ints,
+    hypotheses: Hypotheses, pasts: Pasts, column: Ints, first: int, rows: ObservedRows, mark: Ints,
+    every_alternative: Alternatives, total: int, most_loss: float, before: Present, chosen: Ints,
 ) -> int:  # fmt: skip
     """Choose the best alternatives of different keys; of equally good ones the first.
 
     Parameters
     ----------
-    held, pasts
+    hypotheses, pasts
         The hypotheses before.
     column : int64 (hypothesis, row)
         Slot of each row by the best assignment, -1 for somebody new.
-    first, seen
+    first, rows
         The frame's first row, and all rows.
     mark : int64 (hypothesis,)
         Differs where constraints bind the hypotheses otherwise.
-    alternatives, total
+    every_alternative, total
         The alternatives, and how many there are.
     most_loss
         Greatest loss against the best alternative, nats.
     before
-        Work space.
+        Room for their people.
     chosen : int64 (most,)
         Filled with alternatives, the best first.
 
@@ -51,117 +77,129 @@ def choose_distinct(
     int
         Number of choices.
     """
-    found, there = pointed(alternatives), pointed(before)
-    loss_class, upto = np.empty(total, np.int64), np.empty(_CLASSES, np.int64)
-    _fill_classes(found, total, most_loss, loss_class, upto)
-    size = 2
-    while size < 2 * upto[-2]:
+    alternatives, present, size = pointed(every_alternative), pointed(before), 2
+    while size < 2 * len(chosen):
         size *= 2
-    table, key, best = np.empty(size, np.int64), np.empty(total, np.int64), np.empty(total, np.int64)
-    table[:] = -1
-    done, wanted, number = -1, len(chosen), 0
-    while number < len(chosen) and done < _CLASSES - 2:
-        last = done + 1
-        while last < _CLASSES - 2 and upto[last] < wanted:
-            last += 1
-        number = _tell_apart(
-            held, pasts, column, first, seen, mark, found, total, loss_class, done, last, there, table, key, best,
-            number,
-        )  # fmt: skip
-        done, wanted = last, 2 * wanted
-    return _fill_best(best, number, found, chosen)
-
-
-@part
-def _fill_classes(found: Alternatives, total: int, most_loss: float, loss_class: Ints, upto: Ints) -> None:
-    """Fill the class of each alternative, and how many there are up to each class; the last has too great losses."""
-    best = -np.inf
-    for a in range(total):
-        best = max(best, found.value[a])
-    upto[:] = 0
-    for a in range(total):
-        loss = best - found.value[a]
-        own = min(int(loss / most_loss * (_CLASSES - 1)), _CLASSES - 2)
-        loss_class[a] = _CLASSES - 1 if found.value[a] < best - most_loss else own
-        upto[loss_class[a]] += 1
-    for k in range(1, _CLASSES):
-        upto[k] += upto[k - 1]
-
-
-@part
-def _tell_apart(
-    held: Hypotheses, pasts: Pasts, column: Ints, first: int, seen: ObservedRows, mark: Ints, found: Alternatives,
-    total: int, loss_class: Ints, done: int, last: int, there: Present, table: Ints, key: Ints, best: Ints, number: int,
-) -> int:  # fmt: skip
-    """Add keys, and the best alternative of each (key,), of the classes after one up to another; number of keys.
-
-    Keys are numbered by a table with open addressing.
-    """
-    h, start, change = -1, 0, found.change
-    for a in range(total):
-        if not done < loss_class[a] <= last:
-            continue
-        if change[a, 0] != h:
-            h = change[a, 0]
-            start = int(mark[h]) + fill_present(held, pasts, h, seen, there)
-            for i in range(column.shape[1]):
-                start += row_share(there, seen, first + i, column[h, i])
-        own = start
-        for k in range(4):  # the row, its slot, and what they were, of both rows that change
-            i = change[a, 1 + k // 2 * 2]
-            if i >= 0:
-                s = column[h, i] if k % 2 else change[a, 2 + k // 2 * 2]
-                share = row_share(there, seen, first + i, s)
-                own += -share if k % 2 else share
-        number += _add(own & KEY_BITS, a, found, table, key, best, number)
-    return number
-
-
-@part
-def _add(own: int, a: int, found: Alternatives, table: Ints, key: Ints, best: Ints, number: int) -> int:
-    """Add an alternative of a key, unless one is as good; by how many keys there are more."""
-    at = own & (len(table) - 1)
-    while table[at] >= 0 and key[table[at]] != own:
-        at = (at + 1) & (len(table) - 1)
-    if table[at] < 0:
-        table[at], key[number], best[number] = number, own, a
-        return 1
-    if found.value[a] > found.value[best[table[at]]]:
-        best[table[at]] = a
-    return 0
-
-
-@part
-def _fill_best(heap: Ints, waiting: int, found: Alternatives, chosen: Ints) -> int:
-    """Fill the best of the alternatives that wait; how many there are."""
-    for place in range(waiting // 2 - 1, -1, -1):
-        _sink(heap, waiting, place, found)
-    number = min(waiting, len(chosen))
-    for n in range(number):
-        chosen[n] = heap[0]
-        waiting -= 1
+    heap, table, key = np.empty(total, np.int64), np.full(size, -1), np.empty(len(chosen), np.int64)
+    waiting, number = _fill_heap(alternatives, total, most_loss, heap), 0
+    while waiting > 0 and number < len(chosen):
+        best, waiting = heap[0], waiting - 1
         heap[0] = heap[waiting]
-        _sink(heap, waiting, 0, found)
+        _sink(heap, waiting, 0, alternatives)
+        h = alternatives.change[best, 0]
+        if present.key[h] < 0:
+            _fill_present(hypotheses, pasts, h, column, first, rows, int(mark[h]), present)
+        found = _key_of(alternatives, best, column, first, rows, present)
+        place = found & (size - 1)  # keys are in a table with open addressing
+        while table[place] >= 0 and key[table[place]] != found:
+            place = (place + 1) & (size - 1)
+        if table[place] < 0:
+            table[place], key[number], chosen[number] = number, found, best
+            number += 1
+    return number
+
+
+@kernel
+def empty_present(hypotheses: int, slots: int) -> Present:
+    """Room for the people of some hypotheses."""
+    shape = hypotheses, slots
+    return Present(
+        np.empty(shape, np.int64), np.empty(shape, np.int64), np.empty(shape, np.int64), np.empty(shape, np.int64),
+        np.full(hypotheses, -1),
+    )  # fmt: skip
+
+
+@part
+def _fill_present(
+    hypotheses: Hypotheses, pasts: Pasts, h: int, column: Ints, first: int, rows: ObservedRows, mark: int,
+    present: Present,
+) -> None:  # fmt: skip
+    """Fill the people of a hypothesis, and its key by the best assignment."""
+    key, slots = mark, present.name.shape[1]
+    for s in range(slots):
+        p = hypotheses.past[h, s]
+        present.name[h, s] = pasts.name[p] if p >= 0 else -1
+        present.birth[h, s] = rows.birth[present.name[h, s]] if p >= 0 else -1
+    for s in range(slots):
+        if present.name[h, s] >= 0:
+            present.kin[h, s] = _kin(present, h, present.name[h, s], present.birth[h, s])
+            present.unseen[h, s] = _product(present.kin[h, s], rows.sign[pasts.last[hypotheses.past[h, s]]])
+            key = (key + int(present.unseen[h, s])) & KEY_BITS
+    for i in range(column.shape[1]):
+        key += _key_term(present, h, rows, first + i, column[h, i])
+    present.key[h] = key & KEY_BITS
+
+
+@part
+def _key_of(
+    alternatives: Alternatives, a: int, column: Ints, first: int, rows: ObservedRows, present: Present
+) -> int:  # fmt: skip
+    """Key of an alternative: that of the best assignment, with other terms for both rows that change."""
+    change, h = alternatives.change, alternatives.change[a, 0]
+    key = int(present.key[h])
+    for k in (1, 3):
+        i = change[a, k]
+        if i >= 0:
+            key += _key_term(present, h, rows, first + i, change[a, k + 1])
+            key -= _key_term(present, h, rows, first + i, column[h, i])
+    return key & KEY_BITS
+
+
+@part
+def _key_term(present: Present, h: int, rows: ObservedRows, r: int, s: int) -> int:
+    """Change of the key of a hypothesis where row r is that of a slot, or of somebody new (-1)."""
+    if s < 0:
+        return _product(_kin(present, h, r, rows.birth[r]), rows.sign[r])
+    return int(_product(present.kin[h, s], rows.sign[r]) - present.unseen[h, s])
+
+
+@part
+def _product(one: int, other: int) -> int:
+    return (int(one) * int(other)) & KEY_BITS
+
+
+@part
+def _kin(present: Present, h: int, name: int, birth: int) -> int:
+    """Number of an identity by its birth, and by how many others of that birth began before."""
+    rank = 0
+    for s in range(present.name.shape[1]):
+        if 0 <= present.name[h, s] < name and present.birth[h, s] == birth:
+            rank += 1
+    return int(birth + rank)
+
+
+@part
+def _fill_heap(alternatives: Alternatives, total: int, most_loss: float, heap: Ints) -> int:
+    """Fill a heap, the best first, with the alternatives that lose little against the best; how many they are."""
+    best, number = -np.inf, 0
+    for a in range(total):
+        best = max(best, alternatives.value[a])
+    for a in range(total):
+        if not alternatives.value[a] < best - most_loss:
+            heap[number] = a
+            number += 1
+    for place in range(number // 2 - 1, -1, -1):
+        _sink(heap, number, place, alternatives)
     return number
 
 
 @part
-def _sink(heap: Ints, number: int, place: int, found: Alternatives) -> None:
+def _sink(heap: Ints, number: int, place: int, alternatives: Alternatives) -> None:
     """Restore the order of a heap, the best first, of which one place may be too high."""
-    own = heap[place]
+    sinking = heap[place]
     while 2 * place + 1 < number:
         below = 2 * place + 1
-        if below + 1 < number and _before(heap[below + 1], heap[below], found):
+        if below + 1 < number and _is_before(heap[below + 1], heap[below], alternatives):
             below += 1
-        if not _before(heap[below], own, found):
+        if not _is_before(heap[below], sinking, alternatives):
             break
         heap[place] = heap[below]
         place = below
-    heap[place] = own
+    heap[place] = sinking
 
 
 @part
-def _before(one: int, other: int, found: Alternatives) -> bool:
+def _is_before(one: int, other: int, alternatives: Alternatives) -> bool:
     """Whether one alternative comes before another."""
-    better = found.value[one] - found.value[other]
+    better = alternatives.value[one] - alternatives.value[other]
     return bool(better > 0.0 or (better == 0.0 and one < other))
