@@ -21,9 +21,8 @@ from stseg.config import Config
 from stseg.detection.appearance import appearance_rows
 from stseg.detection.detector import Detector
 from stseg.geometry import Rig
-from stseg.identities.identity_problem import NOBODY, IdentityProblem
-from stseg.identities.search.beam_search import FREELY
-from stseg.identities.search.constraints import Constraints
+from stseg.identities.association import NO_KNOWN_PEOPLE, IdentityProblem
+from stseg.identities.search.constraints import NO_CONSTRAINTS, Constraints
 from stseg.occupancy.volume import Occupancy
 from stseg.records.border import Border
 from stseg.records.candidates import Candidates
@@ -112,7 +111,7 @@ def decides_by_appearance(tracker: type[TrackingMethod], config: Config) -> bool
 
 def finished_tracks(
     rig: Rig, config: Config, tracker: type[TrackingMethod], committed: Rows, events: Rows, appearance: Rows,
-    shown: Rig, known: Rows = NOBODY,
+    shown: Rig, known: Rows = NO_KNOWN_PEOPLE,
 ) -> tuple[Tracks, Ints]:  # fmt: skip
     """The tracks of a whole run, and the track id of each committed row.
 
@@ -139,7 +138,7 @@ def finished_tracks(
 
 def associated_tracks(
     rig: Rig, config: Config, committed: Rows, events: Rows, appearance: Rows, shown: Rig,
-    constraints: Constraints = FREELY, known: Rows = NOBODY,
+    constraints: Constraints = NO_CONSTRAINTS, known: Rows = NO_KNOWN_PEOPLE,
 ) -> tuple[Tracks, Ints]:  # fmt: skip
     """As `finished_tracks`, of a tracker whose identities are not final, under constraints on the committed rows."""
     whole = final_tracks(committed, events, appearance, rig.frame_rate, Border.of(rig), config, constraints, known)
@@ -147,7 +146,7 @@ def associated_tracks(
 
 
 def identity_problem(
-    rig: Rig, config: Config, committed: Rows, appearance: Rows, constraints: Constraints = FREELY
+    rig: Rig, config: Config, committed: Rows, appearance: Rows, constraints: Constraints = NO_CONSTRAINTS
 ) -> IdentityProblem:
     """Whose the committed rows are, as a problem of which single decisions can be tried."""
     bridged, sizes = bridged_rows(committed, rig.frame_rate, config)

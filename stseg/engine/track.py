@@ -19,7 +19,7 @@ from stseg.engine.reporter import LogReporter, Progress, Reporter
 from stseg.engine.rig_body import with_body_of
 from stseg.engine.workers.workforce import Workforce
 from stseg.errors import ConfigError
-from stseg.identities.identity_problem import NOBODY
+from stseg.identities.association import NO_KNOWN_PEOPLE
 from stseg.io.config_file import format_config, read_config
 from stseg.io.recording.recording import Recording
 from stseg.io.recording.rigs import read_rig
@@ -142,7 +142,7 @@ def track_recording(
     """
     require_effect(config, tracker)
     config = with_body_of(recording, config)
-    people = NOBODY if known is None else read_known(known, config)
+    people = NO_KNOWN_PEOPLE if known is None else read_known(known, config)
     request = run_request(recording, gather_provenance(recording, format_config(config)))
     request |= {"--frames": "all" if frames is None else str(frames), "--tracker": tracker, "--volume": volume}
     request |= {"--known": "nobody" if known is None else digest(people)}

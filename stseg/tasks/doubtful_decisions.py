@@ -9,10 +9,10 @@ import numpy as np
 
 from stseg.engine.offline.known import rows_with_ids
 from stseg.engine.pipeline import identity_problem
-from stseg.identities.evidence.costs import CONTRADICTION
 from stseg.identities.review.answered_constraints import answered_rows
 from stseg.identities.review.corrections import Answer
 from stseg.identities.review.doubts import Doubt, find_doubts
+from stseg.identities.search.costs import CONTRADICTION
 from stseg.io.config_file import parse_config
 from stseg.io.runfile.runs import Run
 from stseg.tasks.correction import answered_before, is_solved_again

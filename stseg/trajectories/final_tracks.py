@@ -17,12 +17,10 @@ import numpy as np
 
 from stseg.arrays import Ints, Rows
 from stseg.config import Config, TrackingConfig
+from stseg.identities.association import NO_KNOWN_PEOPLE, IdentityProblem, Link, associate_globally
 from stseg.identities.evidence.returns import Return
 from stseg.identities.evidence.size_model import MeasuredSizes
-from stseg.identities.global_association import Link, associate_globally
-from stseg.identities.identity_problem import NOBODY
-from stseg.identities.search.beam_search import FREELY
-from stseg.identities.search.constraints import Constraints
+from stseg.identities.search.constraints import NO_CONSTRAINTS, Constraints
 from stseg.records.border import Border
 from stseg.records.tables import EVENT
 from stseg.tracking.windows.encounters import encounters
@@ -57,14 +55,15 @@ class FinalTracks:
 
 def final_tracks(
     committed: Rows, events: Rows, appearance: Rows, frame_rate: float, border: Border, config: Config,
-    constraints: Constraints = FREELY, known: Rows = NOBODY,
+    constraints: Constraints = NO_CONSTRAINTS, known: Rows = NO_KNOWN_PEOPLE,
 ) -> FinalTracks:  # fmt: skip
     """The tracks of a run from its committed TRAJECTORY, EVENT and APPEARANCE rows, under constraints on those rows.
 
     People of earlier recordings, KNOWN (k,), keep their ids; all others have greater ones.
     """
     bridged, sizes = bridged_rows(committed, frame_rate, config)
-    linked = associate_globally(bridged, sizes, appearance, frame_rate, border, config, constraints)
+    problem = IdentityProblem.of(bridged, sizes, appearance, frame_rate, border, config, constraints)
+    linked = associate_globally(bridged, problem, constraints)
     bridged["id"] = linked.identity
     named = linked.identity[: len(committed)]
     repeats, repeated = coincident(bridged, frame_rate, _LASTING)
@@ -81,7 +80,7 @@ def final_tracks(
     if least == 1:
         return whole
     whole = _beyond(whole, int(known["id"].max(initial=0)))
-    returns = returns_of(linked.problem, whole.identity, bridged, least, constraints, known)
+    returns = returns_of(problem, whole.identity, bridged, least, constraints, known)
     return _under_people(whole, returns, frame_rate)
 
 

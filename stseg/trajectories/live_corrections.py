@@ -1,7 +1,7 @@
 """Live ids decided again: who was exchanged, and who was lost and found, a short time after it.
 
 Live ids follow the tracker's tracks. Every few seconds the identities of the latest minutes are decided as those of a
-whole run are (`stseg.identities.global_association`), under the ids that were published; where an id holds
+whole run are (`stseg.identities.association`), under the ids that were published; where an id holds
 somebody else, its rows are corrected.
 """
 
@@ -14,7 +14,7 @@ import numpy as np
 
 from stseg.arrays import Ints, Rows
 from stseg.config import Config
-from stseg.identities.global_association import associate_globally
+from stseg.identities.association import IdentityProblem, associate_globally
 from stseg.records.border import Border
 from stseg.records.rows_of_tracks import rows_of_tracks
 from stseg.records.tables import APPEARANCE, CORRECTION, TRAJECTORY
@@ -69,7 +69,8 @@ class LiveCorrections:
 
     def _decided_again(self, decided: int, fresh: Callable[[], int]) -> Rows:
         bridged, sizes = bridged_rows(self._rows, self._rate, self._config)
-        linked = associate_globally(bridged, sizes, self._appearance, self._rate, self._border, self._config)
+        problem = IdentityProblem.of(bridged, sizes, self._appearance, self._rate, self._border, self._config)
+        linked = associate_globally(bridged, problem)
         identity = linked.identity[: len(self._rows)]
         known = int(bridged["id"].max())
         issued = {number: fresh() for number in np.unique(identity[identity > known]).tolist()}

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from stseg.arrays import Ints, Rows
+from stseg.identities.association import IdentityProblem
 from stseg.identities.evidence.returns import Return, find_returns
-from stseg.identities.identity_problem import IdentityProblem
 from stseg.identities.search.constraints import Constraints
 from stseg.records.tables import EVENT
 

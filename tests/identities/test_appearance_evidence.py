@@ -7,9 +7,9 @@ import pytest
 from strollers import BORDER, CONFIG, RATE, Path, rows_of, straight, swapped, visit
 
 from stseg.arrays import Floats, Ints, Rows
+from stseg.identities.association import IdentityProblem, associate_globally
 from stseg.identities.evidence.appearance_model import LearnedAppearance, learn_appearance, row_looks
 from stseg.identities.evidence.size_model import MeasuredSizes
-from stseg.identities.global_association import associate_globally
 from stseg.records.tables import APPEARANCE, COLOURS, FEATURES
 from stseg.tracking.windows.isolated_tracklets import isolated_tracklets
 
@@ -121,7 +121,7 @@ def test_features_tell_two_apart_who_are_equally_tall() -> None:
             told[pair] = swapped(true[pair], 80)
         looks = appearance(told, true["id"], 1.0, 1.0, 4)
         sizes = MeasuredSizes.of_heights(told["height"], CONFIG)
-        found = associate_globally(told, sizes, looks, RATE, BORDER, CONFIG)
+        found = associate_globally(told, IdentityProblem.of(told, sizes, looks, RATE, BORDER, CONFIG))
         apart = ~np.isin(told["frame"], range(72, 89))
         np.testing.assert_array_equal(found.identity[apart], true["id"][apart])
 
@@ -142,7 +142,7 @@ def test_looks_are_learned_though_most_identities_would_be_wrong_without_them() 
     true = 1 + index // 2 * 2 + (index % 2 + crossed[index // 2, meeting]) % 2
     looks = appearance(rows, true, 1.0, 1.0, 4)
     sizes = MeasuredSizes.of_heights(rows["height"], CONFIG)
-    found = associate_globally(rows, sizes, looks, RATE, BORDER, CONFIG)
+    found = associate_globally(rows, IdentityProblem.of(rows, sizes, looks, RATE, BORDER, CONFIG))
     apart = np.abs(rows["x"]) > 0.6
     pairs, count = np.unique(np.stack([found.identity[apart], true[apart]]), axis=1, return_counts=True)
     assert pairs.shape[1] == 6, (pairs, count)

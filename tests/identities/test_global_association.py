@@ -9,15 +9,15 @@ from hypothesis import strategies as st
 from strollers import BORDER, CONFIG, RATE, gone, rows_of, runs, swapped, visit
 
 from stseg.arrays import Ints, Rows
+from stseg.identities.association import GlobalAssociation, IdentityProblem, _prevailing_track, associate_globally
 from stseg.identities.evidence.size_model import MeasuredSizes
-from stseg.identities.global_association import GlobalAssociation, _mostly_held, associate_globally
 from stseg.records.tables import APPEARANCE, EVENT, TRAJECTORY
 from stseg.tracking.windows.isolated_tracklets import isolated_tracklets
 
 
 def relinked(rows: Rows) -> GlobalAssociation:
     sizes = MeasuredSizes.of_heights(rows["height"], CONFIG)
-    return associate_globally(rows, sizes, np.zeros(0, APPEARANCE), RATE, BORDER, CONFIG)
+    return associate_globally(rows, IdentityProblem.of(rows, sizes, np.zeros(0, APPEARANCE), RATE, BORDER, CONFIG))
 
 
 def names(rows: Rows, identity: Ints, track: int, frames: range) -> set[int]:
@@ -171,4 +171,4 @@ def test_the_track_that_an_identity_holds_is_that_of_most_rows_around(
         around = rows["id"][np.abs(rows["frame"] - row["frame"]) <= reach].tolist()
         (most,) = [one for one in set(around) if 2 * around.count(one) > len(around)] or [int(row["id"])]
         held.append(most)
-    assert _mostly_held(rows, reach).tolist() == held
+    assert _prevailing_track(rows, reach).tolist() == held

@@ -15,8 +15,8 @@ from strollers import BORDER, CONFIG, RATE, gone, rows_of, runs, straight, swapp
 from stseg.arrays import Ints, Rows
 from stseg.commands.correct import correct
 from stseg.errors import FormatError, InputError
+from stseg.identities.association import IdentityProblem, associate_globally
 from stseg.identities.evidence.size_model import MeasuredSizes
-from stseg.identities.global_association import associate_globally
 from stseg.identities.review.answered_constraints import answered_rows
 from stseg.identities.review.corrections import Answer
 from stseg.identities.search.constraints import Constraints
@@ -26,7 +26,8 @@ from stseg.records.tables import APPEARANCE
 
 def identities(rows: Rows, constraints: Constraints) -> Ints:
     sizes = MeasuredSizes.of_heights(rows["height"], CONFIG)
-    found = associate_globally(rows, sizes, np.zeros(0, APPEARANCE), RATE, BORDER, CONFIG, constraints)
+    problem = IdentityProblem.of(rows, sizes, np.zeros(0, APPEARANCE), RATE, BORDER, CONFIG, constraints)
+    found = associate_globally(rows, problem, constraints)
     return found.identity
 
 

@@ -11,15 +11,14 @@ from reference_identities import crossings, greatest_score, score
 from strollers import BORDER, CONFIG, RATE, rows_of, runs, straight, swapped, visit
 
 from stseg.arrays import Floats, Ints, Rows
-from stseg.identities.evidence.crossings import crossing, crossings_of
 from stseg.identities.evidence.observations import Observations, observe
 from stseg.identities.evidence.size_model import MeasuredSizes, SizeModel, SizePrior, learn_sizes
 from stseg.identities.search import beam_search as search
-from stseg.identities.search.alternatives import Alternatives
 from stseg.identities.search.beam_search import SearchLimits, search_identities
 from stseg.identities.search.choice import choose_distinct, empty_present
-from stseg.identities.search.hypotheses import Hypotheses
-from stseg.identities.search.pasts import Pasts
+from stseg.identities.search.costs import crossing, crossings_of
+from stseg.identities.search.extension import Alternatives
+from stseg.identities.search.hypotheses import Hypotheses, Pasts
 from stseg.tracking.windows.isolated_tracklets import isolated_tracklets
 
 MODEL = SizeModel(np.array([1.7]), np.array([0.03**2]), np.array([0.5]), np.array([0.1**2]), np.full(1, np.inf))
@@ -103,8 +102,8 @@ def test_hypotheses_that_differ_in_the_frame_of_a_birth_are_one(
     change, value = np.array([[h, -1, -1, -1, -1] for h in range(2)]), np.array([2.0, 1.0])
     chosen, mark = np.empty(2, np.int64), np.zeros(2, np.int64)
     number = choose_distinct(
-        held, pasts, np.array(columns)[:, None], 4, seen, mark, Alternatives(change, value), 2, 60.0, empty_present(2),
-        chosen,
+        held, pasts, np.array(columns)[:, None], 4, seen, mark, Alternatives(change, value), 2, 60.0,
+        empty_present(2, 2), chosen,
     )  # fmt: skip
     assert chosen[:number].tolist() == [0, 1][:distinct]
 

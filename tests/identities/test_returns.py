@@ -15,13 +15,10 @@ from stseg.arrays import Floats, Rows
 from stseg.config import Config
 from stseg.engine.offline.known import digest, read_known
 from stseg.errors import ConfigError, FormatError, InputError
-from stseg.identities.evidence.returns import find_returns
-from stseg.identities.evidence.visits import Visits, lasting_variance, pooled_visits
-from stseg.identities.known_people import known_people
+from stseg.identities.evidence.returns import Visits, find_returns, known_people, lasting_variance, pooled_visits
 from stseg.identities.review.answered_constraints import answered_rows
 from stseg.identities.review.corrections import Answer
-from stseg.identities.search.beam_search import FREELY
-from stseg.identities.search.constraints import Constraints
+from stseg.identities.search.constraints import NO_CONSTRAINTS, Constraints
 from stseg.records.tables import APPEARANCE, COLOURS, EVENT, FEATURES, KNOWN
 from stseg.trajectories.final_tracks import FinalTracks, final_tracks
 
@@ -138,7 +135,7 @@ def scene() -> tuple[Rows, Rows, Rows]:
     return rows, np.array([*events, (399, b"death", 6, 0, b"")], EVENT), looks
 
 
-def whole(config: Config, constraints: Constraints = FREELY) -> FinalTracks:
+def whole(config: Config, constraints: Constraints = NO_CONSTRAINTS) -> FinalTracks:
     rows, events, looks = scene()
     return final_tracks(rows, events, looks, RATE, BORDER, config, constraints)
 

@@ -13,7 +13,7 @@ import pytest
 from stseg.arrays import Floats
 from stseg.baselines.huang_wang_2012.kalman_filters import corrected, initial, innovations, predicted
 from stseg.config import MotionConfig
-from stseg.identities.search.pasts import correct_place, predicted_variance
+from stseg.identities.search.hypotheses import correct_place, predicted_variance
 from stseg.tracking.filter.motion_model import process_noise, transition
 from stseg.tracking.filter.track_filter import Measurement, TrackState
 from stseg.trajectories.smoother import smoothed_paths

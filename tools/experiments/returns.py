@@ -19,8 +19,7 @@ import numpy as np
 from stseg.arrays import Flags, Floats, Ints, Rows
 from stseg.engine.offline.known import rows_with_ids
 from stseg.engine.pipeline import identity_problem
-from stseg.identities.evidence.returns import find_returns
-from stseg.identities.evidence.visits import Visits
+from stseg.identities.evidence.returns import Visits, find_returns
 from stseg.io.config_file import parse_config
 from stseg.io.runfile.runs import read_run
 from stseg.io.track_csv import read_tracks_csv

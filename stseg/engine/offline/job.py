@@ -9,7 +9,7 @@ from stseg.arrays import Rows
 from stseg.config import Config
 from stseg.engine.offline.segments import Segment, find_gaps, longest_absence, segments
 from stseg.engine.pipeline import Pipeline, decides_by_appearance
-from stseg.identities.identity_problem import NOBODY
+from stseg.identities.association import NO_KNOWN_PEOPLE
 from stseg.io.recording.appearance_axes import appearance_axes
 from stseg.io.recording.recording import Recording
 from stseg.io.recording.stream_index import StreamIndex
@@ -42,7 +42,7 @@ class Job:
     first: int
     stop: int
     streams: StreamIndex
-    known: Rows = field(default_factory=lambda: NOBODY)
+    known: Rows = field(default_factory=lambda: NO_KNOWN_PEOPLE)
 
     @cached_property
     def read(self) -> Recording:

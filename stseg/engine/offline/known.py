@@ -10,7 +10,7 @@ import numpy as np
 from stseg.arrays import Rows
 from stseg.config import Config
 from stseg.errors import ConfigError, FormatError
-from stseg.identities.known_people import known_people
+from stseg.identities.evidence.returns import known_people
 from stseg.io.runfile.runs import Run, read_run
 from stseg.io.untrusted import limits
 

@@ -7,7 +7,7 @@ person (`stseg.identities.evidence.size_model`). It is learned twice: first from
 its own, then from the identities that are found with it, for looks outlast tracklets. Where identities err, the
 appearance of people seems to change, and weighs less.
 
-How many frames make one independent observation is learned (`stseg.identities.evidence.appearance_duration`); it is no
+How many frames make one independent observation is learned (`stseg.identities.evidence.appearance_axes`); it is no
 less than differences within tracklets say. Where appearance is no better than chance, it says nothing and is left out.
 """
 
@@ -19,8 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints, Rows
-from stseg.identities.evidence.appearance_duration import WRONG, independent_frames
-from stseg.identities.evidence.discriminant_axes import Axes, discriminant_axes
+from stseg.identities.evidence.appearance_axes import WRONG, Axes, discriminant_axes, independent_frames
 from stseg.identities.evidence.size_model import SizeModel, SizePrior, frame_errors, measured_tracklets
 
 _LEAST_FRAMES = 8

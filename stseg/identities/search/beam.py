@@ -11,15 +11,15 @@ from typing import NamedTuple
 import numpy as np
 
 from stseg.arrays import Floats, Ints
-from stseg.identities.evidence.costs import RowCosts, row_costs
-from stseg.identities.evidence.crossings import Crossings, crossings_of
 from stseg.identities.evidence.observations import ObservedRows
-from stseg.identities.rules import Rules
-from stseg.identities.search.alternatives import Alternatives, add_alternatives, empty_alternatives
 from stseg.identities.search.choice import choose_distinct, empty_present
 from stseg.identities.search.constraints import BoundPeople, binding_people, mark_of
+from stseg.identities.search.costs import Crossings, RowCosts, crossings_of, row_costs
 from stseg.identities.search.extension import (
+    Alternatives,
     Extension,
+    add_alternatives,
+    empty_alternatives,
     empty_extension,
     end_identities,
     fill_cheapest,
@@ -27,8 +27,7 @@ from stseg.identities.search.extension import (
     fill_least,
     impose_identity,
 )
-from stseg.identities.search.hypotheses import Hypotheses, fill_successors, slots_in_use
-from stseg.identities.search.pasts import Pasts
+from stseg.identities.search.hypotheses import Hypotheses, Pasts, Rules, fill_successors, slots_in_use
 from stseg.kernels.accelerate import kernel, part
 from stseg.kernels.pointed_tuples import pointed
 

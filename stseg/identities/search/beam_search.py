@@ -16,11 +16,9 @@ from stseg.arrays import Ints
 from stseg.config import MotionConfig
 from stseg.identities.evidence.observations import Observations
 from stseg.identities.evidence.size_model import SizeModel
-from stseg.identities.rules import Rules
 from stseg.identities.search.beam import Frames, extend_beam
-from stseg.identities.search.constraints import Constraints, KnownPeople
-from stseg.identities.search.hypotheses import Hypotheses
-from stseg.identities.search.pasts import Pasts
+from stseg.identities.search.constraints import NO_CONSTRAINTS, Constraints, KnownPeople
+from stseg.identities.search.hypotheses import Hypotheses, Pasts, Rules
 
 _BIRTH = 6.0
 """Cost of a birth or a death inside the area, nats (per square metre)."""
@@ -30,8 +28,6 @@ _LEAST_PLACE = -25.0
 """Least evidence of a place against an identity, nats."""
 _ALTERNATIVE_LOSS, _BEAM_LOSS = 15.0, 60.0
 """Greatest loss of an alternative in one frame, and of a hypothesis against the best, nats."""
-FREELY = Constraints.of([], [])
-"""No constraint."""
 _SPARE = 16
 """Slots for people out of sight."""
 _BLOCK = 256
@@ -122,7 +118,7 @@ class _History:
 
 
 @dataclass(frozen=True)
-class Solution:
+class BestHypothesis:
     """The best hypothesis found.
 
     Attributes
@@ -138,8 +134,12 @@ class Solution:
 
 
 def search_identities(
-    seen: Observations, sizes: SizeModel, motion: MotionConfig, limits: SearchLimits, constraints: Constraints = FREELY
-) -> Solution:
+    seen: Observations,
+    sizes: SizeModel,
+    motion: MotionConfig,
+    limits: SearchLimits,
+    constraints: Constraints = NO_CONSTRAINTS,
+) -> BestHypothesis:  # fmt: skip
     """The most likely identity of each observation.
 
     Parameters
@@ -181,7 +181,7 @@ def search_identities(
             number = len(agree)
         begin = stop
     history.decide(np.inf, number)
-    return Solution(history.name, float(held[0].score[0]))
+    return BestHypothesis(history.name, float(held[0].score[0]))
 
 
 def _frames(seen: Observations, motion: MotionConfig) -> Frames:

@@ -16,9 +16,8 @@ import numpy as np
 
 from stseg.arrays import Ints
 from stseg.identities.evidence.observations import ObservedRows
-from stseg.identities.search.alternatives import Alternatives
-from stseg.identities.search.hypotheses import Hypotheses
-from stseg.identities.search.pasts import Pasts
+from stseg.identities.search.extension import Alternatives
+from stseg.identities.search.hypotheses import Hypotheses, Pasts
 from stseg.kernels.accelerate import kernel, part
 from stseg.kernels.pointed_tuples import pointed
 

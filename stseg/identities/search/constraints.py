@@ -60,6 +60,10 @@ class Constraints:
         return np.asarray((identity[self.earlier] == identity[self.later]) != self.same)
 
 
+NO_CONSTRAINTS = Constraints.of([], [])
+"""No pairs of rows."""
+
+
 @dataclass(frozen=True)
 class KnownPeople:
     """Observations that constraints name: those that are one person, and pairs of people that are two.

@@ -1,4 +1,4 @@
-"""The identities of a run as one problem: its observations, what sizes and appearance tell, and the search's limits."""
+"""Global association: the identities of all rows of a run, and where they differ from the filter's tracks."""
 
 from __future__ import annotations
 
@@ -9,26 +9,27 @@ import numpy as np
 
 from stseg.arrays import Ints, Rows
 from stseg.config import Config, MotionConfig
+from stseg.identities.evidence.appearance_axes import Axes
 from stseg.identities.evidence.appearance_model import LearnedAppearance, learn_appearance, row_looks
-from stseg.identities.evidence.discriminant_axes import Axes
 from stseg.identities.evidence.observations import Observations, observe
+from stseg.identities.evidence.returns import Visits, pooled_visits
 from stseg.identities.evidence.size_model import MeasuredSizes, SizeModel, learn_sizes
-from stseg.identities.evidence.visits import Visits, pooled_visits
-from stseg.identities.search.beam_search import FREELY, SearchLimits, search_identities
-from stseg.identities.search.constraints import Constraints
+from stseg.identities.search.beam_search import SearchLimits, search_identities
+from stseg.identities.search.constraints import NO_CONSTRAINTS, Constraints
 from stseg.records.border import Border
+from stseg.records.rows_of_tracks import rows_of_tracks
 from stseg.records.tables import KNOWN
 from stseg.tracking.windows.isolated_tracklets import isolated_tracklets
 
-_DRAFT = 4
+_DRAFT_DIVISOR = 4
 """Share of the hypotheses, one in so many, of the search from whose identities appearance is learned."""
-NOBODY: Rows = np.zeros(0, KNOWN)
-"""Nobody who was known before."""
+NO_KNOWN_PEOPLE: Rows = np.zeros(0, KNOWN)
+"""No people of earlier recordings."""
 
 
 @dataclass(frozen=True)
 class IdentityProblem:
-    """Whose are the rows of a run?
+    """Observations of a run, statistics of sizes and appearance, and the limits of the search.
 
     Attributes
     ----------
@@ -56,7 +57,7 @@ class IdentityProblem:
     @classmethod
     def of(
         cls, trajectory: Rows, sizes: MeasuredSizes, appearance: Rows, frame_rate: float, border: Border,
-        config: Config, constraints: Constraints = FREELY,
+        config: Config, constraints: Constraints = NO_CONSTRAINTS,
     ) -> IdentityProblem:  # fmt: skip
         """The problem of a run; sizes and appearance are learned from it.
 
@@ -77,8 +78,8 @@ class IdentityProblem:
         constraints
             Pairs of rows that are one person, or two: identities from which appearance is learned obey them.
         """
-        tracklets, own = isolated_tracklets(trajectory, frame_rate), config.tracking
-        limits = SearchLimits(own.hypotheses, own.maximum_gap, own.identity_lag)
+        tracklets, tracking = isolated_tracklets(trajectory, frame_rate), config.tracking
+        limits = SearchLimits(tracking.hypotheses, tracking.maximum_gap, tracking.identity_lag)
         model = learn_sizes(sizes, trajectory["frame"], tracklets, frame_rate)
 
         def problem(learned: LearnedAppearance) -> IdentityProblem:
@@ -94,22 +95,22 @@ class IdentityProblem:
             return problem(LearnedAppearance.nothing(len(trajectory)))
         looks = row_looks(trajectory, appearance)
         # Tracklets are right, but looks outlast them; identities last, and with appearance few are wrong.
-        draft = problem(learned(_tracklet_of(tracklets))).with_hypotheses(-(-own.hypotheses // _DRAFT))
+        draft = problem(learned(_tracklet_of(tracklets))).with_hypotheses(-(-tracking.hypotheses // _DRAFT_DIVISOR))
         return problem(learned(draft.solve(constraints)))
 
     def with_hypotheses(self, number: int) -> IdentityProblem:
         """The problem with another number of hypotheses."""
         return replace(self, limits=replace(self.limits, hypotheses=number))
 
-    def solve(self, constraints: Constraints = FREELY) -> Ints:
+    def solve(self, constraints: Constraints = NO_CONSTRAINTS) -> Ints:
         """The first row of the identity of each row, int64 (n,)."""
         order, first = self.seen.order, np.empty(len(self.seen.order), np.int64)
         known = constraints.renumbered(np.argsort(order))
         first[order] = order[search_identities(self.seen, self.model, self.motion, self.limits, known).name]
         return first
 
-    def visits(self, identity: Ints, frame: Ints, known: Rows = NOBODY) -> Visits:
-        """What sizes and appearance tell of identities, and of people who were known before.
+    def visits(self, identity: Ints, frame: Ints, known: Rows = NO_KNOWN_PEOPLE) -> Visits:
+        """Sums of sizes and appearance over the visit of each identity, after those of people of earlier recordings.
 
         Parameters
         ----------
@@ -153,3 +154,99 @@ def _tracklet_of(tracklets: Sequence[Ints]) -> Ints:
     for rows in tracklets:
         first[rows] = rows[0]
     return first
+
+
+_LINK_WINDOW = 0.5
+"""Time before and after a row in which the prevailing track of its identity is counted, seconds."""
+
+
+@dataclass(frozen=True)
+class Link:
+    """A track that continues under the identity of another.
+
+    Attributes
+    ----------
+    frame
+        First frame under that identity.
+    identity, track
+        The identity, and the number of the track.
+    reason
+        In words.
+    """
+
+    frame: int
+    identity: int
+    track: int
+    reason: str
+
+
+@dataclass(frozen=True)
+class GlobalAssociation:
+    """Identities of a whole run.
+
+    Attributes
+    ----------
+    identity : int64 (row,)
+        Of each row of the trajectory.
+    links
+        Where they differ from the filter tracks.
+    """
+
+    identity: Ints
+    links: list[Link]
+
+
+def associate_globally(
+    trajectory: Rows, problem: IdentityProblem, constraints: Constraints = NO_CONSTRAINTS
+) -> GlobalAssociation:
+    """Identities of the rows of a trajectory by their problem, under constraints on them."""
+    identity = _numbered(trajectory, problem.solve(constraints))
+    return GlobalAssociation(identity, _links(trajectory, identity, problem.frame_rate))
+
+
+def _numbered(trajectory: Rows, first: Ints) -> Ints:
+    """Numbers of identities: that of the track in which each begins, or a new one where another has that."""
+    number, last_number, used = dict[int, int](), int(trajectory["id"].max(initial=0)), set[int]()
+    begins = np.unique(first)
+    for row in begins[np.lexsort((trajectory["id"][begins], trajectory["frame"][begins]))].tolist():
+        number[row] = int(trajectory["id"][row])
+        if number[row] in used:
+            last_number += 1
+            number[row] = last_number
+        used.add(number[row])
+    return np.array([number[row] for row in first.tolist()], np.int64)
+
+
+def _links(trajectory: Rows, identity: Ints, frame_rate: float) -> list[Link]:
+    """Rows from which on an identity holds another track.
+
+    People who stand together may be exchanged for single frames, so the track of most of the frames around counts.
+    """
+    links = []
+    for index in rows_of_tracks(identity):
+        rows, name = trajectory[index[np.argsort(trajectory["frame"][index])]], int(identity[index[0]])
+        current = int(rows["id"][0])
+        for k, track in enumerate(_prevailing_track(rows, _LINK_WINDOW * frame_rate).tolist()):
+            if track != current and track == rows["id"][k]:
+                links.append(_link(rows[k - 1], rows[k], name, frame_rate))
+                current = track
+    return sorted(links, key=lambda link: (link.frame, link.track))
+
+
+def _prevailing_track(rows: Rows, reach: float) -> Ints:
+    """The track of most rows (n,) of one identity within some frames of each; its own where two have as many."""
+    first = np.searchsorted(rows["frame"], rows["frame"] - reach)
+    stop = np.searchsorted(rows["frame"], rows["frame"] + reach, "right")
+    prevailing = rows["id"].copy()
+    for index in rows_of_tracks(rows["id"]):
+        around = slice(first[index[0]], stop[index[-1]])
+        count = np.searchsorted(index, stop[around]) - np.searchsorted(index, first[around])
+        prevailing[around][2 * count > stop[around] - first[around]] = rows["id"][index[0]]
+    return np.asarray(prevailing)
+
+
+def _link(before: np.void, after: np.void, identity: int, frame_rate: float) -> Link:
+    seconds = (after["frame"] - before["frame"]) / frame_rate
+    away = float(np.hypot(after["x"] - before["x"], after["y"] - before["y"]))
+    reason = f"{seconds:.1f} s on, {away:.2f} m away, {before['height']:.2f} and {after['height']:.2f} m tall"
+    return Link(int(after["frame"]), identity, int(after["id"]), reason)

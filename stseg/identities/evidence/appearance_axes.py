@@ -1,4 +1,4 @@
-"""How long appearance lasts: the number of frames that make one independent observation of a person.
+"""Axes along which the appearance of people differs most, and the frames of one independent observation of a person.
 
 A turned back stays turned for seconds, a place in the light for longer, so frames are not independent; how many of
 them make one independent observation is learned where it matters. Axes are learned from one half of each person's
@@ -15,7 +15,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from stseg.arrays import AnyArray, Flags, Floats, Ints
-from stseg.identities.evidence.discriminant_axes import Axes, discriminant_axes
 from stseg.identities.evidence.size_model import evidence
 
 WRONG = 0.1
@@ -145,3 +144,42 @@ def _log_probability(ratio: Floats) -> Floats:
     """Log-probability of an answer of which some are wrong: single wrong ones do not count without bound."""
     right = 1.0 / (1.0 + np.exp(-np.clip(ratio, -50.0, 50.0)))
     return np.asarray(np.log(WRONG + (1.0 - 2.0 * WRONG) * right))
+
+
+_MOST = 4
+"""Most axes."""
+_WHOLE = 0.1
+"""Weight of the whole scatter in that within people: no axis is free of noise."""
+
+
+@dataclass(frozen=True)
+class Axes:
+    """mean (k,), axis (k, d) of unit noise, and the spread among people along each, (d,)."""
+
+    mean: Floats
+    axis: Floats
+    spread: Floats
+
+    def of(self, value: Floats) -> Floats:
+        """Appearance along the axes."""
+        return np.asarray((value - self.mean) @ self.axis)
+
+
+def discriminant_axes(value: Floats, people: Sequence[Ints]) -> Axes:
+    """Axes of the greatest spread among people (rows of each, in the order of time) beside the scatter within them."""
+    every = value[np.concatenate(people)]
+    mean, size = every.mean(axis=0), value.shape[1]
+    within, between = np.zeros((size, size)), np.zeros((size, size))
+    for rows in people:
+        centred = value[rows] - value[rows].mean(axis=0)
+        within += centred.T @ centred / len(every)
+        # Errors of the two halves are nearly independent, so no noise has to be subtracted.
+        early, late = (part.mean(axis=0) - mean for part in np.array_split(value[rows], 2))
+        between += (np.outer(early, late) + np.outer(late, early)) / 2 / len(people)
+    whole = (every - mean).T @ (every - mean) / len(every)
+    within = (1 - _WHOLE) * within + _WHOLE * whole + 1e-9 * max(np.trace(whole), 1e-9) * np.eye(size)
+    root = np.linalg.cholesky(np.linalg.inv(within))
+    spread, turn = np.linalg.eigh(root.T @ between @ root)
+    chosen = np.argsort(-spread, kind="stable")[:_MOST]
+    chosen = chosen[spread[chosen] > 0]
+    return Axes(mean, root @ turn[:, chosen], spread[chosen])
