@@ -18,7 +18,7 @@ _MARGIN = 0.5
 
 @dataclass(frozen=True)
 class ViewReport:
-    """How well one view fits the others.
+    """Agreement of one view with the others.
 
     Attributes
     ----------

@@ -15,18 +15,18 @@ from stseg.arrays import Flags, Floats, Ints
 from stseg.calibration.automatic.correspondence import Correspondences
 from stseg.calibration.pinhole import CENTRE, CLOCK, FOCAL, MIDDLE, RADIAL, SIZE, moved, project
 
-_STEPS = np.array([1e-5] * 5 + [1e-5] * 3 + [1e-4] * 3 + [1e-3])
+_STEP_SIZES = np.array([1e-5] * 5 + [1e-5] * 3 + [1e-4] * 3 + [1e-3])
 """Steps of the finite differences of a camera's parameters."""
 _PRIOR_SPREAD = np.zeros(SIZE)
 _PRIOR_SPREAD[FOCAL], _PRIOR_SPREAD[MIDDLE], _PRIOR_SPREAD[RADIAL] = 0.5, 0.01, 0.25
 _PRIOR_MEAN = np.zeros(SIZE)
 _PRIOR_MEAN[FOCAL], _PRIOR_MEAN[3] = np.log(0.85), -0.15
-_SAME_LENS = {FOCAL: 0.05, 3: 0.05, 4: 0.05}
+_LENS_SPREAD = {FOCAL: 0.05, 3: 0.05, 4: 0.05}
 """Standard deviations of log focal length, k1 and k2 between cameras of one make."""
 _TOE_MEAN, _TOE_SPREAD = np.array([0.12, 0.08]), np.array([0.06, 0.05])
-_PACE = 1.5
+_MAX_STEP_SPEED = 1.5
 """Speed above which steps no longer lengthen, m/s."""
-_OUTLIER = 3.0
+_OUTLIER_RESIDUAL = 3.0
 """Residual, in standard deviations, at which an observation's weight is a quarter."""
 _ITERATIONS = 40
 
@@ -41,7 +41,7 @@ class Parameters:
         See `stseg.calibration.pinhole`.
     toe_offset : float64 (2,)
         Distance from a body's axis to its lowest visible point, towards the camera: metres at rest or walking
-        across, and metres for each m/s along the line of sight (half a step).
+        across, and metres for each m/s along the viewing ray (half a step).
     points : float64 (n, 3)
         x, y and head height of each person in each frame, metres.
     """
@@ -72,7 +72,7 @@ class Problem:
     clock_spread
         Standard deviation of the residual clock offsets, seconds.
     make : float64 (view,)
-        How far a camera is taken for one of the make of the others, 0..1, see `same_make`.
+        Weight of a camera as one of the make of the others, 0..1, see `same_make`.
     body : float64 (m,)
         1 for an observation of a person, 0 for one of a floor feature: that has no toe offset, and a head of infinite
         spread.
@@ -136,9 +136,9 @@ def _covariance(reduced: Floats, parameters: Parameters) -> Floats:
         changed = np.array([moved(view, turn, np.array(shift), 1.0) for view in parameters.views])
         free[k, : changed.size] = (changed - parameters.views).ravel() / 1e-5
     basis = np.linalg.qr(free.T)[0]
-    keep = np.eye(len(reduced)) - basis @ basis.T
+    projector = np.eye(len(reduced)) - basis @ basis.T
     stiff = float(np.abs(np.diag(reduced)).max())
-    return np.asarray(keep @ np.linalg.inv(keep @ reduced @ keep + stiff * basis @ basis.T) @ keep)
+    return np.asarray(projector @ np.linalg.inv(projector @ reduced @ projector + stiff * basis @ basis.T) @ projector)
 
 
 def residuals(parameters: Parameters, problem: Problem) -> Floats:
@@ -159,7 +159,7 @@ def _residuals(views: Floats, toe_offset: Floats, points: Floats, problem: Probl
     place[:, :2] -= views[:, CLOCK, None] * velocity
     toward = views[:, CENTRE][:, :2] - place[:, :2]
     toward /= np.maximum(np.linalg.norm(toward, axis=1, keepdims=True), 1e-6)
-    forward = toe_offset[0] + toe_offset[1] * np.minimum(np.abs((toward * velocity).sum(axis=1)), _PACE)
+    forward = toe_offset[0] + toe_offset[1] * np.minimum(np.abs((toward * velocity).sum(axis=1)), _MAX_STEP_SPEED)
     forward *= problem.body
     lowest = np.column_stack([place[:, :2] + forward[:, None] * toward, np.zeros(len(place))])
     down = correspondences.foot - correspondences.head
@@ -180,47 +180,47 @@ def _squares(residual: Floats, problem: Problem) -> Floats:
 
 def _cost(parameters: Parameters, problem: Problem) -> float:
     square = _squares(residuals(parameters, problem), problem)
-    robust = (square / (1.0 + square / _OUTLIER**2)).sum() / problem.redundancy
+    robust = (square / (1.0 + square / _OUTLIER_RESIDUAL**2)).sum() / problem.redundancy
     heights = (((parameters.points[:, 2] - problem.height) / problem.height_spread) ** 2).sum()
     return float(robust + heights / problem.redundancy + _prior(parameters, problem)[0])
 
 
 def _prior(parameters: Parameters, problem: Problem) -> tuple[float, Floats, Floats]:
     """Cost, half gradient and half Hessian of the prior on cameras and toe offset."""
-    known = _PRIOR_SPREAD > 0
-    weight = np.where(known, 1.0 / np.where(known, _PRIOR_SPREAD, 1.0) ** 2, 0.0)
+    constrained = _PRIOR_SPREAD > 0
+    weight = np.where(constrained, 1.0 / np.where(constrained, _PRIOR_SPREAD, 1.0) ** 2, 0.0)
     weight[CLOCK] = problem.clock_spread**-2
     matrix = np.diag(np.append(np.tile(weight, len(parameters.views)), _TOE_SPREAD**-2))
-    alike = np.diag(problem.make) - np.outer(problem.make, problem.make) / max(problem.make.sum(), 1e-9)
-    for place, spread in _SAME_LENS.items():
+    same_lens = np.diag(problem.make) - np.outer(problem.make, problem.make) / max(problem.make.sum(), 1e-9)
+    for place, spread in _LENS_SPREAD.items():
         rows = place + SIZE * np.arange(len(parameters.views))
-        matrix[np.ix_(rows, rows)] += alike / spread**2
+        matrix[np.ix_(rows, rows)] += same_lens / spread**2
     off = np.append((parameters.views - _PRIOR_MEAN).ravel(), parameters.toe_offset - _TOE_MEAN)
     slope = matrix @ off
     return float(off @ slope), slope, matrix
 
 
 def same_make(views: Floats, size: Ints) -> Floats:
-    """How far each camera seems to be of the make of most others, 0..1.
+    """Weight of each camera as one of the make of most others, 0..1.
 
-    That is, with images of one size and a focal length near the median. People in a part of an image tell focal length
+    These have images of one size and a focal length near the median. People in a part of an image tell focal length
     and lens apart badly; cameras of a rig are mostly of one make, and each sees people in another part. The weights are
     those of Geman and McClure, so another lens is left alone.
 
     Parameters
     ----------
     views : float64 (view, 12)
-        Cameras as far as they are known.
+        Approximate cameras.
     size : int64 (view, 2)
         Width and height of their images, pixels.
     """
     make = np.zeros(len(views))
-    for own in np.unique(size, axis=0):
-        rows = np.flatnonzero((size == own).all(axis=1))
+    for image_size in np.unique(size, axis=0):
+        rows = np.flatnonzero((size == image_size).all(axis=1))
         if len(rows) > make.astype(bool).sum():
-            off = (views[rows, FOCAL] - np.median(views[rows, FOCAL])) / _SAME_LENS[FOCAL]
+            off = (views[rows, FOCAL] - np.median(views[rows, FOCAL])) / _LENS_SPREAD[FOCAL]
             make[:] = 0
-            make[rows] = (1 + (off / _OUTLIER) ** 2) ** -2
+            make[rows] = (1 + (off / _OUTLIER_RESIDUAL) ** 2) ** -2
     return make
 
 
@@ -240,7 +240,7 @@ def _system(parameters: Parameters, problem: Problem) -> _System:
     of_view, of_point = parameters.views[correspondences.view], parameters.points[correspondences.point]
     residual = _residuals(of_view, parameters.toe_offset, of_point, problem)
     ahead: Flags = np.asarray(np.isfinite(residual).all(axis=(1, 2)))
-    weight = np.where(ahead[:, None], (1.0 + _squares(residual, problem) / _OUTLIER**2) ** -2, 0.0)
+    weight = np.where(ahead[:, None], (1.0 + _squares(residual, problem) / _OUTLIER_RESIDUAL**2) ** -2, 0.0)
     root = (np.sqrt(weight / problem.redundancy)[..., None] / problem.spread).reshape(-1, 4)
 
     def slope(views: Floats, toe_offset: Floats, points: Floats, step: float) -> Floats:
@@ -248,7 +248,8 @@ def _system(parameters: Parameters, problem: Problem) -> _System:
         return np.where(np.isfinite(changed), changed, 0.0) * root
 
     by_view = np.stack(
-        [slope(of_view + h * _unit(k, SIZE), parameters.toe_offset, of_point, h) for k, h in enumerate(_STEPS)], -1
+        [slope(of_view + h * _unit(k, SIZE), parameters.toe_offset, of_point, h) for k, h in enumerate(_STEP_SIZES)],
+        -1,
     )
     by_toe = np.stack(
         [slope(of_view, parameters.toe_offset + 1e-4 * _unit(k, 2), of_point, 1e-4) for k in range(2)], -1
@@ -256,20 +257,22 @@ def _system(parameters: Parameters, problem: Problem) -> _System:
     by_point = np.stack(
         [slope(of_view, parameters.toe_offset, of_point + 1e-4 * _unit(k, 3), 1e-4) for k in range(3)], -1
     )
-    left = np.nan_to_num(residual.reshape(-1, 4)) * root
+    weighted_residual = np.nan_to_num(residual.reshape(-1, 4)) * root
     rows = np.zeros((len(residual), 4, SIZE * len(parameters.views) + len(parameters.toe_offset)))
     columns = SIZE * correspondences.view[:, None] + np.arange(SIZE)
     np.put_along_axis(rows, np.repeat(columns[:, None], 4, axis=1), by_view, axis=2)
     rows[:, :, -2:] = by_toe
-    return _normal(parameters, problem, rows, by_point, left)
+    return _normal(parameters, problem, rows, by_point, weighted_residual)
 
 
-def _normal(parameters: Parameters, problem: Problem, rows: Floats, by_point: Floats, left: Floats) -> _System:
+def _normal(
+    parameters: Parameters, problem: Problem, rows: Floats, by_point: Floats, weighted_residual: Floats
+) -> _System:
     """Normal equations from weighted Jacobians and residuals; observations of one point are consecutive."""
     first = np.flatnonzero(np.diff(problem.correspondences.point, prepend=-1))
     transposed = by_point.transpose(0, 2, 1)
     people = np.add.reduceat(transposed @ by_point, first)
-    people_slope = np.add.reduceat((transposed @ left[..., None])[..., 0], first)
+    people_slope = np.add.reduceat((transposed @ weighted_residual[..., None])[..., 0], first)
     between = np.add.reduceat(rows.transpose(0, 2, 1) @ by_point, first)
     stiff = 1.0 / (problem.height_spread**2 * problem.redundancy)
     people[:, 2, 2] += stiff
@@ -278,7 +281,7 @@ def _normal(parameters: Parameters, problem: Problem, rows: Floats, by_point: Fl
     _, prior_slope, prior_curvature = _prior(parameters, problem)
     flat = rows.reshape(-1, rows.shape[2])
     cameras = flat.T @ flat + prior_curvature
-    return _System(cameras, flat.T @ left.ravel() + prior_slope, people, people_slope, between)
+    return _System(cameras, flat.T @ weighted_residual.ravel() + prior_slope, people, people_slope, between)
 
 
 def _unit(k: int, size: int) -> Floats:

@@ -10,9 +10,9 @@ from stseg.geometry import Rig
 
 def coverage(rig: Rig) -> Bytes:
     """Number of views whose image holds each cell's centre, uint8 (plane, y, x)."""
-    seen = np.zeros(rig.grid.shape, np.uint8)
+    count = np.zeros(rig.grid.shape, np.uint8)
     for plane, height in enumerate(rig.grid.heights.tolist()):
         for camera in rig.cameras:
             pixel, ahead = camera.project(rig.grid.ground, height)
-            seen[plane] += ahead & camera.inside(pixel)
-    return seen
+            count[plane] += ahead & camera.inside(pixel)
+    return count

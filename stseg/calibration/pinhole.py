@@ -34,9 +34,9 @@ def project(views: Floats, width: Floats, height: Floats, points: Floats) -> Flo
     float64 (n, 2)
         Pixels of the real image; nan behind the camera.
     """
-    seen = Rotation.from_rotvec(views[:, TURN]).apply(points - views[:, CENTRE])
-    depth = np.where(seen[:, 2] > 1e-3, seen[:, 2], np.nan)
-    ray = seen[:, :2] / depth[:, None]
+    in_camera = Rotation.from_rotvec(views[:, TURN]).apply(points - views[:, CENTRE])
+    depth = np.where(in_camera[:, 2] > 1e-3, in_camera[:, 2], np.nan)
+    ray = in_camera[:, :2] / depth[:, None]
     # Far outside the image the polynomial of a barrel lens folds back; it is held constant from there on.
     square = np.minimum((ray**2).sum(axis=1), _fold_squared(views[:, RADIAL]))
     bend = 1 + square * (views[:, 3] + square * views[:, 4])

@@ -58,7 +58,7 @@ class TestBystanders:
         true = WALK[people.frame]
         off = np.hypot(*np.moveaxis(true[..., :2] - placed.ground[:, None], -1, 0)).min(axis=1)
         assert np.median(off) < 0.03 and np.quantile(off, 0.9) < 0.1
-        assert people.seen.sum(axis=1).mean() > 3
+        assert people.has_box.sum(axis=1).mean() > 3
 
     def test_nobody_is_found_in_nothing(self) -> None:
         people = match_frames(RIG, tables_of(RIG), {0: [np.zeros((0, 4))] * 4}, [0])
@@ -144,8 +144,8 @@ class TestBlunders:
 
 
 def test_coverage_counts_views() -> None:
-    seen = coverage(RIG)
-    assert seen.shape == RIG.grid.shape and seen.max() == 4
+    has_box = coverage(RIG)
+    assert has_box.shape == RIG.grid.shape and has_box.max() == 4
     camera = RIG.cameras[0]
     alone = coverage(replace(RIG, cameras=(camera,)))
     pixel, ahead = camera.project(RIG.grid.ground[10, 20], 0.0)

@@ -12,22 +12,22 @@ from stseg.calibration.automatic.view_alignment import ViewPaths, align, mirrore
 from stseg.calibration.automatic.view_merging import MergedViews
 from stseg.errors import SourceError
 
-_LEAST_ENDS = 40
+_MIN_ENDPOINTS = 40
 """Isolated people (a person in a frame counts once) that a view needs."""
-_LEAST_WAY = 0.25
+_MIN_FOOT_SPREAD = 0.25
 """Least standard deviation of their feet over the image, in body lengths."""
-_LEAST_SHARE = 0.5
+_MIN_AGREEMENT = 0.5
 """Least share of a view's people that agree with another view's."""
 
 
 def require_people(name: str, endpoints: Endpoints) -> None:
     """Raise SourceError where a view shows too few isolated people, or people who do not walk."""
-    if len(endpoints) < _LEAST_ENDS:
+    if len(endpoints) < _MIN_ENDPOINTS:
         found = f"{len(endpoints)} isolated people (a person in a frame counts once)"
-        raise SourceError(name, "", found, f"at least {_LEAST_ENDS}: a longer recording, or one with fewer people")
-    way = float(np.linalg.norm(endpoints.foot.std(axis=0)) / np.median(endpoints.length))
-    if way < _LEAST_WAY:
-        found = f"people who stay in one place (their feet move by {way:.2f} body lengths)"
+        raise SourceError(name, "", found, f"at least {_MIN_ENDPOINTS}: a longer recording, or one with fewer people")
+    foot_spread = float(np.linalg.norm(endpoints.foot.std(axis=0)) / np.median(endpoints.length))
+    if foot_spread < _MIN_FOOT_SPREAD:
+        found = f"people who stay in one place (their feet move by {foot_spread:.2f} body lengths)"
         raise SourceError(name, "", found, "people who walk about")
 
 
@@ -38,10 +38,10 @@ def require_merged(
     share = agreement_shares(paths, merged)
     worst = int(np.argmin(share))
     for view in np.argsort(share):
-        if share[view] < _LEAST_SHARE + 0.2 and (other := _mirror(int(view), paths, merged, rate, most)) is not None:
+        if share[view] < _MIN_AGREEMENT + 0.2 and (other := _mirror(int(view), paths, merged, rate, most)) is not None:
             found = f"people who meet those of {names[other]} only in a mirror"
             raise SourceError(names[int(view)], "", found, "an image that is not mirrored")
-    if share[worst] < _LEAST_SHARE:
+    if share[worst] < _MIN_AGREEMENT:
         found = f"people who meet those of other views in {100 * share[worst]:.0f} % of what these see"
         expected = f"a view of the same ground at the same time, at most {most / rate:g} s apart (--most-delay)"
         raise SourceError(names[worst], "", found, expected)
@@ -50,13 +50,13 @@ def require_merged(
 def agreement_shares(paths: Sequence[ViewPaths], merged: MergedViews) -> list[float]:
     """Share of the common frames in which each view agrees with its best partner, 0..1."""
     shares = []
-    for view, own in enumerate(paths):
+    for view, view_path in enumerate(paths):
         best = 0.0
-        for other, theirs in enumerate(paths):
+        for other, other_path in enumerate(paths):
             if other != view and view in merged.placed and other in merged.placed:
                 delay_frames = merged.placed[other].delay - merged.placed[view].delay
-                common = len(np.intersect1d(own.frame + delay_frames, theirs.frame))
-                best = max(best, float(merged.support[view, other]) / max(common, _LEAST_ENDS))
+                common = len(np.intersect1d(view_path.frame + delay_frames, other_path.frame))
+                best = max(best, float(merged.support[view, other]) / max(common, _MIN_ENDPOINTS))
         shares.append(min(best, 1.0))
     return shares
 
@@ -75,6 +75,6 @@ def require_correspondences(names: Sequence[str], solution: Solution) -> None:
     """Raise SourceError for a view with too few correspondences after the adjustment."""
     count = np.bincount(solution.problem.correspondences.view, minlength=len(names))
     worst = int(np.argmin(count))
-    if count[worst] < _LEAST_ENDS // 2:
+    if count[worst] < _MIN_ENDPOINTS // 2:
         found = f"{count[worst]} correspondences with other views"
-        raise SourceError(names[worst], "", found, f"at least {_LEAST_ENDS // 2}")
+        raise SourceError(names[worst], "", found, f"at least {_MIN_ENDPOINTS // 2}")

@@ -10,7 +10,7 @@ import numpy as np
 from stseg.arrays import Flags, Floats, Ints
 from stseg.calibration.automatic.endpoints import Endpoints
 
-_PACE = 2.5
+_MAX_WALKING_SPEED = 2.5
 """Greatest walking speed, metres per second."""
 _LINK_SECONDS = 0.5
 """Longest gap between two points of one track, seconds."""
@@ -83,18 +83,18 @@ def match_endpoints(
     view = np.repeat(np.arange(len(endpoints)), [len(one) for one in endpoints])
     frame = np.concatenate([one.frame - delay_frames for one, delay_frames in zip(endpoints, delay, strict=True)])
     place = np.concatenate(ground)
-    known: Flags = np.asarray(np.isfinite(place).all(axis=1))
+    on_ground: Flags = np.asarray(np.isfinite(place).all(axis=1))
     order = np.lexsort((view, frame))
-    order = order[known[order]]
+    order = order[on_ground[order]]
     bounds = np.flatnonzero(np.diff(frame[order])) + 1
     groups = [group for rows in np.split(order, bounds) for group in _groups(rows, view, place, gate)]
     point = np.repeat(np.arange(len(groups)), [len(group) for group in groups])
     rows = np.array([row for group in groups for row in group], np.int64)
-    at = np.array([place[group].mean(axis=0) for group in groups]).reshape(-1, 2)
-    when = np.array([frame[group[0]] for group in groups], np.int64)
-    person, velocity = _followed(when, at, frame_rate)
+    point_place = np.array([place[group].mean(axis=0) for group in groups]).reshape(-1, 2)
+    point_frame = np.array([frame[group[0]] for group in groups], np.int64)
+    person, velocity = _link_points(point_frame, point_place, frame_rate)
     foot, head = (np.concatenate([getattr(one, end) for one in endpoints])[rows] for end in ("foot", "head"))
-    return Correspondences(when, at, velocity, person, point, view[rows], foot, head)
+    return Correspondences(point_frame, point_place, velocity, person, point, view[rows], foot, head)
 
 
 def _groups(rows: Ints, view: Ints, place: Floats, gate: float) -> list[list[int]]:
@@ -102,33 +102,33 @@ def _groups(rows: Ints, view: Ints, place: Floats, gate: float) -> list[list[int
     away = np.hypot(*np.moveaxis(place[rows][:, None] - place[rows][None], -1, 0))
     first, second = np.nonzero(np.triu(away <= gate, 1))
     group = {k: [k] for k in range(len(rows))}
-    of = list(range(len(rows)))
+    group_of = list(range(len(rows)))
     for k in np.argsort(away[first, second], kind="stable"):
-        a, b = of[first[k]], of[second[k]]
+        a, b = group_of[first[k]], group_of[second[k]]
         if a == b or {view[rows[x]] for x in group[a]} & {view[rows[x]] for x in group[b]}:
             continue
         if away[np.ix_(group[a], group[b])].max() > gate:
             continue
         for x in group[b]:
-            of[x] = a
+            group_of[x] = a
         group[a] += group.pop(b)
     return [[int(rows[x]) for x in sorted(members)] for members in group.values() if len(members) > 1]
 
 
-def _followed(frame: Ints, ground: Floats, frame_rate: float) -> tuple[Ints, Floats]:
+def _link_points(frame: Ints, ground: Floats, frame_rate: float) -> tuple[Ints, Floats]:
     """Track number of each point, and velocity in metres per second."""
     before, after = (np.full(len(frame), -1, np.int64) for _ in range(2))
     most = max(1, round(_LINK_SECONDS * frame_rate))
     for gap in range(1, most + 1):
-        reach = 0.25 + _PACE * gap / frame_rate
+        reach = 0.25 + _MAX_WALKING_SPEED * gap / frame_rate
         begin = np.searchsorted(frame, frame + gap, "left")
         end = np.searchsorted(frame, frame + gap, "right")
         for k in np.flatnonzero((after < 0) & (end > begin)):
             later = np.arange(begin[k], end[k])
             away = np.hypot(*(ground[later] - ground[k]).T)
-            near = later[away < reach]
-            if len(near) == 1 and before[near[0]] < 0:
-                after[k], before[near[0]] = near[0], k
+            candidates = later[away < reach]
+            if len(candidates) == 1 and before[candidates[0]] < 0:
+                after[k], before[candidates[0]] = candidates[0], k
     person = np.arange(len(frame))
     for k in np.flatnonzero(before >= 0):  # in order of frames
         person[k] = person[before[k]]

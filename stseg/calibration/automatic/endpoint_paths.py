@@ -7,9 +7,9 @@ import numpy as np
 from stseg.arrays import Ints
 from stseg.calibration.automatic.endpoints import Endpoints
 
-_STEP = 0.25
+_LINK_GATE = 0.25
 """Gate of a link: movement of foot and head in body lengths, plus as much for each second between."""
-_GAP = 0.35
+_PATH_GAP = 0.35
 """Longest gap within a path, seconds."""
 
 
@@ -25,16 +25,16 @@ def path_of(endpoints: Endpoints, frame_rate: float) -> Ints:
     started = 0
     for frame in np.unique(endpoints.frame):
         now = np.flatnonzero(endpoints.frame == frame)
-        open_rows = [row for row in open_rows if frame - endpoints.frame[row] <= max(1.0, _GAP * frame_rate)]
+        open_rows = [row for row in open_rows if frame - endpoints.frame[row] <= max(1.0, _PATH_GAP * frame_rate)]
         before = np.array(open_rows, np.int64)
         seconds = (frame - endpoints.frame[before]) / frame_rate
         away = np.abs(places[before][:, None] - places[now][None]).max(axis=(2, 3))
-        near = away <= (_STEP * (1 + seconds) * length[before])[:, None]
+        in_gate = away <= (_LINK_GATE * (1 + seconds) * length[before])[:, None]
         for k, row in enumerate(now):
-            (mine,) = np.nonzero(near[:, k])
-            if len(mine) == 1 and near[mine[0]].sum() == 1:
-                path[row] = path[before[mine[0]]]
-                open_rows.remove(int(before[mine[0]]))
+            (predecessors,) = np.nonzero(in_gate[:, k])
+            if len(predecessors) == 1 and in_gate[predecessors[0]].sum() == 1:
+                path[row] = path[before[predecessors[0]]]
+                open_rows.remove(int(before[predecessors[0]]))
             else:
                 path[row] = started
                 started += 1

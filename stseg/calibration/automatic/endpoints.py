@@ -13,18 +13,18 @@ import numpy as np
 
 from stseg.arrays import AnyArray, Bytes, Floats, Ints, Singles
 
-_SURE = 0.8
+_MIN_LIKELIHOOD = 0.8
 """Foreground likelihood of a silhouette's pixels, at least."""
-_LEAST_AREA, _LEAST_LENGTH = 1.5e-3, 0.10
+_MIN_AREA, _MIN_LENGTH = 1.5e-3, 0.10
 """Least area and length of a person, shares of the image's area and height."""
-_SLIM = 2.0
+_MIN_ELONGATION = 2.0
 """Least ratio of length to width (standard deviations) of a silhouette."""
-_HEAD, _FEET = 0.06, 0.12
+_HEAD_SHARE, _FEET_SHARE = 0.06, 0.12
 """Shares of a silhouette's length taken as the top of the head and the feet."""
-_LOST = 1.0
+_EROSION = 1.0
 """Distance from the centre of a silhouette's last pixel to the end of the body, pixels: half a pixel, and as much again
 lost to pooling over neighbours and to the high likelihood threshold."""
-_CRUMB = 0.03
+_NOISE_AREA = 0.03
 """Greatest area of a component that counts as noise rather than a fragment, share of the silhouette's area."""
 
 
@@ -77,7 +77,7 @@ def upright_endpoints(likelihood: Singles) -> Floats:
     float64 (n, 2, 2)
         Foot and head (u, v), pixels.
     """
-    mask = cv2.medianBlur((likelihood > _SURE).astype(np.uint8), 5)
+    mask = cv2.medianBlur((likelihood > _MIN_LIKELIHOOD).astype(np.uint8), 5)
     count, label, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
     found = [_endpoints(label, stats, k) for k in range(1, count) if _may_be_person(stats, k, label.shape)]
     kept = [endpoints for endpoints in found if endpoints is not None]
@@ -89,18 +89,18 @@ def _may_be_person(stats: AnyArray, k: int, shape: tuple[int, ...]) -> bool:
     left, top, width, height, area = stats[k]
     rows, columns = shape
     whole = left > 1 and top > 1 and left + width < columns - 1 and top + height < rows - 1
-    if not whole or area < _LEAST_AREA * rows * columns or max(height, width) < _LEAST_LENGTH * rows:
+    if not whole or area < _MIN_AREA * rows * columns or max(height, width) < _MIN_LENGTH * rows:
         return False
     gap = max(3, round(0.08 * max(height, width)))
     others = stats[1:]
-    near = (
+    neighbours = (
         (others[:, 0] < left + width + gap)
         & (others[:, 0] + others[:, 2] > left - gap)
         & (others[:, 1] < top + height + gap)
         & (others[:, 1] + others[:, 3] > top - gap)
-        & (others[:, 4] > _CRUMB * area)
+        & (others[:, 4] > _NOISE_AREA * area)
     )
-    return int(near.sum()) == 1
+    return int(neighbours.sum()) == 1
 
 
 def _endpoints(label: AnyArray, stats: AnyArray, k: int) -> Floats | None:
@@ -112,12 +112,12 @@ def _endpoints(label: AnyArray, stats: AnyArray, k: int) -> Floats | None:
     centre = pixel.mean(axis=0)
     spread, axes = np.linalg.eigh(np.cov((pixel - centre).T))
     down = axes[:, 1] * np.sign(axes[1, 1])
-    if spread[1] < _SLIM**2 * spread[0] or abs(down[1]) < 0.5:
+    if spread[1] < _MIN_ELONGATION**2 * spread[0] or abs(down[1]) < 0.5:
         return None
     along, across = (pixel - centre) @ down, (pixel - centre) @ np.array([-down[1], down[0]])
     lowest, high = along.max(), along.min()
     length = lowest - high
-    feet, head = across[along > lowest - _FEET * length], across[along < high + _HEAD * length]
-    aside = np.array([(feet.max() + feet.min()) / 2, (head.max() + head.min()) / 2])
-    reach = np.array([lowest + _LOST, high - _LOST])
-    return np.asarray(centre + reach[:, None] * down + aside[:, None] * np.array([-down[1], down[0]]))
+    feet, head = across[along > lowest - _FEET_SHARE * length], across[along < high + _HEAD_SHARE * length]
+    offset_across = np.array([(feet.max() + feet.min()) / 2, (head.max() + head.min()) / 2])
+    extent = np.array([lowest + _EROSION, high - _EROSION])
+    return np.asarray(centre + extent[:, None] * down + offset_across[:, None] * np.array([-down[1], down[0]]))

@@ -17,17 +17,17 @@ import numpy as np
 from stseg.arrays import AnyArray, Bytes, Floats, Ints
 from stseg.geometry import Camera, Grid
 
-_STEP = 0.02
+_PLAN_RESOLUTION = 0.02
 """Resolution of a rectified plan, metres."""
-_COARSEST = 0.08
+_MAX_GROUND_RESOLUTION = 0.08
 """Coarsest ground resolution of an image that is used, metres a pixel."""
-_NEAR = 0.4
+_SEARCH_RADIUS = 0.4
 """Search radius between two plans, metres."""
-_RATIO = 0.8
+_DESCRIPTOR_RATIO = 0.8
 """Ratio test: greatest ratio of the best to the second best descriptor distance (Lowe 2004)."""
-_EXACT = 0.06
+_INLIER_DISTANCE = 0.06
 """Inlier threshold of the homography, metres."""
-_LEAST = 25
+_MIN_FEATURES = 25
 """Least number of features that two views must share."""
 
 
@@ -86,47 +86,48 @@ def floor_marks(backgrounds: Sequence[Bytes], cameras: Sequence[Camera], grid: G
 
 def _places(grid: Grid) -> Floats:
     """Ground points of a plan, float64 (y, x, 2)."""
-    x, y = np.arange(grid.x[0], grid.x[1], _STEP), np.arange(grid.y[0], grid.y[1], _STEP)
+    x, y = np.arange(grid.x[0], grid.x[1], _PLAN_RESOLUTION), np.arange(grid.y[0], grid.y[1], _PLAN_RESOLUTION)
     return np.stack(np.meshgrid(x, y), -1)
 
 
 def _features(background: Bytes, camera: Camera, ground: Floats) -> tuple[Floats, AnyArray]:
     """Ground points and upright SIFT descriptors of a plan, float64 (n, 2) and float32 (n, 128)."""
     pixel, ahead = camera.project(ground, 0.0)
-    seen = ahead & camera.inside(pixel)
+    visible = ahead & camera.inside(pixel)
     across, down = (np.linalg.norm(np.gradient(pixel, axis=axis), axis=-1) for axis in (0, 1))
-    seen &= np.minimum(across, down) > _STEP / _COARSEST
-    place = np.where(seen[..., None], pixel, -1.0).astype(np.float32)
+    visible &= np.minimum(across, down) > _PLAN_RESOLUTION / _MAX_GROUND_RESOLUTION
+    place = np.where(visible[..., None], pixel, -1.0).astype(np.float32)
     plan = cv2.remap(cv2.cvtColor(background, cv2.COLOR_BGR2GRAY), place[..., 0], place[..., 1], cv2.INTER_LINEAR)
     plan = cv2.createCLAHE(3.0, (8, 8)).apply(plan)
-    inner = cv2.erode(seen.astype(np.uint8), np.ones((9, 9), np.uint8))
+    inner = cv2.erode(visible.astype(np.uint8), np.ones((9, 9), np.uint8))
     sift = cv2.SIFT.create(contrastThreshold=0.02)
     points = [cv2.KeyPoint(point.pt[0], point.pt[1], point.size, 0.0) for point in sift.detect(plan, inner)]
     if not points:
         return np.zeros((0, 2)), np.zeros((0, 128), np.float32)
     kept, descriptor = sift.compute(plan, points)
     first: Floats = ground[0, 0]
-    return first + _STEP * np.array([point.pt for point in kept]), descriptor
+    return first + _PLAN_RESOLUTION * np.array([point.pt for point in kept]), descriptor
 
 
 def _shared(one: tuple[Floats, AnyArray], other: tuple[Floats, AnyArray]) -> Ints:
     """Matched rows of the features of two plans, int64 (n, 2)."""
-    if min(len(one[0]), len(other[0])) < _LEAST:
+    if min(len(one[0]), len(other[0])) < _MIN_FEATURES:
         return np.zeros((0, 2), np.int64)
     away = np.linalg.norm(one[0][:, None] - other[0][None], axis=2)
-    unlike = np.where(away < _NEAR, _distances(one[1], other[1]), np.inf)
+    unlike = np.where(away < _SEARCH_RADIUS, _distances(one[1], other[1]), np.inf)
     best = unlike.argmin(axis=1)
     rows = np.arange(len(best))
     first = unlike[rows, best]
     unlike[rows, best] = np.inf
-    clear = np.isfinite(first) & (first < _RATIO * np.minimum(unlike.min(axis=1), 1e9))
+    clear = np.isfinite(first) & (first < _DESCRIPTOR_RATIO * np.minimum(unlike.min(axis=1), 1e9))
     rows, best = rows[clear], best[clear]
-    if len(rows) < _LEAST:
+    if len(rows) < _MIN_FEATURES:
         return np.zeros((0, 2), np.int64)
-    _, held = cv2.findHomography(one[0][rows], other[0][best], cv2.USAC_MAGSAC, _EXACT, maxIters=5000, confidence=0.999)
-    kept = np.zeros(len(rows), bool) if held is None else held.ravel() > 0
+    ground = one[0][rows], other[0][best]
+    _, inlier = cv2.findHomography(*ground, cv2.USAC_MAGSAC, _INLIER_DISTANCE, maxIters=5000, confidence=0.999)
+    kept = np.zeros(len(rows), bool) if inlier is None else inlier.ravel() > 0
     pairs = np.stack([rows[kept], best[kept]], -1)
-    return pairs if len(pairs) >= _LEAST else np.zeros((0, 2), np.int64)
+    return pairs if len(pairs) >= _MIN_FEATURES else np.zeros((0, 2), np.int64)
 
 
 def _distances(one: AnyArray, other: AnyArray) -> Floats:

@@ -22,7 +22,7 @@ FORWARD = 0.15
 """Distance from a body's axis to its lowest visible point, towards the camera (a toe, half a step), metres."""
 _STARTS = tuple(product((0.6, 0.9, 1.4), (0.2, 0.5), (0.0, -0.3)))
 """Starts of the search: focal length in image widths, pitch in radians, k1."""
-_FIRST, _MOST = 60, 300
+_COARSE_PAIRS, _FINE_PAIRS = 60, 300
 """Number of endpoint pairs in the first and the last stage of the search."""
 
 
@@ -43,7 +43,7 @@ def view_of_upright(endpoints: Endpoints, size: tuple[int, int], person_height: 
     float64 (12,), float
         The camera (see `stseg.calibration.pinhole`), and the median head residual in body lengths.
     """
-    coarse, fine = (_spread_out(endpoints, most) for most in (_FIRST, _MOST))
+    coarse, fine = (_spread_out(endpoints, most) for most in (_COARSE_PAIRS, _FINE_PAIRS))
 
     def fit(rows: Endpoints, start: Floats, most: int) -> tuple[float, Floats]:
         def residual(unknown: Floats) -> Floats:
@@ -88,16 +88,16 @@ def _prior(unknown: Floats) -> Floats:
 def _head_residuals(view: Floats, endpoints: Endpoints, size: tuple[int, int], person_height: float) -> Floats:
     """Head residuals given the feet, in body lengths, float64 (2n,); 1 where feet are above the horizon."""
     ground = axis_of_foot(view, size, endpoints.foot, FORWARD)
-    known: Flags = np.asarray(np.isfinite(ground).all(axis=1))
-    top = np.column_stack([np.where(known[:, None], ground, 0.0), np.full(len(ground), person_height)])
+    on_ground: Flags = np.asarray(np.isfinite(ground).all(axis=1))
+    top = np.column_stack([np.where(on_ground[:, None], ground, 0.0), np.full(len(ground), person_height)])
     many = np.ones(len(top))
     head = project(np.tile(view, (len(top), 1)), many * size[0], many * size[1], top)
     residual = (head - endpoints.head) / endpoints.length[:, None]
-    return np.asarray(np.where(known[:, None] & np.isfinite(residual), np.clip(residual, -1, 1), 1.0).ravel())
+    return np.asarray(np.where(on_ground[:, None] & np.isfinite(residual), np.clip(residual, -1, 1), 1.0).ravel())
 
 
 def axis_of_foot(view: Floats, size: tuple[int, int], foot: Floats, forward: float) -> Floats:
-    """Ground point of the axis of a body whose lowest visible point, `forward` metres nearer, is at `foot`, (n, 2)."""
+    """Ground point of a body's axis, (n, 2); `foot` is its lowest visible point, `forward` metres nearer."""
     ground = on_plane(view, size, foot, 0.0)
     away = ground - view[CENTRE][:2]
     return np.asarray(ground + forward * away / np.linalg.norm(away, axis=1, keepdims=True))

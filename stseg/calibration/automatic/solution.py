@@ -21,18 +21,18 @@ from stseg.calibration.pinhole import CLOCK, height_of_head, moved
 _GATES = (0.8, 0.6, 0.5, 0.5, 0.5)
 """Correspondence gate of each round, metres."""
 ROUNDS = len(_GATES)
-_MOST_POINTS = 1200
-_HEIGHTS = 0.08
+_MAX_POINTS = 1200
+_HEIGHT_SPREAD = 0.08
 """Standard deviation of body height between people, metres."""
-_BOB = 0.03
+_HEAD_SPREAD = 0.03
 """Standard deviation of the head height of one walking person, metres."""
-_LEAST_SPREAD = np.array([[0.02, 0.02], [0.004, 0.003]])
+_MIN_SPREAD = np.array([[0.02, 0.02], [0.004, 0.003]])
 """Least standard deviations of feet and heads, along and across, in body lengths."""
-_TRACE = 0.3
+_MIN_PIXEL_SPREAD = 0.3
 """Least standard deviation of an endpoint, pixels."""
-_CLOCKS, _SAME_CLOCK = 0.2, 1e-4
+_CLOCK_SPREAD, _SYNCHRONOUS_SPREAD = 0.2, 1e-4
 """Standard deviations of residual clock offsets, of unknown and of known delays, seconds."""
-_MOST_MARKS = 800
+_MAX_MARKS = 800
 _MARK_PIXELS = 1.5
 """Standard deviation of a floor feature, pixels: it is located in a plan, where distant ground is stretched."""
 _STEP_SECONDS = 0.5
@@ -133,30 +133,30 @@ def refine(views: CalibrationInput, start: Floats, delay: Ints, progress: Callab
         delay_frames = np.rint(clock * views.frame_rate).astype(np.int64)
         delay = delay + delay_frames - delay_frames[0]
         parameters.views[:, CLOCK] -= delay_frames / views.frame_rate
-        solution = _turn(views, parameters, delay, gate, spread)
+        solution = _round(views, parameters, delay, gate, spread)
         parameters = solution.adjustment.parameters
-        spread = _spread(solution)
+        spread = _residual_spread(solution)
         progress()
     return solution
 
 
-def _turn(views: CalibrationInput, parameters: Parameters, delay: Ints, gate: float, spread: Floats) -> Solution:
+def _round(views: CalibrationInput, parameters: Parameters, delay: Ints, gate: float, spread: Floats) -> Solution:
     ground = [
         axis_of_foot(view, size, endpoints.foot, float(parameters.toe_offset[0] + 0.5 * parameters.toe_offset[1]))
         for view, size, endpoints in zip(parameters.views, views.sizes, views.endpoints, strict=True)
     ]
     matched = match_endpoints(views.endpoints, delay, ground, gate, views.frame_rate)
     matched = matched.of(_spread_out(matched))
-    known = len(parameters.points) > 0
-    height = _heights(views, parameters, matched) if known else np.full(len(matched.frame), views.person_height)
+    refined = len(parameters.points) > 0
+    height = _heights(views, parameters, matched) if refined else np.full(len(matched.frame), views.person_height)
     problem = Problem(
         np.array(views.sizes),
         matched,
-        _floored(matched, spread),
+        _observation_spread(matched, spread),
         height,
-        _BOB if known else _HEIGHTS,
+        _HEAD_SPREAD if refined else _HEIGHT_SPREAD,
         _redundancy(matched, views),
-        _CLOCKS if views.most_delay else _SAME_CLOCK,
+        _CLOCK_SPREAD if views.most_delay else _SYNCHRONOUS_SPREAD,
         same_make(parameters.views, np.array(views.sizes)),
         np.ones(len(matched.view)),
     )
@@ -169,7 +169,7 @@ def refine_with_marks(views: CalibrationInput, solution: Solution, marks: Marks)
     if not len(marks):
         return solution
     problem, parameters = solution.problem, solution.adjustment.parameters
-    fine = marks.of(np.unique(np.linspace(0, len(marks) - 1, min(_MOST_MARKS, len(marks))).astype(np.int64)))
+    fine = marks.of(np.unique(np.linspace(0, len(marks) - 1, min(_MAX_MARKS, len(marks))).astype(np.int64)))
     joint = _with_marks(problem, fine)
     points = np.concatenate(
         [parameters.points, np.column_stack([fine.ground, np.full(len(fine), views.person_height)])]
@@ -187,7 +187,7 @@ def _with_marks(problem: Problem, marks: Marks) -> Problem:
     correspondences, count = problem.correspondences, len(marks)
     pixel = marks.pixel.reshape(-1, 2)
     foot = np.array([_MARK_PIXELS * np.sqrt(problem.redundancy)] * 2)
-    matched = Correspondences(
+    extended = Correspondences(
         np.concatenate([correspondences.frame, np.zeros(count, np.int64)]),
         np.concatenate([correspondences.ground, marks.ground]),
         np.concatenate([correspondences.velocity, np.zeros((count, 2))]),
@@ -199,7 +199,7 @@ def _with_marks(problem: Problem, marks: Marks) -> Problem:
     )
     return replace(
         problem,
-        correspondences=matched,
+        correspondences=extended,
         spread=np.concatenate([problem.spread, np.tile([foot, [np.inf, np.inf]], (2 * count, 1, 1))]),
         height=np.concatenate([problem.height, np.full(count, float(problem.height.mean()))]),
         body=np.concatenate([problem.body, np.zeros(2 * count)]),
@@ -208,7 +208,7 @@ def _with_marks(problem: Problem, marks: Marks) -> Problem:
 
 def _spread_out(matched: Correspondences) -> Ints:
     """Subset of the points for the adjustment, spread over all frames."""
-    return np.unique(np.linspace(0, len(matched.frame) - 1, min(_MOST_POINTS, len(matched.frame))).astype(np.int64))
+    return np.unique(np.linspace(0, len(matched.frame) - 1, min(_MAX_POINTS, len(matched.frame))).astype(np.int64))
 
 
 def _heights(views: CalibrationInput, parameters: Parameters, matched: Correspondences) -> Floats:
@@ -236,17 +236,17 @@ def _redundancy(matched: Correspondences, views: CalibrationInput) -> float:
     return max(1.0, rate * _STEP_SECONDS)
 
 
-def _floored(matched: Correspondences, spread: Floats) -> Floats:
+def _observation_spread(matched: Correspondences, spread: Floats) -> Floats:
     """Standard deviations of each observation, in body lengths, not below the pixel floor."""
     length = np.hypot(*(matched.foot - matched.head).T)
-    return np.asarray(np.maximum(spread, (_TRACE / length)[:, None, None]))
+    return np.asarray(np.maximum(spread, (_MIN_PIXEL_SPREAD / length)[:, None, None]))
 
 
-def _spread(solution: Solution) -> Floats:
+def _residual_spread(solution: Solution) -> Floats:
     """Robust standard deviation of feet and heads along and across, in body lengths.
 
     The three parameters of each point reduce the residuals; the degrees of freedom correct for it.
     """
     residual = solution.adjustment.residual
     free = 1.0 - 3 * len(solution.adjustment.parameters.points) / max(4 * len(residual), 1)
-    return np.asarray(np.maximum(1.4826 * np.nanmedian(np.abs(residual), axis=0) / np.sqrt(free), _LEAST_SPREAD))
+    return np.asarray(np.maximum(1.4826 * np.nanmedian(np.abs(residual), axis=0) / np.sqrt(free), _MIN_SPREAD))

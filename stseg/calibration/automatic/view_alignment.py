@@ -12,20 +12,20 @@ import numpy as np
 
 from stseg.arrays import Complexes, Floats, Ints
 
-_LEAST_SECONDS, _LEAST_SPREAD = 1.5, 0.4
+_MIN_OVERLAP, _MIN_SPREAD = 1.5, 0.4
 """Least overlap of two paths, seconds, and least standard deviation of positions in it, metres."""
 _NOISE = 0.15
 """Standard deviation between two views' positions of one person, metres."""
 _GATE = 0.7
 """Agreement gate, metres."""
-_APART = 1.0
+_BASELINE = 1.0
 """Least distance of the two points of a two-point hypothesis, metres."""
-_PATHS_TRIED, _FRAME_PAIRS_TRIED = 60, 40
+_PATH_HYPOTHESES, _FRAME_HYPOTHESES = 60, 40
 """Number of hypotheses of each kind that are verified."""
-_DRAWN, _ASKED = 1500, 300
+_SAMPLES, _SCORED_PAIRS = 1500, 300
 """Two-point samples at each delay, and point pairs in their first scoring."""
 _ROUNDS = 4
-_KEPT = 5
+_MAX_ALIGNMENTS = 5
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class Alignment:
         return Alignment(self.delay + after.delay, after.factor * self.factor, shift, after.support)
 
 
-SAME = Alignment(0, 1 + 0j, 0j, 0.0)
+IDENTITY = Alignment(0, 1 + 0j, 0j, 0.0)
 """Identity."""
 
 
@@ -99,7 +99,7 @@ def align(a: ViewPaths, b: ViewPaths, frame_rate: float, most_delay: int) -> lis
     for one in judged:
         if all(_differ(one, other, frame_rate) for other in best):
             best.append(_at_best_delay(a, b, one, most_delay))
-        if len(best) == _KEPT:
+        if len(best) == _MAX_ALIGNMENTS:
             break
     return sorted(best, key=_less_support)
 
@@ -121,7 +121,7 @@ def _differ(one: Alignment, other: Alignment, frame_rate: float) -> bool:
 
 def _from_paths(a: ViewPaths, b: ViewPaths, frame_rate: float, most_delay: int) -> list[Alignment]:
     """Hypotheses from pairs of paths, the best gains first."""
-    least = max(4, round(_LEAST_SECONDS * frame_rate))
+    least = max(4, round(_MIN_OVERLAP * frame_rate))
     first = min(int(a.frame.min(initial=0)), int(b.frame.min(initial=0)))
     span = max(int(a.frame.max(initial=0)), int(b.frame.max(initial=0))) - first + 1
     size = 1 << int(np.ceil(np.log2(span + most_delay + 1)))
@@ -132,7 +132,7 @@ def _from_paths(a: ViewPaths, b: ViewPaths, frame_rate: float, most_delay: int) 
         for other in of_b:
             found += _best_delays(one, other, delays, least)
     found.sort(key=lambda pair: -pair[0])
-    return [alignment for _, alignment in found[:_PATHS_TRIED]]
+    return [alignment for _, alignment in found[:_PATH_HYPOTHESES]]
 
 
 def _from_frame_pairs(a: ViewPaths, b: ViewPaths, frame_rate: float, most_delay: int) -> list[Alignment]:
@@ -145,25 +145,25 @@ def _from_frame_pairs(a: ViewPaths, b: ViewPaths, frame_rate: float, most_delay:
     found: list[Alignment] = []
     for delay in range(-(most_delay // step) * step, most_delay + 1, step):
         found += _at_delay(a, b, delay, rng)
-    return sorted(found, key=lambda one: -one.support)[:_FRAME_PAIRS_TRIED]
+    return sorted(found, key=lambda one: -one.support)[:_FRAME_HYPOTHESES]
 
 
 def _at_delay(a: ViewPaths, b: ViewPaths, delay: int, rng: np.random.Generator) -> list[Alignment]:
     of_a, of_b = _same_time(a, b, delay)
-    known = np.isfinite(a.place[of_a]) & np.isfinite(b.place[of_b])
-    x, y = a.place[of_a[known]], b.place[of_b[known]]
+    finite = np.isfinite(a.place[of_a]) & np.isfinite(b.place[of_b])
+    x, y = a.place[of_a[finite]], b.place[of_b[finite]]
     if len(x) < 4:
         return []
-    one, other = rng.integers(0, len(x), (2, 20 * _DRAWN))
+    one, other = rng.integers(0, len(x), (2, 20 * _SAMPLES))
     far_x, far_y = np.abs(x[one] - x[other]), np.abs(y[one] - y[other])
-    redundancy = (far_x > _APART) & (np.abs(far_x - far_y) < _GATE / 2)
-    one, other = one[redundancy][:_DRAWN], other[redundancy][:_DRAWN]
+    distant = (far_x > _BASELINE) & (np.abs(far_x - far_y) < _GATE / 2)
+    one, other = one[distant][:_SAMPLES], other[distant][:_SAMPLES]
     factor = (y[one] - y[other]) / (x[one] - x[other])
     factor /= np.abs(factor)
     shift = (y[one] + y[other] - factor * (x[one] + x[other])) / 2
-    asked = rng.permutation(len(x))[:_ASKED]
-    away = np.abs(factor[:, None] * x[asked] + shift[:, None] - y[asked])
-    support = np.maximum(0.0, 1 - (away / _GATE) ** 2).sum(axis=1) * len(x) / len(asked)
+    sample = rng.permutation(len(x))[:_SCORED_PAIRS]
+    away = np.abs(factor[:, None] * x[sample] + shift[:, None] - y[sample])
+    support = np.maximum(0.0, 1 - (away / _GATE) ** 2).sum(axis=1) * len(x) / len(sample)
     best = np.argsort(-support)[:5]
     return [Alignment(delay, complex(factor[k]), complex(shift[k]), float(support[k])) for k in best]
 
@@ -195,11 +195,11 @@ def _best_delays(a: Complexes, b: Complexes, delays: Ints, least: int) -> list[t
     var_a = over(a[2], b[0]).real / n - np.abs(sum_a / n) ** 2
     var_b = over(a[0], b[2]).real / n - np.abs(sum_b / n) ** 2
     both = over(a[1], b[1]) / n - np.conj(sum_a / n) * (sum_b / n)
-    enough &= (var_a > _LEAST_SPREAD**2) & (var_b > _LEAST_SPREAD**2)
+    enough &= (var_a > _MIN_SPREAD**2) & (var_b > _MIN_SPREAD**2)
     if not enough.any():
         return []
-    left = np.maximum(var_a + var_b - 2 * np.abs(both), 0.0)
-    gain = np.where(enough, n * np.log((var_a + var_b + _NOISE**2) / (left + _NOISE**2)), -np.inf)
+    remainder = np.maximum(var_a + var_b - 2 * np.abs(both), 0.0)
+    gain = np.where(enough, n * np.log((var_a + var_b + _NOISE**2) / (remainder + _NOISE**2)), -np.inf)
     found = []
     for k in np.argsort(-gain)[:3]:
         if np.isfinite(gain[k]):
@@ -234,8 +234,8 @@ def _at_best_delay(a: ViewPaths, b: ViewPaths, one: Alignment, most_delay: int) 
     """Local search over the delay."""
     best, step = one, 8
     while step:
-        near = [best.delay + off for off in (-step, step) if abs(best.delay + off) <= most_delay]
-        better = max((_refined(a, b, replace(best, delay=delay)) for delay in near), key=_has_support, default=best)
+        delays = [best.delay + off for off in (-step, step) if abs(best.delay + off) <= most_delay]
+        better = max((_refined(a, b, replace(best, delay=delay)) for delay in delays), key=_has_support, default=best)
         if better.support > best.support:
             best = better
         else:

@@ -9,7 +9,7 @@ from itertools import combinations
 import numpy as np
 
 from stseg.arrays import Floats
-from stseg.calibration.automatic.view_alignment import SAME, Alignment, ViewPaths, align, support
+from stseg.calibration.automatic.view_alignment import IDENTITY, Alignment, ViewPaths, align, support
 
 _STARTS = 4
 """Number of view pairs from which merging is started."""
@@ -56,7 +56,7 @@ def merge_views(paths: Sequence[ViewPaths], pairs: Pairs) -> MergedViews:
     """
     starts = [(one.support, i, j, one) for (i, j), several in pairs.items() for one in several[:2]]
     starts.sort(key=lambda start: -start[0])
-    grown = [_grown(paths, pairs, {i: SAME, j: one}) for _, i, j, one in starts[:_STARTS]]
+    grown = [_grown(paths, pairs, {i: IDENTITY, j: one}) for _, i, j, one in starts[:_STARTS]]
     return max(grown, key=lambda merged: float(merged.support.sum()), default=MergedViews({}, _agreements(paths, {})))
 
 

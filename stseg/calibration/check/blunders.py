@@ -19,22 +19,22 @@ from stseg.calibration.check.box_correspondence import (
     wholly_visible,
 )
 from stseg.calibration.check.leave_one_out import edge_residuals, locate
-from stseg.calibration.check.verdict import LEAST
+from stseg.calibration.check.verdict import MIN_PEOPLE
 from stseg.geometry import Rig
 
 BoxesByFrame = Mapping[int, Sequence[Floats]]
 """Boxes of every view, float64 (n, 4), by frame."""
-_BETTER = 1.3
+_SWAP_GAIN = 1.3
 """Least ratio of fitting boxes, after swapping two streams to before."""
-_CLOSE = 0.35
+_FIT_DISTANCE = 0.35
 """Distance, in gates, within which a box fits a person located by all views."""
-_NEARER = 0.75
+_DELAY_MISFIT = 0.75
 """Share of the misfit that a delay may leave for the stream to count as delayed."""
 
 
 @dataclass(frozen=True)
 class StreamDelay:
-    """A view whose stream is delayed.
+    """A view with a delayed stream.
 
     Attributes
     ----------
@@ -63,7 +63,7 @@ def find_swapped_streams(
     frames: Sequence[int],
     people: BoxCorrespondences,
 ) -> tuple[int, int] | None:
-    """Two views whose streams fit far better when swapped: the best pair with images of one size.
+    """Two views that fit far better with their streams swapped: the best pair with images of one size.
 
     Parameters
     ----------
@@ -80,14 +80,14 @@ def find_swapped_streams(
     -------
     (view, view), or None
     """
-    best, pair = _BETTER * max(_fitting_boxes(tables, people), LEAST), None
+    best, pair = _SWAP_GAIN * max(_fitting_boxes(tables, people), MIN_PEOPLE), None
     for first, second in combinations(range(len(tables)), 2):
         if rig.cameras[first].size != rig.cameras[second].size:
             continue
         order = list(range(len(tables)))
         order[first], order[second] = second, first
-        turned = {frame: [boxes_by_frame[frame][view] for view in order] for frame in frames}
-        fits = _fitting_boxes(tables, match_frames(rig, tables, turned, frames))
+        swapped_boxes = {frame: [boxes_by_frame[frame][view] for view in order] for frame in frames}
+        fits = _fitting_boxes(tables, match_frames(rig, tables, swapped_boxes, frames))
         if fits > best:
             best, pair = fits, (first, second)
     return pair
@@ -100,19 +100,19 @@ def _fitting_boxes(tables: Sequence[BodyTable], people: BoxCorrespondences) -> i
     measured = np.isfinite(located.height)
     count = 0
     for view, table in enumerate(tables):
-        residual, known, pixel_height = edge_residuals(
+        residual, uncut, pixel_height = edge_residuals(
             table, located.ground[measured], located.height[measured], people.box[measured, view]
         )
         with np.errstate(invalid="ignore"):
             off = np.hypot(residual[:, 0], residual[:, 1]) / pixel_height
-            count += int((known[:, :2].all(axis=1) & (off < _CLOSE * GATE)).sum())
+            count += int((uncut[:, :2].all(axis=1) & (off < _FIT_DISTANCE * GATE)).sum())
     return count
 
 
 def find_stream_delay(
     tables: Sequence[BodyTable], boxes_by_frame: BoxesByFrame, people: BoxCorrespondences, most: int
 ) -> StreamDelay | None:
-    """The view whose boxes fit the others best at a different time; None where each fits best undelayed.
+    """The view with boxes that fit the others best at a different time; None where each fits best undelayed.
 
     Parameters
     ----------
@@ -124,13 +124,13 @@ def find_stream_delay(
     most
         Largest delay in either direction, frames.
     """
-    clearest, found = _NEARER, None
+    clearest, found = _DELAY_MISFIT, None
     shifts = range(-most, most + 1)
     for view in range(len(tables)):
         others = [other for other in range(len(tables)) if other != view]
         located = locate(people, tables, others, min(2, len(others)))
-        known = replace(people, ground=located.ground, height=located.height)
-        misfit = np.array([_misfit(tables[view], view, boxes_by_frame, known, shift) for shift in shifts])
+        relocated = replace(people, ground=located.ground, height=located.height)
+        misfit = np.array([_misfit(tables[view], view, boxes_by_frame, relocated, shift) for shift in shifts])
         if not np.isfinite(misfit).all():
             continue
         best = int(misfit.argmin())
@@ -144,8 +144,8 @@ def without_delay(boxes_by_frame: BoxesByFrame, one: StreamDelay, size: int) -> 
     nothing = [np.zeros((0, 4))] * size
     return {
         frame: [
-            boxes_by_frame.get(frame + one.frames, nothing)[view] if view == one.view else own
-            for view, own in enumerate(boxes)
+            boxes_by_frame.get(frame + one.frames, nothing)[view] if view == one.view else view_boxes
+            for view, view_boxes in enumerate(boxes)
         ]
         for frame, boxes in boxes_by_frame.items()
     }
@@ -159,19 +159,20 @@ def _misfit(table: BodyTable, view: int, boxes_by_frame: BoxesByFrame, people: B
     inside = wholly_visible(table, people.ground, people.height)
     offsets, places = [np.zeros((0, 2))], [np.zeros((0, 2))]
     for frame in np.unique(people.frame[inside]).tolist():
-        own = np.flatnonzero(inside & (people.frame == frame))
+        rows = np.flatnonzero(inside & (people.frame == frame))
         boxes = boxes_by_frame.get(frame + shift)
         if boxes is None or not len(boxes[view]):
             continue
-        apart = mismatch(table, people.ground[own], people.height[own], boxes[view])
-        met = np.isfinite(apart.min(axis=1))
-        nearest = boxes[view][apart.argmin(axis=1)[met]]
-        residual, _, pixel_height = edge_residuals(table, people.ground[own[met]], people.height[own[met]], nearest)
+        distance = mismatch(table, people.ground[rows], people.height[rows], boxes[view])
+        matched = np.isfinite(distance.min(axis=1))
+        nearest = boxes[view][distance.argmin(axis=1)[matched]]
+        rows = rows[matched]
+        residual, _, pixel_height = edge_residuals(table, people.ground[rows], people.height[rows], nearest)
         offsets.append(residual[:, :2] / pixel_height[:, None])
-        places.append(people.ground[own[met]])
-    together, ground = np.concatenate(offsets), np.concatenate(places)
-    if len(together) < LEAST:
+        places.append(people.ground[rows])
+    scatter, ground = np.concatenate(offsets), np.concatenate(places)
+    if len(scatter) < MIN_PEOPLE:
         return np.nan
     basis = np.column_stack([np.ones(len(ground)), ground])
-    rest = together - basis @ np.linalg.lstsq(basis, together)[0]
+    rest = scatter - basis @ np.linalg.lstsq(basis, scatter)[0]
     return float(np.median(np.hypot(*rest.T)))

@@ -16,14 +16,14 @@ from stseg.arrays import Flags, Floats, Ints
 from stseg.bodies.pillars import BodyTable
 from stseg.geometry import Camera, Grid, Rig
 
-_COMMON = 1.70
-"""Height assumed for a head whose feet may be hidden, metres."""
-_SHORTEST, _TALLEST = 1.35, 2.10
+_HEAD_HEIGHT = 1.70
+"""Height assumed for a head above feet that may be hidden, metres."""
+_MIN_HEIGHT, _MAX_HEIGHT = 1.35, 2.10
 GATE = 0.35
 """Association gate: distance of a box's middle and top from the body's, in body heights (about 0.6 m)."""
-_HIDDEN = 0.6
+_OCCLUSION = 0.6
 """Share of a body's height that may be hidden at the feet."""
-_WIDTHS = (0.4, 2.0)
+_MIN_WIDTH, _MAX_WIDTH = 0.4, 2.0
 """Least and greatest width of a single person's box, in body widths."""
 _BORDER = 2.0
 """Distance from the image border within which a box counts as cut, pixels."""
@@ -55,7 +55,7 @@ class BoxCorrespondences:
         return len(self.frame)
 
     @property
-    def seen(self) -> Flags:
+    def has_box(self) -> Flags:
         """Whether each view has a box of each person, bool (n, view)."""
         return np.asarray(np.isfinite(self.box[..., 0]))
 
@@ -81,10 +81,10 @@ def match_boxes(rig: Rig, tables: Sequence[BodyTable], frame: int, boxes: Sequen
     ground, height = _candidates(rig, boxes)
     views = len(boxes)
     residual, which = np.full((len(ground), views), np.inf), np.full((len(ground), views), -1)
-    for view, (table, own) in enumerate(zip(tables, boxes, strict=True)):
-        if len(own) and len(ground):
-            apart = mismatch(table, ground, height, own)
-            which[:, view], residual[:, view] = apart.argmin(axis=1), apart.min(axis=1)
+    for view, (table, view_boxes) in enumerate(zip(tables, boxes, strict=True)):
+        if len(view_boxes) and len(ground):
+            distance = mismatch(table, ground, height, view_boxes)
+            which[:, view], residual[:, view] = distance.argmin(axis=1), distance.min(axis=1)
     selected = _greedy_selection(residual, which)
     box = np.full((len(selected), views, 4), np.nan)
     for row, (candidate, confirmed) in enumerate(selected):
@@ -125,7 +125,7 @@ def mismatch(table: BodyTable, ground: Floats, height: Floats, boxes: Floats) ->
         early = (body[:, None, 3] - boxes[None, :, 3]) / pixel_height
         widths = (boxes[:, 2] - boxes[:, 0])[None] / wide
         off = np.hypot(middle, top) / GATE
-        fits = (off < 1) & (early < _HIDDEN) & (early > -GATE) & (widths > _WIDTHS[0]) & (widths < _WIDTHS[1])
+        fits = (off < 1) & (early < _OCCLUSION) & (early > -GATE) & (widths > _MIN_WIDTH) & (widths < _MAX_WIDTH)
     inside = _inside(body, table.size)[:, None]
     return np.where(fits & inside, off, np.inf)
 
@@ -146,19 +146,19 @@ def _inside(body: Floats, size: tuple[int, int]) -> Flags:
 def _candidates(rig: Rig, boxes: Sequence[Floats]) -> tuple[Floats, Floats]:
     """Candidate ground points and heights of the boxes, float64 (n, 2) and (n,)."""
     grounds, heights = [np.zeros((0, 2))], [np.zeros(0)]
-    for camera, own in zip(rig.cameras, boxes, strict=True):
-        if not len(own):
+    for camera, view_boxes in zip(rig.cameras, boxes, strict=True):
+        if not len(view_boxes):
             continue
-        middle = own[:, [0, 2]].mean(axis=1)
-        whole = own[:, 3] < camera.size[1] - 1 - _BORDER
-        foot = camera.back_project(np.stack([middle, own[:, 3]], -1))
-        height = np.where(whole, height_of(camera, foot, middle, own[:, 1]), np.nan)
-        by_head = camera.back_project(np.stack([middle, own[:, 1]], -1), _COMMON)
+        middle = view_boxes[:, [0, 2]].mean(axis=1)
+        whole = view_boxes[:, 3] < camera.size[1] - 1 - _BORDER
+        foot = camera.back_project(np.stack([middle, view_boxes[:, 3]], -1))
+        height = np.where(whole, height_of(camera, foot, middle, view_boxes[:, 1]), np.nan)
+        by_head = camera.back_project(np.stack([middle, view_boxes[:, 1]], -1), _HEAD_HEIGHT)
         grounds += [foot, by_head]
-        heights += [height, np.full(len(own), _COMMON)]
+        heights += [height, np.full(len(view_boxes), _HEAD_HEIGHT)]
     ground, height = np.concatenate(grounds), np.concatenate(heights)
     with np.errstate(invalid="ignore"):
-        kept = (height > _SHORTEST) & (height < _TALLEST) & _in_area(ground, rig.grid)
+        kept = (height > _MIN_HEIGHT) & (height < _MAX_HEIGHT) & _in_area(ground, rig.grid)
     return ground[kept], height[kept]
 
 

@@ -2,7 +2,7 @@
 
 Ground point and height of a person are a robust least-squares fit (Cauchy loss) to the middle, upper and lower edges of
 its boxes, in standard deviations of a box's edges. Residuals in the view that was left out are metres at the person,
-across the line of sight, so that near and far views are comparable.
+across the viewing ray, so that near and far views are comparable.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from stseg.arrays import Flags, Floats
 from stseg.bodies.pillars import BodyTable
 from stseg.calibration.check.box_correspondence import BoxCorrespondences
 
-_SIDE, _HEAD, _FEET, _PIXELS = 0.06, 0.045, 0.06, 2.0
+_EDGE_SPREAD, _PIXEL_SPREAD = (0.06, 0.045, 0.06), 2.0
 """Standard deviations of a box's middle, upper and lower edge as shares of the body's height, and pixels added to each
 (a detector's grid, a blob's fringe)."""
 _HEIGHT, _HEIGHT_SPREAD = 1.70, 0.15
 _ROUNDS = 6
-_STEP = 0.02
+_DIFFERENCE = 0.02
 """Step of the finite differences, metres."""
 
 
@@ -48,13 +48,13 @@ def locate(people: BoxCorrespondences, tables: Sequence[BodyTable], views: Seque
     chosen = [tables[view] for view in views]
     enough = np.isfinite(boxes[..., 0]).sum(axis=1) >= least
     for _ in range(_ROUNDS):
-        here = np.column_stack([ground, height])
-        residual = _edge_residuals(chosen, boxes, here)
+        estimate = np.column_stack([ground, height])
+        residual = _edge_residuals(chosen, boxes, estimate)
         slope = np.stack(
             [
-                (_edge_residuals(chosen, boxes, here + move) - _edge_residuals(chosen, boxes, here - move))
-                / (2 * _STEP)
-                for move in _STEP * np.eye(3)
+                (_edge_residuals(chosen, boxes, estimate + move) - _edge_residuals(chosen, boxes, estimate - move))
+                / (2 * _DIFFERENCE)
+                for move in _DIFFERENCE * np.eye(3)
             ],
             -1,
         )
@@ -71,13 +71,13 @@ def locate(people: BoxCorrespondences, tables: Sequence[BodyTable], views: Seque
     return GroundEstimate(np.where(enough[:, None], ground, np.nan), np.where(enough, height, np.nan))
 
 
-def _edge_residuals(tables: Sequence[BodyTable], boxes: Floats, here: Floats) -> Floats:
+def _edge_residuals(tables: Sequence[BodyTable], boxes: Floats, people: Floats) -> Floats:
     """Normalised residuals of middle, upper and lower edges in all views, float64 (n, 3 view); nan where unknown."""
     parts = []
     for k, table in enumerate(tables):
-        residual, known, pixel_height = edge_residuals(table, here[:, :2], here[:, 2], boxes[:, k])
-        spread = np.stack([_SIDE * pixel_height, _HEAD * pixel_height, _FEET * pixel_height], -1) + _PIXELS
-        parts.append(np.where(known, residual / spread, np.nan))
+        residual, uncut, pixel_height = edge_residuals(table, people[:, :2], people[:, 2], boxes[:, k])
+        spread = np.stack([share * pixel_height for share in _EDGE_SPREAD], -1) + _PIXEL_SPREAD
+        parts.append(np.where(uncut, residual / spread, np.nan))
     return np.concatenate(parts, axis=1)
 
 
@@ -109,5 +109,5 @@ def edge_residuals(table: BodyTable, ground: Floats, height: Floats, box: Floats
         sides = (np.minimum(box[:, 0], body[:, 0]) > 1) & (np.maximum(box[:, 2], body[:, 2]) < width - 2)
         head = np.minimum(box[:, 1], body[:, 1]) > 1
         feet = np.maximum(box[:, 3], body[:, 3]) < rows - 2
-    known = np.stack([sides, head, feet], -1) & np.isfinite(residual)
-    return residual, known, body[:, 3] - body[:, 1]
+    uncut = np.stack([sides, head, feet], -1) & np.isfinite(residual)
+    return residual, uncut, body[:, 3] - body[:, 1]

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from stseg.arrays import Floats
 from stseg.bodies.pillars import BodyTable
 from stseg.calibration.check.blunders import (
     BoxesByFrame,
@@ -17,16 +18,16 @@ from stseg.calibration.check.blunders import (
     without_delay,
 )
 from stseg.calibration.check.box_correspondence import BoxCorrespondences, tables_of, wholly_visible
-from stseg.calibration.check.verdict import LEAST, Disagreement, Verdict, judge
+from stseg.calibration.check.verdict import MIN_PEOPLE, Disagreement, Verdict, judge
 from stseg.geometry import Rig
 
-_MOST = 80
+_MAX_FRAMES = 80
 """Greatest number of frames in use, evenly spread."""
-_LATE = 1.0
+_MAX_DELAY = 1.0
 """Largest stream delay that is tested, seconds."""
-_FAR = 1.5
+_SWAP_DISPLACEMENT = 1.5
 """Displacement, in cells, from which swapped streams are tested."""
-_LOST = 0.6
+_LOST_CONFIRMATION = 0.6
 """Share of the median confirmation rate below which a view counts as lost."""
 
 
@@ -43,7 +44,7 @@ class Check:
     lost : tuple of int
         Views that confirm almost no person of the others.
     swapped
-        Two views whose streams are swapped.
+        Two views with swapped streams.
     delays
         Delayed streams; the verdict holds with their delays undone.
     people
@@ -75,16 +76,18 @@ def check_rig(rig: Rig, boxes_by_frame: BoxesByFrame) -> Check:
     tables, frames = tables_of(rig), spread(sorted(boxes_by_frame))
     people = match_frames(rig, tables, boxes_by_frame, frames)
     share = confirmations(tables, people)
-    lost = tuple(int(view) for view in np.flatnonzero(share < _LOST * np.nanmedian(share))) if _known(share) else ()
+    lost: tuple[int, ...] = ()
+    if comparable := bool(np.isfinite(share).sum() > 1):
+        lost = tuple(np.flatnonzero(share < _LOST_CONFIRMATION * np.nanmedian(share)).tolist())
     verdict = judge(rig, tables, people)
-    far = any(one.off > _FAR * rig.grid.cell for one in verdict.named)
-    swapped = (
-        find_swapped_streams(rig, tables, boxes_by_frame, frames, people) if lost or far or not _known(share) else None
-    )
+    far = any(one.off > _SWAP_DISPLACEMENT * rig.grid.cell for one in verdict.named)
+    swapped = None
+    if lost or far or not comparable:
+        swapped = find_swapped_streams(rig, tables, boxes_by_frame, frames, people)
     if swapped is not None:
         return Check(Verdict((None,) * len(tables), (), None), tuple(share.tolist()), (), swapped, (), len(people))
     shifted: list[StreamDelay] = []
-    most = max(1, round(_LATE * rig.frame_rate))
+    most = max(1, round(_MAX_DELAY * rig.frame_rate))
     while (
         len(shifted) < len(tables) // 2 and (one := find_stream_delay(tables, boxes_by_frame, people, most)) is not None
     ):
@@ -98,26 +101,20 @@ def check_rig(rig: Rig, boxes_by_frame: BoxesByFrame) -> Check:
 
 def spread(frames: Sequence[int]) -> list[int]:
     """At most `_MOST` frames, evenly spread."""
-    if len(frames) <= _MOST:
+    if len(frames) <= _MAX_FRAMES:
         return list(frames)
-    return [frames[k] for k in np.rint(np.linspace(0, len(frames) - 1, _MOST)).astype(int)]
+    return [frames[k] for k in np.rint(np.linspace(0, len(frames) - 1, _MAX_FRAMES)).astype(int)]
 
 
-def confirmations(
-    tables: Sequence[BodyTable], people: BoxCorrespondences
-) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+def confirmations(tables: Sequence[BodyTable], people: BoxCorrespondences) -> Floats:
     """Confirmation rate of each view: share of people seen by two others that it shows; nan where there are few."""
     share = np.full(len(tables), np.nan)
     for view, table in enumerate(tables):
         inside = wholly_visible(table, people.ground, people.height)
-        others = np.delete(people.seen, view, axis=1).sum(axis=1) >= min(2, len(tables) - 1)
-        if (inside & others).sum() >= LEAST:
-            share[view] = people.seen[inside & others, view].mean()
+        others = np.delete(people.has_box, view, axis=1).sum(axis=1) >= min(2, len(tables) - 1)
+        if (inside & others).sum() >= MIN_PEOPLE:
+            share[view] = people.has_box[inside & others, view].mean()
     return share
-
-
-def _known(share: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> bool:
-    return bool(np.isfinite(share).sum() > 1)
 
 
 def verdict_text(rig: Rig, check: Check) -> list[str]:
@@ -149,7 +146,7 @@ def verdict_text(rig: Rig, check: Check) -> list[str]:
         )
     silent = [name for name, one in zip(names, check.verdict.views, strict=True) if one is None]
     if silent and check.swapped is None:
-        sentences.append(f"too few people stand alone before {', '.join(silent)} to judge (fewer than {LEAST})")
+        sentences.append(f"too few people stand alone before {', '.join(silent)} to judge (fewer than {MIN_PEOPLE})")
     if not sentences:
         worst = max((one for one in check.verdict.views if one is not None), key=lambda one: one.off)
         sentences.append(

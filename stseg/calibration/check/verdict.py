@@ -20,10 +20,10 @@ from stseg.calibration.check.box_correspondence import BoxCorrespondences, wholl
 from stseg.calibration.check.leave_one_out import edge_residuals, locate
 from stseg.geometry import Camera, Rig
 
-LEAST = 20
+MIN_PEOPLE = 20
 """Least number of people (a person in a frame counts once) for a statement on a view."""
 _ROUNDS = 15
-_FEET, _HIDDEN = 2, 0.35
+_FEET_COLUMN, _OCCLUSION_WEIGHT = 2, 0.35
 """Column of the feet, and the weight of a lower edge above them: others and furniture hide feet."""
 _SUSPECTS = 3
 """Number of the most displaced views that are tried as the cause."""
@@ -44,7 +44,7 @@ class Disagreement:
     confirmed
         Share of the people inside its image that it shows.
     feet, heads
-        Root mean square of the smoothed disagreement across the line of sight at feet and heads, metres.
+        Root mean square of the smoothed disagreement across the viewing ray at feet and heads, metres.
     right, down
         Its mean at the feet: the view's people against the others', metres.
     scatter
@@ -85,7 +85,7 @@ class _RawDisagreement:
     planes
         Smoothed over the ground.
     field : float64 (n, 3)
-        The same of each person: middle to the right, head and feet downwards, metres across the line of sight.
+        The same of each person: middle to the right, head and feet downwards, metres across the viewing ray.
     scale : float64 (n,)
         Pixels a metre at each person.
     slope : float64 (n, 2, 2)
@@ -130,14 +130,14 @@ def _raw_disagreement(
     camera: Camera, tables: Sequence[BodyTable], people: BoxCorrespondences, view: int, others: Sequence[int]
 ) -> _RawDisagreement | None:
     located = locate(people, tables, others, min(2, len(others)))
-    residual, known, pixel_height = edge_residuals(tables[view], located.ground, located.height, people.box[:, view])
+    residual, uncut, pixel_height = edge_residuals(tables[view], located.ground, located.height, people.box[:, view])
     with np.errstate(invalid="ignore"):
-        across = np.where(known, residual / pixel_height[:, None] * located.height[:, None], np.nan)
+        across = np.where(uncut, residual / pixel_height[:, None] * located.height[:, None], np.nan)
     inside = wholly_visible(tables[view], located.ground, located.height)
     measured = np.isfinite(across[:, 0])
-    if measured.sum() < LEAST:
+    if measured.sum() < MIN_PEOPLE:
         return None
-    confirmed = float(people.seen[inside, view].mean()) if inside.any() else 0.0
+    confirmed = float(people.has_box[inside, view].mean()) if inside.any() else 0.0
     ground = located.ground[measured]
     planes = _smooth(ground, across[measured])
     field = planes.at(ground)
@@ -175,14 +175,14 @@ def _smooth(ground: Floats, across: Floats) -> _Planes:
     found = np.zeros((3, across.shape[1]))
     for column in range(across.shape[1]):
         measured = np.isfinite(across[:, column])
-        if measured.sum() < LEAST:
+        if measured.sum() < MIN_PEOPLE:
             continue
-        own, value, weight = basis[measured], across[measured, column], np.ones(int(measured.sum()))
+        rows, value, weight = basis[measured], across[measured, column], np.ones(int(measured.sum()))
         for _ in range(_ROUNDS):
-            normal = (own * weight[:, None]).T @ own + np.diag([0.0, 1e-3, 1e-3])
-            found[:, column] = np.linalg.solve(normal, (own * weight[:, None]).T @ value)
-            rest = value - own @ found[:, column]
-            hidden = _HIDDEN if column == _FEET else 1.0
+            normal = (rows * weight[:, None]).T @ rows + np.diag([0.0, 1e-3, 1e-3])
+            found[:, column] = np.linalg.solve(normal, (rows * weight[:, None]).T @ value)
+            rest = value - rows @ found[:, column]
+            hidden = _OCCLUSION_WEIGHT if column == _FEET_COLUMN else 1.0
             weight = np.where(rest < 0, hidden, 1.0) / np.maximum(np.abs(rest), 0.01)
     return _Planes(middle, found)
 
@@ -224,8 +224,8 @@ def judge(rig: Rig, tables: Sequence[BodyTable], people: BoxCorrespondences) -> 
     """Find the views that are displaced by more than a cell."""
     first = current = _all_raw_disagreements(rig, tables, people)
     named: list[Disagreement] = []
-    while len(_known(current)) > 2 and _worst(current) > rig.grid.cell and len(named) < len(rig.cameras) - 2:
-        unnamed = [one for one in _known(current) if one.view not in {other.view for other in named}]
+    while len(_judged(current)) > 2 and _worst(current) > rig.grid.cell and len(named) < len(rig.cameras) - 2:
+        unnamed = [one for one in _judged(current) if one.view not in {other.view for other in named}]
         suspects = sorted(unnamed, key=lambda one: -one.off)[:_SUSPECTS]
         trials = []
         for suspect in suspects:
@@ -238,7 +238,7 @@ def judge(rig: Rig, tables: Sequence[BodyTable], people: BoxCorrespondences) -> 
         if worst.off <= rig.grid.cell:
             break
         named.append(worst)
-    whole = _known(first)
+    whole = _judged(first)
     unresolved = (whole[0], whole[1]) if len(whole) == 2 and _worst(first) > rig.grid.cell else None
     return Verdict(tuple(_without_shared(first)), tuple(named), unresolved)
 
@@ -254,8 +254,8 @@ def _all_raw_disagreements(
 
 def _without_shared(raw: Sequence[_RawDisagreement | None]) -> list[Disagreement | None]:
     """Disagreements without the common component, which needs three views or more."""
-    known = [one.mean for one in raw if one is not None]
-    shared = _common(np.array(known)) if len(known) > 2 else np.zeros(3)
+    means = [one.mean for one in raw if one is not None]
+    shared = _common(np.array(means)) if len(means) > 2 else np.zeros(3)
     return [None if one is None else one.without(shared) for one in raw]
 
 
@@ -270,7 +270,7 @@ def _common(means: Floats) -> Floats:
     return np.asarray(shared)
 
 
-def _known(raw: Sequence[_RawDisagreement | None]) -> list[Disagreement]:
+def _judged(raw: Sequence[_RawDisagreement | None]) -> list[Disagreement]:
     return [one for one in _without_shared(raw) if one is not None]
 
 
@@ -287,9 +287,9 @@ def _corrected(people: BoxCorrespondences, table: BodyTable, raw: _RawDisagreeme
 
 
 def _worst(raw: Sequence[_RawDisagreement | None]) -> float:
-    return max((one.off for one in _known(raw)), default=0.0)
+    return max((one.off for one in _judged(raw)), default=0.0)
 
 
 def _spread(raw: Sequence[_RawDisagreement | None]) -> float:
     """Root mean square over the views."""
-    return float(np.sqrt(np.mean([one.off**2 for one in _known(raw)])))
+    return float(np.sqrt(np.mean([one.off**2 for one in _judged(raw)])))

@@ -11,9 +11,9 @@ import numpy as np
 from stseg.arrays import Bytes, Floats
 from stseg.errors import CalibrationError
 
-LEAST = 8
+MIN_VIEWS = 8
 """Views of the board that a calibration needs."""
-_MOST = 60
+_MAX_VIEWS = 60
 """Views in use, spread over all that were found."""
 _REFINE = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 40, 1e-3)
 
@@ -76,10 +76,10 @@ def fit_lens(
     CalibrationError
         Where there are too few views.
     """
-    if len(corners) < LEAST:
-        expected = f"at least {LEAST}, tilted and all over the image (is --board the number of inner corners?)"
+    if len(corners) < MIN_VIEWS:
+        expected = f"at least {MIN_VIEWS}, tilted and all over the image (is --board the number of inner corners?)"
         raise CalibrationError(name, "checkerboard", f"{len(corners)} views of the whole board", expected)
-    chosen = np.unique(np.linspace(0, len(corners) - 1, min(_MOST, len(corners))).astype(int))
+    chosen = np.unique(np.linspace(0, len(corners) - 1, min(_MAX_VIEWS, len(corners))).astype(int))
     grid = np.stack(np.meshgrid(np.arange(board[0]), np.arange(board[1])), -1).reshape(-1, 2) * square
     points = np.column_stack([grid, np.zeros(len(grid))]).astype(np.float32)
     pixels = [corners[k].astype(np.float32) for k in chosen]

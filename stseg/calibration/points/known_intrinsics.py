@@ -80,8 +80,8 @@ def fit_pinhole(
     def miss(unknowns: Floats) -> Floats:
         flat = unfold(unknowns)
         image = np.column_stack([ground, np.ones(len(ground))]) @ flat[:9].reshape(3, 3).T + height[:, None] * flat[9:]
-        shown = image[:, :2] / image[:, 2:]
-        return ((shown if lens is None else lens.distort(shown)[0]) - pixel).ravel()
+        projected = image[:, :2] / image[:, 2:]
+        return ((projected if lens is None else lens.distort(projected)[0]) - pixel).ravel()
 
     start = _start(homography, fixed if fixed is not None else middle_matrix(focal or 1.0, size))
     if focal is not None:

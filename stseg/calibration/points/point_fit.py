@@ -29,15 +29,15 @@ from stseg.geometry.fits import (
 
 VerticalFrom = Literal["points", "lens", "square pixels"]
 """Source of the vertical."""
-_CLICK = 1.0
+_CLICK_SPREAD = 1.0
 """Least standard deviation of a clicked pixel, pixels."""
-_MAGSAC = 3.0
+_MAGSAC_NOISE = 3.0
 """Greatest noise scale of MAGSAC++, pixels."""
-_OUT = 4.0
+_OUTLIER_LIMIT = 4.0
 """Outlier threshold, robust standard deviations."""
-_WORSE = 1.5
+_NOISE_RATIO = 1.5
 """Greatest ratio of noise variances, pose to free homography, for the pose to be preferred."""
-_FEW = 5
+_MIN_POINTS = 5
 """Number of points up to which none is rejected."""
 
 
@@ -105,14 +105,14 @@ class PointFit:
         """
         camera, ground = self.camera, grid.ground
         pixel, ahead = camera.project(ground, 0.0)
-        seen = ahead & camera.inside(pixel) & grid.inside()
-        deviation = np.full(seen.shape, np.nan)
-        if seen.any():
-            level = np.zeros(int(seen.sum()))
-            by_parameters = _slope(self.parameters, ground[seen], level, camera.lens)
-            moved = np.linalg.solve(_ground_slope(camera, ground[seen]), by_parameters)
+        visible = ahead & camera.inside(pixel) & grid.inside()
+        deviation = np.full(visible.shape, np.nan)
+        if visible.any():
+            level = np.zeros(int(visible.sum()))
+            by_parameters = _slope(self.parameters, ground[visible], level, camera.lens)
+            moved = np.linalg.solve(_ground_slope(camera, ground[visible]), by_parameters)
             spread = moved @ self.covariance @ np.swapaxes(moved, 1, 2)
-            deviation[seen] = np.sqrt(np.linalg.eigvalsh(spread)[:, -1])
+            deviation[visible] = np.sqrt(np.linalg.eigvalsh(spread)[:, -1])
         return deviation
 
 
@@ -149,7 +149,7 @@ def fit_points(name: str, size: tuple[int, int], points: Points, lens: Lens | No
     used = np.ones(len(high), bool) if vertical_from == "points" else points.low
     scale = np.linalg.norm(start[2])
     robust = _refined(free / scale, points, used, lens)
-    wrong = _out(np.hypot(*(_project(robust.x, points.ground, points.height, lens) - points.pixel).T), used)
+    wrong = _outliers(np.hypot(*(_project(robust.x, points.ground, points.height, lens) - points.pixel).T), used)
     used &= ~wrong
     fitted = _refined(robust.x, points, used, lens, "linear")
     parameters, covariance = fitted.x, _covariance(fitted.jac, fitted.fun, int(used.sum()))
@@ -157,30 +157,30 @@ def fit_points(name: str, size: tuple[int, int], points: Points, lens: Lens | No
         fitted.x[:9].reshape(3, 3), size, points.ground[used], points.height[used], points.pixel[used], lens
     )
     if pinhole is not None and _fits_as_well(pinhole, fitted.fun, len(fitted.x) - 1):
-        parameters, covariance = pinhole.parameters, pinhole.covariance(max(pinhole.noise, _CLICK**2))
+        parameters, covariance = pinhole.parameters, pinhole.covariance(max(pinhole.noise, _CLICK_SPREAD**2))
         vertical_from = "square pixels" if lens is None else "lens"
     ground = parameters[:9].reshape(3, 3)
     vertical = parameters[9:] if len(parameters) > 9 else _assumed_vertical(name, ground, size, lens)
     require_right_handed(name, ground, vertical)
     camera = Camera(name, size, ground, vertical, lens)
     require_upright(camera)
-    shown, _ = camera.project(points.ground, points.height)
-    off = np.hypot(*(shown - points.pixel).T)
-    out = wrong | _out(off, used)
+    projected, _ = camera.project(points.ground, points.height)
+    off = np.hypot(*(projected - points.pixel).T)
+    out = wrong | _outliers(off, used)
     return PointFit(camera, points, vertical_from, off, _off_ground(camera, points), out, parameters, covariance)
 
 
 def _fits_as_well(pinhole: Pinhole, free_miss: Floats, unknowns: int) -> bool:
     """Whether the pose fits as well as the free homography, per degree of freedom."""
     count = len(free_miss)
-    free = max(float(np.sum(free_miss**2)) / max(count - unknowns, 1), _CLICK**2)
-    return pinhole.noise <= _WORSE * free
+    free = max(float(np.sum(free_miss**2)) / max(count - unknowns, 1), _CLICK_SPREAD**2)
+    return pinhole.noise <= _NOISE_RATIO * free
 
 
-def _out(off: Floats, used: Flags) -> Flags:
+def _outliers(off: Floats, used: Flags) -> Flags:
     """Outliers against the median of the points in use; none where a camera has few points."""
-    limit = _OUT * max(1.4826 * float(np.median(off[used])), _CLICK)
-    return np.asarray((off > limit) & (used.sum() > _FEW))
+    limit = _OUTLIER_LIMIT * max(1.4826 * float(np.median(off[used])), _CLICK_SPREAD)
+    return np.asarray((off > limit) & (used.sum() > _MIN_POINTS))
 
 
 def _start(points: Points, ideal: Floats) -> Floats:
@@ -189,7 +189,7 @@ def _start(points: Points, ideal: Floats) -> Floats:
     starts = [fit_homography(ground, pixel)]
     if len(ground) > 4:
         middle, reach = ground.mean(axis=0), ground.std()
-        found, _ = cv2.findHomography((ground - middle) / reach, pixel, cv2.USAC_MAGSAC, _MAGSAC, maxIters=10_000)
+        found, _ = cv2.findHomography((ground - middle) / reach, pixel, cv2.USAC_MAGSAC, _MAGSAC_NOISE, maxIters=10_000)
         if found is not None:
             unit = np.array([[1 / reach, 0, -middle[0] / reach], [0, 1 / reach, -middle[1] / reach], [0, 0, 1]])
             starts.append(_ahead(np.asarray(found, float) @ unit, ground))
@@ -230,7 +230,7 @@ def _refined(
         return (_project(parameters, ground, height, lens) - pixel).ravel()
 
     spread = 1.4826 * float(np.median(np.abs(miss(start))))
-    return least_squares(miss, start, x_scale="jac", loss=loss, f_scale=max(spread, _CLICK), max_nfev=500)
+    return least_squares(miss, start, x_scale="jac", loss=loss, f_scale=max(spread, _CLICK_SPREAD), max_nfev=500)
 
 
 def _project(parameters: Floats, ground: Floats, height: Floats, lens: Lens | None) -> Floats:
@@ -267,10 +267,10 @@ def _ground_slope(camera: Camera, ground: Floats) -> Floats:
 def _covariance(slope: Floats, miss: Floats, count: int) -> Floats:
     """Covariance of the parameters: noise variance times the pseudo-inverse of J'J (the scale is free)."""
     free = max(2 * count - (slope.shape[1] - 1), 1)
-    noise = max(float(np.sum(miss**2)) / free, _CLICK**2)
+    noise = max(float(np.sum(miss**2)) / free, _CLICK_SPREAD**2)
     return np.asarray(noise * np.linalg.pinv(slope.T @ slope, rcond=1e-14, hermitian=True))
 
 
 def _off_ground(camera: Camera, points: Points) -> Floats:
-    seen = [camera.back_project(pixel, z) for pixel, z in zip(points.pixel, points.height.tolist(), strict=True)]
-    return np.asarray(np.hypot(*(np.array(seen) - points.ground).T))
+    ground = [camera.back_project(pixel, z) for pixel, z in zip(points.pixel, points.height.tolist(), strict=True)]
+    return np.asarray(np.hypot(*(np.array(ground) - points.ground).T))

@@ -8,11 +8,11 @@ from stseg.arrays import Floats
 from stseg.errors import CalibrationError
 from stseg.geometry import Camera
 
-LEAST = 4
+MIN_POINTS = 4
 """Least number of ground points of a homography."""
-_FLAT = 0.02
+_COLLINEAR_RATIO = 0.02
 """Ratio of width to length of a point set below which it counts as collinear."""
-HEIGHTS = (0.3, 60.0)
+CAMERA_HEIGHTS = (0.3, 60.0)
 """Plausible camera heights, metres."""
 
 
@@ -32,8 +32,8 @@ def require_ground(name: str, ground: Floats, pixel: Floats) -> None:
         Where there are fewer than four, or they are collinear on the ground or in the image.
     """
     place = f"camera {name}"
-    if len(ground) < LEAST:
-        raise CalibrationError(place, "points", f"{len(ground)} on the ground (z = 0)", f"at least {LEAST}")
+    if len(ground) < MIN_POINTS:
+        raise CalibrationError(place, "points", f"{len(ground)} on the ground (z = 0)", f"at least {MIN_POINTS}")
     for where, points in (("on the ground", ground), ("in the image", pixel)):
         if _on_line(points):
             raise CalibrationError(place, "points", f"points on one line {where}", "points spread over the ground")
@@ -73,7 +73,7 @@ def require_upright(camera: Camera) -> None:
 
 
 def mirrored(name: str) -> CalibrationError:
-    """The error of a camera whose points are mirrored."""
+    """The error of a camera with mirrored points."""
     return CalibrationError(
         f"camera {name}",
         "points",
@@ -98,15 +98,15 @@ def require_height(camera: Camera, unit: str, metres: dict[str, float]) -> None:
     CalibrationError
     """
     height = float(camera.centre[2])
-    if HEIGHTS[0] <= height <= HEIGHTS[1]:
+    if CAMERA_HEIGHTS[0] <= height <= CAMERA_HEIGHTS[1]:
         return
     for other, length in metres.items():
-        if HEIGHTS[0] <= height / metres[unit] * length <= HEIGHTS[1]:
+        if CAMERA_HEIGHTS[0] <= height / metres[unit] * length <= CAMERA_HEIGHTS[1]:
             raise CalibrationError(
                 f"camera {camera.name}",
                 f"--unit {unit}",
                 f"a camera {height:.4g} m above the ground",
-                f"{HEIGHTS[0]} to {HEIGHTS[1]:.0f} m: are its points in {other}? (--unit {other})",
+                f"{CAMERA_HEIGHTS[0]} to {CAMERA_HEIGHTS[1]:.0f} m: are its points in {other}? (--unit {other})",
             )
 
 
@@ -117,4 +117,4 @@ def all_but_one_on_line(points: Floats) -> bool:
 
 def _on_line(points: Floats) -> bool:
     spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-    return bool(spread[1] <= _FLAT * spread[0])
+    return bool(spread[1] <= _COLLINEAR_RATIO * spread[0])
