@@ -103,6 +103,15 @@ def looking(pitch: float, roll: float) -> Floats:
     return np.asarray((Rotation.from_euler("z", roll) * Rotation.from_euler("x", pitch) * level).as_rotvec())
 
 
+def ground_jacobian(camera: Camera, ground: Floats, step: float) -> Floats:
+    """Jacobian of pixels in the ground point by differences of `step` metres, pixels a metre, float64 (n, 2, 2)."""
+    columns = [
+        (camera.project(ground + move, 0.0)[0] - camera.project(ground - move, 0.0)[0]) / (2 * step)
+        for move in step * np.eye(2)
+    ]
+    return np.stack(columns, -1)
+
+
 def _lens(view: Floats, size: tuple[int, int]) -> Lens:
     width, height = size
     focal = width * float(np.exp(view[FOCAL]))

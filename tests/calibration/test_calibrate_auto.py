@@ -14,11 +14,9 @@ from walking import Walking, changed, delayed, walking
 
 from stseg.arrays import Floats, Singles
 from stseg.calibration.adjusted_rig import cameras_of, centred, distance_factor, grid_of, offsets_of, reports_of, scaled
-from stseg.calibration.automatic.auto import calibrate_from_people, sharpen_by_floor
-from stseg.calibration.automatic.auto_diagnosis import require_merged
+from stseg.calibration.automatic.auto import calibrate_from_people, require_merged, sharpen_by_floor
 from stseg.calibration.automatic.correspondence import match_endpoints
-from stseg.calibration.automatic.endpoint_paths import path_of
-from stseg.calibration.automatic.endpoints import Endpoints, upright_endpoints
+from stseg.calibration.automatic.endpoints import Endpoints, path_of, upright_endpoints
 from stseg.calibration.automatic.single_view import view_of_upright
 from stseg.calibration.automatic.solution import Solution, refine
 from stseg.calibration.automatic.view_alignment import ViewPaths, align, mirrored

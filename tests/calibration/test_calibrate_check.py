@@ -11,11 +11,9 @@ from walkabout import SIZE, exchanged, moved, ring, shown, walkers
 
 from stseg.arrays import Boxes, Floats
 from stseg.calibration.check.blunders import match_frames
-from stseg.calibration.check.box_correspondence import tables_of
-from stseg.calibration.check.isolated_boxes import isolated_boxes
+from stseg.calibration.check.box_correspondence import isolated_boxes, tables_of
 from stseg.calibration.check.leave_one_out import locate
-from stseg.calibration.check.rig_check import Check, check_rig, verdict_text
-from stseg.calibration.coverage import coverage
+from stseg.calibration.check.rig_check import Check, check_rig, coverage, verdict_text
 from stseg.commands.calibrate.app import app
 from stseg.errors import ConfigError, OutputError
 from stseg.foreground.view_foreground import ViewForeground

@@ -8,7 +8,7 @@ import numpy as np
 
 from stseg.arrays import Bytes
 from stseg.calibration.adjusted_rig import cameras_of, centred, grid_of
-from stseg.calibration.automatic.auto_diagnosis import require_correspondences, require_merged, require_people
+from stseg.calibration.automatic.endpoints import Endpoints
 from stseg.calibration.automatic.floor_features import floor_marks
 from stseg.calibration.automatic.solution import (
     ROUNDS,
@@ -20,7 +20,8 @@ from stseg.calibration.automatic.solution import (
     single_view_cameras,
     view_paths,
 )
-from stseg.calibration.automatic.view_merging import align_all, merge_views
+from stseg.calibration.automatic.view_alignment import ViewPaths, align, mirrored
+from stseg.calibration.automatic.view_merging import MergedViews, align_all, merge_views
 from stseg.errors import SourceError
 
 _FLOOR_ROUNDS = 2
@@ -86,3 +87,71 @@ def sharpen_by_floor(views: CalibrationInput, solution: Solution, backgrounds: S
             break
         solution, count = centred(refine_with_marks(views, solution, marks)), len(marks)
     return solution, count
+
+
+_MIN_ENDPOINTS = 40
+"""Isolated people (a person in a frame counts once) that a view needs."""
+_MIN_FOOT_SPREAD = 0.25
+"""Least standard deviation of their feet over the image, in body lengths."""
+_MIN_AGREEMENT = 0.5
+"""Least share of a view's people that agree with another view's."""
+
+
+def require_people(name: str, endpoints: Endpoints) -> None:
+    """Raise SourceError where a view shows too few isolated people, or people who do not walk."""
+    if len(endpoints) < _MIN_ENDPOINTS:
+        found = f"{len(endpoints)} isolated people (a person in a frame counts once)"
+        raise SourceError(name, "", found, f"at least {_MIN_ENDPOINTS}: a longer recording, or one with fewer people")
+    foot_spread = float(np.linalg.norm(endpoints.foot.std(axis=0)) / np.median(endpoints.length))
+    if foot_spread < _MIN_FOOT_SPREAD:
+        found = f"people who stay in one place (their feet move by {foot_spread:.2f} body lengths)"
+        raise SourceError(name, "", found, "people who walk about")
+
+
+def require_merged(
+    names: Sequence[str], paths: Sequence[ViewPaths], merged: MergedViews, rate: float, most: int
+) -> None:
+    """Raise SourceError for a view that fits no other, or only when mirrored."""
+    share = agreement_shares(paths, merged)
+    worst = int(np.argmin(share))
+    for view in np.argsort(share):
+        if share[view] < _MIN_AGREEMENT + 0.2 and (other := _mirror(int(view), paths, merged, rate, most)) is not None:
+            found = f"people who meet those of {names[other]} only in a mirror"
+            raise SourceError(names[int(view)], "", found, "an image that is not mirrored")
+    if share[worst] < _MIN_AGREEMENT:
+        found = f"people who meet those of other views in {100 * share[worst]:.0f} % of what these see"
+        expected = f"a view of the same ground at the same time, at most {most / rate:g} s apart (--most-delay)"
+        raise SourceError(names[worst], "", found, expected)
+
+
+def agreement_shares(paths: Sequence[ViewPaths], merged: MergedViews) -> list[float]:
+    """Share of the common frames in which each view agrees with its best partner, 0..1."""
+    shares = []
+    for view, view_path in enumerate(paths):
+        best = 0.0
+        for other, other_path in enumerate(paths):
+            if other != view and view in merged.placed and other in merged.placed:
+                delay_frames = merged.placed[other].delay - merged.placed[view].delay
+                common = len(np.intersect1d(view_path.frame + delay_frames, other_path.frame))
+                best = max(best, float(merged.support[view, other]) / max(common, _MIN_ENDPOINTS))
+        shares.append(min(best, 1.0))
+    return shares
+
+
+def _mirror(view: int, paths: Sequence[ViewPaths], merged: MergedViews, rate: float, most: int) -> int | None:
+    """The view that agrees far better with the mirror image of this one, or None."""
+    for other in np.argsort(-merged.support[view]):
+        if other != view:
+            found = align(paths[int(other)], mirrored(paths[view]), rate, most)
+            if found and found[0].support > 1.5 * merged.support[view].max():
+                return int(other)
+    return None
+
+
+def require_correspondences(names: Sequence[str], solution: Solution) -> None:
+    """Raise SourceError for a view with too few correspondences after the adjustment."""
+    count = np.bincount(solution.problem.correspondences.view, minlength=len(names))
+    worst = int(np.argmin(count))
+    if count[worst] < _MIN_ENDPOINTS // 2:
+        found = f"{count[worst]} correspondences with other views"
+        raise SourceError(names[worst], "", found, f"at least {_MIN_ENDPOINTS // 2}")

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from stseg.arrays import Flags, Floats
-from stseg.calibration.automatic.endpoints import Endpoints
+from stseg.calibration.automatic.endpoints import Endpoints, even_rows
 from stseg.calibration.pinhole import CENTRE, CLOCK, FOCAL, RADIAL, SIZE, TURN, looking, on_plane, project
 
 _SPREAD = 0.05
@@ -43,7 +43,7 @@ def view_of_upright(endpoints: Endpoints, size: tuple[int, int], person_height: 
     float64 (12,), float
         The camera (see `stseg.calibration.pinhole`), and the median head residual in body lengths.
     """
-    coarse, fine = (_spread_out(endpoints, most) for most in (_COARSE_PAIRS, _FINE_PAIRS))
+    coarse, fine = (endpoints.of(even_rows(len(endpoints), most)) for most in (_COARSE_PAIRS, _FINE_PAIRS))
 
     def fit(rows: Endpoints, start: Floats, most: int) -> tuple[float, Floats]:
         def residual(unknown: Floats) -> Floats:
@@ -60,10 +60,6 @@ def view_of_upright(endpoints: Endpoints, size: tuple[int, int], person_height: 
     view = _view(best)
     away = _head_residuals(view, fine, size, person_height).reshape(-1, 2)
     return view, float(np.median(np.hypot(*away.T)))
-
-
-def _spread_out(endpoints: Endpoints, most: int) -> Endpoints:
-    return endpoints.of(np.unique(np.linspace(0, len(endpoints) - 1, min(most, len(endpoints))).astype(np.int64)))
 
 
 def _cost(fit: tuple[float, Floats]) -> float:

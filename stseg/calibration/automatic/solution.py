@@ -9,8 +9,7 @@ import numpy as np
 
 from stseg.arrays import Floats, Ints
 from stseg.calibration.automatic.correspondence import Correspondences, match_endpoints
-from stseg.calibration.automatic.endpoint_paths import path_of
-from stseg.calibration.automatic.endpoints import Endpoints
+from stseg.calibration.automatic.endpoints import Endpoints, even_rows, path_of
 from stseg.calibration.automatic.floor_features import Marks
 from stseg.calibration.automatic.single_view import FORWARD, axis_of_foot, view_of_upright
 from stseg.calibration.automatic.view_alignment import Alignment, ViewPaths
@@ -146,7 +145,7 @@ def _round(views: CalibrationInput, parameters: Parameters, delay: Ints, gate: f
         for view, size, endpoints in zip(parameters.views, views.sizes, views.endpoints, strict=True)
     ]
     matched = match_endpoints(views.endpoints, delay, ground, gate, views.frame_rate)
-    matched = matched.of(_spread_out(matched))
+    matched = matched.of(even_rows(len(matched.frame), _MAX_POINTS))
     refined = len(parameters.points) > 0
     height = _heights(views, parameters, matched) if refined else np.full(len(matched.frame), views.person_height)
     problem = Problem(
@@ -169,7 +168,7 @@ def refine_with_marks(views: CalibrationInput, solution: Solution, marks: Marks)
     if not len(marks):
         return solution
     problem, parameters = solution.problem, solution.adjustment.parameters
-    fine = marks.of(np.unique(np.linspace(0, len(marks) - 1, min(_MAX_MARKS, len(marks))).astype(np.int64)))
+    fine = marks.of(even_rows(len(marks), _MAX_MARKS))
     joint = _with_marks(problem, fine)
     points = np.concatenate(
         [parameters.points, np.column_stack([fine.ground, np.full(len(fine), views.person_height)])]
@@ -204,11 +203,6 @@ def _with_marks(problem: Problem, marks: Marks) -> Problem:
         height=np.concatenate([problem.height, np.full(count, float(problem.height.mean()))]),
         body=np.concatenate([problem.body, np.zeros(2 * count)]),
     )
-
-
-def _spread_out(matched: Correspondences) -> Ints:
-    """Subset of the points for the adjustment, spread over all frames."""
-    return np.unique(np.linspace(0, len(matched.frame) - 1, min(_MAX_POINTS, len(matched.frame))).astype(np.int64))
 
 
 def _heights(views: CalibrationInput, parameters: Parameters, matched: Correspondences) -> Floats:

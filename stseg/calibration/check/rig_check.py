@@ -1,4 +1,4 @@
-"""Check of a rig against the boxes of its recording, and the verdict as text."""
+"""Check of a rig against the boxes of its recording, the verdict as text, and the coverage of its views."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stseg.arrays import Floats
+from stseg.arrays import Bytes, Floats
 from stseg.bodies.pillars import BodyTable
 from stseg.calibration.check.blunders import (
     BoxesByFrame,
@@ -169,3 +169,13 @@ def disagreement_text(name: str, one: Disagreement) -> str:
         f"{name} is off: of {one.people} people it shows {feet} and heads {100 * one.heads:.0f} cm "
         f"from where the others say{where}"
     )
+
+
+def coverage(rig: Rig) -> Bytes:
+    """Number of views that show each cell's centre, uint8 (plane, y, x)."""
+    count = np.zeros(rig.grid.shape, np.uint8)
+    for plane, height in enumerate(rig.grid.heights.tolist()):
+        for camera in rig.cameras:
+            pixel, ahead = camera.project(rig.grid.ground, height)
+            count[plane] += ahead & camera.inside(pixel)
+    return count

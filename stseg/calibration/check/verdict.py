@@ -18,11 +18,14 @@ from stseg.arrays import Floats
 from stseg.bodies.pillars import BodyTable
 from stseg.calibration.check.box_correspondence import BoxCorrespondences, wholly_visible
 from stseg.calibration.check.leave_one_out import edge_residuals, locate
+from stseg.calibration.pinhole import ground_jacobian
 from stseg.geometry import Camera, Rig
 
 MIN_PEOPLE = 20
 """Least number of people (a person in a frame counts once) for a statement on a view."""
 _ROUNDS = 15
+_DIFFERENCE = 0.01
+"""Step of the finite differences, metres."""
 _FEET_COLUMN, _OCCLUSION_WEIGHT = 2, 0.35
 """Column of the feet, and the weight of a lower edge above them: others and furniture hide feet."""
 _SUSPECTS = 3
@@ -142,7 +145,7 @@ def _raw_disagreement(
     planes = _smooth(ground, across[measured])
     field = planes.at(ground)
     scatter = 1.4826 * float(np.nanmedian(np.abs(across[measured, 0] - field[:, 0])))
-    slope = np.asarray(np.linalg.inv(_slope(camera, ground)), float)
+    slope = np.asarray(np.linalg.inv(ground_jacobian(camera, ground, _DIFFERENCE)), float)
     return _RawDisagreement(
         view, len(others), confirmed, planes, field, scatter, pixel_height[measured] / located.height[measured], slope
     )
@@ -185,16 +188,6 @@ def _smooth(ground: Floats, across: Floats) -> _Planes:
             hidden = _OCCLUSION_WEIGHT if column == _FEET_COLUMN else 1.0
             weight = np.where(rest < 0, hidden, 1.0) / np.maximum(np.abs(rest), 0.01)
     return _Planes(middle, found)
-
-
-def _slope(camera: Camera, ground: Floats) -> Floats:
-    """Jacobian of pixels in the ground point, pixels a metre, float64 (n, 2, 2)."""
-    step = 0.01
-    columns = [
-        (camera.project(ground + move, 0.0)[0] - camera.project(ground - move, 0.0)[0]) / (2 * step)
-        for move in step * np.eye(2)
-    ]
-    return np.stack(columns, -1)
 
 
 def _size(moves: Floats) -> float:

@@ -15,6 +15,7 @@ import numpy as np
 from scipy.optimize import OptimizeResult, least_squares
 
 from stseg.arrays import Flags, Floats
+from stseg.calibration.pinhole import ground_jacobian
 from stseg.calibration.points.known_intrinsics import Pinhole, fit_pinhole
 from stseg.calibration.points.point_requirements import require_ground, require_right_handed, require_upright
 from stseg.errors import CalibrationError
@@ -37,6 +38,8 @@ _OUTLIER_LIMIT = 4.0
 """Outlier threshold, robust standard deviations."""
 _NOISE_RATIO = 1.5
 """Greatest ratio of noise variances, pose to free homography, for the pose to be preferred."""
+_DIFFERENCE = 1e-3
+"""Step of the finite differences on the ground, metres."""
 _MIN_POINTS = 5
 """Number of points up to which none is rejected."""
 
@@ -110,7 +113,7 @@ class PointFit:
         if visible.any():
             level = np.zeros(int(visible.sum()))
             by_parameters = _slope(self.parameters, ground[visible], level, camera.lens)
-            moved = np.linalg.solve(_ground_slope(camera, ground[visible]), by_parameters)
+            moved = np.linalg.solve(ground_jacobian(camera, ground[visible], _DIFFERENCE), by_parameters)
             spread = moved @ self.covariance @ np.swapaxes(moved, 1, 2)
             deviation[visible] = np.sqrt(np.linalg.eigvalsh(spread)[:, -1])
         return deviation
@@ -251,16 +254,6 @@ def _slope(parameters: Floats, ground: Floats, height: Floats, lens: Lens | None
         move[k] = size
         later = _project(parameters + move, ground, height, lens)
         columns.append((later - _project(parameters - move, ground, height, lens)) / (2 * size))
-    return np.stack(columns, -1)
-
-
-def _ground_slope(camera: Camera, ground: Floats) -> Floats:
-    """Jacobian of pixels in the ground point, pixels a metre, float64 (n, 2, 2)."""
-    step = 1e-3
-    columns = [
-        (camera.project(ground + move, 0.0)[0] - camera.project(ground - move, 0.0)[0]) / (2 * step)
-        for move in step * np.eye(2)
-    ]
     return np.stack(columns, -1)
 
 

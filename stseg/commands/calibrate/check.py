@@ -16,10 +16,9 @@ from rich.progress import track
 from rich.table import Table
 
 from stseg.arrays import Floats, Observation
-from stseg.calibration.check.isolated_boxes import isolated_boxes
-from stseg.calibration.check.rig_check import Check, check_rig, verdict_text
+from stseg.calibration.check.box_correspondence import isolated_boxes
+from stseg.calibration.check.rig_check import Check, check_rig, coverage, verdict_text
 from stseg.calibration.check.verdict import Disagreement
-from stseg.calibration.coverage import coverage
 from stseg.engine.offline.backgrounds import make_foregrounds
 from stseg.engine.offline.frame_range import FrameRange
 from stseg.errors import ConfigError
