@@ -2,7 +2,7 @@
 
     python tools/bench.py --work FOLDER                      all workloads, one row each
     python tools/bench.py --work FOLDER --base OTHER         the same for another checkout, in turns with this one
-    python tools/bench.py --work FOLDER --record             append the rows to docs/development/speed.csv
+    python tools/bench.py --work FOLDER --record             append the rows to docs/results/speed.csv
     python tools/bench.py --work FOLDER --check              the smallest workload against the stored ratio (CI)
 
 A workload is `stseg run` with one worker on a simulated recording. Its cost is the CPU time of the process and its
@@ -31,7 +31,7 @@ from workbench import ROOT, commit
 from stseg.io.outputs.simulated_scene import write_scene
 from stseg.simulation import NAMED, Film, SceneSpec
 
-TABLE = ROOT / "docs" / "development" / "speed.csv"
+TABLE = ROOT / "docs" / "results" / "speed.csv"
 _ALLOWED = 1.25
 """How many times the stored ratio a check may come to."""
 _ATTEMPTS = 5

@@ -1,4 +1,4 @@
-"""Pages name what is there: links, files, commands, configuration and rig keys, tables; and users' pages stay short."""
+"""Pages name what is there: links, files, commands, keys, tables, functions; sentences and notes are short."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import re
 import sys
 import tomllib
 from pathlib import Path
+from pkgutil import resolve_name
 
 import pytest
 
@@ -26,11 +27,14 @@ import configuration_page  # noqa: E402
 
 DOCS = ROOT / "docs"
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(DOCS.rglob("*.md"))]
-NOT_FOR_USERS = ("how-it-works.md", "glossary.md")
-MOST_WORDS = 12_000
+DEVELOPMENT = DOCS / "development"
+DEVELOPMENT_WORDS = 7_000
+"""Greatest number of words of all pages for developers."""
 README, INPUTS, OUTPUTS = (
     (ROOT / page).read_text("utf-8") for page in ("README.md", "docs/inputs.md", "docs/outputs.md")
 )
+EQUATIONS = {"KS09": 8, "HW12": 28, "KD06": 7, "DP06": 12}
+"""Number of equations of each paper."""
 NAMES = [page.relative_to(ROOT).as_posix() for page in PAGES]
 KEYS = dict(values(Config()))
 SECTIONS = {key.partition(".")[0] for key in KEYS}
@@ -88,9 +92,35 @@ def test_every_page_is_reached_from_the_readme() -> None:
     assert set(PAGES) <= reached
 
 
-def test_the_pages_for_users_are_short() -> None:
-    pages = [page for page in DOCS.glob("*.md") if page.name not in NOT_FOR_USERS]
-    assert sum(len(page.read_text("utf-8").split()) for page in pages) <= MOST_WORDS
+def test_the_pages_for_developers_are_short() -> None:
+    words = [word for page in DEVELOPMENT.glob("*.md") for word in page.read_text("utf-8").split()]
+    assert sum(bool(re.search(r"\w", word)) for word in words) <= DEVELOPMENT_WORDS
+
+
+@pytest.mark.parametrize("page", PAGES, ids=NAMES)
+def test_no_page_names_a_commit(page: Path) -> None:
+    assert not re.findall(r"\b(?=[0-9a-f]*[a-f])(?=[0-9a-f]*[0-9])[0-9a-f]{7,40}\b", page.read_text("utf-8"))
+
+
+ARCHITECTURE = (DEVELOPMENT / "architecture.md").read_text("utf-8")
+_EQUATIONS = re.findall(r"^\| (\w+) \| ([^|]+) \| [^|]+ \| ([^|]+) \|$", ARCHITECTURE, re.MULTILINE)
+
+
+@pytest.mark.parametrize(("paper", "equation", "where"), [row for row in _EQUATIONS if row[0] in EQUATIONS])
+def test_the_function_of_an_equation_exists(paper: str, equation: str, where: str) -> None:
+    names = re.findall(r"`([\w.]+)`", where)
+    assert names or where.startswith("not used"), (paper, equation)
+    assert all(resolve_name(name) is not None for name in names)
+
+
+@pytest.mark.parametrize("paper", EQUATIONS)
+def test_every_equation_of_a_paper_has_a_row(paper: str) -> None:
+    listed = set[int]()
+    for equation in (equation for name, equation, _ in _EQUATIONS if name == paper and equation[0].isdigit()):
+        for part in equation.split(", "):
+            first, _, last = part.partition(" to ")
+            listed |= set(range(int(first), int(last or first) + 1))
+    assert listed == set(range(1, EQUATIONS[paper] + 1))
 
 
 def test_the_table_of_keys_is_that_of_the_configuration() -> None:
