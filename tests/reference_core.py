@@ -10,7 +10,7 @@ import numpy as np
 from reference_track_filter import best_pairs
 
 from stseg.arrays import Boxes, Flags, Floats, Ints, Labels, Singles
-from stseg.bodies.box_fit import GRAIN, TOLERANCE
+from stseg.bodies.box_fit import EDGE_GRAIN, TOLERANCE
 from stseg.detection.problem import BoxEvidence, Parameters, PixelEvidence, Problem
 from stseg.graphcut.grid_energy import GridEnergy
 from stseg.occupancy.fusion import ErrorRates
@@ -38,7 +38,7 @@ def half_square(body: Floats, box: Floats, tolerance: Floats, width: float, heig
     top, bottom = np.clip(body[[1, 3]], 0, height - 1)
     if left >= right or top >= bottom:
         return math.inf
-    middle, width_off, head, late, early = tolerance * (max(float(body[3] - body[1]), 8.0) + GRAIN)
+    middle, width_off, head, late, early = tolerance * (max(float(body[3] - body[1]), 8.0) + EDGE_GRAIN)
     off = np.array([(left + right) / 2 - (box[0] + box[2]) / 2, right - left - box[2] + box[0], top - box[1]])
     off = off / [middle, width_off, head]
     feet = (bottom - box[3]) / (early if box[3] < bottom else late)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints, Singles
-from stseg.geometry.summed_area import TOP, Levels
+from stseg.geometry.summed_area import TOP_LEVEL, Levels
 from stseg.occupancy.fusion import ErrorRates, log_odds_terms
 
 
@@ -35,7 +35,7 @@ def counts(
         level, share = shown.levels[view][cell], float(shown.share[view][cell])
         if level < 0 or share == 0:
             continue
-        likelihood, person, mine = int(level) / TOP, near[cell[1:]], rates[view]
+        likelihood, person, mine = int(level) / TOP_LEVEL, near[cell[1:]], rates[view]
         if person < 0:
             others = [i for i in range(len(rates)) if i != view and shown.levels[i][cell] >= 0]
             said = sum(

@@ -20,7 +20,7 @@ from stseg.records.tables import (
     BOX,
     CANDIDATE,
     EVENT,
-    KNOWN,
+    KNOWN_PERSON,
     RATES,
     SHIFT,
     TIMING,
@@ -124,7 +124,7 @@ def table_types(views: int) -> dict[str, np.dtype[np.void]]:
         "committed_events": EVENT,
         "appearance": APPEARANCE,
         "answered": ANSWERED,
-        "known": KNOWN,
+        "known": KNOWN_PERSON,
     }
 
 

@@ -12,17 +12,17 @@ import numpy as np
 from stseg.arrays import Floats
 from stseg.kernels.accelerate import kernel, part
 
-MIDDLE, WIDE, HEAD, LATE, EARLY = range(5)
+MIDDLE_OFFSET, WIDTH_OFFSET, UPPER_EDGE, LOWER_EDGE_BELOW, LOWER_EDGE_ABOVE = range(5)
 """Compared quantities of a box: middle, width, upper edge, lower edge below the feet, and above them."""
 TOLERANCE = np.array([0.06, 0.15, 0.045, 0.06, 0.24])
 """Their standard deviations in a box of score 1 before learning, shares of the body's height."""
 _PIXELS = np.array([2.0, 2.0, 2.0, 2.0, 8.0])
 """Quantisation of a detector's grid beside them, pixels."""
-GRAIN = _PIXELS / TOLERANCE
+EDGE_GRAIN = _PIXELS / TOLERANCE
 """The same as pixels added to the height of which tolerances are shares: a sharper detector's grid is finer, too."""
-FAR = 4.5
+MATCH_LIMIT = 4.5
 """Offsets of the middle beyond this many tolerances exclude a match."""
-LEAST_HEIGHT = 8.0
+LEAST_PIXEL_HEIGHT = 8.0
 """Shares are taken of at least this height, pixels."""
 
 
@@ -35,16 +35,16 @@ def half_square(body: Floats, box: Floats, tolerance: Floats, width: float, heig
     left, right = min(max(body[0], 0.0), width - 1.0), min(max(body[2], 0.0), width - 1.0)
     if right <= left:
         return np.inf
-    tall = max(body[3] - body[1], LEAST_HEIGHT)
-    middle = ((left + right) - (box[0] + box[2])) / 2.0 / (tall + GRAIN[MIDDLE]) / tolerance[MIDDLE]
-    if not abs(middle) <= FAR:  # most pairs are decided here
+    tall = max(body[3] - body[1], LEAST_PIXEL_HEIGHT)
+    middle = ((left + right) - (box[0] + box[2])) / 2.0 / (tall + EDGE_GRAIN[MIDDLE_OFFSET]) / tolerance[MIDDLE_OFFSET]
+    if not abs(middle) <= MATCH_LIMIT:  # most pairs are decided here
         return np.inf
     _, wide, head, feet = _offsets(body, box, width, height)
     if np.isnan(wide):
         return np.inf
-    wide /= tolerance[WIDE]
-    head /= tolerance[HEAD]
-    feet /= tolerance[EARLY if feet > 0 else LATE]
+    wide /= tolerance[WIDTH_OFFSET]
+    head /= tolerance[UPPER_EDGE]
+    feet /= tolerance[LOWER_EDGE_ABOVE if feet > 0 else LOWER_EDGE_BELOW]
     return float(0.5 * (middle * middle + wide * wide + head * head + feet * feet))
 
 
@@ -64,12 +64,12 @@ def _offsets(body: Floats, box: Floats, width: float, height: float) -> tuple[fl
     top, bottom = min(max(body[1], 0.0), height - 1.0), min(max(body[3], 0.0), height - 1.0)
     if right <= left or bottom <= top:
         return np.nan, np.nan, np.nan, np.nan
-    tall = max(body[3] - body[1], LEAST_HEIGHT)
+    tall = max(body[3] - body[1], LEAST_PIXEL_HEIGHT)
     return (
-        ((left + right) - (box[0] + box[2])) / 2.0 / (tall + GRAIN[MIDDLE]),
-        ((right - left) - (box[2] - box[0])) / (tall + GRAIN[WIDE]),
-        (top - box[1]) / (tall + GRAIN[HEAD]),
-        (bottom - box[3]) / (tall + GRAIN[LATE]),
+        ((left + right) - (box[0] + box[2])) / 2.0 / (tall + EDGE_GRAIN[MIDDLE_OFFSET]),
+        ((right - left) - (box[2] - box[0])) / (tall + EDGE_GRAIN[WIDTH_OFFSET]),
+        (top - box[1]) / (tall + EDGE_GRAIN[UPPER_EDGE]),
+        (bottom - box[3]) / (tall + EDGE_GRAIN[LOWER_EDGE_BELOW]),
     )
 
 

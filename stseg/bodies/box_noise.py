@@ -18,11 +18,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from stseg.arrays import Floats
-from stseg.bodies.box_fit import EARLY, LATE, TOLERANCE
+from stseg.bodies.box_fit import LOWER_EDGE_ABOVE, LOWER_EDGE_BELOW, TOLERANCE
 
 EFFECTIVE_OBSERVATIONS = 0.5
 """Effective number of observations of one edge of a box: errors of edges and views are correlated."""
-KNOTS = np.array([0.05, 0.2, 0.4, 0.6, 0.8, 1.0])
+SCORE_KNOTS = np.array([0.05, 0.2, 0.4, 0.6, 0.8, 1.0])
 """Scores of the table; between them logarithms are interpolated."""
 
 
@@ -43,16 +43,16 @@ class BoxNoise:
 
 def knots_of(score: Floats) -> tuple[np.ndarray, Floats]:
     """The knot below each score, int64 (box,), and how far on to the next it is, 0..1."""
-    at = np.interp(score, KNOTS, np.arange(len(KNOTS)))
-    lower = np.minimum(at.astype(int), len(KNOTS) - 2)
+    at = np.interp(score, SCORE_KNOTS, np.arange(len(SCORE_KNOTS)))
+    lower = np.minimum(at.astype(int), len(SCORE_KNOTS) - 2)
     return lower, at - lower
 
 
 def _sides(spread: Floats) -> Floats:
     """The lower edge's two standard deviations as one, (..., 4)."""
-    foot = (spread[..., LATE] + spread[..., EARLY]) / 2
-    return np.concatenate([spread[..., :LATE], foot[..., None]], -1)
+    foot = (spread[..., LOWER_EDGE_BELOW] + spread[..., LOWER_EDGE_ABOVE]) / 2
+    return np.concatenate([spread[..., :LOWER_EDGE_BELOW], foot[..., None]], -1)
 
 
-FIRST = BoxNoise(TOLERANCE * np.sqrt(EFFECTIVE_OBSERVATIONS / KNOTS)[:, None])
+PRIOR_NOISE = BoxNoise(TOLERANCE * np.sqrt(EFFECTIVE_OBSERVATIONS / SCORE_KNOTS)[:, None])
 """Before anything is learned."""

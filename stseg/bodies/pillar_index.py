@@ -13,7 +13,16 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from stseg.arrays import Floats, Ints, Labels, Singles
-from stseg.bodies.box_fit import EARLY, FAR, GRAIN, HEAD, LATE, LEAST_HEIGHT, MIDDLE, half_square
+from stseg.bodies.box_fit import (
+    EDGE_GRAIN,
+    LEAST_PIXEL_HEIGHT,
+    LOWER_EDGE_ABOVE,
+    LOWER_EDGE_BELOW,
+    MATCH_LIMIT,
+    MIDDLE_OFFSET,
+    UPPER_EDGE,
+    half_square,
+)
 from stseg.kernels.accelerate import kernel, part
 
 _CLASSES = 2.0
@@ -49,9 +58,9 @@ class PillarIndex(NamedTuple):
         left, right = (edges[:, k].clip(0, size[0] - 1) for k in (0, 2))
         top, bottom = (edges[:, k].clip(0, size[1] - 1) for k in (1, 3))
         inside = (right > left) & (bottom > top)
-        tall = np.maximum(edges[:, 3] - edges[:, 1], LEAST_HEIGHT)
+        tall = np.maximum(edges[:, 3] - edges[:, 1], LEAST_PIXEL_HEIGHT)
         middle = (left + right) / 2
-        kind = np.floor(_CLASSES * np.log2(np.where(inside, tall, LEAST_HEIGHT)))
+        kind = np.floor(_CLASSES * np.log2(np.where(inside, tall, LEAST_PIXEL_HEIGHT)))
         order = np.lexsort((middle, kind))
         order = order[inside[order]]
         starts = np.flatnonzero(np.diff(kind[order], prepend=-1.0))
@@ -63,7 +72,7 @@ class PillarIndex(NamedTuple):
 @part
 def _reach(quantity: int, tall: float, tolerance: Floats, deviations: float) -> float:
     """How far a box may be in one quantity from a pillar that it fits within so many tolerances, pixels."""
-    return float(deviations * tolerance[quantity] * (tall + GRAIN[quantity]) + 1e-3)
+    return float(deviations * tolerance[quantity] * (tall + EDGE_GRAIN[quantity]) + 1e-3)
 
 
 @part
@@ -78,7 +87,7 @@ def run_of(index: PillarIndex, kind: int, box: Floats, tolerance: Floats, deviat
         See `stseg.bodies.box_fit`.
     """
     place = (box[0] + box[2]) / 2
-    reach = _reach(MIDDLE, index.tallest[kind], tolerance, deviations)
+    reach = _reach(MIDDLE_OFFSET, index.tallest[kind], tolerance, deviations)
     middle = index.middle[index.start[kind] : index.start[kind + 1]]
     first = np.searchsorted(middle, place - reach)
     stop = np.searchsorted(middle, place + reach, side="right")
@@ -119,11 +128,14 @@ def fill_fits(
     top, bottom = box[1], box[3]
     for kind in range(len(index.tallest)):
         tall = index.tallest[kind]
-        head, late = _reach(HEAD, tall, tolerance, deviations), _reach(LATE, tall, tolerance, deviations)
+        head, late = (
+            _reach(UPPER_EDGE, tall, tolerance, deviations),
+            _reach(LOWER_EDGE_BELOW, tall, tolerance, deviations),
+        )
         if tall + head + late < bottom - top:
             continue
-        early = _reach(EARLY, tall, tolerance, deviations)
-        first, stop = run_of(index, kind, box, tolerance, min(FAR, deviations))
+        early = _reach(LOWER_EDGE_ABOVE, tall, tolerance, deviations)
+        first, stop = run_of(index, kind, box, tolerance, min(MATCH_LIMIT, deviations))
         for k in range(np.uint64(first), np.uint64(stop)):  # most pillars are decided by their edges
             if abs(index.top[k] - top) > head or not -late <= index.bottom[k] - bottom <= early:
                 continue

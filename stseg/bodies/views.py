@@ -10,7 +10,7 @@ import numpy as np
 
 from stseg.arrays import Boxes, Flags, Floats, Ints, Shorts, Singles
 from stseg.bodies.box_fit import fill_inside
-from stseg.bodies.box_noise import FIRST, BoxNoise
+from stseg.bodies.box_noise import PRIOR_NOISE, BoxNoise
 from stseg.bodies.outlines import Spans, outlines, sums_inside
 from stseg.bodies.pillar_index import PillarIndex
 from stseg.bodies.pillars import WIDTH, BodyTable
@@ -18,7 +18,7 @@ from stseg.config import BodyConfig, DetectionConfig
 from stseg.geometry import Camera, Grid
 from stseg.kernels.accelerate import kernel, wide_kernel
 
-OWN, BACKGROUND = 5.0, -10.0
+BODY_WEIGHT, BACKGROUND_WEIGHT = 5.0, -10.0
 """Weights of a person's own pixels and of background inside their pillar (HW12 eq. 27)."""
 _BODY_ROWS = 30
 """Rows of a body on a raster: enough for its outline, few enough for speed."""
@@ -152,7 +152,7 @@ class BoxView(View):
         share = (visible - config.hidden_visibility) / (config.full_visibility - config.hidden_visibility)
         return np.asarray(share.clip(config.hidden_detection_rate, 1.0))
 
-    def observe(self, seen: Boxes | Singles | None, sharpness: BoxNoise = FIRST) -> ViewObservation:
+    def observe(self, seen: Boxes | Singles | None, sharpness: BoxNoise = PRIOR_NOISE) -> ViewObservation:
         """The frame's boxes."""
         boxes = seen if isinstance(seen, Boxes) else Boxes(np.zeros((0, 4)), np.zeros(0))
         width, height = self.camera.size
@@ -171,7 +171,7 @@ class BoxView(View):
 class PixelView(View):
     """A view that delivers a likelihood map."""
 
-    def observe(self, seen: Boxes | Singles | None, sharpness: BoxNoise = FIRST) -> ViewObservation:
+    def observe(self, seen: Boxes | Singles | None, sharpness: BoxNoise = PRIOR_NOISE) -> ViewObservation:
         """The frame's log-odds on the raster; all zero where the view is blind."""
         del sharpness
         raster = np.empty(self.shape, np.float32)
@@ -257,7 +257,7 @@ def _fill_label_values(raster: Singles, values: Singles) -> None:
             if raster[v, u] != last:
                 last = raster[v, u]
                 own = one / (one + np.exp(-last))
-                value = np.float32(2 * OWN) * own + np.float32(BACKGROUND) * (one - own)
+                value = np.float32(2 * BODY_WEIGHT) * own + np.float32(BACKGROUND_WEIGHT) * (one - own)
             values[v, u] = value
 
 

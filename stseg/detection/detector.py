@@ -29,10 +29,10 @@ from stseg.detection.search.merging import merged
 from stseg.detection.search.restart import better, is_doubtful, restarted
 from stseg.detection.search.search import ENUMERATED
 from stseg.geometry import Rig
-from stseg.noise.box_noise_estimate import BoxNoiseCalibration
-from stseg.noise.estimates import Calibrations
-from stseg.noise.population_estimate import PopulationCalibration
-from stseg.noise.rim_estimate import RimCalibration
+from stseg.noise.box_noise_estimate import BoxNoiseEstimate
+from stseg.noise.estimates import Estimates
+from stseg.noise.population_estimate import PopulationEstimate
+from stseg.noise.rim_estimate import RimEstimate
 from stseg.records.border import Border
 from stseg.records.candidates import Candidates
 from stseg.records.people import Explanation
@@ -77,7 +77,7 @@ class Detector:
     ) -> None:
         self.config, self.body = config, body
         self._rate, self._level = rig.frame_rate, level or ErrorRateConfig()
-        self.first_noise = BoxNoiseCalibration(self._rate, self._level).noise
+        self.first_noise = BoxNoiseEstimate(self._rate, self._level).noise
         grid = rig.grid
         self.lattice_ground = lattice(grid, config.lattice_spacing)
         flat = self.lattice_ground.reshape(-1, 2)
@@ -95,19 +95,19 @@ class Detector:
         self._has_boxes = "boxes" in kinds
         self._swap_rounds = 0 if self._has_boxes else config.swap_moves
 
-    def new_calibrations(self) -> Calibrations:
-        """Calibrations of a session that begins: first guesses, the configured population, and no view that fails."""
+    def new_estimates(self) -> Estimates:
+        """Estimates of a session that begins: first guesses, the configured population, and no view that fails."""
         number, rate, level = len(self.views), self._rate, self._level
-        return Calibrations(
-            BoxNoiseCalibration(rate, level),
-            PopulationCalibration(self.body, rate, level),
-            RimCalibration(number, self.body, self.config, rate, level),
+        return Estimates(
+            BoxNoiseEstimate(rate, level),
+            PopulationEstimate(self.body, rate, level),
+            RimEstimate(number, self.body, self.config, rate, level),
             ViewFailures(number, self.body, rate, level),
         )
 
     def explain_next(
         self,
-        learned: Calibrations,
+        learned: Estimates,
         frame: int,
         seen: Sequence[ViewEvidence],
         predicted: PredictedTracks | None,
@@ -134,8 +134,8 @@ class Detector:
             learned.population.learn(explained.people)
             learned.rims.learn(explained.people, self.views, shown)
         else:
-            learned.population.let_pass()
-            learned.rims.let_pass()
+            learned.population.skip_frame()
+            learned.rims.skip_frame()
         if failures.excluded.any():
             return self._with_excluded_residuals(explained, every, failures.excluded)
         return explained
@@ -156,7 +156,7 @@ class Detector:
 
     def _explained(
         self,
-        learned: Calibrations,
+        learned: Estimates,
         is_key: bool,
         shown: Sequence[ViewObservation | None],
         predicted: PredictedTracks | None,
@@ -173,7 +173,7 @@ class Detector:
             found = better(found, self._searched_afresh(found))
         return explanation(found), True
 
-    def _look_at_rims(self, rims: RimCalibration, shown: Sequence[ViewObservation | None], body: BodyConfig) -> None:
+    def _look_at_rims(self, rims: RimEstimate, shown: Sequence[ViewObservation | None], body: BodyConfig) -> None:
         """Learn the rims of a session's first frame before it is explained: births cost nothing in that frame alone."""
         for _ in range(_LOOKS):
             explained = explanation(self._searched(self._tracked(rims.applied(shown), body, None), None))

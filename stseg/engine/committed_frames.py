@@ -10,7 +10,7 @@ import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints, Labels, Rows, Singles
 from stseg.engine.stopwatch import Stopwatch
-from stseg.occupancy.rate_estimate import RateCalibration
+from stseg.occupancy.error_rate_estimate import ErrorRateEstimate
 from stseg.records.people import Explanation, People
 from stseg.records.sparse_volume import SparseVolume
 from stseg.records.tables import CANDIDATE, RATES
@@ -130,12 +130,12 @@ def committed_frames(commit: Commit, records: dict[int, FrameRecord], watch: Sto
     )  # fmt: skip
 
 
-def rate_rows(frame: int, calibration: RateCalibration) -> Rows:
+def rate_rows(frame: int, estimate: ErrorRateEstimate) -> Rows:
     """RATES (view,) of a frame, by the error rates known before it."""
-    rows = np.zeros(len(calibration.rates), RATES)
-    rows["frame"], rows["view"], rows["filled"] = frame, np.arange(len(rows)), calibration.filled_share
+    rows = np.zeros(len(estimate.rates), RATES)
+    rows["frame"], rows["view"], rows["filled"] = frame, np.arange(len(rows)), estimate.filled_share
     rows["aside"] = np.nan
-    rows["miss"], rows["clutter"], rows["beside"] = np.array(calibration.rates).T
+    rows["miss"], rows["clutter"], rows["beside"] = np.array(estimate.rates).T
     return rows
 
 

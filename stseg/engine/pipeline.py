@@ -127,7 +127,7 @@ def finished_tracks(
         What the detections look like.
     shown
         The rig in whose pixels the tracks' boxes are given.
-    known : KNOWN (m,)
+    known : KNOWN_PERSON (m,)
         People of earlier recordings.
     """
     if not tracker.final:

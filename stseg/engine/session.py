@@ -69,8 +69,8 @@ class Session:
         self._tracker = pipeline.tracker(pipeline.rig, pipeline.config, first)
         cameras = [camera.name for camera in pipeline.rig.cameras]
         self._frozen, self._excluded = FrozenViews(len(cameras), pipeline.rig.frame_rate), ExcludedViews(cameras)
-        self._learned = pipeline.detector.new_calibrations()
-        self._error_rates = pipeline.occupancy.new_calibration()
+        self._learned = pipeline.detector.new_estimates()
+        self._error_rates = pipeline.occupancy.new_error_rates()
         self._records: dict[int, FrameRecord] = {}
         self.fusion: Executor | None = None
         self._open: deque[Future[FusedEvidence]] = deque()

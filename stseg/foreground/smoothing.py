@@ -7,10 +7,10 @@ import math
 import numpy as np
 
 from stseg.arrays import Singles
-from stseg.foreground.background.posterior import CERTAIN
+from stseg.foreground.background.posterior import LOG_ODDS_LIMIT
 from stseg.kernels.accelerate import wide_kernel
 
-_NEAR_BOUND = np.float32(1e-5 - CERTAIN)  # means of certain background are the bound but for rounding
+_NEAR_BOUND = np.float32(1e-5 - LOG_ODDS_LIMIT)  # means of certain background are the bound but for rounding
 
 
 @wide_kernel
@@ -32,7 +32,7 @@ def pool_log_odds(log_odds: Singles, radius: int, likelihood: Singles) -> None:
     """
     height, width = log_odds.shape
     down, mean, share = np.empty(width, np.float32), np.empty(width, np.float32), np.empty(width, np.float32)
-    lowest = np.float32(1.0 / (1.0 + math.exp(CERTAIN)))
+    lowest = np.float32(1.0 / (1.0 + math.exp(LOG_ODDS_LIMIT)))
     for u in range(width):
         share[u] = np.float32(1.0 / _weight_within(u, width, radius))
     for v in range(height):

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from stseg.arrays import Singles
 from stseg.kernels.accelerate import kernel
 
-TOP = 4095
+TOP_LEVEL = 4095
 """The level of likelihood 1."""
 LARGEST_SIDE = 1024
 """Pixels; sums over larger footprints would not fit."""
@@ -29,7 +29,7 @@ def level_of(likelihood: np.float32) -> np.int32:
     """The nearest level; values outside 0..1 are clipped, NaN counts as 0."""
     above = likelihood if likelihood > 0 else np.float32(0.0)
     within = above if above < 1 else np.float32(1.0)
-    return np.int32(within * np.float32(TOP) + np.float32(0.5))
+    return np.int32(within * np.float32(TOP_LEVEL) + np.float32(0.5))
 
 
 @kernel
@@ -49,7 +49,7 @@ def fill_sums(likelihood: Singles, left: int, top: int, sums: Sums) -> int:
         The lowest level of that part; TOP where there is none.
     """
     columns = sums.shape[1] - 1
-    row, lowest = np.empty(columns, np.uint32), np.full(columns, TOP, np.uint32)
+    row, lowest = np.empty(columns, np.uint32), np.full(columns, TOP_LEVEL, np.uint32)
     sums[0] = 0
     for v in range(len(sums) - 1):
         here = likelihood[top + v, left : left + columns]  # of whole rows: a strided part would be no vector code
@@ -64,7 +64,7 @@ def fill_sums(likelihood: Singles, left: int, top: int, sums: Sums) -> int:
         sums[v + 1, 0] = 0
         for u in range(columns):
             sums[v + 1, u + 1] = sums[v, u + 1] + row[u]
-    least = np.uint32(TOP)
+    least = np.uint32(TOP_LEVEL)
     for u in range(columns):
         least = min(least, lowest[u])
     return int(least)

@@ -18,12 +18,12 @@ from stseg.identities.search.beam_search import SearchLimits, search_identities
 from stseg.identities.search.constraints import NO_CONSTRAINTS, Constraints
 from stseg.records.border import Border
 from stseg.records.rows_of_tracks import rows_of_tracks
-from stseg.records.tables import KNOWN
+from stseg.records.tables import KNOWN_PERSON
 from stseg.tracking.windows.isolated_tracklets import isolated_tracklets
 
 _DRAFT_DIVISOR = 4
 """Share of the hypotheses, one in so many, of the search from whose identities appearance is learned."""
-NO_KNOWN_PEOPLE: Rows = np.zeros(0, KNOWN)
+NO_KNOWN_PEOPLE: Rows = np.zeros(0, KNOWN_PERSON)
 """No people of earlier recordings."""
 
 
@@ -116,7 +116,7 @@ class IdentityProblem:
         ----------
         identity, frame : int64 (n,)
             Of each row; identity 0 for none.
-        known : KNOWN (k,)
+        known : KNOWN_PERSON (k,)
             People of earlier recordings.
         """
         order = self.seen.order

@@ -2,7 +2,7 @@
 
 E step: the offsets of each person's own boxes, over the posterior of the person's place and height. M step: the
 standard deviations that make them most likely, `weight` seconds of one person's box at the first guess among them, and
-what was seen since forgotten at exp(-t / memory), as for the rates of `stseg.occupancy.rate_estimate`. The lower
+what was seen since forgotten at exp(-t / memory), as for the rates of `stseg.occupancy.error_rate_estimate`. The lower
 edge has two, of one density that is steeper below the feet than above: with S_1, S_2 the sums of squares on either
 side of n boxes,
 
@@ -20,8 +20,8 @@ from functools import cached_property
 import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints
-from stseg.bodies.box_fit import EARLY, LATE, TOLERANCE, WIDE, fill_offsets
-from stseg.bodies.box_noise import FIRST, KNOTS, BoxNoise, knots_of
+from stseg.bodies.box_fit import LOWER_EDGE_ABOVE, LOWER_EDGE_BELOW, TOLERANCE, WIDTH_OFFSET, fill_offsets
+from stseg.bodies.box_noise import PRIOR_NOISE, SCORE_KNOTS, BoxNoise, knots_of
 from stseg.bodies.views import BoxView, View, ViewObservation
 from stseg.config import ErrorRateConfig
 from stseg.records.people import Explanation, People
@@ -30,7 +30,7 @@ _POINTS = np.sqrt(3.0) * np.concatenate([np.eye(3), -np.eye(3)])
 """Places and heights that stand for a posterior: its means and variances are theirs (unscented transform)."""
 
 
-class BoxNoiseCalibration:
+class BoxNoiseEstimate:
     """Accumulated squared offsets of boxes.
 
     Parameters
@@ -46,7 +46,7 @@ class BoxNoiseCalibration:
 
     def __init__(self, frame_rate: float, config: ErrorRateConfig) -> None:
         self.frame_rate, self.config = frame_rate, config
-        self.squares, self.seen = np.zeros_like(FIRST.spread), np.zeros(len(KNOTS))
+        self.squares, self.seen = np.zeros_like(PRIOR_NOISE.spread), np.zeros(len(SCORE_KNOTS))
 
     @property
     def noise(self) -> BoxNoise:
@@ -59,15 +59,15 @@ class BoxNoiseCalibration:
         return self._estimated()
 
     def _estimated(self) -> BoxNoise:
-        weight, first = self.config.prior_weight, FIRST.spread**2
-        both = FIRST.spread[:, LATE] + FIRST.spread[:, EARLY]
-        first[:, LATE:] *= FIRST.spread[:, LATE:] / both[:, None]
+        weight, first = self.config.prior_weight, PRIOR_NOISE.spread**2
+        both = PRIOR_NOISE.spread[:, LOWER_EDGE_BELOW] + PRIOR_NOISE.spread[:, LOWER_EDGE_ABOVE]
+        first[:, LOWER_EDGE_BELOW:] *= PRIOR_NOISE.spread[:, LOWER_EDGE_BELOW:] / both[:, None]
         squares, count = weight * first + self.squares, (weight + self.seen)[:, None]
         spread = np.sqrt(squares / count)
-        root = np.cbrt(squares[:, LATE:])
-        spread[:, LATE:] = root * np.sqrt(root.sum(1, keepdims=True) / count)
-        spread[:, WIDE] = FIRST.spread[:, WIDE]
-        return BoxNoise(np.minimum(spread, FIRST.spread))
+        root = np.cbrt(squares[:, LOWER_EDGE_BELOW:])
+        spread[:, LOWER_EDGE_BELOW:] = root * np.sqrt(root.sum(1, keepdims=True) / count)
+        spread[:, WIDTH_OFFSET] = PRIOR_NOISE.spread[:, WIDTH_OFFSET]
+        return BoxNoise(np.minimum(spread, PRIOR_NOISE.spread))
 
     def forget_a_frame(self) -> None:
         """Let earlier frames count less, by the time of one frame."""
@@ -113,7 +113,7 @@ def _squares(view: View, people: People, person: Ints, edges: Floats) -> Floats:
         offsets = np.empty((count, 4))
         fill_offsets(bodies, edges, width, height, offsets)
         squares = np.nan_to_num(offsets**2)
-        total[:, :LATE] += squares[:, :LATE]
-        total[:, LATE] += np.where(offsets[:, LATE] <= 0, squares[:, LATE], 0)
-        total[:, EARLY] += np.where(offsets[:, LATE] > 0, squares[:, LATE], 0)
+        total[:, :LOWER_EDGE_BELOW] += squares[:, :LOWER_EDGE_BELOW]
+        total[:, LOWER_EDGE_BELOW] += np.where(offsets[:, LOWER_EDGE_BELOW] <= 0, squares[:, LOWER_EDGE_BELOW], 0)
+        total[:, LOWER_EDGE_ABOVE] += np.where(offsets[:, LOWER_EDGE_BELOW] > 0, squares[:, LOWER_EDGE_BELOW], 0)
     return total / len(_POINTS)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from stseg.noise.box_noise_estimate import BoxNoiseCalibration
-from stseg.noise.population_estimate import PopulationCalibration
-from stseg.noise.rim_estimate import RimCalibration
+from stseg.noise.box_noise_estimate import BoxNoiseEstimate
+from stseg.noise.population_estimate import PopulationEstimate
+from stseg.noise.rim_estimate import RimEstimate
 from stseg.view_health.view_failures import ViewFailures
 
 
 @dataclass(frozen=True)
-class Calibrations:
+class Estimates:
     """Calibrations of one session; each frame that is explained updates them.
 
     Attributes
@@ -26,7 +26,7 @@ class Calibrations:
         Views that fail.
     """
 
-    box_noise: BoxNoiseCalibration
-    population: PopulationCalibration
-    rims: RimCalibration
+    box_noise: BoxNoiseEstimate
+    population: PopulationEstimate
+    rims: RimEstimate
     failures: ViewFailures

@@ -23,7 +23,7 @@ from stseg.config import BodyConfig, ErrorRateConfig
 from stseg.records.people import People
 
 
-class PopulationCalibration:
+class PopulationEstimate:
     """Accumulated sizes of people.
 
     Parameters
@@ -61,7 +61,7 @@ class PopulationCalibration:
             width_spread=max(spread * height, first.width_spread),
         )
 
-    def let_pass(self) -> None:
+    def skip_frame(self) -> None:
         """Count a frame in which no size was measured: the next that is learned from counts for its time, too."""
         self._unmeasured += 1
 

@@ -41,7 +41,7 @@ _ALIKE = 2.0
 """Weight of the mean of all views in each of them: seconds of one person."""
 
 
-class RimCalibration:
+class RimEstimate:
     """Accumulated background inside people who stand alone.
 
     Parameters
@@ -88,7 +88,7 @@ class RimCalibration:
             for view, share in zip(shown, self.withdrawn.tolist(), strict=True)
         ]
 
-    def let_pass(self) -> None:
+    def skip_frame(self) -> None:
         """Count a frame that is not measured: the next one counts for its time, too."""
         self._unmeasured += 1
 

@@ -10,7 +10,7 @@ The likelihood ratio is r = m + M (1 - m) / b. L(X, Z) is the likelihood that gi
     ((1 - m) L + m (1 - L)) / (b L + (1 - b) (1 - L)) = r,
 
 with b' for b within reach of a person. The ray of an empty cell then meets foreground with a probability of about M
-(the E step of `stseg.occupancy.rate_estimate`), so b and b' converge to the means of M from any first guess.
+(the E step of `stseg.occupancy.error_rate_estimate`), so b and b' converge to the means of M from any first guess.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints, Singles
-from stseg.bodies.box_fit import FAR, half_square
+from stseg.bodies.box_fit import MATCH_LIMIT, half_square
 from stseg.bodies.pillar_index import PillarIndex, run_of
 from stseg.geometry.sampling import Footprints
-from stseg.geometry.summed_area import TOP, UNSEEN, Levels
+from stseg.geometry.summed_area import TOP_LEVEL, UNSEEN, Levels
 from stseg.kernels.accelerate import kernel
 from stseg.occupancy.fusion import ErrorRates
 from stseg.occupancy.shown_cells import ShownCells
@@ -111,7 +111,7 @@ def fill_fit(
                     fit[h, cells.cell[k]] = max(fit[h, cells.cell[k]], log_fit)
             continue
         for kind in range(len(index.tallest)):
-            first, stop = run_of(index, kind, box, tolerance, FAR)
+            first, stop = run_of(index, kind, box, tolerance, MATCH_LIMIT)
             for k in range(first, stop):
                 h, cell = index.order[k] // ground_cells, index.order[k] % ground_cells
                 body = pillars[index.order[k]]
@@ -171,7 +171,7 @@ def fill_levels(
 @kernel
 def level_of_match(match: float, miss: float, clutter: float) -> np.int16:
     """L in whole levels."""
-    return np.int16(np.rint(plane_likelihood(match, miss, clutter) * TOP))
+    return np.int16(np.rint(plane_likelihood(match, miss, clutter) * TOP_LEVEL))
 
 
 @kernel

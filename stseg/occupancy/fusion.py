@@ -28,7 +28,7 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from stseg.arrays import Labels, Singles
-from stseg.geometry.summed_area import TOP, Levels
+from stseg.geometry.summed_area import TOP_LEVEL, Levels
 from stseg.kernels.accelerate import kernel, part, wide_kernel
 
 
@@ -123,7 +123,7 @@ def log_odds_terms(rates: ErrorRates) -> Singles:
     float32 (2, TOP + 1)
         Near no person, and within reach of a person.
     """
-    likelihood = np.arange(TOP + 1) / TOP
+    likelihood = np.arange(TOP_LEVEL + 1) / TOP_LEVEL
     body = (1 - rates.miss) * likelihood + rates.miss * (1 - likelihood)
     clutter = np.array([[rates.clutter], [rates.near_clutter]])
     empty = clutter * likelihood + (1 - clutter) * (1 - likelihood)
@@ -132,7 +132,7 @@ def log_odds_terms(rates: ErrorRates) -> Singles:
 
 def synergy_terms(floor: float) -> Singles:
     """log max(L, floor) of each level, nats, float32 (2, TOP + 1): the same near people."""
-    likelihood = np.arange(TOP + 1) / TOP
+    likelihood = np.arange(TOP_LEVEL + 1) / TOP_LEVEL
     return np.tile(np.log(np.maximum(likelihood, floor)).astype(np.float32), (2, 1))
 
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from stseg.arrays import Flags, Floats, Ints, Labels, Singles
 from stseg.geometry.cell_means import SumTable
 from stseg.geometry.sampling import Footprints
-from stseg.geometry.summed_area import TOP, UNSEEN, Levels, sum_of
+from stseg.geometry.summed_area import TOP_LEVEL, UNSEEN, Levels, sum_of
 from stseg.kernels.accelerate import kernel, part
 from stseg.occupancy.shown_cells import Reach, ShownCells
 
@@ -219,4 +219,4 @@ def _level_and_share(
         if visible > 0:
             total -= others
     mean = np.float32(total) / (np.float32(pixels) * (visible if visible > 0 else np.float32(1)))
-    return min(int(mean + np.float32(0.5)), TOP), visible
+    return min(int(mean + np.float32(0.5)), TOP_LEVEL), visible

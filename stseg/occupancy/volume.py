@@ -11,7 +11,7 @@ from scipy.special import logit
 
 from stseg.arrays import Boxes, Bytes, Flags, Floats, Ints, Singles, ViewEvidence
 from stseg.bodies.box_likelihood import box_likelihood
-from stseg.bodies.box_noise import FIRST, BoxNoise
+from stseg.bodies.box_noise import PRIOR_NOISE, BoxNoise
 from stseg.bodies.filled_cells import inside_bodies
 from stseg.bodies.pillar_index import PillarIndex
 from stseg.bodies.pillars import BodyTable
@@ -23,8 +23,8 @@ from stseg.geometry.sampling import Sampling
 from stseg.geometry.summed_area import UNSEEN, Levels
 from stseg.occupancy.box_planes import CellsByPerson, ViewBoxes, fill_fit, fill_levels, level_of_match, mark_fit
 from stseg.occupancy.clutter import clutter, clutter_side, clutter_weights
+from stseg.occupancy.error_rate_estimate import ErrorRateEstimate, cells_per_person, fill_counts
 from stseg.occupancy.fusion import ErrorRates, FrameTerms, Sums, log_odds_terms
-from stseg.occupancy.rate_estimate import RateCalibration, cells_per_person, fill_counts
 from stseg.occupancy.shown_cells import CellTables, ShownCells, mark_columns, mark_map
 from stseg.occupancy.visible_cells import PixelAssignment, fill_map, fill_occupied, fill_share, mark_people
 from stseg.records.people import Explanation
@@ -80,16 +80,16 @@ class Occupancy:
         self._ground = rig.grid.ground
         self._rate_config = rates or ErrorRateConfig()
 
-    def new_calibration(self) -> RateCalibration:
-        """Error-rate calibration of a new session, at the first guess."""
-        return RateCalibration(self._first_rates, self.rig.frame_rate, self._rate_config)
+    def new_error_rates(self) -> ErrorRateEstimate:
+        """Error rates of a new session, at the first guess."""
+        return ErrorRateEstimate(self._first_rates, self.rig.frame_rate, self._rate_config)
 
     def fuse(
         self,
         seen: Sequence[ViewEvidence],
         explanation: Explanation,
         rates: Sequence[ErrorRates] | None = None,
-        noise: BoxNoise = FIRST,
+        noise: BoxNoise = PRIOR_NOISE,
     ) -> SparseVolume:
         """A frame's log-odds, nats; nan where no view sees the cell.
 
@@ -105,19 +105,19 @@ class Occupancy:
         noise
             Noise of boxes; by default the first guess.
         """
-        return self._volume(self._fused(seen, explanation, rates or self.new_calibration().rates, noise))
+        return self._volume(self._fused(seen, explanation, rates or self.new_error_rates().rates, noise))
 
     def fuse_and_learn(
         self,
-        calibration: RateCalibration,
+        estimate: ErrorRateEstimate,
         seen: Sequence[ViewEvidence],
         explanation: Explanation,
-        noise: BoxNoise = FIRST,
+        noise: BoxNoise = PRIOR_NOISE,
     ) -> SparseVolume:
         """`fuse` of a session's next frame, followed by the update of the session's error rates."""
-        fused = self._fused(seen, explanation, calibration.rates, noise)
-        if calibration.next_is_due():
-            self._learn(calibration, fused, explanation)
+        fused = self._fused(seen, explanation, estimate.rates, noise)
+        if estimate.next_is_due():
+            self._learn(estimate, fused, explanation)
         return self._volume(fused)
 
     def _fused(
@@ -217,8 +217,8 @@ class Occupancy:
         empty = np.where(sets.seen.any(1), total[len(cell) :], np.float32(np.nan))
         return SparseVolume(sets.of_cell, empty, cell, total[: len(cell)])
 
-    def _learn(self, calibration: RateCalibration, fused: _Fused, explanation: Explanation) -> None:
-        people, grid, cells, config = explanation.people, self.rig.grid, fused.cells, calibration.config
+    def _learn(self, estimate: ErrorRateEstimate, fused: _Fused, explanation: Explanation) -> None:
+        people, grid, cells, config = explanation.people, self.rig.grid, fused.cells, estimate.config
         beside = np.flatnonzero(cells.near >= 0)
         filled = inside_bodies(grid, fused.near, people.ground, people.height)
         inside = np.zeros(len(cells.near), bool)
@@ -229,14 +229,14 @@ class Occupancy:
             people.visibility >= _UNOCCLUDED
         )
         fill_counts(
-            fused.terms, fused.sums, inside, cells.number, trusted, np.array(calibration.rates),
+            fused.terms, fused.sums, inside, cells.number, trusted, np.array(estimate.rates),
             self.config.effective_observations, self.prior, errors, seen,
         )  # fmt: skip
         seen_cells = np.maximum(self._tables.sets.size @ self._tables.sets.seen, 1)
         units = np.column_stack([np.full(len(errors), body), seen_cells, np.full(len(errors), reached - body)])
         supported = inside[beside][(people.evidence >= config.minimum_evidence)[cells.near[beside]]]
         share = np.array([supported.sum(), len(supported)]) / reached
-        calibration.learn(errors / units, seen / units, share, calibration.interval)
+        estimate.learn(errors / units, seen / units, share, estimate.interval)
 
     def _assignment(self, i: int, explanation: Explanation) -> PixelAssignment:
         people, assigned = explanation.people, explanation.box_assignment[i]

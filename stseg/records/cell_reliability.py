@@ -19,11 +19,11 @@ from stseg.bodies.filled_cells import inside_bodies
 from stseg.geometry.grid import Grid
 from stseg.geometry.nearest_person import nearest_person
 
-REACH = 1.0
+PERSON_RADIUS = 1.0
 """Metres around a person within which cells count, whatever their log-odds."""
-SURE = 6.0
+CERTAIN_LOG_ODDS = 6.0
 """Cells farther away count where their log-odds are nearer to 0, nats."""
-KNOTS = np.linspace(-12.0, 12.0, 49)
+LOG_ODDS_KNOTS = np.linspace(-12.0, 12.0, 49)
 """Log-odds at which the probability is learned, nats."""
 
 
@@ -42,25 +42,27 @@ class CellCounts:
 
 def count_cells(log_odds: Singles, filled: Flags, counted: Flags) -> CellCounts:
     """Counts of one frame; all arrays are (plane, y, x), log-odds in nats."""
-    knot = np.rint((log_odds[counted].astype(float) - KNOTS[0]) / (KNOTS[1] - KNOTS[0]))
-    knot = np.clip(knot, 0, len(KNOTS) - 1).astype(np.int64)
-    cells, inside = np.bincount(knot, minlength=len(KNOTS)), np.bincount(knot, filled[counted], len(KNOTS))
+    knot = np.rint((log_odds[counted].astype(float) - LOG_ODDS_KNOTS[0]) / (LOG_ODDS_KNOTS[1] - LOG_ODDS_KNOTS[0]))
+    knot = np.clip(knot, 0, len(LOG_ODDS_KNOTS) - 1).astype(np.int64)
+    number = len(LOG_ODDS_KNOTS)
+    cells, inside = np.bincount(knot, minlength=number), np.bincount(knot, filled[counted], number)
     return CellCounts(cells.astype(float), inside.astype(float))
 
 
 def doubtful_cells(grid: Grid, log_odds: Singles, rows: Rows) -> Flags:
     """Cells that are seen, and in doubt or near a row of the frame, bool (plane, y, x)."""
     ground = np.column_stack([rows["x"], rows["y"]]).astype(float)
-    near = nearest_person(grid.ground, ground, REACH) >= 0
-    return np.asarray(np.isfinite(log_odds) & ((np.abs(log_odds) < SURE) | near))
+    near_person = nearest_person(grid.ground, ground, PERSON_RADIUS) >= 0
+    return np.asarray(np.isfinite(log_odds) & ((np.abs(log_odds) < CERTAIN_LOG_ODDS) | near_person))
 
 
 def filled_cells(grid: Grid, rows: Rows) -> Flags:
-    """Cells that anybody's pillar fills, bool (plane, y, x); `rows` have x, y and height in metres."""
+    """Cells that a pillar fills, bool (plane, y, x); `rows` have x, y and height in metres."""
     filled = np.zeros(grid.shape, bool)
     for x, y, height in zip(rows["x"], rows["y"], rows["height"], strict=True):
         ground = np.array([[x, y]], float)
-        filled |= inside_bodies(grid, nearest_person(grid.ground, ground, REACH), ground, np.array([height], float))
+        person = nearest_person(grid.ground, ground, PERSON_RADIUS)
+        filled |= inside_bodies(grid, person, ground, np.array([height], float))
     return filled
 
 
@@ -71,7 +73,7 @@ class CellReliability:
     Attributes
     ----------
     probability : float64 (knot,)
-        That a body fills a cell, at log-odds `KNOTS`; never falls.
+        That a body fills a cell, at log-odds `LOG_ODDS_KNOTS`; never falls.
     """
 
     probability: Floats
@@ -79,17 +81,17 @@ class CellReliability:
     @classmethod
     def of(cls, counts: Iterable[CellCounts]) -> CellReliability:
         """The curve that fits counts of several frames; a half everywhere where no cell was counted."""
-        known = list(counts)
-        cells = np.sum([one.cells for one in known], 0) if known else np.zeros(len(KNOTS))
-        filled = np.sum([one.filled for one in known], 0) if known else np.zeros(len(KNOTS))
-        seen = cells > 0
-        if not seen.any():
-            return cls(np.full(len(KNOTS), 0.5))
+        frames = list(counts)
+        cells = np.sum([frame.cells for frame in frames], 0) if frames else np.zeros(len(LOG_ODDS_KNOTS))
+        filled = np.sum([frame.filled for frame in frames], 0) if frames else np.zeros(len(LOG_ODDS_KNOTS))
+        counted = cells > 0
+        if not counted.any():
+            return cls(np.full(len(LOG_ODDS_KNOTS), 0.5))
         from scipy.optimize import isotonic_regression  # a run is read far more often than its cells' probability
 
-        share = isotonic_regression(filled[seen] / cells[seen], weights=cells[seen]).x
-        return cls(np.interp(KNOTS, KNOTS[seen], share))
+        share = isotonic_regression(filled[counted] / cells[counted], weights=cells[counted]).x
+        return cls(np.interp(LOG_ODDS_KNOTS, LOG_ODDS_KNOTS[counted], share))
 
     def of_cells(self, log_odds: Singles) -> Singles:
         """Probability of cells of any shape, float32, NaN where no view sees the cell."""
-        return np.interp(log_odds, KNOTS, self.probability).astype(np.float32)
+        return np.interp(log_odds, LOG_ODDS_KNOTS, self.probability).astype(np.float32)

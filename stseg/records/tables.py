@@ -138,7 +138,7 @@ A row beside itself with 0 is nobody's.
 """
 
 
-KNOWN = np.dtype(
+KNOWN_PERSON = np.dtype(
     [
         ("id", "<i8"),
         ("height", "<f8"),  # metres, mean over so many rows; nan without

@@ -59,7 +59,7 @@ def final_tracks(
 ) -> FinalTracks:  # fmt: skip
     """The tracks of a run from its committed TRAJECTORY, EVENT and APPEARANCE rows, under constraints on those rows.
 
-    People of earlier recordings, KNOWN (k,), keep their ids; all others have greater ones.
+    People of earlier recordings, KNOWN_PERSON (k,), keep their ids; all others have greater ones.
     """
     bridged, sizes = bridged_rows(committed, frame_rate, config)
     problem = IdentityProblem.of(bridged, sizes, appearance, frame_rate, border, config, constraints)

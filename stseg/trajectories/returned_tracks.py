@@ -30,7 +30,7 @@ def returns_of(
         Least probability.
     constraints
         Pairs of rows that are one person, or two.
-    known : KNOWN (k,)
+    known : KNOWN_PERSON (k,)
         People of earlier recordings, whose ids are no others'.
     """
     visits = problem.visits(np.pad(identity, (0, len(bridged) - len(identity))), bridged["frame"], known)

@@ -18,7 +18,7 @@ from stseg.config import OccupancyConfig
 from stseg.errors import SourceError
 from stseg.geometry import Camera, Grid, Rig
 from stseg.geometry.sampling import Sampling, SamplingKind
-from stseg.geometry.summed_area import TOP, UNSEEN, fill_means, fill_points, fill_sums, sum_of
+from stseg.geometry.summed_area import TOP_LEVEL, UNSEEN, fill_means, fill_points, fill_sums, sum_of
 from stseg.occupancy.fusion import ErrorRates, log_odds_terms, synergy_terms
 from stseg.occupancy.volume import Occupancy
 from stseg.records.people import Explanation
@@ -32,7 +32,9 @@ COARSE = rig_of(corner_cameras(), cell=0.5, planes=3)
 def noise(seed: int, views: int = 4) -> list[Singles]:
     """A random map in whole levels for each view."""
     rng = np.random.default_rng(seed)
-    return [np.asarray(np.rint(rng.random((96, 128)) ** (k + 1) * TOP) / TOP, np.float32) for k in range(views)]
+    return [
+        np.asarray(np.rint(rng.random((96, 128)) ** (k + 1) * TOP_LEVEL) / TOP_LEVEL, np.float32) for k in range(views)
+    ]
 
 
 def box_rows(rng: np.random.Generator, width: int, height: int, number: int) -> list[list[int]]:
@@ -58,16 +60,16 @@ def test_means_over_footprints_by_definition(width: int, height: int, seed: int)
     assert levels[0, 0, -1] == UNSEEN
     for box, level in zip(boxes, levels[0, 0], strict=False):
         mean = np.mean([likelihood[v, u] for v, u in reference.pixels_of(box)])
-        assert level / TOP == pytest.approx(mean, abs=1.01 / TOP)
+        assert level / TOP_LEVEL == pytest.approx(mean, abs=1.01 / TOP_LEVEL)
     footprint[..., 2:].clip(0, 1, out=footprint[..., 2:])
     fill_points(likelihood, footprint, levels)
     assert levels[0, 0, -1] == UNSEEN
     for (left, top, _, _), level in zip(boxes, levels[0, 0], strict=False):
-        assert level / TOP == pytest.approx(likelihood[top, left], abs=0.51 / TOP)
+        assert level / TOP_LEVEL == pytest.approx(likelihood[top, left], abs=0.51 / TOP_LEVEL)
 
 
 def test_sums_may_pass_the_end_of_their_numbers() -> None:
-    levels = np.random.default_rng(0).integers(0, TOP + 1, (8, 9))
+    levels = np.random.default_rng(0).integers(0, TOP_LEVEL + 1, (8, 9))
     whole = np.pad(levels.cumsum(0).cumsum(1), ((1, 0), (1, 0))) + 2**32 - 40_000
     sums = (whole % 2**32).astype(np.uint32)
     assert (np.diff(sums.astype(float), axis=1) < 0).any()
@@ -137,10 +139,10 @@ def test_nobody_explained_is_the_plain_localisation() -> None:
 def test_terms_at_their_ends() -> None:
     terms = log_odds_terms(ErrorRates(0.2, 0.07, 0.4))
     np.testing.assert_allclose(terms[:, 0], np.log([0.2 / 0.93, 0.2 / 0.6]), rtol=1e-5)
-    np.testing.assert_allclose(terms[:, TOP], np.log([0.8 / 0.07, 0.8 / 0.4]), rtol=1e-5)
+    np.testing.assert_allclose(terms[:, TOP_LEVEL], np.log([0.8 / 0.07, 0.8 / 0.4]), rtol=1e-5)
     assert (np.diff(terms) > 0).all()
     np.testing.assert_allclose(synergy_terms(0.05)[:, 0], np.log(0.05), rtol=1e-5)
-    assert (synergy_terms(0.05)[:, TOP] == 0).all()
+    assert (synergy_terms(0.05)[:, TOP_LEVEL] == 0).all()
 
 
 def test_maps_that_do_not_fit_the_cameras() -> None:

@@ -20,7 +20,7 @@ from stseg.config import BodyConfig, ProposalConfig
 from stseg.errors import SourceError
 from stseg.geometry import Camera
 from stseg.geometry.planes import plane_homography
-from stseg.geometry.summed_area import TOP, fill_sums
+from stseg.geometry.summed_area import TOP_LEVEL, fill_sums
 
 FEW = ProposalConfig(body_sizes=3, lattice_spacing=0.25)
 HEIGHTS = np.array([1.5, 1.7, 1.9])
@@ -44,8 +44,8 @@ def rolled(camera: Camera, angle: float) -> Camera:
 def maps(draw: st.DrawFn) -> Singles:
     """A small map of whole levels, so that its sums are exact."""
     rows, columns = draw(st.integers(3, 12)), draw(st.integers(3, 12))
-    levels = np.random.default_rng(draw(st.integers(0, 10**6))).integers(0, TOP + 1, (rows, columns))
-    return (levels / TOP).astype(np.float32)
+    levels = np.random.default_rng(draw(st.integers(0, 10**6))).integers(0, TOP_LEVEL + 1, (rows, columns))
+    return (levels / TOP_LEVEL).astype(np.float32)
 
 
 @st.composite

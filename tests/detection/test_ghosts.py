@@ -33,7 +33,7 @@ from strategies import numbers
 
 from stseg.arrays import Floats, Ints, ViewEvidence
 from stseg.bodies.box_fit import TOLERANCE, fill_inside, fill_match, half_square
-from stseg.bodies.box_noise import FIRST
+from stseg.bodies.box_noise import PRIOR_NOISE
 from stseg.bodies.outlines import outlines, sums_inside
 from stseg.bodies.pillar_index import PillarIndex, fill_fits
 from stseg.bodies.pillars import BodyTable
@@ -92,7 +92,7 @@ def test_a_box_that_fits_costs_nothing_and_early_feet_little() -> None:
 def test_matches_by_definition(bodies: Floats, found: list[Floats], seed: int) -> None:
     bodies[seed % len(bodies)] = np.nan if seed % 3 == 0 else bodies[0]
     edges = np.array(found).reshape(-1, 4)
-    tolerance, belief = FIRST.of(np.random.default_rng(seed).uniform(0.1, 1, len(edges)))
+    tolerance, belief = PRIOR_NOISE.of(np.random.default_rng(seed).uniform(0.1, 1, len(edges)))
     match, best = np.empty((len(bodies), len(edges))), np.full(len(bodies), -np.inf)
     fill_match(bodies, edges, tolerance, belief, WIDTH, HEIGHT, match)
     index = PillarIndex.of(bodies, (int(WIDTH), int(HEIGHT)))

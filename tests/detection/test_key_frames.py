@@ -36,7 +36,7 @@ def show(kind: str, standing: Floats) -> list[ViewEvidence]:
 
 def explained(kind: str, frame: int, standing: Floats, predicted: PredictedTracks) -> Explanation:
     asked = detector(kind)
-    return asked.explain_next(asked.new_calibrations(), frame, show(kind, standing), predicted)
+    return asked.explain_next(asked.new_estimates(), frame, show(kind, standing), predicted)
 
 
 def is_searched(explanation: Explanation) -> bool:
@@ -113,7 +113,7 @@ def test_an_empty_room_stays_empty() -> None:
 @pytest.mark.parametrize("kind", KINDS)
 def test_walkers_are_followed_as_by_searches(kind: str) -> None:
     truth, asked = walkers(24), detector(kind)
-    follow, learned = TrackFilter(RATE, CONFIG), asked.new_calibrations()
+    follow, learned = TrackFilter(RATE, CONFIG), asked.new_estimates()
     names, searched = set[int](), 0
     for frame in range(24):
         standing = standing_at(truth, frame)

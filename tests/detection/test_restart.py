@@ -74,7 +74,7 @@ def test_key_frames_of_two_views_leave_the_set_into_which_tracks_lead(seed: int)
     seen = likelihoods(rig.cameras, people(*ground))
     asked, hits = Detector(rig, ["pixels"] * 2, FEW_HEIGHTS, BODY), []
     for frame in range(2):  # the first is a key frame
-        found = asked.explain_next(asked.new_calibrations(), frame, seen, expected).people
+        found = asked.explain_next(asked.new_estimates(), frame, seen, expected).people
         hits.append(len(match(distances(ground, found.ground), 0.3)[0]))
     assert hits[0] == len(ground) > hits[1]
 

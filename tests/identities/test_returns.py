@@ -19,7 +19,7 @@ from stseg.identities.evidence.returns import Visits, find_returns, known_people
 from stseg.identities.review.answered_constraints import answered_rows
 from stseg.identities.review.corrections import Answer
 from stseg.identities.search.constraints import NO_CONSTRAINTS, Constraints
-from stseg.records.tables import APPEARANCE, COLOURS, EVENT, FEATURES, KNOWN
+from stseg.records.tables import APPEARANCE, COLOURS, EVENT, FEATURES, KNOWN_PERSON
 from stseg.trajectories.final_tracks import FinalTracks, final_tracks
 
 SPREAD = np.full(3, 25.0)
@@ -241,7 +241,7 @@ def test_a_run_file_tells_of_its_people_or_says_why_not(tmp_path: Path) -> None:
         read_known(path, CONFIG)
     with pytest.raises(FormatError, match=r"run.h5: /committed: found no rows"):
         read_known(path, returning(0.99))
-    before = np.zeros(2, KNOWN)
+    before = np.zeros(2, KNOWN_PERSON)
     before["id"] = 2, 7
     with h5py.File(path, "r+") as file:
         rows = file["trajectory"][:]

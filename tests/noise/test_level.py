@@ -19,16 +19,16 @@ from stseg.config import ErrorRateConfig, OccupancyConfig
 from stseg.detection.detector import Detector
 from stseg.geometry import Grid
 from stseg.geometry.nearest_person import nearest_person
-from stseg.geometry.summed_area import TOP, UNSEEN, Levels
-from stseg.occupancy.fusion import ErrorRates, FrameTerms, Sums, log_odds_terms
-from stseg.occupancy.rate_estimate import (
+from stseg.geometry.summed_area import TOP_LEVEL, UNSEEN, Levels
+from stseg.occupancy.error_rate_estimate import (
     CLUTTER,
     MISS,
     NEAR_CLUTTER,
-    RateCalibration,
+    ErrorRateEstimate,
     cells_per_person,
     fill_counts,
 )
+from stseg.occupancy.fusion import ErrorRates, FrameTerms, Sums, log_odds_terms
 from stseg.occupancy.volume import Occupancy
 from stseg.records.people import Explanation
 
@@ -39,9 +39,9 @@ RIG = rig_of(corner_cameras(), cell=0.5, planes=3)
 STANDING = people((-0.75, 0.25), (0.75, -0.75))
 
 
-def one_level(views: int = 1) -> RateCalibration:
+def one_level(views: int = 1) -> ErrorRateEstimate:
     """Ten frames a second."""
-    return RateCalibration([FIRST] * views, 10.0, CONFIG)
+    return ErrorRateEstimate([FIRST] * views, 10.0, CONFIG)
 
 
 def teach(
@@ -63,7 +63,7 @@ def teach(
 
 def random_levels(rng: np.random.Generator, shape: tuple[int, ...], chance: Floats) -> Levels:
     """Ones at their chance, all else zeros."""
-    return np.where(rng.random(shape) < chance, TOP, 0).astype(np.int16)
+    return np.where(rng.random(shape) < chance, TOP_LEVEL, 0).astype(np.int16)
 
 
 @given(st.integers(0, 2**32 - 1))
@@ -71,7 +71,7 @@ def random_levels(rng: np.random.Generator, shape: tuple[int, ...], chance: Floa
 def test_counts_by_definition(seed: int) -> None:
     rng = np.random.default_rng(seed)
     shape = (2, 3, 4)
-    levels = tuple(rng.integers(UNSEEN, TOP + 1, shape).astype(np.int16) for _ in range(3))
+    levels = tuple(rng.integers(UNSEEN, TOP_LEVEL + 1, shape).astype(np.int16) for _ in range(3))
     levels[0][rng.random(shape) < 0.3] = UNSEEN
     share = tuple(rng.choice([0.0, 0.4, 1.0], shape).astype(np.float32) for _ in range(3))
     shown = reference.Shown(levels, share)
@@ -111,7 +111,7 @@ def test_rates_are_found() -> None:
 def test_soft_likelihoods_sharpen_the_rates() -> None:
     """A map that only ever says 0.8 of bodies misses none of them: the rate falls frame by frame, not to 0.2."""
     level, shape = one_level(), (1, 1, 1)
-    shown = reference.Shown((np.full(shape, round(0.8 * TOP), np.int16),), (np.ones(shape, np.float32),))
+    shown = reference.Shown((np.full(shape, round(0.8 * TOP_LEVEL), np.int16),), (np.ones(shape, np.float32),))
     near, inside, rates = np.zeros((1, 1), np.int64), np.ones(shape, bool), []
     for _ in range(200):
         errors, seen = teach(0, shown, near, inside, np.array([True]), level.rates, 1.0)
@@ -123,7 +123,7 @@ def test_soft_likelihoods_sharpen_the_rates() -> None:
 
 def test_whom_the_pass_missed_is_no_clutter() -> None:
     shape, near = (1, 1, 2), np.full((1, 2), -1)
-    body = np.full(shape, TOP, np.int16)
+    body = np.full(shape, TOP_LEVEL, np.int16)
     body[..., 1] = 0
     shown = reference.Shown((body,) * 4, (np.ones(shape, np.float32),) * 4)
     args = near, np.zeros(shape, bool), np.zeros(0, bool), [FIRST] * 4, 1.0
@@ -153,7 +153,7 @@ def test_the_first_guess_holds_at_first_and_comes_back() -> None:
 
 
 def test_memory_is_in_seconds() -> None:
-    slow, fast = RateCalibration([FIRST], 5.0, CONFIG), RateCalibration([FIRST], 20.0, CONFIG)
+    slow, fast = ErrorRateEstimate([FIRST], 5.0, CONFIG), ErrorRateEstimate([FIRST], 20.0, CONFIG)
     once = np.ones((1, 3))
     for level, frames in ((slow, 100), (fast, 400)):
         for _ in range(frames):
@@ -191,7 +191,7 @@ def occupancy(kind: str) -> Occupancy:
 @pytest.mark.parametrize("kind", ["pixels", "boxes"])
 def test_a_frame_is_fused_by_those_before_it(kind: str) -> None:
     fusion = occupancy(kind)
-    running, fresh = fusion.new_calibration(), fusion.new_calibration()
+    running, fresh = fusion.new_error_rates(), fusion.new_error_rates()
     frames = [frame(kind, k) for k in range(2)]
     np.testing.assert_array_equal(fusion.fuse_and_learn(running, *frames[0]).dense(), fusion.fuse(*frames[0]).dense())
     for one in frames[1:]:
@@ -205,10 +205,10 @@ def test_going_on_from_a_state_is_going_on() -> None:
     """Wherever a recording is divided, its parts in order say what the whole says."""
     frames = [frame("pixels", k) for k in range(3)]
     fusion = occupancy("pixels")
-    whole = fusion.new_calibration()
+    whole = fusion.new_error_rates()
     volumes = [fusion.fuse_and_learn(whole, *one).dense() for one in frames]
     for division in (1, 2):
-        part = fusion.new_calibration()
+        part = fusion.new_error_rates()
         for one in frames[:division]:
             fusion.fuse_and_learn(part, *one)
         rest = deepcopy(part)
@@ -218,7 +218,7 @@ def test_going_on_from_a_state_is_going_on() -> None:
 
 def test_a_blind_view_learns_nothing() -> None:
     fusion = occupancy("pixels")
-    running = fusion.new_calibration()
+    running = fusion.new_error_rates()
     seen, explanation = frame("pixels", 0)
     fusion.fuse_and_learn(running, [None, *seen[1:]], explanation)
     assert not running.seen[0].any()
@@ -229,7 +229,7 @@ def test_a_blind_view_learns_nothing() -> None:
 
 def test_people_whom_one_view_alone_asserts_do_not_teach_it() -> None:
     fusion, (seen, explanation) = occupancy("pixels"), frame("pixels", 0)
-    running = fusion.new_calibration()
+    running = fusion.new_error_rates()
     everybody = explanation.people
     parts = np.zeros_like(everybody.view_evidence)
     parts[0] = everybody.evidence
@@ -240,7 +240,7 @@ def test_people_whom_one_view_alone_asserts_do_not_teach_it() -> None:
 
 def test_a_detector_is_not_blamed_for_the_hidden() -> None:
     fusion = occupancy("boxes")
-    running = fusion.new_calibration()
+    running = fusion.new_error_rates()
     seen, explanation = frame("boxes", 0)
     hidden = np.array([[0.5] * len(explanation.people), *np.ones((3, len(explanation.people)))])
     unseen = replace(

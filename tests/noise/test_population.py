@@ -16,7 +16,7 @@ from stseg.errors import ConfigError, RigError
 from stseg.io.recording.recording import BodyPrior, CameraSource, Recording, Source
 from stseg.io.recording.rig_text import format_rig
 from stseg.io.recording.rigs import parse_rig
-from stseg.noise.population_estimate import PopulationCalibration
+from stseg.noise.population_estimate import PopulationEstimate
 from stseg.records.people import People
 
 RATE = 8.0
@@ -34,10 +34,10 @@ def sized(heights: list[float], widths: list[float], unresolved: float = 0.0, ev
 
 
 def learned(frames: list[People], config: ErrorRateConfig = LASTING) -> BodyConfig:
-    calibration = PopulationCalibration(BodyConfig(), RATE, config)
+    estimate = PopulationEstimate(BodyConfig(), RATE, config)
     for frame in frames:
-        calibration.learn(frame)
-    return calibration.body
+        estimate.learn(frame)
+    return estimate.body
 
 
 def test_means_and_spreads_by_the_formulas() -> None:
@@ -78,11 +78,11 @@ def test_a_run_among_children_learns_it_and_one_among_adults_does_not() -> None:
     means = {}
     for who, places in standing.items():
         asked = Detector(rig, ["pixels"] * 4, FEW_HEIGHTS, replace(BODY, heights=(1.1, 1.4, 1.7)))
-        calibrations = asked.new_calibrations()
+        estimates = asked.new_estimates()
         for _ in range(40):
-            explained = asked.explain_next(calibrations, 0, likelihoods(rig.cameras, people(*places)), None)
+            explained = asked.explain_next(estimates, 0, likelihoods(rig.cameras, people(*places)), None)
         assert len(explained.people) == 2
-        means[who] = calibrations.population.body.height_mean
+        means[who] = estimates.population.body.height_mean
     assert means["children"] < 1.62
     assert means["adults"] == pytest.approx(1.7, abs=0.04)
 

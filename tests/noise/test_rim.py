@@ -14,7 +14,7 @@ from scipy.ndimage import maximum_filter
 from stseg.arrays import Floats, Singles, ViewEvidence
 from stseg.bodies.views import ViewObservation
 from stseg.detection.detector import Detector
-from stseg.noise.rim_estimate import RimCalibration, without_rim
+from stseg.noise.rim_estimate import RimEstimate, without_rim
 
 APART = ((-0.9, 0.4, 1.7), (0.8, -0.6, 1.75))
 
@@ -30,15 +30,15 @@ def seen(standing: Floats, eaten: int) -> list[ViewEvidence]:
     return [np.asarray(cv2.erode(view, disc), np.float32) for view in likelihoods(room().cameras, standing)]
 
 
-def learned(standing: Floats, eaten: int, frames: int = 10, evidence: float = 20.0) -> RimCalibration:
+def learned(standing: Floats, eaten: int, frames: int = 10, evidence: float = 20.0) -> RimEstimate:
     return learned_from(seen(standing, eaten), standing, frames, evidence)
 
 
 def learned_from(
     evidence_of_views: Sequence[ViewEvidence], standing: Floats, frames: int = 10, evidence: float = 20.0
-) -> RimCalibration:
+) -> RimEstimate:
     asked = Detector(room(), ["pixels"] * 4, FEW_HEIGHTS, BODY)
-    rims, here = asked.new_calibrations().rims, replace(found(standing, evidence=evidence), height=standing[:, 2])
+    rims, here = asked.new_estimates().rims, replace(found(standing, evidence=evidence), height=standing[:, 2])
     observations = asked.observe(evidence_of_views)
     for _ in range(frames):
         rims.learn(here, asked.views, observations)
@@ -104,7 +104,7 @@ def test_who_overlaps_or_is_doubted_teaches_nothing(standing: list[tuple[float, 
 def test_people_in_eaten_silhouettes_are_surer_once_rims_are_known() -> None:
     standing = people((-0.9, 0.4, 1.7), (0.8, -0.6, 1.75), (0.7, 0.9, 1.65))
     asked, evidence = Detector(room(), ["pixels"] * 4, FEW_HEIGHTS, BODY), []
-    first = asked.new_calibrations()
+    first = asked.new_estimates()
     for known in (first, replace(first, rims=learned(people(*APART), 1))):
         explained = asked.explain_next(known, 0, seen(standing, 1), expecting(*standing))
         assert len(explained.people) == len(standing)

@@ -15,7 +15,7 @@ from strategies import numbers
 from stseg.arrays import Boxes, Flags, Floats, Singles
 from stseg.bodies.outlines import outlines
 from stseg.bodies.pillars import SILHOUETTE, WIDTH
-from stseg.bodies.views import BACKGROUND, OWN, PixelView
+from stseg.bodies.views import BACKGROUND_WEIGHT, BODY_WEIGHT, PixelView
 from stseg.detection.detector import Detector
 from stseg.detection.score.assignment import Assignment
 from stseg.detection.search.body_size import measure
@@ -87,8 +87,8 @@ def by_definition(view: PixelView, raster: Singles, open_pixels: Flags, fits: Ca
                 inside[i, first[i] + k, start:stop] = True
     union, own, score = inside.any(0), expit(raster.astype(float)), np.zeros(len(fits))
     for v, u in np.argwhere(union & open_pixels):
-        within = OWN * own[v, u] + BACKGROUND * (1 - own[v, u])
-        score += np.where(inside[:, v, u], within, -OWN * own[v, u]) / area.mean()
+        within = BODY_WEIGHT * own[v, u] + BACKGROUND_WEIGHT * (1 - own[v, u])
+        score += np.where(inside[:, v, u], within, -BODY_WEIGHT * own[v, u]) / area.mean()
     return view.config.effective_observations * score
 
 

@@ -21,7 +21,7 @@ from stseg.config import OccupancyConfig
 from stseg.detection.detector import Detector
 from stseg.geometry import Grid, Rig
 from stseg.geometry.sampling import Sampling, SamplingKind
-from stseg.geometry.summed_area import TOP, UNSEEN
+from stseg.geometry.summed_area import TOP_LEVEL, UNSEEN
 from stseg.occupancy.box_planes import CellsByPerson, ViewBoxes, fill_fit, fill_levels, plane_likelihood
 from stseg.occupancy.clutter import clutter, clutter_weights
 from stseg.occupancy.fusion import ErrorRates, log_odds_terms
@@ -204,7 +204,7 @@ def test_likelihood_per_plane_by_definition(seed: int) -> None:
                 free,
                 camera.size,
             )
-            expected = TOP * plane_likelihood(best, rates.miss, clutter_rate) if (z, cell) != (2, 5) else UNSEEN
+            expected = TOP_LEVEL * plane_likelihood(best, rates.miss, clutter_rate) if (z, cell) != (2, 5) else UNSEEN
             assert levels[z, cell] == pytest.approx(expected, abs=0.6)
 
 
@@ -213,7 +213,7 @@ def test_a_box_says_as_much_as_its_match_is_worth(near: int, clutter: float) -> 
     """The terms of the rates by which L was made give back m + M (1 - m) / b, and an empty cell counts as M."""
     match, rates = np.linspace(0.05, 0.9, 18).astype(np.float32).reshape(-1, 1, 1), ErrorRates(0.15, 0.01, 0.2)
     likelihood = np.array([plane_likelihood(float(m), rates.miss, clutter) for m in match.flat]).reshape(match.shape)
-    said = log_odds_terms(rates)[near + 1, np.rint(likelihood * TOP).astype(int)]
+    said = log_odds_terms(rates)[near + 1, np.rint(likelihood * TOP_LEVEL).astype(int)]
     np.testing.assert_allclose(said, np.log(0.15 + match * 0.85 / clutter), atol=0.02)
     erring = clutter * likelihood / (clutter * likelihood + (1 - clutter) * (1 - likelihood))
     np.testing.assert_allclose(erring, match, atol=0.2 * clutter)
@@ -228,7 +228,7 @@ LEVEL = 0.01
 
 def rounded(likelihood: Singles) -> Singles:
     """A map in whole levels."""
-    return np.asarray(np.rint(likelihood * TOP) / TOP, np.float32)
+    return np.asarray(np.rint(likelihood * TOP_LEVEL) / TOP_LEVEL, np.float32)
 
 
 def volume_by_definition(
@@ -291,7 +291,7 @@ def test_cells_at_which_nothing_is_shown_are_fused_as_all_others(kind: str, monk
         seen = [view * (view > 0.5) for view in likelihoods(rig.cameras, standing)]
     explanation = Detector(rig, [kind] * 4, FEW_HEIGHTS, BODY).explain(seen, None)
     occupancy = Occupancy(rig, [kind] * 4, CONFIG, FEW_HEIGHTS, BODY)
-    some, every = occupancy.new_calibration(), occupancy.new_calibration()
+    some, every = occupancy.new_error_rates(), occupancy.new_error_rates()
     sparse = occupancy.fuse_and_learn(some, seen, explanation)
     assert 0 < len(sparse.cell) < 0.8 * sparse.of_cell.size
     monkeypatch.setattr(CellTables, "nothing_marked", lambda self: np.ones(self.reach[0].shape[:3], bool))

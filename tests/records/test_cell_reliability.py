@@ -11,7 +11,14 @@ from scipy.special import expit
 
 from stseg.geometry import Grid
 from stseg.io.runfile.runs import read_run
-from stseg.records.cell_reliability import KNOTS, CellCounts, CellReliability, count_cells, doubtful_cells, filled_cells
+from stseg.records.cell_reliability import (
+    LOG_ODDS_KNOTS,
+    CellCounts,
+    CellReliability,
+    count_cells,
+    doubtful_cells,
+    filled_cells,
+)
 
 GRID = Grid((-1.0, 1.0), (-1.0, 1.0), 0.1, 1.8, 10)
 
@@ -36,7 +43,7 @@ def test_evidence_that_counts_twice_is_calibrated() -> None:
 
 def test_nothing_counted_is_a_half() -> None:
     np.testing.assert_array_equal(CellReliability.of([]).probability, 0.5)
-    empty = CellCounts(np.zeros(len(KNOTS)), np.zeros(len(KNOTS)))
+    empty = CellCounts(np.zeros(len(LOG_ODDS_KNOTS)), np.zeros(len(LOG_ODDS_KNOTS)))
     np.testing.assert_array_equal(CellReliability.of([empty]).probability, 0.5)
 
 

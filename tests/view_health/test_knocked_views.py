@@ -148,7 +148,7 @@ def test_a_run_by_three_views_says_from_when_to_when_one_is_knocked(kind: str) -
 def test_how_far_beside_a_knocked_view_sees_people_is_measured(kind: str) -> None:
     apart = people((-1.0, 1.0, 1.7), (0.0, 0.0, 1.75), (1.0, -1.0, 1.65))
     detector = Watch(kind).detector
-    learned, standing, seen = detector.new_calibrations(), expecting(*apart), shown(kind, apart)
+    learned, standing, seen = detector.new_estimates(), expecting(*apart), shown(kind, apart)
     for _ in range(15):
         before = detector.explain_next(learned, 0, seen, standing).residual
     seen[KNOCKED] = aside(seen[KNOCKED], 6)

@@ -14,7 +14,7 @@ from scenes import BODY, FEW_HEIGHTS, boxes, likelihoods, looking, people, rig_o
 from stseg import Tracker
 from stseg.arrays import Boxes, Floats, Observation, ViewEvidence
 from stseg.detection.detector import Detector
-from stseg.noise.estimates import Calibrations
+from stseg.noise.estimates import Estimates
 from stseg.view_health.view_failures import informedness
 
 STANDING = people((-0.9, 0.4, 1.7), (0.8, -0.6, 1.75), (0.7, 0.9, 1.65))
@@ -36,10 +36,10 @@ def test_informedness_is_the_share_of_bodies_less_that_of_the_rest(seed: int, nu
     assert share == pytest.approx(expected)
 
 
-def session(kind: str, views: int = 4) -> tuple[Detector, Calibrations]:
+def session(kind: str, views: int = 4) -> tuple[Detector, Estimates]:
     rig = replace(room(), frame_rate=RATE, cameras=room().cameras[:views])
     asked = Detector(rig, [kind] * views, FEW_HEIGHTS, BODY)
-    return asked, asked.new_calibrations()
+    return asked, asked.new_estimates()
 
 
 def shown(kind: str, standing: Floats = STANDING, views: int = 4) -> list[ViewEvidence]:
@@ -47,7 +47,7 @@ def shown(kind: str, standing: Floats = STANDING, views: int = 4) -> list[ViewEv
     return list(likelihoods(cameras, standing)) if kind == "pixels" else [boxes(camera, standing) for camera in cameras]
 
 
-def explained(asked: Detector, learned: Calibrations, seen: Sequence[ViewEvidence], frames: int) -> None:
+def explained(asked: Detector, learned: Estimates, seen: Sequence[ViewEvidence], frames: int) -> None:
     for _ in range(frames):
         asked.explain_next(learned, 0, seen, None)
 
@@ -96,7 +96,7 @@ def test_beside_four_sound_views_one_that_never_showed_people_fails(others: int,
     corner, *more = room().cameras
     rig = rig_of([corner, *more, looking("beside", (0.0, -3.6, 2.6))][: others + 1])
     asked = Detector(replace(rig, frame_rate=RATE), ["pixels"] * len(rig.cameras), FEW_HEIGHTS, BODY)
-    learned, seen = asked.new_calibrations(), list(likelihoods(rig.cameras, STANDING))
+    learned, seen = asked.new_estimates(), list(likelihoods(rig.cameras, STANDING))
     half = [np.where(np.arange(view.shape[1]) % 2, view, 0.0).astype(np.float32) for view in map(np.asarray, seen)]
     explained(asked, learned, [half[0], *seen[1:]], 50)
     assert learned.failures.failing.tolist() == [failing] + [False] * others

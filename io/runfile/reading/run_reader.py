@@ -146,7 +146,7 @@ class Run:
 
     @cached_property
     def known(self) -> Rows:
-        """KNOWN (n,): people of earlier recordings (`stseg run --known`); empty in a file that has none."""
+        """KNOWN_PERSON (n,): people of earlier recordings (`stseg run --known`); empty in a file that has none."""
         return self._table("known")
 
     @cached_property

@@ -25,7 +25,7 @@ from stseg.config import BodyConfig, ProposalConfig
 from stseg.errors import SourceError
 from stseg.geometry import Rig
 from stseg.geometry.grid import inside_polygon
-from stseg.geometry.summed_area import TOP, Sums, fill_sums, sum_of
+from stseg.geometry.summed_area import TOP_LEVEL, Sums, fill_sums, sum_of
 from stseg.kernels.accelerate import kernel
 
 _WITHIN = 2.0
@@ -180,7 +180,7 @@ def fill_chance(
                     else:
                         shown[j] += sum_of(sums, first, left, last, right)
                 if k >= base and covered[j] > 0:
-                    omega = (shown[j] / TOP + outside * (covered[j] - within[j])) / covered[j]
+                    omega = (shown[j] / TOP_LEVEL + outside * (covered[j] - within[j])) / covered[j]
                     total += height_share[k - base] * width_share[j] * omega
         if within[-1] > 0:
             chance[i] = total

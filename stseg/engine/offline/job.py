@@ -31,7 +31,7 @@ class Job:
         The frames of the run, half open.
     streams
         Lengths and frame times of the streams (`stseg.io.recording.stream_index`).
-    known : KNOWN (k,)
+    known : KNOWN_PERSON (k,)
         People of earlier recordings.
     """
 

@@ -20,7 +20,7 @@ _PLACE = [("frame", "<i8"), ("raw_x", "<f8"), ("raw_y", "<f8")]
 
 
 def read_known(path: Path, config: Config) -> Rows:
-    """The people of a run file and those whom it knew from earlier ones, KNOWN (n,).
+    """The people of a run file and those whom it knew from earlier ones, KNOWN_PERSON (n,).
 
     Raises
     ------

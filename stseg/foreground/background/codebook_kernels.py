@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stseg.arrays import Bytes, Floats, Singles
-from stseg.foreground.background.posterior import CERTAIN, FAR, bounded_log_odds, doubt_of, outshines
+from stseg.foreground.background.posterior import EXPONENT_LIMIT, LOG_ODDS_LIMIT, bounded_log_odds, doubt_of, outshines
 from stseg.kernels.accelerate import kernel
 
 _WHITE, _ZERO, _ONE, _HALF = np.float32(255), np.float32(0), np.float32(1), np.float32(0.5)
-_TWO, _TINY, _FAR = np.float32(2), np.float32(1e-6), np.float32(FAR)
+_TWO, _TINY, _FAR = np.float32(2), np.float32(1e-6), np.float32(EXPONENT_LIMIT)
 _OUTWARDS = np.float32(20)  # times faster than inwards do the bounds move
 
 
@@ -79,7 +79,7 @@ def evaluate(
                     decay = math.exp(-across - half * under * under)
                     lit += high_share * density * slope * decay / (span + (bright - _ONE) * high * length)
             if certain:
-                log_odds[v, u] = -CERTAIN
+                log_odds[v, u] = -LOG_ODDS_LIMIT
                 continue
             if lit + dimmed == _ZERO:
                 log_odds[v, u] = unknown

@@ -16,7 +16,13 @@ import numpy as np
 
 from stseg.arrays import Bytes, Labels, Singles
 from stseg.config import MixtureConfig
-from stseg.foreground.background.posterior import CERTAIN, FAR, UNIFORM, bounded_log_odds, doubt_of
+from stseg.foreground.background.posterior import (
+    EXPONENT_LIMIT,
+    LOG_ODDS_LIMIT,
+    UNIFORM_DENSITY,
+    bounded_log_odds,
+    doubt_of,
+)
 from stseg.kernels.accelerate import part, wide_kernel
 
 MEAN, VARIANCE = 0, 3
@@ -25,7 +31,7 @@ MEAN, VARIANCE = 0, 3
 _WHITE, _ZERO, _ONE, _TWO, _HALF = (np.float32(value) for value in (255, 0, 1, 2, 0.5))
 _TINY, _SIXTEENTH, _TWO_PI = np.float32(1e-6), np.float32(1 / 16), np.float32(2 * math.pi)
 _SHORTEST = np.float32(1 / math.sqrt(3))  # no colour is shorter than this share of the sum of its channels
-_UNIFORM, _FAR, _THIRD, _NEVER = (np.float32(value) for value in (UNIFORM, FAR, 1 / 3, np.inf))
+_UNIFORM, _FAR, _THIRD, _NEVER = (np.float32(value) for value in (UNIFORM_DENSITY, EXPONENT_LIMIT, 1 / 3, np.inf))
 
 
 class Priors(NamedTuple):
@@ -59,7 +65,7 @@ def evaluate(image: Bytes, gain: Singles, modes: Singles, priors: Priors, log_od
     """Fill `log_odds` (v, u) with the foreground log-odds; densities as in `stseg.foreground.background.chromatic`."""
     rows, columns = log_odds.shape
     colour, margin = np.empty((3, columns), np.float32), np.empty(columns, np.float32)
-    least = np.float32(-CERTAIN)
+    least = np.float32(-LOG_ODDS_LIMIT)
     none = bounded_log_odds(
         0.0, 0.0, priors.foreground_prior, priors.outlier_rate, priors.shadow_prior, priors.shadow_confusion
     )

@@ -14,12 +14,12 @@ import numpy as np
 
 from stseg.kernels.accelerate import kernel
 
-UNIFORM = 1.0 / 256.0**3  # density of an unknown colour, per cubed grey level
-CERTAIN = 5.0  # nats; beyond it one pixel would outvote all its neighbours
-FAR = 50.0  # half a squared Mahalanobis distance; beyond it the density is below every constant here
-_CERTAIN_RATIO = math.exp(CERTAIN)
+UNIFORM_DENSITY = 1.0 / 256.0**3  # density of an unknown colour, per cubed grey level
+LOG_ODDS_LIMIT = 5.0  # nats; beyond it one pixel would outvote all its neighbours
+EXPONENT_LIMIT = 50.0  # half a squared Mahalanobis distance; beyond it the density is below every constant here
+_CERTAIN_RATIO = math.exp(LOG_ODDS_LIMIT)
 _ROUNDING = 1.001  # more than single precision loses
-_UNIFORM = np.float32(UNIFORM)
+_UNIFORM = np.float32(UNIFORM_DENSITY)
 _ZERO, _ONE, _TWO, _SIXTEENTH = np.float32(0), np.float32(1), np.float32(2), np.float32(1 / 16)
 
 
@@ -28,19 +28,19 @@ def bounded_log_odds(
     lit: float, dimmed: float, foreground: float, unexplained: float, shadow: float, mimicry: float
 ) -> float:
     """The log-odds of a person, nats, within 5."""
-    person = (1.0 - mimicry) * UNIFORM + mimicry * dimmed
-    scene = (1.0 - unexplained) * ((1.0 - shadow) * lit + shadow * dimmed) + unexplained * UNIFORM
+    person = (1.0 - mimicry) * UNIFORM_DENSITY + mimicry * dimmed
+    scene = (1.0 - unexplained) * ((1.0 - shadow) * lit + shadow * dimmed) + unexplained * UNIFORM_DENSITY
     ratio = foreground * person / ((1.0 - foreground) * scene)
     if ratio >= _CERTAIN_RATIO:
-        return CERTAIN
-    return max(math.log(ratio), -CERTAIN) if ratio * _CERTAIN_RATIO > 1.0 else -CERTAIN
+        return LOG_ODDS_LIMIT
+    return max(math.log(ratio), -LOG_ODDS_LIMIT) if ratio * _CERTAIN_RATIO > 1.0 else -LOG_ODDS_LIMIT
 
 
 @kernel
 def doubt_of(foreground: float, unexplained: float, shadow: float) -> float:
     """Ratio of the densities of background and people from which on the log-odds are at their lower bound."""
     known = (1.0 - unexplained) * (1.0 - shadow)
-    return _ROUNDING * foreground * math.exp(CERTAIN) / ((1.0 - foreground) * known)
+    return _ROUNDING * foreground * math.exp(LOG_ODDS_LIMIT) / ((1.0 - foreground) * known)
 
 
 @kernel

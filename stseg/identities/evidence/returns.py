@@ -22,7 +22,7 @@ import numpy as np
 from stseg.arrays import AnyArray, Floats, Ints, Rows
 from stseg.identities.evidence.appearance_model import row_means
 from stseg.identities.evidence.size_model import evidence
-from stseg.records.tables import KNOWN
+from stseg.records.tables import KNOWN_PERSON
 
 NO_PAIRS: Ints = np.zeros((0, 2), np.int64)
 """No pairs."""
@@ -228,7 +228,7 @@ def _sums(value: Floats, half: Ints, number: int) -> Floats:
 
 
 def known_people(committed: Rows, appearance: Rows) -> Rows:
-    """Means over the rows of every person, KNOWN (k,), by rising id.
+    """Means over the rows of every person, KNOWN_PERSON (k,), by rising id.
 
     Colours are without the offsets of the cameras. Features of a detector are left out: they lie along axes of their
     recording.
@@ -242,7 +242,7 @@ def known_people(committed: Rows, appearance: Rows) -> Rows:
     """
     people = np.unique(committed["id"][committed["id"] > 0])
     owner = np.where(committed["id"] > 0, np.searchsorted(people, committed["id"]), -1)
-    known = np.zeros(len(people), KNOWN)
+    known = np.zeros(len(people), KNOWN_PERSON)
     known["id"] = people
     known["height"], known["heights"] = _means(committed["height"][:, None], owner, len(people), 0)
     known["colours"], known["looks"] = _means(row_means(committed, appearance, "colours"), owner, len(people))

@@ -28,7 +28,7 @@ from stseg.arrays import Flags, Floats
 from stseg.bodies.pillars import PROFILE
 from stseg.config import ErrorRateConfig
 from stseg.geometry import Grid
-from stseg.geometry.summed_area import TOP
+from stseg.geometry.summed_area import TOP_LEVEL
 from stseg.kernels.accelerate import kernel, part
 from stseg.occupancy.fusion import ErrorRates, FrameTerms, Sums
 
@@ -41,7 +41,7 @@ _INTERVAL = 0.25
 """Seconds from one counted frame to the next: rates have a memory of minutes."""
 
 
-class RateCalibration:
+class ErrorRateEstimate:
     """Current estimate of all views' error rates; state of one session.
 
     Parameters
@@ -152,7 +152,7 @@ def fill_counts(
                 wrong[i], empty[i] = 0.0, 0.0
                 if level >= 0 and share > 0.0:
                     empty[i] = number[c] * share / (1.0 + _occupied_odds(views, sums, i, c, observations, prior))
-                    wrong[i] = _error_posterior(rates[i, CLUTTER], level / TOP) * empty[i]
+                    wrong[i] = _error_posterior(rates[i, CLUTTER], level / TOP_LEVEL) * empty[i]
         for i in range(len(wrong)):
             all_wrong[i] += wrong[i]
             all_empty[i] += empty[i]
@@ -177,7 +177,7 @@ def _count_beside_person(
     for i in range(len(views.weight)):
         level, share = views.levels[i, c], views.share[i, c]
         if level >= 0 and share > 0.0 and trusted[i, views.near[c]]:
-            likelihood = level / TOP
+            likelihood = level / TOP_LEVEL
             rate, error_likelihood = (MISS, 1.0 - likelihood) if is_inside else (NEAR_CLUTTER, likelihood)
             errors[i, rate] += _error_posterior(rates[i, rate], error_likelihood) * share
             seen[i, rate] += share
