@@ -1,4 +1,9 @@
-"""Track and score one set of tools/result_sets.py in this process: on fewer views, spoiled, or perturbed."""
+"""Prepare one set of tools/result_sets.py, perturb it, track it in this process, and score it.
+
+A perturbation shifts the ground's area by 10 cm in a random direction and the grid by up to half a cell, moves the
+image of each camera by one pixel, and drops one box, or one frame of a view, in 200. People outside the area that all
+perturbed runs share are not scored.
+"""
 
 from __future__ import annotations
 
@@ -19,6 +24,7 @@ from stseg.evaluation import evaluate
 from stseg.evaluation.scores import Scores
 from stseg.evaluation.sequence import Area
 from stseg.foreground.view_foreground import ViewForeground
+from stseg.geometry import Camera, Rig
 from stseg.io.recording.appearance_axes import appearance_axes
 from stseg.io.recording.frames import open_frames
 from stseg.io.recording.recording import Recording
@@ -27,102 +33,87 @@ from stseg.io.track_csv import read_tracks_csv
 
 DROPPED = 1 / 200
 """Share of boxes, and of frames of a view without boxes, that a perturbed run does not see."""
+AREA_SHIFT = 0.1
+"""Shift of the ground's area, metres."""
+_MARGIN = 0.2
+"""Width of the ground's border that is not scored where a set has no area of its own, metres."""
 
 
-class Perturbed(ViewForeground):
+@dataclass(frozen=True)
+class Perturbed:
     """A foreground of which a few random boxes or frames are missing."""
 
-    def __init__(self, whole: ViewForeground, rng: np.random.Generator) -> None:
-        super().__init__(whole.background)
-        self._rng = rng
+    whole: ViewForeground
+    rng: np.random.Generator
+
+    def __getattr__(self, name: str) -> object:
+        return getattr(self.whole, name)
 
     def evidence(self, seen: Observation) -> ViewEvidence:
         """The evidence of the frame, less what is dropped."""
-        evidence = super().evidence(seen)
+        evidence = self.whole.evidence(seen)
         if isinstance(evidence, Boxes):
-            kept = self._rng.random(len(evidence)) >= DROPPED
-            return evidence.of(kept)
-        return None if self._rng.random() < DROPPED else evidence
+            return evidence.of(self.rng.random(len(evidence)) >= DROPPED)
+        return None if self.rng.random() < DROPPED else evidence
 
 
-@dataclass(frozen=True)
-class Committed:
-    """Rows of a whole recording as the tracker committed them, and what the identity search needs besides."""
-
-    trajectory: Rows
-    events: Rows
-    appearance: Rows
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """Trajectories before and after the final association over the whole recording."""
-
-    committed: Rows
-    finished: Rows
+def perturbed_rig(rig: Rig, rng: np.random.Generator) -> Rig:
+    """The rig with another area, another phase of the grid, and cameras that are one pixel off."""
+    angle = rng.uniform(0, 2 * np.pi)
+    shift = AREA_SHIFT * np.array([np.cos(angle), np.sin(angle)]) + rng.uniform(-0.5, 0.5, 2) * rig.grid.cell
+    (x0, x1), (y0, y1) = rig.grid.x, rig.grid.y
+    polygon = None if rig.grid.polygon is None else rig.grid.polygon + shift
+    grid = replace(rig.grid, x=(x0 + shift[0], x1 + shift[0]), y=(y0 + shift[1], y1 + shift[1]), polygon=polygon)
+    return replace(rig, grid=grid, cameras=tuple(_shifted(camera, rng.uniform(0, 2 * np.pi)) for camera in rig.cameras))
 
 
-def track(
-    recording: Recording, first: int, stop: int, tracker: str, config: Config, seed: int | None = None
-) -> Outcome:
-    """Track a recording; with a seed, perturbed."""
-    pipeline = _pipeline(recording, config, tracker)
-    rows = committed(recording, pipeline, first, stop, seed)
-    finished = pipeline.finished(rows.trajectory, rows.events, rows.appearance)[0]
-    return Outcome(rows.trajectory, finished.trajectory)
+def _shifted(camera: Camera, angle: float) -> Camera:
+    """The camera, its (undistorted) image moved by one pixel."""
+    if camera.lens is not None:
+        return camera
+    shift = np.eye(3)
+    shift[:2, 2] = np.cos(angle), np.sin(angle)
+    return replace(camera, ground=shift @ camera.ground, vertical=shift @ camera.vertical)
 
 
-def commit_rows(recording: Recording, first: int, stop: int, tracker: str, config: Config, seed: int) -> Committed:
-    """What the tracker commits on perturbed evidence."""
-    return committed(recording, _pipeline(recording, config, tracker), first, stop, seed)
-
-
-def committed(recording: Recording, pipeline: Pipeline, first: int, stop: int, seed: int | None) -> Committed:
-    """What the pipeline's tracker commits; with a seed, on perturbed evidence."""
-    foregrounds: Sequence[ViewForeground] = make_foregrounds(recording, pipeline.config, first, stop)
-    if seed is not None:
-        streams = np.random.SeedSequence(seed).spawn(len(foregrounds))
-        pairs = zip(foregrounds, streams, strict=True)
-        foregrounds = [Perturbed(whole, np.random.default_rng(stream)) for whole, stream in pairs]
-    done: list[int] = []
-    with open_frames(recording, first, stop) as frames:
-        steps = list(run_session(pipeline, foregrounds, frames, first, done.append))
-    trajectory, events = (np.concatenate([getattr(s.commit, name) for s in steps]) for name in ("trajectory", "events"))
-    return Committed(trajectory, events, np.concatenate([step.appearance for step in steps]))
-
-
-def _pipeline(recording: Recording, config: Config, tracker: str) -> Pipeline:
-    kinds = ["boxes" if source.source.kind in ("boxes", "instances") else "pixels" for source in recording.sources]
-    return Pipeline(recording.rig, kinds, config, tracker, appearance_axes(recording))
-
-
-def first_views(recording: Recording, number: int) -> Recording:
-    """The first cameras of a recording."""
-    rig = replace(recording.rig, cameras=recording.rig.cameras[:number])
-    return replace(recording, rig=rig, sources=recording.sources[:number])
-
-
-def score(one: ResultSet, rows: Rows, bench: Bench, first: int, stop: int) -> Scores:
-    """Scores of tracks, with the set's own options."""
+def scored_run(one: ResultSet, bench: Bench, config: Config, seed: int, tracker: str = "cut") -> Scores:
+    """Scores of one perturbed run of a set whose inputs are made."""
+    recording = read_rig(bench.path(one.rig))
+    streams = np.random.SeedSequence(seed).spawn(1 + len(recording.sources))
+    area = scored_area(one, recording.rig)
+    recording = replace(recording, rig=perturbed_rig(recording.rig, np.random.default_rng(streams[0])))
+    first, stop = map(int, one.frames.split(":"))
+    rows = track(recording, config, tracker, first, stop, streams[1:])
     assert one.truth is not None
     truth, frames = read_tracks_csv(bench.path(one.truth)), np.arange(first, stop)
     flagged = "--ignore-flagged" in shlex.split(one.scoring)
-    return evaluate(truth, rows, area=area_of(one), frames=frames, ignore_flagged=flagged)
+    return evaluate(truth, rows, area=area, frames=frames, ignore_flagged=flagged)
 
 
-def area_of(one: ResultSet) -> Area | None:
-    """The rectangle that is scored, None for all."""
+def track(
+    recording: Recording, config: Config, tracker: str, first: int, stop: int, streams: Sequence[np.random.SeedSequence]
+) -> Rows:
+    """The trajectory of a recording of which random boxes or frames are missing."""
+    kinds = ["boxes" if source.source.kind in ("boxes", "instances") else "pixels" for source in recording.sources]
+    pipeline = Pipeline(recording.rig, kinds, config, tracker, appearance_axes(recording))
+    pairs = zip(make_foregrounds(recording, config, first, stop), streams, strict=True)
+    foregrounds = [Perturbed(whole, np.random.default_rng(stream)) for whole, stream in pairs]
+    frames_done: list[int] = []
+    with open_frames(recording, first, stop) as frames:
+        steps = list(run_session(pipeline, foregrounds, frames, first, frames_done.append))  # type: ignore[arg-type]
+    trajectory, events = (np.concatenate([getattr(s.commit, name) for s in steps]) for name in ("trajectory", "events"))
+    appearance = np.concatenate([step.appearance for step in steps])
+    return pipeline.finished(trajectory, events, appearance)[0].trajectory
+
+
+def scored_area(one: ResultSet, rig: Rig) -> Area:
+    """The rectangle that is scored: the set's own, or the ground without its border."""
     for option in shlex.split(one.scoring):
         if option.startswith("--area="):
             x0, y0, x1, y1 = map(float, option.partition("=")[2].split(","))
             return x0, y0, x1, y1
-    return None
-
-
-def prepared(one: ResultSet, bench: Bench) -> Recording:
-    """The set's recording; its rig and truth are made."""
-    prepare(one, bench)
-    return read_rig(bench.path(one.rig))
+    (x0, x1), (y0, y1) = rig.grid.x, rig.grid.y
+    return x0 + _MARGIN, y0 + _MARGIN, x1 - _MARGIN, y1 - _MARGIN
 
 
 def prepare(one: ResultSet, bench: Bench) -> None:

@@ -1,4 +1,4 @@
-"""The sets that docs/development/measurements.md is measured on: what each is made from, and how it is scored.
+"""The sets that docs/development/results.md is measured on: what each is made from, and how it is scored.
 
 Commands are written as one types them; $DATA is the folder of data sets, $WORK the folder for what is made.
 """
@@ -39,8 +39,6 @@ class ResultSet:
         Options of `stseg evaluate` beside the frames.
     area, remark
         In words.
-    peer_frames
-        The part of the frames that peers were measured on, where it is not all of them.
     colour
         Whether it is followed in the variants, too, that need colour images.
     """
@@ -56,7 +54,6 @@ class ResultSet:
     scoring: str = ""
     area: str = "all the ground"
     remark: str = ""
-    peer_frames: str | None = None
     colour: bool = False
 
     @property
@@ -72,10 +69,10 @@ class ResultSet:
         """The run that the row was measured on."""
         return f"stseg run {self.rig} -o {self.run_file(variant)} --frames {self.frames} {variant.options}"
 
-    def score_command(self, variant: Variant, frames: str | None = None) -> str:
-        """How it was scored."""
+    def score_command(self, variant: Variant) -> str:
+        """The command that scores it."""
         options = f" {self.scoring}" if self.scoring else ""
-        return f"stseg evaluate {self.run_file(variant)} {self.truth} --frames {frames or self.frames}{options}"
+        return f"stseg evaluate {self.run_file(variant)} {self.truth} --frames {self.frames}{options}"
 
 
 _ROOM = "--size 644,486 --unit mm --up=-z --area=-2.5,-4.5,2.5,1.5"
@@ -131,7 +128,6 @@ def _wildtrack(name: str, foreground: str, folder: str, *inputs: str) -> ResultS
         truth="$WORK/wildtrack.csv",
         area="x -3 .. 9, y -9 .. 27 m",
         remark="24 people a frame",
-        peer_frames="0:40",
     )
 
 
@@ -169,6 +165,15 @@ def _filmed(
 
 
 _ALL = (
+    ResultSet(
+        "laboratory",
+        "a simulated detector's boxes of a real recording",
+        4,
+        "0:591",
+        "$DATA/laboratory/rig.toml",
+        truth="$DATA/laboratory/truth.csv",
+        remark="6 people in a small room",
+    ),
     ResultSet(
         "uu4",
         "given silhouettes (video of masks)",
@@ -248,7 +253,7 @@ _MEETINGS = {
     "meeting_heights": "the same, 8 cm apart in height",
     "border": "5 people who cross, meet, come and go where windows end",
 }
-_TOLD = tuple(
+_ENCOUNTERS = tuple(
     _simulated(f"{scene}{ending}", scene, rig, foreground, 4, people, "5 m x 5 m")
     for scene, people in _MEETINGS.items()
     for ending, rig, foreground in (
@@ -257,5 +262,5 @@ _TOLD = tuple(
     )
 )
 
-SETS = {one.name: one for one in (*_ALL, *_TOLD)}
+SETS = {one.name: one for one in (*_ALL, *_ENCOUNTERS)}
 """In the order of the table."""

@@ -1,4 +1,4 @@
-"""The variants of tracking that the page of measurements compares: the trackers, and the ablations of their papers."""
+"""The variants of tracking that the table of results compares: the trackers, and the ablations of their papers."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class Variant:
     Attributes
     ----------
     name
-        In the keys of docs/results.json and in the names of run files.
+        In the table and in the names of run files.
     words
         In the tables.
     tracker

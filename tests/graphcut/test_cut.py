@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -13,6 +12,7 @@ import pytest
 import reference_core as reference
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from recordings import track, write_recording
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import maximum_flow
 
@@ -20,18 +20,16 @@ from stseg.config import SegmentationConfig
 from stseg.errors import ConfigError
 from stseg.geometry import Grid
 from stseg.graphcut import pymaxflow
-from stseg.graphcut.cut import minimum_cut
+from stseg.graphcut.cut import Cut, minimum_cut
 from stseg.graphcut.grid_energy import QUANTUM, GridEnergy
 from stseg.graphcut.pymaxflow import grid_cut
 from stseg.graphcut.reduction import reduce
 from stseg.graphcut.sign_sets import LABEL_ONE, UNDECIDED
-from stseg.graphcut.solvers import SOLVERS, find_solver
+from stseg.graphcut.solvers import SOLVERS, Solver, find_solver
 from stseg.graphcut.sparse import CAPACITY_LIMIT, sparse_cut
 from stseg.segmentation.cell_motion import successor_cells
 from stseg.segmentation.cut_energy import build_energy, neighbourhood
 
-ROOT = Path(__file__).parents[2]
-DATA = Path(os.environ.get("STSEG_DATA", ROOT / "../shared/data"))
 TINY = [(1, 1, 3, 4), (2, 1, 2, 3), (2, 2, 1, 3), (3, 1, 2, 2), (2, 2, 3, 1), (1, 3, 2, 2), (4, 1, 1, 3), (12, 1, 1, 1)]
 """Volumes of at most twelve cells, with and without each of the axes."""
 INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT") == "1"
@@ -270,11 +268,16 @@ def test_cuts_in_two_threads_at_once_agree() -> None:
 # Real windows
 
 
-@pytest.mark.skipif(not (DATA / "uu4").exists(), reason="the uu4 set is not at hand")
 @pytest.mark.skipif(INTERPRETED, reason="too large for plain Python")
-def test_real_windows(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.syspath_prepend(ROOT / "tools")
-    energies = list(importlib.import_module("bench_windows").real("uu4", "0:10", DATA))
+def test_real_windows(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    energies: list[GridEnergy] = []
+
+    def kept(energy: GridEnergy) -> Cut:
+        energies.append(energy)
+        return minimum_cut(energy)
+
+    monkeypatch.setitem(SOLVERS, "stseg", Solver(kept, sparse_cut))
+    assert track(write_recording(tmp_path), tmp_path / "run.h5", "--frames", "0:10") == 0
     assert energies
     for energy in energies:
         expected = grid_cut(energy).occupied

@@ -1,22 +1,18 @@
-"""tools/results.py: the page it writes, the commands it runs, the rig it fits."""
+"""The tools of the results table: its page, its commands, its perturbations, the rig of a data set."""
 
 from __future__ import annotations
 
 import importlib
-import json
 import os
 import shlex
 from pathlib import Path
-from types import ModuleType
-from typing import Any
 
 import numpy as np
 import pytest
+from scenes import looking, rig_of
 
-from stseg.evaluation import evaluate
 from stseg.geometry import Camera
 from stseg.io.recording.rigs import read_rig
-from stseg.io.track_csv import POSITION
 
 ROOT = Path(__file__).parents[2]
 DATA = Path(os.environ.get("STSEG_DATA", ROOT / "../shared/data"))
@@ -29,71 +25,30 @@ def tools(monkeypatch: pytest.MonkeyPatch) -> Path:
     return ROOT / "tools"
 
 
-@pytest.fixture
-def page_tool(tools: Path) -> ModuleType:
+def test_the_page_shows_the_rows_of_the_default_tracker(tools: Path) -> None:
     del tools
-    return importlib.import_module("result_page")
+    results = importlib.import_module("results")
+    row = {"set": "uu4", "variant": "cut", "frames": "0:136", "MODA": "99.6", "error_m": "0.03"}
+    shown = results.page(
+        "above\n<!-- table -->\nold\n<!-- end of table -->\nbelow\n", [row, row | {"variant": "kalman"}]
+    )
+    assert "| uu4 | cut | 0:136 | 99.6 | - | - | - | - | - | 0.03 |" in shown
+    assert "kalman" not in shown and "old" not in shown
+    assert shown.startswith("above\n") and shown.endswith("below\n")
 
 
-def rows(*places: tuple[int, int, float, float]) -> np.ndarray[tuple[int], np.dtype[np.void]]:
-    return np.array([(*place, 0) for place in places], POSITION)
-
-
-def figure_row(name: str, variant: str, scores: dict[str, Any] | None) -> dict[str, Any]:
-    row = {
-        "set": name,
-        "variant": variant,
-        "frames": "0:136",
-        "version": "1.2",
-        "date": "2030-01-01",
-        "milliseconds": {"read": 10.0, "ghosts": 220.0, "track": 20.0},
-        "tracks": 7,
-        "people_a_frame": 2.5,
-        "run": "stseg run RIG",
-    }
-    return row if scores is None else {**row, "evaluate": "stseg evaluate RUN", "scores": scores}
-
-
-def some_scores() -> dict[str, Any]:
-    truth = rows((0, 1, 0.0, 0.0), (1, 1, 0.0, 0.0))
-    return evaluate(truth, rows((0, 5, 0.25, 0.0), (1, 5, 3.0, 0.0))).as_dict()
-
-
-def test_page_shows_the_figures(page_tool: ModuleType) -> None:
-    figures = {"uu4 cut": figure_row("uu4", "cut", some_scores()), "pom cut": figure_row("pom", "cut", None)}
-    page = page_tool.page(figures)
-    assert "| uu4 | cut | 0.0 | 50.0 | 50.0 | 50.0 |" in page
-    assert "| 0.250 | 4.0 | given silhouettes (video of masks); 4 views; frames 0:136; gate 0.5 m;" in page
-    assert "| pom | cut | - |" in page
-    assert "2.5 people a frame |" in page
-    assert "| **stseg, cut** | **0.0** |" in page
-    assert "# pom, cut: stseg 1.2, 2030-01-01\npython tools/pom_rig.py" in page
-
-
-def test_variants_stand_side_by_side(page_tool: ModuleType) -> None:
-    figures = {
-        "easy belief-condensation": figure_row("easy", "belief-condensation", some_scores()),
-        "easy kalman": {**figure_row("easy", "kalman", some_scores()), "frames": "0:50"},
-    }
-    page = page_tool.page(figures)
-    table = page.partition("## Trackers")[2].partition("\n## ")[0].splitlines()[1:]
-    assert table[3].startswith("| easy | 0:50 | kalman | 0.0 | 50.0 |")
-    assert table[4].startswith("| easy | 0:136 | belief: each view by itself |")
-    assert table[4].endswith("| 0.250 | 7 | 20.0 | 250.0 |")
-    assert len({line.count("|") for line in table[1:]}) == 1
-    assert "kalman" not in page.partition("## Peers")[2]
-
-
-def test_committed_page_says_what_the_figures_say(page_tool: ModuleType) -> None:
-    text = (ROOT / "docs" / "results.json").read_text(encoding="utf-8")
-    page = (ROOT / "docs" / "development" / "measurements.md").read_text(encoding="utf-8")
-    assert page_tool.page(json.loads(text)) == page
-
-
-def test_every_row_of_a_table_has_a_cell_for_every_heading(page_tool: ModuleType) -> None:
-    page = page_tool.page({"cmc1 frames": figure_row("cmc1", "frames", some_scores())})
-    table = page.partition("## Results")[2].partition("\n## ")[0].strip()
-    assert len({line.count(" | ") for line in table.splitlines()}) == 1
+def test_a_perturbed_rig_is_shifted_as_stated(tools: Path) -> None:
+    del tools
+    measure = importlib.import_module("measure")
+    rig = rig_of([looking("west", (-3.5, -3.5, 2.6)), looking("east", (3.5, -3.4, 2.6))])
+    for seed in range(20):
+        moved = measure.perturbed_rig(rig, np.random.default_rng(seed))
+        shift = np.hypot(moved.grid.x[0] - rig.grid.x[0], moved.grid.y[0] - rig.grid.y[0])
+        assert shift <= measure.AREA_SHIFT + rig.grid.cell / np.sqrt(2)
+        assert moved.grid.shape == rig.grid.shape
+        for before, after in zip(rig.cameras, moved.cameras, strict=True):
+            pixels = [camera.project(np.zeros((1, 2)), 1.0)[0] for camera in (before, after)]
+            assert np.hypot(*(pixels[1] - pixels[0])[0]) == pytest.approx(1.0)
 
 
 def test_sets_are_commands_that_exist(tools: Path) -> None:
@@ -111,29 +66,11 @@ def test_sets_are_commands_that_exist(tools: Path) -> None:
             assert all("{" not in word or "{name}" in word for word in rest)
 
 
-def test_unknown_set_is_refused(tools: Path, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize("option", [["--sets", "uu4,uu5"], ["--sets", "none", "--variants", "cut,uu5"]])
+def test_an_unknown_name_is_refused(tools: Path, option: list[str]) -> None:
     del tools
-    with pytest.raises(SystemExit) as stop:
-        importlib.import_module("results").main(["--sets", "uu4,uu5"])
-    assert stop.value.code == 2
-    assert "uu5: expected names among uu4," in capsys.readouterr().err
-
-
-def test_unknown_variant_is_refused(tools: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    del tools
-    with pytest.raises(SystemExit) as stop:
-        importlib.import_module("results").main(["--sets", "none", "--variants", "kalman,magic"])
-    assert stop.value.code == 2
-    assert "magic: expected names among cut, frames, kalman," in capsys.readouterr().err
-
-
-def test_errors_of_a_frame_are_judged_in_the_area_alone(tools: Path) -> None:
-    del tools
-    truth = rows((0, 1, 0.0, 0.0), (0, 2, 9.0, 0.0), (1, 1, 0.0, 0.0))
-    found = rows((0, 1, 0.1, 0.0), (1, 1, 2.0, 0.0), (1, 2, 2.0, 2.0))
-    scores = {"gate_m": 0.5, "area": [-1.0, -1.0, 3.0, 3.0]}
-    errors = importlib.import_module("result_pictures").frame_errors(found, truth, [0, 1], scores, False)
-    assert errors.tolist() == [[0, 0, 0], [1, 1, 2]]
+    with pytest.raises(SystemExit, match="uu5: expected names among"):
+        importlib.import_module("results").main(option)
 
 
 def test_pom_camera_is_fitted_to_its_rectangles(tools: Path) -> None:

@@ -153,5 +153,5 @@ def test_nobody_is_taken_for_somebody_else_from_boxes(name: str) -> None:
 @pytest.mark.skipif(INTERPRETED, reason="whole scenes need the compiler")
 @pytest.mark.parametrize("name", ["crossing", "border"])
 def test_nobody_is_taken_for_somebody_else_from_silhouettes(name: str) -> None:
-    """The first six seconds, in which people cross; tools/experiment.py ablation runs all of it."""
+    """The first six seconds, in which people cross."""
     assert switches(name, "pixels", 60) == 0

@@ -18,11 +18,12 @@ from math import comb
 from pathlib import Path
 
 import numpy as np
+from scipy.optimize import linear_sum_assignment
 from workbench import ROOT, commit
 
-from experiments.points import matched
 from experiments.target_trials import CMC_AREA, Recorded, delivered, filmed
 from experiments.targets import tracked
+from stseg.arrays import Flags, Rows
 from stseg.evaluation import evaluate
 from stseg.simulation import NAMED
 
@@ -64,6 +65,17 @@ def recordings(data: Path, work: Path) -> dict[str, Callable[[int], Recorded]]:
         "dense4, masks": filmed(NAMED["dense4"], "masks"),
         "wildtrack": lambda most: delivered(work / "wildtrack.toml", work / "wildtrack.csv", most),
     }
+
+
+def matched(found: Rows, truth: Rows, gate: float) -> Flags:
+    """Rows that are matched, one to one, to a person of their frame, bool (n,)."""
+    right = np.zeros(len(found), bool)
+    for frame in np.unique(found["frame"]):
+        rows, people = np.flatnonzero(found["frame"] == frame), truth[truth["frame"] == frame]
+        distance = np.hypot(people["x"][:, None] - found["x"][rows], people["y"][:, None] - found["y"][rows])
+        i, j = linear_sum_assignment(np.where(distance < gate, distance, 1e3))
+        right[rows[j[distance[i, j] < gate]]] = True
+    return right
 
 
 def choices(cameras: int, number: int, most: int) -> Iterator[tuple[int, ...]]:

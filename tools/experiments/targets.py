@@ -18,36 +18,29 @@ from pathlib import Path
 import numpy as np
 from workbench import ROOT, commit
 
-from experiments.perfect_past import perfect_past
 from experiments.target_trials import Recorded, Trial, trials
 from stseg import Tracker
 from stseg.arrays import Rows
 from stseg.evaluation import evaluate
 
-_EVERY = 3
-"""Of the frames whose past is made right, every third."""
 _PAGE = """# Targets for bodies as they come
 
-MODA / IDF1, percent, of the default tracker on the first {frames} frames of the recordings that match
-`{only}`. Where a recording misses its target: MODA of
-every third frame by itself if the places of the frame before are given to the detector, as a perfect observer of the
-past would; and in how many of the frames that err even so the truth scores lower under the model than what was found
-(the model loses; in the others the search was short). Made by `tools/experiment.py targets` at commit {commit}.
+MODA / IDF1, percent, of the default tracker on the first {frames} frames of the recordings that match `{only}`.
+Made by `tools/experiment.py targets` at commit {commit}.
 
 """
 
 
 @dataclass(frozen=True)
 class Row:
-    """One recording's scores, percent, and its perfect past in words."""
+    """One recording's scores, percent."""
 
     trial: Trial
     moda: float
     idf1: float
-    past: str
 
     def __str__(self) -> str:
-        return f"| {self.trial.target} | {self.trial.name} | {self.moda:.1f} / {self.idf1:.1f} | {self.past} |"
+        return f"| {self.trial.target} | {self.trial.name} | {self.moda:.1f} / {self.idf1:.1f} |"
 
 
 def measured(trial: Trial, frames: int) -> Row:
@@ -57,9 +50,7 @@ def measured(trial: Trial, frames: int) -> Row:
     shown = np.arange(len(made.frames))
     found = evaluate(made.truth, tracked(made), area=made.area, frames=shown, ignore_flagged=flagged)
     moda = np.nan if found.moda is None else found.moda
-    missed = moda < trial.least[0] or found.idf1 < trial.least[1]
-    past = str(perfect_past(made, _EVERY)) if missed else "-"
-    return Row(trial, moda, found.idf1, past)
+    return Row(trial, moda, found.idf1)
 
 
 def tracked(made: Recorded) -> Rows:
@@ -79,7 +70,7 @@ def page(rows: Sequence[Row], frames: int, only: str) -> str:
         shown = [f"{moda:.1f} / {idf1:.1f}" for moda, idf1 in (own.mean(0), own.min(0))]
         wanted = " / ".join(f"{score:g}" if score else "-" for score in asked)
         lines.append(f"| {target} | {wanted} | {' | '.join(shown)} |")
-    lines += ["", "| target | recording | MODA / IDF1 | perfect past |", "| --- | --- | --- | --- |", *map(str, rows)]
+    lines += ["", "| target | recording | MODA / IDF1 |", "| --- | --- | --- |", *map(str, rows)]
     return _PAGE.format(frames=frames, only=only, commit=commit()) + "\n".join(lines) + "\n"
 
 
