@@ -33,7 +33,8 @@ SCORES = {
 }  # fmt: skip
 """Columns of the table, and their names in the output of `stseg evaluate --json`."""
 COLUMNS = ("set", "variant", "frames", *SCORES, "tracks", "error_m", "commit", "run", "evaluate")
-_SHOWN = ("set", "variant", "frames", "MODA", "IDF1", "MOTA", "HOTA", "switches", "false_tracks", "error_m")
+_OTHERS = ("kalman", "particles", "belief")
+"""Baselines that stand beside the trackers on the page."""
 _MARKS = "<!-- table -->", "<!-- end of table -->"
 
 Row = Mapping[str, str]
@@ -70,17 +71,28 @@ def publish(rows: Mapping[tuple[str, str], Row]) -> None:
         writer = csv.DictWriter(file, COLUMNS, restval="", lineterminator="\n")
         writer.writeheader()
         writer.writerows(rows[key] for key in sorted(rows))
-    PAGE.write_text(page(PAGE.read_text(encoding="utf-8"), list(rows.values())), encoding="utf-8")
+    PAGE.write_text(page(PAGE.read_text(encoding="utf-8"), rows), encoding="utf-8")
 
 
-def page(text: str, rows: Sequence[Row]) -> str:
-    """The page with the table of the default tracker between its marks."""
+def page(text: str, rows: Mapping[tuple[str, str], Row]) -> str:
+    """The page with the table of all sets and trackers between its marks."""
     begin, end = _MARKS
-    lines = [f"| {' | '.join(_SHOWN)} |", f"| {' | '.join(['---'] * len(_SHOWN))} |"]
-    shown = sorted((row for row in rows if row["variant"] == "cut"), key=lambda row: row["set"])
-    lines += [f"| {' | '.join(row.get(column) or '-' for column in _SHOWN)} |" for row in shown]
+    head = ["set", "input", "frames", "cut", "switches", "error m", "frames only", *_OTHERS]
+    lines = [f"| {' | '.join(head)} |", f"|{' --- |' * 3}{' --: |' * (len(head) - 3)}"]
+    for one in SETS.values():
+        row = rows.get((one.name, "cut"))
+        if row is not None:
+            words = "; ".join(filter(None, (one.foreground, f"{one.views} views", one.remark)))
+            others = [_scores(rows.get((one.name, name))) for name in ("frames", *_OTHERS)]
+            cells = [_scores(row), row.get("switches") or "-", row.get("error_m") or "-", *others]
+            lines.append(f"| {' | '.join([f'`{one.name}`', words, row['frames'], *cells])} |")
     before, _, rest = text.partition(begin)
     return f"{before}{begin}\n" + "\n".join(lines) + f"\n{end}{rest.partition(end)[2]}"
+
+
+def _scores(row: Row | None) -> str:
+    """MODA / IDF1."""
+    return f"{float(row['MODA']):.1f} / {float(row['IDF1']):.1f}" if row and row.get("MODA") else "-"
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

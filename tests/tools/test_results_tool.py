@@ -25,16 +25,22 @@ def tools(monkeypatch: pytest.MonkeyPatch) -> Path:
     return ROOT / "tools"
 
 
-def test_the_page_shows_the_rows_of_the_default_tracker(tools: Path) -> None:
+def test_the_page_shows_trackers_side_by_side(tools: Path) -> None:
     del tools
     results = importlib.import_module("results")
-    row = {"set": "uu4", "variant": "cut", "frames": "0:136", "MODA": "99.6", "error_m": "0.03"}
-    shown = results.page(
-        "above\n<!-- table -->\nold\n<!-- end of table -->\nbelow\n", [row, row | {"variant": "kalman"}]
-    )
-    assert "| uu4 | cut | 0:136 | 99.6 | - | - | - | - | - | 0.03 |" in shown
-    assert "kalman" not in shown and "old" not in shown
+    row = {"frames": "0:136", "MODA": "99.6", "IDF1": "98.04", "error_m": "0.03", "switches": "0"}
+    text = "above\n<!-- table -->\nold\n<!-- end of table -->\nbelow\n"
+    shown = results.page(text, {("uu4", "cut"): row, ("uu4", "kalman"): row | {"MODA": ""}})
+    assert "| 0:136 | 99.6 / 98.0 | 0 | 0.03 | - | - | - | - |" in shown
+    assert "old" not in shown
     assert shown.startswith("above\n") and shown.endswith("below\n")
+
+
+def test_the_committed_page_shows_the_stored_rows(tools: Path) -> None:
+    del tools
+    results = importlib.import_module("results")
+    text = results.PAGE.read_text(encoding="utf-8")
+    assert results.page(text, results.stored()) == text
 
 
 def test_a_perturbed_rig_is_shifted_as_stated(tools: Path) -> None:
