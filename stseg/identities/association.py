@@ -22,7 +22,7 @@ from stseg.records.tables import KNOWN_PERSON
 from stseg.tracking.windows.isolated_tracklets import isolated_tracklets
 
 _DRAFT_DIVISOR = 4
-"""Share of the hypotheses, one in so many, of the search from whose identities appearance is learned."""
+"""Divisor of the number of hypotheses in the draft search; appearance is learned from its identities."""
 NO_KNOWN_PEOPLE: Rows = np.zeros(0, KNOWN_PERSON)
 """No people of earlier recordings."""
 
@@ -33,7 +33,7 @@ class IdentityProblem:
 
     Attributes
     ----------
-    seen
+    observations
         The rows in the order of time.
     model
         Statistics of sizes and appearance.
@@ -47,7 +47,7 @@ class IdentityProblem:
         The last axes of the model: those of colours; None where there are none.
     """
 
-    seen: Observations
+    observations: Observations
     model: SizeModel
     motion: MotionConfig
     limits: SearchLimits
@@ -85,16 +85,16 @@ class IdentityProblem:
         def problem(learned: LearnedAppearance) -> IdentityProblem:
             joined = SizeModel.joined([model, learned.model])
             value = np.concatenate([sizes.value, learned.value], axis=1)
-            seen = observe(trajectory, value, joined, frame_rate, border, config)
-            return cls(seen, joined, config.motion, limits, frame_rate, learned.colours)
+            observations = observe(trajectory, value, joined, frame_rate, border, config)
+            return cls(observations, joined, config.motion, limits, frame_rate, learned.colours)
 
         def learned(person: Ints) -> LearnedAppearance:
-            return learn_appearance(trajectory["frame"], looks, tracklets, person, frame_rate)
+            return learn_appearance(trajectory["frame"], appearances, tracklets, person, frame_rate)
 
         if not len(appearance):
             return problem(LearnedAppearance.nothing(len(trajectory)))
-        looks = row_looks(trajectory, appearance)
-        # Tracklets are right, but looks outlast them; identities last, and with appearance few are wrong.
+        appearances = row_looks(trajectory, appearance)
+        # Tracklets are right, but appearance outlasts them; identities last, and with appearance few are wrong.
         draft = problem(learned(_tracklet_of(tracklets))).with_hypotheses(-(-tracking.hypotheses // _DRAFT_DIVISOR))
         return problem(learned(draft.solve(constraints)))
 
@@ -104,9 +104,9 @@ class IdentityProblem:
 
     def solve(self, constraints: Constraints = NO_CONSTRAINTS) -> Ints:
         """The first row of the identity of each row, int64 (n,)."""
-        order, first = self.seen.order, np.empty(len(self.seen.order), np.int64)
-        known = constraints.renumbered(np.argsort(order))
-        first[order] = order[search_identities(self.seen, self.model, self.motion, self.limits, known).name]
+        order, first = self.observations.order, np.empty(len(self.observations.order), np.int64)
+        bound = constraints.renumbered(np.argsort(order))
+        first[order] = order[search_identities(self.observations, self.model, self.motion, self.limits, bound).name]
         return first
 
     def visits(self, identity: Ints, frame: Ints, known: Rows = NO_KNOWN_PEOPLE) -> Visits:
@@ -119,8 +119,9 @@ class IdentityProblem:
         known : KNOWN_PERSON (k,)
             People of earlier recordings.
         """
-        order = self.seen.order
-        visits = pooled_visits(identity[order], frame[order], self.seen.precision, self.seen.information)
+        order = self.observations.order
+        precision, information = self.observations.precision, self.observations.information
+        visits = pooled_visits(identity[order], frame[order], precision, information)
         value = np.full((len(known), len(self.model.spread)), np.nan)
         number = np.zeros(value.shape)
         value[:, 0], number[:, 0] = known["height"], known["heights"]
@@ -140,12 +141,12 @@ class IdentityProblem:
         since, until
             Seconds.
         """
-        start, stop = np.searchsorted(self.seen.seconds, (since, until)).tolist()
-        part = self.seen.between(start, stop)
-        place = np.full(len(self.seen.order), -1)
+        start, stop = np.searchsorted(self.observations.seconds, (since, until)).tolist()
+        part = self.observations.between(start, stop)
+        place = np.full(len(self.observations.order), -1)
         place[part.order] = np.arange(len(part.order))
-        known = constraints.renumbered(place).among()
-        return search_identities(part, self.model, self.motion, self.limits, known).score
+        bound = constraints.renumbered(place).among()
+        return search_identities(part, self.model, self.motion, self.limits, bound).score
 
 
 def _tracklet_of(tracklets: Sequence[Ints]) -> Ints:

@@ -21,7 +21,7 @@ WRONG = 0.1
 """Share of wrong answers: identities are exchanged, and tracks slip from one person to another."""
 _LEAST_PROBE = 4
 """Least frames of a tracklet that is compared."""
-_LASTING = 2.0 ** np.arange(0, 13)
+_FRAME_COUNTS = 2.0 ** np.arange(0, 13)
 """Numbers of frames that make one independent observation, of which one is chosen."""
 _LEAST_GAIN = 0.05
 """Least gain of a pair's mean log-probability that is no chance, nats."""
@@ -48,15 +48,15 @@ def independent_frames(
     float
         Infinite where no number is better than chance.
     """
-    cost = np.zeros(len(_LASTING))
+    cost = np.zeros(len(_FRAME_COUNTS))
     for side in range(2):
-        known = [half[side] for half in halves]
-        axes = discriminant_axes(value, known)
+        references = [half[side] for half in halves]
+        axes = discriminant_axes(value, references)
         probes = _Probes.of(frame, tracklets, [half[1 - side] for half in halves])
-        pairs = _Pairs.of(axes, value, known, probes)
-        cost += [_cost(pairs.ratio(lasting), probes.same) / 2 for lasting in _LASTING.tolist()]
+        pairs = _Pairs.of(axes, value, references, probes)
+        cost += [_cost(pairs.ratio(lasting), probes.same) / 2 for lasting in _FRAME_COUNTS.tolist()]
     best = int(np.argmin(cost))
-    return float(_LASTING[best]) if cost[best] < np.log(2.0) - _LEAST_GAIN else np.inf
+    return float(_FRAME_COUNTS[best]) if cost[best] < np.log(2.0) - _LEAST_GAIN else np.inf
 
 
 @dataclass(frozen=True)
@@ -79,25 +79,25 @@ class _Probes:
 
     @classmethod
     def of(cls, frame: Ints, tracklets: Sequence[Ints], people: Sequence[Ints]) -> _Probes:
-        """Of each tracklet the parts that belong to one person's rows."""
+        """Parts of each tracklet that belong to the rows of one person."""
         owner = np.full(len(frame), -1)
         for k, rows in enumerate(people):
             owner[rows] = k
         owned = np.flatnonzero(owner >= 0)
         owned = owned[np.argsort(frame[owned], kind="stable")]
         frames, owners = frame[owned], owner[owned]
-        probes, there, same = list[Ints](), list[Ints](), list[Flags]()
+        probes, present, same = list[Ints](), list[Ints](), list[Flags]()
         for rows in tracklets:
             mine = rows[owner[rows] >= 0]
             for k in np.unique(owner[mine]).tolist():
-                own = mine[owner[mine] == k]
-                if len(own) >= _LEAST_PROBE:
-                    between = slice(*np.searchsorted(frames, (frame[own[0]], frame[own[-1]] + 1)))
-                    probes.append(own)
-                    there.append(np.unique(owners[between][np.isin(frames[between], frame[own])]))
-                    same.append(there[-1] == k)
-        probe = np.repeat(np.arange(len(probes)), np.array([len(one) for one in there], np.int64))
-        return cls(probes, probe, _joined(there, np.int64), _joined(same, np.bool_))
+                of_person = mine[owner[mine] == k]
+                if len(of_person) >= _LEAST_PROBE:
+                    between = slice(*np.searchsorted(frames, (frame[of_person[0]], frame[of_person[-1]] + 1)))
+                    probes.append(of_person)
+                    present.append(np.unique(owners[between][np.isin(frames[between], frame[of_person])]))
+                    same.append(present[-1] == k)
+        probe = np.repeat(np.arange(len(probes)), np.array([len(one) for one in present], np.int64))
+        return cls(probes, probe, _joined(present, np.int64), _joined(same, np.bool_))
 
 
 def _joined(parts: Sequence[AnyArray], kind: type) -> AnyArray:
@@ -116,7 +116,7 @@ class _Pairs:
 
     @classmethod
     def of(cls, axes: Axes, value: Floats, people: Sequence[Ints], probes: _Probes) -> _Pairs:
-        """Of rows of each person, and of each probe."""
+        """Pairs by the rows of each person, and of each probe."""
         y, size = axes.of(value), len(axes.spread)
         sums = [np.array([y[rows].sum(axis=0) for rows in part]).reshape(-1, size) for part in (people, probes.rows)]
         numbers = [np.array([len(rows) for rows in part], float)[:, None] for part in (people, probes.rows)]
@@ -146,9 +146,9 @@ def _log_probability(ratio: Floats) -> Floats:
     return np.asarray(np.log(WRONG + (1.0 - 2.0 * WRONG) * right))
 
 
-_MOST = 4
+_AXIS_LIMIT = 4
 """Most axes."""
-_WHOLE = 0.1
+_TOTAL_SCATTER_WEIGHT = 0.1
 """Weight of the whole scatter in that within people: no axis is free of noise."""
 
 
@@ -167,19 +167,20 @@ class Axes:
 
 def discriminant_axes(value: Floats, people: Sequence[Ints]) -> Axes:
     """Axes of the greatest spread among people (rows of each, in the order of time) beside the scatter within them."""
-    every = value[np.concatenate(people)]
-    mean, size = every.mean(axis=0), value.shape[1]
+    values = value[np.concatenate(people)]
+    mean, size = values.mean(axis=0), value.shape[1]
     within, between = np.zeros((size, size)), np.zeros((size, size))
     for rows in people:
         centred = value[rows] - value[rows].mean(axis=0)
-        within += centred.T @ centred / len(every)
+        within += centred.T @ centred / len(values)
         # Errors of the two halves are nearly independent, so no noise has to be subtracted.
         early, late = (part.mean(axis=0) - mean for part in np.array_split(value[rows], 2))
         between += (np.outer(early, late) + np.outer(late, early)) / 2 / len(people)
-    whole = (every - mean).T @ (every - mean) / len(every)
-    within = (1 - _WHOLE) * within + _WHOLE * whole + 1e-9 * max(np.trace(whole), 1e-9) * np.eye(size)
+    whole = (values - mean).T @ (values - mean) / len(values)
+    within = (1 - _TOTAL_SCATTER_WEIGHT) * within + _TOTAL_SCATTER_WEIGHT * whole
+    within = within + 1e-9 * max(np.trace(whole), 1e-9) * np.eye(size)
     root = np.linalg.cholesky(np.linalg.inv(within))
     spread, turn = np.linalg.eigh(root.T @ between @ root)
-    chosen = np.argsort(-spread, kind="stable")[:_MOST]
+    chosen = np.argsort(-spread, kind="stable")[:_AXIS_LIMIT]
     chosen = chosen[spread[chosen] > 0]
     return Axes(mean, root @ turn[:, chosen], spread[chosen])

@@ -4,7 +4,7 @@ A row's appearance is the mean over the views that see its person apart, less ea
 numbers are logarithms of colours). It is whitened by its scatter within people and turned to the axes along which
 people differ most: probabilistic linear discriminant analysis (Ioffe 2006). Each axis is then one more size of the
 person (`stseg.identities.evidence.size_model`). It is learned twice: first from isolated tracklets, each a person of
-its own, then from the identities that are found with it, for looks outlast tracklets. Where identities err, the
+its own, then from the identities that are found with it, for appearance outlasts tracklets. Where identities err, the
 appearance of people seems to change, and weighs less.
 
 How many frames make one independent observation is learned (`stseg.identities.evidence.appearance_axes`); it is no
@@ -26,10 +26,10 @@ _LEAST_FRAMES = 8
 """Least frames of half a person's time."""
 _LEAST_PEOPLE, _MOST_PEOPLE = 3, 1000
 """Least and most people."""
-_TOGETHER = 50
-"""People who come one after the other, of whom all are taken or none: tracklets are compared with who is there."""
-_UNIT = SizePrior(1.0, 1.0)
-"""Of an axis of unit noise."""
+_PEOPLE_BLOCK = 50
+"""Successive people that are taken or left out together: tracklets are compared with people of the same time."""
+_UNIT_PRIOR = SizePrior(1.0, 1.0)
+"""Prior of an axis of unit noise."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class LearnedAppearance:
 
 
 def learn_appearance(
-    frame: Ints, looks: Sequence[Floats], tracklets: Sequence[Ints], person: Ints, frame_rate: float
+    frame: Ints, appearances: Sequence[Floats], tracklets: Sequence[Ints], person: Ints, frame_rate: float
 ) -> LearnedAppearance:
     """Learn how much the appearance of a recording's people tells of identity.
 
@@ -65,7 +65,7 @@ def learn_appearance(
     ----------
     frame : int64 (n,)
         Frame of each row of a trajectory.
-    looks : of float64 (n, k)
+    appearances : of float64 (n, k)
         Features and colours of each row, see `row_looks`.
     tracklets
         Rows of each isolated tracklet, in the order of time.
@@ -79,7 +79,7 @@ def learn_appearance(
         halves = _halves(frame, person, np.isfinite(value[:, 0]))
         return _learned(value, frame, tracklets, halves, frame_rate)
 
-    found = [learned(value) for value in looks]
+    found = [learned(value) for value in appearances]
     value = np.concatenate([one.value for one in found], axis=1)
     return LearnedAppearance(value, SizeModel.joined([one.model for one in found]), found[-1].colours)
 
@@ -91,25 +91,25 @@ def row_looks(trajectory: Rows, appearance: Rows) -> list[Floats]:
 
 def row_means(trajectory: Rows, appearance: Rows, name: str) -> Floats:
     """Mean over views of each row's appearance, less the cameras' offsets, float64 (n, k); nan where unknown."""
-    known = np.flatnonzero(np.isfinite(appearance[name]).all(axis=1))
-    value, view = appearance[name][known].astype(np.float64), appearance["view"][known].astype(np.int64)
-    detection, number, row = _rows_of(trajectory, appearance, known)
+    measured = np.flatnonzero(np.isfinite(appearance[name]).all(axis=1))
+    value, view = appearance[name][measured].astype(np.float64), appearance["view"][measured].astype(np.int64)
+    detection, number, row = _rows_of(trajectory, appearance, measured)
     mean = np.full((len(trajectory), value.shape[1]), np.nan)
     if len(value):
         value -= _offsets(value, view, detection)[view]
-        total = np.stack([np.bincount(detection, own, len(number)) for own in value.T], axis=1)
+        total = np.stack([np.bincount(detection, column, len(number)) for column in value.T], axis=1)
         mean[row[row >= 0]] = (total / number[:, None])[row >= 0]
     return mean
 
 
-def _rows_of(trajectory: Rows, appearance: Rows, known: Ints) -> tuple[Ints, Ints, Ints]:
+def _rows_of(trajectory: Rows, appearance: Rows, measured: Ints) -> tuple[Ints, Ints, Ints]:
     """Detection of each known appearance row, how many each has, and the trajectory row of each, -1 for none."""
     key = [("frame", "<i8"), ("x", "<f8"), ("y", "<f8")]
-    seen = np.zeros(len(known), key)
+    detected = np.zeros(len(measured), key)
     placed = np.zeros(len(trajectory), key)
     for name, raw in (("frame", "frame"), ("x", "raw_x"), ("y", "raw_y")):
-        seen[name], placed[name] = appearance[name][known], trajectory[raw]
-    detections, detection, number = np.unique(seen, return_inverse=True, return_counts=True)
+        detected[name], placed[name] = appearance[name][measured], trajectory[raw]
+    detections, detection, number = np.unique(detected, return_inverse=True, return_counts=True)
     order = np.argsort(placed, kind="stable")
     at = np.searchsorted(placed[order], detections).clip(max=max(len(placed) - 1, 0))
     row = np.where(placed[order][at] == detections, order[at], -1) if len(placed) else np.full(len(detections), -1)
@@ -123,25 +123,25 @@ def _offsets(value: Floats, view: Ints, detection: Ints) -> Floats:
     inside[detection, view] = 1.0
     number = inside.sum(axis=1)
     normal = np.diag(inside.sum(axis=0)) - (inside / number[:, None]).T @ inside
-    mean = np.stack([np.bincount(detection, own) for own in value.T], axis=1) / number[:, None]
+    mean = np.stack([np.bincount(detection, column) for column in value.T], axis=1) / number[:, None]
     columns = zip(value.T, mean.T, strict=True)
-    right = np.stack([np.bincount(view, own - middle[detection], views) for own, middle in columns], axis=1)
+    right = np.stack([np.bincount(view, column - middle[detection], views) for column, middle in columns], axis=1)
     return np.asarray(np.linalg.pinv(normal, rcond=1e-9, hermitian=True) @ right)
 
 
-def _halves(frame: Ints, person: Ints, known: Flags) -> list[tuple[Ints, Ints]]:
+def _halves(frame: Ints, person: Ints, measured: Flags) -> list[tuple[Ints, Ints]]:
     """Rows of the first and the second half of the time of each person who has enough of both.
 
-    Of more than `_MOST_PEOPLE`, who come one after the other are taken together, and the next left out.
+    Of more than `_MOST_PEOPLE`, blocks of successive people are taken, and others left out.
     """
-    rows = np.flatnonzero(known)
+    rows = np.flatnonzero(measured)
     rows = rows[np.lexsort((frame[rows], person[rows]))]
     people = np.split(rows, np.flatnonzero(np.diff(person[rows])) + 1)
-    long = [own for own in people if len(own) // 2 >= _LEAST_FRAMES]
-    long.sort(key=lambda own: (int(frame[own[0]]), int(person[own[0]])))
+    long = [one for one in people if len(one) // 2 >= _LEAST_FRAMES]
+    long.sort(key=lambda one: (int(frame[one[0]]), int(person[one[0]])))
     share = -(-len(long) // _MOST_PEOPLE)
-    kept = [own for k, own in enumerate(long) if k // _TOGETHER % share == 0]
-    return [(own[: len(own) // 2], own[len(own) // 2 :]) for own in kept]
+    kept = [one for k, one in enumerate(long) if k // _PEOPLE_BLOCK % share == 0]
+    return [(one[: len(one) // 2], one[len(one) // 2 :]) for one in kept]
 
 
 def _learned(
@@ -157,8 +157,8 @@ def _learned(
     axes = discriminant_axes(value, [rows for half in halves for rows in half])
     number, along = len(axes.spread), axes.of(value)
     # Where all pairs are far apart, they do not say how long errors last, but differences within tracklets do.
-    known = measured_tracklets(value[:, 0], tracklets)
-    noise, alike = frame_errors(np.ascontiguousarray(along.T), frame, known, _UNIT, frame_rate)
+    measured = measured_tracklets(value[:, 0], tracklets)
+    noise, alike = frame_errors(np.ascontiguousarray(along.T), frame, measured, _UNIT_PRIOR, frame_rate)
     seconds = np.maximum(lasting / frame_rate, noise * alike)
     # An observation may be of a person in front: under a share of such errors none says more than this against one.
     most_against = np.full(number, -np.log(WRONG) / max(number, 1))

@@ -15,11 +15,11 @@ from stseg.tracking.windows.near_rows import near_rows
 
 _EXCHANGE_DISTANCE = 0.8
 """Distance below which the filter may have exchanged two tracks, metres."""
-_LASTING = 0.4
+_ERROR_TIME = 0.4
 """Correlation time of the error of a place, seconds: frames within it say less than independent ones."""
-_ONE_BIRTH = 1.0
-"""Time within which it does not matter in which frame of a track somebody begins, seconds."""
-_LEAST = 0.05
+_BIRTH_TIME = 1.0
+"""Time within which births in one track count as one, seconds."""
+_LEAST_PLACE_ERROR = 0.05
 """Least error of a place, metres (standard deviation)."""
 
 
@@ -63,7 +63,7 @@ class Observations:
     previous : int64 (n,)
         The observation before in the same filter track, -1 for none.
     certain : bool (n,)
-        Whether the observation continues its filter track without doubt: nobody was near.
+        Whether the observation continues its filter track without doubt, far from all others.
     inside : float64 (n,)
         How far inside the area: 0 at the border, 1 from `detection.border_width` on.
     precision, information : float64 (n, size)
@@ -86,22 +86,22 @@ class Observations:
 
     def birth(self) -> Ints:
         """A number of each filter track and second, of which births are one, int64 (n,)."""
-        second = np.repeat(self.seconds // _ONE_BIRTH, np.diff(self.start))
+        second = np.repeat(self.seconds // _BIRTH_TIME, np.diff(self.start))
         track = _heads(self.previous, self.previous >= 0)
         return np.asarray(np.unique(np.stack([track, second]), axis=1, return_inverse=True)[1].reshape(-1), np.int64)
 
     def rows(self) -> ObservedRows:
-        """What kernels know of them."""
+        """The observations for kernels, with a random number of each birth and row."""
         drawn = np.random.default_rng(0).integers(1 << 61, size=(2, len(self.order))) * 2 + 1
         return ObservedRows(
             self.ground, self.variance, self.previous, self.certain, self.inside, self.precision, self.information,
             drawn[0][self.birth()], drawn[1],
         )  # fmt: skip
 
-    def foreseen(self) -> Observations:
-        """The same, with what a part of a track that is certainly one person's tells said by its first observation.
+    def with_foreseen_sizes(self) -> Observations:
+        """The same, with the size evidence of each unambiguous part of a track moved to its first observation.
 
-        The score of a whole hypothesis stays as it is, but decisions are made with what comes after them.
+        The score of a whole hypothesis stays as it is, but each decision has the evidence that comes after it.
         """
         head = _heads(self.previous, self.certain)
         precision, information = np.zeros_like(self.precision), np.zeros_like(self.information)
@@ -110,7 +110,7 @@ class Observations:
         return replace(self, precision=precision, information=information)
 
     def between(self, start: int, stop: int) -> Observations:
-        """Those of the frames from `start` to before `stop`; who was observed before is new there."""
+        """Those of the frames from `start` to before `stop`; people observed before are new there."""
         first, last = int(self.start[start]), int(self.start[stop])
         part = slice(first, last)
         previous = np.where(self.previous[part] >= first, self.previous[part] - first, -1)
@@ -148,11 +148,12 @@ def observe(
     precision, information = model.evidence(sizes[order], frame_rate)
     previous = _previous(rows)
     start = np.append(start, len(rows))
-    alike = 1.0 + 2.0 * _LASTING * frame_rate
+    alike = 1.0 + 2.0 * _ERROR_TIME * frame_rate
     return Observations(
-        order, start, frames / frame_rate, ground, np.maximum(alike * (rows["xx"] + rows["yy"]) / 2, _LEAST**2),
-        previous, _certain(rows, previous), border.inside(ground, config.detection.border_width),
-        precision, information, config.detection.minimum_distance,
+        order, start, frames / frame_rate, ground,
+        np.maximum(alike * (rows["xx"] + rows["yy"]) / 2, _LEAST_PLACE_ERROR**2), previous,
+        _certain(rows, previous), border.inside(ground, config.detection.border_width), precision,
+        information, config.detection.minimum_distance,
     )  # fmt: skip
 
 
@@ -173,7 +174,7 @@ def _previous(rows: Rows) -> Ints:
 
 
 def _certain(rows: Rows, previous: Ints) -> Flags:
-    """Rows that follow their track in the very next frame, with nobody near in either."""
+    """Rows that follow their track in the very next frame, far from all others in both."""
     alone = np.ones(len(rows), bool)
     alone[near_rows(rows, _EXCHANGE_DISTANCE)[0]] = False
     follows = (previous >= 0) & (rows["frame"] - rows["frame"][previous] == 1)

@@ -1,6 +1,6 @@
 """Returns: visits of one person, decided one after the other in the order of time; means of people for later runs.
 
-A visit v is that of somebody new, or of one of the n people g who were there before and are away. By the odds
+A visit v is that of a new person, or of one of the n people g who were there before and are away. By the odds
 
     o(v, g) = P(return) / P(new) / n * exp(E(v and g) - E(v) - E(g)),    E the evidence of one person (size_model)
 
@@ -26,7 +26,7 @@ from stseg.records.tables import KNOWN_PERSON
 
 NO_PAIRS: Ints = np.zeros((0, 2), np.int64)
 """No pairs."""
-_MOST = 500.0
+_EVIDENCE_LIMIT = 500.0
 """Most evidence that is told apart from certainty, nats."""
 
 
@@ -43,7 +43,7 @@ class Return:
     probability
         That both are one person's.
     absence
-        Frames since that person was there; None for somebody of an earlier recording.
+        Frames since that person was there; None for a person of an earlier recording.
     """
 
     frame: int
@@ -55,7 +55,7 @@ class Return:
 
 @dataclass
 class _People:
-    """Who was there so far, by the visit in which each was first: sums over all visits, last frame; whose each is."""
+    """People so far, by the visit in which each was first: sums over all visits, last frame; person of each visit."""
 
     first: list[int]
     precision: Floats
@@ -70,9 +70,9 @@ class _People:
 
     def away(self, frame: int, others: set[int]) -> Ints:
         """People who were last seen before a frame, without those of some visits."""
-        known = np.array(self.first, np.int64)
-        known = known[self.last[known] < frame]
-        return known[~np.isin(known, self.person[list(others)])] if others else known
+        people = np.array(self.first, np.int64)
+        people = people[self.last[people] < frame]
+        return people[~np.isin(people, self.person[list(others)])] if others else people
 
     def add(self, person: int, visit: int) -> None:
         """A visit of a person who was there before."""
@@ -82,7 +82,7 @@ class _People:
         self.person[visit] = person
 
 
-def find_returns(visits: Visits, spread: Floats, least: float, apart: Ints = NO_PAIRS) -> list[Return]:
+def find_returns(visits: Visits, spread: Floats, least: float, different: Ints = NO_PAIRS) -> list[Return]:
     """Visits of people who were there before.
 
     Parameters
@@ -93,13 +93,13 @@ def find_returns(visits: Visits, spread: Floats, least: float, apart: Ints = NO_
         Variance of each size among people.
     least
         Least probability of a return.
-    apart : int64 (pair, 2)
+    different : int64 (pair, 2)
         Identities that are known to be two people.
     """
     people, found, chances = _People.of(visits), list[Return](), 0
     named = {identity: visit for visit, identity in enumerate(visits.identity.tolist())}
     other = dict[int, set[int]]()
-    for one, two in apart.tolist():
+    for one, two in different.tolist():
         other.setdefault(named.get(one, -1), set()).add(named.get(two, -1))
         other.setdefault(named.get(two, -1), set()).add(named.get(one, -1))
     for visit in range(len(visits)):
@@ -119,13 +119,13 @@ def find_returns(visits: Visits, spread: Floats, least: float, apart: Ints = NO_
 def _probability(visits: Visits, visit: int, people: _People, away: Ints, spread: Floats, prior: float) -> Floats:
     """Probability that a visit is that of each of the people who are away."""
     founders = np.array(people.first, np.int64)
-    there = np.concatenate([[visit], _beside(visits, visit, founders)])
+    simultaneous = np.concatenate([[visit], _beside(visits, visit, founders)])
     precision, information = people.precision[away], people.information[away]
-    own, seen = visits.precision[there, None], visits.information[there, None]
-    ratio = evidence(precision + own, information + seen, spread) - evidence(own, seen, spread)
+    weight, total = visits.precision[simultaneous, None], visits.information[simultaneous, None]
+    ratio = evidence(precision + weight, information + total, spread) - evidence(weight, total, spread)
     ratio -= evidence(precision, information, spread)
-    possible = people.last[away] < visits.first[there, None]
-    odds = np.where(possible, np.exp(np.minimum(ratio + prior, _MOST)), 0.0)
+    possible = people.last[away] < visits.first[simultaneous, None]
+    odds = np.where(possible, np.exp(np.minimum(ratio + prior, _EVIDENCE_LIMIT)), 0.0)
     return np.asarray(odds[0] / (1.0 + odds[0].sum() + odds[1:].sum(axis=0)))
 
 
@@ -137,9 +137,9 @@ def _beside(visits: Visits, visit: int, founders: Ints) -> Ints:
 
 def _return(visits: Visits, visit: int, person: int, probability: float, people: _People) -> Return:
     frame = int(visits.first[visit])
-    identity, own = visits.identity[[person, visit]].tolist()
+    identity, name = visits.identity[[person, visit]].tolist()
     last = int(people.last[person])
-    return Return(frame, identity, own, probability, frame - last if last >= 0 else None)
+    return Return(frame, identity, name, probability, frame - last if last >= 0 else None)
 
 
 @dataclass(frozen=True)
@@ -194,16 +194,16 @@ def pooled_visits(identity: Ints, frame: Ints, precision: Floats, information: F
     """
     order = np.lexsort((frame, identity))
     order = order[identity[order] > 0]
-    own, start, count = np.unique(identity[order], return_index=True, return_counts=True)
+    names, start, count = np.unique(identity[order], return_index=True, return_counts=True)
     half = 2 * (np.arange(len(order)) - np.repeat(start, count)) >= np.repeat(count, count)
-    key = 2 * np.repeat(np.arange(len(own)), count) + half
-    weight, total = (_sums(part[order], key, len(own)) for part in (precision, information))
+    key = 2 * np.repeat(np.arange(len(names)), count) + half
+    weight, total = (_sums(part[order], key, len(names)) for part in (precision, information))
     lasting = lasting_variance(weight, total)
     shrink = 1.0 / (1.0 + weight.sum(axis=1) * lasting)
     first, last = frame[order[start]], frame[order[start + count - 1]]
-    by_time = np.lexsort((own, first))
+    by_time = np.lexsort((names, first))
     return Visits(
-        own[by_time], first[by_time], last[by_time], (weight.sum(axis=1) * shrink)[by_time],
+        names[by_time], first[by_time], last[by_time], (weight.sum(axis=1) * shrink)[by_time],
         (total.sum(axis=1) * shrink)[by_time], lasting,
     )  # fmt: skip
 
@@ -213,11 +213,11 @@ def lasting_variance(precision: Floats, information: Floats) -> Floats:
 
     The half of the squared difference of both means, less the errors that are known.
     """
-    known = (precision > 0).all(axis=1)
+    measured = (precision > 0).all(axis=1)
     variance = 1.0 / np.where(precision > 0, precision, 1.0)
     mean = information * variance
-    excess = np.where(known, ((mean[:, 0] - mean[:, 1]) ** 2 - variance.sum(axis=1)) / 2, 0.0)
-    return np.asarray(np.maximum(excess.sum(axis=0) / np.maximum(known.sum(axis=0), 1), 0.0))
+    excess = np.where(measured, ((mean[:, 0] - mean[:, 1]) ** 2 - variance.sum(axis=1)) / 2, 0.0)
+    return np.asarray(np.maximum(excess.sum(axis=0) / np.maximum(measured.sum(axis=0), 1), 0.0))
 
 
 def _sums(value: Floats, half: Ints, number: int) -> Floats:
@@ -242,11 +242,11 @@ def known_people(committed: Rows, appearance: Rows) -> Rows:
     """
     people = np.unique(committed["id"][committed["id"] > 0])
     owner = np.where(committed["id"] > 0, np.searchsorted(people, committed["id"]), -1)
-    known = np.zeros(len(people), KNOWN_PERSON)
-    known["id"] = people
-    known["height"], known["heights"] = _means(committed["height"][:, None], owner, len(people), 0)
-    known["colours"], known["looks"] = _means(row_means(committed, appearance, "colours"), owner, len(people))
-    return known
+    table = np.zeros(len(people), KNOWN_PERSON)
+    table["id"] = people
+    table["height"], table["heights"] = _means(committed["height"][:, None], owner, len(people), 0)
+    table["colours"], table["looks"] = _means(row_means(committed, appearance, "colours"), owner, len(people))
+    return table
 
 
 def _means(value: AnyArray, owner: Ints, people: int, column: int | None = None) -> tuple[Floats, Ints]:

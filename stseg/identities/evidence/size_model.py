@@ -1,7 +1,7 @@
 """Noise and spread of people's sizes, learned from isolated tracklets (docs/how-it-works.md, Tracks).
 
 A measured size is x = mean + person + error. The error of a frame has a variance and lasts for some time; the person's
-part has the variance `spread` among people. A size whose spread is 0 says nothing of identity.
+part has the variance `spread` among people. A size of spread 0 says nothing of identity.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _PRIOR_LASTING = 0.5
 
 @dataclass(frozen=True)
 class SizePrior:
-    """What is known of a size before the recording.
+    """Errors and spread of a size before the recording.
 
     Attributes
     ----------
@@ -99,9 +99,9 @@ class SizeModel:
 
         Errors that last are shared among the frames for which they last.
         """
-        known = np.isfinite(sizes)
-        precision = np.where(known, 1.0 / (self.noise * np.maximum(self.lasting * frame_rate, 1.0)), 0.0)
-        return precision, np.where(known, sizes - self.mean, 0.0) * precision
+        measured = np.isfinite(sizes)
+        precision = np.where(measured, 1.0 / (self.noise * np.maximum(self.lasting * frame_rate, 1.0)), 0.0)
+        return precision, np.where(measured, sizes - self.mean, 0.0) * precision
 
 
 def learn_sizes(sizes: MeasuredSizes, frame: Ints, tracklets: Sequence[Ints], frame_rate: float) -> SizeModel:
@@ -132,8 +132,8 @@ def evidence(precision: Floats, information: Floats, spread: Floats) -> Floats:
 
 def measured_tracklets(size: Floats, tracklets: Sequence[Ints]) -> list[Ints]:
     """Rows with a size (n,) of each tracklet that has enough of them."""
-    known = [rows[np.isfinite(size[rows])] for rows in tracklets]
-    return [rows for rows in known if len(rows) >= _LEAST_FRAMES]
+    measured = [rows[np.isfinite(size[rows])] for rows in tracklets]
+    return [rows for rows in measured if len(rows) >= _LEAST_FRAMES]
 
 
 def frame_errors(
@@ -162,13 +162,13 @@ def frame_errors(
     lags = np.arange(1, max(round(_LONGEST * frame_rate), 1) + 1)
     total, count = np.zeros((len(sizes), len(lags))), np.zeros(len(lags))
     for rows in tracklets:
-        own, value = frame[rows], sizes[:, rows]
-        if own[-1] - own[0] == len(own) - 1:  # in every frame: most are
-            number = np.maximum(len(own) - lags, 0)
+        frames, value = frame[rows], sizes[:, rows]
+        if frames[-1] - frames[0] == len(frames) - 1:  # in every frame: most are
+            number = np.maximum(len(frames) - lags, 0)
             pairs = [(value[:, lag:], value[:, :-lag]) for lag in lags[number > 0].tolist()]
         else:
-            after = np.searchsorted(own, own + lags[:, None]).clip(max=len(rows) - 1)
-            paired = own[after] - own == lags[:, None]
+            after = np.searchsorted(frames, frames + lags[:, None]).clip(max=len(rows) - 1)
+            paired = frames[after] - frames == lags[:, None]
             number = paired.sum(axis=1)
             pairs = [(value[:, later[which]], value[:, which]) for later, which in zip(after, paired, strict=True)]
         for k, (later, earlier) in enumerate(pairs):
@@ -184,10 +184,10 @@ def frame_errors(
 def _learn(
     size: Floats, frame: Ints, tracklets: Sequence[Ints], prior: SizePrior, frame_rate: float
 ) -> tuple[float, float, float, float]:
-    known = measured_tracklets(size, tracklets)
-    mean = float(np.mean(size[np.concatenate(known)])) if known else 0.0
-    noise, lasting = (float(one[0]) for one in frame_errors(size[None], frame, known, prior, frame_rate))
-    return mean, noise, lasting, _spread(size - mean, known, prior)
+    measured = measured_tracklets(size, tracklets)
+    mean = float(np.mean(size[np.concatenate(measured)])) if measured else 0.0
+    noise, lasting = (float(one[0]) for one in frame_errors(size[None], frame, measured, prior, frame_rate))
+    return mean, noise, lasting, _spread(size - mean, measured, prior)
 
 
 def _spread(deviation: Floats, tracklets: Sequence[Ints], prior: SizePrior) -> float:

@@ -1,7 +1,7 @@
 """Answers about the tracks of a run as constraints on its rows.
 
-Where a swap is said to have happened, two people stand together, and which row is whose is just what is in doubt. So an
-answer about two tracks binds the rows nearest in time in which they stand apart.
+In the frame of a swap two people stand together, and their rows are just what is in doubt. So an answer about two
+tracks binds the rows nearest in time in which they stand apart.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ from stseg.identities.review.corrections import Answer
 from stseg.identities.search.constraints import Constraints
 from stseg.records.tables import ANSWERED
 
-_APART = 0.8
+_SEPARATION_DISTANCE = 0.8
 """Distance from which on two people stand apart, metres."""
-_LONGEST = 5.0
+_SEARCH_TIME = 5.0
 """Longest time before and after the frame of an answer in which rows are looked for, seconds."""
-_SOON = 1.0
-"""Time from there on in which a row apart from everybody is preferred, seconds: later, others may be exchanged."""
+_SOLITARY_TIME = 1.0
+"""Time from there on in which a row apart from all others is preferred, seconds: later, others may be exchanged."""
 
 
 @dataclass(frozen=True)
 class AnsweredRows:
-    """What answers say of rows.
+    """Constraints and deletions of rows by answers.
 
     Attributes
     ----------
@@ -44,7 +44,7 @@ class AnsweredRows:
 
     @classmethod
     def of_table(cls, table: Rows, number: int) -> AnsweredRows:
-        """What ANSWERED rows say of so many rows."""
+        """Constraints and deletions of so many rows by ANSWERED rows."""
         pair = table["row"] != table["other"]
         deleted = np.zeros(number, bool)
         deleted[table["row"][~pair & (table["same"] == 0)]] = True
@@ -53,11 +53,11 @@ class AnsweredRows:
         return cls(found, ["an answer given before"] * len(found), deleted)
 
     def __add__(self, more: AnsweredRows) -> AnsweredRows:
-        """Both of two; who is no person by one of them is bound by none."""
+        """Both of two; rows that one of them deletes are bound by none."""
         deleted, both = self.deleted | more.deleted, self.constraints + more.constraints
-        known = ~(deleted[both.earlier] | deleted[both.later])
-        places = [place for place, one in zip([*self.places, *more.places], known, strict=True) if one]
-        return AnsweredRows(both.where(known), places, deleted)
+        bound = ~(deleted[both.earlier] | deleted[both.later])
+        places = [place for place, one in zip([*self.places, *more.places], bound, strict=True) if one]
+        return AnsweredRows(both.where(bound), places, deleted)
 
     @property
     def table(self) -> Rows:
@@ -105,7 +105,7 @@ class _Tracks:
     """Rows of each track in the order of time."""
 
     def __init__(self, rows: Rows, frame_rate: float) -> None:
-        self.rows, self.frame_rate, self.reach = rows, frame_rate, _LONGEST * frame_rate
+        self.rows, self.frame_rate, self.reach = rows, frame_rate, _SEARCH_TIME * frame_rate
         self.of, self.by_frame = _divided(rows["id"], rows["frame"]), _divided(rows["frame"], rows["id"])
 
     def pairs(self, answer: Answer) -> tuple[list[tuple[int, int]], list[tuple[int, int]]]:
@@ -136,34 +136,36 @@ class _Tracks:
 
     def before(self, track: int, other: int, frame: int) -> int | None:
         """The last row of a track before a frame in which it is apart; None where it has none before."""
-        own = self.of[track][self.rows["frame"][self.of[track]] < frame][::-1]
-        return self._first_apart(self._near(own, frame), other)
+        rows = self.of[track][self.rows["frame"][self.of[track]] < frame][::-1]
+        return self._first_apart(self._near(rows, frame), other)
 
     def after(self, track: int, other: int, frame: int) -> int | None:
         """The first row of a track from a frame on in which it is apart; None where it has none."""
-        own = self.of[track][self.rows["frame"][self.of[track]] >= frame]
-        return self._first_apart(self._near(own, frame), other)
+        rows = self.of[track][self.rows["frame"][self.of[track]] >= frame]
+        return self._first_apart(self._near(rows, frame), other)
 
-    def _near(self, own: Ints, frame: int) -> Ints:
+    def _near(self, rows: Ints, frame: int) -> Ints:
         """Those of some rows, the nearest first, that are near a frame; the nearest where the person was away."""
-        near = own[np.abs(self.rows["frame"][own] - frame) <= self.reach]
-        return near if len(near) else own[:1]
+        reached = rows[np.abs(self.rows["frame"][rows] - frame) <= self.reach]
+        return reached if len(reached) else rows[:1]
 
-    def _first_apart(self, own: Ints, other: int) -> int | None:
-        """The first of some rows in which a track is apart from another, if soon after, from everybody."""
-        if not len(own):
+    def _first_apart(self, rows: Ints, other: int) -> int | None:
+        """The first of some rows in which a track is apart from another; a solitary one if that is soon after."""
+        if not len(rows):
             return None
-        apart = own[self._distances(own, other) >= _APART]
-        first = apart[0] if len(apart) else own[0]
-        passed = np.abs(self.rows["frame"][own] - self.rows["frame"][first])
-        soon = own[(passed <= _SOON * self.frame_rate) & (np.arange(len(own)) >= np.flatnonzero(own == first)[0])]
-        alone = soon[self._distances(soon, 0) >= _APART]
+        distant = rows[self._distances(rows, other) >= _SEPARATION_DISTANCE]
+        first = distant[0] if len(distant) else rows[0]
+        passed = np.abs(self.rows["frame"][rows] - self.rows["frame"][first])
+        soon = rows[
+            (passed <= _SOLITARY_TIME * self.frame_rate) & (np.arange(len(rows)) >= np.flatnonzero(rows == first)[0])
+        ]
+        alone = soon[self._distances(soon, 0) >= _SEPARATION_DISTANCE]
         return int(alone[0] if len(alone) else first)
 
-    def _distances(self, own: Ints, other: int) -> Floats:
+    def _distances(self, rows: Ints, other: int) -> Floats:
         """Distance of rows (n,) from another track in the same frame, or from the nearest (0); inf where alone."""
-        away = np.full(len(own), np.inf)
-        for k, row in enumerate(own.tolist()):
+        away = np.full(len(rows), np.inf)
+        for k, row in enumerate(rows.tolist()):
             here = self.by_frame[int(self.rows["frame"][row])]
             here = here[(here != row) & ((self.rows["id"][here] == other) | (other == 0))]
             x, y = (self.rows[name][here] - self.rows[name][row] for name in ("x", "y"))

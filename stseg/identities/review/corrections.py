@@ -67,8 +67,8 @@ class Corrections:
         span = int(max(frame.max(initial=0), self.start.max(initial=0))) + 2
         key = self.track * span + np.clip(self.start, 0, None)
         index = np.searchsorted(key, track * span + frame, "right") - 1
-        known = (index >= 0) & (self.track[index] == track) if len(key) else np.zeros(len(track), bool)
-        return np.where(known, self.identity[index] if len(key) else 0, np.where(track == 0, 0, track))
+        in_piece = (index >= 0) & (self.track[index] == track) if len(key) else np.zeros(len(track), bool)
+        return np.where(in_piece, self.identity[index] if len(key) else 0, np.where(track == 0, 0, track))
 
 
 def solve_corrections(tracks: Rows, answers: Sequence[Answer]) -> Corrections:
@@ -169,16 +169,16 @@ def _identities(
 ) -> Corrections:
     """Ids of chains of pieces: that of the first piece, a new one where it is taken."""
     identity: dict[Piece, int] = {}
-    free, taken = max(last, default=0) + 1, set[int]()
+    free, used = max(last, default=0) + 1, set[int]()
     followers = set(following.values())
     for piece in sorted((one for one in pieces if one not in followers), key=lambda one: (one[1], one[0])):
-        own = wanted.get(piece, piece[0])
-        own = own if own not in taken else free
-        free += own == free
-        taken.add(own)
+        number = wanted.get(piece, piece[0])
+        number = number if number not in used else free
+        free += number == free
+        used.add(number)
         step: Piece | None = piece
         while step is not None:
-            identity[step] = 0 if step in deleted else own
+            identity[step] = 0 if step in deleted else number
             step = following.get(step)
     names = {
         identity[next(one for one in pieces if one[0] == answer.track)]: answer.name

@@ -10,21 +10,21 @@ import numpy as np
 from stseg.arrays import Floats, Rows
 from stseg.records.rows_of_tracks import rows_of_tracks
 
-_NEAR = 0.7
+_ENCOUNTER_DISTANCE = 0.7
 """Distance of an encounter, metres."""
-_AROUND = 2.0
+_COMPARED_TIME = 2.0
 """Time before and after an encounter in which heights are compared, seconds."""
-_HEIGHT = 0.05
+_HEIGHT_ERROR = 0.05
 """Standard deviation of a track's median height, metres."""
-_PACE = 0.6
+_VELOCITY_NOISE = 0.6
 """Standard deviation of a change of velocity, metres a second for each second."""
-_PLACE = 0.3
+_PLACE_ERROR = 0.3
 """Standard deviation of positions extrapolated over a moment, metres."""
-_GAP = 10.0
+_LONGEST_GAP = 10.0
 """Longest absence that may be one person's, seconds."""
-_EDGE = 0.5
+_BORDER_WIDTH = 0.5
 """Distance from the border of the area within which tracks may begin and end, metres."""
-_MOST = 12.0
+_MARGIN_LIMIT = 12.0
 """Greatest doubt-free margin, nats: larger margins count as equal."""
 
 
@@ -35,8 +35,8 @@ class Doubt:
     Attributes
     ----------
     question
-        "encounter": were two tracks swapped; "gap": does one track continue another; "birth": is a track that begins
-        beside another who that one was until then; "false": is a track a person.
+        "encounter": were two tracks swapped; "gap": does one track continue another; "birth": does a track that begins
+        beside another continue the person of that one; "false": is a track a person.
     track, other
         Ids; 0 for none.
     first, last
@@ -68,9 +68,9 @@ def find_doubts(trajectory: Rows, tracks: Rows, frame_rate: float, border: Float
     if not len(tracks):
         return []
     ordered = trajectory[np.argsort(trajectory["frame"], kind="stable")]
-    own = [ordered[of_track] for of_track in rows_of_tracks(ordered["id"])]
-    every = {int(one["id"][0]): one for one in own}
-    rows = {int(identity): every[int(identity)] for identity in tracks["id"]}
+    divided = [ordered[index] for index in rows_of_tracks(ordered["id"])]
+    by_track = {int(one["id"][0]): one for one in divided}
+    rows = {int(identity): by_track[int(identity)] for identity in tracks["id"]}
     found = _encounters(rows, frame_rate)
     found += _births(rows, frame_rate, {(one.other, one.track, one.first) for one in found})
     found += [*_gaps(rows, frame_rate), *_weak(rows, frame_rate, border)]
@@ -84,9 +84,9 @@ def _encounters(rows: dict[int, Rows], frame_rate: float) -> list[Doubt]:
         common, in_a, in_b = np.intersect1d(rows[a]["frame"], rows[b]["frame"], return_indices=True)
         if not len(common):
             continue
-        apart = np.hypot(rows[a]["x"][in_a] - rows[b]["x"][in_b], rows[a]["y"][in_a] - rows[b]["y"][in_b])
-        near = common[apart < _NEAR]
-        for part in np.split(near, np.flatnonzero(np.diff(near) > frame_rate) + 1):
+        distance = np.hypot(rows[a]["x"][in_a] - rows[b]["x"][in_b], rows[a]["y"][in_a] - rows[b]["y"][in_b])
+        encounter = common[distance < _ENCOUNTER_DISTANCE]
+        for part in np.split(encounter, np.flatnonzero(np.diff(encounter) > frame_rate) + 1):
             if len(part):
                 first, last = int(part[0]), int(part[-1])
                 margin = _swap_margin(rows[a], rows[b], first, last, frame_rate)
@@ -103,53 +103,53 @@ def _together(rows: dict[int, Rows]) -> Iterator[tuple[int, int]]:
             yield one, ids[k + 1 + later]
 
 
-def _between(own: Rows, first: float, last: float) -> Rows:
+def _between(of_track: Rows, first: float, last: float) -> Rows:
     """Rows of a track from one frame to another, both included."""
-    return own[np.searchsorted(own["frame"], first) : np.searchsorted(own["frame"], last, "right")]
+    return of_track[np.searchsorted(of_track["frame"], first) : np.searchsorted(of_track["frame"], last, "right")]
 
 
 def _swap_margin(a: Rows, b: Rows, first: int, last: int, frame_rate: float) -> float:
     """Log-odds of the identities as they are against swapped ones: heights, and motion over short encounters."""
-    length = round(_AROUND * frame_rate)
-    parts = [(_between(own, first - length, first), _between(own, last, last + length)) for own in (a, b)]
+    length = round(_COMPARED_TIME * frame_rate)
+    parts = [(_between(one, first - length, first), _between(one, last, last + length)) for one in (a, b)]
     if any(not len(part) for pair in parts for part in pair):
         return 0.0
     (a0, a1), (b0, b1) = parts
     height = _height(a0, b1) + _height(b0, a1) - _height(a0, a1) - _height(b0, b1)
     motion = _motion(a0, b1, frame_rate) + _motion(b0, a1, frame_rate)
     motion -= _motion(a0, a1, frame_rate) + _motion(b0, b1, frame_rate)
-    return float(np.clip(height + motion, -_MOST, _MOST))
+    return float(np.clip(height + motion, -_MARGIN_LIMIT, _MARGIN_LIMIT))
 
 
 def _height(before: Rows, after: Rows) -> float:
     off = float(np.median(before["height"]) - np.median(after["height"]))
-    return 0.25 * (off / _HEIGHT) ** 2 if np.isfinite(off) else 0.0
+    return 0.25 * (off / _HEIGHT_ERROR) ** 2 if np.isfinite(off) else 0.0
 
 
 def _motion(before: Rows, after: Rows, frame_rate: float) -> float:
     """Cost of a constant velocity from the end of one part to the beginning of the other, nats."""
     gap = max(int(after["frame"][0] - before["frame"][-1]), 0) / frame_rate
     here = np.array([before["x"][-1], before["y"][-1]])
-    there = np.array([after["x"][0], after["y"][0]])
+    after_place = np.array([after["x"][0], after["y"][0]])
     start = max(len(before) - 1 - round(frame_rate), 0)
     span = max(int(before["frame"][-1] - before["frame"][start]), 1) / frame_rate
     velocity = (here - np.array([before["x"][start], before["y"][start]])) / span
-    spread = _PLACE + _PACE * gap + 0.5 * gap**2
-    return 0.5 * float(((there - here - velocity * gap) ** 2).sum()) / spread**2
+    spread = _PLACE_ERROR + _VELOCITY_NOISE * gap + 0.5 * gap**2
+    return 0.5 * float(((after_place - here - velocity * gap) ** 2).sum()) / spread**2
 
 
 def _gaps(rows: dict[int, Rows], frame_rate: float) -> list[Doubt]:
     """Tracks that begin where another ended shortly before: the decision is that they are two people."""
     found, ids = [], list(rows)
-    last = np.array([own["frame"][-1] for own in rows.values()])
-    for late, own in rows.items():
+    last = np.array([of_track["frame"][-1] for of_track in rows.values()])
+    for late, of_track in rows.items():
         best: Doubt | None = None
-        gaps = (own["frame"][0] - last) / frame_rate
-        for k in np.flatnonzero((gaps > 0) & (gaps <= _GAP)).tolist():
+        gaps = (of_track["frame"][0] - last) / frame_rate
+        for k in np.flatnonzero((gaps > 0) & (gaps <= _LONGEST_GAP)).tolist():
             early, other = ids[k], rows[ids[k]]
-            margin = _motion(other, own, frame_rate) + _height(other, own) + np.log1p(gaps[k]) - 1.0
-            if margin < _MOST and (best is None or margin < best.margin):
-                best = Doubt("gap", early, late, int(other["frame"][-1]), int(own["frame"][0]), float(margin))
+            margin = _motion(other, of_track, frame_rate) + _height(other, of_track) + np.log1p(gaps[k]) - 1.0
+            if margin < _MARGIN_LIMIT and (best is None or margin < best.margin):
+                best = Doubt("gap", early, late, int(other["frame"][-1]), int(of_track["frame"][0]), float(margin))
         found += [] if best is None else [best]
     return found
 
@@ -157,17 +157,17 @@ def _gaps(rows: dict[int, Rows], frame_rate: float) -> list[Doubt]:
 def _births(rows: dict[int, Rows], frame_rate: float, met: set[tuple[int, int, int]]) -> list[Doubt]:
     """Tracks that begin while another one goes on from where it may come; `met` there are asked about already."""
     found, ids = [], list(rows)
-    begin, end = np.array([own["frame"][[0, -1]] for own in rows.values()]).T
-    for late, own in rows.items():
-        first = int(own["frame"][0])
+    begin, end = np.array([of_track["frame"][[0, -1]] for of_track in rows.values()]).T
+    for late, of_track in rows.items():
+        first = int(of_track["frame"][0])
         for other in (ids[k] for k in np.flatnonzero((begin < first) & (end >= first)).tolist()):
             if {(other, late, first), (late, other, first)} & met:
                 continue
             before = rows[other][: np.searchsorted(rows[other]["frame"], first)]
             if first - int(before["frame"][-1]) <= frame_rate:
-                begun = _between(own, first, first + _AROUND * frame_rate)
-                margin = _motion(before, own, frame_rate) + _height(before[-len(begun) :], begun)
-                if margin < _MOST:
+                begun = _between(of_track, first, first + _COMPARED_TIME * frame_rate)
+                margin = _motion(before, of_track, frame_rate) + _height(before[-len(begun) :], begun)
+                if margin < _MARGIN_LIMIT:
                     found.append(Doubt("birth", other, late, int(before["frame"][-1]), first, margin))
     return found
 
@@ -175,11 +175,11 @@ def _births(rows: dict[int, Rows], frame_rate: float, met: set[tuple[int, int, i
 def _weak(rows: dict[int, Rows], frame_rate: float, border: Floats) -> list[Doubt]:
     """Tracks that begin and end inside the area: the decision is that they are people."""
     found = []
-    first, last = min(own["frame"][0] for own in rows.values()), max(own["frame"][-1] for own in rows.values())
-    for identity, own in rows.items():
-        ends = np.array([[own["x"][k], own["y"][k]] for k in (0, -1)])
-        inside = (np.minimum(ends - border[0], border[1] - ends) > _EDGE).all(axis=1)
-        if inside.all() and own["frame"][0] > first and own["frame"][-1] < last:
-            margin = float(own["score"].mean()) * min(len(own) / frame_rate / 2.0, 3.0)
-            found.append(Doubt("false", identity, 0, int(own["frame"][0]), int(own["frame"][-1]), min(margin, _MOST)))
+    first, last = min(one["frame"][0] for one in rows.values()), max(one["frame"][-1] for one in rows.values())
+    for identity, of_track in rows.items():
+        ends = np.array([[of_track["x"][k], of_track["y"][k]] for k in (0, -1)])
+        inside = (np.minimum(ends - border[0], border[1] - ends) > _BORDER_WIDTH).all(axis=1)
+        if inside.all() and of_track["frame"][0] > first and of_track["frame"][-1] < last:
+            margin = min(float(of_track["score"].mean()) * min(len(of_track) / frame_rate / 2.0, 3.0), _MARGIN_LIMIT)
+            found.append(Doubt("false", identity, 0, int(of_track["frame"][0]), int(of_track["frame"][-1]), margin))
     return found

@@ -31,7 +31,7 @@ from stseg.identities.search.hypotheses import Hypotheses, Pasts, Rules, fill_su
 from stseg.kernels.accelerate import kernel, part
 from stseg.kernels.pointed_tuples import pointed
 
-_STEP = 4
+_SLOT_STEP = 4
 """Slots by which their number changes."""
 
 
@@ -68,7 +68,7 @@ def extend_beam(
     begin, frames
         Number of the first of these frames, and all of them.
     every_row, bound_people, constants
-        All rows, whom constraints know, and the constants of the search.
+        All rows, the people of constraints, and the constants of the search.
     one, pasts_of_one, other, pasts_of_other
         The hypotheses, and room for as many. After an even number of frames the new ones are in the former.
     number, size
@@ -81,51 +81,56 @@ def extend_beam(
     tuple of int
         Number of the new hypotheses, and of their pasts.
     """
-    seen, people, rules = pointed(every_row), pointed(bound_people), pointed(constants)
-    held, pasts, fresh, later_pasts = pointed(one), pointed(pasts_of_one), pointed(other), pointed(pasts_of_other)
+    observed, people, rules = pointed(every_row), pointed(bound_people), pointed(constants)
+    hypotheses, pasts = pointed(one), pointed(pasts_of_one)
+    successors, later_pasts = pointed(other), pointed(pasts_of_other)
     for step in range(len(counts)):
         k = begin + step
         first, stop = frames.start[k], frames.start[k + 1]
         rows, now = stop - first, frames.seconds[k]
-        slots = -(-(slots_in_use(held.past, number) + rows) // _STEP) * _STEP
-        slots = min(slots, held.past.shape[1])
+        slots = -(-(slots_in_use(hypotheses.past, number) + rows) // _SLOT_STEP) * _SLOT_STEP
+        slots = min(slots, hypotheses.past.shape[1])
         before = frames.start[max(k - 1, 0)]
-        crossings = crossings_of(before, first, stop, seen.ground, seen.variance, frames.bend[k], frames.room)
-        costs = row_costs(pasts, size, first, rows, now, seen, rules)
-        column, extension = np.empty((number, rows), np.int64), empty_extension(slots, first, rows, seen.certain)
-        found, there = empty_alternatives(number, slots, len(extension.doubtful)), empty_present(number, slots)
+        crossings = crossings_of(before, first, stop, observed.ground, observed.variance, frames.bend[k], frames.room)
+        costs = row_costs(pasts, size, first, rows, now, observed, rules)
+        column, extension = np.empty((number, rows), np.int64), empty_extension(slots, first, rows, observed.certain)
+        found, present = empty_alternatives(number, slots, len(extension.doubtful)), empty_present(number, slots)
         total = _fill_alternatives(
-            held, pasts, slots, k, frames, costs, seen, people, rules, crossings, extension, column, found
+            hypotheses, pasts, slots, k, frames, costs, observed, people, rules, crossings, extension, column, found
         )
-        chosen, mark = np.empty(len(fresh.score), np.int64), _marks(number, held, people, first)
-        number = choose_distinct(held, pasts, column, first, seen, mark, found, total, rules.beam_loss, there, chosen)
+        chosen, mark = np.empty(len(successors.score), np.int64), _marks(number, hypotheses, people, first)
+        number = choose_distinct(
+            hypotheses, pasts, column, first, observed, mark, found, total, rules.beam_loss, present, chosen
+        )
         parent, slot = parents[step, :number], np.empty((number, rows), np.int64)
         for n in range(number):
-            fresh.score[n] = found.value[chosen[n]]
+            successors.score[n] = found.value[chosen[n]]
             parent[n] = found.change[chosen[n], 0]
             _fill_slots(found.change, chosen[n], column, slot, n)
-            _fill_names(held, pasts, parent[n], slot, n, first, names, step)
-        size = fill_successors(held, pasts, size, parent, slot, slots, first, now, seen, rules, fresh, later_pasts)
-        _bind(fresh, people, k, first, names[step, :number])
+            _fill_names(hypotheses, pasts, parent[n], slot, n, first, names, step)
+        size = fill_successors(
+            hypotheses, pasts, size, parent, slot, slots, first, now, observed, rules, successors, later_pasts
+        )
+        _bind(successors, people, k, first, names[step, :number])
         counts[step] = number
-        held, pasts, fresh, later_pasts = fresh, later_pasts, held, pasts
+        hypotheses, pasts, successors, later_pasts = successors, later_pasts, hypotheses, pasts
     return number, size
 
 
 @kernel
-def _marks(number: int, held: Hypotheses, people: BoundPeople, first: int) -> Ints:
-    """Numbers that differ where hypotheses differ in who people are of whom constraints hold from a row on."""
+def _marks(number: int, hypotheses: Hypotheses, people: BoundPeople, first: int) -> Ints:
+    """Numbers that differ where hypotheses differ in the identities of people that constraints bind from a row on."""
     binding, mark = binding_people(people, first), np.empty(number, np.int64)
     for h in range(number):
-        mark[h] = mark_of(held.bound, h, binding)
+        mark[h] = mark_of(hypotheses.bound, h, binding)
     return mark
 
 
 @kernel
 def _fill_alternatives(
-    held: Hypotheses, pasts: Pasts, slots: int, k: int, frames: Frames, row_costs: RowCosts, seen: ObservedRows,
-    people: BoundPeople, rules: Rules, all_crossings: Crossings, extension: Extension, column: Ints,
-    alternatives: Alternatives,
+    hypotheses: Hypotheses, pasts: Pasts, slots: int, k: int, frames: Frames, row_costs: RowCosts,
+    observed: ObservedRows, people: BoundPeople, rules: Rules, all_crossings: Crossings, extension: Extension,
+    column: Ints, alternatives: Alternatives,
 ) -> int:  # fmt: skip
     """Fill the alternatives of all hypotheses for the rows of the k-th frame, and count them.
 
@@ -134,16 +139,16 @@ def _fill_alternatives(
     costs, crossings, one, found = pointed(row_costs), pointed(all_crossings), pointed(extension), pointed(alternatives)
     first, total = frames.start[k], 0
     for h in range(len(column)):
-        end_identities(held, pasts, h, first, frames.seconds[k], seen, people, rules)
-        identities = fill_identities(held, pasts, h, costs, one)
-        _impose(held.bound, h, people, k, first, one, identities)
+        end_identities(hypotheses, pasts, h, first, frames.seconds[k], observed, people, rules)
+        identities = fill_identities(hypotheses, pasts, h, costs, one)
+        _impose(hypotheses.bound, h, people, k, first, one, identities)
         if not fill_cheapest(one, identities):
             fill_least(one, identities, slots)
         cost = 0.0
         for i in range(column.shape[1]):
-            cost += one.cost[i, one.own[i]]
-            column[h, i] = one.slot[one.own[i]]
-        score = held.score[h] - cost
+            cost += one.cost[i, one.assigned[i]]
+            column[h, i] = one.slot[one.assigned[i]]
+        score = hypotheses.score[h] - cost
         total = add_alternatives(h, one, identities, score, crossings, rules.alternative_loss, total, found)
     return total
 
@@ -172,16 +177,18 @@ def _fill_slots(change: Ints, alternative: int, best: Ints, slot: Ints, n: int) 
 
 
 @part
-def _fill_names(held: Hypotheses, pasts: Pasts, h: int, slot: Ints, n: int, first: int, names: Ints, step: int) -> None:
+def _fill_names(
+    hypotheses: Hypotheses, pasts: Pasts, h: int, slot: Ints, n: int, first: int, names: Ints, step: int
+) -> None:
     """Fill the n-th names (step, n, row) of a frame's rows."""
     for i in range(slot.shape[1]):
         s = slot[n, i]
-        names[step, n, i] = pasts.name[held.past[h, s]] if s >= 0 else first + i
+        names[step, n, i] = pasts.name[hypotheses.past[h, s]] if s >= 0 else first + i
 
 
 @kernel
-def _bind(fresh: Hypotheses, people: BoundPeople, k: int, first: int, name: Ints) -> None:
+def _bind(successors: Hypotheses, people: BoundPeople, k: int, first: int, name: Ints) -> None:
     """Note who known people are by the names (hypothesis, row) of the rows of the k-th frame."""
     for j in range(people.start[k], people.start[k + 1]):
         for n in range(len(name)):
-            fresh.bound[n, people.person[j]] = name[n, people.observation[j] - first]
+            successors.bound[n, people.person[j]] = name[n, people.observation[j] - first]

@@ -29,7 +29,7 @@ _LEAST_PLACE = -25.0
 _ALTERNATIVE_LOSS, _BEAM_LOSS = 15.0, 60.0
 """Greatest loss of an alternative in one frame, and of a hypothesis against the best, nats."""
 _SPARE = 16
-"""Slots for people out of sight."""
+"""Slots for hidden people."""
 _BLOCK = 256
 """Frames that hypotheses are extended by at a time."""
 
@@ -43,7 +43,7 @@ class SearchLimits:
     hypotheses
         Number that is kept.
     longest
-        Longest time out of sight, seconds.
+        Longest time unseen, seconds.
     lag
         Time after which names are final, seconds.
     """
@@ -93,12 +93,12 @@ class _History:
     name: Ints
     steps: list[_Step] = field(default_factory=list)
 
-    def add(self, choices: _Choices, seen: Observations, begin: int) -> None:
+    def add(self, choices: _Choices, observations: Observations, begin: int) -> None:
         """Add the choices of the next frames, from the one of number `begin` on."""
         for k, number in enumerate(choices.number.tolist()):
-            first, stop = seen.start[begin + k : begin + k + 2].tolist()
+            first, stop = observations.start[begin + k : begin + k + 2].tolist()
             names = choices.names[k, :number, : stop - first]
-            self.steps.append(_Step(choices.parent[k, :number], names, first, float(seen.seconds[begin + k])))
+            self.steps.append(_Step(choices.parent[k, :number], names, first, float(observations.seconds[begin + k])))
 
     def decide(self, until: float, number: int) -> Ints:
         """Make names up to a time final, by the best hypothesis; which of the `number` hypotheses agree, int64 (k,)."""
@@ -134,7 +134,7 @@ class BestHypothesis:
 
 
 def search_identities(
-    seen: Observations,
+    observations: Observations,
     sizes: SizeModel,
     motion: MotionConfig,
     limits: SearchLimits,
@@ -144,7 +144,7 @@ def search_identities(
 
     Parameters
     ----------
-    seen
+    observations
         The observations.
     sizes
         Statistics of the sizes.
@@ -155,40 +155,42 @@ def search_identities(
     constraints
         Pairs of observations. All are obeyed unless they contradict each other.
     """
-    frame = np.repeat(np.arange(len(seen.seconds)), np.diff(seen.start))
-    known = KnownPeople.of(constraints, frame)
-    # Where it is known who somebody is, who seemed certain may have to give way.
-    seen = replace(seen, certain=seen.certain & ~np.isin(frame, known.decided(frame))).foreseen()
-    slots = int(np.diff(seen.start).max(initial=0)) + _SPARE + known.most_open()
+    frame = np.repeat(np.arange(len(observations.seconds)), np.diff(observations.start))
+    people = KnownPeople.of(constraints, frame)
+    # Frames with constraints lose their certain rows: a constraint may overrule them.
+    certain = observations.certain & ~np.isin(frame, people.decided(frame))
+    observations = replace(observations, certain=certain).with_foreseen_sizes()
+    slots = int(np.diff(observations.start).max(initial=0)) + _SPARE + people.most_open()
     most = limits.hypotheses
-    held, spare = (
-        (Hypotheses.empty(most, slots, len(known.first)), Pasts.empty(2 * most * slots, len(sizes.spread)))
+    hypotheses, spare = (
+        (Hypotheses.empty(most, slots, len(people.first)), Pasts.empty(2 * most * slots, len(sizes.spread)))
         for _ in range(2)
     )
-    beam = _frames(seen, motion), seen.rows(), known.bound(seen.start), _rules(sizes, motion, limits)
-    history, number, size, begin = _History(np.full(len(seen.order), -1)), 1, 0, 0
-    while begin < len(seen.seconds):
-        since = history.steps[0].seconds if history.steps else seen.seconds[begin]
-        late = np.flatnonzero(seen.seconds[begin : begin + _BLOCK] - since > 2 * limits.lag)[:1]
-        stop = min(begin + int(late.min(initial=_BLOCK - 1)) + 1, len(seen.seconds))
-        choices = _Choices.empty(stop - begin, most, int(np.diff(seen.start).max()))
-        number, size = extend_beam(begin, *beam, *held, *spare, number, size, *choices)
-        history.add(choices, seen, begin)
-        held, spare = (spare, held) if (stop - begin) % 2 else (held, spare)
+    rows, bound = observations.rows(), people.bound(observations.start)
+    beam = _frames(observations, motion), rows, bound, _rules(sizes, motion, limits)
+    history, number, size, begin = _History(np.full(len(observations.order), -1)), 1, 0, 0
+    while begin < len(observations.seconds):
+        since = history.steps[0].seconds if history.steps else observations.seconds[begin]
+        late = np.flatnonzero(observations.seconds[begin : begin + _BLOCK] - since > 2 * limits.lag)[:1]
+        stop = min(begin + int(late.min(initial=_BLOCK - 1)) + 1, len(observations.seconds))
+        choices = _Choices.empty(stop - begin, most, int(np.diff(observations.start).max()))
+        number, size = extend_beam(begin, *beam, *hypotheses, *spare, number, size, *choices)
+        history.add(choices, observations, begin)
+        hypotheses, spare = (spare, hypotheses) if (stop - begin) % 2 else (hypotheses, spare)
         if len(late):
-            agree = history.decide(float(seen.seconds[stop - 1]) - limits.lag, number)
-            held[0].keep(agree)
+            agree = history.decide(float(observations.seconds[stop - 1]) - limits.lag, number)
+            hypotheses[0].keep(agree)
             number = len(agree)
         begin = stop
     history.decide(np.inf, number)
-    return BestHypothesis(history.name, float(held[0].score[0]))
+    return BestHypothesis(history.name, float(hypotheses[0].score[0]))
 
 
-def _frames(seen: Observations, motion: MotionConfig) -> Frames:
+def _frames(observations: Observations, motion: MotionConfig) -> Frames:
     """The frames of some observations."""
-    steps = np.diff(seen.seconds, prepend=seen.seconds[:1]).tolist()
+    steps = np.diff(observations.seconds, prepend=observations.seconds[:1]).tolist()
     bend = np.array([(motion.speed_spread * step / 4.0) ** 2 for step in steps])
-    return Frames(seen.start, seen.seconds, bend, seen.room)
+    return Frames(observations.start, observations.seconds, bend, observations.room)
 
 
 def _rules(sizes: SizeModel, motion: MotionConfig, limits: SearchLimits) -> Rules:

@@ -47,7 +47,7 @@ class Present(NamedTuple):
 
 @kernel
 def choose_distinct(
-    hypotheses: Hypotheses, pasts: Pasts, column: Ints, first: int, rows: ObservedRows, mark: Ints,
+    hypotheses: Hypotheses, pasts: Pasts, column: Ints, first: int, observed: ObservedRows, mark: Ints,
     every_alternative: Alternatives, total: int, most_loss: float, before: Present, chosen: Ints,
 ) -> int:  # fmt: skip
     """Choose the best alternatives of different keys; of equally good ones the first.
@@ -57,8 +57,8 @@ def choose_distinct(
     hypotheses, pasts
         The hypotheses before.
     column : int64 (hypothesis, row)
-        Slot of each row by the best assignment, -1 for somebody new.
-    first, rows
+        Slot of each row by the best assignment, -1 for a new person.
+    first, observed
         The frame's first row, and all rows.
     mark : int64 (hypothesis,)
         Differs where constraints bind the hypotheses otherwise.
@@ -87,8 +87,8 @@ def choose_distinct(
         _sink(heap, waiting, 0, alternatives)
         h = alternatives.change[best, 0]
         if present.key[h] < 0:
-            _fill_present(hypotheses, pasts, h, column, first, rows, int(mark[h]), present)
-        found = _key_of(alternatives, best, column, first, rows, present)
+            _fill_present(hypotheses, pasts, h, column, first, observed, int(mark[h]), present)
+        found = _key_of(alternatives, best, column, first, observed, present)
         place = found & (size - 1)  # keys are in a table with open addressing
         while table[place] >= 0 and key[table[place]] != found:
             place = (place + 1) & (size - 1)
@@ -110,7 +110,7 @@ def empty_present(hypotheses: int, slots: int) -> Present:
 
 @part
 def _fill_present(
-    hypotheses: Hypotheses, pasts: Pasts, h: int, column: Ints, first: int, rows: ObservedRows, mark: int,
+    hypotheses: Hypotheses, pasts: Pasts, h: int, column: Ints, first: int, observed: ObservedRows, mark: int,
     present: Present,
 ) -> None:  # fmt: skip
     """Fill the people of a hypothesis, and its key by the best assignment."""
@@ -118,20 +118,20 @@ def _fill_present(
     for s in range(slots):
         p = hypotheses.past[h, s]
         present.name[h, s] = pasts.name[p] if p >= 0 else -1
-        present.birth[h, s] = rows.birth[present.name[h, s]] if p >= 0 else -1
+        present.birth[h, s] = observed.birth[present.name[h, s]] if p >= 0 else -1
     for s in range(slots):
         if present.name[h, s] >= 0:
             present.kin[h, s] = _kin(present, h, present.name[h, s], present.birth[h, s])
-            present.unseen[h, s] = _product(present.kin[h, s], rows.sign[pasts.last[hypotheses.past[h, s]]])
+            present.unseen[h, s] = _product(present.kin[h, s], observed.sign[pasts.last[hypotheses.past[h, s]]])
             key = (key + int(present.unseen[h, s])) & KEY_BITS
     for i in range(column.shape[1]):
-        key += _key_term(present, h, rows, first + i, column[h, i])
+        key += _key_term(present, h, observed, first + i, column[h, i])
     present.key[h] = key & KEY_BITS
 
 
 @part
 def _key_of(
-    alternatives: Alternatives, a: int, column: Ints, first: int, rows: ObservedRows, present: Present
+    alternatives: Alternatives, a: int, column: Ints, first: int, observed: ObservedRows, present: Present
 ) -> int:  # fmt: skip
     """Key of an alternative: that of the best assignment, with other terms for both rows that change."""
     change, h = alternatives.change, alternatives.change[a, 0]
@@ -139,17 +139,17 @@ def _key_of(
     for k in (1, 3):
         i = change[a, k]
         if i >= 0:
-            key += _key_term(present, h, rows, first + i, change[a, k + 1])
-            key -= _key_term(present, h, rows, first + i, column[h, i])
+            key += _key_term(present, h, observed, first + i, change[a, k + 1])
+            key -= _key_term(present, h, observed, first + i, column[h, i])
     return key & KEY_BITS
 
 
 @part
-def _key_term(present: Present, h: int, rows: ObservedRows, r: int, s: int) -> int:
-    """Change of the key of a hypothesis where row r is that of a slot, or of somebody new (-1)."""
+def _key_term(present: Present, h: int, observed: ObservedRows, r: int, s: int) -> int:
+    """Change of the key of a hypothesis where row r is that of a slot, or of a new person (-1)."""
     if s < 0:
-        return _product(_kin(present, h, r, rows.birth[r]), rows.sign[r])
-    return int(_product(present.kin[h, s], rows.sign[r]) - present.unseen[h, s])
+        return _product(_kin(present, h, r, observed.birth[r]), observed.sign[r])
+    return int(_product(present.kin[h, s], observed.sign[r]) - present.unseen[h, s])
 
 
 @part

@@ -86,7 +86,7 @@ class KnownPeople:
 
     @classmethod
     def of(cls, constraints: Constraints, frame: Ints) -> KnownPeople:
-        """People whose observations constraints name; frame (n,) is that of every observation."""
+        """People of the observations that constraints name; frame (n,) is that of every observation."""
         pairs = np.stack([constraints.earlier, constraints.later])
         observation, ends = np.unique(pairs, return_inverse=True)
         ends = ends.reshape(2, -1)
@@ -95,10 +95,10 @@ class KnownPeople:
         people, person = connected_components(graph, directed=False) if number else (0, np.zeros(0, np.int64))
         person = person.astype(np.int64)
         other = np.zeros((people, people), bool)
-        apart = person[ends[:, ~constraints.same]]
+        different = person[ends[:, ~constraints.same]]
         together = np.array(np.nonzero(frame[observation][:, None] == frame[observation]))
-        beside = person[together[:, together[0] != together[1]]]
-        for one, two in (apart, beside):
+        simultaneous = person[together[:, together[0] != together[1]]]
+        for one, two in (different, simultaneous):
             other[one, two] = other[two, one] = True
         first, last = np.full(people, len(frame)), np.full(people, -1)
         np.minimum.at(first, person, observation)
@@ -127,7 +127,7 @@ class KnownPeople:
 
 
 class BoundPeople(NamedTuple):
-    """People whom constraints know.
+    """People of constraints.
 
     Attributes
     ----------
@@ -136,7 +136,7 @@ class BoundPeople(NamedTuple):
     start : int64 (frame + 1,)
         The first of the named observations from each frame on.
     binding : int64 (person,)
-        The last observation for which it matters who somebody is.
+        The last observation that depends on the identity of each.
     """
 
     observation: Ints
@@ -159,7 +159,7 @@ def is_awaited(people: BoundPeople, bound: Ints, h: int, name: int, first: int) 
 
 @kernel
 def binding_people(people: BoundPeople, first: int) -> Ints:
-    """People observed before an observation whose identity matters from then on."""
+    """People observed before an observation with an identity that later ones depend on."""
     found, number = np.empty(len(people.first), np.int64), 0
     for person in range(len(found)):
         if people.first[person] < first <= people.binding[person]:

@@ -1,7 +1,7 @@
 """Costs of the rows of a frame as those of identities or of new people, and of two people who cross.
 
-Bodies do not pass through each other. Two people whose positions differ by r in one frame and by r' in the next one
-walk from r to r' between them. Where that path comes nearer than both of its ends, they have to pass each other there:
+Bodies do not pass through each other. Two people at a distance r in one frame and r' in the next one walk from r
+to r' between them. Where that path comes nearer than both of its ends, they have to pass each other there:
 
     cost = log P(apart | d_ends) - log P(apart | d_least),   P(apart | d) = P(|n| >= room), n ~ N(d, v)
 
@@ -41,7 +41,7 @@ class RowCosts(NamedTuple):
     follower : int64 (past,)
         The row that certainly follows each, -1 for none.
     begun : float64 (row,)
-        As somebody new.
+        As a new person.
     """
 
     cost: Floats
@@ -50,7 +50,9 @@ class RowCosts(NamedTuple):
 
 
 @kernel
-def row_costs(pasts: Pasts, size: int, first: int, rows: int, now: float, seen: ObservedRows, rules: Rules) -> RowCosts:
+def row_costs(
+    pasts: Pasts, size: int, first: int, rows: int, now: float, observed: ObservedRows, rules: Rules
+) -> RowCosts:  # fmt: skip
     """Costs of the rows of a frame, which begin with `first`, as those of some pasts."""
     sizes = len(rules.spread)
     costs = RowCosts(np.empty((size, rows)), np.empty(size, np.int64), np.empty(rows))
@@ -60,48 +62,48 @@ def row_costs(pasts: Pasts, size: int, first: int, rows: int, now: float, seen: 
     for i in range(rows):
         r, evidence = first + i, 0.0
         for d in range(sizes):
-            alone[i, d] = size_evidence(seen.precision[r, d], seen.information[r, d], rules.spread[d])
+            alone[i, d] = size_evidence(observed.precision[r, d], observed.information[r, d], rules.spread[d])
             evidence += alone[i, d]
-        costs.begun[i] = rules.birth * seen.inside[r] - evidence
+        costs.begun[i] = rules.birth * observed.inside[r] - evidence
     for p in range(size):
-        _fill_costs(pasts, p, first, now, seen, rules, alone, costs)
+        _fill_costs(pasts, p, first, now, observed, rules, alone, costs)
     return costs
 
 
 @part
 def _fill_costs(
-    pasts: Pasts, p: int, first: int, now: float, seen: ObservedRows, rules: Rules, alone: Floats,
+    pasts: Pasts, p: int, first: int, now: float, observed: ObservedRows, rules: Rules, alone: Floats,
     costs: RowCosts,
 ) -> None:  # fmt: skip
-    """Fill the costs of rows as those of the p-th past; sizes say `alone` (row, size) of somebody new."""
+    """Fill the costs of rows as those of the p-th past; `alone` (row, size) is the size evidence of new people."""
     since = now - pasts.seconds[p]
     x = pasts.state[p, 0] + since * pasts.state[p, 2]
     y = pasts.state[p, 1] + since * pasts.state[p, 3]
     spreads = predicted_variance(pasts.covariance, p, since, rules.turn)
     for i in range(len(alone)):
         r = first + i
-        follows = seen.previous[r] == pasts.last[p]
-        if seen.certain[r] and not follows:
+        follows = observed.previous[r] == pasts.last[p]
+        if observed.certain[r] and not follows:
             continue
-        total = spreads + seen.variance[r]
-        square = (seen.ground[r, 0] - x) ** 2 + (seen.ground[r, 1] - y) ** 2
+        total = spreads + observed.variance[r]
+        square = (observed.ground[r, 0] - x) ** 2 + (observed.ground[r, 1] - y) ** 2
         gain = max(-0.5 * square / total, rules.least) - math.log(2.0 * math.pi * total) - rules.absence * since
         if gain < 4.0 * rules.least and not follows:
             continue
         for d in range(alone.shape[1]):
-            if seen.precision[r, d] == 0.0:
+            if observed.precision[r, d] == 0.0:
                 continue
-            both = pasts.precision[p, d] + seen.precision[r, d]
-            together = size_evidence(both, pasts.information[p, d] + seen.information[r, d], rules.spread[d])
-            gain += max(together - pasts.evidence[p, d], alone[i, d] - rules.most_against[d] * seen.precision[r, d])
+            both = pasts.precision[p, d] + observed.precision[r, d]
+            together = size_evidence(both, pasts.information[p, d] + observed.information[r, d], rules.spread[d])
+            gain += max(together - pasts.evidence[p, d], alone[i, d] - rules.most_against[d] * observed.precision[r, d])
         costs.cost[p, i] = -gain
-        if seen.certain[r]:
+        if observed.certain[r]:
             costs.follower[p] = i
 
 
-_NEAR = 1.0
+_CROSSING_DISTANCE = 1.0
 """Distance in both frames below which two may have crossed, metres."""
-_LEAST = 1e-10
+_LEAST_PROBABILITY = 1e-10
 """Least probability that two are apart: what is known of places is bounded."""
 
 
@@ -150,7 +152,7 @@ def crossings_of(
 
 @part
 def crossing(i: int, one: int, j: int, other: int, last: Ints, crossings: Crossings) -> float:
-    """Cost of rows i and j of a frame as those of two identities whose last rows are last (identity,), nats."""
+    """Cost of rows i and j of a frame as those of two identities with their last rows, last (identity,), nats."""
     if crossings.now[i, j] < 0:
         return 0.0
     p, q = last[one] - crossings.before, last[other] - crossings.before
@@ -160,12 +162,12 @@ def crossing(i: int, one: int, j: int, other: int, last: Ints, crossings: Crossi
 
 
 @part
-def crossings_with_others(i: int, one: int, spared: int, own: Ints, last: Ints, crossings: Crossings) -> float:
+def crossings_with_others(i: int, one: int, spared: int, assigned: Ints, last: Ints, crossings: Crossings) -> float:
     """Cost of row i as that of an identity, beside all rows but one and their identities (row,), nats."""
     total = 0.0
-    for k in range(len(own)):
+    for k in range(len(assigned)):
         if k not in (i, spared):
-            total += crossing(i, one, k, own[k], last, crossings)
+            total += crossing(i, one, k, assigned[k], last, crossings)
     return total
 
 
@@ -178,7 +180,7 @@ def _number_near_pairs(ground: Floats, first: int, pair: Ints) -> int:
             pair[i, j] = -1
             if i != j:
                 x, y = ground[first + i, 0] - ground[first + j, 0], ground[first + i, 1] - ground[first + j, 1]
-                if math.hypot(x, y) < _NEAR:
+                if math.hypot(x, y) < _CROSSING_DISTANCE:
                     pair[i, j] = number
                     number += 1
     return number
@@ -224,4 +226,5 @@ def _approach(x: float, y: float, later_x: float, later_y: float) -> tuple[float
 def _apart(distance: float, deviation: float, room: float) -> float:
     """Probability that a normal number of this mean and deviation is `room` or more away from 0."""
     scale = 1.0 / (math.sqrt(2.0) * deviation)
-    return max(0.5 * math.erfc((room - distance) * scale) + 0.5 * math.erfc((room + distance) * scale), _LEAST)
+    probability = 0.5 * math.erfc((room - distance) * scale) + 0.5 * math.erfc((room + distance) * scale)
+    return max(probability, _LEAST_PROBABILITY)

@@ -37,9 +37,9 @@ class Extension(NamedTuple):
         Slot, first and last row of each; -1 for a new one.
     cost : float64 (row, identity + 1)
         Nats.
-    own : int64 (row,)
+    assigned : int64 (row,)
         The best assignment.
-    taken : bool (identity + 1,)
+    has_row : bool (identity + 1,)
         Whether a row has each identity by the best assignment; never of a new one.
     doubtful : int64 (k,)
         Rows that do not certainly follow their track, rising; all others have the identity that they follow, or a new
@@ -50,8 +50,8 @@ class Extension(NamedTuple):
     name: Ints
     last: Ints
     cost: Floats
-    own: Ints
-    taken: Flags
+    assigned: Ints
+    has_row: Flags
     doubtful: Ints
 
 
@@ -71,47 +71,47 @@ def empty_extension(most: int, first: int, rows: int, certain: Flags) -> Extensi
 
 @part
 def end_identities(
-    held: Hypotheses,
+    hypotheses: Hypotheses,
     pasts: Pasts,
     h: int,
     first: int,
     now: float,
-    seen: ObservedRows,
+    observed: ObservedRows,
     people: BoundPeople,
     rules: Rules,
 ) -> None:
     """Free the slots of identities that were unseen for too long; each costs its death. Those awaited stay."""
-    for s in range(held.past.shape[1]):
-        p = held.past[h, s]
+    for s in range(hypotheses.past.shape[1]):
+        p = hypotheses.past[h, s]
         is_over = p >= 0 and now - pasts.seconds[p] > rules.longest
-        if is_over and not is_awaited(people, held.bound, h, pasts.name[p], first):
-            held.score[h] -= rules.birth * seen.inside[pasts.last[p]]
-            held.past[h, s] = FREE
+        if is_over and not is_awaited(people, hypotheses.bound, h, pasts.name[p], first):
+            hypotheses.score[h] -= rules.birth * observed.inside[pasts.last[p]]
+            hypotheses.past[h, s] = FREE
 
 
 @part
-def fill_identities(held: Hypotheses, pasts: Pasts, h: int, costs: RowCosts, one: Extension) -> int:
+def fill_identities(hypotheses: Hypotheses, pasts: Pasts, h: int, costs: RowCosts, one: Extension) -> int:
     """Fill the identities of a hypothesis, their costs, and the rows that certainly follow; number of identities."""
-    number, own, doubtful = 0, one.own, one.doubtful
-    for i in range(len(own)):
-        own[i] = FREE
-    for s in range(held.past.shape[1]):
-        p = held.past[h, s]
+    number, assigned, doubtful = 0, one.assigned, one.doubtful
+    for i in range(len(assigned)):
+        assigned[i] = FREE
+    for s in range(hypotheses.past.shape[1]):
+        p = hypotheses.past[h, s]
         if p >= 0:
             one.slot[number], one.name[number], one.last[number] = s, pasts.name[p], pasts.last[p]
-            one.taken[number] = costs.follower[p] >= 0
+            one.has_row[number] = costs.follower[p] >= 0
             if costs.follower[p] >= 0:
-                own[costs.follower[p]] = number
+                assigned[costs.follower[p]] = number
                 one.cost[costs.follower[p], number] = costs.cost[p, costs.follower[p]]
             for i in doubtful:
                 one.cost[i, number] = costs.cost[p, i]
             number += 1
     one.slot[number] = one.name[number] = one.last[number] = -1
-    one.taken[number] = False
-    for i in range(len(own)):
+    one.has_row[number] = False
+    for i in range(len(assigned)):
         one.cost[i, number] = costs.begun[i]
-        if own[i] < 0:
-            own[i] = number
+        if assigned[i] < 0:
+            assigned[i] = number
     return number
 
 
@@ -122,10 +122,10 @@ def impose_identity(one: Extension, identities: int, bound: int, row: int, same:
     for c in range(identities):
         if one.name[c] == bound:
             if same:
-                own = min(cost[row, c], UNLIKELY)
+                demanded = min(cost[row, c], UNLIKELY)
                 for other in range(identities):
                     cost[row, other] = FORBIDDEN
-                cost[row, c], cost[row, identities] = own, CONTRADICTION
+                cost[row, c], cost[row, identities] = demanded, CONTRADICTION
                 break
             cost[row, c] = FORBIDDEN
             cost[row, identities] = min(cost[row, identities], CONTRADICTION)
@@ -137,7 +137,7 @@ def fill_cheapest(one: Extension, identities: int) -> bool:
 
     It is the best one where each row has one cheapest identity of its own.
     """
-    cost, taken = one.cost, one.taken
+    cost, has_row = one.cost, one.has_row
     for i in one.doubtful:
         best, ties = 0, False
         for c in range(1, identities + 1):
@@ -145,17 +145,17 @@ def fill_cheapest(one: Extension, identities: int) -> bool:
                 best, ties = c, False
             elif cost[i, c] == cost[i, best]:
                 ties = True
-        if ties or taken[best]:
+        if ties or has_row[best]:
             return False
-        taken[best] = best < identities
-        one.own[i] = best
+        has_row[best] = best < identities
+        one.assigned[i] = best
     return True
 
 
 @kernel
 def fill_least(one: Extension, identities: int, slots: int) -> None:
     """Fill the assignment of least cost, found in a table of all slots and a new identity for each row."""
-    rows = len(one.own)
+    rows = len(one.assigned)
     table, column = np.empty((rows, slots + rows)), np.empty(rows, np.int64)
     number, certain = np.empty(slots + rows, np.int64), np.empty(rows, np.bool_)
     table[:] = FORBIDDEN
@@ -163,7 +163,7 @@ def fill_least(one: Extension, identities: int, slots: int) -> None:
     certain[:] = True
     for c in range(identities):
         number[one.slot[c]] = c
-        one.taken[c] = False
+        one.has_row[c] = False
     for i in one.doubtful:
         certain[i] = False
         for c in range(identities):
@@ -171,12 +171,12 @@ def fill_least(one: Extension, identities: int, slots: int) -> None:
         table[i, slots + i] = one.cost[i, identities]
     for i in range(rows):
         if certain[i]:
-            c = one.own[i]
+            c = one.assigned[i]
             table[i, one.slot[c] if c < identities else slots + i] = one.cost[i, c]
     fill_assignment_of_least_cost(table, column)
     for i in range(rows):
-        one.own[i] = number[column[i]]
-        one.taken[one.own[i]] = one.own[i] < identities
+        one.assigned[i] = number[column[i]]
+        one.has_row[one.assigned[i]] = one.assigned[i] < identities
 
 
 class Alternatives(NamedTuple):
@@ -186,7 +186,7 @@ class Alternatives(NamedTuple):
     ----------
     change : int64 (alternative, 5)
         Hypothesis, row, its slot, other row, its slot, where they differ from the best assignment; -1 for no row, and
-        for somebody new.
+        for a new person.
     value : float64 (alternative,)
         Score, nats.
     """
@@ -227,26 +227,26 @@ def add_alternatives(
     int
         Number of alternatives.
     """
-    cost, own, slot = one.cost, one.own, one.slot
+    cost, assigned, slot = one.cost, one.assigned, one.slot
     crossed = crossings.cost.size > 0
     if crossed:
-        for i in range(len(own)):
-            score -= crossings_with_others(i, own[i], -1, own, one.last, crossings) / 2.0
+        for i in range(len(assigned)):
+            score -= crossings_with_others(i, assigned[i], -1, assigned, one.last, crossings) / 2.0
     _fill(found, number, h, -1, -1, -1, -1, score)
     number += 1
     for a in range(len(one.doubtful)):
         i = one.doubtful[a]
         for c in range(identities + 1 + a):  # another identity, then that of each doubtful row before
             j = one.doubtful[c - identities - 1] if c > identities else -1
-            to = own[j] if j >= 0 else c
-            loss = cost[i, to] - cost[i, own[i]]
+            to = assigned[j] if j >= 0 else c
+            loss = cost[i, to] - cost[i, assigned[i]]
             if j >= 0:
-                loss = cost[i, to] + cost[j, own[i]] - cost[i, own[i]] - cost[j, to]
-            if loss < most and to != own[i] and (j >= 0 or not one.taken[to]):
+                loss = cost[i, to] + cost[j, assigned[i]] - cost[i, assigned[i]] - cost[j, to]
+            if loss < most and to != assigned[i] and (j >= 0 or not one.has_row[to]):
                 if crossed:
-                    loss += _crossings_of(i, to, j, own[i], own, one.last, crossings)
-                    loss -= _crossings_of(i, own[i], j, to, own, one.last, crossings)
-                _fill(found, number, h, i, slot[to], j, slot[own[i]], score - loss)
+                    loss += _crossings_of(i, to, j, assigned[i], assigned, one.last, crossings)
+                    loss -= _crossings_of(i, assigned[i], j, to, assigned, one.last, crossings)
+                _fill(found, number, h, i, slot[to], j, slot[assigned[i]], score - loss)
                 number += 1
     return number
 
@@ -259,10 +259,10 @@ def _fill(found: Alternatives, number: int, h: int, i: int, to: int, j: int, bac
 
 
 @part
-def _crossings_of(i: int, one: int, j: int, other: int, own: Ints, last: Ints, crossings: Crossings) -> float:
+def _crossings_of(i: int, one: int, j: int, other: int, assigned: Ints, last: Ints, crossings: Crossings) -> float:
     """Cost of crossings of one row or two (-1 for none) as those of identities, with each other and others, nats."""
-    total = crossings_with_others(i, one, j, own, last, crossings)
+    total = crossings_with_others(i, one, j, assigned, last, crossings)
     if j >= 0:
-        total += crossings_with_others(j, other, i, own, last, crossings)
+        total += crossings_with_others(j, other, i, assigned, last, crossings)
         total += crossing(i, one, j, other, last, crossings)
     return total

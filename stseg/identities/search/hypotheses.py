@@ -29,7 +29,7 @@ class Hypotheses(NamedTuple):
     past : int64 (hypothesis, slot)
         Which of the pasts each identity has, `FREE` where there is none.
     bound : int64 (hypothesis, person)
-        Identity of each person whom constraints know, -1 before the first observation.
+        Identity of each person of the constraints, -1 before the first observation.
     """
 
     score: Floats
@@ -37,14 +37,14 @@ class Hypotheses(NamedTuple):
     bound: Ints
 
     @classmethod
-    def empty(cls, number: int, slots: int, known: int) -> Hypotheses:
-        """Room for hypotheses, of nobody."""
-        return cls(np.zeros(number), np.full((number, slots), FREE), np.full((number, known), -1))
+    def empty(cls, number: int, slots: int, people: int) -> Hypotheses:
+        """Room for hypotheses without people."""
+        return cls(np.zeros(number), np.full((number, slots), FREE), np.full((number, people), -1))
 
     def keep(self, chosen: Ints) -> None:
         """Move the chosen hypotheses to the front."""
-        for own in self:
-            own[: len(chosen)] = own[chosen]
+        for column in self:
+            column[: len(chosen)] = column[chosen]
 
 
 @part
@@ -59,22 +59,22 @@ def slots_in_use(past: Ints, number: int) -> int:
 
 @kernel
 def fill_successors(
-    held: Hypotheses, pasts: Pasts, size: int, parent: Ints, slot: Ints, slots: int, first: int, now: float,
-    seen: ObservedRows, rules: Rules, fresh: Hypotheses, later_pasts: Pasts,
+    hypotheses: Hypotheses, pasts: Pasts, size: int, parent: Ints, slot: Ints, slots: int, first: int, now: float,
+    observed: ObservedRows, rules: Rules, successors: Hypotheses, later_pasts: Pasts,
 ) -> int:  # fmt: skip
     """Fill hypotheses with those before and a frame's rows from `first` on, and number their pasts.
 
     Parameters
     ----------
-    held, pasts, size
+    hypotheses, pasts, size
         The hypotheses before, their pasts, and the number of these.
     slots
         Number of slots.
-    first, now, seen
+    first, now, observed
         The frame's first row and its time, and all rows.
     rules
         The constants of the search.
-    fresh, later_pasts
+    successors, later_pasts
         Filled, but for scores.
     """
     rows, number = slot.shape[1], 0
@@ -82,14 +82,14 @@ def fill_successors(
     later[:] = FREE
     now_born[:] = FREE
     for n in range(len(parent)):
-        before, after = held.past[parent[n]], fresh.past[n]
+        before, after = hypotheses.past[parent[n]], successors.past[n]
         after[:] = FREE
         for i in range(rows):
             s = slot[n, i]
             if s < 0:  # a new identity takes the first free slot, or that of who was unseen for longest
                 s = _slot_for_new(before, after, slots, pasts.seconds, now)
                 if now_born[i] < 0:
-                    begin_past(later_pasts, number, first + i, now, seen, rules)
+                    begin_past(later_pasts, number, first + i, now, observed, rules)
                     now_born[i], number = number, number + 1
                 after[s] = now_born[i]
             elif after[s] < 0 and later[before[s], i] >= 0:
@@ -100,7 +100,7 @@ def fill_successors(
                     later[before[s], i] = number
                 else:  # the slot was just taken: the row is that of who took it
                     keep_past(later_pasts, after[s], later_pasts, number)
-                continue_past(later_pasts, number, first + i, now, seen, rules)
+                continue_past(later_pasts, number, first + i, now, observed, rules)
                 after[s], number = number, number + 1
         for s in range(slots):
             if after[s] < 0 <= before[s]:
@@ -108,8 +108,8 @@ def fill_successors(
                     keep_past(pasts, before[s], later_pasts, number)
                     later[before[s], rows], number = number, number + 1
                 after[s] = later[before[s], rows]
-        for person in range(held.bound.shape[1]):
-            fresh.bound[n, person] = held.bound[parent[n], person]
+        for person in range(hypotheses.bound.shape[1]):
+            successors.bound[n, person] = hypotheses.bound[parent[n], person]
     return number
 
 
@@ -178,40 +178,41 @@ def predicted_variance(covariance: Floats, p: int, seconds: float, turn: float) 
 
 
 @part
-def begin_past(pasts: Pasts, p: int, r: int, now: float, seen: ObservedRows, rules: Rules) -> None:
-    """Make the p-th past that of somebody whom observation r is the first of."""
+def begin_past(pasts: Pasts, p: int, r: int, now: float, observed: ObservedRows, rules: Rules) -> None:
+    """Begin the p-th past with observation r."""
     pasts.name[p] = pasts.last[p] = r
     pasts.seconds[p] = now
-    pasts.state[p, 0], pasts.state[p, 1] = seen.ground[r, 0], seen.ground[r, 1]
+    pasts.state[p, 0], pasts.state[p, 1] = observed.ground[r, 0], observed.ground[r, 1]
     pasts.state[p, 2] = pasts.state[p, 3] = 0.0
-    pasts.covariance[p, 0], pasts.covariance[p, 1], pasts.covariance[p, 2] = seen.variance[r], 0.0, rules.pace
+    pasts.covariance[p, 0], pasts.covariance[p, 1], pasts.covariance[p, 2] = observed.variance[r], 0.0, rules.pace
     for d in range(pasts.precision.shape[1]):
-        pasts.precision[p, d], pasts.information[p, d] = seen.precision[r, d], seen.information[r, d]
-        pasts.evidence[p, d] = size_evidence(seen.precision[r, d], seen.information[r, d], rules.spread[d])
+        pasts.precision[p, d], pasts.information[p, d] = observed.precision[r, d], observed.information[r, d]
+        pasts.evidence[p, d] = size_evidence(observed.precision[r, d], observed.information[r, d], rules.spread[d])
 
 
 @part
-def keep_past(pasts: Pasts, p: int, fresh: Pasts, q: int) -> None:
+def keep_past(pasts: Pasts, p: int, others: Pasts, q: int) -> None:
     """Copy the p-th past to the q-th of others."""
-    fresh.name[q], fresh.last[q], fresh.seconds[q] = pasts.name[p], pasts.last[p], pasts.seconds[p]
+    others.name[q], others.last[q], others.seconds[q] = pasts.name[p], pasts.last[p], pasts.seconds[p]
     for k in range(4):
-        fresh.state[q, k] = pasts.state[p, k]
+        others.state[q, k] = pasts.state[p, k]
     for k in range(3):
-        fresh.covariance[q, k] = pasts.covariance[p, k]
+        others.covariance[q, k] = pasts.covariance[p, k]
     for d in range(pasts.precision.shape[1]):
-        fresh.precision[q, d], fresh.information[q, d] = pasts.precision[p, d], pasts.information[p, d]
-        fresh.evidence[q, d] = pasts.evidence[p, d]
+        others.precision[q, d], others.information[q, d] = pasts.precision[p, d], pasts.information[p, d]
+        others.evidence[q, d] = pasts.evidence[p, d]
 
 
 @part
-def continue_past(pasts: Pasts, q: int, r: int, now: float, seen: ObservedRows, rules: Rules) -> None:
+def continue_past(pasts: Pasts, q: int, r: int, now: float, observed: ObservedRows, rules: Rules) -> None:
     """Continue the q-th past by observation r."""
-    correct_place(pasts.state, pasts.covariance, q, now - pasts.seconds[q], seen.ground, seen.variance, r, rules.turn)
+    since = now - pasts.seconds[q]
+    correct_place(pasts.state, pasts.covariance, q, since, observed.ground, observed.variance, r, rules.turn)
     pasts.last[q], pasts.seconds[q] = r, now
     for d in range(pasts.precision.shape[1]):
-        if seen.precision[r, d] != 0.0:
-            pasts.precision[q, d] += seen.precision[r, d]
-            pasts.information[q, d] += seen.information[r, d]
+        if observed.precision[r, d] != 0.0:
+            pasts.precision[q, d] += observed.precision[r, d]
+            pasts.information[q, d] += observed.information[r, d]
             pasts.evidence[q, d] = size_evidence(pasts.precision[q, d], pasts.information[q, d], rules.spread[d])
 
 
@@ -243,13 +244,14 @@ class Rules(NamedTuple):
     least
         Least evidence of a place against an identity, nats.
     longest
-        Longest time out of sight, seconds.
+        Longest time unseen, seconds.
     alternative_loss, beam_loss
         Greatest loss of an alternative in one frame, and of a hypothesis against the best, nats.
     turn, pace
-        Variances of the velocity gained in a second, and of that of somebody new.
+        Variances of the velocity gained in a second, and of that of a new person.
     spread, most_against : float64 (size,)
-        Variance of each size among people, and the greatest evidence of a look for somebody new, nats times variance.
+        Variance of each size among people, and greatest evidence of an appearance for a new person, nats times
+        variance.
     """
 
     birth: float
