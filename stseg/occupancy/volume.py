@@ -7,7 +7,6 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import logit
 
 from stseg.arrays import Boxes, Bytes, Flags, Floats, Ints, Singles, ViewEvidence
 from stseg.bodies.box_likelihood import box_likelihood
@@ -25,14 +24,13 @@ from stseg.occupancy.box_planes import CellsByPerson, ViewBoxes, fill_fit, fill_
 from stseg.occupancy.clutter import clutter, clutter_side, clutter_weights
 from stseg.occupancy.error_rate_estimate import ErrorRateEstimate, cells_per_person, fill_counts
 from stseg.occupancy.fusion import ErrorRates, FrameTerms, Sums, log_odds_terms
+from stseg.occupancy.revision import NEAR_PRIOR, prior_log_odds
 from stseg.occupancy.shown_cells import CellTables, ShownCells, mark_columns, mark_map
 from stseg.occupancy.visible_cells import PixelAssignment, fill_map, fill_occupied, fill_share, mark_people
 from stseg.records.people import Explanation
 from stseg.records.sparse_volume import SparseVolume
 
 _MAP_STEP = 8
-_NEAR_PRIOR = 0.0
-"""Prior log-odds of a cell within reach of a person, nats."""
 _UNOCCLUDED = 0.99
 """Least visible share of a body that counts as unoccluded."""
 
@@ -72,7 +70,7 @@ class Occupancy:
         self.views: Bytes = self.sampling.views()
         self.heights = np.asarray(body.heights)
         self.height_mean, self.height_spread = body.height_mean, body.height_spread
-        self.prior = float(logit(config.occupied_share))
+        self.prior = prior_log_odds(config)
         self._means = CellMeans(self.sampling)
         self._tables = CellTables(self.sampling.footprint)
         self._pillars = [self._pillars_of(view) if kind == "boxes" else None for view, kind in enumerate(kinds)]
@@ -213,7 +211,7 @@ class Occupancy:
 
     def _volume(self, fused: _Fused) -> SparseVolume:
         cell, sets = fused.cells.cell, self._tables.sets
-        total = fused.sums.total(fused.cells.near, self.config.effective_observations, (self.prior, _NEAR_PRIOR))
+        total = fused.sums.total(fused.cells.near, self.config.effective_observations, (self.prior, NEAR_PRIOR))
         empty = np.where(sets.seen.any(1), total[len(cell) :], np.float32(np.nan))
         return SparseVolume(sets.of_cell, empty, cell, total[: len(cell)])
 

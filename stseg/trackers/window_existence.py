@@ -8,16 +8,14 @@ from functools import cached_property
 from itertools import count
 
 import numpy as np
-from scipy.special import logit
 
 from stseg.arrays import Flags, Floats, Ints
 from stseg.config import Config
 from stseg.geometry import Rig
-from stseg.geometry.nearest_person import nearest_person
 from stseg.graphcut.solvers import Solver
+from stseg.occupancy.revision import revised_volume
 from stseg.records.border import Border
 from stseg.records.people import People
-from stseg.records.sparse_volume import SparseVolume
 from stseg.segmentation.candidate_links import LinkModel, WindowCandidates
 from stseg.segmentation.existence import Existence, ExistenceModel
 from stseg.trackers.protocol import FusedFrame
@@ -27,8 +25,6 @@ _SURE = 12.0
 """Least log-odds of people whom the window alone finds, nats: 40 m x 40 m have e^12 places and heights to try."""
 _FOUND_BY_WINDOW = 1 << 30
 """First number of their tracks: those of the filter count from 1."""
-_OCCUPIED = 1.0
-"""Least log-odds of the cells inside a body that the window holds to be real, nats."""
 
 
 @dataclass(frozen=True)
@@ -61,12 +57,11 @@ class WindowExistence:
     """
 
     def __init__(self, rig: Rig, config: Config, solver: Solver) -> None:
-        self.grid, self.solver = rig.grid, solver
-        self.radius, self.width = config.occupancy.person_radius, config.body.width_mean
-        self.prior = -float(logit(config.occupancy.occupied_share))
+        self.grid, self.solver, self.config = rig.grid, solver, config
         patience, prior = config.tracking.interpolation_gap, config.detection.prior_log_odds
         links = LinkModel(rig.frame_rate, patience, prior, config.motion, config.body)
-        self.model = ExistenceModel(links, self.radius, Border.of(rig), config.detection, config.body)
+        radius = config.occupancy.person_radius
+        self.model = ExistenceModel(links, radius, Border.of(rig), config.detection, config.body)
         self._numbers = count(_FOUND_BY_WINDOW)
 
     def revised(self, frames: Sequence[TrackedFrame], first: int, stop: int) -> list[TrackedFrame]:
@@ -92,22 +87,10 @@ class WindowExistence:
         people, ghosts = _at(every, np.flatnonzero(real)), _at(every, np.flatnonzero(~real))
         if not real[:number].all() or real[number:].any():
             added = _at(every, number + np.flatnonzero(real[number:]))
-            fused = replace(fused, made=self._volume(fused, people, added))
+            before, volume = fused.people.ground, fused.volume
+            made = revised_volume(volume, before, people.ground, added, self.grid, self.config)
+            fused = replace(fused, made=made)
         return TrackedFrame(replace(fused, people=people, ghosts=ghosts), tracks[real])
-
-    def _volume(self, fused: FusedFrame, people: People, added: People) -> SparseVolume:
-        """Log-odds with the prior of the revised people, and at least the odds of a body inside those added."""
-        ground = self.grid.ground
-        before = nearest_person(ground, fused.people.ground, self.radius) >= 0
-        now = nearest_person(ground, people.ground, self.radius) >= 0
-        body = nearest_person(ground, added.ground, self.width / 2)
-        places = np.flatnonzero((before != now) | (body >= 0))
-        before, now, body = before.reshape(-1)[places], now.reshape(-1)[places], body.reshape(-1)[places]
-        volume = fused.volume
-        log_odds = volume.at(places) + (self.prior * (now.astype(np.float32) - before)).astype(np.float32)
-        tall = np.append(added.height, -1.0)[body] >= self.grid.heights[:, None]
-        revised = np.where(tall & (body >= 0), np.fmax(log_odds, np.float32(_OCCUPIED)), log_odds)
-        return volume.with_values(places, revised)
 
 
 def _candidates(frames: Sequence[TrackedFrame]) -> WindowCandidates:

@@ -45,7 +45,7 @@ STAGES: dict[str, set[str]] = {
 """In the order of the data: what each may import besides the foundation. What two share is a record of `records`."""
 
 BESIDE = {
-    "trackers": {"segmentation", "tracking", SOLVER},
+    "trackers": {"occupancy", "segmentation", "tracking", SOLVER},
     "baselines": {"trackers", "tracking", "occupancy"},
     "evaluation": {"errors", "arrays"},
     "measures": {"errors", "arrays", "geometry"},
