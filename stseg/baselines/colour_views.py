@@ -39,10 +39,10 @@ def colour_views(observed: FrameObservations, tracker: str, frame: int) -> list[
         _view(observation, evidence)
         for observation, evidence in zip(observed.observations, observed.evidence, strict=True)
     ]
-    seen = [observation for observation in observed.observations if observation is not None]
-    if seen and not any(_is_colour(observation) for observation in seen):
+    observations = [observation for observation in observed.observations if observation is not None]
+    if observations and not any(_is_colour(observation) for observation in observations):
         raise SourceError(
-            f"--tracker {tracker}", f"frame {frame}", f"{_kinds(seen)} and no colour",
+            f"--tracker {tracker}", f"frame {frame}", f"{_kinds(observations)} and no colour",
             "a camera that delivers colour images: this tracker knows people by their clothes",
         )  # fmt: skip
     return views
@@ -60,8 +60,8 @@ def _is_colour(observation: Observation) -> bool:
     return isinstance(observation, np.ndarray) and observation.ndim == 3
 
 
-def _kinds(seen: Sequence[Observation]) -> str:
-    kinds = {"boxes" if isinstance(one, Boxes) else _dtype_kind(one) for one in seen}
+def _kinds(observations: Sequence[Observation]) -> str:
+    kinds = {"boxes" if isinstance(one, Boxes) else _dtype_kind(one) for one in observations}
     return " and ".join(sorted(kinds))
 
 

@@ -8,7 +8,7 @@ from scipy.optimize import linear_sum_assignment
 from stseg.arrays import Flags, Floats, Ints
 
 _PAIR = 1e3  # reward of a pair, metres: more than the distances of a whole frame
-_KEPT = 1e6  # reward of a continued pair, metres: more than all pairs of a frame
+_CONTINUATION_REWARD = 1e6  # reward of a continued pair, metres: more than all pairs of a frame
 
 
 def distances(person_ground: Floats, track_ground: Floats) -> Floats:
@@ -41,10 +41,10 @@ def match(distance: Floats, gate: float, kept: Flags | None = None) -> tuple[Int
     int64 (k,), int64 (k,)
         Rows and columns of the pairs, rows ascending.
     """
-    near = distance <= gate
-    gain = np.where(near, _PAIR + gate - distance, 0.0)
+    within_gate = distance <= gate
+    gain = np.where(within_gate, _PAIR + gate - distance, 0.0)
     if kept is not None:
-        gain += np.where(near & kept, _KEPT, 0.0)
+        gain += np.where(within_gate & kept, _CONTINUATION_REWARD, 0.0)
     rows, columns = linear_sum_assignment(-gain)
-    paired = near[rows, columns]
+    paired = within_gate[rows, columns]
     return np.asarray(rows[paired], np.int64), np.asarray(columns[paired], np.int64)

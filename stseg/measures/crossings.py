@@ -22,8 +22,8 @@ def line_crossings(line: Line, trajectory: Rows, frame_rate: float, band: float)
     them: a person who stands on it does not cross it again and again.
     """
     found = []
-    for own in (stay for track in by_track(trajectory) for stay in stays(track, frame_rate)):
-        ground = np.stack([own["x"], own["y"]], -1)
+    for stay in (stay for track in by_track(trajectory) for stay in stays(track, frame_rate)):
+        ground = np.stack([stay["x"], stay["y"]], -1)
         kept: list[tuple[int, float, int]] = []
         for row, share, side in _intersections(line, ground):
             if kept and kept[-1][2] != side and not _far(line, ground[kept[-1][0] + 1 : row + 1], band):
@@ -31,13 +31,13 @@ def line_crossings(line: Line, trajectory: Rows, frame_rate: float, band: float)
             else:
                 kept.append((row, share, side))
         for row, share, side in kept:
-            step = own["frame"][row + 1] - own["frame"][row]
-            frame = own["frame"][row] + share * step
+            step = stay["frame"][row + 1] - stay["frame"][row]
+            frame = stay["frame"][row] + share * step
             x, y = ground[row] + share * (ground[row + 1] - ground[row])
             speed = float(np.hypot(*(ground[row + 1] - ground[row]))) * frame_rate / step
             reached = "left" if side > 0 else "right"
             place = (round(float(x), 4), round(float(y), 4), round(speed, 4))
-            found.append((line.name, int(np.ceil(frame)), frame / frame_rate, int(own["id"][0]), reached, *place))
+            found.append((line.name, int(np.ceil(frame)), frame / frame_rate, int(stay["id"][0]), reached, *place))
     return np.sort(np.array(found, CROSSING), order=["time", "id"])
 
 

@@ -77,12 +77,12 @@ def measure_tracks(
     people = [zone_counts(zone, trajectory, frames, frame_rate) for zone in areas.zones]
     visits = [zone_visits(zone, trajectory, frame_rate, patience) for zone in areas.zones]
     crossings = [line_crossings(line, trajectory, frame_rate, band) for line in areas.lines]
-    zones = [_zone(z.name, z.area, own, stays) for z, own, stays in zip(areas.zones, people, visits, strict=True)]
+    zones = [_zone(z.name, z.area, count, stays) for z, count, stays in zip(areas.zones, people, visits, strict=True)]
     minutes = max(len(frames) / frame_rate / 60, 1e-9)
     lines = [
-        (line.name, (own["to"] == "left").sum(), (own["to"] == "right").sum(), len(own) / minutes,
-         _of(own["speed"], np.mean))
-        for line, own in zip(areas.lines, crossings, strict=True)
+        (line.name, (crossed["to"] == "left").sum(), (crossed["to"] == "right").sum(), len(crossed) / minutes,
+         _of(crossed["speed"], np.mean))
+        for line, crossed in zip(areas.lines, crossings, strict=True)
     ]  # fmt: skip
     return Measures(
         np.array(zones, ZONE),

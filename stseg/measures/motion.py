@@ -25,26 +25,26 @@ _STANDING = 0.2
 def track_measures(trajectory: Rows, frame_rate: float) -> Rows:
     """Duration, distance and speeds of every track while it is there, TRACK_MEASURE (n,)."""
     rows = []
-    for own in by_track(trajectory):
-        speed, frame = np.hypot(*velocities(own, frame_rate).T), own["frame"]
-        there = stays(own, frame_rate)
-        seconds = sum(int(stay["frame"][-1] - stay["frame"][0] + 1) for stay in there) / frame_rate
-        distance = sum(_distance(stay, frame_rate) for stay in there)
+    for track in by_track(trajectory):
+        speed, frame = np.hypot(*velocities(track, frame_rate).T), track["frame"]
+        present = stays(track, frame_rate)
+        seconds = sum(int(stay["frame"][-1] - stay["frame"][0] + 1) for stay in present) / frame_rate
+        distance = sum(_distance(stay, frame_rate) for stay in present)
         speeds = (speed.mean(), np.median(speed), speed.max(), (speed < _STANDING).mean())
-        rows.append((own["id"][0], frame[0], frame[-1], seconds, distance, *speeds, own["score"].mean()))
+        rows.append((track["id"][0], frame[0], frame[-1], seconds, distance, *speeds, track["score"].mean()))
     return np.array(rows, TRACK_MEASURE)
 
 
-def _distance(own: Rows, frame_rate: float) -> float:
+def _distance(track: Rows, frame_rate: float) -> float:
     """Way of a track in steps of half a second, metres."""
-    every = np.unique(np.append(np.arange(0, len(own), max(1, round(frame_rate / 2))), len(own) - 1))
-    return float(np.hypot(*np.diff(_ground(own)[every], axis=0).T).sum())
+    sampled = np.unique(np.append(np.arange(0, len(track), max(1, round(frame_rate / 2))), len(track) - 1))
+    return float(np.hypot(*np.diff(_ground(track)[sampled], axis=0).T).sum())
 
 
-def velocities(own: Rows, frame_rate: float) -> Floats:
+def velocities(track: Rows, frame_rate: float) -> Floats:
     """Velocity of one track at each row over one second around it, metres a second, float64 (n, 2)."""
-    ground, half = _ground(own), max(1, round(frame_rate / 2))
-    frame = own["frame"].astype(float)
+    ground, half = _ground(track), max(1, round(frame_rate / 2))
+    frame = track["frame"].astype(float)
     before, after = np.clip(frame - half, frame[0], frame[-1]), np.clip(frame + half, frame[0], frame[-1])
     span = np.maximum(after - before, 1) / frame_rate
     moved = [np.interp(after, frame, axis) - np.interp(before, frame, axis) for axis in ground.T]
@@ -54,13 +54,15 @@ def velocities(own: Rows, frame_rate: float) -> Floats:
 def spacings(trajectory: Rows, frame_rate: float) -> Rows:
     """Distances between people, SPACING (n,)."""
     table, rows = trajectory[np.argsort(trajectory["frame"], kind="stable")], []
-    for own in np.split(table, np.flatnonzero(np.diff(table["frame"])) + 1):
-        if len(own) > 1:
-            ground = _ground(own)
+    for people in np.split(table, np.flatnonzero(np.diff(table["frame"])) + 1):
+        if len(people) > 1:
+            ground = _ground(people)
             away = np.hypot(*np.moveaxis(ground[:, None] - ground[None], -1, 0))
             np.fill_diagonal(away, np.inf)
             nearest = away.min(axis=1)
-            rows.append((own["frame"][0], own["frame"][0] / frame_rate, len(own), nearest.min(), nearest.mean()))
+            rows.append(
+                (people["frame"][0], people["frame"][0] / frame_rate, len(people), nearest.min(), nearest.mean())
+            )
     return np.array(rows, SPACING)
 
 
@@ -71,7 +73,7 @@ def flow_field(
     wide, tall = (max(1, int(np.ceil((high - low) / side - 1e-9))) for low, high in (x, y))
     tracks = by_track(trajectory)
     table = np.concatenate(tracks) if tracks else trajectory[:0]
-    velocity = np.concatenate([np.zeros((0, 2)), *(velocities(own, frame_rate) for own in tracks)])
+    velocity = np.concatenate([np.zeros((0, 2)), *(velocities(track, frame_rate) for track in tracks)])
     column, row = (np.floor((table[name] - low) / side) for name, low in (("x", x[0]), ("y", y[0])))
     inside = (column >= 0) & (column < wide) & (row >= 0) & (row < tall)
     index = (row * wide + column)[inside].astype(np.int64)
@@ -89,5 +91,5 @@ def flow_field(
     return cells
 
 
-def _ground(own: Rows) -> Floats:
-    return np.stack([own["x"], own["y"]], -1)
+def _ground(track: Rows) -> Floats:
+    return np.stack([track["x"], track["y"]], -1)

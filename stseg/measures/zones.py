@@ -28,9 +28,9 @@ def zone_counts(zone: Zone, trajectory: Rows, frames: Ints, frame_rate: float) -
     A track exists with probability 1 / (1 + exp(-score)) of its row, independently of the others; the count's mean and
     variance are the sums of p and p (1 - p).
     """
-    own = trajectory[zone.contains(np.stack([trajectory["x"], trajectory["y"]], -1))]
-    index = np.searchsorted(frames, own["frame"])
-    exists = 1 / (1 + np.exp(-np.clip(own["score"].astype(float), -50, 50)))
+    inside = trajectory[zone.contains(np.stack([trajectory["x"], trajectory["y"]], -1))]
+    index = np.searchsorted(frames, inside["frame"])
+    exists = 1 / (1 + np.exp(-np.clip(inside["score"].astype(float), -50, 50)))
     rows = np.zeros(len(frames), COUNT)
     rows["frame"], rows["time"], rows["zone"] = frames, frames / frame_rate, zone.name
     rows["people"] = np.bincount(index, minlength=len(frames))
@@ -43,14 +43,14 @@ def zone_counts(zone: Zone, trajectory: Rows, frames: Ints, frame_rate: float) -
 def zone_visits(zone: Zone, trajectory: Rows, frame_rate: float, patience: float) -> Rows:
     """Stays of tracks in a zone, VISIT (n,), by start; absences of up to `patience` seconds do not end a stay."""
     visits = []
-    for own in by_track(trajectory):
-        inside = zone.contains(np.stack([own["x"], own["y"]], -1))
-        starts, stops = _spells(inside, own["frame"], round(patience * frame_rate))
+    for track in by_track(trajectory):
+        inside = zone.contains(np.stack([track["x"], track["y"]], -1))
+        starts, stops = _spells(inside, track["frame"], round(patience * frame_rate))
         for start, stop in zip(starts.tolist(), stops.tolist(), strict=True):
-            first, last = int(own["frame"][start]), int(own["frame"][stop - 1])
+            first, last = int(track["frame"][start]), int(track["frame"][stop - 1])
             dwell = (last - first + 1) / frame_rate
             visits.append(
-                (zone.name, int(own["id"][0]), first, last, first / frame_rate, dwell, start > 0, stop < len(own))
+                (zone.name, int(track["id"][0]), first, last, first / frame_rate, dwell, start > 0, stop < len(track))
             )
     return np.sort(np.array(visits, VISIT), order=["first", "id"])
 
@@ -58,12 +58,12 @@ def zone_visits(zone: Zone, trajectory: Rows, frame_rate: float, patience: float
 def by_track(trajectory: Rows) -> list[Rows]:
     """The rows of each track in order of time."""
     table = trajectory[np.lexsort((trajectory["frame"], trajectory["id"]))]
-    return [own for own in np.split(table, np.flatnonzero(np.diff(table["id"])) + 1) if len(own)]
+    return [track for track in np.split(table, np.flatnonzero(np.diff(table["id"])) + 1) if len(track)]
 
 
-def stays(own: Rows, frame_rate: float) -> list[Rows]:
-    """The rows of one track, parted where its person was away: nobody knows the way from the exit to the entrance."""
-    return np.split(own, np.flatnonzero(np.diff(own["frame"]) > AWAY * frame_rate) + 1)
+def stays(track: Rows, frame_rate: float) -> list[Rows]:
+    """The rows of one track, parted where its person was away: the way from the exit to the entrance is unknown."""
+    return np.split(track, np.flatnonzero(np.diff(track["frame"]) > AWAY * frame_rate) + 1)
 
 
 def _spells(inside: Flags, frame: Ints, patience: int) -> tuple[Ints, Ints]:

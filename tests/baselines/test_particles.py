@@ -272,10 +272,10 @@ def test_appearances_fill_and_are_renewed_slowly() -> None:
     rng = np.random.default_rng(0)
     red, blue = np.full((300, 3), (200, 10, 90), np.uint8), np.full((300, 3), (10, 10, 90), np.uint8)
     one = Appearance.unknown().learned(1, red[:10], 0.1, rng)
-    assert one.known.tolist() == [0, 0, 0]  # too few
+    assert one.usable_samples.tolist() == [0, 0, 0]  # too few
     assert one.reference.sum() == 0
     full = one.learned(1, red, 0.1, rng)
-    assert full.known.tolist() == [0, SAMPLES, 0]
+    assert full.usable_samples.tolist() == [0, SAMPLES, 0]
     assert full.reference[1].max() == 1
     later = full
     for _ in range(5):

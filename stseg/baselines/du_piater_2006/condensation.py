@@ -28,7 +28,10 @@ def condense(
     rngs: Sequence[np.random.Generator],
 ) -> list[Star]:
     """One frame of all targets without messages between views; parameters of `propagate`."""
-    return [_alone(star, seen, motion, config, rng) for star, seen, rng in zip(stars, likelihoods, rngs, strict=True)]
+    return [
+        _alone(star, likelihood, motion, config, rng)
+        for star, likelihood, rng in zip(stars, likelihoods, rngs, strict=True)
+    ]
 
 
 def _alone(
@@ -41,29 +44,34 @@ def _alone(
     prediction = Prediction.of(star.ground, np.eye(2), motion)
     leaves = grow(star, likelihoods, prediction, config.particles)
     views: list[Particles | None] = []
-    for leaf, own in zip(leaves, star.views, strict=True):
+    for leaf, particles in zip(leaves, star.views, strict=True):
         if leaf:
             leaf.follow(rng)
             views.append(leaf.settled(np.ones(config.particles), rng))
         else:
-            views.append(own and _unseen(own, motion))
+            views.append(particles and _unseen(particles, motion))
     seeing = [(leaf, view) for leaf, view in zip(leaves, views, strict=True) if leaf and view]
-    visibility = np.array([float(leaf.seen.sum()) if leaf else 0.0 for leaf in leaves])
+    visibility = np.array([float(leaf.visible_belief.sum()) if leaf else 0.0 for leaf in leaves])
     ground = _fused(seeing) if seeing else prediction.settled(prediction.centre, prediction.weight, rng)
     return Star(ground, tuple(views), visibility)
 
 
-def _unseen(own: Particles, motion: Motion) -> Particles:
+def _unseen(particles: Particles, motion: Motion) -> Particles:
     """Particles of a view that cannot show the target: moved at their velocities, as no message corrects them."""
-    return Particles(own.place + motion.seconds * own.velocity, own.velocity, own.weight)
+    return Particles(particles.place + motion.seconds * particles.velocity, particles.velocity, particles.weight)
 
 
 def _fused(seeing: Sequence[tuple[Leaf, Particles]]) -> Particles:
     """All views' particles on the ground, each view weighted by the inverse of the ground area of a pixel."""
     place = np.concatenate([leaf.mapped for leaf, _ in seeing])
     velocity = np.concatenate(
-        [np.einsum("nij,nj->ni", leaf.likelihood.view.ground_slope(own.place), own.velocity) for leaf, own in seeing]
+        [
+            np.einsum("nij,nj->ni", leaf.likelihood.view.ground_slope(particles.place), particles.velocity)
+            for leaf, particles in seeing
+        ]
     )
     resolution = [1 / np.sqrt(np.linalg.det(leaf.covariance).mean()) for leaf, _ in seeing]
-    weight = np.concatenate([share * own.weight for share, (_, own) in zip(resolution, seeing, strict=True)])
+    weight = np.concatenate(
+        [share * particles.weight for share, (_, particles) in zip(resolution, seeing, strict=True)]
+    )
     return Particles(place, velocity, weight / weight.sum())

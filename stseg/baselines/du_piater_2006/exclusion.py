@@ -20,27 +20,27 @@ from stseg.arrays import Floats
 from stseg.baselines.du_piater_2006.particles import Particles
 from stseg.kernels.accelerate import kernel
 
-_FAR = 6.0
+_CUTOFF = 6.0
 """Distance of two targets' means beyond which the factor is 1, in s and in their own standard deviations."""
 
 
-def exclusion(ground: Floats, others: Sequence[Particles], apart: float) -> Floats:
-    """Product of other targets' factors at ground points (n, 2), float64 (n,), 0..1; `apart` is s, metres."""
+def exclusion(ground: Floats, others: Sequence[Particles], distance: float) -> Floats:
+    """Product of other targets' factors at ground points (n, 2), float64 (n,), 0..1; `distance` is s, metres."""
     message = np.ones(len(ground))
-    low, high = ground.min(0) - _FAR * apart, ground.max(0) + _FAR * apart
+    low, high = ground.min(0) - _CUTOFF * distance, ground.max(0) + _CUTOFF * distance
     for other in others:
-        near = ((other.place >= low) & (other.place <= high)).all(1)
-        if near.any():
-            fill_exclusion(ground, other.place[near], other.weight[near], apart, message)
+        overlapping = ((other.place >= low) & (other.place <= high)).all(1)
+        if overlapping.any():
+            fill_exclusion(ground, other.place[overlapping], other.weight[overlapping], distance, message)
     return message
 
 
 @kernel
-def fill_exclusion(ground: Floats, place: Floats, weight: Floats, apart: float, message: Floats) -> None:
+def fill_exclusion(ground: Floats, place: Floats, weight: Floats, distance: float, message: Floats) -> None:
     """Multiply the message (n,) by that of one other target, with particles at places (m, 2), at ground (n, 2)."""
     for n in range(len(ground)):
         overlap = 0.0
         for m in range(len(place)):
             x, y = ground[n, 0] - place[m, 0], ground[n, 1] - place[m, 1]
-            overlap += weight[m] * np.exp(-0.5 * (x * x + y * y) / apart**2)
+            overlap += weight[m] * np.exp(-0.5 * (x * x + y * y) / distance**2)
         message[n] *= max(1.0 - overlap, 0.0)

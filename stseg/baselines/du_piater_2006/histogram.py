@@ -16,7 +16,7 @@ BINS = 110
 """10 x 10 of hue and saturation, 10 of value."""
 PARTS = 3
 """Thirds of a body, from the head down."""
-_STEPS = 10
+_BINS_PER_AXIS = 10
 _GREY, _DARK = 0.1, 0.2  # saturation and value, 0..1, below which hue means nothing (Perez et al.)
 _LEVELS = 32  # of each channel of the colour table
 _LATTICE = (9, 24)  # points across and along an ellipse
@@ -34,11 +34,13 @@ def hsv_bins() -> Bytes:
     sector = np.select(
         [value == red, value == green], [(green - blue) / safe % 6, (blue - red) / safe + 2], (red - green) / safe + 4
     )
-    hue_step = np.minimum((sector / 6 * _STEPS).astype(int), _STEPS - 1)
-    saturation_step = np.minimum((saturation * _STEPS).astype(int), _STEPS - 1)
-    value_step = np.minimum((value * _STEPS).astype(int), _STEPS - 1)
+    hue_step = np.minimum((sector / 6 * _BINS_PER_AXIS).astype(int), _BINS_PER_AXIS - 1)
+    saturation_step = np.minimum((saturation * _BINS_PER_AXIS).astype(int), _BINS_PER_AXIS - 1)
+    value_step = np.minimum((value * _BINS_PER_AXIS).astype(int), _BINS_PER_AXIS - 1)
     coloured = (saturation > _GREY) & (value > _DARK)
-    chosen = np.where(coloured, hue_step * _STEPS + saturation_step, _STEPS * _STEPS + value_step)
+    chosen = np.where(
+        coloured, hue_step * _BINS_PER_AXIS + saturation_step, _BINS_PER_AXIS * _BINS_PER_AXIS + value_step
+    )
     return np.asarray(chosen, np.uint8)
 
 

@@ -31,7 +31,7 @@ class Leaf:
         The particles, ideal pixels.
     mapped, covariance : float64 (m, 2), (m, 2, 2)
         The same on the ground, metres, square metres.
-    belief, seen : float64 (m,)
+    belief, visible_belief : float64 (m,)
         Weights of the belief before any message, whose sum is 1; and the part of each for a visible target.
     """
 
@@ -42,7 +42,7 @@ class Leaf:
         self.noise = likelihood.config.foot_noise * float(tall if np.isfinite(tall) else likelihood.view.camera.size[1])
         self.place = self.mapped = np.zeros((0, 2))
         self.covariance = np.zeros((0, 2, 2))
-        self.belief = self.seen = np.zeros(0)
+        self.belief = self.visible_belief = np.zeros(0)
 
     def follow(self, rng: np.random.Generator) -> None:
         """Draw the particles from the view's own prediction."""
@@ -72,7 +72,7 @@ class Leaf:
         visible, share = self.likelihood.likelihood(self.mapped)
         total = float(importance @ (visible + self.likelihood.hidden))
         self.belief = importance * (visible + self.likelihood.hidden) / total
-        self.seen = importance * visible * share / total
+        self.visible_belief = importance * visible * share / total
 
     def potential(self, ground: Floats, outlier: Outlier) -> Potential:
         """The potential between ground particles (n, 2) and this view's."""

@@ -73,14 +73,14 @@ class Potential:
         fill_inlier(ground, mapped, covariance, inlier)
         return cls(inlier, outlier.density(ground), outlier)
 
-    def to_ground(self, seen: Floats) -> Floats:
+    def to_ground(self, visible_belief: Floats) -> Floats:
         """Message from the view to each ground particle, float64 (n,); seen (m,) are its weights a."""
-        share, visible = self.outlier.share, float(seen.sum())
-        message = (1 - share) * (self.inlier @ seen) + share * visible * self.stray
+        share, visible = self.outlier.share, float(visible_belief.sum())
+        message = (1 - share) * (self.inlier @ visible_belief) + share * visible * self.stray
         return np.asarray(message + (1 - visible) * self.outlier.flat)
 
     def to_view(self, weight: Floats) -> Floats:
-        """Message from the ground, whose particles weigh (n,), to each particle of the view, float64 (m,)."""
+        """Message from the ground, where particles weigh (n,), to each particle of the view, float64 (m,)."""
         share = self.outlier.share
         return np.asarray((1 - share) * (weight @ self.inlier) + share * float(weight @ self.stray))
 

@@ -54,10 +54,10 @@ class Star:
 
     def place(self, j: int, view: StarView, prediction: Prediction) -> Floats:
         """Place predicted by view j if it follows the target, else by the ground, metres, float64 (2,)."""
-        own = self.views[j]
-        if own is None:
+        particles = self.views[j]
+        if particles is None:
             return prediction.mean
-        next_pixel = own.mean + prediction.motion.seconds * own.weight @ own.velocity
+        next_pixel = particles.mean + prediction.motion.seconds * particles.weight @ particles.velocity
         return np.asarray(view.to_ground(next_pixel[None])[0])
 
 
@@ -113,7 +113,9 @@ class Rounds:
         self.potentials = [leaf.potential(self.ground, self.outlier) if leaf else None for leaf in self.leaves]
         alone = self._importance(proposed) * exclusion(self.ground, others, self.config.minimum_distance)
         self.to_ground = [
-            potential.to_ground(leaf.seen) if leaf and potential else np.full(len(self.ground), self.outlier.flat)
+            potential.to_ground(leaf.visible_belief)
+            if leaf and potential
+            else np.full(len(self.ground), self.outlier.flat)
             for leaf, potential in zip(self.leaves, self.potentials, strict=True)
         ]
         self.to_view = [self._product(alone, j) for j in range(len(self.leaves))]
@@ -123,16 +125,16 @@ class Rounds:
 
     def _drawn(self) -> tuple[Floats, int]:
         """Ground particles, the last of them drawn from the views' messages, and the number of those."""
-        count, seen = self.config.particles, [leaf.seen if leaf else np.zeros(0) for leaf in self.leaves]
-        proposed = count // 2 if sum(float(s.sum()) for s in seen) > 0 else 0
+        count, beliefs = self.config.particles, [leaf.visible_belief if leaf else np.zeros(0) for leaf in self.leaves]
+        proposed = count // 2 if sum(float(s.sum()) for s in beliefs) > 0 else 0
         parts = [self.prior.draw(count - proposed, self.rng)]
         if proposed:
-            chosen = systematic(np.concatenate(seen), proposed, self.rng.random())
-            starts = np.cumsum([0, *(len(s) for s in seen)])
+            chosen = systematic(np.concatenate(beliefs), proposed, self.rng.random())
+            starts = np.cumsum([0, *(len(s) for s in beliefs)])
             for leaf, start, stop in zip(self.leaves, starts[:-1], starts[1:], strict=True):
-                own = chosen[(chosen >= start) & (chosen < stop)] - start
-                if leaf and len(own):
-                    parts.append(leaf.draw_ground(own, self.rng))
+                drawn = chosen[(chosen >= start) & (chosen < stop)] - start
+                if leaf and len(drawn):
+                    parts.append(leaf.draw_ground(drawn, self.rng))
         return np.concatenate(parts), proposed
 
     def _importance(self, proposed: int) -> Floats:
@@ -140,8 +142,10 @@ class Rounds:
         prior, share = self.prior.density(self.ground), proposed / self.config.particles
         if not proposed:
             return np.ones(len(prior))
-        pairs = [(psi, leaf.seen) for leaf, psi in zip(self.leaves, self.potentials, strict=True) if leaf and psi]
-        message = sum(psi.inlier @ seen for psi, seen in pairs) / sum(float(seen.sum()) for _, seen in pairs)
+        pairs = [
+            (psi, leaf.visible_belief) for leaf, psi in zip(self.leaves, self.potentials, strict=True) if leaf and psi
+        ]
+        message = sum(psi.inlier @ belief for psi, belief in pairs) / sum(float(belief.sum()) for _, belief in pairs)
         return np.asarray(prior / ((1 - share) * prior + share * message))
 
     def _product(self, alone: Floats, without: int) -> Floats:
@@ -157,7 +161,7 @@ class Rounds:
         for j, (leaf, potential, rest) in enumerate(zip(self.leaves, self.potentials, self.to_view, strict=True)):
             views.append(leaf.settled(potential.to_view(rest), self.rng) if leaf and potential else None)
             if leaf and potential:
-                visible = (1 - self.outlier.share) * (self.weight @ (potential.inlier @ leaf.seen))
+                visible = (1 - self.outlier.share) * (self.weight @ (potential.inlier @ leaf.visible_belief))
                 visibility[j] = visible / (self.weight @ self.to_ground[j])
         return Star(self.prior.settled(self.ground, self.weight, self.rng), tuple(views), visibility)
 
@@ -191,7 +195,8 @@ def propagate(
     A round uses the other targets' beliefs of the round before, so the order of targets does not matter.
     """
     targets = [
-        Rounds(star, seen, motion, config, rng) for star, seen, rng in zip(stars, likelihoods, rngs, strict=True)
+        Rounds(star, likelihood, motion, config, rng)
+        for star, likelihood, rng in zip(stars, likelihoods, rngs, strict=True)
     ]
     unconverged = list(range(len(targets)))
     for done in range(1, config.iterations + 1):

@@ -74,8 +74,8 @@ class Target:
                 continue
             colours, visibility = histograms(image, view.boxes(ground[None], self.height), nearer[j])
             if visibility[0].min() >= _VISIBLE:
-                known = self.colours[j]
-                self.colours[j] = colours[0] if known is None else (1 - share) * known + share * colours[0]
+                learned = self.colours[j]
+                self.colours[j] = colours[0] if learned is None else (1 - share) * learned + share * colours[0]
 
 
 def in_front(targets: Floats, heights: Floats, view: StarView) -> list[Floats]:

@@ -25,7 +25,7 @@ from stseg.tracking.filter.assignment import assign, distances
 
 _METHODS = {"messages": propagate, "condensation": condense}
 """Propagation of stars from frame to frame."""
-_SEEN = 0.5
+_LEAST_VISIBILITY = 0.5
 """Least probability at which a view counts as seeing a target."""
 _HEIGHT_FRAMES = 50
 """Frames over which a height is averaged."""
@@ -78,14 +78,14 @@ class BeliefTracker(FramewiseTracker):
         self._follow(fused.frame, images)
         found = self._find(fused, images)
         events = self._end(fused.frame) + self._begin(fused, found, images)
-        seen = [t for t in self.targets if t.missed == 0 or t.star.visibility.max(initial=0.0) >= _SEEN]
-        return [self._commit(fused, seen, events)]
+        visible = [t for t in self.targets if t.missed == 0 or t.star.visibility.max(initial=0.0) >= _LEAST_VISIBILITY]
+        return [self._commit(fused, visible, events)]
 
     def _follow(self, frame: int, images: list[Bytes | None]) -> None:
-        seen = target_likelihoods(self.targets, self.views, images, self.motion, self.config.belief)
+        likelihoods = target_likelihoods(self.targets, self.views, images, self.motion, self.config.belief)
         rngs = [self._rng(frame, target.track) for target in self.targets]
         follow = _METHODS[self.config.belief.method]
-        stars = follow([target.star for target in self.targets], seen, self.motion, self.config.belief, rngs)
+        stars = follow([target.star for target in self.targets], likelihoods, self.motion, self.config.belief, rngs)
         for target, star in zip(self.targets, stars, strict=True):
             target.star = star
 
@@ -120,10 +120,9 @@ class BeliefTracker(FramewiseTracker):
             if target.missed and outside:
                 reason = "left the area"
             elif target.missed > min(patience, target.found):
-                seen = target.star.visibility.max(initial=0.0) >= _SEEN
-                reason = (
-                    f"nobody was found there for {target.missed} frames; its colours were{'' if seen else ' not'} seen"
-                )
+                visible = target.star.visibility.max(initial=0.0) >= _LEAST_VISIBILITY
+                colours = "seen" if visible else "not seen"
+                reason = f"nobody was found there for {target.missed} frames; its colours were {colours}"
             else:
                 continue
             self.targets.remove(target)
@@ -154,16 +153,16 @@ class BeliefTracker(FramewiseTracker):
             events.append((fused.frame, "birth", target.track, 0, "a detection where nobody was followed"))
         return events
 
-    def _commit(self, fused: FusedFrame, seen: list[Target], events: list[Event]) -> Commit:
-        ids = np.array([target.track for target in seen], np.int64)
-        ground = np.array([target.star.ground.mean for target in seen]).reshape(-1, 2)
-        covariance: Floats = np.array([target.star.ground.covariance for target in seen]).reshape(-1, 2, 2)
-        height, score = (np.array(column, float) for column in ([t.height for t in seen], self._scores(seen)))
-        width = np.full(len(seen), self.config.body.width_mean)
+    def _commit(self, fused: FusedFrame, targets: list[Target], events: list[Event]) -> Commit:
+        ids = np.array([target.track for target in targets], np.int64)
+        ground = np.array([target.star.ground.mean for target in targets]).reshape(-1, 2)
+        covariance: Floats = np.array([target.star.ground.covariance for target in targets]).reshape(-1, 2, 2)
+        height, score = (np.array(column, float) for column in ([t.height for t in targets], self._scores(targets)))
+        width = np.full(len(targets), self.config.body.width_mean)
         return self.commit(fused, TrackPlaces(ids, ground, covariance, height, width, score), events)
 
     @staticmethod
-    def _scores(seen: list[Target]) -> list[float]:
+    def _scores(targets: list[Target]) -> list[float]:
         """Log-odds that some view sees each target, nats."""
-        hidden = [float(np.prod(1 - target.star.visibility).clip(1e-9, 1 - 1e-9)) for target in seen]
+        hidden = [float(np.prod(1 - target.star.visibility).clip(1e-9, 1 - 1e-9)) for target in targets]
         return [float(np.log(1 - share) - np.log(share)) for share in hidden]

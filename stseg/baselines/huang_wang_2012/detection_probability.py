@@ -29,8 +29,8 @@ from stseg.geometry.summed_area import TOP_LEVEL, Sums, fill_sums, sum_of
 from stseg.kernels.accelerate import kernel
 
 _WITHIN = 2.0
-"""How far the lattice of heights and widths goes, standard deviations; the paper's range is illegible."""
-_FAR = 1e6
+"""Range of the lattice of heights and widths, standard deviations; the paper's range is illegible."""
+_PIXEL_BOUND = 1e6
 """Pixels; nothing farther outside an image matters."""
 
 
@@ -87,15 +87,15 @@ class DetectionProbability:
         """
         self._require(maps)
         total = np.where(self.inside, 0.0, -np.inf)
-        for pillars, seen in zip(self.pillars, maps, strict=True):
-            if seen is not None:
-                total += self.view_log_ratio(self.chance(pillars, seen))
+        for pillars, soft_map in zip(self.pillars, maps, strict=True):
+            if soft_map is not None:
+                total += self.view_log_ratio(self.chance(pillars, soft_map))
         return total.reshape(self.ground.shape[:2])
 
-    def chance(self, pillars: Pillars, seen: Singles) -> Floats:
+    def chance(self, pillars: Pillars, soft_map: Singles) -> Floats:
         """p(F_i | X) of one view (eq. 6), float64 (place,); nan where it does not see the pillar."""
-        sums = np.empty((seen.shape[0] + 1, seen.shape[1] + 1), np.uint32)
-        fill_sums(seen, 0, 0, sums)
+        sums = np.empty((soft_map.shape[0] + 1, soft_map.shape[1] + 1), np.uint32)
+        fill_sums(soft_map, 0, 0, sums)
         chance = np.empty(len(pillars.edge))
         fill_chance(
             sums, pillars.upright, pillars.edge, pillars.middle, pillars.half, pillars.base, self.widths,
@@ -112,11 +112,11 @@ class DetectionProbability:
         cameras = self.rig.cameras
         if len(maps) != len(cameras):
             raise SourceError("maps", "number", len(maps), f"{len(cameras)}, one a camera")
-        for camera, step, seen in zip(cameras, self.steps, maps, strict=True):
+        for camera, step, soft_map in zip(cameras, self.steps, maps, strict=True):
             width, height = camera.size
             expected = (-(-height // step), -(-width // step))
-            if seen is not None and seen.shape != expected:
-                raise SourceError(f"camera {camera.name}", "shape of the map", seen.shape, f"{expected}")
+            if soft_map is not None and soft_map.shape != expected:
+                raise SourceError(f"camera {camera.name}", "shape of the map", soft_map.shape, f"{expected}")
 
 
 def _lattice(mean: float, spread: float, number: int) -> tuple[Floats, Floats]:
@@ -154,12 +154,12 @@ def fill_chance(
         e, F_i outside the image.
     """
     rows, columns = sums.shape[0] - 1, sums.shape[1] - 1
-    shown, covered, within = np.empty(len(widths)), np.empty(len(widths)), np.empty(len(widths))
+    foreground, covered, within = np.empty(len(widths)), np.empty(len(widths)), np.empty(len(widths))
     for i in range(len(edge)):
         chance[i] = np.nan
         if np.isnan(edge[i, 0]):
             continue
-        shown[:], covered[:], within[:] = 0.0, 0.0, 0.0
+        foreground[:], covered[:], within[:] = 0.0, 0.0, 0.0
         total = 0.0
         # Rows and columns change places where the pillar lies across the image.
         length, breadth = (rows, columns) if upright[i] else (columns, rows)
@@ -176,11 +176,11 @@ def fill_chance(
                 if first < last and left < right:
                     within[j] += (last - first) * (right - left)
                     if upright[i]:
-                        shown[j] += sum_of(sums, left, first, right, last)
+                        foreground[j] += sum_of(sums, left, first, right, last)
                     else:
-                        shown[j] += sum_of(sums, first, left, last, right)
+                        foreground[j] += sum_of(sums, first, left, last, right)
                 if k >= base and covered[j] > 0:
-                    omega = (shown[j] / TOP_LEVEL + outside * (covered[j] - within[j])) / covered[j]
+                    omega = (foreground[j] / TOP_LEVEL + outside * (covered[j] - within[j])) / covered[j]
                     total += height_share[k - base] * width_share[j] * omega
         if within[-1] > 0:
             chance[i] = total
@@ -189,4 +189,4 @@ def fill_chance(
 @kernel
 def _nearest(edge: float) -> int:
     """The nearest edge between pixels; what is far outside the image is held within reach of whole numbers."""
-    return int(np.floor(min(max(float(edge), -_FAR), _FAR) + 0.5))
+    return int(np.floor(min(max(float(edge), -_PIXEL_BOUND), _PIXEL_BOUND) + 0.5))

@@ -20,12 +20,12 @@ import numpy as np
 from stseg.arrays import Floats, Ints
 from stseg.kernels.accelerate import kernel
 
-_REACH = 2.5
-"""How far the kernel goes, in C: there it is 0.002 of its height."""
-_STILL = 1e-3
+_KERNEL_EXTENT = 2.5
+"""Extent of the kernel, in C: there it is 0.002 of its height."""
+_REST_STEP = 1e-3
 """A sample stands still once a step is shorter, in spacings of the lattice."""
-_STEPS = 200
-_SAME = 0.25
+_STEP_LIMIT = 200
+_MODE_RADIUS = 0.25
 """Samples that come to rest so near each other are of one mode, in C."""
 
 
@@ -97,7 +97,7 @@ def fill_modes(weight: Floats, reach: float, found: Floats, mode: Ints) -> int:
         The mode of each sample, in the order of rows and columns.
     """
     rows, columns = weight.shape
-    window = int(np.ceil(_REACH * reach))
+    window = int(np.ceil(_KERNEL_EXTENT * reach))
     down, across = np.empty(2 * window + 2), np.empty(2 * window + 2)
     number, sample = 0, 0
     for row in range(rows):
@@ -105,15 +105,15 @@ def fill_modes(weight: Floats, reach: float, found: Floats, mode: Ints) -> int:
             if not weight[row, column] > 0:
                 continue
             y, x = float(row), float(column)
-            for _ in range(_STEPS):
+            for _ in range(_STEP_LIMIT):
                 to_y, to_x = _mean_around(weight, y, x, reach, window, down, across)
                 moved = np.hypot(to_y - y, to_x - x)
                 y, x = to_y, to_x
-                if moved < _STILL:
+                if moved < _REST_STEP:
                     break
             mode[sample] = -1
             for m in range(number):
-                if np.hypot(found[m, 0] - y, found[m, 1] - x) < _SAME * reach:
+                if np.hypot(found[m, 0] - y, found[m, 1] - x) < _MODE_RADIUS * reach:
                     mode[sample] = m
                     break
             if mode[sample] < 0:

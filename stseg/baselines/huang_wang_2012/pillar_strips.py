@@ -102,8 +102,8 @@ def _project(camera: Camera, ground: Floats, levels: Floats) -> tuple[Floats, Fl
             (before, before_ahead), (after, after_ahead) = (
                 camera.project(ground + sign * away, float(level)) for sign in (-1, 1)
             )
-            seen = before_ahead & after_ahead
-            jacobian[k][seen, :, axis] = (after - before)[seen] / (2 * _DISTANCE)
+            visible = before_ahead & after_ahead
+            jacobian[k][visible, :, axis] = (after - before)[visible] / (2 * _DISTANCE)
     return pixel, jacobian
 
 

@@ -26,7 +26,7 @@ _ROWS = 240
 """Rows of a map that boxes are drawn into, about."""
 _FILLED = 0.3
 """Share of a column's planes that must be filled for it to be a sample: a person of whom two thirds are missed."""
-_MOST = 30.0
+_LOG_RATIO_LIMIT = 30.0
 """Largest log-ratio of a sample, nats: beyond it a place is certain, and larger weights only drown its neighbours."""
 
 
@@ -50,25 +50,25 @@ class Proposals:
         if self.config.source in ("probability", "both"):
             self.probability = DetectionProbability(rig, self.config, config.body, map_steps(rig, kinds))
 
-    def of(self, seen: Sequence[ViewEvidence], fuse: Fuse) -> Candidates:
+    def of(self, evidence: Sequence[ViewEvidence], fuse: Fuse) -> Candidates:
         """Candidates of a frame, best first by source.
 
         Parameters
         ----------
-        seen
+        evidence
             Evidence of each view.
         fuse
             The volume float32 (plane, y, x) of a frame's evidence under an explanation, nats (`stseg.occupancy`).
         """
         found = self._pool(np.zeros((0, 2)))
         if self.config.source in ("volume", "both"):
-            volume = fuse(seen, empty_explanation(self.rig, seen))
+            volume = fuse(evidence, empty_explanation(self.rig, evidence))
             found = found.joined_apart(
                 self._pool(volume_modes(volume, self.rig.grid, self.config.kernel_radius).ground), self._apart
             )
         if self.probability is not None:
-            own = probability_modes(self.probability, soft_maps(self.probability, seen))
-            found = found.joined_apart(self._pool(own.ground), self._apart)
+            modes = probability_modes(self.probability, soft_maps(self.probability, evidence))
+            found = found.joined_apart(self._pool(modes.ground), self._apart)
         return found
 
     @property
@@ -88,12 +88,12 @@ def map_steps(rig: Rig, kinds: Sequence[str]) -> list[int]:
     ]
 
 
-def soft_maps(probability: DetectionProbability, seen: Sequence[ViewEvidence]) -> list[Singles | None]:
+def soft_maps(probability: DetectionProbability, evidence: Sequence[ViewEvidence]) -> list[Singles | None]:
     """F_i of each view, boxes drawn as soft bodies."""
     cameras = probability.rig.cameras
     return [
         box_likelihood(view, camera.size, step) if isinstance(view, Boxes) else view
-        for camera, step, view in zip(cameras, probability.steps, seen, strict=True)
+        for camera, step, view in zip(cameras, probability.steps, evidence, strict=True)
     ]
 
 
@@ -105,7 +105,7 @@ def probability_modes(probability: DetectionProbability, maps: Sequence[Singles 
 
 def weights(log_ratio: Floats) -> Floats:
     """G of the samples, from its logarithm (y, x), nats: 0 where that is not above 0."""
-    return np.where(log_ratio > 0, np.exp(np.minimum(log_ratio, _MOST)), 0.0)
+    return np.where(log_ratio > 0, np.exp(np.minimum(log_ratio, _LOG_RATIO_LIMIT)), 0.0)
 
 
 def marginal(volume: Singles) -> Floats:

@@ -105,10 +105,10 @@ class Localiser:
         self._require(maps)
         levels = [self._means.levels(i, view).reshape(-1) for i, view in enumerate(maps) if view is not None]
         sighted = [i for i, view in enumerate(maps) if view is not None]
-        every = np.array(levels, np.int16).reshape(len(sighted), -1)
-        share, nobody = np.ones(every.shape, np.float32), np.ones((len(sighted), 0), np.float32)
+        levels_of_views = np.array(levels, np.int16).reshape(len(sighted), -1)
+        share, no_people = np.ones(levels_of_views.shape, np.float32), np.ones((len(sighted), 0), np.float32)
         weight = weights[sighted].astype(np.float32)
-        sums = Sums.of(FrameTerms(every, share, self._no_person, terms[sighted], weight, nobody))
+        sums = Sums.of(FrameTerms(levels_of_views, share, self._no_person, terms[sighted], weight, no_people))
         total = sums.total(self._no_person, 1.0, (prior, prior))
         total[self._views.reshape(-1) == 0] = np.nan
         return total.reshape(self._views.shape)

@@ -42,7 +42,7 @@ class Appearance:
         return cls(np.zeros((parts, SAMPLES, 3), np.uint8), np.zeros(parts, np.int64), np.tile(empty, (parts, 1)))
 
     @property
-    def known(self) -> Ints:
+    def usable_samples(self) -> Ints:
         """Number of usable samples of each part, int64 (part,); 0 for a part without a model."""
         return np.where(self.counts >= _FEWEST, self.counts, 0)
 
@@ -51,9 +51,9 @@ class Appearance:
         samples, counts, reference = self.samples.copy(), self.counts.copy(), self.reference.copy()
         room = SAMPLES - int(counts[part])
         wanted = room if room else rng.binomial(SAMPLES, share)
-        fresh = colour[rng.permutation(len(colour))[:wanted]]
-        where = counts[part] + np.arange(len(fresh)) if room else rng.permutation(SAMPLES)[: len(fresh)]
-        samples[part, where] = fresh
-        counts[part] += len(fresh) if room else 0
-        reference[part] = histogram(samples[part, : counts[part]] if counts[part] >= _FEWEST else fresh[:0])
+        drawn = colour[rng.permutation(len(colour))[:wanted]]
+        where = counts[part] + np.arange(len(drawn)) if room else rng.permutation(SAMPLES)[: len(drawn)]
+        samples[part, where] = drawn
+        counts[part] += len(drawn) if room else 0
+        reference[part] = histogram(samples[part, : counts[part]] if counts[part] >= _FEWEST else drawn[:0])
         return Appearance(samples, counts, reference)

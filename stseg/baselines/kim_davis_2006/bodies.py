@@ -44,9 +44,9 @@ def placed(body: Floats, u: float, v: float) -> tuple[float, float]:
 def occupancy(along: float, across: float, half_width: Floats) -> float:
     """O(h, w) of eq. 3, 0..1."""
     level = min(max(along, 0.0), 1.0)
-    beyond = along - level
-    if beyond != 0.0:
-        across = math.sqrt(across * across + beyond * beyond)
+    overshoot = along - level
+    if overshoot != 0.0:
+        across = math.sqrt(across * across + overshoot * overshoot)
     width = half_width[min(int(level * len(half_width)), len(half_width) - 1)]
     return 1.0 / (1.0 + math.exp(min((across - width) / LOOSENESS, 30.0)))
 

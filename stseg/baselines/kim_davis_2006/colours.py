@@ -19,7 +19,7 @@ CHROMA_FIRST, CHROMA_SPAN = 0.13, 0.41
 SPREAD = np.array([0.02, 0.02, 30.0])
 """sigma of r, g and s: wide for the lightness, as in the paper, since it changes with the illumination."""
 BINS = (10, 10, 5)
-"""Of the histograms of eq. 6, along r, g and s."""
+"""Bins of the histograms of eq. 6, along r, g and s."""
 _OUTLIERS = 0.05
 """Share of outliers among a body part's pixels."""
 

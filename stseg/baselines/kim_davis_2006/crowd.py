@@ -16,7 +16,7 @@ class Crowd:
 
     Attributes
     ----------
-    ids, seen : int64 (n,)
+    ids, last_detection : int64 (n,)
         Track ids, and the last frame in which each was detected.
     height : float64 (n,)
         Metres.
@@ -29,7 +29,7 @@ class Crowd:
     """
 
     ids: Ints
-    seen: Ints
+    last_detection: Ints
     height: Floats
     ground: Floats
     covariance: Floats
@@ -55,7 +55,7 @@ class Crowd:
         """The chosen people, bool (n,)."""
         appearances = tuple(one for one, stays in zip(self.appearances, which, strict=True) if stays)
         return Crowd(
-            self.ids[which], self.seen[which], self.height[which], self.ground[which], self.covariance[which],
+            self.ids[which], self.last_detection[which], self.height[which], self.ground[which], self.covariance[which],
             self.particles[:, which], appearances,
         )  # fmt: skip
 
@@ -63,7 +63,7 @@ class Crowd:
         """These, then others, concatenated."""
         return Crowd(
             np.append(self.ids, others.ids),
-            np.append(self.seen, others.seen),
+            np.append(self.last_detection, others.last_detection),
             np.append(self.height, others.height),
             np.concatenate([self.ground, others.ground]),
             np.concatenate([self.covariance, others.covariance]),

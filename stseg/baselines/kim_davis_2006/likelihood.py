@@ -57,13 +57,13 @@ def add_misfit(
                 free[v, u] *= 1.0 - covered
         length = bodies[k, 2] ** 2 + bodies[k, 3] ** 2
         for r in range(len(areas)):
-            seen, coefficient, known = 0.0, 0.0, 0.0
+            counted, coefficient, learned = 0.0, 0.0, 0.0
             for b in range(counts.shape[1]):
-                seen += counts[r, b]
-                known += reference[k, r, b]
+                counted += counts[r, b]
+                learned += reference[k, r, b]
                 coefficient += math.sqrt(counts[r, b] * reference[k, r, b])
             share = 0.0
-            if seen > 0.0 and known > 0.0:
-                coefficient /= math.sqrt(seen)
-                share = min(seen / max(areas[r] * length, 1.0), 1.0)
+            if counted > 0.0 and learned > 0.0:
+                coefficient /= math.sqrt(counted)
+                share = min(counted / max(areas[r] * length, 1.0), 1.0)
             misfit[k] += share * (1.0 - coefficient) + (1.0 - share) * NEUTRAL

@@ -97,7 +97,7 @@ def segment(
 @kernel
 def fill_unoccluded(
     bodies: Floats, order: Ints, boxes: Ints, ideal: Singles, half_width: Floats, parts: Floats,
-    free: Singles, owner: Labels, shown: Ints,
+    free: Singles, owner: Labels, unoccluded: Ints,
 ) -> None:  # fmt: skip
     """Mark the unoccluded pixels of people, from which colour models may be learned.
 
@@ -107,7 +107,7 @@ def fill_unoccluded(
         Scratch buffer.
     owner : int32 (v, u)
         Filled within the boxes with the number of parts times the person, plus the part, or UNASSIGNED.
-    shown : int64 (n,)
+    unoccluded : int64 (n,)
         Filled with the number of pixels that each person covers and no nearer person does.
     """
     for k in range(len(boxes)):
@@ -115,13 +115,13 @@ def fill_unoccluded(
             for u in range(boxes[k, 2], boxes[k, 3]):
                 free[v, u], owner[v, u] = 1.0, UNASSIGNED
     for k in order:
-        shown[k] = 0
+        unoccluded[k] = 0
         for v in range(boxes[k, 0], boxes[k, 1]):
             for u in range(boxes[k, 2], boxes[k, 3]):
                 along, across = placed(bodies[k], ideal[v, u, 0], ideal[v, u, 1])
                 covered = occupancy(along, across, half_width)
                 if covered * free[v, u] > 0.5:
-                    shown[k] += 1
+                    unoccluded[k] += 1
                 if covered > 0.7 and free[v, u] > 0.9:
                     owner[v, u] = k * len(parts) + part_at(along, parts)
                 free[v, u] *= 1.0 - covered

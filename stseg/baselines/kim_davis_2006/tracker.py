@@ -64,7 +64,7 @@ class ParticleTracker(FramewiseTracker):
             return None
         crowd, config = self.crowd, self.config
         drift = config.motion.position_noise**2 + self._step(frame) ** 2
-        unseen = (frame - 1 - crowd.seen) / self.rig.frame_rate
+        unseen = (frame - 1 - crowd.last_detection) / self.rig.frame_rate
         sizes = Sizes.of_heights(crowd.height, np.full(len(crowd), _HEIGHT_NOISE**2), config.body)
         return PredictedTracks(crowd.ground, crowd.covariance + drift * np.eye(2), sizes, STAYING - FORGETTING * unseen)
 
@@ -113,7 +113,7 @@ class ParticleTracker(FramewiseTracker):
         lost, new = np.setdiff1d(np.arange(len(crowd)), detected), np.setdiff1d(np.arange(len(found)), assigned)
         reach = (
             config.particles.assignment_distance
-            + config.particles.walking_speed * (fused.frame - crowd.seen) / self.rig.frame_rate
+            + config.particles.walking_speed * (fused.frame - crowd.last_detection) / self.rig.frame_rate
         )
         particles = crowd.particles.copy()
         if config.particles.method != "search":
@@ -153,12 +153,12 @@ class ParticleTracker(FramewiseTracker):
     def _recognise(self, fused: FusedFrame) -> tuple[dict[int, float], Ints]:
         """Assign detections: evidence of each track, nats, and the unassigned detections."""
         crowd, people = self.crowd, fused.people
-        known, found = assign(distances(crowd.ground, people.ground), self.config.particles.assignment_distance)
-        seen, height = crowd.seen.copy(), crowd.height.copy()
-        seen[known] = fused.frame
-        height[known] += _HEIGHT_RENEWAL * (people.height[found] - height[known])
-        self.crowd = replace(crowd, seen=seen, height=height)
-        evidence = {int(i): float(nats) for i, nats in zip(crowd.ids[known], people.evidence[found], strict=True)}
+        matched, found = assign(distances(crowd.ground, people.ground), self.config.particles.assignment_distance)
+        last_detection, height = crowd.last_detection.copy(), crowd.height.copy()
+        last_detection[matched] = fused.frame
+        height[matched] += _HEIGHT_RENEWAL * (people.height[found] - height[matched])
+        self.crowd = replace(crowd, last_detection=last_detection, height=height)
+        evidence = {int(i): float(nats) for i, nats in zip(crowd.ids[matched], people.evidence[found], strict=True)}
         return evidence, np.setdiff1d(np.arange(len(people)), found)
 
     def _begin(self, fused: FusedFrame, unassigned: Ints) -> list[Event]:
@@ -180,12 +180,12 @@ class ParticleTracker(FramewiseTracker):
     def _end(self) -> list[Event]:
         """Remove tracks that left, were undetected for too long, or share the place of another."""
         crowd, config = self.crowd, self.config
-        undetected = (self.frame - crowd.seen) / self.rig.frame_rate
+        undetected = (self.frame - crowd.last_detection) / self.rig.frame_rate
         left = (self.border.away(crowd.ground) == 0.0) & (undetected > 0)
-        near = distances(crowd.ground, crowd.ground) < config.detection.minimum_distance
+        close = distances(crowd.ground, crowd.ground) < config.detection.minimum_distance
         deaths: list[Event] = []
         for k, identity in enumerate(crowd.ids.tolist()):
-            others = crowd.ids[near[k] & (undetected == 0)]
+            others = crowd.ids[close[k] & (undetected == 0)]
             if left[k]:
                 deaths.append((self.frame, "death", identity, 0, "left the area"))
             elif undetected[k] > config.particles.patience:

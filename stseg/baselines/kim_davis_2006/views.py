@@ -71,7 +71,7 @@ class ParticleView:
         fill_boxes(self.ideal, self.bodies(ground, height), margin / height, boxes)
         density = np.zeros((len(ground), len(PARTS), *foreground.shape), np.float32)
         for box, appearance, person_density in zip(boxes, appearances, density, strict=True):
-            fill_density(colour, foreground, box, appearance.samples, appearance.known, FALL, person_density)
+            fill_density(colour, foreground, box, appearance.samples, appearance.usable_samples, FALL, person_density)
         return ParticleFrame(self, height, colour, bins_of(colour).astype(np.int32), foreground, boxes, density)
 
 
@@ -136,15 +136,17 @@ class ParticleFrame:
         """
         view, (bodies, order) = self.view, self.segment(ground)
         owner = np.full(self.foreground.shape, UNASSIGNED, np.int32)
-        shown = np.zeros(len(ground), np.int64)
-        fill_unoccluded(bodies, order, self.boxes, view.ideal, HALF_WIDTH, PARTS, view.pixel_buffer, owner, shown)
-        whole = shown >= _VISIBLE * view.areas.sum() * (bodies[:, 2:4] ** 2).sum(1)
+        unoccluded = np.zeros(len(ground), np.int64)
+        fill_unoccluded(bodies, order, self.boxes, view.ideal, HALF_WIDTH, PARTS, view.pixel_buffer, owner, unoccluded)
+        whole = unoccluded >= _VISIBLE * view.areas.sum() * (bodies[:, 2:4] ** 2).sum(1)
         result = list(appearances)
-        for k in np.flatnonzero(whole & (shown > 0)).tolist():
+        for k in np.flatnonzero(whole & (unoccluded > 0)).tolist():
             rows, columns = slice(*self.boxes[k, :2]), slice(*self.boxes[k, 2:])
-            seen = self.foreground[rows, columns] > 0
-            fits = seen & (view.canvas.label[rows, columns] == k)
+            foreground = self.foreground[rows, columns] > 0
+            fits = foreground & (view.canvas.label[rows, columns] == k)
             for part in range(len(PARTS)):
-                own = (fits if result[k].known[part] else seen) & (owner[rows, columns] == k * len(PARTS) + part)
-                result[k] = result[k].learned(part, self.colour[rows, columns][own], share, rng)
+                pixels = (fits if result[k].usable_samples[part] else foreground) & (
+                    owner[rows, columns] == k * len(PARTS) + part
+                )
+                result[k] = result[k].learned(part, self.colour[rows, columns][pixels], share, rng)
         return result
