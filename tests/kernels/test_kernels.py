@@ -25,9 +25,9 @@ print("numba.cpython.unicode" in sys.modules)
 """
 """Prints notes, the result of a kernel that calls another kernel, and whether what compiling needs was imported."""
 AHEAD = """
-from stseg.kernels.accelerate import take_kept_kernels
+from stseg.kernels.accelerate import load_cached_kernels
 from stseg.detection.score.scoring import track_score
-take_kept_kernels()
+load_cached_kernels()
 print(len(track_score.signatures))
 """
 """Prints how many forms of a kernel were taken from the cache before it was called."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 from stseg.engine.offline import assembly
 from stseg.engine.workers import local_workers
 from stseg.engine.workers.garbage import collect_rarely
-from stseg.kernels.accelerate import take_kept_kernels
+from stseg.kernels.accelerate import load_cached_kernels
 
 __all__ = ["assembly", "local_workers"]
 
 collect_rarely()
-take_kept_kernels()
+load_cached_kernels()
