@@ -29,11 +29,19 @@ if TYPE_CHECKING:
     from stseg.geometry import Camera, Grid, Lens, Rig
     from stseg.io.config_file import read_config
     from stseg.io.recording.frames import FrameSet
-    from stseg.io.recording.recording import Recording
+    from stseg.io.recording.recording import Recording, Source
     from stseg.io.recording.rigs import read_rig, write_rig
     from stseg.io.runfile.runs import Run, read_run
     from stseg.io.track_csv import read_tracks_csv
+    from stseg.tasks.calibration.automatic import calibrate_auto
+    from stseg.tasks.calibration.check import check_rig
+    from stseg.tasks.calibration.points import calibrate_points
+    from stseg.tasks.correction import correct
+    from stseg.tasks.forecast import plan
     from stseg.tasks.measures import measure
+    from stseg.tasks.pixel_labels import label_images
+    from stseg.tasks.report import report
+    from stseg.tasks.simulation import simulate
 
 __all__ = [
     "Boxes",
@@ -48,34 +56,51 @@ __all__ = [
     "Rig",
     "Run",
     "Scores",
+    "Source",
     "StsegError",
     "Tracker",
+    "calibrate_auto",
+    "calibrate_points",
+    "check_rig",
+    "correct",
     "evaluate",
+    "label_images",
     "measure",
+    "plan",
     "read_config",
     "read_rig",
     "read_run",
     "read_tracks_csv",
+    "report",
+    "simulate",
     "track",
     "write_rig",
 ]
 
 _HOMES = {
+    "stseg.arrays": ("Boxes",),
     "stseg.config": ("Config",),
+    "stseg.engine.committed_frames": ("CommittedFrames",),
+    "stseg.engine.track": ("track",),
+    "stseg.engine.tracker": ("Tracker",),
     "stseg.errors": ("InputError", "StsegError"),
     "stseg.evaluation": ("Scores", "evaluate"),
     "stseg.geometry": ("Camera", "Grid", "Lens", "Rig"),
     "stseg.io.config_file": ("read_config",),
-    "stseg.io.recording.recording": ("Recording",),
+    "stseg.io.recording.frames": ("FrameSet",),
+    "stseg.io.recording.recording": ("Recording", "Source"),
     "stseg.io.recording.rigs": ("read_rig", "write_rig"),
     "stseg.io.runfile.runs": ("Run", "read_run"),
     "stseg.io.track_csv": ("read_tracks_csv",),
-    "stseg.arrays": ("Boxes",),
-    "stseg.engine.committed_frames": ("CommittedFrames",),
+    "stseg.tasks.calibration.automatic": ("calibrate_auto",),
+    "stseg.tasks.calibration.check": ("check_rig",),
+    "stseg.tasks.calibration.points": ("calibrate_points",),
+    "stseg.tasks.correction": ("correct",),
+    "stseg.tasks.forecast": ("plan",),
     "stseg.tasks.measures": ("measure",),
-    "stseg.engine.track": ("track",),
-    "stseg.engine.tracker": ("Tracker",),
-    "stseg.io.recording.frames": ("FrameSet",),
+    "stseg.tasks.pixel_labels": ("label_images",),
+    "stseg.tasks.report": ("report",),
+    "stseg.tasks.simulation": ("simulate",),
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 
@@ -84,3 +109,7 @@ def __getattr__(name: str) -> Any:
     if name not in _HOME_OF:
         raise AttributeError(f"module 'stseg' has no attribute {name!r}")
     return getattr(import_module(_HOME_OF[name]), name)
+
+
+def __dir__() -> list[str]:
+    return [*__all__, "__version__"]

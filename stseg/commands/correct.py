@@ -7,14 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from stseg.errors import ConfigError
-from stseg.identities.review.corrections import ACTIONS, Answer
-from stseg.io.answers import read_answers
-from stseg.io.outputs.whole_files import require_new
-from stseg.io.runfile.corrected import write_corrected
-from stseg.io.runfile.runs import read_run
-from stseg.io.untrusted.bounded_files import read_text
-from stseg.tasks.correction import corrected_tracks
+from stseg.tasks import correction
 
 
 def correct(
@@ -52,13 +45,6 @@ def correct(
     overwrite
         Replace the file if it exists.
     """
-    require_new(output, overwrite)
-    if output.exists() and run_file.exists() and output.samefile(run_file):
-        raise ConfigError("command line", "--output", "the run file itself", "another file")
-    run, rows = read_run(run_file), read_answers(answers, ACTIONS)
-    given = [Answer(r.place, r.action, r.track, r.other, r.frame, r.name) for r in rows]
-    found = corrected_tracks(run, given)
-    text = read_text(answers)
-    write_corrected(run_file, output, found.tracks, found.answered, found.new_ids, found.names, text, overwrite)
-    changed = sum(row.action != "keep" for row in rows)
-    print(f"wrote {output}: {len(rows)} answers, {changed} changes; {len(read_run(output).tracks)} tracks")
+    found = correction.correct(run_file, answers, output, overwrite=overwrite)
+    changed = sum(answer.action != "keep" for answer in found.answers)
+    print(f"wrote {output}: {len(found.answers)} answers, {changed} changes; {len(found.run.tracks)} tracks")

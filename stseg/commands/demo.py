@@ -8,13 +8,14 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from stseg.commands.evaluate import evaluate
-from stseg.commands.report import report, write_pictures
+from stseg.commands.report import report
 from stseg.commands.run import run
 from stseg.commands.simulate import simulate
 from stseg.errors import OutputError
 from stseg.io.recording.rigs import read_rig
 from stseg.io.runfile.runs import read_run
 from stseg.io.track_csv import read_tracks_csv
+from stseg.tasks.report import write_pictures
 
 
 def demo(

@@ -7,12 +7,9 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from stseg.commands.run_frames import select_frames
 from stseg.commands.terminal.progress import TerminalReporter
-from stseg.io.config_file import parse_config
-from stseg.io.runfile.runs import read_run
-from stseg.reporting.pictures.colours import track_palette
-from stseg.tasks.pixel_labels import write_labels
+from stseg.engine.offline.frame_range import FrameRange
+from stseg.tasks.pixel_labels import label_images
 
 
 def labels(
@@ -45,9 +42,8 @@ def labels(
     overwrite
         Write into a folder that is not empty.
     """
-    run = read_run(run_file)
-    config = parse_config(run.provenance.config, f"{run_file}: the configuration", set_)
-    count = write_labels(
-        run, config, output, select_frames(run, frames), track_palette(), TerminalReporter(), overwrite=overwrite
+    chosen = FrameRange.parsed(frames)
+    count = label_images(
+        run_file, output, frames=chosen, changes=set_, overwrite=overwrite, progress=TerminalReporter()
     )
     print(f"{output}: {count} label images")

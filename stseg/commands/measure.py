@@ -9,14 +9,8 @@ from cyclopts import Parameter
 from rich.console import Console
 from rich.table import Table
 
-from stseg.io.exports.measure_tables import write_tables
-from stseg.io.outputs.output_files import make_folder, write_file
-from stseg.io.runfile.runs import read_run
 from stseg.measures.measure import Measures
-from stseg.reporting.page.html import png_bytes
-from stseg.reporting.pictures.flow_map import flow_map
-from stseg.tasks.measures import measure as measure_run
-from stseg.tasks.measures import read_areas
+from stseg.tasks import measures
 
 
 def measure(
@@ -55,16 +49,7 @@ def measure(
     overwrite
         Replace tables that exist.
     """
-    run = read_run(run_file)
-    run.require_fit()
-    found = measure_run(run, zones, lines)
-    make_folder(output)
-    write_tables(output, found.tables(), format_, overwrite)
-    areas, rig = read_areas(run, zones, lines), run.recording.rig
-    picture = flow_map(
-        rig, found.field, [(z.name, z.rings) for z in areas.zones], [(one.name, one.points) for one in areas.lines]
-    )
-    write_file(output / "flow.png", png_bytes(picture), overwrite)
+    found = measures.measure(run_file, zones, lines, output=output, format_=format_, overwrite=overwrite)
     _print(found)
     print(f"wrote {len(found.tables())} tables and flow.png to {output}")
 

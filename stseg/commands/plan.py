@@ -3,25 +3,20 @@
 from __future__ import annotations
 
 import json
-import sys
 from dataclasses import asdict
 from pathlib import Path
-from time import perf_counter
 from typing import Annotated
 
 from cyclopts import Parameter
 
-from stseg.config.effect import require_effect
-from stseg.engine.offline.frame_range import FrameRange, resolve_frames
-from stseg.engine.offline.job import Job
-from stseg.engine.rig_body import with_body_of
-from stseg.engine.workers.workforce import Workforce
+from stseg.commands.terminal.progress import TerminalReporter
+from stseg.engine.offline.frame_range import FrameRange
 from stseg.io.config_file import read_config
 from stseg.io.recording.recording import Recording
 from stseg.io.recording.rigs import read_rig
-from stseg.io.recording.stream_index import index_streams
 from stseg.io.runfile.layout import VolumeKind
-from stseg.tasks.forecast import Forecast, forecast
+from stseg.tasks import forecast
+from stseg.tasks.forecast import Forecast
 
 
 def plan(
@@ -62,24 +57,18 @@ def plan(
     as_json
         Print numbers for a program: seconds and bytes.
     """
-    workforce = Workforce(workers)
-    chosen = None if frames is None else FrameRange.parse(frames)
     recording = read_rig(rig)
-    resolved = with_body_of(recording, read_config(config, set_))
-    require_effect(resolved, tracker)
-    start = perf_counter()
-    streams = index_streams(recording)
-    counting = perf_counter() - start
-    for note in streams.notes:
-        print(f"stseg: {note}", file=sys.stderr)
-    first, stop = resolve_frames(chosen, streams, recording)
-    job = Job(recording, resolved, tracker, volume, first, stop, streams)
-    estimate = forecast(job, counting, workforce.processes(job))
-    print(
-        json.dumps(asdict(estimate) | {"seconds": estimate.seconds}, indent=1)
-        if as_json
-        else _text(estimate, recording)
+    estimate = forecast.plan(
+        recording,
+        frames=FrameRange.parsed(frames),
+        config=read_config(config, set_),
+        tracker=tracker,
+        volume=volume,
+        workers=workers,
+        progress=TerminalReporter(),
     )
+    numbers = asdict(estimate) | {"seconds": estimate.seconds}
+    print(json.dumps(numbers, indent=1) if as_json else _text(estimate, recording))
 
 
 def _text(estimate: Forecast, recording: Recording) -> str:

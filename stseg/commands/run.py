@@ -92,7 +92,7 @@ def run(
     from stseg.io.recording.rigs import read_rig
     from stseg.tasks.warnings import rig_warnings
 
-    chosen, workforce = None if frames is None else FrameRange.parse(frames), Workforce(workers, scheduler)
+    chosen, workforce = FrameRange.parsed(frames), Workforce(workers, scheduler)
     resolved, recording, reporter = read_config(config, set_), read_rig(rig), TerminalReporter()
     receiver = None
     if publish is not None:
@@ -113,8 +113,7 @@ def run(
         return
     if labels is not None:
         from stseg.io.outputs.label_images import require_label_folder
-        from stseg.reporting.pictures.colours import track_palette
-        from stseg.tasks.pixel_labels import require_pixels, write_labels
+        from stseg.tasks.pixel_labels import label_images, require_pixels
 
         require_pixels(recording)
         require_label_folder(labels, overwrite)
@@ -125,7 +124,7 @@ def run(
         print(f"stseg: warning: {warning}", file=sys.stderr)
     print(_summary(done))
     if labels is not None:
-        count = write_labels(done, resolved, labels, done.frames, track_palette(), reporter, overwrite=overwrite)
+        count = label_images(done, labels, config=resolved, overwrite=overwrite, progress=reporter)
         print(f"{labels}: {count} label images")
 
 

@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
-import difflib
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
-from rich.console import Console
-from rich.progress import Progress
 
+from stseg.commands.terminal.progress import TerminalReporter
 from stseg.errors import ConfigError
-from stseg.io.outputs.simulated_scene import rig_name, write_scene
-from stseg.io.recording.recording import BodyPrior
 from stseg.io.toml.text import shown
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.numbers import parse_whole
-from stseg.simulation import NAMED, Film, SceneSpec, Spoil, SpoiledFilm
-from stseg.simulation.spoiling.spoil import STRENGTHS
+from stseg.tasks import simulation
 
 
 def simulate(
@@ -89,70 +83,25 @@ def simulate(
     overwrite
         Write into a folder that is not empty.
     """
-    _require_bounded(seconds, frame_rate)
-    changes = {
-        "people": people,
-        "cameras": cameras,
-        "seconds": seconds,
-        "frame_rate": frame_rate,
-        "size": None if size is None else _size(size),
-        "noise": noise,
-        "shadows": shadows,
-        "light_drift": light_drift,
-        "alike": alike,
-        "seed": seed,
-    }
-    given = {key: value for key, value in changes.items() if value is not None}
-    errors = [_spoil(text) for text in spoil]
-    film = Film(replace(_named(scene), **given))  # type: ignore[arg-type]  # each value has its field's type
-    console = Console(stderr=True)
-    with Progress(console=console, disable=not console.is_terminal, transient=True) as bar:
-        task = bar.add_task("filming", total=film.frames)
-        write_scene(
-            folder,
-            SpoiledFilm(film, errors) if errors else film,
-            body=_body(film.spec),
-            instances=instances,
-            overwrite=overwrite,
-            progress=lambda done, _: bar.update(task, completed=done),
-        )
-    rig = folder / rig_name(film.kinds[0])
-    print(f"{rig}: {film.frames} frames of {len(film.rig.cameras)} cameras; truth in truth.csv")
-
-
-def _named(name: str) -> SceneSpec:
-    if name in NAMED:
-        return NAMED[name]
-    near = difflib.get_close_matches(name, NAMED, n=1)
-    suggestion = f"; did you mean {near[0]}?" if near else ""
-    raise ConfigError("command line", "--scene", repr(name), f"one of {', '.join(NAMED)}{suggestion}")
-
-
-def _body(spec: SceneSpec) -> BodyPrior:
-    """What a rig says of a scene's bodies: nothing of people."""
-    if not spec.length:
-        return BodyPrior()
-    low, high = spec.heights
-    width, spread = (spec.cylinder + spec.length) / 2, (spec.length - spec.cylinder) / 4
-    return BodyPrior(*(round(size, 3) for size in ((low + high) / 2, (high - low) / 2, width, spread)))
-
-
-def _spoil(text: str) -> Spoil:
-    """A kind of error with its strength, or with the kind's middle one."""
-    kind, colon, strength = text.partition(":")
-    try:
-        return Spoil(kind, float(strength) if colon else STRENGTHS.get(kind, (0.0, 0.0, 0.0))[1])
-    except ValueError as error:
-        raise ConfigError("command line", "--spoil", shown(text), "KIND or KIND:STRENGTH, a number") from error
-
-
-def _require_bounded(seconds: float | None, frame_rate: float | None) -> None:
-    for option, value, low, high in (
-        ("--seconds", seconds, 0.0, 86_400.0),
-        ("--frame-rate", frame_rate, *limits.FRAME_RATE),
-    ):
-        if value is not None and not low <= value <= high:
-            raise ConfigError("command line", option, repr(value), f"a number from {low:g} to {high:g}")
+    film = simulation.simulate(
+        folder,
+        scene,
+        spoil=spoil,
+        instances=instances,
+        overwrite=overwrite,
+        progress=TerminalReporter(),
+        people=people,
+        cameras=cameras,
+        seconds=seconds,
+        frame_rate=frame_rate,
+        size=None if size is None else _size(size),
+        noise=noise,
+        shadows=shadows,
+        light_drift=light_drift,
+        alike=alike,
+        seed=seed,
+    )
+    print(f"{film.rig_path}: {film.frames} frames of {film.cameras} cameras; truth in {film.truth_path.name}")
 
 
 def _size(text: str) -> tuple[int, int]:

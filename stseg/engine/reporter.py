@@ -52,3 +52,8 @@ class LogReporter:
                 self.function(work, count, total)
 
         yield advance
+
+
+def reporter_of(progress: Progress | Reporter | None) -> Reporter:
+    """A reporter as it is; or one that logs notes, and reports progress to a function, if there is one."""
+    return LogReporter(progress) if progress is None or callable(progress) else progress

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 import weakref
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import mkdtemp
@@ -15,14 +15,15 @@ from stseg.engine.offline.assembly import FinishedSegment, assemble
 from stseg.engine.offline.frame_range import FrameRange, resolve_frames
 from stseg.engine.offline.job import Job
 from stseg.engine.offline.known import digest, read_known
-from stseg.engine.reporter import LogReporter, Progress, Reporter
+from stseg.engine.recordings import AnySource, config_of, recording_of
+from stseg.engine.reporter import Progress, Reporter, reporter_of
 from stseg.engine.rig_body import with_body_of
 from stseg.engine.workers.workforce import Workforce
 from stseg.errors import ConfigError
+from stseg.geometry import Rig
 from stseg.identities.association import NO_KNOWN_PEOPLE
-from stseg.io.config_file import format_config, read_config
+from stseg.io.config_file import format_config
 from stseg.io.recording.recording import Recording
-from stseg.io.recording.rigs import read_rig
 from stseg.io.recording.stream_index import StreamIndex, index_streams
 from stseg.io.runfile.layout import VolumeKind
 from stseg.io.runfile.provenance import gather_provenance, run_request
@@ -32,9 +33,10 @@ from stseg.kernels.accelerate import compilation_noted
 
 
 def track(
-    rig: Path | str,
+    rig: Path | str | Recording | Rig,
     output: Path | str | None = None,
     *,
+    sources: Mapping[str, AnySource] | None = None,
     frames: tuple[int | None, int | None] | None = None,
     tracker: str = "cut",
     config: Config | Path | str | None = None,
@@ -42,17 +44,21 @@ def track(
     volume: VolumeKind = "all",
     known: Path | str | None = None,
     overwrite: bool = False,
-    progress: Progress | None = None,
+    progress: Progress | Reporter | None = None,
 ) -> Run:
     """Track the people of a recording, as `stseg run` does.
 
     Parameters
     ----------
     rig
-        The rig file (.toml): cameras, their recordings and the ground that they watch.
+        The rig file (.toml): cameras, their recordings and the ground that they watch; or a recording; or a rig, with
+        the sources of its cameras.
     output
         The run file to write; None for a temporary one, which is deleted with the returned run. An unfinished run of
         the same output is continued.
+    sources
+        Source of each camera of a `Rig` by the camera's name: the path of its boxes, images or video, or a
+        `stseg.Source`, which masks and instance images need.
     frames
         (first, stop), half open; None at either place for the recording's first frame and its end. None for all.
     tracker
@@ -70,7 +76,7 @@ def track(
         Whether an older file of that name may be replaced.
     progress
         Called with the kind of work, the frames done, and the frames in all (None where not known). Notes go to the
-        logger "stseg".
+        logger "stseg". Or a reporter, which receives both.
 
     Returns
     -------
@@ -82,10 +88,9 @@ def track(
     InputError
         As the command: one line with the file, the key, what was found and what was expected.
     """
-    resolved = config if isinstance(config, Config) else read_config(None if config is None else Path(config))
-    force = Workforce(workers)
-    chosen, reporter = None if frames is None else FrameRange(*frames), LogReporter(progress)
-    recording, earlier = read_rig(Path(rig)), None if known is None else Path(known)
+    resolved, force = config_of(config), Workforce(workers)
+    chosen, reporter = None if frames is None else FrameRange(*frames), reporter_of(progress)
+    recording, earlier = recording_of(rig, sources), None if known is None else Path(known)
     if output is not None:
         return track_recording(
             recording, Path(output), resolved, tracker, volume, chosen, force, reporter, known=earlier,

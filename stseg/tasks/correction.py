@@ -1,21 +1,28 @@
-"""A run under the answers of a person: identities solved again, with the answers as hard constraints."""
+"""`stseg.correct`: identities solved again, with the answers of a person as hard constraints."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from stseg.arrays import Ints, Rows
 from stseg.engine.offline.known import rows_with_ids
 from stseg.engine.pipeline import associated_tracks
-from stseg.errors import FormatError, InputError
+from stseg.engine.recordings import run_of
+from stseg.errors import ConfigError, FormatError, InputError
 from stseg.identities.review.answered_constraints import AnsweredRows, answered_rows
-from stseg.identities.review.corrections import Answer, Corrections, solve_corrections
+from stseg.identities.review.corrections import ACTIONS, Answer, Corrections, solve_corrections
 from stseg.identities.search.constraints import Constraints
+from stseg.io.answers import read_answers
 from stseg.io.config_file import parse_config
-from stseg.io.runfile.runs import Run
+from stseg.io.outputs.whole_files import require_new
+from stseg.io.runfile.corrected import write_corrected
+from stseg.io.runfile.runs import Run, read_run
+from stseg.io.untrusted.bounded_files import read_text
 from stseg.records.tables import Tracks
 
 
@@ -38,6 +45,51 @@ class CorrectedTracks:
     answered: Rows
     new_ids: Callable[[Ints, Ints], Ints]
     names: dict[int, str]
+
+
+class CorrectedRun(NamedTuple):
+    """A corrected run, and the answers that it is corrected by."""
+
+    run: Run
+    answers: tuple[Answer, ...]
+
+
+def correct(run: Run | Path | str, answers: Path | str, output: Path | str, *, overwrite: bool = False) -> CorrectedRun:
+    """Write a run file with corrected identities, as `stseg correct` does; the run itself stays as it is.
+
+    Parameters
+    ----------
+    run
+        The run, or its file.
+    answers
+        CSV with the columns action,frame,id,other,name; see `stseg correct --help` for the actions.
+    output
+        The run file to write.
+    overwrite
+        Replace the file if it exists.
+
+    Returns
+    -------
+    CorrectedRun
+        The run of the written file, and the answers.
+
+    Raises
+    ------
+    InputError
+        For an answer that names no such track or frame, or that contradicts another.
+    """
+    source, output, answers = run.path if isinstance(run, Run) else Path(run), Path(output), Path(answers)
+    require_new(output, overwrite)
+    if output.exists() and source.exists() and output.samefile(source):
+        raise ConfigError("command line", "--output", "the run file itself", "another file")
+    found, rows = run_of(run), read_answers(answers, ACTIONS)
+    given = tuple(Answer(row.place, row.action, row.track, row.other, row.frame, row.name) for row in rows)
+    corrected = corrected_tracks(found, given)
+    write_corrected(
+        source, output, corrected.tracks, corrected.answered, corrected.new_ids, corrected.names, read_text(answers),
+        overwrite,
+    )  # fmt: skip
+    return CorrectedRun(read_run(output), given)
 
 
 def corrected_tracks(run: Run, answers: Sequence[Answer]) -> CorrectedTracks:

@@ -1,4 +1,4 @@
-"""Forecast of a run's duration and size, from short parts of its recording that are tracked."""
+"""`stseg.plan`: duration and size of a run, from short parts of its recording that are tracked."""
 
 from __future__ import annotations
 
@@ -7,10 +7,20 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter
 
+from stseg.config import Config
+from stseg.config.effect import require_effect
 from stseg.engine.offline.assembly import FinishedSegment, assemble
+from stseg.engine.offline.frame_range import FrameRange, resolve_frames
 from stseg.engine.offline.job import Job
 from stseg.engine.offline.segment_worker import SegmentWorker
 from stseg.engine.offline.segments import Segment
+from stseg.engine.recordings import config_of, recording_of
+from stseg.engine.reporter import Progress, Reporter, reporter_of
+from stseg.engine.rig_body import with_body_of
+from stseg.engine.workers.workforce import Workforce
+from stseg.io.recording.recording import Recording
+from stseg.io.recording.stream_index import index_streams
+from stseg.io.runfile.layout import VolumeKind
 
 _SECONDS = 10.0
 """Duration of all tried parts, seconds."""
@@ -48,6 +58,49 @@ class Forecast:
         """From the beginning to the end, by workers that do not slow each other down."""
         rounds = -(-self.segments // min(self.workers, self.segments))
         return self.counting + (self.learning + self.tracking) * rounds / self.segments + self.joining
+
+
+def plan(
+    rig: Path | str | Recording,
+    *,
+    frames: tuple[int | None, int | None] | None = None,
+    config: Config | Path | str | None = None,
+    tracker: str = "cut",
+    volume: VolumeKind = "all",
+    workers: int | None = None,
+    progress: Progress | Reporter | None = None,
+) -> Forecast:
+    """Forecast the time of a run and the size of its file, as `stseg plan` does.
+
+    The recording is counted, and three short parts of it are tracked.
+
+    Parameters
+    ----------
+    rig, frames, config, tracker, volume, progress
+        As of `stseg.track`.
+    workers
+        Processes that will share the work, a core each; None for one per core as far as memory allows.
+
+    Raises
+    ------
+    InputError
+        As `stseg.track`.
+    """
+    workforce, chosen, recording = (
+        Workforce(workers),
+        None if frames is None else FrameRange(*frames),
+        recording_of(rig),
+    )
+    resolved = with_body_of(recording, config_of(config))
+    require_effect(resolved, tracker)
+    watch = _Clock()
+    streams = index_streams(recording)
+    counting = watch.lap()
+    for note in streams.notes:
+        reporter_of(progress).note(note)
+    first, stop = resolve_frames(chosen, streams, recording)
+    job = Job(recording, resolved, tracker, volume, first, stop, streams)
+    return forecast(job, counting, workforce.processes(job))
 
 
 def forecast(job: Job, counting: float, workers: int) -> Forecast:

@@ -1,27 +1,47 @@
-"""`stseg.measure`: measures of a run file."""
+"""`stseg.measure`: people in zones, at lines, and over the ground."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
+from stseg.engine.recordings import run_of
 from stseg.io.areas import read_lines, read_polygons
+from stseg.io.exports.measure_tables import write_tables
+from stseg.io.outputs.output_files import make_folder, write_file
 from stseg.io.runfile.runs import Run
 from stseg.measures.areas import Areas, Line, Zone
 from stseg.measures.measure import Measures, measure_tracks
+from stseg.reporting.page.html import png_bytes
+from stseg.reporting.pictures.flow_map import flow_map
 
 
-def measure(run: Run, zones: Path | str | None = None, lines: Path | str | None = None) -> Measures:
-    """Measure a run: zones, lines, tracks, distances, density and flow.
+def measure(
+    run: Run | Path | str,
+    zones: Path | str | None = None,
+    lines: Path | str | None = None,
+    *,
+    output: Path | str | None = None,
+    format_: Literal["csv", "parquet"] = "csv",
+    overwrite: bool = False,
+) -> Measures:
+    """Measure a run, as `stseg measure` does: zones, lines, tracks, distances, density and flow.
 
     Parameters
     ----------
     run
-        A run, see `stseg.read_run`.
+        The run, or its file.
     zones, lines
         GeoJSON files with polygons and with lines, in metres on the ground; `properties.name` names each. Without zones
         the whole ground is one.
+    output
+        Folder for the tables and flow.png; None to write nothing.
+    format_
+        Of the tables.
+    overwrite
+        Replace tables that exist.
 
     Returns
     -------
@@ -33,14 +53,25 @@ def measure(run: Run, zones: Path | str | None = None, lines: Path | str | None 
     FormatError
         Where a file is no GeoJSON of such features.
     """
-    grid = run.recording.rig.grid
-    return measure_tracks(run.trajectory, run.frames, run.frame_rate, grid, read_areas(run, zones, lines))
+    found = run_of(run)
+    if output is not None:
+        found.require_fit()
+    rig, areas = found.recording.rig, read_areas(found, zones, lines)
+    measures = measure_tracks(found.trajectory, found.frames, found.frame_rate, rig.grid, areas)
+    if output is not None:
+        folder = Path(output)
+        make_folder(folder)
+        write_tables(folder, measures.tables(), format_, overwrite)
+        drawn_zones = [(zone.name, zone.rings) for zone in areas.zones]
+        drawn_lines = [(line.name, line.points) for line in areas.lines]
+        write_file(folder / "flow.png", png_bytes(flow_map(rig, measures.field, drawn_zones, drawn_lines)), overwrite)
+    return measures
 
 
 def read_areas(run: Run, zones: Path | str | None, lines: Path | str | None) -> Areas:
     """Zones and lines from files; without a file of zones, the whole ground."""
     named = [] if zones is None else [Zone(name, rings) for name, rings in read_polygons(Path(zones))]
-    drawn = [] if lines is None else [Line(name, own) for name, (own,) in read_lines(Path(lines))]
+    drawn = [] if lines is None else [Line(name, points) for name, (points,) in read_lines(Path(lines))]
     return Areas(tuple(named) or (_whole(run),), tuple(drawn))
 
 

@@ -1,4 +1,4 @@
-"""Images of track ids: for every pixel of every camera, the track that it shows."""
+"""`stseg.label_images`: for every pixel of every camera, the track that it shows."""
 
 from __future__ import annotations
 
@@ -10,8 +10,11 @@ import numpy as np
 from stseg.arrays import Bytes, Ints, Observation, Rows, Singles
 from stseg.config import Config
 from stseg.engine.offline.backgrounds import make_foregrounds
-from stseg.engine.reporter import Reporter
+from stseg.engine.offline.frame_range import frames_of_run
+from stseg.engine.recordings import run_of
+from stseg.engine.reporter import Progress, Reporter, reporter_of
 from stseg.errors import SourceError
+from stseg.io.config_file import parse_config
 from stseg.io.outputs.label_images import LabelImages
 from stseg.io.recording.frames import FrameSet, open_frames
 from stseg.io.recording.recording import Recording
@@ -19,60 +22,73 @@ from stseg.io.runfile.runs import Run
 from stseg.pixel_labels.appearance import Appearance, ColourSums
 from stseg.pixel_labels.placed_people import PlacedPeople
 from stseg.pixel_labels.views import ViewLabels, view_labels
+from stseg.reporting.pictures.colours import track_palette
 
 _LEARNING_FRAMES = 200
 """Frames, about, from which the colours of tracks are learned."""
 
 
-def write_labels(
-    run: Run,
-    config: Config,
-    folder: Path,
-    frames: Ints,
-    palette: Bytes,
-    reporter: Reporter,
+def label_images(
+    run: Run | Path | str,
+    folder: Path | str,
     *,
+    frames: tuple[int | None, int | None] | None = None,
+    config: Config | None = None,
+    changes: Sequence[str] = (),
     overwrite: bool = False,
+    progress: Progress | Reporter | None = None,
 ) -> int:
-    """Write the label images of some frames of a run, and count them.
+    """Write the track id of every pixel of every camera as images, as `stseg labels` does.
 
     Parameters
     ----------
     run
-        A finished run.
-    config
-        The constants of foreground and labels.
+        A finished run, or its file; the cameras' streams are read again.
     folder
-        Folder of the images.
-    frames : int64 (n,)
-        Consecutive frames of the run, one or more.
-    palette : uint8 (256, 3)
-        Colours of the ids, red, green, blue.
-    reporter
-        Receives progress.
+        Folder of the images, FOLDER/CAMERA/000123.png for frame 123.
+    frames
+        (first, stop), half open; None for all frames of the run.
+    config
+        The constants of foreground and labels; None for those of the run.
+    changes
+        Constants other than those of the run, each SECTION.KEY=VALUE.
     overwrite
-        Whether the folder may hold files already.
+        Write into a folder that is not empty.
+    progress
+        As of `stseg.track`.
+
+    Returns
+    -------
+    int
+        Number of images.
 
     Raises
     ------
-    SourceError
+    InputError
         Where no camera delivers pixels, or a stream cannot be read.
-    OutputError
     """
+    found = run_of(run)
+    if config is None:
+        config = parse_config(found.provenance.config, f"{found.path}: the configuration", tuple(changes))
+    return _write_labels(found, config, Path(folder), frames_of_run(found, frames), reporter_of(progress), overwrite)
+
+
+def _write_labels(run: Run, config: Config, folder: Path, frames: Ints, reporter: Reporter, overwrite: bool) -> int:
+    """Write the label images of consecutive frames, int64 (n,), and count them."""
     recording, cameras = run.recording, require_pixels(run.recording)
     people = _people(run.trajectory, frames)
     largest = int(run.trajectory["id"].max(initial=0))
-    images = LabelImages(folder, [run.cameras[k] for k in cameras], largest, palette, overwrite)
+    images = LabelImages(folder, [run.cameras[k] for k in cameras], largest, track_palette(), overwrite)
     views = view_labels(recording.rig, config.labels, config.body)
-    worn = _appearances(run, views, people, frames, reporter)
+    colours = _appearances(run, views, people, frames, reporter)
     foregrounds = make_foregrounds(recording, config, int(run.frames[0]), int(run.frames[-1]) + 1)
     count = 0
     for frame_set in _frame_sets(run, frames, config.foreground.chosen.memory, reporter):
         for k in cameras:
-            seen = frame_set.views[k]
-            pixels = foregrounds[k].pixels(seen)
+            view = frame_set.views[k]
+            pixels = foregrounds[k].pixels(view)
             if frame_set.frame in people:
-                ids = _ids(views[k], people[frame_set.frame], pixels, seen, worn.get(k))
+                ids = _ids(views[k], people[frame_set.frame], pixels, view, colours.get(k))
                 images.write(run.cameras[k], frame_set.frame, ids)
                 count += 1
     return count
@@ -117,9 +133,9 @@ def _appearances(
     colours = {k: ColourSums.of(tracks) for k, kind in enumerate(kinds) if kind in ("video", "images")}
     if not colours or not len(tracks):
         return {}
-    every = max(len(frames) // _LEARNING_FRAMES, 1)
+    step = max(len(frames) // _LEARNING_FRAMES, 1)
     for frame_set in _frame_sets(run, frames, 0.0, reporter, "learning colours"):
-        if (frame_set.frame - int(frames[0])) % every == 0:
+        if (frame_set.frame - int(frames[0])) % step == 0:
             for k, sums in colours.items():
                 image = _colours(frame_set.views[k])
                 if image is not None:
@@ -128,12 +144,12 @@ def _appearances(
 
 
 def _ids(
-    view: ViewLabels, people: Rows, pixels: Singles | None, seen: Observation, worn: Appearance | None
+    view: ViewLabels, people: Rows, pixels: Singles | None, observation: Observation, colours: Appearance | None
 ) -> Ints:  # fmt: skip
     """Ids of the tracks that a view shows, int64 (v, u); all 0 for a blind view."""
     if pixels is None:
         return np.zeros(view.camera.size[::-1], np.int64)
-    index = view.label(_placed(people), pixels, _colours(seen), worn)
+    index = view.label(_placed(people), pixels, _colours(observation), colours)
     return np.asarray(np.append(0, people["id"])[index], np.int64)
 
 
@@ -143,6 +159,6 @@ def _placed(people: Rows) -> PlacedPeople:
     return PlacedPeople(ground, covariance, height, people["id"].astype(np.int64))
 
 
-def _colours(seen: Observation) -> Bytes | None:
+def _colours(observation: Observation) -> Bytes | None:
     """The image of an observation that has colours."""
-    return np.asarray(seen, np.uint8) if isinstance(seen, np.ndarray) and seen.ndim == 3 else None
+    return np.asarray(observation, np.uint8) if isinstance(observation, np.ndarray) and observation.ndim == 3 else None

@@ -12,12 +12,12 @@ from strategies import BARREL, Pose, poses
 from stseg.arrays import Floats
 from stseg.calibration.points.point_fit import PointFit, Points, fit_points
 from stseg.commands.calibrate.app import app
-from stseg.commands.calibrate.points import warnings
 from stseg.errors import CalibrationError, ConfigError, FormatError, InputError
 from stseg.geometry import Camera, Grid
 from stseg.geometry.fits import fit_homography, focal_of_square_pixels, middle_matrix, vertical_of_matrix
 from stseg.io.calibrations.point_files import read_points
 from stseg.io.recording.rigs import read_rig
+from stseg.tasks.calibration.points import fit_warnings
 
 SIZE = (640, 480)
 GRID = Grid((-2.0, 2.0), (-2.0, 2.0))
@@ -108,12 +108,12 @@ class TestSpread:
     def test_points_in_a_corner_are_warned_of(self) -> None:
         true = camera()
         corner = SPREAD * 0.15 + (-1.4, -1.4)
-        (words,) = warnings(fit(seen(true, corner, None), true), GRID)
+        (words,) = fit_warnings(fit(seen(true, corner, None), true), GRID)
         assert "cam: its points are badly spread" in words and "add points there" in words
-        assert warnings(fit(seen(true), true), GRID) == []
+        assert fit_warnings(fit(seen(true), true), GRID) == []
 
     def test_four_points_show_nothing(self) -> None:
-        words = warnings(fit(seen(camera(), SPREAD[:4]), camera()), GRID)
+        words = fit_warnings(fit(seen(camera(), SPREAD[:4]), camera()), GRID)
         assert any("a fifth" in word for word in words)
 
 

@@ -17,7 +17,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from stseg.arrays import AnyArray, Boxes, Bytes, Rows
-from stseg.commands.report import report, write_pictures
+from stseg.commands.report import report
 from stseg.errors import ConfigError, FormatError, OutputError, SourceError
 from stseg.geometry import Camera, Grid, Rig
 from stseg.io.recording.recording import CameraSource, Source
@@ -33,6 +33,7 @@ from stseg.reporting.pictures.overlay import OverlayView, pillar_outline
 from stseg.reporting.pictures.plan import plan_map
 from stseg.reporting.pictures.slices import colours_of
 from stseg.reporting.pictures.spacetime import Block
+from stseg.tasks.report import write_pictures
 
 GRID = Grid((0.0, 4.0), (-1.0, 2.0), 0.5, 1.8, 3)
 

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from stseg.arrays import Ints
 from stseg.errors import ConfigError
 from stseg.io.recording.recording import Recording
 from stseg.io.recording.stream_index import StreamIndex
+from stseg.io.runfile.runs import Run
 from stseg.io.toml.text import shown
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.numbers import parse_whole
@@ -20,6 +22,11 @@ class FrameRange(NamedTuple):
 
     def __str__(self) -> str:
         return f"{'' if self.first is None else self.first}:{'' if self.stop is None else self.stop}"
+
+    @classmethod
+    def parsed(cls, text: str | None) -> FrameRange | None:
+        """The range of an option's text; None without one."""
+        return None if text is None else cls.parse(text)
 
     @classmethod
     def parse(cls, text: str) -> FrameRange:
@@ -45,3 +52,21 @@ def resolve_frames(frames: FrameRange | None, streams: StreamIndex, recording: R
     if not 0 <= first < stop <= streams.length:
         raise ConfigError("--frames", "", f"'{frames}'", f"a part of the recording's frames, 0:{streams.length}")
     return first, stop
+
+
+def frames_of_run(run: Run, frames: tuple[int | None, int | None] | None) -> Ints:
+    """Frame numbers of a part of a run, all of the run's by default, int64 (n,).
+
+    Raises
+    ------
+    ConfigError
+        Where the run has no frames, or the range is not within them.
+    """
+    if not len(run.frames):
+        raise ConfigError(run.path, "", "a run without frames", "one that has some")
+    given, begin, end = FrameRange(*(frames or (None, None))), int(run.frames[0]), int(run.frames[-1]) + 1
+    first, stop = begin if given.first is None else given.first, end if given.stop is None else given.stop
+    if not begin <= first < stop <= end:
+        expected = f"A:B, half open, of the run's frames {begin}:{end}"
+        raise ConfigError("command line", "--frames", f"'{given}'", expected)
+    return run.frames[(run.frames >= first) & (run.frames < stop)]

@@ -1,0 +1,245 @@
+"""`stseg.calibrate_auto`: a rig from the videos themselves, by people who walk where several cameras see them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from stseg.arrays import Bytes, Floats
+from stseg.calibration.adjusted_rig import (
+    ViewReport,
+    cameras_of,
+    distance_factor,
+    grid_of,
+    offsets_of,
+    reports_of,
+    scaled,
+)
+from stseg.calibration.automatic.auto import calibrate_from_people, sharpen_by_floor, steps_of
+from stseg.calibration.automatic.endpoints import Endpoints, concatenate_endpoints, upright_endpoints
+from stseg.calibration.automatic.solution import CalibrationInput, Solution
+from stseg.config import Config
+from stseg.engine.offline.backgrounds import make_foregrounds
+from stseg.engine.offline.frame_range import FrameRange
+from stseg.engine.reporter import Progress, Reporter, reporter_of
+from stseg.errors import ConfigError
+from stseg.foreground.view_foreground import ViewForeground
+from stseg.geometry import Camera, Grid, Rig
+from stseg.io.outputs.whole_files import require_new
+from stseg.io.recording.frames import open_frames
+from stseg.io.recording.recording import CameraSource, Recording, Source
+from stseg.io.recording.rigs import write_rig
+from stseg.io.recording.stream_index import StreamIndex, index_streams
+from stseg.io.recording.video.video_size import read_video_size
+
+Distance = tuple[str, float, float, float, float, float]
+"""A camera's name, two of its ground pixels (u, v, u, v), and their distance in metres."""
+UNCALIBRATED = np.array([[1.0, 0, 0, 0], [0, 1.0, 0, 0], [0, 0, 1.0, 1.0]])
+"""Projection of a camera that is read before it is calibrated."""
+_DEFAULT_FRAMES = 3000
+"""Frames that are read by default, at most."""
+
+
+@dataclass(frozen=True)
+class AutomaticCalibration:
+    """A rig from videos.
+
+    Attributes
+    ----------
+    recording
+        The rig and its streams, as they were written.
+    reports
+        Precision of each camera, in the rig's order.
+    people
+        Number of people, each in one frame, by which the cameras were adjusted.
+    height
+        Mean height of these people, metres.
+    floor_marks
+        Number of marks on the floor that several views share.
+    """
+
+    recording: Recording
+    reports: tuple[ViewReport, ...]
+    people: int
+    height: float
+    floor_marks: int
+
+
+def calibrate_auto(
+    videos: Sequence[Path | str],
+    output: Path | str,
+    *,
+    frame_rate: float,
+    person_height: float = 1.7,
+    distance: Distance | None = None,
+    most_delay: float = 2.0,
+    frames: tuple[int | None, int | None] | None = None,
+    background: str | None = None,
+    source_kind: Literal["video", "masks"] = "video",
+    cell: float = Grid.cell,
+    overwrite: bool = False,
+    progress: Progress | Reporter | None = None,
+) -> AutomaticCalibration:
+    """Make a rig file from videos alone, as `stseg calibrate auto` does.
+
+    Parameters
+    ----------
+    videos
+        One video a camera; file names become camera names.
+    output
+        The rig file to write.
+    frame_rate
+        Frames per second of all videos.
+    person_height
+        Mean body height, metres. It sets the scale where no distance is given.
+    distance
+        (camera, u, v, u, v, metres): two ground pixels of one camera and their distance.
+    most_delay
+        Greatest delay of one video against another, seconds; 0 where all are synchronous.
+    frames
+        (first, stop), half open; None for the first 3000 frames.
+    background
+        Video of every camera's empty scene, `{name}` standing for the camera's name.
+    source_kind
+        Colour videos, or videos of masks.
+    cell
+        Side of a ground cell of the rig, metres.
+    overwrite
+        Replace the rig file if it exists.
+    progress
+        As of `stseg.track`.
+
+    Raises
+    ------
+    InputError
+        Where a video cannot be read, or too few people walk where several cameras see them.
+    """
+    output, paths, reporter = Path(output), [Path(video) for video in videos], reporter_of(progress)
+    require_new(output, overwrite)
+    streams = _streams(paths, output, frame_rate, background, source_kind)
+    names = [camera.name for camera in streams.rig.cameras]
+    known = None if distance is None else _known_distance(distance, names)
+    counted = index_streams(streams)
+    for note in counted.notes:
+        reporter.note(note)
+    first, stop = _frame_range(frames, counted.length)
+    foregrounds = make_foregrounds(streams, Config(), first, stop, streams=counted)
+    views = CalibrationInput(
+        _endpoints(streams, counted, foregrounds, range(first, stop), reporter),
+        tuple(camera.size for camera in streams.rig.cameras),
+        frame_rate,
+        person_height,
+        most_delay,
+    )
+    with reporter.progress("calibrating", steps_of(len(names))) as advance:
+        solution = calibrate_from_people([str(path) for path in paths], views, lambda: advance(1))
+    floor_marks, backgrounds = 0, _background_images(foregrounds)
+    if backgrounds:
+        solution, floor_marks = sharpen_by_floor(views, solution, backgrounds)
+    if known is not None:
+        solution = scaled(solution, _scale(distance_factor(solution, *known)))
+    recording = _recording(output, streams, solution, cell)
+    write_rig(output, recording)
+    points = solution.adjustment.parameters.points
+    return AutomaticCalibration(
+        recording, tuple(reports_of(solution)), len(points), float(np.median(points[:, 2])), floor_marks
+    )
+
+
+def camera_names(videos: Sequence[Path]) -> list[str]:
+    """Names of the cameras of videos: of the files, or of their folders where those are called the same."""
+    names = [path.stem for path in videos]
+    return [path.absolute().parent.name for path in videos] if len(set(names)) < len(names) else names
+
+
+def _streams(
+    videos: Sequence[Path], output: Path, frame_rate: float, background: str | None, kind: Literal["video", "masks"]
+) -> Recording:
+    """The videos as a recording with placeholder cameras; streams may end at different times."""
+    names = camera_names(videos)
+    if len(videos) < 2 or len(set(names)) < len(names):
+        raise ConfigError("calibrate auto", "VIDEO", ", ".join(map(str, videos)), "two or more, with different names")
+    if not frame_rate > 0:
+        raise ConfigError("--frame-rate", "", frame_rate, "frames per second, above 0")
+    cameras = tuple(
+        Camera.from_projection(name, read_video_size(path), UNCALIBRATED)
+        for name, path in zip(names, videos, strict=True)
+    )
+    sources = tuple(
+        CameraSource(
+            Source(kind, path),
+            None if background is None else Source("video", Path(background.replace("{name}", name))),
+            on_missing="blind",
+        )
+        for name, path in zip(names, videos, strict=True)
+    )
+    return Recording(output, Rig(output.stem, frame_rate, Grid((0.0, 1.0), (0.0, 1.0)), cameras), sources)
+
+
+def _known_distance(distance: Distance, names: Sequence[str]) -> tuple[int, Floats, float]:
+    """View, pixels (2, 2) and metres of a distance."""
+    camera, *pixels, metres = distance
+    found = repr(",".join([camera, *(f"{number:g}" for number in (*pixels, metres))]))
+    if camera not in names:
+        raise ConfigError("--distance", "", found, f"camera,u,v,u,v,metres with a camera of {', '.join(names)}")
+    if not metres > 0 or pixels[:2] == pixels[2:]:
+        raise ConfigError("--distance", "", found, "two different pixels, and metres above 0")
+    return list(names).index(camera), np.array(pixels, float).reshape(2, 2), metres
+
+
+def _scale(factor: float) -> float:
+    if not np.isfinite(factor):
+        raise ConfigError("--distance", "", "a pixel above the horizon", "pixels that show the ground")
+    return factor
+
+
+def _frame_range(frames: tuple[int | None, int | None] | None, length: int) -> tuple[int, int]:
+    given = FrameRange(*(frames or (0, min(length, _DEFAULT_FRAMES))))
+    first, stop = given.first or 0, length if given.stop is None else min(given.stop, length)
+    if not first < stop:
+        raise ConfigError("--frames", "", f"'{given}'", f"a part of the videos' frames, 0:{length}")
+    return first, stop
+
+
+def _endpoints(
+    streams: Recording, counted: StreamIndex, foregrounds: Sequence[ViewForeground], frames: range, reporter: Reporter
+) -> tuple[Endpoints, ...]:
+    """Feet and heads of isolated people, frame by frame and view by view."""
+    found: list[list[tuple[int, Floats]]] = [[] for _ in foregrounds]
+    with (
+        open_frames(streams, frames.start, frames.stop, counted) as frame_sets,
+        reporter.progress("looking for people", len(frames)) as advance,
+    ):
+        for frame_set in frame_sets:
+            for foreground, view, endpoints in zip(foregrounds, frame_set.views, found, strict=True):
+                likelihood = foreground.evidence(view)
+                if isinstance(likelihood, np.ndarray):
+                    endpoints.append((frame_set.frame, upright_endpoints(likelihood)))
+            advance(1)
+    return tuple(concatenate_endpoints(parts) for parts in found)
+
+
+def _background_images(foregrounds: Sequence[ViewForeground]) -> list[Bytes]:
+    """The empty scene in each view; none where the streams are masks."""
+    return [
+        np.clip(np.rint(foreground.background.model.background_image()), 0, 255).astype(np.uint8)
+        for foreground in foregrounds
+        if foreground.background is not None
+    ]
+
+
+def _recording(output: Path, streams: Recording, solution: Solution, cell: float) -> Recording:
+    names = [camera.name for camera in streams.rig.cameras]
+    rig = replace(streams.rig, grid=grid_of(solution, cell), cameras=cameras_of(solution, names))
+    offsets = offsets_of(solution)
+    # Streams that began at different times end at different times too.
+    missing: Literal["blind", "error"] = "blind" if offsets.any() else "error"
+    sources = tuple(
+        replace(source, offset=int(offset), on_missing=missing)
+        for source, offset in zip(streams.sources, offsets, strict=True)
+    )
+    return Recording(output, rig, sources)

@@ -1,0 +1,194 @@
+"""`stseg.check_rig`: a rig against its recording, by the people in it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from html import escape
+from pathlib import Path
+
+from stseg.arrays import Floats, Observation
+from stseg.calibration.check.box_correspondence import isolated_boxes
+from stseg.calibration.check.rig_check import Check, coverage, verdict_text
+from stseg.calibration.check.rig_check import check_rig as check_boxes
+from stseg.calibration.check.verdict import Disagreement
+from stseg.config import Config
+from stseg.engine.offline.backgrounds import make_foregrounds
+from stseg.engine.recordings import recording_of
+from stseg.engine.reporter import Progress, Reporter, reporter_of
+from stseg.errors import ConfigError
+from stseg.io.outputs.output_files import make_folder, write_file, write_page
+from stseg.io.recording.frames import open_frames
+from stseg.io.recording.recording import Recording
+from stseg.reporting.figures import Figure, backdrop
+from stseg.reporting.page.html import figures, note, png_bytes, section, table
+from stseg.reporting.page.style import STYLE
+from stseg.reporting.pictures.ground_grid import grid_picture
+from stseg.reporting.pictures.maps import blind_map
+
+DEFAULT_FRAMES = 300
+"""Frames that are read by default."""
+COLUMNS = ("camera", "people", "shown %", "feet cm", "heads cm", "right cm", "down cm", "ground cm", "px")
+"""Headings of `RigCheck.rows`."""
+_FIELDS = ("people", "confirmed", "feet", "heads", "right", "down", "ground", "pixels")
+
+
+@dataclass(frozen=True)
+class RigCheck:
+    """Disagreements of each view of a rig with the others.
+
+    Attributes
+    ----------
+    recording
+        The rig and its streams.
+    check
+        Disagreements, swapped and delayed streams.
+    verdict
+        The same in sentences.
+    frame, views
+        The middle frame, and each camera's observation of it.
+    """
+
+    recording: Recording
+    check: Check
+    verdict: tuple[str, ...]
+    frame: int
+    views: tuple[Observation, ...]
+
+    def __repr__(self) -> str:
+        return f"RigCheck({self.recording.rig.name}: {' '.join(self.verdict)})"
+
+    @property
+    def sound(self) -> bool:
+        """Whether no fault was found."""
+        return self.check.sound
+
+    def rows(self) -> list[list[str]]:
+        """Disagreement of each view with the others in words, one row a camera, under `COLUMNS`."""
+        rows = []
+        views = zip(self.recording.rig.cameras, self.check.verdict.views, self.check.confirmed, strict=True)
+        for camera, one, share in views:
+            confirmed = "" if share != share else f"{100 * share:.0f}"
+            rows.append([camera.name, *_numbers(one, confirmed)])
+        return rows
+
+    def as_dict(self) -> dict[str, object]:
+        """The verdict in numbers, for JSON."""
+        names, check = [camera.name for camera in self.recording.rig.cameras], self.check
+        views = [None if one is None else {k: getattr(one, k) for k in _FIELDS} for one in check.verdict.views]
+        return {
+            "sound": check.sound,
+            "words": list(self.verdict),
+            "off": [names[one.view] for one in check.verdict.named],
+            "swapped": [] if check.swapped is None else [names[view] for view in check.swapped],
+            "late": {names[one.view]: one.frames for one in check.delays},
+            "people": check.people,
+            "views": dict(zip(names, views, strict=True)),
+        }
+
+    @cached_property
+    def pictures(self) -> list[Figure]:
+        """Each camera's frame with the ground's grid and upright poles; last, how many views see the ground."""
+        rig, views = self.recording.rig, zip(self.recording.rig.cameras, self.views, strict=True)
+        grids = [
+            Figure(
+                f"grid_{camera.name}",
+                grid_picture(camera, rig.grid, backdrop(view, camera.size), self.frame),
+                camera.name,
+            )
+            for camera, view in views
+        ]
+        words = "How many views see each ground cell at some height."
+        return [*grids, Figure("coverage", blind_map(rig, coverage(rig)), words)]
+
+    def write_page(self, output: Path, overwrite: bool = False) -> None:
+        """Write verdict and pictures as one HTML page, which holds images of the cameras."""
+        write_page(output, _page(self), overwrite)
+
+    def write_pictures(self, folder: Path, overwrite: bool = False) -> int:
+        """Write the pictures as PNG files grid_CAMERA.png and coverage.png; their number."""
+        make_folder(folder)
+        for figure in self.pictures:
+            write_file(folder / f"{figure.name}.png", png_bytes(figure.picture), overwrite)
+        return len(self.pictures)
+
+
+def check_rig(
+    rig: Path | str | Recording,
+    *,
+    frames: tuple[int | None, int | None] | None = None,
+    progress: Progress | Reporter | None = None,
+) -> RigCheck:
+    """Check each view of a rig against the others by the people in its recording, as `stseg calibrate check` does.
+
+    Parameters
+    ----------
+    rig
+        The rig file, or a recording.
+    frames
+        (first, stop), half open; None for the first 300 frames.
+    progress
+        As of `stseg.track`.
+
+    Raises
+    ------
+    InputError
+        Where the recording cannot be read, or has no such frames.
+    """
+    recording, (first, stop) = recording_of(rig), _frame_range(frames)
+    foregrounds = make_foregrounds(recording, Config(), first, stop)
+    sizes = [camera.size for camera in recording.rig.cameras]
+    boxes: dict[int, list[Floats]] = {}
+    middle: tuple[int, tuple[Observation, ...]] = (first, (None,) * len(foregrounds))
+    with (
+        open_frames(recording.without_images(), first, None) as frame_sets,
+        reporter_of(progress).progress("looking", stop - first) as advance,
+    ):
+        for frame_set, _ in zip(frame_sets, range(first, stop), strict=False):
+            evidence = [
+                foreground.evidence(view) for foreground, view in zip(foregrounds, frame_set.views, strict=True)
+            ]
+            boxes[frame_set.frame] = [isolated_boxes(one, size) for one, size in zip(evidence, sizes, strict=True)]
+            if frame_set.frame <= first + (stop - first) // 2:
+                middle = (frame_set.frame, frame_set.views)
+            advance(1)
+    if not boxes:
+        raise ConfigError("--frames", "", f"{first}:{stop}", "a part of the recording")
+    check = check_boxes(recording.rig, boxes)
+    return RigCheck(recording, check, tuple(verdict_text(recording.rig, check)), *middle)
+
+
+def _frame_range(frames: tuple[int | None, int | None] | None) -> tuple[int, int]:
+    begin, end = frames or (None, None)
+    first = begin or 0
+    stop = first + DEFAULT_FRAMES if end is None else end
+    if stop <= first:
+        raise ConfigError("--frames", "", f"'{first}:{stop}'", "A:B with A before B")
+    return first, stop
+
+
+def _numbers(one: Disagreement | None, confirmed: str) -> Sequence[str]:
+    if one is None:
+        return ["few", confirmed, *[""] * 6]
+    metres = (one.feet, one.heads, one.right, one.down, one.ground)
+    return [str(one.people), confirmed, *(f"{100 * value:.1f}" for value in metres), f"{one.pixels:.1f}"]
+
+
+def _page(found: RigCheck) -> str:
+    *grids, seen_by = found.pictures
+    verdict = section("Verdict", *(note(escape(sentence)) for sentence in found.verdict))
+    rows = [[escape(cell) for cell in row] for row in found.rows()]
+    numbers = section(
+        "Views",
+        table(COLUMNS, rows, len(rows)),
+        note(
+            "Off by so much, across the line of sight, from where the other views put feet and heads; root mean square."
+        ),
+    )
+    views = section("Ground and poles", figures(grids, "pair"), note("These pictures hold frames of the cameras."))
+    ground = section("Coverage", figures([seen_by], "pair"))
+    title = escape(f"{found.recording.rig.name}: check of the rig")
+    head = f'<head><meta charset="utf-8"><title>{title}</title><style>{STYLE}</style></head>'
+    main = f"<main>{verdict}{numbers}{views}{ground}</main>"
+    return f'<!doctype html>\n<html lang="en">{head}\n<body><header><h1>{title}</h1></header>\n{main}</body></html>\n'

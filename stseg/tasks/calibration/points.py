@@ -1,0 +1,147 @@
+"""`stseg.calibrate_points`: a rig from measured points."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from stseg.arrays import Ints
+from stseg.calibration.points.point_fit import PointFit, Points, fit_points
+from stseg.calibration.points.point_requirements import require_height
+from stseg.engine.recordings import AnySource, camera_source
+from stseg.errors import ConfigError
+from stseg.geometry import Grid, Lens, Rig
+from stseg.io.calibrations.opencv_xml import read_opencv_lens
+from stseg.io.calibrations.point_files import PointTable, read_points
+from stseg.io.calibrations.world_frame import UNITS
+from stseg.io.outputs.whole_files import require_new
+from stseg.io.recording.recording import Recording
+from stseg.io.recording.rigs import write_rig
+
+_UNCERTAIN_SHARE = 0.01
+"""Share of a camera's ground that may be uncertain without a warning."""
+
+
+@dataclass(frozen=True)
+class PointCalibration:
+    """A rig from points.
+
+    Attributes
+    ----------
+    recording
+        The rig and its streams, as they were written.
+    lines
+        For each camera the lines of its points in the file, int64 (n,).
+    fits
+        For each camera its fit: the error of every point, and the covariance.
+    warnings
+        One sentence for each badly determined camera.
+    """
+
+    recording: Recording
+    lines: tuple[Ints, ...]
+    fits: tuple[PointFit, ...]
+    warnings: tuple[str, ...]
+
+
+def calibrate_points(
+    points: Path | str,
+    output: Path | str,
+    *,
+    size: tuple[int, int],
+    grid: Grid,
+    frame_rate: float,
+    sources: Mapping[str, AnySource] | str | Callable[[Sequence[str]], Sequence[AnySource]],
+    scene: str | None = None,
+    unit: Literal["mm", "cm", "m"] = "m",
+    lens: str | None = None,
+    overwrite: bool = False,
+) -> PointCalibration:
+    """Make a rig file from measured ground points and their pixels in each camera, as `stseg calibrate points` does.
+
+    Parameters
+    ----------
+    points
+        CSV with the columns camera,u,v,x,y and perhaps z: pixels (u to the right, v down), and places on the ground.
+    output
+        The rig file to write.
+    size
+        Width and height of the images, pixels.
+    grid
+        Ground cells and planes of the rig.
+    frame_rate
+        Frames per second of the recording.
+    sources
+        Source of every camera by its name; the path of all with `{name}` for the camera's name; or a function that
+        gives the sources of cameras by their names.
+    scene
+        Name of the scene; None for the rig file's name.
+    unit
+        Unit of x, y and z.
+    lens
+        OpenCV XML with `camera_matrix` and `distortion_coefficients` of each camera, `{name}` standing for its name.
+    overwrite
+        Replace the rig file if it exists.
+
+    Raises
+    ------
+    InputError
+        Where the points do not determine a camera, or the rig file cannot be written.
+    """
+    output = Path(output)
+    require_new(output, overwrite)
+    tables, fits = read_points(Path(points)), list[PointFit]()
+    for table in tables:
+        fits.append(_fit(table, size, unit, None if lens is None else _lens(lens, table.camera)))
+        require_height(fits[-1].camera, unit, UNITS)
+    names = [table.camera for table in tables]
+    rig = Rig(scene or output.stem, frame_rate, grid, tuple(fit.camera for fit in fits))
+    recording = Recording(output, rig, tuple(map(camera_source, _sources(sources, names))))
+    write_rig(output, recording)
+    warnings = tuple(words for fit in fits for words in fit_warnings(fit, grid))
+    return PointCalibration(recording, tuple(table.line for table in tables), tuple(fits), warnings)
+
+
+def _sources(
+    sources: Mapping[str, AnySource] | str | Callable[[Sequence[str]], Sequence[AnySource]], names: Sequence[str]
+) -> Sequence[AnySource]:
+    if isinstance(sources, str):
+        return [sources.replace("{name}", name) for name in names]
+    if callable(sources):
+        return sources(names)
+    if missing := [name for name in names if name not in sources]:
+        raise ConfigError("sources", "", ", ".join(sources) or "none", f"one of camera {missing[0]} too")
+    return [sources[name] for name in names]
+
+
+def fit_warnings(fit: PointFit, grid: Grid) -> list[str]:
+    """Warnings of a fit: badly spread points, or too few to check."""
+    deviation, words = fit.ground_deviation(grid), []
+    finite = deviation[np.isfinite(deviation)]
+    share = float(np.mean(finite > grid.cell)) if len(finite) else 0.0
+    if share > _UNCERTAIN_SHARE:
+        row, column = np.unravel_index(int(np.nanargmax(deviation)), deviation.shape)
+        x, y = grid.ground[row, column].tolist()
+        words.append(
+            f"{fit.camera.name}: its points are badly spread: {100 * share:.0f} % of the ground that it sees is known "
+            f"worse than to a cell, and at ({x:.1f}, {y:.1f}) m only to {100 * deviation[row, column]:.0f} cm (one "
+            "standard deviation): add points there"
+        )
+    if int(fit.points.low.sum()) == 4:
+        words.append(f"{fit.camera.name}: four points fit any camera: a fifth would show whether they are right")
+    return words
+
+
+def _fit(table: PointTable, size: tuple[int, int], unit: str, lens: Lens | None) -> PointFit:
+    metres = table.place * UNITS[unit]
+    return fit_points(table.camera, size, Points(table.pixel, metres[:, :2], metres[:, 2]), lens)
+
+
+def _lens(pattern: str, name: str) -> Lens:
+    if "{name}" not in pattern:
+        raise ConfigError("--lens", "", repr(pattern), "a path with {name} in it")
+    return read_opencv_lens(Path(pattern.replace("{name}", name)))

@@ -1,0 +1,246 @@
+"""`stseg.report`: a run as one HTML page, as pictures and as a film."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+from itertools import repeat
+from pathlib import Path
+
+import numpy as np
+
+from stseg.arrays import Bytes, Ints, Observation, Rows
+from stseg.engine.offline.frame_range import frames_of_run
+from stseg.engine.recordings import run_of
+from stseg.engine.reporter import Progress, Reporter, reporter_of
+from stseg.errors import ConfigError
+from stseg.io.answers import read_names
+from stseg.io.outputs.output_files import make_folder, write_file, write_page
+from stseg.io.outputs.video_writer import require_film_name, write_film
+from stseg.io.outputs.whole_files import require_new
+from stseg.io.recording.frames import open_frames
+from stseg.io.recording.recording import Recording
+from stseg.io.runfile.runs import Run
+from stseg.io.track_csv import read_tracks_csv
+from stseg.reporting.figures import Figure, Instant, camera_figures, ground_figures, slice_figures
+from stseg.reporting.page.html import png_bytes
+from stseg.reporting.page.page import report_page
+from stseg.reporting.pictures.film import Film
+from stseg.tasks.report_contents import page_contents
+
+_DEFAULT_INSTANTS = 3
+"""Number of frames that the page shows by default."""
+
+
+def report(
+    run: Run | Path | str,
+    output: Path | str | None = None,
+    *,
+    truth: Path | str | None = None,
+    frame: Sequence[int] = (),
+    pictures: Path | str | None = None,
+    video: Path | str | None = None,
+    frames: tuple[int | None, int | None] | None = None,
+    camera_images: bool = False,
+    names: Path | str | None = None,
+    overwrite: bool = False,
+    progress: Progress | Reporter | None = None,
+) -> list[Path]:
+    """Write a run as an HTML page that needs no other file, or as a film, as `stseg report` does.
+
+    Parameters
+    ----------
+    run
+        The run, or its file.
+    output
+        The page to write, or None for the film alone.
+    truth
+        CSV with the columns frame,id,x,y (metres), drawn beside the tracks.
+    frame
+        Frames of which the page shows planes and camera views; empty for the camera views of three frames.
+    pictures
+        Folder to write the pictures of the page to as well.
+    video
+        A film to write, MP4.
+    frames
+        (first, stop), half open: the part of the run that the film shows; None for all.
+    camera_images
+        Show the cameras' frames under the tracks. Page, pictures and film then hold images of people.
+    names
+        CSV with the columns id,name: names of tracks.
+    overwrite
+        Replace files that exist.
+    progress
+        As of `stseg.track`.
+
+    Returns
+    -------
+    list of Path
+        The files that were written.
+
+    Raises
+    ------
+    InputError
+        Where nothing is to be written, a file exists, or the run has no such frame.
+    """
+    page, folder, movie = (None if path is None else Path(path) for path in (output, pictures, video))
+    require_outputs(page, folder, movie, None if frames is None else "{}:{}".format(*frames), overwrite)
+    found = run_of(run)
+    if names is not None:
+        found = found.with_names(read_names(Path(names)))
+    true = None if truth is None else Path(truth)
+    paths = [] if page is None else write_report(found, page, true, frame, folder, camera_images, overwrite)
+    if movie is not None:
+        film(found, movie, frames, camera_images, reporter_of(progress), overwrite)
+        paths.append(movie)
+    return paths
+
+
+def require_outputs(
+    output: Path | None, pictures: Path | None, video: Path | None, frames: str | None, overwrite: bool
+) -> None:
+    """Refuse outputs that cannot be written and options without effect, before any work."""
+    if output is None and video is None:
+        raise ConfigError("command line", "", "nothing to write", "-o REPORT.html, or --video FILM.mp4")
+    if output is None and pictures is not None:
+        raise ConfigError("command line", "--pictures", pictures, "-o REPORT.html with it")
+    if video is None and frames is not None:
+        raise ConfigError("command line", "--frames", frames, "--video FILM.mp4 with it")
+    for path in (output, video):
+        if path is not None:
+            require_new(path, overwrite)
+    if video is not None:
+        require_film_name(video)
+
+
+def write_report(
+    run: Run,
+    output: Path,
+    truth: Path | None,
+    frame: Sequence[int],
+    pictures: Path | None,
+    camera_images: bool,
+    overwrite: bool,
+) -> list[Path]:
+    """Write the page and its pictures, see `report`; the files that were written."""
+    true = None if truth is None else _during(run, read_tracks_csv(truth))
+    instants = _read_instants(run, run.recording, _frames(run, frame), camera_images)
+    contents = page_contents(run, true, instants, bool(frame), camera_images)
+    write_page(output, report_page(contents), overwrite)
+    if pictures is None:
+        return [output]
+    drawn = instants if frame else instants[len(instants) // 2 :][:1]
+    return [output, *_write_figures(pictures, [*contents.still, *_named(run.recording, run, drawn)], overwrite)]
+
+
+def film(
+    run: Run,
+    output: Path,
+    frames: tuple[int | None, int | None] | None,
+    camera_images: bool,
+    reporter: Reporter,
+    overwrite: bool,
+) -> int:
+    """Write the film, see `report`; the number of its frames."""
+    numbers = frames_of_run(run, frames)
+    drawn = Film(run.recording.rig, run.views, run.trajectory)
+    return write_film(output, _film_pictures(run, drawn, numbers, camera_images, reporter), run.frame_rate, overwrite)
+
+
+def write_pictures(
+    folder: Path, recording: Recording, run: Run, truth: Rows | None, frame: int, camera_images: bool = False
+) -> list[Path]:
+    """Write the report's pictures as PNG files, replacing older ones.
+
+    Parameters
+    ----------
+    folder
+        Made where it is not there.
+    recording
+        The rig and its streams; these are read with `camera_images` alone.
+    run
+    truth : (m,) with frame, id, x, y, or None
+    frame
+        The frame that slices and cameras show.
+    camera_images
+        Whether the overlays show the cameras' frames.
+
+    Returns
+    -------
+    list of Path
+        plan.png, spacetime.png, slices.png, marginal.png and overlay_CAMERA.png for each camera.
+
+    Raises
+    ------
+    OutputError
+        Where they cannot be written.
+    SourceError
+        Where the cameras' frames are asked for and cannot be read.
+    """
+    instants = _read_instants(run, recording, [frame], camera_images)
+    ground = ground_figures(recording.rig, run.views, run.trajectory, truth, run.names)
+    return _write_figures(folder, [*ground, *_named(recording, run, instants)], True)
+
+
+def _frames(run: Run, chosen: Sequence[int]) -> list[int]:
+    """The frames to show, in order of time."""
+    numbers = run.frames.tolist()
+    for frame in chosen:
+        if frame not in numbers:
+            some = f"a frame of the run, {numbers[0]} to {numbers[-1]}" if numbers else "none: the run is empty"
+            raise ConfigError("command line", "--frame", frame, some)
+    if chosen or not numbers:
+        return sorted(set(chosen))
+    middles = (2 * np.arange(_DEFAULT_INSTANTS) + 1) * len(numbers) // (2 * _DEFAULT_INSTANTS)
+    return sorted({numbers[index] for index in middles.tolist()})
+
+
+def _during(run: Run, truth: Rows) -> Rows:
+    """The truth of the run's frames."""
+    return truth[np.isin(truth["frame"], run.frames)]
+
+
+def _read_instants(run: Run, recording: Recording, frames: Sequence[int], camera_images: bool) -> list[Instant]:
+    unseen = (None,) * len(recording.rig.cameras)
+    views = _read_views(recording, frames) if camera_images and frames else {}
+    return [Instant(frame, *run.read_frame(frame), views.get(frame, unseen)) for frame in frames]
+
+
+def _read_views(recording: Recording, frames: Sequence[int]) -> dict[int, tuple[Observation, ...]]:
+    """What the cameras delivered at these frames, which are in order."""
+    with open_frames(recording.pictured(), frames[0], frames[-1] + 1) as frame_sets:
+        return {frame_set.frame: frame_set.views for frame_set in frame_sets if frame_set.frame in frames}
+
+
+def _named(recording: Recording, run: Run, instants: Sequence[Instant]) -> list[Figure]:
+    """Figures of these frames; where there are several, the frame is part of the name."""
+    figures = []
+    for instant in instants:
+        drawn = [*slice_figures(recording.rig, instant), *camera_figures(recording.rig, run.trajectory, instant)]
+        ending = f"_{instant.frame}" if len(instants) > 1 else ""
+        figures += [replace(figure, name=figure.name + ending) for figure in drawn]
+    return figures
+
+
+def _write_figures(folder: Path, figures: Iterable[Figure], overwrite: bool) -> list[Path]:
+    make_folder(folder)
+    paths = []
+    for figure in figures:
+        paths.append(folder / f"{figure.name}.png")
+        write_file(paths[-1], png_bytes(figure.picture), overwrite)
+    return paths
+
+
+def _film_pictures(run: Run, film: Film, frames: Ints, camera_images: bool, reporter: Reporter) -> Iterator[Bytes]:
+    with reporter.progress("drawing", len(frames)) as advance:
+        if not camera_images:
+            for frame in frames.tolist():
+                yield film.picture(frame, tuple(repeat(None, len(run.cameras))))
+                advance(1)
+            return
+        wanted = set(frames.tolist())
+        with open_frames(run.recording.pictured(), int(frames[0]), int(frames[-1]) + 1) as frame_sets:
+            for frame_set in frame_sets:
+                if frame_set.frame in wanted:
+                    yield film.picture(frame_set.frame, frame_set.views)
+                    advance(1)

@@ -1,0 +1,121 @@
+"""`stseg.simulate`: a rendered scene with ground truth."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from stseg.engine.reporter import Progress, Reporter, reporter_of
+from stseg.errors import ConfigError
+from stseg.io.outputs.simulated_scene import rig_name, write_scene
+from stseg.io.recording.recording import BodyPrior
+from stseg.io.toml.text import shown
+from stseg.io.untrusted import limits
+from stseg.simulation import NAMED, Film, SceneSpec, Spoil, SpoiledFilm
+from stseg.simulation.spoiling.spoil import STRENGTHS
+
+_BOUNDS = {"seconds": (0.0, 86_400.0), "frame_rate": limits.FRAME_RATE}
+
+
+@dataclass(frozen=True)
+class SimulatedRecording:
+    """Files of a simulated scene.
+
+    Attributes
+    ----------
+    rig_path, truth_path
+        The rig file of its first kind of source, and the truth as CSV.
+    frames, cameras
+        Numbers of frames and cameras.
+    """
+
+    rig_path: Path
+    truth_path: Path
+    frames: int
+    cameras: int
+
+
+def simulate(
+    folder: Path | str,
+    scene: str = "easy",
+    *,
+    spoil: Sequence[str] = (),
+    instances: bool = False,
+    overwrite: bool = False,
+    progress: Progress | Reporter | None = None,
+    **changes: Any,
+) -> SimulatedRecording:
+    """Render a simulated scene, as `stseg simulate` does: videos, masks, boxes, rig files and truth.
+
+    Parameters
+    ----------
+    folder
+        Folder to write to; it must be empty or not there yet.
+    scene
+        Name of the scene; see `stseg simulate --help`.
+    spoil
+        Errors of masks and boxes, each KIND or KIND:STRENGTH.
+    instances
+        Write images of person ids, too.
+    overwrite
+        Write into a folder that is not empty.
+    progress
+        As of `stseg.track`.
+    **changes
+        Fields of `stseg.simulation.SceneSpec` other than the scene's: people, cameras, seconds, frame_rate, size
+        (width, height), noise, shadows, light_drift, alike, seed. None keeps the scene's.
+
+    Raises
+    ------
+    InputError
+        For a scene, kind of error or number that is none.
+    """
+    for name, (low, high) in _BOUNDS.items():
+        value = changes.get(name)
+        if value is not None and not low <= value <= high:
+            option = f"--{name.replace('_', '-')}"
+            raise ConfigError("command line", option, repr(value), f"a number from {low:g} to {high:g}")
+    given = {key: value for key, value in changes.items() if value is not None}
+    errors, folder = [_spoil(text) for text in spoil], Path(folder)
+    film = Film(replace(_named(scene), **given))
+    with reporter_of(progress).progress("filming", film.frames) as advance:
+        write_scene(
+            folder,
+            SpoiledFilm(film, errors) if errors else film,
+            body=_body(film.spec),
+            instances=instances,
+            overwrite=overwrite,
+            progress=lambda _done, _total: advance(1),
+        )
+    return SimulatedRecording(
+        folder / rig_name(film.kinds[0]), folder / "truth.csv", film.frames, len(film.rig.cameras)
+    )
+
+
+def _named(name: str) -> SceneSpec:
+    if name in NAMED:
+        return NAMED[name]
+    near = difflib.get_close_matches(name, NAMED, n=1)
+    suggestion = f"; did you mean {near[0]}?" if near else ""
+    raise ConfigError("command line", "--scene", repr(name), f"one of {', '.join(NAMED)}{suggestion}")
+
+
+def _body(spec: SceneSpec) -> BodyPrior:
+    """What a rig says of a scene's bodies: nothing of people."""
+    if not spec.length:
+        return BodyPrior()
+    low, high = spec.heights
+    width, spread = (spec.cylinder + spec.length) / 2, (spec.length - spec.cylinder) / 4
+    return BodyPrior(*(round(size, 3) for size in ((low + high) / 2, (high - low) / 2, width, spread)))
+
+
+def _spoil(text: str) -> Spoil:
+    """A kind of error with its strength, or with the kind's middle one."""
+    kind, colon, strength = text.partition(":")
+    try:
+        return Spoil(kind, float(strength) if colon else STRENGTHS.get(kind, (0.0, 0.0, 0.0))[1])
+    except ValueError as error:
+        raise ConfigError("command line", "--spoil", shown(text), "KIND or KIND:STRENGTH, a number") from error
