@@ -13,7 +13,7 @@ from stseg.io.untrusted import limits
 from stseg.io.untrusted.numbers import parse_whole
 from stseg.records.tables import CORRECTION
 
-COLUMNS = ("decided", "first", "last", "id", "corrected_id")
+COLUMNS = CORRECTION.names or ()
 
 
 class CorrectionTable:

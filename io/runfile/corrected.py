@@ -26,7 +26,7 @@ NewIds = Callable[[Ints, Ints], Ints]
 
 
 def write_corrected(
-    run: Path, path: Path, tracks: Tracks, answered: Rows, new_ids: NewIds, names: Mapping[int, str], answers: str,
+    run: Path, path: Path, tracks: Tracks, answers: Rows, new_ids: NewIds, names: Mapping[int, str], text: str,
     overwrite: bool,
 ) -> None:  # fmt: skip
     """Copy a run file with other tracks; evidence (log_odds, ghosts, rates) is copied unchanged.
@@ -37,13 +37,13 @@ def write_corrected(
         The run file, and the one to write.
     tracks
         The corrected tracks.
-    answered : ANSWERED (n,)
-        What was answered so far.
+    answers : ANSWER (n,)
+        The answers so far.
     new_ids
         Ids of the labels.
     names
         Names by corrected id, kept in the provenance.
-    answers
+    text
         Text of the answers, kept in the provenance.
     overwrite
         Whether an older file may be replaced.
@@ -62,13 +62,11 @@ def write_corrected(
                 ("tracks", tracks.summary()),
                 ("boxes", tracks.boxes),
                 ("events", tracks.events),
-                ("answered", answered),
+                ("answers", answers),
             ):
-                if name not in file:  # the first files of this version lack a table
-                    file.create_dataset(name, (0,), rows.dtype, maxshape=(None,))
                 _replace(run, file[name], rows)
             _relabel(run, file[layout.OCCUPANCY], new_ids)
-            _note(file[layout.PROVENANCE], names, answers)
+            _note(file[layout.PROVENANCE], names, text)
 
 
 def _replace(run: Path, dataset: h5py.Dataset, rows: Rows) -> None:

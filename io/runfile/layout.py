@@ -15,7 +15,7 @@ import numpy as np
 from stseg.arrays import Floats
 from stseg.geometry import Grid
 from stseg.records.tables import (
-    ANSWERED,
+    ANSWER,
     APPEARANCE,
     BOX,
     CANDIDATE,
@@ -30,7 +30,7 @@ from stseg.records.tables import (
 )  # fmt: skip
 
 FORMAT = "stseg-run"
-VERSION = 1
+VERSION = 2
 
 OCCUPANCY = "/entry/occupancy"
 PROVENANCE = "/provenance"
@@ -93,19 +93,10 @@ ABOUT = {
     "committed": "rows before identities were decided, as in trajectory; id is the filter's track",
     "committed_events": "events before identities were decided",
     "appearance": "one row per detection, frame and view that sees it apart: colours and features, a few numbers",
-    "answered": "pairs of rows of /committed that answers bind: one person (same 1) or two (0)",
-    "known": "people of earlier recordings, whom those who came were compared with: mean height and colours",
+    "answers": "pairs of rows of /committed and how many people they show by an answer; 0 for a row that is no person",
+    "known_people": "people of earlier recordings with whom those of this one were compared: mean height and colours",
 }
 """Every table and its contents."""
-
-EARLIER = {LOG_ODDS.name: np.dtype("<f2")}
-"""Types of fields in the first files of this version, which readers accept; browsers cannot show half precision."""
-
-ADDED = frozenset({"rates", "shifts", "committed", "committed_events", "appearance", "answered", "known"})
-"""Tables absent from the first files of this version; read as empty."""
-
-ADDED_COLUMNS = frozenset({"width", "aside"})
-"""Columns of floats absent from the first files of this version; read as nan."""
 
 
 def table_types(views: int) -> dict[str, np.dtype[np.void]]:
@@ -123,8 +114,8 @@ def table_types(views: int) -> dict[str, np.dtype[np.void]]:
         "committed": TRAJECTORY,
         "committed_events": EVENT,
         "appearance": APPEARANCE,
-        "answered": ANSWERED,
-        "known": KNOWN_PERSON,
+        "answers": ANSWER,
+        "known_people": KNOWN_PERSON,
     }
 
 

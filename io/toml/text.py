@@ -10,6 +10,8 @@ from difflib import get_close_matches
 from reprlib import Repr
 from typing import Any
 
+import numpy as np
+
 from stseg.io.untrusted import limits
 
 _SHOWN = 60
@@ -54,7 +56,7 @@ def one_of(name: object, names: Iterable[str]) -> str:
 def shown(value: object) -> str:
     """A value as an error shows it: what Python writes, cut to one line; nested values are never written out."""
     try:
-        text = _REPR.repr(value)
+        text = _REPR.repr(value.item() if isinstance(value, np.number) else value)
     except ValueError:  # an int of more digits than Python converts
         return "a number of thousands of digits"
     return text if len(text) <= _SHOWN else f"{text[: _SHOWN - 3]}..."

@@ -14,6 +14,7 @@ from rich.table import Table
 from stseg.commands.inspect_rig import inspect_rig
 from stseg.errors import ConfigError
 from stseg.io.runfile.runs import read_run
+from stseg.records.tables import ERROR_RATES
 from stseg.tasks.overview import Overview, per, summarise_run
 from stseg.tasks.slices import write_slice
 
@@ -145,9 +146,7 @@ def _views(overview: Overview) -> Table:
         table.add_column(heading, justify="left" if heading == "view" else "right")
     for name in overview.cameras:
         rates = overview.rates.get(name)
-        errors = (
-            ("", "", "") if rates is None else tuple(f"{100 * rates[k]:.1f}" for k in ("miss", "clutter", "beside"))
-        )
+        errors = ("", "", "") if rates is None else tuple(f"{100 * rates[k]:.1f}" for k in ERROR_RATES)
         table.add_row(name, *errors, str(overview.ghosts_denied_by[name]))
     return table
 

@@ -28,7 +28,7 @@ class CommittedFrames:
     candidates : CANDIDATE (n,), parts : float32 (n, view)
         Every candidate of the frames, true or ghost, and the evidence of each view for it, nats.
     rates : RATES (view,)
-        Error rates by which the last of the frames was fused; `aside` is a mean over all of them.
+        Error rates by which the last of the frames was fused; `residual` is a mean over all of them.
     timings : TIMING (k,)
     appearance : APPEARANCE (l,)
         What detections look like.
@@ -121,7 +121,7 @@ def committed_frames(commit: Commit, records: dict[int, FrameRecord], watch: Sto
         for status, candidates in ((1, explanation.people), (0, explanation.ghosts)):
             rows.append(_candidate_rows(fused.frame, status, candidates))
             parts.append(candidates.view_evidence.T)
-    rates["aside"] = _finite_mean(np.array(residuals))
+    rates["residual"] = _finite_mean(np.array(residuals))
     window = int(commit.windows["index"][0]) if len(commit.windows) else commit.frames[0].frame
     commit = replace(commit, events=np.concatenate(events))
     return CommittedFrames(
@@ -133,9 +133,9 @@ def committed_frames(commit: Commit, records: dict[int, FrameRecord], watch: Sto
 def rate_rows(frame: int, estimate: ErrorRateEstimate) -> Rows:
     """RATES (view,) of a frame, by the error rates known before it."""
     rows = np.zeros(len(estimate.rates), RATES)
-    rows["frame"], rows["view"], rows["filled"] = frame, np.arange(len(rows)), estimate.filled_share
-    rows["aside"] = np.nan
-    rows["miss"], rows["clutter"], rows["beside"] = np.array(estimate.rates).T
+    rows["frame"], rows["view"], rows["occupied_share"] = frame, np.arange(len(rows)), estimate.filled_share
+    rows["residual"] = np.nan
+    rows["miss"], rows["clutter"], rows["person_clutter"] = np.array(estimate.rates).T
     return rows
 
 

@@ -94,7 +94,7 @@ class Session:
         evidence = self.evidence(frame_set) if evidence is None else evidence
         noise, failures = self._learned.box_noise.noise, self._learned.failures
         frame, predicted = frame_set.frame, self._tracker.predict(frame_set.frame)
-        with self.watch.time("ghosts"):
+        with self.watch.time("detection"):
             source = self.pipeline.proposals
             proposed = source.of(failures.kept(evidence), self._fuse_with_current_rates) if source else None
             explanation = self.pipeline.detector.explain_next(self._learned, frame, evidence, predicted, proposed)

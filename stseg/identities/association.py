@@ -124,10 +124,10 @@ class IdentityProblem:
         visits = pooled_visits(identity[order], frame[order], precision, information)
         value = np.full((len(known), len(self.model.spread)), np.nan)
         number = np.zeros(value.shape)
-        value[:, 0], number[:, 0] = known["height"], known["heights"]
+        value[:, 0], number[:, 0] = known["height"], known["height_count"]
         if self.colours is not None and len(known):
             axes = self.colours.of(known["colours"])
-            value[:, -axes.shape[1] :], number[:, -axes.shape[1] :] = axes, known["looks"][:, None]
+            value[:, -axes.shape[1] :], number[:, -axes.shape[1] :] = axes, known["appearance_count"][:, None]
         precision, information = self.model.evidence(value, self.frame_rate)
         return visits.after(known["id"], number * precision, number * information)
 

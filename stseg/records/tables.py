@@ -62,8 +62,16 @@ BOX = np.dtype(
 EVENT = np.dtype([("frame", "<i8"), ("kind", "S12"), ("id", "<i8"), ("other", "<i8"), ("reason", "S96")])
 """birth, death, merge, split, hand-over, return, dropped, blind; `other` is the other track, 0 for none."""
 
-CORRECTION = np.dtype([("decided", "<i8"), ("first", "<i8"), ("last", "<i8"), ("id", "<i8"), ("corrected", "<i8")])
-"""Rows of a live id in frames first to last, both included, that are of another; as decided with a frame."""
+CORRECTION = np.dtype(
+    [
+        ("decision_frame", "<i8"),  # latest frame by which it was decided
+        ("first", "<i8"),  # frames, both included
+        ("last", "<i8"),
+        ("id", "<i8"),
+        ("corrected_id", "<i8"),
+    ]
+)
+"""Rows of a live id in some frames that are of another id."""
 
 CANDIDATE = np.dtype(
     [
@@ -113,28 +121,34 @@ TIMING = np.dtype([("stage", "S24"), ("window", "<i8"), ("seconds", "<f8")])
 """One row per stage and window; window -1 for work that belongs to none."""
 
 
+ERROR_RATES = ("miss", "clutter", "person_clutter")
+"""Columns of RATES that are error rates of a view."""
+
 RATES = np.dtype(
     [
         ("frame", "<i8"),
         ("view", "<i4"),
         ("miss", "<f4"),  # how often a cell of a body is missed
         ("clutter", "<f4"),  # how often the ray of an empty cell meets foreground, away from people
-        ("beside", "<f4"),  # the same within reach of a person
-        ("filled", "<f4"),  # share of the cells within reach of a person that bodies fill, of all views together
-        ("aside", "<f4"),  # reprojection residual, metres to the right of the places by all views
+        ("person_clutter", "<f4"),  # the same within reach of a person
+        (
+            "occupied_share",
+            "<f4",
+        ),  # share of the cells within reach of a person that bodies fill, by all views
+        ("residual", "<f4"),  # mean reprojection residual, metres to the right of the positions by all views; or nan
     ]
 )
-"""One row per window and view: rates of its last frame; `aside` is the mean residual, nan where unmeasured."""
+"""One row per window and view: error rates of its last frame, 0..1, and the residual of all its frames."""
 
 
 SHIFT = np.dtype([("frame", "<i8"), ("view", "<i4"), ("u", "<f4"), ("v", "<f4")])
 """How far a colour view's picture has moved since its background was learned, pixels, every other second."""
 
 
-ANSWERED = np.dtype([("row", "<i8"), ("other", "<i8"), ("same", "u1")])
-"""What answers of a person say of committed rows, by their index: two that are one person (`same` 1) or two people (0).
+ANSWER = np.dtype([("row", "<i8"), ("other", "<i8"), ("people", "u1")])
+"""Number of people that two committed rows show by an answer, by their index: 1, 2, or 0 for a row that is no person.
 
-A row beside itself with 0 is nobody's.
+A row that is no person is its own `other`.
 """
 
 
@@ -142,12 +156,12 @@ KNOWN_PERSON = np.dtype(
     [
         ("id", "<i8"),
         ("height", "<f8"),  # metres, mean over so many rows; nan without
-        ("heights", "<i8"),
+        ("height_count", "<i8"),
         ("colours", "<f8", (COLOURS,)),  # as of APPEARANCE, mean over so many rows, without the cameras' offsets
-        ("looks", "<i8"),
+        ("appearance_count", "<i8"),
     ]
 )
-"""One row per person of earlier recordings, whom those who come are compared with."""
+"""One row per person of earlier recordings, with whom the people of this one are compared."""
 
 
 @dataclass(frozen=True)

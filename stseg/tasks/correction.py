@@ -33,7 +33,7 @@ class CorrectedTracks:
     Attributes
     ----------
     tracks
-    answered : ANSWERED (n,)
+    answered : ANSWER (n,)
         What was answered so far.
     new_ids
         Corrected ids of labels by the run's id and frame, 0 where they are no person.
@@ -113,7 +113,7 @@ def corrected_tracks(run: Run, answers: Sequence[Answer]) -> CorrectedTracks:
     rig = run.recording.reduced(config.foreground.body_rows).read_rig
     tracks, identity = associated_tracks(
         rig, config, run.committed[kept], run.committed_events, run.appearance, run.recording.rig, constraints,
-        run.known,
+        run.known_people,
     )  # fmt: skip
     _require_obeyed(constraints, answered.places, identity)
     numbers = _numbers(old[kept], identity, np.concatenate([tracks.events["id"], tracks.events["other"]]))
@@ -126,18 +126,18 @@ def corrected_tracks(run: Run, answers: Sequence[Answer]) -> CorrectedTracks:
 
 def is_solved_again(run: Run) -> bool:
     """Whether answers solve the identities of a run again: it has committed rows, and what was answered before."""
-    return len(run.committed) > 0 and (len(run.answered) > 0 or not run.corrected)
+    return len(run.committed) > 0 and (len(run.answers) > 0 or not run.corrected)
 
 
 def answered_before(run: Run) -> AnsweredRows:
     """What answers said of the committed rows of a run so far; raises FormatError where they name no such rows."""
-    table, number = run.answered, len(run.committed)
+    table, number = run.answers, len(run.committed)
     last = np.maximum(table["row"], table["other"])
     if (last >= number).any():
-        raise FormatError(run.path, "/answered", f"row {last.max()}", f"rows of /committed, which has {number}")
+        raise FormatError(run.path, "/answers", f"row {last.max()}", f"rows of /committed, which has {number}")
     frame = run.committed["frame"]
     if (frame[table["row"]] > frame[table["other"]]).any():
-        raise FormatError(run.path, "/answered", "a row after its other", "rows in the order of frames")
+        raise FormatError(run.path, "/answers", "a row after its other", "rows in the order of frames")
     return AnsweredRows.of_table(table, number)
 
 
@@ -213,4 +213,4 @@ def _renamed(run: Run, linked: Corrections) -> CorrectedTracks:
     events["other"] = linked.map(events["other"], events["frame"])
     trajectory = trajectory[np.lexsort((trajectory["id"], trajectory["frame"]))]
     tracks = Tracks(trajectory, of(run.boxes), events)
-    return CorrectedTracks(tracks, run.answered, linked.map, run.names | linked.names)
+    return CorrectedTracks(tracks, run.answers, linked.map, run.names | linked.names)

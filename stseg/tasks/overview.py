@@ -8,6 +8,7 @@ import numpy as np
 
 from stseg.io.runfile.runs import Run
 from stseg.records.ghost_reasons import REASONS, ghost_reasons
+from stseg.records.tables import ERROR_RATES
 from stseg.reporting.findings import ground_by_views, people_per_minute
 from stseg.tasks.warnings import run_warnings
 
@@ -50,7 +51,7 @@ class Overview:
     windows: int
     frames_per_window: float
     rates: dict[str, dict[str, float]]
-    """Error rates of each view at the end of the run: `miss`, `clutter`, `beside` of /rates, 0..1."""
+    """Error rates of each view at the end of the run: `miss`, `clutter`, `person_clutter` of /rates, 0..1."""
     seconds_by_stage: dict[str, float]
     bytes_per_frame: float
     bytes: int
@@ -114,9 +115,7 @@ def seconds_by_stage(run: Run) -> dict[str, float]:
 
 def _rates(run: Run) -> dict[str, dict[str, float]]:
     last = run.rates[run.rates["frame"] == run.rates["frame"].max(initial=-1)]
-    return {
-        run.cameras[row["view"]]: {name: float(row[name]) for name in ("miss", "clutter", "beside")} for row in last
-    }
+    return {run.cameras[row["view"]]: {name: float(row[name]) for name in ERROR_RATES} for row in last}
 
 
 def _tracks(run: Run) -> list[dict[str, float]]:

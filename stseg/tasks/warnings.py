@@ -61,7 +61,7 @@ def _residual_by_window(run: Run) -> tuple[Ints, Floats]:
     """Last frame of each window, and each view's mean reprojection residual in it (window, view), metres."""
     frames, window = np.unique(run.rates["frame"], return_inverse=True)
     residual = np.full((len(frames), len(run.cameras)), np.nan)
-    residual[window, run.rates["view"]] = run.rates["aside"]
+    residual[window, run.rates["view"]] = run.rates["residual"]
     return frames, residual
 
 

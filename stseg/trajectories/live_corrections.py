@@ -82,11 +82,11 @@ class LiveCorrections:
 def corrected(rows: Rows, corrections: Rows) -> Rows:
     """TRAJECTORY rows under corrected ids: those of one decision hold at once, and one decision after another."""
     named = rows.copy()
-    for decided in np.unique(corrections["decided"]).tolist():
+    for decided in np.unique(corrections["decision_frame"]).tolist():
         before = named["id"].copy()
-        for one in corrections[corrections["decided"] == decided]:
+        for one in corrections[corrections["decision_frame"] == decided]:
             own = (before == one["id"]) & (rows["frame"] >= one["first"]) & (rows["frame"] <= one["last"])
-            named["id"][own] = one["corrected"]
+            named["id"][own] = one["corrected_id"]
     return named
 
 
@@ -101,7 +101,7 @@ def renamed(names: dict[int, int], corrections: Rows, present: Container[int]) -
     present
         Tracks of the latest rows.
     """
-    now = {int(one["id"]): int(one["corrected"]) for one in corrections if one["last"] == one["decided"]}
+    now = {int(one["id"]): int(one["corrected_id"]) for one in corrections if one["last"] == one["decision_frame"]}
     found = {track: now.get(name, name) for track, name in names.items()}
     taken = {name for track, name in found.items() if track in present}
     return {track: name for track, name in found.items() if track in present or name not in taken}

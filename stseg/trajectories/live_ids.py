@@ -29,7 +29,9 @@ class LiveIds:
 
     def __init__(self, rows: Rows, corrections: Rows, kept: int) -> None:
         self._kept = kept
-        self._issued = max(int(ids.max(initial=0)) for ids in (rows["id"], corrections["id"], corrections["corrected"]))
+        self._issued = max(
+            int(ids.max(initial=0)) for ids in (rows["id"], corrections["id"], corrections["corrected_id"])
+        )
         self._recent = self._last(corrected(rows, corrections))
 
     def begin(self, lead: Rows) -> Names:

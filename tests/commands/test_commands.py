@@ -138,7 +138,7 @@ def test_inspect_sums_up_a_run(run_path: Path) -> None:
     assert list(overview.seconds_by_stage) == ["cut", "volume"]
     assert (overview.windows, overview.frames_per_window) == (2, 3.0)
     assert list(overview.rates) == ["left", "right"]
-    assert overview.rates["left"] == pytest.approx({"miss": 0.2, "clutter": 0.025, "beside": 0.4})
+    assert overview.rates["left"] == pytest.approx({"miss": 0.2, "clutter": 0.025, "person_clutter": 0.4})
     assert overview.bytes == run_path.stat().st_size
     assert overview.warnings == ["view right has no evidence on any candidate: is it blind, or its calibration wrong?"]
 

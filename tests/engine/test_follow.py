@@ -157,7 +157,7 @@ def test_ids_that_are_corrected_go_on_so_and_are_told(
     messages = read_tracks_csv(output.with_name("run.h5.live.csv"))
     assert evaluate(walkers(FRAMES), messages).switches == 2
     told = CorrectionTable(output.with_name("run.h5.live_corrections.csv"), FRAMES).rows
-    assert told["decided"].tolist() == decided * 2
+    assert told["decision_frame"].tolist() == decided * 2
     late = corrected(messages, told)
     assert evaluate(walkers(FRAMES), late[late["frame"] >= 4]).switches == 0
     assert_same(output, live)

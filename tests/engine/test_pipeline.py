@@ -145,7 +145,7 @@ def test_candidates_are_told_for_every_frame() -> None:
             assert (own["evidence"][own["status"] == 0] < 0).all()
             assert (true["evidence"] > 0).all()
     timed = np.concatenate([step.timings for step in done.steps])
-    assert {b"foreground", b"ghosts", b"occupancy", b"track"} <= set(timed["stage"].tolist())
+    assert {b"foreground", b"detection", b"occupancy", b"track"} <= set(timed["stage"].tolist())
     assert (timed["seconds"] >= 0).all()
     told = np.concatenate([step.candidates for step in done.steps])
     assert np.unique(told["frame"]).tolist() == list(range(FRAMES))
@@ -160,7 +160,7 @@ def test_rates_are_told_for_every_window() -> None:
     # A perfect detector: it misses less than was guessed, and people's surroundings are told apart from the rest.
     first, last = done.steps[0].rates, done.steps[-1].rates
     assert (last["miss"] < first["miss"]).all()
-    assert (last["beside"] > last["clutter"]).all()
+    assert (last["person_clutter"] > last["clutter"]).all()
 
 
 def test_every_frame_is_committed_once() -> None:

@@ -89,7 +89,7 @@ KALIBR = b"""cam0:
 POM = b"1.0 0.1 5.0\n0.0 1.2 3.0\n0.0 0.01 1.0\n1.0 0.1 4.0\n0.0 1.1 2.0\n0.0 0.01 1.0\n"
 BEGUN = json.dumps({"config": {"a": 1}, "rig": {"b": "c"}}).encode()
 NOTES = json.dumps({"cam1": [["a.avi", 9], ["b.avi", 3]]}).encode()
-LIVE_CORRECTIONS = b"decided,first,last,id,corrected_id\n50,20,50,1,2\n50,20,50,2,1\n"
+LIVE_CORRECTIONS = b"decision_frame,first,last,id,corrected_id\n50,20,50,1,2\n50,20,50,2,1\n"
 LIVE_TABLE = b"frame,time,id,x,y,height,score\n0,0.000,1,0.500,0.500,1.700,3.000\n"
 
 

@@ -181,7 +181,7 @@ def test_a_corrected_run_is_corrected_again_under_the_answers_before(tmp_path: P
     correct(run_file, answers, output=tmp_path / "both.h5")
     two, both = (read_run(tmp_path / f"{name}.h5") for name in ("two", "both"))
     np.testing.assert_array_equal(two.trajectory, both.trajectory)
-    assert sorted(two.answered.tolist()) == sorted(both.answered.tolist())
+    assert sorted(two.answers.tolist()) == sorted(both.answers.tolist())
     answers.write_text("action,frame,id,other,name\nswap,20,1,2,\n")
     with pytest.raises(InputError, match="contradicts others"):
         correct(tmp_path / "one.h5", answers, output=tmp_path / "back.h5")
@@ -193,8 +193,8 @@ def test_rows_that_are_not_there_are_refused(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("action,frame,id,other,name\nswap,20,1,2,\n")
     correct(run_file, tmp_path / "a.csv", output=tmp_path / "new.h5")
     with h5py.File(tmp_path / "new.h5", "r+") as file:
-        file["answered"][0] = (10**6, 10**6 + 1, 1)
-    with pytest.raises(FormatError, match="/answered: found row 1000001"):
+        file["answers"][0] = (10**6, 10**6 + 1, 1)
+    with pytest.raises(FormatError, match="/answers: found row 1000001"):
         correct(tmp_path / "new.h5", tmp_path / "a.csv", output=tmp_path / "more.h5")
 
 

@@ -54,7 +54,7 @@ def test_who_was_lost_and_found_gets_the_first_id_back() -> None:
     named = corrected(rows, found)
     assert set(named["id"][rows["y"] == 0.0].tolist()) == {1}
     assert set(named["id"][rows["y"] == 3.0].tolist()) == {3}
-    assert found["decided"].min() < 80
+    assert found["decision_frame"].min() < 80
 
 
 def test_nothing_is_decided_before_the_interval_is_over_or_without_one() -> None:
@@ -88,7 +88,7 @@ def test_corrections_of_one_decision_hold_at_once_and_decisions_one_after_anothe
     within = (rows["frame"] >= 20) & (rows["frame"] <= 50)
     np.testing.assert_array_equal(exchanged["id"], np.where(within, 3 - rows["id"], rows["id"]))
     later = EXCHANGE.copy()
-    later["decided"] = 60
+    later["decision_frame"] = 60
     np.testing.assert_array_equal(corrected(rows, np.concatenate([EXCHANGE, later]))["id"], rows["id"])
 
 
@@ -105,13 +105,17 @@ def test_the_table_keeps_whole_lines_before_a_frame(tmp_path: Path) -> None:
     table = CorrectionTable(path, 0)
     assert not path.exists()
     later = EXCHANGE.copy()
-    later["decided"] = 90
+    later["decision_frame"] = 90
     table.append(EXCHANGE)
     table.append(later)
     path.write_text(path.read_text() + "95,1,9\n95,1,-9,2,3\n95,1,9,x,3\n12,")
     np.testing.assert_array_equal(CorrectionTable(path, 100).rows, np.concatenate([EXCHANGE, later]))
     np.testing.assert_array_equal(CorrectionTable(path, 90).rows, EXCHANGE)
-    assert path.read_text().splitlines() == ["decided,first,last,id,corrected_id", "50,20,50,1,2", "50,20,50,2,1"]
+    assert path.read_text().splitlines() == [
+        "decision_frame,first,last,id,corrected_id",
+        "50,20,50,1,2",
+        "50,20,50,2,1",
+    ]
     assert len(CorrectionTable(path, 0).rows) == 0
     assert not path.exists()
 
@@ -133,8 +137,8 @@ def test_corrections_are_sent_as_one_message() -> None:
         publisher.correct(EXCHANGE[:0])
     (message,) = receiver.messages
     assert [json.loads(line) for line in message.splitlines()] == [
-        {"decided": 50, "first": 20, "last": 50, "id": 1, "corrected_id": 2},
-        {"decided": 50, "first": 20, "last": 50, "id": 2, "corrected_id": 1},
+        {"decision_frame": 50, "first": 20, "last": 50, "id": 1, "corrected_id": 2},
+        {"decision_frame": 50, "first": 20, "last": 50, "id": 2, "corrected_id": 1},
     ]
 
 

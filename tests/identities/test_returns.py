@@ -211,7 +211,7 @@ def test_people_of_an_earlier_run_keep_their_ids_and_others_get_greater_ones() -
     morning["id"] += 10
     known = known_people(morning, looks)
     assert known["id"].tolist() == [11, 12, 13, 14, 15]
-    assert known["looks"].tolist() == [240] * 5 and known["height"] == pytest.approx(1.7, abs=0.02)
+    assert known["appearance_count"].tolist() == [240] * 5 and known["height"] == pytest.approx(1.7, abs=0.02)
     rows, looks = coloured({1: 4, 2: 9, 3: 1, 4: 8, 5: 7}, seed=2)
     birth = np.array([(0, b"birth", 2, 0, b"")], EVENT)
     found = final_tracks(rows, birth, looks, RATE, BORDER, returning(0.99), known=known)
@@ -229,7 +229,7 @@ def test_nobody_of_whom_nothing_is_known_is_recognised() -> None:
     rows, looks = coloured({1: 1, 2: 2, 3: 3, 4: 4, 5: 5}, seed=1)
     rows["height"] = np.nan
     known = known_people(rows, looks[:0])
-    assert np.isnan(known["height"]).all() and not known["heights"].any() and not known["looks"].any()
+    assert np.isnan(known["height"]).all() and not known["height_count"].any() and not known["appearance_count"].any()
     rows, looks = coloured({1: 1, 2: 2, 3: 3, 4: 4, 5: 5}, seed=2)
     found = final_tracks(rows, np.zeros(0, EVENT), looks, RATE, BORDER, returning(0.9), known=known)
     assert found.identity.min() > 5
@@ -249,15 +249,15 @@ def test_a_run_file_tells_of_its_people_or_says_why_not(tmp_path: Path) -> None:
         file["trajectory"][:] = rows
         file["committed"].resize((len(rows),))
         file["committed"][:] = rows
-        file["known"].resize((2,))
-        file["known"][:] = before
+        file["known_people"].resize((2,))
+        file["known_people"][:] = before
     known = read_known(path, returning(0.99))
-    assert known["id"].tolist() == [7, 1, 2] and known["heights"].tolist() == [0, 6, 3]
+    assert known["id"].tolist() == [7, 1, 2] and known["height_count"].tolist() == [0, 6, 3]
     assert digest(known) != digest(known[::-1])
     for ids, message in (((7, 7), "a person twice"), ((0, 7), "an id from 1 on"), ((2, 2**31 - 1), "ids up to")):
         with h5py.File(path, "r+") as file:
             before["id"] = ids
-            file["known"][:] = before
+            file["known_people"][:] = before
         with pytest.raises(FormatError, match=message):
             read_known(path, returning(0.99))
     (tmp_path / "text.h5").write_text("not HDF5")

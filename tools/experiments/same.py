@@ -29,7 +29,19 @@ from workbench import ROOT, Bench
 
 _UNCOMPARED = ("timings", "provenance")
 """Parts of a run file in which equal runs differ."""
-RENAMED: dict[str, str] = {}
+RENAMED = {
+    "rates.beside": "rates.person_clutter",
+    "rates.filled": "rates.occupied_share",
+    "rates.aside": "rates.residual",
+    "answered.row": "answers.row",
+    "answered.other": "answers.other",
+    "answered.same": "answers.people",
+    "known.id": "known_people.id",
+    "known.height": "known_people.height",
+    "known.heights": "known_people.height_count",
+    "known.colours": "known_people.colours",
+    "known.looks": "known_people.appearance_count",
+}
 """Column or dataset of the base, and its name now."""
 
 

@@ -66,14 +66,12 @@ class LayoutChecks:
     def require_value(self, name: str, key: str, expected: str | int) -> None:
         found = self.attribute(name, key, repr(expected))
         if np.shape(found) or found != expected:
-            raise FormatError(self.path, f"{name}@{key}", repr(found), repr(expected))
+            raise FormatError(self.path, f"{name}@{key}", shown(found), repr(expected))
 
     def require_dataset(self, name: str, dtype: np.dtype[np.generic], dimensions: int) -> h5py.Dataset:
-        """A dataset of that dtype, or of its first form without the columns that were added, and so many dimensions."""
+        """A dataset of that dtype and so many dimensions."""
         dataset = self.require(name)
-        lacking = lacking_columns(dataset.dtype, dtype)
-        first = [column for column in dtype.descr if column[0] not in lacking & layout.ADDED_COLUMNS]
-        if dataset.dtype not in (dtype, np.dtype(first)):
+        if dataset.dtype != dtype:
             raise FormatError(self.path, name, f"the type {dataset.dtype}", str(dtype))
         if dataset.ndim != dimensions:
             raise FormatError(self.path, name, f"{dataset.ndim} dimensions", str(dimensions))
@@ -82,9 +80,7 @@ class LayoutChecks:
     def require_field(self, field: layout.Field, lengths: dict[str, int]) -> None:
         """Scales come first and say how long the axes are."""
         name = f"{layout.OCCUPANCY}/{field.name}"
-        earlier = layout.EARLIER.get(field.name, field.dtype)
-        dtype = earlier if self.require(name).dtype == earlier else field.dtype
-        dataset = self.require_dataset(name, dtype, len(field.axes))
+        dataset = self.require_dataset(name, field.dtype, len(field.axes))
         expected = tuple(lengths.setdefault(axis, len(dataset)) for axis in field.axes)
         if dataset.shape != expected:
             raise FormatError(self.path, name, f"the shape {dataset.shape}", f"{expected}, as its axes say")
@@ -94,11 +90,6 @@ class LayoutChecks:
             self.require(f"{layout.PROVENANCE}/{name}")
         for key in ("created", "rig_path"):
             self.attribute(layout.PROVENANCE, key, "a text")
-
-
-def lacking_columns(found: np.dtype[np.generic], dtype: np.dtype[np.generic]) -> set[str]:
-    """Columns of a table that an older file does not have."""
-    return set(dtype.names or ()) - set(found.names or ())
 
 
 def require_bounded_volume(group: h5py.Group) -> None:

@@ -23,7 +23,7 @@ from stseg.io.runfile.provenance import Provenance, read_provenance
 from stseg.io.runfile.reading.cell_probability import learn_reliability
 from stseg.io.runfile.reading.data_frames import to_data_frame
 from stseg.io.runfile.reading.hdf5_reading import format_errors, read_object
-from stseg.io.runfile.reading.layout_checks import LayoutChecks, lacking_columns, require_bounded_volume
+from stseg.io.runfile.reading.layout_checks import LayoutChecks, require_bounded_volume
 from stseg.io.runfile.reading.texts import read_attribute, read_texts
 from stseg.io.runfile.reading.value_checks import Bounds, require_fit, require_table
 from stseg.io.runfile.reading.volume import RunVolume
@@ -111,12 +111,12 @@ class Run:
 
     @cached_property
     def rates(self) -> Rows:
-        """RATES (n,); empty in a file that has none."""
+        """RATES (n,)."""
         return self._table("rates")
 
     @cached_property
     def shifts(self) -> Rows:
-        """SHIFT (n,); empty in a file that has none."""
+        """SHIFT (n,)."""
         return self._table("shifts")
 
     @cached_property
@@ -126,28 +126,28 @@ class Run:
 
     @cached_property
     def committed(self) -> Rows:
-        """TRAJECTORY (n,) before identities were decided, ids of the filter; empty in a file that has none."""
+        """TRAJECTORY (n,) before identities were decided, ids of the filter."""
         return self._table("committed")
 
     @cached_property
     def committed_events(self) -> Rows:
-        """EVENT (n,) before identities were decided; empty in a file that has none."""
+        """EVENT (n,) before identities were decided."""
         return self._table("committed_events")
 
     @cached_property
     def appearance(self) -> Rows:
-        """APPEARANCE (n,); empty in a file that has none."""
+        """APPEARANCE (n,)."""
         return self._table("appearance")
 
     @cached_property
-    def answered(self) -> Rows:
-        """ANSWERED (n,): what was answered so far (`stseg correct`); empty in a file that has none."""
-        return self._table("answered")
+    def answers(self) -> Rows:
+        """ANSWER (n,): answers so far (`stseg correct`)."""
+        return self._table("answers")
 
     @cached_property
-    def known(self) -> Rows:
-        """KNOWN_PERSON (n,): people of earlier recordings (`stseg run --known`); empty in a file that has none."""
-        return self._table("known")
+    def known_people(self) -> Rows:
+        """KNOWN_PERSON (n,): people of earlier recordings (`stseg run --known`)."""
+        return self._table("known_people")
 
     @cached_property
     def names(self) -> dict[int, str]:
@@ -273,10 +273,8 @@ class Run:
 
     def _table(self, name: str) -> Rows:
         def take(file: h5py.File) -> Rows:
-            if name in layout.ADDED and name not in file:
-                return np.zeros(0, layout.table_types(len(self.cameras))[name])
             dtype = layout.table_types(len(self.cameras))[name]
-            return _with_added(read_whole(file[name], limits.ROWS * dtype.itemsize), dtype)
+            return read_whole(file[name], limits.ROWS * dtype.itemsize)
 
         return require_table(self._bounds, name, read_object(self.path, f"/{name}", take))
 
@@ -287,16 +285,6 @@ class Run:
 
 def _packed_chunk(dataset: h5py.Dataset, index: int) -> PackedFrame:
     return PackedFrame(*dataset.id.read_direct_chunk((index, 0, 0, 0)))
-
-
-def _with_added(rows: Rows, dtype: np.dtype[np.void]) -> Rows:
-    """Rows of a table with the columns that its first files lack."""
-    if rows.dtype == dtype:
-        return rows
-    whole = np.zeros(len(rows), dtype)
-    for name in dtype.names or ():
-        whole[name] = np.nan if name in lacking_columns(rows.dtype, dtype) else rows[name]
-    return whole
 
 
 def read_run(path: Path | str) -> Run:
@@ -339,8 +327,7 @@ def _checked_run(path: Path, file: h5py.File) -> Run:
     for field in layout.FIELDS:
         checks.require_field(field, lengths)
     for name, dtype in layout.table_types(len(cameras)).items():
-        if name in file or name not in layout.ADDED:
-            checks.require_dataset(f"/{name}", dtype, 1)
+        checks.require_dataset(f"/{name}", dtype, 1)
     checks.require_provenance()
     entry, group = checks.require("/entry/title"), file[layout.OCCUPANCY]
     require_bounded_volume(group)

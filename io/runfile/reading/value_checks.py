@@ -21,9 +21,9 @@ _RANGES: dict[str, tuple[int, int]] = {
     "other": (0, 2**31 - 1),
     "window": (-1, limits.FRAMES),
     "row": (0, limits.ROWS),
-    "same": (0, 1),
-    "heights": (0, limits.ROWS),
-    "looks": (0, limits.ROWS),
+    "people": (0, 2),
+    "height_count": (0, limits.ROWS),
+    "appearance_count": (0, limits.ROWS),
 }
 """Columns of whole numbers; `view` counts the cameras."""
 _PLACES = {"trajectory": ("x", "y", "z"), "boxes": ("left", "top", "width", "height"), "ghosts": ("x", "y")}
@@ -47,8 +47,8 @@ def require_table(bounds: Bounds, name: str, rows: Rows) -> Rows:
             raise FormatError(bounds.path, f"/{name}, {column}", printable(str(value))[: limits.NAME], expected)
     if name in ("trajectory", "boxes") and _repeated(rows):
         raise FormatError(bounds.path, f"/{name}", "a track twice in a frame", "once, or once a view")
-    if name == "known" and _repeated(rows):
-        raise FormatError(bounds.path, "/known", "a person twice", "each once")
+    if name == "known_people" and _repeated(rows):
+        raise FormatError(bounds.path, "/known_people", "a person twice", "each once")
     return rows
 
 
@@ -67,7 +67,7 @@ def _wrong_values(bounds: Bounds, name: str, rows: Rows) -> Iterator[tuple[str, 
         elif column in _RANGES and values.dtype.kind in "iu":
             low, high = _RANGES[column]
             yield column, (values < low) | (values > high), f"a whole number from {low} to {high}"
-    if name in ("trajectory", "boxes", "known"):
+    if name in ("trajectory", "boxes", "known_people"):
         yield "id", rows["id"] < 1, "an id from 1 on"
 
 

@@ -102,7 +102,7 @@ def assemble(job: Job, finished: Sequence[FinishedSegment], output: Path, call: 
         if not find_tracker(job.tracker).final:
             writer.append("committed", joined.committed)
             writer.append("committed_events", joined.events)
-            writer.append("known", job.known)
+            writer.append("known_people", job.known)
         writer.append("boxes", tracks.boxes)
         writer.append("events", tracks.events)
         writer.finish(tracks.summary())

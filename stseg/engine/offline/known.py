@@ -36,7 +36,7 @@ def read_known(path: Path, config: Config) -> Rows:
     if not len(run.committed):
         raise FormatError(path, "/committed", "no rows", "those of a run of the tracker cut or frames")
     own = known_people(rows_with_ids(run), run.appearance)
-    earlier = run.known[~np.isin(run.known["id"], own["id"])]
+    earlier = run.known_people[~np.isin(run.known_people["id"], own["id"])]
     people = np.concatenate([earlier, own])
     if (greatest := people["id"].max(initial=0)) > _MOST:
         raise FormatError(path, "/tracks, id", str(greatest), f"ids up to {_MOST}, so that there are some for others")

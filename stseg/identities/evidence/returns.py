@@ -244,8 +244,9 @@ def known_people(committed: Rows, appearance: Rows) -> Rows:
     owner = np.where(committed["id"] > 0, np.searchsorted(people, committed["id"]), -1)
     table = np.zeros(len(people), KNOWN_PERSON)
     table["id"] = people
-    table["height"], table["heights"] = _means(committed["height"][:, None], owner, len(people), 0)
-    table["colours"], table["looks"] = _means(row_means(committed, appearance, "colours"), owner, len(people))
+    table["height"], table["height_count"] = _means(committed["height"][:, None], owner, len(people), 0)
+    colours = row_means(committed, appearance, "colours")
+    table["colours"], table["appearance_count"] = _means(colours, owner, len(people))
     return table
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from stseg.arrays import Flags, Floats, Ints, Rows
 from stseg.identities.review.corrections import Answer
 from stseg.identities.search.constraints import Constraints
-from stseg.records.tables import ANSWERED
+from stseg.records.tables import ANSWER
 
 _SEPARATION_DISTANCE = 0.8
 """Distance from which on two people stand apart, metres."""
@@ -44,12 +44,11 @@ class AnsweredRows:
 
     @classmethod
     def of_table(cls, table: Rows, number: int) -> AnsweredRows:
-        """Constraints and deletions of so many rows by ANSWERED rows."""
-        pair = table["row"] != table["other"]
+        """Constraints and deletions of so many rows by ANSWER rows."""
         deleted = np.zeros(number, bool)
-        deleted[table["row"][~pair & (table["same"] == 0)]] = True
-        bound = table[pair]
-        found = Constraints(bound["row"], bound["other"], bound["same"] == 1)
+        deleted[table["row"][table["people"] == 0]] = True
+        bound = table[table["people"] > 0]
+        found = Constraints(bound["row"], bound["other"], bound["people"] == 1)
         return cls(found, ["an answer given before"] * len(found), deleted)
 
     def __add__(self, more: AnsweredRows) -> AnsweredRows:
@@ -61,11 +60,11 @@ class AnsweredRows:
 
     @property
     def table(self) -> Rows:
-        """ANSWERED rows that say the same."""
+        """ANSWER rows that say the same."""
         gone, bound = np.flatnonzero(self.deleted), self.constraints
-        table = np.zeros(len(bound) + len(gone), ANSWERED)
+        table = np.zeros(len(bound) + len(gone), ANSWER)
         table["row"], table["other"] = np.append(bound.earlier, gone), np.append(bound.later, gone)
-        table["same"][: len(bound)] = bound.same
+        table["people"][: len(bound)] = np.where(bound.same, 1, 2)
         return table
 
     @property
