@@ -11,7 +11,7 @@ from reference_track_filter import best_pairs
 
 from stseg.arrays import Boxes, Flags, Floats, Ints, Labels, Singles
 from stseg.bodies.box_fit import EDGE_GRAIN, TOLERANCE
-from stseg.detection.problem import BoxEvidence, Parameters, PixelEvidence, Problem
+from stseg.detection.problem import BoxEvidence, DetectionProblem, PixelEvidence, ScoreParameters
 from stseg.graphcut.grid_energy import GridEnergy
 from stseg.occupancy.fusion import ErrorRates
 from stseg.occupancy.visible_cells import SHOULDER
@@ -24,7 +24,7 @@ Edge = tuple[int, int, int]
 # Boxes and pillars
 
 
-def repulsion(distance: float, parameters: Parameters) -> float:
+def repulsion(distance: float, parameters: ScoreParameters) -> float:
     """Cost of a pair: excluded within the hard core, linear up to the distance at which bodies touch."""
     if distance < parameters.hard_core:
         return 1e4
@@ -71,7 +71,7 @@ def cover(bodies: Floats, distance: Floats, width: float, height: float, i: int,
 # The score of a set
 
 
-def set_score(members: Sequence[int], problem: Problem) -> float:
+def set_score(members: Sequence[int], problem: DetectionProblem) -> float:
     """What a set of people says of a frame: each box, pixel and walker speaks for one of them."""
     boxes, pixels, ground, parameters = problem.boxes, problem.pixels, problem.ground, problem.parameters
     total = sum(parameters.prior_log_odds + problem.size_prior[j] - problem.birth_cost[j] for j in members)
@@ -96,7 +96,7 @@ def left_by_all(boxes: BoxEvidence) -> Floats:
     return left.reshape(views, candidates, candidates)
 
 
-def _boxes_of_view(view: int, members: Sequence[int], boxes: BoxEvidence, parameters: Parameters) -> float:
+def _boxes_of_view(view: int, members: Sequence[int], boxes: BoxEvidence, parameters: ScoreParameters) -> float:
     total = 0.0
     gains: list[tuple[float, int, int]] = []
     for j in members:
@@ -127,19 +127,19 @@ def covered(pixels: PixelEvidence, view: int, j: int) -> Flags:
     return shown
 
 
-def _pixels_of_view(view: int, members: Sequence[int], pixels: PixelEvidence, parameters: Parameters) -> float:
+def _pixels_of_view(view: int, members: Sequence[int], pixels: PixelEvidence, parameters: ScoreParameters) -> float:
     total = 0.0
     bodies = {j: covered(pixels, view, j) for j in members}
     for v, u in np.ndindex(*pixels.raster.shape[1:]):
         there = [j for j in members if bodies[j][v, u]]
         if there:
-            nearest = min(there, key=lambda j: pixels.order[view, j])
+            nearest = min(there, key=lambda j: pixels.distance[view, j])
             scale = max(pixels.area[view, nearest], float(pixels.scale[view, v, u]))
             total += parameters.effective_observations * float(pixels.raster[view, v, u]) / scale
     return total
 
 
-def touch(i: int, j: int, problem: Problem) -> bool:
+def interact(i: int, j: int, problem: DetectionProblem) -> bool:
     """Whether one of two candidates bears on what the other adds to a set."""
     boxes, pixels, parameters = problem.boxes, problem.pixels, problem.parameters
     room = parameters.minimum_distance * (problem.breadth[i] + problem.breadth[j]) / 2

@@ -64,7 +64,7 @@ class Prior:
         wide = log_heavy_tailed((widths - self.body.width_of(heights)) / self.body.width_spread)
         return self.log_height(heights) + wide
 
-    def known_sizes(self, sizes: Sizes, track_index: Ints) -> Sizes:
+    def track_sizes(self, sizes: Sizes, track_index: Ints) -> Sizes:
         """Size posteriors of one frame under the population prior, put under each track's own prior instead.
 
         `track_index` int64 (n,) is the predicted track of each person, -1 for births.

@@ -14,13 +14,49 @@ from numpy.typing import NDArray
 from stseg.arrays import Floats, Ints, Singles
 from stseg.bodies.outlines import Spans
 from stseg.config import DetectionConfig
-from stseg.detection.evidence.ragged_lists import Lists
+from stseg.kernels.accelerate import kernel, part
 
 PixelAssignment = NDArray[np.int16]
-"""int16 (view, v * u): the candidate whom each raster pixel is assigned to, -1 for none. Small, for speed."""
+"""int16 (view, v * u): the candidate that each raster pixel is assigned to, -1 for none. Small, for speed."""
 
 
-class Parameters(NamedTuple):
+class RaggedArray(NamedTuple):
+    """Rows of different lengths, one behind the other: row r is `item[start[r]:start[r + 1]]`, with its values.
+
+    Attributes
+    ----------
+    start : int64 (row + 1,)
+    item : int64 (k,)
+    value : float64 (k,)
+    """
+
+    start: Ints
+    item: Ints
+    value: Floats
+
+
+@kernel
+def ragged_array(number: Ints) -> tuple[RaggedArray, Ints]:
+    """Rows with room for number (row,) of items each, and the places of their next items, int64 (row,)."""
+    start = np.zeros(len(number) + 1, np.int64)
+    for row in range(len(number)):
+        start[row + 1] = start[row] + number[row]
+    return RaggedArray(start, np.empty(start[-1], np.int64), np.empty(start[-1])), start[:-1].copy()
+
+
+@part
+def append(rows: RaggedArray, place: Ints, row: int, item: int, value: float) -> None:
+    """Add an item to a row, at its next place."""
+    rows.item[place[row]], rows.value[place[row]] = item, value
+    place[row] += 1
+
+
+def no_rows() -> RaggedArray:
+    """Make an array without rows."""
+    return RaggedArray(np.zeros(1, np.int64), np.zeros(0, np.int64), np.zeros(0))
+
+
+class ScoreParameters(NamedTuple):
     """Constants of the score; see `stseg.config.DetectionConfig` for their meaning. Nats, shares and metres."""
 
     prior_log_odds: float
@@ -35,7 +71,7 @@ class Parameters(NamedTuple):
     effective_observations: float
 
     @classmethod
-    def of(cls, config: DetectionConfig, hard_core: float, common_width: float) -> Parameters:
+    def of(cls, config: DetectionConfig, hard_core: float, common_width: float) -> ScoreParameters:
         """Those of a configuration; the hard core between bodies of common width, metres, depends on the views."""
         same = {name: getattr(config, name) for name in cls._fields if name not in ("hard_core", "common_width")}
         return cls(**same, hard_core=hard_core, common_width=common_width)
@@ -55,15 +91,15 @@ class BoxEvidence(NamedTuple):
         view * candidates + candidate.
     inside : float64 (view, candidate)
         Share of the candidate's pillar inside the image.
-    left : float64 (candidate,)
-        Scratch, 1 before and after: the share that each candidate leaves of one of them.
+    visible_past : float64 (candidate,)
+        Scratch, 1 before and after: the share of one candidate that each other leaves visible.
     """
 
     match: Floats
     boxes: Ints
-    hiders: Lists
+    hiders: RaggedArray
     inside: Floats
-    left: Floats
+    visible_past: Floats
 
 
 class PixelEvidence(NamedTuple):
@@ -81,7 +117,7 @@ class PixelEvidence(NamedTuple):
         First and last column (exclusive) of each row from `first` on; empty rows have both 0.
     area : float64 (view, candidate)
         Pixels of the whole outline, those outside the raster included.
-    order : float64 (view, candidate)
+    distance : float64 (view, candidate)
         Distance from the camera on the ground, metres.
     """
 
@@ -90,29 +126,30 @@ class PixelEvidence(NamedTuple):
     first: Ints
     spans: Spans
     area: Floats
-    order: Floats
+    distance: Floats
 
     def joined_with(self, other: PixelEvidence) -> PixelEvidence:
         """The evidence for these candidates, then for those of the other, by the same pixels."""
         views, number = self.first.shape
-        every, tall = number + other.first.shape[1], max(self.spans.shape[2], other.spans.shape[2])
-        spans = np.zeros((views, every, tall, 2), np.int16)
+        total, tall = number + other.first.shape[1], max(self.spans.shape[2], other.spans.shape[2])
+        spans = np.zeros((views, total, tall, 2), np.int16)
         spans[:, :number, : self.spans.shape[2]] = self.spans
         spans[:, number:, : other.spans.shape[2]] = other.spans
         first = np.concatenate([self.first, other.first], 1)
-        area, order = np.concatenate([self.area, other.area], 1), np.concatenate([self.order, other.order], 1)
-        return PixelEvidence(self.raster, self.scale, first, spans, area, order)
+        area = np.concatenate([self.area, other.area], 1)
+        distance = np.concatenate([self.distance, other.distance], 1)
+        return PixelEvidence(self.raster, self.scale, first, spans, area, distance)
 
 
-class Problem(NamedTuple):
-    """The candidates of a frame and all that is known of them.
+class DetectionProblem(NamedTuple):
+    """The candidates of a frame, their evidence and their prior.
 
     Attributes
     ----------
     boxes, pixels
         Evidence of the views.
     size_prior : float64 (candidate,)
-        Log prior density of each candidate's height and width beside that of the means, nats.
+        Log prior density of each candidate's height and width, less that of the means, nats.
     birth_cost : float64 (candidate,)
         Cost of a birth at each place, nats.
     track_gain : float64 (candidate, track)
@@ -120,16 +157,19 @@ class Problem(NamedTuple):
     ground : float64 (candidate, 2)
         Metres.
     breadth : float64 (candidate,)
-        Width of each body beside a common one, at least 1: wider bodies need more room. 1 where boxes alone are seen.
+        Ratio of each body's width to a common one, at least 1: wider bodies need more room. 1 without pixels.
     parameters
         Constants of the score.
-    assigned : int64 (at least boxes, at least v * u, at least tracks)
-        Scratch: after a view was scored, the place in the set of the member whom each box or pixel is assigned to, -1
-        for none; after the tracks were scored, of the member who continues each track.
+    assignment : int64 (at least boxes, at least v * u)
+        Scratch: after a view was scored, the place in the set of the member that each box or pixel is assigned to, -1
+        for none.
+    track_member : int64 (at least tracks,)
+        Scratch: after a set was scored, the place in it of the member who continues each track, -1 for none.
     owner : int16 (view, v * u)
-        Scratch, -1 before and after: the candidate whom each pixel is assigned to while sets are searched.
+        Scratch, -1 before and after: the candidate that each pixel is assigned to while sets are searched.
     view_evidence : float64 (view, candidate + 1)
-        Scratch: after a set was scored, what each view says of each of its members, nats; views with boxes first.
+        Scratch: after a set was scored, the evidence of each view for each of its members, nats; views with boxes
+        first.
     """
 
     boxes: BoxEvidence
@@ -139,7 +179,8 @@ class Problem(NamedTuple):
     track_gain: Floats
     ground: Floats
     breadth: Floats
-    parameters: Parameters
-    assigned: Ints
+    parameters: ScoreParameters
+    assignment: Ints
+    track_member: Ints
     owner: PixelAssignment
     view_evidence: Floats

@@ -17,9 +17,8 @@ from stseg.bodies.outlines import outlines
 from stseg.bodies.pillars import SILHOUETTE, WIDTH
 from stseg.bodies.views import BACKGROUND_WEIGHT, BODY_WEIGHT, PixelView
 from stseg.detection.detector import Detector
-from stseg.detection.score.assignment import Assignment
-from stseg.detection.search.body_size import measure
-from stseg.detection.search.refine import RefinedPlaces
+from stseg.detection.search.body_sizes import body_sizes
+from stseg.detection.search.refine import EvidenceAssignment, RefinedPlaces
 from stseg.records.candidates import Candidates
 from stseg.records.sizes import Sizes
 
@@ -44,14 +43,14 @@ def at(ground: Floats) -> RefinedPlaces:
     return RefinedPlaces(ground, np.zeros((n, 2, 2)), mean, variance)
 
 
-def open_to_one(*views: Flags) -> Assignment:
+def open_to_one(*views: Flags) -> EvidenceAssignment:
     """Of a single person, the pixels that are open to them in each view."""
-    return Assignment.of_all(
+    return EvidenceAssignment.of_all(
         np.full((len(views), 1), -1), [np.where(pixels, -1, 1).astype(np.int16) for pixels in views]
     )
 
 
-def everything(view: PixelView) -> Assignment:
+def everything(view: PixelView) -> EvidenceAssignment:
     return open_to_one(np.ones(view.shape, bool))
 
 
@@ -98,7 +97,7 @@ def test_the_e_step_by_definition(hidden: float) -> None:
     sight = replace(view.observe(None), raster=rng.normal(0, 2, view.shape).astype(np.float32))
     open_pixels = rng.random(view.shape) >= hidden
     place, width = np.array([[0.3, -0.2]]), np.array([0.45])
-    found = measure(at(place), width, [view], [sight], open_to_one(open_pixels), BODY)
+    found = body_sizes(at(place), width, [view], [sight], open_to_one(open_pixels), BODY)
     everywhere, one = np.tile(place, (25, 1)), np.ones(25)
     heights, widths = np.linspace(0.75, 2.19, 25), np.linspace(0.26, 0.86, 25)
     for lattice, off, fits, mean, variance in (
@@ -120,9 +119,9 @@ def test_who_is_hidden_is_like_anybody() -> None:
     sight = view.observe(likelihoods([view.camera], people((0.3, -0.2, 1.9)))[0])
     nobodys = open_to_one(np.zeros(view.shape, bool))
     place, width, anybody = at(np.array([[0.3, -0.2]])), np.array([0.42]), Sizes.of_population(1, BODY)
-    found = measure(place, width, [view], [sight], nobodys, BODY)
+    found = body_sizes(place, width, [view], [sight], nobodys, BODY)
     np.testing.assert_allclose([found.height, found.width], [anybody.height, anybody.width])
-    blind = measure(place, width, [view], [None], nobodys, BODY)
+    blind = body_sizes(place, width, [view], [None], nobodys, BODY)
     np.testing.assert_allclose(blind.height_variance, anybody.height_variance, rtol=0.03)  # of the lattice, cut off
 
 
@@ -141,7 +140,7 @@ def test_wider_people_are_found_wider() -> None:
                 seen[first[0] + k, start:stop] = 1.0
             sights.append(view.observe(seen))
         own = open_to_one(*(np.ones(view.shape, bool) for view in views))
-        found.append(float(measure(at(np.zeros((1, 2))), np.array([0.42]), views, sights, own, BODY).width[0]))
+        found.append(float(body_sizes(at(np.zeros((1, 2))), np.array([0.42]), views, sights, own, BODY).width[0]))
     assert 0.8 * WIDTH - 0.03 < found[0] < found[1] - 0.04
     assert found[1] == pytest.approx(WIDTH, abs=0.04)
 
@@ -201,7 +200,7 @@ def test_taller_people_are_found_taller(height: float) -> None:
     view = pixel_view()
     place, width = at(np.zeros((1, 2))), np.array([WIDTH])
     found = [
-        measure(place, width, [view], [view.observe(seen)], everything(view), BODY).height[0]
+        body_sizes(place, width, [view], [view.observe(seen)], everything(view), BODY).height[0]
         for tall in (height, height + 0.1)
         for seen in likelihoods([view.camera], people((0.0, 0.0, tall)))
     ]

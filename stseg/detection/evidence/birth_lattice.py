@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from stseg.arrays import Floats
-from stseg.detection.evidence.evidence import peaks
+from stseg.detection.evidence.candidate_evidence import peaks
 from stseg.detection.evidence.open_pixels import OpenPixels
 from stseg.detection.evidence.pillar_evidence import fill_scores
 from stseg.detection.search.map_estimate import MapEstimate

@@ -34,10 +34,10 @@ def blob_scales(
     lattice
         The pillars of bodies.
     """
-    scale, nobody = np.empty(rasters.shape, np.float32), lattice.nobody.reshape(-1)
+    scale, owner = np.empty(rasters.shape, np.float32), lattice.owner.reshape(-1)
     certain = float(np.log((1 - config.pixel_miss_rate) / config.pixel_clutter_rate))
     _fill_scales(
-        OpenPixels.of(rasters, nobody, lattice, extremes), lattice, len(body.heights), config.effective_observations,
+        OpenPixels.of(rasters, owner, lattice, extremes), lattice, len(body.heights), config.effective_observations,
         config.prior_log_odds, certain, scale,
     )  # fmt: skip
     return scale

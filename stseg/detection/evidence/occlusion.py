@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints
-from stseg.detection.evidence.ragged_lists import Lists
+from stseg.detection.problem import RaggedArray
 from stseg.kernels.accelerate import kernel, part
 
 _CLEARANCE = 0.1
@@ -20,8 +20,8 @@ _INSET = 0.1
 
 @kernel
 def hiders_of(
-    bodies: Floats, distance: Floats, sizes: Floats, is_blind: Flags, known: Lists, known_candidates: int
-) -> Lists:
+    bodies: Floats, distance: Floats, sizes: Floats, is_blind: Flags, known: RaggedArray, known_candidates: int
+) -> RaggedArray:
     """Occluders of each candidate, rising, with the share that each leaves visible of the box inside the image.
 
     Parameters
@@ -57,7 +57,7 @@ def hiders_of(
             if not is_blind[view]:
                 number = _add_hiders(i, first, bodies[view], distance[view], sizes[view], item, value, number)
             start[view * candidates + i + 1] = number
-    return Lists(start, item[:number].copy(), value[:number].copy())
+    return RaggedArray(start, item[:number].copy(), value[:number].copy())
 
 
 @part

@@ -43,7 +43,7 @@ class PixelLattice(NamedTuple):
     boxes: Shorts
     strips: Shorts
     shapes: Ints
-    nobody: Shorts
+    owner: Shorts
     above: Labels
     left_of: Floats
 
@@ -59,8 +59,8 @@ class PixelLattice(NamedTuple):
         shapes = np.array([view.shape for view in chosen], np.int64).reshape(-1, 2)
         rows, columns = shapes.max(0, initial=0)
         above = np.empty((len(chosen), rows + 1, columns + 1), np.int32)
-        nobody = np.full((len(chosen), rows * columns), -1, np.int16)
-        return cls(outlines, boxes, strips, shapes, nobody, above, np.empty((len(chosen), rows, columns + 1)))
+        owner = np.full((len(chosen), rows * columns), -1, np.int16)
+        return cls(outlines, boxes, strips, shapes, owner, above, np.empty((len(chosen), rows, columns + 1)))
 
 
 def _drawn(

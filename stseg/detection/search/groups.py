@@ -1,7 +1,7 @@
-"""Groups of candidates that interact, which can be decided apart (HW12 section IV-B).
+"""Groups of candidates that interact, each decided by itself (HW12 section IV-B).
 
 Two candidates interact where their projections overlap in a view with pixels, where one hides the other or both fit one
-box in a view with boxes, where both may continue one track, and where they stand too near for two bodies. The score of
+box in a view with boxes, where both may continue one track, and where they stand too close for two bodies. The score of
 a set is the sum of the scores of its groups, exactly.
 """
 
@@ -10,71 +10,95 @@ from __future__ import annotations
 import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints
-from stseg.detection.evidence.ragged_lists import Lists, append, lists_of
-from stseg.detection.problem import BoxEvidence, PixelEvidence, Problem
-from stseg.detection.score.repulsion import apart_of_bodies
-from stseg.detection.score.sharing import Sharing
-from stseg.detection.score.track_sharing import TrackSharing
+from stseg.detection.problem import BoxEvidence, DetectionProblem, PixelEvidence, RaggedArray, append, ragged_array
+from stseg.detection.score.scoring import body_distance
+from stseg.detection.score.set_state import SetState
+from stseg.detection.score.track_state import TrackState
 from stseg.kernels.accelerate import kernel, part
 
 
 @kernel
-def fill_interactions(problem: Problem, sharing: Sharing, interacts: Flags) -> None:
-    """Fill touch (candidate, candidate), symmetric: whether the gain of one depends on the other."""
-    boxes, candidates = sharing.boxes, len(interacts)
+def fill_interactions(state: SetState, interacts: Flags) -> None:
+    """Fill interacts (candidate, candidate), symmetric: whether the gain of one depends on the other."""
+    followers = _followers(state.tracks)
     interacts[:] = False
-    _join_lists(_followers(sharing.tracks), interacts)
-    _join_lists(boxes.fitting, interacts)
-    for view in range(boxes.views):
-        for i in range(candidates):
-            row = view * candidates + i
-            for k in range(boxes.hidden.start[row], boxes.hidden.start[row + 1]):
-                j = boxes.hidden.item[k]
-                interacts[i, j] = interacts[j, i] = True
-    for i in range(candidates):
+    for i in range(len(interacts)):
         interacts[i, i] = True
+        _mark_linked(i, state, followers, interacts[i])
         for j in range(i):
             if not interacts[i, j]:
-                interacts[i, j] = interacts[j, i] = _overlap_on_ground(i, j, problem) or _overlap(i, j, problem.pixels)
+                interacts[i, j] = interacts[j, i] = _overlap(i, j, state.problem)
 
 
 @kernel
-def _followers(tracks: TrackSharing) -> Lists:
+def fill_groups(state: SetState, group: Ints) -> int:
+    """Fill group (candidate,) with numbers from 0, in the order of their first candidates; returns how many."""
+    candidates, followers = len(group), _followers(state.tracks)
+    linked, waiting, number = np.zeros(candidates, np.bool_), np.empty(candidates, np.int64), 0
+    group[:] = -1
+    for first in range(candidates):
+        if group[first] >= 0:
+            continue
+        group[first], waiting[0], count = number, first, 1
+        while count > 0:
+            count -= 1
+            i = waiting[count]
+            linked[:] = False
+            _mark_linked(i, state, followers, linked)
+            for j in range(candidates):
+                if group[j] < 0 and (linked[j] or _overlap(i, j, state.problem)):
+                    group[j], waiting[count] = number, j
+                    count += 1
+        number += 1
+    return number
+
+
+@kernel
+def _followers(tracks: TrackState) -> RaggedArray:
     """The candidates who may continue each track."""
-    followers, place = lists_of(np.bincount(tracks.may.item, minlength=len(tracks.holder)))
-    for i in range(len(tracks.may.start) - 1):
-        for k in range(tracks.may.start[i], tracks.may.start[i + 1]):
-            append(followers, place, tracks.may.item[k], i, tracks.may.value[k])
+    followers, place = ragged_array(np.bincount(tracks.gains.item, minlength=len(tracks.member_of)))
+    for i in range(len(tracks.gains.start) - 1):
+        for k in range(tracks.gains.start[i], tracks.gains.start[i + 1]):
+            append(followers, place, tracks.gains.item[k], i, tracks.gains.value[k])
     return followers
 
 
 @part
-def _join_lists(lists: Lists, interacts: Flags) -> None:
-    """Let all of each list interact."""
-    for row in range(len(lists.start) - 1):
-        for a in range(lists.start[row], lists.start[row + 1]):
-            for b in range(lists.start[row], a):
-                i, j = lists.item[a], lists.item[b]
-                interacts[i, j] = interacts[j, i] = True
-
-
-@kernel
-def _fits(match: Floats, problem: Problem) -> Flags:
-    """Candidates that may gain by a box, from their matches (n,): bool (n,)."""
-    return np.asarray(problem.parameters.box_log_ratio + match > np.log(problem.parameters.box_miss_rate))
-
-
-@part
-def _overlap_on_ground(i: int, j: int, problem: Problem) -> bool:
-    room = 0.5 * problem.parameters.minimum_distance * (problem.breadth[i] + problem.breadth[j])
-    if abs(problem.ground[i, 0] - problem.ground[j, 0]) > room:
-        return False
-    return bool(apart_of_bodies(i, j, problem.ground, problem.breadth) < problem.parameters.minimum_distance)
+def _mark_linked(i: int, state: SetState, followers: RaggedArray, linked: Flags) -> None:
+    """Mark the candidates that share a track, a box or a line of sight with candidate i: linked (candidate,)."""
+    boxes, gains = state.boxes, state.tracks.gains
+    for k in range(gains.start[i], gains.start[i + 1]):
+        _mark_row(gains.item[k], followers, linked)
+    for view in range(boxes.views):
+        row = view * len(linked) + i
+        for k in range(boxes.fits.start[row], boxes.fits.start[row + 1]):
+            _mark_row(view * boxes.boxes + boxes.fits.item[k], boxes.fitting, linked)
+        _mark_row(row, boxes.hidden, linked)
+        _mark_row(row, boxes.hiders, linked)
 
 
 @part
-def _overlap(i: int, j: int, pixels: PixelEvidence) -> bool:
-    """Whether their outlines share a pixel."""
+def _mark_row(row: int, rows: RaggedArray, linked: Flags) -> None:
+    for k in range(rows.start[row], rows.start[row + 1]):
+        linked[rows.item[k]] = True
+
+
+@part
+def _overlap(i: int, j: int, problem: DetectionProblem) -> bool:
+    """Whether two candidates are too close for two bodies, or their outlines share a pixel."""
+    contact = problem.parameters.minimum_distance
+    room = 0.5 * contact * (problem.breadth[i] + problem.breadth[j])
+    if (
+        abs(problem.ground[i, 0] - problem.ground[j, 0]) <= room
+        and body_distance(i, j, problem.ground, problem.breadth) < contact
+    ):
+        return True
+    return _outlines_overlap(i, j, problem.pixels)
+
+
+@part
+def _outlines_overlap(i: int, j: int, pixels: PixelEvidence) -> bool:
+    """Whether the outlines of two candidates share a pixel."""
     for view in range(len(pixels.raster)):
         one, other = pixels.first[view, i], pixels.first[view, j]
         if one < 0 or other < 0:
@@ -87,108 +111,36 @@ def _overlap(i: int, j: int, pixels: PixelEvidence) -> bool:
 
 
 @kernel
-def fill_groups(problem: Problem, sharing: Sharing, group: Ints) -> int:
-    """Fill group (candidate,) with numbers from 0, in the order of their first candidates; returns how many.
-
-    Candidates are compared on the ground and in pixels only where lists have not brought them together before.
-    """
-    boxes, tracks, candidates = sharing.boxes, sharing.tracks, len(group)
-    followers, known = _followers(tracks), np.zeros(len(boxes.fitting.start) + len(tracks.holder), np.bool_)
-    group[:] = -1
-    waiting = np.empty(candidates, np.int64)
-    found = 0
-    for first in range(candidates):
-        if group[first] >= 0:
-            continue
-        group[first], waiting[0], left = found, first, 1
-        while left > 0:
-            left -= 1
-            i = waiting[left]
-            for k in range(tracks.may.start[i], tracks.may.start[i + 1]):
-                track = tracks.may.item[k]
-                left = _take_row(followers, track, known, len(known) - 1 - track, found, group, waiting, left)
-            for view in range(boxes.views):
-                row = view * candidates + i
-                for k in range(boxes.fits.start[row], boxes.fits.start[row + 1]):
-                    box = view * boxes.boxes + boxes.fits.item[k]
-                    left = _take_row(boxes.fitting, box, known, box, found, group, waiting, left)
-                left = _take(boxes.hidden, row, found, group, waiting, left)
-                left = _take(boxes.hiders, row, found, group, waiting, left)
-            for j in range(candidates):
-                if group[j] < 0 and (_overlap_on_ground(i, j, problem) or _overlap(i, j, problem.pixels)):
-                    group[j], waiting[left] = found, j
-                    left += 1
-        found += 1
-    return found
-
-
-@part
-def _take_row(
-    lists: Lists, row: int, known: Flags, place: int, found: int, group: Ints, waiting: Ints, left: int
-) -> int:
-    """`_take` a row of lists whose candidates all interact, if it was not taken before: known (place,) says so."""
-    if known[place]:
-        return left
-    known[place] = True
-    return _take(lists, row, found, group, waiting, left)
-
-
-@part
-def _take(lists: Lists, row: int, found: int, group: Ints, waiting: Ints, left: int) -> int:
-    """Take the candidates of a row of lists into a group; returns how many are waiting then."""
-    for k in range(lists.start[row], lists.start[row + 1]):
-        j = lists.item[k]
-        if group[j] < 0:
-            group[j], waiting[left] = found, j
-            left += 1
-    return left
-
-
-@kernel
-def restricted(problem: Problem, own: Ints) -> Problem:
+def restricted(problem: DetectionProblem, group: Ints) -> DetectionProblem:
     """A problem with the boxes and tracks alone that a group (n,) may take; candidates keep their numbers."""
-    boxes = problem.boxes
+    boxes, parameters = problem.boxes, problem.parameters
     number = np.zeros(len(boxes.boxes), np.int64)
-    kept = np.zeros((len(boxes.boxes), boxes.match.shape[2]), np.int64)
-    for view in range(len(boxes.boxes)):
-        for b in range(boxes.boxes[view]):
-            if _fits(boxes.match[view, :, b][own], problem).any():
-                kept[view, number[view]] = b
-                number[view] += 1
-    most = number.max() if len(number) else 0
-    match = np.full((len(number), boxes.match.shape[1], most), -np.inf)
+    match = np.empty(boxes.match.shape)  # filled, and read, for the group's boxes alone
     for view in range(len(number)):
-        for i in own:
-            for k in range(number[view]):
-                match[view, i, k] = boxes.match[view, i, kept[view, k]]
-    known = _tracks_of(problem, own)
-    part = BoxEvidence(match, number, boxes.hiders, boxes.inside, boxes.left)
-    return Problem(
-        part,
-        problem.pixels,
-        problem.size_prior,
-        problem.birth_cost,
-        known,
-        problem.ground,
-        problem.breadth,
-        problem.parameters,
-        problem.assigned,
-        problem.owner,
-        problem.view_evidence,
-    )
+        for b in range(boxes.boxes[view]):
+            matches = boxes.match[view, :, b][group]
+            if (parameters.box_log_ratio + matches > np.log(parameters.box_miss_rate)).any():
+                for i in group:
+                    match[view, i, number[view]] = boxes.match[view, i, b]
+                number[view] += 1
+    return DetectionProblem(
+        BoxEvidence(match, number, boxes.hiders, boxes.inside, boxes.visible_past), problem.pixels, problem.size_prior,
+        problem.birth_cost, _tracks_of(problem, group), problem.ground, problem.breadth, parameters,
+        problem.assignment, problem.track_member, problem.owner, problem.view_evidence,
+    )  # fmt: skip
 
 
 @kernel
-def _tracks_of(problem: Problem, own: Ints) -> Floats:
+def _tracks_of(problem: DetectionProblem, group: Ints) -> Floats:
     """Gains of the tracks that a group may continue, float64 (candidate, k)."""
-    kept = np.zeros(problem.track_gain.shape[1], np.int64)
+    chosen = np.zeros(problem.track_gain.shape[1], np.int64)
     count = 0
-    for k in range(len(kept)):
-        if ((problem.birth_cost + problem.track_gain[:, k])[own] > 0).any():
-            kept[count] = k
+    for k in range(len(chosen)):
+        if ((problem.birth_cost + problem.track_gain[:, k])[group] > 0).any():
+            chosen[count] = k
             count += 1
-    known = np.zeros((len(problem.track_gain), count))
-    for i in own:
+    gains = np.zeros((len(problem.track_gain), count))
+    for i in group:
         for k in range(count):
-            known[i, k] = problem.track_gain[i, kept[k]]
-    return known
+            gains[i, k] = problem.track_gain[i, chosen[k]]
+    return gains

@@ -10,295 +10,198 @@ from __future__ import annotations
 import numpy as np
 
 from stseg.arrays import Flags, Ints
-from stseg.detection.problem import PixelAssignment, Problem
-from stseg.detection.score.box_sharing import forget, forget_linked
-from stseg.detection.score.gains import (
-    clear_assignment,
-    fill_assignment,
-    gain_in_place,
-    gain_of,
-    insert,
-    withdraw,
-)
-from stseg.detection.score.scoring import set_score
-from stseg.detection.score.sharing import Sharing
-from stseg.detection.score.track_sharing import assign_track, assign_tracks
+from stseg.detection.problem import DetectionProblem
+from stseg.detection.score.box_state import clear_cache
+from stseg.detection.score.set_state import SetState, add, assign, changed, gain, put, release, score, withdraw
 from stseg.kernels.accelerate import kernel, part
 
-SWEEPS = 8
-"""Sweeps of simple moves at most; two or three are usual."""
-GAINED = 1e-9
+SCORE_TOLERANCE = 1e-9
 """Least rise of the score that counts, nats: above rounding errors."""
-_NEAR = 0.7
-"""A member is replaced by candidates this near alone, metres: more is another person."""
-_SLACK = 3.0
+_SWEEP_LIMIT = 8
+"""Sweeps of simple moves at most; two or three are usual."""
+_REPLACEMENT_DISTANCE = 0.7
+"""A member is replaced by candidates at most this far away, metres: more is another person."""
+_RETRY_MARGIN = 3.0
 """Candidates that were this far below the best gain are not tried again in a sweep, nats."""
-_HOPELESS = -12.0
+_INSERTION_GAIN = -12.0
 """Candidates with less gain are not forced in, nats: members that leave for them cannot make up for it."""
 
 
 @kernel
-def local_search(
-    members: Ints,
-    count: int,
-    own: Ints,
-    inside: Flags,
-    assigned: PixelAssignment,
-    problem: Problem,
-    sharing: Sharing,
-) -> int:
-    """Simple moves until none helps; returns the set's new size.
-
-    Parameters
-    ----------
-    members : int64 (candidate + 1,)
-        The first `count` are the set.
-    own : int64 (n,)
-        The candidates of the group.
-    inside : bool (candidate,)
-        Membership of all candidates.
-    assigned : int16 (view, v * u)
-        Scratch, -1 everywhere before and after.
-    """
-    forget(sharing.boxes)
-    for _ in range(SWEEPS):
-        grown = _add(members, count, own, inside, assigned, problem, sharing)
-        shrunk = _remove(members, grown, -1, inside, inside, assigned, problem, sharing)
-        exchanged = _exchange(members, shrunk, own, inside, assigned, problem, sharing)
-        if grown == count and shrunk == grown and not exchanged:
+def local_search(group: Ints, state: SetState) -> None:
+    """Simple moves among the candidates of a group, int64 (n,), until none helps."""
+    clear_cache(state.boxes)
+    for _ in range(_SWEEP_LIMIT):
+        size = state.size[0]
+        _add_best(group, state)
+        grown = state.size[0]
+        _remove_worthless(-1, state.inside, state)
+        shrunk = state.size[0]
+        replaced = _replace(group, state)
+        if grown == size and shrunk == grown and not replaced:
             break
-        count = shrunk
-    return count
 
 
 @kernel
-def swap(
-    members: Ints,
-    count: int,
-    own: Ints,
-    inside: Flags,
-    interacts: Flags,
-    assigned: PixelAssignment,
-    trades: int,
-    problem: Problem,
-    sharing: Sharing,
-) -> int:
-    """Sweeps of swap moves until none helps; arguments of `local_search`, and `interacts` (candidate, candidate)."""
-    trial, trial_inside = members.copy(), inside.copy()
-    score = set_score(members, count, problem)
-    for _ in range(trades):
-        before = score
-        for i in own:
-            _become(trial, trial_inside, members, inside)
-            near = own[interacts[i][own]]
+def swap_moves(group: Ints, interacts: Flags, sweeps: int, state: SetState) -> None:
+    """Sweeps of swap moves until none helps; interacts (candidate, candidate) is that of `fill_interactions`."""
+    members, inside, size = state.members.copy(), state.inside.copy(), state.size[0]
+    best_score = score(state)
+    for _ in range(sweeps):
+        before = best_score
+        for i in group:
+            _become(members, inside, size, state)
+            partners = group[interacts[i][group]]
             if inside[i]:
-                size = _withdraw_and_refill(trial, count, i, near[near != i], trial_inside, assigned, problem, sharing)
+                is_changed = _remove_and_refill(i, partners[partners != i], state)
             else:
-                size = _insert_and_prune(trial, count, i, trial_inside, interacts, assigned, problem, sharing)
-            if size < 0:
+                is_changed = _insert_and_prune(i, interacts[i], state)
+            if not is_changed:
                 continue
-            size = local_search(trial, size, near, trial_inside, assigned, problem, sharing)
-            after = set_score(trial, size, problem)
-            if after > score + GAINED:
-                _become(members, inside, trial, trial_inside)
-                count, score = size, after
-        if score <= before + GAINED:
+            local_search(partners, state)
+            after = score(state)
+            if after > best_score + SCORE_TOLERANCE:
+                size, best_score = state.size[0], after
+                for a in range(size):
+                    members[a] = state.members[a]
+                for j in range(len(inside)):
+                    inside[j] = state.inside[j]
+        if best_score <= before + SCORE_TOLERANCE:
             break
-    return count
+    _become(members, inside, size, state)
 
 
 @part
-def _become(members: Ints, inside: Flags, other: Ints, other_inside: Flags) -> None:
-    """Make a set that of others: as loops, since assigned slices are checked by code that takes seconds to compile."""
-    for a in range(len(members)):
-        members[a] = other[a]
+def _become(members: Ints, inside: Flags, size: int, state: SetState) -> None:
+    """Make the state that of a set: in loops, since slices that are assigned to are slow to compile."""
+    state.size[0] = size
+    for a in range(size):
+        state.members[a] = members[a]
     for i in range(len(inside)):
-        inside[i] = other_inside[i]
+        state.inside[i] = inside[i]
 
 
 @kernel
-def _withdraw_and_refill(
-    members: Ints,
-    count: int,
-    i: int,
-    near: Ints,
-    inside: Flags,
-    assigned: PixelAssignment,
-    problem: Problem,
-    sharing: Sharing,
-) -> int:
-    """Force member i out and add candidates near it; the set's size, or -1 where none is added."""
-    for a in range(count):
-        if members[a] == i:
-            members[a] = members[count - 1]
-    inside[i] = False
-    forget(sharing.boxes)
-    size = _add(members, count - 1, near, inside, assigned, problem, sharing)
-    return size if size > count - 1 else -1
+def _remove_and_refill(i: int, partners: Ints, state: SetState) -> bool:
+    """Force member i out and add candidates that interact with it; whether any is added."""
+    size = state.size[0] - 1
+    for a in range(size):
+        if state.members[a] == i:
+            state.members[a] = state.members[size]
+    state.size[0], state.inside[i] = size, False
+    clear_cache(state.boxes)
+    _add_best(partners, state)
+    return bool(state.size[0] > size)
 
 
 @kernel
-def _insert_and_prune(
-    members: Ints,
-    count: int,
-    i: int,
-    inside: Flags,
-    interacts: Flags,
-    assigned: PixelAssignment,
-    problem: Problem,
-    sharing: Sharing,
-) -> int:
-    """Force candidate i in and remove members that add nothing beside it; the set's size, or -1 where none is removed.
+def _insert_and_prune(i: int, partners: Flags, state: SetState) -> bool:
+    """Force candidate i in and remove partners (candidate,) that add nothing to it; whether any is removed.
 
-    Where just one near member is removed, that is a simple replacement, which was tried.
+    Where just one nearby member is removed, that is a simple replacement, which was tried.
     """
-    forget(sharing.boxes)
-    fill_assignment(members, count, problem.pixels, assigned)
-    assign_tracks(members, count, sharing.tracks)
-    gain = gain_of(i, members, count, inside, assigned, problem, sharing)
-    clear_assignment(members, count, problem.pixels, assigned)
-    if gain < _HOPELESS:
-        return -1
-    before = members[:count].copy()
-    forget_linked(i, inside, sharing.boxes)
-    members[count], inside[i] = i, True
-    left = _remove(members, count + 1, i, interacts[i], inside, assigned, problem, sharing)
-    gone = before[~inside[before]]
-    if len(gone) == 0 or (len(gone) == 1 and _apart(i, gone[0], problem) <= _NEAR):
-        return -1
-    return left
+    clear_cache(state.boxes)
+    assign(state)
+    is_worth = gain(i, state, True) >= _INSERTION_GAIN
+    release(state)
+    if not is_worth:
+        return False
+    before = state.members[: state.size[0]].copy()
+    changed(i, state)
+    state.members[state.size[0]], state.inside[i] = i, True
+    state.size[0] += 1
+    _remove_worthless(i, partners, state)
+    removed = before[~state.inside[before]]
+    return len(removed) > 1 or (len(removed) == 1 and _distance(i, removed[0], state.problem) > _REPLACEMENT_DISTANCE)
 
 
 @part
-def _apart(i: int, j: int, problem: Problem) -> float:
+def _distance(i: int, j: int, problem: DetectionProblem) -> float:
     return float(np.hypot(problem.ground[i, 0] - problem.ground[j, 0], problem.ground[i, 1] - problem.ground[j, 1]))
 
 
 @kernel
-def _add(
-    members: Ints,
-    count: int,
-    own: Ints,
-    inside: Flags,
-    assigned: PixelAssignment,
-    problem: Problem,
-    sharing: Sharing,
-) -> int:
+def _add_best(group: Ints, state: SetState) -> None:
     """Add the best candidate while one helps; gains seldom rise, so candidates far below the best are tried once."""
     outside = 0
-    for i in own:
-        outside += not inside[i]
+    for i in group:
+        outside += not state.inside[i]
     if outside == 0:
-        return count
-    gain = np.full(len(own), np.inf)
-    fill_assignment(members, count, problem.pixels, assigned)
-    assign_tracks(members, count, sharing.tracks)
+        return
+    gains = np.full(len(group), np.inf)
+    assign(state)
     while True:
-        best, best_gain = -1, GAINED
-        for k in range(len(own)):
-            if inside[own[k]] or gain[k] < best_gain - _SLACK:
+        best, best_gain = -1, SCORE_TOLERANCE
+        for k in range(len(group)):
+            if state.inside[group[k]] or gains[k] < best_gain - _RETRY_MARGIN:
                 continue
-            gain[k] = gain_of(own[k], members, count, inside, assigned, problem, sharing)
-            if gain[k] > best_gain:
-                best, best_gain = own[k], gain[k]
+            gains[k] = gain(group[k], state, True)
+            if gains[k] > best_gain:
+                best, best_gain = group[k], gains[k]
         if best < 0:
             break
-        forget_linked(best, inside, sharing.boxes)
-        members[count], inside[best] = best, True
-        count += 1
-        insert(best, problem.pixels, assigned)
-        assign_track(best, sharing.tracks)
-    clear_assignment(members, count, problem.pixels, assigned)
-    return count
+        add(best, state)
+    release(state)
 
 
 @kernel
-def _remove(
-    members: Ints,
-    count: int,
-    keep: int,
-    may: Flags,
-    inside: Flags,
-    assigned: PixelAssignment,
-    problem: Problem,
-    sharing: Sharing,
-) -> int:
-    """Remove each member without whom the score is higher, of those that `may` (candidate,) leave, but not `keep`."""
-    fill_assignment(members, count, problem.pixels, assigned)
+def _remove_worthless(fixed: int, removable: Flags, state: SetState) -> None:
+    """Remove each member that lowers the score, of those that are removable (candidate,), but not `fixed`."""
+    assign(state)
     a = 0
-    while a < count:
-        leaving = members[a]
-        if not may[leaving] or leaving == keep:
+    while a < state.size[0]:
+        if not removable[state.members[a]] or state.members[a] == fixed:
             a += 1
             continue
-        members[a] = members[count - 1]
-        inside[leaving] = False
-        withdraw(leaving, members, count - 1, problem.pixels, assigned)
-        assign_tracks(members, count - 1, sharing.tracks)
-        if gain_of(leaving, members, count - 1, inside, assigned, problem, sharing) < -GAINED:
-            forget_linked(leaving, inside, sharing.boxes)
-            count -= 1
+        i = withdraw(a, state)
+        if gain(i, state, True) < -SCORE_TOLERANCE:
+            changed(i, state)
         else:
-            members[a], inside[leaving] = leaving, True
-            insert(leaving, problem.pixels, assigned)
+            put(i, a, state)
             a += 1
-    clear_assignment(members, count, problem.pixels, assigned)
-    return count
+    release(state)
 
 
 @kernel
-def _exchange(
-    members: Ints,
-    count: int,
-    own: Ints,
-    inside: Flags,
-    assigned: PixelAssignment,
-    problem: Problem,
-    sharing: Sharing,
-) -> bool:
-    """Replace each member by the near candidate that raises the score most."""
+def _replace(group: Ints, state: SetState) -> bool:
+    """Replace each member by the nearby candidate that raises the score most; whether any is replaced."""
     rivals = 0
-    for a in range(count):
-        rivals += _has_rival(members[a], own, inside, problem)
+    for a in range(state.size[0]):
+        rivals += _has_rival(state.members[a], group, state)
     if rivals == 0:
         return False
-    changed = False
-    fill_assignment(members, count, problem.pixels, assigned)
-    for a in range(count):
-        old = members[a]
-        if not _has_rival(old, own, inside, problem):
+    is_changed = False
+    assign(state)
+    for a in range(state.size[0]):
+        if not _has_rival(state.members[a], group, state):
             continue
-        members[a], inside[old] = members[count - 1], False
-        withdraw(old, members, count - 1, problem.pixels, assigned)
-        assign_tracks(members, count - 1, sharing.tracks)
-        best, best_gain = old, gain_of(old, members, count - 1, inside, assigned, problem, sharing) + GAINED
-        for i in own:
-            if i == old or not _may_replace(i, old, inside, problem):
+        member = withdraw(a, state)
+        best, best_gain = member, gain(member, state, True) + SCORE_TOLERANCE
+        for i in group:
+            if i == member or not _may_replace(i, member, state):
                 continue
-            gain = gain_in_place(i, members, count - 1, inside, assigned, problem, sharing)
-            if gain > best_gain:
-                best, best_gain = i, gain
-        members[count - 1] = members[a]
-        if best != old:
-            forget_linked(old, inside, sharing.boxes)
-            forget_linked(best, inside, sharing.boxes)
-        members[a], inside[best] = best, True
-        insert(best, problem.pixels, assigned)
-        changed = changed or best != old
-    clear_assignment(members, count, problem.pixels, assigned)
-    return changed
+            trial_gain = gain(i, state, False)
+            if trial_gain > best_gain:
+                best, best_gain = i, trial_gain
+        if best != member:
+            changed(member, state)
+            changed(best, state)
+            is_changed = True
+        put(best, a, state)
+    release(state)
+    return is_changed
 
 
 @part
-def _has_rival(old: int, own: Ints, inside: Flags, problem: Problem) -> bool:
+def _has_rival(member: int, group: Ints, state: SetState) -> bool:
     """Whether any candidate may replace a member."""
-    found = False
-    for i in own:
-        found = found or _may_replace(i, old, inside, problem)
-    return found
+    has_rival = False
+    for i in group:
+        has_rival = has_rival or _may_replace(i, member, state)
+    return has_rival
 
 
 @part
-def _may_replace(i: int, old: int, inside: Flags, problem: Problem) -> bool:
-    """Whether a candidate is outside the set and near a member."""
-    return not inside[i] and _apart(i, old, problem) <= _NEAR
+def _may_replace(i: int, member: int, state: SetState) -> bool:
+    """Whether a candidate is outside the set and close to a member."""
+    return not state.inside[i] and _distance(i, member, state.problem) <= _REPLACEMENT_DISTANCE

@@ -10,21 +10,49 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stseg.arrays import Floats, Ints
+from stseg.arrays import Floats, Ints, Shorts
 from stseg.bodies.box_fit import fill_own_match
 from stseg.bodies.views import BoxView, PixelView, TriedPillars, View, ViewObservation
 from stseg.detection.prior import Prior
-from stseg.detection.score.assignment import WORST, Assignment
 from stseg.records.candidates import Candidates
 
-_REACH = 2
-"""Half width of the patch, in its spacings."""
-_SPACING = 0.08
+_PATCH_SPACING = 0.08
 """Spacing of the patch, metres: a third of the offset of two lattice places."""
-_AXIS = np.arange(-_REACH, _REACH + 1) * _SPACING
+_AXIS = np.arange(-2, 3) * _PATCH_SPACING
 _PATCH = np.stack(np.meshgrid(_AXIS, _AXIS), -1).reshape(-1, 2)
-_FEW_HEIGHTS = 4
-"""Where pixels tell the height afterwards (`body_size`), every other of more heights is enough here."""
+_HEIGHT_LIMIT = 4
+"""Where pixels show the height afterwards (`body_sizes`), every other of more heights is enough here."""
+_MINIMUM_BOX_LOG_LIKELIHOOD = -8.0
+"""Least log-likelihood of a box in a person's posterior, nats: below it the assignment itself is in doubt."""
+
+
+@dataclass(frozen=True)
+class EvidenceAssignment:
+    """Boxes and pixels assigned to each of some people.
+
+    Attributes
+    ----------
+    box : int64 (view, person)
+        The box of each; -1 for none, and in views with pixels.
+    pixels : sequence of int16 (v, u), one a view
+        The number of the person that each raster pixel is assigned to, -1 for none: those are open to everyone. Not
+        read for views with boxes.
+    number : int64 (person,)
+        The number of each, by which pixels name them; others have numbers, too.
+    """
+
+    box: Ints
+    pixels: Sequence[Shorts]
+    number: Ints
+
+    @classmethod
+    def of_all(cls, box: Ints, pixels: Sequence[Shorts]) -> EvidenceAssignment:
+        """The assignment to people who are numbered as they stand."""
+        return cls(box, pixels, np.arange(box.shape[1]))
+
+    def of(self, chosen: Ints) -> EvidenceAssignment:
+        """The assignment to some of the people, int64 (k,)."""
+        return EvidenceAssignment(self.box[:, chosen], self.pixels, self.number[chosen])
 
 
 @dataclass(frozen=True)
@@ -49,7 +77,7 @@ def refine(
     pool: Candidates,
     views: Sequence[View],
     observations: Sequence[ViewObservation | None],
-    own: Assignment,
+    own: EvidenceAssignment,
     prior: Prior,
     track_index: Ints,
     known: dict[bytes, Floats],
@@ -75,7 +103,7 @@ def refine(
         Means and variances.
     """
     tried = np.asarray(prior.body.heights)
-    if len(tried) > _FEW_HEIGHTS and not any(isinstance(view, BoxView) for view in views):
+    if len(tried) > _HEIGHT_LIMIT and not any(isinstance(view, BoxView) for view in views):
         tried = tried[::2]
     patch = pool.ground[:, None] + _PATCH
     if all(isinstance(view, BoxView) for view in views) and len(pool):
@@ -91,7 +119,7 @@ def _known_scores(
     pool: Candidates,
     views: Sequence[View],
     observations: Sequence[ViewObservation | None],
-    own: Assignment,
+    own: EvidenceAssignment,
     prior: Prior,
     tried: Floats,
     known: dict[bytes, Floats],
@@ -109,7 +137,7 @@ def _scores(
     pool: Candidates,
     views: Sequence[View],
     observations: Sequence[ViewObservation | None],
-    own: Assignment,
+    own: EvidenceAssignment,
     prior: Prior,
     tried: Floats,
 ) -> Floats:
@@ -126,7 +154,7 @@ def refine_places(
     pool: Candidates,
     views: Sequence[View],
     observations: Sequence[ViewObservation | None],
-    own: Assignment,
+    own: EvidenceAssignment,
     prior: Prior,
     track_index: Ints,
 ) -> RefinedPlaces:
@@ -158,8 +186,9 @@ def _posterior(score: Floats, patch: Floats, tried: Floats) -> RefinedPlaces:
 def _moments(weight: Floats, patch: Floats) -> tuple[Floats, Floats]:
     """Means and covariances of places (person, place, 2) by their weights (person, place), metres, square metres."""
     ground = np.matmul(weight[:, None], patch)[:, 0]
-    spread = patch - ground[:, None]
-    return ground, np.matmul((spread * weight[..., None]).transpose(0, 2, 1), spread) + np.eye(2) * _SPACING**2 / 12
+    offset = patch - ground[:, None]
+    covariance = np.matmul((offset * weight[..., None]).transpose(0, 2, 1), offset)
+    return ground, covariance + np.eye(2) * _PATCH_SPACING**2 / 12
 
 
 def _pillars(view: View, patch: Floats, tried: Floats, width: Floats) -> TriedPillars:
@@ -170,7 +199,9 @@ def _pillars(view: View, patch: Floats, tried: Floats, width: Floats) -> TriedPi
     return view.tried(everywhere, tall, np.repeat(width[:, None], tall.shape[1], 1))
 
 
-def _patch_score(view: View, observation: ViewObservation, own: Assignment, k: int, pillars: TriedPillars) -> Floats:
+def _patch_score(
+    view: View, observation: ViewObservation, own: EvidenceAssignment, k: int, pillars: TriedPillars
+) -> Floats:
     """Log-likelihood of pillars in view k, nats, float64 (person, pillar)."""
     if isinstance(view, PixelView):
         sums, area = view.open_sums(observation.raster, own.pixels[k], own.number, pillars)
@@ -184,5 +215,5 @@ def _patch_score(view: View, observation: ViewObservation, own: Assignment, k: i
         bodies.reshape(*match.shape, 4), observation.edges[box], observation.tolerance[box],
         observation.belief[box], columns, rows, match,
     )  # fmt: skip
-    score[shown] = np.maximum(match, WORST)
+    score[shown] = np.maximum(match, _MINIMUM_BOX_LOG_LIKELIHOOD)
     return score

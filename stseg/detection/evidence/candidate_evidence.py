@@ -11,8 +11,7 @@ from stseg.arrays import Floats, Singles
 from stseg.bodies.box_fit import fill_inside, fill_match
 from stseg.bodies.views import BoxView, PixelView, View, ViewObservation
 from stseg.detection.evidence.occlusion import hiders_of
-from stseg.detection.evidence.ragged_lists import no_lists
-from stseg.detection.problem import BoxEvidence, PixelEvidence
+from stseg.detection.problem import BoxEvidence, PixelEvidence, no_rows
 from stseg.records.candidates import Candidates
 
 MOST = 250
@@ -100,14 +99,14 @@ def box_evidence(
             )  # fmt: skip
             fill_inside(edges, width, height, inside[k, first:])
     is_blind = np.array([observation is None for _, observation in chosen], bool)
-    hiders = hiders_of(bodies.edges, bodies.distance, sizes, is_blind, known.hiders if known else no_lists(), first)
+    hiders = hiders_of(bodies.edges, bodies.distance, sizes, is_blind, known.hiders if known else no_rows(), first)
     return BoxEvidence(match, boxes, hiders, inside, np.ones(candidates))
 
 
 def _no_boxes(candidates: int) -> BoxEvidence:
     """Evidence where no view delivers boxes."""
     nothing = np.zeros((0, candidates))
-    return BoxEvidence(np.zeros((0, candidates, 0)), np.zeros(0, np.int64), no_lists(), nothing, np.ones(candidates))
+    return BoxEvidence(np.zeros((0, candidates, 0)), np.zeros(0, np.int64), no_rows(), nothing, np.ones(candidates))
 
 
 def stacked_rasters(views: Sequence[View], own: Sequence[Singles | None]) -> Singles:

@@ -27,8 +27,7 @@ import numpy as np
 from stseg.arrays import Floats, Ints, Shorts, Singles
 from stseg.bodies.views import PixelView, View, ViewObservation
 from stseg.config import BodyConfig
-from stseg.detection.score.assignment import Assignment
-from stseg.detection.search.refine import RefinedPlaces
+from stseg.detection.search.refine import EvidenceAssignment, RefinedPlaces
 from stseg.records.sizes import Sizes, log_heavy_tailed
 
 _STEPS = 25
@@ -39,12 +38,12 @@ _WIDTHS = np.linspace(0.26, 0.86, _STEPS)
 """Widths of the lattice, metres: the slim to coats, bags and prams."""
 
 
-def measure(
+def body_sizes(
     places: RefinedPlaces,
     width: Floats,
     views: Sequence[View],
     observations: Sequence[ViewObservation | None],
-    own: Assignment,
+    own: EvidenceAssignment,
     body: BodyConfig,
 ) -> Sizes:
     """E step: posteriors of people's sizes after one frame, under the population prior.

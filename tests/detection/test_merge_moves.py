@@ -15,10 +15,11 @@ from scenes import BODY, FEW_HEIGHTS, boxes, expecting, likelihoods, room
 from stseg.arrays import Floats, Singles, ViewEvidence
 from stseg.bodies.outlines import outlines
 from stseg.detection.detector import Detector
+from stseg.detection.explanation import explained_frame
 from stseg.detection.prior import Prior
-from stseg.detection.result import explanation
 from stseg.detection.search.map_estimate import MapEstimate
-from stseg.detection.search.merging import merged
+from stseg.detection.search.merge_moves import merged
+from stseg.detection.search.refined_people import refined_members
 from stseg.records.candidates import Candidates
 from stseg.records.people import Explanation
 from stseg.records.predicted_tracks import PredictedTracks
@@ -99,7 +100,7 @@ def test_a_merge_is_the_better_of_both_sets_by_the_plain_score(width: float, dis
     before = members_at(pair(distance), silhouettes(pair(0.0)[:1], width))
     after = merged(before)
     leading = before.members_score.view_evidence.sum(0).argmax()
-    alone = before.with_members(before.members[[leading]]).refined().pool
+    alone = refined_members(before.with_members(before.members[[leading]])).pool
     np.testing.assert_array_equal(after.pool.ground[2], alone.ground[0])
     sets = ([0, 1], [2], [3])  # both; one at the leading member's place; one between them
     scores = [reference.set_score(members, after.problem) for members in sets]
@@ -178,9 +179,9 @@ def test_no_two_members_stand_within_the_hard_core(
 
     def kept(estimate: MapEstimate) -> Explanation:
         final.append(estimate.pool.ground[estimate.members])
-        return explanation(estimate)
+        return explained_frame(estimate)
 
-    monkeypatch.setattr("stseg.detection.detector.explanation", kept)
+    monkeypatch.setattr("stseg.detection.detector.explained_frame", kept)
     for seen, predicted in crowded(kinds, seed):
         asked.explain(seen, predicted)
     assert len(final) == 2

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import reference_detection as reference
+import reference_detection_probability as reference
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scenes import corner_cameras, likelihoods, looking, people, rig_of

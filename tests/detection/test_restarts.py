@@ -15,7 +15,8 @@ from stseg.detection.detector import Detector
 from stseg.detection.evidence.birth_lattice import lattice_candidates
 from stseg.detection.prior import Prior
 from stseg.detection.search.map_estimate import MapEstimate
-from stseg.detection.search.restart import restarted
+from stseg.detection.search.refined_people import refined_members
+from stseg.detection.search.restarts import restarted
 from stseg.evaluation.matching import distances, match
 from stseg.records.predicted_tracks import PredictedTracks
 
@@ -89,7 +90,7 @@ def test_no_set_becomes_less_likely(seed: int) -> None:
 
 def box_tables(estimate: MapEstimate) -> list[Floats | Ints]:
     boxes = estimate.problem.boxes
-    return [boxes.match, boxes.boxes, *boxes.hiders, boxes.inside, boxes.left]
+    return [boxes.match, boxes.boxes, *boxes.hiders, boxes.inside, boxes.visible_past]
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -117,10 +118,10 @@ def test_refined_places_are_those_of_a_frame_in_which_none_is_known(seed: int) -
     """Members who take other boxes, since others are gone, are not where they were."""
     _, seen, expected = crowd(seed)
     estimate = of_tracks(seen, expected)
-    estimate.refined()
+    refined_members(estimate)
     for one in (estimate, estimate.with_members(estimate.members[::2])):
         anew = replace(one, evidence=replace(one.evidence))
-        found, by_itself = one.refined(), anew.refined()
+        found, by_itself = refined_members(one), refined_members(anew)
         np.testing.assert_array_equal(found.pool.ground, by_itself.pool.ground)
         np.testing.assert_array_equal(found.covariance, by_itself.covariance)
 

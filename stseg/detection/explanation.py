@@ -1,0 +1,97 @@
+"""Explanation of a frame by an estimate: people, rejected candidates, and the assignment of boxes and pixels."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from stseg.arrays import Floats, Ints, Shorts
+from stseg.bodies.outlines import paint
+from stseg.bodies.views import BoxView, PixelView, View
+from stseg.detection.ghosts import prior_log_odds, rejected_candidates
+from stseg.detection.problem import BoxEvidence, DetectionProblem
+from stseg.detection.search.map_estimate import MapEstimate
+from stseg.detection.search.refined_people import RefinedPeople, refined_members
+from stseg.records.candidates import Candidates
+from stseg.records.people import Explanation, People
+from stseg.view_health.reprojection_residuals import reprojection_residuals
+
+
+def explained_frame(estimate: MapEstimate) -> Explanation:
+    """The explanation by a final estimate: its members are refined, residuals measured."""
+    explanation = explained_by(estimate, refined_members(estimate))
+    people, evidence = explanation.people, estimate.evidence
+    bodies = Candidates(people.ground, people.height, people.width)
+    residual = reprojection_residuals(bodies, evidence.views, evidence.observations, estimate.box_assignment)
+    return replace(explanation, residual=residual)
+
+
+def explained_by(estimate: MapEstimate, refined: RefinedPeople) -> Explanation:
+    """The explanation by an estimate whose members are refined already; no residuals are measured."""
+    views, members, score = estimate.evidence.views, estimate.members, estimate.members_score
+    ground = _outside_core(refined.pool.ground, members, estimate.problem)
+    bodies = Candidates(ground, refined.track_sizes.height, refined.track_sizes.width)
+    people = People(
+        bodies.ground, bodies.height, bodies.width, refined.covariance, estimate.losses, score.view_evidence,
+        _visibility(estimate), prior_log_odds(estimate, members, score.track_index), score.track_index, refined.sizes,
+    )  # fmt: skip
+    pixel_assignment = [
+        pixels if isinstance(view, PixelView) else _painted(view, bodies)
+        for view, pixels in zip(views, estimate.pixel_assignment, strict=True)
+    ]
+    return Explanation(
+        people,
+        rejected_candidates(estimate),
+        tuple(pixel_assignment),
+        tuple(view.step for view in views),
+        tuple(estimate.box_assignment),
+        np.full(len(views), np.nan),
+    )
+
+
+def _outside_core(refined: Floats, members: Ints, problem: DetectionProblem) -> Floats:
+    """Refined places (n, 2), but where that would bring two bodies into the hard core those that were searched, metres.
+
+    Places are refined one by one; no two of those that were searched are within the core.
+    """
+    ground, is_reset, breadth = refined.copy(), np.zeros(len(refined), bool), problem.breadth[members]
+    room = problem.parameters.hard_core * (breadth[:, None] + breadth) / 2
+    np.fill_diagonal(room, 0.0)
+    while True:
+        is_inside = (np.hypot(*np.moveaxis(ground[:, None] - ground, -1, 0)) < room).any(1) & ~is_reset
+        if not is_inside.any():
+            return ground
+        is_reset |= is_inside
+        ground[is_inside] = problem.ground[members[is_inside]]
+
+
+def _visibility(estimate: MapEstimate) -> Floats:
+    """Share of each member that each view sees past the others, float64 (view, member)."""
+    members, evidence = estimate.members, estimate.problem.boxes
+    visibility = np.ones((len(estimate.evidence.views), len(members)))
+    boxes = iter(range(len(evidence.match)))
+    for row, view in zip(visibility, estimate.evidence.views, strict=True):
+        if isinstance(view, BoxView):
+            k = next(boxes)
+            visible = np.prod(_visible_past(evidence, k, members), axis=1)
+            row[:] = view.found_share(evidence.inside[k][members] * visible)
+    return visibility
+
+
+def _visible_past(evidence: BoxEvidence, view: int, members: Ints) -> Floats:
+    """Share of each member's pillar visible past each other member in a view with boxes, float64 (member, member)."""
+    hiders, candidates = evidence.hiders, evidence.inside.shape[1]
+    visible = np.ones((len(members), candidates))
+    for row, i in zip(visible, (view * candidates + members).tolist(), strict=True):
+        hiders_of_one = slice(*hiders.start[i : i + 2].tolist())
+        row[hiders.item[hiders_of_one]] = hiders.value[hiders_of_one]
+    return visible[:, members]
+
+
+def _painted(view: View, people: Candidates) -> Shorts:
+    """The person whose body is nearest at each raster pixel of a view, int16 (v, u); -1 for none."""
+    first, spans, _ = view.outlines(people.ground, people.height, people.width)
+    owner = np.full(view.shape, -1, np.int16)
+    paint(np.argsort(-view.distance(people.ground), kind="stable"), first, spans, owner)
+    return owner

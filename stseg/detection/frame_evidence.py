@@ -1,0 +1,102 @@
+"""Evidence of one frame: observations of all views and the prior, and the detection problem of any candidates."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from stseg.arrays import Floats, Ints, Singles
+from stseg.bodies.views import BoxView, PixelView, ViewObservation
+from stseg.detection.evidence.blob_scale import blob_scales
+from stseg.detection.evidence.box_lattice import BoxLattice
+from stseg.detection.evidence.candidate_evidence import ProjectedBodies, box_evidence, pixel_evidence, stacked_rasters
+from stseg.detection.evidence.pixel_lattice import PixelLattice
+from stseg.detection.prior import Prior
+from stseg.detection.problem import DetectionProblem, ScoreParameters
+from stseg.records.candidates import Candidates
+
+
+@dataclass(frozen=True)
+class FrameEvidence:
+    """Constants of all rounds of a frame: views, their observations (None where blind), and the prior.
+
+    `lattice` has the birth lattice's pillars in the views that deliver pixels.
+    """
+
+    views: Sequence[BoxView | PixelView]
+    observations: Sequence[ViewObservation | None]
+    prior: Prior
+    parameters: ScoreParameters
+    lattice: PixelLattice
+
+    @cached_property
+    def extremes(self) -> Floats:
+        """The lowest and the highest log-odds of each view that delivers pixels, 0 where it is blind: (view, 2)."""
+        pairs = zip(self.views, self.observations, strict=True)
+        extremes = [o.extremes if o else (0.0, 0.0) for view, o in pairs if isinstance(view, PixelView)]
+        return np.array(extremes).reshape(-1, 2)
+
+    @cached_property
+    def rasters(self) -> Singles:
+        """`stacked_rasters` of the views' log-odds."""
+        return stacked_rasters(self.views, [None if o is None else o.raster for o in self.observations])
+
+    @cached_property
+    def box_lattices(self) -> list[BoxLattice | None]:
+        """The lattice of each view that delivers boxes with those of the frame; None where there are none."""
+        return [
+            BoxLattice(view, observation) if isinstance(view, BoxView) and observation is not None else None
+            for view, observation in zip(self.views, self.observations, strict=True)
+        ]
+
+    @cached_property
+    def patch_scores(self) -> dict[bytes, Floats]:
+        """Scores of places, by place and boxes, that `stseg.detection.search.refine` has computed in this frame."""
+        return {}
+
+    @cached_property
+    def scales(self) -> Singles:
+        """Scales of their pixels (`stseg.detection.evidence.blob_scale`)."""
+        return blob_scales(self.rasters, self.extremes, self.lattice, self.prior.config, self.prior.body)
+
+    @cached_property
+    def _assignment(self) -> Ints:
+        """Scratch of scores; see `DetectionProblem`."""
+        boxes = max((len(o.edges) for o in self.observations if o), default=0)
+        return np.empty(max(self.rasters[:1].size, boxes, 1), np.int64)
+
+    def problem(self, pool: Candidates, bodies: ProjectedBodies, base: DetectionProblem | None) -> DetectionProblem:
+        """The candidates of a pool as the kernels read them; `base` is the problem of the first ones, if there is one.
+
+        `bodies` are the same candidates in the views that deliver boxes.
+        """
+        has_pixels = any(isinstance(view, PixelView) for view in self.views)  # boxes show no widths
+        more, prior = pool if base is None else pool.after(len(base.ground)), self.prior
+        boxes = box_evidence(self.views, self.observations, bodies, None if base is None else base.boxes)
+        pixels = pixel_evidence(self.views, self.rasters, self.scales, more)
+        size_prior = prior.log_size(more.height, more.width) if has_pixels else prior.log_height(more.height)
+        birth_cost, track_gain = prior.birth_cost(more.ground), prior.track_log_ratio(more)
+        breadth = np.maximum(more.width / self.parameters.common_width, 1.0) if has_pixels else np.ones(len(more))
+        if base is not None:
+            pixels = base.pixels.joined_with(pixels)
+            size_prior = np.concatenate([base.size_prior, size_prior])
+            birth_cost = np.concatenate([base.birth_cost, birth_cost])
+            track_gain = np.concatenate([base.track_gain, track_gain])
+            breadth = np.concatenate([base.breadth, breadth])
+        return DetectionProblem(
+            boxes=boxes,
+            pixels=pixels,
+            size_prior=size_prior,
+            birth_cost=birth_cost,
+            track_gain=track_gain,
+            ground=pool.ground,
+            breadth=breadth,
+            parameters=self.parameters,
+            assignment=self._assignment,
+            track_member=np.empty(len(prior.predicted), np.int64),
+            owner=self.lattice.owner,
+            view_evidence=np.zeros((len(self.views), len(pool) + 1)),
+        )

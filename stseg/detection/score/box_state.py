@@ -1,0 +1,265 @@
+"""Boxes of a set: the change of the box score with one more member, from the members linked to it alone.
+
+One more member changes the score of a view for the members behind, for those who fit the same boxes, for those who fit
+the boxes of these, and so on. They are few, so the boxes of a view are assigned anew among them alone.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from stseg.arrays import Flags, Floats, Ints
+from stseg.detection.problem import BoxEvidence, RaggedArray, ScoreParameters, append, ragged_array
+from stseg.detection.score.scoring import missing_box_cost
+from stseg.kernels.accelerate import kernel, part
+
+
+class BoxPairs(NamedTuple):
+    """Scratch for the assignment of boxes: pairs of a member and a box, and members and boxes with a pair."""
+
+    gain: Floats
+    member: Ints
+    box: Ints
+    has_box: Flags
+    has_member: Flags
+
+
+class BoxState(NamedTuple):
+    """Links of the candidates through boxes; the row of a candidate in a view is view * candidates + candidate.
+
+    Attributes
+    ----------
+    views
+        Number of views with boxes.
+    boxes
+        Most boxes of a view: the row of a box is view * boxes + box.
+    fits
+        Boxes that a candidate may gain by, with the gain against no box at no cost, nats.
+    fitting
+        The candidates of each box.
+    hidden
+        Candidates whom one hides in part, with the share that is left.
+    hiders
+        Candidates who hide a part of one, with the share that they leave.
+    visible, missing_cost : float64 (view * candidate,)
+        Share of the candidate's pillar inside the image, and the cost of a missing box of one that no member hides,
+        nats.
+    is_cached : bool (view * candidate,), before, after : float64 (view * candidate,)
+        Whether the view's score of the candidate's linked members is cached, and that score, without and with the
+        candidate, nats.
+    linked : int64 (candidate + 1,), is_linked : bool (candidate,), pairs
+        Scratch; no candidate is linked before and after.
+    """
+
+    views: int
+    boxes: int
+    fits: RaggedArray
+    fitting: RaggedArray
+    hidden: RaggedArray
+    hiders: RaggedArray
+    visible: Floats
+    missing_cost: Floats
+    is_cached: Flags
+    before: Floats
+    after: Floats
+    linked: Ints
+    is_linked: Flags
+    pairs: BoxPairs
+
+
+@kernel
+def box_state(evidence: BoxEvidence, parameters: ScoreParameters) -> BoxState:
+    """The links of all candidates, with nothing cached."""
+    views, candidates, boxes = evidence.match.shape
+    threshold = np.log(parameters.box_miss_rate) - parameters.box_log_ratio
+    fit, fitted = np.zeros(views * candidates, np.int64), np.zeros(views * boxes, np.int64)
+    missing_cost = np.empty(views * candidates)
+    for view in range(views):
+        for i in range(candidates):
+            row = view * candidates + i
+            missing_cost[row] = missing_box_cost(evidence.inside[view, i], parameters)
+            for b in range(evidence.boxes[view]):
+                if evidence.match[view, i, b] > threshold:
+                    fit[row] += 1
+                    fitted[view * boxes + b] += 1
+    (fits, fit), (fitting, fitted) = ragged_array(fit), ragged_array(fitted)
+    for view in range(views):
+        for i in range(candidates):
+            for b in range(evidence.boxes[view]):
+                if evidence.match[view, i, b] > threshold:
+                    gain = parameters.box_log_ratio + evidence.match[view, i, b]
+                    append(fits, fit, view * candidates + i, b, gain)
+                    append(fitting, fitted, view * boxes + b, i, gain)
+    most = len(fits.item) + 1
+    pairs = BoxPairs(
+        np.empty(most), np.empty(most, np.int64), np.empty(most, np.int64),
+        np.zeros(candidates, np.bool_), np.zeros(boxes, np.bool_),
+    )  # fmt: skip
+    return BoxState(
+        views, boxes, fits, fitting, _hidden_by(evidence.hiders, views, candidates), evidence.hiders,
+        evidence.inside.copy().reshape(-1), missing_cost, np.zeros(views * candidates, np.bool_),
+        np.empty(views * candidates), np.empty(views * candidates), np.empty(candidates + 1, np.int64),
+        np.zeros(candidates, np.bool_), pairs,
+    )  # fmt: skip
+
+
+@kernel
+def _hidden_by(hiders: RaggedArray, views: int, candidates: int) -> RaggedArray:
+    """Candidates hidden by each, rising, from the rows of those who hide each."""
+    number = np.zeros(views * candidates, np.int64)
+    for view in range(views):
+        for k in range(hiders.start[view * candidates], hiders.start[(view + 1) * candidates]):
+            number[view * candidates + hiders.item[k]] += 1
+    hidden, place = ragged_array(number)
+    for view in range(views):
+        for i in range(candidates):
+            for k in range(hiders.start[view * candidates + i], hiders.start[view * candidates + i + 1]):
+                append(hidden, place, view * candidates + hiders.item[k], i, hiders.value[k])
+    return hidden
+
+
+@part
+def box_gain(i: int, inside: Flags, state: BoxState, parameters: ScoreParameters, use_cache: bool) -> float:
+    """Change of the box score of all views when candidate i joins the set, inside (candidate,), without i: nats."""
+    total, candidates = 0.0, len(state.is_linked)
+    for view in range(state.views):
+        row = view * candidates + i
+        if use_cache and state.is_cached[row]:
+            before, after = state.before[row], state.after[row]
+        else:
+            before, after = _linked_scores(view, i, inside, state, parameters)
+            if use_cache:
+                state.before[row], state.after[row], state.is_cached[row] = before, after, True
+        total -= before
+        total += after
+    return total
+
+
+@part
+def clear_cache(state: BoxState) -> None:
+    """Clear all cached scores."""
+    for row in range(len(state.is_cached)):
+        state.is_cached[row] = False
+
+
+@part
+def clear_dependents(i: int, inside: Flags, state: BoxState) -> None:
+    """Clear the cached scores that depend on whether candidate i is in the set, inside (candidate,), without i.
+
+    Those are the scores of all who fit the boxes, or hide a part, of i and of the members that i is linked to, and of
+    those whom i hides.
+    """
+    candidates, fits, fitting, hiders = len(state.is_linked), state.fits, state.fitting, state.hiders
+    for view in range(state.views):
+        first = view * candidates
+        for k in range(state.hidden.start[first + i], state.hidden.start[first + i + 1]):
+            state.is_cached[first + state.hidden.item[k]] = False
+        for a in range(_link(view, i, inside, state)):
+            row = first + state.linked[a]
+            for k in range(hiders.start[row], hiders.start[row + 1]):
+                state.is_cached[first + hiders.item[k]] = False
+            for k in range(fits.start[row], fits.start[row + 1]):
+                box = view * state.boxes + fits.item[k]
+                for m in range(fitting.start[box], fitting.start[box + 1]):
+                    state.is_cached[first + fitting.item[m]] = False
+
+
+@part
+def _linked_scores(
+    view: int, i: int, inside: Flags, state: BoxState, parameters: ScoreParameters
+) -> tuple[float, float]:
+    """A view's score of the members linked to candidate i, without and with i, nats."""
+    number = _link(view, i, inside, state)
+    if number == 1:
+        return 0.0, _score_alone(view * len(state.is_linked) + i, inside, state, parameters)
+    before = _score_of_linked(view, 1, number, inside, state, parameters)
+    inside[i] = True
+    after = _score_of_linked(view, 0, number, inside, state, parameters)
+    inside[i] = False
+    return before, after
+
+
+@part
+def _score_alone(row: int, inside: Flags, state: BoxState, parameters: ScoreParameters) -> float:
+    """A view's score of a candidate that no box and no occlusion links to a member, nats."""
+    missing, best = _missing_cost(row, inside, state, parameters), 0.0
+    for k in range(state.fits.start[row], state.fits.start[row + 1]):
+        best = max(best, state.fits.value[k] - missing)
+    return float(missing + best)
+
+
+@part
+def _link(view: int, i: int, inside: Flags, state: BoxState) -> int:
+    """Fill `state.linked` with i and the members whose part of the score may depend on i; returns their number."""
+    linked, is_linked, candidates = state.linked, state.is_linked, len(state.is_linked)
+    fits, fitting, hidden = state.fits, state.fitting, state.hidden
+    linked[0], number, row = i, 1, view * candidates + i
+    for k in range(hidden.start[row], hidden.start[row + 1]):
+        j = hidden.item[k]
+        if inside[j]:
+            linked[number], is_linked[j] = j, True
+            number += 1
+    done = 0
+    while done < number:
+        row = view * candidates + linked[done]
+        done += 1
+        for k in range(fits.start[row], fits.start[row + 1]):
+            box = view * state.boxes + fits.item[k]
+            for m in range(fitting.start[box], fitting.start[box + 1]):
+                j = fitting.item[m]
+                if inside[j] and not is_linked[j]:
+                    linked[number], is_linked[j] = j, True
+                    number += 1
+    for k in range(number):
+        is_linked[linked[k]] = False
+    return number
+
+
+@part
+def _score_of_linked(
+    view: int, first: int, number: int, inside: Flags, state: BoxState, parameters: ScoreParameters
+) -> float:
+    """A view's score of the linked from `first` on, nats: boxes go to them in falling order of their gain."""
+    total, count, candidates = 0.0, 0, len(state.is_linked)
+    fits, pairs = state.fits, state.pairs
+    for a in range(first, number):
+        row = view * candidates + state.linked[a]
+        missing = _missing_cost(row, inside, state, parameters)
+        total += missing
+        for k in range(fits.start[row], fits.start[row + 1]):
+            if fits.value[k] > missing:
+                pairs.gain[count], pairs.member[count] = fits.value[k] - missing, state.linked[a]
+                pairs.box[count] = fits.item[k]
+                count += 1
+    return total + _assigned_gain(count, pairs)
+
+
+@part
+def _missing_cost(row: int, inside: Flags, state: BoxState, parameters: ScoreParameters) -> float:
+    """Cost of a missing box of a candidate that members may hide in part, nats."""
+    visible, is_hidden = state.visible[row], False
+    for k in range(state.hiders.start[row], state.hiders.start[row + 1]):
+        if inside[state.hiders.item[k]]:
+            visible *= state.hiders.value[k]
+            is_hidden = True
+    return missing_box_cost(visible, parameters) if is_hidden else float(state.missing_cost[row])
+
+
+@part
+def _assigned_gain(count: int, pairs: BoxPairs) -> float:
+    """Gain of the first pairs, assigned one to one in falling order of their gains, nats."""
+    total = 0.0
+    while True:
+        best, gain = -1, 0.0
+        for k in range(count):
+            if pairs.gain[k] > gain and not pairs.has_box[pairs.member[k]] and not pairs.has_member[pairs.box[k]]:
+                best, gain = k, pairs.gain[k]
+        if best < 0:
+            break
+        pairs.has_box[pairs.member[best]] = pairs.has_member[pairs.box[best]] = True
+        total += gain
+    for k in range(count):
+        pairs.has_box[pairs.member[k]] = pairs.has_member[pairs.box[k]] = False
+    return total

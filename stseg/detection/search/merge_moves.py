@@ -1,0 +1,79 @@
+"""Merge moves: members that stand close together against one body, sized by the pixels of all of them.
+
+A body that is wider or taller than its candidate leaves a strip of foreground over, and the strip finds a second body.
+Adding, removing or replacing one person does not lead back: the two hold each other's pixels, and the size of either is
+measured without them. So close members are also tried as one, measured with all that they explain together.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stseg.arrays import Flags, Ints
+from stseg.bodies.views import PixelView
+from stseg.detection.search.local_search import SCORE_TOLERANCE
+from stseg.detection.search.map_estimate import MapEstimate
+from stseg.detection.search.refined_people import refined_members
+from stseg.records.candidates import Candidates
+
+_MERGE_DISTANCE = 0.6
+"""Members at less than this distance may be one body, metres: half the widest body and half a common one."""
+
+
+def merged(estimate: MapEstimate) -> MapEstimate:
+    """The estimate with close members as one wherever that explains the frame better."""
+    is_close = _close_pairs(estimate)
+    if not is_close.any() or not any(isinstance(view, PixelView) for view in estimate.evidence.views):
+        return estimate
+    separate = _separate_members(estimate, is_close)
+    absorbing = np.flatnonzero(is_close[separate].any(1))
+    in_place = refined_members(estimate.with_members(estimate.members[separate]), absorbing).pool
+    centred = refined_members(_centred(estimate, is_close, separate), absorbing).pool
+    first = len(estimate.pool)
+    best = estimate.with_more(in_place.joined_with(centred))
+    for k, a in enumerate(separate[absorbing]):
+        bodies = (first + k, first + len(absorbing) + k)
+        others = np.flatnonzero(is_close[a])
+        for absorbed in [others, *(others[[i]] for i in range(len(others) if len(others) > 1 else 0))]:
+            replaced = estimate.members[np.append(absorbed, a)]
+            rest = best.members[~np.isin(best.members, replaced)]
+            trial = max((best.with_members(np.append(rest, body)) for body in bodies), key=_total)
+            if len(trial.members) < len(best.members) and _total(trial) > _total(best) + SCORE_TOLERANCE:
+                best = trial
+                break
+    return best
+
+
+def _total(estimate: MapEstimate) -> float:
+    """Score of the members, nats."""
+    return estimate.members_score.total
+
+
+def _centred(estimate: MapEstimate, is_close: Flags, separate: Ints) -> MapEstimate:
+    """The separate members alone, each at the mean place of all that it may absorb: three members stand on its edge.
+
+    The mean is weighted by the evidence of the views for each.
+    """
+    evidence = estimate.members_score.view_evidence.sum(0).clip(1.0)
+    weight = np.where(is_close | np.eye(len(is_close), dtype=bool), evidence, 0.0)
+    ground = (weight @ estimate.pool.ground[estimate.members] / weight.sum(1, keepdims=True))[separate]
+    pool, first = estimate.pool, len(estimate.pool)
+    members = estimate.members[separate]
+    moved = Candidates(ground, pool.height[members], pool.width[members])
+    return estimate.with_more(moved).with_members(np.arange(first, first + len(separate)))
+
+
+def _close_pairs(estimate: MapEstimate) -> Flags:
+    """Pairs of members that may be one body, bool (n, n)."""
+    ground = estimate.pool.ground[estimate.members]
+    distance = np.hypot(*(ground[:, None] - ground[None]).transpose(2, 0, 1))
+    return np.asarray((distance < _MERGE_DISTANCE) & ~np.eye(len(ground), dtype=bool))
+
+
+def _separate_members(estimate: MapEstimate, is_close: Flags) -> Ints:
+    """Members none of which is close to another, by falling evidence of the views: int64 (k,), indices of members."""
+    separate: list[int] = []
+    for a in np.argsort(-estimate.members_score.view_evidence.sum(0), kind="stable"):
+        if not is_close[a][separate].any():
+            separate.append(int(a))
+    return np.array(separate, np.int64)

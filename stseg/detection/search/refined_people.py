@@ -1,0 +1,84 @@
+"""Members of an estimate at the means of their posteriors, by the boxes and pixels that are assigned to each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stseg.arrays import Floats, Ints
+from stseg.bodies.views import BoxView
+from stseg.detection.search.body_sizes import body_sizes
+from stseg.detection.search.map_estimate import MapEstimate
+from stseg.detection.search.refine import EvidenceAssignment, refine, refine_places
+from stseg.records.candidates import Candidates
+from stseg.records.sizes import Sizes
+
+
+@dataclass(frozen=True)
+class RefinedPeople:
+    """People at the means of their posteriors.
+
+    Attributes
+    ----------
+    pool
+        Places, heights by this frame alone (a track's height would confirm itself), and widths.
+    covariance : float64 (n, 2, 2)
+        Covariance of each place, square metres.
+    sizes
+        Size posteriors of this frame alone, under the population prior.
+    track_sizes
+        Size posteriors of all frames so far.
+    """
+
+    pool: Candidates
+    covariance: Floats
+    sizes: Sizes
+    track_sizes: Sizes
+
+
+def moved_members(estimate: MapEstimate) -> Candidates:
+    """The members at the means of their places, each at the size that it has."""
+    evidence, pool = estimate.evidence, estimate.pool.at(estimate.members)
+    assignment, track_index = _assignment(estimate), estimate.track_index
+    places = refine_places(pool, evidence.views, evidence.observations, assignment, evidence.prior, track_index)
+    return Candidates(places.ground, pool.height, pool.width)
+
+
+def refined_members(estimate: MapEstimate, chosen: Ints | None = None) -> RefinedPeople:
+    """Some of the members, int64 (k,) counted from 0, by default all, at the means of their posteriors."""
+    chosen = np.arange(len(estimate.members)) if chosen is None else chosen
+    start, assignment = estimate.pool.at(estimate.members[chosen]), _assignment(estimate).of(chosen)
+    return _refined(estimate, start, assignment, estimate.track_index[chosen])
+
+
+def followed_members(estimate: MapEstimate, start: Candidates) -> RefinedPeople:
+    """The members at the means of their places, which are sought about those of `start`, one for each member.
+
+    Their sizes are those of their tracks where all views show pixels: a size errs alike in frames that follow each
+    other, so few of them need to measure it. Boxes show heights and places together.
+    """
+    evidence, assignment, track_index = estimate.evidence, _assignment(estimate), estimate.track_index
+    if any(isinstance(view, BoxView) for view in evidence.views):
+        return _refined(estimate, start, assignment, track_index)
+    places = refine_places(start, evidence.views, evidence.observations, assignment, evidence.prior, track_index)
+    unmeasured = Sizes.of_population(len(start), evidence.prior.body)
+    sizes = evidence.prior.track_sizes(unmeasured, track_index)
+    return RefinedPeople(Candidates(places.ground, sizes.height, sizes.width), places.covariance, unmeasured, sizes)
+
+
+def _assignment(estimate: MapEstimate) -> EvidenceAssignment:
+    return EvidenceAssignment.of_all(estimate.member_boxes, estimate.pixel_assignment)
+
+
+def _refined(
+    estimate: MapEstimate, start: Candidates, assignment: EvidenceAssignment, track_index: Ints
+) -> RefinedPeople:
+    """People at the means of their posteriors, sought about where they start, by the evidence assigned to each."""
+    evidence = estimate.evidence
+    views, observations, prior = evidence.views, evidence.observations, evidence.prior
+    places = refine(start, views, observations, assignment, prior, track_index, evidence.patch_scores)
+    sizes = body_sizes(places, start.width, views, observations, assignment, prior.body)
+    track_sizes = prior.track_sizes(sizes, track_index)
+    pool = Candidates(places.ground, sizes.height, track_sizes.width)
+    return RefinedPeople(pool, places.covariance, sizes, track_sizes)

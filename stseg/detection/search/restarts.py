@@ -1,0 +1,61 @@
+"""Restarts: the search again without weak members, with the lattice of all that the others leave unexplained.
+
+A ghost that continues a track may hold boxes of a person next to it. Without those boxes the lattice does not show that
+person, and no exchange of one member for nearby candidates leads back: the ghost lives on, from frame to frame, by its
+track. So the weak members are removed together, and the frame is searched from the others.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stseg.arrays import Floats
+from stseg.detection.evidence.birth_lattice import lattice_candidates
+from stseg.detection.search.map_estimate import MapEstimate
+from stseg.detection.search.refined_people import refined_members
+
+_REMOVAL_MARGIN = 12.0
+"""Members whose removal lowers the score by less are removed before a restart, nats."""
+_MINIMUM_GAIN = 1.0
+"""Least rise of the score for which another set is taken, nats: less is a matter of the members' exact places."""
+_RESTART_LIMIT = 3
+"""Restarts of one frame at most."""
+
+
+def restarted(estimate: MapEstimate, lattice_ground: Floats) -> MapEstimate:
+    """The estimate, or a better one that was found from its strong members alone.
+
+    Parameters
+    ----------
+    estimate
+        The result of a search.
+    lattice_ground : float64 (y, x, 2)
+        The lattice, metres.
+    """
+    for _ in range(_RESTART_LIMIT):
+        trial = better_of(estimate, _from_strong_members(estimate, lattice_ground))
+        if trial is estimate:
+            break
+        estimate = trial
+    return estimate
+
+
+def better_of(estimate: MapEstimate, trial: MapEstimate) -> MapEstimate:
+    """A trial, if it explains the frame better than the estimate."""
+    return trial if trial.members_score.total > estimate.members_score.total + _MINIMUM_GAIN else estimate
+
+
+def has_weak_members(estimate: MapEstimate) -> bool:
+    """Whether an estimate has members that a restart would remove."""
+    return bool((estimate.losses < _REMOVAL_MARGIN).any())
+
+
+def _from_strong_members(estimate: MapEstimate, lattice_ground: Floats) -> MapEstimate:
+    """A search that begins with the strong members; twice, the second time with places refined."""
+    strong = estimate.members[estimate.losses >= _REMOVAL_MARGIN]
+    if len(strong) == len(estimate.members):
+        return estimate
+    more = lattice_candidates(estimate.with_members(strong), lattice_ground).new_to(estimate.pool)
+    result = estimate.searched_with(more, strong)
+    refined, number = refined_members(result).pool, len(result.pool)
+    return result.searched_with(refined, np.arange(number, number + len(refined)))
