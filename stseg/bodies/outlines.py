@@ -13,6 +13,8 @@ from stseg.kernels.accelerate import kernel, part
 
 # Innermost loops have unsigned places: whether one is negative, and counts from the end, is not asked there.
 
+WHOLE_SHARE = 0.9
+"""Share of an outline's area that lies in the image where the image's border does not cut the body."""
 Spans = NDArray[np.int16]
 """int16 (..., row, 2): first and last column (exclusive) of an outline in each raster row."""
 

@@ -2,7 +2,7 @@
 
 E step: the offsets of each person's own boxes, over the posterior of the person's place and height. M step: the
 standard deviations that make them most likely, `weight` seconds of one person's box at the first guess among them, and
-what was seen since forgotten at exp(-t / memory), as for the rates of `stseg.occupancy.error_rate_estimate`. The lower
+what was counted since forgotten (`stseg.records.forgetting`). The lower
 edge has two, of one density that is steeper below the feet than above: with S_1, S_2 the sums of squares on either
 side of n boxes,
 
@@ -24,6 +24,7 @@ from stseg.bodies.box_fit import LOWER_EDGE_ABOVE, LOWER_EDGE_BELOW, TOLERANCE, 
 from stseg.bodies.box_noise import PRIOR_NOISE, SCORE_KNOTS, BoxNoise, knots_of
 from stseg.bodies.views import BoxView, View, ViewObservation
 from stseg.config import ErrorRateConfig
+from stseg.records.forgetting import Forgetting
 from stseg.records.people import Explanation, People
 
 _POINTS = np.sqrt(3.0) * np.concatenate([np.eye(3), -np.eye(3)])
@@ -40,18 +41,18 @@ class BoxNoiseEstimate:
 
     Attributes
     ----------
-    squares : float64 (knot, 5), seen : float64 (knot,)
-        Squared offsets, of the lower edge on either side of the feet, and boxes; both times seconds.
+    offsets : (knot, 6)
+        Boxes, and their squared offsets, of the lower edge on either side of the feet; both times seconds.
     """
 
     def __init__(self, frame_rate: float, config: ErrorRateConfig) -> None:
-        self.frame_rate, self.config = frame_rate, config
-        self.squares, self.seen = np.zeros_like(PRIOR_NOISE.spread), np.zeros(len(SCORE_KNOTS))
+        self._config = config
+        self.offsets = Forgetting((len(SCORE_KNOTS), 6), frame_rate, config.memory)
 
     @property
     def noise(self) -> BoxNoise:
         """The noise by all frames so far."""
-        return self._estimated() if self.seen.any() else self._first
+        return self._estimated() if self.offsets.sums[:, 0].any() else self._first
 
     @cached_property
     def _first(self) -> BoxNoise:
@@ -59,41 +60,36 @@ class BoxNoiseEstimate:
         return self._estimated()
 
     def _estimated(self) -> BoxNoise:
-        weight, first = self.config.prior_weight, PRIOR_NOISE.spread**2
+        first = PRIOR_NOISE.spread**2
         both = PRIOR_NOISE.spread[:, LOWER_EDGE_BELOW] + PRIOR_NOISE.spread[:, LOWER_EDGE_ABOVE]
         first[:, LOWER_EDGE_BELOW:] *= PRIOR_NOISE.spread[:, LOWER_EDGE_BELOW:] / both[:, None]
-        squares, count = weight * first + self.squares, (weight + self.seen)[:, None]
+        prior = np.column_stack([np.ones(len(first)), first])
+        count, squares = np.split(self.offsets.with_prior(self._config.prior_weight, prior), [1], axis=1)
         spread = np.sqrt(squares / count)
         root = np.cbrt(squares[:, LOWER_EDGE_BELOW:])
         spread[:, LOWER_EDGE_BELOW:] = root * np.sqrt(root.sum(1, keepdims=True) / count)
         spread[:, WIDTH_OFFSET] = PRIOR_NOISE.spread[:, WIDTH_OFFSET]
         return BoxNoise(np.minimum(spread, PRIOR_NOISE.spread))
 
-    def forget_a_frame(self) -> None:
-        """Let earlier frames count less, by the time of one frame."""
-        kept = np.exp(-1.0 / (self.frame_rate * self.config.memory))
-        self.squares *= kept
-        self.seen *= kept
-
     def learn(
         self, explanation: Explanation, views: Sequence[View], observations: Sequence[ViewObservation | None]
     ) -> None:
         """Count one frame."""
-        self.forget_a_frame()
+        self.offsets.forget()
         people = explanation.people
         for k, (view, observation, owner) in enumerate(
             zip(views, observations, explanation.box_assignment, strict=True)
         ):
             if isinstance(view, BoxView) and observation is not None and len(people):
-                trusted = people.evidence - people.view_evidence[k] >= self.config.minimum_evidence
+                trusted = people.evidence - people.view_evidence[k] >= self._config.minimum_evidence
                 box = np.flatnonzero((owner >= 0) & trusted[owner] & _whole(observation.edges, view.camera.size))
                 self._count(observation.score[box], _squares(view, people, owner[box], observation.edges[box]))
 
     def _count(self, score: Floats, squares: Floats) -> None:
         lower, share = knots_of(score)
+        boxes = np.column_stack([np.ones(len(squares)), squares])
         for knot, part in ((lower, 1 - share), (lower + 1, share)):
-            np.add.at(self.squares, knot, squares * part[:, None] / self.frame_rate)
-            np.add.at(self.seen, knot, part / self.frame_rate)
+            np.add.at(self.offsets.sums, knot, self.offsets.seconds(boxes * part[:, None]))
 
 
 def _whole(edges: Floats, size: tuple[int, int]) -> Flags:

@@ -1,4 +1,4 @@
-"""What a session has learned for detection from the frames it explained."""
+"""Noise, sizes and failures that a session has learned for detection from the frames it explained."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from stseg.view_health.view_failures import ViewFailures
 
 @dataclass(frozen=True)
 class Estimates:
-    """Calibrations of one session; each frame that is explained updates them.
+    """Estimates of one session; each frame that is explained updates them.
 
     Attributes
     ----------

@@ -1,9 +1,9 @@
-"""Rims of silhouettes: background beside foreground, which says less where a segmentation eats the edges of people.
+"""Rims of silhouettes: background beside foreground, weaker evidence where a segmentation eats the edges of people.
 
 A segmentation that errs along outlines errs alike in all frames of a view: silhouettes come out narrower than bodies,
-and legs and arms vanish. Then a pixel of background next to foreground is no evidence that nobody is there. A share of
-what such pixels say is withdrawn, and learned view by view from people who stand alone: with A pixels of their bodies,
-B of them missing and R of them background on the rim, the share
+and legs and arms vanish. Then a pixel of background next to foreground is no evidence of an empty place. A share of
+the evidence of such pixels is withdrawn, and learned view by view from people who stand alone: with A pixels of their
+bodies, B of them missing and R of them background on the rim, the share
 
     w = (B - m A) / R,    within 0 and 1,
 
@@ -12,9 +12,9 @@ background within the outline of a pillar, too: a limb stands beside it. So of e
 are missing as it has more of background within than of foreground beside, up to half its width on either side.
 
 Bodies are as wide as the configured population: sizes that are measured in eaten silhouettes hide what is missing. A
-short time of one person at the rate m counts beside what is seen, since one look at a person shows what a segmentation
-leaves of them; and a longer one at the mean of all views, whose pictures are mostly segmented alike. What was seen is
-forgotten at exp(-t / memory), as for the noise of boxes. Only rigs of pixels learn.
+short time of one person at the rate m counts beside the measured ones, since one frame of a person shows most of a
+segmentation's errors; and a longer one at the mean of all views, which are mostly segmented alike. Measurements are
+forgotten (`stseg.records.forgetting`). Only rigs of pixels learn.
 """
 
 from __future__ import annotations
@@ -25,19 +25,16 @@ from dataclasses import replace
 import numpy as np
 
 from stseg.arrays import Floats, Ints, Singles
-from stseg.bodies.outlines import Spans
+from stseg.bodies.outlines import WHOLE_SHARE, Spans
 from stseg.bodies.views import PixelView, View, ViewObservation
 from stseg.config import BodyConfig, DetectionConfig, ErrorRateConfig
 from stseg.kernels.accelerate import kernel, part
+from stseg.records.forgetting import Forgetting
 from stseg.records.people import People
 
-_WHOLE = 0.9
-"""Share of an outline's area that its pixels in the image make up, where the image's border does not cut it."""
-
-
-_PRIOR = 0.25
+_PRIOR_WEIGHT = 0.25
 """Weight of the first guess, that nothing is withdrawn: seconds of one person in any view."""
-_ALIKE = 2.0
+_MEAN_WEIGHT = 2.0
 """Weight of the mean of all views in each of them: seconds of one person."""
 
 
@@ -54,61 +51,59 @@ class RimEstimate:
         Usual share of a body that is background, 0..1.
     frame_rate
         Frames per second.
-    level
-        How fast is forgotten, and from which evidence on people count.
+    learning
+        Memory, and least evidence of people who count.
 
     Attributes
     ----------
-    shares : float64 (view, 3)
+    shares : (view, 3)
         Weight, and weighted sums of the shares of bodies that are missing, and background on the rim; seconds.
     """
 
     def __init__(
-        self, views: int, body: BodyConfig, config: DetectionConfig, frame_rate: float, level: ErrorRateConfig
+        self, views: int, body: BodyConfig, config: DetectionConfig, frame_rate: float, learning: ErrorRateConfig
     ) -> None:
-        self._body, self._miss, self._rate, self._level = body, config.pixel_miss_rate, frame_rate, level
-        self.shares = np.zeros((views, 3))
-        self._unmeasured = 0
+        self._body, self._miss, self._evidence = body, config.pixel_miss_rate, learning.minimum_evidence
+        self.shares = Forgetting((views, 3), frame_rate, learning.memory)
 
     @property
     def withdrawn(self) -> Floats:
-        """Share of what rim pixels say that is withdrawn, 0..1, float64 (view,)."""
-        weight, missing, rim = (self.shares + _ALIKE * self._mean()).T
+        """Share of the evidence of rim pixels that is withdrawn, 0..1, float64 (view,)."""
+        weight, missing, rim = self.shares.with_prior(_MEAN_WEIGHT, self._mean()).T
         return np.asarray(((missing - self._miss * weight) / rim).clip(0.0, 1.0))
 
     def _mean(self) -> Floats:
         """Shares of all views and the first guess for one second of one person, float64 (3,)."""
-        total = self.shares.sum(0) + _PRIOR * np.array([1.0, self._miss, self._miss])
+        total = self.shares.sums.sum(0) + _PRIOR_WEIGHT * np.array([1.0, self._miss, self._miss])
         return np.asarray(total / total[0])
 
-    def applied(self, shown: Sequence[ViewObservation | None]) -> list[ViewObservation | None]:
-        """What the views show, less what is withdrawn."""
+    def applied(self, observations: Sequence[ViewObservation | None]) -> list[ViewObservation | None]:
+        """The observations of all views without the withdrawn share of their rims."""
         return [
             None if view is None else without_rim(view, share)
-            for view, share in zip(shown, self.withdrawn.tolist(), strict=True)
+            for view, share in zip(observations, self.withdrawn.tolist(), strict=True)
         ]
 
     def skip_frame(self) -> None:
-        """Count a frame that is not measured: the next one counts for its time, too."""
-        self._unmeasured += 1
+        """Defer the weight of a frame that is not measured to the next one."""
+        self.shares.skip_frame()
 
     def learn(self, people: People, views: Sequence[View], observations: Sequence[ViewObservation | None]) -> None:
         """Count one frame."""
-        frames, self._unmeasured = 1 + self._unmeasured, 0
-        self.shares *= np.exp(-frames / (self._rate * self._level.memory))
+        self.shares.forget()
         for k, (view, observation) in enumerate(zip(views, observations, strict=True)):
             if isinstance(view, PixelView) and observation is not None and len(people):
-                trusted = people.evidence - people.view_evidence[k] >= self._level.minimum_evidence
+                trusted = people.evidence - people.view_evidence[k] >= self._evidence
                 widths = self._body.width_of(people.height)
                 first, spans, whole = view.whole_outlines(people.ground, people.height, widths)
                 counts = np.zeros((len(people), 3))
                 _fill_counts(first, spans, observation.raster, counts)
-                counted = trusted & (counts[:, 0] > _WHOLE * whole)
-                self.shares[k] += (counts[counted] / counts[counted, :1]).sum(0) * frames / self._rate
+                counted = trusted & (counts[:, 0] > WHOLE_SHARE * whole)
+                self.shares.add(self.shares.seconds((counts[counted] / counts[counted, :1]).sum(0)), k)
 
 
 def without_rim(observation: ViewObservation, withdrawn: float) -> ViewObservation:
-    """An observation of pixels in which background beside foreground says less by a share, 0..1."""
+    """An observation of pixels in which background beside foreground is weaker evidence by a share, 0..1."""
     if withdrawn <= 0.0:
         return observation
     raster = np.empty_like(observation.raster)

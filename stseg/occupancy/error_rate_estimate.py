@@ -11,11 +11,11 @@ A likelihood L is a probability itself, so a cell counts with the probability th
 is, (1 - m) L / ((1 - m) L + m (1 - L)) in a pillar and b L / (b L + (1 - b)(1 - L)) outside; for maps of 0 and 1 that
 is L. This is the E step of the maximum-likelihood estimate of the rates.
 
-A rate is the mean of a beta posterior: `prior_weight` seconds of the first guess, and the counts since, which decay
-with exp(-t / memory). A view's own evidence is left out of its counts, or it would confirm itself: persons count where
-the rest of the evidence supports them, and a cell near no person counts as empty with the probability that the other
-views give it, so that a missed person is no clutter. This is one round of Dawid and Skene's estimate of
-observers' error rates (Applied Statistics 28, 1979) per frame, each observer's own vote left out.
+A rate is the mean of a beta posterior: `prior_weight` seconds of the first guess, and the counts since, which are
+forgotten (`stseg.records.forgetting`). A view's own evidence is left out of its counts, or it would confirm itself:
+persons count where the rest of the evidence supports them, and a cell near no person counts as empty with the
+probability that the other views give it, so that a missed person is no clutter. This is one round of Dawid and Skene's
+estimate of observers' error rates (Applied Statistics 28, 1979) per frame, each observer's own vote left out.
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ from stseg.geometry import Grid
 from stseg.geometry.summed_area import TOP_LEVEL
 from stseg.kernels.accelerate import kernel, part
 from stseg.occupancy.fusion import ErrorRates, FrameTerms, Sums
+from stseg.records.forgetting import Forgetting
 
 MISS, CLUTTER, NEAR_CLUTTER = 0, 1, 2
 _FIRST_FILLED = 0.5
@@ -53,45 +54,46 @@ class ErrorRateEstimate:
 
     Attributes
     ----------
-    errors, seen : float64 (view, 3)
-        Decayed errors and trials of each rate in `ErrorRates`, in seconds: of one person's cells for m and b', of all
-        the view's cells for b.
-    filled : float64 (2,)
-        Seconds of one person's cells that the pillar fills, and of all cells within reach of the person.
+    counts : (2, view, 3)
+        Trials and errors of each rate in `ErrorRates`, in seconds: of one person's cells for m and b', of all the
+        view's cells for b.
+    filled : (2,)
+        Seconds of one person's cells: all within reach of the person, and those that the pillar fills.
     interval : int
         Frames from one counted frame to the next.
     """
 
     def __init__(self, first: Sequence[ErrorRates], frame_rate: float, config: ErrorRateConfig) -> None:
         self.first = np.array(first, float).reshape(-1, 3)
-        self.frame_rate, self.config = frame_rate, config
-        self.errors, self.seen, self.filled = np.zeros_like(self.first), np.zeros_like(self.first), np.zeros(2)
+        self.config = config
+        self.counts = Forgetting((2, *self.first.shape), frame_rate, config.memory)
+        self.filled = Forgetting((2,), frame_rate, config.memory)
         self.interval = max(1, round(_INTERVAL * frame_rate))
         self._frames = 0
 
     @property
     def rates(self) -> list[ErrorRates]:
         """Estimate for each view."""
-        weight = self.config.prior_weight
-        return [ErrorRates(*row) for row in ((weight * self.first + self.errors) / (weight + self.seen)).tolist()]
+        prior = np.stack([np.ones_like(self.first), self.first])
+        trials, errors = self.counts.with_prior(self.config.prior_weight, prior)
+        return [ErrorRates(*row) for row in (errors / trials).tolist()]
 
     @property
     def filled_share(self) -> float:
         """Share of the cells within reach of a person that bodies fill; one half at first."""
-        weight = self.config.prior_weight
-        return float((weight * _FIRST_FILLED + self.filled[0]) / (weight + self.filled[1]))
+        reached, filled = self.filled.with_prior(self.config.prior_weight, np.array([1.0, _FIRST_FILLED]))
+        return float(filled / reached)
 
     def next_is_due(self) -> bool:
         """Advance by one frame; whether its counts are to be learned, for all frames until the next such one."""
         self._frames += 1
         return (self._frames - 1) % self.interval == 0
 
-    def learn(self, errors: Floats, seen: Floats, filled: Floats, frames: int = 1) -> None:
+    def learn(self, counts: Floats, filled: Floats, frames: int = 1) -> None:
         """Add the counts of one frame, 0 for a blind view, as many times as the `frames` that it represents."""
-        decay = np.exp(-frames / (self.frame_rate * self.config.memory))
-        for total, count in ((self.errors, errors), (self.seen, seen), (self.filled, filled)):
-            total *= decay
-            total += frames * count / self.frame_rate
+        for total, count in ((self.counts, counts), (self.filled, filled)):
+            total.forget(frames=frames)
+            total.add(total.seconds(count))
 
 
 def cells_per_person(grid: Grid, height: float, reach: float) -> tuple[float, float]:
@@ -119,9 +121,9 @@ def fill_counts(
     observations: float,
     prior: float,
     errors: Floats,
-    seen: Floats,
+    trials: Floats,
 ) -> None:
-    """Fill errors and seen (view, 3) with each view's errors and trials of m, b and b' in a frame, in cells.
+    """Fill errors and trials (view, 3) with each view's errors and trials of m, b and b' in a frame, in cells.
 
     Parameters
     ----------
@@ -138,12 +140,12 @@ def fill_counts(
     prior
         Prior log-odds of a cell near no person, nats.
     """
-    errors[:], seen[:] = 0.0, 0.0
+    errors[:], trials[:] = 0.0, 0.0
     wrong, empty, all_wrong, all_empty = np.zeros((4, len(views.weight)))
     last = -1
     for c in range(len(views.near)):
         if views.near[c] >= 0:
-            _count_beside_person(views, c, inside[c], trusted, rates, errors, seen)
+            _count_beside_person(views, c, inside[c], trusted, rates, errors, trials)
             continue
         if last < 0 or number[c] != number[last] or not _are_seen_alike(views, c, last):
             last = c
@@ -156,7 +158,7 @@ def fill_counts(
         for i in range(len(wrong)):
             all_wrong[i] += wrong[i]
             all_empty[i] += empty[i]
-    errors[:, CLUTTER], seen[:, CLUTTER] = all_wrong, all_empty
+    errors[:, CLUTTER], trials[:, CLUTTER] = all_wrong, all_empty
 
 
 @part
@@ -171,7 +173,7 @@ def _are_seen_alike(views: FrameTerms, one: int, other: int) -> bool:
 
 @part
 def _count_beside_person(
-    views: FrameTerms, c: int, is_inside: bool, trusted: Flags, rates: Floats, errors: Floats, seen: Floats
+    views: FrameTerms, c: int, is_inside: bool, trusted: Flags, rates: Floats, errors: Floats, trials: Floats
 ) -> None:
     """Count a cell within reach of a person."""
     for i in range(len(views.weight)):
@@ -180,7 +182,7 @@ def _count_beside_person(
             likelihood = level / TOP_LEVEL
             rate, error_likelihood = (MISS, 1.0 - likelihood) if is_inside else (NEAR_CLUTTER, likelihood)
             errors[i, rate] += _error_posterior(rates[i, rate], error_likelihood) * share
-            seen[i, rate] += share
+            trials[i, rate] += share
 
 
 @part

@@ -222,19 +222,19 @@ class Occupancy:
         inside = np.zeros(len(cells.near), bool)
         inside[beside] = filled.reshape(-1)[cells.cell[beside]]
         body, reached = cells_per_person(grid, self.height_mean, self.config.person_radius)
-        errors, seen = np.empty((2, len(fused.terms.weight), 3))
+        trials, errors = counts = np.empty((2, len(fused.terms.weight), 3))
         trusted = (people.evidence - people.view_evidence >= config.minimum_evidence) & (
             people.visibility >= _UNOCCLUDED
         )
         fill_counts(
             fused.terms, fused.sums, inside, cells.number, trusted, np.array(estimate.rates),
-            self.config.effective_observations, self.prior, errors, seen,
+            self.config.effective_observations, self.prior, errors, trials,
         )  # fmt: skip
-        seen_cells = np.maximum(self._tables.sets.size @ self._tables.sets.seen, 1)
-        units = np.column_stack([np.full(len(errors), body), seen_cells, np.full(len(errors), reached - body)])
+        visible = np.maximum(self._tables.sets.size @ self._tables.sets.seen, 1)
+        units = np.column_stack([np.full(len(errors), body), visible, np.full(len(errors), reached - body)])
         supported = inside[beside][(people.evidence >= config.minimum_evidence)[cells.near[beside]]]
-        share = np.array([supported.sum(), len(supported)]) / reached
-        estimate.learn(errors / units, seen / units, share, estimate.interval)
+        filled_cells = np.array([len(supported), supported.sum()]) / reached
+        estimate.learn(counts / units, filled_cells, estimate.interval)
 
     def _assignment(self, i: int, explanation: Explanation) -> PixelAssignment:
         people, assigned = explanation.people, explanation.box_assignment[i]

@@ -55,7 +55,7 @@ def test_background_beside_foreground_says_less() -> None:
 
 def test_nothing_is_withdrawn_from_whole_silhouettes() -> None:
     rims, raster = learned(people(*APART), 0), np.full((3, 3), -1.0, np.float32)
-    assert rims.shares[:, 0].min() > 1.0
+    assert rims.shares.sums[:, 0].min() > 1.0
     np.testing.assert_array_equal(rims.withdrawn, 0.0)
     whole = shown(raster)
     assert without_rim(whole, 0.0) is whole
@@ -69,7 +69,7 @@ def test_eaten_silhouettes_lose_their_rim() -> None:
 
 def test_the_share_is_that_which_leaves_the_usual_misses() -> None:
     rims = learned(people(*APART), 2, frames=200)
-    weight, missing, rim = rims.shares.T
+    weight, missing, rim = rims.shares.sums.T
     left = (missing - rims.withdrawn * rim) / weight
     np.testing.assert_allclose(left[rims.withdrawn < 1], FEW_HEIGHTS.pixel_miss_rate, atol=0.01)
     assert (rims.withdrawn > 0).any()
@@ -83,13 +83,13 @@ def test_limbs_beside_an_outline_make_up_for_background_within() -> None:
         beside = np.roll(view, 2, axis=1)
         shifted.append(beside)
         eaten.append(np.minimum(view, beside))
-    assert (learned_from(eaten, alone).shares[:, 1] > 1.5 * learned_from(shifted, alone).shares[:, 1]).all()
+    assert (learned_from(eaten, alone).shares.sums[:, 1] > 1.5 * learned_from(shifted, alone).shares.sums[:, 1]).all()
 
 
 def test_a_view_that_has_seen_nobody_takes_the_mean_of_the_others() -> None:
     rims = learned(people(*APART), 3)
     every = rims.withdrawn
-    rims.shares[2] = 0.0
+    rims.shares.sums[2] = 0.0
     assert rims.withdrawn[2] == pytest.approx(np.delete(every, 2).mean(), abs=0.1)
     assert rims.withdrawn[2] > 0.5
 
@@ -98,7 +98,7 @@ def test_a_view_that_has_seen_nobody_takes_the_mean_of_the_others() -> None:
     ("standing", "evidence"), [([(0.0, 0.0, 1.7), (0.1, 0.1, 1.7)], 20.0), (list(APART), 1.0), ([], 20.0)]
 )
 def test_who_overlaps_or_is_doubted_teaches_nothing(standing: list[tuple[float, ...]], evidence: float) -> None:
-    np.testing.assert_array_equal(learned(people(*standing), 3, evidence=evidence).shares, 0.0)
+    np.testing.assert_array_equal(learned(people(*standing), 3, evidence=evidence).shares.sums, 0.0)
 
 
 def test_people_in_eaten_silhouettes_are_surer_once_rims_are_known() -> None:

@@ -8,7 +8,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-import reference_level as reference
+import reference_error_rates as reference
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scenes import BODY, FEW_HEIGHTS, boxes, corner_cameras, likelihoods, no_boxes, people, rig_of
@@ -100,9 +100,8 @@ def test_rates_are_found() -> None:
         chance = [np.where(inside, 1 - r.miss, np.where(near >= 0, r.near_clutter, r.clutter)) for r in true]
         shown = reference.Shown(tuple(random_levels(rng, shape, c) for c in chance), whole)
         counted = [teach(i, shown, near, inside, np.array([True]), level.rates, 1.0) for i in range(3)]
-        errors, seen = np.stack(counted, 1) / units
-        level.learn(errors, seen, np.array([0.25, 1.0]))
-    first = CONFIG.prior_weight / (CONFIG.prior_weight + level.seen)
+        level.learn(np.stack(counted, 1)[::-1] / units, np.array([1.0, 0.25]))
+    first = CONFIG.prior_weight / (CONFIG.prior_weight + level.counts.sums[0])
     expected = first * FIRST + (1 - first) * np.array(true)
     np.testing.assert_allclose(np.array(level.rates), expected, atol=0.02)
     assert abs(level.filled_share - 0.25) < 0.03
@@ -115,7 +114,7 @@ def test_soft_likelihoods_sharpen_the_rates() -> None:
     near, inside, rates = np.zeros((1, 1), np.int64), np.ones(shape, bool), []
     for _ in range(200):
         errors, seen = teach(0, shown, near, inside, np.array([True]), level.rates, 1.0)
-        level.learn(errors[None], seen[None], np.zeros(2))
+        level.learn(np.stack([seen, errors])[:, None], np.zeros(2))
         rates.append(level.rates[0].miss)
     assert (np.diff(rates) < 0).all()
     assert rates[-1] < 0.1
@@ -138,16 +137,16 @@ def test_the_first_guess_holds_at_first_and_comes_back() -> None:
     level = one_level(2)
     assert level.rates == [FIRST, FIRST]
     assert level.filled_share == 0.5
-    seen = np.array([[1.0, 1.0, 1.0], [0.0, 0.0, 0.0]])
-    level.learn(seen * 0.5, seen, np.zeros(2))
+    trials = np.array([[1.0, 1.0, 1.0], [0.0, 0.0, 0.0]])
+    level.learn(np.stack([trials, trials * 0.5]), np.zeros(2))
     assert level.rates[1] == FIRST  # blind
     # One frame is a tenth of a second against the guess's two.
     assert level.rates[0].miss == pytest.approx((2.0 * 0.2 + 0.1 * 0.5) / 2.1)
     for _ in range(100):
-        level.learn(seen * 0.5, seen, np.zeros(2))
+        level.learn(np.stack([trials, trials * 0.5]), np.zeros(2))
     learned = level.rates[0].miss
     for _ in range(3000):
-        level.learn(np.zeros((2, 3)), np.zeros((2, 3)), np.zeros(2))
+        level.learn(np.zeros((2, 2, 3)), np.zeros(2))
     assert learned > 0.4
     assert level.rates[0].miss == pytest.approx(0.2, abs=1e-3)
 
@@ -157,7 +156,7 @@ def test_memory_is_in_seconds() -> None:
     once = np.ones((1, 3))
     for level, frames in ((slow, 100), (fast, 400)):
         for _ in range(frames):
-            level.learn(0.3 * once, once, np.zeros(2))
+            level.learn(np.stack([once, 0.3 * once]), np.zeros(2))
     np.testing.assert_allclose(slow.rates, fast.rates, atol=2e-3)
 
 
@@ -221,8 +220,8 @@ def test_a_blind_view_learns_nothing() -> None:
     running = fusion.new_error_rates()
     seen, explanation = frame("pixels", 0)
     fusion.fuse_and_learn(running, [None, *seen[1:]], explanation)
-    assert not running.seen[0].any()
-    assert running.seen[1:].all()
+    assert not running.counts.sums[0][0].any()
+    assert running.counts.sums[0][1:].all()
     fusion.fuse_and_learn(running, [None] * 4, explanation)
     assert running.rates[0] == ErrorRates(*running.first[0])
 
@@ -234,8 +233,8 @@ def test_people_whom_one_view_alone_asserts_do_not_teach_it() -> None:
     parts = np.zeros_like(everybody.view_evidence)
     parts[0] = everybody.evidence
     fusion.fuse_and_learn(running, seen, replace(explanation, people=replace(everybody, view_evidence=parts)))
-    assert not running.seen[0, [MISS, NEAR_CLUTTER]].any()
-    assert running.seen[1:, [MISS, NEAR_CLUTTER]].all()
+    assert not running.counts.sums[0][0, [MISS, NEAR_CLUTTER]].any()
+    assert running.counts.sums[0][1:, [MISS, NEAR_CLUTTER]].all()
 
 
 def test_a_detector_is_not_blamed_for_the_hidden() -> None:
@@ -249,5 +248,5 @@ def test_a_detector_is_not_blamed_for_the_hidden() -> None:
         box_assignment=(np.zeros(0, np.int64), *explanation.box_assignment[1:]),
     )
     fusion.fuse_and_learn(running, [no_boxes(), *seen[1:]], unseen)
-    assert not running.seen[0, MISS].any()
-    assert running.seen[1:, MISS].all()
+    assert not running.counts.sums[0][0, MISS].any()
+    assert running.counts.sums[0][1:, MISS].all()
