@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from stseg.io.config_file import read_config
     from stseg.io.recording.frames import FrameSet
     from stseg.io.recording.recording import Recording, Source
-    from stseg.io.recording.rigs import read_rig, write_rig
+    from stseg.io.recording.rigs import read_recording, write_rig
     from stseg.io.runfile.runs import Run, read_run
     from stseg.io.track_csv import read_tracks_csv
     from stseg.tasks.calibration.automatic import calibrate_auto
@@ -68,7 +68,7 @@ __all__ = [
     "measure",
     "plan",
     "read_config",
-    "read_rig",
+    "read_recording",
     "read_run",
     "read_tracks_csv",
     "report",
@@ -89,7 +89,7 @@ _HOMES = {
     "stseg.io.config_file": ("read_config",),
     "stseg.io.recording.frames": ("FrameSet",),
     "stseg.io.recording.recording": ("Recording", "Source"),
-    "stseg.io.recording.rigs": ("read_rig", "write_rig"),
+    "stseg.io.recording.rigs": ("read_recording", "write_rig"),
     "stseg.io.runfile.runs": ("Run", "read_run"),
     "stseg.io.track_csv": ("read_tracks_csv",),
     "stseg.tasks.calibration.automatic": ("calibrate_auto",),

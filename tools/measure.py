@@ -28,7 +28,7 @@ from stseg.geometry import Camera, Rig
 from stseg.io.recording.appearance_axes import appearance_axes
 from stseg.io.recording.frames import open_frames
 from stseg.io.recording.recording import Recording
-from stseg.io.recording.rigs import read_rig
+from stseg.io.recording.rigs import read_recording
 from stseg.io.track_csv import read_tracks_csv
 
 DROPPED = 1 / 200
@@ -78,7 +78,7 @@ def _shifted(camera: Camera, angle: float) -> Camera:
 
 def scored_run(one: ResultSet, bench: Bench, config: Config, seed: int, tracker: str = "cut") -> Scores:
     """Scores of one perturbed run of a set whose inputs are made."""
-    recording = read_rig(bench.path(one.rig))
+    recording = read_recording(bench.path(one.rig))
     streams = np.random.SeedSequence(seed).spawn(1 + len(recording.sources))
     area = scored_area(one, recording.rig)
     recording = replace(recording, rig=perturbed_rig(recording.rig, np.random.default_rng(streams[0])))

@@ -217,5 +217,5 @@ class FollowedCameras:
 
 def _queue_length(recording: Recording, config: LiveConfig) -> int:
     """Number of frame sets that may wait with their observations."""
-    bytes_of_one = sum(3 * camera.size[0] * camera.size[1] for camera in recording.read_rig.cameras)
+    bytes_of_one = sum(3 * camera.size[0] * camera.size[1] for camera in recording.reduced_rig.cameras)
     return max(2, int(min(config.buffer_time * recording.rig.frame_rate, config.buffer_memory * _MEBI / bytes_of_one)))

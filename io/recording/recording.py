@@ -141,7 +141,7 @@ class Recording:
         return self.reduction or (1,) * len(self.sources)
 
     @property
-    def read_rig(self) -> Rig:
+    def reduced_rig(self) -> Rig:
         """The rig of the frames as they are read."""
         return self.rig.reduced(self.reduction) if self.reduction else self.rig
 

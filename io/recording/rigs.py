@@ -42,7 +42,7 @@ _CAMERA_KEYS = (
 _DETECTION_KEYS = ("first_frame", "frames", "classes", "score", "view", "select", "image_list", "columns", "appearance")
 
 
-def read_rig(path: str | Path) -> Recording:
+def read_recording(path: str | Path) -> Recording:
     """Read and check a rig file.
 
     Parameters
@@ -70,7 +70,7 @@ def read_rig(path: str | Path) -> Recording:
 
 
 def parse_rig(text: str, path: Path) -> Recording:
-    """`read_rig` of a text that belongs to the file `path`."""
+    """`read_recording` of a text that belongs to the file `path`."""
     try:
         top = Table(path, "", parse_toml(text))
     except ValueError as error:
@@ -93,7 +93,7 @@ def parse_rig(text: str, path: Path) -> Recording:
 
 
 def write_rig(path: str | Path, recording: Recording) -> None:
-    """Write a rig file; `read_rig` gives back the same recording, to the last bit.
+    """Write a rig file; `read_recording` gives back the same recording, to the last bit.
 
     Paths of streams are written relative to the file, unless they are absolute and lie elsewhere. An existing file is
     replaced, whole or not at all.
@@ -101,7 +101,7 @@ def write_rig(path: str | Path, recording: Recording) -> None:
     Raises
     ------
     RigError, CalibrationError
-        Where `read_rig` would refuse the file; nothing is written then.
+        Where `read_recording` would refuse the file; nothing is written then.
     OutputError
         Where the file cannot be written.
     """

@@ -12,7 +12,7 @@ from stseg.commands.report import report
 from stseg.commands.run import run
 from stseg.commands.simulate import simulate
 from stseg.errors import OutputError
-from stseg.io.recording.rigs import read_rig
+from stseg.io.recording.rigs import read_recording
 from stseg.io.runfile.runs import read_run
 from stseg.io.track_csv import read_tracks_csv
 from stseg.tasks.report import write_pictures
@@ -61,7 +61,7 @@ def _draw(run_file: Path, scene: Path, folder: Path) -> None:
     """Write the pictures of the middle frame; people are simulated, so camera images may be shown."""
     run, truth = read_run(run_file), read_tracks_csv(scene / "truth.csv")
     middle = int(run.frames[len(run.frames) // 2])
-    write_pictures(folder, read_rig(scene / "rig.toml"), run, truth, middle, camera_images=True)
+    write_pictures(folder, read_recording(scene / "rig.toml"), run, truth, middle, camera_images=True)
 
 
 def _what_to_open(folder: Path) -> str:

@@ -16,7 +16,7 @@ from stseg.io.outputs.output_files import make_folder, write_file
 from stseg.io.recording.frames import open_frames
 from stseg.io.recording.image_stream import is_detection_file
 from stseg.io.recording.recording import CameraSource, Recording
-from stseg.io.recording.rigs import read_rig
+from stseg.io.recording.rigs import read_recording
 from stseg.reporting.figures import backdrop
 from stseg.reporting.page.html import png_bytes
 from stseg.reporting.pictures.canvas import outline
@@ -37,7 +37,7 @@ def inspect_rig(path: Path, pictures: Path | None, overwrite: bool) -> None:
     InputError
         Where the rig file or a source cannot be read.
     """
-    recording = read_rig(path)
+    recording = read_recording(path)
     found = [_detections(own, camera) for own, camera in zip(recording.sources, recording.rig.cameras, strict=True)]
     console = Console(highlight=False, markup=False)
     table = Table(box=None, padding=(0, 2, 0, 0), title=str(path), title_justify="left")

@@ -13,7 +13,7 @@ from stseg.commands.terminal.progress import TerminalReporter
 from stseg.engine.offline.frame_range import FrameRange
 from stseg.io.config_file import read_config
 from stseg.io.recording.recording import Recording
-from stseg.io.recording.rigs import read_rig
+from stseg.io.recording.rigs import read_recording
 from stseg.io.runfile.layout import VolumeKind
 from stseg.tasks import forecast
 from stseg.tasks.forecast import Forecast
@@ -57,7 +57,7 @@ def plan(
     as_json
         Print numbers for a program: seconds and bytes.
     """
-    recording = read_rig(rig)
+    recording = read_recording(rig)
     estimate = forecast.plan(
         recording,
         frames=FrameRange.parsed(frames),

@@ -89,11 +89,11 @@ def run(
     from stseg.engine.track import track_recording
     from stseg.engine.workers.workforce import Workforce
     from stseg.io.config_file import read_config
-    from stseg.io.recording.rigs import read_rig
+    from stseg.io.recording.rigs import read_recording
     from stseg.tasks.warnings import rig_warnings
 
     chosen, workforce = FrameRange.parsed(frames), Workforce(workers, scheduler)
-    resolved, recording, reporter = read_config(config, set_), read_rig(rig), TerminalReporter()
+    resolved, recording, reporter = read_config(config, set_), read_recording(rig), TerminalReporter()
     receiver = None
     if publish is not None:
         from stseg.io.live.receivers import receiver_of  # most runs send nothing

@@ -12,7 +12,7 @@ from stseg.io.config_file import read_config
 from stseg.io.recording.image_stream import is_detection_file, is_image_source
 from stseg.io.recording.recording import CameraSource, Recording, Source
 from stseg.io.recording.rig_text import format_rig
-from stseg.io.recording.rigs import parse_rig, read_rig
+from stseg.io.recording.rigs import parse_rig, read_recording
 from stseg.io.runfile.runs import Run, read_run
 
 AnySource = Path | str | Source | CameraSource
@@ -41,7 +41,7 @@ def recording_of(rig: Path | str | Recording | Rig, sources: Mapping[str, AnySou
         return parse_rig(format_rig(recording, path), path)
     if sources is not None:
         raise ConfigError("sources", "", "a recording that has its own", "a stseg.Rig with them")
-    return rig if isinstance(rig, Recording) else read_rig(rig)
+    return rig if isinstance(rig, Recording) else read_recording(rig)
 
 
 def run_of(run: Path | str | Run) -> Run:

@@ -110,7 +110,7 @@ def corrected_tracks(run: Run, answers: Sequence[Answer]) -> CorrectedTracks:
     answered = answered_before(run) + answered_rows(old, answers, run.frame_rate)
     kept, constraints = answered.kept
     config = parse_config(run.provenance.config, f"{run.path}: configuration")
-    rig = run.recording.reduced(config.foreground.body_rows).read_rig
+    rig = run.recording.reduced(config.foreground.body_rows).reduced_rig
     tracks, identity = associated_tracks(
         rig, config, run.committed[kept], run.committed_events, run.appearance, run.recording.rig, constraints,
         run.known_people,

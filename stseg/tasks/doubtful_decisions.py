@@ -43,7 +43,7 @@ def _weighed(run: Run, doubts: Sequence[Doubt]) -> list[Doubt]:
     rows, before = rows_with_ids(run), answered_before(run)
     kept, constraints = before.kept
     config = parse_config(run.provenance.config, f"{run.path}: configuration")
-    rig = run.recording.reduced(config.foreground.body_rows).read_rig
+    rig = run.recording.reduced(config.foreground.body_rows).reduced_rig
     problem = identity_problem(rig, config, run.committed[kept], run.appearance, constraints)
     problem = problem.with_hypotheses(_HYPOTHESES)
 

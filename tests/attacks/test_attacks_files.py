@@ -14,7 +14,7 @@ from run_files import write_small_run
 
 from stseg.commands.main import main
 from stseg.errors import InputError
-from stseg.io.recording.rigs import parse_rig, read_rig
+from stseg.io.recording.rigs import parse_rig, read_recording
 from stseg.io.runfile.unfinished.work_folder import WorkFolder
 from stseg.io.untrusted.names import is_name
 
@@ -88,7 +88,7 @@ def test_notes_of_another_form_are_refused(tmp_path: Path, content: str) -> None
 
 
 def test_damaged_time_stamps_are_made_anew(tmp_path: Path) -> None:
-    recording = read_rig(write_rig(tmp_path))
+    recording = read_recording(write_rig(tmp_path))
     with WorkFolder(tmp_path / "q.h5", {}) as work:
         from stseg.io.recording.stream_index import index_streams
 
@@ -111,7 +111,7 @@ def test_damaged_time_stamps_are_made_anew(tmp_path: Path) -> None:
 def test_a_recording_that_changed_in_place_is_noticed(tmp_path: Path) -> None:
     from stseg.io.runfile.provenance import gather_provenance, run_request
 
-    recording, path = read_rig(write_rig(tmp_path)), tmp_path / "boxes.csv"
+    recording, path = read_recording(write_rig(tmp_path)), tmp_path / "boxes.csv"
     before, state = run_request(recording, gather_provenance(recording, "")), path.stat()
     path.write_text(path.read_text().replace("3,11", "3,12"))
     os.utime(path, ns=(state.st_atime_ns, state.st_mtime_ns))

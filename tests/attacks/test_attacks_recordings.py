@@ -14,7 +14,7 @@ from attacks import film, refusal, write_rig
 
 from stseg.errors import InputError, SourceError
 from stseg.io.recording.pictures import read_picture
-from stseg.io.recording.rigs import read_rig
+from stseg.io.recording.rigs import read_recording
 from stseg.io.recording.video.packets import PictureHeads
 from stseg.io.recording.video.video_size import read_video_size
 
@@ -32,7 +32,7 @@ def test_paths_that_are_no_utf8_work(tmp_path: Path) -> None:
     folder.mkdir()
     film(folder / "a.avi", tmp_path / "plain.avi")
     assert read_video_size(folder / "a.avi") == (64, 48)
-    assert read_rig(write_rig(folder)).rig.name == "yard"
+    assert read_recording(write_rig(folder)).rig.name == "yard"
 
 
 @pytest.mark.parametrize(

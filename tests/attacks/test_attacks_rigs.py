@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from attacks import RIG, refusal, write_rig
 
-from stseg.io.recording.rigs import read_rig
+from stseg.io.recording.rigs import read_recording
 from stseg.io.recording.source_files import source_parts
 
 
@@ -59,7 +59,7 @@ def test_three_thousand_cameras_are_refused(tmp_path: Path, capsys: pytest.Captu
 def test_a_polygon_of_a_thousand_corners_works(tmp_path: Path) -> None:
     turn = np.linspace(0, 2 * np.pi, 1000, endpoint=False)
     corners = np.stack([1.5 * np.cos(turn), 1.5 * np.sin(turn)], -1).tolist()
-    grid = read_rig(write_rig(tmp_path, "[grid]", f"polygon = {corners}\n[grid]")).rig.grid
+    grid = read_recording(write_rig(tmp_path, "[grid]", f"polygon = {corners}\n[grid]")).rig.grid
     near = np.hypot(*np.moveaxis(grid.ground, -1, 0)) < 1.5
     np.testing.assert_array_equal(grid.inside(), near)
 
@@ -81,7 +81,9 @@ def test_a_hundred_thousand_boxes_in_a_frame_are_refused(tmp_path: Path, capsys:
 
 
 def test_a_file_with_a_superscript_in_its_name_is_ordered(tmp_path: Path) -> None:
-    recording = read_rig(write_rig(tmp_path, 'kind = "boxes", path = "boxes.csv"', 'kind = "video", path = "a*.avi"'))
+    recording = read_recording(
+        write_rig(tmp_path, 'kind = "boxes", path = "boxes.csv"', 'kind = "video", path = "a*.avi"')
+    )
     for name in ("a1²2.avi", "a10²2.avi", "a9²2.avi"):
         (tmp_path / name).write_bytes(b"\0")
     parts = source_parts(recording.sources[0].source, "")

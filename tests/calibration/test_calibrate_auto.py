@@ -25,7 +25,7 @@ from stseg.calibration.bundle_adjustment import residuals
 from stseg.calibration.pinhole import SIZE, as_camera, height_of_head, looking, moved, on_plane, project
 from stseg.commands.calibrate.auto import calibrate_auto
 from stseg.errors import ConfigError, SourceError
-from stseg.io.recording.rigs import read_rig
+from stseg.io.recording.rigs import read_recording
 
 IMAGE = (480, 360)
 
@@ -295,7 +295,7 @@ def test_the_command_makes_a_rig_of_videos(tmp_path: Path, capsys: pytest.Captur
     output = tmp_path / "rig.toml"
     distance = "a,150,250,300,260,3"
     calibrate_auto(*videos, output=output, frame_rate=5.0, source_kind="masks", most_delay=0.0, distance=distance)
-    recording = read_rig(output)
+    recording = read_recording(output)
     assert [camera.name for camera in recording.rig.cameras] == ["a", "b"]
     ground = recording.rig.cameras[0].back_project(np.array([[150.0, 250.0], [300.0, 260.0]]))
     assert np.linalg.norm(ground[1] - ground[0]) == pytest.approx(3.0, abs=0.01)

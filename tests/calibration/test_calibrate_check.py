@@ -20,7 +20,7 @@ from stseg.foreground.view_foreground import ViewForeground
 from stseg.geometry import Rig
 from stseg.io.recording.frames import open_frames
 from stseg.io.recording.recording import CameraSource, Recording, Source
-from stseg.io.recording.rigs import read_rig, write_rig
+from stseg.io.recording.rigs import read_recording, write_rig
 from stseg.reporting.pictures.ground_grid import grid_picture
 
 DATA = Path(os.environ.get("STSEG_DATA", Path(__file__).parents[2] / "../shared/data"))
@@ -210,7 +210,7 @@ class TestRealRigs:
             ["import", "opencv", *names, "--size=644,486", "--area=-2.5,-4.5,2.5,1.5", "--frame-rate=5", *source],
             exit_on_error=False, print_error=False, result_action="return_value",
         )  # fmt: skip
-        recording = read_rig("real.toml")
+        recording = read_recording("real.toml")
         boxes = {}
         with open_frames(recording, 0, frames) as moments:
             for moment in moments:

@@ -16,7 +16,7 @@ from stseg.errors import CalibrationError, ConfigError, FormatError, InputError
 from stseg.geometry import Camera, Grid
 from stseg.geometry.fits import fit_homography, focal_of_square_pixels, middle_matrix, vertical_of_matrix
 from stseg.io.calibrations.point_files import read_points
-from stseg.io.recording.rigs import read_rig
+from stseg.io.recording.rigs import read_recording
 from stseg.tasks.calibration.points import fit_warnings
 
 SIZE = (640, 480)
@@ -189,7 +189,7 @@ class TestCommand:
     def test_points_make_a_rig(self, capsys: pytest.CaptureFixture[str]) -> None:
         table(Path("p.csv"))
         run("p.csv")
-        cameras = read_rig("room.toml").rig.cameras
+        cameras = read_recording("room.toml").rig.cameras
         assert [view.name for view in cameras] == ["a", "b", "c", "d"]
         assert max(off(view, camera(turn)) for view, turn in zip(cameras, (0.7, 2.3, 3.9, 5.4), strict=True)) < 0.05
         printed = capsys.readouterr().out
@@ -201,7 +201,7 @@ class TestCommand:
         with pytest.raises(CalibrationError, match=r"camera a: --unit m: found a camera 2600 m .*\(--unit mm\)"):
             run("p.csv")
         run("p.csv", "--unit=mm")
-        assert off(read_rig("room.toml").rig.cameras[0], camera(0.7)) < 0.05
+        assert off(read_recording("room.toml").rig.cameras[0], camera(0.7)) < 0.05
 
     def test_lenses_are_used(self) -> None:
         lens = camera(distortion=BARREL).lens
@@ -213,7 +213,7 @@ class TestCommand:
         rows = [f"cam,{u},{v},{x},{y}" for (u, v), (x, y) in zip(points.pixel, points.ground, strict=True)]
         Path("p.csv").write_text("\n".join(["camera,u,v,x,y", *rows]))
         run("p.csv", "--lens={name}.xml")
-        assert off(read_rig("room.toml").rig.cameras[0], camera(distortion=BARREL)) < 0.01
+        assert off(read_recording("room.toml").rig.cameras[0], camera(distortion=BARREL)) < 0.01
 
     @pytest.mark.parametrize(
         ("text", "kind", "complaint"),

@@ -22,7 +22,7 @@ from run_files import write_small_run
 from stseg.commands.main import main
 from stseg.detection.score.scoring import set_score
 from stseg.io.outputs.whole_files import create_part, replacing
-from stseg.io.recording.rigs import read_rig
+from stseg.io.recording.rigs import read_recording
 from stseg.io.runfile.provenance import gather_provenance, run_request
 from stseg.io.runfile.reading.run_reader import read_run
 from stseg.io.runfile.unfinished import locks
@@ -154,7 +154,7 @@ def test_files_of_another_user_are_left_alone(shared: Path) -> None:
 
 @pytest.mark.parametrize("seconds", [-1e11, 0.0, 4e9, 253402300800.0, 1e12])
 def test_any_time_of_change_is_told(tmp_path: Path, seconds: float) -> None:
-    recording = read_rig(write_rig(tmp_path))
+    recording = read_recording(write_rig(tmp_path))
     provenance = gather_provenance(recording, "")
     provenance.sources["modified"] = seconds
     assert all("bytes in all, written" in text for text in run_request(recording, provenance)["source"].values())

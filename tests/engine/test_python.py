@@ -59,7 +59,7 @@ def test_errors_are_those_of_the_command(rig_path: Path, arguments: Mapping[str,
 
 @COMPILED
 def test_boxes_in_memory_are_tracked_as_those_of_files(rig_path: Path) -> None:
-    recording = stseg.read_rig(rig_path)
+    recording = stseg.read_recording(rig_path)
     tracker, results = stseg.Tracker(recording.rig), []
     for frame_set in box_moments(recording.rig, walkers(20), 0, 20):
         boxes = [view for view in frame_set.views if isinstance(view, Boxes)]

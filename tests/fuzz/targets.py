@@ -33,7 +33,7 @@ from stseg.io.live.live_table import LiveTable
 from stseg.io.outputs.whole_files import replacing
 from stseg.io.recording.pictures import read_picture
 from stseg.io.recording.recording import Source
-from stseg.io.recording.rigs import parse_rig, read_rig
+from stseg.io.recording.rigs import parse_rig, read_recording
 from stseg.io.recording.video.video_stream import VideoStream
 from stseg.io.runfile.runs import read_run
 from stseg.io.runfile.unfinished.work_folder import WorkFolder
@@ -89,7 +89,7 @@ def _streams(path: Path) -> None:
     path.with_name("boxes.csv").write_bytes(BOXES)
     with WorkFolder(path.with_name("q.h5"), {}) as work:
         (work.path / "streams.npz").write_bytes(path.read_bytes())
-        work.streams(read_rig(rig))
+        work.streams(read_recording(rig))
 
 
 def _begun(path: Path) -> None:
@@ -163,7 +163,7 @@ def _calibration_page(path: Path) -> None:
 TARGETS = (
     *DETECTION_TARGETS,
     Target("rig.toml", plain(corpus.RIG), lambda path: parse_rig(path.read_text("utf-8", "replace"), path)),
-    Target("rig_file.toml", plain(corpus.RIG), read_rig),
+    Target("rig_file.toml", plain(corpus.RIG), read_recording),
     Target("config.toml", plain(corpus.CONFIG), read_config),
     Target("tracks.csv", plain(corpus.TRACKS), read_tracks_csv),
     Target("points.csv", plain(corpus.POINTS), read_points),

@@ -18,7 +18,7 @@ from stseg.geometry import Grid, Rig
 from stseg.geometry.reduction import greatest_reduction
 from stseg.io.recording.frames import open_frames, read_background
 from stseg.io.recording.recording import CameraSource, Recording, Source
-from stseg.io.recording.rigs import read_rig
+from stseg.io.recording.rigs import read_recording
 from stseg.io.runfile.runs import read_run
 from stseg.kernels.accelerate import python_form
 
@@ -63,7 +63,7 @@ def test_frames_are_means_of_squares_and_masks_stay(tmp_path: Path) -> None:
     )
     recording = Recording(tmp_path / "rig.toml", Rig("hall", 5.0, GRID, cameras), sources).reduced(6.0)
     assert recording.factors == (2, 1)
-    assert [camera.size for camera in recording.read_rig.cameras] == [(32, 24), (65, 48)]
+    assert [camera.size for camera in recording.reduced_rig.cameras] == [(32, 24), (65, 48)]
     expected = picture[:, :64].reshape(24, 2, 32, 2, 3).mean((1, 3))
     with open_frames(recording) as moments:
         colour, masks = next(moments).views
@@ -79,7 +79,7 @@ def test_boxes_of_a_run_are_in_the_pixels_of_the_images(tmp_path: Path) -> None:
     film = ["simulate", str(tmp_path / "film"), "--scene", "demo", "--seconds", "1.5", "--size", "320,240"]
     assert main(film) == 0
     rig, rows = tmp_path / "film" / "rig.toml", 25.0
-    factors = read_rig(rig).reduced(rows).factors
+    factors = read_recording(rig).reduced(rows).factors
     assert min(factors) > 1
     boxes = []
     for name, asked in (("whole.h5", 10000.0), ("reduced.h5", rows)):

@@ -25,7 +25,7 @@ from stseg.io.calibrations.projection import read_projection
 from stseg.io.calibrations.structured import read_kalibr_yaml, read_krt_json, read_nvidia_json, read_pose_toml
 from stseg.io.calibrations.tsai import read_tsai_xml
 from stseg.io.calibrations.world_frame import World, guess_unit, guess_up, median_height, require_height
-from stseg.io.recording.rigs import read_rig
+from stseg.io.recording.rigs import read_recording
 
 DATA = Path(os.environ.get("STSEG_DATA", Path(__file__).parents[2] / "../shared/data"))
 SIZE = (640, 480)
@@ -281,7 +281,7 @@ class TestPom:
             run("pom", *files, *scene)
         run("pom", *files, *scene, "--mirrored")
         assert "calibrated in units of 0.25 m (given), +z up (given), mirrored" in capsys.readouterr().out
-        camera = read_rig("r.toml").rig.cameras[0]
+        camera = read_recording("r.toml").rig.cameras[0]
         np.testing.assert_allclose(camera.centre, [4.0, 0.0, 2.2], atol=1e-6)
 
     def test_refuses_what_is_not_two_planes(self, tmp_path: Path) -> None:
@@ -345,7 +345,7 @@ class TestCommand:
         monkeypatch.chdir(tmp_path)
         pose_toml(tmp_path / "c.toml", "cam_")
         run("anipose", "c.toml", "-o=r.toml")
-        cameras: tuple[Camera, ...] = read_rig("r.toml").rig.cameras
+        cameras: tuple[Camera, ...] = read_recording("r.toml").rig.cameras
         assert [camera.name for camera in cameras] == ["view0", "view1", "view2"]
         np.testing.assert_allclose(cameras[1].project(GROUND, HEIGHTS)[0], expected(1, DISTORTION), rtol=0, atol=1e-6)
         assert "calibrated in cm (guessed: --unit), +z up (guessed: --up)" in capsys.readouterr().out

@@ -20,7 +20,7 @@ from stseg.io.calibrations.foreign_camera import ForeignCamera
 from stseg.io.calibrations.opencv_xml import read_opencv_xml
 from stseg.io.calibrations.projection import read_projection
 from stseg.io.calibrations.world_frame import Up, World
-from stseg.io.recording.rigs import read_rig
+from stseg.io.recording.rigs import read_recording
 
 DATA = Path(os.environ.get("STSEG_DATA", Path(__file__).parents[2] / "../shared/data"))
 SIZE = (640, 480)
@@ -290,7 +290,7 @@ class TestCommand:
     def test_one_line_makes_a_rig(self, calibrations: list[str], capsys: pytest.CaptureFixture[str]) -> None:
         masks = ("--source-pattern={name}/fg.avi", "--source-kind=masks", "--background={name}/empty.avi")
         calibrate("opencv", *calibrations, *SCENE, *masks, "-o=room.toml", "--planes=4", "--cell=0.25")
-        recording = read_rig("room.toml")
+        recording = read_recording("room.toml")
         rig, grid = recording.rig, recording.rig.grid
         assert (rig.name, rig.frame_rate, [camera.name for camera in rig.cameras]) == ("room", 5.0, ["left", "right"])
         assert (grid.x, grid.y, grid.cell, grid.planes, grid.top) == ((-1.0, 1.0), (0.5, 3.0), 0.25, 4, 1.8)
@@ -310,7 +310,7 @@ class TestCommand:
             print_error=False,
             result_action="return_value",
         )
-        assert read_rig("room.toml").rig.grid.x == (-1.0, 1.0)
+        assert read_recording("room.toml").rig.grid.x == (-1.0, 1.0)
 
     def test_pairs_names_sources_polygon(self, calibrations: list[str]) -> None:
         Path("in.xml").write_text(xml(camera_matrix=MATRIX, distortion_coefficients=np.zeros(5)))
@@ -319,7 +319,7 @@ class TestCommand:
         boxes = ("--sources=a.txt,b.txt", "--source-kind=boxes", *kept)
         scene = (*SCENE, "--polygon=-1,0.5,1,0.5,1,3", "--scene=hall", "--names=a,b")
         calibrate("opencv", "in.xml+ex.xml", calibrations[0], *scene, *boxes, "-o=room.toml")
-        recording = read_rig("room.toml")
+        recording = read_recording("room.toml")
         assert recording.rig.name == "hall"
         assert [camera.name for camera in recording.rig.cameras] == ["a", "b"]
         assert recording.rig.grid.polygon is not None and len(recording.rig.grid.polygon) == 3
@@ -332,7 +332,7 @@ class TestCommand:
         np.savetxt("p.txt", matrix_of(MATRIX, ROTATION, TRANSLATION), fmt="%.17g")
         calibrate("matrix", "p.txt", *SCENE, *SOURCE, "-o=matrix.toml")
         calibrate("opencv", calibrations[0], *SCENE, *SOURCE, "-o=opencv.toml")
-        by_matrix, by_opencv = (read_rig(f"{name}.toml").rig.cameras[0] for name in ("matrix", "opencv"))
+        by_matrix, by_opencv = (read_recording(f"{name}.toml").rig.cameras[0] for name in ("matrix", "opencv"))
         np.testing.assert_allclose(by_matrix.projection, by_opencv.projection, rtol=1e-12, atol=1e-9)
         assert by_matrix.name == "p"
 
@@ -343,7 +343,7 @@ class TestCommand:
             calibrate(*tokens)
         assert Path("room.toml").read_text() == "mine"
         calibrate(*tokens, "--overwrite")
-        assert len(read_rig("room.toml").rig.cameras) == 2
+        assert len(read_recording("room.toml").rig.cameras) == 2
 
     @pytest.mark.parametrize(
         ("token", "kind", "complaint"),

@@ -351,7 +351,7 @@ def test_images_at_equal_steps_are_consecutive_frames() -> None:
 
 
 def test_the_rig_names_a_wrong_key(tmp_path: Path) -> None:
-    from stseg.io.recording.rigs import read_rig
+    from stseg.io.recording.rigs import read_recording
 
     text = f"""format = 1
 [scene]
@@ -372,13 +372,13 @@ images = {{ kind = "video", path = "x.mp4" }}
 """  # noqa: F541
     path = tmp_path / "rig.toml"
     path.write_text(text.replace("SOURCE", 'classes = ["person"], score = 0.3, columns = { frame = "t" }'))
-    (own,) = read_rig(path).sources
+    (own,) = read_recording(path).sources
     assert own.source.classes == ("person",) and own.source.least_score == 0.3 and own.images is not None
-    assert read_rig(path).pictured().sources[0].source.kind == "video"
+    assert read_recording(path).pictured().sources[0].source.kind == "video"
     for wrong, message in (("score = 3", "a number of 0..1"), ('columns = { frme = "t" }', "did you mean frame")):
         path.write_text(text.replace("SOURCE", wrong))
         with pytest.raises(RigError, match=message):
-            read_rig(path)
+            read_recording(path)
 
 
 def test_inspect_says_what_a_rig_delivers_and_draws_it(

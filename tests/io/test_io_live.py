@@ -25,7 +25,7 @@ from stseg.io.live.live_stream import Capture
 from stseg.io.recording.frames import open_frames
 from stseg.io.recording.recording import CameraSource, Recording, Source, mask_passwords
 from stseg.io.recording.rig_text import format_rig
-from stseg.io.recording.rigs import parse_rig, read_rig
+from stseg.io.recording.rigs import parse_rig, read_recording
 from stseg.io.recording.stream_index import count_frames
 from stseg.io.recording.video.video_stream import VideoStream
 from stseg.io.runfile.provenance import gather_provenance
@@ -44,7 +44,7 @@ def arriving(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def followed(rig: Path, first: int, stop: int | None, notes: FileNotes, say: Callable[[str], None]) -> FollowedFiles:
-    return FollowedFiles(read_rig(rig), first, stop, QUICK, notes, Event(), say)
+    return FollowedFiles(read_recording(rig), first, stop, QUICK, notes, Event(), say)
 
 
 # Files
@@ -82,7 +82,7 @@ def _later(halt: Event, seconds: float) -> None:
 
 
 def test_files_that_arrive_show_what_they_show_afterwards(arriving: Path, tmp_path: Path) -> None:
-    recording = read_rig(arriving)
+    recording = read_recording(arriving)
     assert count_frames(recording) == FRAMES
     for first in (0, 13):
         notes = FileNotes(tmp_path / "files.json")
@@ -153,7 +153,7 @@ def test_who_is_waited_for_is_said(tmp_path: Path) -> None:
     halt = Event()
     meanwhile(partial(_later, halt, 1.6))
     with FollowedFiles(
-        read_rig(rig), 0, None, QUICK, FileNotes(tmp_path / "files.json"), halt, reported.append
+        read_recording(rig), 0, None, QUICK, FileNotes(tmp_path / "files.json"), halt, reported.append
     ) as frame_sets:
         assert list(frame_sets) == []
     assert reported == ["waiting for the next file of east, at frame 0"]
@@ -168,7 +168,7 @@ def test_who_is_waited_for_is_said(tmp_path: Path) -> None:
     ],
 )
 def test_what_cannot_be_followed_is_refused(arriving: Path, source: Source) -> None:
-    recording = read_rig(arriving)
+    recording = read_recording(arriving)
     assert not is_live(recording)
     assert is_live(live())
     with pytest.raises(SourceError, match="by a pattern"):

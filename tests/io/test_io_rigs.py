@@ -11,7 +11,7 @@ from strategies import recordings
 
 from stseg.errors import CalibrationError, InputError, OutputError, RigError
 from stseg.io.recording.recording import CameraSource, Recording, Source
-from stseg.io.recording.rigs import parse_rig, read_rig, write_rig
+from stseg.io.recording.rigs import parse_rig, read_recording, write_rig
 
 RIG = """\
 format = 1
@@ -90,18 +90,18 @@ class TestRead:
     def test_windows_line_ends_and_byte_order_mark(self, tmp_path: Path) -> None:
         file = tmp_path / "rig.toml"
         file.write_bytes(b"\xef\xbb\xbf" + RIG.replace("\n", "\r\n").encode())
-        assert read_rig(file).rig.name == "room"
+        assert read_recording(file).rig.name == "room"
 
     def test_missing_file(self, tmp_path: Path) -> None:
         with pytest.raises(RigError, match=r"nowhere.toml: found No such file or directory, expected a rig file"):
-            read_rig(tmp_path / "nowhere.toml")
+            read_recording(tmp_path / "nowhere.toml")
 
     @pytest.mark.parametrize("content", [b"\xff\xfe", b"format = ", b"a = " + b"[" * 5000, b"a = " + b"9" * 5000])
     def test_what_is_no_toml(self, tmp_path: Path, content: bytes) -> None:
         file = tmp_path / "rig.toml"
         file.write_bytes(content)
         with pytest.raises(RigError, match=r"rig.toml: found .* expected TOML"):
-            read_rig(file)
+            read_recording(file)
 
 
 class TestRefuse:
@@ -213,16 +213,16 @@ class TestWrite:
         path = tmp_path_factory.mktemp("rig") / "rig.toml"
         recording = data.draw(recordings(path))
         write_rig(path, recording)
-        assert plain(read_rig(path)) == plain(recording)
+        assert plain(read_recording(path)) == plain(recording)
         assert [file.name for file in path.parent.iterdir()] == ["rig.toml"]
 
     def test_what_is_read_is_written_the_same(self, tmp_path: Path) -> None:
         path = tmp_path / "rig.toml"
         path.write_text(RIG)
-        recording = read_rig(path)
+        recording = read_recording(path)
         write_rig(path, recording)
         first = path.read_text()
-        write_rig(path, read_rig(path))
+        write_rig(path, read_recording(path))
         assert path.read_text() == first
         assert 'path = "../boxes/cam2.txt"' in first
 
@@ -240,7 +240,7 @@ class TestWrite:
         grid = dataclasses.replace(recording.rig.grid, cell=np.float64(0.1), planes=int(np.int64(4)))
         rig = dataclasses.replace(recording.rig, grid=grid, frame_rate=5)
         write_rig(tmp_path / "rig.toml", Recording(FILE, rig, recording.sources))
-        assert read_rig(tmp_path / "rig.toml").rig.grid.cell == 0.1
+        assert read_recording(tmp_path / "rig.toml").rig.grid.cell == 0.1
 
     def test_what_could_not_be_read_is_not_written(self, tmp_path: Path) -> None:
         recording = parse_rig(RIG, FILE)

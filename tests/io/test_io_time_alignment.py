@@ -18,7 +18,7 @@ from stseg.errors import RigError, SourceError
 from stseg.geometry import Camera, Grid, Rig
 from stseg.io.recording.frames import open_frames, read_camera
 from stseg.io.recording.recording import CameraSource, Recording, Source
-from stseg.io.recording.rigs import read_rig, write_rig
+from stseg.io.recording.rigs import read_recording, write_rig
 from stseg.io.recording.stream_index import StreamIndex, index_streams
 from stseg.io.recording.time_alignment import TimeAlignment, align_in_time, coverage, nearest_frames, with_alignment
 from stseg.io.recording.video.time_stamps import concatenate_files, interpret_stamps
@@ -340,8 +340,8 @@ def test_the_rig_file_says_clock_and_starts(tmp_path: Path) -> None:
     path = tmp_path / "rig.toml"
     source = Source("video", tmp_path / "a.mkv", more=(tmp_path / "b.mkv",), starts=(0.0, 3600.5))
     write_rig(path, recording(CameraSource(source, clock="stamps")))
-    assert read_rig(path).sources[0].source.starts == (0.0, 3600.5)
-    assert read_rig(path).sources[0].clock == "stamps"
+    assert read_recording(path).sources[0].source.starts == (0.0, 3600.5)
+    assert read_recording(path).sources[0].clock == "stamps"
     path.write_text(path.read_text().replace('clock = "stamps"', 'clock = "sundial"'))
     with pytest.raises(RigError, match="clock"):
-        read_rig(path)
+        read_recording(path)

@@ -20,7 +20,7 @@ from stseg.errors import ConfigError, OutputError
 from stseg.geometry import Camera
 from stseg.io.outputs.simulated_scene import write_scene
 from stseg.io.recording.frames import open_frames, read_background
-from stseg.io.recording.rigs import read_rig
+from stseg.io.recording.rigs import read_recording
 from stseg.io.track_csv import read_tracks_csv
 from stseg.kernels.accelerate import python_form
 from stseg.simulation import NAMED, Film, Lamp, SceneSpec
@@ -425,7 +425,9 @@ def test_a_written_scene_reads_back(tmp_path: Path) -> None:
     write_scene(tmp_path / "a", film, instances=True, progress=lambda done, of: told.append((done, of)))
     assert told == [(k, 4) for k in range(1, 5)]
     moments = list(film.frame_sets())
-    recordings = {kind: read_rig(tmp_path / "a" / f"rig{kind}.toml") for kind in ("", "_masks", "_boxes", "_instances")}
+    recordings = {
+        kind: read_recording(tmp_path / "a" / f"rig{kind}.toml") for kind in ("", "_masks", "_boxes", "_instances")
+    }
     readers = [open_frames(recording) for recording in recordings.values()]
     for moment, *seen in zip(moments, *readers, strict=True):
         for k, view in enumerate(moment.views):
@@ -458,7 +460,7 @@ def test_a_full_folder_is_left_alone(tmp_path: Path) -> None:
 
 def test_command_changes_the_named_scene(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     simulate(tmp_path / "s", scene="tiny", cameras=1, seconds=0.2, size="40,32", noise=0.0, people=1)
-    recording = read_rig(tmp_path / "s" / "rig.toml")
+    recording = read_recording(tmp_path / "s" / "rig.toml")
     assert [camera.size for camera in recording.rig.cameras] == [(40, 32)]
     assert read_tracks_csv(tmp_path / "s" / "truth.csv")["frame"].max() == 1
     assert "2 frames of 1 cameras" in capsys.readouterr().out
@@ -496,6 +498,6 @@ def test_animals_are_as_long_as_they_say_in_the_direction_in_which_they_face() -
 def test_the_rig_says_what_animals_are(tmp_path: Path) -> None:
     simulate(tmp_path / "a", scene="animals", seconds=0.06, size="64,48")
     simulate(tmp_path / "b", scene="tiny", seconds=0.1)
-    body = read_rig(tmp_path / "a" / "rig_masks.toml").body
+    body = read_recording(tmp_path / "a" / "rig_masks.toml").body
     assert (body.height_mean, body.width_mean) == (0.6, 0.725)
-    assert read_rig(tmp_path / "b" / "rig.toml").body.height_mean is None
+    assert read_recording(tmp_path / "b" / "rig.toml").body.height_mean is None

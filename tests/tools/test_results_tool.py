@@ -12,7 +12,7 @@ import pytest
 from scenes import looking, rig_of
 
 from stseg.geometry import Camera
-from stseg.io.recording.rigs import read_rig
+from stseg.io.recording.rigs import read_recording
 
 ROOT = Path(__file__).parents[2]
 DATA = Path(os.environ.get("STSEG_DATA", ROOT / "../shared/data"))
@@ -99,7 +99,7 @@ def test_pom_rig_sees_bodies_where_the_recording_says(tools: Path, tmp_path: Pat
     del tools
     pom_rig = importlib.import_module("pom_rig")
     pom_rig.main(DATA / "pom", tmp_path / "pom.toml")
-    for index, camera in enumerate(read_rig(tmp_path / "pom.toml").rig.cameras):
+    for index, camera in enumerate(read_recording(tmp_path / "pom.toml").rig.cameras):
         ground, rectangle = pom_rig.read_rectangles(DATA / "pom" / "test.pom", index)
         whole = (rectangle[:, 0] > 0) & (rectangle[:, 2] < 159) & (rectangle[:, 3] < 119)
         pixel, ahead = camera.project(ground[whole], 0.0)

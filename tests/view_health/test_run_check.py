@@ -14,7 +14,7 @@ from stseg.arrays import Floats, ViewEvidence
 from stseg.detection.detector import Detector
 from stseg.detection.score.scoring import set_score
 from stseg.geometry import Camera, Rig
-from stseg.io.recording.rigs import read_rig, write_rig
+from stseg.io.recording.rigs import read_recording, write_rig
 from stseg.io.runfile.runs import read_run
 from stseg.kernels.accelerate import python_form
 from stseg.tasks.overview import summarise_run
@@ -99,7 +99,7 @@ def test_a_knock_is_found_with_its_window(side: int) -> None:
 @slow
 def test_a_run_says_which_view_disagrees(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = write_recording(tmp_path)
-    recording = read_rig(path)
+    recording = read_recording(path)
     assert track(path, tmp_path / "sound.h5") == 0
     assert "calibrate check" not in capsys.readouterr().err
     write_rig(tmp_path / "wrong.toml", replace(recording, rig=moved(recording.rig, 1, 9.0)))

@@ -23,7 +23,7 @@ from stseg.arrays import Observation, Rows
 from stseg.evaluation import evaluate
 from stseg.geometry import Rig
 from stseg.io.recording.frames import open_frames
-from stseg.io.recording.rigs import read_rig
+from stseg.io.recording.rigs import read_recording
 from stseg.io.track_csv import read_tracks_csv
 from stseg.simulation import NAMED, Film, Spoil
 from stseg.simulation.crowd.social_forces import TRUTH
@@ -89,7 +89,7 @@ def crowd(people: int, views: int, seconds: float, seed: int = NAMED["easy"].see
 
 def recorded(rig: Path, truth: Path, first: int, stop: int) -> Shown:
     """A recording of masks, in which connected pieces stand for people."""
-    recording, frames = read_rig(rig), []
+    recording, frames = read_recording(rig), []
     nobody = crowd(0, 1, 0.1).frames[0][0].boxes
     with open_frames(recording, first, stop) as sets:
         for frame_set in sets:

@@ -15,7 +15,7 @@ from stseg.arrays import Bytes, Observation, Rows
 from stseg.evaluation.sequence import Area
 from stseg.geometry import Rig
 from stseg.io.recording.frames import open_frames
-from stseg.io.recording.rigs import read_rig
+from stseg.io.recording.rigs import read_recording
 from stseg.io.track_csv import read_tracks_csv
 from stseg.simulation import NAMED, Film, SceneSpec, Spoil
 from stseg.simulation.rendering.render import RenderedView
@@ -129,7 +129,7 @@ def _uu4(rig: Path, truth: Path) -> Iterator[Trial]:
 
 def delivered(rig: Path, truth: Path, stop: int, area: Area | None = None) -> Recorded:
     """A recording's first frames."""
-    recording, rows = read_rig(rig), read_tracks_csv(truth)
+    recording, rows = read_recording(rig), read_tracks_csv(truth)
     with open_frames(recording, 0, stop) as sets:
         frames = [frame_set.views for frame_set in sets]
     return Recorded(recording.rig, rows[rows["frame"] < stop], frames, area)

@@ -86,7 +86,7 @@ class LiveRun:
         self._window = window_length(frame_rate, job.config.tracking)[0]
         warm_up = round(job.config.segments.warm_up * frame_rate)
         self._names = LiveIds(table.rows, corrections.rows, warm_up + 2 * self._window)
-        self._decided_again = LiveCorrections(frame_rate, Border.of(job.read.read_rig), job.config)
+        self._decided_again = LiveCorrections(frame_rate, Border.of(job.read.reduced_rig), job.config)
         self._blind_views = BlindViews([camera.name for camera in job.recording.rig.cameras])
         self.pipeline = job.pipeline()
         self._members: list[_Member] = []

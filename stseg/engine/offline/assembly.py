@@ -121,7 +121,7 @@ def _associated(job: Job, finished: Sequence[FinishedSegment]) -> _Association:
         appearance.append(run.appearance)
     joined = stitcher.joined()
     tracks, identity = finished_tracks(
-        job.read.read_rig, job.config, find_tracker(job.tracker), joined.committed, joined.events,
+        job.read.reduced_rig, job.config, find_tracker(job.tracker), joined.committed, joined.events,
         np.concatenate(appearance), job.recording.rig, job.known,
     )  # fmt: skip
     return _Association(joined, tracks, identity)

@@ -100,7 +100,7 @@ def is_colour(recording: Recording, camera: int) -> bool:
 
 def empty_background(recording: Recording, camera: int, config: Config) -> Background:
     """A background trained on the camera's empty scene; untrained if the camera has none."""
-    model = make_background(recording.read_rig.cameras[camera].size, recording.rig.frame_rate, config.foreground)
+    model = make_background(recording.reduced_rig.cameras[camera].size, recording.rig.frame_rate, config.foreground)
     if recording.sources[camera].background is not None:
         for empty in read_background(recording, camera):
             model.learn(np.asarray(empty, np.uint8))

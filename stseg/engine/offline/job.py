@@ -64,4 +64,4 @@ class Job:
         """The stages, with their tables."""
         sources = [source.source.kind for source in self.recording.sources]
         kinds = ["boxes" if kind in ("boxes", "instances") else "pixels" for kind in sources]
-        return Pipeline(self.read.read_rig, kinds, self.config, self.tracker, appearance_axes(self.recording))
+        return Pipeline(self.read.reduced_rig, kinds, self.config, self.tracker, appearance_axes(self.recording))
