@@ -6,7 +6,7 @@ import numpy as np
 
 from stseg.arrays import Ints, Labels, Singles
 from stseg.geometry import Grid
-from stseg.segmentation.blob_measures import Measures
+from stseg.segmentation.blob_measures import BlobMeasures
 
 _FAINT = 1e-6
 
@@ -23,8 +23,8 @@ def ground_labels(label: Labels, log_odds: Singles) -> Labels:
     return ground_label
 
 
-def measures(cells: Labels, track: Ints, label: Labels, log_odds: Singles, grid: Grid) -> Measures:
-    """Measures of blobs; see `stseg.segmentation.blob_measures`."""
+def measures(cells: Labels, track: Ints, label: Labels, log_odds: Singles, grid: Grid) -> BlobMeasures:
+    """BlobMeasures of blobs; see `stseg.segmentation.blob_measures`."""
     n, cell_ground = len(track), grid.ground
     occupied = label == np.append(0, track)[cells]
     occupied &= label != 0
@@ -43,4 +43,4 @@ def measures(cells: Labels, track: Ints, label: Labels, log_odds: Singles, grid:
         planes = occupied[:, inside].any(1)
         height[b] = grid.heights[np.flatnonzero(planes)[-1]]
         mass[b] = strength[:, inside].sum() / max(occupied[:, inside].sum(), 1)
-    return Measures(ground, covariance, count, height, mass)
+    return BlobMeasures(ground, covariance, count, height, mass)

@@ -22,9 +22,9 @@ from stseg.arrays import Floats, Ints
 from stseg.config import BodyConfig
 from stseg.records.sizes import Sizes, log_heavy_tailed
 
-_RESOLUTION = 0.1
+PLACE_RESOLUTION = 0.1
 """s: resolution of places in one frame, metres (standard deviation)."""
-_WORST_HEIGHT = -4.0
+LEAST_HEIGHT_RATIO = -4.0
 """Least log-ratio of a height, nats: people stoop and sit."""
 
 
@@ -57,7 +57,7 @@ class PredictedTracks:
     @cached_property
     def _concentration(self) -> Floats:
         """Log-ratio of the density at each track's place against that of a birth within the resolution, nats."""
-        return np.asarray(np.log(_RESOLUTION**2 / np.sqrt(np.linalg.det(self.covariance))))
+        return np.asarray(np.log(PLACE_RESOLUTION**2 / np.sqrt(np.linalg.det(self.covariance))))
 
     def track_log_ratio(self, ground: Floats, height: Floats, body: BodyConfig, birth_log_odds: float) -> Floats:
         """Log-ratio of candidates (n, 2), (n,) being tracks against being births, nats, float64 (n, track)."""
@@ -68,7 +68,7 @@ class PredictedTracks:
         tall = -0.5 * off**2 / variance + np.log(body.height_spread / np.sqrt(variance))
         anybody = log_heavy_tailed((height - body.height_mean) / body.height_spread)
         squares = _squares(ground[:, None] - self.ground, self._precision)
-        shape = np.maximum(tall - anybody[:, None], _WORST_HEIGHT)
+        shape = np.maximum(tall - anybody[:, None], LEAST_HEIGHT_RATIO)
         return np.asarray(self.existence - birth_log_odds + self._concentration - 0.5 * squares + shape)
 
     def place_log_density(self, track: Ints, ground: Floats) -> Floats:

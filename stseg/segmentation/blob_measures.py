@@ -14,7 +14,7 @@ _FAINT = np.float32(1e-6)
 _ZERO = np.float32(0)
 
 
-class Measures(NamedTuple):
+class BlobMeasures(NamedTuple):
     """Measures of the blobs (n,) of a frame, as of `stseg.records.blobs.Blobs`.
 
     Attributes
@@ -51,16 +51,16 @@ def fill_ground_labels(label: Labels, log_odds: Singles, ground_label: Labels) -
         for x in range(columns):
             most = _ZERO
             for z in range(planes):
-                own = label[z, y, x]
-                if own == 0 or own == ground_label[y, x]:
+                candidate = label[z, y, x]
+                if candidate == 0 or candidate == ground_label[y, x]:
                     continue
                 mass = _ZERO
                 for k in range(planes):
-                    if label[k, y, x] == own:
+                    if label[k, y, x] == candidate:
                         strength = _strength(log_odds[k, y, x])
                         mass += (strength if strength > _ZERO else _ZERO) + _FAINT
-                if mass > most or (mass == most and own < ground_label[y, x]):
-                    ground_label[y, x], most = own, mass
+                if mass > most or (mass == most and candidate < ground_label[y, x]):
+                    ground_label[y, x], most = candidate, mass
 
 
 @kernel
@@ -89,7 +89,7 @@ def fill_measures(
     log_odds: Singles,
     ground: Floats,
     heights: Floats,
-    found: Measures,
+    found: BlobMeasures,
 ) -> bool:
     """Fill the measures of blobs, 0 everywhere before; whether any two blobs are beside each other.
 

@@ -10,7 +10,7 @@ from scipy.ndimage import label as connected
 from stseg.arrays import Flags, Floats, Ints, Labels, Singles
 from stseg.geometry import Grid
 from stseg.records.blobs import UNASSIGNED, Blobs
-from stseg.segmentation.blob_measures import Measures, fill_ground_labels, fill_measures, fill_nearest
+from stseg.segmentation.blob_measures import BlobMeasures, fill_ground_labels, fill_measures, fill_nearest
 from stseg.segmentation.patches import Patches
 
 _EIGHT = np.ones((3, 3), int)
@@ -41,15 +41,15 @@ def find_blobs(
     ground_label = np.zeros(label.shape[1:], np.int32)
     fill_ground_labels(label, log_odds, ground_label)
     unassigned_component, number = _in_ground_order(ground_label == UNASSIGNED, patches.place)
-    known = np.unique(ground_label[ground_label > 0])
-    cells = np.where(ground_label > 0, 1 + np.searchsorted(known, ground_label), 0).astype(np.int32)
-    cells[unassigned_component > 0] = len(known) + unassigned_component[unassigned_component > 0]
-    track = np.concatenate([known, np.full(number, UNASSIGNED)]).astype(np.int64)
+    tracks = np.unique(ground_label[ground_label > 0])
+    cells = np.where(ground_label > 0, 1 + np.searchsorted(tracks, ground_label), 0).astype(np.int32)
+    cells[unassigned_component > 0] = len(tracks) + unassigned_component[unassigned_component > 0]
+    track = np.concatenate([tracks, np.full(number, UNASSIGNED)]).astype(np.int64)
     nearest = np.empty(len(people_ground))
     fill_nearest(ground_label, people_ground, people_track, patches.ground, nearest)
     person = np.full(len(track), -1, np.int64)
-    held = np.flatnonzero(nearest <= reach / 2)
-    person[known.searchsorted(people_track[held])] = held
+    holding = np.flatnonzero(nearest <= reach / 2)
+    person[tracks.searchsorted(people_track[holding])] = holding
     blobs = _measured(cells, track, person, label, log_odds, patches)
     alone = _in_volume(people_ground, log_odds, patches)
     alone[person[person >= 0]] = False
@@ -57,16 +57,16 @@ def find_blobs(
     return _joined(blobs, without, people_ground[without], people_track[without], patches.grid)
 
 
-def _in_ground_order(taken: Flags, place: Ints) -> tuple[Labels, int]:
+def _in_ground_order(occupied: Flags, place: Ints) -> tuple[Labels, int]:
     """Components of what is taken on a sheet (row, column), from 1 in the order of their first ground cells."""
-    if not taken.any():
-        return np.zeros(taken.shape, np.int32), 0
-    found, number = connected(taken, _EIGHT)
+    if not occupied.any():
+        return np.zeros(occupied.shape, np.int32), 0
+    found, number = connected(occupied, _EIGHT)
     component: Labels = np.asarray(found, np.int32)
     if number < 2:
         return component, number
     first = np.full(number, np.iinfo(np.int64).max)
-    np.minimum.at(first, component[taken] - 1, place[taken])
+    np.minimum.at(first, component[occupied] - 1, place[occupied])
     rank = np.zeros(number + 1, np.int32)
     rank[1 + np.argsort(first)] = np.arange(1, number + 1)
     return rank[component], number
@@ -80,8 +80,8 @@ def _in_volume(ground: Floats, log_odds: Singles, patches: Patches) -> Flags:
     column, row = cell.clip(0, (columns - 1, rows - 1)).T
     inside = (ground >= (grid.x[0], grid.y[0])).all(1) & (ground <= (grid.x[1], grid.y[1])).all(1)
     place = patches.on_sheet_at[row * columns + column]
-    seen = np.isfinite(log_odds.reshape(len(log_odds), -1)[:, place]).any(0)
-    return np.asarray(inside & (place >= 0) & seen)
+    visible = np.isfinite(log_odds.reshape(len(log_odds), -1)[:, place]).any(0)
+    return np.asarray(inside & (place >= 0) & visible)
 
 
 def _joined(blobs: Blobs, person: Ints, ground: Floats, track: Ints, grid: Grid) -> Blobs:
@@ -103,7 +103,7 @@ def _joined(blobs: Blobs, person: Ints, ground: Floats, track: Ints, grid: Grid)
 
 def _measured(cells: Labels, track: Ints, person: Ints, label: Labels, log_odds: Singles, patches: Patches) -> Blobs:
     n, grid = len(track), patches.grid
-    found = Measures(np.zeros((n, 2)), np.zeros((n, 2, 2)), np.zeros(n), np.zeros(n), np.zeros(n))
+    found = BlobMeasures(np.zeros((n, 2)), np.zeros((n, 2, 2)), np.zeros(n), np.zeros(n), np.zeros(n))
     meet = fill_measures(cells, track, label, log_odds, patches.ground, grid.heights, found)
     covariance = found.covariance + np.eye(2) * grid.cell**2 / 12
     extent = found.cells * grid.cell**2
@@ -115,9 +115,9 @@ def _measured(cells: Labels, track: Ints, person: Ints, label: Labels, log_odds:
 
 def _touches(cells: Labels, number: int) -> Ints:
     """Pairs of blobs, from 0, in one connected component of the ground, int64 (k, 2)."""
-    taken = cells > 0
-    component = connected(taken, _EIGHT)[0][taken]
-    members = np.unique(component.astype(np.int64) * (number + 1) + cells[taken])
+    occupied = cells > 0
+    component = connected(occupied, _EIGHT)[0][occupied]
+    members = np.unique(component.astype(np.int64) * (number + 1) + cells[occupied])
     component, blob = np.divmod(members, number + 1)
     first, second = np.nonzero(np.triu(component[:, None] == component, 1))
     return np.asarray(np.unique(np.column_stack([blob[first], blob[second]]) - 1, axis=0), np.int64)

@@ -1,4 +1,4 @@
-"""Links between candidates of a window: which of a later frame may be the same body, and what that gains.
+"""Links between candidates of a window that may be the same body in two frames, and their gains.
 
     b_ij = birth cost_j + death cost_i + log [ N(m_j - m_i; 0, S_ij) / (prior odds / s^2) ] + height ratio - absence
 
@@ -15,18 +15,14 @@ import numpy as np
 from stseg.arrays import Floats, Ints
 from stseg.config import BodyConfig, MotionConfig
 from stseg.kernels.accelerate import kernel
+from stseg.records.predicted_tracks import LEAST_HEIGHT_RATIO, PLACE_RESOLUTION
 from stseg.records.sizes import log_heavy_tailed
+from stseg.segmentation.label_energy import GATE
 
-_RESOLUTION = 0.1
-"""s: standard deviation of the place of a detection, to which the prior log-odds refer, metres."""
 _ABSENCE = 4.0
 """Cost of a frame without a candidate inside a path, nats per second."""
-_GATE = 13.8
-"""Squared Mahalanobis distance of a link that one step in a thousand exceeds."""
-_USUAL = 32
+_LINKS_PER_CANDIDATE = 32
 """Links of a candidate for which there is room at first."""
-_OUT_OF_SHAPE = -4.0
-"""Least log-ratio of two heights, nats: people stoop and sit."""
 Links = tuple[Ints, Ints, Floats]
 """Candidates before and after, and b, nats, (link,) each."""
 
@@ -62,7 +58,7 @@ class WindowCandidates:
 
 @dataclass(frozen=True)
 class LinkModel:
-    """What a link gains.
+    """Gains of links.
 
     Attributes
     ----------
@@ -88,18 +84,18 @@ class LinkModel:
         noise = 2 * self.motion.position_noise**2 + (self.motion.speed_spread * seconds) ** 2
         spread = found.covariance[start] + found.covariance[end] + noise[:, None, None] * np.eye(2)
         square = np.einsum("ei,eij,ej->e", off, np.linalg.inv(spread), off)
-        place = np.log(_RESOLUTION**2 / np.sqrt(np.linalg.det(spread))) - 0.5 * square
+        place = np.log(PLACE_RESOLUTION**2 / np.sqrt(np.linalg.det(spread))) - 0.5 * square
         absence = _ABSENCE * (seconds - 1 / self.frame_rate)
         bonus = place - self.prior_log_odds + self._height_ratio(found, start, end) - absence
         bonus = bonus + birth[end] + death[start]
-        kept = (bonus > 0) & (square < _GATE)
+        kept = (bonus > 0) & (square < GATE)
         return start[kept], end[kept], bonus[kept]
 
     def _near(self, found: WindowCandidates) -> tuple[Ints, Ints]:
         """Pairs within a patience and the gate: a window's pairs would take more memory than its volume."""
         span = max(1, round(self.patience * self.frame_rate))
         noise, speed = 2 * self.motion.position_noise**2, self.motion.speed_spread / self.frame_rate
-        number = _USUAL * len(found)
+        number = _LINKS_PER_CANDIDATE * len(found)
         while True:
             pair = np.empty((number, 2), np.int64)
             number = _fill_near(found.frame, found.ground, found.covariance, span, noise, speed, pair)
@@ -112,9 +108,9 @@ class LinkModel:
         """Log-ratio of a height as the continuation of another against the population, nats."""
         spread, error = self.body.height_spread, self.body.height_spread / 2
         off = found.height[end] - found.height[start]
-        anybody = log_heavy_tailed((found.height[end] - self.body.height_mean) / spread)
-        ratio = np.log(spread / error) - 0.5 * (off / error) ** 2 - anybody
-        return np.asarray(np.maximum(ratio, _OUT_OF_SHAPE))
+        population = log_heavy_tailed((found.height[end] - self.body.height_mean) / spread)
+        ratio = np.log(spread / error) - 0.5 * (off / error) ** 2 - population
+        return np.asarray(np.maximum(ratio, LEAST_HEIGHT_RATIO))
 
 
 @kernel
@@ -130,14 +126,14 @@ def _fill_near(
     span
         Most frames between two that are linked.
     noise
-        Variance of the distance between two places of somebody who stands, square metres.
+        Variance of the distance between two places of a standing person, square metres.
     speed
         Standard deviation of a step, metres a frame.
     """
     found = 0
     for i in range(len(frame)):
         x, y = ground[i]
-        own = covariance[i, 0, 0] + covariance[i, 1, 1] + 2.0 * noise
+        variance = covariance[i, 0, 0] + covariance[i, 1, 1] + 2.0 * noise
         for j in range(i + 1, len(frame)):
             frames = frame[j] - frame[i]
             if frames > span:
@@ -145,8 +141,8 @@ def _fill_near(
             if frames == 0:
                 continue
             # The square distance is at least that by the sum of both variances: most pairs need no inverse.
-            spread = own + covariance[j, 0, 0] + covariance[j, 1, 1] + 2.0 * (speed * frames) * (speed * frames)
-            if (ground[j, 0] - x) ** 2 + (ground[j, 1] - y) ** 2 < _GATE * spread:
+            spread = variance + covariance[j, 0, 0] + covariance[j, 1, 1] + 2.0 * (speed * frames) * (speed * frames)
+            if (ground[j, 0] - x) ** 2 + (ground[j, 1] - y) ** 2 < GATE * spread:
                 if found < len(pair):
                     pair[found, 0], pair[found, 1] = i, j
                 found += 1

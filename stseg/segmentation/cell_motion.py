@@ -51,8 +51,8 @@ def motion_field(
         return motion
     start = ground_now[now]
     moved = np.rint((ground_next[later] - start) / cell).astype(np.int64)
-    near = nearest_person(ground, start, reach)
-    motion[near >= 0] = moved[near[near >= 0]][:, ::-1]
+    nearest = nearest_person(ground, start, reach)
+    motion[nearest >= 0] = moved[nearest[nearest >= 0]][:, ::-1]
     return motion
 
 
@@ -81,15 +81,15 @@ def successor_cells(motion: Ints) -> Labels:
 def _fill_successors(motion: Ints, successor: Labels) -> None:
     """Fill successor (time, y, x), which holds -1; moving cells claim theirs before still ones."""
     frames, rows, columns = successor.shape
-    taken = np.empty((rows, columns), np.bool_)
+    claimed = np.empty((rows, columns), np.bool_)
     for t in range(frames):
-        taken[:] = False
+        claimed[:] = False
         for moving in (True, False):
             for y in range(rows):
                 for x in range(columns):
                     down, right = motion[t, y, x, 0], motion[t, y, x, 1]
                     to_y, to_x = y + down, x + right
                     inside = 0 <= to_y < rows and 0 <= to_x < columns
-                    if moving == (down != 0 or right != 0) and inside and not taken[to_y, to_x]:
-                        taken[to_y, to_x] = True
+                    if moving == (down != 0 or right != 0) and inside and not claimed[to_y, to_x]:
+                        claimed[to_y, to_x] = True
                         successor[t, y, x] = to_y * columns + to_x

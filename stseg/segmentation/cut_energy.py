@@ -19,7 +19,8 @@ from stseg.geometry import Grid
 from stseg.graphcut.grid_energy import QUANTUM, GridEnergy
 from stseg.kernels.accelerate import wide_kernel
 
-_MOST_NATS = 30.0
+_LOG_ODDS_LIMIT = 30.0
+"""Greatest magnitude of a unary term, nats."""
 
 
 def build_energy(
@@ -37,7 +38,7 @@ def build_energy(
         See `stseg.graphcut.grid_energy.GridEnergy`.
     """
     unary = np.empty(log_odds.shape, np.int32)
-    _fill_unary(log_odds.reshape(-1), np.float32(_MOST_NATS), np.float32(QUANTUM), unary.reshape(-1))
+    fill_cut_unary(log_odds.reshape(-1), np.float32(_LOG_ODDS_LIMIT), np.float32(QUANTUM), unary.reshape(-1))
     offsets = neighbourhood(config.neighbours)
     scale = (config.time_distance, grid.top / max(grid.planes - 1, 1), grid.cell, grid.cell)
     distance = np.sqrt(((offsets * scale) ** 2).sum(1))
@@ -46,13 +47,13 @@ def build_energy(
 
 
 @wide_kernel
-def _fill_unary(log_odds: Singles, most: np.float32, quantum: np.float32, unary: Labels) -> None:
-    """Fill unary (cell,) with log-odds held within `most` nats, in quanta; 0 where there are none."""
+def fill_cut_unary(log_odds: Singles, most: np.float32, quantum: np.float32, unary: Labels) -> None:
+    """Fill unary (cell,) with log-odds bounded by `most` nats, in quanta; 0 for nan."""
     for i in range(len(unary)):
-        held = log_odds[i]
-        held = held if held < most else most if held == held else np.float32(0)
-        held = held if held > -most else -most
-        unary[i] = np.int32(np.rint(held / quantum))
+        value = log_odds[i]
+        value = value if value < most else most if value == value else np.float32(0)
+        value = value if value > -most else -most
+        unary[i] = np.int32(np.rint(value / quantum))
 
 
 def neighbourhood(neighbours: int) -> Ints:

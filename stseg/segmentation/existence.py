@@ -34,9 +34,9 @@ from stseg.records.sizes import log_heavy_tailed
 from stseg.segmentation.candidate_links import LinkModel, Links, WindowCandidates
 from stseg.segmentation.paths import best_paths, path_marginals
 
-_EXCLUDED = 1e4
+_EXCLUSION_PENALTY = 1e4
 """K: repulsion of candidates that exclude each other, nats."""
-_ROUNDS = 4
+_ROUND_LIMIT = 4
 """Most times that paths are sought again."""
 Exclusions = tuple[Ints, Ints]
 """Candidates that exclude each other, (pair,) each."""
@@ -100,7 +100,7 @@ class ExistenceModel:
         gain, birth, death = self._gains(found)
         links, exclusions = self.links.between(found, birth, death), self._exclusions(found)
         best = _solve(gain, links, exclusions, np.zeros(n, bool), cut)
-        for _ in range(_ROUNDS):
+        for _ in range(_ROUND_LIMIT):
             excluded = _excluded(best.real, exclusions)
             if not excluded.any():
                 break
@@ -123,8 +123,8 @@ class ExistenceModel:
         ends = np.searchsorted(found.frame, np.arange(found.frame[-1] + 2))
         pairs = [first + _pairs(stop - first) for first, stop in pairwise(ends.tolist())]
         one, other = np.concatenate(pairs, axis=1)
-        near = np.hypot(*(found.ground[one] - found.ground[other]).T) < self.reach
-        kept = near & ~((found.track[one] > 0) & (found.track[other] > 0))
+        overlapping = np.hypot(*(found.ground[one] - found.ground[other]).T) < self.reach
+        kept = overlapping & ~((found.track[one] > 0) & (found.track[other] > 0))
         return one[kept].astype(np.int64), other[kept].astype(np.int64)
 
 
@@ -139,7 +139,7 @@ def _solve(gain: Floats, links: Links, exclusions: Exclusions, barred: Flags, cu
     start, end, bonus = links
     allowed = ~(barred[start] | barred[end])
     start, end, bonus = start[allowed], end[allowed], bonus[allowed]
-    successor = best_paths(np.where(barred, -_EXCLUDED, gain), start, end, bonus)
+    successor = best_paths(np.where(barred, -_EXCLUSION_PENALTY, gain), start, end, bonus)
     chosen = successor[start] == end
     start, end, bonus = start[chosen], end[chosen], bonus[chosen]
     one, other = exclusions
@@ -147,7 +147,7 @@ def _solve(gain: Floats, links: Links, exclusions: Exclusions, barred: Flags, cu
         _quanta(-gain),
         np.concatenate([start, one]),
         np.concatenate([end, other]),
-        np.concatenate([_quanta(-bonus), np.full(len(one), round(_EXCLUDED / QUANTUM), np.int64)]),
+        np.concatenate([_quanta(-bonus), np.full(len(one), round(_EXCLUSION_PENALTY / QUANTUM), np.int64)]),
     )
     least: QuadraticMinimum = minimise(energy, cut)
     real = least.labels

@@ -8,7 +8,7 @@ So all cells outside R have label 0 in the minimum with the smallest source set.
 greatest empty set has in R obeys the rule on R alone, so it is G: the cells that are left undecided are the same, with
 the same edges, and so is their minimum.
 
-Patches grow until their borders are in G. They hold everybody's cells too, so that edges in time stay within a patch:
+Patches grow until their borders are in G. They hold the cells of all people, so edges in time stay within a patch;
 elsewhere a cell's successor is the same cell.
 """
 
@@ -82,9 +82,9 @@ class Patches:
         wide = sum(columns.stop - columns.start + 1 for _, columns in rectangles)
         place, left = np.full((tall, max(wide - 1, 1)), -1, np.int64), 0
         for rectangle in rectangles:
-            own = flat[rectangle]
-            place[: own.shape[0], left : left + own.shape[1]] = own
-            left += own.shape[1] + 1
+            cells = flat[rectangle]
+            place[: cells.shape[0], left : left + cells.shape[1]] = cells
+            left += cells.shape[1] + 1
         return cls(grid, tuple(rectangles), place)
 
     @cached_property
@@ -150,9 +150,9 @@ class Patches:
         sheet = np.full(motion.shape[:3], -1, np.int32)
         for down, across in self.rectangles:
             tall, wide = down.stop - down.start, across.stop - across.start
-            own = successor_cells(np.ascontiguousarray(motion[:, :tall, left : left + wide]))
-            to_row, to_column = np.divmod(own, wide)
-            sheet[:, :tall, left : left + wide] = np.where(own >= 0, to_row * columns + to_column + left, -1)
+            cells = successor_cells(np.ascontiguousarray(motion[:, :tall, left : left + wide]))
+            to_row, to_column = np.divmod(cells, wide)
+            sheet[:, :tall, left : left + wide] = np.where(cells >= 0, to_row * columns + to_column + left, -1)
             left += wide + 1
         return sheet
 

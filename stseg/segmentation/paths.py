@@ -39,11 +39,11 @@ def best_paths(gain: Floats, start: Ints, end: Ints, bonus: Floats) -> Ints:
 
 def path_marginals(gain: Floats, start: Ints, end: Ints, bonus: Floats) -> Floats:
     """Marginal log-odds of each candidate on its path by messages both ways, nats; links in order of time."""
-    own, forward, backward = gain.tolist(), gain.tolist(), [0.0] * len(gain)  # lists: few links, one after the other
+    gains, forward, backward = gain.tolist(), gain.tolist(), [0.0] * len(gain)  # lists: few links, one after the other
     for i, j, b in zip(start.tolist(), end.tolist(), bonus.tolist(), strict=True):
         forward[j] += _message(forward[i], b)
     for i, j, b in zip(start[::-1].tolist(), end[::-1].tolist(), bonus[::-1].tolist(), strict=True):
-        backward[i] += _message(own[j] + backward[j], b)
+        backward[i] += _message(gains[j] + backward[j], b)
     return np.asarray(np.array(forward) + np.array(backward))
 
 

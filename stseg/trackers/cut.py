@@ -36,7 +36,7 @@ from stseg.tracking.windows.window_association import TrackAssociation, WindowAs
 from stseg.tracking.windows.windows import LONGEST, Window, windows
 
 _ENDLESS = 1 << 62
-"""Stop frame of a run whose end is not known yet."""
+"""Stop frame of a run without a known end."""
 
 
 class CutTracker:
@@ -62,7 +62,7 @@ class CutTracker:
         self.existence = WindowExistence(rig, config, self.solver)
         self.context = min(round(config.tracking.context * rig.frame_rate), LONGEST)
         self.pillar = BodyShape(config.occupancy.person_radius, spread, unassigned)
-        self.held: list[TrackedFrame] = []
+        self.open_frames: list[TrackedFrame] = []
         self.first = self.committed = first
         self.coming = windows(rig.frame_rate, config.tracking, first, _ENDLESS)
         self.window = next(self.coming)
@@ -74,7 +74,7 @@ class CutTracker:
     def add(self, fused: FusedFrame, observed: FrameObservations) -> list[Commit]:
         """Add a frame; commit the window before it if that is complete.
 
-        A window waits for the time after its last frame in which somebody hidden may appear again.
+        A window waits for the time after its last frame in which a hidden person may appear again.
         """
         del observed
         commits = []
@@ -82,49 +82,49 @@ class CutTracker:
             commits.append(self._solve(self.window))
             self.window = next(self.coming)
             needed = self.window.solve_first - self.context
-            self.held = [tracked for tracked in self.held if tracked.fused.frame >= needed]
+            self.open_frames = [tracked for tracked in self.open_frames if tracked.fused.frame >= needed]
         tracks = self.filter.update(fused.frame, fused.people, fused.ghosts)
-        self.held.append(TrackedFrame(fused, tracks))
+        self.open_frames.append(TrackedFrame(fused, tracks))
         return commits
 
     def finish(self) -> list[Commit]:
         """Solve the open windows; the run ends here."""
-        if not self.held:
+        if not self.open_frames:
             return []
-        stop = self.held[-1].fused.frame + 1
+        stop = self.open_frames[-1].fused.frame + 1
         remaining = windows(self.rig.frame_rate, self.config.tracking, self.first, stop)
         return [self._solve(window) for window in remaining if window.commit_stop > self.committed]
 
     def _solve(self, window: Window) -> Commit:
         first, stop = window.solve_first, window.solve_stop
-        around = [one for one in self.held if first - self.context <= one.fused.frame < stop + self.context]
-        held = self.existence.revised(around, first, stop)
-        patches, log_odds, energy = self._cut_out(held)
+        around = [one for one in self.open_frames if first - self.context <= one.fused.frame < stop + self.context]
+        frames = self.existence.revised(around, first, stop)
+        patches, log_odds, energy = self._cut_out(frames)
         cut = self.solver.grid(energy)
-        label = self._divide(window, held, patches, energy, cut.occupied).label
+        label = self._divide(window, frames, patches, energy, cut.occupied).label
         reach = self.config.occupancy.person_radius
         blobs = [
             find_blobs(cells, volume, one.fused.people.ground, one.tracks, reach, patches)
-            for cells, volume, one in zip(label, log_odds, held, strict=True)
+            for cells, volume, one in zip(label, log_odds, frames, strict=True)
         ]
         tracklets = form_tracklets(blobs, window.solve_first, self.config.tracking)
         decision = self.association.decide(window, blobs, tracklets)
         row = np.array([(*_ranges(window), energy.of(cut.occupied), QUANTUM, cut.nodes)], WINDOW)
         self.committed = window.commit_stop
-        return self._commit(window, held, patches, label, blobs, decision, row)
+        return self._commit(window, frames, patches, label, blobs, decision, row)
 
-    def _cut_out(self, held: list[TrackedFrame]) -> tuple[Patches, Singles, GridEnergy]:
+    def _cut_out(self, frames: list[TrackedFrame]) -> tuple[Patches, Singles, GridEnergy]:
         """Patches of the ground that are enough, and the window's log-odds (time, plane, row, column) and energy there.
 
         See `stseg.segmentation.patches`.
         """
-        grid, squares = self.rig.grid, self._squares(held)
+        grid, squares = self.rig.grid, self._squares(frames)
         if self.solver is not SOLVERS["stseg"]:  # others take whole grids
             squares[:] = True
         while True:
             patches = Patches.of(grid, squares)
-            log_odds = np.stack([patches.log_odds(tracked.fused.volume) for tracked in held])
-            energy = self._energy(held, patches, log_odds)
+            log_odds = np.stack([patches.log_odds(tracked.fused.volume) for tracked in frames])
+            energy = self._energy(frames, patches, log_odds)
             if not patches.border.any():
                 return patches, log_odds, energy
             open_border = patches.border & ~greatest_empty_set(energy).all((0, 1))
@@ -132,56 +132,56 @@ class CutTracker:
                 return patches, log_odds, energy
             mark_places(squares, patches.place[open_border], grid)
 
-    def _squares(self, held: list[TrackedFrame]) -> Flags:
-        """Squares of the ground where somebody is, or log-odds are above 0."""
+    def _squares(self, frames: list[TrackedFrame]) -> Flags:
+        """Squares of the ground with people, or with log-odds above 0."""
         grid, ahead = self.rig.grid, []
-        for now, then in zip(held, [*held[1:], held[-1]], strict=True):
-            own, later = same_tracks(now.tracks, then.tracks)
+        for now, then in zip(frames, [*frames[1:], frames[-1]], strict=True):
+            first_rows, later = same_tracks(now.tracks, then.tracks)
             ahead.append(now.fused.people.ground.copy())
-            ahead[-1][own] = then.fused.people.ground[later]
-        here = np.concatenate([one.fused.people.ground for one in held])
+            ahead[-1][first_rows] = then.fused.people.ground[later]
+        here = np.concatenate([one.fused.people.ground for one in frames])
         squares = people_squares(grid, here, np.concatenate(ahead), self.config.occupancy.person_radius)
-        mark_places(squares, np.concatenate([one.fused.volume.occupied_places() for one in held]), grid)
+        mark_places(squares, np.concatenate([one.fused.volume.occupied_places() for one in frames]), grid)
         return squares
 
-    def _energy(self, held: list[TrackedFrame], patches: Patches, log_odds: Singles) -> GridEnergy:
+    def _energy(self, frames: list[TrackedFrame], patches: Patches, log_odds: Singles) -> GridEnergy:
         reach, grid = self.config.occupancy.person_radius, self.rig.grid
         motion = [
             motion_field(
                 now.fused.people.ground, then.fused.people.ground, now.tracks, then.tracks, reach, grid.cell,
                 patches.ground,
             )
-            for now, then in pairwise(held)
+            for now, then in pairwise(frames)
         ]  # fmt: skip
         steps = np.array(motion, np.int64).reshape(-1, *patches.place.shape, 2)
         successor, present = patches.successors(steps), patches.place >= 0
         return build_energy(log_odds, successor, grid, self.config.segmentation, present)
 
     def _divide(
-        self, window: Window, held: list[TrackedFrame], patches: Patches, energy: GridEnergy, occupied: Flags
+        self, window: Window, frames: list[TrackedFrame], patches: Patches, energy: GridEnergy, occupied: Flags
     ) -> WindowLabels:
         """Label the occupied cells with the filter tracks of this window and of active tracks."""
         tails = [track.tail for track in self.association.active]
         mean_height = self.config.body.height_mean
-        seen = [earlier_detections(tails, window.solve_first, mean_height, self.config.motion)]
-        seen += [tracked.detections() for tracked in held]
+        histories = [earlier_detections(tails, window.solve_first, mean_height, self.config.motion)]
+        histories += [tracked.detections() for tracked in frames]
         places = predicted_places(
-            together(seen), window.solve_first, window.solve_stop, self.rig.frame_rate, self.config.tracking
+            together(histories), window.solve_first, window.solve_stop, self.rig.frame_rate, self.config.tracking
         )
-        found = WindowDetections([one.fused.people.ground for one in held], [one.tracks for one in held])
+        found = WindowDetections([one.fused.people.ground for one in frames], [one.tracks for one in frames])
         return label_cells(energy, occupied, found, places, self.pillar, patches, self.solver)
 
     def _commit(
         self,
         window: Window,
-        held: list[TrackedFrame],
+        frames: list[TrackedFrame],
         patches: Patches,
         label: Labels,
         blobs: list[Blobs],
         decision: WindowAssignment,
         row: Rows,
     ) -> Commit:
-        kept = range(window.commit_first - held[0].fused.frame, window.commit_stop - held[0].fused.frame)
+        kept = range(window.commit_first - frames[0].fused.frame, window.commit_stop - frames[0].fused.frame)
         named = np.zeros((len(kept), *self.rig.grid.shape), np.int32)
         rows = []
         for k, cells in zip(kept, named, strict=True):
@@ -189,23 +189,23 @@ class CutTracker:
             plane, sheet = np.divmod(np.flatnonzero(label[k]), patches.place.size)
             place = patches.place.reshape(-1)[sheet]
             cells.reshape(len(cells), -1)[plane, place] = identity[blobs[k].cells.reshape(-1)[place]]
-            rows.append(self._rows(held[k].fused, blobs[k], decision.identity[k]))
-        frames = [held[k].fused for k in kept]
-        return Commit(frames, named, np.concatenate(rows), event_rows(decision.events), row)
+            rows.append(self._rows(frames[k].fused, blobs[k], decision.identity[k]))
+        return Commit([frames[k].fused for k in kept], named, np.concatenate(rows), event_rows(decision.events), row)
 
     def _rows(self, fused: FusedFrame, blobs: Blobs, identity: Ints) -> Rows:
         """TRAJECTORY rows: the detection's place where a blob holds one, else the blob's centroid."""
         named = np.flatnonzero(identity)
         person = blobs.person[named]
-        held, held_person = person >= 0, person.clip(0)
+        detected = person >= 0
+        detections = person[detected]
         people = fused.people if len(fused.people) else None
         ground, covariance = blobs.ground[named].copy(), blobs.covariance[named].copy()
         height, score = blobs.height[named].copy(), blobs.mass[named].copy()
         width = np.full(len(named), self.config.body.width_mean)
         if people is not None:
-            ground[held], covariance[held] = people.ground[held_person[held]], people.covariance[held_person[held]]
-            height[held], score[held] = people.sizes.height[held_person[held]], people.evidence[held_person[held]]
-            width[held] = people.sizes.width[held_person[held]]
+            ground[detected], covariance[detected] = people.ground[detections], people.covariance[detections]
+            height[detected], score[detected] = people.sizes.height[detections], people.evidence[detections]
+            width[detected] = people.sizes.width[detections]
         views = views_at(self.views, ground, self.rig.grid)
         tracks = TrackPlaces(identity[named], ground, covariance, height, width, score)
         return trajectory_rows(fused.frame, tracks, blobs.extent[named], views)

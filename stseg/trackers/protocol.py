@@ -13,10 +13,6 @@ from stseg.records.people import People
 from stseg.records.predicted_tracks import PredictedTracks
 from stseg.records.sparse_volume import SparseVolume
 
-STAYING, FORGETTING = 1.0, 4.0
-"""Existence of a track in trackers that do not estimate it: log-odds that a track detected in one frame is detected in
-the next, nats, and their decay rate while it is undetected, nats per second."""
-
 
 @dataclass(frozen=True)
 class FusedFrame:

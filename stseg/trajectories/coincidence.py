@@ -8,7 +8,7 @@ from stseg.arrays import Flags, Ints, Rows
 from stseg.records.tables import EVENT
 from stseg.tracking.windows.near_rows import near_rows
 
-_ONE_PLACE = 0.12
+_COINCIDENCE_DISTANCE = 0.12
 """Distance of two tracks in one place, metres: half a body's depth, for places of people in touch err."""
 
 
@@ -42,7 +42,7 @@ def coincident(trajectory: Rows, frame_rate: float, shortest: float) -> tuple[Fl
 
 def _near_pairs(trajectory: Rows) -> Ints:
     """Rows of two tracks in one place, int64 (k, 2), the lower id first; sorted by ids, then frame."""
-    found, _ = near_rows(trajectory, _ONE_PLACE)
+    found, _ = near_rows(trajectory, _COINCIDENCE_DISTANCE)
     names = trajectory["id"][found]
     return found[np.lexsort((trajectory["frame"][found[:, 0]], names[:, 1], names[:, 0]))]
 

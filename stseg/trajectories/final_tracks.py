@@ -5,7 +5,7 @@ committed rows -> short gaps filled -> global association -> repetitions, short 
 -> people who come back, where that is wanted
    (returned_tracks)
 
-Global association moves no place: it decides which rows belong to one person, and fills gaps where nobody else stands.
+Global association moves no place: it decides which rows belong to one person, and fills gaps without other people.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from stseg.trajectories.pruning import drop_ghosts, drop_short
 from stseg.trajectories.returned_tracks import renamed_events, renamed_ids, renamed_trajectory, returns_of
 from stseg.trajectories.smoother import smooth_places
 
-_LASTING = 1.0
+_COINCIDENCE_TIME = 1.0
 """Time in one place from which two tracks are one person, seconds."""
 
 
@@ -55,7 +55,7 @@ class FinalTracks:
 
 def final_tracks(
     committed: Rows, events: Rows, appearance: Rows, frame_rate: float, border: Border, config: Config,
-    constraints: Constraints = NO_CONSTRAINTS, known: Rows = NO_KNOWN_PEOPLE,
+    constraints: Constraints = NO_CONSTRAINTS, known_people: Rows = NO_KNOWN_PEOPLE,
 ) -> FinalTracks:  # fmt: skip
     """The tracks of a run from its committed TRAJECTORY, EVENT and APPEARANCE rows, under constraints on those rows.
 
@@ -66,11 +66,11 @@ def final_tracks(
     linked = associate_globally(bridged, problem, constraints)
     bridged["id"] = linked.identity
     named = linked.identity[: len(committed)]
-    repeats, repeated = coincident(bridged, frame_rate, _LASTING)
-    own = ~repeats[: len(committed)]
-    kept, dropped = _kept(bridged[: len(committed)][own], frame_rate, config.tracking)
-    identity = np.where(np.isin(named, kept) & own, named, 0)
-    met = _met(events, _Names(committed, identity), frame_rate, config.tracking)
+    repeats, repeated = coincident(bridged, frame_rate, _COINCIDENCE_TIME)
+    unrepeated = ~repeats[: len(committed)]
+    kept, dropped = _kept(bridged[: len(committed)][unrepeated], frame_rate, config.tracking)
+    identity = np.where(np.isin(named, kept) & unrepeated, named, 0)
+    met = _encounters(events, _Names(committed, identity), frame_rate, config.tracking)
     renamed = _renamed(events, _Names(committed, named), linked.links)
     every_event = np.concatenate([renamed, met, repeated, dropped])
     tracks = _without_gaps(bridged[np.isin(bridged["id"], kept) & ~repeats], frame_rate, config.tracking)
@@ -79,8 +79,8 @@ def final_tracks(
     least = config.tracking.return_probability
     if least == 1:
         return whole
-    whole = _beyond(whole, int(known["id"].max(initial=0)))
-    returns = returns_of(problem, whole.identity, bridged, least, constraints, known)
+    whole = _above(whole, int(known_people["id"].max(initial=0)))
+    returns = returns_of(problem, whole.identity, bridged, least, constraints, known_people)
     return _under_people(whole, returns, frame_rate)
 
 
@@ -91,13 +91,13 @@ def _kept(trajectory: Rows, frame_rate: float, config: TrackingConfig) -> tuple[
     return np.unique(kept["id"]), np.concatenate([short, ghosts])
 
 
-def _beyond(whole: FinalTracks, taken: int) -> FinalTracks:
-    """Tracks under ids above those that are taken."""
+def _above(whole: FinalTracks, last_id: int) -> FinalTracks:
+    """Tracks under ids above another."""
     trajectory, events = whole.trajectory.copy(), whole.events.copy()
-    trajectory["id"] += taken
+    trajectory["id"] += last_id
     for role in ("id", "other"):
-        events[role] += taken * (events[role] > 0)
-    return FinalTracks(trajectory, events, whole.identity + taken * (whole.identity > 0))
+        events[role] += last_id * (events[role] > 0)
+    return FinalTracks(trajectory, events, whole.identity + last_id * (whole.identity > 0))
 
 
 def _under_people(whole: FinalTracks, returns: Sequence[Return], frame_rate: float) -> FinalTracks:
@@ -115,7 +115,7 @@ def bridged_rows(committed: Rows, frame_rate: float, config: Config) -> tuple[Ro
 
 
 def committed_tracks(committed: Rows, events: Rows, frame_rate: float, config: TrackingConfig) -> FinalTracks:
-    """The tracks of a tracker whose identities and places are final: short ones dropped, short gaps filled."""
+    """The tracks of a tracker with final identities and places: short ones dropped, short gaps filled."""
     kept, dropped = drop_short(committed, frame_rate, config)
     every_event = np.concatenate([events, dropped])
     identity = np.where(np.isin(committed["id"], kept["id"]), committed["id"], 0)
@@ -126,14 +126,14 @@ def committed_tracks(committed: Rows, events: Rows, frame_rate: float, config: T
 def _without_gaps(tracks: Rows, frame_rate: float, config: TrackingConfig) -> Rows:
     """Tracks with the gaps filled that global association left, sorted by frame, then id."""
     filled = apart_from(interpolated_rows(tracks, frame_rate, config), tracks)
-    every = np.concatenate([tracks, filled])
-    return np.asarray(every[np.lexsort((every["id"], every["frame"]))])
+    rows = np.concatenate([tracks, filled])
+    return np.asarray(rows[np.lexsort((rows["id"], rows["frame"]))])
 
 
 def _renamed(events: Rows, name_at: _Names, links: Sequence[Link]) -> Rows:
     """Births, deaths and hand-overs under the final identities: a linked track has neither birth nor death there.
 
-    Where somebody is born or dies beyond the area's border, the event is at the first or last row.
+    A birth or death beyond the area's border is at the first or last row.
     """
     events = events[~np.isin(events["kind"], (b"merge", b"split"))]
     named = events.copy()
@@ -149,13 +149,13 @@ def _renamed(events: Rows, name_at: _Names, links: Sequence[Link]) -> Rows:
     return np.concatenate([named[~(refuted | nowhere)], np.array(joined, EVENT)])
 
 
-def _met(events: Rows, name_at: _Names, frame_rate: float, config: TrackingConfig) -> Rows:
+def _encounters(events: Rows, name_at: _Names, frame_rate: float, config: TrackingConfig) -> Rows:
     """Encounters between retained tracks."""
-    known = set(name_at.track.tolist())
+    tracks = set(name_at.track.tolist())
     last = max(name_at.until.values(), default=-1)
 
     def name(track: int, frame: int) -> int:
-        return name_at.name(track, frame) if track in known else 0
+        return name_at.name(track, frame) if track in tracks else 0
 
     return encounters(events, name, round(config.separation_time * frame_rate), frame_rate, last)
 

@@ -8,17 +8,16 @@ from stseg.arrays import Floats, Rows
 from stseg.config import TrackingConfig
 from stseg.records.tables import TRAJECTORY
 from stseg.tracking.filter.assignment import distances
+from stseg.tracking.filter.track_filter import EXCLUSION_RADIUS
 
-_EXCLUSION = 0.5
-"""Distance to another person within which an interpolated place is refused, metres."""
-_DRIFT = 0.1
+_DRIFT_PER_FRAME = 0.1
 """Growth of a place's standard deviation a frame away from the nearest detection, metres."""
 
 
 def fill_gaps(trajectory: Rows, frame_rate: float, config: TrackingConfig) -> Rows:
     """The trajectory with its interpolated rows, sorted by frame, then id."""
-    every = np.concatenate([trajectory, interpolated_rows(trajectory, frame_rate, config)])
-    return every[np.lexsort((every["id"], every["frame"]))]
+    rows = np.concatenate([trajectory, interpolated_rows(trajectory, frame_rate, config)])
+    return rows[np.lexsort((rows["id"], rows["frame"]))]
 
 
 def interpolated_rows(trajectory: Rows, frame_rate: float, config: TrackingConfig) -> Rows:
@@ -34,14 +33,14 @@ def interpolated_rows(trajectory: Rows, frame_rate: float, config: TrackingConfi
 
 
 def apart_from(rows: Rows, trajectory: Rows) -> Rows:
-    """Those of some rows where nobody of the trajectory stands in the same frame: two bodies need two places."""
+    """Rows apart from all rows of the trajectory in the same frame: two bodies need two places."""
     free = np.ones(len(rows), bool)
     by_frame = trajectory[np.argsort(trajectory["frame"], kind="stable")]
     order = np.argsort(rows["frame"], kind="stable")
-    for own in np.split(order, np.flatnonzero(np.diff(rows["frame"][order])) + 1) if len(rows) else ():
-        first, stop = np.searchsorted(by_frame["frame"], rows["frame"][own[0]] + np.arange(2))
-        away = distances(_ground(rows[own]), _ground(by_frame[first:stop]))
-        free[own] = (away >= _EXCLUSION).all(axis=1)
+    for of_frame in np.split(order, np.flatnonzero(np.diff(rows["frame"][order])) + 1) if len(rows) else ():
+        first, stop = np.searchsorted(by_frame["frame"], rows["frame"][of_frame[0]] + np.arange(2))
+        away = distances(_ground(rows[of_frame]), _ground(by_frame[first:stop]))
+        free[of_frame] = (away >= EXCLUSION_RADIUS).all(axis=1)
     return np.asarray(rows[free])
 
 
@@ -57,7 +56,7 @@ def _between(before: np.void, after: np.void) -> Rows:
     for name in ("x", "y", "raw_x", "raw_y", "xx", "xy", "yy", "height", "width", "score"):
         filled[name] = before[name] + fraction * (after[name] - before[name])
     away = np.minimum(frames - before["frame"], after["frame"] - frames)
-    filled["xx"] += (_DRIFT * away) ** 2
-    filled["yy"] += (_DRIFT * away) ** 2
+    filled["xx"] += (_DRIFT_PER_FRAME * away) ** 2
+    filled["yy"] += (_DRIFT_PER_FRAME * away) ** 2
     filled["views"] = before["views"]
     return filled

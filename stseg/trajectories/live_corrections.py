@@ -1,8 +1,8 @@
-"""Live ids decided again: who was exchanged, and who was lost and found, a short time after it.
+"""Live ids decided again: people who were exchanged, or lost and found, a short time after it.
 
 Live ids follow the tracker's tracks. Every few seconds the identities of the latest minutes are decided as those of a
 whole run are (`stseg.identities.association`), under the ids that were published; where an id holds
-somebody else, its rows are corrected.
+another person, its rows are corrected.
 """
 
 from __future__ import annotations
@@ -39,14 +39,14 @@ class LiveCorrections:
         self._rows, self._appearance = np.zeros(0, TRAJECTORY), np.zeros(0, APPEARANCE)
         self._due = 0
 
-    def decide(self, rows: Rows, appearance: Rows, fresh: Callable[[], int]) -> Rows:
+    def decide(self, rows: Rows, appearance: Rows, new_id: Callable[[], int]) -> Rows:
         """The corrections that the next rows bring.
 
         Parameters
         ----------
         rows : TRAJECTORY (n,), appearance : APPEARANCE (l,)
             Committed rows under live ids, with what the detections look like.
-        fresh
+        new_id
             A new live id.
 
         Returns
@@ -63,17 +63,17 @@ class LiveCorrections:
         if decided < self._due:
             return np.zeros(0, CORRECTION)
         self._due = decided + round(live.correction_interval * self._rate)
-        found = self._decided_again(decided, fresh)
+        found = self._decided_again(decided, new_id)
         self._rows = corrected(self._rows, found)
         return found
 
-    def _decided_again(self, decided: int, fresh: Callable[[], int]) -> Rows:
+    def _decided_again(self, decided: int, new_id: Callable[[], int]) -> Rows:
         bridged, sizes = bridged_rows(self._rows, self._rate, self._config)
         problem = IdentityProblem.of(bridged, sizes, self._appearance, self._rate, self._border, self._config)
         linked = associate_globally(bridged, problem)
         identity = linked.identity[: len(self._rows)]
-        known = int(bridged["id"].max())
-        issued = {number: fresh() for number in np.unique(identity[identity > known]).tolist()}
+        last_id = int(bridged["id"].max())
+        issued = {number: new_id() for number in np.unique(identity[identity > last_id]).tolist()}
         named = np.array([issued.get(number, number) for number in identity.tolist()], np.int64)
         found = [(decided, *one) for one in _differences(self._rows, named)]
         return np.array(found, CORRECTION)
@@ -85,8 +85,8 @@ def corrected(rows: Rows, corrections: Rows) -> Rows:
     for decided in np.unique(corrections["decision_frame"]).tolist():
         before = named["id"].copy()
         for one in corrections[corrections["decision_frame"] == decided]:
-            own = (before == one["id"]) & (rows["frame"] >= one["first"]) & (rows["frame"] <= one["last"])
-            named["id"][own] = one["corrected_id"]
+            chosen = (before == one["id"]) & (rows["frame"] >= one["first"]) & (rows["frame"] <= one["last"])
+            named["id"][chosen] = one["corrected_id"]
     return named
 
 
@@ -103,8 +103,8 @@ def renamed(names: dict[int, int], corrections: Rows, present: Container[int]) -
     """
     now = {int(one["id"]): int(one["corrected_id"]) for one in corrections if one["last"] == one["decision_frame"]}
     found = {track: now.get(name, name) for track, name in names.items()}
-    taken = {name for track, name in found.items() if track in present}
-    return {track: name for track, name in found.items() if track in present or name not in taken}
+    present_names = {name for track, name in found.items() if track in present}
+    return {track: name for track, name in found.items() if track in present or name not in present_names}
 
 
 def _after(since: int, rows: Rows) -> Rows:
@@ -112,16 +112,16 @@ def _after(since: int, rows: Rows) -> Rows:
 
 
 def _differences(rows: Rows, identity: Ints) -> Iterator[tuple[int, int, int, int]]:
-    """First and last frame in which an id holds somebody else, the id, and that of who it holds.
+    """First and last frame in which an id holds another person, the id, and the id of that person.
 
-    What lasts to the last row of an id lasts to the last frame of all: the id may go on.
+    A difference that lasts to the last row of an id lasts to the last frame of all: the id may go on.
     """
     end = int(rows["frame"].max())
-    for own in rows_of_tracks(rows["id"]):
-        ordered = own[np.argsort(rows["frame"][own], kind="stable")]
-        frame, name, held = rows["frame"][ordered], identity[ordered], int(rows["id"][own[0]])
-        edges = [0, *(np.flatnonzero(np.diff(name)) + 1).tolist(), len(own)]
+    for index in rows_of_tracks(rows["id"]):
+        ordered = index[np.argsort(rows["frame"][index], kind="stable")]
+        frame, name, published = rows["frame"][ordered], identity[ordered], int(rows["id"][index[0]])
+        edges = [0, *(np.flatnonzero(np.diff(name)) + 1).tolist(), len(index)]
         for first, stop in pairwise(edges):
-            if name[first] != held:
-                last = end if stop == len(own) else int(frame[stop]) - 1
-                yield int(frame[first]), last, held, int(name[first])
+            if name[first] != published:
+                last = end if stop == len(index) else int(frame[stop]) - 1
+                yield int(frame[first]), last, published, int(name[first])

@@ -24,7 +24,7 @@ class LiveIds:
     rows : TRAJECTORY (n,), corrections : CORRECTION (k,)
         Rows committed before, under names of the run, and what was corrected in them.
     kept
-        Number of latest frames whose rows are kept for stitching.
+        Number of latest frames with rows for stitching.
     """
 
     def __init__(self, rows: Rows, corrections: Rows, kept: int) -> None:
@@ -43,17 +43,17 @@ class LiveIds:
 
     def named(self, rows: Rows, names: Names) -> Rows:
         """Rows of a segment under names of the run; `names` gains one for each new track, and for one of two alike."""
-        taken = set[int]()
-        for own in np.unique(rows["id"]).tolist():
-            if own not in names or names[own] in taken:
-                names[own] = self.fresh()
-            taken.add(names[own])
+        used = set[int]()
+        for track in np.unique(rows["id"]).tolist():
+            if track not in names or names[track] in used:
+                names[track] = self.new_id()
+            used.add(names[track])
         named = rows.copy()
-        named["id"] = [names[own] for own in rows["id"].tolist()]
+        named["id"] = [names[track] for track in rows["id"].tolist()]
         self._recent = self._last(np.concatenate([self._recent, named]))
         return named
 
-    def fresh(self) -> int:
+    def new_id(self) -> int:
         """A name that was never given."""
         self._issued += 1
         return self._issued

@@ -14,7 +14,7 @@ from stseg.records.tables import EVENT
 
 
 def returns_of(
-    problem: IdentityProblem, identity: Ints, bridged: Rows, least: float, constraints: Constraints, known: Rows
+    problem: IdentityProblem, identity: Ints, bridged: Rows, least: float, constraints: Constraints, known_people: Rows
 ) -> list[Return]:
     """Visits that are one person's with an earlier one.
 
@@ -30,10 +30,10 @@ def returns_of(
         Least probability.
     constraints
         Pairs of rows that are one person, or two.
-    known : KNOWN_PERSON (k,)
-        People of earlier recordings, whose ids are no others'.
+    known_people : KNOWN_PERSON (k,)
+        People of earlier recordings; no other person has their ids.
     """
-    visits = problem.visits(np.pad(identity, (0, len(bridged) - len(identity))), bridged["frame"], known)
+    visits = problem.visits(np.pad(identity, (0, len(bridged) - len(identity))), bridged["frame"], known_people)
     two = [identity[rows[~constraints.same]] for rows in (constraints.earlier, constraints.later)]
     return find_returns(visits, problem.model.spread, least, np.column_stack(two))
 
@@ -74,14 +74,14 @@ def renamed_events(events: Rows, trajectory: Rows, returns: Sequence[Return], fr
     first = trajectory["frame"][start]
     last = np.zeros(len(ids), np.int64)
     np.maximum.at(last, np.searchsorted(ids, trajectory["id"]), trajectory["frame"])
-    own = np.searchsorted(ids, named["id"]).clip(max=max(len(ids) - 1, 0))
+    person = np.searchsorted(ids, named["id"]).clip(max=max(len(ids) - 1, 0))
     between = here & (
-        ((named["kind"] == b"birth") & (named["frame"] > first[own]))
-        | ((named["kind"] == b"death") & (named["frame"] < last[own]))
+        ((named["kind"] == b"birth") & (named["frame"] > first[person]))
+        | ((named["kind"] == b"death") & (named["frame"] < last[person]))
     )
     came = [(one.frame, b"return", one.identity, 0, _reason(one, frame_rate).encode()) for one in returns]
-    every = np.concatenate([named[~between], np.array(came, EVENT)])
-    return np.asarray(every[np.argsort(every["frame"], kind="stable")])
+    joined = np.concatenate([named[~between], np.array(came, EVENT)])
+    return np.asarray(joined[np.argsort(joined["frame"], kind="stable")])
 
 
 def _reason(one: Return, frame_rate: float) -> str:

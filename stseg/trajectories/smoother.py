@@ -72,9 +72,9 @@ def smoothed_paths(
     predicted, ahead = state.copy(), spread.copy()
     turns = [(slice(k - n, k - n + m), slice(k, k + m)) for k, n, m in zip(start, number, number[1:], strict=False)]
     for old, new in turns:
-        own = motion[new.start - first : new.stop - first]
-        predicted[new] = own @ state[old]
-        ahead[new] = own @ spread[old] @ own.transpose(0, 2, 1) + turn[new.start - first : new.stop - first]
+        rows = motion[new.start - first : new.stop - first]
+        predicted[new] = rows @ state[old]
+        ahead[new] = rows @ spread[old] @ rows.transpose(0, 2, 1) + turn[new.start - first : new.stop - first]
         gain = ahead[new, :, :2] @ np.linalg.inv(ahead[new, :2, :2] + noise[new])
         state[new] = predicted[new] + gain @ (ground[new] - predicted[new, :2])
         spread[new] = ahead[new] - gain @ ahead[new, :2]

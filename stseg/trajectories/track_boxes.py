@@ -21,11 +21,11 @@ def box_rows(tables: Sequence[BodyTable], trajectory: Rows) -> Rows:
     for view, table in enumerate(tables):
         width, height = table.size
         edges = table.boxes_of(ground, trajectory["height"].astype(float)).clip(0, [width, height] * 2)
-        seen = (edges[:, 2] > edges[:, 0]) & (edges[:, 3] > edges[:, 1])
-        own = np.zeros(int(seen.sum()), BOX)
-        own["frame"], own["id"], own["view"] = trajectory["frame"][seen], trajectory["id"][seen], view
-        own["left"], own["top"] = edges[seen, 0], edges[seen, 1]
-        own["width"], own["height"] = (edges[seen, 2:] - edges[seen, :2]).T
-        rows.append(own)
-    every = np.concatenate(rows)
-    return every[np.lexsort((every["view"], every["id"], every["frame"]))]
+        visible = (edges[:, 2] > edges[:, 0]) & (edges[:, 3] > edges[:, 1])
+        boxes = np.zeros(int(visible.sum()), BOX)
+        boxes["frame"], boxes["id"], boxes["view"] = trajectory["frame"][visible], trajectory["id"][visible], view
+        boxes["left"], boxes["top"] = edges[visible, 0], edges[visible, 1]
+        boxes["width"], boxes["height"] = (edges[visible, 2:] - edges[visible, :2]).T
+        rows.append(boxes)
+    joined = np.concatenate(rows)
+    return joined[np.lexsort((joined["view"], joined["id"], joined["frame"]))]

@@ -214,7 +214,7 @@ def test_people_of_an_earlier_run_keep_their_ids_and_others_get_greater_ones() -
     assert known["appearance_count"].tolist() == [240] * 5 and known["height"] == pytest.approx(1.7, abs=0.02)
     rows, looks = coloured({1: 4, 2: 9, 3: 1, 4: 8, 5: 7}, seed=2)
     birth = np.array([(0, b"birth", 2, 0, b"")], EVENT)
-    found = final_tracks(rows, birth, looks, RATE, BORDER, returning(0.99), known=known)
+    found = final_tracks(rows, birth, looks, RATE, BORDER, returning(0.99), known_people=known)
     names = [np.unique(found.identity[rows["id"] == track]).tolist() for track in range(1, 6)]
     assert names[0] == [14] and names[2] == [11]
     assert all(one > 15 for track in (1, 3, 4) for one in names[track])
@@ -231,7 +231,7 @@ def test_nobody_of_whom_nothing_is_known_is_recognised() -> None:
     known = known_people(rows, looks[:0])
     assert np.isnan(known["height"]).all() and not known["height_count"].any() and not known["appearance_count"].any()
     rows, looks = coloured({1: 1, 2: 2, 3: 3, 4: 4, 5: 5}, seed=2)
-    found = final_tracks(rows, np.zeros(0, EVENT), looks, RATE, BORDER, returning(0.9), known=known)
+    found = final_tracks(rows, np.zeros(0, EVENT), looks, RATE, BORDER, returning(0.9), known_people=known)
     assert found.identity.min() > 5
 
 

@@ -13,7 +13,7 @@ from stseg.arrays import Flags, Floats
 from stseg.geometry import Grid
 from stseg.geometry.nearest_person import nearest_person
 from stseg.records.blobs import UNASSIGNED, Blobs
-from stseg.segmentation.blob_measures import Measures, fill_ground_labels, fill_measures
+from stseg.segmentation.blob_measures import BlobMeasures, fill_ground_labels, fill_measures
 from stseg.segmentation.blobs import find_blobs
 from stseg.segmentation.cell_motion import motion_field
 from stseg.segmentation.patches import Patches
@@ -194,7 +194,7 @@ def test_kernels_of_blobs_agree_with_their_plain_form(seed: int) -> None:
     track = np.unique(ground_label[ground_label != 0]).astype(np.int64)
     cells = np.where(ground_label != 0, 1 + track.searchsorted(ground_label), 0).astype(np.int32)
     n = len(track)
-    found = Measures(np.zeros((n, 2)), np.zeros((n, 2, 2)), np.zeros(n), np.zeros(n), np.zeros(n))
+    found = BlobMeasures(np.zeros((n, 2)), np.zeros((n, 2, 2)), np.zeros(n), np.zeros(n), np.zeros(n))
     fill_measures(cells, track, label, log_odds, GRID.ground, GRID.heights, found)
     for own, plain in zip(found, reference_blobs.measures(cells, track, label, log_odds, GRID), strict=True):
         np.testing.assert_allclose(own, plain, rtol=1e-4, atol=1e-5)

@@ -19,9 +19,10 @@ from stseg.records.border import Border
 from stseg.records.predicted_tracks import PredictedTracks
 from stseg.records.sizes import Sizes
 from stseg.trackers.framewise import FramewiseTracker
-from stseg.trackers.protocol import FORGETTING, STAYING, Commit, FrameObservations, FusedFrame
+from stseg.trackers.protocol import Commit, FrameObservations, FusedFrame
 from stseg.trackers.rows import Event, TrackPlaces
 from stseg.tracking.filter.assignment import assign, distances
+from stseg.tracking.filter.track_filter import DETECTED_LOG_ODDS, EXISTENCE_DECAY
 
 _METHODS = {"messages": propagate, "condensation": condense}
 """Propagation of stars from frame to frame."""
@@ -68,7 +69,7 @@ class BeliefTracker(FramewiseTracker):
                 np.array([height_noise * (1 + 1 / target.found) for target in self.targets]),
                 self.config.body,
             ),
-            STAYING - FORGETTING * missed,
+            DETECTED_LOG_ODDS - EXISTENCE_DECAY * missed,
         )
 
     def add(self, fused: FusedFrame, observed: FrameObservations) -> list[Commit]:

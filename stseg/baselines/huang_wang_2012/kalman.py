@@ -18,9 +18,10 @@ from stseg.geometry import Rig
 from stseg.records.predicted_tracks import PredictedTracks
 from stseg.records.sizes import Sizes
 from stseg.trackers.framewise import FramewiseTracker
-from stseg.trackers.protocol import FORGETTING, STAYING, Commit, FrameObservations, FusedFrame
+from stseg.trackers.protocol import Commit, FrameObservations, FusedFrame
 from stseg.trackers.rows import Event, TrackPlaces
 from stseg.tracking.filter.assignment import assign
+from stseg.tracking.filter.track_filter import DETECTED_LOG_ODDS, EXISTENCE_DECAY
 
 
 class KalmanTracker(FramewiseTracker):
@@ -47,7 +48,7 @@ class KalmanTracker(FramewiseTracker):
             filters.state[:, :2],
             filters.covariance[:, :2, :2] + noise,
             self.sizes.with_noise(self.config.tracking),
-            STAYING - FORGETTING * unseen,
+            DETECTED_LOG_ODDS - EXISTENCE_DECAY * unseen,
         )
 
     def add(self, fused: FusedFrame, observed: FrameObservations) -> list[Commit]:

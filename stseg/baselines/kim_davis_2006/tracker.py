@@ -27,9 +27,10 @@ from stseg.records.border import Border
 from stseg.records.predicted_tracks import PredictedTracks
 from stseg.records.sizes import Sizes
 from stseg.trackers.framewise import FramewiseTracker
-from stseg.trackers.protocol import FORGETTING, STAYING, Commit, FrameObservations, FusedFrame
+from stseg.trackers.protocol import Commit, FrameObservations, FusedFrame
 from stseg.trackers.rows import Event, TrackPlaces
 from stseg.tracking.filter.assignment import assign, distances
+from stseg.tracking.filter.track_filter import DETECTED_LOG_ODDS, EXISTENCE_DECAY
 
 _FLOOR = 0.05
 """Least standard deviation of a place, metres: particles share errors."""
@@ -66,7 +67,9 @@ class ParticleTracker(FramewiseTracker):
         drift = config.motion.position_noise**2 + self._step(frame) ** 2
         unseen = (frame - 1 - crowd.last_detection) / self.rig.frame_rate
         sizes = Sizes.of_heights(crowd.height, np.full(len(crowd), _HEIGHT_NOISE**2), config.body)
-        return PredictedTracks(crowd.ground, crowd.covariance + drift * np.eye(2), sizes, STAYING - FORGETTING * unseen)
+        return PredictedTracks(
+            crowd.ground, crowd.covariance + drift * np.eye(2), sizes, DETECTED_LOG_ODDS - EXISTENCE_DECAY * unseen
+        )
 
     def add(self, fused: FusedFrame, observed: FrameObservations) -> list[Commit]:
         """Add a frame; it is committed at once.

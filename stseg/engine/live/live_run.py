@@ -185,7 +185,7 @@ class LiveRun:
         """Decide live ids again with newly published rows, and append what is corrected; some trackers' are final."""
         if find_tracker(self._job.tracker).final:
             return
-        found = self._decided_again.decide(rows, new.appearance, self._names.fresh)
+        found = self._decided_again.decide(rows, new.appearance, self._names.new_id)
         if not len(found):
             return
         self._corrections.append(found)

@@ -12,9 +12,9 @@ from stseg.config import MotionConfig, TrackingConfig
 from stseg.records.predicted_places import PredictedPlaces
 from stseg.tracking.windows.tracklets import Tracklet
 
-_DRIFT = 0.5
+_DRIFT_SPEED = 0.5
 """Growth of a place's standard deviation away from the nearest detection, metres per second."""
-_STEPS = 4
+_VELOCITY_STEPS = 4
 """Detections before the last from which the velocity is estimated."""
 
 
@@ -45,13 +45,13 @@ class DetectionHistory:
 
 def earlier_detections(tails: Iterable[Tracklet], before: int, height: float, model: MotionConfig) -> DetectionHistory:
     """The committed ends of tracks before a frame, as detections of bodies of mean height, metres."""
-    seen = [
+    history = [
         (frame, tail.filter_track, *ground)
         for tail in tails
         for frame, ground in zip(tail.frames, tail.ground, strict=True)
         if frame < before
     ]
-    rows = np.array(seen, float).reshape(-1, 4)
+    rows = np.array(history, float).reshape(-1, 4)
     covariance = np.tile(np.eye(2) * model.position_noise**2, (len(rows), 1, 1))
     frame, track = rows[:, :2].T.astype(np.int64)
     return DetectionHistory(frame, track, rows[:, 2:], covariance, np.full(len(rows), height))
@@ -64,39 +64,43 @@ def together(parts: Iterable[DetectionHistory]) -> DetectionHistory:
 
 
 def predicted_places(
-    seen: DetectionHistory, first: int, stop: int, frame_rate: float, config: TrackingConfig
+    history: DetectionHistory, first: int, stop: int, frame_rate: float, config: TrackingConfig
 ) -> PredictedPlaces:
     """Predicted place of each filter track in frames first .. stop - 1.
 
     At a detection its place; between two on a straight line; after the last at constant velocity, for at most
     `tracking.prediction_horizon`. The covariance grows with the time to the nearest detection.
     """
-    tracks = np.unique(seen.track)
+    tracks = np.unique(history.track)
     size = (stop - first, len(tracks))
     places = PredictedPlaces(
         tracks, np.zeros(size, bool), np.zeros((*size, 2)), np.zeros((*size, 2, 2)), np.zeros(size)
     )
     frames = np.arange(first, stop)
     for k, track in enumerate(tracks):
-        rows = np.flatnonzero(seen.track == track)
-        own = seen.at(rows[np.argsort(seen.frame[rows], kind="stable")])
-        after = own.frame.searchsorted(frames)
-        before = np.searchsorted(own.frame, frames, side="right") - 1
-        earlier, later = before.clip(0), after.clip(0, len(own.frame) - 1)
-        away = np.minimum(np.abs(frames - own.frame[earlier]), np.abs(own.frame[later] - frames))
-        nearest = np.where(frames - own.frame[earlier] <= np.abs(own.frame[later] - frames), earlier, later)
-        ahead = frames - own.frame[-1]
+        rows = np.flatnonzero(history.track == track)
+        detections = history.at(rows[np.argsort(history.frame[rows], kind="stable")])
+        after = detections.frame.searchsorted(frames)
+        before = np.searchsorted(detections.frame, frames, side="right") - 1
+        earlier, later = before.clip(0), after.clip(0, len(detections.frame) - 1)
+        away = np.minimum(np.abs(frames - detections.frame[earlier]), np.abs(detections.frame[later] - frames))
+        nearest = np.where(
+            frames - detections.frame[earlier] <= np.abs(detections.frame[later] - frames), earlier, later
+        )
+        ahead = frames - detections.frame[-1]
         places.expected[:, k] = (before >= 0) & (ahead <= config.prediction_horizon * frame_rate)
-        places.ground[:, k] = own.ground[-1] + ahead[:, None] * _velocity(own)
+        places.ground[:, k] = detections.ground[-1] + ahead[:, None] * _velocity(detections)
         inside = ahead <= 0
-        places.ground[inside, k] = np.column_stack([np.interp(frames[inside], own.frame, g) for g in own.ground.T])
-        spread = (_DRIFT * away / frame_rate) ** 2
-        places.covariance[:, k] = own.covariance[nearest] + spread[:, None, None] * np.eye(2)
-        places.height[:, k] = own.height[nearest]
+        places.ground[inside, k] = np.column_stack(
+            [np.interp(frames[inside], detections.frame, g) for g in detections.ground.T]
+        )
+        spread = (_DRIFT_SPEED * away / frame_rate) ** 2
+        places.covariance[:, k] = detections.covariance[nearest] + spread[:, None, None] * np.eye(2)
+        places.height[:, k] = detections.height[nearest]
     return places
 
 
-def _velocity(own: DetectionHistory) -> Floats:
+def _velocity(detections: DetectionHistory) -> Floats:
     """Velocity over the last detections, metres per frame, float64 (2,)."""
-    frame, ground = own.frame[-1 - _STEPS :], own.ground[-1 - _STEPS :]
+    frame, ground = detections.frame[-1 - _VELOCITY_STEPS :], detections.ground[-1 - _VELOCITY_STEPS :]
     return np.zeros(2) if len(frame) < 2 else np.asarray((ground[-1] - ground[0]) / (frame[-1] - frame[0]))

@@ -20,19 +20,19 @@ from stseg.records.sizes import Sizes
 from stseg.tracking.filter.assignment import distances
 from stseg.tracking.filter.motion_model import process_noise, transition
 
-_GROWTH = 0.002
-"""How a person's apparent height and width change, metres per square root of a second: shoes, stoop, lens."""
-_MOST_ODDS = 1.0
+_SIZE_DRIFT = 0.002
+"""Random walk of a person's apparent height and width, metres per square root of a second: shoes, stoop, lens."""
+DETECTED_LOG_ODDS = 1.0
 """Greatest log-odds that a person detected in one frame is detected in the next, nats."""
 _LEAST_EVIDENCE = -4.0
 """Evidence below which a rejected candidate starts no tentative track, nats."""
-_REPEATED = 2.0
+_REPETITION_DISCOUNT = 2.0
 """Discount of a rejected candidate's evidence: consecutive frames are not independent, nats."""
-_EXCLUSION = 0.5
-"""Birth exclusion radius around existing tracks, metres."""
-_OPEN = 0.6
-"""A size is measured by a frame that leaves less than this share of the population's variance."""
-_DECAY = 4.0
+EXCLUSION_RADIUS = 0.5
+"""Radius around existing tracks within which no track begins and no place is interpolated, metres."""
+_UNMEASURED_SHARE = 0.6
+"""Share of the population's variance from which on a frame has not measured a size."""
+EXISTENCE_DECAY = 4.0
 """Decay rate of the existence log-odds while a track is undetected, nats per second."""
 
 
@@ -76,8 +76,8 @@ class TrackState(NamedTuple):
         return self._replace(
             state=motion @ self.state,
             covariance=motion @ self.covariance @ motion.T + process_noise(seconds, model),
-            height_variance=self.height_variance + _GROWTH**2 * seconds,
-            width_variance=self.width_variance + _GROWTH**2 * seconds,
+            height_variance=self.height_variance + _SIZE_DRIFT**2 * seconds,
+            width_variance=self.width_variance + _SIZE_DRIFT**2 * seconds,
         )
 
     def corrected(
@@ -90,7 +90,9 @@ class TrackState(NamedTuple):
         frame
             Of the detection.
         ground, covariance : float64 (2,), (2, 2)
-            Posterior of the place, whose prior is this prediction. The velocity follows by their covariance.
+            Posterior of the place, of which this prediction is taken to be the whole prior. The detector's prior is
+            wider, by `motion.position_noise` (`predict`), so the corrected covariance is too small where people
+            stray by as much. The velocity follows by their covariance.
         height, width
             Measurements, without this prediction as their prior.
         odds
@@ -164,12 +166,17 @@ class TrackFilter:
         predicted = self._predictions(frame)
         names, detected = np.zeros(len(people), np.int64), []
         for j in range(len(people)):
-            known = int(people.track_index[j])
-            before = predicted[known] if known >= 0 else self._birth(frame, people, j)
-            odds = (before.odds if known >= 0 else self.birth_log_odds) + people.evidence[j] - people.prior[j]
+            index = int(people.track_index[j])
+            before = predicted[index] if index >= 0 else self._birth(frame, people, j)
+            odds = (before.odds if index >= 0 else self.birth_log_odds) + people.evidence[j] - people.prior[j]
             detected.append(
                 before.corrected(
-                    frame, people.ground[j], people.covariance[j], heights[j], widths[j], min(float(odds), _MOST_ODDS)
+                    frame,
+                    people.ground[j],
+                    people.covariance[j],
+                    heights[j],
+                    widths[j],
+                    min(float(odds), DETECTED_LOG_ODDS),
                 )
             )
             if before.track == 0:
@@ -211,17 +218,17 @@ class TrackFilter:
     def _predicted(self, track: TrackState, frame: int) -> TrackState:
         seconds = (frame - track.last_seen) / self.frame_rate
         undetected = seconds - 1 / self.frame_rate
-        return track.predicted(seconds, self.motion)._replace(odds=track.odds - _DECAY * undetected)
+        return track.predicted(seconds, self.motion)._replace(odds=track.odds - EXISTENCE_DECAY * undetected)
 
     def _tentative(self, frame: int, ghosts: People, standing: Floats) -> list[TrackState]:
         """Tentative tracks of rejected candidates: evidence adds up if the next frame shows them again.
 
         None begins near the places of other tracks, `standing` float64 (n, 2), metres.
         """
-        near = distances(ghosts.ground, standing).min(1, initial=np.inf) < _EXCLUSION
+        excluded = distances(ghosts.ground, standing).min(1, initial=np.inf) < EXCLUSION_RADIUS
         return [
-            self._birth(frame, ghosts, j)._replace(odds=float(ghosts.evidence[j]) - _REPEATED)
-            for j in np.flatnonzero(~near & (ghosts.evidence > _LEAST_EVIDENCE)).tolist()
+            self._birth(frame, ghosts, j)._replace(odds=float(ghosts.evidence[j]) - _REPETITION_DISCOUNT)
+            for j in np.flatnonzero(~excluded & (ghosts.evidence > _LEAST_EVIDENCE)).tolist()
         ]
 
     def _birth(self, frame: int, people: People, j: int) -> TrackState:
@@ -235,6 +242,6 @@ class TrackFilter:
 
 
 def _measurements(mean: Floats, variance: Floats, spread: float, noise: float) -> list[Measurement]:
-    """Measurements of one size, metres, from posteriors whose prior has a standard deviation of `spread`."""
-    used = np.where(variance < _OPEN * spread**2, noise**2, np.inf)
+    """Measurements of one size, metres, from posteriors of a prior with the standard deviation `spread`."""
+    used = np.where(variance < _UNMEASURED_SHARE * spread**2, noise**2, np.inf)
     return [Measurement(*one) for one in zip(mean.tolist(), used.tolist(), strict=True)]

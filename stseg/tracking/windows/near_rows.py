@@ -8,7 +8,7 @@ from stseg.arrays import Floats, Ints, Rows
 
 
 def near_rows(trajectory: Rows, distance: float) -> tuple[Ints, Floats]:
-    """Pairs of rows of one frame whose places are less than a distance apart.
+    """Pairs of rows of one frame less than a distance apart.
 
     Parameters
     ----------
@@ -24,13 +24,13 @@ def near_rows(trajectory: Rows, distance: float) -> tuple[Ints, Floats]:
     """
     order = np.lexsort((trajectory["id"], trajectory["frame"]))
     frame, x, y = (trajectory[name][order] for name in ("frame", "x", "y"))
-    pairs, apart = [np.zeros((0, 2), np.int64)], [np.zeros(0)]
+    pairs, distances = [np.zeros((0, 2), np.int64)], [np.zeros(0)]
     for step in range(1, len(order)):
         same = frame[step:] == frame[:-step]
         if not same.any():
             break
         away = np.hypot(x[step:] - x[:-step], y[step:] - y[:-step])
-        near = np.flatnonzero(same & (away < distance))
-        pairs.append(np.column_stack([order[near], order[near + step]]))
-        apart.append(away[near])
-    return np.concatenate(pairs), np.concatenate(apart)
+        pair = np.flatnonzero(same & (away < distance))
+        pairs.append(np.column_stack([order[pair], order[pair + step]]))
+        distances.append(away[pair])
+    return np.concatenate(pairs), np.concatenate(distances)

@@ -18,7 +18,7 @@ from stseg.tracking.filter.assignment import assign, distances
 
 _EventRow = tuple[int, bytes, int, int, bytes]
 """A row of EVENT."""
-_SAME = 0.35
+_SAME_PLACE_DISTANCE = 0.35
 """Greatest distance between two segments' places of one person, metres."""
 
 
@@ -161,23 +161,23 @@ def rename_labels(label: Labels, frames: Ints, rows: Rows, identity: Ints) -> No
     order = np.argsort(rows["frame"], kind="stable")
     bounds = rows["frame"][order].searchsorted([frames, frames + 1])
     for cells, first, stop in zip(label, *bounds, strict=True):
-        own = order[first:stop]
+        indices = order[first:stop]
         names = np.zeros(most + 1, np.int32)
-        names[rows["id"][own]] = identity[own]
+        names[rows["id"][indices]] = identity[indices]
         cells[...] = names[cells]
 
 
 def matches(before: Rows, lead: Rows) -> dict[int, int]:
     """The earlier track with the same place, for each matched track of a warm-up."""
-    known, fresh = np.unique(before["id"]), np.unique(lead["id"])
-    shared = np.zeros((len(known), len(fresh)))
+    earlier, later = np.unique(before["id"]), np.unique(lead["id"])
+    shared = np.zeros((len(earlier), len(later)))
     for frame in np.intersect1d(before["frame"], lead["frame"]).tolist():
         a, b = before[before["frame"] == frame], lead[lead["frame"] == frame]
-        near = distances(_ground(a), _ground(b)) < _SAME
-        rows, columns = np.nonzero(near)
-        shared[known.searchsorted(a["id"][rows]), fresh.searchsorted(b["id"][columns])] += 1
+        matched = distances(_ground(a), _ground(b)) < _SAME_PLACE_DISTANCE
+        rows, columns = np.nonzero(matched)
+        shared[earlier.searchsorted(a["id"][rows]), later.searchsorted(b["id"][columns])] += 1
     a, b = assign(np.where(shared > 0, -shared, np.inf), 0.0)
-    return dict(zip(fresh[b].tolist(), known[a].tolist(), strict=True))
+    return dict(zip(later[b].tolist(), earlier[a].tolist(), strict=True))
 
 
 def _ground(rows: Rows) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:

@@ -73,8 +73,8 @@ class Tracklet:
 def form_tracklets(blobs: Sequence[Blobs], first: int, config: TrackingConfig) -> list[Tracklet]:
     """The tracklets of a window.
 
-    Blobs that hold detections of one filter track are one tracklet. A blob without a detection joins the tracklet in
-    whose gap it lies, near the interpolated place, unless another track claims it. So the cut bridges missed
+    Blobs that hold detections of one filter track are one tracklet. A blob without a detection joins the tracklet with
+    a gap there, near the interpolated place, unless another track claims it. So the cut bridges missed
     detections, and nothing more.
 
     Parameters

@@ -83,18 +83,18 @@ class TrackAssociation:
 
     def _names(self, window: Window, blobs: Sequence[Blobs], tracklets: Sequence[Tracklet]) -> list[int]:
         names = [0] * len(tracklets)
-        known = [track.identity for track in self.active]
-        shared = np.zeros((len(known), len(tracklets)))
+        tracks = [track.identity for track in self.active]
+        shared = np.zeros((len(tracks), len(tracklets)))
         for p, tracklet in enumerate(tracklets):
             for frame, blob in zip(tracklet.frames, tracklet.blobs, strict=True):
                 if frame in self.shared_cells:
                     inside = blobs[frame - window.solve_first].cells == blob + 1
                     owners, counts = np.unique(self.shared_cells[frame][inside], return_counts=True)
                     for owner, count in zip(owners, counts, strict=True):
-                        if owner in known:
-                            shared[known.index(int(owner)), p] += count
+                        if owner in tracks:
+                            shared[tracks.index(int(owner)), p] += count
         for k, p in zip(*assign(np.where(shared > 0, -shared, np.inf), 0.0), strict=True):
-            names[p] = known[k]
+            names[p] = tracks[k]
         self._follow(names, tracklets)
         for p in range(len(tracklets)):
             if not names[p]:
@@ -114,22 +114,22 @@ class TrackAssociation:
     ) -> list[tuple[int, str, int, int, str]]:
         """Update active tracks by the window's commit range, with birth, death and hand-over events."""
         events: list[tuple[int, str, int, int, str]] = []
-        known = {track.identity: track for track in self.active}
+        tracks = {track.identity: track for track in self.active}
         for tracklet, name in zip(tracklets, names, strict=True):
             kept = _within(tracklet, window.commit_first, window.commit_stop)
             if not kept.frames:
                 continue
-            if name in known:
-                gap = kept.frames[0] - known[name].tail.frames[-1] - 1
+            if name in tracks:
+                gap = kept.frames[0] - tracks[name].tail.frames[-1] - 1
                 if gap > 0:
                     events.append((kept.frames[0], "hand-over", name, 0, f"found again after {gap} unseen frames"))
-                known[name].tail.extend(kept)
+                tracks[name].tail.extend(kept)
             else:
-                known[name] = ActiveTrack(name, kept)
+                tracks[name] = ActiveTrack(name, kept)
                 events.append((kept.frames[0], "birth", name, 0, "nobody known was near"))
         patience = max(round(self.config.patience * self.frame_rate), 1)
         self.active = []
-        for track in known.values():
+        for track in tracks.values():
             if window.commit_stop - track.tail.frames[-1] > patience + 1:
                 events.append((track.tail.frames[-1], "death", track.identity, 0, f"unseen for over {patience} frames"))
             else:

@@ -21,7 +21,7 @@ class Window:
     solve_first, solve_stop
         Frames of one cut.
     commit_first, commit_stop
-        Frames whose result is committed; these ranges partition the run.
+        Frames that the window commits; these ranges partition the run.
     """
 
     index: int
