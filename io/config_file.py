@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from stseg.config import Config
 from stseg.config.keys import describe, is_user_key, values
-from stseg.config.renamed import FORMER_VALUES, RENAMED
 from stseg.errors import ConfigError
 from stseg.io.toml.settings import Given, as_toml, build
 from stseg.io.toml.text import parse_toml
@@ -39,22 +38,17 @@ def read_config(path: Path | None, assignments: Sequence[str] = ()) -> Config:
     given: dict[str, Any] = {} if path is None else _wrapped(_read_toml(Path(path)), str(path))
     for assignment in assignments:
         _assign(given, assignment)
-    _refuse_former(given)
     return build(Config, given, _OPTION if path is None else str(path))
 
 
 def parse_config(text: str, place: str, assignments: Sequence[str] = ()) -> Config:
-    """The configuration of a TOML text from `place` and assignments. As `read_config`.
-
-    Former names of keys are accepted in the text, which may come from an older run file.
-    """
+    """The configuration of a TOML text from `place` and assignments; raises as `read_config` does."""
     try:
-        given = _with_present_names(_wrapped(parse_toml(text), place))
+        given = _wrapped(parse_toml(text), place)
     except ValueError as error:
         raise ConfigError(place, "", f"what is not TOML ({error})", "TOML") from error
     for assignment in assignments:
         _assign(given, assignment)
-    _refuse_former(given)
     return build(Config, given, place)
 
 
@@ -96,34 +90,6 @@ def _wrapped(table: Mapping[str, Any], place: str) -> dict[str, Any]:
         name: _wrapped(value, place) if isinstance(value, dict) else Given(value, place)
         for name, value in table.items()
     }
-
-
-def _leaves(given: Mapping[str, Any], table: str = "") -> Iterator[tuple[str, Given]]:
-    """Each value with its full name, as `section.key`."""
-    for name, entry in given.items():
-        if isinstance(entry, Given):
-            yield table + name, entry
-        else:
-            yield from _leaves(entry, f"{table}{name}.")
-
-
-def _refuse_former(given: Mapping[str, Any]) -> None:
-    for key, entry in _leaves(given):
-        if key in RENAMED:
-            raise ConfigError(entry.place, key, "a former name", RENAMED[key])
-
-
-def _with_present_names(given: Mapping[str, Any]) -> dict[str, Any]:
-    renamed: dict[str, Any] = {}
-    for key, entry in _leaves(given):
-        if (key, entry.value) in FORMER_VALUES:
-            continue
-        *tables, name = RENAMED.get(key, key).split(".")
-        table = renamed
-        for part in tables:
-            table = table.setdefault(part, {})
-        table.setdefault(name, entry)  # of several former keys that are one now, the detector's comes first
-    return renamed
 
 
 def _assign(given: dict[str, Any], assignment: str) -> None:

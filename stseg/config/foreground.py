@@ -5,59 +5,45 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
-from stseg.config.ranges import require
+from stseg.config.ranges import Settings, at_least, not_negative, positive, share, within
 
 
 @dataclass(frozen=True)
-class BackgroundConfig:
+class BackgroundConfig(Settings):
     """Assumptions that all background models share (how-it-works, Foreground)."""
 
-    memory: float = 60.0
+    memory: float = positive(60.0)
     """Time constant with which the background follows slow changes, seconds."""
-    absorption_time: float = 600.0
+    absorption_time: float = positive(600.0)
     """How long an object that was moved in must stay still to become background, seconds."""
-    foreground_prior: float = 0.1
+    foreground_prior: float = share(0.1)
     """f: prior probability of a person at a pixel, 0..1; guides learning, and is taken out of the evidence."""
-    outlier_rate: float = 1e-3
+    outlier_rate: float = share(1e-3)
     """e: share of background colours that no learned mode explains, 0..1; keeps the likelihood below 1."""
-    shadow_prior: float = 0.1
+    shadow_prior: float = share(0.1)
     """s: prior probability of shadow on the background, 0..1."""
-    darkest_shadow: float = 0.5
+    darkest_shadow: float = share(0.5)
     """Brightness of the deepest shadow relative to full light, 0..1."""
-    shadow_confusion: float = 0.1
+    shadow_confusion: float = share(0.1)
     """m: share of people's colours that look like shadowed background, 0..1."""
-    match_distance: float = 5.0
+    match_distance: float = positive(5.0)
     """Distance within which a colour belongs to a learned mode, standard deviations."""
-    smoothing_radius: int = 1
+    smoothing_radius: int = not_negative(1, "0 or more pixels")
     """Radius over which log-odds are averaged, pixels; 0 for none."""
-
-    def __post_init__(self) -> None:
-        require(self.smoothing_radius >= 0, self, "smoothing_radius", "0 or more pixels")
-        for key in ("memory", "absorption_time", "match_distance"):
-            require(getattr(self, key) > 0, self, key, "a number above 0")
-        for key in ("foreground_prior", "outlier_rate", "shadow_prior", "darkest_shadow", "shadow_confusion"):
-            require(0 < getattr(self, key) < 1, self, key, "a number between 0 and 1")
 
 
 @dataclass(frozen=True)
 class MixtureConfig(BackgroundConfig):
     """Mixture of Gaussians per pixel (Stauffer and Grimson 1999; Zivkovic 2004)."""
 
-    modes: int = 3
+    modes: int = at_least(3, 1)
     """K: modes per pixel; with 1 no object is ever absorbed."""
-    background_weight: float = 0.1
+    background_weight: float = share(0.1)
     """Weight from which a mode is background: share of time in which it is visible, 0..1."""
-    minimum_sd: float = 4.0
+    minimum_sd: float = positive(4.0)
     """Lower bound of the standard deviation of a mode, grey levels: sensor noise and compression."""
-    initial_sd: float = 12.0
+    initial_sd: float = positive(12.0)
     """Standard deviation of a new mode, grey levels."""
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        require(self.modes >= 1, self, "modes", "1 or more")
-        require(0 < self.background_weight < 1, self, "background_weight", "a number between 0 and 1")
-        for key in ("minimum_sd", "initial_sd"):
-            require(getattr(self, key) > 0, self, key, "a number above 0")
 
 
 @dataclass(frozen=True)
@@ -66,48 +52,35 @@ class ChromaticConfig(MixtureConfig):
 
     minimum_sd: float = 3.0
     """Lower bound of the standard deviation of a mode's brightness, grey levels."""
-    chromatic_sd: float = 2.0
+    chromatic_sd: float = positive(2.0)
     """Lower bound of the standard deviation of a mode's colour across its ray, grey levels."""
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        require(self.chromatic_sd > 0, self, "chromatic_sd", "a number above 0")
 
 
 @dataclass(frozen=True)
 class CodebookConfig(BackgroundConfig):
     """Codebook per pixel (Kim et al. 2005)."""
 
-    codewords: int = 3
+    codewords: int = at_least(3, 1)
     """K: codewords per pixel; with 1 no object is ever absorbed."""
-    channel_sd: float = 2.5
+    channel_sd: float = positive(2.5)
     """sigma: standard deviation of a channel around its codeword, grey levels."""
-    highlight_prior: float = 0.02
+    highlight_prior: float = share(0.02)
     """h: prior probability of light brighter than any learned, 0..1."""
-    brightest_highlight: float = 1.3
+    brightest_highlight: float = within(1.3, lambda value: value > 1, "a number above 1")
     """Brightness of the strongest highlight relative to the brightest learned, above 1."""
-    recurrence: float = 0.1
+    recurrence: float = share(0.1)
     """Longest absence of background, as a share of the frames it is learned from, 0..1."""
-    absence: float = 10.0
+    absence: float = positive(10.0)
     """How long a new object may be out of view before it is forgotten, seconds."""
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        require(self.codewords >= 1, self, "codewords", "1 or more")
-        require(self.channel_sd > 0, self, "channel_sd", "a number above 0")
-        require(self.brightest_highlight > 1, self, "brightest_highlight", "a number above 1")
-        require(self.absence > 0, self, "absence", "a number above 0")
-        for key in ("highlight_prior", "recurrence"):
-            require(0 < getattr(self, key) < 1, self, key, "a number between 0 and 1")
 
 
 @dataclass(frozen=True)
-class ForegroundConfig:
+class ForegroundConfig(Settings):
     """Background model of colour cameras. Only the table of the chosen model has an effect."""
 
     model: Literal["mixture", "chromatic", "codebook"] = "mixture"
     """Background model; docs/configuration.md says where another than the mixture is better."""
-    body_rows: float = 60.0
+    body_rows: float = positive(60.0, "rows, above 0")
     """Image rows of a standing person that are enough: larger images are reduced by whole factors; 10000 for none."""
     mixture: MixtureConfig = field(default_factory=MixtureConfig)
     """Constants of the mixture."""
@@ -115,9 +88,6 @@ class ForegroundConfig:
     """Constants of the chromatic mixture."""
     codebook: CodebookConfig = field(default_factory=CodebookConfig)
     """Constants of the codebook."""
-
-    def __post_init__(self) -> None:
-        require(self.body_rows > 0, self, "body_rows", "rows, above 0")
 
     @property
     def chosen(self) -> BackgroundConfig:
@@ -127,17 +97,12 @@ class ForegroundConfig:
 
 
 @dataclass(frozen=True)
-class IlluminationConfig:
+class IlluminationConfig(Settings):
     """Sudden changes of light (how-it-works, Foreground)."""
 
-    changed_share: float = 0.2
+    changed_share: float = share(0.2)
     """Share of a view that must turn into foreground for a change of light, 0..1."""
-    change_time: float = 2.0
+    change_time: float = positive(2.0, "seconds, above 0")
     """Time within which that happens, seconds."""
-    blind_time: float = 1.0
+    blind_time: float = positive(1.0, "seconds, above 0")
     """Longest time for which a view is ignored while its new light is learned, seconds."""
-
-    def __post_init__(self) -> None:
-        require(0 < self.changed_share < 1, self, "changed_share", "a number between 0 and 1")
-        require(self.change_time > 0, self, "change_time", "seconds, above 0")
-        require(self.blind_time > 0, self, "blind_time", "seconds, above 0")

@@ -7,29 +7,29 @@ from dataclasses import dataclass
 import numpy as np
 
 from stseg.arrays import Floats
-from stseg.config.ranges import require
+from stseg.config.ranges import Settings, positive, require
 
 _TALLEST = 2.2
 """Metres; taller pillars reach above most grids."""
 
 
 @dataclass(frozen=True)
-class BodyConfig:
+class BodyConfig(Settings):
     """Population prior of body height and width. A person is a pillar: a body of revolution of that size.
 
     Widths of bodies do not go with their heights, but for small ones: below one spread under the mean height, mean
     widths fall in proportion.
     """
 
-    height_mean: float = 1.70
+    height_mean: float = positive(1.70)
     """Mean height of the people recorded, metres (HW12); the first guess of what the run learns."""
-    height_spread: float = 0.12
+    height_spread: float = positive(0.12)
     """Standard deviation of their heights, metres; the least that the run learns."""
-    width_mean: float = 0.42
+    width_mean: float = positive(0.42)
     """Mean width of a body across shoulders and arms, metres; the first guess."""
-    width_spread: float = 0.04
+    width_spread: float = positive(0.04)
     """Standard deviation of these widths, metres; the least that the run learns."""
-    prior_weight: float = 20.0
+    prior_weight: float = positive(20.0)
     """Weight of these means and spreads: seconds of one person; sizes that the run measures count beside them."""
     heights: tuple[float, ...] = (1.0, 1.25, 1.5, 1.6, 1.7, 1.8, 1.9)
     """Heights that the search for candidates tries, metres, rising."""
@@ -42,8 +42,7 @@ class BodyConfig:
         return self.width_mean * np.minimum(height / small, 1.0)
 
     def __post_init__(self) -> None:
-        for name in ("height_mean", "height_spread", "width_mean", "width_spread", "prior_weight"):
-            require(getattr(self, name) > 0, self, name, "a number above 0")
+        super().__post_init__()
         require(self.height_mean > 2 * self.height_spread, self, "height_mean", "more than two standard deviations")
         require(self.width_mean > 2 * self.width_spread, self, "width_mean", "more than two standard deviations")
         for name in ("heights", "box_heights"):
@@ -54,16 +53,12 @@ class BodyConfig:
 
 
 @dataclass(frozen=True)
-class MotionConfig:
+class MotionConfig(Settings):
     """Nearly constant velocity: white acceleration (Bar-Shalom, Li and Kirubarajan 2001, section 6.2.2)."""
 
-    speed_spread: float = 0.8
+    speed_spread: float = positive(0.8)
     """Standard deviation of walking velocity along each axis, metres per second."""
-    velocity_noise: float = 0.8
+    velocity_noise: float = positive(0.8)
     """Random change of velocity, metres per second per square root of a second (standard deviation)."""
-    position_noise: float = 0.15
+    position_noise: float = positive(0.15)
     """Error of one frame's position beyond its own covariance, metres (standard deviation): calibration and gait."""
-
-    def __post_init__(self) -> None:
-        for name in ("speed_spread", "velocity_noise", "position_noise"):
-            require(getattr(self, name) > 0, self, name, "a number above 0")

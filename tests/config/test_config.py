@@ -16,9 +16,8 @@ from stseg.config import BodyConfig, Config
 from stseg.config.effect import require_effect
 from stseg.config.keys import USER_KEYS, describe, values
 from stseg.config.ranges import require
-from stseg.config.renamed import RENAMED
 from stseg.errors import ConfigError
-from stseg.io.config_file import describe_config, format_config, parse_config, read_config
+from stseg.io.config_file import describe_config, format_config, read_config
 from stseg.io.toml.settings import Given, as_toml, build
 
 TOML = """
@@ -170,29 +169,6 @@ def test_a_fault_is_laid_where_the_value_was_given(tmp_path: Path) -> None:
         read_config(path)
     with pytest.raises(ConfigError, match=r"none\.toml: found No such file"):
         read_config(tmp_path / "none.toml")
-
-
-@pytest.mark.parametrize(
-    ("former", "present"),
-    [("ghosts.person=1", "detection.prior_log_odds"), ("light.rise=1", "illumination.changed_share")],
-)
-def test_a_former_name_is_answered_with_the_present_one(tmp_path: Path, former: str, present: str) -> None:
-    with pytest.raises(
-        ConfigError, match=f"--set: {former.partition('=')[0]}: found a former name, expected {present}"
-    ):
-        read(tmp_path / "c.toml", TOML, former)
-
-
-def test_every_former_name_leads_to_a_present_key() -> None:
-    present = tomllib.loads(format_config(Config()))
-    for name in RENAMED.values():
-        table = present
-        for part in name.split("."):
-            table = table[part]
-
-
-def test_the_configuration_of_an_older_run_file_is_read_by_its_present_names() -> None:
-    assert parse_config("[ghosts]\nperson = -3.0\n", "run.h5").detection.prior_log_odds == -3.0
 
 
 def test_a_text_needs_no_quotes_in_an_assignment() -> None:
