@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints, Singles
-from stseg.baselines.huang_wang_2012.mean_shift import _REACH, _SAME, _STEPS, _STILL
+from stseg.baselines.huang_wang_2012.mean_shift import _KERNEL_EXTENT, _MODE_RADIUS, _REST_STEP, _STEP_LIMIT
 from stseg.baselines.huang_wang_2012.pillar_strips import Pillars
 from stseg.geometry import Camera
 
@@ -59,21 +59,21 @@ def mean_shift(weight: Floats, reach: float) -> tuple[Floats, Ints]:
     """Places (row, column) of the modes, and the mode of each sample in the order of rows and columns (HW12 eq. 7)."""
     samples = np.argwhere(weight > 0)
     share = weight[weight > 0]
-    window = math.ceil(_REACH * reach)
+    window = math.ceil(_KERNEL_EXTENT * reach)
     found: list[Floats] = []
     own = []
     for start in samples:
         place = start.astype(float)
-        for _ in range(_STEPS):
+        for _ in range(_STEP_LIMIT):
             off = samples - place
             near = (np.abs(off) <= window).all(1)
             pull = np.where(near, share * np.exp(-(off**2).sum(1) / reach**2), 0.0)
             to = (pull[:, None] * samples).sum(0) / pull.sum()
             moved = math.dist(to, place)
             place = to
-            if moved < _STILL:
+            if moved < _REST_STEP:
                 break
-        met = [m for m, mode in enumerate(found) if math.dist(mode, place) < _SAME * reach]
+        met = [m for m, mode in enumerate(found) if math.dist(mode, place) < _MODE_RADIUS * reach]
         if not met:
             found.append(place)
         own.append(met[0] if met else len(found) - 1)

@@ -13,24 +13,24 @@ from stseg.kernels.accelerate import wide_kernel
 from stseg.records.people import Explanation
 from stseg.records.tables import APPEARANCE, FEATURES
 
-_APART = 0.5
-"""Share of a body that a view must see."""
-_FOREGROUND = 0.5
+_MINIMUM_VISIBILITY = 0.5
+"""Least share of a body that a view sees past others, for a row."""
+_MINIMUM_FOREGROUND = 0.5
 """Least likelihood of a pixel whose colour counts."""
 _SLICES = ((0.17, 0.5), (0.5, 0.95))
 """Trunk and legs: from and to, as shares of the body's extent in the image, from the head down."""
-_LEAST_PIXELS = 8
+_MINIMUM_PIXELS = 8
 """Least pixels of the raster in each of them."""
-_DARK = 16.0
+_DARK_OFFSET = 16.0
 """Grey levels added to a colour before its logarithm is taken: noise of dark pixels says little."""
-_LOGARITHM = np.log(np.arange(256) + _DARK)
+_LOGARITHM = np.log(np.arange(256) + _DARK_OFFSET)
 
 
 def appearance_rows(
     frame: int, explanation: Explanation, tables: Sequence[BodyTable], axes: Floats | None,
     observations: Sequence[Observation], evidence: Sequence[ViewEvidence], images: Sequence[Observation] = (),
 ) -> Rows:  # fmt: skip
-    """APPEARANCE rows of a frame: for each view and person that it sees apart from others.
+    """APPEARANCE rows of a frame: for each view and person that it sees past others.
 
     Parameters
     ----------
@@ -44,13 +44,13 @@ def appearance_rows(
     observations, evidence
         Of each view, in the rig's order.
     images
-        Colour frames beside boxes, of each view, None where it has none; empty where none has.
+        Colour frames of views that deliver boxes, of each view, None where it has none; empty where none has.
     """
     parts = []
-    beside = images or [None] * len(observations)
-    for k, (seen, likely, image) in enumerate(zip(observations, evidence, beside, strict=True)):
-        apart = explanation.people.visibility[k] >= _APART
-        rows = np.zeros(len(apart), APPEARANCE)
+    pictures = images or [None] * len(observations)
+    for k, (observation, likely, image) in enumerate(zip(observations, evidence, pictures, strict=True)):
+        is_visible = explanation.people.visibility[k] >= _MINIMUM_VISIBILITY
+        rows = np.zeros(len(is_visible), APPEARANCE)
         rows["frame"], rows["view"] = frame, k
         rows["x"], rows["y"] = explanation.people.ground.T
         rows["features"], rows["colours"] = np.nan, np.nan
@@ -60,25 +60,25 @@ def appearance_rows(
             rows["features"][owner[owner >= 0]] = np.pad(reduced, ((0, 0), (0, FEATURES - axes.shape[1])))
         if isinstance(likely, Boxes) and isinstance(image, np.ndarray):
             middles = _middles(likely, explanation.box_assignment[k], image.shape[:2])
-            rows["colours"] = _colours(explanation, k, tables[k], apart, np.asarray(image, np.uint8), middles)
-        elif isinstance(likely, np.ndarray) and isinstance(seen, np.ndarray) and seen.ndim == 3:
-            rows["colours"] = _colours(explanation, k, tables[k], apart, np.asarray(seen, np.uint8), likely)
-        known = np.isfinite(rows["features"]).any(axis=1) | np.isfinite(rows["colours"]).all(axis=1)
-        parts.append(rows[apart & known])
+            rows["colours"] = _colours(explanation, k, tables[k], is_visible, np.asarray(image, np.uint8), middles)
+        elif isinstance(likely, np.ndarray) and isinstance(observation, np.ndarray) and observation.ndim == 3:
+            rows["colours"] = _colours(explanation, k, tables[k], is_visible, np.asarray(observation, np.uint8), likely)
+        has_appearance = np.isfinite(rows["features"]).any(axis=1) | np.isfinite(rows["colours"]).all(axis=1)
+        parts.append(rows[is_visible & has_appearance])
     return np.concatenate([np.zeros(0, APPEARANCE), *parts])
 
 
 def _middles(boxes: Boxes, owner: Ints, shape: tuple[int, ...]) -> Singles:
     """Where the boxes of people show bodies: 1 in the middle half of their width, 0 elsewhere, float32 (v, u)."""
-    shown = np.zeros(shape, np.float32)
+    body_mask = np.zeros(shape, np.float32)
     for left, top, width, height in boxes.pixel[owner >= 0].tolist():
         columns = slice(max(round(left + width / 4), 0), max(round(left + 3 * width / 4), 0))
-        shown[max(round(top), 0) : max(round(top + height), 0), columns] = 1.0
-    return shown
+        body_mask[max(round(top), 0) : max(round(top + height), 0), columns] = 1.0
+    return body_mask
 
 
 def _colours(
-    explanation: Explanation, view: int, table: BodyTable, apart: Flags, image: Bytes, likelihood: Singles
+    explanation: Explanation, view: int, table: BodyTable, is_visible: Flags, image: Bytes, likelihood: Singles
 ) -> Singles:
     """Mean logarithms of blue, green and red of trunk and legs of each person (n, 6); nan where too little is seen.
 
@@ -87,8 +87,8 @@ def _colours(
     people, step = explanation.people, explanation.raster_step[view]
     box = table.boxes_of(people.ground, people.height)
     total, count = np.zeros((len(people), len(_SLICES), 3)), np.zeros((len(people), len(_SLICES)), np.int64)
-    _add_colours(explanation.pixel_assignment[view], step, apart, box, image, likelihood, total, count)
-    enough = count >= _LEAST_PIXELS
+    _add_colours(explanation.pixel_assignment[view], step, is_visible, box, image, likelihood, total, count)
+    enough = count >= _MINIMUM_PIXELS
     found = np.full(total.shape, np.nan, np.float32)
     found[enough] = total[enough] / count[enough][:, None]
     return found.reshape(len(people), len(_SLICES) * 3)
@@ -96,12 +96,12 @@ def _colours(
 
 @wide_kernel
 def _add_colours(
-    assigned: PixelAssignment, step: int, apart: Flags, box: Floats, image: Bytes, likelihood: Singles, total: Floats,
-    count: Ints,
+    assigned: PixelAssignment, step: int, is_visible: Flags, box: Floats, image: Bytes, likelihood: Singles,
+    total: Floats, count: Ints,
 ) -> None:  # fmt: skip
     """Add the logarithms of colours to total (person, slice, channel), and their number to count (person, slice).
 
-    Of each raster pixel that is assigned (v, u) to a person seen apart (person,), whose box (person, 4) is in pixels,
+    Of each raster pixel that is assigned (v, u) to a visible person (person,), whose box (person, 4) is in pixels,
     the pixel in its middle counts.
     """
     for v in range(assigned.shape[0]):
@@ -112,10 +112,10 @@ def _add_colours(
             continue
         for u in range(len(here)):
             person = here[u]
-            if person < 0 or not apart[person]:
+            if person < 0 or not is_visible[person]:
                 continue
             column = min(u * step + step // 2, image.shape[1] - 1)
-            if not likelihood[row, column] > _FOREGROUND:
+            if not likelihood[row, column] > _MINIMUM_FOREGROUND:
                 continue
             down = (row - box[person, 1]) / (box[person, 3] - box[person, 1])
             for s in range(len(_SLICES)):

@@ -26,8 +26,8 @@ from scenes import (
 
 from stseg.arrays import Floats, ViewEvidence
 from stseg.detection.detector import Detector
-from stseg.detection.evidence.open_pixels import OpenPixels
 from stseg.detection.evidence.pillar_evidence import fill_scores
+from stseg.detection.evidence.unexplained_pixels import UnexplainedPixels
 from stseg.detection.prior import Prior
 from stseg.engine.committed_frames import CommittedFrames
 from stseg.engine.pipeline import Pipeline
@@ -167,7 +167,7 @@ def test_the_moving_ghost_is_borne_out_by_both_views() -> None:
         seen, said = frame_pass.observe(show("pixels", rig.cameras, strollers(frame))), np.zeros((3, len(ground)))
         evidence, lattice = frame_pass.evidence(seen, nothing_known), frame_pass.pixel_lattice
         nobody = np.full(int(lattice.shapes.prod(1).sum()), -1, np.int16)
-        pixels = OpenPixels.of(evidence.rasters, nobody, lattice, evidence.extremes)
+        pixels = UnexplainedPixels.of(evidence.rasters, nobody, lattice, evidence.extremes)
         weight = FEW_HEIGHTS.effective_observations
         fill_scores(pixels, lattice, np.array([1]), np.zeros(0, np.int64), -np.inf, weight, said)
         here = distances(ground, crossings(strollers(frame), rig)).min(1) < 0.3

@@ -1,4 +1,4 @@
-"""The birth lattice: places on the ground where the evidence that nobody explains yet may show a further person."""
+"""The birth lattice: places on the ground where the unexplained evidence may show a further person."""
 
 from __future__ import annotations
 
@@ -6,16 +6,16 @@ import numpy as np
 
 from stseg.arrays import Floats
 from stseg.detection.evidence.candidate_evidence import peaks
-from stseg.detection.evidence.open_pixels import OpenPixels
 from stseg.detection.evidence.pillar_evidence import fill_scores
+from stseg.detection.evidence.unexplained_pixels import UnexplainedPixels
 from stseg.detection.search.map_estimate import MapEstimate
 from stseg.geometry import Grid
 from stseg.records.candidates import Candidates
 
-_HOPELESS = -4.0
-"""Where the probed heights are worth less, no other height makes a candidate, nats."""
-_ALIKE = 0.8
-"""Ratio of two heights above which what one pillar shows tells of the other."""
+_MINIMUM_PROBE_SCORE = -4.0
+"""Score of the probe heights below which no other height makes a candidate, nats."""
+_SIMILAR_HEIGHT_RATIO = 0.8
+"""Ratio of two heights above which their pillars have similar scores."""
 
 
 def lattice(grid: Grid, spacing: float) -> Floats:
@@ -28,7 +28,7 @@ def lattice(grid: Grid, spacing: float) -> Floats:
 def lattice_candidates(estimate: MapEstimate, lattice_ground: Floats) -> Candidates:
     """Peaks of the lattice's score by the evidence that an estimate leaves unexplained.
 
-    Pixels are summed at one or two heights first, and at the others only where those are not all hopeless.
+    Pixels are summed at one or two heights first, and at the others only where one of those scores well enough.
     `lattice_ground` float64 (y, x, 2) is that of the views, metres.
     """
     evidence = estimate.evidence
@@ -39,14 +39,14 @@ def lattice_candidates(estimate: MapEstimate, lattice_ground: Floats) -> Candida
         if boxes is not None:
             score += boxes.score(assigned < 0)
     if len(evidence.rasters):
-        pixels = OpenPixels.of(evidence.rasters, estimate.owners, evidence.lattice, evidence.extremes)
+        pixels = UnexplainedPixels.of(evidence.rasters, estimate.owners, evidence.lattice, evidence.extremes)
         probes = _probes(heights)
         others, weight = np.delete(np.arange(len(heights)), probes), prior.config.effective_observations
-        fill_scores(pixels, evidence.lattice, np.array(probes), others, _HOPELESS, weight, score)
+        fill_scores(pixels, evidence.lattice, np.array(probes), others, _MINIMUM_PROBE_SCORE, weight, score)
     return peaks(score.reshape(-1, rows, columns), lattice_ground, heights, prior.body.width_of(heights))
 
 
 def _probes(heights: Floats) -> list[int]:
-    """Heights that show whether a place is worth a look: the middle one, and a small one where they differ much."""
+    """Indices of the heights that are tried first: the middle one, and a small one where they differ much."""
     middle, small = len(heights) // 2, len(heights) // 4
-    return [middle, small] if heights[small] < _ALIKE * heights[middle] else [middle]
+    return [middle, small] if heights[small] < _SIMILAR_HEIGHT_RATIO * heights[middle] else [middle]

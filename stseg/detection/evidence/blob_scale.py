@@ -13,9 +13,9 @@ import numpy as np
 
 from stseg.arrays import Floats, Singles
 from stseg.config import BodyConfig, DetectionConfig
-from stseg.detection.evidence.open_pixels import OpenPixels
 from stseg.detection.evidence.pillar_evidence import add_pillar_evidence, fill_around
 from stseg.detection.evidence.pixel_lattice import PixelLattice
+from stseg.detection.evidence.unexplained_pixels import UnexplainedPixels
 from stseg.kernels.accelerate import kernel
 from stseg.kernels.pointed_tuples import pointed
 
@@ -37,15 +37,15 @@ def blob_scales(
     scale, owner = np.empty(rasters.shape, np.float32), lattice.owner.reshape(-1)
     certain = float(np.log((1 - config.pixel_miss_rate) / config.pixel_clutter_rate))
     _fill_scales(
-        OpenPixels.of(rasters, owner, lattice, extremes), lattice, len(body.heights), config.effective_observations,
-        config.prior_log_odds, certain, scale,
+        UnexplainedPixels.of(rasters, owner, lattice, extremes), lattice, len(body.heights),
+        config.effective_observations, config.prior_log_odds, certain, scale,
     )  # fmt: skip
     return scale
 
 
 @kernel
 def _fill_scales(
-    every_pixel: OpenPixels,
+    every_pixel: UnexplainedPixels,
     every_pillar: PixelLattice,
     heights: int,
     weight: float,
@@ -61,17 +61,17 @@ def _fill_scales(
             line = scale[view, row, : every_pillar.shapes[view, 1]]
             for u in range(len(line)):
                 line[u] = 0.0
-    (more, said), every = np.empty((2, views)), len(every_pillar.outlines.first) // max(views, 1)
-    cells = every // heights
+    (more, parts), pillars = np.empty((2, views)), len(every_pillar.outlines.first) // max(views, 1)
+    cells = pillars // heights
     for cell in range(cells):
         pillar = cell * heights + heights // 2
         fill_around(cell, pixels, lattice, more)
-        if add_pillar_evidence(prior, 0.0, pillar, cell, every, pixels, lattice, weight, more, said) > -np.inf:
+        if add_pillar_evidence(prior, 0.0, pillar, cell, pillars, pixels, lattice, weight, more, parts) > -np.inf:
             total = 0.0
             for view in range(views):
-                total += said[view] / weight
+                total += parts[view] / weight
             for view in range(views if prior + weight * total > 0 else 0):
-                _raise_inside(view, view * every + pillar, said[view] / weight, certain, lattice, scale)
+                _raise_inside(view, view * pillars + pillar, parts[view] / weight, certain, lattice, scale)
 
 
 @kernel

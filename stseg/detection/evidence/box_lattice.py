@@ -1,6 +1,6 @@
-"""Score of the lattice's pillars by the boxes of one view that nobody takes.
+"""Score of the lattice's pillars by the boxes of one view that are assigned to no member.
 
-A frame is looked at several times, each time with other boxes free; the pillars that fit a box are found once.
+A frame has several rounds, each with other boxes free; the pillars that fit a box are found once.
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ from stseg.bodies.pillar_index import fill_fits
 from stseg.bodies.views import BoxView, ViewObservation
 from stseg.kernels.accelerate import kernel
 
-_OPTIMISM = 0.3
+_EXPECTED_MISSING_COST = 0.3
 """Cost of a missing box while candidates are sought, nats: occluders are not known yet."""
 
 
 class BoxLattice:
-    """The pillars of a view's lattice beside the boxes of a frame."""
+    """The pillars of a view's lattice and the boxes of a frame."""
 
     def __init__(self, view: BoxView, observation: ViewObservation) -> None:
         self._view, self._observation = view, observation
@@ -37,12 +37,12 @@ class BoxLattice:
 
     def _fits_of(self, box: int) -> tuple[Labels, Floats]:
         """The pillars that gain by a box, int32 (k,), and its log-likelihood given each, nats, float64 (k,)."""
-        index, seen = self._view.index, self._observation
+        index, observation = self._view.index, self._observation
         pillar, fit = np.empty(len(index.order), np.int32), np.empty(len(index.order))
         width, height = map(float, self._view.camera.size)
         number = fill_fits(
-            index, self._pillars, seen.edges[box], seen.tolerance[box], float(seen.belief[box]), width, height,
-            -self._view.config.box_log_ratio - _OPTIMISM, pillar, fit,
+            index, self._pillars, observation.edges[box], observation.tolerance[box], float(observation.belief[box]),
+            width, height, -self._view.config.box_log_ratio - _EXPECTED_MISSING_COST, pillar, fit,
         )  # fmt: skip
         return pillar[:number].copy(), fit[:number].copy()
 
@@ -58,4 +58,4 @@ def _raise_to(pillar: Labels, fit: Floats, best: Floats) -> None:
 def _take_for_score(best: Floats, found: Floats, log_ratio: float) -> None:
     """Make scores of log-likelihoods of the best box, best (pillar,), where the view may find (pillar,) the body."""
     for i in range(len(best)):
-        best[i] = max(log_ratio + best[i], -_OPTIMISM * found[i]) if found[i] > 0 else 0.0
+        best[i] = max(log_ratio + best[i], -_EXPECTED_MISSING_COST * found[i]) if found[i] > 0 else 0.0

@@ -14,24 +14,24 @@ from stseg.detection.evidence.occlusion import hiders_of
 from stseg.detection.problem import BoxEvidence, PixelEvidence, no_rows
 from stseg.records.candidates import Candidates
 
-MOST = 250
+CANDIDATE_LIMIT = 250
 """Most candidates that one round adds."""
-_AROUND = np.indices((3, 3)).reshape(2, 9)
+_NEIGHBOURHOOD = np.indices((3, 3)).reshape(2, 9)
 """Rows and columns of a place and its neighbours, from the first of them on."""
-_LEAST_SCORE = 0.0
+_MINIMUM_SCORE = 0.0
 """Score above which a peak of the lattice is a candidate, nats."""
 
 
 def peaks(score: Floats, lattice_ground: Floats, heights: Floats, widths: Floats) -> Candidates:
     """Local maxima of a lattice score (height, y, x) over the ground (y, x, 2), best first."""
     best = score.max(0)
-    rows, columns = np.nonzero(best > _LEAST_SCORE)  # few places, so these alone are compared with their neighbours
+    rows, columns = np.nonzero(best > _MINIMUM_SCORE)  # few places, so these alone are compared with their neighbours
     framed = np.full((best.shape[0] + 2, best.shape[1] + 2), -np.inf)
     framed[1:-1, 1:-1] = best
-    around = framed[rows[:, None] + _AROUND[0], columns[:, None] + _AROUND[1]]
+    around = framed[rows[:, None] + _NEIGHBOURHOOD[0], columns[:, None] + _NEIGHBOURHOOD[1]]
     highest = best[rows, columns] == around.max(1, initial=-np.inf)
     rows, columns = rows[highest], columns[highest]
-    order = np.argsort(-best[rows, columns], kind="stable")[:MOST]
+    order = np.argsort(-best[rows, columns], kind="stable")[:CANDIDATE_LIMIT]
     rows, columns = rows[order], columns[order]
     chosen = score[:, rows, columns].argmax(0)
     return Candidates(lattice_ground[rows, columns], heights[chosen], widths[chosen])
@@ -72,11 +72,11 @@ def box_evidence(
     views: Sequence[View],
     observations: Sequence[ViewObservation | None],
     bodies: ProjectedBodies,
-    known: BoxEvidence | None = None,
+    base: BoxEvidence | None = None,
 ) -> BoxEvidence:
     """Evidence of all views that deliver boxes; a blind one (None) has the candidates outside its image.
 
-    `known` is that of the first candidates, where it was found before: the others alone are compared with the boxes.
+    `base` is that of the first candidates, where it was found before: the others alone are compared with the boxes.
     """
     chosen = [
         (view, observation) for view, observation in zip(views, observations, strict=True) if isinstance(view, BoxView)
@@ -85,21 +85,21 @@ def box_evidence(
         return _no_boxes(bodies.edges.shape[1])
     sizes = np.array([view.camera.size for view, _ in chosen], float)
     boxes = np.array([len(observation.edges) if observation else 0 for _, observation in chosen], np.int64)
-    candidates, first = bodies.edges.shape[1], 0 if known is None else known.inside.shape[1]
+    candidates, first = bodies.edges.shape[1], 0 if base is None else base.inside.shape[1]
     match = np.full((len(chosen), candidates, boxes.max(initial=0)), -np.inf)
     inside = np.zeros((len(chosen), candidates))
-    if known is not None:
-        match[:, :first], inside[:, :first] = known.match, known.inside
+    if base is not None:
+        match[:, :first], inside[:, :first] = base.match, base.inside
     for k, (_, observation) in enumerate(chosen):
         if observation is not None:
-            edges, own, (width, height) = bodies.edges[k, first:], match[k, first:], sizes[k].tolist()
+            edges, (width, height) = bodies.edges[k, first:], sizes[k].tolist()
             fill_match(
                 edges, observation.edges, observation.tolerance, observation.belief, width, height,
-                own[:, : len(observation.edges)],
+                match[k, first:, : len(observation.edges)],
             )  # fmt: skip
             fill_inside(edges, width, height, inside[k, first:])
     is_blind = np.array([observation is None for _, observation in chosen], bool)
-    hiders = hiders_of(bodies.edges, bodies.distance, sizes, is_blind, known.hiders if known else no_rows(), first)
+    hiders = hiders_of(bodies.edges, bodies.distance, sizes, is_blind, base.hiders if base else no_rows(), first)
     return BoxEvidence(match, boxes, hiders, inside, np.ones(candidates))
 
 
@@ -109,13 +109,13 @@ def _no_boxes(candidates: int) -> BoxEvidence:
     return BoxEvidence(np.zeros((0, candidates, 0)), np.zeros(0, np.int64), no_rows(), nothing, np.ones(candidates))
 
 
-def stacked_rasters(views: Sequence[View], own: Sequence[Singles | None]) -> Singles:
+def stacked_rasters(views: Sequence[View], of_views: Sequence[Singles | None]) -> Singles:
     """Rasters of all views that deliver pixels, float32 (view, v, u); zero where a view is blind, unset beyond each."""
-    chosen = [(view, seen) for view, seen in zip(views, own, strict=True) if isinstance(view, PixelView)]
+    chosen = [(view, raster) for view, raster in zip(views, of_views, strict=True) if isinstance(view, PixelView)]
     shapes = np.array([view.shape for view, _ in chosen], int).reshape(-1, 2)
     rasters = np.empty((len(chosen), *shapes.max(0, initial=0)), np.float32)
-    for raster, (view, seen) in zip(rasters, chosen, strict=True):
-        raster[: view.shape[0], : view.shape[1]] = 0.0 if seen is None else seen
+    for raster, (view, source) in zip(rasters, chosen, strict=True):
+        raster[: view.shape[0], : view.shape[1]] = 0.0 if source is None else source
     return rasters
 
 

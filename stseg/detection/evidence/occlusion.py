@@ -1,6 +1,6 @@
-"""Occlusion of pillars by each other in the views with boxes, as lists: few candidates hide a part of another.
+"""Occlusion of pillars by each other in the views with boxes, as ragged rows: few candidates hide a part of another.
 
-A pool grows from search to search of a frame, and the lists of those that it had stay; only pairs with somebody new are
+A pool grows from search to search of a frame, and the lists of those that it had stay; only pairs with new ones are
 looked for.
 """
 
@@ -20,7 +20,7 @@ _INSET = 0.1
 
 @kernel
 def hiders_of(
-    bodies: Floats, distance: Floats, sizes: Floats, is_blind: Flags, known: RaggedArray, known_candidates: int
+    bodies: Floats, distance: Floats, sizes: Floats, is_blind: Flags, base: RaggedArray, base_candidates: int
 ) -> RaggedArray:
     """Occluders of each candidate, rising, with the share that each leaves visible of the box inside the image.
 
@@ -34,7 +34,7 @@ def hiders_of(
         Width and height of the images, pixels.
     is_blind : bool (view,)
         Views without occlusion.
-    known, known_candidates
+    base, base_candidates
         The lists of the first candidates, and how many these are.
 
     Returns
@@ -44,15 +44,15 @@ def hiders_of(
     """
     views, candidates = distance.shape
     start = np.zeros(views * candidates + 1, np.int64)
-    most = len(known.item) + views * (candidates * candidates - known_candidates * known_candidates)
+    most = len(base.item) + views * (candidates * candidates - base_candidates * base_candidates)
     item, value, number = np.empty(most, np.int64), np.empty(most), 0  # what is not filled takes no memory
     for view in range(views):
         for i in range(candidates):
             first = 0
-            if i < known_candidates:
-                first, row = known_candidates, view * known_candidates + i
-                for k in range(known.start[row], known.start[row + 1]):
-                    item[number], value[number] = known.item[k], known.value[k]
+            if i < base_candidates:
+                first, row = base_candidates, view * base_candidates + i
+                for k in range(base.start[row], base.start[row + 1]):
+                    item[number], value[number] = base.item[k], base.value[k]
                     number += 1
             if not is_blind[view]:
                 number = _add_hiders(i, first, bodies[view], distance[view], sizes[view], item, value, number)

@@ -14,9 +14,9 @@ from stseg.bodies.views import PixelView, View
 from stseg.config import BodyConfig
 from stseg.kernels.accelerate import kernel
 
-STRIP = 8
+STRIP_CELLS = 8
 """Cells of the lattice in a strip."""
-_DRAWN = 4096
+_PILLARS_AT_ONCE = 4096
 """Pillars of the lattice that are drawn at once: until they are packed, each takes as many rows as the tallest."""
 
 
@@ -33,10 +33,10 @@ class PixelLattice(NamedTuple):
         The same around the outlines of a strip's cells.
     shapes : int64 (view, 2)
         Rows and columns of the rasters.
-    nobody : int16 (view, v * u)
+    owner : int16 (view, v * u)
         Owners of the pixels of rasters, -1, but while a search uses them.
     above, left_of
-        Scratch of `stseg.detection.evidence.open_pixels`, whose memory would have to be asked for anew in each frame.
+        Scratch of `stseg.detection.evidence.unexplained_pixels`, allocated once.
     """
 
     outlines: PackedOutlines
@@ -53,7 +53,7 @@ class PixelLattice(NamedTuple):
         chosen = [view for view in views if isinstance(view, PixelView)]
         outlines = PackedOutlines.of(_drawn(chosen, lattice_ground, body))
         boxes = np.zeros((len(chosen), len(lattice_ground), 4), np.int16)
-        strips = np.zeros((len(chosen), -(-len(lattice_ground) // STRIP), 4), np.int16)
+        strips = np.zeros((len(chosen), -(-len(lattice_ground) // STRIP_CELLS), 4), np.int16)
         boxes[..., :2] = strips[..., :2] = np.iinfo(np.int16).max
         _fill_boxes(outlines, len(body.heights), len(lattice_ground), boxes, strips)
         shapes = np.array([view.shape for view in chosen], np.int64).reshape(-1, 2)
@@ -70,9 +70,9 @@ def _drawn(
     heights = np.tile(np.asarray(body.heights), len(lattice_ground))
     places, widths = np.repeat(lattice_ground, len(body.heights), 0), body.width_of(heights)
     for view in views:
-        for begin in range(0, len(heights), _DRAWN):
-            own = slice(begin, begin + _DRAWN)
-            yield view.outlines(places[own], heights[own], widths[own])
+        for begin in range(0, len(heights), _PILLARS_AT_ONCE):
+            block = slice(begin, begin + _PILLARS_AT_ONCE)
+            yield view.outlines(places[block], heights[block], widths[block])
 
 
 @kernel
@@ -80,7 +80,7 @@ def _fill_boxes(outlines: PackedOutlines, heights: int, cells: int, boxes: Short
     """Widen boxes (view, cell, 4) and strips (view, strip, 4), empty before, around the outlines."""
     for i in range(len(outlines.first)):
         view, cell, row = i // (heights * cells), i // heights % cells, outlines.first[i]
-        box, strip = boxes[view, cell], strips[view, cell // STRIP]
+        box, strip = boxes[view, cell], strips[view, cell // STRIP_CELLS]
         for k in range(outlines.start[i], outlines.start[i + 1]):
             left, right = outlines.spans[k]
             if right > left:

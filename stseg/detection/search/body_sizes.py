@@ -30,11 +30,11 @@ from stseg.config import BodyConfig
 from stseg.detection.search.refine import EvidenceAssignment, RefinedPlaces
 from stseg.records.sizes import Sizes, log_heavy_tailed
 
-_STEPS = 25
+_LATTICE_SIZE = 25
 """Sizes on the lattice."""
-_HEIGHTS = np.linspace(0.75, 2.19, _STEPS)
+_HEIGHTS = np.linspace(0.75, 2.19, _LATTICE_SIZE)
 """Heights of the lattice, metres: children to the tallest."""
-_WIDTHS = np.linspace(0.26, 0.86, _STEPS)
+_WIDTHS = np.linspace(0.26, 0.86, _LATTICE_SIZE)
 """Widths of the lattice, metres: the slim to coats, bags and prams."""
 
 
@@ -43,7 +43,7 @@ def body_sizes(
     width: Floats,
     views: Sequence[View],
     observations: Sequence[ViewObservation | None],
-    own: EvidenceAssignment,
+    assignment: EvidenceAssignment,
     body: BodyConfig,
 ) -> Sizes:
     """E step: posteriors of people's sizes after one frame, under the population prior.
@@ -60,15 +60,19 @@ def body_sizes(
     found = Sizes.of_population(len(width), body)
     measured = [
         _PixelLabels(view, observation.label_values, owner)
-        for view, observation, owner in zip(views, observations, own.pixels, strict=True)
+        for view, observation, owner in zip(views, observations, assignment.pixels, strict=True)
         if isinstance(view, PixelView) and observation is not None
     ]
     if not measured or not len(width):
         return replace(found, height=places.height, height_variance=places.height_variance)
-    each, all_steps = (len(width), 1), (1, _STEPS)
-    score = _score(places.ground, np.tile(_HEIGHTS, each), np.tile(width[:, None], all_steps), measured, own.number)
+    each, all_steps = (len(width), 1), (1, _LATTICE_SIZE)
+    score = _score(
+        places.ground, np.tile(_HEIGHTS, each), np.tile(width[:, None], all_steps), measured, assignment.number
+    )
     height, height_variance = _posterior(_HEIGHTS, score, body.height_mean, body.height_spread)
-    score = _score(places.ground, np.tile(height[:, None], all_steps), np.tile(_WIDTHS, each), measured, own.number)
+    score = _score(
+        places.ground, np.tile(height[:, None], all_steps), np.tile(_WIDTHS, each), measured, assignment.number
+    )
     return Sizes(
         height, height_variance, *_posterior(_WIDTHS, score, body.width_of(height[:, None]), body.width_spread)
     )
@@ -88,19 +92,19 @@ def _posterior(lattice: Floats, score: Floats, mean: Floats | float, spread: flo
     Those of the population, `mean`, which may be a column of one each, and `spread` squared, where all sizes are as
     likely.
     """
-    seen = np.ptp(score, axis=1) > 0
+    is_measured = np.ptp(score, axis=1) > 0
     score = score + log_heavy_tailed((lattice - mean) / spread)
     weight = np.exp(score - score.max(1, keepdims=True))
     weight /= weight.sum(1, keepdims=True)
     size = weight @ lattice
     variance = (weight * (lattice - size[:, None]) ** 2).sum(1)
-    return np.where(seen, size, np.ravel(mean)), np.where(seen, variance, spread**2)
+    return np.where(is_measured, size, np.ravel(mean)), np.where(is_measured, variance, spread**2)
 
 
 def _score(ground: Floats, heights: Floats, widths: Floats, measured: Sequence[_PixelLabels], number: Ints) -> Floats:
     """Log-likelihood in all views of people's pillars at their places (person, 2), nats, float64 (person, pillar)."""
-    score, everywhere = np.zeros(heights.shape), np.repeat(ground[:, None], _STEPS, 1)
-    pillars = measured[0].view.tried(everywhere, heights, widths)
+    score, ground_of_each = np.zeros(heights.shape), np.repeat(ground[:, None], _LATTICE_SIZE, 1)
+    pillars = measured[0].view.tried(ground_of_each, heights, widths)
     for view, values, owner in measured:
         sums, area = view.open_sums(values, owner, number, pillars)
         score += sums / np.maximum(area.mean(1, keepdims=True), 1.0)

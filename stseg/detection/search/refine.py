@@ -13,7 +13,7 @@ import numpy as np
 from stseg.arrays import Floats, Ints, Shorts
 from stseg.bodies.box_fit import fill_own_match
 from stseg.bodies.views import BoxView, PixelView, TriedPillars, View, ViewObservation
-from stseg.detection.prior import Prior
+from stseg.detection.frame_evidence import FrameEvidence
 from stseg.records.candidates import Candidates
 
 _PATCH_SPACING = 0.08
@@ -74,113 +74,75 @@ class RefinedPlaces:
 
 
 def refine(
-    pool: Candidates,
-    views: Sequence[View],
-    observations: Sequence[ViewObservation | None],
-    own: EvidenceAssignment,
-    prior: Prior,
-    track_index: Ints,
-    known: dict[bytes, Floats],
+    pool: Candidates, evidence: FrameEvidence, assignment: EvidenceAssignment, track_index: Ints
 ) -> RefinedPlaces:
-    """The posterior of each person's place and height.
+    """The posterior of each person's place and height, by the boxes and pixels assigned to each.
 
-    Parameters
-    ----------
-    pool
-        The people.
-    own
-        Boxes and pixels assigned to each.
-    prior
-        The frame's prior.
-    track_index : int64 (n,)
-        The predicted track that each person continues, -1 for births.
-    known
-        What boxes said of patches before in this frame, by place and boxes; this adds to it.
-
-    Returns
-    -------
-    RefinedPlaces
-        Means and variances.
+    `track_index` int64 (n,) is the predicted track that each person continues, -1 for births.
     """
-    tried = np.asarray(prior.body.heights)
-    if len(tried) > _HEIGHT_LIMIT and not any(isinstance(view, BoxView) for view in views):
-        tried = tried[::2]
+    views, prior = evidence.views, evidence.prior
+    heights = np.asarray(prior.body.heights)
+    if len(heights) > _HEIGHT_LIMIT and not any(isinstance(view, BoxView) for view in views):
+        heights = heights[::2]
     patch = pool.ground[:, None] + _PATCH
     if all(isinstance(view, BoxView) for view in views) and len(pool):
-        score = _known_scores(pool, views, observations, own, prior, tried, known)
+        score = _cached_scores(pool, evidence, assignment, heights)
     else:
-        score = _scores(pool, views, observations, own, prior, tried)
-    met = np.flatnonzero(track_index >= 0)
-    score[met] += prior.predicted.place_log_density(track_index[met], patch[met])[:, None]
-    return _posterior(score, patch, tried)
-
-
-def _known_scores(
-    pool: Candidates,
-    views: Sequence[View],
-    observations: Sequence[ViewObservation | None],
-    own: EvidenceAssignment,
-    prior: Prior,
-    tried: Floats,
-    known: dict[bytes, Floats],
-) -> Floats:
-    """`_scores` of people in views that all deliver boxes: in a frame many keep their place and their boxes."""
-    names = [place.tobytes() + box.tobytes() for place, box in zip(pool.ground, own.box.T, strict=True)]
-    fresh = np.array([j for j, name in enumerate(names) if name not in known], int)
-    if len(fresh):
-        found = _scores(pool.at(fresh), views, observations, own.of(fresh), prior, tried)
-        known.update(zip((names[j] for j in fresh), found, strict=True))
-    return np.stack([known[name] for name in names])
-
-
-def _scores(
-    pool: Candidates,
-    views: Sequence[View],
-    observations: Sequence[ViewObservation | None],
-    own: EvidenceAssignment,
-    prior: Prior,
-    tried: Floats,
-) -> Floats:
-    """Log-posterior of each person over heights and places of a patch as a birth, float64 (person, height, place)."""
-    score = np.tile(prior.log_height(tried)[:, None], (len(pool), 1, len(_PATCH)))
-    pillars = _pillars(views[0], pool.ground[:, None] + _PATCH, tried, pool.width)
-    for k, (view, observation) in enumerate(zip(views, observations, strict=True)):
-        if observation is not None and len(pool):
-            score += _patch_score(view, observation, own, k, pillars).reshape(score.shape)
-    return score
+        score = _scores(pool, evidence, assignment, heights)
+    tracked = np.flatnonzero(track_index >= 0)
+    score[tracked] += prior.predicted.place_log_density(track_index[tracked], patch[tracked])[:, None]
+    return _posterior(score, patch, heights)
 
 
 def refine_places(
-    pool: Candidates,
-    views: Sequence[View],
-    observations: Sequence[ViewObservation | None],
-    own: EvidenceAssignment,
-    prior: Prior,
-    track_index: Ints,
+    pool: Candidates, evidence: FrameEvidence, assignment: EvidenceAssignment, track_index: Ints
 ) -> RefinedPlaces:
-    """The posterior of each person's place alone, by pixels, at its height in the pool."""
-    patch = pool.ground[:, None] + _PATCH
+    """The posterior of each person's place alone, by pixels, at its height in the pool; arguments of `refine`."""
+    patch, views = pool.ground[:, None] + _PATCH, evidence.views
     score = np.zeros(patch.shape[:2])
-    tall, wide = (np.repeat(size[:, None], len(_PATCH), 1) for size in (pool.height, pool.width))
-    pillars = views[0].tried(patch, tall, wide)
-    for k, (view, observation) in enumerate(zip(views, observations, strict=True)):
+    heights, widths = (np.repeat(size[:, None], len(_PATCH), 1) for size in (pool.height, pool.width))
+    pillars = views[0].tried(patch, heights, widths)
+    for k, (view, observation) in enumerate(zip(views, evidence.observations, strict=True)):
         if isinstance(view, PixelView) and observation is not None and len(pool):
-            sums, area = view.open_sums(observation.raster, own.pixels[k], own.number, pillars)
-            score += np.divide(sums, area, out=np.zeros_like(sums), where=area > 0)
-    met = np.flatnonzero(track_index >= 0)
-    score[met] += prior.predicted.place_log_density(track_index[met], patch[met])
+            score += _patch_score(view, observation, assignment, k, pillars)
+    tracked = np.flatnonzero(track_index >= 0)
+    score[tracked] += evidence.prior.predicted.place_log_density(track_index[tracked], patch[tracked])
     weight = np.exp(score - score.max(1, keepdims=True))
     weight /= weight.sum(1, keepdims=True)
     return RefinedPlaces(*_moments(weight, patch), pool.height, np.zeros(len(pool)))
 
 
-def _posterior(score: Floats, patch: Floats, tried: Floats) -> RefinedPlaces:
+def _cached_scores(
+    pool: Candidates, evidence: FrameEvidence, assignment: EvidenceAssignment, heights: Floats
+) -> Floats:
+    """`_scores` of people in views that all deliver boxes: in a frame many keep their place and their boxes."""
+    cache = evidence.patch_scores
+    names = [place.tobytes() + box.tobytes() for place, box in zip(pool.ground, assignment.box.T, strict=True)]
+    uncached = np.array([j for j, name in enumerate(names) if name not in cache], int)
+    if len(uncached):
+        scores = _scores(pool.at(uncached), evidence, assignment.of(uncached), heights)
+        cache.update(zip((names[j] for j in uncached), scores, strict=True))
+    return np.stack([cache[name] for name in names])
+
+
+def _scores(pool: Candidates, evidence: FrameEvidence, assignment: EvidenceAssignment, heights: Floats) -> Floats:
+    """Log-posterior of each person over heights and places of a patch as a birth, float64 (person, height, place)."""
+    score = np.tile(evidence.prior.log_height(heights)[:, None], (len(pool), 1, len(_PATCH)))
+    pillars = _pillars(evidence.views[0], pool.ground[:, None] + _PATCH, heights, pool.width)
+    for k, (view, observation) in enumerate(zip(evidence.views, evidence.observations, strict=True)):
+        if observation is not None and len(pool):
+            score += _patch_score(view, observation, assignment, k, pillars).reshape(score.shape)
+    return score
+
+
+def _posterior(score: Floats, patch: Floats, heights: Floats) -> RefinedPlaces:
     """Means and variances from scores (person, height, place) of patches (person, place, 2), nats and metres."""
     weight = np.exp(score - score.max((1, 2), keepdims=True))
-    total = weight.reshape(len(score), len(tried) * patch.shape[1]).sum(1)[:, None]
-    place, tall = weight.sum(1) / total, weight.sum(2) / total
-    height = tall @ tried
-    return RefinedPlaces(*_moments(place, patch), height, (tall * (tried - height[:, None]) ** 2).sum(1))
+    total = weight.reshape(len(score), len(heights) * patch.shape[1]).sum(1)[:, None]
+    of_place, of_height = weight.sum(1) / total, weight.sum(2) / total
+    height = of_height @ heights
+    variance = (of_height * (heights - height[:, None]) ** 2).sum(1)
+    return RefinedPlaces(*_moments(of_place, patch), height, variance)
 
 
 def _moments(weight: Floats, patch: Floats) -> tuple[Floats, Floats]:
@@ -191,29 +153,29 @@ def _moments(weight: Floats, patch: Floats) -> tuple[Floats, Floats]:
     return ground, covariance + np.eye(2) * _PATCH_SPACING**2 / 12
 
 
-def _pillars(view: View, patch: Floats, tried: Floats, width: Floats) -> TriedPillars:
-    """Pillars of all heights that are tried, then of all places of a patch (person, place, 2), for each person."""
+def _pillars(view: View, patch: Floats, heights: Floats, width: Floats) -> TriedPillars:
+    """Pillars of all heights, then of all places of a patch (person, place, 2), for each person."""
     people, places = patch.shape[:2]
-    everywhere = np.repeat(patch[:, None], len(tried), 1).reshape(people, len(tried) * places, 2)
-    tall = np.tile(np.repeat(tried, places), (people, 1))
-    return view.tried(everywhere, tall, np.repeat(width[:, None], tall.shape[1], 1))
+    ground = np.repeat(patch[:, None], len(heights), 1).reshape(people, len(heights) * places, 2)
+    tall = np.tile(np.repeat(heights, places), (people, 1))
+    return view.tried(ground, tall, np.repeat(width[:, None], tall.shape[1], 1))
 
 
 def _patch_score(
-    view: View, observation: ViewObservation, own: EvidenceAssignment, k: int, pillars: TriedPillars
+    view: View, observation: ViewObservation, assignment: EvidenceAssignment, k: int, pillars: TriedPillars
 ) -> Floats:
     """Log-likelihood of pillars in view k, nats, float64 (person, pillar)."""
     if isinstance(view, PixelView):
-        sums, area = view.open_sums(observation.raster, own.pixels[k], own.number, pillars)
+        sums, area = view.open_sums(observation.raster, assignment.pixels[k], assignment.number, pillars)
         return np.divide(sums, area, out=np.zeros_like(sums), where=area > 0)
     score = np.zeros_like(pillars.height)
     columns, rows = map(float, view.camera.size)
-    shown = np.flatnonzero(own.box[k] >= 0)
-    bodies = view.table.boxes_of(pillars.ground[shown].reshape(-1, 2), pillars.height[shown].reshape(-1))
-    match, box = np.empty((len(shown), score.shape[1])), own.box[k, shown]
+    people = np.flatnonzero(assignment.box[k] >= 0)
+    bodies = view.table.boxes_of(pillars.ground[people].reshape(-1, 2), pillars.height[people].reshape(-1))
+    match, box = np.empty((len(people), score.shape[1])), assignment.box[k, people]
     fill_own_match(
         bodies.reshape(*match.shape, 4), observation.edges[box], observation.tolerance[box],
         observation.belief[box], columns, rows, match,
     )  # fmt: skip
-    score[shown] = np.maximum(match, _MINIMUM_BOX_LOG_LIKELIHOOD)
+    score[people] = np.maximum(match, _MINIMUM_BOX_LOG_LIKELIHOOD)
     return score

@@ -39,9 +39,8 @@ class RefinedPeople:
 
 def moved_members(estimate: MapEstimate) -> Candidates:
     """The members at the means of their places, each at the size that it has."""
-    evidence, pool = estimate.evidence, estimate.pool.at(estimate.members)
-    assignment, track_index = _assignment(estimate), estimate.track_index
-    places = refine_places(pool, evidence.views, evidence.observations, assignment, evidence.prior, track_index)
+    pool = estimate.pool.at(estimate.members)
+    places = refine_places(pool, estimate.evidence, _assignment(estimate), estimate.track_index)
     return Candidates(places.ground, pool.height, pool.width)
 
 
@@ -61,7 +60,7 @@ def followed_members(estimate: MapEstimate, start: Candidates) -> RefinedPeople:
     evidence, assignment, track_index = estimate.evidence, _assignment(estimate), estimate.track_index
     if any(isinstance(view, BoxView) for view in evidence.views):
         return _refined(estimate, start, assignment, track_index)
-    places = refine_places(start, evidence.views, evidence.observations, assignment, evidence.prior, track_index)
+    places = refine_places(start, evidence, assignment, track_index)
     unmeasured = Sizes.of_population(len(start), evidence.prior.body)
     sizes = evidence.prior.track_sizes(unmeasured, track_index)
     return RefinedPeople(Candidates(places.ground, sizes.height, sizes.width), places.covariance, unmeasured, sizes)
@@ -75,10 +74,9 @@ def _refined(
     estimate: MapEstimate, start: Candidates, assignment: EvidenceAssignment, track_index: Ints
 ) -> RefinedPeople:
     """People at the means of their posteriors, sought about where they start, by the evidence assigned to each."""
-    evidence = estimate.evidence
-    views, observations, prior = evidence.views, evidence.observations, evidence.prior
-    places = refine(start, views, observations, assignment, prior, track_index, evidence.patch_scores)
-    sizes = body_sizes(places, start.width, views, observations, assignment, prior.body)
+    evidence, prior = estimate.evidence, estimate.evidence.prior
+    places = refine(start, evidence, assignment, track_index)
+    sizes = body_sizes(places, start.width, evidence.views, evidence.observations, assignment, prior.body)
     track_sizes = prior.track_sizes(sizes, track_index)
     pool = Candidates(places.ground, sizes.height, track_sizes.width)
     return RefinedPeople(pool, places.covariance, sizes, track_sizes)

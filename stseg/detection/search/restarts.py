@@ -15,7 +15,7 @@ from stseg.detection.search.map_estimate import MapEstimate
 from stseg.detection.search.refined_people import refined_members
 
 _REMOVAL_MARGIN = 12.0
-"""Members whose removal lowers the score by less are removed before a restart, nats."""
+"""Members are removed before a restart if that lowers the score by less, nats."""
 _MINIMUM_GAIN = 1.0
 """Least rise of the score for which another set is taken, nats: less is a matter of the members' exact places."""
 _RESTART_LIMIT = 3

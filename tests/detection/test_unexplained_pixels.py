@@ -8,8 +8,8 @@ from scenes import BODY, FEW_HEIGHTS, corner_cameras, rig_of
 
 from stseg.arrays import Floats, Shorts, Singles
 from stseg.detection.detector import Detector
-from stseg.detection.evidence.open_pixels import OpenPixels
 from stseg.detection.evidence.pillar_evidence import fill_scores
+from stseg.detection.evidence.unexplained_pixels import UnexplainedPixels
 
 BACKGROUND = np.float32(-2.2)
 DETECTOR = Detector(rig_of(corner_cameras(), cell=0.5, planes=3), ["pixels"] * 4, FEW_HEIGHTS, BODY)
@@ -48,24 +48,24 @@ def by_definition(rasters: Singles, owner: Shorts) -> Floats:
     return np.asarray(BEFORE + WEIGHT * mean.sum(0).reshape(CELLS, 3).T)
 
 
-def scores(rasters: Singles, owner: Shorts, hopeless: float) -> Floats:
+def scores(rasters: Singles, owner: Shorts, minimum_probe_score: float) -> Floats:
     extremes = np.tile([rasters.min(), rasters.max()], (4, 1)).astype(float)
     score = np.full((3, CELLS), BEFORE)
-    pixels = OpenPixels.of(rasters, owner, LATTICE, extremes)
-    fill_scores(pixels, LATTICE, np.array([1]), np.array([0, 2]), hopeless, WEIGHT, score)
+    pixels = UnexplainedPixels.of(rasters, owner, LATTICE, extremes)
+    fill_scores(pixels, LATTICE, np.array([1]), np.array([0, 2]), minimum_probe_score, WEIGHT, score)
     return score
 
 
 @pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("hopeless", [-np.inf, -1.0])
-def test_scores_by_definition_where_they_matter(seed: int, hopeless: float) -> None:
-    found, expected = scores(*scene(seed), hopeless), by_definition(*scene(seed))
-    known = np.isfinite(found)
-    np.testing.assert_allclose(found[known], expected[known], atol=1e-9)
-    worth = expected[1] > hopeless
-    assert known[1, worth].all()
-    assert known[:, worth][expected[:, worth] > 0].all()
-    assert not known[::2, ~worth].any()
+@pytest.mark.parametrize("minimum_probe_score", [-np.inf, -1.0])
+def test_scores_by_definition_where_they_matter(seed: int, minimum_probe_score: float) -> None:
+    found, expected = scores(*scene(seed), minimum_probe_score), by_definition(*scene(seed))
+    is_evaluated = np.isfinite(found)
+    np.testing.assert_allclose(found[is_evaluated], expected[is_evaluated], atol=1e-9)
+    worth = expected[1] > minimum_probe_score
+    assert is_evaluated[1, worth].all()
+    assert is_evaluated[:, worth][expected[:, worth] > 0].all()
+    assert not is_evaluated[::2, ~worth].any()
     assert (expected > 0).any()
 
 
