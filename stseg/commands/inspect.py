@@ -11,12 +11,13 @@ from cyclopts import Parameter
 from rich.console import Console
 from rich.table import Table
 
-from stseg.commands.inspect_rig import inspect_rig
 from stseg.errors import ConfigError
+from stseg.io.recording.rigs import read_recording
 from stseg.io.runfile.runs import read_run
 from stseg.records.tables import ERROR_RATES
 from stseg.tasks.overview import Overview, per, summarise_run
 from stseg.tasks.slices import write_slice
+from stseg.tasks.sources import COLUMNS, summarise_sources, write_source_pictures
 
 _LONGEST = 8  # tracks on the screen
 _MINUTES = 15  # of the run on the screen
@@ -59,7 +60,7 @@ def inspect(
     if run.suffix.lower() == ".toml":
         if slice_ is not None or as_json:
             raise ConfigError("command line", "--slice" if slice_ else "--json", str(run), "a run file")
-        inspect_rig(run, output, overwrite)
+        _inspect_rig(run, output, overwrite)
         return
     found = read_run(run)
     if (slice_ is None) != (output is None):
@@ -71,6 +72,25 @@ def inspect(
         print(json.dumps(asdict(summarise_run(found)), indent=1))
     else:
         _show(summarise_run(found), Console(highlight=False, markup=False))
+
+
+def _inspect_rig(path: Path, pictures: Path | None, overwrite: bool) -> None:
+    """Print what each camera's source is and holds, and draw one frame of each camera into a folder."""
+    recording = read_recording(path)
+    summaries = summarise_sources(recording)
+    console = Console(highlight=False, markup=False)
+    table = Table(box=None, padding=(0, 2, 0, 0), title=str(path), title_justify="left")
+    for name in COLUMNS:
+        table.add_column(name, justify="left" if name in ("camera", "recognised", "classes") else "right")
+    for summary in summaries:
+        table.add_row(*summary.row())
+    console.print(table)
+    for words in (words for summary in summaries for words in summary.warnings()):
+        console.print(f"warning: {words}", style="yellow", soft_wrap=True)
+    if pictures is not None:
+        with_frames = write_source_pictures(recording, summaries, pictures, overwrite)
+        contents = "they show camera frames" if with_frames else "boxes on the ruled ground"
+        print(f"wrote {len(summaries)} pictures to {pictures} ({contents})")
 
 
 def _show(overview: Overview, console: Console) -> None:

@@ -69,7 +69,7 @@ class Session:
         self._tracker = pipeline.tracker(pipeline.rig, pipeline.config, first)
         cameras = [camera.name for camera in pipeline.rig.cameras]
         self._frozen, self._excluded = FrozenViews(len(cameras), pipeline.rig.frame_rate), ExcludedViews(cameras)
-        self._learned = pipeline.detector.new_estimates()
+        self._estimates = pipeline.detector.new_estimates()
         self._error_rates = pipeline.occupancy.new_error_rates()
         self._records: dict[int, FrameRecord] = {}
         self.fusion: Executor | None = None
@@ -92,12 +92,12 @@ class Session:
             The result of `evidence` for them, if it was called before.
         """
         evidence = self.evidence(frame_set) if evidence is None else evidence
-        noise, failures = self._learned.box_noise.noise, self._learned.failures
+        noise, failures = self._estimates.box_noise.noise, self._estimates.failures
         frame, predicted = frame_set.frame, self._tracker.predict(frame_set.frame)
         with self.watch.time("detection"):
             source = self.pipeline.proposals
             proposed = source.of(failures.kept(evidence), self._fuse_with_current_rates) if source else None
-            explanation = self.pipeline.detector.explain_next(self._learned, frame, evidence, predicted, proposed)
+            explanation = self.pipeline.detector.explain_next(self._estimates, frame, evidence, predicted, proposed)
         events = self._excluded.events(frame, frame_set.views, evidence, failures)
         used = failures.kept(evidence)
         fusion = self._submit(frame, used, explanation, noise)
@@ -105,13 +105,13 @@ class Session:
             appearance = self.pipeline.appearance_rows(frame, explanation, frame_set.views, used, frame_set.images)
         self._records[frame] = FrameRecord(explanation, fusion, appearance, events)
         fused = FusedFrame(frame, explanation.people, explanation.ghosts, lambda: fusion.result().volume)
-        with self.watch.time("track"):
+        with self.watch.time("tracking"):
             commits = self._tracker.add(fused, FrameObservations(frame_set.views, used))
         return [self._committed(commit) for commit in commits]
 
     def finish(self) -> list[CommittedFrames]:
         """No more frame sets; the results of all frames that are still open."""
-        with self.watch.time("track"):
+        with self.watch.time("tracking"):
             commits = self._tracker.finish()
         return [self._committed(commit) for commit in commits]
 
@@ -141,7 +141,7 @@ class Session:
     def _fuse_with_current_rates(self, evidence: Sequence[ViewEvidence], explanation: Explanation) -> Singles:
         while self._open:
             self._open.popleft().result()
-        rates, noise = self._error_rates.rates, self._learned.box_noise.noise
+        rates, noise = self._error_rates.rates, self._estimates.box_noise.noise
         return self.pipeline.occupancy.fuse(evidence, explanation, rates, noise).dense()
 
 

@@ -145,7 +145,7 @@ def test_candidates_are_told_for_every_frame() -> None:
             assert (own["evidence"][own["status"] == 0] < 0).all()
             assert (true["evidence"] > 0).all()
     timed = np.concatenate([step.timings for step in done.steps])
-    assert {b"foreground", b"detection", b"occupancy", b"track"} <= set(timed["stage"].tolist())
+    assert {b"foreground", b"detection", b"occupancy", b"tracking"} <= set(timed["stage"].tolist())
     assert (timed["seconds"] >= 0).all()
     told = np.concatenate([step.candidates for step in done.steps])
     assert np.unique(told["frame"]).tolist() == list(range(FRAMES))

@@ -26,9 +26,9 @@ PROGRAM = """
 import signal, sys, time
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell that runs the tests in its background has it ignored
 from stseg.commands.main import main
-from stseg.engine.offline import segment_worker
-keep_segment = segment_worker.keep_segment
-segment_worker.keep_segment = lambda draft: (time.sleep(0.5), keep_segment(draft))[1]
+from stseg.engine.offline.segment_writer import SegmentWriter
+keep = SegmentWriter.keep
+SegmentWriter.keep = lambda writer: (time.sleep(0.5), keep(writer))[1]
 sys.exit(main())
 """
 """A run on a slow disk, that it is still at work when a signal reaches it on a machine of any speed."""

@@ -43,7 +43,7 @@ _READY, _MEASURED = 8, 16
 """Frames before the clock starts, and while it runs."""
 _EMPTY = 10
 """Images from which a background is learned."""
-_STAGES = ("foreground", "detection", "occupancy", "track")
+_STAGES = ("foreground", "detection", "occupancy", "tracking")
 _PAGE = """# How the time of a frame grows
 
 CPU milliseconds a frame in one thread, and the share of each stage: foreground, detection (ghosts), occupancy, and the

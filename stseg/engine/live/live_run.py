@@ -7,7 +7,6 @@ each frame is read once, and no frame is stored.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from statistics import median
 from types import TracebackType
 from typing import Self
@@ -32,17 +31,7 @@ from stseg.records.tables import TRAJECTORY
 from stseg.trackers import find_tracker
 from stseg.tracking.windows.windows import window_length
 from stseg.trajectories.live_corrections import LiveCorrections, renamed
-from stseg.trajectories.live_ids import LiveIds, Names
-
-
-@dataclass
-class _Member:
-    """An open segment, the trajectory rows of its warm-up, and the run's ids of its tracks."""
-
-    segment: OpenSegment
-    lead: list[Rows] = field(default_factory=list)
-    names: Names | None = None
-    """None during the warm-up."""
+from stseg.trajectories.live_ids import LiveIds
 
 
 class LiveRun:
@@ -89,7 +78,7 @@ class LiveRun:
         self._decided_again = LiveCorrections(frame_rate, Border.of(job.read.reduced_rig), job.config)
         self._blind_views = BlindViews([camera.name for camera in job.recording.rig.cameras])
         self.pipeline = job.pipeline()
-        self._members: list[_Member] = []
+        self._opened: list[OpenSegment] = []
         self._plan: Iterator[Segment] = iter(())
         self._coming: Segment | None = None
         self._since, self._stop, self._published = 0, 0, 0
@@ -134,54 +123,52 @@ class LiveRun:
         while self._coming is not None and frame_set.frame >= self._coming.lead:
             self._open(self._coming)
             self._coming = next(self._plan, None)
-        for member in self._members:
-            self._take(member, member.segment.add(frame_set), member.segment.segment.stop)
-        if self._members:
-            oldest = self._members[0].segment
+        for opened in self._opened:
+            self._take(opened, opened.add(frame_set), opened.segment.stop)
+        if self._opened:
+            oldest = self._opened[0]
             if oldest.complete and frame_set.frame >= oldest.segment.stop + self._window:
                 self._keep(oldest.segment.stop)
 
     def finish(self) -> list[FinishedSegment]:
         """Close the run after its last frame set; all finished segments."""
-        if self._members and self._members[0].segment.segment.first < self._stop:
-            self._take(self._members[0], self._members[0].segment.finish(), self._stop)
+        if self._opened and self._opened[0].segment.first < self._stop:
+            self._take(self._opened[0], self._opened[0].finish(), self._stop)
             self._keep(self._stop)
         self._discard()
         return self.finished
 
     def _open(self, segment: Segment) -> None:
         draft = self._folder.draft(segment.index)
-        self._members.append(
-            _Member(OpenSegment(self._job, segment, self.pipeline, self.foregrounds.snapshot(), draft))
-        )
+        self._opened.append(OpenSegment(self._job, segment, self.pipeline, self.foregrounds.snapshot(), draft))
 
-    def _take(self, member: _Member, steps: list[CommittedFrames], stop: int) -> None:
+    def _take(self, opened: OpenSegment, steps: list[CommittedFrames], stop: int) -> None:
         for step in steps:
             frames = [fused.frame for fused in step.commit.frames]
-            member.segment.write(step, self._blind_views.events(frames))
-            self._publish(member, step, stop)
+            opened.write(step, self._blind_views.events(frames))
+            self._publish(opened, step, stop)
 
-    def _publish(self, member: _Member, step: CommittedFrames, stop: int) -> None:
+    def _publish(self, opened: OpenSegment, step: CommittedFrames, stop: int) -> None:
         """Append newly committed track rows to the live table; the warm-up belongs to the segment before."""
-        segment, rows = member.segment.segment, step.commit.trajectory
+        segment, rows = opened.segment, step.commit.trajectory
         last = step.commit.frames[-1].frame
-        member.lead.append(rows[rows["frame"] < segment.first])
+        opened.warm_up.append(rows[rows["frame"] < segment.first])
         if last < segment.first:
             return
-        if member.names is None:
-            member.names = self._names.begin(np.concatenate([*member.lead, np.zeros(0, TRAJECTORY)]))
+        if opened.names is None:
+            opened.names = self._names.begin(np.concatenate([*opened.warm_up, np.zeros(0, TRAJECTORY)]))
         new = step.within(max(segment.first, self._published), stop)
         if not new.commit.frames:
             return
-        rows = self._names.named(new.commit.trajectory, member.names)
+        rows = self._names.named(new.commit.trajectory, opened.names)
         self._table.append(rows)
         if self._publisher is not None:
             self._publisher.append(rows)
-        self._correct(member, rows, new)
+        self._correct(opened, rows, new)
         self._published = new.commit.frames[-1].frame + 1
         self._delays += [now() - self._arrived.pop(fused.frame) for fused in new.commit.frames]
 
-    def _correct(self, member: _Member, rows: Rows, new: CommittedFrames) -> None:
+    def _correct(self, opened: OpenSegment, rows: Rows, new: CommittedFrames) -> None:
         """Decide live ids again with newly published rows, and append what is corrected; some trackers' are final."""
         if find_tracker(self._job.tracker).final:
             return
@@ -193,17 +180,17 @@ class LiveRun:
             self._publisher.correct(found)
         self._names.correct(found)
         present = set(new.commit.trajectory["id"].tolist())
-        for one in self._members:
-            if one.names is not None:
-                one.names = renamed(one.names, found, present if one is member else ())
+        for other in self._opened:
+            if other.names is not None:
+                other.names = renamed(other.names, found, present if other is opened else ())
 
     def _keep(self, stop: int) -> None:
         """Finish the oldest segment before frame `stop`."""
-        member = self._members.pop(0)
-        self.finished.append(FinishedSegment(*member.segment.keep(stop)))
-        self._blind_views.forget(min((other.segment.segment.lead for other in self._members), default=stop))
+        opened = self._opened.pop(0)
+        self.finished.append(FinishedSegment(*opened.keep(stop)))
+        self._blind_views.forget(min((other.segment.lead for other in self._opened), default=stop))
 
     def _discard(self) -> None:
-        for member in self._members:
-            member.segment.close()
-        self._members = []
+        for opened in self._opened:
+            opened.close()
+        self._opened = []

@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
-
-import numpy as np
 
 from stseg.arrays import Rows
 from stseg.engine.committed_frames import CommittedFrames
 from stseg.engine.image_shift import ImageShifts
 from stseg.engine.offline.job import Job
-from stseg.engine.offline.segment_file import open_segment_file, packed_step, write_step
+from stseg.engine.offline.segment_writer import SegmentWriter
 from stseg.engine.offline.segments import Segment
 from stseg.engine.pipeline import Pipeline
 from stseg.engine.session import Session
 from stseg.foreground.view_foreground import ViewForeground
 from stseg.io.live.live_frames import LiveFrameSet
-from stseg.io.runfile.unfinished.segment_files import keep_segment
-from stseg.records.tables import TRACK
+from stseg.trajectories.live_ids import Names
 
 
 class OpenSegment:
@@ -35,20 +31,26 @@ class OpenSegment:
         Foreground model of each camera, owned by this segment.
     draft
         Path of the unfinished file.
+
+    Attributes
+    ----------
+    warm_up : list of TRAJECTORY (n,)
+        Rows of the warm-up.
+    names
+        The run's ids of the segment's tracks; None during the warm-up.
     """
 
     def __init__(
         self, job: Job, segment: Segment, pipeline: Pipeline, foregrounds: list[ViewForeground], draft: Path
     ) -> None:
-        self.segment = segment
-        self._job, self._draft = job, draft
+        self.segment, self.warm_up = segment, list[Rows]()
+        self.names: Names | None = None
         self._session = Session(pipeline, foregrounds, segment.lead)
         self._shifts = ImageShifts(foregrounds, job.read.factors, job.recording.rig.frame_rate)
+        self._writer = SegmentWriter(job, segment, pipeline.occupancy.views, self._shifts, draft)
         self._beyond: list[tuple[CommittedFrames, Rows]] = []
         """Steps beyond the planned end; part of this segment only if it is the last of the run."""
         self._committed = segment.lead
-        self._opened = ExitStack()
-        self._writer = self._opened.enter_context(open_segment_file(job, pipeline.occupancy.views, draft))
 
     @property
     def complete(self) -> bool:
@@ -57,7 +59,7 @@ class OpenSegment:
 
     def close(self) -> None:
         """Close the writer; a file that was not kept is discarded."""
-        self._opened.close()
+        self._writer.__exit__(None, None, None)
 
     def add(self, frame_set: LiveFrameSet) -> list[CommittedFrames]:
         """Process the next frame set; the frames that it commits."""
@@ -74,31 +76,12 @@ class OpenSegment:
         if self._committed > self.segment.stop:
             self._beyond.append((step, events))
         else:
-            self._write(step, events)
+            self._writer.write(step, events)
 
     def keep(self, stop: int) -> tuple[Segment, Path]:
-        """Finish the segment's file.
-
-        Parameters
-        ----------
-        stop
-            The frame after the last of the segment.
-
-        Returns
-        -------
-        tuple of Segment and Path
-            The segment with its final end, and the path of its file.
-        """
-        self.segment = replace(self.segment, stop=stop)
+        """The segment with its final end before frame `stop`, and the path of its finished file."""
+        self.segment = self._writer.segment = replace(self.segment, stop=stop)
         for step, events in self._beyond:
             if step.commit.frames[0].frame < stop:
-                self._write(step, events)
-        self._writer.append("shifts", self._shifts.rows(self.segment.first, self.segment.stop))
-        self._writer.finish(np.zeros(0, TRACK))
-        self._opened.close()
-        return self.segment, keep_segment(self._draft)
-
-    def _write(self, step: CommittedFrames, events: Rows) -> None:
-        write_step(self._job, packed_step(self._job, step, self.segment, None), self._writer)
-        own = (self.segment.first <= events["frame"]) & (events["frame"] < self.segment.stop)
-        self._writer.append("events", events[own])
+                self._writer.write(step, events)
+        return self.segment, self._writer.keep()

@@ -2,25 +2,20 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import ExitStack
 from copy import deepcopy
 from pathlib import Path
 
-import numpy as np
-
 from stseg.engine.image_shift import ImageShifts
 from stseg.engine.offline.backgrounds import BackgroundFrames, background_frames, make_foregrounds
 from stseg.engine.offline.job import Job
-from stseg.engine.offline.segment_file import PackedStep, open_segment_file, packed_step, write_step
+from stseg.engine.offline.segment_writer import SegmentWriter
 from stseg.engine.offline.segments import Segment
 from stseg.engine.session import run_session, two_cores
 from stseg.foreground.view_foreground import ViewForeground
 from stseg.io.recording.frames import open_frames
-from stseg.io.runfile.unfinished.segment_files import keep_segment
-from stseg.records.tables import TRACK
 
 
 class SegmentWorker:
@@ -67,24 +62,18 @@ class SegmentWorker:
         end = min(end for end in self._ends if end >= segment.stop)
         with (
             open_frames(job.read, segment.lead, end, job.streams) as frame_sets,
-            open_segment_file(job, self.pipeline.occupancy.views, draft) as writer,
+            SegmentWriter(job, segment, self.pipeline.occupancy.views, shifts, draft) as writer,
             ExitStack() as threads,
         ):
             packing: Executor | None = None
-            observed, packed = shifts.measured(frame_sets), deque[PackedStep]()
+            observed = shifts.measured(frame_sets)
             for step in run_session(self.pipeline, foregrounds, observed, segment.lead, fused, self.cores):
                 if packing is None and self.cores() > 1:
                     packing = threads.enter_context(ThreadPoolExecutor(1, "packing"))
-                packed.append(packed_step(job, step, segment, packing))
-                if len(packed) > 1:  # the last step is packed while the session goes on
-                    write_step(job, packed.popleft(), writer)
+                writer.write(step, executor=packing)
                 if step.commit.frames[-1].frame >= segment.stop - 1:
                     break
-            for one in packed:
-                write_step(job, one, writer)
-            writer.append("shifts", shifts.rows(segment.first, segment.stop))
-            writer.finish(np.zeros(0, TRACK))
-        return keep_segment(draft)
+            return writer.keep()
 
     def foregrounds(self, segment: Segment) -> list[ViewForeground]:
         """Foreground models at a segment's first frame; the last learned backgrounds are reused where they hold."""

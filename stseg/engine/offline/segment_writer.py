@@ -1,0 +1,155 @@
+"""The file of a segment: a run file of its frames, and of its warm-up the trajectory."""
+
+from __future__ import annotations
+
+from collections import deque
+from concurrent.futures import Executor, Future
+from contextlib import AbstractContextManager, ExitStack
+from pathlib import Path
+from types import TracebackType
+from typing import NamedTuple
+
+import numpy as np
+
+from stseg.arrays import Bytes, Labels, Rows, Singles
+from stseg.engine.committed_frames import CommittedFrames
+from stseg.engine.image_shift import ImageShifts
+from stseg.engine.offline.job import Job
+from stseg.engine.offline.segments import Segment
+from stseg.geometry.nearest_person import nearest_person
+from stseg.io.config_file import format_config
+from stseg.io.runfile.layout import ghost_type
+from stseg.io.runfile.packed_frames import PackedFrame
+from stseg.io.runfile.run_writer import packed_volume
+from stseg.io.runfile.runs import RunWriter
+from stseg.io.runfile.unfinished.segment_files import keep_segment
+from stseg.records.tables import EVENT, TRACK
+
+_VOLUME_RADIUS = 1.0
+"""Radius around each track within which the volume is kept, where it is kept around tracks, metres."""
+
+_Volumes = list[tuple[PackedFrame, PackedFrame]]
+
+
+class _Step(NamedTuple):
+    """Committed frames on their way to the file.
+
+    Attributes
+    ----------
+    trajectory : TRAJECTORY (n,)
+        Of the frames of the segment and of its warm-up.
+    results
+        The results of the segment's frames.
+    volumes
+        Their log-odds and labels, packed.
+    events : EVENT (k,)
+        Further events of these frames.
+    """
+
+    trajectory: Rows
+    results: CommittedFrames
+    volumes: Future[_Volumes]
+    events: Rows
+
+
+class SegmentWriter(AbstractContextManager["SegmentWriter"]):
+    """Writes the file of a segment; one that `keep` has not completed is discarded on exit.
+
+    Of the warm-up the file has the trajectory alone: by it the segment's tracks are associated with those of the
+    segment before (`stseg.tracking.windows.stitching`).
+
+    Parameters
+    ----------
+    job, segment
+        The run, and the segment; its end may be changed while it is written.
+    views : uint8 (plane, y, x)
+        Number of views that see each cell.
+    shifts
+        Measured shifts of the cameras' images.
+    draft
+        Path of the file until it is complete.
+    """
+
+    def __init__(self, job: Job, segment: Segment, views: Bytes, shifts: ImageShifts, draft: Path) -> None:
+        self.segment = segment
+        self._job, self._shifts, self._draft = job, shifts, draft
+        self._steps = deque[_Step]()
+        self._opened = ExitStack()
+        self._writer = self._opened.enter_context(
+            RunWriter(draft, job.recording, views, format_config(job.config), overwrite=True, kept=job.volume)
+        )
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._opened.close()
+
+    def write(self, step: CommittedFrames, events: Rows | None = None, executor: Executor | None = None) -> None:
+        """Append committed frames; the last step may be packed until the next is written.
+
+        Parameters
+        ----------
+        step
+            The next committed frames.
+        events : EVENT (k,), or None
+            Further events of these frames.
+        executor
+            One thread that packs volumes; None to pack them here.
+        """
+        first, stop = self.segment.first, self.segment.stop
+        results, trajectory = step.within(first, stop), step.within(self.segment.lead, stop).commit.trajectory
+        events = np.zeros(0, EVENT) if events is None else events
+        within = events[(first <= events["frame"]) & (events["frame"] < stop)]
+        if executor is None:
+            volumes = Future[_Volumes]()
+            volumes.set_result(_packed_volumes(self._job, results))
+        else:
+            volumes = executor.submit(_packed_volumes, self._job, results)
+        self._steps.append(_Step(trajectory, results, volumes, within))
+        if len(self._steps) > 1:
+            self._append(self._steps.popleft())
+
+    def keep(self) -> Path:
+        """Complete the file; its path, whose name has the checksum."""
+        while self._steps:
+            self._append(self._steps.popleft())
+        self._writer.append("shifts", self._shifts.rows(self.segment.first, self.segment.stop))
+        self._writer.finish(np.zeros(0, TRACK))
+        self._opened.close()
+        return keep_segment(self._draft)
+
+    def _append(self, step: _Step) -> None:
+        results, writer = step.results, self._writer
+        writer.append("trajectory", step.trajectory)
+        writer.append("timings", results.timings)
+        if results.commit.frames:
+            volumes = step.volumes.result()
+            writer.append_packed_log_odds(results.frames, [log_odds for log_odds, _ in volumes])
+            writer.append_packed_labels([label for _, label in volumes])
+            ghosts = np.zeros(len(results.candidates), ghost_type(len(self._job.recording.sources)))
+            for name in results.candidates.dtype.names or ():
+                ghosts[name] = results.candidates[name]
+            ghosts["parts"] = results.parts
+            writer.append("ghosts", ghosts)
+            writer.append("events", results.commit.events)
+            writer.append("windows", results.commit.windows)
+            writer.append("rates", results.rates)
+            writer.append("appearance", results.appearance)
+        writer.append("events", step.events)
+
+
+def _packed_volumes(job: Job, step: CommittedFrames) -> _Volumes:
+    return [packed_volume(*_volume(job, step, k)) for k in range(len(step.commit.frames))]
+
+
+def _volume(job: Job, step: CommittedFrames, k: int) -> tuple[Singles, Labels]:
+    """Log-odds and labels (plane, y, x) of a frame as far as the job keeps the volume; nan and 0 elsewhere."""
+    label, scene = step.commit.label[k], step.commit.frames[k]
+    if job.volume == "none":
+        return np.full(label.shape, np.nan, np.float32), np.zeros_like(label)
+    log_odds = scene.log_odds
+    if job.volume == "tracks":
+        rows, ground = step.commit.trajectory, job.recording.rig.grid.ground
+        here = rows[rows["frame"] == scene.frame]
+        log_odds[:, nearest_person(ground, np.column_stack([here["x"], here["y"]]), _VOLUME_RADIUS) < 0] = np.nan
+    return log_odds, label

@@ -1,0 +1,88 @@
+"""A page that asks about the decisions of which a run is least sure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from stseg.arrays import Observation
+from stseg.identities.review.doubts import Doubt
+from stseg.io.outputs.output_files import write_page
+from stseg.io.outputs.whole_files import require_new
+from stseg.io.recording.frames import open_frames
+from stseg.io.runfile.runs import Run, read_run
+from stseg.reporting.page.review_page import Question, best_views, moment_picture, review_page
+from stseg.tasks.doubtful_decisions import doubtful_decisions
+
+
+def write_review(run_file: Path, output: Path, *, most: int, camera_images: bool, overwrite: bool) -> int:
+    """Write a page with questions about a run, the most doubtful decisions first; their number.
+
+    Raises
+    ------
+    InputError
+        Where the run file cannot be read, or the page exists.
+    """
+    require_new(output, overwrite)
+    run = read_run(run_file)
+    run.require_fit()
+    doubts = doubtful_decisions(run)[:most]
+    views = _frames(run, doubts) if camera_images and doubts else {}
+    questions = [_question(run, doubt, views) for doubt in doubts]
+    write_page(output, review_page(f"{run.scene}: review", questions, camera_images), overwrite)
+    return len(questions)
+
+
+def _moments(run: Run, doubt: Doubt) -> tuple[tuple[str, int], ...]:
+    second = max(1, round(run.frame_rate))
+    first, last = int(run.frames[0]), int(run.frames[-1])
+    before, after = max(first, doubt.first - second), min(last, doubt.last + second)
+    if doubt.question == "false":
+        before, after = doubt.first, doubt.last
+    return ("before", before), ("during", (doubt.first + doubt.last) // 2), ("after", after)
+
+
+def _frames(run: Run, doubts: Sequence[Doubt]) -> Mapping[int, tuple[Observation, ...]]:
+    """Observations of the frames of all questions."""
+    wanted = sorted({frame for doubt in doubts for _, frame in _moments(run, doubt)})
+    with open_frames(run.recording.pictured(), wanted[0], wanted[-1] + 1) as frame_sets:
+        return {one.frame: one.views for one in frame_sets if one.frame in set(wanted)}
+
+
+def _question(run: Run, doubt: Doubt, views: Mapping[int, tuple[Observation, ...]]) -> Question:
+    rig, ids = run.recording.rig, [one for one in (doubt.track, doubt.other) if one]
+    moments, unseen = _moments(run, doubt), (None,) * len(run.cameras)
+    rows = run.trajectory[np.isin(run.trajectory["id"], ids)]
+    shown = rows[(rows["frame"] >= moments[0][1]) & (rows["frame"] <= moments[2][1])]
+    ground = np.array([[part["x"].mean(), part["y"].mean()] for k in ids if len(part := shown[shown["id"] == k])])
+    pictures = [
+        (
+            f"{words}, frame {frame}, {run.cameras[view]}",
+            moment_picture(
+                rig, view, run.trajectory, frame, ids, views.get(frame, unseen)[view], round(2 * run.frame_rate)
+            ),
+        )
+        for view in best_views(rig, ground)
+        for words, frame in moments
+    ]
+    return Question(*_words(doubt), pictures)
+
+
+def _words(doubt: Doubt) -> tuple[str, list[tuple[str, str, str]]]:
+    a, b, frame = doubt.track, doubt.other, (doubt.first + doubt.last + 1) // 2
+    keep = f"keep,{frame},{a},{b or ''},"
+    if doubt.question == "encounter":
+        swap = ("2", "they were swapped", f"swap,{frame},{a},{b},")
+        one, two = (f"split,{frame},{track},," for track in (a, b))
+        others = [("3", f"{a} is somebody else", one), ("4", f"{b} is", two), ("5", "both are", f"{one}\n{two}")]
+        return f"Are {a} and {b} after the encounter who they were before?", [("1", "same people", keep), swap, *others]
+    if doubt.question == "birth":
+        swap = ("2", f"{b} is who was {a}", f"swap,{doubt.last},{a},{b},")
+        other = ("3", f"{a} is somebody else from then on", f"split,{doubt.last},{a},,")
+        return f"{b} begins: is it the person who was {a} until then?", [("1", f"no, {a} goes on", keep), swap, other]
+    if doubt.question == "gap":
+        join = ("2", "the same person", f"join,,{a},{b},")
+        return f"Is {b} the person who was {a}?", [("1", "two people", keep), join]
+    return f"Is {a} a person?", [("1", "a person", keep), ("2", "no person", f"delete,,{a},,")]

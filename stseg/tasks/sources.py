@@ -1,0 +1,144 @@
+"""The sources of a rig file: what they were recognised as, what they deliver, and pictures of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from stseg.arrays import Bytes, Flags, Floats, Observation
+from stseg.geometry import Camera, Grid
+from stseg.io.detections.source_detections import SourceDetections, read_source
+from stseg.io.outputs.output_files import make_folder, write_file
+from stseg.io.recording.frames import open_frames
+from stseg.io.recording.image_stream import is_detection_file
+from stseg.io.recording.recording import CameraSource, Recording
+from stseg.reporting.figures import backdrop
+from stseg.reporting.page.html import png_bytes
+from stseg.reporting.pictures.canvas import outline
+from stseg.reporting.pictures.ground_grid import grid_picture
+
+COLUMNS = ("camera", "recognised", "frames", "boxes", "a frame", "height px", "score", "feet in area", "classes")
+"""Headings of `SourceSummary.row`."""
+_PICTURE_WIDTH = 1280
+"""Pixels."""
+_BOX_COLOUR = (80, 220, 120)
+_OUTSIDE_SHARE = 0.5
+"""Share of feet outside the area from which there is a warning."""
+
+
+@dataclass(frozen=True)
+class SourceSummary:
+    """One camera's source.
+
+    Attributes
+    ----------
+    camera, source, grid
+        The camera, its source, and the ground.
+    detections
+        Those of the source; None where it delivers pixels.
+    """
+
+    camera: Camera
+    source: CameraSource
+    grid: Grid
+    detections: SourceDetections | None
+
+    @cached_property
+    def in_area(self) -> Flags:
+        """Whether the middle of each box's lower edge projects into the ground rectangle, bool (n,)."""
+        pixel, grid = self._pixel, self.grid
+        foot = self.camera.back_project(np.stack([pixel[:, 0] + pixel[:, 2] / 2, pixel[:, 1] + pixel[:, 3]], -1))
+        with np.errstate(invalid="ignore"):
+            inside = (foot > [grid.x[0], grid.y[0]]) & (foot < [grid.x[1], grid.y[1]])
+        return np.asarray(inside.all(axis=1))
+
+    @property
+    def _pixel(self) -> Floats:
+        return np.zeros((0, 4)) if self.detections is None else self.detections.kept.pixel
+
+    def row(self) -> tuple[str, ...]:
+        """What it was recognised as, and what it holds, in words under `COLUMNS`."""
+        found, pixel = self.detections, self._pixel
+        if found is None:
+            return self.camera.name, self.source.source.kind, *[""] * (len(COLUMNS) - 2)
+        return (
+            self.camera.name,
+            found.format + (" with masks" if found.read.mask else ""),
+            str(found.frames),
+            str(len(pixel)),
+            f"{len(pixel) / max(found.frames, 1):.1f}",
+            _span(pixel[:, 3], "{:.0f}"),
+            _span(found.kept.score, "{:.2f}"),
+            f"{100 * self.in_area.mean():.0f} %" if len(pixel) else "",
+            ", ".join(f"{name} {count}" for name, count in list(found.read.classes().items())[:5]),
+        )
+
+    def warnings(self) -> Iterator[str]:
+        """One sentence for each number that is probably a mistake of the rig file."""
+        name, found, pixel = self.camera.name, self.detections, self._pixel
+        if found is None or not len(pixel):
+            return
+        if int(found.kept.frame.min()) == 1 and int(found.read.frame.min()) == 1:
+            yield f"{name}: its first frame with detections is 1: do its frames count from 1? (first_frame = 1)"
+        outside = 1 - float(self.in_area.mean())
+        if outside > _OUTSIDE_SHARE:
+            yield (
+                f"{name}: {100 * outside:.0f} % of its feet project outside the area: "
+                "is it this camera, and the image size right?"
+            )
+        right = float((pixel[:, 0] + pixel[:, 2]).max())
+        if right > 1.2 * self.camera.size[0]:
+            yield f"{name}: boxes reach to column {right:.0f} of an image {self.camera.size[0]} pixels wide"
+
+    def picture(self, view: Observation, frame: int) -> Bytes:
+        """The ground's grid and the boxes of a frame, on the camera's image where there is one."""
+        colourless = view is None or (self.detections is not None and self.source.images is None)
+        image = None if colourless else backdrop(view, self.camera.size)
+        picture = grid_picture(self.camera, self.grid, image, frame, _PICTURE_WIDTH)
+        if self.detections is not None:
+            scale = picture.shape[1] / self.camera.size[0]
+            boxes = self._pixel[self.detections.kept.frame == frame - self.source.offset]
+            for left, top, width, height in (boxes * scale).tolist():
+                right, bottom = left + width, top + height
+                corners = np.array([[left, top], [right, top], [right, bottom], [left, bottom]])
+                outline(picture, corners, _BOX_COLOUR, 2)
+        return picture
+
+
+def summarise_sources(recording: Recording) -> list[SourceSummary]:
+    """A summary of each camera's source; raises InputError where one cannot be read."""
+    cameras = zip(recording.rig.cameras, recording.sources, strict=True)
+    return [SourceSummary(camera, one, recording.rig.grid, _detections(one, camera)) for camera, one in cameras]
+
+
+def write_source_pictures(recording: Recording, summaries: list[SourceSummary], folder: Path, overwrite: bool) -> bool:
+    """Write a picture of each camera amid what the cameras deliver; whether they show camera frames."""
+    make_folder(folder)
+    counts = [one.detections.frames for one in summaries if one.detections is not None]
+    frame, pictured = min(counts) // 2 if counts else 0, recording.pictured()
+    views: tuple[Observation, ...] = (None,) * len(summaries)
+    with open_frames(pictured, frame, frame + 1) as frame_sets:
+        for frame_set in frame_sets:
+            views = frame_set.views
+    for summary, view in zip(summaries, views, strict=True):
+        write_file(folder / f"{summary.camera.name}.png", png_bytes(summary.picture(view, frame)), overwrite)
+    return any(stream.source.kind in ("video", "images") for stream in pictured.sources)
+
+
+def _detections(stream: CameraSource, camera: Camera) -> SourceDetections | None:
+    source = stream.source
+    if source.kind == "boxes" or (source.kind == "instances" and is_detection_file(source.path)):
+        return read_source(source, camera.size)
+    return None
+
+
+def _span(values: Floats, form: str) -> str:
+    """The 5th to the 95th percentile."""
+    if not len(values):
+        return ""
+    low, high = np.percentile(values, (5, 95))
+    return f"{form.format(low)}-{form.format(high)}"
