@@ -1,4 +1,4 @@
-"""Pixel labels of each view, frame by frame (Huang and Wang, TCSVT 22(11), 2012, section IV-B)."""
+"""Pixel labels of each view, frame by frame (Huang and Wang, T-ASE 9(1), 2012, section IV-B)."""
 
 from __future__ import annotations
 

@@ -21,9 +21,9 @@ from stseg.segmentation.existence import Existence, ExistenceModel
 from stseg.trackers.protocol import FusedFrame
 from stseg.tracking.filter.prediction import DetectionHistory
 
-_SURE = 12.0
-"""Least log-odds of people whom the window alone finds, nats: 40 m x 40 m have e^12 places and heights to try."""
-_FOUND_BY_WINDOW = 1 << 30
+_LEAST_LOG_ODDS = 12.0
+"""Of people that the window alone finds, nats: 40 m x 40 m have e^12 places and heights to try."""
+_FIRST_NUMBER = 1 << 30
 """First number of their tracks: those of the filter count from 1."""
 
 
@@ -62,7 +62,7 @@ class WindowExistence:
         links = LinkModel(rig.frame_rate, patience, prior, config.motion, config.body)
         radius = config.occupancy.person_radius
         self.model = ExistenceModel(links, radius, Border.of(rig), config.detection, config.body)
-        self._numbers = count(_FOUND_BY_WINDOW)
+        self._numbers = count(_FIRST_NUMBER)
 
     def revised(self, frames: Sequence[TrackedFrame], first: int, stop: int) -> list[TrackedFrame]:
         """Frames first .. stop - 1 with the people that are real by all frames given, those before and after too."""
@@ -74,8 +74,8 @@ class WindowExistence:
             tracks[rows] = next(self._numbers)
         bounds = np.searchsorted(found.frame, np.arange(len(frames) + 1))
         return [
-            self._frame(one, tracks[own], decision.log_odds[own])
-            for one, own in zip(frames, map(slice, bounds, bounds[1:]), strict=False)
+            self._frame(one, tracks[rows], decision.log_odds[rows])
+            for one, rows in zip(frames, map(slice, bounds, bounds[1:]), strict=False)
             if first <= one.fused.frame < stop
         ]
 
@@ -83,10 +83,10 @@ class WindowExistence:
         """One frame with the candidates that have a track as people, the others as ghosts; evidence of the window."""
         fused, number = one.fused, len(one.tracks)
         real = tracks > 0
-        every = replace(one.candidates, evidence=log_odds)
-        people, ghosts = _at(every, np.flatnonzero(real)), _at(every, np.flatnonzero(~real))
+        candidates = replace(one.candidates, evidence=log_odds)
+        people, ghosts = _at(candidates, np.flatnonzero(real)), _at(candidates, np.flatnonzero(~real))
         if not real[:number].all() or real[number:].any():
-            added = _at(every, number + np.flatnonzero(real[number:]))
+            added = _at(candidates, number + np.flatnonzero(real[number:]))
             before, volume = fused.people.ground, fused.volume
             made = revised_volume(volume, before, people.ground, added, self.grid, self.config)
             fused = replace(fused, made=made)
@@ -94,12 +94,12 @@ class WindowExistence:
 
 
 def _candidates(frames: Sequence[TrackedFrame]) -> WindowCandidates:
-    every = [one.candidates for one in frames]
+    people = [one.candidates for one in frames]
     tracks = [np.append(one.tracks, np.zeros(len(one.fused.ghosts), np.int64)) for one in frames]
-    frame = np.repeat(np.arange(len(frames)), [len(one) for one in every])
+    frame = np.repeat(np.arange(len(frames)), [len(one) for one in people])
 
     def joined(name: str) -> Floats:
-        return np.concatenate([getattr(one, name) for one in every])
+        return np.concatenate([getattr(one, name) for one in people])
 
     evidence = joined("evidence") - joined("prior")
     return WindowCandidates(
@@ -111,13 +111,13 @@ def tracks_of(found: WindowCandidates, decision: Existence, inside: Flags) -> In
     """Track of each candidate that is real, 0 for the others: added ones take that of the next detection on their path.
 
     A candidate is added between two of the detector's people, and before the first of a path away from the border,
-    where nobody appears. Elsewhere candidates are the best of many places that were tried, and so are their sums
+    where no person appears. Elsewhere candidates are the best of many places that were tried, and so are their sums
     (`found_by_window` asks for more); and what prolongs a track at the border of the area costs nothing.
     """
-    own = np.where(decision.real, found.track, 0)
+    detected = np.where(decision.real, found.track, 0)
     linked = np.flatnonzero((decision.successor >= 0) & decision.real)
     linked = linked[decision.real[decision.successor[linked]]]
-    earlier, later = own.copy(), own.copy()
+    earlier, later = detected.copy(), detected.copy()
     for i in linked.tolist():
         _take_over(earlier, int(decision.successor[i]), i, found)
     for i in linked[::-1].tolist():
@@ -128,7 +128,7 @@ def tracks_of(found: WindowCandidates, decision: Existence, inside: Flags) -> In
 def found_by_window(found: WindowCandidates, decision: Existence) -> list[Ints]:
     """Rows of each path of rejected candidates alone that the window is sure of, one int64 (k,) a path.
 
-    Somebody small or seen badly is worth less than a birth in every frame, and much more than one birth in all of them.
+    The evidence of a small or hardly visible person is less than a birth in each frame, and much more in all of them.
     """
     head, rows = np.arange(len(found)), np.flatnonzero(decision.real)
     for i in rows.tolist():
@@ -136,7 +136,8 @@ def found_by_window(found: WindowCandidates, decision: Existence) -> list[Ints]:
             head[decision.successor[i]] = head[i]
     by_path = rows[np.argsort(head[rows], kind="stable")]
     paths = np.split(by_path, np.flatnonzero(np.diff(head[by_path])) + 1)
-    return [own for own in paths if not found.track[own].any() and decision.log_odds[own].max(initial=0.0) >= _SURE]
+    certain = [rows for rows in paths if decision.log_odds[rows].max(initial=0.0) >= _LEAST_LOG_ODDS]
+    return [rows for rows in certain if not found.track[rows].any()]
 
 
 def _take_over(tracks: Ints, to: int, source: int, found: WindowCandidates) -> None:

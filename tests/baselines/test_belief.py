@@ -210,7 +210,7 @@ def test_squared_distances_of_histograms() -> None:
     np.testing.assert_allclose(squares(one, other), [[0.0] * PARTS, [1.0] * PARTS])
 
 
-def test_a_look_prefers_the_target_and_does_not_mind_what_is_hidden() -> None:
+def test_colours_prefer_the_target_and_ignore_hidden_parts() -> None:
     standing = people((0.0, 0.0), (1.2, -0.6))
     target = known(standing)
     colours = target.colours[0]

@@ -147,7 +147,7 @@ def test_a_map_all_foreground_fills_every_pillar_that_it_holds() -> None:
     np.testing.assert_allclose(asked.log_ratio(full).reshape(-1)[centre], expected, atol=1e-5)
 
 
-def test_a_view_that_does_not_see_the_pillar_and_a_blind_one_say_nothing() -> None:
+def test_blind_views_and_invisible_pillars_say_nothing() -> None:
     narrow = looking("narrow", (3.5, 3.5, 2.6), target=(-1.5, -1.5, 0.9), focal=260.0)
     views = (*corner_cameras()[:2], narrow)
     asked = probability(views)
@@ -181,7 +181,7 @@ def test_outside_the_polygon_nobody_is() -> None:
 
 
 @pytest.mark.parametrize("camera", (0, 1, 2))
-def test_it_is_highest_where_somebody_stands_through_a_lens_and_a_roll(camera: int) -> None:
+def test_it_is_highest_at_people_through_a_lens_and_a_roll(camera: int) -> None:
     views = (
         corner_cameras(),
         tuple(rolled(view, 0.5) for view in corner_cameras()),

@@ -111,7 +111,7 @@ def test_who_is_not_found_for_too_long_is_forgotten() -> None:
         assert deaths["reason"].tolist() == [b"not found for 1 s"] * (len(ids) - 1)
 
 
-def test_rows_hold_what_the_filter_believes_beside_what_the_frame_said() -> None:
+def test_rows_hold_filtered_and_detected_places() -> None:
     jitter = [0.0, 0.1, -0.1, 0.1, -0.1, 0.1, -0.1, 0.1]
     rows, _ = follow([[(0.0, y)] for y in jitter])
     assert rows["raw_y"].tolist() == jitter

@@ -188,7 +188,7 @@ def test_what_is_open_is_in_front() -> None:
 
 @given(st.lists(st.floats(-5, 5), min_size=3, max_size=25))
 @settings(max_examples=50, deadline=None)
-def test_the_middle_of_the_shortest_half_has_the_least_median_of_squares(distances: list[float]) -> None:
+def test_the_middle_of_the_shortest_half_is_the_least_median(distances: list[float]) -> None:
     given_ = np.array(distances)
     middle = _middle_of_shortest_half(given_.copy())
     half = len(distances) // 2
@@ -380,7 +380,7 @@ def test_without_colour_it_says_what_it_lacks() -> None:
             tracker.add(scene(3, standing), FrameObservations(observations, [None] * 4))
 
 
-def test_one_camera_in_colour_is_enough_and_blind_frames_are_borne() -> None:
+def test_one_camera_in_colour_is_enough() -> None:
     standing = people((0.0, 0.0))
     full = shown(standing)
     tracker = ParticleTracker(RIG, QUICK, 0)

@@ -90,7 +90,7 @@ def test_both_sources_have_no_duplicates_of_each_other() -> None:
     np.testing.assert_array_equal(both.ground[: len(volume)], volume.ground)
 
 
-def test_the_volume_of_an_unexplained_frame_is_filled_where_people_stand() -> None:
+def test_the_volume_without_explanation_is_filled_at_people() -> None:
     occupancy = Occupancy(RIG, ["pixels"] * 4, CONFIG.occupancy, FEW_HEIGHTS, BODY)
     seen = evidence("pixels")
     filled = marginal(occupancy.fuse(seen, empty_explanation(occupancy.rig, seen)).dense())
@@ -116,7 +116,7 @@ def test_who_is_in_a_pool_already_is_not_new_to_it() -> None:
 
 
 @pytest.mark.parametrize("kind", ("boxes", "pixels"))
-def test_the_pass_takes_what_is_proposed_and_drops_what_is_nobody(kind: str) -> None:
+def test_detection_keeps_people_of_proposals_and_drops_others(kind: str) -> None:
     frame_pass = Detector(RIG, [kind] * 4, FEW_HEIGHTS, BODY)
     proposed = pool(*(tuple(place) for place in STANDING[:, :2]), (-1.5, 1.5), (0.0, 1.6))
     plain, given = (frame_pass.explain(evidence(kind), None, asked).people for asked in (None, proposed))

@@ -92,7 +92,7 @@ def test_looks_that_last_are_believed_less_than_independent_ones() -> None:
     assert learned(rows, lasting).model.lasting.min(initial=np.inf) > learned(rows, fresh).model.lasting.max()
 
 
-def test_along_an_axis_that_tells_little_looks_last_as_long_as_tracklets_say() -> None:
+def test_a_weak_axis_lasts_as_long_as_tracklets_say() -> None:
     """Nobody is confused by the other axes, whatever is believed of how long errors last."""
     rows = walkers()
     lasting = learned(rows, drifting(rows, 0.2, 3.0, 4, "colours")).model.lasting
@@ -131,7 +131,7 @@ def dance(side: float, y: float) -> Path:
     return lambda t: (side * (0.1 + abs(np.sin(np.pi * t / 4))), y)
 
 
-def test_looks_are_learned_though_most_identities_would_be_wrong_without_them() -> None:
+def test_appearance_is_learned_from_mostly_wrong_identities() -> None:
     """Pairs of equally tall people, who are exchanged or not each time they stand together."""
     paths = {2 * k + side: (dance(2 * side - 1, 3.0 * k), 1.7, FRAMES) for k in range(3) for side in (0, 1)}
     rows = raw(rows_of({track + 1: path for track, path in paths.items()}))

@@ -34,7 +34,7 @@ def of(solved: Corrections, track: int, *frames: int) -> list[int]:
 TWO = tracks((0, 99), (0, 99))
 
 
-def test_a_swap_exchanges_from_its_frame_on_and_two_swaps_are_one_stretch() -> None:
+def test_a_swap_exchanges_from_its_frame_on() -> None:
     solved = solve_corrections(TWO, [Answer("a", "swap", 1, 2, 50)])
     assert of(solved, 1, 0, 49, 50, 99) == [1, 1, 2, 2] and of(solved, 2, 49, 50) == [2, 1]
     solved = solve_corrections(TWO, [Answer("b", "swap", 2, 1, 70), Answer("a", "swap", 1, 2, 50)])

@@ -33,7 +33,7 @@ MET = range(72, 89)
 
 
 @pytest.mark.parametrize(("frame", "taller"), [(80, 0.08), (78, 0.15), (80, 0.15), (82, 0.15)])
-def test_height_tells_two_apart_who_swapped_while_they_stood_together(frame: int, taller: float) -> None:
+def test_heights_resolve_a_swap_of_two_who_stood_together(frame: int, taller: float) -> None:
     true = rows_of({1: (visit(-1), 1.70, range(160)), 2: (visit(1), 1.70 + taller, range(160))}, noise=0.0)
     told = swapped(true, frame)
     found = relinked(told)
@@ -135,7 +135,7 @@ def test_nobody_at_all() -> None:
 # Tracklets
 
 
-def test_a_track_is_cut_where_it_met_another_and_where_it_was_unseen() -> None:
+def test_a_track_is_cut_at_encounters_and_gaps() -> None:
     rows = rows_of(
         {
             1: (lambda t: (-4 + t, -0.1), 1.7, range(64)),
@@ -161,9 +161,7 @@ def test_stretches_hold_every_row_once(rows: Rows) -> None:
 
 
 @given(st.lists(st.tuples(st.integers(1, 3), st.integers(1, 4)), max_size=40), st.sampled_from([0.0, 1.0, 2.5, 4.0]))
-def test_the_track_that_an_identity_holds_is_that_of_most_rows_around(
-    steps: list[tuple[int, int]], reach: float
-) -> None:
+def test_the_prevailing_track_is_that_of_most_rows_around(steps: list[tuple[int, int]], reach: float) -> None:
     rows = np.zeros(len(steps), TRAJECTORY)
     rows["id"], rows["frame"] = [track for track, _ in steps], np.cumsum([step for _, step in steps])
     held = []

@@ -169,7 +169,7 @@ def test_a_run_is_solved_again(tmp_path: Path) -> None:
     np.testing.assert_array_equal(new.read_frame(20)[0], run.read_frame(20)[0])
 
 
-def test_a_corrected_run_is_corrected_again_under_the_answers_before(tmp_path: Path) -> None:
+def test_a_second_correction_keeps_earlier_answers(tmp_path: Path) -> None:
     """Two corrections one after the other are both at once; an old one holds, whatever a later one says."""
     run_file, answers = tmp_path / "run.h5", tmp_path / "a.csv"
     assert track(write_recording(tmp_path), run_file) == 0

@@ -46,7 +46,7 @@ def test_no_partition_of_a_few_rows_is_better(rows: Rows) -> None:
 
 
 @pytest.mark.parametrize("away", [0.0, 0.2])
-def test_who_stand_beside_each_other_do_not_pass_through_each_other(away: float) -> None:
+def test_two_side_by_side_do_not_pass_through_each_other(away: float) -> None:
     """Two of one height, between two frames exchanged to within `away` metres: less likely than the distance says."""
     rows = rows_of({k: (straight(0, 0.35 * k, 0, 0), 1.7, range(2)) for k in (1, 2)}, noise=0.0)
     rows["y"][rows["frame"] == 1] += away

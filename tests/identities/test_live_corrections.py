@@ -57,7 +57,7 @@ def test_who_was_lost_and_found_gets_the_first_id_back() -> None:
     assert found["decision_frame"].min() < 80
 
 
-def test_nothing_is_decided_before_the_interval_is_over_or_without_one() -> None:
+def test_nothing_is_decided_before_the_interval_is_over() -> None:
     rows = np.concatenate([walk(1, 0, 45), walk(2, 52, 80)])
     for interval in (20.0, 0.0):
         assert len(in_windows(rows, Config(live=LiveConfig(correction_interval=interval)), count(3).__next__)) == 0
@@ -82,7 +82,7 @@ def test_no_id_stands_twice_in_a_frame(seed: int) -> None:
     assert len(np.unique(np.stack([named["frame"], named["id"]]), axis=1).T) == len(named)
 
 
-def test_corrections_of_one_decision_hold_at_once_and_decisions_one_after_another() -> None:
+def test_corrections_of_one_decision_hold_at_once() -> None:
     rows = np.concatenate([walk(1, 0, 60), walk(2, 0, 60, 1.0)])
     exchanged = corrected(rows, EXCHANGE)
     within = (rows["frame"] >= 20) & (rows["frame"] <= 50)
@@ -92,7 +92,7 @@ def test_corrections_of_one_decision_hold_at_once_and_decisions_one_after_anothe
     np.testing.assert_array_equal(corrected(rows, np.concatenate([EXCHANGE, later]))["id"], rows["id"])
 
 
-def test_ids_go_on_as_corrected_and_who_is_lost_leaves_a_taken_one() -> None:
+def test_ids_go_on_as_corrected_and_lost_tracks_leave_used_ones() -> None:
     assert renamed({10: 1, 11: 2, 12: 5}, EXCHANGE, {10, 11}) == {10: 2, 11: 1, 12: 5}
     found_again = np.array([(50, 40, 50, 7, 1)], CORRECTION)
     assert renamed({10: 1, 20: 7}, found_again, {20}) == {20: 1}

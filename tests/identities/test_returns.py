@@ -206,7 +206,7 @@ def coloured(people: dict[int, int], seed: int) -> tuple[Rows, Rows]:
     return rows, np.concatenate(seen)
 
 
-def test_people_of_an_earlier_run_keep_their_ids_and_others_get_greater_ones() -> None:
+def test_people_of_an_earlier_run_keep_their_ids() -> None:
     morning, looks = coloured({1: 1, 2: 2, 3: 3, 4: 4, 5: 5}, seed=1)
     morning["id"] += 10
     known = known_people(morning, looks)

@@ -53,12 +53,12 @@ def test_a_person_seen_badly_for_five_frames_stays() -> None:
     assert decide(candidates(*walk(evidence))).real.all()
 
 
-def test_a_child_pays_for_being_small_what_the_detector_takes_for_it() -> None:
+def test_the_height_prior_is_that_of_the_detector() -> None:
     found = replace(candidates(*walk(np.full(9, 3.0), off=0.1)), height=np.full(9, 1.05))
     assert decide(found).real.all()
 
 
-def test_a_path_of_rejected_candidates_alone_is_a_person_where_the_window_is_sure() -> None:
+def test_a_certain_path_of_rejected_candidates_is_a_person() -> None:
     for evidence, paths in ((7.0, 1), (2.0, 0)):
         found = candidates(*walk(np.full(9, evidence), track=0), *walk(np.full(9, 9.0), off=1.0))
         decision = decide(found)
@@ -95,7 +95,7 @@ def test_two_candidates_of_one_body_exclude_each_other() -> None:
     assert decision.gap == 0
 
 
-def test_a_path_leads_round_a_candidate_that_another_person_excludes() -> None:
+def test_a_path_leads_round_an_excluded_candidate() -> None:
     standing = [(t, 0.0, -0.3, 20.0, 1) for t in range(9)]
     passing = [(t, x, y, 3.0, 0 if t == 4 else 2) for t, (x, y) in enumerate(WALK)]
     found = candidates(*standing, *passing)
@@ -104,7 +104,7 @@ def test_a_path_leads_round_a_candidate_that_another_person_excludes() -> None:
     assert not real[found.track == 0].any()
 
 
-def test_candidates_are_added_between_detections_and_before_the_first_away_from_the_border() -> None:
+def test_candidates_are_added_inside_paths() -> None:
     weak = np.array([3.0, 3.0, 12.0, 12.0, 3.0, 12.0, 12.0, 3.0, 3.0])
     found = candidates(*walk(weak))
     decision = decide(found)

@@ -75,7 +75,7 @@ def test_an_encounter_says_how_long_it_was() -> None:
     assert split["frame"] == 13
 
 
-def test_who_is_renamed_meets_under_the_new_name_and_nobody_meets_themselves() -> None:
+def test_encounters_are_under_new_names_and_never_with_oneself() -> None:
     touching = [{(0, 1), (2, 3)} if f < 10 else set() for f in range(LENGTH)]
     rows = told(touching, [1, 2, 3, 4], [5])
 

@@ -1,4 +1,8 @@
-"""Every filter's claimed errors are its true ones on walks of the motion model (Bar-Shalom et al. 2001, section 5.4).
+"""The claimed errors of textbook filters are their true ones on walks of the motion model.
+
+Bar-Shalom et al. 2001, section 5.4. The Kalman filters and the identity search are whole filters. Of the tracks' filter
+only `TrackState` is here, corrected by posteriors with its prediction as their whole prior. `TrackFilter` itself gives
+the detector a wider prior (`motion.position_noise`); nothing here says that its claims are true.
 
 The mean normalised square of an error of two coordinates is 2: of innovations (NIS), and of smoothed places (NEES).
 """
@@ -41,8 +45,8 @@ def square(off: Floats, covariance: Floats) -> float:
     return float(off @ np.linalg.solve(covariance, off))
 
 
-def of_the_track_filter(measured: Floats, noise: Floats) -> list[float]:
-    """Posteriors are the textbook's: the detector's prior is the prediction."""
+def of_track_states(measured: Floats, noise: Floats) -> list[float]:
+    """Posteriors as of a detector with the prediction as its whole prior, without position noise."""
     spread = np.diag([0, 0, MOTION.speed_spread**2, MOTION.speed_spread**2])
     spread[:2, :2] = noise
     state = TrackState(1, 0, np.append(measured[0], [0, 0]), spread, 1.7, 0.01, 0.4, 0.01, 0.0)
@@ -80,7 +84,7 @@ def of_the_identity_search(measured: Floats, noise: Floats) -> list[float]:
 @pytest.mark.parametrize(
     ("squares", "noise"),
     [
-        (of_the_track_filter, NOISE),
+        (of_track_states, NOISE),
         (of_the_kalman_tracker, NOISE),
         (of_the_identity_search, ROUND * np.eye(2)),
     ],

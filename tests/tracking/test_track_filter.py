@@ -221,7 +221,7 @@ def test_far_away_is_somebody_new() -> None:
     assert chains == [1] * 10 + [2] * 10
 
 
-def test_before_the_first_frame_nothing_is_known_and_after_an_empty_one_that_nobody_is_there() -> None:
+def test_predictions_before_the_first_and_after_an_empty_frame() -> None:
     walkers = TrackFilter(RATE, CONFIG)
     assert walkers.predict(0) is None
     assert walkers.update(0, GHOSTS, GHOSTS).shape == (0,)

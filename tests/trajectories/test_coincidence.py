@@ -21,7 +21,7 @@ def walk(track: int, first: int, stop: int, y: float, score: float) -> Rows:
     return rows
 
 
-def test_the_weaker_of_two_tracks_in_one_place_is_dropped_for_as_long() -> None:
+def test_the_weaker_of_two_coincident_tracks_is_dropped() -> None:
     rows = np.concatenate([walk(1, 0, 60, 0.0, 5.0), walk(2, 20, 45, 0.1, 3.0), walk(3, 0, 60, 0.6, 1.0)])
     repeats, events = coincident(rows, RATE, 1.0)
     assert set(rows["id"][repeats]) == {2} and repeats.sum() == 25

@@ -49,7 +49,7 @@ def test_who_is_found_again_was_neither_dead_nor_born() -> None:
     assert set(found.identity.tolist()) == {1}
 
 
-def test_who_is_born_and_dies_beyond_the_border_does_so_at_the_first_and_last_row() -> None:
+def test_births_and_deaths_beyond_the_border_are_at_end_rows() -> None:
     rows = committed(rows_of({1: (visit(-1), 1.7, range(3, 60))}, noise=0.0))
     beyond = told((0, "birth", 1, 0), (1, "birth", 2, 0), (2, "death", 2, 0), (62, "death", 1, 0))
     assert story(whole(rows, beyond).events) == [(3, b"birth", 1, 0), (59, b"death", 1, 0)]

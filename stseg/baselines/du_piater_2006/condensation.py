@@ -1,6 +1,6 @@
-"""An independent particle filter in each view (Isard and Blake, Condensation, 1998).
+"""An independent particle filter in each view: Du and Piater 2006, eqs 10, 11 without messages (figure 4).
 
-The ablation of Du and Piater 2006, figure 4.
+The filter is Isard and Blake's (Condensation, 1998).
 
 Views exchange no messages; a view is initialised from the ground once, when it begins to follow a target. The ground
 belief is the views' particles, each view weighted by its resolution on the ground there: the central fusion of the

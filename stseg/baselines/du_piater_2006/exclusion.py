@@ -1,4 +1,4 @@
-"""Mutual exclusion of targets on the ground.
+"""Mutual exclusion of targets on the ground: a factor of the ground's belief (Du and Piater 2006, eq. 10).
 
 Du and Piater 2006 follow one target. Here the ground nodes of targets are joined in pairs by the potential
 

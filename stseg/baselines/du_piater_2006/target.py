@@ -1,4 +1,4 @@
-"""A target: a star, its colour model in each view, and the time since its last detection."""
+"""A target: a star and its colour models, which give p(z | x) of each view (Du and Piater 2006, eqs 8 to 11)."""
 
 from __future__ import annotations
 

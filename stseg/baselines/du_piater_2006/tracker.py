@@ -1,4 +1,4 @@
-"""Belief propagation between views: detections start and end tracks, colours update them (Du and Piater 2006)."""
+"""Belief propagation between views, which updates tracks by colours (Du and Piater 2006, eqs 4 to 11)."""
 
 from __future__ import annotations
 

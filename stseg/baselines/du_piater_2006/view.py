@@ -1,4 +1,4 @@
-"""A view of the star: its ground homography, and boxes of people."""
+"""A view of the star: the ground homography H of the potential (Du and Piater 2006, eq. 12), and boxes of people."""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""Constant-velocity Kalman filters, many at once (motion model: `stseg.tracking.filter.motion_model`).
+"""Constant-velocity Kalman filters, many at once (Huang and Wang 2012, section V.E).
+
+The motion model is that of `stseg.tracking.filter.motion_model`.
 
 K = P H^T (H P H^T + R)^-1          correction by a place z with covariance R
 x <- x + K (z - H x),  P <- (I - K H) P

@@ -1,4 +1,4 @@
-"""Proposals: candidates of a frame from the volume and from the detection probability, beside the lattice's.
+"""Candidates of a frame from the volume and from the detection probability (Huang and Wang 2012, eqs 7 to 9).
 
 Predicted tracks come first, in the detector itself; then modes of the volume of all evidence, then modes of the
 detection probability (HW12 section III). A proposal at the place of an earlier one is a duplicate. The sources are

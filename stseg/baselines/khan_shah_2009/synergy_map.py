@@ -1,4 +1,4 @@
-"""Homographic occupancy without an explanation of the frame (Khan and Shah 2009, section 4).
+"""Homographic occupancy without an explanation of the frame: the synergy map (Khan and Shah 2009, eqs 1 to 7).
 
 localiser = Localiser(rig, "footprint")
 volume = localiser.synergy(maps, localiser.clutter_weights(maps), least=0.05)

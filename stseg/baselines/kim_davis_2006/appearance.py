@@ -1,4 +1,4 @@
-"""Colour model of a person: colour samples of each body part (Kim and Davis 2006, sections 2 and 3.2)."""
+"""Colour model of a person: colour samples of each body part (Kim and Davis 2006, samples of eq. 1)."""
 
 from __future__ import annotations
 

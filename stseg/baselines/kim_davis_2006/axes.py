@@ -1,4 +1,4 @@
-"""Central vertical axes of segmented people, and their intersection on the ground (Kim and Davis 2006, section 3.3).
+"""Central vertical axes of segmented people, and their intersection on the ground (Kim and Davis 2006, eq. 5).
 
 A person's pixels lie on both sides of the image of the vertical through their ground point. The paper fits a free line
 to them. Here the direction is known: all verticals of a view meet in its vertical vanishing point

@@ -1,4 +1,4 @@
-"""Projection of a body into a view, and its coverage probability of a pixel (Kim and Davis 2006, section 3.1).
+"""Projection of a body into a view, and its coverage probability of a pixel (Kim and Davis 2006, eq. 3).
 
 A body's axis runs from the pixel of its feet to that of its head. A pixel x lies at the height h along it and at the
 distance w from it, both relative to the axis's length, and is covered with

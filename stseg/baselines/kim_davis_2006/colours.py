@@ -1,4 +1,4 @@
-"""Colours robust to illumination, and their density in samples of a body part (Kim and Davis 2006, section 2).
+"""Colours robust to illumination, and their density in samples of a body part (Kim and Davis 2006, eqs 1, 6).
 
     r = R / (R + G + B),   g = G / (R + G + B),   s = (R + G + B) / 3
     p_M(c) = 1 / N_M  sum_i  prod_j  exp(-(c_j - c_ij)^2 / sigma_j^2)      (Kim and Davis 2006, equation 1)

@@ -1,4 +1,4 @@
-"""The tracked people and their particles."""
+"""The tracked people and their particles: the joint state of Kim and Davis 2006, section 4."""
 
 from __future__ import annotations
 

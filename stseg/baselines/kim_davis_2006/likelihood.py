@@ -1,4 +1,4 @@
-"""Colour likelihood of a particle (Kim and Davis 2006, section 4.2).
+"""Colour likelihood of a particle (Kim and Davis 2006, eqs 6, 7).
 
     d^2 = 1 - sum_u sqrt(q*_r(u) q_r(u)),     log pi = sum over people, views and parts r of  -lambda d^2     (eq. 7)
 

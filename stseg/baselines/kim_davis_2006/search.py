@@ -1,4 +1,4 @@
-"""Iterated localisation: segment, find the axes, intersect them, repeat (Kim and Davis 2006, section 3.3)."""
+"""Iterated localisation: segment, find the axes, intersect them, repeat (Kim and Davis 2006, section 3.3, eq. 5)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Assignment of foreground pixels to people, given a hypothesis of their places (Kim and Davis 2006, section 3.1).
+"""Assignment of foreground pixels to people, given a hypothesis of their places (Kim and Davis 2006, eqs 2, 4).
 
     P(k | x) = P(k) P(x | k) / P(x),   P(k) = O_k(x) prod over l nearer to the camera of (1 - O_l(x))   (eqs 2 and 4)
 

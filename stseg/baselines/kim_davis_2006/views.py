@@ -1,4 +1,4 @@
-"""A camera of the particle filter: a raster of its pixels, and cached quantities of each frame."""
+"""A camera of the particle filter: its raster, and eq. 1 of each person's parts (Kim and Davis 2006)."""
 
 from __future__ import annotations
 

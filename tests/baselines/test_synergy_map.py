@@ -222,7 +222,7 @@ def test_ten_planes_unless_somebody_says_otherwise() -> None:
 
 
 @pytest.mark.parametrize("views", [1, 2, 3, 5, 8])
-def test_empty_cells_are_not_taken_for_occupied_however_many_views_see_them(views: int) -> None:
+def test_empty_cells_are_not_occupied_in_many_views(views: int) -> None:
     """With the true rates, at most pi / (1 - pi) of the empty cells come to log-odds above 0 (Markov's inequality)."""
     rig = rig_of([looking(f"cam{k}", (0.0, -3.5, 2.6), focal=60.0) for k in range(views)], cell=0.04, planes=1)
     rng = np.random.default_rng(views)
@@ -236,7 +236,7 @@ def test_empty_cells_are_not_taken_for_occupied_however_many_views_see_them(view
     assert hit > 0.6
 
 
-def test_cells_that_few_views_see_fill_under_a_mean_but_not_under_log_odds() -> None:
+def test_cells_of_few_views_fill_under_a_mean_alone() -> None:
     """A level of the mean that is right for four views is cleared by chance where two see the cell."""
     rng = np.random.default_rng(0)
     false_mean, false_u = {}, {}
