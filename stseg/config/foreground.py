@@ -81,7 +81,7 @@ class ForegroundConfig(Settings):
     model: Literal["mixture", "chromatic", "codebook"] = "mixture"
     """Background model; docs/configuration.md says where another than the mixture is better."""
     body_rows: float = positive(60.0, "rows, above 0")
-    """Image rows of a standing person that are enough: larger images are reduced by whole factors; 10000 for none."""
+    """Target height of a standing person, image rows: larger images are reduced by an integer factor; 10000: never."""
     mixture: MixtureConfig = field(default_factory=MixtureConfig)
     """Constants of the mixture."""
     chromatic: ChromaticConfig = field(default_factory=ChromaticConfig)

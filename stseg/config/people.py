@@ -34,7 +34,7 @@ class BodyConfig(Settings):
     heights: tuple[float, ...] = (1.0, 1.25, 1.5, 1.6, 1.7, 1.8, 1.9)
     """Heights that the search for candidates tries, metres, rising."""
     box_heights: tuple[float, ...] = (1.5, 1.6, 1.7, 1.8, 1.9)
-    """The same where cameras deliver boxes: the box of a half hidden adult is that of a child who stands elsewhere."""
+    """The same for boxes, fewer: the box of a half-occluded adult looks like that of a child at another position."""
 
     def width_of(self, height: Floats) -> Floats:
         """Mean width of bodies of given heights, both metres: that of all, less in proportion for small ones."""
