@@ -139,7 +139,7 @@ def evaluate(
     frames : int64, optional
         The frames to evaluate; by default those of the truth. A frame without detections counts.
     ignore_flagged
-        Treat rows of the truth whose flag is not 0 as people outside the area.
+        Treat rows of the truth with a flag other than 0 as people outside the area.
 
     Raises
     ------

@@ -51,11 +51,11 @@ def _parts(span: Span, trajectory: Rows, seconds: float) -> list[BusyTime]:
     length = max(1, round(seconds * span.frame_rate))
     edges: Ints = np.append(np.arange(span.first, span.stop, length), span.stop)
     counts = np.bincount(trajectory["frame"] - span.first, minlength=span.stop - span.first)
-    come, _ = np.histogram(_first_frames(trajectory), edges)
+    begun, _ = np.histogram(_first_frames(trajectory), edges)
     return [
-        BusyTime(first, stop, float(own.mean()), int(own.max()), int(new))
-        for first, stop, new in zip(edges[:-1].tolist(), edges[1:].tolist(), come.tolist(), strict=True)
-        if len(own := counts[first - span.first : stop - span.first])
+        BusyTime(first, stop, float(counts_of_part.mean()), int(counts_of_part.max()), int(new))
+        for first, stop, new in zip(edges[:-1].tolist(), edges[1:].tolist(), begun.tolist(), strict=True)
+        if len(counts_of_part := counts[first - span.first : stop - span.first])
     ]
 
 

@@ -59,5 +59,5 @@ def doubtful_stretches(trajectory: Rows) -> list[DoubtfulStretch]:
 
 
 def _probability(rows: Rows) -> Floats:
-    """Of a person at each point; scores are log-odds."""
+    """Probability of a person at each point; scores are log-odds."""
     return np.asarray(expit(rows["score"].astype(float)))

@@ -16,7 +16,7 @@ from stseg.reporting.pictures.colours import hex_colour, track_colour
 
 _WIDTH, _LEFT, _RIGHT = 1000, 44, 16  # pixels
 _COLUMNS = 900  # steps of a chart, however long the recording
-_LANE, _MOST_LANES = 15, 60
+_LANE_HEIGHT, _MAX_LANES = 15, 60
 
 
 @dataclass(frozen=True)
@@ -63,22 +63,22 @@ def track_chart(
     for stretch in doubtful:
         pale[stretch.track].append(stretch)
     lanes = _lanes(tracks, max(1, (span.stop - span.first) // 150))
-    count = min(max(lanes, default=0) + 1, _MOST_LANES)
-    bottom = 8 + count * _LANE + 4
+    count = min(max(lanes, default=0) + 1, _MAX_LANES)
+    bottom = 8 + count * _LANE_HEIGHT + 4
     lines = [_open(bottom + 32), *_clock(span, bottom, 4)]
     for row, lane in zip(tracks, lanes, strict=True):
-        if lane < _MOST_LANES:
+        if lane < _MAX_LANES:
             u, end = span.place(int(row["first"])), span.place(int(row["last"]) + 1)
-            v, colour = 8 + lane * _LANE, hex_colour(track_colour(int(row["id"])))
+            v, colour = 8 + lane * _LANE_HEIGHT, hex_colour(track_colour(int(row["id"])))
             name = names.get(int(row["id"]), str(row["id"]))
             words = f"track {escape(name)}: frames {row['first']} to {row['last']}"
             lines.append(
-                f'<rect x="{u:.1f}" y="{v}" width="{max(end - u, 1.5):.1f}" height="{_LANE - 4}" rx="3" '
+                f'<rect x="{u:.1f}" y="{v}" width="{max(end - u, 1.5):.1f}" height="{_LANE_HEIGHT - 4}" rx="3" '
                 f'fill="{colour}"><title>{words}</title></rect>'
             )
             lines += [_pale(span, stretch, v) for stretch in pale[int(row["id"])]]
             if end - u > 8 * len(name) + 8:
-                lines.append(f'<text class="on" x="{u + 5:.1f}" y="{v + _LANE - 6}">{escape(name)}</text>')
+                lines.append(f'<text class="on" x="{u + 5:.1f}" y="{v + _LANE_HEIGHT - 6}">{escape(name)}</text>')
     return "\n".join([*lines, "</svg>"])
 
 
@@ -87,7 +87,7 @@ def _pale(span: Span, stretch: DoubtfulStretch, v: int) -> str:
     u, end = span.place(stretch.first), span.place(stretch.last + 1)
     words = f"track {stretch.track}, frames {stretch.first} to {stretch.last}: {100 * stretch.certainty:.0f} % certain"
     return (
-        f'<rect class="pale" x="{u:.1f}" y="{v}" width="{max(end - u, 1.5):.1f}" height="{_LANE - 4}">'
+        f'<rect class="pale" x="{u:.1f}" y="{v}" width="{max(end - u, 1.5):.1f}" height="{_LANE_HEIGHT - 4}">'
         f"<title>{words}</title></rect>"
     )
 
@@ -125,19 +125,18 @@ def _round_time(seconds: float) -> float:
 
 def _counts(span: Span, frames: Ints) -> Floats:
     """People in each frame, float64 (frame,)."""
-    own = frames[(frames >= span.first) & (frames < span.stop)] - span.first
-    return np.bincount(own, minlength=span.stop - span.first).astype(float)
+    inside = frames[(frames >= span.first) & (frames < span.stop)] - span.first
+    return np.bincount(inside, minlength=span.stop - span.first).astype(float)
 
 
 def _true_counts(span: Span, frames: Ints) -> Floats:
-    """The same of truth, which may be sparse: a frame that it does not know has the people of the last one it knows."""
+    """The same of truth, which may be sparse: a frame without rows has the people of the last one with rows."""
     counts = _counts(span, frames)
-    known = np.flatnonzero(counts)
-    return (
-        counts
-        if not len(known)
-        else counts[known[np.maximum(np.searchsorted(known, np.arange(len(counts)), "right") - 1, 0)]]
-    )
+    frames = np.flatnonzero(counts)
+    if not len(frames):
+        return counts
+    last = np.searchsorted(frames, np.arange(len(counts)), "right") - 1
+    return np.asarray(counts[frames[np.maximum(last, 0)]])
 
 
 def _steps(span: Span, counts: Floats, bottom: float, rise: float) -> str:
@@ -150,13 +149,13 @@ def _steps(span: Span, counts: Floats, bottom: float, rise: float) -> str:
     return " ".join(words)
 
 
-def _lanes(tracks: Rows, apart: int) -> list[int]:
-    """The first lane that is free at each track's first frame, `tracks` being in any order."""
+def _lanes(tracks: Rows, gap: int) -> list[int]:
+    """The first lane that is free `gap` frames before each track, `tracks` being in any order."""
     ends: list[int] = []
     lanes = [0] * len(tracks)
     for k in np.lexsort((tracks["id"], tracks["first"])).tolist():
         first, last = int(tracks["first"][k]), int(tracks["last"][k])
-        lane = next((lane for lane, end in enumerate(ends) if end + apart < first), len(ends))
+        lane = next((lane for lane, end in enumerate(ends) if end + gap < first), len(ends))
         ends[lane : lane + 1] = [last]
         lanes[k] = lane
     return lanes

@@ -19,7 +19,7 @@ TRAIL = 5.0
 """Length of a trail, seconds."""
 
 
-_PLAN = (900, 1000)
+_PLAN_SIZE = (900, 1000)
 """Width and height of the plan at most, pixels: as it is shown beside another picture, its labels can be read."""
 
 
@@ -78,7 +78,7 @@ def ground_figures(
     names
         Of tracks, by id.
     """
-    plan = plan_view(rig, trajectory, truth, views.max(axis=0), rig.name, *_PLAN, names)
+    plan = plan_view(rig, trajectory, truth, views.max(axis=0), rig.name, *_PLAN_SIZE, names)
     thread = spacetime_picture(rig.grid, trajectory, rig.frame_rate, rig.name)
     return [
         Figure("plan", plan, "From above. The lighter the ground, the more views see what stands there."),

@@ -26,9 +26,9 @@ def people_per_minute(frames: Ints, trajectory: Rows, frame_rate: float) -> Floa
         return np.zeros(0)
     length = max(1, round(60 * frame_rate))
     minute, rows = (frames - frames[0]) // length, (trajectory["frame"] - frames[0]) // length
-    there = np.bincount(minute)
-    people = np.bincount(rows, minlength=len(there))[: len(there)]
-    return np.asarray(people[there > 0] / there[there > 0], float)
+    frame_count = np.bincount(minute)
+    people = np.bincount(rows, minlength=len(frame_count))[: len(frame_count)]
+    return np.asarray(people[frame_count > 0] / frame_count[frame_count > 0], float)
 
 
 def ground_by_views(views: Bytes, inside: Flags, cameras: int) -> Floats:
@@ -43,5 +43,5 @@ def ground_by_views(views: Bytes, inside: Flags, cameras: int) -> Floats:
     cameras
         Number of cameras.
     """
-    seen = views.max(axis=0)[inside]
-    return np.asarray(np.bincount(seen, minlength=cameras + 1) / max(len(seen), 1), float)
+    view_count = views.max(axis=0)[inside]
+    return np.asarray(np.bincount(view_count, minlength=cameras + 1) / max(len(view_count), 1), float)

@@ -15,7 +15,7 @@ from stseg.commands.simulate import simulate
 from stseg.errors import ConfigError
 from stseg.evaluation import evaluate
 from stseg.simulation import NAMED, Film, Spoil, SpoiledFilm
-from stseg.simulation.spoiling.spoil import MOST, STRENGTHS, spoiled_boxes, spoiled_mask
+from stseg.simulation.spoiling.spoil import MAX_STRENGTHS, STRENGTHS, spoiled_boxes, spoiled_mask
 from stseg.simulation.spoiling.spoiled_boxes import BOX_KINDS
 from stseg.simulation.spoiling.spoiled_masks import MASK_KINDS, Moment
 
@@ -73,7 +73,7 @@ def test_boxes_jitter_go_missing_and_double() -> None:
     assert (jittered[:, 1] - 20).std() == pytest.approx(9.0, rel=0.2)
     assert len(spoiled_boxes(BOXES, [Spoil("missed", 0.2)], MOMENT)) == pytest.approx(320, abs=30)
     assert len(spoiled_boxes(BOXES, [Spoil("doubled", 0.2)], MOMENT)) == pytest.approx(480, abs=30)
-    assert set(BOX_KINDS) | set(MASK_KINDS) == set(STRENGTHS) == set(MOST)
+    assert set(BOX_KINDS) | set(MASK_KINDS) == set(STRENGTHS) == set(MAX_STRENGTHS)
 
 
 def test_a_spoiled_film_keeps_all_but_masks_and_boxes() -> None:

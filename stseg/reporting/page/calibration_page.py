@@ -16,9 +16,9 @@ import numpy as np
 from stseg.arrays import Bytes
 from stseg.reporting.page.style import STYLE
 
-_WIDEST = 1920
+_MAX_FRAME_WIDTH = 1920
 """Greatest width of a frame in the page, pixels; points are in the camera's own pixels."""
-_PLAN = 900
+_PLAN_SIZE = 900
 """Size of a plan without a picture, pixels."""
 
 
@@ -52,7 +52,7 @@ def calibration_page(
         Drawn below the plan's grid; None for a grid alone.
     """
     x0, y0, x1, y1 = area
-    scale = plan.scale if plan is not None else _PLAN / max(x1 - x0, y1 - y0)
+    scale = plan.scale if plan is not None else _PLAN_SIZE / max(x1 - x0, y1 - y0)
     data = {
         "area": area,
         "plan": {
@@ -73,9 +73,9 @@ def calibration_page(
 
 
 def _jpeg(image: Bytes) -> str:
-    share = min(1.0, _WIDEST / image.shape[1])
-    shown = image if share == 1 else cv2.resize(image, None, fx=share, fy=share, interpolation=cv2.INTER_AREA)
-    _, data = cv2.imencode(".jpg", shown, [cv2.IMWRITE_JPEG_QUALITY, 90])
+    share = min(1.0, _MAX_FRAME_WIDTH / image.shape[1])
+    scaled = image if share == 1 else cv2.resize(image, None, fx=share, fy=share, interpolation=cv2.INTER_AREA)
+    _, data = cv2.imencode(".jpg", scaled, [cv2.IMWRITE_JPEG_QUALITY, 90])
     return "data:image/jpeg;base64," + base64.b64encode(np.asarray(data, np.uint8).tobytes()).decode("ascii")
 
 

@@ -14,8 +14,8 @@ from stseg.records.ghost_reasons import REASONS, ghost_reasons
 from stseg.reporting.pictures.colours import hex_colour, track_colour
 from stseg.reporting.pictures.sheets import Sheets
 
-_MOST_PLACES = 250_000  # of tracks
-_MOST_CANDIDATES = 120  # of a frame, those with most evidence
+_MAX_PLACES = 250_000  # of tracks
+_MAX_CANDIDATES = 120  # of a frame, those with most evidence
 
 
 def embedded_json(
@@ -60,7 +60,7 @@ def embedded_json(
     return json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
 
 
-def thin_tracks(trajectory: Rows, slider_frames: Ints, most: int = _MOST_PLACES) -> tuple[Rows, int]:
+def thin_tracks(trajectory: Rows, slider_frames: Ints, most: int = _MAX_PLACES) -> tuple[Rows, int]:
     """Thin rows for the page, sorted by id and frame, and the stride in frames.
 
     The ends of every track, the slider's frames and every stride-th frame are kept.
@@ -94,17 +94,17 @@ def _tracks(rig: Rig, trajectory: Rows, slider_frames: Ints, names: Mapping[int,
 
 def _candidates(candidates: Rows, slider_frames: Ints) -> list[list[list[object]]]:
     """Candidates of each slider frame by evidence: x, y, evidence, reason (-1 for a person) and evidence by view."""
-    shown = candidates[np.isin(candidates["frame"], slider_frames)]
-    found = ghost_reasons(shown)
-    reason = np.full(len(shown), -1)
-    reason[shown["status"] == 0] = found.reason
-    order = np.lexsort((-shown["evidence"], shown["frame"]))
-    shown, reason = shown[order], reason[order]
-    bounds = np.searchsorted(shown["frame"], [*slider_frames.tolist(), np.iinfo(np.int64).max])
+    rows = candidates[np.isin(candidates["frame"], slider_frames)]
+    found = ghost_reasons(rows)
+    reason = np.full(len(rows), -1)
+    reason[rows["status"] == 0] = found.reason
+    order = np.lexsort((-rows["evidence"], rows["frame"]))
+    rows, reason = rows[order], reason[order]
+    bounds = np.searchsorted(rows["frame"], [*slider_frames.tolist(), np.iinfo(np.int64).max])
     listed = []
     for start, stop in zip(bounds[:-1].tolist(), bounds[1:].tolist(), strict=True):
-        part = range(start, min(stop, start + _MOST_CANDIDATES))
-        listed.append([_candidate(shown[k], int(reason[k])) for k in part])
+        part = range(start, min(stop, start + _MAX_CANDIDATES))
+        listed.append([_candidate(rows[k], int(reason[k])) for k in part])
     return listed
 
 

@@ -18,7 +18,7 @@ MOST_ROWS = 2000
 """Greatest number of rows of a table; a note counts the others."""
 
 
-_PHOTOGRAPH = 400_000
+_MAX_PNG = 400_000
 """Size from which a picture in the page is stored as JPEG, bytes."""
 
 
@@ -39,17 +39,17 @@ def note(words: str, kind: str = "note") -> str:
     return f'<p class="{kind}">{words}</p>'
 
 
-def figures(shown: Sequence[Figure], layout: str) -> str:
+def figures(pictures: Sequence[Figure], layout: str) -> str:
     """Pictures with their captions; `layout` is a class of the style sheet."""
-    parts = [figure(one) for one in shown]
+    parts = [figure(one) for one in pictures]
     return f'<div class="{layout}">{"".join(parts)}</div>' if parts else ""
 
 
-def figure(shown: Figure) -> str:
+def figure(picture: Figure) -> str:
     """A picture with its caption."""
-    kind, data = _encoded(shown.picture)
-    tall, wide = shown.picture.shape[:2]
-    words = escape(shown.caption)
+    kind, data = _encoded(picture.picture)
+    tall, wide = picture.picture.shape[:2]
+    words = escape(picture.caption)
     return (
         f'<figure><img width="{wide}" height="{tall}" alt="{words}" src="data:image/{kind};base64,{data}">'
         f"<figcaption>{words}</figcaption></figure>"
@@ -59,7 +59,7 @@ def figure(shown: Figure) -> str:
 def _encoded(picture: Bytes) -> tuple[str, str]:
     """Its kind and base64: PNG, but JPEG of photographs, that a page with many cameras stays light."""
     data, kind = png_bytes(picture), "png"
-    if len(data) > _PHOTOGRAPH:
+    if len(data) > _MAX_PNG:
         _, packed = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, 85])
         data, kind = bytes(np.asarray(packed, np.uint8)), "jpeg"
     return kind, base64.b64encode(data).decode("ascii")

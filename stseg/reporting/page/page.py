@@ -272,7 +272,7 @@ def _privacy(contents: Contents) -> str:
 
 
 def _reasons(contents: Contents) -> str:
-    """How many ghosts were removed for each reason, the commonest first, and how many each view denies."""
+    """Number of ghosts removed for each reason, the commonest first, and of those that each view denies."""
     counts, count = contents.ghosts.counts(), len(contents.ghosts.ghosts)
     ranked = [k for k in np.argsort(-np.array(counts), kind="stable").tolist() if counts[k]]
     reasons = [(REASONS[k], float(counts[k])) for k in ranked]
@@ -318,7 +318,7 @@ def _track_table(span: Span, tracks: Rows, certainty: Floats, names: Mapping[int
 
 
 def _cells(cell_probability: Sequence[tuple[float, float]]) -> str:
-    """How far log-odds of cells can be believed; nothing where no volume was kept."""
+    """Reliability of the log-odds of cells; nothing where no volume was kept."""
     if not cell_probability:
         return ""
     cells = [(f"{nats:+g}", f"{100 * probability:.0f} %") for nats, probability in cell_probability]

@@ -19,7 +19,7 @@ from stseg.reporting.figures import backdrop
 from stseg.reporting.page.style import STYLE
 from stseg.reporting.pictures.overlay import overlay
 
-_WIDTH, _TALL = 960, 260
+_WIDTH, _HEIGHT = 960, 260
 _VIEWS = 2
 """Views of each decision."""
 
@@ -56,11 +56,11 @@ def review_page(title: str, questions: Sequence[Question], shows_images: bool) -
 
 
 def _item(question: Question) -> str:
-    shown = "".join(
+    pictures = "".join(
         f'<figure><img alt="{escape(words)}" src="{_jpeg(picture)}"><figcaption>{escape(words)}</figcaption></figure>'
         for words, picture in question.pictures
     )
-    return f'<section class="item" hidden><h2>{escape(question.text)}</h2><div class="row">{shown}</div></section>'
+    return f'<section class="item" hidden><h2>{escape(question.text)}</h2><div class="row">{pictures}</div></section>'
 
 
 def _jpeg(picture: Bytes) -> str:
@@ -69,23 +69,23 @@ def _jpeg(picture: Bytes) -> str:
 
 
 def best_views(rig: Rig, ground: AnyArray) -> list[int]:
-    """The views that show ground points (n, 2) at body height, those first in which they are farthest apart."""
+    """The views that show ground points (n, 2) at body height, ordered by the distance between them in the image."""
     scores = []
     for view, camera in enumerate(rig.cameras):
         pixel, ahead = camera.project(np.asarray(ground, float), 0.9)
-        seen = float((ahead & camera.inside(pixel)).mean())
-        apart = float(np.ptp(pixel[:, 0])) / camera.size[0] if ahead.all() else 0.0
+        visible = float((ahead & camera.inside(pixel)).mean())
+        separation = float(np.ptp(pixel[:, 0])) / camera.size[0] if ahead.all() else 0.0
         distance = float(np.hypot(*(np.asarray(ground, float).mean(axis=0) - camera.centre[:2])))
-        scores.append((-seen, -apart if len(pixel) > 1 and apart > 0 else distance, view))
+        scores.append((-visible, -separation if len(pixel) > 1 and separation > 0 else distance, view))
     return [view for *_, view in sorted(scores)][:_VIEWS]
 
 
 def moment_picture(
-    rig: Rig, view: int, trajectory: Rows, frame: int, ids: Sequence[int], seen: Observation, trail: int
+    rig: Rig, view: int, trajectory: Rows, frame: int, ids: Sequence[int], observation: Observation, trail: int
 ) -> Bytes:
     """A crop of one view around some tracks in a frame, with pillars and trails."""
     camera = rig.cameras[view]
-    picture = overlay(camera, rig.grid, backdrop(seen, camera.size), trajectory, frame, trail, _WIDTH)
+    picture = overlay(camera, rig.grid, backdrop(observation, camera.size), trajectory, frame, trail, _WIDTH)
     nearest = trajectory[np.isin(trajectory["id"], ids)]
     nearest = nearest[np.abs(nearest["frame"] - frame) <= trail]
     return _resized(_crop(picture, camera, nearest) if len(nearest) else picture)
@@ -104,7 +104,7 @@ def _crop(picture: Bytes, camera: Camera, rows: Rows) -> Bytes:
 
 
 def _resized(picture: Bytes) -> Bytes:
-    scale = _TALL / picture.shape[0]
+    scale = _HEIGHT / picture.shape[0]
     return np.asarray(cv2.resize(picture, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA), np.uint8)
 
 

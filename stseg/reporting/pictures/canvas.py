@@ -41,16 +41,16 @@ def dashes(canvas: Bytes, points: AnyArray, colour: Colour, width: int = 1, on: 
 
 
 def fading_stroke(canvas: Bytes, points: AnyArray, colour: Colour, width: int, opacities: AnyArray) -> None:
-    """An open polyline whose pieces have opacities of their own, 0..1, one fewer than points."""
+    """An open polyline with an opacity for each piece, 0..1, one fewer than points."""
     points = np.asarray(points, float)
-    known: Flags = np.asarray(np.isfinite(points).all(axis=1))
-    if not known.any():
+    finite: Flags = np.asarray(np.isfinite(points).all(axis=1))
+    if not finite.any():
         return
-    part, origin = _part(canvas, points[known], width + 1)
+    part, origin = _part(canvas, points[finite], width + 1)
     if not part.size:
         return
     mask = np.zeros(part.shape[:2], np.uint8)
-    for k in np.flatnonzero(known[1:] & known[:-1]):
+    for k in np.flatnonzero(finite[1:] & finite[:-1]):
         piece = _fixed(points[k : k + 2] - origin)
         cv2.polylines(mask, [piece], False, round(255 * float(opacities[k])), width, cv2.LINE_AA, _SHIFT)
     blend(part, mask, colour, 1.0)
@@ -86,7 +86,7 @@ def ring(canvas: Bytes, place: AnyArray, radius: float, colour: Colour, width: i
 
 
 def text_size(words: str, size: float, weight: int = 1) -> tuple[int, int]:
-    """Width and height of a line of text whose capitals are `size` pixels tall."""
+    """Width and height of a line of text with capitals `size` pixels tall."""
     (width, _), _ = cv2.getTextSize(words, _FONT, size / _CAPITALS, weight)
     return width, round(size)
 
@@ -147,8 +147,8 @@ def _fixed(points: AnyArray) -> NDArray[np.int32]:
 def _unbroken(points: AnyArray) -> Iterator[Floats]:
     """Unbroken parts of a line between its nans, of two points or more."""
     points = np.asarray(points, float)
-    known = np.isfinite(points).all(axis=1)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], known, [False]]).astype(np.int8)))
+    finite = np.isfinite(points).all(axis=1)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], finite, [False]]).astype(np.int8)))
     for start, stop in edges.reshape(-1, 2):
         if stop - start > 1:
             yield points[start:stop]
@@ -182,7 +182,7 @@ def _part(canvas: Bytes, points: AnyArray, margin: int) -> tuple[Bytes, Ints]:
 
 
 def _rounded(centre: tuple[float, float], width: float, height: float) -> Floats:
-    """A rectangle whose corners are quarter circles, float64 (n, 2)."""
+    """A rectangle with quarter circles for corners, float64 (n, 2)."""
     radius = 0.38 * min(width, height)
     angle = np.linspace(0, np.pi / 2, 8)
     corners = []

@@ -16,8 +16,8 @@ from stseg.reporting.pictures.labels import place_labels
 from stseg.reporting.pictures.overlay import OverlayView, overlay
 from stseg.reporting.pictures.plan import ground_sheet, plan_map
 
-_WIDEST, _ALL_VIEWS = 960, 1280  # width of a view, and of all views side by side, pixels
-_LEAST_HEIGHT = 720  # of the film, pixels
+_MAX_VIEW_WIDTH, _MAX_WIDTH = 960, 1280  # width of a view, and of all views side by side, pixels
+_MIN_HEIGHT = 720  # of the film, pixels
 
 
 class Film:
@@ -37,10 +37,10 @@ class Film:
         self._trail = round(TRAIL * rig.frame_rate)
         count = len(rig.cameras)
         self._columns = int(np.ceil(np.sqrt(count)))
-        self._wide = min(_WIDEST, _ALL_VIEWS // self._columns)
+        self._wide = min(_MAX_VIEW_WIDTH, _MAX_WIDTH // self._columns)
         self._tall = max(OverlayView(camera, self._wide).size[1] for camera in rig.cameras)
         rows = -(-count // self._columns)
-        height = max(rows * self._tall, _LEAST_HEIGHT)
+        height = max(rows * self._tall, _MIN_HEIGHT)
         self._plan = plan_map(rig, height, height)
         self._ground = ground_sheet(self._plan, rig, views.max(axis=0), rig.name)
         wide, tall = self._columns * self._wide + self._plan.size[0], max(height, self._plan.size[1])
@@ -65,11 +65,11 @@ class Film:
         recent = self._rows[first:stop]
         canvas = blank(*self.size, NIGHT)
         for k, (camera, view) in enumerate(zip(self._rig.cameras, views, strict=True)):
-            shown = overlay(
+            picture = overlay(
                 camera, self._rig.grid, backdrop(view, camera.size), recent, frame, self._trail, width=self._wide
             )
             v, u = (k // self._columns) * self._tall, (k % self._columns) * self._wide
-            canvas[v : v + shown.shape[0], u : u + shown.shape[1]] = shown
+            canvas[v : v + picture.shape[0], u : u + picture.shape[1]] = picture
         left = self._columns * self._wide
         canvas[:, left:] = PAPER
         plan = self._plan_of(frame, recent)
@@ -78,19 +78,19 @@ class Film:
 
     def _plan_of(self, frame: int, recent: Rows) -> Bytes:
         canvas, plan = self._ground.copy(), self._plan
-        own = recent[recent["frame"] == frame]
-        places = plan.pixel(np.stack([own["x"], own["y"]], -1))
-        for row, place in zip(own, places, strict=True):
+        present = recent[recent["frame"] == frame]
+        places = plan.pixel(np.stack([present["x"], present["y"]], -1))
+        for row, place in zip(present, places, strict=True):
             path = recent[recent["id"] == row["id"]]
             opacity = 1 - 0.85 * (frame - path["frame"][:-1]) / max(self._trail, 1)
             colour = track_colour(int(row["id"]))
             fading_stroke(canvas, plan.pixel(np.stack([path["x"], path["y"]], -1)), colour, 3, opacity)
             disc(canvas, place, 8, PAPER)
             disc(canvas, place, 6.5, colour)
-        words = [str(int(row["id"])) for row in own]
+        words = [str(int(row["id"])) for row in present]
         sizes = [chip_size(word, 13) for word in words]
         centres = place_labels(places, sizes, (*plan.corner, *plan.far_corner), 14)
-        for row, word, (u, v) in zip(own, words, centres.tolist(), strict=True):
+        for row, word, (u, v) in zip(present, words, centres.tolist(), strict=True):
             chip(canvas, word, (u, v), track_colour(int(row["id"])), 13)
         clock = f"{clock_time(frame / self._rig.frame_rate)}, frame {frame}"
         text(canvas, clock, (plan.corner[0], plan.size[1] - 38), QUIET, 16, (0, 0.5))

@@ -52,7 +52,7 @@ def flow_map(
     busy = field["density"] > 0.1 * max(float(field["density"].max(initial=0.0)), 1e-9)
     for row in field[busy]:
         _arrow(canvas, plan, row, side)
-    _name(canvas, plan, [*((name, rings[0], _ZONE) for name, rings in zones), *((*own, _LINE) for own in lines)])
+    _name(canvas, plan, [*((name, rings[0], _ZONE) for name, rings in zones), *((*line, _LINE) for line in lines)])
     return canvas
 
 

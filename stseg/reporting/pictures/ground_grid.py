@@ -13,8 +13,8 @@ from stseg.reporting.pictures.overlay import OverlayView
 _LINE: Colour = (255, 196, 64)
 _BORDER: Colour = (64, 220, 255)
 _POLE: Colour = (80, 80, 255)
-_MOST_LINES = 14
-_STEPS = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
+_MAX_LINES = 14
+_LINE_DISTANCES = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 _POLES = 4
 """Along the longer side of the area."""
 _TALL = 1.7
@@ -42,7 +42,8 @@ def grid_picture(camera: Camera, grid: Grid, image: Bytes | None, frame: int, wi
     """
     view = OverlayView(camera, width)
     canvas = view.canvas(image)
-    step = next((s for s in _STEPS if s * _MOST_LINES >= max(grid.x[1] - grid.x[0], grid.y[1] - grid.y[0])), _STEPS[-1])
+    side = max(grid.x[1] - grid.x[0], grid.y[1] - grid.y[0])
+    step = next((s for s in _LINE_DISTANCES if s * _MAX_LINES >= side), _LINE_DISTANCES[-1])
     for x in _stops(grid.x, step):
         _line(canvas, view, np.full(400, x), np.linspace(*grid.y, 400), x in grid.x)
     for y in _stops(grid.y, step):

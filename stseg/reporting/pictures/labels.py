@@ -32,21 +32,21 @@ def place_labels(
     float64 (n, 2)
     """
     points = np.asarray(points, float).reshape(-1, 2)
-    taken = np.concatenate([points - 5, points + 5], axis=1)
+    occupied = np.concatenate([points - 5, points + 5], axis=1)
     centres = np.zeros_like(points)
     for k, (point, size) in enumerate(zip(points, sizes, strict=True)):
         half = np.array(size, float) / 2
         offered = point + _DIRECTIONS * (half + gap * np.where(_DIRECTIONS.all(axis=1), 0.5, 1.0)[:, None])
         offered = np.clip(offered, np.array(bounds[:2]) + half, np.array(bounds[2:]) - half)
         boxes = np.concatenate([offered - half, offered + half], axis=1)
-        best = int(np.argmin(_overlap(boxes, taken)))
+        best = int(np.argmin(_overlap(boxes, occupied)))
         centres[k] = offered[best]
-        taken = np.concatenate([taken, boxes[best : best + 1]])
+        occupied = np.concatenate([occupied, boxes[best : best + 1]])
     return centres
 
 
-def _overlap(boxes: Floats, taken: Floats) -> Floats:
-    """How much of each box is taken, square pixels, float64 (n,)."""
-    low = np.maximum(boxes[:, None, :2], taken[None, :, :2])
-    high = np.minimum(boxes[:, None, 2:], taken[None, :, 2:])
+def _overlap(boxes: Floats, occupied: Floats) -> Floats:
+    """Occupied area of each box, square pixels, float64 (n,)."""
+    low = np.maximum(boxes[:, None, :2], occupied[None, :, :2])
+    high = np.minimum(boxes[:, None, 2:], occupied[None, :, 2:])
     return np.asarray(np.prod(np.clip(high - low, 0, None), axis=-1).sum(axis=1))

@@ -14,10 +14,10 @@ from stseg.reporting.pictures.colours import INK, PAPER, QUIET, Colour, mixed
 from stseg.reporting.pictures.plan import border, draw_cameras
 from stseg.reporting.pictures.plan_map import PlanMap, rule, scale_bar, sheet
 
-_BINS = 40  # along the longer side of the ground, at most
-_SIDES = (0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)  # metres
-_NEAR = 0.75  # radius of a dwell place, metres
-_WARM = np.array([(252, 251, 250), (150, 206, 254), (60, 140, 240), (38, 54, 190), (48, 18, 96)], float)
+_MAX_BINS = 40  # along the longer side of the ground, at most
+_BIN_SIDES = (0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)  # metres
+_DWELL_RADIUS = 0.75  # radius of a dwell place, metres
+_WARM_TONES = np.array([(252, 251, 250), (150, 206, 254), (60, 140, 240), (38, 54, 190), (48, 18, 96)], float)
 
 
 @dataclass(frozen=True)
@@ -40,8 +40,8 @@ class Bins:
     def of(cls, grid: Grid) -> Bins:
         """Bins of a round side, no finer than the cells."""
         longest = max(grid.x[1] - grid.x[0], grid.y[1] - grid.y[0])
-        fit = [side for side in _SIDES if side >= grid.cell - 1e-9 and side * _BINS >= longest]
-        return cls(grid.x, grid.y, min(fit, default=longest / _BINS))
+        fit = [side for side in _BIN_SIDES if side >= grid.cell - 1e-9 and side * _MAX_BINS >= longest]
+        return cls(grid.x, grid.y, min(fit, default=longest / _MAX_BINS))
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -88,23 +88,23 @@ class DwellPlace:
 
 
 def dwell_places(trajectory: Rows, bins: Bins, most: int = 3) -> list[DwellPlace]:
-    """Places with more person-time within `_NEAR` than an even spread would give, the longest first.
+    """Places with more person-time within `_DWELL_RADIUS` than an even spread would give, the longest first.
 
     Greedy: the place with most time, then the next in the remaining time.
     """
-    left = np.stack([trajectory["x"], trajectory["y"]], -1)
-    even = np.pi * _NEAR**2 / ((bins.x[1] - bins.x[0]) * (bins.y[1] - bins.y[0]))
+    remaining = np.stack([trajectory["x"], trajectory["y"]], -1)
+    even = np.pi * _DWELL_RADIUS**2 / ((bins.x[1] - bins.x[0]) * (bins.y[1] - bins.y[0]))
     found: list[DwellPlace] = []
-    total = max(len(left), 1)
-    while len(left) and len(found) < most:
-        place = _busiest(left, bins)
-        near = np.hypot(*(left - place).T) <= _NEAR
-        share = float(near.sum() / total)
+    total = max(len(remaining), 1)
+    while len(remaining) and len(found) < most:
+        place = _busiest(remaining, bins)
+        inside = np.hypot(*(remaining - place).T) <= _DWELL_RADIUS
+        share = float(inside.sum() / total)
         if share < max(0.02, 1.5 * even):
             break
-        x, y = left[near].mean(axis=0).tolist()
+        x, y = remaining[inside].mean(axis=0).tolist()
         found.append(DwellPlace(x, y, share))
-        left = left[~near]
+        remaining = remaining[~inside]
     return found
 
 
@@ -113,12 +113,12 @@ def _busiest(places: Floats, bins: Bins) -> Floats:
     edges = [np.arange(low, high + bins.side, bins.side) for low, high in (bins.x, bins.y)]
     counts, *_ = np.histogram2d(places[:, 0], places[:, 1], edges)
     middles = [(edge[1:] + edge[:-1]) / 2 for edge in edges]
-    reach = int(_NEAR // bins.side)
+    reach = int(_DWELL_RADIUS // bins.side)
     padded = np.pad(counts, reach)
     sums = np.zeros_like(counts)
     for u in range(2 * reach + 1):
         for v in range(2 * reach + 1):
-            if (u - reach) ** 2 + (v - reach) ** 2 <= (_NEAR / bins.side) ** 2:
+            if (u - reach) ** 2 + (v - reach) ** 2 <= (_DWELL_RADIUS / bins.side) ** 2:
                 sums += padded[u : u + counts.shape[0], v : v + counts.shape[1]]
     best = np.unravel_index(int(sums.argmax()), sums.shape)
     return np.array([middles[0][best[0]], middles[1][best[1]]])
@@ -163,10 +163,10 @@ def blind_map(rig: Rig, views: Bytes) -> Bytes:
     """Map of the number of views that see each ground cell at some height: none red, one orange, more lighter."""
     plan = map_of_maps(rig)
     canvas = sheet(plan, "Views that see the ground")
-    seen = views.max(axis=0)
-    most = max(len(rig.cameras), int(seen.max()))
+    view_count = views.max(axis=0)
+    most = max(len(rig.cameras), int(view_count.max()))
     tones = [_blind_tone(count, most) for count in range(most + 1)]
-    paint(canvas, plan, Bins(rig.grid.x, rig.grid.y, rig.grid.cell), np.array(tones, np.uint8)[seen])
+    paint(canvas, plan, Bins(rig.grid.x, rig.grid.y, rig.grid.cell), np.array(tones, np.uint8)[view_count])
     _frame(canvas, plan, rig)
     u, v = 76.0, plan.size[1] - 38.0
     wide = min(44.0, 460.0 / len(tones))
@@ -196,8 +196,8 @@ def paint(canvas: Bytes, plan: PlanMap, bins: Bins, colours: Bytes) -> None:
 def warm_colours(values: AnyArray, limit: float) -> Bytes:
     """White, orange, red, dark for 0 to `limit`, uint8 (..., 3)."""
     share = np.clip(np.asarray(values, float) / limit, 0, 1)
-    stops = np.linspace(0, 1, len(_WARM))
-    return np.asarray(np.rint(np.stack([np.interp(share, stops, tone) for tone in _WARM.T], -1)), np.uint8)
+    stops = np.linspace(0, 1, len(_WARM_TONES))
+    return np.asarray(np.rint(np.stack([np.interp(share, stops, tone) for tone in _WARM_TONES.T], -1)), np.uint8)
 
 
 def _blind_tone(count: int, most: int) -> Colour:

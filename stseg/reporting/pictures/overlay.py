@@ -16,8 +16,8 @@ from stseg.reporting.pictures.colours import NIGHT, PAPER, Colour, mixed, track_
 from stseg.reporting.pictures.labels import place_labels
 
 _COMMON_HEIGHT = 1.70  # metres, of a person of unknown height
-_FINE = 4  # sub-pixels a pixel of a pillar's outline
-_ROUND = np.linspace(0, 2 * np.pi, 33)[:-1]
+_SUBPIXELS = 4  # sub-pixels a pixel of a pillar's outline
+_CIRCLE_ANGLES = np.linspace(0, 2 * np.pi, 33)[:-1]
 _LINE = mixed(NIGHT, PAPER, 0.22)
 
 
@@ -58,20 +58,20 @@ def overlay(
     canvas = view.canvas(image)
     if image is None or image.ndim == 2:
         _rule(canvas, view, grid)
-    own = trajectory[trajectory["frame"] == frame]
+    present = trajectory[trajectory["frame"] == frame]
     recent = trajectory[(trajectory["frame"] <= frame) & (trajectory["frame"] >= frame - trail)]
-    for row in own:
+    for row in present:
         _draw_trail(canvas, view, recent[recent["id"] == row["id"]], frame, trail)
-    for row in own[np.argsort(-_distance(camera, own), kind="stable")]:
+    for row in present[np.argsort(-_distance(camera, present), kind="stable")]:
         _draw_pillar(canvas, view, row)
-    _label(canvas, view, own)
+    _label(canvas, view, present)
     text(canvas, f"{camera.name}  frame {frame}", (18, 16), PAPER, 14, (0, 0), 2)
     return canvas
 
 
 @dataclass(frozen=True)
 class OverlayView:
-    """A camera whose image is shown `width` pixels wide."""
+    """A camera with its image scaled to `width` pixels."""
 
     camera: Camera
     width: int
@@ -89,19 +89,19 @@ class OverlayView:
         """The image in the picture's size, a little darker than it was; or a dark canvas."""
         if image is None:
             return blank(*self.size, NIGHT)
-        shown = cv2.resize(image, self.size, interpolation=cv2.INTER_AREA if self.scale < 1 else cv2.INTER_LINEAR)
+        scaled = cv2.resize(image, self.size, interpolation=cv2.INTER_AREA if self.scale < 1 else cv2.INTER_LINEAR)
         if image.ndim == 2:
             tones = np.linspace(NIGHT, mixed(NIGHT, PAPER, 0.5), 256)
-            return np.asarray(np.rint(tones)[shown], np.uint8)
-        return np.asarray(np.rint(shown * 0.85), np.uint8)
+            return np.asarray(np.rint(tones)[scaled], np.uint8)
+        return np.asarray(np.rint(scaled * 0.85), np.uint8)
 
     def pixel(self, ground: AnyArray, height: AnyArray | float) -> Floats:
         """Where the picture shows points, float64 (..., 2); nan behind the camera and far off the picture."""
         place, ahead = self.camera.project(np.asarray(ground, float), np.asarray(height, float))
         place = (place + 0.5) * self.scale - 0.5
         limit = np.array(self.size)
-        near = ahead & (np.abs(place - limit / 2) < 1.5 * limit).all(axis=-1)
-        return np.asarray(np.where(near[..., None], place, np.nan))
+        drawable = ahead & (np.abs(place - limit / 2) < 1.5 * limit).all(axis=-1)
+        return np.asarray(np.where(drawable[..., None], place, np.nan))
 
 
 def pillar_outline(view: OverlayView, ground: Floats, height: float) -> list[Floats]:
@@ -109,19 +109,19 @@ def pillar_outline(view: OverlayView, ground: Floats, height: float) -> list[Flo
 
     Each slice between two discs shows as the convex hull of both; the body is their union.
     """
-    around = np.stack([np.cos(_ROUND), np.sin(_ROUND)], -1)
+    around = np.stack([np.cos(_CIRCLE_ANGLES), np.sin(_CIRCLE_ANGLES)], -1)
     discs = ground + PROFILE[:, 1, None, None] * around
     pixel = view.pixel(discs, np.broadcast_to((PROFILE[:, 0] * height)[:, None], discs.shape[:2]))
     if not np.isfinite(pixel).all():
         return []
     low = np.floor(pixel.min(axis=(0, 1))) - 2
     wide, tall = (np.ceil(np.ptp(pixel.reshape(-1, 2), axis=0)).astype(int) + 5).tolist()
-    mask = np.zeros((tall * _FINE, wide * _FINE), np.uint8)
-    fine = np.rint((pixel - low) * _FINE).astype(np.int32)
+    mask = np.zeros((tall * _SUBPIXELS, wide * _SUBPIXELS), np.uint8)
+    fine = np.rint((pixel - low) * _SUBPIXELS).astype(np.int32)
     for below, above in pairwise(fine):
         cv2.fillConvexPoly(mask, cv2.convexHull(np.concatenate([below, above])), 255)
     found, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-    return [cv2.approxPolyDP(contour, 1.2, True)[:, 0] / _FINE + low for contour in found]
+    return [cv2.approxPolyDP(contour, 1.2, True)[:, 0] / _SUBPIXELS + low for contour in found]
 
 
 def _draw_pillar(canvas: Bytes, view: OverlayView, row: np.void) -> None:
@@ -144,15 +144,15 @@ def _draw_trail(canvas: Bytes, view: OverlayView, rows: Rows, frame: int, trail:
     fading_stroke(canvas, pixel, colour, 3, 1 - 0.85 * age)
 
 
-def _label(canvas: Bytes, view: OverlayView, own: Rows) -> None:
+def _label(canvas: Bytes, view: OverlayView, people: Rows) -> None:
     """Ids above the heads."""
-    heights = np.array([_height(row) for row in own])
-    heads = view.pixel(np.stack([own["x"], own["y"]], -1), heights + 0.12)
+    heights = np.array([_height(row) for row in people])
+    heads = view.pixel(np.stack([people["x"], people["y"]], -1), heights + 0.12)
     inside = np.isfinite(heads).all(axis=1) & (heads >= 0).all(axis=1) & (heads < view.size).all(axis=1)
-    heads, own = heads[inside], own[inside]
-    words = [str(int(row["id"])) for row in own]
+    heads, people = heads[inside], people[inside]
+    words = [str(int(row["id"])) for row in people]
     centres = place_labels(heads, [chip_size(word, 13) for word in words], (4, 4, view.size[0] - 4, view.size[1] - 4))
-    for row, word, (u, v) in zip(own, words, centres.tolist(), strict=True):
+    for row, word, (u, v) in zip(people, words, centres.tolist(), strict=True):
         chip(canvas, word, (u, v), track_colour(int(row["id"])), 13)
 
 

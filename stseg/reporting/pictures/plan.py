@@ -15,10 +15,10 @@ from stseg.reporting.pictures.colours import INK, PAPER, QUIET, Colour, mixed, t
 from stseg.reporting.pictures.labels import place_labels
 from stseg.reporting.pictures.plan_map import PlanMap, rule, scale_bar, sheet
 
-_NEAR = 0.45  # cameras within this share of the ground's longer side are shown where they stand
-_DARKEST: Colour = (206, 199, 195)  # seen by no view
-_TRUTH: Colour = (84, 76, 70)
-_LABELLED = 24  # tracks, the longest ones
+_CAMERA_DISTANCE = 0.45  # cameras within this share of the ground's longer side are shown where they stand
+_UNSEEN_TONE: Colour = (206, 199, 195)  # seen by no view
+_TRUTH_COLOUR: Colour = (84, 76, 70)
+_MAX_LABELS = 24  # tracks, the longest ones
 
 
 def plan_view(
@@ -60,7 +60,7 @@ def plan_view(
     _draw_tracks(canvas, plan, trajectory)
     if truth is not None:
         for _, path in _paths(truth):
-            dashes(canvas, plan.pixel(path), _TRUTH)
+            dashes(canvas, plan.pixel(path), _TRUTH_COLOUR)
     _label_tracks(canvas, plan, trajectory, names)
     _legend(canvas, plan, None if coverage is None else int(coverage.max()), truth is not None)
     return canvas
@@ -79,18 +79,18 @@ def ground_sheet(plan: PlanMap, rig: Rig, coverage: Bytes | None, title: str) ->
 
 def plan_map(rig: Rig, width: int = 1400, height: int = 1500) -> PlanMap:
     """The map from metres to pixels of `plan_view`."""
-    near = [_ground_position(camera, rig.grid) for camera in rig.cameras]
-    places = [place for place in near if place is not None]
+    positions = [_ground_position(camera, rig.grid) for camera in rig.cameras]
+    places = [place for place in positions if place is not None]
     return PlanMap.fit(rig.grid, np.array(places).reshape(-1, 2), width, height)
 
 
 def _ground_position(camera: Camera, grid: Grid) -> Floats | None:
     """Ground position of a camera, metres (x, y), None where that is far away."""
     place = camera.centre[:2]
-    reach = _NEAR * max(grid.x[1] - grid.x[0], grid.y[1] - grid.y[0])
+    reach = _CAMERA_DISTANCE * max(grid.x[1] - grid.x[0], grid.y[1] - grid.y[0])
     low, high = np.array([grid.x[0], grid.y[0]]), np.array([grid.x[1], grid.y[1]])
-    beyond = np.maximum(low - place, place - high).max()
-    return place if beyond <= reach else None
+    distance = np.maximum(low - place, place - high).max()
+    return place if distance <= reach else None
 
 
 def border(grid: Grid) -> Floats:
@@ -113,7 +113,7 @@ def _shade(canvas: Bytes, plan: PlanMap, grid: Grid, coverage: Bytes) -> None:
 
 
 def _tone(count: int, most: int) -> Colour:
-    return mixed(_DARKEST, (252, 251, 250), count / most)
+    return mixed(_UNSEEN_TONE, (252, 251, 250), count / most)
 
 
 def draw_cameras(canvas: Bytes, plan: PlanMap, cameras: Sequence[Camera]) -> None:
@@ -135,8 +135,8 @@ def _draw_camera(canvas: Bytes, plan: PlanMap, camera: Camera) -> tuple[Colour, 
     """
     position = camera.centre[:2]
     edge = np.clip(position, [plan.x[0], plan.y[0]], [plan.x[1], plan.y[1]])
-    place, beyond = plan.pixel(edge), bool((edge != position).any())
-    tone = QUIET if beyond else INK
+    place, outside = plan.pixel(edge), bool((edge != position).any())
+    tone = QUIET if outside else INK
     sides = _view_directions(camera)
     if sides is not None:
         wedge = np.concatenate([place[None], place + 46 * sides])
@@ -151,10 +151,10 @@ def _name_place(name: str, place: Floats, back: Floats, plan: PlanMap) -> tuple[
     """Middle of a camera's name: behind it, or where that would cover the numbers of the axes, before or beside it."""
     (wide, tall), space = text_size(name, 15), np.array(plan.size)
     half = np.array([wide / 2, tall / 2])
-    aside = np.array([-back[1], back[0]])
+    across = np.array([-back[1], back[0]])
     middles = [
         np.clip(place + way * (14 + wide / 2, 22), (wide / 2 + 4, tall), space - (wide / 2 + 4, tall))
-        for way in (back, -back, aside, -aside)
+        for way in (back, -back, across, -across)
     ]
     free = (middle for middle in middles if not plan.covers_numbers(middle - half, middle + half))
     u, v = next(free, middles[0]).tolist()
@@ -183,18 +183,18 @@ def _paths(table: Rows) -> list[tuple[int, Floats]]:
     step = _frame_step(table["frame"])
     order = np.lexsort((table["frame"], table["id"]))
     table = table[order]
-    for own in np.split(table, np.flatnonzero(np.diff(table["id"])) + 1):
-        if len(own):
-            places = np.stack([own["x"], own["y"]], -1)
-            gaps = np.flatnonzero(np.diff(own["frame"]) > step) + 1
-            paths.append((int(own["id"][0]), np.insert(places, gaps, np.nan, axis=0)))
+    for rows in np.split(table, np.flatnonzero(np.diff(table["id"])) + 1):
+        if len(rows):
+            places = np.stack([rows["x"], rows["y"]], -1)
+            gaps = np.flatnonzero(np.diff(rows["frame"]) > step) + 1
+            paths.append((int(rows["id"][0]), np.insert(places, gaps, np.nan, axis=0)))
     return paths
 
 
 def _frame_step(frames: AnyArray) -> int:
     """Frames from one row of a table to the next where nothing is missing: truth may be sparse."""
-    known = np.unique(frames)
-    return int(np.diff(known).min()) if len(known) > 1 else 1
+    numbers = np.unique(frames)
+    return int(np.diff(numbers).min()) if len(numbers) > 1 else 1
 
 
 def _draw_tracks(canvas: Bytes, plan: PlanMap, trajectory: Rows) -> None:
@@ -203,9 +203,9 @@ def _draw_tracks(canvas: Bytes, plan: PlanMap, trajectory: Rows) -> None:
     width, opacity = (3 if few else 2 if some else 1), (1.0 if some else max(0.2, 0.7 * (60 / len(paths)) ** 0.5))
     for identity, path in paths:
         colour, pixel = track_colour(identity), plan.pixel(path)
-        known = pixel[np.isfinite(pixel[:, 0])]
-        if len(known) < len(pixel):
-            dashes(canvas, known, mixed(colour, PAPER, 0.4), 1, 3, 5)
+        drawn = pixel[np.isfinite(pixel[:, 0])]
+        if len(drawn) < len(pixel):
+            dashes(canvas, drawn, mixed(colour, PAPER, 0.4), 1, 3, 5)
         stroke(canvas, pixel, colour, width, opacity)
     size = 1.0 if few else 0.8 if some else 0.5
     for identity, path in paths:
@@ -228,7 +228,7 @@ def _draw_ends(canvas: Bytes, pixel: Floats, colour: Colour, size: float) -> Non
 
 def _label_tracks(canvas: Bytes, plan: PlanMap, trajectory: Rows, names: Mapping[int, str]) -> None:
     """Ids beside the ends; of many tracks only the longest."""
-    paths = sorted(_paths(trajectory), key=lambda path: -len(path[1]))[:_LABELLED]
+    paths = sorted(_paths(trajectory), key=lambda path: -len(path[1]))[:_MAX_LABELS]
     size = 14.0 if len(paths) <= 12 else 11.0
     ends = np.array([plan.pixel(path[-1]) for _, path in paths]).reshape(-1, 2)
     labels = [names.get(identity, str(identity)) for identity, _ in paths]
@@ -250,7 +250,7 @@ def _legend(canvas: Bytes, plan: PlanMap, most: int | None, has_truth: bool) -> 
     text(canvas, "track", (u + 66, v), QUIET, 15, (0, 0.5))
     u += 66 + text_size("track", 15)[0] + 28
     if has_truth:
-        dashes(canvas, np.array([[u, v], [u + 46, v]]), _TRUTH)
+        dashes(canvas, np.array([[u, v], [u + 46, v]]), _TRUTH_COLOUR)
         text(canvas, "truth", (u + 56, v), QUIET, 15, (0, 0.5))
     scale_bar(canvas, plan, (plan.size[0] - 44.0, v))
 

@@ -11,9 +11,9 @@ from stseg.geometry import Grid
 from stseg.reporting.pictures.canvas import blank, outline, stroke, text, text_size
 from stseg.reporting.pictures.colours import INK, PAPER, QUIET, RULE, Colour
 
-_LEFT, _RIGHT, _TOP, _BOTTOM = 76, 44, 104, 132  # margins for title, labels and legend, pixels
-_NARROWEST = 900  # pixels, for the legend
-_STEPS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)
+_LEFT_MARGIN, _RIGHT_MARGIN, _TOP_MARGIN, _BOTTOM_MARGIN = 76, 44, 104, 132  # for title, labels and legend, pixels
+_MIN_WIDTH = 900  # pixels, for the legend
+_ROUND_DISTANCES = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)
 
 
 @dataclass(frozen=True)
@@ -42,12 +42,12 @@ class PlanMap:
     def fit(cls, grid: Grid, places: AnyArray, width: int, height: int) -> PlanMap:
         """The largest map of the grid's rectangle, and of places (n, 2) beside it, on a canvas of at most that size."""
         x, y = _bounds(grid, places)
-        space = (width - _LEFT - _RIGHT, height - _TOP - _BOTTOM)
+        space = (width - _LEFT_MARGIN - _RIGHT_MARGIN, height - _TOP_MARGIN - _BOTTOM_MARGIN)
         scale = min(space[0] / (x[1] - x[0]), space[1] / (y[1] - y[0]))
         wide, tall = scale * (x[1] - x[0]), scale * (y[1] - y[0])
-        size = (max(round(wide) + _LEFT + _RIGHT, _NARROWEST), round(tall) + _TOP + _BOTTOM)
-        spare = size[0] - _LEFT - _RIGHT - wide
-        return cls(x, y, scale, (_LEFT + spare / 2, float(_TOP)), size)
+        size = (max(round(wide) + _LEFT_MARGIN + _RIGHT_MARGIN, _MIN_WIDTH), round(tall) + _TOP_MARGIN + _BOTTOM_MARGIN)
+        spare = size[0] - _LEFT_MARGIN - _RIGHT_MARGIN - wide
+        return cls(x, y, scale, (_LEFT_MARGIN + spare / 2, float(_TOP_MARGIN)), size)
 
     def pixel(self, ground: AnyArray) -> Floats:
         """Pixels of ground points, float64 (..., 2)."""
@@ -66,8 +66,8 @@ class PlanMap:
         """Whether a rectangle of the canvas lies on the numbers of `rule`, below and left of the ground."""
         (left, top), (right, bottom) = self.corner, self.far_corner
         below = high[1] > bottom + 8 and low[1] < bottom + 34 and low[0] < right + 24 and high[0] > left - 24
-        beside = high[0] > left - 60 and low[0] < left - 8 and low[1] < bottom + 12 and high[1] > top - 12
-        return bool(below or beside)
+        left_of = high[0] > left - 60 and low[0] < left - 8 and low[1] < bottom + 12 and high[1] > top - 12
+        return bool(below or left_of)
 
 
 def sheet(plan: PlanMap, title: str) -> Bytes:
@@ -80,25 +80,25 @@ def sheet(plan: PlanMap, title: str) -> Bytes:
 def rule(canvas: Bytes, plan: PlanMap) -> None:
     """Grid lines every metre (wider apart where they would crowd), with labels in metres."""
     step = step_for(plan.scale, 12, 1.0)
-    every = step_for(plan.scale, 56, step)
+    label_step = step_for(plan.scale, 56, step)
     (left, top), (right, bottom) = plan.corner, plan.far_corner
     for metres in _multiples(plan.x, step):
         u = plan.pixel(np.array([metres, 0.0]))[0]
         stroke(canvas, np.array([[u, top], [u, bottom]]), RULE)
-        if _is_multiple(metres, every):
+        if _is_multiple(metres, label_step):
             text(canvas, f"{metres + 0.0:g}", (u, bottom + 14), QUIET, 15, (0.5, 0))
     for metres in _multiples(plan.y, step):
         v = plan.pixel(np.array([0.0, metres]))[1]
         stroke(canvas, np.array([[left, v], [right, v]]), RULE)
-        if _is_multiple(metres, every):
+        if _is_multiple(metres, label_step):
             text(canvas, f"{metres + 0.0:g}", (left - 14, v), QUIET, 15, (1, 0.5))
     outline(canvas, np.array([[left, top], [right, top], [right, bottom], [left, bottom]]), RULE)
     text(canvas, "x and y, metres", (right, bottom + 42), QUIET, 15, (1, 0))
 
 
 def scale_bar(canvas: Bytes, plan: PlanMap, place: tuple[float, float], colour: Colour = INK) -> None:
-    """A bar of a round number of metres whose right end stands at `place`."""
-    metres = max((step for step in _STEPS if step * plan.scale <= 180), default=_STEPS[0])
+    """A bar of a round number of metres with its right end at `place`."""
+    metres = max((step for step in _ROUND_DISTANCES if step * plan.scale <= 180), default=_ROUND_DISTANCES[0])
     (u, v), length = place, metres * plan.scale
     words = f"{metres:g} m"
     stroke(canvas, np.array([[u - length, v], [u, v]]), colour, 3)
@@ -107,9 +107,10 @@ def scale_bar(canvas: Bytes, plan: PlanMap, place: tuple[float, float], colour: 
     text(canvas, words, (u - length - 12 - text_size(words, 16)[0], v), colour, 16, (0, 0.5))
 
 
-def step_for(scale: float, apart: float, least: float) -> float:
-    """The least round number of metres, `least` or more, that is `apart` pixels long or longer."""
-    return min((step for step in _STEPS if step >= least and step * scale >= apart), default=_STEPS[-1])
+def step_for(scale: float, pixels: float, least: float) -> float:
+    """The least round number of metres, `least` or more, that is so many pixels long or longer."""
+    fitting = (step for step in _ROUND_DISTANCES if step >= least and step * scale >= pixels)
+    return min(fitting, default=_ROUND_DISTANCES[-1])
 
 
 def _bounds(grid: Grid, places: AnyArray) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -117,8 +118,8 @@ def _bounds(grid: Grid, places: AnyArray) -> tuple[tuple[float, float], tuple[fl
     margin = 0.04 * max(grid.x[1] - grid.x[0], grid.y[1] - grid.y[0])
     spans = []
     for axis, (low, high) in enumerate((grid.x, grid.y)):
-        own = np.asarray(places, float).reshape(-1, 2)[:, axis]
-        spans.append((min([low, *own]) - margin, max([high, *own]) + margin))
+        coordinates = np.asarray(places, float).reshape(-1, 2)[:, axis]
+        spans.append((min([low, *coordinates]) - margin, max([high, *coordinates]) + margin))
     return spans[0], spans[1]
 
 

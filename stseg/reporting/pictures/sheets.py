@@ -19,10 +19,10 @@ from stseg.reporting.pictures.slices import colour_limit
 ReadFrame = Callable[[int], tuple[Singles, Labels]]
 """The volume of a frame: log_odds and label, both (plane, y, x)."""
 
-_MOST_FRAMES = 400
-_MOST_CELLS = 5e8  # read in all
-_FINEST = 160  # cells along the longer side of the ground
-_HALF = 63  # grey levels on either side of no evidence
+_MAX_FRAMES = 400
+_MAX_CELLS = 5e8  # read in all
+_MAX_SIDE = 160  # cells along the longer side of the ground
+_HALF_RANGE = 63  # grey levels on either side of no evidence
 
 
 @dataclass(frozen=True)
@@ -67,17 +67,17 @@ def thin_sheets(frames: Ints, grid: Grid, read_frame: ReadFrame, budget: int, wa
     Sheets
         Without frames where there are none.
     """
-    most = int(np.clip(_MOST_CELLS // np.prod(grid.shape), 3, _MOST_FRAMES))
+    most = int(np.clip(_MAX_CELLS // np.prod(grid.shape), 3, _MAX_FRAMES))
     chosen = spread(frames, most)
     probes = chosen[len(chosen) // 6 :: max(1, len(chosen) // 3)][:3]
     limit = max((colour_limit(read_frame(int(frame))[0]) for frame in probes), default=1.0)
-    step = max(1, -(-max(grid.shape[1:]) // _FINEST))
+    step = max(1, -(-max(grid.shape[1:]) // _MAX_SIDE))
     shape = (grid.planes, -(-grid.shape[1] // step), -(-grid.shape[2] // step))
     pngs = {int(frame): _sheet(read_frame(int(frame))[0], step, limit) for frame in np.union1d(chosen, wanted)}
     while len(chosen) > 1 and sum(len(pngs[int(frame)]) for frame in chosen) > budget:
         chosen = chosen[::2]
-    shown = np.union1d(chosen, wanted)
-    return Sheets(shown, shape, limit, [pngs[int(frame)] for frame in shown])
+    sheet_frames = np.union1d(chosen, wanted)
+    return Sheets(sheet_frames, shape, limit, [pngs[int(frame)] for frame in sheet_frames])
 
 
 def spread(frames: Ints, most: int) -> Ints:
@@ -98,7 +98,7 @@ def coarse(log_odds: AnyArray, step: int) -> AnyArray:
 
 def _sheet(log_odds: AnyArray, step: int, limit: float) -> bytes:
     cells = coarse(log_odds, step)[:, ::-1]
-    level = np.rint(np.clip(np.nan_to_num(cells) / limit, -1, 1) * _HALF) + _HALF + 1
+    level = np.rint(np.clip(np.nan_to_num(cells) / limit, -1, 1) * _HALF_RANGE) + _HALF_RANGE + 1
     grey: Bytes = np.where(np.isnan(cells), 0, level).astype(np.uint8)
     _, data = cv2.imencode(".png", grey.reshape(-1, grey.shape[2]), [cv2.IMWRITE_PNG_COMPRESSION, 9])
     return bytes(np.asarray(data, np.uint8))

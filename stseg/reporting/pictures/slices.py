@@ -19,7 +19,7 @@ _TONES = np.array([(176, 128, 84), (230, 204, 176), (249, 249, 249), (110, 184, 
 _UNSEEN = np.array([(236, 234, 232), (205, 201, 198)], np.uint8)  # hatching, light and dark
 _GAP, _HEAD, _MARGIN, _FOOT = 22, 30, 26, 64  # pixels
 _SHEET_SHAPE = 1.6  # width over height
-_RIM = 5  # greatest width of an outline, pixels
+_MAX_OUTLINE = 5  # greatest width of an outline, pixels
 
 
 def volume_picture(
@@ -60,9 +60,9 @@ def marginal_picture(
     -------
     uint8 (v, u, 3)
     """
-    seen = np.isfinite(log_odds)
-    highest = np.where(seen, log_odds, -np.inf).max(axis=0)
-    highest = np.where(seen.any(axis=0), highest, np.nan)
+    finite = np.isfinite(log_odds)
+    highest = np.where(finite, log_odds, -np.inf).max(axis=0)
+    highest = np.where(finite.any(axis=0), highest, np.nan)
     panel = _Panel(f"greatest of {grid.planes} planes; {_extent(grid)}", highest, _commonest(label))
     return _contact_sheet([panel], title, width, colour_limit(log_odds) if limit is None else limit)
 
@@ -114,7 +114,7 @@ def _contact_sheet(panels: Sequence[_Panel], title: str, width: int, limit: floa
 
 
 def _extent(grid: Grid) -> str:
-    """What a panel shows, from left to right and from bottom to top."""
+    """Ground of a panel, from left to right and from bottom to top."""
     (left, right), (bottom, top) = grid.x, grid.y
     return f"x {left:g} to {right:g} m, y {bottom:g} to {top:g} m upwards"
 
@@ -153,7 +153,7 @@ def _panel_picture(panel: _Panel, scale: int, limit: float) -> Bytes:
     v, u = np.ogrid[: cell.shape[0], : cell.shape[1]]
     unseen = np.isnan(cell)
     picture[unseen] = _UNSEEN[((u + v) % 8 < 2).astype(int)][unseen]
-    wide = min(max(1, scale // 5), _RIM)
+    wide = min(max(1, scale // 5), _MAX_OUTLINE)
     rim = _rim(label, wide)
     picture[_rim(label, wide + 1) & ~rim] = PAPER
     for identity in np.unique(label[rim]).tolist():
@@ -172,16 +172,16 @@ def _commonest(label: Labels) -> Labels:
     """The id that most planes give to each ground cell, 0 where none does; of equals the least, int32 (y, x)."""
     best, votes = np.zeros(label.shape[1:], np.int32), np.zeros(label.shape[1:], np.int64)
     for identity in np.unique(label[label > 0]).tolist():
-        own = (label == identity).sum(axis=0)
-        best[own > votes] = identity
-        votes = np.maximum(votes, own)
+        count = (label == identity).sum(axis=0)
+        best[count > votes] = identity
+        votes = np.maximum(votes, count)
     return best
 
 
 def colour_limit(log_odds: AnyArray) -> float:
     """Default end of the colour scale: 99th percentile of the absolute log-odds, nats."""
-    known = np.abs(np.asarray(log_odds, np.float32)[np.isfinite(log_odds)])
-    return max(float(np.percentile(known, 99)), 1e-3) if known.size else 1.0
+    sizes = np.abs(np.asarray(log_odds, np.float32)[np.isfinite(log_odds)])
+    return max(float(np.percentile(sizes, 99)), 1e-3) if sizes.size else 1.0
 
 
 def _colour_bar(canvas: Bytes, limit: float) -> None:

@@ -15,8 +15,8 @@ from stseg.reporting.pictures.labels import place_labels
 from stseg.reporting.pictures.plan_map import step_for
 
 _AZIMUTH, _ELEVATION = np.radians(-32.0), np.radians(32.0)
-_MARGIN, _PIECE, _MOST_PIECES = 88, 6, 6000
-_LABELLED = 24
+_MARGIN, _PIECE_POINTS, _MAX_PIECES = 88, 6, 6000
+_MAX_LABELS = 24
 
 
 def spacetime_picture(
@@ -127,13 +127,13 @@ def _threads(trajectory: Rows) -> list[_Thread]:
     width = 3 if count <= 12 else 2 if count <= 60 else 1
     table = trajectory[np.lexsort((trajectory["frame"], trajectory["id"]))]
     # A picture shows no more points than that, however long the recording.
-    stride = max(1, len(table) // (_PIECE * _MOST_PIECES))
+    stride = max(1, len(table) // (_PIECE_POINTS * _MAX_PIECES))
     threads = []
-    for own in np.split(table, np.flatnonzero(np.diff(table["id"])) + 1):
-        if len(own):
-            kept = np.unique(np.append(np.arange(0, len(own), stride), len(own) - 1))
-            places = np.stack([own["x"], own["y"], own["frame"]], -1).astype(float)[kept]
-            threads.append(_Thread(int(own["id"][0]), places, width))
+    for rows in np.split(table, np.flatnonzero(np.diff(table["id"])) + 1):
+        if len(rows):
+            kept = np.unique(np.append(np.arange(0, len(rows), stride), len(rows) - 1))
+            places = np.stack([rows["x"], rows["y"], rows["frame"]], -1).astype(float)[kept]
+            threads.append(_Thread(int(rows["id"][0]), places, width))
     return threads
 
 
@@ -147,13 +147,13 @@ def _draw_floor(canvas: Bytes, block: Block) -> None:
     for y in np.arange(np.ceil(y0 / step) * step, y1 + 1e-9, step):
         stroke(canvas, block.pixel([[x0, y, first], [x1, y, first]]), RULE)
     outline(canvas, floor, mixed(INK, PAPER, 0.35), 2)
-    every = step_for(block.scale, 70, step)
+    label_step = step_for(block.scale, 70, step)
     away = block.pixel([0, -1, 0]) - block.pixel([0, 0, 0])
-    for x in np.arange(np.ceil(x0 / every) * every, x1 + 1e-9, every):
+    for x in np.arange(np.ceil(x0 / label_step) * label_step, x1 + 1e-9, label_step):
         u, v = (block.pixel([x, y0, first]) + away / np.hypot(*away) * 26).tolist()
         text(canvas, f"{x + 0.0:g}", (u, v), QUIET, 15, (0.5, 0.5))
     away = block.pixel([1, 0, 0]) - block.pixel([0, 0, 0])
-    for y in np.arange(np.ceil(y0 / every) * every, y1 + 1e-9, every):
+    for y in np.arange(np.ceil(y0 / label_step) * label_step, y1 + 1e-9, label_step):
         u, v = (block.pixel([x1, y, first]) + away / np.hypot(*away) * 26).tolist()
         text(canvas, f"{y + 0.0:g}", (u, v), QUIET, 15, (0.5, 0.5))
 
@@ -184,8 +184,8 @@ def _draw_threads(canvas: Bytes, block: Block, threads: list[_Thread]) -> None:
     """Far pieces first, each in a white casing, so that crossings read as in front and behind."""
     pieces = []
     for thread in threads:
-        for start in range(0, len(thread.places) - 1, _PIECE):
-            places = thread.places[start : start + _PIECE + 1]
+        for start in range(0, len(thread.places) - 1, _PIECE_POINTS):
+            places = thread.places[start : start + _PIECE_POINTS + 1]
             pieces.append((float(block.distance(places).mean()), thread, block.pixel(places)))
     for _, thread, pixel in sorted(pieces, key=lambda piece: -piece[0]):
         if thread.width > 2:
@@ -198,7 +198,7 @@ def _draw_threads(canvas: Bytes, block: Block, threads: list[_Thread]) -> None:
 
 def _label(canvas: Bytes, block: Block, threads: list[_Thread]) -> None:
     """Ids at the upper ends; of many threads only the longest."""
-    longest = sorted(threads, key=lambda thread: -len(thread.places))[:_LABELLED]
+    longest = sorted(threads, key=lambda thread: -len(thread.places))[:_MAX_LABELS]
     ends = np.array([block.pixel(thread.places[-1]) for thread in longest]).reshape(-1, 2)
     sizes = [chip_size(str(thread.identity), 14) for thread in longest]
     tall, wide = canvas.shape[:2]

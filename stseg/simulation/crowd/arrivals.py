@@ -1,4 +1,4 @@
-"""Who comes into a simulated scene, and when."""
+"""Arrivals of people in a simulated scene."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ class Arrivals(Protocol):
     """The people who come into a scene, by their numbers from 1."""
 
     def next(self, inside: int, /) -> int:
-        """Number of the next one who comes now, 0 for nobody; `inside` are there or about to be."""
+        """Number of the next person to arrive now, 0 for none; `inside` people are present or about to be."""
 
     def advance(self, step: float, present: Iterable[int]) -> None:
         """Let some seconds pass; `present` are in the scene."""
 
 
-class Newcomers:
-    """Whoever leaves is replaced by somebody new."""
+class Replacements:
+    """A new person replaces each one that leaves."""
 
     def __init__(self, spec: SceneSpec) -> None:
         self._people, self._number = spec.people, 0
@@ -33,7 +33,7 @@ class Newcomers:
         return self._number
 
     def advance(self, step: float, present: Iterable[int]) -> None:
-        """Newcomers wait for nothing."""
+        """Replacements arrive at once."""
 
 
 class Regulars:
@@ -45,7 +45,7 @@ class Regulars:
         self._away = {person: self._absence * self._rng.uniform(0.0, 1.6) for person in self._people}
 
     def next(self, _inside: int) -> int:
-        """The first number of those whose absence is over."""
+        """The first number of those with an absence that is over."""
         due = min((person for person, left in self._away.items() if left <= 0), default=0)
         self._away.pop(due, None)
         return due

@@ -10,10 +10,10 @@ from stseg.arrays import Floats
 
 MARGIN = 0.9
 """Distance outside the area at which pedestrians appear and disappear, metres."""
-_BORDER = 0.45  # metres that goals keep from the area's border
-_PATIENCE = 7.0  # seconds after which an unreached goal is replaced
-_STAND, _MEET = 0.25, 0.15  # probabilities of standing, and of a meeting, on arrival
-_MEETING = 0.7  # metres between two people in a meeting
+_GOAL_MARGIN = 0.45  # metres that goals keep from the area's border
+_GOAL_TIME = 7.0  # seconds after which an unreached goal is replaced
+_STAND_PROBABILITY, _MEETING_PROBABILITY = 0.25, 0.15  # probabilities of standing, and of a meeting, on arrival
+_MEETING_DISTANCE = 0.7  # metres between two people in a meeting
 
 
 @dataclass(slots=True)
@@ -115,17 +115,17 @@ class Planner:
             errand.stay -= step
             errand.spent += step
             errand.enters = errand.enters and bool((np.abs(ground) > self._half - 0.2).any())
-            near = float(np.hypot(*(errand.goal - ground))) < 0.3
+            at_goal = float(np.hypot(*(errand.goal - ground))) < 0.3
             if errand.leaves:
                 # A pedestrian pushed past its exit gets another one after a few seconds.
-                if errand.spent > _PATIENCE:
+                if errand.spent > _GOAL_TIME:
                     errand.send(self._exit())
-            elif errand.waits or (near and errand.pause > 0):
+            elif errand.waits or (at_goal and errand.pause > 0):
                 errand.waits = True
                 errand.pause -= step
                 if errand.pause <= 0:
                     self._next(errand, people)
-            elif near or errand.spent > _PATIENCE:
+            elif at_goal or errand.spent > _GOAL_TIME:
                 self._next(errand, people)
 
     def _next(self, errand: Errand, people: list[tuple[Floats, Errand]]) -> None:
@@ -135,22 +135,22 @@ class Planner:
             return
         draw = self._rng.uniform()
         free = [other for _, other in people if other.is_free and other is not errand]
-        if draw < _MEET and free and not errand.enters:
+        if draw < _MEETING_PROBABILITY and free and not errand.enters:
             self._meet(errand, free[int(self._rng.integers(len(free)))])
-        elif draw < _MEET + _STAND:
+        elif draw < _MEETING_PROBABILITY + _STAND_PROBABILITY:
             errand.send(self._goal(), self._rng.uniform(1.5, 5.0))
         else:
             errand.send(self._goal())
 
     def _meet(self, one: Errand, other: Errand) -> None:
         place, angle = self._goal(), self._rng.uniform(0, np.pi)
-        apart = _MEETING / 2 * np.array([np.cos(angle), np.sin(angle)])
+        offset = _MEETING_DISTANCE / 2 * np.array([np.cos(angle), np.sin(angle)])
         pause = self._rng.uniform(2.5, 6.0)
-        one.send(place + apart, pause, place - apart)
-        other.send(place - apart, pause, place + apart)
+        one.send(place + offset, pause, place - offset)
+        other.send(place - offset, pause, place + offset)
 
     def _goal(self) -> Floats:
-        return self._rng.uniform(-1.0, 1.0, 2) * (self._half - _BORDER)
+        return self._rng.uniform(-1.0, 1.0, 2) * (self._half - _GOAL_MARGIN)
 
     def _exit(self) -> Floats:
         """A position beyond the middle of a side; cameras stand at the corners."""

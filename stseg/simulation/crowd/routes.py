@@ -9,7 +9,7 @@ import numpy as np
 from stseg.arrays import Floats
 from stseg.errors import ConfigError
 
-_EASE = 0.6
+_SMOOTHING = 0.6
 """Seconds over which a change of velocity is spread."""
 
 
@@ -45,5 +45,5 @@ class Route:
     def ground(self, time: float) -> Floats:
         """Ground position, metres, float64 (2,): the polyline smoothed over the duration of a turn."""
         times, x, y = np.array(self.stops).T
-        around = np.clip(time + _EASE * np.linspace(-0.5, 0.5, 13), times[0], times[-1])
+        around = np.clip(time + _SMOOTHING * np.linspace(-0.5, 0.5, 13), times[0], times[-1])
         return np.array([np.interp(around, times, x).mean(), np.interp(around, times, y).mean()])

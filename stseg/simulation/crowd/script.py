@@ -12,9 +12,9 @@ from stseg.simulation.crowd.social_forces import Crowd, stride
 from stseg.simulation.random_streams import Topic, random_stream
 from stseg.simulation.scene import SceneSpec
 
-_INSTANT = 0.05
+_DIFFERENCE = 0.05
 """Half interval of the finite differences of velocity, seconds."""
-_STANDS = 0.05
+_STANDING_SPEED = 0.05
 """Speed below which the heading stays, metres per second."""
 
 
@@ -27,7 +27,7 @@ def walk_routes(spec: SceneSpec) -> Iterator[Crowd]:
         time = frame / spec.frame_rate
         velocity = np.stack([_velocity(route, time) for route in spec.routes])
         speed = np.hypot(*velocity.T)
-        heading = np.where(speed > _STANDS, np.arctan2(velocity[:, 1], velocity[:, 0]), heading)
+        heading = np.where(speed > _STANDING_SPEED, np.arctan2(velocity[:, 1], velocity[:, 0]), heading)
         swing = np.minimum(1.0, speed)
         phase = phase + 2 * np.pi * speed / spec.frame_rate / stride(height, swing)
         here = np.flatnonzero([route.is_there(time) for route in spec.routes])
@@ -41,4 +41,4 @@ def _initial_heading(route: Route) -> float:
 
 
 def _velocity(route: Route, time: float) -> Floats:
-    return (route.ground(time + _INSTANT) - route.ground(time - _INSTANT)) / (2 * _INSTANT)
+    return (route.ground(time + _DIFFERENCE) - route.ground(time - _DIFFERENCE)) / (2 * _DIFFERENCE)

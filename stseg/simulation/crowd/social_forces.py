@@ -13,7 +13,7 @@ from typing import overload
 import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints, Rows
-from stseg.simulation.crowd.arrivals import Arrivals, Newcomers, Regulars
+from stseg.simulation.crowd.arrivals import Arrivals, Regulars, Replacements
 from stseg.simulation.crowd.errands import Errand, Planner
 from stseg.simulation.random_streams import Topic, random_stream
 from stseg.simulation.scene import SceneSpec
@@ -21,10 +21,10 @@ from stseg.simulation.scene import SceneSpec
 TRUTH = np.dtype([("frame", "<i8"), ("id", "<i8"), ("x", "<f8"), ("y", "<f8"), ("height", "<f8")])
 """One row per person inside the area and frame; metres."""
 
-_STEP = 0.05  # seconds, at most
+_TIME_STEP = 0.05  # seconds, at most
 _WARM_UP = 5.0  # seconds before the first frame, to forget the start
 _REACTION = 0.4  # seconds to reach the preferred velocity
-_PUSH, _REACH, _WIDTH = 2.2, 0.25, 0.55  # m/s^2, m, m: force between two, how fast it falls, where it starts to
+_PUSH, _PUSH_RANGE, _WIDTH = 2.2, 0.25, 0.55  # m/s^2, m, m: force between two, how fast it falls, where it starts to
 _BEHIND = 0.3  # share of the force of pedestrians behind
 _SWERVE = 0.35  # share of it to the right, so that two head on can pass
 _CLOSEST = 0.45  # metres between two bodies' axes
@@ -88,9 +88,9 @@ class Pedestrian:
 def walk_freely(spec: SceneSpec) -> Iterator[Crowd]:
     """Simulate the crowd of a scene, frame by frame."""
     planner = Planner(spec.area, spec.stay, random_stream(spec.seed, Topic.CROWD))
-    arrivals: Arrivals = Regulars(spec) if spec.absence else Newcomers(spec)
+    arrivals: Arrivals = Regulars(spec) if spec.absence else Replacements(spec)
     pedestrians: list[Pedestrian] = []
-    steps = int(np.ceil(1 / spec.frame_rate / _STEP))
+    steps = int(np.ceil(1 / spec.frame_rate / _TIME_STEP))
     step = 1 / spec.frame_rate / steps
     for frame in range(-int(np.ceil(_WARM_UP * spec.frame_rate)), spec.frames):
         for _ in range(steps):
@@ -106,27 +106,27 @@ def walk_freely(spec: SceneSpec) -> Iterator[Crowd]:
 
 
 def _new_pedestrian(spec: SceneSpec, planner: Planner, number: int, others: Floats) -> Pedestrian:
-    own = random_stream(spec.seed, Topic.PERSON, number)
+    rng = random_stream(spec.seed, Topic.PERSON, number)
     crowded_start = number <= spec.people and not spec.absence
     ground = planner.place_inside(others) if crowded_start else planner.door(others)
     return Pedestrian(
         number,
         ground,
         planner.errand(enters=not crowded_start),
-        pace=own.uniform(*spec.speed),
-        height=_height(spec, own),
-        build=float(np.clip(own.normal(1.0, 0.09), 0.8, 1.25)),
+        pace=rng.uniform(*spec.speed),
+        height=_height(spec, rng),
+        build=float(np.clip(rng.normal(1.0, 0.09), 0.8, 1.25)),
         velocity=np.zeros(2),
-        heading=own.uniform(-np.pi, np.pi),
-        phase=own.uniform(0, 2 * np.pi),
+        heading=rng.uniform(-np.pi, np.pi),
+        phase=rng.uniform(0, 2 * np.pi),
     )
 
 
-def _height(spec: SceneSpec, own: np.random.Generator) -> float:
+def _height(spec: SceneSpec, rng: np.random.Generator) -> float:
     """Height of one person, metres."""
     if spec.heights:
-        return float(own.uniform(spec.heights[0], spec.heights[-1]))
-    return float(np.clip(own.normal(1.70, 0.10), 1.45, 1.98))
+        return float(rng.uniform(spec.heights[0], spec.heights[-1]))
+    return float(np.clip(rng.normal(1.70, 0.10), 1.45, 1.98))
 
 
 def _advance(pedestrians: list[Pedestrian], half: Floats, step: float) -> None:
@@ -161,7 +161,7 @@ def _repulsion(ground: Floats, velocity: Floats) -> Floats:
     away /= np.maximum(distance, 1e-9)[..., None]
     toward = velocity / np.maximum(np.linalg.norm(velocity, axis=1), 1e-9)[:, None]
     ahead = -(away * toward[:, None]).sum(axis=2)
-    strength = _PUSH * np.exp((_WIDTH - distance) / _REACH) * (_BEHIND + (1 - _BEHIND) * (1 + ahead) / 2)
+    strength = _PUSH * np.exp((_WIDTH - distance) / _PUSH_RANGE) * (_BEHIND + (1 - _BEHIND) * (1 + ahead) / 2)
     np.fill_diagonal(strength, 0.0)
     strength[distance > 2.5] = 0.0
     right = np.stack([-away[..., 1], away[..., 0]], -1)

@@ -15,7 +15,7 @@ from stseg.simulation.crowd.social_forces import Crowd
 
 _HIP, _THIGH, _SHIN, _ANKLE = 0.512, 0.245, 0.225, 0.042
 _SHOULDER, _UPPER_ARM, _FOREARM = 0.80, 0.165, 0.20
-_HIP_ASIDE, _SHOULDER_ASIDE = 0.05, 0.115
+_HIP_OFFSET, _SHOULDER_OFFSET = 0.05, 0.115
 _LEG_SWING, _ARM_SWING = 0.42, 0.45  # radians to each side at full pace
 _KNEE, _ELBOW = 0.85, 0.35  # radians of bend at full pace, in the leg that swings; at rest a tenth in the arm
 
@@ -120,12 +120,12 @@ def _ellipsoids(low: Floats, high: Floats, build: Floats) -> tuple[Floats, Float
     length = np.linalg.norm(bone, axis=-1, keepdims=True)
     along = bone / length
     left = np.array([0.0, 1.0, 0.0])
-    aside = left - (along @ left)[..., None] * along
-    aside /= np.linalg.norm(aside, axis=-1, keepdims=True)
-    ahead = np.cross(aside, along)
+    sideways = left - (along @ left)[..., None] * along
+    sideways /= np.linalg.norm(sideways, axis=-1, keepdims=True)
+    ahead = np.cross(sideways, along)
     wide = build[:, None, None] * np.array([[part.aside, part.ahead] for part in PARTS])
     half = length * 0.5 * np.array([part.stretch for part in PARTS])[:, None]
-    return 0.5 * (low + high), np.stack([ahead * wide[..., 1:], aside * wide[..., :1], along * half], axis=2)
+    return 0.5 * (low + high), np.stack([ahead * wide[..., 1:], sideways * wide[..., :1], along * half], axis=2)
 
 
 def _skeleton(phase: Floats, swing: Floats) -> dict[str, Floats]:
@@ -140,14 +140,14 @@ def _skeleton(phase: Floats, swing: Floats) -> dict[str, Floats]:
         leg = sign * _LEG_SWING * swing * np.sin(phase)
         # The knee bends while the leg comes forward, when the angle at the hip grows.
         knee = _KNEE * swing * np.maximum(sign * np.cos(phase), 0.0) ** 2 + 0.05
-        joints[f"{side} hip"] = at(0.0, sign * _HIP_ASIDE, _HIP)
+        joints[f"{side} hip"] = at(0.0, sign * _HIP_OFFSET, _HIP)
         joints[f"{side} knee"] = joints[f"{side} hip"] + _THIGH * _down(leg)
         joints[f"{side} ankle"] = joints[f"{side} knee"] + _SHIN * _down(leg - knee)
         joints[f"{side} heel"] = joints[f"{side} ankle"] + at(-0.03, 0.0, -0.018)
         joints[f"{side} toe"] = joints[f"{side} ankle"] + at(0.11, 0.0, -0.02)
         arm = -sign * _ARM_SWING * swing * np.sin(phase)
         bend = _ELBOW * (0.1 + swing)
-        joints[f"{side} shoulder"] = at(0.0, sign * _SHOULDER_ASIDE, _SHOULDER)
+        joints[f"{side} shoulder"] = at(0.0, sign * _SHOULDER_OFFSET, _SHOULDER)
         joints[f"{side} elbow"] = joints[f"{side} shoulder"] + _UPPER_ARM * _down(arm) + at(0.0, sign * 0.012, 0.0)
         joints[f"{side} hand"] = joints[f"{side} elbow"] + _FOREARM * _down(arm + bend)
     lowest = np.minimum(joints["left ankle"][:, 2], joints["right ankle"][:, 2])

@@ -47,12 +47,12 @@ def own_clothing(seed: int, person: int) -> Floats:
 
 def clothing(seed: int, person: int, alike: int) -> Floats:
     """Clothing where the first `alike` people dress like the first one, in slightly different tones."""
-    own = own_clothing(seed, person)
+    clothes = own_clothing(seed, person)
     if person > alike:
-        return own
+        return clothes
     first = own_clothing(seed, 1)
     paint = first.copy()
-    paint[:, :6] += _OWN_TONE * (own - first)[:, :6]
+    paint[:, :6] += _OWN_TONE * (clothes - first)[:, :6]
     return paint
 
 

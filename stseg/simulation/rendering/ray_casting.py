@@ -1,4 +1,4 @@
-"""Ray casting of bodies: each pixel's ray is intersected with the ellipsoids whose boxes contain the pixel."""
+"""Ray casting of bodies: each pixel's ray is intersected with the ellipsoids with boxes that contain the pixel."""
 
 from __future__ import annotations
 
@@ -86,8 +86,8 @@ def draw_bodies(
         it stood there alone.
     """
     for b in range(len(centre)):
-        seen = silhouettes[b]
-        seen[0], seen[1], seen[2], seen[3], seen[4] = image.shape[1], -1, image.shape[0], -1, 0
+        extent = silhouettes[b]
+        extent[0], extent[1], extent[2], extent[3], extent[4] = image.shape[1], -1, image.shape[0], -1, 0
         origin = np.empty((centre.shape[1], 3))
         for k in range(centre.shape[1]):
             for i in range(3):
@@ -99,9 +99,9 @@ def draw_bodies(
                 part, distance = _nearest(rays[v, u], boxes[b], origin, form[b], u, v)
                 if part < 0:
                     continue
-                seen[0], seen[1] = min(seen[0], u), max(seen[1], u)
-                seen[2], seen[3] = min(seen[2], v), max(seen[3], v)
-                seen[4] += 1
+                extent[0], extent[1] = min(extent[0], u), max(extent[1], u)
+                extent[2], extent[3] = min(extent[2], v), max(extent[3], v)
+                extent[4] += 1
                 if distance < depth[v, u]:
                     depth[v, u] = distance
                     instances[v, u] = ids[b]

@@ -96,7 +96,7 @@ class Viewer:
         return self._expose(self.room.image, self.room.depth, frame)
 
     def view(self, crowd: Crowd, bodies: Bodies) -> RenderedView:
-        """The camera's frame of a crowd whose `bodies` are those of `stseg.simulation.rendering.body.pose`."""
+        """The camera's frame of a crowd with its `bodies`, see `stseg.simulation.rendering.body.pose`."""
         drawing = self.draw(crowd, bodies)
         visible = np.empty((len(crowd.id), 5), np.int64)
         row_of = np.zeros(int(crowd.id.max(initial=0)) + 1, np.int64)

@@ -52,11 +52,11 @@ def render_room(spec: SceneSpec, rays: Singles, eye: Floats) -> Room:
     """
     half = 1.25 * spec.camera_distance + 1.0
     lattice = random_stream(spec.seed, Topic.ROOM).uniform(-1.0, 1.0, (_LATTICE, _LATTICE))
-    seen = np.any(rays != 0, axis=-1)
+    visible = np.any(rays != 0, axis=-1)
     across, down = np.gradient(rays, axis=1), np.gradient(rays, axis=0)
     # Four rays a pixel, so that the joints between tiles do not flicker where they are narrow.
     shots = [_shade_rays(rays + 0.25 * (i * across + j * down), eye, half, lattice) for i in (-1, 1) for j in (-1, 1)]
-    image = np.where(seen[..., None], np.mean(shots, axis=0), 0.0)
+    image = np.where(visible[..., None], np.mean(shots, axis=0), 0.0)
     ground = _ground(rays, eye, half)
     down = np.where(rays[..., 2] < 0, rays[..., 2], -1.0)
     depth = np.where(np.isfinite(ground[..., 0]), -eye[2] / down, np.abs(_to_walls(rays, eye, half)).min(axis=-1))

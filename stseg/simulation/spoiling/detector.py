@@ -8,12 +8,13 @@ from stseg.arrays import Boxes, Floats, Ints
 from stseg.geometry import Camera
 from stseg.kernels.accelerate import kernel
 
-_SMALLEST = 0.0015  # least visible area of a detection, share of the image
-_BEST, _HALF, _SOFT = 0.97, 0.35, 0.09  # detection probability in full view; visible share of half of it; its width
-_GUESS = 0.6  # probability that the box of a partly hidden person spans the whole body
-_JITTER = 0.03  # standard deviation of each edge, share of the box's width and height
-_FALSE = 0.08  # false boxes a view and frame
-_OVERLAP = 0.65  # intersection over union above which the lower score is suppressed
+_MIN_AREA = 0.0015  # least visible area of a detection, share of the image
+_MAX_PROBABILITY = 0.97  # of detection, in full view
+_HALF_SHARE, _SHARE_WIDTH = 0.35, 0.09  # visible share at half of that probability, and width of the transition
+_WHOLE_BODY_PROBABILITY = 0.6  # probability that the box of a partly hidden person spans the whole body
+_EDGE_SPREAD = 0.03  # standard deviation of each edge, share of the box's width and height
+_FALSE_RATE = 0.08  # false boxes a view and frame
+_MAX_OVERLAP = 0.65  # intersection over union above which the lower score is suppressed
 
 
 @kernel
@@ -31,15 +32,15 @@ def visible_boxes(instances: np.ndarray[tuple[int, int], np.dtype[np.uint16]], r
     """
     rows, columns = instances.shape
     for row in range(len(visible)):
-        seen = visible[row]
-        seen[0], seen[1], seen[2], seen[3], seen[4] = columns, -1, rows, -1, 0
+        extent = visible[row]
+        extent[0], extent[1], extent[2], extent[3], extent[4] = columns, -1, rows, -1, 0
     for v in range(rows):
         for u in range(columns):
             if instances[v, u] > 0:
-                seen = visible[row_of[instances[v, u]]]
-                seen[0], seen[1] = min(seen[0], u), max(seen[1], u)
-                seen[2], seen[3] = min(seen[2], v), max(seen[3], v)
-                seen[4] += 1
+                extent = visible[row_of[instances[v, u]]]
+                extent[0], extent[1] = min(extent[0], u), max(extent[1], u)
+                extent[2], extent[3] = min(extent[2], v), max(extent[3], v)
+                extent[4] += 1
 
 
 def detect(camera: Camera, visible: Ints, silhouettes: Ints, half: Floats, rng: np.random.Generator) -> Boxes:
@@ -58,9 +59,9 @@ def detect(camera: Camera, visible: Ints, silhouettes: Ints, half: Floats, rng: 
     """
     width, height = camera.size
     share = visible[:, 4] / np.maximum(silhouettes[:, 4], 1)
-    random_stream = _BEST / (1 + np.exp((_HALF - share) / _SOFT))
-    found = (rng.uniform(size=len(share)) < random_stream) & (visible[:, 4] > _SMALLEST * width * height)
-    guessed = (rng.uniform(size=len(share)) < _GUESS) & (share > _HALF)
+    probability = _MAX_PROBABILITY / (1 + np.exp((_HALF_SHARE - share) / _SHARE_WIDTH))
+    found = (rng.uniform(size=len(share)) < probability) & (visible[:, 4] > _MIN_AREA * width * height)
+    guessed = (rng.uniform(size=len(share)) < _WHOLE_BODY_PROBABILITY) & (share > _HALF_SHARE)
     spans = np.where(guessed[:, None], silhouettes, visible)[:, :4]
     edges = _edges(spans) + _edge_noise(spans, rng)
     score = np.clip(0.35 + 0.6 * share + rng.normal(0.0, 0.08, len(share)), 0.05, 1.0)
@@ -78,19 +79,19 @@ def _edges(spans: Ints) -> Floats:
 
 def _edge_noise(spans: Ints, rng: np.random.Generator) -> Floats:
     size = np.maximum(spans[:, [1, 3]] - spans[:, [0, 2]] + 1, 1)
-    return np.asarray(rng.normal(0.0, _JITTER, (len(spans), 4)) * np.tile(size, 2))
+    return np.asarray(rng.normal(0.0, _EDGE_SPREAD, (len(spans), 4)) * np.tile(size, 2))
 
 
 def _false_boxes(camera: Camera, half: Floats, rng: np.random.Generator) -> tuple[Floats, Floats]:
     """False boxes (n, 4) of a person's size at random ground points, and their scores."""
-    count = int(rng.poisson(_FALSE))
+    count = int(rng.poisson(_FALSE_RATE))
     ground = rng.uniform(-1.0, 1.0, (count, 2)) * half
     foot, ahead = camera.project(ground, 0.0)
     head, above = camera.project(ground, 1.7)
     wide = 0.4 * np.abs(foot[:, 1] - head[:, 1]) / 2
     edges = np.stack([foot[:, 0] - wide, head[:, 1], foot[:, 0] + wide, foot[:, 1]], axis=1)
-    seen = ahead & above & camera.inside((foot + head) / 2) & (wide > 1)
-    return edges[seen], rng.uniform(0.2, 0.6, count)[seen]
+    visible = ahead & above & camera.inside((foot + head) / 2) & (wide > 1)
+    return edges[visible], rng.uniform(0.2, 0.6, count)[visible]
 
 
 def _non_maximum_suppression(edges: Floats, score: Floats) -> Ints:
@@ -100,7 +101,7 @@ def _non_maximum_suppression(edges: Floats, score: Floats) -> Ints:
         low, high = np.maximum(edges[row, :2], edges[kept, :2]), np.minimum(edges[row, 2:], edges[kept, 2:])
         common = np.prod(np.maximum(high - low, 0.0), axis=1)
         union = _areas(edges[[row]]) + _areas(edges[kept]) - common
-        if (common <= _OVERLAP * union).all():
+        if (common <= _MAX_OVERLAP * union).all():
             kept.append(row)
     return np.array(sorted(kept), np.int64)
 

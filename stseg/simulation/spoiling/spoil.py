@@ -1,4 +1,4 @@
-"""Spoiled silhouettes and boxes: a scene whose masks and boxes err as segmentations and detectors do.
+"""Spoiled silhouettes and boxes: a scene with masks and boxes that err as segmentations and detectors do.
 
 Colour frames, instance images and the truth stay as they are. Errors of a frame depend on the scene's seed, the camera
 and the frame alone.
@@ -34,7 +34,7 @@ class Spoil:
     def __post_init__(self) -> None:
         if self.kind not in STRENGTHS:
             raise ConfigError("spoil", "kind", repr(self.kind), f"one of {', '.join(STRENGTHS)}")
-        most = MOST[self.kind]
+        most = MAX_STRENGTHS[self.kind]
         if not 0 <= self.strength <= most:
             raise ConfigError("spoil", self.kind, f"{self.strength:g}", f"a strength from 0 to {most:g}")
 
@@ -54,7 +54,7 @@ STRENGTHS: dict[str, tuple[float, float, float]] = {
     "doubled": (0.1, 0.2, 0.4),  # likewise
 }
 """The kinds, each with a weak, a middle and a strong strength."""
-MOST = {kind: {"staying": 20.0, "rain": 1000.0}.get(kind, 1.0) for kind in STRENGTHS}
+MAX_STRENGTHS = {kind: {"staying": 20.0, "rain": 1000.0}.get(kind, 1.0) for kind in STRENGTHS}
 """Greatest strength of each kind."""
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from stseg.arrays import Boxes
 
-_TWIN = 0.25
+_DOUBLE_SPREAD = 0.25
 """Standard deviation of the edges of a box's double, share of its size."""
 
 
@@ -28,7 +28,7 @@ def _missed(boxes: Boxes, share: float, rng: np.random.Generator) -> Boxes:
 def _doubled(boxes: Boxes, share: float, rng: np.random.Generator) -> Boxes:
     """A share of the boxes with an inexact double of lower score."""
     chosen = rng.uniform(size=len(boxes)) < share
-    twins = _jitter(Boxes(boxes.pixel[chosen], 0.8 * boxes.score[chosen]), _TWIN, rng)
+    twins = _jitter(Boxes(boxes.pixel[chosen], 0.8 * boxes.score[chosen]), _DOUBLE_SPREAD, rng)
     return Boxes(np.concatenate([boxes.pixel, twins.pixel]), np.concatenate([boxes.score, twins.score]))
 
 

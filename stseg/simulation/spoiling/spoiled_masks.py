@@ -20,15 +20,15 @@ from stseg.simulation.random_streams import Topic, random_stream
 
 People = NDArray[np.uint16]
 
-_BLINK = 0.5
+_ABSENCE = 0.5
 """Time for which a person is missing, seconds."""
-_ARRIVAL = 2.0
+_ARRIVAL_TIME = 2.0
 """Time within which what stays has come, seconds."""
-_GRAIN = 0.4
+_HOLE_SIZE = 0.4
 """Size of holes, share of a body's width."""
-_DROP = (0.05, 0.2)
+_BLOB_RADIUS = (0.05, 0.2)
 """Least and greatest radius of small blobs, shares of a body's width."""
-_TALL = 3.0
+_OBJECT_HEIGHT = 3.0
 """Height of what stays, beside a body's width."""
 
 
@@ -96,7 +96,7 @@ def _holes(mask: Bytes, people: People, share: float, moment: Moment) -> Bytes:
     """Smooth noise below a quantile tears the silhouettes, in each frame anew."""
     del people
     height, width = mask.shape
-    grain = max(2, round(_GRAIN * moment.body_width))
+    grain = max(2, round(_HOLE_SIZE * moment.body_width))
     coarse = moment.stream("holes").random((height // grain + 2, width // grain + 2))
     noise = cv2.resize(coarse, (width, height), interpolation=cv2.INTER_CUBIC)
     inside = mask > 0
@@ -124,7 +124,7 @@ def _shadows(mask: Bytes, people: People, share: float, moment: Moment) -> Bytes
 
 
 def _flicker(mask: Bytes, people: People, share: float, moment: Moment) -> Bytes:
-    blink, left = int(moment.frame / (moment.frame_rate * _BLINK)), mask.copy()
+    blink, left = int(moment.frame / (moment.frame_rate * _ABSENCE)), mask.copy()
     for person in np.unique(people[people > 0]).tolist():
         if moment.lasting("flicker", person, blink).uniform() < share:
             left[people == person] = 0
@@ -134,23 +134,23 @@ def _flicker(mask: Bytes, people: People, share: float, moment: Moment) -> Bytes
 def _staying(mask: Bytes, people: People, number: float, moment: Moment) -> Bytes:
     del people
     height, width = mask.shape
-    shown = mask.copy()
+    spoiled = mask.copy()
     for blob in range(round(number)):
         rng = moment.lasting("staying", blob)
-        comes, left, top = rng.uniform(0, _ARRIVAL), rng.uniform(0, width), rng.uniform(height / 4, height)
+        comes, left, top = rng.uniform(0, _ARRIVAL_TIME), rng.uniform(0, width), rng.uniform(height / 4, height)
         if moment.frame >= comes * moment.frame_rate:
-            right, bottom = left + moment.body_width, top + _TALL * moment.body_width
-            shown[int(top) : int(bottom), int(left) : int(right)] = 255
-    return shown
+            right, bottom = left + moment.body_width, top + _OBJECT_HEIGHT * moment.body_width
+            spoiled[int(top) : int(bottom), int(left) : int(right)] = 255
+    return spoiled
 
 
 def _rain(mask: Bytes, people: People, number: float, moment: Moment) -> Bytes:
     del people
-    rng, shown = moment.stream("rain"), mask.copy()
+    rng, spoiled = moment.stream("rain"), mask.copy()
     for _ in range(rng.poisson(number)):
         u, v = (int(rng.integers(side)) for side in mask.shape[::-1])
-        cv2.circle(shown, (u, v), round(rng.uniform(*_DROP) * moment.body_width), 255, -1)
-    return shown
+        cv2.circle(spoiled, (u, v), round(rng.uniform(*_BLOB_RADIUS) * moment.body_width), 255, -1)
+    return spoiled
 
 
 def _jpeg(mask: Bytes, people: People, strength: float, moment: Moment) -> Bytes:
