@@ -13,13 +13,13 @@ from stseg.evaluation.clear import (
     Matches,
     false_tracks,
     fragments,
+    idf1,
     match_per_frame,
     match_with_continuity,
     matched_share,
     switches,
 )
 from stseg.evaluation.hota import hota
-from stseg.evaluation.identity import idf1
 from stseg.evaluation.sequence import Area, Sequence, align_frames
 
 

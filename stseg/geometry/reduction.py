@@ -9,7 +9,7 @@ import numpy as np
 from stseg.geometry.camera import Camera
 from stseg.geometry.grid import Grid
 
-_TALL = 1.7
+BODY_HEIGHT = 1.7
 """Height of a standing person, metres."""
 
 
@@ -30,7 +30,7 @@ def greatest_reduction(camera: Camera, grid: Grid, rows: float) -> int:
     """
     ground = grid.ground[grid.inside()]
     feet, before_feet = camera.project(ground, 0.0)
-    head, before_head = camera.project(ground, _TALL)
+    head, before_head = camera.project(ground, BODY_HEIGHT)
     whole = before_feet & before_head & camera.inside(feet) & camera.inside(head)
     if not whole.any():
         return 1

@@ -4,32 +4,23 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from html import escape
 from types import MappingProxyType
 
 import numpy as np
 
 from stseg.arrays import Floats, Ints, Rows
-from stseg.reporting.certainty import DoubtfulStretch
 from stseg.reporting.pictures.colours import hex_colour, track_colour
+from stseg.reporting.run_statistics import DoubtfulStretch, Span
 
-_WIDTH, _LEFT, _RIGHT = 1000, 44, 16  # pixels
+_WIDTH, _LEFT_MARGIN, _RIGHT_MARGIN = 1000, 44, 16  # pixels
 _COLUMNS = 900  # steps of a chart, however long the recording
 _LANE_HEIGHT, _MAX_LANES = 15, 60
 
 
-@dataclass(frozen=True)
-class Span:
-    """The frames that a chart shows, half open, and the recording's frames per second."""
-
-    first: int
-    stop: int
-    frame_rate: float
-
-    def place(self, frame: float) -> float:
-        """Pixels from the left."""
-        return _LEFT + (frame - self.first) / (self.stop - self.first) * (_WIDTH - _LEFT - _RIGHT)
+def _column(span: Span, frame: float) -> float:
+    """Pixels from the left."""
+    return _LEFT_MARGIN + (frame - span.first) / (span.stop - span.first) * (_WIDTH - _LEFT_MARGIN - _RIGHT_MARGIN)
 
 
 def people_chart(span: Span, trajectory: Rows, truth: Rows | None) -> str:
@@ -42,13 +33,15 @@ def people_chart(span: Span, trajectory: Rows, truth: Rows | None) -> str:
     lines = [_open(height), *_clock(span, bottom, 14)]
     for count in range(0, most + 1, max(1, -(-most // 5))):
         v = bottom - count * rise
-        lines.append(f'<line class="rule" x1="{_LEFT}" x2="{_WIDTH - _RIGHT}" y1="{v:.1f}" y2="{v:.1f}"/>')
-        lines.append(f'<text x="{_LEFT - 8}" y="{v + 4:.1f}" text-anchor="end">{count}</text>')
+        lines.append(
+            f'<line class="rule" x1="{_LEFT_MARGIN}" x2="{_WIDTH - _RIGHT_MARGIN}" y1="{v:.1f}" y2="{v:.1f}"/>'
+        )
+        lines.append(f'<text x="{_LEFT_MARGIN - 8}" y="{v + 4:.1f}" text-anchor="end">{count}</text>')
     steps = _steps(span, found, bottom, rise)
-    lines.append(f'<path class="area" d="M{_LEFT},{bottom} {steps} V{bottom} Z"/>')
-    lines.append(f'<path class="line" d="M{_LEFT},{bottom} {steps}"/>')
+    lines.append(f'<path class="area" d="M{_LEFT_MARGIN},{bottom} {steps} V{bottom} Z"/>')
+    lines.append(f'<path class="line" d="M{_LEFT_MARGIN},{bottom} {steps}"/>')
     if true is not None:
-        lines.append(f'<path class="truth" d="M{_LEFT},{bottom} {_steps(span, true, bottom, rise)}"/>')
+        lines.append(f'<path class="truth" d="M{_LEFT_MARGIN},{bottom} {_steps(span, true, bottom, rise)}"/>')
     return "\n".join([*lines, "</svg>"])
 
 
@@ -68,7 +61,7 @@ def track_chart(
     lines = [_open(bottom + 32), *_clock(span, bottom, 4)]
     for row, lane in zip(tracks, lanes, strict=True):
         if lane < _MAX_LANES:
-            u, end = span.place(int(row["first"])), span.place(int(row["last"]) + 1)
+            u, end = _column(span, int(row["first"])), _column(span, int(row["last"]) + 1)
             v, colour = 8 + lane * _LANE_HEIGHT, hex_colour(track_colour(int(row["id"])))
             name = names.get(int(row["id"]), str(row["id"]))
             words = f"track {escape(name)}: frames {row['first']} to {row['last']}"
@@ -84,7 +77,7 @@ def track_chart(
 
 def _pale(span: Span, stretch: DoubtfulStretch, v: int) -> str:
     """A veil over a doubtful part of a bar."""
-    u, end = span.place(stretch.first), span.place(stretch.last + 1)
+    u, end = _column(span, stretch.first), _column(span, stretch.last + 1)
     words = f"track {stretch.track}, frames {stretch.first} to {stretch.last}: {100 * stretch.certainty:.0f} % certain"
     return (
         f'<rect class="pale" x="{u:.1f}" y="{v}" width="{max(end - u, 1.5):.1f}" height="{_LANE_HEIGHT - 4}">'
@@ -103,7 +96,7 @@ def _clock(span: Span, bottom: float, top: float) -> list[str]:
     lines = []
     start = span.first / span.frame_rate
     for second in np.arange(np.ceil(start / step) * step, start + seconds + 1e-9, step):
-        u = span.place(second * span.frame_rate)
+        u = _column(span, second * span.frame_rate)
         lines.append(f'<line class="rule" x1="{u:.1f}" x2="{u:.1f}" y1="{top}" y2="{bottom}"/>')
         lines.append(f'<text x="{u:.1f}" y="{bottom + 18}" text-anchor="middle">{clock_time(float(second))}</text>')
     return lines
@@ -144,7 +137,7 @@ def _steps(span: Span, counts: Floats, bottom: float, rise: float) -> str:
     bounds = np.unique(np.linspace(0, len(counts), min(len(counts), _COLUMNS) + 1).astype(int))
     words = []
     for start, stop in zip(bounds[:-1].tolist(), bounds[1:].tolist(), strict=True):
-        v, end = bottom - counts[start:stop].mean() * rise, span.place(span.first + stop)
+        v, end = bottom - counts[start:stop].mean() * rise, _column(span, span.first + stop)
         words.append(f"V{v:.1f} H{end:.1f}")
     return " ".join(words)
 

@@ -7,8 +7,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from stseg.simulation.crowd.encounters import BORDER, CROSSING, meeting
-from stseg.simulation.crowd.routes import Route
+from stseg.simulation.crowd.routes import BORDER, CROSSING, Route, meeting
 from stseg.simulation.scene import SceneSpec
 
 _DENSE = SceneSpec(

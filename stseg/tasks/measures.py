@@ -15,7 +15,7 @@ from stseg.io.runfile.runs import Run
 from stseg.measures.areas import Areas, Line, Zone
 from stseg.measures.measure import Measures, measure_tracks
 from stseg.reporting.page.html import png_bytes
-from stseg.reporting.pictures.flow_map import flow_map
+from stseg.reporting.pictures.maps import flow_map
 
 
 def measure(

@@ -9,7 +9,7 @@ import numpy as np
 from stseg.io.runfile.runs import Run
 from stseg.records.ghost_reasons import REASONS, ghost_reasons
 from stseg.records.tables import ERROR_RATES
-from stseg.reporting.findings import ground_by_views, people_per_minute
+from stseg.reporting.run_statistics import ground_by_views, people_per_minute
 from stseg.tasks.warnings import run_warnings
 
 _BLIND_SHARE = 0.05  # of the ground that no view sees, from which on it is worth a warning

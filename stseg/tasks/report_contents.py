@@ -12,17 +12,15 @@ from stseg.geometry import Camera, Grid
 from stseg.io.runfile.runs import Run
 from stseg.measures.motion import flow_field
 from stseg.records.ghost_reasons import GhostReasons, ghost_reasons, has_evidence
-from stseg.reporting.busy_times import LONG, busiest_minutes, people_by_hour
-from stseg.reporting.charts import Span, clock_time
+from stseg.reporting.charts import clock_time
 from stseg.reporting.figures import Figure, Instant, camera_figures, ground_figures, slice_figures
-from stseg.reporting.findings import ground_by_views
 from stseg.reporting.page.answers import answers
 from stseg.reporting.page.embedded import embedded_json
 from stseg.reporting.page.page import Contents, ViewSummary
-from stseg.reporting.pictures.flow_map import flow_map
-from stseg.reporting.pictures.maps import Bins, DwellPlace, blind_map, density, dwell, dwell_places, heat_map
+from stseg.reporting.pictures.maps import Bins, DwellPlace, blind_map, density, dwell, dwell_places, flow_map, heat_map
 from stseg.reporting.pictures.plan import plan_view
 from stseg.reporting.pictures.sheets import thin_sheets
+from stseg.reporting.run_statistics import BUSY_DURATION, Span, busiest_minutes, ground_by_views, people_by_hour
 from stseg.tasks.overview import seconds_by_stage
 from stseg.tasks.warnings import run_warnings
 
@@ -151,7 +149,7 @@ def _haunt_figures(run: Run, bins: Bins, places: Sequence[DwellPlace]) -> list[F
 
 def _busy_figures(run: Run, span: Span) -> list[Figure]:
     """Small plans of the busiest minutes of a long run."""
-    if (span.stop - span.first) / span.frame_rate < LONG:
+    if (span.stop - span.first) / span.frame_rate < BUSY_DURATION:
         return []
     rig, trajectory, figures = run.recording.rig, run.trajectory, []
     for number, minute in enumerate(busiest_minutes(span, trajectory), 1):

@@ -19,7 +19,7 @@ from stseg.io.recording.recording import CameraSource, Recording
 from stseg.reporting.figures import backdrop
 from stseg.reporting.page.html import png_bytes
 from stseg.reporting.pictures.canvas import outline
-from stseg.reporting.pictures.ground_grid import grid_picture
+from stseg.reporting.pictures.overlay import grid_picture
 
 COLUMNS = ("camera", "recognised", "frames", "boxes", "a frame", "height px", "score", "feet in area", "classes")
 """Headings of `SourceSummary.row`."""

@@ -21,7 +21,7 @@ from stseg.geometry import Rig
 from stseg.io.recording.frames import open_frames
 from stseg.io.recording.recording import CameraSource, Recording, Source
 from stseg.io.recording.rigs import read_recording, write_rig
-from stseg.reporting.pictures.ground_grid import grid_picture
+from stseg.reporting.pictures.overlay import grid_picture
 
 DATA = Path(os.environ.get("STSEG_DATA", Path(__file__).parents[2] / "../shared/data"))
 RIG = ring()

@@ -9,9 +9,9 @@ import run_files
 
 from stseg.records.ghost_reasons import ghost_reasons
 from stseg.records.tables import EVENT, Tracks
-from stseg.reporting.charts import Span
 from stseg.reporting.page.answers import answers
 from stseg.reporting.pictures.maps import DwellPlace
+from stseg.reporting.run_statistics import Span
 
 
 def told(places: list[DwellPlace], shares: list[float], dropped: int = 0) -> list[str]:

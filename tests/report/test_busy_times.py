@@ -6,8 +6,7 @@ import numpy as np
 
 from stseg.arrays import Rows
 from stseg.records.tables import TRAJECTORY
-from stseg.reporting.busy_times import busiest_minutes, people_by_hour
-from stseg.reporting.charts import Span
+from stseg.reporting.run_statistics import Span, busiest_minutes, people_by_hour
 
 
 def stays(*tracks: tuple[int, int]) -> Rows:

@@ -13,7 +13,7 @@ from stseg.config import BodyConfig
 from stseg.io.runfile.layout import ghost_type
 from stseg.records.ghost_reasons import DENIED, OTHERS, TOO_LITTLE, ghost_reasons
 from stseg.records.tables import RATES, TRAJECTORY
-from stseg.reporting.findings import ground_by_views, people_per_minute
+from stseg.reporting.run_statistics import ground_by_views, people_per_minute
 from stseg.view_health.body_warnings import body_warnings
 from stseg.view_health.silent_views import view_warnings
 

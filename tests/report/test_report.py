@@ -24,15 +24,15 @@ from stseg.io.recording.recording import CameraSource, Source
 from stseg.io.runfile.runs import RunWriter, read_run
 from stseg.records.tables import EVENT, TRACK, TRAJECTORY, Tracks
 from stseg.reporting import marginal_picture, overlay, plan_view, spacetime_picture, volume_picture
-from stseg.reporting.certainty import doubtful_stretches, mean_certainty
-from stseg.reporting.charts import Span, clock_time, people_chart, track_chart
+from stseg.reporting.charts import clock_time, people_chart, track_chart
 from stseg.reporting.figures import backdrop
+from stseg.reporting.pictures.canvas import place_labels
 from stseg.reporting.pictures.colours import NIGHT, PAPER, track_colour
-from stseg.reporting.pictures.labels import place_labels
 from stseg.reporting.pictures.overlay import OverlayView, pillar_outline
 from stseg.reporting.pictures.plan import plan_map
 from stseg.reporting.pictures.slices import colours_of
 from stseg.reporting.pictures.spacetime import Block
+from stseg.reporting.run_statistics import Span, doubtful_stretches, mean_certainty
 from stseg.tasks.report import write_pictures
 
 GRID = Grid((0.0, 4.0), (-1.0, 2.0), 0.5, 1.8, 3)

@@ -29,9 +29,8 @@ from stseg.simulation.rendering import ray_casting as draw_module
 from stseg.simulation.rendering.body import PARTS, pose, upright_cylinders
 from stseg.simulation.rendering.cameras import build_rig, pixel_rays
 from stseg.simulation.rendering.clothes import clothing, own_clothing
-from stseg.simulation.rendering.ray_casting import draw_bodies, pixel_boxes
+from stseg.simulation.rendering.ray_casting import PENUMBRA, darken, draw_bodies, pixel_boxes
 from stseg.simulation.rendering.render import LAMP, Viewer
-from stseg.simulation.rendering.shadows import PENUMBRA, darken
 from stseg.simulation.scene import KINDS
 from stseg.simulation.spoiling.detector import detect, visible_boxes
 

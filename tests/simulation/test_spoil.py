@@ -15,9 +15,8 @@ from stseg.commands.simulate import simulate
 from stseg.errors import ConfigError
 from stseg.evaluation import evaluate
 from stseg.simulation import NAMED, Film, Spoil, SpoiledFilm
+from stseg.simulation.spoiling.errors import BOX_KINDS, MASK_KINDS, Moment
 from stseg.simulation.spoiling.spoil import MAX_STRENGTHS, STRENGTHS, spoiled_boxes, spoiled_mask
-from stseg.simulation.spoiling.spoiled_boxes import BOX_KINDS
-from stseg.simulation.spoiling.spoiled_masks import MASK_KINDS, Moment
 
 MOMENT = Moment(seed=3, camera=0, frame=200, frame_rate=10.0, body_width=20.0)
 PEOPLE = np.zeros((120, 160), np.uint16)

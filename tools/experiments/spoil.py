@@ -28,9 +28,8 @@ from stseg.io.track_csv import read_tracks_csv
 from stseg.simulation import NAMED, Film, Spoil
 from stseg.simulation.crowd.social_forces import TRUTH
 from stseg.simulation.rendering.render import RenderedView
+from stseg.simulation.spoiling.errors import BOX_KINDS, MASK_KINDS, Moment
 from stseg.simulation.spoiling.spoil import STRENGTHS, body_width, spoiled_boxes, spoiled_mask
-from stseg.simulation.spoiling.spoiled_boxes import BOX_KINDS
-from stseg.simulation.spoiling.spoiled_masks import MASK_KINDS, Moment
 
 NAMES = ("weak", "middle", "strong")
 _PAGE = """# What spoiled masks and boxes cost

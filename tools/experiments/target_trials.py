@@ -19,9 +19,8 @@ from stseg.io.recording.rigs import read_recording
 from stseg.io.track_csv import read_tracks_csv
 from stseg.simulation import NAMED, Film, SceneSpec, Spoil
 from stseg.simulation.rendering.render import RenderedView
+from stseg.simulation.spoiling.errors import BOX_KINDS, MASK_KINDS
 from stseg.simulation.spoiling.spoil import STRENGTHS
-from stseg.simulation.spoiling.spoiled_boxes import BOX_KINDS
-from stseg.simulation.spoiling.spoiled_masks import MASK_KINDS
 
 MIDDLE = NAMES.index("middle")
 PLAZA_SEEDS = (1706, 2311)

@@ -1,6 +1,6 @@
 """Correspondence of boxes between views: people on the ground, and the box of each in every view.
 
-Every box proposes a ground point: under its feet or, since these may be hidden, under its head at a common height. Each
+Every box proposes a ground point: under its feet or, since these may be hidden, under its head at `BODY_HEIGHT`. Each
 candidate is compared with the boxes of the other views, and candidates are selected greedily by the number and quality
 of confirmations. Gates are wide (half a metre), so that a displaced view still takes part.
 """
@@ -16,9 +16,8 @@ from scipy import ndimage
 from stseg.arrays import Boxes, Flags, Floats, Ints, Singles
 from stseg.bodies.pillars import BodyTable
 from stseg.geometry import Camera, Grid, Rig
+from stseg.geometry.reduction import BODY_HEIGHT
 
-_HEAD_HEIGHT = 1.70
-"""Height assumed for a head above feet that may be hidden, metres."""
 _MIN_HEIGHT, _MAX_HEIGHT = 1.35, 2.10
 GATE = 0.35
 """Association gate: distance of a box's middle and top from the body's, in body heights (about 0.6 m)."""
@@ -154,9 +153,9 @@ def _candidates(rig: Rig, boxes: Sequence[Floats]) -> tuple[Floats, Floats]:
         whole = view_boxes[:, 3] < camera.size[1] - 1 - _BORDER
         foot = camera.back_project(np.stack([middle, view_boxes[:, 3]], -1))
         height = np.where(whole, height_of(camera, foot, middle, view_boxes[:, 1]), np.nan)
-        by_head = camera.back_project(np.stack([middle, view_boxes[:, 1]], -1), _HEAD_HEIGHT)
+        by_head = camera.back_project(np.stack([middle, view_boxes[:, 1]], -1), BODY_HEIGHT)
         grounds += [foot, by_head]
-        heights += [height, np.full(len(view_boxes), _HEAD_HEIGHT)]
+        heights += [height, np.full(len(view_boxes), BODY_HEIGHT)]
     ground, height = np.concatenate(grounds), np.concatenate(heights)
     with np.errstate(invalid="ignore"):
         kept = (height > _MIN_HEIGHT) & (height < _MAX_HEIGHT) & _in_area(ground, rig.grid)

@@ -15,11 +15,12 @@ import numpy as np
 from stseg.arrays import Flags, Floats
 from stseg.bodies.pillars import BodyTable
 from stseg.calibration.check.box_correspondence import BoxCorrespondences
+from stseg.geometry.reduction import BODY_HEIGHT
 
 _EDGE_SPREAD, _PIXEL_SPREAD = (0.06, 0.045, 0.06), 2.0
 """Standard deviations of a box's middle, upper and lower edge as shares of the body's height, and pixels added to each
 (a detector's grid, a blob's fringe)."""
-_HEIGHT, _HEIGHT_SPREAD = 1.70, 0.15
+_HEIGHT_SPREAD = 0.15  # metres, around `BODY_HEIGHT`
 _ROUNDS = 6
 _DIFFERENCE = 0.02
 """Step of the finite differences, metres."""
@@ -65,7 +66,7 @@ def locate(people: BoxCorrespondences, tables: Sequence[BodyTable], views: Seque
         normal = np.einsum("nk,nka,nkb->nab", weight, slope, slope) + 1e-6 * np.eye(3)
         normal[:, 2, 2] += 1 / _HEIGHT_SPREAD**2
         push = np.einsum("nk,nka,nk->na", weight, slope, residual)
-        push[:, 2] += (height - _HEIGHT) / _HEIGHT_SPREAD**2
+        push[:, 2] += (height - BODY_HEIGHT) / _HEIGHT_SPREAD**2
         step = np.clip(-np.linalg.solve(normal, push[..., None])[..., 0], -0.5, 0.5)
         ground, height = ground + step[:, :2], np.clip(height + step[:, 2], 1.2, 2.2)
     return GroundEstimate(np.where(enough[:, None], ground, np.nan), np.where(enough, height, np.nan))

@@ -8,8 +8,9 @@ import numpy as np
 
 from stseg.arrays import Floats, Rows
 from stseg.records.ghost_reasons import REASONS, GhostReasons
-from stseg.reporting.charts import Span, clock_time
+from stseg.reporting.charts import clock_time
 from stseg.reporting.pictures.maps import DwellPlace
+from stseg.reporting.run_statistics import Span
 
 
 def answers(

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import base64
-import hashlib
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
-from html import escape
-from importlib.resources import files
 
 import cv2
 import numpy as np
 
 from stseg.arrays import Bytes
-from stseg.reporting.page.style import STYLE
+from stseg.reporting.page.html import jpeg_uri
+from stseg.reporting.page.template import page, script_json
 
 _MAX_FRAME_WIDTH = 1920
 """Greatest width of a frame in the page, pixels; points are in the camera's own pixels."""
@@ -66,17 +62,14 @@ def calibration_page(
             for name, frame in zip(names, frames, strict=True)
         ],
     }
-    script = (files("stseg.reporting.page") / "calibration_page.js").read_text("utf-8")
-    digest = base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
-    text = json.dumps(data, separators=(",", ":")).replace("<", "\\u003c")
-    return _PAGE.format(title=escape("Ground points"), style=STYLE + _STYLE, digest=digest, data=text, script=script)
+    title = "Ground points"
+    return page(title, _BODY.format(title=title), script_json(data), ("calibration_page.js",), _STYLE)
 
 
 def _jpeg(image: Bytes) -> str:
     share = min(1.0, _MAX_FRAME_WIDTH / image.shape[1])
     scaled = image if share == 1 else cv2.resize(image, None, fx=share, fy=share, interpolation=cv2.INTER_AREA)
-    _, data = cv2.imencode(".jpg", scaled, [cv2.IMWRITE_JPEG_QUALITY, 90])
-    return "data:image/jpeg;base64," + base64.b64encode(np.asarray(data, np.uint8).tobytes()).decode("ascii")
+    return jpeg_uri(np.asarray(scaled, np.uint8), 90)
 
 
 _STYLE = """
@@ -87,18 +80,7 @@ _STYLE = """
 .tools > * { margin-right: 12px }
 """
 
-_PAGE = """<!doctype html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta http-equiv="Content-Security-Policy"
- content="default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'sha256-{digest}'">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<title>{title}</title>
-<style>{style}</style>
-</head>
-<body>
-<main>
+_BODY = """<main>
 <h1>{title}</h1>
 <p>Click a place of the ground in two or more views and on the plan; then <b>N</b> for the next point. The homographies
 are solved as you click and drawn as a grid; a ring shows where the next point helps most. <b>P</b> begins the top of a
@@ -114,9 +96,4 @@ nothing.</p>
 <textarea id="csv" readonly aria-label="points.csv"></textarea>
 <p>Then: <code>stseg calibrate points points.csv -o rig.toml --size W,H --area=... --frame-rate ...</code></p>
 </main>
-<canvas id="lens" width="160" height="160" hidden></canvas>
-<script id="data" type="application/json">{data}</script>
-<script>{script}</script>
-</body>
-</html>
-"""
+<canvas id="lens" width="160" height="160" hidden></canvas>"""

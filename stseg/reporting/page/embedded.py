@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import json
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -11,6 +10,7 @@ import numpy as np
 from stseg.arrays import AnyArray, Bytes, Ints, Rows
 from stseg.geometry import Camera, Rig
 from stseg.records.ghost_reasons import REASONS, ghost_reasons
+from stseg.reporting.page.template import script_json
 from stseg.reporting.pictures.colours import hex_colour, track_colour
 from stseg.reporting.pictures.sheets import Sheets
 
@@ -57,7 +57,7 @@ def embedded_json(
         "candidates": _candidates(candidates, sheets.frames),
         "ghosts": _ghost_counts(candidates, sheets.frames),
     }
-    return json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+    return script_json(data)
 
 
 def thin_tracks(trajectory: Rows, slider_frames: Ints, most: int = _MAX_PLACES) -> tuple[Rows, int]:

@@ -10,9 +10,10 @@ import cv2
 import numpy as np
 
 from stseg.arrays import Bytes
-from stseg.reporting.charts import Span, clock_time
+from stseg.reporting.charts import clock_time
 from stseg.reporting.figures import Figure
 from stseg.reporting.pictures.colours import hex_colour, track_colour
+from stseg.reporting.run_statistics import Span
 
 MOST_ROWS = 2000
 """Greatest number of rows of a table; a note counts the others."""
@@ -46,23 +47,25 @@ def figures(pictures: Sequence[Figure], layout: str) -> str:
 
 
 def figure(picture: Figure) -> str:
-    """A picture with its caption."""
-    kind, data = _encoded(picture.picture)
+    """A picture with its caption: PNG, but JPEG of photographs, that a page with many cameras stays light."""
+    data = png_bytes(picture.picture)
+    source = jpeg_uri(picture.picture, 85) if len(data) > _MAX_PNG else _uri("png", data)
     tall, wide = picture.picture.shape[:2]
     words = escape(picture.caption)
     return (
-        f'<figure><img width="{wide}" height="{tall}" alt="{words}" src="data:image/{kind};base64,{data}">'
+        f'<figure><img width="{wide}" height="{tall}" alt="{words}" src="{source}">'
         f"<figcaption>{words}</figcaption></figure>"
     )
 
 
-def _encoded(picture: Bytes) -> tuple[str, str]:
-    """Its kind and base64: PNG, but JPEG of photographs, that a page with many cameras stays light."""
-    data, kind = png_bytes(picture), "png"
-    if len(data) > _MAX_PNG:
-        _, packed = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, 85])
-        data, kind = bytes(np.asarray(packed, np.uint8)), "jpeg"
-    return kind, base64.b64encode(data).decode("ascii")
+def jpeg_uri(picture: Bytes, quality: int) -> str:
+    """A picture as the address of a JPEG inside the page; `quality` is 1..100."""
+    _, data = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, quality])
+    return _uri("jpeg", bytes(np.asarray(data, np.uint8)))
+
+
+def _uri(kind: str, data: bytes) -> str:
+    return f"data:image/{kind};base64,{base64.b64encode(data).decode('ascii')}"
 
 
 def chart(svg: str, caption: str) -> str:

@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-import base64
-import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
 from html import escape
-from importlib.resources import files
 
 import numpy as np
 
 from stseg.arrays import Floats, Rows
 from stseg.records.ghost_reasons import REASONS, GhostReasons
-from stseg.reporting.busy_times import BusyTime
-from stseg.reporting.certainty import DOUBTFUL, doubtful_stretches, mean_certainty
-from stseg.reporting.charts import Span, people_chart, track_chart
+from stseg.reporting.charts import people_chart, track_chart
 from stseg.reporting.figures import Figure
 from stseg.reporting.page.html import MOST_ROWS, bars, chart, figure, figures, note, section, swatch, table, when
-from stseg.reporting.page.style import STYLE
+from stseg.reporting.page.template import page
+from stseg.reporting.run_statistics import DOUBT_LIMIT, BusyTime, Span, doubtful_stretches, mean_certainty
 
 
 @dataclass(frozen=True)
@@ -122,24 +117,12 @@ class Contents:
 
 def report_page(contents: Contents) -> str:
     """The page's text. The same contents give the same text."""
-    script = _script()
-    digest = base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
-    return _PAGE.format(
+    body = _BODY.format(
         title=escape(contents.title),
-        style=STYLE,
-        digest=digest,
         facts="".join(f"<div><dt>{escape(name)}</dt><dd>{escape(value)}</dd></div>" for name, value in contents.facts),
         sections="\n".join(filter(None, _sections(contents))),
-        data=contents.data,
-        script=script,
     )
-
-
-@cache
-def _script() -> str:
-    return "\n".join(
-        (files("stseg.reporting.page") / name).read_text("utf-8") for name in ("zone_drawing.js", "page.js")
-    )
+    return page(contents.title, body, contents.data, ("zone_drawing.js", "page.js"))
 
 
 def _sections(contents: Contents) -> list[str]:
@@ -164,7 +147,7 @@ def _sections(contents: Contents) -> list[str]:
             "Tracks",
             chart(
                 track_chart(span, tracks, doubtful_stretches(contents.trajectory), contents.names),
-                f"from first frame to last; pale where a person is less than {100 * DOUBTFUL:.0f} % certain",
+                f"from first frame to last; pale where a person is less than {100 * DOUBT_LIMIT:.0f} % certain",
             ),
             _track_table(span, tracks, mean_certainty(contents.trajectory, tracks), contents.names),
         ),
@@ -175,18 +158,7 @@ def _sections(contents: Contents) -> list[str]:
     ]
 
 
-_PAGE = """<!doctype html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta http-equiv="Content-Security-Policy"
- content="default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'sha256-{digest}'">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<title>{title}</title>
-<style>{style}</style>
-</head>
-<body>
-<header>
+_BODY = """<header>
 <h1>{title}</h1>
 <dl>{facts}</dl>
 </header>
@@ -194,12 +166,7 @@ _PAGE = """<!doctype html>
 {sections}
 </main>
 <div id="time"><button id="play">Play</button><input id="slider" type="range" min="0" step="1" value="0"
- aria-label="moment"><output id="clock"></output></div>
-<script id="data" type="application/json">{data}</script>
-<script>{script}</script>
-</body>
-</html>
-"""
+ aria-label="moment"><output id="clock"></output></div>"""
 
 _MOMENT = """<p class="note">The slider at the foot of the page chooses the moment. Left: people with their paths of
 the last 5 seconds; crosses are candidates that were dropped as ghosts. Red ground is seen by no view, orange by one.

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import base64
-import hashlib
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
-from importlib.resources import files
 
 import cv2
 import numpy as np
@@ -16,7 +12,8 @@ import numpy as np
 from stseg.arrays import AnyArray, Bytes, Observation, Rows
 from stseg.geometry import Camera, Rig
 from stseg.reporting.figures import backdrop
-from stseg.reporting.page.style import STYLE
+from stseg.reporting.page.html import jpeg_uri
+from stseg.reporting.page.template import page, script_json
 from stseg.reporting.pictures.overlay import overlay
 
 _WIDTH, _HEIGHT = 960, 260
@@ -45,27 +42,19 @@ class Question:
 
 def review_page(title: str, questions: Sequence[Question], shows_images: bool) -> str:
     """The page's text."""
-    script = (files("stseg.reporting.page") / "review_page.js").read_text("utf-8")
-    digest = base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
-    data = json.dumps([{"choices": one.choices} for one in questions]).replace("<", "\\u003c")
     items = "\n".join(map(_item, questions))
     privacy = "This page shows images from the cameras: share it with care." if shows_images else "No camera image."
-    return _PAGE.format(
-        title=escape(title), style=STYLE + _STYLE, digest=digest, items=items, data=data, script=script, privacy=privacy
-    )
+    data = script_json([{"choices": one.choices} for one in questions])
+    body = _BODY.format(title=escape(title), items=items, privacy=privacy)
+    return page(title, body, data, ("review_page.js",), _STYLE)
 
 
 def _item(question: Question) -> str:
     pictures = "".join(
-        f'<figure><img alt="{escape(words)}" src="{_jpeg(picture)}"><figcaption>{escape(words)}</figcaption></figure>'
-        for words, picture in question.pictures
+        f'<figure><img alt="{words}" src="{jpeg_uri(picture, 80)}"><figcaption>{words}</figcaption></figure>'
+        for words, picture in ((escape(caption), picture) for caption, picture in question.pictures)
     )
     return f'<section class="item" hidden><h2>{escape(question.text)}</h2><div class="row">{pictures}</div></section>'
-
-
-def _jpeg(picture: Bytes) -> str:
-    _, data = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, 80])
-    return "data:image/jpeg;base64," + base64.b64encode(np.asarray(data, np.uint8).tobytes()).decode("ascii")
 
 
 def best_views(rig: Rig, ground: AnyArray) -> list[int]:
@@ -114,18 +103,7 @@ main { max-width: none } .row { display: flex; flex-wrap: wrap; gap: 10px } .row
 #csv { width: 100%; height: 120px; font-family: monospace }
 """
 
-_PAGE = """<!doctype html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta http-equiv="Content-Security-Policy"
- content="default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'sha256-{digest}'">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<title>{title}</title>
-<style>{style}</style>
-</head>
-<body>
-<main>
+_BODY = """<main>
 <h1>{title}</h1>
 <p>The most doubtful decision first. A key answers and goes on; arrows move, Backspace takes an answer back.
 {privacy}</p>
@@ -133,9 +111,4 @@ _PAGE = """<!doctype html>
 {items}
 <textarea id="csv" readonly aria-label="answers.csv"></textarea>
 <p>Then: <code>stseg correct RUN.h5 answers.csv -o corrected.h5</code></p>
-</main>
-<script id="data" type="application/json">{data}</script>
-<script>{script}</script>
-</body>
-</html>
-"""
+</main>"""

@@ -10,9 +10,8 @@ from stseg.arrays import Bytes, Observation, Rows
 from stseg.geometry import Rig
 from stseg.reporting.charts import clock_time
 from stseg.reporting.figures import TRAIL, backdrop
-from stseg.reporting.pictures.canvas import blank, chip, chip_size, disc, fading_stroke, text
+from stseg.reporting.pictures.canvas import blank, chip, chip_size, disc, fading_stroke, place_labels, text
 from stseg.reporting.pictures.colours import NIGHT, PAPER, QUIET, track_colour
-from stseg.reporting.pictures.labels import place_labels
 from stseg.reporting.pictures.overlay import OverlayView, overlay
 from stseg.reporting.pictures.plan import ground_sheet, plan_map
 

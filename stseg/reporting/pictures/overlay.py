@@ -1,7 +1,8 @@
-"""Overlay of tracks on a camera's image: pillars of the people's heights, ids and trails."""
+"""Overlays on a camera's image: tracks (pillars, ids and trails), or the ground's grid with upright poles."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -11,14 +12,33 @@ import numpy as np
 from stseg.arrays import AnyArray, Bytes, Floats, Rows
 from stseg.bodies.pillars import PROFILE
 from stseg.geometry import Camera, Grid
-from stseg.reporting.pictures.canvas import blank, chip, chip_size, disc, fading_stroke, fill, outline, stroke, text
-from stseg.reporting.pictures.colours import NIGHT, PAPER, Colour, mixed, track_colour
-from stseg.reporting.pictures.labels import place_labels
+from stseg.geometry.reduction import BODY_HEIGHT
+from stseg.reporting.pictures.canvas import (
+    blank,
+    chip,
+    chip_size,
+    disc,
+    fading_stroke,
+    fill,
+    outline,
+    place_labels,
+    stroke,
+    text,
+)
+from stseg.reporting.pictures.colours import INK, NIGHT, PAPER, Colour, mixed, track_colour
 
-_COMMON_HEIGHT = 1.70  # metres, of a person of unknown height
 _SUBPIXELS = 4  # sub-pixels a pixel of a pillar's outline
 _CIRCLE_ANGLES = np.linspace(0, 2 * np.pi, 33)[:-1]
-_LINE = mixed(NIGHT, PAPER, 0.22)
+_RULE = mixed(NIGHT, PAPER, 0.22)
+_RULE_STYLES = ((_RULE, 1), (mixed(_RULE, PAPER, 0.3), 2))
+"""Colour and width of the ground's metres, and of its border."""
+_GRID_STYLES: tuple[tuple[Colour, int], ...] = (((255, 196, 64), 1), ((64, 220, 255), 2))
+"""The same of `grid_picture`."""
+_POLE_COLOUR: Colour = (80, 80, 255)
+_MAX_LINES = 14
+_LINE_DISTANCES = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)  # metres
+_POLES = 4
+"""Along the longer side of the area."""
 
 
 def overlay(
@@ -158,7 +178,7 @@ def _label(canvas: Bytes, view: OverlayView, people: Rows) -> None:
 
 def _height(row: np.void) -> float:
     height = float(row["height"])
-    return height if np.isfinite(height) and height > 0 else _COMMON_HEIGHT
+    return height if np.isfinite(height) and height > 0 else BODY_HEIGHT
 
 
 def _distance(camera: Camera, rows: Rows) -> Floats:
@@ -168,13 +188,81 @@ def _distance(camera: Camera, rows: Rows) -> Floats:
 def _rule(canvas: Bytes, view: OverlayView, grid: Grid) -> None:
     """The ground's metres, and its rectangle a little brighter."""
     (x0, x1), (y0, y1) = grid.x, grid.y
-    along_x, along_y = np.linspace(x0, x1, 400), np.linspace(y0, y1, 400)
-    for x in [*np.arange(np.ceil(x0), x1), x0, x1]:
-        _ground_line(canvas, view, np.full(400, x), along_y, x in (x0, x1))
-    for y in [*np.arange(np.ceil(y0), y1), y0, y1]:
-        _ground_line(canvas, view, along_x, np.full(400, y), y in (y0, y1))
+    _ground_lines(canvas, view, grid, [*np.arange(np.ceil(x0), x1), x0, x1], [*np.arange(np.ceil(y0), y1), y0, y1])
 
 
-def _ground_line(canvas: Bytes, view: OverlayView, x: Floats, y: Floats, is_border: bool) -> None:
-    colour: Colour = mixed(_LINE, PAPER, 0.3) if is_border else _LINE
-    stroke(canvas, view.pixel(np.stack([x, y], -1), 0.0), colour, 2 if is_border else 1)
+def _ground_lines(
+    canvas: Bytes,
+    view: OverlayView,
+    grid: Grid,
+    x_stops: Sequence[float],
+    y_stops: Sequence[float],
+    styles: tuple[tuple[Colour, int], ...] = _RULE_STYLES,
+) -> None:
+    """Lines over the whole ground at x and at y, in the second style where they are its border."""
+    along_x, along_y = np.linspace(*grid.x, 400), np.linspace(*grid.y, 400)
+    lines = [(np.full(400, x), along_y, x in grid.x) for x in x_stops]
+    lines += [(along_x, np.full(400, y), y in grid.y) for y in y_stops]
+    for x, y, is_border in lines:
+        stroke(canvas, view.pixel(np.stack([x, y], -1), 0.0), *styles[is_border])
+
+
+def grid_picture(camera: Camera, grid: Grid, image: Bytes | None, frame: int, width: int = 1280) -> Bytes:
+    """The ground's metres, and poles as tall as most people with a mark at each half metre, over a camera's frame.
+
+    Parameters
+    ----------
+    camera
+    grid
+    image : uint8 (v, u, 3) or (v, u) or None
+        As in `overlay`.
+    frame
+        Its number.
+    width
+        Of the picture, pixels.
+
+    Returns
+    -------
+    uint8 (v, u, 3)
+        Blue, green, red.
+    """
+    view = OverlayView(camera, width)
+    canvas = view.canvas(image)
+    side = max(grid.x[1] - grid.x[0], grid.y[1] - grid.y[0])
+    step = next((s for s in _LINE_DISTANCES if s * _MAX_LINES >= side), _LINE_DISTANCES[-1])
+    _ground_lines(canvas, view, grid, _stops(grid.x, step), _stops(grid.y, step), _GRID_STYLES)
+    for ground in sorted(_pole_places(grid), key=lambda place: -float(np.hypot(*(place - camera.centre[:2])))):
+        _pole(canvas, view, ground)
+    words = f"{camera.name}  frame {frame}  lines every {step:g} m, poles {BODY_HEIGHT} m"
+    text(canvas, words, (18, 16), PAPER, 14, (0, 0), 2)
+    return canvas
+
+
+def _stops(bounds: tuple[float, float], step: float) -> list[float]:
+    low, high = bounds
+    inner = np.arange(np.ceil(low / step), np.floor(high / step) + 1) * step
+    return sorted({low, high, *inner.tolist()})
+
+
+def _pole_places(grid: Grid) -> list[Floats]:
+    """Whole metres where the area allows, inside it."""
+    side = max(grid.x[1] - grid.x[0], grid.y[1] - grid.y[0]) / _POLES
+    x, y = (
+        np.round(np.arange(low + side / 2, high, side)) if side >= 1 else np.arange(low + side / 2, high, side)
+        for low, high in (grid.x, grid.y)
+    )
+    return list(np.stack(np.meshgrid(x, y), -1).reshape(-1, 2))
+
+
+def _pole(canvas: Bytes, view: OverlayView, ground: AnyArray) -> None:
+    heights = np.linspace(0.0, BODY_HEIGHT, 35)
+    pixel = view.pixel(np.broadcast_to(ground, (len(heights), 2)), heights)
+    if not np.isfinite(pixel).all():
+        return
+    stroke(canvas, pixel, INK, 5)
+    stroke(canvas, pixel, _POLE_COLOUR, 3)
+    for mark in (0.0, 0.5, 1.0, 1.5):
+        disc(canvas, view.pixel(np.asarray(ground), mark), 4, _POLE_COLOUR)
+    u, v = pixel[-1].tolist()
+    if 0 <= u < view.size[0] and 24 <= v < view.size[1]:
+        chip(canvas, f"{ground[0] + 0.0:g}, {ground[1] + 0.0:g}", (u, v - 12), _POLE_COLOUR, 10)

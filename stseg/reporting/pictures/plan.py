@@ -10,9 +10,19 @@ import numpy as np
 
 from stseg.arrays import AnyArray, Bytes, Floats, Rows
 from stseg.geometry import Camera, Grid, Rig
-from stseg.reporting.pictures.canvas import chip, chip_size, dashes, disc, fill, outline, stroke, text, text_size
+from stseg.reporting.pictures.canvas import (
+    chip,
+    chip_size,
+    dashes,
+    disc,
+    fill,
+    outline,
+    place_labels,
+    stroke,
+    text,
+    text_size,
+)
 from stseg.reporting.pictures.colours import INK, PAPER, QUIET, Colour, mixed, track_colour
-from stseg.reporting.pictures.labels import place_labels
 from stseg.reporting.pictures.plan_map import PlanMap, rule, scale_bar, sheet
 
 _CAMERA_DISTANCE = 0.45  # cameras within this share of the ground's longer side are shown where they stand

@@ -9,9 +9,8 @@ from numpy.typing import ArrayLike
 
 from stseg.arrays import Bytes, Floats, Rows
 from stseg.geometry import Grid
-from stseg.reporting.pictures.canvas import blank, chip, chip_size, disc, fill, outline, stroke, text
+from stseg.reporting.pictures.canvas import blank, chip, chip_size, disc, fill, outline, place_labels, stroke, text
 from stseg.reporting.pictures.colours import INK, PAPER, QUIET, RULE, mixed, track_colour
-from stseg.reporting.pictures.labels import place_labels
 from stseg.reporting.pictures.plan_map import step_for
 
 _AZIMUTH, _ELEVATION = np.radians(-32.0), np.radians(32.0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,10 +16,8 @@ from stseg.simulation.rendering.body import Bodies
 from stseg.simulation.rendering.cameras import frame_seed, light_phase, pixel_rays
 from stseg.simulation.rendering.clothes import clothing
 from stseg.simulation.rendering.illumination import lit
-from stseg.simulation.rendering.ray_casting import draw_bodies, pixel_boxes
+from stseg.simulation.rendering.ray_casting import PENUMBRA, darken, draw_bodies, pixel_boxes
 from stseg.simulation.rendering.room import render_room
-from stseg.simulation.rendering.sensor import expose
-from stseg.simulation.rendering.shadows import PENUMBRA, darken
 from stseg.simulation.scene import SceneSpec
 from stseg.simulation.spoiling.detector import detect, visible_boxes
 
@@ -154,3 +153,32 @@ class Viewer:
             points = self._eye + depth[..., None] * self._rays
             gain = np.float32(gain) * lit(self._spec.lamps, frame / self._spec.frame_rate, points)
         return expose(light, gain, self._spec.noise, rng)
+
+
+_SOFTNESS = 0.6
+"""Standard deviation of the lens's blur, pixels."""
+
+
+def expose(light: Bytes, gain: Singles | float, noise: float, rng: np.random.Generator) -> Bytes:
+    """Expose a frame.
+
+    Parameters
+    ----------
+    light : uint8 (v, u, 3)
+        The scene at normal light.
+    gain : float32 (v, u) or float
+        Illumination relative to normal.
+    noise
+        Standard deviation of the sensor's noise, grey levels.
+    rng
+        Source of randomness.
+
+    Returns
+    -------
+    uint8 (v, u, 3)
+    """
+    soft = cv2.GaussianBlur(light, (5, 5), _SOFTNESS)
+    frame = rng.standard_normal(light.shape, np.float32)
+    frame *= noise
+    frame += np.float32(gain) * soft + 0.5 if isinstance(gain, float) else gain[..., None] * soft + np.float32(0.5)
+    return np.clip(frame, 0, 255, out=frame).astype(np.uint8)

@@ -6,6 +6,7 @@ import numpy as np
 
 from stseg.arrays import Boxes, Floats, Ints
 from stseg.geometry import Camera
+from stseg.geometry.reduction import BODY_HEIGHT
 from stseg.kernels.accelerate import kernel
 
 _MIN_AREA = 0.0015  # least visible area of a detection, share of the image
@@ -87,7 +88,7 @@ def _false_boxes(camera: Camera, half: Floats, rng: np.random.Generator) -> tupl
     count = int(rng.poisson(_FALSE_RATE))
     ground = rng.uniform(-1.0, 1.0, (count, 2)) * half
     foot, ahead = camera.project(ground, 0.0)
-    head, above = camera.project(ground, 1.7)
+    head, above = camera.project(ground, BODY_HEIGHT)
     wide = 0.4 * np.abs(foot[:, 1] - head[:, 1]) / 2
     edges = np.stack([foot[:, 0] - wide, head[:, 1], foot[:, 0] + wide, foot[:, 1]], axis=1)
     visible = ahead & above & camera.inside((foot + head) / 2) & (wide > 1)

@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 from stseg.arrays import Boxes, Bytes, Floats, Rows
 from stseg.errors import ConfigError
 from stseg.geometry import Camera, Rig
+from stseg.geometry.reduction import BODY_HEIGHT
 from stseg.simulation.film import Film
 from stseg.simulation.scene import Kind
-from stseg.simulation.spoiling.spoiled_boxes import BOX_KINDS
-from stseg.simulation.spoiling.spoiled_masks import MASK_KINDS, Moment
+from stseg.simulation.spoiling.errors import BOX_KINDS, MASK_KINDS, Moment
 
-_TRUNK, _HEIGHT = 0.42, 1.7
-"""Width and height of a common body, metres."""
+_BODY_WIDTH = 0.42
+"""Width of a common body, metres."""
 
 
 @dataclass(frozen=True)
@@ -129,8 +129,8 @@ class SpoiledFilm:
 def body_width(camera: Camera, ground: Floats) -> float:
     """Width of a common body at a ground point (1, 2), pixels of the camera's image."""
     foot, _ = camera.project(ground, 0.0)
-    head, _ = camera.project(ground, _HEIGHT)
-    return float(np.hypot(*(head - foot)[0])) * _TRUNK / _HEIGHT
+    head, _ = camera.project(ground, BODY_HEIGHT)
+    return float(np.hypot(*(head - foot)[0])) * _BODY_WIDTH / BODY_HEIGHT
 
 
 def spoiled_mask(mask: Bytes, people: NDArray[np.uint16], spoils: Sequence[Spoil], moment: Moment) -> Bytes:

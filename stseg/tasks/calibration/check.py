@@ -23,9 +23,9 @@ from stseg.io.recording.frames import open_frames
 from stseg.io.recording.recording import Recording
 from stseg.reporting.figures import Figure, backdrop
 from stseg.reporting.page.html import figures, note, png_bytes, section, table
-from stseg.reporting.page.style import STYLE
-from stseg.reporting.pictures.ground_grid import grid_picture
+from stseg.reporting.page.template import STYLE
 from stseg.reporting.pictures.maps import blind_map
+from stseg.reporting.pictures.overlay import grid_picture
 
 DEFAULT_FRAMES = 300
 """Frames that are read by default."""

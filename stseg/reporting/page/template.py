@@ -1,4 +1,13 @@
-"""The report page's style sheet."""
+"""The template of every page: head, style, and a script with its data; nothing is loaded from elsewhere."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+from collections.abc import Sequence
+from html import escape
+from importlib.resources import files
 
 STYLE = """
 :root { --ink: #2a2e34; --quiet: #7c828a; --rule: #e4e6ea; --soft: #f6f7f9; --accent: #0b70d8 }
@@ -69,3 +78,46 @@ td small { color: var(--quiet); margin-left: 6px }
 td:last-child { white-space: normal }
 @media print { #time { display: none !important } section { break-inside: avoid } .scroll { max-height: none } }
 """
+
+_PAGE = """<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta http-equiv="Content-Security-Policy"
+ content="default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'sha256-{digest}'">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>{title}</title>
+<style>{style}</style>
+</head>
+<body>
+{body}
+<script id="data" type="application/json">{data}</script>
+<script>{script}</script>
+</body>
+</html>
+"""
+
+
+def page(title: str, body: str, data: str, scripts: Sequence[str], style: str = "") -> str:
+    """The text of a page.
+
+    Parameters
+    ----------
+    title
+    body
+        HTML before the script.
+    data
+        JSON for the script, see `script_json`.
+    scripts
+        Names of the files in this folder that make the script.
+    style
+        Rules of the page beside `STYLE`.
+    """
+    script = "\n".join((files("stseg.reporting.page") / name).read_text("utf-8") for name in scripts)
+    digest = base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
+    return _PAGE.format(title=escape(title), style=STYLE + style, digest=digest, body=body, data=data, script=script)
+
+
+def script_json(data: object) -> str:
+    """Data as JSON, safe inside a script element."""
+    return json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")

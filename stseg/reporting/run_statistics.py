@@ -1,0 +1,168 @@
+"""Statistics of a run: certainty of its tracks, people by the minute and hour, ground by number of views."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.special import expit
+
+from stseg.arrays import Bytes, Flags, Floats, Ints, Rows
+
+DOUBT_LIMIT = 0.9
+"""Probability below which a point is doubtful."""
+BUSY_DURATION = 600.0
+"""Length of a run from which its busiest minutes are shown separately, seconds."""
+_MINUTE, _HOUR = 60.0, 3600.0  # seconds
+
+
+@dataclass(frozen=True)
+class Span:
+    """The frames that a chart shows, half open, and the recording's frames per second."""
+
+    first: int
+    stop: int
+    frame_rate: float
+
+
+class DoubtfulStretch(NamedTuple):
+    """Consecutive points of a track that are doubtful.
+
+    Attributes
+    ----------
+    track
+        Its id.
+    first, last
+        Frames, both included.
+    certainty
+        Mean probability of its points, 0..1.
+    """
+
+    track: int
+    first: int
+    last: int
+    certainty: float
+
+
+def mean_certainty(trajectory: Rows, tracks: Rows) -> Floats:
+    """Mean probability of the points of each of `tracks`, float64 (n,), 0..1; nan for a track without points."""
+    ids, place = np.unique(trajectory["id"], return_inverse=True)
+    sums, counts = np.bincount(place, _probability(trajectory), len(ids)), np.bincount(place, minlength=len(ids))
+    means = dict(zip(ids.tolist(), (sums / np.maximum(counts, 1)).tolist(), strict=True))
+    return np.array([means.get(int(track), np.nan) for track in tracks["id"]])
+
+
+def doubtful_stretches(trajectory: Rows) -> list[DoubtfulStretch]:
+    """Stretches of doubtful points, by track and frame."""
+    rows = trajectory[np.lexsort((trajectory["frame"], trajectory["id"]))]
+    probability = _probability(rows)
+    doubtful = np.flatnonzero(probability < DOUBT_LIMIT)
+    breaks = (np.diff(rows["id"][doubtful]) != 0) | (np.diff(rows["frame"][doubtful]) > 1)
+    pieces = np.split(doubtful, np.flatnonzero(breaks) + 1) if len(doubtful) else []
+    return [
+        DoubtfulStretch(
+            int(rows["id"][piece[0]]),
+            int(rows["frame"][piece[0]]),
+            int(rows["frame"][piece[-1]]),
+            float(probability[piece].mean()),
+        )
+        for piece in pieces
+    ]
+
+
+def _probability(rows: Rows) -> Floats:
+    """Probability of a person at each point; scores are log-odds."""
+    return np.asarray(expit(rows["score"].astype(float)))
+
+
+def people_per_minute(frames: Ints, trajectory: Rows, frame_rate: float) -> Floats:
+    """Mean number of people in each minute of the run that has frames, the last one perhaps shorter.
+
+    Parameters
+    ----------
+    frames : int64 (time,)
+        The run's frames.
+    trajectory : TRAJECTORY (n,)
+    frame_rate
+        Frames per second.
+
+    Returns
+    -------
+    float64 (minute,)
+    """
+    if not len(frames):
+        return np.zeros(0)
+    length = max(1, round(60 * frame_rate))
+    minute, rows = (frames - frames[0]) // length, (trajectory["frame"] - frames[0]) // length
+    frame_count = np.bincount(minute)
+    people = np.bincount(rows, minlength=len(frame_count))[: len(frame_count)]
+    return np.asarray(people[frame_count > 0] / frame_count[frame_count > 0], float)
+
+
+def ground_by_views(views: Bytes, inside: Flags, cameras: int) -> Floats:
+    """Share of the area of interest that 0, 1, 2, ... views see at some height, float64 (cameras + 1,).
+
+    Parameters
+    ----------
+    views : uint8 (plane, y, x)
+        Number of views that see each cell.
+    inside : bool (y, x)
+        Cells of the area of interest.
+    cameras
+        Number of cameras.
+    """
+    view_count = views.max(axis=0)[inside]
+    return np.asarray(np.bincount(view_count, minlength=cameras + 1) / max(len(view_count), 1), float)
+
+
+@dataclass(frozen=True)
+class BusyTime:
+    """A part of a run.
+
+    Attributes
+    ----------
+    first, stop
+        Its frames, half open.
+    mean, most
+        People at a time.
+    come
+        Tracks that begin in it.
+    """
+
+    first: int
+    stop: int
+    mean: float
+    most: int
+    come: int
+
+
+def people_by_hour(span: Span, trajectory: Rows) -> list[BusyTime]:
+    """Each hour from the beginning of the run."""
+    return _parts(span, trajectory, _HOUR)
+
+
+def busiest_minutes(span: Span, trajectory: Rows, most: int = 3) -> list[BusyTime]:
+    """The minutes with most people, the earlier first where they are equal; in order of time."""
+    minutes = _parts(span, trajectory, _MINUTE)
+    busiest = sorted(minutes, key=lambda one: (-one.mean, one.first))[:most]
+    return sorted((one for one in busiest if one.mean > 0), key=lambda one: one.first)
+
+
+def _parts(span: Span, trajectory: Rows, seconds: float) -> list[BusyTime]:
+    length = max(1, round(seconds * span.frame_rate))
+    edges: Ints = np.append(np.arange(span.first, span.stop, length), span.stop)
+    counts = np.bincount(trajectory["frame"] - span.first, minlength=span.stop - span.first)
+    begun, _ = np.histogram(_first_frames(trajectory), edges)
+    return [
+        BusyTime(first, stop, float(counts_of_part.mean()), int(counts_of_part.max()), int(new))
+        for first, stop, new in zip(edges[:-1].tolist(), edges[1:].tolist(), begun.tolist(), strict=True)
+        if len(counts_of_part := counts[first - span.first : stop - span.first])
+    ]
+
+
+def _first_frames(trajectory: Rows) -> Floats:
+    """First frame of each track, float64 (tracks,)."""
+    order = np.lexsort((trajectory["frame"], trajectory["id"]))
+    _, first = np.unique(trajectory["id"][order], return_index=True)
+    return np.asarray(trajectory["frame"][order][first], float)
