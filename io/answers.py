@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from stseg.errors import FormatError
-from stseg.io.toml.text import one_of, shown
+from stseg.io.toml.text import abbreviated, one_of
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.bounded_files import read_text
 from stseg.io.untrusted.names import EXPECTED_TITLE, is_title
@@ -81,7 +81,7 @@ def _lines(path: Path, needed: tuple[str, ...]) -> list[tuple[int, dict[str, str
 
 def _title(path: Path, line: int, text: str) -> str:
     if not is_title(text):
-        raise FormatError(path, f"line {line}", f"name {shown(text)}", EXPECTED_TITLE)
+        raise FormatError(path, f"line {line}", f"name {abbreviated(text)}", EXPECTED_TITLE)
     return text
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from stseg.arrays import Floats
 from stseg.errors import FormatError
-from stseg.io.toml.text import shown
+from stseg.io.toml.text import abbreviated
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.bounded_files import parse_json, read_text
 from stseg.io.untrusted.names import EXPECTED_TITLE, is_title
@@ -23,8 +23,8 @@ Named = tuple[str, tuple[Floats, ...]]
 def read_polygons(path: Path) -> list[Named]:
     """Polygons of a GeoJSON file: name, and rings in metres."""
     return [
-        (name, tuple(_rings(path, name, own)))
-        for name, own in _features(path, {"Polygon": lambda rings: [rings], "MultiPolygon": lambda own: own}, "zone")
+        (name, tuple(_rings(path, name, parts)))
+        for name, parts in _features(path, {"Polygon": lambda rings: [rings], "MultiPolygon": list}, "zone")
     ]
 
 
@@ -76,7 +76,7 @@ def _name(path: Path, feature: dict[str, Any], default: str) -> str:
     given = properties.get("name") if isinstance(properties, dict) else None
     name = next((str(one) for one in (given, feature.get("id")) if isinstance(one, str | int)), default)
     if not is_title(name):
-        raise FormatError(path, "name", shown(name), EXPECTED_TITLE)
+        raise FormatError(path, "name", abbreviated(name), EXPECTED_TITLE)
     return name
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from stseg.arrays import Flags, Floats, Ints, Rows
 from stseg.errors import FormatError, OutputError
-from stseg.io.toml.text import shown
+from stseg.io.toml.text import abbreviated
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.bounded_files import require_regular
 from stseg.io.untrusted.numbers import parse_number
@@ -111,7 +111,7 @@ class _Sheet:
         """Raise a FormatError that names the first wrong row, if there is one."""
         if wrong.any():
             row = int(np.argmax(wrong))
-            cell = shown(self.cells[column][row])
+            cell = abbreviated(self.cells[column][row])
             raise FormatError(self.path, f"line {self.lines[row]}, column {column}", found.format(cell), expected)
 
 

@@ -16,14 +16,14 @@ from stseg.io.calibrations.projection import read_projection
 from stseg.io.calibrations.structured import read_kalibr_yaml, read_krt_json, read_nvidia_json, read_pose_toml
 from stseg.io.calibrations.tsai import read_tsai_xml
 from stseg.io.calibrations.world_frame import World
-from stseg.io.toml.text import shown
+from stseg.io.toml.text import abbreviated
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.names import EXPECTED, is_name
 
 
 @dataclass(frozen=True, slots=True)
 class ImportOptions:
-    """What the command line says of calibrations that lack it.
+    """Options of the command line for calibrations that lack them.
 
     Attributes
     ----------
@@ -109,7 +109,7 @@ def read_cameras(format: str, files: Sequence[Path], options: ImportOptions) -> 
         raise FormatError(place, "", f"{len(cameras)} cameras", f"at most {limits.CAMERAS}")
     for camera in cameras:
         if camera.name and not is_name(camera.name):
-            raise FormatError(place, "camera", shown(camera.name), EXPECTED)
+            raise FormatError(place, "camera", abbreviated(camera.name), EXPECTED)
         if not np.isfinite(camera.projection).all():
             raise CalibrationError(place, f"camera {camera.name}", "numbers that overflow", "those of a camera")
     return cameras
@@ -117,4 +117,4 @@ def read_cameras(format: str, files: Sequence[Path], options: ImportOptions) -> 
 
 def help_text() -> str:
     """The formats as paragraphs of a command's help."""
-    return "\n\n".join(f"    **{name}**: {own.about}." for name, own in FORMATS.items()).strip()
+    return "\n\n".join(f"    **{name}**: {form.about}." for name, form in FORMATS.items()).strip()

@@ -11,7 +11,7 @@ import numpy as np
 
 from stseg.arrays import Floats, Ints
 from stseg.errors import FormatError
-from stseg.io.toml.text import shown
+from stseg.io.toml.text import abbreviated
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.bounded_files import require_regular
 from stseg.io.untrusted.names import EXPECTED, is_name
@@ -64,7 +64,7 @@ def read_points(path: Path) -> list[PointTable]:
         cells = [_number(path, line, name, row) for name in ("u", "v", "x", "y", "z")]
         name = (row["camera"] or "").strip()
         if not is_name(name):
-            strange = shown(name) if name else "nothing"
+            strange = abbreviated(name) if name else "nothing"
             raise FormatError(path, f"line {line}, column camera", strange, f"a camera's name: {EXPECTED}")
         rows.setdefault(name, []).append((line, cells))
     if not rows:
@@ -103,5 +103,5 @@ def _number(path: Path, line: int, column: str, row: dict[str, str]) -> float:
         return 0.0
     number = parse_number(cell)
     if not abs(number) <= limits.NUMBER:
-        raise FormatError(path, f"line {line}, column {column}", shown(cell), "a finite number of usual size")
+        raise FormatError(path, f"line {line}, column {column}", abbreviated(cell), "a finite number of usual size")
     return number

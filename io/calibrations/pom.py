@@ -43,24 +43,24 @@ def read_pom(files: Sequence[Path], size: tuple[int, int], head: float) -> list[
         Where they are no planes that a camera sees.
     """
     rows = [row for file in files for row in _rows(file)]
-    shown = " + ".join(map(str, files))
+    names = " + ".join(map(str, files))
     if len(rows) != 6:
-        raise FormatError(shown, "", f"{len(rows)} lines of three numbers", _EXPECTED)
+        raise FormatError(names, "", f"{len(rows)} lines of three numbers", _EXPECTED)
     ground, heads = np.array(rows[:3]), np.array(rows[3:])
     pixel = np.stack(np.meshgrid(*(np.linspace(0, side - 1, _SAMPLES) for side in size)), -1).reshape(-1, 2)
     try:
         homography, to_head = np.linalg.inv(ground), np.linalg.inv(heads)
     except np.linalg.LinAlgError as error:
-        raise CalibrationError(shown, "homography", "a singular matrix", "one that can be inverted") from error
+        raise CalibrationError(names, "homography", "a singular matrix", "one that can be inverted") from error
     # The lower edge of an image shows the ground, if anything does.
     foot = homogeneous(np.array([(size[0] - 1) / 2, size[1] - 1.0])) @ ground.T
     homography = homography * np.sign(float(homography[2] @ (foot / foot[2])))
-    place, seen = _seen(homography, homogeneous(pixel) @ ground.T)
-    image = homogeneous(place[seen]) @ to_head.T
-    if seen.sum() < _SAMPLES:
-        raise CalibrationError(shown, "homography", "a ground plane that the image hardly shows", "one that it does")
+    place, visible = _seen(homography, homogeneous(pixel) @ ground.T)
+    image = homogeneous(place[visible]) @ to_head.T
+    if visible.sum() < _SAMPLES:
+        raise CalibrationError(names, "homography", "a ground plane that the image hardly shows", "one that it does")
     above = image[:, :2] / image[:, 2:]
-    vertical = fit_vertical(homography, place[seen], np.full(int(seen.sum()), head), above)
+    vertical = fit_vertical(homography, place[visible], np.full(int(visible.sum()), head), above)
     projection = np.column_stack([homography[:, :2], vertical, homography[:, 2]])
     return [ForeignCamera(files[0], "", size, projection)]
 

@@ -175,7 +175,7 @@ def _split(path: Path, file: TextIO) -> Iterator[tuple[int, list[str]]]:
         return
     reader = csv.reader(rest, skipinitialspace=True)
     try:
-        yield from ((skipped + reader.line_num, own) for own in reader if any(map(str.strip, own)))
+        yield from ((skipped + reader.line_num, row) for row in reader if any(map(str.strip, row)))
     except csv.Error as error:
         raise FormatError(path, f"line {skipped + reader.line_num}", error, "fields between commas") from error
 

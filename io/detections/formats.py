@@ -85,10 +85,10 @@ def _read(request: Request, path: Path) -> tuple[str, Detections] | None:
 
 
 def _read_json(request: Request, data: Any) -> tuple[str, Detections]:
-    for own in JSON_FORMATS:
-        if own.recognises(data):
-            with _of_form(request.path, own.name):
-                return own.name, own.read(request, data)
+    for form in JSON_FORMATS:
+        if form.recognises(data):
+            with _of_form(request.path, form.name):
+                return form.name, form.read(request, data)
     raise FormatError(request.path, "", "JSON of no known detections", f"one of {', '.join(NAMES)}")
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from stseg.arrays import Flags, Floats, Ints, Singles
 from stseg.errors import FormatError
 from stseg.io.detections.masks import Mask
-from stseg.io.toml.text import shown
+from stseg.io.toml.text import abbreviated
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.numbers import finite_number, parse_number
 
@@ -20,7 +20,7 @@ LEAST_NUMBERS = ("frame", "left", "top", "width", "height", "score")
 
 @dataclass(frozen=True)
 class Request:
-    """What a reader is asked for.
+    """Request to a reader.
 
     Attributes
     ----------
@@ -166,5 +166,5 @@ def number(path: Path, place: str, name: str, value: object) -> float:
         value = value.item()
     found = parse_number(value) if isinstance(value, str) else finite_number(value)
     if found is None or not abs(found) <= limits.NUMBER:
-        raise FormatError(path, place, f"{name} {shown(value)}", "a finite number of usual size")
+        raise FormatError(path, place, f"{name} {abbreviated(value)}", "a finite number of usual size")
     return found

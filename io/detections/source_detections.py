@@ -45,8 +45,8 @@ class SourceDetections:
     def table(self) -> BoxTable:
         """The kept boxes by frame."""
         order = np.argsort(self.kept.frame, kind="stable")
-        own = self.kept.of(order)
-        return BoxTable(self.frames, own.frame, own.pixel, own.score, order, own.features)
+        selected = self.kept.of(order)
+        return BoxTable(self.frames, selected.frame, selected.pixel, selected.score, order, selected.features)
 
 
 def read_source(source: Source, size: tuple[int, int]) -> SourceDetections:

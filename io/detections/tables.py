@@ -67,19 +67,19 @@ def known_columns(header: Sequence[str], columns: Mapping[str, str] | None) -> d
     """Where our columns stand in a header, by the rig's mapping, our names, and the usual other names."""
     lower = [name.lower() for name in header]
     found: dict[str, int] = {}
-    for own in COLUMNS:
-        for name in [columns[own]] if columns and own in columns else [own, *_SYNONYMS.get(own, ())]:
+    for column in COLUMNS:
+        for name in [columns[column]] if columns and column in columns else [column, *_SYNONYMS.get(column, ())]:
             if name in header or name.lower() in lower:
-                found[own] = header.index(name) if name in header else lower.index(name.lower())
+                found[column] = header.index(name) if name in header else lower.index(name.lower())
                 break
     return found
 
 
 def _collect(request: Request, header: Sequence[str], rows: Sequence[tuple[str, Sequence[Any]]]) -> Detections:
     at = known_columns(header, request.columns)
-    for own, name in (request.columns or {}).items():
-        if own not in at:
-            raise FormatError(request.path, f"columns.{own}", f"no column {name}", one_of(name, list(header)))
+    for column, name in (request.columns or {}).items():
+        if column not in at:
+            raise FormatError(request.path, f"columns.{column}", f"no column {name}", one_of(name, list(header)))
     form = next((form for form in _FORMS if all(name in at for name in form)), None)
     if form is None or "frame" not in at:
         raise FormatError(

@@ -23,18 +23,18 @@ def read_frames(request: Request, paths: list[Path], data: list[Any]) -> Detecti
     if request.view is None:
         raise FormatError(request.path, "view", "no number of the camera", "view = NUMBER in the rig's source, from 0")
     frames, count = listed_frames([path.name for path in paths])
-    found, seen = DetectionList(request.path), False
+    found, has_view = DetectionList(request.path), False
     for path, frame, people in zip(paths, frames.tolist(), data, strict=True):
         for index, person in enumerate(people):
             place = f"{path.name}, person {index}"
             for view in require(request.path, place, person, "views"):
                 if require(request.path, place, view, "viewNum") != request.view:
                     continue
-                seen = True
+                has_view = True
                 corners = [require(request.path, place, view, key) for key in _KEYS]
                 if corners != [-1, -1, -1, -1]:
                     found.add_corners(place, frame, corners, label="person")
-    if not seen:
+    if not has_view:
         raise FormatError(
             request.path, f"view {request.view}", "no such viewNum", "the camera's number in the files: view"
         )

@@ -39,12 +39,12 @@ def write_mot_boxes(path: Path, run: Run) -> None:
     """
     texts = {}
     for view, camera in enumerate(run.cameras):
-        own = run.boxes[run.boxes["view"] == view]
-        own = own[np.lexsort((own["id"], own["frame"]))]
+        boxes = run.boxes[run.boxes["view"] == view]
+        boxes = boxes[np.lexsort((boxes["id"], boxes["frame"]))]
         lines = (
             f"{row['frame'] + 1},{row['id']},{row['left']:.2f},{row['top']:.2f},"
             f"{row['width']:.2f},{row['height']:.2f},1,-1,-1,-1\n"
-            for row in own
+            for row in boxes
         )
         texts[f"{camera}.txt"] = "".join(lines)
     _write_zip(path, texts.items())
@@ -68,7 +68,7 @@ def write_wildtrack(path: Path, run: Run) -> None:
         key = int(row["frame"]), int(row["id"])
         views = [{"viewNum": view, **boxes.get((*key, view), _NOT_SEEN)} for view in range(len(run.cameras))]
         people[key[0]].append({"personID": key[1], "positionID": position, "views": views})
-    files = ((f"annotations_positions/{frame:08d}.json", json.dumps(own, indent=4)) for frame, own in people.items())
+    files = ((f"annotations_positions/{frame:08d}.json", json.dumps(rows, indent=4)) for frame, rows in people.items())
     _write_zip(path, [("grid.json", json.dumps(about, indent=4)), *files])
 
 
@@ -93,7 +93,7 @@ def _boxes_of_rows(run: Run) -> Mapping[tuple[int, int, int], Mapping[str, int]]
     right, bottom = np.rint(boxes["left"] + boxes["width"]), np.rint(boxes["top"] + boxes["height"])
     edges = np.stack([left, top, right, bottom], -1).astype(int).tolist()
     keys = zip(boxes["frame"].tolist(), boxes["id"].tolist(), boxes["view"].tolist(), strict=True)
-    return {key: dict(zip(_NOT_SEEN, own, strict=True)) for key, own in zip(keys, edges, strict=True)}
+    return {key: dict(zip(_NOT_SEEN, values, strict=True)) for key, values in zip(keys, edges, strict=True)}
 
 
 def _write_zip(path: Path, texts: Iterable[tuple[str, str]]) -> None:

@@ -62,4 +62,4 @@ def write_tracks(to: str, path: Path, run: Run) -> None:
 
 def help_text() -> str:
     """The formats as paragraphs of a command's help."""
-    return "\n\n".join(f"    **{name}**: {own.about}." for name, own in FORMATS.items()).strip()
+    return "\n\n".join(f"    **{name}**: {form.about}." for name, form in FORMATS.items()).strip()

@@ -17,7 +17,7 @@ from stseg.arrays import Rows
 from stseg.io.runfile.reading.run_reader import Run
 
 BEGINNING = datetime(1970, 1, 1, tzinfo=UTC)
-"""What stands for the first frame of the recording: run files do not say at what time of day it was."""
+"""Time that stands for the first frame of the recording: run files do not say at what time of day it was."""
 
 GROUND = 'LOCAL_CS["ground of the rig",UNIT["metre",1]]'
 """A coordinate system of the place, as well-known text."""
@@ -34,7 +34,7 @@ def write_moving_features(path: Path, run: Run) -> None:
         "type": "FeatureCollection",
         "crs": {"type": "Name", "properties": {"name": GROUND}},
         "trs": {"type": "Name", "properties": {"name": _ISO_8601}},
-        "features": [_moving_point(run, track, own) for track, own in _by_track(run)],
+        "features": [_moving_point(run, track, rows) for track, rows in _by_track(run)],
     }
     with path.open("w", newline="\n", encoding="utf-8") as file:
         json.dump(collection, file, allow_nan=False)
@@ -43,8 +43,8 @@ def write_moving_features(path: Path, run: Run) -> None:
 def write_geojson_lines(path: Path, run: Run) -> None:
     """Write newline-delimited GeoJSON: a line a track, a LineString, or a Point where it has one place."""
     with path.open("w", newline="\n", encoding="utf-8") as file:
-        for track, own in _by_track(run):
-            places = _places(own)
+        for track, rows in _by_track(run):
+            places = _places(rows)
             geometry: dict[str, object] = {"type": "LineString", "coordinates": places}
             if len(places) == 1:
                 geometry = {"type": "Point", "coordinates": places[0]}
@@ -69,10 +69,10 @@ def _by_track(run: Run) -> Iterator[tuple[np.void, Rows]]:
             yield track, table[start:stop]
 
 
-def _moving_point(run: Run, track: np.void, own: Rows) -> dict[str, object]:
-    times = [_time_of(frame / run.frame_rate) for frame in own["frame"].tolist()]
-    score = {"type": "Measure", "values": [_finite(value) for value in own["score"].tolist()]}
-    point = {"type": "MovingPoint", "datetimes": times, "coordinates": _places(own), "interpolation": "Linear"}
+def _moving_point(run: Run, track: np.void, rows: Rows) -> dict[str, object]:
+    times = [_time_of(frame / run.frame_rate) for frame in rows["frame"].tolist()]
+    score = {"type": "Measure", "values": [_finite(value) for value in rows["score"].tolist()]}
+    point = {"type": "MovingPoint", "datetimes": times, "coordinates": _places(rows), "interpolation": "Linear"}
     return {
         "type": "Feature",
         "id": int(track["id"]),
@@ -89,9 +89,9 @@ def _properties(run: Run, track: np.void) -> dict[str, object]:
     return {"id": identity, **named, "height": _finite(float(track["height"])), "score": _finite(float(track["score"]))}
 
 
-def _places(own: Rows) -> list[list[float]]:
+def _places(rows: Rows) -> list[list[float]]:
     """x and y of every row, metres, to 0.1 mm."""
-    return [[round(x, 4), round(y, 4)] for x, y in zip(own["x"].tolist(), own["y"].tolist(), strict=True)]
+    return [[round(x, 4), round(y, 4)] for x, y in zip(rows["x"].tolist(), rows["y"].tolist(), strict=True)]
 
 
 def _time_of(seconds: float) -> str:

@@ -37,6 +37,6 @@ def _write_parquet(path: Path, rows: Rows) -> None:
     arrow, parquet = load_extra("pyarrow", "parquet"), load_extra("pyarrow.parquet", "parquet")
     columns = {name: rows[name].tolist() for name in rows.dtype.names or ()}
     types = {name: arrow.string() if rows.dtype[name] == np.dtype("O") else None for name in columns}
-    table = arrow.table({name: arrow.array(own, types[name]) for name, own in columns.items()})
+    table = arrow.table({name: arrow.array(column, types[name]) for name, column in columns.items()})
     with path.open("wb") as file:  # a path that is no UTF-8 is refused by the library
         parquet.write_table(table, file)

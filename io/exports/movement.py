@@ -27,10 +27,10 @@ def write_movement(path: Path, run: Run) -> None:
     with _dataset(path, run, "poses", {"keypoint": ["ground"]}) as file:
         position = _variable(file, "position", ("time", "space", "keypoint", "individual"), "metres on the ground")
         confidence = _variable(file, "confidence", ("time", "keypoint", "individual"), "probability of a person")
-        for individual, own in _by_id(run, run.trajectory):
-            span, ground = _filled(run, own, np.stack([own["x"], own["y"]], -1))
+        for individual, rows in _by_id(run, run.trajectory):
+            span, ground = _filled(run, rows, np.stack([rows["x"], rows["y"]], -1))
             position[span, :, 0, individual] = ground
-            confidence[span, 0, individual] = _filled(run, own, _probability(own))[1]
+            confidence[span, 0, individual] = _filled(run, rows, _probability(rows))[1]
 
 
 def write_movement_boxes(path: Path, run: Run) -> None:
@@ -45,14 +45,14 @@ def write_movement_boxes(path: Path, run: Run) -> None:
         places = dict(_by_id(run, run.trajectory))
         for individual, boxes in _by_id(run, run.boxes):
             for view in np.unique(boxes["view"]):
-                own = boxes[boxes["view"] == view]
-                size = np.stack([own["width"], own["height"]], -1).astype(float)
-                corner = np.stack([own["left"], own["top"]], -1).astype(float)
-                seen = places[individual][np.isin(places[individual]["frame"], own["frame"])]
-                span, centre = _filled(run, own, corner + size / 2)
+                rows = boxes[boxes["view"] == view]
+                size = np.stack([rows["width"], rows["height"]], -1).astype(float)
+                corner = np.stack([rows["left"], rows["top"]], -1).astype(float)
+                visible = places[individual][np.isin(places[individual]["frame"], rows["frame"])]
+                span, centre = _filled(run, rows, corner + size / 2)
                 position[view, span, :, individual] = centre
-                shape[view, span, :, individual] = _filled(run, own, size)[1]
-                confidence[view, span, individual] = _filled(run, own, _probability(seen))[1]
+                shape[view, span, :, individual] = _filled(run, rows, size)[1]
+                confidence[view, span, individual] = _filled(run, rows, _probability(visible))[1]
 
 
 @contextmanager
@@ -62,10 +62,10 @@ def _dataset(path: Path, run: Run, kind: str, names: dict[str, Sequence[str]]) -
     individuals = [f"id_{number}" for number in run.tracks["id"].tolist()]
     texts = {**names, "space": ["x", "y"], "individual": individuals}
     with netcdf.File(path, "w") as file:
-        file.dimensions = {"time": len(run.frames), **{name: len(own) for name, own in texts.items()}}
+        file.dimensions = {"time": len(run.frames), **{name: len(labels) for name, labels in texts.items()}}
         file.create_variable("time", ("time",), float, run.frames / run.frame_rate)
-        for name, own in texts.items():
-            file.create_variable(name, (name,), h5py.string_dtype())[:] = np.array(own, dtype=object)
+        for name, labels in texts.items():
+            file.create_variable(name, (name,), h5py.string_dtype())[:] = np.array(labels, dtype=object)
         file.attrs["ds_type"], file.attrs["fps"], file.attrs["time_unit"] = kind, run.frame_rate, "seconds"
         file.attrs["source_software"], file.attrs["source_file"] = "stseg", run.path.name
         yield file
@@ -92,14 +92,14 @@ def _by_id(run: Run, table: Rows) -> Iterator[tuple[int, Rows]]:
             yield individual, table[start:stop]
 
 
-def _filled(run: Run, own: Rows, values: Floats) -> tuple[slice, Floats]:
+def _filled(run: Run, rows: Rows, values: Floats) -> tuple[slice, Floats]:
     """From a track's first frame to its last, as a slice of the run's frames, the values (n, ...) with NaN between."""
-    time = np.searchsorted(run.frames, own["frame"])
+    time = np.searchsorted(run.frames, rows["frame"])
     filled = np.full((time[-1] - time[0] + 1, *values.shape[1:]), np.nan)
     filled[time - time[0]] = values
     return slice(int(time[0]), int(time[-1]) + 1), filled
 
 
-def _probability(own: Rows) -> Floats:
+def _probability(rows: Rows) -> Floats:
     """Log-odds in nats as probability, float64 (n,)."""
-    return np.asarray(0.5 * (1 + np.tanh(0.5 * own["score"].astype(float))))
+    return np.asarray(0.5 * (1 + np.tanh(0.5 * rows["score"].astype(float))))

@@ -13,7 +13,7 @@ from stseg.io.runfile import layout
 from stseg.io.runfile.reading.run_reader import Run
 
 _JUPEDSIM_VERSION = 2  # PedPy refuses the area of version 3; JuPedSim reads both
-_STILL = 1e-6  # metres
+_MOTION_TOLERANCE = 1e-6  # metres
 _ONLY_AREA = 1  # its number among the areas of the recording; it does not change
 _JUPEDSIM_TABLES = """
 CREATE TABLE metadata(key TEXT NOT NULL UNIQUE PRIMARY KEY, value TEXT NOT NULL);
@@ -68,7 +68,7 @@ def headings(table: Rows) -> Floats:
     rows = np.arange(len(track))
     way = place[np.where(np.roll(begins, -1), rows, rows + 1)] - place[np.where(begins, rows, rows - 1)]
     length = np.hypot(*way.T)
-    still = length < _STILL
+    still = length < _MOTION_TOLERANCE
     heading = np.zeros((len(table), 2))
     heading[order] = np.where(still[:, None], (1.0, 0.0), way / np.where(still, 1.0, length)[:, None])
     return heading

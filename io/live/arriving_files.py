@@ -55,7 +55,7 @@ def _checked_notes(notes: object) -> dict[str, list[tuple[str, int]]]:
         raise ValueError("no notes")
     checked = {}
     for camera, files in notes.items():
-        if not isinstance(files, list) or not all(isinstance(own, list) and len(own) == 2 for own in files):
+        if not isinstance(files, list) or not all(isinstance(entry, list) and len(entry) == 2 for entry in files):
             raise ValueError("no list of files")
         if not all(
             is_file_name(name) and type(frames) is int and 0 <= frames <= limits.FRAMES for name, frames in files

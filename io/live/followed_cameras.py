@@ -29,7 +29,7 @@ _POLL = 0.2
 """Interval at which a request to stop is noticed while waiting, seconds."""
 _SLACK = 0.5
 """Lateness of the clock thread up to which no picture is lost, seconds."""
-_BEFORE = 0.5
+_START_DELAY = 0.5
 """Delay between the first pictures and frame 0, so that every camera has one, seconds."""
 _REPORT_INTERVAL = 60.0
 """Least interval between reports of dropped frame sets, seconds."""
@@ -141,9 +141,9 @@ class FollowedCameras:
         if not self._wait_for_pictures():
             return
         if self.start is None:
-            first, self.start = 0, self._in_phase(now() + _BEFORE + max(0, *self._offsets) * self._period)
+            first, self.start = 0, self._in_phase(now() + _START_DELAY + max(0, *self._offsets) * self._period)
         else:
-            first = max(0, ceil((now() + _BEFORE - self.start) / self._period))
+            first = max(0, ceil((now() + _START_DELAY - self.start) / self._period))
         start = self.start
         for frame in count(first):
             at = [start + (frame - offset) * self._period for offset in self._offsets]
@@ -155,8 +155,8 @@ class FollowedCameras:
     def _in_phase(self, least: float) -> float:
         """The first time from `least` on that is in phase with the pictures of the first camera that delivers."""
         with self._arrival:
-            shown = next(stream.pictures[-1].at for stream in self._streams if stream.pictures)
-        return shown + ceil((least - shown) / self._period) * self._period
+            latest = next(stream.pictures[-1].at for stream in self._streams if stream.pictures)
+        return latest + ceil((least - latest) / self._period) * self._period
 
     def _wait_for_pictures(self) -> bool:
         """Wait until the clock can start; False where the run is stopped before."""
@@ -200,13 +200,13 @@ class FollowedCameras:
         """Queue a frame set; where too many wait, the oldest with observations loses them."""
         with self._ready:
             self._queue.append(frame_set)
-            seen = [k for k, waits in enumerate(self._queue) if any(view is not None for view in waits.views)]
-            if len(seen) > self._longest_queue:
-                oldest = self._queue[seen[0]]
-                self._queue[seen[0]] = replace(oldest, views=(None,) * len(oldest.views), dropped=True)
+            filled = [k for k, waits in enumerate(self._queue) if any(view is not None for view in waits.views)]
+            if len(filled) > self._longest_queue:
+                oldest = self._queue[filled[0]]
+                self._queue[filled[0]] = replace(oldest, views=(None,) * len(oldest.views), dropped=True)
                 self.dropped += 1
             self._ready.notify_all()
-        if len(seen) > self._longest_queue and now() - self._reported > _REPORT_INTERVAL:
+        if len(filled) > self._longest_queue and now() - self._reported > _REPORT_INTERVAL:
             self._reported = now()
             dropped = f"{self.dropped} frame sets dropped so far, at frame {frame_set.frame}"
             self._report(f"tracking is slower than the cameras: {dropped}")

@@ -145,11 +145,11 @@ class _AlignedFiles:
 
     def read(self, frame: int) -> Observation:
         """The observation at a frame, None before the stream begins; frames are read in rising order."""
-        own = frame - self.source.offset
-        if own < 0:
+        number = frame - self.source.offset
+        if number < 0:
             return None
-        self._next += self.stream.skip(own - self._next)
-        view = self.stream.read() if self._next == own else None
+        self._next += self.stream.skip(number - self._next)
+        view = self.stream.read() if self._next == number else None
         self._next += view is not None
         return view
 

@@ -18,7 +18,7 @@ from stseg.arrays import Bytes, Ints
 from stseg.errors import OutputError
 from stseg.io.outputs.whole_files import clear_frames, output_error, write_quickly
 from stseg.io.recording.indexed_png import encode_indexed
-from stseg.io.toml.text import shown
+from stseg.io.toml.text import abbreviated
 from stseg.io.untrusted.names import EXPECTED, is_name
 
 _BYTE, _WORD = 255, 65535
@@ -91,7 +91,7 @@ class LabelImages:
 
     def _folder_of(self, camera: str) -> Path:
         if not is_name(camera):
-            raise OutputError(self._folder, "camera", shown(camera), EXPECTED)
+            raise OutputError(self._folder, "camera", abbreviated(camera), EXPECTED)
         return self._folder / camera
 
     @staticmethod

@@ -55,7 +55,7 @@ def create_part(path: Path) -> tuple[Path, int]:
 def parts_of(path: Path) -> list[Path]:
     """All parts of `path`: regular files of that name pattern, no links."""
     name = re.compile(rf"{re.escape(path.name)}\.[0-9a-f]{{16}}\.part")
-    return [own for own in path.parent.iterdir() if name.fullmatch(own.name) and is_regular(own)]
+    return [file for file in path.parent.iterdir() if name.fullmatch(file.name) and is_regular(file)]
 
 
 def publish_part(part: Path, path: Path, overwrite: bool) -> None:

@@ -44,10 +44,10 @@ class AlignedStream:
         if tick >= len(shown):
             self.end = len(shown) + self.source.offset
             return None
-        own = int(shown[tick])
-        if own >= self._next:
-            self._last = self._own(own)
-        return None if own < 0 else self._last
+        number = int(shown[tick])
+        if number >= self._next:
+            self._last = self._own(number)
+        return None if number < 0 else self._last
 
     def _own(self, number: int) -> Observation:
         """One of the stream's own frames, in rising order."""
@@ -104,10 +104,10 @@ def open_image_streams(recording: Recording, opened: ExitStack) -> dict[int, Ali
     Their frame k belongs to frame k of the detections. Raises as `open_aligned_stream` does.
     """
     streams = dict[int, AlignedStream]()
-    for k, (camera, own) in enumerate(zip(recording.rig.cameras, recording.sources, strict=True)):
-        if own.images is not None:
-            beside = replace(own, source=own.images, images=None)
-            streams[k] = AlignedStream(camera, beside, open_stream(own.images, camera))
+    for k, (camera, source) in enumerate(zip(recording.rig.cameras, recording.sources, strict=True)):
+        if source.images is not None:
+            images = replace(source, source=source.images, images=None)
+            streams[k] = AlignedStream(camera, images, open_stream(source.images, camera))
             opened.callback(streams[k].close)
     return streams
 

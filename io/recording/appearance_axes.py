@@ -24,15 +24,15 @@ def appearance_axes(recording: Recording) -> Floats | None:
         Where a file cannot be read, or cameras have features of different lengths.
     """
     samples = list[Singles]()
-    for camera, own in zip(recording.rig.cameras, recording.sources, strict=True):
-        if own.source.appearance is None:
+    for camera, feed in zip(recording.rig.cameras, recording.sources, strict=True):
+        if feed.source.appearance is None:
             continue
-        features = read_source(own.source, camera.size).kept.features
+        features = read_source(feed.source, camera.size).kept.features
         if features is None or not len(features):
             continue
         if samples and features.shape[1] != samples[0].shape[1]:
             found, expected = f"{features.shape[1]} numbers a box", f"{samples[0].shape[1]}, as of the cameras before"
-            raise FormatError(own.source.appearance, "", found, expected)
+            raise FormatError(feed.source.appearance, "", found, expected)
         step = -(-len(features) // _BOXES)
         samples.append(np.asarray(features[::step]))
     return principal_axes(samples, FEATURES) if samples else None

@@ -109,8 +109,8 @@ class FrameReader:
     def _read_ahead(self) -> list[Future[Observation]]:
         if self._frame == self._stop:
             return []
-        every = [*self._streams, *self._images.values()]
-        return [self._pool.submit(stream.read, self._frame) for stream in every]
+        streams = [*self._streams, *self._images.values()]
+        return [self._pool.submit(stream.read, self._frame) for stream in streams]
 
     def _beside(self, views: Sequence[Observation], read: Sequence[Observation]) -> tuple[Observation, ...]:
         """Colour frames in the places of their cameras; each detection's frame has one."""

@@ -148,19 +148,21 @@ class Recording:
     def reduced(self, rows: float) -> Recording:
         """The recording with colour frames reduced as far as standing people still span `rows` pixels."""
         cameras = zip(self.rig.cameras, self.sources, strict=True)
-        return replace(self, reduction=tuple(self._factor(camera, own, rows) for camera, own in cameras))
+        return replace(self, reduction=tuple(self._factor(camera, feed, rows) for camera, feed in cameras))
 
     def pictured(self) -> Recording:
         """The recording with its cameras' colour frames in place of boxes, where `images` gives them."""
-        sources = (own if own.images is None else replace(own, source=own.images, images=None) for own in self.sources)
+        sources = (
+            feed if feed.images is None else replace(feed, source=feed.images, images=None) for feed in self.sources
+        )
         return replace(self, sources=tuple(sources))
 
     def without_images(self) -> Recording:
         """The recording without the colour frames beside detections."""
-        return replace(self, sources=tuple(replace(own, images=None) for own in self.sources))
+        return replace(self, sources=tuple(replace(feed, images=None) for feed in self.sources))
 
-    def _factor(self, camera: Camera, own: CameraSource, rows: float) -> int:
-        colour = own.source.kind in ("video", "images")
+    def _factor(self, camera: Camera, feed: CameraSource, rows: float) -> int:
+        colour = feed.source.kind in ("video", "images")
         return greatest_reduction(camera, self.rig.grid, rows) if colour else 1
 
 

@@ -98,7 +98,7 @@ def _source_text(source: Source, folder: Path) -> str:
     if source.appearance is not None:
         entries.append(f"appearance = {toml_string(_relative(source.appearance, folder).as_posix())}")
     if source.columns:
-        pairs = ", ".join(f"{toml_string(own)} = {toml_string(name)}" for own, name in source.columns)
+        pairs = ", ".join(f"{toml_string(column)} = {toml_string(name)}" for column, name in source.columns)
         entries.append(f"columns = {{ {pairs} }}")
     if source.starts:
         entries.append(f"starts = {_list(np.array(source.starts))}")

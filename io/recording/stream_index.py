@@ -17,7 +17,7 @@ from stseg.io.recording.time_alignment import align_in_time, coverage, with_alig
 
 @dataclass(frozen=True)
 class StreamIndex:
-    """What reading a recording's streams to their ends gives.
+    """Length and time stamps of a recording's streams, read to their ends.
 
     Attributes
     ----------
@@ -38,7 +38,7 @@ class StreamIndex:
 
     def coverage(self, recording: Recording) -> Flags:
         """Which frames of the indexed recording each camera shows, bool (camera, length)."""
-        counts = [sum(map(len, own)) for own in self.times]
+        counts = [sum(map(len, files)) for files in self.times]
         return coverage(with_alignment(recording, self.shown), counts, self.length)
 
     def multi_view_range(self, recording: Recording) -> tuple[int, int]:
@@ -80,7 +80,7 @@ def index_from_times(
     aligned = with_alignment(recording, alignment.shown)
     with ExitStack() as opened:
         streams = streams or open_aligned_streams(recording, opened)
-        for stream, source, own in zip(streams, aligned.sources, times, strict=True):
-            stream.align(source, sum(map(len, own)))
+        for stream, source, files in zip(streams, aligned.sources, times, strict=True):
+            stream.align(source, sum(map(len, files)))
         length = int(recording_length(streams))
     return StreamIndex(length, tuple(map(tuple, times)), alignment.shown, alignment.notes)

@@ -155,8 +155,8 @@ class JoinedStream:
         return True
 
     def _open(self) -> Stream:
-        known = None if self._times is None else [self._times[self._at]]
-        return open_stream(self._parts[self._at], self._camera, known, self._factor)
+        stamps = None if self._times is None else [self._times[self._at]]
+        return open_stream(self._parts[self._at], self._camera, stamps, self._factor)
 
 
 def open_stream(

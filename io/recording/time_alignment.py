@@ -33,9 +33,9 @@ from stseg.io.recording.video.time_stamps import (
 _JITTER = 0.5
 """Hysteresis, ticks: how much farther than the last frame a new one may lie and still replace it. Without it a camera
 whose frames lie midway between ticks would repeat and skip frames at the slightest jitter."""
-_ALIKE = 0.01
+_COUNT_TOLERANCE = 0.01
 """Relative difference up to which two frame counts are equal."""
-_TOGETHER = 1.0
+_END_TOLERANCE = 1.0
 """Cameras aligned by time end together where their ends differ by no more than this, seconds."""
 
 
@@ -93,8 +93,8 @@ def align_in_time(recording: Recording, times: Sequence[Sequence[Floats]]) -> Ti
     """
     rate = recording.rig.frame_rate
     cameras = [
-        _camera_times(camera.name, source, own, rate)
-        for camera, source, own in zip(recording.rig.cameras, recording.sources, times, strict=True)
+        _camera_times(camera.name, source, files, rate)
+        for camera, source, files in zip(recording.rig.cameras, recording.sources, times, strict=True)
     ]
     notes: dict[str, list[str]] = {}
     shown: list[Ints | None] = []
@@ -115,7 +115,7 @@ def with_alignment(recording: Recording, shown: Sequence[Ints | None]) -> Record
     if not shown:
         return recording
     pairs = zip(recording.sources, shown, strict=True)
-    return replace(recording, sources=tuple(replace(source, shown=own) for source, own in pairs))
+    return replace(recording, sources=tuple(replace(source, shown=numbers) for source, numbers in pairs))
 
 
 def nearest_frames(position: Floats, period: float) -> Ints:
@@ -163,11 +163,11 @@ def coverage(recording: Recording, counts: Sequence[int], length: int) -> Flags:
         Frames of the recording.
     """
     flags = np.zeros((len(counts), length), bool)
-    for own, source, count in zip(flags, recording.sources, counts, strict=True):
+    for flag, source, count in zip(flags, recording.sources, counts, strict=True):
         shows = np.ones(count, bool) if source.shown is None else source.shown >= 0
         shows = shows[max(0, -source.offset) :][: max(0, length - max(0, source.offset))]
         first = max(0, source.offset)
-        own[first : first + len(shows)] = shows
+        flag[first : first + len(shows)] = shows
     return flags
 
 
@@ -175,7 +175,7 @@ def _camera_times(name: str, source: CameraSource, times: Sequence[Floats], rate
     paths = [part.path for part in source_parts(source.source, f"camera {name}")]
     require_starts(source.source.starts, len(paths), source.source.path, f"camera {name}, source.starts")
     starts = np.array(source.source.starts, float)
-    counted = concatenate_files([np.arange(float(len(own))) for own in times], 1.0, rate, paths, starts)
+    counted = concatenate_files([np.arange(float(len(stamps))) for stamps in times], 1.0, rate, paths, starts)
     return _CameraTimes(name, source, have_stamps(times, paths), interpret_stamps(times, rate, paths, starts), counted)
 
 
@@ -212,7 +212,7 @@ def _same_count(camera: _CameraTimes, stamps: TimeStamps, references: Sequence[_
     """Whether a camera has as many frames as a reference at the rig's rate, but by its stamps another end."""
     count, by_time = len(camera.counted), stamps.position[-1] + stamps.period
     ends = [_end(other) for other in references]
-    return any(abs(count - end) <= _ALIKE * end and abs(count - end) < abs(by_time - end) for end in ends)
+    return any(abs(count - end) <= _COUNT_TOLERANCE * end and abs(count - end) < abs(by_time - end) for end in ends)
 
 
 def _end(camera: _CameraTimes) -> float:
@@ -229,12 +229,12 @@ def _with_common_end(
     """
     required = [k for k, camera in enumerate(cameras) if camera.source.on_missing == "error"]
     counted = [cameras[k].source.offset + len(cameras[k].counted) for k in required if shown[k] is None]
-    timed = {k: cameras[k].source.offset + len(own) for k in required if (own := shown[k]) is not None}
+    timed = {k: cameras[k].source.offset + len(numbers) for k in required if (numbers := shown[k]) is not None}
     if not timed:
         return tuple(shown)
     end, made = max(counted or timed.values()), list(shown)
     for k, own_end in timed.items():
-        own = shown[k]
-        if own is not None and abs(own_end - end) <= _TOGETHER * recording.rig.frame_rate:
-            made[k] = np.append(own, np.full(max(0, end - own_end), -1))[: len(own) + end - own_end]
+        numbers = shown[k]
+        if numbers is not None and abs(own_end - end) <= _END_TOLERANCE * recording.rig.frame_rate:
+            made[k] = np.append(numbers, np.full(max(0, end - own_end), -1))[: len(numbers) + end - own_end]
     return tuple(made)

@@ -96,6 +96,6 @@ def _note(group: h5py.Group, names: Mapping[int, str], answers: str) -> None:
     for name in (NAMES, ANSWERS):
         if name in group:
             del group[name]
-    rows = [f"{identity},{own}" for identity, own in sorted(names.items())]
+    rows = [f"{identity},{name}" for identity, name in sorted(names.items())]
     group.create_dataset(NAMES, data=rows, dtype=text, shape=(len(rows),))
     group.create_dataset(ANSWERS, data=answers, dtype=text)

@@ -19,7 +19,7 @@ from stseg.arrays import AnyArray, Ints, Labels
 
 _LEVEL, _WINDOW, _MEMORY = 1, 15, 9
 _HEADER, _END = b"\x78\x01", b"\x03\x00"
-"""What comes before and after the blocks of a stream (RFC 1950): a header for `_WINDOW`, and an empty last block."""
+"""Bytes before and after the blocks of a stream (RFC 1950): a header for `_WINDOW`, and an empty last block."""
 
 
 class PackedFrame(NamedTuple):
@@ -57,45 +57,16 @@ def packed_frame(values: AnyArray) -> PackedFrame:
     whole = np.ascontiguousarray(values).reshape(-1)
     used = np.bitwise_or.reduce(whole.view(f"u{whole.itemsize}"), keepdims=True).view(np.uint8) != 0
     by_significance = zip(whole.reshape(-1, 1).view(np.uint8).T, used.tolist(), strict=True)
-    return _packed([own.tobytes() if is_used else bytes(len(own)) for own, is_used in by_significance])
+    return _packed([part.tobytes() if is_used else bytes(len(part)) for part, is_used in by_significance])
 
 
 def _packed(by_significance: Sequence[bytes]) -> PackedFrame:
     """The bytes of each significance, the least first, packed."""
     blocks, checksum = [_HEADER], 1
-    for own in by_significance:
-        blocks.append(_blocks_of_zeros(len(own)) if own == bytes(len(own)) else _blocks(own))
-        checksum = zlib.adler32(own, checksum)
+    for part in by_significance:
+        blocks.append(_blocks_of_zeros(len(part)) if part == bytes(len(part)) else _blocks(part))
+        checksum = zlib.adler32(part, checksum)
     return PackedFrame(0, b"".join([*blocks, _END, checksum.to_bytes(4, "big")]))
-
-
-def renamed_label(packed: PackedFrame, cells: int, names: Labels) -> PackedFrame | None:
-    """The labels that `packed_frame` packed, under other names and packed again.
-
-    Parameters
-    ----------
-    packed
-        The labels of a frame.
-    cells
-        Their number.
-    names : int32 (256,)
-        New names of the labels 0 to 255.
-
-    Returns
-    -------
-    PackedFrame or None
-        None where labels are greater, or packed otherwise.
-    """
-    try:
-        label = zlib.decompressobj().decompress(packed.data, cells)
-    except zlib.error:
-        return None
-    above = bytes(3 * cells)
-    rest = 3 * _blocks_of_zeros(cells) + _END + zlib.adler32(above, zlib.adler32(label)).to_bytes(4, "big")
-    if packed.filters or len(label) != cells or not packed.data.endswith(rest):
-        return None
-    tables = names.astype("<i4").view(np.uint8).reshape(-1, 4).T
-    return _packed([label.translate(own.tobytes()) if own.any() else bytes(cells) for own in tables])
 
 
 def _blocks(values: bytes) -> bytes:

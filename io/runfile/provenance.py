@@ -111,8 +111,8 @@ def write_provenance(group: h5py.Group, provenance: Provenance) -> None:
 def read_provenance(group: h5py.Group) -> Provenance:
     """Read the group /provenance; ValueError where its values cannot be."""
     shown = {str(read_attribute(dataset, "camera")): read_whole(dataset) for dataset in group.get("shown", {}).values()}
-    for camera, own in shown.items():
-        if own.ndim != 1 or own.dtype.kind != "i" or ((own < -1) | (own > limits.FRAMES)).any():
+    for camera, numbers in shown.items():
+        if numbers.ndim != 1 or numbers.dtype.kind != "i" or ((numbers < -1) | (numbers > limits.FRAMES)).any():
             raise ValueError(f"shown of camera {camera}: no frames by tick")
     return Provenance(
         printable(str(read_attribute(group, "created")))[: limits.NAME],
@@ -141,7 +141,8 @@ def run_request(recording: Recording, provenance: Provenance) -> dict[str, Any]:
     sources = {f"{_word(row['camera'])}, {_word(row['role'])}": _files_in_words(row) for row in provenance.sources}
     config = parse_toml(provenance.config)
     samples = {
-        camera.name: _samples(own.source) for camera, own in zip(recording.rig.cameras, recording.sources, strict=True)
+        camera.name: _samples(feed.source)
+        for camera, feed in zip(recording.rig.cameras, recording.sources, strict=True)
     }
     return {
         "config": config,

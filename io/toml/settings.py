@@ -13,7 +13,7 @@ from types import NoneType, UnionType
 from typing import Any, Literal, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
 from stseg.errors import ConfigError
-from stseg.io.toml.text import one_of, shown, toml_string
+from stseg.io.toml.text import abbreviated, one_of, toml_string
 from stseg.io.untrusted.numbers import finite_number
 
 T = TypeVar("T")
@@ -89,20 +89,20 @@ def as_toml(settings: Any, table: str = "", comment: Callable[[str], str | None]
             if above is not None:
                 lines += [f"# {line}" for line in wrap(above, _COMMENT)] + [f"{field.name} = {_text(value)}"]
     head = [f"[{table}]"] if table else []
-    own = ["\n".join([*head, *lines]) + "\n"] if lines else []
-    return "\n".join(own + [text for text in tables if text])
+    body = ["\n".join([*head, *lines]) + "\n"] if lines else []
+    return "\n".join(body + [text for text in tables if text])
 
 
 def _built(hint: Any, entry: Given | GivenTree, place: str, key: str) -> Any:
     if is_dataclass(hint):
         if isinstance(entry, Given):
-            raise ConfigError(entry.place, key, shown(entry.value), "a table")
+            raise ConfigError(entry.place, key, abbreviated(entry.value), "a table")
         return build(cast(type[Any], hint), entry, place, key)
     if not isinstance(entry, Given):
         raise ConfigError(_place(entry, place), key, "a table", _in_words(hint))
     value = _converted(hint, entry.value)
     if value is None:
-        raise ConfigError(entry.place, key, shown(entry.value), _in_words(hint))
+        raise ConfigError(entry.place, key, abbreviated(entry.value), _in_words(hint))
     return value
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from stseg.arrays import Floats
 from stseg.errors import InputError, RigError
-from stseg.io.toml.text import one_of, shown
+from stseg.io.toml.text import abbreviated, one_of
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.names import EXPECTED, is_name, is_path
 from stseg.io.untrusted.numbers import finite_number
@@ -61,14 +61,14 @@ class Table:
         """A string that is not empty."""
         value = self._get(name, "a text")
         if not isinstance(value, str) or not value.strip():
-            raise self.error(name, shown(value), "a text")
+            raise self.error(name, abbreviated(value), "a text")
         return value
 
     def name(self, name: str) -> str:
         """The name of a camera or scene, see `stseg.io.untrusted.names`."""
         value = self.text(name)
         if not is_name(value):
-            raise self.error(name, shown(value), EXPECTED)
+            raise self.error(name, abbreviated(value), EXPECTED)
         return value
 
     def paths(self, name: str) -> list[str]:
@@ -76,7 +76,7 @@ class Table:
         values = self.texts(name)
         for value in values:
             if not is_path(value):
-                raise self.error(name, shown(value), "a path that a file system takes")
+                raise self.error(name, abbreviated(value), "a path that a file system takes")
         return values
 
     def texts(self, name: str) -> list[str]:
@@ -84,7 +84,7 @@ class Table:
         value = self._get(name, "a text or a list of texts")
         values = value if isinstance(value, list) else [value]
         if not values or not all(isinstance(text, str) and text.strip() for text in values):
-            raise self.error(name, shown(value), "a text or a list of texts")
+            raise self.error(name, abbreviated(value), "a text or a list of texts")
         return [str(text) for text in values]
 
     def choice(self, name: str, choices: Iterable[T]) -> T:
@@ -94,21 +94,21 @@ class Table:
         for choice in choices:
             if value == choice:
                 return choice
-        raise self.error(name, shown(value), one_of(value, choices))
+        raise self.error(name, abbreviated(value), one_of(value, choices))
 
     def integer(self, name: str, low: int, high: int) -> int:
         """A whole number within [low, high]."""
         expected = f"a whole number from {low} to {high}"
         value = self._get(name, expected)
         if not isinstance(value, int) or isinstance(value, bool) or not low <= value <= high:
-            raise self.error(name, shown(value), expected)
+            raise self.error(name, abbreviated(value), expected)
         return value
 
     def truth(self, name: str) -> bool:
         """True or false."""
         value = self._get(name, "true or false")
         if not isinstance(value, bool):
-            raise self.error(name, shown(value), "true or false")
+            raise self.error(name, abbreviated(value), "true or false")
         return value
 
     def within(self, name: str, bounds: tuple[float, float]) -> float:
@@ -126,7 +126,7 @@ class Table:
         expected = _shape_in_words(shape)
         value = self._get(name, expected)
         if not _has_shape(value, shape):
-            raise self.error(name, shown(value), expected)
+            raise self.error(name, abbreviated(value), expected)
         array = np.array(value, float)
         wrong = ~(np.abs(array) <= largest) | ~np.isfinite(array)
         if wrong.any():
@@ -138,7 +138,7 @@ class Table:
         """The table below this key."""
         value = self._get(name, "a table")
         if not isinstance(value, dict):
-            raise self.error(name, shown(value), "a table")
+            raise self.error(name, abbreviated(value), "a table")
         return type(self)(self.file, self.key(name), value)
 
     def tables(self, name: str, most: int) -> tuple[Self, ...]:
@@ -146,7 +146,7 @@ class Table:
         expected = f"one [[{name}]] or more"
         value = self._get(name, expected)
         if not isinstance(value, list) or not value or not all(isinstance(row, dict) for row in value):
-            raise self.error(name, shown(value), expected)
+            raise self.error(name, abbreviated(value), expected)
         if len(value) > most:
             raise self.error(name, f"{len(value)} of them", f"at most {most}")
         return tuple(type(self)(self.file, f"{self.key(name)}[{index}]", row) for index, row in enumerate(value))

@@ -47,13 +47,13 @@ def toml_string(text: str) -> str:
 
 
 def one_of(name: object, names: Iterable[str]) -> str:
-    """What an error expects in place of an unknown name: the known ones, and the one most like it."""
+    """Expectation of an error in place of an unknown name: all names, and the one most like it."""
     names = tuple(names)
     close = get_close_matches(str(name)[:_SHOWN], names, 1)
     return f"one of {', '.join(names)}" + (f"; did you mean {close[0]}?" if close else "")
 
 
-def shown(value: object) -> str:
+def abbreviated(value: object) -> str:
     """A value as an error shows it: what Python writes, cut to one line; nested values are never written out."""
     try:
         text = _REPR.repr(value.item() if isinstance(value, np.number) else value)

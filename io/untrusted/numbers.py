@@ -14,7 +14,7 @@ from stseg.io.untrusted import limits
 _LONGEST = 400
 """Characters of a number: the longest that Python itself writes has 326."""
 _NUMBER = re.compile(r"\s*[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,5})?\s*", re.ASCII)
-_WHOLE = re.compile(r"\s*[+-]?\d{1,18}\s*", re.ASCII)
+_WHOLE_NUMBER = re.compile(r"\s*[+-]?\d{1,18}\s*", re.ASCII)
 
 
 def parse_number(text: str) -> float:
@@ -30,7 +30,7 @@ def parse_number(text: str) -> float:
 
 def parse_whole(text: str, low: int, high: int) -> int | None:
     """A whole number within [low, high] from text; None for anything else."""
-    if _WHOLE.fullmatch(text) is None:
+    if _WHOLE_NUMBER.fullmatch(text) is None:
         return None
     number = int(text)
     return number if low <= number <= high else None

@@ -100,13 +100,13 @@ def _require_known_sizes(file: h5py.File) -> None:
 
 def _require_own(file: h5py.File) -> None:
     """Visit every link and dataset once, without following links of other kinds."""
-    waiting, seen = [("/", file, 0)], 0
+    waiting, count = [("/", file, 0)], 0
     while waiting:
         place, group, depth = waiting.pop()
         for name in group:
-            seen += 1
+            count += 1
             key = f"{place}{name}"
-            if seen > limits.MEMBERS or depth > _DEEPEST:
+            if count > limits.MEMBERS or depth > _DEEPEST:
                 raise ValueError(f"{key}: more than {limits.MEMBERS} objects, or groups nested too deeply")
             if not isinstance(group.get(name, getlink=True), h5py.HardLink):
                 raise ValueError(f"{key}: a link that leads elsewhere")

@@ -16,7 +16,7 @@ from stseg.errors import ConfigError
 from stseg.evaluation import Scores
 from stseg.evaluation import evaluate as score
 from stseg.evaluation.sequence import Area
-from stseg.io.toml.text import shown
+from stseg.io.toml.text import abbreviated
 from stseg.io.track_csv import read_tracks_csv
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.numbers import parse_numbers, parse_whole
@@ -86,7 +86,7 @@ def _frames(text: str) -> Ints:
         frames = np.array(numbers if whole else [], np.int64)
     if not len(frames):
         expected = f"A:B with B above A, or a list A,B,C; numbers up to {limits.FRAMES}"
-        raise ConfigError("command line", "--frames", shown(text), expected)
+        raise ConfigError("command line", "--frames", abbreviated(text), expected)
     return frames.astype(np.int64)
 
 
@@ -94,7 +94,7 @@ def _area(text: str) -> Area:
     expected = "x0,y0,x1,y1 in metres with x0 below x1 and y0 below y1"
     found = parse_numbers(text.split(","), limits.METRES)
     if found is None or len(found) != 4:
-        raise ConfigError("command line", "--area", shown(text), expected)
+        raise ConfigError("command line", "--area", abbreviated(text), expected)
     x0, y0, x1, y1 = found
     if not (x0 < x1 and y0 < y1):
         raise ConfigError("command line", "--area", repr(text), expected)

@@ -9,7 +9,7 @@ from cyclopts import Parameter
 
 from stseg.commands.terminal.progress import TerminalReporter
 from stseg.errors import ConfigError
-from stseg.io.toml.text import shown
+from stseg.io.toml.text import abbreviated
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.numbers import parse_whole
 from stseg.tasks import simulation
@@ -108,5 +108,5 @@ def _size(text: str) -> tuple[int, int]:
     sides = [parse_whole(part, 1, limits.SIDE) for part in text.split(",")]
     if len(sides) != 2 or sides[0] is None or sides[1] is None or sides[0] * sides[1] > limits.PIXELS:
         expected = f"width,height in whole pixels, at most {limits.PIXELS:.0e} in all"
-        raise ConfigError("command line", "--size", shown(text), expected)
+        raise ConfigError("command line", "--size", abbreviated(text), expected)
     return sides[0], sides[1]

@@ -86,7 +86,7 @@ class OccupancyConfig(Settings):
     effective_observations: float = within(0.6, lambda value: 0 < value <= 1, "above 0, at most 1")
     """Effective number of independent observations of a cell in one view, 0..1: views err together (k)."""
     sampling: Literal["footprint", "point"] = "footprint"
-    """How a cell samples a view: mean over the pixels of its footprint, or the pixel at its centre."""
+    """Sampling of a view by a cell: mean over the pixels of its footprint, or the pixel at its centre."""
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ class BackgroundConfig(Settings):
     memory: float = positive(60.0)
     """Time constant with which the background follows slow changes, seconds."""
     absorption_time: float = positive(600.0)
-    """How long an object that was moved in must stay still to become background, seconds."""
+    """Time for which an object that was moved in must stay still to become background, seconds."""
     foreground_prior: float = share(0.1)
     """f: prior probability of a person at a pixel, 0..1; guides learning, and is taken out of the evidence."""
     outlier_rate: float = share(1e-3)
@@ -71,7 +71,7 @@ class CodebookConfig(BackgroundConfig):
     recurrence: float = share(0.1)
     """Longest absence of background, as a share of the frames it is learned from, 0..1."""
     absence: float = positive(10.0)
-    """How long a new object may be out of view before it is forgotten, seconds."""
+    """Longest time for which a new object may be out of view before it is forgotten, seconds."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""How large people are and how they walk: one body model and one motion model for all stages."""
+"""Sizes and motion of people: one body model and one motion model for all stages."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ class KalmanConfig(Settings):
     gate_probability: float = share(0.99)
     """Probability that a detection of the tracked person lies within the gate, 0..1."""
     patience: float = not_negative(1.0, "0 or more seconds")
-    """How long a person may go undetected before the track ends, seconds."""
+    """Longest time for which a person may go undetected before the track ends, seconds."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class ParticleConfig(Settings):
     assignment_distance: float = positive(0.5)
     """Largest distance between a track and a detection that continues it, metres."""
     patience: float = not_negative(1.0, "0 or more seconds")
-    """How long a person may go undetected before the track ends, seconds."""
+    """Longest time for which a person may go undetected before the track ends, seconds."""
 
 
 @dataclass(frozen=True)
@@ -81,4 +81,4 @@ class BeliefConfig(Settings):
     assignment_distance: float = positive(0.5)
     """Largest distance between a track and a detection that continues it, metres."""
     patience: float = not_negative(2.0, "0 or more seconds")
-    """How long a person may go undetected before the track ends, seconds."""
+    """Longest time for which a person may go undetected before the track ends, seconds."""

@@ -42,7 +42,7 @@ class TrackingConfig(Settings):
     prediction_horizon: float = not_negative(0.6)
     """Time for which a track is extrapolated while the cells of a window are assigned, seconds."""
     patience: float = not_negative(2.0)
-    """How long a person may go undetected before the track ends, seconds."""
+    """Longest time for which a person may go undetected before the track ends, seconds."""
     maximum_gap: float = not_negative(4.0)
     """Longest gap across which two tracklets may be joined by motion and height, seconds."""
     hypotheses: int = within(400, lambda value: 1 <= value <= 100_000, "1 to 100000")

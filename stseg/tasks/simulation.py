@@ -12,7 +12,7 @@ from stseg.engine.reporter import Progress, Reporter, reporter_of
 from stseg.errors import ConfigError
 from stseg.io.outputs.simulated_scene import rig_name, write_scene
 from stseg.io.recording.recording import BodyPrior
-from stseg.io.toml.text import shown
+from stseg.io.toml.text import abbreviated
 from stseg.io.untrusted import limits
 from stseg.simulation import NAMED, Film, SceneSpec, Spoil, SpoiledFilm
 from stseg.simulation.spoiling.spoil import STRENGTHS
@@ -118,4 +118,4 @@ def _spoil(text: str) -> Spoil:
     try:
         return Spoil(kind, float(strength) if colon else STRENGTHS.get(kind, (0.0, 0.0, 0.0))[1])
     except ValueError as error:
-        raise ConfigError("command line", "--spoil", shown(text), "KIND or KIND:STRENGTH, a number") from error
+        raise ConfigError("command line", "--spoil", abbreviated(text), "KIND or KIND:STRENGTH, a number") from error

@@ -13,7 +13,7 @@ from fuzz.targets import TARGETS
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from stseg.io.toml.text import parse_toml, shown
+from stseg.io.toml.text import abbreviated, parse_toml
 from stseg.io.untrusted.names import is_name, printable
 from stseg.io.untrusted.numbers import parse_number, parse_whole
 
@@ -48,7 +48,7 @@ def test_numbers_are_those_of_python_or_none(text: str) -> None:
 @given(st.text(max_size=40))
 def test_names_and_errors_are_printable(text: str) -> None:
     assert printable(text).isprintable()
-    assert shown(text).isprintable()
+    assert abbreviated(text).isprintable()
     assert not is_name(text) or Path(text).name == text
 
 

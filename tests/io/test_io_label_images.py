@@ -142,7 +142,7 @@ def test_instances_are_taken_pixel_by_pixel(run_path: Path, tmp_path: Path) -> N
         assert (ours != theirs).mean() < 0.01
 
 
-def test_a_camera_with_boxes_has_no_images_and_one_that_is_blind_shows_nobody(tmp_path: Path) -> None:
+def test_boxes_have_no_label_images_and_blind_views_no_labels(tmp_path: Path) -> None:
     frame_sets = list(mask_moments(two_cameras(), walkers(FRAMES), 0, FRAMES))
     masks, _ = mask_sources(tmp_path, frame_sets[:2])
     masks = CameraSource(masks.source, on_missing="blind")

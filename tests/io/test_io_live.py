@@ -223,7 +223,7 @@ def test_cameras_are_aligned_by_when_their_pictures_arrive() -> None:
     np.testing.assert_allclose(np.median(np.diff(shown, axis=0), 0), [1, 2])
 
 
-def test_a_broken_stream_is_asked_again_with_growing_pauses_and_its_view_is_blind() -> None:
+def test_a_broken_stream_is_reopened_with_growing_pauses() -> None:
     steady, breaking = StandIn(numbered(0), 0.05), StandIn(numbered(1), 0.05, breaks=[30], refused=3)
     reported = list[str]()
     with FollowedCameras(live(), QUICK, None, Event(), reported.append, opening(steady, breaking)) as frame_sets:
@@ -241,7 +241,7 @@ def test_a_broken_stream_is_asked_again_with_growing_pauses_and_its_view_is_blin
     assert (pauses[1:] > 1.5 * pauses[:-1]).all(), pauses
 
 
-def test_what_cannot_be_worked_on_in_time_loses_its_oldest_moments_and_says_so() -> None:
+def test_a_full_queue_drops_its_oldest_frame_sets() -> None:
     small = replace(QUICK, buffer_memory=5 * 2 * 128 * 96 * 3 / 2**20)
     cameras, halt, reported = (StandIn(numbered(0), 0.05), StandIn(numbered(1), 0.05)), Event(), list[str]()
     with FollowedCameras(live(), small, None, halt, reported.append, opening(*cameras)) as frame_sets:

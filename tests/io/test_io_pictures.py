@@ -107,7 +107,7 @@ def test_instances_keep_their_numbers(tmp_path: Path, numbers: Bytes | NDArray[n
     np.testing.assert_array_equal(read, numbers)
 
 
-def test_masks_may_be_stored_in_three_channels_but_not_in_colours(tmp_path: Path) -> None:
+def test_masks_of_three_channels_have_no_colours(tmp_path: Path) -> None:
     mask = np.random.default_rng(0).integers(0, 256, (6, 8)).astype(np.uint8)
     for name, picture in (("grey", mask), ("equal", np.dstack([mask] * 3)), ("alpha", np.dstack([mask] * 3 + [mask]))):
         cv2.imwrite(str(tmp_path / f"{name}.png"), picture)

@@ -310,7 +310,7 @@ def test_an_interrupt_at_any_line_leaves_no_part(tmp_path: Path, monkeypatch: py
     assert len(reached) > 50
 
 
-def test_the_part_of_a_killed_run_is_removed_and_foreign_files_are_not(tmp_path: Path) -> None:
+def test_the_part_of_a_killed_run_alone_is_removed(tmp_path: Path) -> None:
     part, descriptor = create_part(tmp_path / "night.h5")
     os.close(descriptor)
     (tmp_path / "night.h5.part").write_text("precious")
@@ -380,9 +380,7 @@ def test_a_full_disk_is_told_and_leaves_the_old_file(
     gc.collect()  # a file that HDF5 could not close would crash here
 
 
-def test_what_a_full_disk_did_not_take_is_read_back_and_the_rest_is_zero(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_bytes_refused_by_a_full_disk_are_read_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A buffer that is not filled has what lay there in memory before, which HDF5 would take for its own."""
 
     def fill_up(data: memoryview) -> None:

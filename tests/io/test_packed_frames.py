@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 import pytest
 
-from stseg.io.runfile.packed_frames import PackedFrame, packed_frame, renamed_label, unpacked_label
+from stseg.io.runfile.packed_frames import PackedFrame, packed_frame, unpacked_label
 
 SHAPE = (3, 5, 7)
 
@@ -29,20 +29,6 @@ def test_hdf5_unpacks_the_same(label: np.ndarray) -> None:
         dataset = file.create_dataset("label", SHAPE, np.int32, chunks=SHAPE, compression="gzip", shuffle=True)
         dataset.id.write_direct_chunk((0, 0, 0), packed_frame(label).data)
         assert np.array_equal(dataset[()], label)
-
-
-@pytest.mark.parametrize("greatest", [1, 255, 70000])
-def test_few_labels_are_renamed_as_they_are_packed(greatest: int) -> None:
-    chosen = np.random.default_rng(greatest)
-    few = chosen.integers(0, 256, SHAPE, np.int32)
-    names = chosen.integers(0, greatest + 1, 256, np.int32)
-    assert renamed_label(packed_frame(few), few.size, names) == packed_frame(names[few])
-
-
-def test_labels_that_are_many_or_packed_otherwise_are_not_renamed_so(label: np.ndarray) -> None:
-    names, few = np.zeros(256, np.int32), packed_frame(np.ones(SHAPE, np.int32)).data
-    broken = [packed_frame(label), PackedFrame(1, few), PackedFrame(0, few[:-6]), PackedFrame(0, few[5:])]
-    assert [renamed_label(one, label.size, names) for one in broken] == [None] * 4
 
 
 @pytest.mark.parametrize("wrong", ["more", "fewer", "cut off", "no deflate", "not shuffled"])

@@ -45,8 +45,8 @@ def packet_times(path: Path) -> Floats | None:
     capture, heads, times = open_video(path, ""), PictureHeads(), list[float]()
     countable = deliver_packets(capture)
     while countable and capture.grab():
-        held, packet = capture.retrieve()
-        countable = held and heads.fits(np.asarray(packet, np.uint8).reshape(-1))
+        is_valid, packet = capture.retrieve()
+        countable = is_valid and heads.fits(np.asarray(packet, np.uint8).reshape(-1))
         times.append(capture.get(cv2.CAP_PROP_POS_MSEC))
     capture.release()
     return np.array(times, float) if countable and times else None

@@ -77,15 +77,15 @@ def interpret_stamps(
     SourceError
         Where a file starts before the previous one has ended.
     """
-    files = [(own - own[:1]) / 1000 * frame_rate for own in times]
-    if not all(np.isfinite(own).all() and _rises(np.diff(own), _LONGEST_GAP * frame_rate) for own in files):
+    files = [(stamps - stamps[:1]) / 1000 * frame_rate for stamps in times]
+    if not all(np.isfinite(stamps).all() and _rises(np.diff(stamps), _LONGEST_GAP * frame_rate) for stamps in files):
         return None
-    steps = np.concatenate([np.diff(own) for own in files])
+    steps = np.concatenate([np.diff(stamps) for stamps in files])
     if not len(steps):
         return TimeStamps(concatenate_files(files, 1.0, frame_rate, paths, starts), 1.0, True)
     mean = float(steps.mean())
     fuzzy = _RESOLUTION * frame_rate
-    steady = all(bool((np.abs(own - mean * np.arange(len(own))) <= fuzzy).all()) for own in files)
+    steady = all(bool((np.abs(stamps - mean * np.arange(len(stamps))) <= fuzzy).all()) for stamps in files)
     if not steady and any(map(_is_avi, paths)):
         return None
     period = mean if steady else float(np.median(steps))
@@ -94,7 +94,7 @@ def interpret_stamps(
 
 def have_stamps(times: Sequence[Floats], paths: Sequence[Path]) -> bool:
     """Whether a camera's files have a time stamp for each frame."""
-    return all(np.isfinite(own).all() for own in times) and not any(map(_is_avi, paths))
+    return all(np.isfinite(stamps).all() for stamps in times) and not any(map(_is_avi, paths))
 
 
 def _rises(steps: Floats, gap: float) -> bool:
@@ -115,12 +115,12 @@ def concatenate_files(
         Where a file starts before the previous one has ended.
     """
     begin, parts = 0.0, list[Floats]()
-    for k, own in enumerate(files):
+    for k, stamps in enumerate(files):
         if len(starts):
             begin = _after(parts, float(starts[k]) * frame_rate, frame_rate, paths[k])
-        parts.append(begin + own)
-        length = len(own)
-        last = float(own[-1]) if length else -period
+        parts.append(begin + stamps)
+        length = len(stamps)
+        last = float(stamps[-1]) if length else -period
         fuzzy = _RESOLUTION * frame_rate + _ROUNDED * length
         begin += length if abs(last + 1 - length) <= fuzzy else last + period
     return np.concatenate(parts)

@@ -19,9 +19,9 @@ from stseg.io.recording.video.packets import (
     packet_times,
 )
 
-_NEAR = 250
+_SEQUENTIAL_FRAMES = 250
 """Frames that are decoded sequentially rather than skipped by seeking."""
-_BEFORE = 4
+_SEEK_MARGIN = 4
 """Frames before the target at which seeking aims: seeking is inexact, and the landing frame is known by its stamp."""
 
 
@@ -114,14 +114,14 @@ class VideoStream:
 
     def _go_to(self, frame: int) -> None:
         """Go to a later frame, or to the last."""
-        if self._times is not None and frame - self._frame > _NEAR:
+        if self._times is not None and frame - self._frame > _SEQUENTIAL_FRAMES:
             self._seek(frame, self._times)
         while self._frame < frame and self._advance():
             pass
 
     def _seek(self, frame: int, times: Floats) -> None:
         """Go to a frame at or shortly before this one; to the beginning where the landing frame is ambiguous."""
-        self._capture.set(cv2.CAP_PROP_POS_FRAMES, frame - _BEFORE)
+        self._capture.set(cv2.CAP_PROP_POS_FRAMES, frame - _SEEK_MARGIN)
         if self._capture.grab():
             here = np.flatnonzero(times == self._capture.get(cv2.CAP_PROP_POS_MSEC))
             if len(here) == 1 and self._frame < here[0] <= frame:
@@ -142,8 +142,8 @@ class VideoStream:
 
     def _keep_packet(self) -> bool:
         """Keep the grabbed packet; False where it is no complete picture."""
-        held, packet = self._capture.retrieve()
-        self._packet = np.asarray(packet, np.uint8).reshape(-1) if held else np.zeros(0, np.uint8)
+        is_valid, packet = self._capture.retrieve()
+        self._packet = np.asarray(packet, np.uint8).reshape(-1) if is_valid else np.zeros(0, np.uint8)
         return self._heads.fits(self._packet)
 
     def _error(self, found: str, expected: str) -> SourceError:

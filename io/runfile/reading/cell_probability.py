@@ -26,5 +26,5 @@ def learn_reliability(run: Run) -> CellReliability:
 
 def _counts(run: Run, grid: Grid, rows: Rows, frame: int) -> CellCounts:
     log_odds, _ = run.read_frame(int(frame))
-    own = rows[rows["frame"] == frame]
-    return count_cells(log_odds, filled_cells(grid, own), doubtful_cells(grid, log_odds, own))
+    frame_rows = rows[rows["frame"] == frame]
+    return count_cells(log_odds, filled_cells(grid, frame_rows), doubtful_cells(grid, log_odds, frame_rows))

@@ -14,7 +14,7 @@ from stseg.arrays import Floats, Ints
 from stseg.errors import FormatError
 from stseg.io.runfile import layout
 from stseg.io.runfile.reading.texts import read_attribute
-from stseg.io.toml.text import shown
+from stseg.io.toml.text import abbreviated
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.names import EXPECTED, is_name
 
@@ -41,7 +41,7 @@ class LayoutChecks:
         """An attribute of several names of cameras, each once."""
         found = np.ravel(self.attribute(name, key, "names of cameras")).tolist()[: limits.CAMERAS + 1]
         if len(found) > limits.CAMERAS or not all(map(is_name, found)) or len(set(found)) != len(found):
-            raise FormatError(self.path, f"{name}@{key}", shown(found), f"names of cameras: {EXPECTED}")
+            raise FormatError(self.path, f"{name}@{key}", abbreviated(found), f"names of cameras: {EXPECTED}")
         return tuple(found)
 
     def frame_rate(self) -> float:
@@ -49,7 +49,7 @@ class LayoutChecks:
         low, high = limits.FRAME_RATE
         found = self.attribute("/trajectory", "fps", "frames per second")
         if np.shape(found) or not isinstance(found, float | int | np.number) or not low <= found <= high:
-            raise FormatError(self.path, "/trajectory@fps", shown(found), f"a number from {low:g} to {high:g}")
+            raise FormatError(self.path, "/trajectory@fps", abbreviated(found), f"a number from {low:g} to {high:g}")
         return float(found)
 
     def require_rising(self, frames: Ints) -> None:
@@ -66,7 +66,7 @@ class LayoutChecks:
     def require_value(self, name: str, key: str, expected: str | int) -> None:
         found = self.attribute(name, key, repr(expected))
         if np.shape(found) or found != expected:
-            raise FormatError(self.path, f"{name}@{key}", shown(found), repr(expected))
+            raise FormatError(self.path, f"{name}@{key}", abbreviated(found), repr(expected))
 
     def require_dataset(self, name: str, dtype: np.dtype[np.generic], dimensions: int) -> h5py.Dataset:
         """A dataset of that dtype and so many dimensions."""

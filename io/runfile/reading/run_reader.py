@@ -27,7 +27,7 @@ from stseg.io.runfile.reading.layout_checks import LayoutChecks, require_bounded
 from stseg.io.runfile.reading.texts import read_attribute, read_texts
 from stseg.io.runfile.reading.value_checks import Bounds, require_fit, require_table
 from stseg.io.runfile.reading.volume import RunVolume
-from stseg.io.toml.text import shown
+from stseg.io.toml.text import abbreviated
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.names import EXPECTED_TITLE, is_title, printable
 from stseg.io.untrusted.numbers import parse_whole
@@ -252,7 +252,7 @@ class Run:
 
     @cached_property
     def cell_reliability(self) -> CellReliability:
-        """How far the volume's log-odds can be believed: their calibration by the run's own tracks."""
+        """Reliability of the volume's log-odds, measured by the run's own tracks."""
         return learn_reliability(self)
 
     def read_cell_probability(self, frame: int) -> Singles:
@@ -338,6 +338,6 @@ def _checked_run(path: Path, file: h5py.File) -> Run:
         checks.require_finite(f"{layout.OCCUPANCY}/{name}", axis)
     kept = read_attribute(group, "kept") if "kept" in group.attrs else layout.KEPT[0]
     if kept not in layout.KEPT:
-        raise FormatError(path, f"{layout.OCCUPANCY}@kept", shown(kept), f"one of {', '.join(layout.KEPT)}")
+        raise FormatError(path, f"{layout.OCCUPANCY}@kept", abbreviated(kept), f"one of {', '.join(layout.KEPT)}")
     title = printable(str(read_texts(entry)))[: limits.NAME]
     return Run(path, title, checks.frame_rate(), cameras, frames, heights, ground_y, ground_x, views, str(kept))

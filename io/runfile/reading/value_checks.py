@@ -32,7 +32,7 @@ _PLACES = {"trajectory": ("x", "y", "z"), "boxes": ("left", "top", "width", "hei
 
 @dataclass(frozen=True)
 class Bounds:
-    """What rows of a run file refer to: its file, its frames, rising, and the number of its cameras."""
+    """The file, its frames, rising, and the number of its cameras: rows of the run file refer to them."""
 
     path: Path
     frames: Ints
@@ -110,6 +110,8 @@ def require_fit(bounds: Bounds, trajectory: Rows, boxes: Rows, tracks: Rows) -> 
     ends = np.array([limits.FRAMES, -1]) + np.zeros((len(identities), 2), np.int64)
     np.minimum.at(ends[:, 0], index, trajectory["frame"])
     np.maximum.at(ends[:, 1], index, trajectory["frame"])
-    own = tracks[np.argsort(tracks["id"])]
-    if not np.array_equal(own["id"], identities) or not np.array_equal(np.stack([own["first"], own["last"]], 1), ends):
+    rows = tracks[np.argsort(tracks["id"])]
+    if not np.array_equal(rows["id"], identities) or not np.array_equal(
+        np.stack([rows["first"], rows["last"]], 1), ends
+    ):
         raise FormatError(bounds.path, "/tracks", "other frames than its rows in /trajectory have", "theirs")

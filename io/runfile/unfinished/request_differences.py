@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from stseg.io.toml.text import shown
+from stseg.io.toml.text import abbreviated
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.names import printable
 
@@ -40,4 +40,4 @@ def differences(now: dict[str, Any], begun: dict[str, Any], prefix: str = "") ->
 
 
 def _value(value: object) -> str:
-    return printable(value[: limits.NAME]) if isinstance(value, str) else shown(value)
+    return printable(value[: limits.NAME]) if isinstance(value, str) else abbreviated(value)

@@ -23,7 +23,7 @@ def read_stream_times(path: Path, recording: Recording) -> StreamIndex | None:
     """The stream index of stored time stamps; None where there are none, or not of this recording."""
     try:
         stored = read_npz(path, _STAMPS)
-        times = tuple(tuple(_stamps(stored, k, own)) for k, own in enumerate(_counts(stored)))
+        times = tuple(tuple(_stamps(stored, k, one)) for k, one in enumerate(_counts(stored)))
     except (OSError, ValueError):
         return None
     expected = [len(source_parts(source.source, "")) for source in recording.sources]
@@ -32,8 +32,8 @@ def read_stream_times(path: Path, recording: Recording) -> StreamIndex | None:
 
 def write_stream_times(path: Path, streams: StreamIndex) -> None:
     """Store the time stamps of all streams, whole or not at all."""
-    times = {f"times{k}_{j}": own for k, files in enumerate(streams.times) for j, own in enumerate(files)}
-    files = np.array([len(own) for own in streams.times], np.int64)
+    times = {f"times{k}_{j}": one for k, files in enumerate(streams.times) for j, one in enumerate(files)}
+    files = np.array([len(one) for one in streams.times], np.int64)
     with replacing(path, overwrite=True) as part, part.open("wb") as file:
         np.savez_compressed(file, files=files, **times)  # type: ignore[arg-type]
 
@@ -51,6 +51,6 @@ def _counts(stored: Any) -> list[int]:
 def _stamps(stored: Any, camera: int, files: int) -> list[Floats]:
     """The time stamps of one camera's files; ValueError where they are none."""
     found = [stored.get(f"times{camera}_{file}") for file in range(files)]
-    if any(own is None or own.ndim != 1 or own.dtype != np.float64 or len(own) > limits.FRAMES for own in found):
+    if any(one is None or one.ndim != 1 or one.dtype != np.float64 or len(one) > limits.FRAMES for one in found):
         raise ValueError("no time stamps")
-    return [np.array(own, float) for own in found]
+    return [np.array(one, float) for one in found]

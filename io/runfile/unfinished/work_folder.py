@@ -32,19 +32,19 @@ from stseg.io.runfile.unfinished.locks import lock
 from stseg.io.runfile.unfinished.request_differences import differences
 from stseg.io.runfile.unfinished.segment_files import FinishedSegments, finished_segments
 from stseg.io.runfile.unfinished.stream_times import read_stream_times, write_stream_times
-from stseg.io.toml.text import shown
+from stseg.io.toml.text import abbreviated
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.bounded_files import is_regular, parse_json, read_text
 
 _MARK = "stseg-work-folder"
 _STREAMS = "streams.npz"
 _ABOUT = "Made by stseg: it may delete the files in this folder that it made.\n"
-_OWN = re.compile(
+_FILE_NAME = re.compile(
     r"(begun\.json|streams\.npz|files\.json|clock\.json|result\.h5|segment-\d{5}(-[0-9a-f]{32})?\.h5)"
     r"(\.[0-9a-f]{16}\.part)?"
 )
 """Names of files in the folder that are ours."""
-_LAST = frozenset((_MARK, "lock", "begun.json", "result.h5"))
+_PUBLISHED_FILES = frozenset((_MARK, "lock", "begun.json", "result.h5"))
 """Files by which a published run is known, until the folder is gone."""
 
 
@@ -220,9 +220,9 @@ class WorkFolder:
             return
         with suppress(OSError):
             for path in self.path.iterdir():
-                if _OWN.fullmatch(path.name) and path.name not in _LAST and is_regular(path):
+                if _FILE_NAME.fullmatch(path.name) and path.name not in _PUBLISHED_FILES and is_regular(path):
                     path.unlink()
-            if {path.name for path in self.path.iterdir()} <= _LAST:
+            if {path.name for path in self.path.iterdir()} <= _PUBLISHED_FILES:
                 _delete(self.path.rename(self.path.with_name(f"{self.path.name}.{secrets.token_hex(8)}.removed")))
             else:
                 for name in ("result.h5", "begun.json"):
@@ -247,7 +247,7 @@ class WorkFolder:
         except (OSError, ValueError) as error:
             raise OutputError(path, "", f"what cannot be read ({error})", self._anew("the run's notes")) from error
         if not isinstance(before, dict):
-            raise OutputError(path, "", f"{shown(before)}", self._anew("the run's notes"))
+            raise OutputError(path, "", f"{abbreviated(before)}", self._anew("the run's notes"))
         for difference in differences(self._request, before):
             found = f"{difference.now}, where the unfinished run of {self.path.name} has {difference.begun}"
             raise OutputError(self.output, difference.key, found, self._anew("the same, to go on"))
@@ -258,7 +258,7 @@ class WorkFolder:
 
 def _delete(folder: Path) -> None:
     """Delete a folder that was renamed to be deleted; the mark goes last."""
-    for name in sorted(_LAST - {_MARK}):
+    for name in sorted(_PUBLISHED_FILES - {_MARK}):
         (folder / name).unlink(missing_ok=True)
     (folder / _MARK).unlink(missing_ok=True)
     folder.rmdir()

@@ -13,7 +13,7 @@ from cyclopts import Parameter
 from stseg.errors import ConfigError
 from stseg.geometry import Grid
 from stseg.io.recording.recording import CameraSource, Source, SourceKind
-from stseg.io.toml.text import shown
+from stseg.io.toml.text import abbreviated
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.numbers import parse_numbers
 
@@ -118,7 +118,7 @@ def size_of(text: str) -> tuple[int, int]:
     width, height = numbers("--size", text, "width,height in whole pixels", 2)
     if width != int(width) or height != int(height) or min(width, height) < 1 or width * height > limits.PIXELS:
         raise ConfigError(
-            "--size", "", shown(text), f"width,height in whole pixels, at most {limits.PIXELS:.0e} in all"
+            "--size", "", abbreviated(text), f"width,height in whole pixels, at most {limits.PIXELS:.0e} in all"
         )
     return int(width), int(height)
 
@@ -135,5 +135,5 @@ def numbers(option: str, text: str, expected: str, count: int | None = None) -> 
     """Finite numbers between commas."""
     found = parse_numbers(text.split(","))
     if found is None or (count is not None and len(found) != count):
-        raise ConfigError(option, "", shown(text), expected)
+        raise ConfigError(option, "", abbreviated(text), expected)
     return found

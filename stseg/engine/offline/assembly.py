@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
@@ -19,7 +18,7 @@ from stseg.engine.pipeline import finished_tracks
 from stseg.io.config_file import format_config
 from stseg.io.recording.time_alignment import with_alignment
 from stseg.io.runfile import layout
-from stseg.io.runfile.packed_frames import PackedFrame, packed_frame, renamed_label, unpacked_label
+from stseg.io.runfile.packed_frames import PackedFrame, packed_frame, unpacked_label
 from stseg.io.runfile.runs import Run, RunWriter, read_run
 from stseg.records.tables import APPEARANCE, Tracks
 from stseg.trackers import find_tracker
@@ -27,8 +26,6 @@ from stseg.tracking.windows.stitching import SegmentTracks, StitchedTracks, Stit
 
 _BLOCK = 64
 """Frames of the volume read at a time."""
-_FEW = 256
-"""Names of a segment that are renamed as they are packed."""
 _COPIED = ("ghosts", "windows", "rates", "shifts", "timings", "appearance")
 """Tables of the segments that the run file takes unchanged."""
 
@@ -169,12 +166,6 @@ def _renamed(label: PackedFrame, shape: tuple[int, ...], rows: Rows, identity: I
     """The labels of a frame, which are names of a segment, as the run's track ids; rows of the frame."""
     if (rows["id"] == identity).all():
         return label
-    if rows["id"].max() < _FEW:
-        names = np.zeros(_FEW, np.int32)
-        names[rows["id"]] = identity
-        few = renamed_label(label, math.prod(shape), names)
-        if few is not None:
-            return few
     cells = unpacked_label(label, shape)
     rename_labels(cells[None], rows["frame"][:1], rows, identity)
     return packed_frame(cells)

@@ -9,7 +9,7 @@ from stseg.errors import ConfigError
 from stseg.io.recording.recording import Recording
 from stseg.io.recording.stream_index import StreamIndex
 from stseg.io.runfile.runs import Run
-from stseg.io.toml.text import shown
+from stseg.io.toml.text import abbreviated
 from stseg.io.untrusted import limits
 from stseg.io.untrusted.numbers import parse_whole
 
@@ -34,7 +34,7 @@ class FrameRange(NamedTuple):
         head, colon, tail = text.partition(":")
         first, stop = (parse_whole(part, 0, limits.FRAMES) for part in (head, tail))
         if not colon or (head and first is None) or (tail and stop is None):
-            raise ConfigError("--frames", "", shown(text), f"A:B, whole numbers up to {limits.FRAMES}, half open")
+            raise ConfigError("--frames", "", abbreviated(text), f"A:B, whole numbers up to {limits.FRAMES}, half open")
         return cls(first, stop)
 
 
