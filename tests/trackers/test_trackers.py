@@ -24,7 +24,7 @@ RIG = room()
 COLOURLESS = sorted(set(TRACKERS) - {"particles", "belief"})
 """Trackers that need no colour; the others have tests of their own."""
 UNSEEN = FrameObservations((None,) * 4, (None,) * 4)
-"""What the cameras showed, for trackers that do not ask."""
+"""Observations for trackers without colour."""
 LENGTH, SHARED = window_length(FRAME_RATE, CONFIG.tracking)
 ENDS = LENGTH + LENGTH - SHARED
 """A run of so many frames ends exactly where its second window ends."""
@@ -45,7 +45,7 @@ def crossing(frame: int) -> list[tuple[float, float]]:
 
 
 def run(tracker: str, first: int, stop: int, rest: bool = True) -> list[Commit]:
-    """What a tracker commits of frames first .. stop - 1 of two people who pass each other."""
+    """Commits of a tracker for frames first .. stop - 1 of two people who pass each other."""
     follow = find_tracker(tracker)(RIG, CONFIG, first)
     done = [
         commit for frame in range(first, stop) for commit in follow.add(scene(follow, frame, *crossing(frame)), UNSEEN)
@@ -62,8 +62,8 @@ def rows_of(commits: Sequence[Commit]) -> Rows:
 @pytest.mark.parametrize("first", [0, 5])
 def test_every_frame_is_committed_once(tracker: str, frames: int, first: int) -> None:
     commits = run(tracker, first, first + frames)
-    told = [s.frame for commit in commits for s in commit.frames]
-    assert told == list(range(first, first + frames))
+    committed = [s.frame for commit in commits for s in commit.frames]
+    assert committed == list(range(first, first + frames))
     for commit in commits:
         assert commit.label.shape == (len(commit.frames), *RIG.grid.shape)
         assert commit.label.dtype == np.int32
@@ -82,8 +82,8 @@ def test_windows_are_those_of_the_run(first: int, frames: int) -> None:
     assert rows.dtype == WINDOW
     expected = windows(FRAME_RATE, CONFIG.tracking, first, first + frames)
     ranges = [(w.index, w.solve_first, w.solve_stop, w.commit_first, w.commit_stop) for w in expected]
-    told = rows[["index", "solve_first", "solve_stop", "commit_first", "commit_stop"]].tolist()
-    assert told == ranges
+    committed = rows[["index", "solve_first", "solve_stop", "commit_first", "commit_stop"]].tolist()
+    assert committed == ranges
     assert (rows["energy"] < 0).all()
     assert (rows["energy_quantum"] == QUANTUM).all()
 

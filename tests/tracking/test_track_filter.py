@@ -1,4 +1,4 @@
-"""Who is followed from frame to frame: the filter against the textbook's, and chains of people in named scenes."""
+"""The filter of tracks from frame to frame: against the textbook's, and chains of people in named scenes."""
 
 from __future__ import annotations
 
@@ -24,26 +24,26 @@ GHOSTS = found(people())
 """Nobody."""
 NOTHING = Measurement(1.0, np.inf)
 Way = Callable[[int], tuple[float, float, float] | None]
-"""Where somebody is in a frame: x, y, height in metres; None where the frame does not see them."""
+"""Place of a person in a frame: x, y, height in metres; None where the frame does not see them."""
 STATES = st.tuples(numbers(-3, 3), numbers(-3, 3), numbers(-2, 2), numbers(-2, 2)).map(np.array)
 
 
-def somebody(state: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0), odds: float = 1.0) -> TrackState:
+def track_state(state: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0), odds: float = 1.0) -> TrackState:
     spread = np.diag([0.03, 0.02, 0.6, 0.5])
     spread[0, 2] = spread[2, 0] = spread[1, 3] = spread[3, 1] = 0.05
     return TrackState(3, 10, np.array(state), spread, 1.7, 0.12**2, 0.42, 0.04**2, odds)
 
 
-# One walker
+# One track
 
 
 @given(STATES, numbers(0.01, 3), numbers(0.01, 3))
 def test_constant_velocity(state: Floats, first: float, second: float) -> None:
-    walker = somebody(tuple(state))
-    then = walker.predicted(first, CONFIG.motion)
+    track = track_state(tuple(state))
+    then = track.predicted(first, CONFIG.motion)
     np.testing.assert_allclose(then.state, [*(state[:2] + first * state[2:]), *state[2:]])
     assert (np.linalg.eigvalsh(then.covariance - np.diag([0, 0, 0.6, 0.5])).sum()) > 0
-    at_once, in_steps = walker.predicted(first + second, CONFIG.motion), then.predicted(second, CONFIG.motion)
+    at_once, in_steps = track.predicted(first + second, CONFIG.motion), then.predicted(second, CONFIG.motion)
     np.testing.assert_allclose(at_once.state, in_steps.state, atol=1e-9)
     np.testing.assert_allclose(at_once.covariance, in_steps.covariance, atol=1e-9)
     assert at_once.height_variance == pytest.approx(in_steps.height_variance)
@@ -52,59 +52,59 @@ def test_constant_velocity(state: Floats, first: float, second: float) -> None:
 @settings(deadline=None)
 @given(STATES, numbers(-1, 1), numbers(-1, 1), numbers(0.02, 0.5), numbers(-0.8, 0.8))
 def test_found_is_the_textbooks_correction(state: Floats, x: float, y: float, sd: float, slant: float) -> None:
-    """The posterior of the place, whose prior is the walker's, tells all that the measurement told."""
-    walker = somebody(tuple(state)).predicted(0.3, CONFIG.motion)
+    """The posterior of the place, with the track's prediction as its prior, holds all of the measurement."""
+    track = track_state(tuple(state)).predicted(0.3, CONFIG.motion)
     noise = sd**2 * np.array([[1.0, slant], [slant, 1.0]])
-    place = walker.state[:2] + np.array([x, y])
-    information = np.linalg.inv(walker.covariance[:2, :2]) + np.linalg.inv(noise)
+    place = track.state[:2] + np.array([x, y])
+    information = np.linalg.inv(track.covariance[:2, :2]) + np.linalg.inv(noise)
     posterior = np.linalg.inv(information)
-    mean = posterior @ (np.linalg.solve(walker.covariance[:2, :2], walker.state[:2]) + np.linalg.solve(noise, place))
-    after = walker.corrected(11, mean, posterior, NOTHING, NOTHING, 1.0)
-    expected, covariance = reference.kalman(walker.state, walker.covariance, place, noise)
+    mean = posterior @ (np.linalg.solve(track.covariance[:2, :2], track.state[:2]) + np.linalg.solve(noise, place))
+    after = track.corrected(11, mean, posterior, NOTHING, NOTHING, 1.0)
+    expected, covariance = reference.kalman(track.state, track.covariance, place, noise)
     np.testing.assert_allclose(after.state, expected, atol=1e-8)
     np.testing.assert_allclose(after.covariance, covariance, atol=1e-8)
 
 
 def test_a_posterior_that_says_nothing_new_changes_nothing() -> None:
-    walker = somebody((1.0, 2.0, 0.3, -0.2)).predicted(0.2, CONFIG.motion)
-    after = walker.corrected(12, walker.state[:2], walker.covariance[:2, :2], NOTHING, NOTHING, 0.5)
-    np.testing.assert_allclose(after.state, walker.state)
-    np.testing.assert_allclose(after.covariance, walker.covariance)
+    track = track_state((1.0, 2.0, 0.3, -0.2)).predicted(0.2, CONFIG.motion)
+    after = track.corrected(12, track.state[:2], track.covariance[:2, :2], NOTHING, NOTHING, 0.5)
+    np.testing.assert_allclose(after.state, track.state)
+    np.testing.assert_allclose(after.covariance, track.covariance)
     assert (after.track, after.last_seen, after.odds) == (3, 12, 0.5)
-    assert (after.height, after.width) == pytest.approx((walker.height, walker.width))
+    assert (after.height, after.width) == pytest.approx((track.height, track.width))
 
 
 def test_sizes_converge() -> None:
     """They are properties of the person: the mean of what the frames say, and ever surer."""
     noise, rng = 0.05, np.random.default_rng(2)
     seen = rng.normal(1.83, noise, 60)
-    walker, sure = somebody(), [0.12**2]
+    track, sure = track_state(), [0.12**2]
     for height in seen:
         tall, wide = Measurement(float(height), noise**2), Measurement(float(height) - 1.4, noise**2)
-        walker = walker.corrected(11, walker.state[:2], walker.covariance[:2, :2], tall, wide, 1.0)
-        sure.append(walker.height_variance)
+        track = track.corrected(11, track.state[:2], track.covariance[:2, :2], tall, wide, 1.0)
+        sure.append(track.height_variance)
     assert (np.diff(sure) < 0).all()
     weight = len(seen) / noise**2
-    assert walker.height_variance == pytest.approx(1 / (1 / 0.12**2 + weight))
-    assert walker.height == pytest.approx((1.7 / 0.12**2 + weight * seen.mean()) / (1 / 0.12**2 + weight))
-    assert walker.width == pytest.approx((0.42 / 0.04**2 + weight * (seen.mean() - 1.4)) / (1 / 0.04**2 + weight))
-    later = walker.predicted(4.0, CONFIG.motion)  # shoes, stoop, lens, clothes
-    assert later.height_variance > walker.height_variance
-    assert later.width_variance > walker.width_variance
+    assert track.height_variance == pytest.approx(1 / (1 / 0.12**2 + weight))
+    assert track.height == pytest.approx((1.7 / 0.12**2 + weight * seen.mean()) / (1 / 0.12**2 + weight))
+    assert track.width == pytest.approx((0.42 / 0.04**2 + weight * (seen.mean() - 1.4)) / (1 / 0.04**2 + weight))
+    later = track.predicted(4.0, CONFIG.motion)  # shoes, stoop, lens, clothes
+    assert later.height_variance > track.height_variance
+    assert later.width_variance > track.width_variance
 
 
 def test_what_a_frame_tells_of_sizes_is_used_once() -> None:
     """The prior of a frame's posterior, anybody's size, is taken out before the person's own comes in."""
-    walkers = TrackFilter(RATE, CONFIG)
-    told = found(people((0.0, 0.0, 1.85)))
-    nothing = replace(told, sizes=Sizes.of_population(1, CONFIG.body))
-    walkers.update(0, told, GHOSTS)
-    sure = walkers.tracks[0]
+    track_filter = TrackFilter(RATE, CONFIG)
+    tracks = found(people((0.0, 0.0, 1.85)))
+    nothing = replace(tracks, sizes=Sizes.of_population(1, CONFIG.body))
+    track_filter.update(0, tracks, GHOSTS)
+    sure = track_filter.tracks[0]
     for frame in range(1, 40):
-        walkers.update(frame, replace(nothing, track_index=np.zeros(1, np.int64)), GHOSTS)
-    (walker,) = walkers.tracks
-    assert walker.height == pytest.approx(sure.height, abs=1e-3)
-    assert walker.height_variance > sure.height_variance
+        track_filter.update(frame, replace(nothing, track_index=np.zeros(1, np.int64)), GHOSTS)
+    (track,) = track_filter.tracks
+    assert track.height == pytest.approx(sure.height, abs=1e-3)
+    assert track.height_variance > sure.height_variance
 
 
 # All of them
@@ -112,17 +112,19 @@ def test_what_a_frame_tells_of_sizes_is_used_once() -> None:
 
 def follow(ways: list[Way], frames: range, order: int | None = None) -> tuple[list[list[int]], TrackFilter]:
     """The chains that these people get, one for each frame that sees them, and who is followed in the end."""
-    walkers = TrackFilter(RATE, CONFIG)
+    track_filter = TrackFilter(RATE, CONFIG)
     chains: list[list[int]] = [[] for _ in ways]
     rng = np.random.default_rng(order)
     for frame in frames:
         turn = range(len(ways)) if order is None else rng.permutation(len(ways)).tolist()
         here = [(k, place) for k in turn if (place := ways[k](frame)) is not None]
-        told = walkers.update(frame, found(people(*(place for _, place in here)), walkers.predict(frame)), GHOSTS)
-        assert len(set(told.tolist())) == len(told)  # nobody is in two places
-        for (k, _), chain in zip(here, told.tolist(), strict=True):
+        tracks = track_filter.update(
+            frame, found(people(*(place for _, place in here)), track_filter.predict(frame)), GHOSTS
+        )
+        assert len(set(tracks.tolist())) == len(tracks)  # no track is in two places
+        for (k, _), chain in zip(here, tracks.tolist(), strict=True):
             chains[k].append(chain)
-    return chains, walkers
+    return chains, track_filter
 
 
 def walk(x: float, y: float, vx: float, vy: float, height: float = 1.7) -> Way:
@@ -135,14 +137,14 @@ def except_for(way: Way, unseen: range) -> Way:
 
 
 def test_who_walks_on_is_expected_where_they_will_be() -> None:
-    _, walkers = follow([walk(-3, 1, 1.2, -0.4)], range(20))
+    _, track_filter = follow([walk(-3, 1, 1.2, -0.4)], range(20))
     for ahead in (20, 24):
-        expected = walkers.predict(ahead)
+        expected = track_filter.predict(ahead)
         assert expected is not None
         there = np.array([[-3 + 1.2 * ahead / RATE, 1 - 0.4 * ahead / RATE]])
         np.testing.assert_allclose(expected.ground, there, atol=0.03)
-    (walker,) = walkers.tracks
-    np.testing.assert_allclose(walker.state[2:], [1.2, -0.4], atol=0.03)
+    (track,) = track_filter.tracks
+    np.testing.assert_allclose(track.state[2:], [1.2, -0.4], atol=0.03)
 
 
 @pytest.mark.parametrize("order", range(3))
@@ -192,10 +194,10 @@ def test_somebody_hidden_for_a_moment_is_the_same() -> None:
 
 
 def test_odds_fall_while_out_of_sight() -> None:
-    _, walkers = follow([except_for(walk(0, 0, 0.3, 0), range(10, 99))], range(14))
+    _, track_filter = follow([except_for(walk(0, 0, 0.3, 0), range(10, 99))], range(14))
     odds, spread = [], []
     for frame in range(14, 18):
-        expected = walkers.predict(frame)
+        expected = track_filter.predict(frame)
         assert expected is not None
         odds.append(float(expected.existence[0]))
         spread.append(float(np.linalg.det(expected.covariance[0])))
@@ -210,8 +212,8 @@ def test_odds_fall_while_out_of_sight() -> None:
 def test_patience_ends() -> None:
     patience = round(IDENTITY.patience * RATE)
     for gone, left in ((patience, 1), (patience + 1, 0)):
-        _, walkers = follow([except_for(walk(0, 0, 0, 0), range(10, 99))], range(10 + gone))
-        assert len(walkers.tracks) == left
+        _, track_filter = follow([except_for(walk(0, 0, 0, 0), range(10, 99))], range(10 + gone))
+        assert len(track_filter.tracks) == left
     (chains,), _ = follow([except_for(walk(0, 0, 0, 0), range(10, 11 + patience))], range(40))
     assert chains == [1] * 10 + [2] * (len(chains) - 10)
 
@@ -222,13 +224,13 @@ def test_far_away_is_somebody_new() -> None:
 
 
 def test_predictions_before_the_first_and_after_an_empty_frame() -> None:
-    walkers = TrackFilter(RATE, CONFIG)
-    assert walkers.predict(0) is None
-    assert walkers.update(0, GHOSTS, GHOSTS).shape == (0,)
-    expected = walkers.predict(1)
+    track_filter = TrackFilter(RATE, CONFIG)
+    assert track_filter.predict(0) is None
+    assert track_filter.update(0, GHOSTS, GHOSTS).shape == (0,)
+    expected = track_filter.predict(1)
     assert expected is not None
     assert len(expected) == 0
-    assert walkers.update(1, found(people((0, 0)), expected), GHOSTS).tolist() == [1]
+    assert track_filter.update(1, found(people((0, 0)), expected), GHOSTS).tolist() == [1]
 
 
 def test_the_same_people_twice() -> None:
@@ -244,29 +246,29 @@ def test_the_same_people_twice() -> None:
 
 
 def doubted(*places: tuple[float, float], evidence: float) -> People:
-    """Candidates of whom a frame made nobody."""
+    """Rejected candidates."""
     return found(people(*places), evidence=evidence)
 
 
 def test_who_was_almost_believed_is_looked_for_once_more() -> None:
     """They have no number before they are found, and are forgotten if the next frame does not find them."""
     for found_again in (True, False):
-        walkers = TrackFilter(RATE, CONFIG)
-        assert walkers.update(0, GHOSTS, doubted((0.5, 0.5), evidence=-1.0)).shape == (0,)
-        expected = walkers.predict(1)
+        track_filter = TrackFilter(RATE, CONFIG)
+        assert track_filter.update(0, GHOSTS, doubted((0.5, 0.5), evidence=-1.0)).shape == (0,)
+        expected = track_filter.predict(1)
         assert expected is not None
         np.testing.assert_array_equal(expected.ground, [[0.5, 0.5]])
         assert expected.existence[0] < -1.0  # a second look at the same thing is not a second witness
-        assert walkers.issued == 0
+        assert track_filter.issued == 0
         now = found(people((0.52, 0.5)), expected) if found_again else GHOSTS
-        assert walkers.update(1, now, GHOSTS).tolist() == [1] * found_again
-        assert walkers.issued == len(walkers.tracks) == int(found_again)
+        assert track_filter.update(1, now, GHOSTS).tolist() == [1] * found_again
+        assert track_filter.issued == len(track_filter.tracks) == int(found_again)
 
 
 @pytest.mark.parametrize(("evidence", "place", "looked_for"), [(-1, 2, 2), (-5, 2, 1), (-1, 0.3, 1)])
 def test_who_is_not_looked_for_again(evidence: float, place: float, looked_for: int) -> None:
     """Who was hardly believed at all, and whoever stands beside somebody who is followed: it may be the same."""
-    walkers = TrackFilter(RATE, CONFIG)
-    walkers.update(0, found(people((0, 0))), doubted((place, 0.0), evidence=evidence))
-    assert len(walkers.predict(1) or ()) == looked_for
-    assert [walker.track for walker in walkers.tracks] == [1, 0][:looked_for]
+    track_filter = TrackFilter(RATE, CONFIG)
+    track_filter.update(0, found(people((0, 0))), doubted((place, 0.0), evidence=evidence))
+    assert len(track_filter.predict(1) or ()) == looked_for
+    assert [track.track for track in track_filter.tracks] == [1, 0][:looked_for]

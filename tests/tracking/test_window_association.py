@@ -166,10 +166,10 @@ def test_a_gap_is_bridged_by_cells_of_the_track_itself() -> None:
     path = walk((-2, 0), (0.4, 0), FRAMES)
     seen = {f: p for f, p in path.items() if f != 45}
     blobs = [blobs_in([seen], f) for f in FRAMES]
-    for whose, bridged in ((1, True), (UNASSIGNED, True), (2, False)):
-        label = np.where(column([path[45]]), whose, 0).astype(np.int32)
-        nobody = np.zeros((0, 2)), np.zeros(0, np.int64)
-        blobs[5] = find_blobs(label, np.ones(GRID.shape, np.float32), *nobody, 0.4, Patches.whole(GRID))
+    for owner, bridged in ((1, True), (UNASSIGNED, True), (2, False)):
+        label = np.where(column([path[45]]), owner, 0).astype(np.int32)
+        no_people = np.zeros((0, 2)), np.zeros(0, np.int64)
+        blobs[5] = find_blobs(label, np.ones(GRID.shape, np.float32), *no_people, 0.4, Patches.whole(GRID))
         (one,) = form_tracklets(blobs, FRAMES[0], CONFIG)
         assert (45 in one.frames) == bridged
 
