@@ -1,6 +1,6 @@
 """Faults of the system at every call of a run, and kills at random moments: what was injected, survived and lost.
 
-python tools/faults.py -o docs/development/faults.md      each fault at each call that writes, and 100 kills
+python tools/faults.py -o build/faults.md      each fault at each call that writes, and 100 kills
 python tools/faults.py --every 32 --kills 20              at every 32nd write, and at each call of any other kind
 
 A fault is survived if the command ends with a whole output or with one line, and the same command then gives the same

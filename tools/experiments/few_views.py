@@ -1,6 +1,6 @@
 """Two and three views of everything: scores, and how many of its points the run itself takes for wrong.
 
-    python tools/experiment.py few_views -o docs/development/few_views.md [--data ../shared/data] [--work FOLDER]
+    python tools/experiment.py few_views -o build/few_views.md [--data ../shared/data] [--work FOLDER]
         [--only REGEX] [--frames 60] [--choices 6]
 
 WORK holds uu4.toml, cmc2.csv, cmc2.toml, cmc2_fairmot.toml, wildtrack.csv and wildtrack.toml, as tools/results.py

@@ -1,6 +1,6 @@
 """How the time of a frame grows with the ground, the views, the people and the pixels: measured, with exponents.
 
-    python tools/experiment.py scaling -o docs/development/scaling.md [--axes area,views] [--kinds masks,boxes,video]
+    python tools/experiment.py scaling -o build/scaling.md [--axes area,views] [--kinds masks,boxes,video]
         [--sides 5,10,20,40,80]
 
 One of the four is changed at a time; the others stay at 10 m x 10 m, 8 views, 10 people, 320 x 240 pixels. The area is

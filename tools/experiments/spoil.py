@@ -1,6 +1,6 @@
 """How much spoiled masks and boxes cost: kinds of errors, three strengths each, few and many views, crowds; and uu4.
 
-    python tools/experiment.py spoil -o docs/development/spoiled.md [--kinds holes,jitter] [--strengths middle]
+    python tools/experiment.py spoil -o build/spoiled.md [--kinds holes,jitter] [--strengths middle]
         [--views 2,4] [--crowds 3,8] [--seconds 4] [--uu4 RIG.toml --uu4-truth TRACKS.csv] [--uu4-frames 0:60]
 
 Each cell of the table is MODA / IDF1, percent, of the default tracker on a simulated crowd of `easy`'s area (images of

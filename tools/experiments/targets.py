@@ -1,6 +1,6 @@
 """Scores on the recordings for which least scores are promised: wide, small and spoiled bodies, and few cameras.
 
-    python tools/experiment.py targets -o docs/development/targets.md [--data ../shared/data] [--work FOLDER]
+    python tools/experiment.py targets -o build/targets.md [--data ../shared/data] [--work FOLDER]
         [--only REGEX] [--frames 250]
 
 WORK holds uu4.toml, cmc2.csv and cmc2_fairmot.toml, as tools/results.py leaves them.
