@@ -120,7 +120,7 @@ def in_rooms(frame: CraftedFrame, size: int) -> CraftedFrame:
 
 
 def two_births(boxes: BoxEvidence | None, pixels: PixelEvidence) -> CraftedFrame:
-    """Two candidates far apart, without tracks, whose births cost nothing; None for no view with boxes."""
+    """Two candidates far apart, without tracks or costs of births; None for no view with boxes."""
     if boxes is None:
         boxes = BoxEvidence(np.zeros((0, 2, 0)), np.zeros(0, np.int64), no_rows(), np.zeros((0, 2)), np.ones(2))
     ground = np.array([[0.0, 0.0], [2.0, 0.0]])

@@ -16,7 +16,7 @@ from stseg.records.tables import APPEARANCE, FEATURES
 _MINIMUM_VISIBILITY = 0.5
 """Least share of a body that a view sees past others, for a row."""
 _MINIMUM_FOREGROUND = 0.5
-"""Least likelihood of a pixel whose colour counts."""
+"""Least likelihood of foreground at which a pixel's colour counts."""
 _SLICES = ((0.17, 0.5), (0.5, 0.95))
 """Trunk and legs: from and to, as shares of the body's extent in the image, from the head down."""
 _MINIMUM_PIXELS = 8
@@ -101,7 +101,7 @@ def _add_colours(
 ) -> None:  # fmt: skip
     """Add the logarithms of colours to total (person, slice, channel), and their number to count (person, slice).
 
-    Of each raster pixel that is assigned (v, u) to a visible person (person,), whose box (person, 4) is in pixels,
+    Of each raster pixel that is assigned (v, u) to a visible person (person,) with a box (person, 4) is in pixels,
     the pixel in its middle counts.
     """
     for v in range(assigned.shape[0]):

@@ -28,7 +28,7 @@ def explained_frame(estimate: MapEstimate) -> Explanation:
 
 
 def explained_by(estimate: MapEstimate, refined: RefinedPeople) -> Explanation:
-    """The explanation by an estimate whose members are refined already; no residuals are measured."""
+    """The explanation by an estimate with its refined members; no residuals are measured."""
     views, members, score = estimate.evidence.views, estimate.members, estimate.members_score
     ground = _outside_core(refined.pool.ground, members, estimate.problem)
     bodies = Candidates(ground, refined.track_sizes.height, refined.track_sizes.width)
@@ -90,7 +90,7 @@ def _visible_past(evidence: BoxEvidence, view: int, members: Ints) -> Floats:
 
 
 def _painted(view: View, people: Candidates) -> Shorts:
-    """The person whose body is nearest at each raster pixel of a view, int16 (v, u); -1 for none."""
+    """The person with the nearest body at each raster pixel of a view, int16 (v, u); -1 for none."""
     first, spans, _ = view.outlines(people.ground, people.height, people.width)
     owner = np.full(view.shape, -1, np.int16)
     paint(np.argsort(-view.distance(people.ground), kind="stable"), first, spans, owner)

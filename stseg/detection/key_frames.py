@@ -10,7 +10,7 @@ something may be decided otherwise. The best set of the predicted tracks alone i
 - no two members are so close that they touch, their places being uncertain by `_PREDICTION_DISTANCE`,
 - and every member stands within `_PREDICTION_DISTANCE` of its track's prediction.
 
-A person whose track is predicted outside the border is found by the lattice alone. So where the lattice shows
+A person with a track that is predicted outside the border is found by the lattice alone. So where the lattice shows
 candidates, they join the tracks, and the best set of both is the answer if it fulfils the same conditions.
 
 Otherwise the frame is searched as a whole. The rule reads the frame's number, its evidence and its prediction alone, so
@@ -43,7 +43,7 @@ _STEP_LIMIT = 3
 
 
 def key_frame_interval(frame_rate: float, config: DetectionConfig) -> int:
-    """Frames from one key frame to the next: those whose numbers it divides are key frames."""
+    """Frames from one key frame to the next; it divides the numbers of key frames."""
     return max(int(config.key_frame_interval * frame_rate), 1)
 
 

@@ -1,7 +1,7 @@
 """One frame's detection problem: candidates and their evidence, as arrays that the search kernels read.
 
 Two forms of evidence stand side by side, since a rig may mix them: boxes, each assigned to one person at most, and
-pixels, each assigned to the nearest person whose body covers it. Both are used once (docs/how-it-works.md, Detection).
+pixels, each assigned to the nearest person that covers it. Both are used once (docs/how-it-works.md, Detection).
 """
 
 from __future__ import annotations

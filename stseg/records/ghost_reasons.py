@@ -1,4 +1,7 @@
-"""Reasons of ghosts: the main evidence against each rejected candidate."""
+"""Reasons of ghosts, read from the rows of a run file: the main evidence against each rejected candidate.
+
+The decision itself is taken by the detector (`stseg.detection.ghosts`).
+"""
 
 from __future__ import annotations
 

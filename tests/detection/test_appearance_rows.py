@@ -1,4 +1,4 @@
-"""What detections look like: the colours of trunk and legs by view, features of boxes, and files of features."""
+"""Appearance of detections: the colours of trunk and legs by view, features of boxes, and files of features."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ TABLES = [BodyTable.of(camera, RIG.grid) for camera in CAMERAS]
 
 
 def explained(step: int = 2) -> Explanation:
-    """Everybody is found; each pixel of a silhouette is of the person whose it is."""
+    """All people are found, and each pixel of a silhouette is assigned to its person."""
     assignment = []
     for camera in CAMERAS:
         owner = np.full(camera.size[::-1], -1, np.int16)
@@ -53,32 +53,32 @@ def painted(gain: float = 1.0) -> tuple[list[Observation], list[ViewEvidence]]:
     return views, likely
 
 
-def looks(views: list[Observation], likely: list[ViewEvidence], axes: Floats | None = None) -> Rows:
+def rows_of(views: list[Observation], likely: list[ViewEvidence], axes: Floats | None = None) -> Rows:
     return appearance_rows(7, explained(), TABLES, axes, views, likely)
 
 
-def test_nobody_looks_like_nothing() -> None:
-    nobody = found(STANDING[:0])
+def test_no_people_have_no_rows() -> None:
+    no_people = found(STANDING[:0])
     empty = tuple(np.full((camera.size[1] // 2, camera.size[0] // 2), -1, np.int16) for camera in CAMERAS)
-    explanation = Explanation(nobody, nobody, empty, (2,) * 4, (np.zeros(0, np.int64),) * 4, np.zeros(4))
+    explanation = Explanation(no_people, no_people, empty, (2,) * 4, (np.zeros(0, np.int64),) * 4, np.zeros(4))
     assert not len(appearance_rows(0, explanation, TABLES, None, *painted()))
 
 
 def test_colours_are_those_that_each_person_wears() -> None:
-    rows = looks(*painted())
+    rows = rows_of(*painted())
     assert set(rows["frame"].tolist()) == {7}
     assert sorted(set(rows["view"].tolist())) == [0, 1, 2, 3]
     for (x, y, _), blue_to_red in zip(STANDING, (1, -1), strict=True):
-        own = rows[(rows["x"] == x) & (rows["y"] == y)]
-        assert len(own) >= 3
-        colours = own["colours"].reshape(-1, 2, 3)
+        of_person = rows[(rows["x"] == x) & (rows["y"] == y)]
+        assert len(of_person) >= 3
+        colours = of_person["colours"].reshape(-1, 2, 3)
         difference = np.log(160 + 16) - np.log(40 + 16)
         np.testing.assert_allclose(colours[..., 0] - colours[..., 2], blue_to_red * difference, atol=0.3)
     assert np.isnan(rows["features"]).all()
 
 
 def test_a_camera_of_another_gain_differs_by_one_offset() -> None:
-    bright, dark = looks(*painted()), looks(*painted(0.6))
+    bright, dark = rows_of(*painted()), rows_of(*painted(0.6))
     offset = (bright["colours"] - dark["colours"]).astype(float)
     assert np.ptp(offset) < 0.25
     assert abs(offset.mean() - np.log(1 / 0.6)) < 0.2
@@ -97,16 +97,16 @@ def test_features_of_boxes_go_to_the_people_whose_boxes_they_are() -> None:
     axes = np.eye(3, 2)
     likely: list[ViewEvidence] = []
     for camera in CAMERAS:
-        own = boxes(camera, STANDING)
-        likely.append(Boxes(own.pixel, own.score, np.array([[1, 2, 3], [4, 5, 6]], np.float32)))
-    rows = looks([None] * 4, likely, axes)
+        of_person = boxes(camera, STANDING)
+        likely.append(Boxes(of_person.pixel, of_person.score, np.array([[1, 2, 3], [4, 5, 6]], np.float32)))
+    rows = rows_of([None] * 4, likely, axes)
     assert len(rows) == 8
     for (x, _, _), features in zip(STANDING, ([1, 2], [4, 5]), strict=True):
-        own = rows["features"][rows["x"] == x]
-        assert (own[:, :2] == features).all()
-        assert (own[:, 2:] == 0).all()
+        of_person = rows["features"][rows["x"] == x]
+        assert (of_person[:, :2] == features).all()
+        assert (of_person[:, 2:] == 0).all()
     assert np.isnan(rows["colours"]).all()
-    assert not len(looks([None] * 4, likely))
+    assert not len(rows_of([None] * 4, likely))
     assert rows["features"].shape[1] == FEATURES
     assert rows["colours"].shape[1] == COLOURS
 
@@ -122,17 +122,17 @@ def test_colours_beside_boxes_are_those_of_their_middles() -> None:
     rows = appearance_rows(7, explanation, TABLES, None, likely, likely, views)
     assert not ((rows["view"] == 2) & (rows["x"] == STANDING[0, 0])).any()
     for (x, _, _), blue_to_red in zip(STANDING, (1, -1), strict=True):
-        own = rows["colours"][rows["x"] == x].reshape(-1, 2, 3)
-        assert len(own) >= 3
+        of_person = rows["colours"][rows["x"] == x].reshape(-1, 2, 3)
+        assert len(of_person) >= 3
         difference = np.log(160 + 16) - np.log(40 + 16)
-        np.testing.assert_allclose(own[..., 0] - own[..., 2], blue_to_red * difference, atol=0.3)
+        np.testing.assert_allclose(of_person[..., 0] - of_person[..., 2], blue_to_red * difference, atol=0.3)
     assert not len(appearance_rows(7, explanation, TABLES, None, likely, likely, [None] * 4))
 
 
 def test_masks_have_no_looks() -> None:
     views, likely = painted()
-    assert not len(looks([mask(camera, STANDING) for camera in CAMERAS], likely))
-    assert not len(looks(views, [None] * 4))
+    assert not len(rows_of([mask(camera, STANDING) for camera in CAMERAS], likely))
+    assert not len(rows_of(views, [None] * 4))
 
 
 # Files
@@ -149,16 +149,20 @@ def source(folder: Path, features: Floats, **more: object) -> Source:
 def test_rows_of_features_are_those_of_the_boxes(tmp_path: Path) -> None:
     """Boxes need not be in the order of frames, and some are left out by their scores."""
     stream = open_stream(source(tmp_path, np.arange(4.0)[:, None] + [0, 10], least_score=0.5), CAMERAS[0])
-    told = [seen for seen in iter(stream.read, None) if isinstance(seen, Boxes) and seen.features is not None]
-    assert [seen.features.tolist() for seen in told] == [[[2, 12]], [[3, 13]], [[0, 10]]]  # type: ignore[union-attr]
-    assert [seen.pixel[:, 0].tolist() for seen in told] == [[20], [30], [0]]
+    means = [
+        found_boxes
+        for found_boxes in iter(stream.read, None)
+        if isinstance(found_boxes, Boxes) and found_boxes.features is not None
+    ]
+    assert [b.features.tolist() for b in means] == [[[2, 12]], [[3, 13]], [[0, 10]]]  # type: ignore[union-attr]
+    assert [b.pixel[:, 0].tolist() for b in means] == [[20], [30], [0]]
 
 
 def test_the_rig_file_names_the_file_of_features(tmp_path: Path) -> None:
     sources = tuple(CameraSource(source(tmp_path, np.zeros((4, 2)))) for _ in CAMERAS)
     text = format_rig(Recording(tmp_path / "rig.toml", RIG, sources), tmp_path / "rig.toml")
     assert 'appearance = "looks.npy"' in text
-    assert [own.source.appearance for own in parse_rig(text, tmp_path / "rig.toml").sources] == [
+    assert [of_person.source.appearance for of_person in parse_rig(text, tmp_path / "rig.toml").sources] == [
         tmp_path / "looks.npy"
     ] * 4
 
@@ -190,7 +194,7 @@ def test_a_missing_or_broken_file_is_named(tmp_path: Path) -> None:
         open_stream(wanted, CAMERAS[0])
 
 
-def test_axes_are_those_of_the_greatest_variance_whatever_the_means_of_cameras() -> None:
+def test_axes_are_those_of_the_greatest_variance() -> None:
     rng = np.random.default_rng(2)
     spread = np.zeros(40)
     spread[[3, 17]] = 5.0, 2.0

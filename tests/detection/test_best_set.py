@@ -71,7 +71,7 @@ def test_groups_interact_within_and_their_scores_add_up(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", range(10))
 def test_each_group_is_decided_by_itself(seed: int) -> None:
-    """Of nine candidates in three groups the best set is found, though more than can be enumerated stand there."""
+    """The best set of nine candidates in three groups is found, though more than can be enumerated stand there."""
     frame = in_rooms(random_frame(seed, 9), 3)
     best = max(frame.score(s) for s in reference.subsets(9))
     assert frame.score(frame.best_set()) == pytest.approx(best, abs=1e-6)

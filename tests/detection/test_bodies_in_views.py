@@ -72,19 +72,19 @@ def test_matches_by_definition(bodies: Floats, found: list[Floats], seed: int) -
 def test_inside_and_cover_by_definition(bodies: Floats, seed: int) -> None:
     bodies[seed % len(bodies)] = np.nan if seed % 3 == 0 else bodies[0]
     distance = np.random.default_rng(seed).uniform(2, 3, len(bodies))
-    inside, known, everyone = np.empty(len(bodies)), seed % (len(bodies) + 1), range(len(bodies))
+    inside, base, everyone = np.empty(len(bodies)), seed % (len(bodies) + 1), range(len(bodies))
     fill_inside(bodies, WIDTH, HEIGHT, inside)
     views, away, sizes = np.stack([bodies] * 3), np.stack([distance] * 3), np.array([[WIDTH, HEIGHT]] * 3)
     blind = np.array([False, True, False])
-    before = hiders_of(views[:, :known].copy(), away[:, :known].copy(), sizes, blind, no_rows(), 0)
-    hiders = hiders_of(views, away, sizes, blind, before, known)
+    before = hiders_of(views[:, :base].copy(), away[:, :base].copy(), sizes, blind, no_rows(), 0)
+    hiders = hiders_of(views, away, sizes, blind, before, base)
     left = reference.left_by_all(
         BoxEvidence(np.empty(0), np.zeros(0, np.int64), hiders, np.empty((3, len(bodies))), inside)
     )
     np.testing.assert_allclose(inside, [reference.inside(b, WIDTH, HEIGHT) for b in bodies], atol=1e-12)
     hidden = [[reference.cover(bodies, distance, WIDTH, HEIGHT, i, k) for k in everyone] for i in everyone]
-    nobody = np.zeros_like(hidden)
-    np.testing.assert_allclose(1 - left, np.stack([hidden, nobody, hidden]), atol=1e-12)
+    none_hidden = np.zeros_like(hidden)
+    np.testing.assert_allclose(1 - left, np.stack([hidden, none_hidden, hidden]), atol=1e-12)
     assert all((np.diff(hiders.item[a:b]) > 0).all() for a, b in itertools.pairwise(hiders.start))
 
 
@@ -95,8 +95,8 @@ def test_an_outline_is_the_silhouette(step: int) -> None:
     rows, columns = -(-96 // step), -(-128 // step)
     table = BodyTable.of(camera, room().grid)
     first, spans, area = outlines(table, standing[:, :2], standing[:, 2], step, (rows, columns))
-    for j, shown in enumerate(likelihoods([camera], standing[k : k + 1])[0] for k in range(2)):
-        fine = np.pad(shown, ((0, rows * step - 96), (0, columns * step - 128)))
+    for j, raster in enumerate(likelihoods([camera], standing[k : k + 1])[0] for k in range(2)):
+        fine = np.pad(raster, ((0, rows * step - 96), (0, columns * step - 128)))
         silhouette = fine.reshape(rows, step, columns, step).mean((1, 3))
         filled = np.zeros((rows, columns))
         for k, (start, stop) in enumerate(spans[j]):
@@ -121,9 +121,9 @@ def test_sums_inside_are_those_of_the_outlines(seed: int, step: int) -> None:
     sums, whole = sums_inside(table, ground, heights, widths, step, values, owner, np.arange(2))
     for person in range(2):
         first, spans, area = outlines(table, ground[person], heights[person], step, shape, widths[person])
-        shown = np.where((owner < 0) | (owner == person), values, 0).astype(float)
+        raster = np.where((owner < 0) | (owner == person), values, 0).astype(float)
         drawn = [
-            sum(shown[first[i] + k, start:stop].sum() for k, (start, stop) in enumerate(spans[i]) if stop > start)
+            sum(raster[first[i] + k, start:stop].sum() for k, (start, stop) in enumerate(spans[i]) if stop > start)
             for i in range(3)
         ]
         np.testing.assert_allclose(sums[person], drawn, atol=1e-9)

@@ -33,35 +33,35 @@ KINDS = ("pixels", "boxes")
 
 
 @cache
-def pass_of(kind: str) -> Detector:
+def detector_of(kind: str) -> Detector:
     return Detector(room(), [kind] * 4, FEW_HEIGHTS, BODY)
 
 
-def show(kind: str, cameras: Sequence[Camera], standing: Floats) -> list[ViewEvidence]:
-    """What the cameras deliver: exact masks, or a box of everybody."""
+def observed(kind: str, cameras: Sequence[Camera], standing: Floats) -> list[ViewEvidence]:
+    """Observations of the cameras: exact masks, or a box of each person."""
     if kind == "pixels":
         return list(likelihoods(cameras, standing))
     return [boxes(camera, standing) for camera in cameras]
 
 
 def assert_found(explanation: Explanation, standing: Floats, within: float = 0.12) -> Ints:
-    """Assert that these people and nobody else were found; for each the index of whom was found there."""
+    """Assert that just these people were found; for each the index of the person found there."""
     found = explanation.people
     assert len(found) == len(standing), found.ground
     away = np.hypot(*np.moveaxis(standing[:, None, :2] - found.ground, -1, 0))
-    who = np.asarray(away.argmin(1), np.int64)
-    assert len(set(who.tolist())) == len(standing)
+    index = np.asarray(away.argmin(1), np.int64)
+    assert len(set(index.tolist())) == len(standing)
     assert away.min(1).max() < within, (found.ground, standing)
-    return who
+    return index
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_two_people_apart(kind: str) -> None:
     standing = people((-0.83, 0.31), (0.9, -0.62, 1.8))
-    explanation = pass_of(kind).explain(show(kind, room().cameras, standing), None)
-    who = assert_found(explanation, standing)
+    explanation = detector_of(kind).explain(observed(kind, room().cameras, standing), None)
+    index = assert_found(explanation, standing)
     found = explanation.people
-    np.testing.assert_allclose(found.height[who], standing[:, 2], atol=0.11)
+    np.testing.assert_allclose(found.height[index], standing[:, 2], atol=0.11)
     assert (found.evidence > 5).all()
     assert (found.view_evidence > 0.5).all()
     assert found.view_evidence.shape == found.visibility.shape == (4, 2)
@@ -73,41 +73,41 @@ def test_two_people_apart(kind: str) -> None:
 @pytest.mark.parametrize("place", [(0.0, 0.0), (-0.5, 0.2), (0.3, -0.4)])
 def test_a_child_is_found_though_its_height_is_not_tried(place: tuple[float, float]) -> None:
     standing = people((*place, 1.0))
-    explanation = pass_of("pixels").explain(show("pixels", room().cameras, standing), None)
+    explanation = detector_of("pixels").explain(observed("pixels", room().cameras, standing), None)
     assert_found(explanation, standing)
     np.testing.assert_allclose(explanation.people.height, 1.0, atol=0.11)
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_who_explains_what(kind: str) -> None:
+def test_pixels_and_boxes_are_assigned_to_people(kind: str) -> None:
     rig = room()
     standing = people((-0.7, -0.7), (0.8, 0.8))
-    explanation = pass_of(kind).explain(show(kind, rig.cameras, standing), None)
-    near, far = assert_found(explanation, standing)
+    explanation = detector_of(kind).explain(observed(kind, rig.cameras, standing), None)
+    nearest, far = assert_found(explanation, standing)
     points = body_points(np.array([-0.7, -0.7, 1.5]))
     pixel, _ = rig.cameras[0].project(points[::20, :2], points[::20, 2])
     u, v = np.rint(pixel / explanation.raster_step[0]).astype(int).T
     owner = explanation.pixel_assignment[0][v, u]
-    assert (owner == near).mean() > 0.8
+    assert (owner == nearest).mean() > 0.8
     assert not (owner == far).any()
     assert set(np.unique(explanation.pixel_assignment[2]).tolist()) == {-1, 0, 1}
     for owners in explanation.box_assignment:
-        assert sorted(owners.tolist()) == ([near, far] if near < far else [far, near]) * (kind == "boxes")
+        assert sorted(owners.tolist()) == ([nearest, far] if nearest < far else [far, nearest]) * (kind == "boxes")
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_one_behind_the_other_in_a_view(kind: str) -> None:
     rig = room()
     standing = people((-0.5, -0.5, 1.8), (0.1, 0.1, 1.6))
-    seen = show(kind, rig.cameras, standing)
+    views = observed(kind, rig.cameras, standing)
     if kind == "boxes":
-        seen[0] = boxes(rig.cameras[0], standing[:1])
-    explanation = pass_of(kind).explain(seen, None)
-    near, far = assert_found(explanation, standing)
+        views[0] = boxes(rig.cameras[0], standing[:1])
+    explanation = detector_of(kind).explain(views, None)
+    nearest, far = assert_found(explanation, standing)
     if kind == "boxes":
-        assert explanation.box_assignment[0].tolist() == [near]
-        assert explanation.people.visibility[0, far] < 0.3 < 0.9 < explanation.people.visibility[0, near]
-        assert explanation.people.view_evidence[0, far] > -1.0  # a box that nobody expects is not missed
+        assert explanation.box_assignment[0].tolist() == [nearest]
+        assert explanation.people.visibility[0, far] < 0.3 < 0.9 < explanation.people.visibility[0, nearest]
+        assert explanation.people.view_evidence[0, far] > -1.0  # a box that is not expected is not missed
 
 
 def crossing(kind: str) -> tuple[Rig, Detector]:
@@ -120,9 +120,9 @@ def crossing(kind: str) -> tuple[Rig, Detector]:
 @pytest.mark.parametrize("kind", KINDS)
 def test_crossing_lines_of_sight_are_ghosts(kind: str) -> None:
     """HW12 figure 4."""
-    rig, frame_pass = crossing(kind)
+    rig, detector = crossing(kind)
     standing = people((-1.0, -1.0), (1.0, 1.0))
-    explanation = frame_pass.explain(show(kind, rig.cameras, standing), None)
+    explanation = detector.explain(observed(kind, rig.cameras, standing), None)
     assert_found(explanation, standing, within=0.2)
     crossings = np.array([[0.5, -1.5], [-1.5, 0.5]])
     ghosts = explanation.ghosts
@@ -135,27 +135,27 @@ def test_crossing_lines_of_sight_are_ghosts(kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_somebody_hidden_from_all_but_two_views_stays(kind: str) -> None:
+def test_a_person_hidden_from_all_but_two_views_stays(kind: str) -> None:
     rig = room()
     hidden = people((0.0, 1.0, 1.6))
     nearer = people((-0.92, -0.18, 1.8), (0.93, -0.17, 1.8))  # on the lines to the first two cameras
-    everybody = np.concatenate([hidden, nearer])
-    seen = show(kind, rig.cameras, everybody)
+    standing = np.concatenate([hidden, nearer])
+    views = observed(kind, rig.cameras, standing)
     if kind == "boxes":
-        seen[:2] = [boxes(camera, nearer) for camera in rig.cameras[:2]]
-    explanation = pass_of(kind).explain(seen, None)
-    assert_found(explanation, everybody, within=0.2)
+        views[:2] = [boxes(camera, nearer) for camera in rig.cameras[:2]]
+    explanation = detector_of(kind).explain(views, None)
+    assert_found(explanation, standing, within=0.2)
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_an_empty_frame_holds_nobody(kind: str) -> None:
-    seen = show(kind, room().cameras, people())
-    explanation = pass_of(kind).explain(seen, None)
+def test_an_empty_frame_has_no_people(kind: str) -> None:
+    views = observed(kind, room().cameras, people())
+    explanation = detector_of(kind).explain(views, None)
     assert len(explanation.people) == 0
     assert len(explanation.ghosts) == 0
     assert all((owner == -1).all() for owner in explanation.pixel_assignment)
-    # Whoever was there a moment ago is not there now.
-    explanation = pass_of(kind).explain(seen, expecting((0.2, 0.4)))
+    # A track of the frame before is rejected, too.
+    explanation = detector_of(kind).explain(views, expecting((0.2, 0.4)))
     assert len(explanation.people) == 0
     assert len(explanation.ghosts) == 1
     assert explanation.ghosts.evidence[0] < 0
@@ -165,25 +165,25 @@ def test_an_empty_frame_holds_nobody(kind: str) -> None:
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_track_proposes_and_the_frame_decides(kind: str) -> None:
     standing = people((0.2, 0.4))
-    seen = show(kind, room().cameras, standing)
-    explanation = pass_of(kind).explain(seen, expecting((0.25, 0.35), (-1.2, 1.1)))
+    views = observed(kind, room().cameras, standing)
+    explanation = detector_of(kind).explain(views, expecting((0.25, 0.35), (-1.2, 1.1)))
     assert_found(explanation, standing)
 
 
 def only(explanation: Explanation) -> tuple[float, float, int]:
-    """Evidence, prior and walker of the one person found."""
+    """Evidence, prior and track of the one person found."""
     names = ("evidence", "prior", "track_index")
-    (evidence,), (prior,), (walker,) = (getattr(explanation.people, name) for name in names)
-    return float(evidence), float(prior), int(walker)
+    (evidence,), (prior,), (track,) = (getattr(explanation.people, name) for name in names)
+    return float(evidence), float(prior), int(track)
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_newcomer_costs_inside_and_at_the_border_not(kind: str) -> None:
-    """What the views say of somebody stays the same; what spoke before they were asked does not."""
-    newcomer = FEW_HEIGHTS.birth_cost
-    for place, cost in (((0.05, -0.04), newcomer), ((-1.9, 0.1), newcomer * 0.125)):  # half a cell from the edge
-        seen = show(kind, room().cameras, people(place))
-        first, later = pass_of(kind).explain(seen, None), pass_of(kind).explain(seen, no_tracks())
+def test_a_birth_costs_inside_and_not_at_the_border(kind: str) -> None:
+    """The evidence of the views stays the same; the prior does not."""
+    birth_cost = FEW_HEIGHTS.birth_cost
+    for place, cost in (((0.05, -0.04), birth_cost), ((-1.9, 0.1), birth_cost * 0.125)):  # half a cell from the edge
+        views = observed(kind, room().cameras, people(place))
+        first, later = detector_of(kind).explain(views, None), detector_of(kind).explain(views, no_tracks())
         assert_found(first, people(place))
         np.testing.assert_array_equal(first.people.ground, later.people.ground)
         assert only(first)[0] - only(later)[0] == pytest.approx(cost, abs=1e-6)
@@ -192,9 +192,9 @@ def test_a_newcomer_costs_inside_and_at_the_border_not(kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_the_first_frame_costs_nobody_anything(kind: str) -> None:
+def test_births_cost_nothing_in_the_first_frame(kind: str) -> None:
     standing = people((-0.83, 0.31), (0.9, -0.62), (0.1, 1.2, 1.6))
-    found = pass_of(kind).explain(show(kind, room().cameras, standing), None).people
+    found = detector_of(kind).explain(observed(kind, room().cameras, standing), None).people
     size = np.zeros(len(found))
     for spread, off in (
         (BODY.height_spread, found.height - BODY.height_mean),
@@ -208,41 +208,41 @@ def test_the_first_frame_costs_nobody_anything(kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_who_is_expected_is_whom_the_frame_finds(kind: str) -> None:
-    """Everybody is one walker at most, and a walker one person at most; heights tell who of two is whom."""
+def test_tracks_are_assigned_to_the_people_found(kind: str) -> None:
+    """A person continues one track at most, and a track is one person at most; heights tell two apart."""
     standing = people((-0.3, 0.0, 1.8), (0.35, 0.1, 1.6), (-1.2, -1.1))
     expected = expecting((0.05, 0.05, 1.6), (0.0, 0.05, 1.8))
-    explanation = pass_of(kind).explain(show(kind, room().cameras, standing), expected)
-    who = assert_found(explanation, standing)
-    assert explanation.people.track_index[who].tolist() == [1, 0, -1]
-    # More speaks for whoever is known than for any stranger, and less for a stranger inside.
-    first, second, stranger = explanation.people.prior[who]
-    assert min(first, second) > FEW_HEIGHTS.prior_log_odds > stranger + 3
+    explanation = detector_of(kind).explain(observed(kind, room().cameras, standing), expected)
+    index = assert_found(explanation, standing)
+    assert explanation.people.track_index[index].tolist() == [1, 0, -1]
+    # The prior of a track is higher than that of any birth, and that of a birth inside is lower.
+    first, second, birth = explanation.people.prior[index]
+    assert min(first, second) > FEW_HEIGHTS.prior_log_odds > birth + 3
 
 
-def test_somebody_expected_stays_though_one_view_alone_shows_them() -> None:
-    """Three nearer people hide them from the other views; a stranger who is seen so badly is not believed."""
+def test_a_track_stays_though_one_view_alone_shows_it() -> None:
+    """Three nearer people hide the person from the other views; without a track, so little evidence is a ghost."""
     rig = room()
     hidden = people((0.0, 0.0, 1.6))
     nearer = people((-0.5, -0.5, 1.85), (0.5, -0.49, 1.85), (0.49, 0.5, 1.85))
-    everybody = np.concatenate([hidden, nearer])
-    seen: list[ViewEvidence] = [boxes(camera, nearer) for camera in rig.cameras[:3]]
-    seen.append(boxes(rig.cameras[3], everybody))
-    known = [tuple(person) for person in nearer]
-    explanation = pass_of("boxes").explain(seen, expecting((0.03, -0.02, 1.6), *known))
-    who = assert_found(explanation, everybody)
-    assert explanation.people.track_index[who].tolist() == [0, 1, 2, 3]
-    assert (explanation.people.visibility[:, who[0]] < [0.5, 0.5, 0.5, 1.1]).all()
-    assert_found(pass_of("boxes").explain(seen, expecting(*known)), nearer)
+    standing = np.concatenate([hidden, nearer])
+    views: list[ViewEvidence] = [boxes(camera, nearer) for camera in rig.cameras[:3]]
+    views.append(boxes(rig.cameras[3], standing))
+    tracked = [tuple(person) for person in nearer]
+    explanation = detector_of("boxes").explain(views, expecting((0.03, -0.02, 1.6), *tracked))
+    index = assert_found(explanation, standing)
+    assert explanation.people.track_index[index].tolist() == [0, 1, 2, 3]
+    assert (explanation.people.visibility[:, index[0]] < [0.5, 0.5, 0.5, 1.1]).all()
+    assert_found(detector_of("boxes").explain(views, expecting(*tracked)), nearer)
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_blind_view_says_nothing(kind: str) -> None:
+def test_a_blind_view_is_no_evidence(kind: str) -> None:
     standing = people((-0.83, 0.31), (0.9, -0.62))
     cameras = corner_cameras()
-    seen = show(kind, cameras, standing)
-    three = Detector(rig_of(cameras[:3]), [kind] * 3, FEW_HEIGHTS, BODY).explain(seen[:3], None)
-    four = pass_of(kind).explain([*seen[:3], None], None)
+    views = observed(kind, cameras, standing)
+    three = Detector(rig_of(cameras[:3]), [kind] * 3, FEW_HEIGHTS, BODY).explain(views[:3], None)
+    four = detector_of(kind).explain([*views[:3], None], None)
     np.testing.assert_allclose(four.people.ground, three.people.ground, atol=1e-9)
     np.testing.assert_array_equal(four.people.height, three.people.height)
     np.testing.assert_allclose(four.people.view_evidence[:3], three.people.view_evidence, atol=1e-9)
@@ -254,52 +254,52 @@ def test_a_blind_view_says_nothing(kind: str) -> None:
 
 def test_all_blind() -> None:
     for kind in KINDS:
-        assert len(pass_of(kind).explain([None] * 4, None).people) == 0
+        assert len(detector_of(kind).explain([None] * 4, None).people) == 0
 
 
-def test_nobody_is_sought_where_nothing_speaks_for_it() -> None:
+def test_no_ghosts_without_evidence() -> None:
     for kind in KINDS:
-        assert len(pass_of(kind).explain([None] * 4, None).ghosts) == 0
+        assert len(detector_of(kind).explain([None] * 4, None).ghosts) == 0
     three = Detector(rig_of(corner_cameras()[:3]), ["boxes"] * 3, FEW_HEIGHTS, BODY)
     assert len(three.explain([no_boxes()] * 3, None).ghosts) == 0
 
 
-def test_parts_stand_in_the_order_of_the_rig() -> None:
+def test_view_evidence_is_in_the_order_of_the_rig() -> None:
     """A rig that mixes both kinds: what a view says stands in that view's row."""
     cameras = corner_cameras()
     kinds = ["pixels", "boxes", "pixels", "boxes"]
     standing = people((0.4, 0.3))
-    seen: list[ViewEvidence] = [show(kind, [c], standing)[0] for kind, c in zip(kinds, cameras, strict=True)]
-    frame_pass = Detector(rig_of(cameras), kinds, FEW_HEIGHTS, BODY)
-    for silent, kind in enumerate(kinds):
-        partly = [*seen]
-        partly[silent] = show(kind, cameras[silent : silent + 1], people())[0]
-        parts = frame_pass.explain(partly, None).people.view_evidence[:, 0]
-        assert [bool(p < 0) for p in parts] == [k == silent for k in range(4)], (silent, parts)
+    views: list[ViewEvidence] = [observed(kind, [c], standing)[0] for kind, c in zip(kinds, cameras, strict=True)]
+    detector = Detector(rig_of(cameras), kinds, FEW_HEIGHTS, BODY)
+    for empty, kind in enumerate(kinds):
+        one_empty = [*views]
+        one_empty[empty] = observed(kind, cameras[empty : empty + 1], people())[0]
+        parts = detector.explain(one_empty, None).people.view_evidence[:, 0]
+        assert [bool(p < 0) for p in parts] == [k == empty for k in range(4)], (empty, parts)
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_same_frame_twice(kind: str) -> None:
     rig = room()
     first, second = people((-0.83, 0.31), (0.9, -0.62), (0.5, 0.1)), people((0.1, 0.1))
-    fresh = Detector(rig, [kind] * 4, FEW_HEIGHTS, BODY).explain(show(kind, rig.cameras, first), None)
-    used = pass_of(kind)
-    used.explain(show(kind, rig.cameras, second), None)
-    again = used.explain(show(kind, rig.cameras, first), None)
+    new = Detector(rig, [kind] * 4, FEW_HEIGHTS, BODY).explain(observed(kind, rig.cameras, first), None)
+    used = detector_of(kind)
+    used.explain(observed(kind, rig.cameras, second), None)
+    again = used.explain(observed(kind, rig.cameras, first), None)
     for name in ("ground", "height", "covariance", "evidence", "view_evidence", "visibility", "prior", "track_index"):
-        np.testing.assert_array_equal(getattr(fresh.people, name), getattr(again.people, name))
-        np.testing.assert_array_equal(getattr(fresh.ghosts, name), getattr(again.ghosts, name))
+        np.testing.assert_array_equal(getattr(new.people, name), getattr(again.people, name))
+        np.testing.assert_array_equal(getattr(new.ghosts, name), getattr(again.ghosts, name))
 
 
-def test_boxes_of_things_are_nobody() -> None:
+def test_a_box_in_one_view_alone_is_no_person() -> None:
     """A box in one view that no other view bears out."""
     rig = room()
     standing = people((-0.83, 0.31))
     thing = boxes(rig.cameras[1], people((1.0, 0.9)))
-    seen: list[ViewEvidence] = list(show("boxes", rig.cameras, standing))
-    seen[1] = together([boxes(rig.cameras[1], standing), thing])
-    explanation = pass_of("boxes").explain(seen, None)
+    views: list[ViewEvidence] = list(observed("boxes", rig.cameras, standing))
+    views[1] = together([boxes(rig.cameras[1], standing), thing])
+    explanation = detector_of("boxes").explain(views, None)
     assert_found(explanation, standing)
     assert explanation.box_assignment[1].tolist() == [0, -1]
-    seen[1] = no_boxes()
-    assert_found(pass_of("boxes").explain(seen, None), standing)
+    views[1] = no_boxes()
+    assert_found(detector_of("boxes").explain(views, None), standing)

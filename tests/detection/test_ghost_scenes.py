@@ -45,7 +45,7 @@ FRAMES = 20
 FIGURE_4 = people((-1.0, -1.0), (1.0, 1.0))
 """HW12 figure 4: two cameras whose lines of sight to two people cross in four places."""
 FIGURE_4_GHOSTS = np.array([[0.5, -1.5], [-1.5, 0.5]])
-"""Where they cross with nobody there, so near to the cameras that the bodies would be small."""
+"""Where they cross without a person, so near to the cameras that the bodies would be small."""
 FIVE = (
     people((-1.2, -0.3, 1.75), (-0.2, 1.2, 1.6), (0.4, -1.1, 1.8), (1.3, 0.5), (0.3, 0.2, 1.65)),
     people((1.2, -1.3), (-0.3, -0.6, 1.8), (0.4, 1.4, 1.65), (-1.4, 0.7, 1.75), (-1.1, -1.4, 1.6)),
@@ -65,12 +65,12 @@ def pass_of(kind: str, cameras: int) -> Detector:
 
 
 def show(kind: str, cameras: Sequence[Camera], standing: Floats) -> list[ViewEvidence]:
-    """Exact silhouettes, or a box of everybody."""
+    """Exact silhouettes, or a box of each person."""
     return list(likelihoods(cameras, standing)) if kind == "pixels" else [boxes(c, standing) for c in cameras]
 
 
 def assert_these(explanation: Explanation, standing: Floats, within: float = 0.25) -> None:
-    """Assert that these people and nobody else were found."""
+    """Assert that just these people were found."""
     found = explanation.people.ground
     who, _ = assign(distances(standing[:, :2], found), within)
     assert len(who) == len(standing) == len(found), found
@@ -91,13 +91,13 @@ def test_figure_4(kind: str) -> None:
 @pytest.mark.parametrize("cameras", [2, 3, 4])
 @pytest.mark.parametrize("scene", [0, 1])
 def test_five_people(kind: str, cameras: int, scene: int) -> None:
-    """At once in a first frame, of which nothing is known, and once they are known."""
+    """At once in a first frame without tracks, and again with their tracks."""
     standing, frame_pass = FIVE[scene], pass_of(kind, cameras)
-    seen = show(kind, corner_cameras()[:cameras], standing)
-    first = frame_pass.explain(seen, None)
+    views = show(kind, corner_cameras()[:cameras], standing)
+    first = frame_pass.explain(views, None)
     assert_these(first, standing)
     assert_these(
-        frame_pass.explain(seen, expecting(*(tuple(p) for p in standing + np.array([0.06, -0.05, 0])))), standing
+        frame_pass.explain(views, expecting(*(tuple(p) for p in standing + np.array([0.06, -0.05, 0])))), standing
     )
     if kind == "pixels" and cameras == 2:
         assert len(first.ghosts) >= 3
@@ -113,7 +113,7 @@ def strollers(frame: int) -> Floats:
 
 
 def crossings(standing: Floats, rig: Rig) -> Floats:
-    """Where the lines of sight of the two cameras to two people cross with nobody there, float64 (2, 2)."""
+    """Where the lines of sight of the two cameras to two people cross without a person, float64 (2, 2)."""
     west, south = (camera.centre[:2] for camera in rig.cameras)
     found = []
     for one, other in ((0, 1), (1, 0)):
@@ -125,7 +125,7 @@ def crossings(standing: Floats, rig: Rig) -> Floats:
 
 @dataclass(frozen=True)
 class Run:
-    """What the whole way made of a scene."""
+    """A scene after the whole way."""
 
     steps: list[CommittedFrames]
     tracks: Tracks
@@ -164,25 +164,25 @@ def test_the_moving_ghost_is_borne_out_by_both_views() -> None:
     nothing_known = Prior.of(None, FEW_HEIGHTS, BODY, frame_pass.border)
     ground = frame_pass.lattice_ground.reshape(-1, 2)
     for frame in range(FRAMES):
-        seen, said = frame_pass.observe(show("pixels", rig.cameras, strollers(frame))), np.zeros((3, len(ground)))
-        evidence, lattice = frame_pass.evidence(seen, nothing_known), frame_pass.pixel_lattice
-        nobody = np.full(int(lattice.shapes.prod(1).sum()), -1, np.int16)
-        pixels = UnexplainedPixels.of(evidence.rasters, nobody, lattice, evidence.extremes)
+        views, score = frame_pass.observe(show("pixels", rig.cameras, strollers(frame))), np.zeros((3, len(ground)))
+        evidence, lattice = frame_pass.evidence(views, nothing_known), frame_pass.pixel_lattice
+        no_owner = np.full(int(lattice.shapes.prod(1).sum()), -1, np.int16)
+        pixels = UnexplainedPixels.of(evidence.rasters, no_owner, lattice, evidence.extremes)
         weight = FEW_HEIGHTS.effective_observations
-        fill_scores(pixels, lattice, np.array([1]), np.zeros(0, np.int64), -np.inf, weight, said)
+        fill_scores(pixels, lattice, np.array([1]), np.zeros(0, np.int64), -np.inf, weight, score)
         here = distances(ground, crossings(strollers(frame), rig)).min(1) < 0.3
-        worth += said[1, here].max() > -FEW_HEIGHTS.prior_log_odds
+        worth += score[1, here].max() > -FEW_HEIGHTS.prior_log_odds
     assert worth > 0.8 * FRAMES
 
 
 def test_a_ghost_is_not_picked_up_by_the_cut_in_later_frames() -> None:
-    """Its cells hold what nobody explains of the evidence, which is nothing: they stay free."""
-    rig, near = facing_pair(), 0.35
+    """Its cells hold the unexplained evidence, which is none: they stay free."""
+    rig, radius = facing_pair(), 0.35
     for step in moving_ghosts("pixels").steps:
         for scene, label in zip(step.commit.frames, step.commit.label, strict=True):
             standing = strollers(scene.frame)
             for ghost in crossings(standing, rig):
-                cells = np.hypot(*np.moveaxis(rig.grid.ground - ghost, -1, 0)) < near
+                cells = np.hypot(*np.moveaxis(rig.grid.ground - ghost, -1, 0)) < radius
                 cells &= np.hypot(*np.moveaxis(rig.grid.ground[..., None, :] - standing[:, :2], -1, 0)).min(-1) > 0.6
                 assert not label[:, cells].any(), (scene.frame, ghost)
 
@@ -196,11 +196,11 @@ def test_somebody_hidden_from_all_views_but_one_stays(kind: str) -> None:
         side = max(1.2 - 0.1 * frame, 0.0)
         corners = (-0.45 + side, -0.45 - side), (0.45 + side, -0.44 + side), (0.44 - side, 0.45 + side)
         nearer = people(*((x, y, 1.9) for x, y in corners))
-        everybody = np.concatenate([hidden, nearer])
-        seen = show(kind, rig.cameras, everybody)
+        standing = np.concatenate([hidden, nearer])
+        views = show(kind, rig.cameras, standing)
         if kind == "boxes" and side < 0.2:
-            seen[:3] = [boxes(camera, nearer) for camera in rig.cameras[:3]]
-        found = pass_of(kind, 4).explain(seen, follow.predict(frame))
+            views[:3] = [boxes(camera, nearer) for camera in rig.cameras[:3]]
+        found = pass_of(kind, 4).explain(views, follow.predict(frame))
         chains = follow.update(frame, found.people, found.ghosts)
         away = distances(found.people.ground, hidden[:, :2])[:, 0]
         assert away.min() < 0.25, (frame, found.people.ground)

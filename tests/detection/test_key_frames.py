@@ -35,8 +35,8 @@ def show(kind: str, standing: Floats) -> list[ViewEvidence]:
 
 
 def explained(kind: str, frame: int, standing: Floats, predicted: PredictedTracks) -> Explanation:
-    asked = detector(kind)
-    return asked.explain_next(asked.new_estimates(), frame, show(kind, standing), predicted)
+    detector_of_kind = detector(kind)
+    return detector_of_kind.explain_next(detector_of_kind.new_estimates(), frame, show(kind, standing), predicted)
 
 
 def is_searched(explanation: Explanation) -> bool:
@@ -78,10 +78,10 @@ def test_known_people_are_followed_to_where_a_search_finds_them(kind: str) -> No
 def test_the_whole_frame_is_searched_where_something_is_open(
     kind: str, standing: Sequence[Sequence[float]], predicted: Sequence[Sequence[float]]
 ) -> None:
-    seen, expected = people(*standing), expecting(*predicted)
-    asked = detector(kind)
-    by_search = asked.explain(show(kind, seen), expected)
-    answer = explained(kind, BETWEEN, seen, expected)
+    views, expected = people(*standing), expecting(*predicted)
+    detector_of_kind = detector(kind)
+    by_search = detector_of_kind.explain(show(kind, views), expected)
+    answer = explained(kind, BETWEEN, views, expected)
     assert len(answer.people) == len(standing)
     np.testing.assert_array_equal(answer.people.ground, by_search.people.ground)
     np.testing.assert_array_equal(answer.people.sizes.height, by_search.people.sizes.height)
@@ -89,12 +89,12 @@ def test_the_whole_frame_is_searched_where_something_is_open(
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_who_lingers_beyond_the_border_needs_no_search(kind: str) -> None:
-    everybody = (*HERE, (room().grid.x[1] + 0.05, 0.4, 1.75))
-    answer = explained(kind, BETWEEN, people(*everybody), expecting(*everybody))
+    all_three = (*HERE, (room().grid.x[1] + 0.05, 0.4, 1.75))
+    answer = explained(kind, BETWEEN, people(*all_three), expecting(*all_three))
     assert not is_searched(answer)
     who = answer.people.track_index
     assert sorted(who.tolist()) == [0, 1, 2]
-    np.testing.assert_allclose(answer.people.ground, people(*everybody)[who, :2], atol=0.04)
+    np.testing.assert_allclose(answer.people.ground, people(*all_three)[who, :2], atol=0.04)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -112,12 +112,12 @@ def test_an_empty_room_stays_empty() -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_walkers_are_followed_as_by_searches(kind: str) -> None:
-    truth, asked = walkers(24), detector(kind)
-    follow, learned = TrackFilter(RATE, CONFIG), asked.new_estimates()
+    truth, detector_of_kind = walkers(24), detector(kind)
+    follow, learned = TrackFilter(RATE, CONFIG), detector_of_kind.new_estimates()
     names, searched = set[int](), 0
     for frame in range(24):
         standing = standing_at(truth, frame)
-        answer = asked.explain_next(learned, frame, show(kind, standing), follow.predict(frame))
+        answer = detector_of_kind.explain_next(learned, frame, show(kind, standing), follow.predict(frame))
         names |= set(follow.update(frame, answer.people, answer.ghosts).tolist())
         searched += is_searched(answer)
         away = np.hypot(*(answer.people.ground[:, None] - standing[:, :2]).transpose(2, 0, 1))

@@ -34,23 +34,23 @@ def detector(*kinds: str) -> Detector:
 
 
 def silhouettes(ground: Floats, width: float) -> list[Singles]:
-    """What the room's cameras show of people 1.7 m high at ground (n, 2), so wide beside the common silhouette."""
-    seen = []
+    """Views of the room's cameras of people 1.7 m high at ground (n, 2), so wide relative to the common silhouette."""
+    views = []
     for view in detector().views:
-        shown = np.zeros(view.camera.size[::-1], np.float32)
+        raster = np.zeros(view.camera.size[::-1], np.float32)
         tall, wide = np.full(len(ground), 1.7), np.full(len(ground), width)
-        for first, spans in zip(*outlines(view.table, ground, tall, 1, shown.shape[:2], wide)[:2], strict=True):
+        for first, spans in zip(*outlines(view.table, ground, tall, 1, raster.shape[:2], wide)[:2], strict=True):
             for k, (start, stop) in enumerate(spans):
-                shown[first + k, start:stop] = 1.0
-        seen.append(shown)
-    return seen
+                raster[first + k, start:stop] = 1.0
+        views.append(raster)
+    return views
 
 
-def members_at(ground: Floats, seen: list[Singles]) -> MapEstimate:
-    """An estimate whose members are people of mean size at ground (n, 2)."""
-    asked = detector()
-    prior = Prior.of(None, asked.config, asked.body, asked.border)
-    evidence = asked.evidence(asked.observe(seen), prior)
+def members_at(ground: Floats, views: list[Singles]) -> MapEstimate:
+    """An estimate with members of mean size at ground (n, 2)."""
+    own_detector = detector()
+    prior = Prior.of(None, own_detector.config, own_detector.body, own_detector.border)
+    evidence = own_detector.evidence(own_detector.observe(views), prior)
     pool = Candidates(ground, np.full(len(ground), 1.7), np.full(len(ground), BODY.width_mean))
     members = np.arange(len(ground))
     return MapEstimate.of_search(evidence, pool, members).with_members(members)
@@ -88,10 +88,10 @@ def test_two_people_half_a_metre_apart_are_found_as_two() -> None:
 
 def test_a_third_person_is_no_part_of_a_merge() -> None:
     ground = np.concatenate([pair(0.3), [[1.2, 1.0]]])
-    seen = [
+    views = [
         np.maximum(*both) for both in zip(silhouettes(ground[2:], 1.0), silhouettes(pair(0.0)[:1], 1.5), strict=True)
     ]
-    after = merged(members_at(ground, seen))
+    after = merged(members_at(ground, views))
     assert len(after.members) == 2 and 2 in after.members
 
 
@@ -111,13 +111,13 @@ def test_a_merge_is_the_better_of_both_sets_by_the_plain_score(width: float, dis
 def test_members_far_apart_and_members_in_boxes_are_left_alone() -> None:
     far = members_at(pair(0.7), silhouettes(pair(0.7), 1.0))
     assert merged(far) is far
-    asked = detector(*["boxes"] * 4)
-    seen = [boxes(camera, np.column_stack([pair(0.5), [1.7, 1.7]])) for camera in room().cameras]
-    prior = Prior.of(None, asked.config, asked.body, asked.border)
-    evidence = asked.evidence(asked.observe(seen), prior)
-    near = MapEstimate.of_search(evidence, Candidates(pair(0.5), np.full(2, 1.7), np.full(2, 0.42)), np.arange(2))
-    assert len(near.members) == 2
-    assert merged(near) is near
+    own_detector = detector(*["boxes"] * 4)
+    views = [boxes(camera, np.column_stack([pair(0.5), [1.7, 1.7]])) for camera in room().cameras]
+    prior = Prior.of(None, own_detector.config, own_detector.body, own_detector.border)
+    evidence = own_detector.evidence(own_detector.observe(views), prior)
+    close_pair = MapEstimate.of_search(evidence, Candidates(pair(0.5), np.full(2, 1.7), np.full(2, 0.42)), np.arange(2))
+    assert len(close_pair.members) == 2
+    assert merged(close_pair) is close_pair
 
 
 # The hard core
@@ -132,8 +132,8 @@ def test_the_hard_core_stands_where_a_view_delivers_pixels() -> None:
 
 def nearest_pair(ground: Floats) -> float:
     """Distance of the two nearest of some places, metres; infinite for fewer than two."""
-    apart = np.hypot(*np.moveaxis(ground[:, None] - ground, -1, 0)) + np.diag(np.full(len(ground), np.inf))
-    return float(apart.min(initial=np.inf))
+    distance = np.hypot(*np.moveaxis(ground[:, None] - ground, -1, 0)) + np.diag(np.full(len(ground), np.inf))
+    return float(distance.min(initial=np.inf))
 
 
 def crowd(seed: int) -> Floats:
@@ -150,21 +150,21 @@ def twins(standing: Floats) -> PredictedTracks:
     return expecting(*doubled)
 
 
-def dilated(shown: Singles) -> Singles:
-    """A map whose foreground is two pixels wider on all sides."""
-    return np.asarray(cv2.dilate(shown, np.ones((5, 5), np.uint8)), np.float32)
+def dilated(raster: Singles) -> Singles:
+    """A map with foreground two pixels wider on all sides."""
+    return np.asarray(cv2.dilate(raster, np.ones((5, 5), np.uint8)), np.float32)
 
 
 def crowded(kinds: Sequence[str], seed: int) -> Iterator[tuple[Sequence[ViewEvidence], PredictedTracks | None]]:
     """A crowd in silhouettes that are too wide and in boxes: in a first frame, and with two tracks on each person."""
     standing = crowd(seed)
-    masks = [dilated(shown) for shown in likelihoods(room().cameras, standing)]
-    seen: list[ViewEvidence] = [
+    masks = [dilated(raster) for raster in likelihoods(room().cameras, standing)]
+    views: list[ViewEvidence] = [
         mask if kind == "pixels" else boxes(camera, standing)
         for kind, mask, camera in zip(kinds, masks, room().cameras, strict=True)
     ]
-    yield seen, None
-    yield seen, twins(standing)
+    yield views, None
+    yield views, twins(standing)
 
 
 @pytest.mark.parametrize("observations", [4.0, 40.0])
@@ -174,24 +174,24 @@ def test_no_two_members_stand_within_the_hard_core(
     observations: float, kinds: list[str], seed: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # Each view speaks for ten views in the second case, which outvote any cost of crowding but the core.
-    asked = Detector(room(), kinds, replace(FEW_HEIGHTS, effective_observations=observations), BODY)
+    own_detector = Detector(room(), kinds, replace(FEW_HEIGHTS, effective_observations=observations), BODY)
     final: list[Floats] = []
 
-    def kept(estimate: MapEstimate) -> Explanation:
+    def recorded_explanation(estimate: MapEstimate) -> Explanation:
         final.append(estimate.pool.ground[estimate.members])
         return explained_frame(estimate)
 
-    monkeypatch.setattr("stseg.detection.detector.explained_frame", kept)
-    for seen, predicted in crowded(kinds, seed):
-        asked.explain(seen, predicted)
+    monkeypatch.setattr("stseg.detection.detector.explained_frame", recorded_explanation)
+    for views, predicted in crowded(kinds, seed):
+        own_detector.explain(views, predicted)
     assert len(final) == 2
     for ground in final:
         assert len(ground) > 2
-        assert nearest_pair(ground) >= asked.parameters.hard_core
+        assert nearest_pair(ground) >= own_detector.parameters.hard_core
 
 
 @pytest.mark.parametrize("seed", range(6))
 def test_no_two_refined_places_are_within_the_hard_core(seed: int) -> None:
-    asked = detector()
-    for seen, predicted in crowded(["pixels"] * 4, seed):
-        assert nearest_pair(asked.explain(seen, predicted).people.ground) >= asked.parameters.hard_core
+    own_detector = detector()
+    for views, predicted in crowded(["pixels"] * 4, seed):
+        assert nearest_pair(own_detector.explain(views, predicted).people.ground) >= own_detector.parameters.hard_core

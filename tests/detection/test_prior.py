@@ -1,4 +1,4 @@
-"""What is known of a frame before any view is asked: who is expected, who may come in where, and who is whom."""
+"""The prior of a frame: predicted tracks, their assignment, and the cost of births."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ PLACES = st.tuples(numbers(-2, 2), numbers(-2, 2))
 SPREADS = st.tuples(numbers(0.05, 0.6), numbers(0.05, 0.6), numbers(-0.9, 0.9)).map(
     lambda s: np.array([[s[0] ** 2, s[0] * s[1] * s[2]], [s[0] * s[1] * s[2], s[1] ** 2]])
 )
-WALKERS = st.tuples(PLACES, SPREADS, numbers(1.4, 2.0), numbers(0.03, 0.12), numbers(-6, 1))
+TRACKS = st.tuples(PLACES, SPREADS, numbers(1.4, 2.0), numbers(0.03, 0.12), numbers(-6, 1))
 CANDIDATES = st.tuples(PLACES, numbers(1.5, 1.9))
 
 
@@ -39,88 +39,88 @@ def population(height: float) -> float:
     return peak - (deviation**2 / 2 if deviation < 2 else 2 + 4 * math.log(deviation / 2))
 
 
-def expected_of(walkers: list[tuple[tuple[float, float], Floats, float, float, float]]) -> PredictedTracks:
-    place, covariance, height, sd, odds = zip(*walkers, strict=True)
+def tracks_of(tracks: list[tuple[tuple[float, float], Floats, float, float, float]]) -> PredictedTracks:
+    place, covariance, height, sd, odds = zip(*tracks, strict=True)
     sizes = Sizes(np.array(height), np.array(sd) ** 2, np.full(len(sd), 0.42), np.array(sd) ** 2)
     return PredictedTracks(np.array(place), np.array(covariance), sizes, np.array(odds))
 
 
 @settings(deadline=None)
-@given(st.lists(WALKERS, min_size=1, max_size=3), st.lists(CANDIDATES, max_size=3))
-def test_what_speaks_for_a_walker_by_hand(
-    walkers: list[tuple[tuple[float, float], Floats, float, float, float]],
+@given(st.lists(TRACKS, min_size=1, max_size=3), st.lists(CANDIDATES, max_size=3))
+def test_log_ratio_of_a_track_by_hand(
+    tracks: list[tuple[tuple[float, float], Floats, float, float, float]],
     candidates: list[tuple[tuple[float, float], float]],
 ) -> None:
-    """The ratio of two stories: this walker, who is there and so tall, or a newcomer, anywhere and anybody."""
+    """The ratio of two hypotheses: this track, at its place and height, or a birth, anywhere and of any height."""
     ground = np.array([place for place, _ in candidates]).reshape(-1, 2)
     height = np.array([tall for _, tall in candidates])
-    known = expected_of(walkers).track_log_ratio(ground, height, BODY, CONFIG.prior_log_odds)
-    assert known.shape == (len(candidates), len(walkers))
+    log_ratio = tracks_of(tracks).track_log_ratio(ground, height, BODY, CONFIG.prior_log_odds)
+    assert log_ratio.shape == (len(candidates), len(tracks))
     anywhere = -math.log(2 * math.pi * 0.1**2)  # at the resolution of a frame, which is 0.1 m
     for j, (place, tall) in enumerate(candidates):
-        newcomer = CONFIG.prior_log_odds + anywhere + population(tall)
-        for k, (at, covariance, height_k, sd, odds) in enumerate(walkers):
+        birth = CONFIG.prior_log_odds + anywhere + population(tall)
+        for k, (at, covariance, height_k, sd, odds) in enumerate(tracks):
             shape = reference.normal(tall - height_k, sd**2)
             least = population(tall) - 4.0  # people stoop and sit
-            walker = odds + reference.normal_place(np.subtract(place, at), covariance) + max(shape, least)
-            assert known[j, k] == pytest.approx(walker - newcomer, abs=1e-6)
+            track = odds + reference.normal_place(np.subtract(place, at), covariance) + max(shape, least)
+            assert log_ratio[j, k] == pytest.approx(track - birth, abs=1e-6)
 
 
-def test_a_place_is_told_up_to_a_constant() -> None:
+def test_log_density_of_a_place_up_to_a_constant() -> None:
     expected = expecting((0.3, -0.4), (1.0, 1.0))
     points = np.array([[0.3, -0.4], [0.5, -0.4], [0.3, 0.2]])
-    told = expected.place_log_density(np.array([1, 0]), points[[[2, 1, 0], [0, 1, 2]]])
-    for k, walker in enumerate((1, 0)):
-        by_hand = [reference.normal_place(p - expected.ground[walker], expected.covariance[walker]) for p in points]
-        at_home = reference.normal_place(np.zeros(2), expected.covariance[walker])
-        np.testing.assert_allclose(told[k], np.subtract(by_hand, at_home)[[[2, 1, 0], [0, 1, 2]][k]], atol=1e-9)
+    log_density = expected.place_log_density(np.array([1, 0]), points[[[2, 1, 0], [0, 1, 2]]])
+    for k, track in enumerate((1, 0)):
+        by_hand = [reference.normal_place(p - expected.ground[track], expected.covariance[track]) for p in points]
+        at_home = reference.normal_place(np.zeros(2), expected.covariance[track])
+        np.testing.assert_allclose(log_density[k], np.subtract(by_hand, at_home)[[[2, 1, 0], [0, 1, 2]][k]], atol=1e-9)
 
 
-def test_a_wrong_height_never_rules_a_walker_out() -> None:
-    """Somebody who sits is still there; but two who stand in one place are told apart."""
+def test_a_wrong_height_never_rules_a_track_out() -> None:
+    """A person who sits is still there; but the heights of two in one place differ."""
     expected = expecting((0.0, 0.0, 1.9))
     height = np.array([1.9, 1.7, 1.5, 1.0])
-    known = expected.track_log_ratio(np.zeros((4, 2)), height, BODY, CONFIG.prior_log_odds)[:, 0]
-    assert known[0] > known[1] + 4
-    assert known[0] - known.min() < 12
-    assert np.isfinite(known).all()
+    log_ratio = expected.track_log_ratio(np.zeros((4, 2)), height, BODY, CONFIG.prior_log_odds)[:, 0]
+    assert log_ratio[0] > log_ratio[1] + 4
+    assert log_ratio[0] - log_ratio.min() < 12
+    assert np.isfinite(log_ratio).all()
 
 
-def test_nobody_expected() -> None:
+def test_no_tracks() -> None:
     assert len(no_tracks()) == 0
     assert no_tracks().track_log_ratio(np.zeros((3, 2)), np.full(3, 1.7), BODY, CONFIG.prior_log_odds).shape == (3, 0)
     assert no_tracks().track_log_ratio(np.zeros((0, 2)), np.zeros(0), BODY, CONFIG.prior_log_odds).shape == (0, 0)
     assert expecting((0, 0)).track_log_ratio(np.zeros((0, 2)), np.zeros(0), BODY, CONFIG.prior_log_odds).shape == (0, 1)
 
 
-# Who is whom
+# Assignment of tracks
 
 
 @settings(deadline=None)
 @given(st.integers(0, 5), st.integers(0, 5), st.integers(0, 999))
-def test_tracks_are_assigned_at_the_greatest_sum(people: int, walkers: int, seed: int) -> None:
+def test_tracks_are_assigned_at_the_greatest_sum(people: int, tracks: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
     candidates = people + 2
-    known, newcomer = rng.normal(-2, 4, (candidates, walkers)), rng.uniform(0, 5, candidates)
+    log_ratio, birth = rng.normal(-2, 4, (candidates, tracks)), rng.uniform(0, 5, candidates)
     members = rng.permutation(candidates)[:people]
-    taken_by = np.full(walkers + 2, 77)
-    total = track_score(members, people, known, newcomer, taken_by)
-    gain = (newcomer[:, None] + known)[members].reshape(people, walkers)
+    member_of = np.full(tracks + 2, 77)
+    total = track_score(members, people, log_ratio, birth, member_of)
+    gain = (birth[:, None] + log_ratio)[members].reshape(people, tracks)
     pairs = reference.best_pairs(gain)
     assert total == pytest.approx(sum(gain[pair] for pair in pairs))
     place = {k: a for a, k in pairs}
-    assert taken_by.tolist() == [*(place.get(k, -1) for k in range(walkers)), 77, 77]
+    assert member_of.tolist() == [*(place.get(k, -1) for k in range(tracks)), 77, 77]
     assert total == pytest.approx(reference.most_of_pairs(gain))
 
 
-def test_a_walker_speaks_for_one_candidate() -> None:
-    known, newcomer, taken_by = np.array([[3.0], [2.5]]), np.array([5.0, 5.0]), np.zeros(1, np.int64)
-    assert track_score(np.array([0, 1]), 2, known, newcomer, taken_by) == 8.0
-    assert taken_by.tolist() == [0]
-    assert track_score(np.array([1, 0]), 1, known, newcomer, taken_by) == 7.5
-    assert taken_by.tolist() == [0]
-    assert track_score(np.array([0, 1]), 2, known - 9, newcomer, taken_by) == 0.0
-    assert taken_by.tolist() == [-1]  # whom it does not help to be walker is a newcomer
+def test_a_track_is_of_one_candidate() -> None:
+    log_ratio, birth, member_of = np.array([[3.0], [2.5]]), np.array([5.0, 5.0]), np.zeros(1, np.int64)
+    assert track_score(np.array([0, 1]), 2, log_ratio, birth, member_of) == 8.0
+    assert member_of.tolist() == [0]
+    assert track_score(np.array([1, 0]), 1, log_ratio, birth, member_of) == 7.5
+    assert member_of.tolist() == [0]
+    assert track_score(np.array([0, 1]), 2, log_ratio - 9, birth, member_of) == 0.0
+    assert member_of.tolist() == [-1]  # a track that does not help leaves a birth
 
 
 # Where people come in
@@ -153,23 +153,23 @@ def test_distance_by_trying_all_cells(polygon: list[tuple[float, float]] | None,
     grid = Grid(AREA, AREA, 0.25, 1.8, 2, corners)
     narrow = [looking("a", (-4.0, 0.0, 2.0), size=(60, 96)), looking("b", (0.0, -4.0, 2.0), size=(40, 96))]
     rig = Rig("part", 8.0, grid, tuple(narrow[:cameras]) or open_ground(grid).cameras)
-    seen = np.zeros(grid.shape[1:], bool)
+    is_seen = np.zeros(grid.shape[1:], bool)
     for camera in rig.cameras:
         image, ahead = camera.project(grid.ground, 1.0)
-        seen |= ahead & camera.inside(image)
-    assert seen.all() == (cameras == 0)
-    expected = reference.away_from_border(seen & grid.inside(), grid.cell)
+        is_seen |= ahead & camera.inside(image)
+    assert is_seen.all() == (cameras == 0)
+    expected = reference.away_from_border(is_seen & grid.inside(), grid.cell)
     np.testing.assert_allclose(Border.of(rig).distance, expected, atol=1e-9)
 
 
-def test_what_no_view_sees_is_no_place_to_be_known() -> None:
+def test_places_that_no_view_sees_are_outside() -> None:
     ahead = looking("ahead", (0.0, 0.0, 1.5), target=(2.0, 0.0, 1.0))
     border = Border.of(rig_of([ahead]))
     np.testing.assert_array_equal(border.away(np.array([[-1.5, 0.0], [-0.2, 1.0]])), 0.0)
     assert border.away(np.array([[1.5, 0.1]]))[0] > 0.2
 
 
-def test_a_newcomer_costs_away_from_the_border() -> None:
+def test_a_birth_costs_away_from_the_border() -> None:
     border = Border.of(open_ground(Grid((-3.0, 3.0), (-3.0, 3.0), 0.1, 1.8, 2)))
     places = np.array([[-2.95, 0.0], [-2.45, 0.0], [-1.95, 0.0], [0.0, 0.0], [-3.5, 0.0]])
     later = Prior.of(no_tracks(), CONFIG, BODY, border)
@@ -178,7 +178,7 @@ def test_a_newcomer_costs_away_from_the_border() -> None:
     np.testing.assert_array_equal(Prior.of(None, CONFIG, BODY, border).birth_cost(places), 0.0)
 
 
-def test_newcomers_cost_nothing_at_doors_and_all_at_walls() -> None:
+def test_births_cost_nothing_at_doors_and_all_at_walls() -> None:
     rig = open_ground(Grid((-3.0, 3.0), (-3.0, 3.0), 0.1, 1.8, 2))
     places = np.array([[0.0, 0.0], [0.5, 0.0], [1.3, 0.0], [-2.95, 0.0], [-3.5, 0.0]])
     door = (-0.2, -0.1, 0.2, 0.1)
@@ -194,7 +194,7 @@ def test_newcomers_cost_nothing_at_doors_and_all_at_walls() -> None:
 
 
 @pytest.mark.parametrize("closed", [False, True])
-def test_who_stands_in_a_door_stays_a_candidate_and_who_is_beyond_the_border_none(closed: bool) -> None:
+def test_tracks_in_doors_are_candidates_and_outside_none(closed: bool) -> None:
     corners = np.array([[-2.0, -2.0], [2.0, -2.0], [2.0, 2.0], [-2.0, 2.0]])
     rig = open_ground(Grid((-3.0, 3.0), (-3.0, 3.0), 0.1, 1.8, 2, corners))
     border = Border.of(replace(rig, doors=((-0.2, -0.1, 0.2, 0.1),), closed=closed))
@@ -202,7 +202,7 @@ def test_who_stands_in_a_door_stays_a_candidate_and_who_is_beyond_the_border_non
     np.testing.assert_array_equal(prior.pool().ground, [[0.0, 0.0], [1.0, 0.5]])
 
 
-def test_who_leaves_the_area_is_no_candidate() -> None:
+def test_tracks_outside_the_area_are_no_candidates() -> None:
     """They stay expected, should the frame itself find them."""
     border = Border.of(open_ground(Grid((-2.0, 2.0), (-2.0, 2.0), 0.1, 1.8, 2)))
     prior = Prior.of(expecting((2.1, 0.0), (1.0, 0.5), (0.0, -9.0)), CONFIG, BODY, border)
@@ -210,7 +210,7 @@ def test_who_leaves_the_area_is_no_candidate() -> None:
     assert len(prior.predicted) == 3
 
 
-def test_those_expected_are_candidates_as_tall_as_they_are() -> None:
+def test_tracks_are_candidates_of_their_heights() -> None:
     prior = Prior.of(expecting((0.1, 0.2, 1.3), (0.4, 0.5, 1.74)), CONFIG, BODY, Border.of(rig_of(corner_cameras())))
     pool = prior.pool()
     np.testing.assert_array_equal(pool.ground, [[0.1, 0.2], [0.4, 0.5]])

@@ -1,4 +1,4 @@
-"""Restarts of the search: people whose boxes a followed ghost holds are found, and no set becomes less likely."""
+"""Restarts of the search: people are found though a ghost holds their boxes, and no score falls."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def detector() -> Detector:
     return Detector(room(), ["boxes"] * 4, FEW_HEIGHTS, BODY)
 
 
-def standing_apart(rng: np.random.Generator, number: int, least: float) -> Floats:
+def separate_places(rng: np.random.Generator, number: int, least: float) -> Floats:
     standing = list[Floats]()
     while len(standing) < number:
         place = rng.uniform(-1.6, 1.6, 2)
@@ -35,55 +35,55 @@ def standing_apart(rng: np.random.Generator, number: int, least: float) -> Float
     return np.array(standing)
 
 
-def astray(rng: np.random.Generator, ground: Floats) -> PredictedTracks:
+def misplaced_tracks(rng: np.random.Generator, ground: Floats) -> PredictedTracks:
     """Tracks of people, the first three beside where they stand."""
-    expected = ground.copy()
-    expected[:3] += rng.normal(0, 0.6, (3, 2))
-    return expecting(*expected.clip(-1.7, 1.7))
+    predicted = ground.copy()
+    predicted[:3] += rng.normal(0, 0.6, (3, 2))
+    return expecting(*predicted.clip(-1.7, 1.7))
 
 
 def crowd(seed: int) -> tuple[Floats, list[Boxes], PredictedTracks]:
     """Eight people, three boxes in four of each, and tracks of which three went astray."""
     rng = np.random.default_rng(seed)
-    ground = standing_apart(rng, 8, 0.4)
-    seen = [boxes(camera, people(*ground)) for camera in room().cameras]
-    seen = [found.of(rng.random(len(found)) > 0.25) for found in seen]
-    return ground, seen, astray(rng, ground)
+    ground = separate_places(rng, 8, 0.4)
+    views = [boxes(camera, people(*ground)) for camera in room().cameras]
+    views = [found.of(rng.random(len(found)) > 0.25) for found in views]
+    return ground, views, misplaced_tracks(rng, ground)
 
 
-def of_tracks(seen: Sequence[Boxes | None], expected: PredictedTracks) -> MapEstimate:
+def of_tracks(views: Sequence[Boxes | None], predicted: PredictedTracks) -> MapEstimate:
     """The best set of the predicted tracks alone."""
-    asked = detector()
-    prior = Prior.of(expected, asked.config, asked.body, asked.border)
-    evidence = asked.evidence(asked.observe(seen), prior)
-    return MapEstimate.of_search(evidence, prior.pool(), np.arange(len(expected)))
+    rig_detector = detector()
+    prior = Prior.of(predicted, rig_detector.config, rig_detector.body, rig_detector.border)
+    evidence = rig_detector.evidence(rig_detector.observe(views), prior)
+    return MapEstimate.of_search(evidence, prior.pool(), np.arange(len(predicted)))
 
 
 @pytest.mark.parametrize("seed", [9, 19, 31])
-def test_people_whose_boxes_a_followed_ghost_holds_are_found(seed: int) -> None:
-    ground, seen, expected = crowd(seed)
-    found = detector().explain(seen, expected).people
+def test_people_are_found_whose_boxes_a_ghost_holds(seed: int) -> None:
+    ground, views, predicted = crowd(seed)
+    found = detector().explain(views, predicted).people
     assert len(found) == len(ground)
     assert len(match(distances(ground, found.ground), 0.3)[0]) == len(ground)
 
 
 @pytest.mark.parametrize("seed", [8, 31, 37])
-def test_key_frames_of_two_views_leave_the_set_into_which_tracks_lead(seed: int) -> None:
+def test_key_frames_leave_the_set_of_misplaced_tracks(seed: int) -> None:
     rng, rig = np.random.default_rng(seed), replace(room(), cameras=room().cameras[:2])
-    ground = standing_apart(rng, 5, 0.5)
-    expected = astray(rng, ground)
-    seen = likelihoods(rig.cameras, people(*ground))
-    asked, hits = Detector(rig, ["pixels"] * 2, FEW_HEIGHTS, BODY), []
+    ground = separate_places(rng, 5, 0.5)
+    predicted = misplaced_tracks(rng, ground)
+    views = likelihoods(rig.cameras, people(*ground))
+    rig_detector, hits = Detector(rig, ["pixels"] * 2, FEW_HEIGHTS, BODY), []
     for frame in range(2):  # the first is a key frame
-        found = asked.explain_next(asked.new_estimates(), frame, seen, expected).people
+        found = rig_detector.explain_next(rig_detector.new_estimates(), frame, views, predicted).people
         hits.append(len(match(distances(ground, found.ground), 0.3)[0]))
     assert hits[0] == len(ground) > hits[1]
 
 
 @pytest.mark.parametrize("seed", range(6))
 def test_no_set_becomes_less_likely(seed: int) -> None:
-    _, seen, expected = crowd(seed)
-    before = of_tracks(seen, expected)
+    _, views, predicted = crowd(seed)
+    before = of_tracks(views, predicted)
     after = restarted(before, detector().lattice_ground)
     assert after.members_score.total >= before.members_score.total
 
@@ -94,30 +94,30 @@ def box_tables(estimate: MapEstimate) -> list[Floats | Ints]:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_more_candidates_have_the_evidence_of_a_pool_that_is_made_whole(seed: int) -> None:
-    _, seen, expected = crowd(seed)
-    shown: list[Boxes | None] = [seen[0], None, *seen[2:]]
-    before = of_tracks(shown, expected)
-    nobody = before.with_members(before.members[:0])
-    fresh = lattice_candidates(nobody, detector().lattice_ground)
-    found = before.with_more(fresh.at([0])).with_more(fresh)
+def test_more_candidates_have_the_boxes_of_a_whole_pool(seed: int) -> None:
+    _, views, predicted = crowd(seed)
+    partly_blind: list[Boxes | None] = [views[0], None, *views[2:]]
+    before = of_tracks(partly_blind, predicted)
+    empty_set = before.with_members(before.members[:0])
+    peaks = lattice_candidates(empty_set, detector().lattice_ground)
+    found = before.with_more(peaks.at([0])).with_more(peaks)
     whole = MapEstimate.of_search(before.evidence, found.pool, before.members)
-    assert len(found.pool) == len(before.pool) + 1 + len(fresh) > len(before.pool) + 2
+    assert len(found.pool) == len(before.pool) + 1 + len(peaks) > len(before.pool) + 2
     np.testing.assert_array_equal(found.members, before.members)
     for table, made_whole in zip(box_tables(found), box_tables(whole), strict=True):
         np.testing.assert_array_equal(table, made_whole)
     np.testing.assert_array_equal(found.problem.track_gain, whole.problem.track_gain)
-    searched = before.searched_with(fresh, before.members)
+    searched = before.searched_with(peaks, before.members)
     np.testing.assert_array_equal(
         searched.members, MapEstimate.of_search(before.evidence, searched.pool, before.members).members
     )
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_refined_places_are_those_of_a_frame_in_which_none_is_known(seed: int) -> None:
+def test_refined_places_are_those_without_a_cache(seed: int) -> None:
     """Members who take other boxes, since others are gone, are not where they were."""
-    _, seen, expected = crowd(seed)
-    estimate = of_tracks(seen, expected)
+    _, views, predicted = crowd(seed)
+    estimate = of_tracks(views, predicted)
     refined_members(estimate)
     for one in (estimate, estimate.with_members(estimate.members[::2])):
         anew = replace(one, evidence=replace(one.evidence))
@@ -126,15 +126,15 @@ def test_refined_places_are_those_of_a_frame_in_which_none_is_known(seed: int) -
         np.testing.assert_array_equal(found.covariance, by_itself.covariance)
 
 
-def test_more_candidates_have_the_pixels_of_a_pool_that_is_made_whole() -> None:
-    ground = standing_apart(np.random.default_rng(3), 5, 0.5)
-    asked = Detector(room(), ["pixels"] * 4, FEW_HEIGHTS, BODY)
-    prior = Prior.of(expecting(*ground[:2]), asked.config, asked.body, asked.border)
-    seen = asked.observe(likelihoods(room().cameras, people(*ground)))
-    before = MapEstimate.of_search(asked.evidence(seen, prior), prior.pool(), np.arange(2))
-    fresh = lattice_candidates(before, asked.lattice_ground)
-    found = before.with_more(fresh.at([0])).with_more(fresh.at([1])).problem
-    whole = MapEstimate.of_search(before.evidence, before.pool.joined_with(fresh.at([0, 1])), before.members).problem
+def test_more_candidates_have_the_pixels_of_a_whole_pool() -> None:
+    ground = separate_places(np.random.default_rng(3), 5, 0.5)
+    rig_detector = Detector(room(), ["pixels"] * 4, FEW_HEIGHTS, BODY)
+    prior = Prior.of(expecting(*ground[:2]), rig_detector.config, rig_detector.body, rig_detector.border)
+    views = rig_detector.observe(likelihoods(room().cameras, people(*ground)))
+    before = MapEstimate.of_search(rig_detector.evidence(views, prior), prior.pool(), np.arange(2))
+    peaks = lattice_candidates(before, rig_detector.lattice_ground)
+    found = before.with_more(peaks.at([0])).with_more(peaks.at([1])).problem
+    whole = MapEstimate.of_search(before.evidence, before.pool.joined_with(peaks.at([0, 1])), before.members).problem
     for table, made_whole in zip(found.pixels, whole.pixels, strict=True):
         np.testing.assert_array_equal(table, made_whole)
     for name in ("size_prior", "birth_cost", "track_gain", "ground", "breadth"):
@@ -142,8 +142,8 @@ def test_more_candidates_have_the_pixels_of_a_pool_that_is_made_whole() -> None:
     assert len(found.ground) == 4
 
 
-def test_sure_members_are_not_sought_again() -> None:
-    seen = [boxes(camera, people((-1, -1), (1, 1))) for camera in room().cameras]
-    before = of_tracks(seen, expecting((-1, -1), (1, 1)))
+def test_strong_members_are_not_searched_again() -> None:
+    views = [boxes(camera, people((-1, -1), (1, 1))) for camera in room().cameras]
+    before = of_tracks(views, expecting((-1, -1), (1, 1)))
     assert (before.losses > 12).all()
     assert restarted(before, detector().lattice_ground) is before

@@ -31,8 +31,8 @@ def fill_scores(
 ) -> None:
     """Add the evidence of unexplained pixels to the score (height, cell) of pillars, nats; -inf where it cannot matter.
 
-    Cells whose `probes` (heights) all score at most `minimum_probe_score` are -inf without evaluating the `others`, and
-    so are other heights whose pillars score 0 or less.
+    Where all `probes` (heights) of a cell score at most `minimum_probe_score`, all its heights are -inf, without
+    evaluating the `others`; so are other heights that score 0 or less.
     """
     pixels, lattice = pointed(every_pixel), pointed(every_pillar)
     more, parts = np.empty((2, len(every_pillar.shapes)))

@@ -40,7 +40,7 @@ class BoxState(NamedTuple):
     fitting
         The candidates of each box.
     hidden
-        Candidates whom one hides in part, with the share that is left.
+        Candidates that one hides in part, with the share that is left.
     hiders
         Candidates who hide a part of one, with the share that they leave.
     visible, missing_cost : float64 (view * candidate,)
@@ -149,7 +149,7 @@ def clear_dependents(i: int, inside: Flags, state: BoxState) -> None:
     """Clear the cached scores that depend on whether candidate i is in the set, inside (candidate,), without i.
 
     Those are the scores of all who fit the boxes, or hide a part, of i and of the members that i is linked to, and of
-    those whom i hides.
+    those that i hides.
     """
     candidates, fits, fitting, hiders = len(state.is_linked), state.fits, state.fitting, state.hiders
     for view in range(state.views):
@@ -192,7 +192,7 @@ def _score_alone(row: int, inside: Flags, state: BoxState, parameters: ScorePara
 
 @part
 def _link(view: int, i: int, inside: Flags, state: BoxState) -> int:
-    """Fill `state.linked` with i and the members whose part of the score may depend on i; returns their number."""
+    """Fill `state.linked` with i and the members with parts of the score that may depend on i; returns their number."""
     linked, is_linked, candidates = state.linked, state.is_linked, len(state.is_linked)
     fits, fitting, hidden = state.fits, state.fitting, state.hidden
     linked[0], number, row = i, 1, view * candidates + i

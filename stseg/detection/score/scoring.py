@@ -10,7 +10,7 @@ pixels that no nearer member covers (HW12's detection energy, eqs 13 to 15, in s
 the image of a body that explains more, over as many pixels as that one explains (`blob_scale`).
 
 crowding(S) is the repulsion of bodies, the pair potential of a Gibbs point process (Moeller and Waagepetersen 2003,
-section 6.2): places of people are a Poisson process whose density is multiplied by exp(-phi(d)) for each pair at a
+section 6.2): places of people are a Poisson process with its density multiplied by exp(-phi(d)) for each pair at a
 distance d. Soft bodies may press together, so phi rises linearly from the distance at which they touch,
 `minimum_distance`. Where views show pixels there is a hard core besides, within which no two bodies stand: the strip
 that a wide body leaves unexplained at its sides shows in all views alike, and any finite cost is outvoted by enough of

@@ -112,7 +112,7 @@ def changed(i: int, state: SetState) -> None:
 
 @kernel
 def put(i: int, place: int, state: SetState) -> None:
-    """Put candidate i at a place of the assigned set, whose member there becomes the last one."""
+    """Put candidate i at a place of the assigned set; the member there becomes the last one."""
     members, size = state.members, state.size
     members[size[0]] = members[place]
     members[place], state.inside[i] = i, True

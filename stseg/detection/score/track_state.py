@@ -1,6 +1,6 @@
 """Tracks of a set: their assignment to the members, and the gain of one more member from it.
 
-One more member takes a track, whose member takes another or none, and so on: the gain is that of the best such
+One more member takes a track, the member before takes another or none, and so on: the gain is that of the best such
 augmenting path, and an assignment that is best before is best after it (Kuhn 1955).
 """
 

@@ -20,7 +20,7 @@ from stseg.kernels.accelerate import kernel
 from stseg.kernels.pointed_tuples import pointed
 
 ENUMERATION_LIMIT = 8
-"""Candidates in the largest group whose subsets are all tried in the final search."""
+"""Most candidates of a group of which all subsets are tried in the final search."""
 
 
 @kernel

@@ -1,8 +1,8 @@
 """Local search among the candidates of one group: simple moves, and swap moves.
 
 Simple moves add, remove or replace one person. A swap forces one candidate out or in and lets simple moves answer
-before the whole is judged: so one ghost gives way to the two people whose evidence it had taken, and two ghosts to the
-one person who explains both.
+before the whole is judged: so one ghost gives way to the two people that it had taken evidence from, and two ghosts to
+the one person who explains both.
 """
 
 from __future__ import annotations

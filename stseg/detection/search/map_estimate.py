@@ -201,7 +201,7 @@ class MapEstimate:
 
     @cached_property
     def pixel_assignment(self) -> list[Shorts]:
-        """For each view the nearest member whose outline covers each raster pixel, int16 (v, u); -1 for none."""
+        """For each view the nearest member with an outline that covers each raster pixel, int16 (v, u); -1 for none."""
         assignment = [np.full(view.shape, -1, np.int16) for view in self.evidence.views]
         rasters = [a for a, view in zip(assignment, self.evidence.views, strict=True) if isinstance(view, PixelView)]
         pixels = self.problem.pixels
