@@ -47,6 +47,9 @@ class Boxes:
     def __len__(self) -> int:
         return len(self.pixel)
 
+    def __repr__(self) -> str:
+        return f"Boxes({len(self)} boxes{'' if self.features is None else ' with appearance features'})"
+
     def of(self, chosen: Flags | Ints | slice) -> Boxes:
         """A subset, by index, mask or slice."""
         features = None if self.features is None else self.features[chosen]

@@ -51,6 +51,10 @@ class FrameSet:
     views: tuple[Observation, ...]
     images: tuple[Observation, ...] = ()
 
+    def __repr__(self) -> str:
+        blind = sum(view is None for view in self.views)
+        return f"FrameSet(frame {self.frame}: {len(self.views)} views, {blind} of them blind)"
+
 
 class FrameReader:
     """Frame sets of a recording in order; made by `open_frames`.

@@ -135,6 +135,10 @@ class Recording:
     reduction: tuple[int, ...] = field(default=(), kw_only=True)
     """Whole factors by which the cameras' colour frames are reduced as they are read; empty for frames as they are."""
 
+    def __repr__(self) -> str:
+        kinds = ", ".join(dict.fromkeys(stream.source.kind for stream in self.sources))
+        return f"Recording({str(self.path)!r}: {kinds}, {self.rig!r})"
+
     @property
     def factors(self) -> tuple[int, ...]:
         """The reduction of every camera, 1 for none."""

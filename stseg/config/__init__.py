@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 
 from stseg.config.detection import DetectionConfig, ErrorRateConfig, LabelConfig, OccupancyConfig, ProposalConfig
 from stseg.config.foreground import (
@@ -62,3 +62,14 @@ class Config:
     particles: ParticleConfig = field(default_factory=ParticleConfig)
     belief: BeliefConfig = field(default_factory=BeliefConfig)
     labels: LabelConfig = field(default_factory=LabelConfig)
+
+    def __repr__(self) -> str:
+        """The values that are not the defaults."""
+        pairs = ((section.name, getattr(self, section.name)) for section in fields(self))
+        given = [
+            f"{name}.{key.name}={getattr(values, key.name)!r}"
+            for name, values in pairs
+            for key in fields(values)
+            if getattr(values, key.name) != getattr(type(values)(), key.name)
+        ]
+        return f"Config({', '.join(given) or 'the defaults'})"

@@ -41,6 +41,10 @@ class CommittedFrames:
     timings: Rows
     appearance: Rows
 
+    def __repr__(self) -> str:
+        frames = f"frames {self.frames[0]} to {self.frames[-1]}" if len(self.frames) else "no frames"
+        return f"CommittedFrames({frames}: {len(self.trajectory)} track rows, {len(self.candidates)} candidates)"
+
     @property
     def frames(self) -> Ints:
         """Numbers of the frames, int64 (time,)."""

@@ -64,6 +64,9 @@ class Tracker:
         self._factors: list[int] = []
         self._kinds: list[str] = []
 
+    def __repr__(self) -> str:
+        return f"Tracker({self._tracker!r}, next frame {self._next}, {self.rig!r})"
+
     def add(self, views: Views | FrameSet, frame: int | None = None) -> list[CommittedFrames]:
         """The next frame set; the results that it decides, often none and then those of several frames.
 

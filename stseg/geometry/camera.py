@@ -45,6 +45,10 @@ class Camera:
     vertical: Floats
     lens: Lens | None = None
 
+    def __repr__(self) -> str:
+        lens = "without" if self.lens is None else "with"
+        return f"Camera({self.name!r}: {self.size[0]} x {self.size[1]} pixels, {lens} a lens)"
+
     def __post_init__(self) -> None:
         ground = np.asarray(self.ground, float)
         vertical = np.asarray(self.vertical, float)

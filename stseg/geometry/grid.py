@@ -35,6 +35,10 @@ class Grid:
     planes: int = 10
     polygon: Floats | None = None
 
+    def __repr__(self) -> str:
+        polygon = "" if self.polygon is None else f", a polygon of {len(self.polygon)} corners"
+        return f"Grid(x={self.x}, y={self.y}, cell={self.cell:g}, top={self.top:g}, planes={self.planes}{polygon})"
+
     @property
     def shape(self) -> tuple[int, int, int]:
         """(plane, y, x)."""

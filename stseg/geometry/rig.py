@@ -41,6 +41,10 @@ class Rig:
     doors: tuple[tuple[float, float, float, float], ...] = ()
     closed: bool = False
 
+    def __repr__(self) -> str:
+        names = ", ".join(camera.name for camera in self.cameras)
+        return f"Rig({self.name!r}: {len(self.cameras)} cameras ({names}), {self.frame_rate:g} frames/s, {self.grid!r})"
+
     @classmethod
     def from_homographies(
         cls,

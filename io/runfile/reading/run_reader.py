@@ -79,6 +79,10 @@ class Run:
     kept: str = "all"
     given_names: tuple[tuple[int, str], ...] | None = None
 
+    def __repr__(self) -> str:
+        frames = f"frames {self.frames[0]} to {self.frames[-1]}" if len(self.frames) else "no frames"
+        return f"Run({str(self.path)!r}: {self.scene}, {frames}, {len(self.cameras)} cameras)"
+
     @cached_property
     def trajectory(self) -> Rows:
         """TRAJECTORY (n,)."""
