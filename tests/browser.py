@@ -1,4 +1,4 @@
-"""A headless Chromium that is asked through its DevTools pipe: what it logs, what it requests, what scripts answer."""
+"""A headless Chromium behind its DevTools pipe: its log, its requests, and the values of scripts."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Page:
     Attributes
     ----------
     complaints
-        What the page logged, and exceptions that nobody caught.
+        Messages that the page logged, and uncaught exceptions.
     requests
         Addresses that it asked for, but for data: and its own.
     """
@@ -51,7 +51,7 @@ class Page:
         self.wait_for("document.readyState === 'complete' && location.protocol === 'file:'")
 
     def ask(self, script: str) -> Any:
-        """What a script's expression is, awaited."""
+        """The value of a script's expression, awaited."""
         wanted = {"expression": script, "returnByValue": True, "awaitPromise": True}
         answer = self._ask("Runtime.evaluate", wanted)
         assert "exceptionDetails" not in answer, answer["exceptionDetails"]

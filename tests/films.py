@@ -1,4 +1,4 @@
-"""Videos of three walkers as cameras deliver them: at any times, with stamps that say so, in one file or several."""
+"""Videos of three people as cameras deliver them: at any times, with time stamps, in one file or several."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def regular(frames: int) -> Floats:
 
 @dataclass(frozen=True)
 class Film:
-    """What one camera records.
+    """Recording of one camera.
 
     Attributes
     ----------
@@ -52,7 +52,7 @@ class Film:
     starts
         When each of them starts, seconds after the first.
     source
-        What the rig file says besides.
+        Further keys of the rig file.
     """
 
     seconds: Floats
@@ -61,8 +61,8 @@ class Film:
     starts: tuple[float, ...] = ()
     source: CameraSource = field(default_factory=lambda: CameraSource(Source("masks", Path())))
 
-    def told(self, offset: int = 0, blind: bool = False, clock: ClockSource = "auto") -> Film:
-        """The same, with more said of it in the rig file."""
+    def with_source(self, offset: int = 0, blind: bool = False, clock: ClockSource = "auto") -> Film:
+        """The same, with keys of its source in the rig file."""
         missing: Literal["blind", "error"] = "blind" if blind else "error"
         return replace(self, source=CameraSource(Source("masks", Path()), None, offset, missing, clock))
 

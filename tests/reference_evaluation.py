@@ -41,10 +41,10 @@ def best(people: dict[int, Place], tracks: dict[int, Place], gate: float, before
     """Most pairs kept from before, then most pairs, then least distance."""
 
     def worth(matching: Matching) -> tuple[float, float, float]:
-        apart = [math.dist(people[p], tracks[t]) for p, t in matching.items()]
-        if any(distance > gate for distance in apart):
+        distances = [math.dist(people[p], tracks[t]) for p, t in matching.items()]
+        if any(distance > gate for distance in distances):
             return -1, 0, 0
-        return sum(before.get(p) == t for p, t in matching.items()), len(apart), -sum(apart)
+        return sum(before.get(p) == t for p, t in matching.items()), len(distances), -sum(distances)
 
     return max(matchings(list(people), list(tracks)), key=worth)
 
@@ -54,7 +54,7 @@ def clear(scene: Scene, gate: float) -> dict[str, float]:
     counts: Counter[str] = Counter()
     before: Matching = {}
     last: Matching = {}
-    seen, hit, track_seen, track_hit = Counter[int](), Counter[int](), Counter[int](), Counter[int]()
+    person_frames, hit, track_seen, track_hit = Counter[int](), Counter[int](), Counter[int](), Counter[int]()
     for people, tracks in scene:
         counts["TP"] += len(best(people, tracks, gate, {}))
         now = best(people, tracks, gate, before)
@@ -62,14 +62,14 @@ def clear(scene: Scene, gate: float) -> dict[str, float]:
             counts["IDSW"] += person in last and last[person] != track
             counts["Frag"] += person in last and person not in before
             counts["kept"] += 1
-        seen.update(people.keys())
+        person_frames.update(people.keys())
         hit.update(now.keys())
         track_seen.update(tracks.keys())
         track_hit.update(now.values())
         last |= now
         before = now
-    counts["MT"] = sum(hit[p] / seen[p] > 0.8 for p in seen)
-    counts["ML"] = sum(hit[p] / seen[p] < 0.2 for p in seen)
+    counts["MT"] = sum(hit[p] / person_frames[p] > 0.8 for p in person_frames)
+    counts["ML"] = sum(hit[p] / person_frames[p] < 0.2 for p in person_frames)
     counts["false_tracks"] = sum(track_hit[t] <= track_seen[t] / 2 for t in track_seen)
     return {name: counts[name] for name in ("TP", "kept", "IDSW", "Frag", "MT", "ML", "false_tracks")}
 
@@ -79,22 +79,22 @@ def idf1(scene: Scene, gate: float) -> float:
     people = sorted({p for frame, _ in scene for p in frame})
     tracks = sorted({t for _, frame in scene for t in frame})
     together = Counter[tuple[int, int]]()
-    for here, there in scene:
-        together.update((p, t) for p in here for t in there if math.dist(here[p], there[t]) <= gate)
+    for here, tracks_here in scene:
+        together.update((p, t) for p in here for t in tracks_here if math.dist(here[p], tracks_here[t]) <= gate)
     true = max(sum(together[pair] for pair in naming.items()) for naming in matchings(people, tracks))
-    total = sum(len(here) + len(there) for here, there in scene)
+    total = sum(len(here) + len(tracks_here) for here, tracks_here in scene)
     return 2 * true / total if people and tracks else 0.0
 
 
 def hota(scene: Scene, radius: float) -> float:
     """HOTA as Luiten et al. write it: for every true positive c, A(c) = TPA / (TPA + FNA + FPA)."""
-    seen = Counter(p for here, _ in scene for p in here)
-    found = Counter(t for _, there in scene for t in there)
-    if not (seen and found):
+    person_frames = Counter(p for here, _ in scene for p in here)
+    found = Counter(t for _, tracks_here in scene for t in tracks_here)
+    if not (person_frames and found):
         return 0.0
     alikes = [
-        {(p, t): max(0.0, 1 - math.dist(here[p], there[t]) / radius) for p in here for t in there}
-        for here, there in scene
+        {(p, t): max(0.0, 1 - math.dist(here[p], tracks_here[t]) / radius) for p in here for t in tracks_here}
+        for here, tracks_here in scene
     ]
     agreed = Counter[tuple[int, int]]()  # floats, but Counter's zero for what is missing serves
     for alike in alikes:
@@ -102,21 +102,21 @@ def hota(scene: Scene, radius: float) -> float:
             rivals = sum(v for (q, u), v in alike.items() if q == p or u == t)
             agreed[p, t] += value / rivals if rivals else 0  # type: ignore[assignment]
     matched = []
-    for (here, there), alike in zip(scene, alikes, strict=True):
+    for (here, tracks_here), alike in zip(scene, alikes, strict=True):
 
         def worth(matching: Matching, alike: dict[tuple[int, int], float] = alike) -> float:
             return sum(
-                alike[pair] * agreed[pair] / (seen[pair[0]] + found[pair[1]] - agreed[pair])
+                alike[pair] * agreed[pair] / (person_frames[pair[0]] + found[pair[1]] - agreed[pair])
                 for pair in matching.items()
             )
 
-        chosen = max(matchings(list(here), list(there)), key=worth)
+        chosen = max(matchings(list(here), list(tracks_here)), key=worth)
         matched += [(pair, alike[pair]) for pair in chosen.items()]
     scores = []
     for alpha in np.arange(0.05, 0.99, 0.05):
         true = [pair for pair, value in matched if value >= alpha]
         tpa = Counter(true)
-        association = sum(tpa[p, t] / (seen[p] + found[t] - tpa[p, t]) for p, t in true)
-        union = seen.total() + found.total() - len(true)
+        association = sum(tpa[p, t] / (person_frames[p] + found[t] - tpa[p, t]) for p, t in true)
+        union = person_frames.total() + found.total() - len(true)
         scores.append(math.sqrt(association / union))  # DetA AssA = (TP / union) (association / TP)
     return sum(scores) / len(scores)

@@ -1,4 +1,4 @@
-"""What a camera sees of bodies and shadows, by other means: every ray against every ellipsoid, no boxes, no kernels."""
+"""Image of bodies and shadows by other means: every ray against every ellipsoid, no boxes, no kernels."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def extents(masks: Floats) -> Ints:
 
 
 def shade(ground: Singles, bodies: Bodies, lamp: Floats, umbra: float, penumbra: float) -> Floats:
-    """How dark the ground is, 0..1 (v, u): walk along the way to the lamp and keep the nearest to each middle."""
+    """Darkness of the ground, 0..1 (v, u): walk along the way to the lamp and keep the nearest to each middle."""
     dark = np.zeros(ground.shape[:2])
     point = np.concatenate([ground, np.zeros_like(ground[..., :1])], -1).astype(float)
     way = np.linspace(0.0, 4.0, 801)[:, None, None, None] * lamp

@@ -49,8 +49,8 @@ SPOTS = np.array([[0.0, 0.0, 0.0], [1.5, 0.5, 1.7], [-1.0, 1.0, 0.9], [0.3, -1.0
 @given(st.floats(0.5, 1.5), st.floats(0.15, 0.7), st.floats(-0.1, 0.1), st.floats(-0.35, 0.1))
 def test_a_pinhole_shows_what_its_camera_shows(focal: float, pitch: float, roll: float, k1: float) -> None:
     view = a_view(focal, pitch, roll, k1)
-    shown, _ = as_camera(view, "a", IMAGE).project(SPOTS[:, :2], SPOTS[:, 2])
-    np.testing.assert_allclose(pixels(view, SPOTS), shown, atol=1e-6)
+    projected, _ = as_camera(view, "a", IMAGE).project(SPOTS[:, :2], SPOTS[:, 2])
+    np.testing.assert_allclose(pixels(view, SPOTS), projected, atol=1e-6)
 
 
 @settings(max_examples=20, deadline=None)
@@ -103,8 +103,8 @@ def test_who_is_not_whole_free_and_upright_has_no_ends(bodies: list[tuple[float,
 
 def test_paths_end_where_two_could_be_meant() -> None:
     frame = np.repeat(np.arange(20), 2)
-    near = np.abs(np.arange(20) - 10.0)[:, None] * [5.0, 0.0] + [0.0, 200.0]
-    foot = np.array([300, 0]) + np.stack([near, near * [-1, 1]], 1).reshape(-1, 2)
+    offsets = np.abs(np.arange(20) - 10.0)[:, None] * [5.0, 0.0] + [0.0, 200.0]
+    foot = np.array([300, 0]) + np.stack([offsets, offsets * [-1, 1]], 1).reshape(-1, 2)
     endpoints = Endpoints(frame, foot, foot - [0, 60])
     path = path_of(endpoints, 10.0).reshape(20, 2)
     assert len(set(path[:7, 0])) == len(set(path[:7, 1])) == 1
@@ -168,14 +168,14 @@ NAMES = ["a", "b", "c"]
 
 def ground_errors(scene: Walking, solution: Solution) -> tuple[Floats, float]:
     """Errors on the ground after the best similarity, metres, and its scale."""
-    shown, true = [], []
+    projected, true = [], []
     for camera, made in zip(scene.rig.cameras, cameras_of(solution, NAMES), strict=True):
         ground = scene.rig.grid.ground[::6, ::6].reshape(-1, 2)
         pixel, ahead = camera.project(ground, 0.0)
-        seen = ahead & camera.inside(pixel)
-        true.append(ground[seen] @ [1, 1j])
-        shown.append(made.back_project(pixel[seen]) @ [1, 1j])
-    x, y = np.concatenate(shown), np.concatenate(true)
+        visible = ahead & camera.inside(pixel)
+        true.append(ground[visible] @ [1, 1j])
+        projected.append(made.back_project(pixel[visible]) @ [1, 1j])
+    x, y = np.concatenate(projected), np.concatenate(true)
     factor = np.vdot(x - x.mean(), y - y.mean()) / np.vdot(x - x.mean(), x - x.mean())
     return np.abs(factor * (x - x.mean()) - (y - y.mean())), float(abs(factor))
 

@@ -125,7 +125,9 @@ class TestBlunders:
     def test_a_late_stream_is_named(self, view: int, frames: int) -> None:
         nothing = [np.zeros((0, 4))] * 4
         boxes = {
-            frame: [SHOWN.get(frame - frames, nothing)[k] if k == view else own for k, own in enumerate(views)]
+            frame: [
+                SHOWN.get(frame - frames, nothing)[k] if k == view else view_boxes for k, view_boxes in enumerate(views)
+            ]
             for frame, views in SHOWN.items()
         }
         check, words = judged(RIG, boxes)

@@ -30,7 +30,7 @@ def camera(turn: float = 0.7, distortion: tuple[float, ...] | None = None) -> Ca
     return looking("cam", place, (0.1, 0.0, 0.3), SIZE, 520.0, distortion)
 
 
-def seen(view: Camera, ground: Floats = SPREAD, high: Floats | None = DOOR) -> Points:
+def points_of(view: Camera, ground: Floats = SPREAD, high: Floats | None = DOOR) -> Points:
     """Points on the ground, and others two metres above it."""
     high = np.zeros((0, 2)) if high is None else high
     place = np.concatenate([ground, high])
@@ -45,8 +45,8 @@ def fit(points: Points, view: Camera) -> PointFit:
 def off(found: Camera, true: Camera) -> float:
     """Largest distance in the image over the area and a body's height, pixels."""
     ground = np.stack(np.meshgrid(np.linspace(-2, 2, 5), np.linspace(-2, 2, 5)), -1)
-    apart = [found.project(ground, z)[0] - true.project(ground, z)[0] for z in (0.0, 0.9, 1.8)]
-    return float(np.abs(apart).max())
+    errors = [found.project(ground, z)[0] - true.project(ground, z)[0] for z in (0.0, 0.9, 1.8)]
+    return float(np.abs(errors).max())
 
 
 class TestFit:
@@ -54,25 +54,25 @@ class TestFit:
     @pytest.mark.parametrize("high", [DOOR, None])
     def test_exact_points_give_the_camera_back(self, distortion: tuple[float, ...] | None, high: Floats | None) -> None:
         true = camera(distortion=distortion)
-        found = fit(seen(true, high=high), true)
+        found = fit(points_of(true, high=high), true)
         assert off(found.camera, true) < 1e-4
         assert found.vertical_from == ("lens" if distortion else "square pixels")
         assert found.off_pixel.max() < 1e-4 and np.nanmax(found.off_ground) < 1e-6
         assert not found.out.any()
 
-    def test_a_camera_of_another_kind_is_told_by_points_above_the_ground(self) -> None:
+    def test_points_above_the_ground_reveal_another_kind_of_camera(self) -> None:
         square = camera()
         matrix = np.array(
             [[1.0, 0.0, 90.0], [0.0, 1.3, -60.0], [0.0, 0.0, 1.0]]
         )  # a crop, and pixels that are not square
         true = Camera.from_projection("cam", SIZE, matrix @ square.projection)
-        found = fit(seen(true), true)
+        found = fit(points_of(true), true)
         assert found.vertical_from == "points" and off(found.camera, true) < 1e-3
 
     @pytest.mark.parametrize("seed", range(6))
     def test_errors_of_clicks_stay_what_they_are(self, seed: int) -> None:
         true = camera()
-        points = seen(true)
+        points = points_of(true)
         lots = np.random.default_rng(seed)
         noisy = Points(points.pixel + lots.normal(0, 1, points.pixel.shape), points.ground, points.height)
         assert off(fit(noisy, true).camera, true) < 12
@@ -81,7 +81,7 @@ class TestFit:
     def test_one_wrong_point_is_pointed_out_and_does_no_harm(self, wrong: int) -> None:
         true = camera()
         ground = np.concatenate([SPREAD, [[0.5, 1.2], [-1.2, -0.3]]])
-        points = seen(true, ground)
+        points = points_of(true, ground)
         pixel = points.pixel + np.random.default_rng(5).normal(0, 0.3, points.pixel.shape)
         pixel[wrong] += (60.0, -45.0)
         found = fit(Points(pixel, points.ground, points.height), true)
@@ -90,8 +90,8 @@ class TestFit:
 
     def test_covariance_is_what_repeated_clicks_scatter_by(self) -> None:
         true = camera()
-        points, lots = seen(true, high=None), np.random.default_rng(3)
-        places, told = [], []
+        points, lots = points_of(true, high=None), np.random.default_rng(3)
+        places, deviations = [], []
         target = np.array([[1.75, 1.75]])
         pixel = true.project(target, 0.0)[0]
         row, column = 37, 37
@@ -99,21 +99,21 @@ class TestFit:
             noisy = Points(points.pixel + lots.normal(0, 1.5, points.pixel.shape), points.ground, points.height)
             found = fit(noisy, true)
             places.append(found.camera.back_project(pixel)[0])
-            told.append(found.ground_deviation(GRID)[row, column])
+            deviations.append(found.ground_deviation(GRID)[row, column])
         scatter = np.sqrt(np.linalg.eigvalsh(np.cov(np.array(places).T))[-1])
-        assert 0.6 < np.median(told) / scatter < 1.6
+        assert 0.6 < np.median(deviations) / scatter < 1.6
 
 
 class TestSpread:
     def test_points_in_a_corner_are_warned_of(self) -> None:
         true = camera()
         corner = SPREAD * 0.15 + (-1.4, -1.4)
-        (words,) = fit_warnings(fit(seen(true, corner, None), true), GRID)
+        (words,) = fit_warnings(fit(points_of(true, corner, None), true), GRID)
         assert "cam: its points are badly spread" in words and "add points there" in words
-        assert fit_warnings(fit(seen(true), true), GRID) == []
+        assert fit_warnings(fit(points_of(true), true), GRID) == []
 
     def test_four_points_show_nothing(self) -> None:
-        words = fit_warnings(fit(seen(camera(), SPREAD[:4]), camera()), GRID)
+        words = fit_warnings(fit(points_of(camera(), SPREAD[:4]), camera()), GRID)
         assert any("a fifth" in word for word in words)
 
 
@@ -131,8 +131,8 @@ class TestSquarePixels:
     def test_straight_down_tells_nothing(self) -> None:
         down = looking("cam", (0.0, 1e-9, 4.0), (0.0, 0.0, 0.0), SIZE, 300.0)
         with pytest.raises(CalibrationError, match=r"leaves its focal length open.*two or more points with z"):
-            fit(seen(down, high=None), down)
-        assert off(fit(seen(down), down).camera, down) < 1e-3
+            fit(points_of(down, high=None), down)
+        assert off(fit(points_of(down), down).camera, down) < 1e-3
 
 
 def swapped(points: Points, columns: str) -> Points:
@@ -147,7 +147,7 @@ class TestWrongPoints:
     @pytest.mark.parametrize("columns", ["xy", "y down", "uv"])
     def test_a_mirrored_camera_is_named(self, columns: str, high: Floats | None) -> None:
         with pytest.raises(CalibrationError, match=r"camera cam: points: found a mirrored ground"):
-            fit(swapped(seen(camera(), high=high), columns), camera())
+            fit(swapped(points_of(camera(), high=high), columns), camera())
 
     @pytest.mark.parametrize(
         ("ground", "complaint"),
@@ -162,14 +162,14 @@ class TestWrongPoints:
     )
     def test_points_that_fix_nothing_are_named(self, ground: Floats, complaint: str) -> None:
         with pytest.raises(CalibrationError, match=rf"camera cam: points: found {complaint}"):
-            fit(seen(camera(), ground), camera())
+            fit(points_of(camera(), ground), camera())
 
 
 def table(path: Path, change: Callable[[str, list[float]], list[float]] = lambda _, row: row) -> Path:
     """The points of four cameras as a CSV file."""
     lines = ["camera,u,v,x,y,z"]
     for name, turn in (("a", 0.7), ("b", 2.3), ("c", 3.9), ("d", 5.4)):
-        points = seen(camera(turn))
+        points = points_of(camera(turn))
         for (u, v), (x, y), z in zip(points.pixel, points.ground, points.height, strict=True):
             lines.append(",".join([name, *(f"{cell:.3f}" for cell in change(name, [u, v, x, y, z]))]))
     path.write_text("\n".join(lines) + "\n")
@@ -209,7 +209,7 @@ class TestCommand:
         nodes = (("camera_matrix", lens.matrix), ("distortion_coefficients", lens.distortion))
         words = [f"<{name}>{' '.join(map(repr, values.ravel().tolist()))}</{name}>" for name, values in nodes]
         Path("cam.xml").write_text(f"<opencv_storage>{''.join(words)}</opencv_storage>")
-        points = seen(camera(distortion=BARREL), high=None)
+        points = points_of(camera(distortion=BARREL), high=None)
         rows = [f"cam,{u},{v},{x},{y}" for (u, v), (x, y) in zip(points.pixel, points.ground, strict=True)]
         Path("p.csv").write_text("\n".join(["camera,u,v,x,y", *rows]))
         run("p.csv", "--lens={name}.xml")

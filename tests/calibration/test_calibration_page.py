@@ -81,8 +81,8 @@ def test_clicked_points_give_the_cameras(page: Page, tmp_path: Path) -> None:
     for table, camera in zip(read_points(points), CAMERAS, strict=True):
         fit = fit_points(table.camera, camera.size, Points(table.pixel, table.place[:, :2], table.place[:, 2]))
         assert np.linalg.norm(fit.camera.centre - camera.centre) < 0.15
-        shown = fit.camera.project(PLACES, 0.0)[0]
-        assert np.abs(shown - camera.project(PLACES, 0.0)[0]).max() < 1.0
+        projected = fit.camera.project(PLACES, 0.0)[0]
+        assert np.abs(projected - camera.project(PLACES, 0.0)[0]).max() < 1.0
 
 
 @needs_browser

@@ -34,7 +34,7 @@ def table(rows: Iterable[tuple[int, int, float, float] | tuple[int, int, float, 
 
 
 def walk(identity: int, y: float, frames: Iterable[int]) -> list[tuple[int, int, float, float]]:
-    """Somebody who walks along x at 0.1 m a frame."""
+    """A person that walks along x at 0.1 m a frame."""
     return [(frame, identity, 0.1 * frame, y) for frame in frames]
 
 
@@ -85,7 +85,7 @@ def test_a_tracker_silent_half_the_time_has_missed_half() -> None:
     assert scores.mostly_tracked == 0
 
 
-def test_a_swap_of_two_names_costs_two_switches_and_half_the_identity() -> None:
+def test_swapped_names_cost_two_switches_and_half_the_identity() -> None:
     tracks = TWO.copy()
     late = tracks["frame"] >= 5
     tracks["id"][late] = 3 - tracks["id"][late]
@@ -107,7 +107,7 @@ def test_a_new_name_after_a_gap_is_a_fragment_and_a_switch() -> None:
     assert (scores.fragments, scores.switches) == (1, 1)
 
 
-def test_a_false_track_costs_detections_and_is_counted_with_its_length() -> None:
+def test_a_false_track_costs_detections_and_counts_its_length() -> None:
     scores = evaluate(TWO, np.concatenate([TWO, table(walk(9, 5.0, range(4)))]))
     assert (scores.false_alarms, scores.false_tracks, scores.false_track_frames) == (4, 1, 4)
     assert (scores.moda, scores.recall) == (80, 100)
@@ -140,9 +140,9 @@ def test_more_pairs_are_better_than_nearer_ones() -> None:
     assert evaluate(truth, tracks).hits == 2
 
 
-def test_nobody_cares_about_people_outside_nor_about_their_tracks() -> None:
+def test_people_outside_and_their_tracks_do_not_count() -> None:
     stranger = walk(3, 9.0, TEN)
-    outside = table(stranger + walk(4, 11.0, TEN))  # one follows the stranger, one follows nobody
+    outside = table(stranger + walk(4, 11.0, TEN))  # one follows the stranger, one follows no person
     scores = evaluate(np.concatenate([TWO, table(stranger)]), np.concatenate([TWO, outside]), area=(-1, -1, 3, 3))
     assert (scores.moda, scores.people, scores.tracks, scores.area) == (100, 2, 2, (-1, -1, 3, 3))
 
@@ -150,10 +150,10 @@ def test_nobody_cares_about_people_outside_nor_about_their_tracks() -> None:
 def test_somebody_just_inside_may_be_found_just_outside() -> None:
     truth, tracks = table([(0, 1, 0.9, 0.0)]), table([(0, 1, 1.1, 0.0)])
     assert evaluate(truth, tracks, area=(-1, -1, 1, 1)).moda == 100
-    assert evaluate(tracks, truth, area=(-1, -1, 1, 1)).detections == 0  # and the other way round nobody is judged
+    assert evaluate(tracks, truth, area=(-1, -1, 1, 1)).detections == 0  # and the other way round none is judged
 
 
-def test_a_false_track_inside_counts_although_a_stranger_stands_outside() -> None:
+def test_a_false_track_counts_though_a_person_stands_outside() -> None:
     truth = table([(0, 1, 0.0, 0.0), (0, 2, 1.5, 0.0)])
     scores = evaluate(truth, table([(0, 1, 0.0, 0.0), (0, 2, 1.5, 0.1), (0, 3, 0.9, 0.6)]), area=(-1, -1, 1, 1))
     assert (scores.hits, scores.false_alarms) == (1, 1)
@@ -175,11 +175,17 @@ def test_frames_without_truth_count_where_asked_for() -> None:
     assert evaluate(TWO, TWO, frames=np.array([3, 4, 4])).frames == 2
 
 
-def test_nothing_to_judge_is_said_by_none() -> None:
-    nobody, nothing = evaluate(TWO[:0], TWO), evaluate(TWO, TWO[:0])
-    assert (nobody.frames, nobody.moda, nobody.mota, nobody.recall) == (0, None, None, None)
-    assert (nothing.moda, nothing.precision, nothing.location_mean, nothing.hota, nothing.idf1) == (0, None, None, 0, 0)
-    assert nothing.mostly_lost == 2
+def test_scores_without_a_denominator_are_none() -> None:
+    no_truth, no_tracks = evaluate(TWO[:0], TWO), evaluate(TWO, TWO[:0])
+    assert (no_truth.frames, no_truth.moda, no_truth.mota, no_truth.recall) == (0, None, None, None)
+    assert (no_tracks.moda, no_tracks.precision, no_tracks.location_mean, no_tracks.hota, no_tracks.idf1) == (
+        0,
+        None,
+        None,
+        0,
+        0,
+    )
+    assert no_tracks.mostly_lost == 2
 
 
 def test_a_trajectory_table_is_taken_as_it_is() -> None:
@@ -313,9 +319,9 @@ def judged_by_motmetrics(truth: Rows, tracks: Rows, gate: float) -> dict[str, fl
     motmetrics = pytest.importorskip("motmetrics")
     judge = motmetrics.MOTAccumulator(auto_id=True)
     for frame in np.unique(truth["frame"]):
-        here, there = (rows[rows["frame"] == frame] for rows in (truth, tracks))
-        apart = np.hypot(here["x"][:, None] - there["x"], here["y"][:, None] - there["y"])
-        judge.update(here["id"].tolist(), there["id"].tolist(), np.where(apart <= gate, apart, np.nan))
+        true, tracked = (rows[rows["frame"] == frame] for rows in (truth, tracks))
+        distance = np.hypot(true["x"][:, None] - tracked["x"], true["y"][:, None] - tracked["y"])
+        judge.update(true["id"].tolist(), tracked["id"].tolist(), np.where(distance <= gate, distance, np.nan))
     figures = motmetrics.metrics.create().compute(judge, metrics=["mota", "motp", "idf1", "num_switches"])
     return {name: float(value) for name, value in figures.iloc[0].items()}
 
@@ -353,10 +359,10 @@ def files(tmp_path: Path) -> tuple[Path, Path]:
 
 def test_the_table_says_what_it_was_taken_on(files: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:
     command(*files, area="-1,-2,8,9")
-    said = capsys.readouterr().out
-    assert "10 frames, gate 0.5 m, x -1 .. 8, y -2 .. 9 m" in said
-    assert "MODA 50.0 %" in said and "misses 10" in said
-    assert len(said.splitlines()) == 6  # nothing is wrapped
+    printed = capsys.readouterr().out
+    assert "10 frames, gate 0.5 m, x -1 .. 8, y -2 .. 9 m" in printed
+    assert "MODA 50.0 %" in printed and "misses 10" in printed
+    assert len(printed.splitlines()) == 6  # nothing is wrapped
 
 
 def test_the_command_line_is_understood(files: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:

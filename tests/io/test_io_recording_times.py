@@ -83,7 +83,7 @@ def test_other_rates_and_dropped_frames_are_put_right(
     lost = [44, 45]
     double = np.delete(np.arange(2 * FRAMES) * TICK / 2, np.s_[2 * 44 - 1 : 2 * 45 + 2])
     dropping = np.delete(jittered(FRAMES, 0.2), [9, 20, 21, 22, 23, *lost])
-    films = [Film(np.delete(regular(FRAMES), lost)), Film(double).told(clock="stamps"), Film(dropping)]
+    films = [Film(np.delete(regular(FRAMES), lost)), Film(double).with_source(clock="stamps"), Film(dropping)]
     run = track(write_films(tmp_path, films))
     messages = capsys.readouterr().err
     assert messages.startswith("stseg: corner0, corner2: the time stamps vary; each tick shows the nearest frame")
@@ -97,9 +97,9 @@ def test_other_rates_and_dropped_frames_are_put_right(
 def test_late_and_early_cameras_are_blind_there(tmp_path: Path) -> None:
     """The run is as long as two of them see: what one alone shows at the beginning is left out."""
     films = [
-        Film(regular(FRAMES)).told(blind=True),
-        Film(regular(FRAMES)[16:]).told(offset=16, blind=True),
-        Film(regular(FRAMES)[24:-8]).told(offset=24, blind=True),
+        Film(regular(FRAMES)).with_source(blind=True),
+        Film(regular(FRAMES)[16:]).with_source(offset=16, blind=True),
+        Film(regular(FRAMES)[24:-8]).with_source(offset=24, blind=True),
     ]
     run = track(write_films(tmp_path, films))
     assert run.frames.tolist() == list(range(16, FRAMES))

@@ -1,4 +1,4 @@
-"""Measures of tracks whose numbers are known by construction."""
+"""Measures of tracks with numbers known by construction."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def test_standing_on_a_line_is_no_traffic() -> None:
 
 
 def test_the_way_from_exit_to_entrance_is_nobodys() -> None:
-    """Somebody leaves to the left of a line and comes back on its right a minute later."""
+    """A person leaves to the left of a line and comes back on its right a minute later."""
     first, second = walk(1, np.linspace(-0.5, -2.0, 16)), walk(1, np.linspace(2.0, 0.5, 16))
     second["frame"] += 600
     found = measure_tracks(np.concatenate([first, second]), np.arange(700), 10.0, GRID, Areas((), (UP,)))

@@ -34,7 +34,7 @@ def front_camera(name: str, x: float) -> Camera:
 
 @pytest.fixture
 def recording(tmp_path: Path) -> Recording:
-    """Two cameras whose frames are of one vivid colour."""
+    """Two cameras with frames of one vivid colour."""
     folder = tmp_path / "frames"
     folder.mkdir()
     for frame in range(16):
@@ -65,14 +65,14 @@ def frames_of(path: Path) -> list[Bytes]:
     film = cv2.VideoCapture(str(path))
     frames: list[Bytes] = []
     while True:
-        there, frame = film.read()
-        if not there:
+        found, frame = film.read()
+        if not found:
             return frames
         frames.append(np.asarray(frame, np.uint8))
 
 
-def near(pixel: Bytes, colour: tuple[int, int, int], apart: float) -> bool:
-    return bool(np.abs(pixel.astype(int) - colour).max() <= apart)
+def is_close(pixel: Bytes, colour: tuple[int, int, int], tolerance: float) -> bool:
+    return bool(np.abs(pixel.astype(int) - colour).max() <= tolerance)
 
 
 def test_pillars_and_the_plan_are_drawn_where_people_are(recording: Recording) -> None:
@@ -96,11 +96,11 @@ def test_the_film_has_the_frames_that_were_asked_for(
     assert "a.mp4: 6 frames" in capsys.readouterr().out
     whole = frames_of(tmp_path / "a.mp4")
     assert len(whole) == 6
-    shown = tuple(round(0.85 * tone) for tone in VIVID)
-    assert near(whole[0][400, 20], (shown[0], shown[1], shown[2]), 12)
+    darkened = tuple(round(0.85 * tone) for tone in VIVID)
+    assert is_close(whole[0][400, 20], (darkened[0], darkened[1], darkened[2]), 12)
     row = walk()[0]
     body = np.rint(OverlayView(front_camera("left", 1), 640).pixel(np.array([row["x"], row["y"]]), 0.9)).astype(int)
-    assert not near(whole[0][body[1], body[0]], (shown[0], shown[1], shown[2]), 30)  # the pillar
+    assert not is_close(whole[0][body[1], body[0]], (darkened[0], darkened[1], darkened[2]), 30)  # the pillar
     assert main(["report", str(run_path), "--video", str(tmp_path / "b.mp4"), "--frames", "12:14"]) == 0
     assert len(frames_of(tmp_path / "b.mp4")) == 2
     assert not (tmp_path / "b.mp4.part").exists() and not list(tmp_path.glob("*.part*"))
@@ -110,8 +110,8 @@ def test_without_the_flag_a_film_holds_no_camera_pixel(run_path: Path, tmp_path:
     for path in (tmp_path / "frames").iterdir():
         path.unlink()
     assert main(["report", str(run_path), "--video", str(tmp_path / "a.mp4")]) == 0
-    shown = np.array([0.85 * tone for tone in VIVID])
-    assert not any((np.abs(frame - shown).max(axis=-1) < 40).any() for frame in frames_of(tmp_path / "a.mp4"))
+    darkened = np.array([0.85 * tone for tone in VIVID])
+    assert not any((np.abs(frame - darkened).max(axis=-1) < 40).any() for frame in frames_of(tmp_path / "a.mp4"))
     assert main(["report", str(run_path), "--video", str(tmp_path / "b.mp4"), "--camera-images"]) == 2
     assert not (tmp_path / "b.mp4").exists()
 
@@ -132,12 +132,12 @@ def test_slips_are_told_before_any_work(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
     arguments: list[str],
-    told: str,
+    message: str,
 ) -> None:
     monkeypatch.chdir(run_path.parent)
     before = set(run_path.parent.iterdir())
     assert main(["report", str(run_path), *arguments]) == 2
-    assert told in capsys.readouterr().err
+    assert message in capsys.readouterr().err
     assert set(run_path.parent.iterdir()) == before
 
 

@@ -32,12 +32,12 @@ def test_density_is_people_a_square_metre() -> None:
     assert density(Bins(BINS.x, BINS.y, 0.5), rows_of((0, 1, 0.2, -0.9)), 1)[0, 0] == 4
 
 
-def test_who_returns_begins_another_stay() -> None:
-    there, away = (0.5, -0.5), (2.5, -0.5)
-    walk = [there, there, there, there, away, there, there, away]
+def test_a_return_begins_another_stay() -> None:
+    home, away = (0.5, -0.5), (2.5, -0.5)
+    walk = [home, home, home, home, away, home, home, away]
     found = dwell(BINS, rows_of(*((frame, 1, *place) for frame, place in enumerate(walk))), 2.0)
     assert (found[0, 0], found[0, 2]) == (6 / 2 / 2.0, 2 / 2 / 2.0)  # frames a stay at two frames a second
-    two = rows_of((0, 1, *there), (1, 1, *there), (0, 2, *there), (1, 2, *there))
+    two = rows_of((0, 1, *home), (1, 1, *home), (0, 2, *home), (1, 2, *home))
     assert dwell(BINS, two, 2.0)[0, 0] == 1
     assert not dwell(BINS, rows_of(), 2.0).any()
 

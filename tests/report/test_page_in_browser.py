@@ -36,7 +36,7 @@ def page(folder: Path) -> Iterator[Page]:
 
 
 def pictures(page: Page) -> list[str]:
-    """What the canvases show, once the slice of the moment has been drawn."""
+    """Pictures of the canvases, once the slice of the moment has been drawn."""
     frame = page.ask("/frame (\\d+)/.exec(document.getElementById('clock').textContent)[1]")
     page.wait_for(f"document.getElementById('slice').dataset.frame === '{frame}'")
     return [page.ask(f"document.getElementById('{name}').toDataURL()") for name in CANVASES]

@@ -35,7 +35,7 @@ from stseg.simulation.scene import KINDS
 from stseg.simulation.spoiling.detector import detect, visible_boxes
 
 TINY = NAMED["tiny"]
-SHARP = replace(TINY, noise=0.0, light_drift=0.0, shadows=0.0)
+NOISELESS = replace(TINY, noise=0.0, light_drift=0.0, shadows=0.0)
 
 
 def crowd_of(ground: Floats, phase: float = 0.7, swing: float = 1.0, heading: float = 0.4) -> Crowd:
@@ -52,12 +52,12 @@ def viewers(spec: SceneSpec) -> list[Viewer]:
 
 def test_people_who_dress_alike_do_so_in_tones_of_their_own() -> None:
     dressed = [clothing(5, person, 3) for person in (1, 2, 3, 4)]
-    own = [own_clothing(5, person) for person in (1, 2, 3, 4)]
-    np.testing.assert_array_equal(dressed[0], own[0])
-    np.testing.assert_array_equal(dressed[3], own[3])
+    clothes = [own_clothing(5, person) for person in (1, 2, 3, 4)]
+    np.testing.assert_array_equal(dressed[0], clothes[0])
+    np.testing.assert_array_equal(dressed[3], clothes[3])
     for k in (1, 2):
-        np.testing.assert_allclose((dressed[k] - own[0])[:, :6], 0.2 * (own[k] - own[0])[:, :6])
-        np.testing.assert_array_equal(dressed[k][:, 6:], own[0][:, 6:])
+        np.testing.assert_allclose((dressed[k] - clothes[0])[:, :6], 0.2 * (clothes[k] - clothes[0])[:, :6])
+        np.testing.assert_array_equal(dressed[k][:, 6:], clothes[0][:, 6:])
 
 
 # Specification and cameras
@@ -107,10 +107,10 @@ def test_half_the_cameras_are_among_the_whole() -> None:
 @given(camera=cameras(size=(80, 60)), depth=st.floats(0.5, 20.0))
 def test_rays_go_through_the_points_that_their_pixels_show(camera: Camera, depth: float) -> None:
     rays = pixel_rays(camera)
-    seen = np.any(rays != 0, axis=-1)
-    point = camera.centre + depth * rays[seen]
+    visible = np.any(rays != 0, axis=-1)
+    point = camera.centre + depth * rays[visible]
     pixel, ahead = camera.project(point[:, :2], point[:, 2])
-    v, u = np.nonzero(seen)
+    v, u = np.nonzero(visible)
     assert ahead.all()
     np.testing.assert_allclose(pixel, np.stack([u, v], -1), atol=2e-2)
     depths = np.concatenate([point, np.ones((len(point), 1))], 1) @ camera.projection[2]
@@ -164,7 +164,7 @@ def test_clothes_belong_to_a_person() -> None:
 def test_drawing_is_what_every_ray_meets_first(
     ground: list[tuple[float, float]], phase: float, distortion: tuple[float, ...]
 ) -> None:
-    viewer = viewers(replace(SHARP, size=(48, 36), cameras=1, distortion=distortion))[0]
+    viewer = viewers(replace(NOISELESS, size=(48, 36), cameras=1, distortion=distortion))[0]
     crowd = crowd_of(np.array(ground), phase)
     bodies = pose(crowd)
     drawing = viewer.draw(crowd, bodies)
@@ -207,9 +207,9 @@ def test_compiled_and_plain_kernels_agree(monkeypatch: pytest.MonkeyPatch) -> No
         for name in ("_nearest", "_paint"):
             monkeypatch.setattr(draw_module, name, form(getattr(draw_module, name)))
         depth, image = np.full((18, 24), np.inf, np.float32), viewer.room.image.copy()
-        instances, seen = np.zeros((18, 24), np.uint16), np.empty((2, 5), np.int64)
+        instances, silhouettes = np.zeros((18, 24), np.uint16), np.empty((2, 5), np.int64)
         scene = (pixel_rays(camera), camera.centre, boxes, bodies.centre, bodies.form, paint, LAMP)
-        form(draw_bodies)(*scene, crowd.id.astype(np.uint16), depth, image, instances, seen)
+        form(draw_bodies)(*scene, crowd.id.astype(np.uint16), depth, image, instances, silhouettes)
         dark = np.zeros((18, 24), np.float32)
         parts = bodies.centre.reshape(-1, 3), bodies.form.reshape(-1, 3, 3)
         whole = np.tile(np.array([0, 23, 0, 17]), (len(parts[0]), 1))
@@ -217,7 +217,7 @@ def test_compiled_and_plain_kernels_agree(monkeypatch: pytest.MonkeyPatch) -> No
             form(darken)(viewer.room.ground, whole, *parts, LAMP, dark)
         visible = np.empty((2, 5), np.int64)
         form(visible_boxes)(instances, np.array([0, 0, 1]), visible)
-        results.append((depth, image.astype(int), instances, seen, dark, visible))
+        results.append((depth, image.astype(int), instances, silhouettes, dark, visible))
     for compiled, plain in zip(*results, strict=True):
         np.testing.assert_allclose(compiled, plain, rtol=1e-5, atol=1.001 if compiled is results[0][1] else 1e-5)
 
@@ -248,7 +248,7 @@ def test_masks_hold_hips_and_feet_of_those_in_full_view() -> None:
 def test_crowds_keep_apart_come_and_go(name: str) -> None:
     spec = NAMED[name]
     inside: list[int] = []
-    known: set[int] = set()
+    earlier: set[int] = set()
     gone: set[int] = set()
     last: dict[int, tuple[Floats, float]] = {}
     for frame, crowd in enumerate(walk_freely(spec)):
@@ -259,20 +259,20 @@ def test_crowds_keep_apart_come_and_go(name: str) -> None:
         assert (np.abs(truth["x"]) <= spec.area[0] / 2).all() and (np.abs(truth["y"]) <= spec.area[1] / 2).all()
         inside.append(len(truth))
         present = set(crowd.id.tolist())
-        assert not present & gone, "nobody comes back"
-        gone |= known - present
-        known |= present
+        assert not present & gone, "no person comes back"
+        gone |= earlier - present
+        earlier |= present
         for person, ground, phase in zip(crowd.id.tolist(), crowd.ground, crowd.phase, strict=True):
             if person in last:
                 way, turn = np.hypot(*(ground - last[person][0])), phase - last[person][1]
                 assert way * spec.frame_rate < 2.5
-                # Two steps of a walker are 0.35 to 0.76 of the height.
+                # Two steps are 0.35 to 0.76 of the height.
                 assert way / (0.77 * 1.98) - 1e-9 <= turn / (2 * np.pi) <= 1.2 * (way + 0.05) / (0.34 * 1.45)
             last[person] = ground, phase
     assert len(inside) == spec.frames
     assert max(inside) <= spec.people + 1
     assert 0.8 * spec.people < np.mean(inside)
-    assert len(known) > spec.people
+    assert len(earlier) > spec.people
 
 
 def test_regulars_come_back_as_they_were() -> None:
@@ -288,7 +288,7 @@ def test_regulars_come_back_as_they_were() -> None:
         before = set(crowd.id.tolist())
     assert set(came) == set(range(1, spec.people + 1))
     assert all(len(frames) >= 6 for frames in came.values())
-    assert all(len(own) == 1 for own in heights.values())
+    assert all(len(heights_of_person) == 1 for heights_of_person in heights.values())
 
 
 def test_nobody_leaves_the_closed_room() -> None:
@@ -318,22 +318,22 @@ def test_equal_scenes_are_equal_and_seeds_matter() -> None:
 
 
 def test_where_nobody_stands_frames_are_those_of_the_empty_room() -> None:
-    film = Film(SHARP)
+    film = Film(NOISELESS)
     empty = next(film.empty())
     moment = next(film.frame_sets())
     for image, view in zip(empty, moment.views, strict=True):
-        near = cv2.dilate((view.instances > 0).astype(np.uint8), np.ones((5, 5), np.uint8)) > 0  # the lens is soft
-        np.testing.assert_array_equal(view.image[~near], image[~near])
+        close = cv2.dilate((view.instances > 0).astype(np.uint8), np.ones((5, 5), np.uint8)) > 0  # the lens is soft
+        np.testing.assert_array_equal(view.image[~close], image[~close])
         assert (view.image[view.instances > 0] != image[view.instances > 0]).mean() > 0.5
 
 
 def test_noise_and_light_are_as_large_as_asked_for() -> None:
-    noisy, still = Film(replace(SHARP, people=0, noise=6.0)), Film(replace(SHARP, people=0))
+    noisy, still = Film(replace(NOISELESS, people=0, noise=6.0)), Film(replace(NOISELESS, people=0))
     rest = [view.image.astype(float) for view in next(still.frame_sets()).views]
     images = [view.image.astype(float) for view in next(noisy.frame_sets()).views]
     assert np.std(np.subtract(images, rest)) == pytest.approx(6.0, rel=0.05)
     assert abs(np.mean(np.subtract(images, rest))) < 0.3
-    drifting = Film(replace(SHARP, people=0, light_drift=0.2, light_period=1.0))
+    drifting = Film(replace(NOISELESS, people=0, light_drift=0.2, light_period=1.0))
     means = np.array([[view.image.mean() for view in moment.views] for moment in drifting.frame_sets()])
     swing = (means.max(axis=0) - means.min(axis=0)) / means.mean(axis=0) / 2
     np.testing.assert_allclose(swing, 0.2, atol=0.02)
@@ -341,7 +341,7 @@ def test_noise_and_light_are_as_large_as_asked_for() -> None:
 
 def test_lamps_are_switched_and_light_what_is_near() -> None:
     lamp = Lamp(1.5, on=0.3, off=0.6, place=(0.0, 0.0, 1.0), reach=1.0)
-    film = Film(replace(SHARP, people=0, lamps=(lamp,)))
+    film = Film(replace(NOISELESS, people=0, lamps=(lamp,)))
     images = [moment.views[0].image.astype(float) for moment in film.frame_sets()]
     viewer = film.viewers[0]
     far = np.hypot(*np.nan_to_num(viewer.room.ground, nan=99.0).transpose(2, 0, 1))
@@ -353,13 +353,13 @@ def test_lamps_are_switched_and_light_what_is_near() -> None:
 
 
 def test_a_cloud_comes_slowly_and_is_everywhere() -> None:
-    film = Film(replace(SHARP, people=0, lamps=(Lamp(-0.5, on=0.2, rise=0.4),)))
+    film = Film(replace(NOISELESS, people=0, lamps=(Lamp(-0.5, on=0.2, rise=0.4),)))
     means = np.array([moment.views[1].image.mean() for moment in film.frame_sets()])
     np.testing.assert_allclose(means[[0, 2, 4, 6, 9]] / means[0], [1, 1, 0.75, 0.5, 0.5], atol=0.02)
 
 
 def test_people_stand_in_the_light_of_lamps() -> None:
-    spec = replace(SHARP, seconds=0.1, size=(160, 120))
+    spec = replace(NOISELESS, seconds=0.1, size=(160, 120))
     lit = replace(spec, lamps=(Lamp(0.4, on=0.0, place=(0.0, 0.0, 2.0), reach=2.0),))
     dark, bright = (next(Film(one).frame_sets()).views[0] for one in (spec, lit))
     person = np.asarray(dark.instances > 0)
@@ -379,7 +379,7 @@ def test_lamps_that_cannot_be_are_refused(key: str, value: float) -> None:
 
 
 def _detections(share: float, rounds: int) -> tuple[int, list[Floats]]:
-    """How many of `rounds` looks at a person of whom a share is visible find a box, and those near the person."""
+    """Number of frames out of `rounds` with a box of a person with a visible share, and those boxes."""
     camera = build_rig(replace(TINY, size=(320, 240))).cameras[0]
     whole = np.array([[100, 139, 80, 179, 2400]])
     visible = np.array([[100, 139, 80, 80 + round(99 * share), round(2400 * share)]])
@@ -387,8 +387,8 @@ def _detections(share: float, rounds: int) -> tuple[int, list[Floats]]:
     for k in range(rounds):
         boxes = detect(camera, visible, whole, np.array([1.5, 1.5]), np.random.default_rng(k))
         assert ((boxes.score >= 0) & (boxes.score <= 1)).all() and (boxes.pixel[:, 2:] > 0).all()
-        near = np.abs(boxes.pixel[:, :2] - [99.5, 79.5]).max(axis=1) < 15
-        found += list(boxes.pixel[near][:1])
+        close = np.abs(boxes.pixel[:, :2] - [99.5, 79.5]).max(axis=1) < 15
+        found += list(boxes.pixel[close][:1])
     return len(found), found
 
 
@@ -410,8 +410,10 @@ def test_detector_guesses_whole_bodies_sometimes() -> None:
 
 def test_detector_sees_ghosts_now_and_then() -> None:
     camera = build_rig(replace(TINY, size=(320, 240))).cameras[0]
-    nobody = np.zeros((0, 5), np.int64)
-    counts = [len(detect(camera, nobody, nobody, np.array([1.5, 1.5]), np.random.default_rng(k))) for k in range(400)]
+    no_people = np.zeros((0, 5), np.int64)
+    counts = [
+        len(detect(camera, no_people, no_people, np.array([1.5, 1.5]), np.random.default_rng(k))) for k in range(400)
+    ]
     assert 0.02 < np.mean(counts) < 0.2
 
 
@@ -420,17 +422,17 @@ def test_detector_sees_ghosts_now_and_then() -> None:
 
 def test_a_written_scene_reads_back(tmp_path: Path) -> None:
     spec = replace(TINY, seconds=0.4, quality=95)
-    film, told = Film(spec), []
-    write_scene(tmp_path / "a", film, instances=True, progress=lambda done, of: told.append((done, of)))
-    assert told == [(k, 4) for k in range(1, 5)]
+    film, reported = Film(spec), []
+    write_scene(tmp_path / "a", film, instances=True, progress=lambda done, of: reported.append((done, of)))
+    assert reported == [(k, 4) for k in range(1, 5)]
     moments = list(film.frame_sets())
     recordings = {
         kind: read_recording(tmp_path / "a" / f"rig{kind}.toml") for kind in ("", "_masks", "_boxes", "_instances")
     }
     readers = [open_frames(recording) for recording in recordings.values()]
-    for moment, *seen in zip(moments, *readers, strict=True):
+    for moment, *read in zip(moments, *readers, strict=True):
         for k, view in enumerate(moment.views):
-            image, mask, boxes, instances = (one.views[k] for one in seen)
+            image, mask, boxes, instances = (one.views[k] for one in read)
             assert isinstance(image, np.ndarray)
             assert np.abs(image.astype(int) - view.image).mean() < 4
             np.testing.assert_array_equal(mask, np.where(view.instances > 0, 255, 0))
@@ -485,11 +487,11 @@ def test_command_suggests_a_scene(tmp_path: Path) -> None:
         simulate(tmp_path, scene="tiny", size="40x30")
 
 
-def test_animals_are_as_long_as_they_say_in_the_direction_in_which_they_face() -> None:
+def test_animals_have_their_length_in_the_direction_they_face() -> None:
     crowd = crowd_of(np.zeros((1, 2)), heading=0.4)
     bodies = upright_cylinders(crowd, 0.35, 1.1)
-    ahead, aside = np.array([np.cos(0.4), np.sin(0.4), 0.0]), np.array([-np.sin(0.4), np.cos(0.4), 0.0])
-    for direction, half in ((ahead, 0.55), (aside, 0.175)):
+    ahead, across = np.array([np.cos(0.4), np.sin(0.4), 0.0]), np.array([-np.sin(0.4), np.cos(0.4), 0.0])
+    for direction, half in ((ahead, 0.55), (across, 0.175)):
         reach = np.sqrt(((bodies.axes[0] @ direction) ** 2).sum(-1))
         assert reach.max() == pytest.approx(half)
 

@@ -30,7 +30,7 @@ def spoiled(kind: str, strength: float, moment: Moment = MOMENT) -> Bytes:
 
 
 @pytest.mark.parametrize("kind", MASK_KINDS)
-def test_the_same_frame_errs_in_the_same_way_and_not_at_strength_zero(kind: str) -> None:
+def test_errors_repeat_for_a_frame_and_vanish_at_strength_zero(kind: str) -> None:
     strong = STRENGTHS[kind][2]
     np.testing.assert_array_equal(spoiled(kind, strong), spoiled(kind, strong))
     assert not np.array_equal(spoiled(kind, 1.0 if kind == "flicker" else strong), MASK)
@@ -52,8 +52,8 @@ def test_holes_take_their_share_and_legs_are_cut() -> None:
 
 def test_foreground_without_people_is_added() -> None:
     for kind in ("shadows", "staying", "rain"):
-        shown = spoiled(kind, STRENGTHS[kind][2])
-        assert (shown >= MASK).all() and (shown > MASK).any()
+        added = spoiled(kind, STRENGTHS[kind][2])
+        assert (added >= MASK).all() and (added > MASK).any()
     before = replace(MOMENT, frame=0)
     np.testing.assert_array_equal(spoiled("staying", 4, before), MASK)
     np.testing.assert_array_equal(spoiled("staying", 4), spoiled("staying", 4, replace(MOMENT, frame=300)))
@@ -102,7 +102,7 @@ CORNER = {"dilation": 4.0, "holes": 4.0, "rain": 4.0}
 
 
 @pytest.mark.parametrize("kind", CORNER)
-def test_a_small_crowd_is_followed_through_errors_of_middle_strength(kind: str) -> None:
+def test_a_small_crowd_is_tracked_through_errors_of_middle_strength(kind: str) -> None:
     spec = replace(NAMED["demo"], people=3, seconds=1.5)
     film = SpoiledFilm(Film(spec), [Spoil(kind, STRENGTHS[kind][1])])
     tracker, results, truth = Tracker(film.rig), [], []

@@ -78,8 +78,8 @@ def test_marks_bring_cameras_nearer_to_the_truth() -> None:
 def exact_marks(scene: Walking) -> Marks:
     ground = np.stack(np.meshgrid(np.linspace(-2, 2, 9), np.linspace(-2, 2, 9)), -1).reshape(-1, 2)
     pixel = np.stack([camera.project(ground, 0.0)[0] for camera in scene.rig.cameras], 1)
-    seen = np.all([camera.inside(pixel[:, k]) for k, camera in enumerate(scene.rig.cameras)], axis=0)
-    return Marks(np.tile([0, 1], (int(seen.sum()), 1)), pixel[seen], 0 * ground[seen])
+    visible = np.all([camera.inside(pixel[:, k]) for k, camera in enumerate(scene.rig.cameras)], axis=0)
+    return Marks(np.tile([0, 1], (int(visible.sum()), 1)), pixel[visible], 0 * ground[visible])
 
 
 def disagreement(solution: Solution, marks: Marks) -> float:

@@ -1,4 +1,4 @@
-"""What the page embeds: sheets within a budget, tracks and candidates that can be read back; and an hour's page."""
+"""Data in the page: sheets within a budget, tracks and candidates that can be read back; and an hour's page."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from stseg.reporting.page.embedded import embedded_json, thin_tracks
 from stseg.reporting.pictures.sheets import Sheets, coarse, spread, thin_sheets
 
 GRID = Grid((0.0, 4.0), (-1.0, 2.0), 0.5, 1.8, 3)
-NONE = np.zeros(0, np.int64)
+NO_FRAMES = np.zeros(0, np.int64)
 
 
 def volume_of(frame: int) -> tuple[Singles, Labels]:
@@ -41,27 +41,27 @@ def decoded(png: bytes) -> Bytes:
 
 
 def test_a_sheet_gives_the_log_odds_back() -> None:
-    sheets = thin_sheets(np.arange(3, 7), GRID, volume_of, 10**6, NONE)
+    sheets = thin_sheets(np.arange(3, 7), GRID, volume_of, 10**6, NO_FRAMES)
     assert sheets.frames.tolist() == [3, 4, 5, 6] and sheets.shape == GRID.shape
     for frame, png in zip(sheets.frames.tolist(), sheets.pngs, strict=True):
         grey = decoded(png).reshape(sheets.shape)[:, ::-1].astype(float)
         log_odds, _ = volume_of(frame)
         np.testing.assert_array_equal(grey == 0, np.isnan(log_odds))
-        known = np.clip(log_odds, -sheets.limit, sheets.limit)
+        clipped = np.clip(log_odds, -sheets.limit, sheets.limit)
         read = (grey - 64) / 63 * sheets.limit
-        np.testing.assert_allclose(read[grey > 0], known[grey > 0], atol=0.51 * sheets.limit / 63)
+        np.testing.assert_allclose(read[grey > 0], clipped[grey > 0], atol=0.51 * sheets.limit / 63)
 
 
 def test_sheets_keep_to_their_budget_and_to_what_is_wanted() -> None:
     frames = np.arange(200)
-    whole = thin_sheets(frames, GRID, volume_of, 10**7, NONE)
+    whole = thin_sheets(frames, GRID, volume_of, 10**7, NO_FRAMES)
     budget = sum(map(len, whole.pngs)) // 3
     thin = thin_sheets(frames, GRID, volume_of, budget, np.array([77]))
     assert len(whole.frames) == 200
     assert 77 in thin.frames and 40 < len(thin.frames) < 70
     assert sum(map(len, thin.pngs)) - len(thin.pngs[thin.frames.tolist().index(77)]) <= budget
-    assert len(thin_sheets(np.arange(5000), GRID, volume_of, 10**9, NONE).frames) == 400
-    assert thin_sheets(NONE, GRID, volume_of, 10**6, NONE).pngs == []
+    assert len(thin_sheets(np.arange(5000), GRID, volume_of, 10**9, NO_FRAMES).frames) == 400
+    assert thin_sheets(NO_FRAMES, GRID, volume_of, 10**6, NO_FRAMES).pngs == []
 
 
 def test_large_ground_is_shown_by_the_greatest_of_some_cells() -> None:
@@ -102,9 +102,9 @@ def test_thin_tracks_keep_ends_and_moments() -> None:
         frames = thin["frame"][thin["id"] == identity]
         assert {0, 501, 777, 999} <= set(frames.tolist())
         assert (np.diff(frames) > 0).all() and np.diff(frames).max() <= stride
-    whole, every = thin_tracks(table, NONE)
-    assert every == 1 and len(whole) == len(table)
-    assert len(thin_tracks(table[:0], NONE)[0]) == 0
+    whole, stride_of_whole = thin_tracks(table, NO_FRAMES)
+    assert stride_of_whole == 1 and len(whole) == len(table)
+    assert len(thin_tracks(table[:0], NO_FRAMES)[0]) == 0
 
 
 def embedded(trajectory: Rows, candidates: Rows, frames: AnyArray, tmp_path: Path) -> dict[str, object]:

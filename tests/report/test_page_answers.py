@@ -13,8 +13,10 @@ from stseg.reporting.page.answers import answers
 from stseg.reporting.pictures.maps import DwellPlace
 from stseg.reporting.run_statistics import Span
 
+PLACES = [DwellPlace(1.0, 2.0, 0.4), DwellPlace(-1.0, 0.0, 0.2)]
 
-def told(places: list[DwellPlace], shares: list[float], dropped: int = 0) -> list[str]:
+
+def answers_of(places: list[DwellPlace], shares: list[float], dropped: int = 0) -> list[str]:
     """The four answers of the small run, without their tags."""
     trajectory, candidates = run_files.small_trajectory(), run_files.small_ghosts()
     events = np.zeros(dropped, EVENT)
@@ -30,7 +32,9 @@ def told(places: list[DwellPlace], shares: list[float], dropped: int = 0) -> lis
 
 
 def test_the_four_questions_are_answered() -> None:
-    people, places, ghosts, blind = told([DwellPlace(1.0, 2.0, 0.4), DwellPlace(-1.0, 0.0, 0.2)], [0.1, 0.25, 0.65], 2)
+    people, places, ghosts, blind = answers_of(
+        [DwellPlace(1.0, 2.0, 0.4), DwellPlace(-1.0, 0.0, 0.2)], [0.1, 0.25, 0.65], 2
+    )
     assert people.startswith("1.5 at a time on average, at most 2. There are 2 tracks, half of them 0.9 s or longer")
     assert "A at (1.0, 2.0), 40 %; B at (-1.0, 0.0), 20 %" in places
     assert ghosts.startswith("1 of 3 candidates (0.2 a frame): 100 % because a view sees nobody there.")
@@ -39,6 +43,6 @@ def test_the_four_questions_are_answered() -> None:
 
 
 def test_an_even_crowd_dwells_nowhere() -> None:
-    _, places, ghosts, _ = told([], [0, 0, 1])
+    _, places, ghosts, _ = answers_of([], [0, 0, 1])
     assert places.startswith("Nowhere in particular")
     assert "too short" not in ghosts

@@ -1,0 +1,372 @@
+"""Pictures of a run agree with its tables: right place, right colour, right way up."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+import run_files
+import strategies
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from stseg.arrays import AnyArray, Boxes, Bytes, Rows
+from stseg.geometry import Camera, Grid, Rig
+from stseg.records.tables import TRAJECTORY
+from stseg.reporting import marginal_picture, overlay, plan_view, spacetime_picture, volume_picture
+from stseg.reporting.figures import backdrop
+from stseg.reporting.pictures.canvas import place_labels
+from stseg.reporting.pictures.colours import NIGHT, PAPER, track_colour
+from stseg.reporting.pictures.overlay import OverlayView, pillar_outline
+from stseg.reporting.pictures.plan import plan_map
+from stseg.reporting.pictures.slices import colours_of
+from stseg.reporting.pictures.spacetime import Block
+
+GRID = Grid((0.0, 4.0), (-1.0, 2.0), 0.5, 1.8, 3)
+
+
+def trajectory_of(*rows: tuple[int, int, float, float]) -> Rows:
+    """Rows of frame, id, x, y."""
+    table = np.zeros(len(rows), TRAJECTORY)
+    for name, column in zip(("frame", "id", "x", "y"), zip(*rows, strict=True), strict=False):
+        table[name] = column
+    table["height"] = 1.7
+    return table
+
+
+def front_camera(size: tuple[int, int] = (320, 240)) -> Camera:
+    """Three metres above y = -5, looking along y and 20 degrees down."""
+    down = np.radians(20)
+    rotation = np.array([[1, 0, 0], [0, -np.sin(down), -np.cos(down)], [0, np.cos(down), -np.sin(down)]])
+    matrix = np.array([[250.0, 0, (size[0] - 1) / 2], [0, 250.0, (size[1] - 1) / 2], [0, 0, 1]])
+    place = np.array([2.0, -5.0, 3.0])
+    return Camera.from_projection("front", size, matrix @ np.column_stack([rotation, -rotation @ place]))
+
+
+RIG = Rig("hall", 5.0, GRID, (front_camera(),))
+
+
+def at(picture: Bytes, pixel: AnyArray) -> tuple[int, int, int]:
+    """The colour at a pixel (u, v)."""
+    u, v = np.rint(pixel).astype(int)
+    blue, green, red = picture[v, u].tolist()
+    return blue, green, red
+
+
+def has(picture: Bytes, colour: tuple[int, int, int]) -> bool:
+    return bool((picture == colour).all(axis=-1).any())
+
+
+# Colours
+
+
+def test_few_tracks_have_distinct_colours() -> None:
+    colours = np.array([track_colour(k) for k in range(1, 9)], float)
+    distances = np.linalg.norm(colours[:, None] - colours[None], axis=-1) + 1e3 * np.eye(8)
+    assert distances.min() > 60
+    assert all(np.linalg.norm(colours - ground, axis=1).min() > 100 for ground in (PAPER, NIGHT))
+
+
+# The plan view
+
+
+def test_the_plan_shows_a_track_at_its_places_in_its_colour() -> None:
+    path = [(frame, 7, 0.5 + 0.25 * frame, 1.5 - 0.2 * frame) for frame in range(12)]
+    picture = plan_view(RIG, trajectory_of(*path))
+    plan = plan_map(RIG)
+    assert picture.shape == (plan.size[1], plan.size[0], 3)
+    for _, identity, x, y in path[:-1]:
+        assert at(picture, plan.pixel(np.array([x, y]))) == track_colour(identity)
+
+
+def test_in_the_plan_y_points_up_and_x_to_the_right() -> None:
+    plan = plan_map(RIG)
+    low, high = plan.pixel(np.array([[1.0, 0.0], [3.0, 1.0]]))
+    assert high[0] > low[0] and high[1] < low[1]
+    np.testing.assert_allclose(high - low, [2 * plan.scale, -plan.scale])
+    picture = plan_view(RIG, trajectory_of((0, 1, 1.0, -0.5), (0, 2, 1.0, 1.5)))
+    assert at(picture, plan.pixel(np.array([1.0, -0.5]))) == track_colour(1)
+    assert at(picture, plan.pixel(np.array([1.0, 1.5]))) == track_colour(2)
+
+
+def test_the_plan_shades_what_few_views_see_at_its_place() -> None:
+    coverage = np.full(GRID.shape[1:], 3, np.uint8)
+    coverage[0, -1] = 0  # least y, greatest x
+    picture = plan_view(RIG, trajectory_of(), None, coverage)
+    plan = plan_map(RIG)
+    unseen, *lighter = (at(picture, plan.pixel(np.array(place))) for place in ((3.8, -0.8), (3.8, 1.8), (0.3, -0.8)))
+    assert all(max(unseen) < min(other) for other in lighter)
+
+
+def test_a_gap_of_a_track_is_no_solid_line() -> None:
+    plan = plan_map(RIG)
+    whole = [(frame, 1, 0.5 + 0.1 * frame, 0.3) for frame in range(30)]
+    torn = [row for row in whole if not 10 <= row[0] < 20]
+    between = plan.pixel(np.stack([np.linspace(1.55, 2.35, 60), np.full(60, 0.3)], -1))
+    pictures = [plan_view(RIG, trajectory_of(*rows)) for rows in (whole, torn)]
+    assert [sum(at(picture, pixel) == track_colour(1) for pixel in between) for picture in pictures] == [60, 0]
+
+
+def test_truth_is_dashed_and_leaves_the_tracks_visible() -> None:
+    truth = trajectory_of(*((frame, 9, 0.5 + 0.1 * frame, 1.0) for frame in range(30)))
+    plain, both = (plan_view(RIG, trajectory_of((0, 1, 1.0, 0.0)), table) for table in (None, truth))
+    line = np.rint(plan_map(RIG).pixel(np.stack([np.linspace(0.5, 3.4, 400), np.full(400, 1.0)], -1))).astype(int)
+    dark = both[line[:, 1], line[:, 0]].max(axis=1) < 130
+    assert 0.3 < dark.mean() < 0.8
+    assert not (plain[line[:, 1], line[:, 0]].max(axis=1) < 130).any()
+
+
+def test_sparse_truth_is_one_line_though_frames_are_missing() -> None:
+    dense = trajectory_of(*((frame, 1, 0.5 + 0.1 * frame, 1.0) for frame in range(20)))
+    sparse = dense.copy()
+    sparse["frame"] *= 10
+    pictures = [plan_view(RIG, trajectory_of(), truth) for truth in (dense, sparse)]
+    np.testing.assert_array_equal(pictures[0], pictures[1])
+
+
+def test_many_tracks_are_drawn_thinner() -> None:
+    def painted(count: int) -> float:
+        rows = [(frame, k, 0.2 + 0.1 * frame, -0.9 + 2.8 * k / count) for k in range(count) for frame in range(35)]
+        picture = plan_view(RIG, trajectory_of(*rows))
+        plan = plan_map(RIG)
+        column = picture[:, int(plan.pixel(np.array([1.75, 0.0]))[0])]
+        return float((np.ptp(column.astype(int), axis=1) > 40).sum() / count)
+
+    few, many = painted(8), painted(150)
+    assert few >= 3 > 2 >= many > 0
+
+
+def test_a_camera_that_is_far_away_does_not_shrink_the_plan() -> None:
+    far = Rig("hall", 5.0, GRID, (replace_centre(front_camera(), (2.0, -500.0)),))
+    alone = Rig("hall", 5.0, GRID, ())
+    assert plan_map(far) == plan_map(alone)
+    assert not np.array_equal(plan_view(far, trajectory_of()), plan_view(alone, trajectory_of()))
+
+
+def replace_centre(camera: Camera, place: tuple[float, float]) -> Camera:
+    rotation = camera.projection[:, :3]
+    shifted = np.array([*place, camera.centre[2]])
+    return Camera.from_projection(camera.name, camera.size, np.column_stack([rotation, -rotation @ shifted]))
+
+
+def test_a_camera_that_looks_down_has_a_place_but_no_wedge(tmp_path: Path) -> None:
+    rig = run_files.small_recording(tmp_path).rig
+    picture = plan_view(rig, trajectory_of(), width=900, height=900)
+    place = plan_map(rig, 900, 900).pixel(rig.cameras[0].centre[:2])
+    assert picture.shape[2] == 3 and np.isfinite(place).all()
+
+
+@settings(max_examples=15, deadline=None)
+@given(strategies.rigs())
+def test_any_rig_has_a_plan(rig: Rig) -> None:
+    middle = rig.grid.ground[rig.grid.inside()].mean(axis=0)
+    picture = plan_view(rig, trajectory_of((0, 3, *middle.tolist())), width=700, height=600)
+    plan = plan_map(rig, 700, 600)
+    assert picture.shape == (plan.size[1], plan.size[0], 3)
+    assert at(picture, plan.pixel(middle))[:2] != PAPER[:2]
+
+
+def test_names_of_cameras_are_not_on_the_numbers_of_the_axes() -> None:
+    matrix = np.array([[250.0, 0, 160], [0, 250.0, 120], [0, 0, 1]])
+    cameras = []
+    for name, (x, y) in {"a camera in the south": (2.0, -1.2), "in the west": (-0.2, 1.0)}.items():
+        way = np.array([2.0 - x, 0.5 - y, -1.0])
+        way /= np.linalg.norm(way)
+        right = np.array([way[1], -way[0], 0.0]) / np.hypot(*way[:2])
+        rotation = np.array([right, np.cross(way, right), way])
+        place = np.array([x, y, 2.5])
+        cameras.append(
+            Camera.from_projection(name, (320, 240), matrix @ np.column_stack([rotation, -rotation @ place]))
+        )
+    nameless = [replace(camera, name=" " * (1 + k)) for k, camera in enumerate(cameras)]
+    named, plain = (
+        plan_view(Rig("hall", 5.0, GRID, tuple(views)), trajectory_of(), width=700, height=600)
+        for views in (cameras, nameless)
+    )
+    plan = plan_map(Rig("hall", 5.0, GRID, tuple(cameras)), 700, 600)
+    (left, _), (_, bottom) = plan.corner, plan.far_corner
+    changed = (named != plain).any(axis=2)
+    assert changed.any(), "the names"
+    assert not changed[round(bottom) + 10 : round(bottom) + 32, round(left) :].any()
+    assert not changed[: round(bottom), : round(left) - 10].any()
+
+
+# Labels
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.lists(st.tuples(st.floats(0, 400), st.floats(0, 300)), max_size=12))
+def test_labels_stay_on_the_canvas(points: list[tuple[float, float]]) -> None:
+    centres = place_labels(np.array(points).reshape(-1, 2), [(30, 16)] * len(points), (0, 0, 400, 300))
+    assert centres.shape == (len(points), 2)
+    assert (centres >= (15, 8)).all() and (centres <= (385, 292)).all()
+
+
+def test_labels_of_neighbours_do_not_cover_each_other() -> None:
+    points = np.array([[200.0, 150.0], [206.0, 150.0], [200.0, 156.0]])
+    centres = place_labels(points, [(30, 16)] * 3, (0, 0, 400, 300))
+    distances = np.abs(centres[:, None] - centres[None])
+    assert ((distances[..., 0] >= 30) | (distances[..., 1] >= 16) | np.eye(3, dtype=bool)).all()
+
+
+# The cameras
+
+
+def test_the_overlay_puts_a_dot_where_the_feet_are() -> None:
+    camera, people = front_camera(), trajectory_of((4, 3, 1.0, 0.0), (4, 5, 3.0, 1.0))
+    picture = overlay(camera, GRID, None, people, 4, width=640)
+    assert picture.shape == (480, 640, 3)
+    for row in people:
+        foot = OverlayView(camera, 640).pixel(np.array([row["x"], row["y"]]), 0.0)
+        assert at(picture, foot) == track_colour(int(row["id"]))
+
+
+def test_a_pillar_is_as_tall_as_its_person() -> None:
+    view = OverlayView(front_camera(), 640)
+    (body,) = pillar_outline(view, np.array([2.0, 0.0]), 1.8)
+    foot, head = (view.pixel(np.array([2.0, 0.0]), z) for z in (0.0, 1.8))
+    assert abs(body[:, 1].min() - head[1]) < 6 and abs(body[:, 1].max() - foot[1]) < 8
+    assert abs(body[:, 0].mean() - foot[0]) < 3
+
+
+@settings(max_examples=25, deadline=None)
+@given(strategies.cameras(), st.floats(1.2, 2.0))
+def test_the_axis_of_a_body_is_inside_its_outline(camera: Camera, height: float) -> None:
+    view = OverlayView(camera, 640)
+    polygons = pillar_outline(view, np.zeros(2), height)
+    axis = view.pixel(np.zeros((9, 2)), np.linspace(0.05, 0.95, 9) * height)
+    for polygon in polygons:
+        inside = [cv2.pointPolygonTest(polygon.astype(np.float32), tuple(map(float, point)), True) for point in axis]
+        assert min(inside) > -1
+
+
+def test_people_behind_the_camera_are_left_out() -> None:
+    behind = trajectory_of((0, 1, 2.0, -9.0))
+    np.testing.assert_array_equal(
+        overlay(front_camera(), GRID, None, behind, 0), overlay(front_camera(), GRID, None, behind[:0], 0)
+    )
+
+
+def test_people_outside_the_picture_leave_no_trace_in_it() -> None:
+    camera = front_camera()
+    outside = trajectory_of((0, 1, 9.0, 0.0), (1, 1, 9.0, 0.2))
+    pixel = OverlayView(camera, 640).pixel(np.array([9.0, 0.0]), 0.0)
+    assert 660 < pixel[0] < 1200
+    np.testing.assert_array_equal(
+        overlay(camera, GRID, None, outside, 1, width=640), overlay(camera, GRID, None, outside[:0], 1, width=640)
+    )
+
+
+def test_a_trail_reaches_back_as_far_as_asked() -> None:
+    walk = trajectory_of(*((frame, 1, 0.3 + 0.1 * frame, 0.0) for frame in range(30)))
+    now, short = walk[walk["frame"] == 29], walk[walk["frame"] >= 24]
+    camera = front_camera()
+    np.testing.assert_array_equal(overlay(camera, GRID, None, walk, 29, 5), overlay(camera, GRID, None, short, 29, 5))
+    assert not np.array_equal(overlay(camera, GRID, None, walk, 29, 5), overlay(camera, GRID, None, now, 29, 5))
+
+
+def test_overlays_show_images_masks_or_the_ground() -> None:
+    camera, empty = front_camera(), trajectory_of()
+    colour = np.full((240, 320, 3), (10, 200, 100), np.uint8)
+    mask = np.zeros((240, 320), np.uint8)
+    mask[100:140, 100:160] = 255
+    kept = colour.copy()
+    pictures = [overlay(camera, GRID, image, empty, 0, width=320) for image in (colour, mask, None)]
+    assert at(pictures[0], np.array([200, 200])) == (8, 170, 85)
+    assert pictures[1][120, 130].min() > pictures[1][20, 300].max() + 40
+    assert has(pictures[2], NIGHT) and not np.array_equal(pictures[1], pictures[2])
+    np.testing.assert_array_equal(colour, kept)
+
+
+def test_instances_and_boxes_become_masks() -> None:
+    instances = np.array([[0, 300], [2, 0]], np.uint16)
+    assert backdrop(instances, (2, 2)).tolist() == [[0, 255], [255, 0]]  # type: ignore[union-attr]
+    boxes = Boxes(np.array([[1.0, -5.0, 2.0, 7.0]]), np.ones(1))
+    assert backdrop(boxes, (4, 3)).tolist() == [[0, 255, 255, 0]] * 2 + [[0] * 4]  # type: ignore[union-attr]
+    assert backdrop(None, (4, 3)) is None
+
+
+# The volume
+
+
+def test_slices_show_cells_in_their_colours_and_outline_tracks() -> None:
+    log_odds = np.full(GRID.shape, -4.0, np.float16)
+    label = np.zeros(GRID.shape, np.int32)
+    label[0, 4:6, 1:3] = 6  # great y: the upper left of the first panel
+    log_odds[label > 0] = 4.0
+    picture = volume_picture(log_odds, label, GRID, limit=4.0)
+    outlined = np.argwhere((picture == track_colour(6)).all(axis=-1))
+    hot = np.argwhere((picture == colours_of(np.array(4.0), 4.0)).all(axis=-1))
+    cold = np.argwhere((picture == colours_of(np.array(-4.0), 4.0)).all(axis=-1))
+    side = np.ptp(outlined[:, 0]) + 1
+    assert side == np.ptp(outlined[:, 1]) + 1  # two cells by two
+    top_left = cold.min(axis=0)
+    np.testing.assert_array_equal(outlined.min(axis=0) - top_left, [0, side // 2])
+    inner = hot[(hot >= outlined.min(axis=0)).all(axis=1) & (hot <= outlined.max(axis=0)).all(axis=1)]
+    assert len(inner) > 0.3 * side**2
+
+
+def test_cells_that_no_view_sees_are_hatched() -> None:
+    log_odds = np.full(GRID.shape, np.nan)
+    picture = volume_picture(log_odds, np.zeros(GRID.shape, np.int32), GRID)
+    even = volume_picture(np.zeros(GRID.shape), np.zeros(GRID.shape, np.int32), GRID)
+    greys = np.ptp(picture.astype(int), axis=-1)
+    assert picture.shape == even.shape and not np.array_equal(picture, even)
+    assert np.median(greys) < 6
+    assert has(picture, (205, 201, 198)) and has(picture, (236, 234, 232))
+
+
+def test_the_colour_map_diverges() -> None:
+    cold, middle, hot, infinite = colours_of(np.array([-2.0, 0.0, 2.0, np.inf]), 2.0).astype(int)
+    assert cold[0] > cold[2] + 40 and hot[2] > hot[0] + 40
+    assert np.ptp(middle) == 0 and middle[0] > 240
+    np.testing.assert_array_equal(hot, infinite)
+
+
+def test_the_marginal_is_the_greatest_of_the_visible_planes() -> None:
+    log_odds = np.full(GRID.shape, -3.0)
+    log_odds[1, 0, 0], log_odds[0, 0, 0] = 3.0, np.nan
+    flat = log_odds.copy()
+    flat[:, 0, 0] = 3.0
+    label = np.zeros(GRID.shape, np.int32)
+    np.testing.assert_array_equal(
+        marginal_picture(log_odds, label, GRID, limit=3.0), marginal_picture(flat, label, GRID, limit=3.0)
+    )
+    label[2, 3, 3] = 2
+    assert has(marginal_picture(log_odds, label, GRID), track_colour(2))
+
+
+# Space and time
+
+
+def test_time_rises() -> None:
+    walk = trajectory_of(*((frame, 1, 2.0, 0.5) for frame in range(20)))
+    picture = spacetime_picture(GRID, walk, 5.0, width=600, height=700)
+    block = Block.fit(GRID, 0, 19, (600, 700))
+    start, end = block.pixel([[2.0, 0.5, 0], [2.0, 0.5, 19]])
+    assert picture.shape == (700, 600, 3)
+    assert end[1] < start[1] - 100 and abs(end[0] - start[0]) < 1e-6
+    assert at(picture, start) == at(picture, end) == track_colour(1)
+
+
+def test_the_nearer_thread_passes_in_front() -> None:
+    front = [(frame, 1, 0.5 + 0.15 * frame, 0.0) for frame in range(21)]
+    far = [(frame, 2, 3.5 - 0.15 * frame, 1.0) for frame in range(21)]
+    picture = spacetime_picture(GRID, trajectory_of(*front, *far), 5.0, width=600, height=700)
+    block = Block.fit(GRID, 0, 20, (600, 700))
+    paths = [block.pixel([row[2:] + row[:1] for row in path]) for path in (front, far)]
+    fine = [
+        np.stack([np.interp(np.linspace(0, 20, 2001), np.arange(21), axis) for axis in path.T], -1) for path in paths
+    ]
+    distances = np.linalg.norm(fine[0][:, None] - fine[1][None, ::4], axis=-1)
+    crossing = fine[0][np.unravel_index(distances.argmin(), distances.shape)[0]]
+    assert distances.min() < 1 and at(picture, crossing) == track_colour(1)
+
+
+@pytest.mark.parametrize("table", [trajectory_of(), trajectory_of((5, 1, 1.0, 0.0))])
+def test_empty_and_tiny_runs_have_pictures(table: Rows) -> None:
+    assert spacetime_picture(GRID, table, 5.0, width=300, height=300).shape == (300, 300, 3)
+    assert plan_view(RIG, table, table).ndim == 3
