@@ -1,7 +1,7 @@
 """Fit of boxes to pillars, and occlusion of pillars by each other.
 
 A box is compared with the box of the pillar, both clipped to the image: its middle, its width, its upper edge, and its
-lower edge, whose tolerance is larger where the box ends early, because nearer people and furniture hide feet. They all
+lower edge, with a larger tolerance where the box ends early, because nearer people and furniture hide feet. They all
 differ from detector to detector, and are learned (`stseg.noise.box_noise_estimate`).
 """
 

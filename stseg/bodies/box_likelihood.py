@@ -59,7 +59,7 @@ def box_likelihood(boxes: Boxes, size: tuple[int, int], step: int = 1) -> Single
 
 @kernel
 def _fill(pixel: Floats, score: Floats, step: float, likelihood: Singles) -> None:
-    """Raise `likelihood` to each box's body; only map pixels whose centre lies in the box are touched."""
+    """Raise `likelihood` to each box's body; only map pixels with centres in the box are touched."""
     rows, columns = likelihood.shape
     offset = (step - 1.0) / 2.0
     for n in range(len(score)):

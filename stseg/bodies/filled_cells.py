@@ -9,7 +9,7 @@ from stseg.bodies.pillars import PROFILE
 from stseg.geometry.grid import Grid
 
 
-def inside_bodies(grid: Grid, near: Ints, ground: Floats, height: Floats) -> Flags:
+def inside_bodies(grid: Grid, near_person: Ints, ground: Floats, height: Floats) -> Flags:
     """Cells that the pillar of the person near them fills, bool (plane, y, x).
 
     Parameters
@@ -20,8 +20,8 @@ def inside_bodies(grid: Grid, near: Ints, ground: Floats, height: Floats) -> Fla
         Metres.
     """
     inside = np.zeros(grid.shape, bool)
-    within_reach = near >= 0
-    person = near[within_reach]
+    within_reach = near_person >= 0
+    person = near_person[within_reach]
     distance = np.hypot(*(grid.ground[within_reach] - ground[person]).T)
     for plane, above in zip(inside, grid.heights, strict=True):
         plane[within_reach] = distance <= np.interp(above / height[person], PROFILE[:, 0], PROFILE[:, 1], right=-1.0)

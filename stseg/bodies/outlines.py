@@ -208,9 +208,9 @@ def _fill_left_of(
     place = np.uint64(0)
     for row in range(top, bottom):
         total, left_of[place] = 0.0, 0.0
-        shown, whose = values[row, left:right], owner[row, left:right]
-        for u in range(len(shown)):
-            total += float(shown[u]) if whose[u] < 0 or whose[u] == person else 0.0
+        row_values, row_owner = values[row, left:right], owner[row, left:right]
+        for u in range(len(row_values)):
+            total += float(row_values[u]) if row_owner[u] < 0 or row_owner[u] == person else 0.0
             place += np.uint64(1)
             left_of[place] = total
         place += np.uint64(1)

@@ -1,6 +1,6 @@
 """Pillars of a view in the order of their image columns, so that a box meets only those that it may fit.
 
-A box fits a pillar only if their middles are within `box_fit.FAR` tolerances of each other, and tolerances are shares
+A box fits a pillar only if their middles are within `MATCH_LIMIT` tolerances of each other, and tolerances are shares
 of the pillar's height in the image. So pillars are sorted by classes of that height, and within a class by the column
 of their middle: the pillars that a box may fit are one run of each class.
 """
@@ -71,7 +71,7 @@ class PillarIndex(NamedTuple):
 
 @part
 def _reach(quantity: int, tall: float, tolerance: Floats, deviations: float) -> float:
-    """How far a box may be in one quantity from a pillar that it fits within so many tolerances, pixels."""
+    """Greatest offset of a box in one quantity from a pillar that it fits within so many tolerances, pixels."""
     return float(deviations * tolerance[quantity] * (tall + EDGE_GRAIN[quantity]) + 1e-3)
 
 
@@ -119,7 +119,7 @@ def fill_fits(
     Returns
     -------
     int
-        How many these are.
+        Number of these.
     """
     spare, number = belief - least, 0
     if spare <= 0.0:
@@ -128,10 +128,8 @@ def fill_fits(
     top, bottom = box[1], box[3]
     for kind in range(len(index.tallest)):
         tall = index.tallest[kind]
-        head, late = (
-            _reach(UPPER_EDGE, tall, tolerance, deviations),
-            _reach(LOWER_EDGE_BELOW, tall, tolerance, deviations),
-        )
+        head = _reach(UPPER_EDGE, tall, tolerance, deviations)
+        late = _reach(LOWER_EDGE_BELOW, tall, tolerance, deviations)
         if tall + head + late < bottom - top:
             continue
         early = _reach(LOWER_EDGE_ABOVE, tall, tolerance, deviations)

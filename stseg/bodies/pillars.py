@@ -1,7 +1,7 @@
 """Projection of standing bodies into a view: boxes and outlines of pillars, from one table of projected points.
 
-A body is a pillar of revolution: discs whose radius changes with the relative height (feet, trunk, head). A lattice of
-ground points is projected once at some levels; between them pixels are interpolated, linearly in x, y and height, so
+A body is a pillar of revolution: discs with a radius at each relative height (feet, trunk, head). A lattice of ground
+points is projected once at some levels; between them pixels are interpolated, linearly in x, y and height, so
 that a lens or a tilt bends the pillar as it bends the image. A disc projects to an ellipse by the Jacobian of that map.
 """
 
@@ -137,12 +137,12 @@ def _fill_boxes(
         x, y = (ground[i, 0] - origin[0]) / step, (ground[i, 1] - origin[1]) / step
         fill_discs(pixel, x, y, heights[i], level_step, step, profile, discs)
         left, top, right, bottom = np.inf, np.inf, -np.inf, -np.inf
-        seen = True
+        visible = True
         for k in range(len(profile)):
             wide = math.sqrt(discs[k, 2] * discs[k, 2] + discs[k, 3] * discs[k, 3])
             tall = math.sqrt(discs[k, 4] * discs[k, 4] + discs[k, 5] * discs[k, 5])
-            seen = seen and not np.isnan(wide + tall)
+            visible = visible and not np.isnan(wide + tall)
             left, right = min(left, discs[k, 0] - wide), max(right, discs[k, 0] + wide)
             top, bottom = min(top, discs[k, 1] - tall), max(bottom, discs[k, 1] + tall)
-        if seen:
+        if visible:
             filled[i, 0], filled[i, 1], filled[i, 2], filled[i, 3] = left, top, right, bottom

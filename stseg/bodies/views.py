@@ -152,13 +152,13 @@ class BoxView(View):
         share = (visible - config.hidden_visibility) / (config.full_visibility - config.hidden_visibility)
         return np.asarray(share.clip(config.hidden_detection_rate, 1.0))
 
-    def observe(self, seen: Boxes | Singles | None, sharpness: BoxNoise = PRIOR_NOISE) -> ViewObservation:
+    def observe(self, evidence: Boxes | Singles | None, noise: BoxNoise = PRIOR_NOISE) -> ViewObservation:
         """The frame's boxes."""
-        boxes = seen if isinstance(seen, Boxes) else Boxes(np.zeros((0, 4)), np.zeros(0))
+        boxes = evidence if isinstance(evidence, Boxes) else Boxes(np.zeros((0, 4)), np.zeros(0))
         width, height = self.camera.size
         corner, extent = boxes.pixel[:, :2], boxes.pixel[:, 2:]
         edges = np.concatenate([corner, corner + extent], 1).clip(0, [width - 1, height - 1] * 2)
-        return ViewObservation(edges, boxes.score, *sharpness.of(boxes.score), np.zeros((0, 0), np.float32))
+        return ViewObservation(edges, boxes.score, *noise.of(boxes.score), np.zeros((0, 0), np.float32))
 
     def foreground(self, observation: ViewObservation) -> Flags:
         """Raster pixels inside any box, bool (v, u)."""
@@ -171,13 +171,13 @@ class BoxView(View):
 class PixelView(View):
     """A view that delivers a likelihood map."""
 
-    def observe(self, seen: Boxes | Singles | None, sharpness: BoxNoise = PRIOR_NOISE) -> ViewObservation:
+    def observe(self, evidence: Boxes | Singles | None, noise: BoxNoise = PRIOR_NOISE) -> ViewObservation:
         """The frame's log-odds on the raster; all zero where the view is blind."""
-        del sharpness
+        del noise
         raster = np.empty(self.shape, np.float32)
-        if isinstance(seen, np.ndarray):
+        if isinstance(evidence, np.ndarray):
             miss, clutter = self.config.pixel_miss_rate, self.config.pixel_clutter_rate
-            _fill_log_odds(seen, self.step, np.float32(miss), np.float32(clutter), raster)
+            _fill_log_odds(evidence, self.step, np.float32(miss), np.float32(clutter), raster)
         else:
             raster[:] = 0.0
         return ViewObservation(np.zeros((0, 4)), np.zeros(0), np.zeros((0, 5)), np.zeros(0), raster)
@@ -256,8 +256,8 @@ def _fill_label_values(raster: Singles, values: Singles) -> None:
         for u in range(raster.shape[1]):
             if raster[v, u] != last:
                 last = raster[v, u]
-                own = one / (one + np.exp(-last))
-                value = np.float32(2 * BODY_WEIGHT) * own + np.float32(BACKGROUND_WEIGHT) * (one - own)
+                probability = one / (one + np.exp(-last))
+                value = np.float32(2 * BODY_WEIGHT) * probability + np.float32(BACKGROUND_WEIGHT) * (one - probability)
             values[v, u] = value
 
 

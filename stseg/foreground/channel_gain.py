@@ -16,12 +16,12 @@ STRIDE = 4
 """Pixels from one sample to the next along u and v; a sixteenth of all pixels is ample for one number."""
 _BIN = 0.01  # of the natural logarithm of the ratio
 _BINS = 221  # ratios from a third to three
-_REACH = 2  # bins on each side of the peak that belong to it
+_PEAK_RADIUS = 2  # bins on each side of the peak that belong to it
 _DARKEST, _BRIGHTEST = 24.0, 250.0  # grey levels: below, rounding spoils the ratio; above, the sensor is saturated
-_ENOUGH = 0.02  # share of the samples that the peak must hold to be accepted
-_FEWEST = 16  # and no fewer than this many
-_FINE = 16  # steps of a grey level in the table of logarithms: errors of 0.13 % at most, against bins of 1 %
-_LOG = np.log(np.maximum(np.arange(256 * _FINE), 1) / _FINE)
+_LEAST_SHARE = 0.02  # share of the samples that the peak must hold to be accepted
+_LEAST_SAMPLES = 16  # and no fewer than this many
+_LOG_STEPS = 16  # steps of a grey level in the table of logarithms: errors of 0.13 % at most, against bins of 1 %
+_LOG = np.log(np.maximum(np.arange(256 * _LOG_STEPS), 1) / _LOG_STEPS)
 
 
 def channel_gains(image: Bytes, background: Singles) -> Floats:
@@ -41,7 +41,7 @@ def channel_gains(image: Bytes, background: Singles) -> Floats:
     """
     counts, gains = np.zeros((3, _BINS), np.int64), np.empty(3)
     _count_ratios(image, background, _LOG, counts)
-    fill_gains(counts, max(_ENOUGH * image.shape[0] * image.shape[1], _FEWEST), gains)
+    fill_gains(counts, max(_LEAST_SHARE * image.shape[0] * image.shape[1], _LEAST_SAMPLES), gains)
     return gains
 
 
@@ -52,10 +52,10 @@ def _count_ratios(image: Bytes, background: Singles, logarithm: Floats, counts: 
     for v in range(image.shape[0]):
         for u in range(image.shape[1]):
             for c in range(3):
-                shown, expected = float(image[v, u, c]), float(background[v, u, c])
-                if min(shown, expected) < _DARKEST or max(shown, expected) > _BRIGHTEST:
+                observed, expected = float(image[v, u, c]), float(background[v, u, c])
+                if min(observed, expected) < _DARKEST or max(observed, expected) > _BRIGHTEST:
                     continue
-                ratio = logarithm[_FINE * int(shown)] - logarithm[int(_FINE * expected + 0.5)]
+                ratio = logarithm[_LOG_STEPS * int(observed)] - logarithm[int(_LOG_STEPS * expected + 0.5)]
                 place = middle + int(np.rint(ratio * bins))
                 if 0 <= place < counts.shape[1]:
                     counts[c, place] += 1
@@ -66,15 +66,15 @@ def fill_gains(counts: Ints, enough: float, gains: Floats) -> None:
     """Fill gains (3,): the centroid of the bins around the peak of each histogram, counts (3, bin)."""
     bins = counts.shape[1]
     for c in range(3):
-        most, total, held, weighted = 0, 0, 0, 0
-        for last in range(bins + _REACH):  # the last of the bins around a middle, which are moved by one
+        most, total, in_window, weighted = 0, 0, 0, 0
+        for last in range(bins + _PEAK_RADIUS):  # the last of the bins around a middle, which are moved by one
             if last < bins:
-                held += counts[c, last]
+                in_window += counts[c, last]
                 weighted += counts[c, last] * (last - bins // 2)
-            before = last - 2 * _REACH - 1
+            before = last - 2 * _PEAK_RADIUS - 1
             if before >= 0:
-                held -= counts[c, before]
+                in_window -= counts[c, before]
                 weighted -= counts[c, before] * (before - bins // 2)
-            if last >= _REACH and held > most:
-                most, total = held, weighted
+            if last >= _PEAK_RADIUS and in_window > most:
+                most, total = in_window, weighted
         gains[c] = np.exp(float(total) / most * _BIN) if most >= enough else 1.0

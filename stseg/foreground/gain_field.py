@@ -43,11 +43,11 @@ def gain_field(image: Bytes, background: Singles, empty: Singles) -> Singles:
     """
     height, width = image.shape[:2]
     step = max(1, round((height * width / _SAMPLES) ** 0.5))
-    seen = image[::step, ::step].astype(np.float64)
+    observed = image[::step, ::step].astype(np.float64)
     expected = background[::step, ::step].astype(np.float64)
-    usable = ((np.minimum(seen, expected) >= _DARKEST) & (np.maximum(seen, expected) <= _BRIGHTEST)).all(-1)
+    usable = ((np.minimum(observed, expected) >= _DARKEST) & (np.maximum(observed, expected) <= _BRIGHTEST)).all(-1)
     weight = np.where(usable, empty[::step, ::step], 0.0).ravel()
-    ratio = np.log(np.maximum(seen, 1.0) / np.maximum(expected, 1.0)).reshape(-1, 3)
+    ratio = np.log(np.maximum(observed, 1.0) / np.maximum(expected, 1.0)).reshape(-1, 3)
     down, across = (_tents(length, count) for length, count in zip((height, width), _NODES, strict=True))
     pixels = sparse.csr_array(sparse.kron(sparse.csr_array(down[::step]), sparse.csr_array(across[::step])))
     nodes = _fit(ratio, weight, pixels).reshape(*_NODES, 3)

@@ -28,15 +28,15 @@ from stseg.foreground.background.model import Background
 from stseg.foreground.gain_field import gain_field
 from stseg.kernels.accelerate import kernel
 
-_STEP = 4  # pixels; a sixteenth of them are ample for a share
-_FAINT = 0.25  # of the rise that is a change: from there on a smooth field is tried
-_UNLIKE, _BROAD = 0.03, 0.4  # a field is light if its logarithm is so far from its median on so much of the view
-_SAME = 20.0  # grey levels within which colours agree, in the channel that differs most
-_KEPT = 8  # frames since a change from which static pixels are found
-_STILL = 0.85  # share of them that must agree
-_TINT = 0.35  # of the logarithm of the gain: how much more one channel may change than their mean
-_BRIGHTER = 1.5  # of that logarithm: how much one pixel's light may change
-_AROUND = 0.02  # of the width of the view: how far the surroundings of a pixel reach
+_STRIDE = 4  # pixels; a sixteenth of them are ample for a share
+_FAINT_SHARE = 0.25  # of the rise that is a change: from there on a smooth field is tried
+_FIELD_DEVIATION, _FIELD_SHARE = 0.03, 0.4  # a field is light if its logarithm differs from its median on this share
+_EQUAL_COLOUR = 20.0  # grey levels within which colours agree, in the channel that differs most
+_KEPT_FRAMES = 8  # frames since a change from which static pixels are found
+_STATIC_SHARE = 0.85  # share of them that must agree
+_GREATEST_TINT = 0.35  # of the logarithm of the gain: how much more one channel may change than their mean
+_GREATEST_GAIN = 1.5  # of that logarithm: how much one pixel's light may change
+_SURROUNDINGS = 0.02  # of the width of the view: how far the surroundings of a pixel reach
 
 
 @dataclass(slots=True)
@@ -97,18 +97,18 @@ class IlluminationMonitor:
         image : uint8 (v, u, 3) BGR
             The next frame.
         """
-        own = seen = self.model.likelihood(image)
-        share = self._share(own)
+        relit = unlit = self.model.likelihood(image)
+        share = self._share(relit)
         rise = 0.0 if self._good is None else share - min(self._shares)
-        if self._good is not None and rise > _FAINT * self._config.changed_share:
+        if self._good is not None and rise > _FAINT_SHARE * self._config.changed_share:
             if self._open is None and rise > self._config.changed_share:
                 self._record_change()
                 self._open = _OpenChange(1 - self._good, self._frames)
-            own = self._in_new_light(image, own, 1 - self._good if self._open is None else self._open.empty)
-        found = own if self._open is None else self._settle(self._open, image, own)
+            relit = self._in_new_light(image, relit, 1 - self._good if self._open is None else self._open.empty)
+        found = relit if self._open is None else self._settle(self._open, image, relit)
         if found is not None:
             self._good = found
-            self._shares.append(share if found is seen else self._share(found))
+            self._shares.append(share if found is unlit else self._share(found))
         self._frames += 1
         return found
 
@@ -129,7 +129,7 @@ class IlluminationMonitor:
     def _settle(self, change: _OpenChange, image: Bytes, likelihood: Singles) -> Singles | None:
         """Likelihood during an open change, None while the change is unexplained."""
         config, waited = self._config, self._frames - change.since + 1
-        if waited % max(1, self._patience // _KEPT) == 0:
+        if waited % max(1, self._patience // _KEPT_FRAMES) == 0:
             change.frames.append(image.copy())
         if waited < self._patience:
             if self._share_rise(likelihood) <= config.changed_share:
@@ -161,26 +161,26 @@ class IlluminationMonitor:
 
     def _explains(self, gain: Singles, image: Bytes, likelihood: Singles, empty: Singles) -> bool:
         """Whether gains explain most of the new foreground."""
-        few = np.s_[::_STEP, ::_STEP]
+        few = np.s_[::_STRIDE, ::_STRIDE]
         expected = np.minimum(gain[few] * self.model.background_image()[few], 255)
-        near = np.abs(image[few] - expected).max(-1) <= _SAME
+        agrees = np.abs(image[few] - expected).max(-1) <= _EQUAL_COLOUR
         new = (likelihood[few] > self.model.prior) & (empty[few] > 0.5)
-        return bool(2 * np.count_nonzero(new & near) > np.count_nonzero(new))
+        return bool(2 * np.count_nonzero(new & agrees) > np.count_nonzero(new))
 
 
 def _is_broad(gain: Singles) -> bool:
     """Whether a field differs over much of the view; a field that differs locally follows a body."""
-    logarithm = np.log(gain[::_STEP, ::_STEP])
-    differs = np.abs(logarithm - np.median(logarithm, axis=(0, 1))).max(-1) > _UNLIKE
-    return bool(differs.mean() > _BROAD)
+    logarithm = np.log(gain[::_STRIDE, ::_STRIDE])
+    differs = np.abs(logarithm - np.median(logarithm, axis=(0, 1))).max(-1) > _FIELD_DEVIATION
+    return bool(differs.mean() > _FIELD_SHARE)
 
 
 @kernel
 def _share_above(likelihood: Singles, bound: np.float32) -> float:
     """Share of the pixels (v, u), of every `_STEP`-th along each axis, that are above a bound."""
     above, count = 0, 0
-    for v in range(0, likelihood.shape[0], _STEP):
-        for u in range(0, likelihood.shape[1], _STEP):
+    for v in range(0, likelihood.shape[0], _STRIDE):
+        for u in range(0, likelihood.shape[1], _STRIDE):
             above += 1 if likelihood[v, u] > bound else 0
             count += 1
     return above / count
@@ -207,7 +207,7 @@ def stationary_gain(frames: Bytes, background: Singles, empty: Singles, unexplai
     empty : float32 (v, u)
         Probability that each pixel showed background before the light changed, 0..1.
     unexplained : bool (v, u)
-        Pixels whose change is unexplained; all others keep their light.
+        Pixels of an unexplained change; all others keep their light.
 
     Returns
     -------
@@ -215,15 +215,16 @@ def stationary_gain(frames: Bytes, background: Singles, empty: Singles, unexplai
         Where a person was or is, where the scene moves or has another colour: the gains of the surroundings.
     """
     middle = np.median(frames, axis=0).astype(np.float32)
-    agree = (np.abs(frames - middle).max(-1) <= _SAME).mean(0)
+    agree = (np.abs(frames - middle).max(-1) <= _EQUAL_COLOUR).mean(0)
     now = gain_field(frames[-1], middle, agree.astype(np.float32))
     ratio = np.log((now * middle + 1) / (background + 1))
     brighter = ratio.mean(-1, keepdims=True)
     tint = np.abs(ratio - brighter).max(-1)
-    around = _AROUND * empty.shape[1]
-    apart = minimum_filter(empty, round(around) | 1)
-    lit = (agree >= _STILL) & (apart > 0.5) & (tint <= _TINT) & (np.abs(brighter[..., 0]) <= _BRIGHTER)
-    known = gaussian_filter(lit.astype(np.float32), around)[..., None] + np.float32(1e-6)
-    filled = gaussian_filter(np.where(lit[..., None], ratio, 0), (around, around, 0)) / known
-    own = np.where(unexplained[..., None], ratio, 0)
-    return np.asarray(np.exp(np.where(lit[..., None], own, filled)), np.float32)
+    around = _SURROUNDINGS * empty.shape[1]
+    empty_around = minimum_filter(empty, round(around) | 1)
+    is_light = (tint <= _GREATEST_TINT) & (np.abs(brighter[..., 0]) <= _GREATEST_GAIN)
+    lit = (agree >= _STATIC_SHARE) & (empty_around > 0.5) & is_light
+    weight = gaussian_filter(lit.astype(np.float32), around)[..., None] + np.float32(1e-6)
+    filled = gaussian_filter(np.where(lit[..., None], ratio, 0), (around, around, 0)) / weight
+    relit = np.where(unexplained[..., None], ratio, 0)
+    return np.asarray(np.exp(np.where(lit[..., None], relit, filled)), np.float32)

@@ -28,32 +28,32 @@ class ViewForeground:
         """Sudden illumination changes, in frames since the first."""
         return [] if self.background is None else self.background.changes
 
-    def evidence(self, seen: Observation) -> ViewEvidence:
+    def evidence(self, observation: Observation) -> ViewEvidence:
         """Evidence of a frame; colour frames also update the background model."""
-        if seen is None and self.background is not None:
+        if observation is None and self.background is not None:
             self.background.skip()
-        if seen is None or isinstance(seen, Boxes):
-            return seen
-        if seen.dtype == np.uint16:
-            return instance_boxes(np.asarray(seen, np.uint16))
-        if seen.dtype == np.float32:
-            return np.asarray(seen, np.float32)
-        if seen.ndim == 2:
-            return mask_likelihood(np.asarray(seen, np.uint8))
+        if observation is None or isinstance(observation, Boxes):
+            return observation
+        if observation.dtype == np.uint16:
+            return instance_boxes(np.asarray(observation, np.uint16))
+        if observation.dtype == np.float32:
+            return np.asarray(observation, np.float32)
+        if observation.ndim == 2:
+            return mask_likelihood(np.asarray(observation, np.uint8))
         if self.background is None:
             raise ValueError("a colour frame needs a background model")
-        posterior = self.background.likelihood(np.asarray(seen, np.uint8))
+        posterior = self.background.likelihood(np.asarray(observation, np.uint8))
         return None if posterior is None else without_prior(posterior, self.background.model.prior)
 
-    def pixels(self, seen: Observation) -> Singles | None:
+    def pixels(self, observation: Observation) -> Singles | None:
         """Foreground likelihood of each pixel, float32 (v, u); None where the view is blind or delivers boxes.
 
         As `evidence`, except that the pixels of an instance image have likelihood 0 or 1. Call exactly one of the two
         for each frame.
         """
-        if isinstance(seen, np.ndarray) and seen.dtype == np.uint16:
-            return (seen > 0).astype(np.float32)
-        found = self.evidence(seen)
+        if isinstance(observation, np.ndarray) and observation.dtype == np.uint16:
+            return (observation > 0).astype(np.float32)
+        found = self.evidence(observation)
         return None if isinstance(found, Boxes) else found
 
 

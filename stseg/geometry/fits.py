@@ -40,7 +40,7 @@ def fit_homography(ground: Floats, pixel: Floats) -> Floats:
 
 
 def fit_vertical(homography: Floats, ground: Floats, height: Floats, pixel: Floats) -> Floats:
-    """What one metre of height adds to the third column of the homography: linear least squares.
+    """Change of the third column of the homography by one metre of height: linear least squares.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def fit_vertical(homography: Floats, ground: Floats, height: Floats, pixel: Floa
 
 
 def focal_of_square_pixels(homography: Floats, size: tuple[int, int]) -> float | None:
-    """The focal length of a camera with square pixels whose axis meets the middle of its image.
+    """The focal length of a camera with square pixels and an axis through the middle of its image.
 
     With H = K [r1 r2 t] and K known but for it, r1 r2 = 0 and |r1| = |r2| are two equations for 1 / f^2; least squares.
 
@@ -98,7 +98,7 @@ def middle_matrix(focal: float, size: tuple[int, int]) -> Floats:
 
 
 def vertical_of_matrix(homography: Floats, matrix: Floats) -> Floats:
-    """The vertical of a camera whose matrix K is known: with H = K [r1 r2 t], a v = K (r1 x r2) in the scale of H.
+    """The vertical of a camera of known matrix K: with H = K [r1 r2 t], a v = K (r1 x r2) in the scale of H.
 
     Parameters
     ----------

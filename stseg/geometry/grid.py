@@ -81,7 +81,7 @@ class Grid:
         return inside if self.polygon is None else inside & inside_polygon(ground, self.polygon)
 
     def inside(self) -> Flags:
-        """Cells whose centre lies within the polygon, all without one, bool (y, x)."""
+        """Cells with centres within the polygon, all without one, bool (y, x)."""
         if self.polygon is None:
             return np.ones(self.shape[1:], bool)
         within = np.zeros(self.shape[1:], bool)

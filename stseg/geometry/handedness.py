@@ -20,13 +20,13 @@ def is_mirrored(camera: Camera, grid: Grid) -> bool:
     for height in grid.heights:
         plane = camera.plane(float(height))
         image = homogeneous(ground) @ plane.T
-        known = np.abs(image[:, 2]) > 1e-12
-        pixel = image[known, :2] / image[known, 2:]
-        shown = camera.inside(pixel)
+        finite = np.abs(image[:, 2]) > 1e-12
+        pixel = image[finite, :2] / image[finite, 2:]
+        inside = camera.inside(pixel)
         a, b, c = vanishing_line(plane)
         below = pixel[:, 1] > -(a * pixel[:, 0] + c) / b if b else np.ones(len(pixel), bool)
-        if (shown & (image[known, 2] > 0)).any():
+        if (inside & (image[finite, 2] > 0)).any():
             return False
-        if (shown & below).any():
+        if (inside & below).any():
             return True
     return False

@@ -101,7 +101,7 @@ class Lens:
         )
 
     def _radial(self, square: Floats) -> tuple[Floats, Floats]:
-        """How far a ray of squared radius s is stretched, N(s) / D(s), and the slope of that in s."""
+        """Stretch N(s) / D(s) of a ray of squared radius s, and the slope of that in s."""
         k1, k2, _, _, k3, *rational = self.distortion
         over = 1 + square * (k1 + square * (k2 + square * k3))
         rise = k1 + square * (2 * k2 + square * 3 * k3)

@@ -22,15 +22,15 @@ def nearest_person(ground: Floats, people_ground: Floats, reach: float) -> Ints:
     -------
     int64 (...)
     """
-    near = np.empty(ground.shape[:-1], np.int64)
-    _fill_nearest(np.ascontiguousarray(ground.reshape(-1, 2)), people_ground, reach, near.reshape(-1))
-    return near
+    nearest = np.empty(ground.shape[:-1], np.int64)
+    _fill_nearest(np.ascontiguousarray(ground.reshape(-1, 2)), people_ground, reach, nearest.reshape(-1))
+    return nearest
 
 
 @kernel
-def _fill_nearest(ground: Floats, people_ground: Floats, reach: float, near: Ints) -> None:
+def _fill_nearest(ground: Floats, people_ground: Floats, reach: float, nearest: Ints) -> None:
     """Fill near (place,); the square of the reach is searched first."""
-    near[:] = -1
+    nearest[:] = -1
     for c in range(len(ground)):
         least = np.inf
         for j in range(len(people_ground)):
@@ -38,4 +38,4 @@ def _fill_nearest(ground: Floats, people_ground: Floats, reach: float, near: Int
             if abs(x) <= reach and abs(y) <= reach:
                 away = np.hypot(x, y)
                 if away <= reach and away < least:
-                    least, near[c] = away, j
+                    least, nearest[c] = away, j

@@ -31,7 +31,7 @@ class Rig:
     doors : (x0, y0, x1, y1) each
         Rectangles of ground where people come and go, metres.
     closed
-        Whether nobody crosses the border of the area but through doors.
+        Whether people cross the border of the area through doors alone.
     """
 
     name: str
@@ -91,7 +91,7 @@ class Rig:
         if len(set(names)) != count:
             raise CalibrationError("names", "", ", ".join(names), f"{count} different names")
         views = zip(names, sizes, ground, vertical, strict=True)
-        rig = cls(name, frame_rate, grid, tuple(Camera(own, size, h, v) for own, size, h, v in views))
+        rig = cls(name, frame_rate, grid, tuple(Camera(camera_name, size, h, v) for camera_name, size, h, v in views))
         rig.require_coverage()
         return rig
 

@@ -28,8 +28,8 @@ SamplingKind = Literal["footprint", "point"]
 Footprints = NDArray[np.int16]
 """int16 (..., 4): left, top, width and height in pixels; all 0 where the view does not see the cell."""
 
-_STEP = 1e-3
-"""Of a cell's side, over which derivatives are taken."""
+_DERIVATIVE_STEP = 1e-3
+"""Distance over which derivatives are taken, shares of a cell's side."""
 
 
 @dataclass(frozen=True)
@@ -65,21 +65,22 @@ class Sampling:
 
 
 def _span(first: NDArray[np.int16], extent: NDArray[np.int16]) -> slice:
-    seen = extent > 0
-    start = int(first[seen].min(initial=32767))
-    return slice(start, max(start, int((first + extent)[seen].max(initial=0))))
+    visible = extent > 0
+    start = int(first[visible].min(initial=32767))
+    return slice(start, max(start, int((first + extent)[visible].max(initial=0))))
 
 
 def _footprints(camera: Camera, rig: Rig, kind: SamplingKind) -> Footprints:
     footprint, within = np.zeros((*rig.grid.shape, 4), np.int16), rig.grid.inside()
     lens = LensTerms.of(camera.lens)
-    shift = (_STEP * rig.grid.cell / 2) if kind == "footprint" else 0.0
+    shift = (_DERIVATIVE_STEP * rig.grid.cell / 2) if kind == "footprint" else 0.0
     for plane, height in enumerate(rig.grid.heights):
         centre, ahead = camera.project(rig.grid.ground, float(height))
-        seen = ahead & camera.inside(centre) & within
+        visible = ahead & camera.inside(centre) & within
         _fill_boxes(
-            rig.grid.ground, float(height), camera.projection, lens, centre, seen, shift, camera.size, footprint[plane]
-        )
+            rig.grid.ground, float(height), camera.projection, lens, centre, visible, shift, camera.size,
+            footprint[plane],
+        )  # fmt: skip
     return footprint
 
 
@@ -90,7 +91,7 @@ def _fill_boxes(
     projection: Floats,
     lens: LensTerms,
     centre: Floats,
-    seen: Flags,
+    visible: Flags,
     shift: float,
     size: tuple[int, int],
     boxes: Footprints,
@@ -100,9 +101,9 @@ def _fill_boxes(
     Their sides are the derivative of the pixel, by a shift in metres to either side along x and y, times the cell's
     side; one pixel where the shift is 0 or there is no derivative.
     """
-    for j in range(seen.shape[0]):
-        for i in range(seen.shape[1]):
-            if not seen[j, i]:
+    for j in range(visible.shape[0]):
+        for i in range(visible.shape[1]):
+            if not visible[j, i]:
                 continue
             x, y, wide, tall = ground[j, i, 0], ground[j, i, 1], 1.0, 1.0
             if shift > 0:
@@ -123,7 +124,7 @@ def _fill_boxes(
 @part
 def _extent(along_x: float, along_y: float) -> float:
     """Pixels that a cell spans, from its pixel's differences over `_STEP` of a cell; 1 where they are not numbers."""
-    extent = math.sqrt((along_x / _STEP) ** 2 + (along_y / _STEP) ** 2)
+    extent = math.sqrt((along_x / _DERIVATIVE_STEP) ** 2 + (along_y / _DERIVATIVE_STEP) ** 2)
     return 1.0 if math.isnan(extent) else extent
 
 

@@ -34,7 +34,7 @@ def level_of(likelihood: np.float32) -> np.int32:
 
 @kernel
 def fill_sums(likelihood: Singles, left: int, top: int, sums: Sums) -> int:
-    """Fill sums (v + 1, u + 1), whose first row and column are 0: the levels of all pixels above and to the left.
+    """Fill sums (v + 1, u + 1), 0 in the first row and column: the levels of all pixels above and to the left.
 
     Parameters
     ----------

@@ -8,7 +8,7 @@ side of n boxes,
 
     sigma_1 = S_1^(1/3) sqrt((S_1^(1/3) + S_2^(1/3)) / n),
 
-the most likely ones of a split normal distribution whose mode is known. People count for a view where the rest of the
+the most likely ones of a split normal distribution of known mode. People count for a view where the rest of the
 evidence supports them, and boxes at the border of the image, which are cut there, do not count.
 """
 

@@ -57,7 +57,7 @@ class CellsByPerson(NamedTuple):
 
     Attributes
     ----------
-    near : int64 (cell,)
+    near_person : int64 (cell,)
         The person near each cell, -1 for none.
     cell : int64 (n,)
         Cells near a person, in the order of persons.
@@ -65,14 +65,14 @@ class CellsByPerson(NamedTuple):
         Index in `cell` of each person's first cell.
     """
 
-    near: Ints
+    near_person: Ints
     cell: Ints
     start: Ints
 
     @classmethod
-    def of(cls, near: Ints, people: int) -> Self:
+    def of(cls, near_person: Ints, people: int) -> Self:
         """From the person near each cell, int64 (y, x), -1 for none, and the number of people."""
-        flat = near.reshape(-1)
+        flat = near_person.reshape(-1)
         order = np.argsort(flat, kind="stable")
         start = np.searchsorted(flat[order], np.arange(people + 1))
         return cls(flat, order, start)
@@ -116,7 +116,7 @@ def fill_fit(
                 h, cell = index.order[k] // ground_cells, index.order[k] % ground_cells
                 body = pillars[index.order[k]]
                 match = boxes.belief[b] - half_square(body, box, tolerance, boxes.width, boxes.height)
-                prior = height_prior[h] if cells.near[cell] < 0 else person_prior[cells.near[cell], h]
+                prior = height_prior[h] if cells.near_person[cell] < 0 else person_prior[cells.near_person[cell], h]
                 fit[h, cell] = max(fit[h, cell], np.float32(prior + match))
 
 
@@ -157,7 +157,7 @@ def fill_levels(
             taller[h, c] = max(taller[h, c], taller[h + 1, c])
     unfit = level_of_match(0.0, rates.miss, rates.clutter), level_of_match(0.0, rates.miss, rates.near_clutter)
     for k in range(len(cells.cell)):
-        cell, place, is_near = np.uint64(cells.cell[k]), np.uint64(cells.place[k]), cells.near[k] >= 0
+        cell, place, is_near = np.uint64(cells.cell[k]), np.uint64(cells.place[k]), cells.near_person[k] >= 0
         first = first_taller[cell // np.uint64(ground_cells)]
         best = float(taller[first, place]) if first < len(heights) else -np.inf
         if footprint[cell, 2] == 0:

@@ -143,8 +143,8 @@ def fill_counts(
     errors[:], trials[:] = 0.0, 0.0
     wrong, empty, all_wrong, all_empty = np.zeros((4, len(views.weight)))
     last = -1
-    for c in range(len(views.near)):
-        if views.near[c] >= 0:
+    for c in range(len(views.near_person)):
+        if views.near_person[c] >= 0:
             _count_beside_person(views, c, inside[c], trusted, rates, errors, trials)
             continue
         if last < 0 or number[c] != number[last] or not _are_seen_alike(views, c, last):
@@ -178,7 +178,7 @@ def _count_beside_person(
     """Count a cell within reach of a person."""
     for i in range(len(views.weight)):
         level, share = views.levels[i, c], views.share[i, c]
-        if level >= 0 and share > 0.0 and trusted[i, views.near[c]]:
+        if level >= 0 and share > 0.0 and trusted[i, views.near_person[c]]:
             likelihood = level / TOP_LEVEL
             rate, error_likelihood = (MISS, 1.0 - likelihood) if is_inside else (NEAR_CLUTTER, likelihood)
             errors[i, rate] += _error_posterior(rates[i, rate], error_likelihood) * share
@@ -191,6 +191,6 @@ def _occupied_odds(views: FrameTerms, sums: Sums, i: int, c: int, observations: 
     weight, share, others = views.weight[i], views.share[i, c], prior
     rest = sums.weights[c] - weight * share
     if rest > _LEAST_WEIGHT * weight:
-        own = weight * share * views.terms[i, 0, views.levels[i, c]]
-        others += observations * (sums.shares[c] - share) * (sums.weighted[c] - own) / rest
+        own_term = weight * share * views.terms[i, 0, views.levels[i, c]]
+        others += observations * (sums.shares[c] - share) * (sums.weighted[c] - own_term) / rest
     return float(np.exp(min(max(others, -30.0), 30.0)))

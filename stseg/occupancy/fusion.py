@@ -51,7 +51,7 @@ class ErrorRates(NamedTuple):
 
 
 class FrameTerms(NamedTuple):
-    """What the views of a frame add to its sums at cells (n,).
+    """Terms of the views of a frame at cells (n,).
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class FrameTerms(NamedTuple):
         Mean likelihood of each cell, or UNSEEN.
     share : float32 (view, n)
         a_i, 0..1: visible share of the footprint; of any value where the level is UNSEEN.
-    near : int32 (n,)
+    near_person : int32 (n,)
         The person near each cell, -1 for none.
     terms : float32 (view, 2, TOP + 1)
         The term of each level near no person, and within reach of a person, nats.
@@ -71,7 +71,7 @@ class FrameTerms(NamedTuple):
 
     levels: Levels
     share: Singles
-    near: Labels
+    near_person: Labels
     terms: Singles
     weight: Singles
     confidence: Singles
@@ -92,25 +92,25 @@ class Sums(NamedTuple):
 
     @classmethod
     def of(cls, views: FrameTerms) -> Self:
-        """Of all views."""
-        sums = cls(*np.zeros((3, len(views.near)), np.float32))
+        """Sums over all views."""
+        sums = cls(*np.zeros((3, len(views.near_person)), np.float32))
         fill_sums(views, sums)
         return sums
 
-    def total(self, near: Labels, observations: float, priors: tuple[float, float]) -> Singles:
+    def total(self, near_person: Labels, observations: float, priors: tuple[float, float]) -> Singles:
         """k n_vis sum_i w_i term_i and the prior of each cell, nats, float32 (n,); where all are hidden the prior.
 
         Parameters
         ----------
-        near : int32 (n,)
+        near_person : int32 (n,)
             The person near each cell, -1 for none.
         observations
             k.
         priors
             log(pi / (1 - pi)) near no person, and within reach of a person.
         """
-        total = np.empty(len(near), np.float32)
-        fill_total(self, near, np.float32(observations), np.float32(priors[0]), np.float32(priors[1]), total)
+        total = np.empty(len(near_person), np.float32)
+        fill_total(self, near_person, np.float32(observations), np.float32(priors[0]), np.float32(priors[1]), total)
         return total
 
 
@@ -139,7 +139,7 @@ def synergy_terms(floor: float) -> Singles:
 @kernel
 def fill_sums(views: FrameTerms, sums: Sums) -> None:
     """Add what all views see to sums, 0 before."""
-    term = np.empty(len(views.near), np.float32)
+    term = np.empty(len(views.near_person), np.float32)
     for i in range(len(views.weight)):
         weight, levels, shares, terms = views.weight[i], views.levels[i], views.share[i], views.terms[i, 0]
         for c in range(len(term)):  # a loop of its own, so that the other becomes vector code
@@ -150,7 +150,7 @@ def fill_sums(views: FrameTerms, sums: Sums) -> None:
             sums.weights[c] += weight * share
             sums.shares[c] += share
     for c in range(len(term)):
-        if views.near[c] >= 0:
+        if views.near_person[c] >= 0:
             sums.weighted[c] = _weighted_near_person(views, c)
 
 
@@ -162,16 +162,16 @@ def _weighted_near_person(views: FrameTerms, c: int) -> np.float32:
         level = views.levels[i, c]
         if level >= 0:
             weight = views.weight[i] * views.share[i, c]
-            weighted += weight * views.confidence[i, views.near[c]] * views.terms[i, 1, level]
+            weighted += weight * views.confidence[i, views.near_person[c]] * views.terms[i, 1, level]
     return weighted
 
 
 @wide_kernel
 def fill_total(
-    sums: Sums, near: Labels, observations: np.float32, prior: np.float32, near_prior: np.float32, total: Singles
+    sums: Sums, near_person: Labels, observations: np.float32, prior: np.float32, near_prior: np.float32, total: Singles
 ) -> None:
     """Fill total (n,); see `Sums.total`."""
-    for c in range(len(near)):
+    for c in range(len(near_person)):
         weight = sums.weights[c] if sums.weights[c] > 0 else np.float32(1)
         mean = observations * sums.shares[c] * sums.weighted[c] / weight
-        total[c] = (prior if near[c] < 0 else near_prior) + (mean if sums.weights[c] > 0 else np.float32(0))
+        total[c] = (prior if near_person[c] < 0 else near_prior) + (mean if sums.weights[c] > 0 else np.float32(0))

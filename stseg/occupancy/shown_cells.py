@@ -1,6 +1,6 @@
 """The cells of a frame at which some view shows something; of all others one stands for many.
 
-Where no view shows foreground or a person, and nobody is near, every view that sees a cell has its *empty level* (of a
+Where no view shows foreground or a person, and none is near, every view that sees a cell has its *empty level* (of a
 map the lowest in the frame: certain background) and nothing hidden. What such a cell sums to depends on the set of
 views that see it and on nothing else. So the cells at which something is shown are fused one by one, and behind them
 one representative of each set of views, by the same kernels: the volume is that of all cells fused one by one, bit for
@@ -30,8 +30,8 @@ _NEARLY_ALL = 0.75
 """Share of blocks from which all are taken: to list cells anew in each frame would cost more than to fuse the rest."""
 _MOST_PIXELS = 1 << 20
 """Pixels up to which a sum of levels fits into 32 bits; blocks with more are taken to show something."""
-_CODES = 60
-"""Views whose sets one whole number holds."""
+_CODE_VIEWS = 60
+"""Number of views with sets that one whole number codes."""
 
 Reach = NDArray[np.int16]
 """int16 (plane, block row, block column, 4): left, top, right, bottom of the box around a block's footprints, pixels;
@@ -45,14 +45,14 @@ class ViewSets(NamedTuple):
     ----------
     of_cell : int32 (plane, y, x)
         The set of each cell.
-    seen : bool (set, view)
+    seen_by : bool (set, view)
         The views of each set.
     size : int64 (set,)
         Number of cells of each set.
     """
 
     of_cell: Labels
-    seen: Flags
+    seen_by: Flags
     size: Ints
 
 
@@ -71,7 +71,7 @@ class ShownCells(NamedTuple):
         First cell of each block, and n behind the last one.
     unseen : int16 (view, n + k)
         UNSEEN where the view does not see it, else 0.
-    near : int32 (n + k,)
+    near_person : int32 (n + k,)
         The person near each, -1 for none.
     number : float64 (n + k,)
         Cells that each stands for.
@@ -82,7 +82,7 @@ class ShownCells(NamedTuple):
     block: Labels
     start: Labels
     unseen: Levels
-    near: Labels
+    near_person: Labels
     number: Floats
 
 
@@ -105,7 +105,7 @@ class _MarkedCells(NamedTuple):
 
 
 class CellTables:
-    """What is known of a rig's cells before any frame, and the cells of the last frame's blocks.
+    """Tables of a rig's cells, and the cells of the last frame's blocks.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ class CellTables:
             reach = np.zeros((len(boxes), *blocks, 4), np.int16)
             _fill_reach(boxes, reach)
             self.reach.append(reach)
-        self._last = _MarkedCells.none()
+        self._cells = _MarkedCells.none()
 
     @cached_property
     def sets(self) -> ViewSets:
@@ -129,36 +129,37 @@ class CellTables:
         shape = self.footprint.shape[1:4]
         code = np.zeros(shape, np.int64)
         for k, boxes in enumerate(self.footprint):
-            if k and k % _CODES == 0:
+            if k and k % _CODE_VIEWS == 0:
                 code = np.unique(code, return_inverse=True)[1].reshape(shape)
             code += code + (boxes[..., 2] > 0)
         _, example, of_cell, size = np.unique(code, return_index=True, return_inverse=True, return_counts=True)
-        seen = self.footprint.reshape(len(self.footprint), -1, 4)[:, example, 2] > 0
-        return ViewSets(of_cell.reshape(shape).astype(np.int32), np.ascontiguousarray(seen.T), size.astype(np.int64))
+        seen_by = self.footprint.reshape(len(self.footprint), -1, 4)[:, example, 2] > 0
+        return ViewSets(of_cell.reshape(shape).astype(np.int32), np.ascontiguousarray(seen_by.T), size.astype(np.int64))
 
     def nothing_marked(self) -> Flags:
         """No block marked, bool (plane, block row, block column)."""
         return np.zeros(self.reach[0].shape[:3], bool)
 
-    def shown(self, marked: Flags, near: Ints, views: Bytes) -> ShownCells:
+    def cells_at(self, marked: Flags, near_person: Ints, views: Bytes) -> ShownCells:
         """The cells of the marked blocks, as far as a view sees them.
 
         Parameters
         ----------
         marked : bool (plane, block row, block column)
-            Every block at which something is shown, or somebody near.
-        near : int64 (y, x)
+            Blocks at which a view shows something, or near a person.
+        near_person : int64 (y, x)
             The person near each cell, -1 for none.
         views : uint8 (plane, y, x)
             Number of views that see each cell.
         """
         if marked.mean() > _NEARLY_ALL:
             marked = np.ones_like(marked)
-        if not np.array_equal(marked, self._last.marked):
-            self._last = self._cells_of(marked, views)
-        _, cell, place, block, start, unseen, number = self._last
+        if not np.array_equal(marked, self._cells.marked):
+            self._cells = self._cells_of(marked, views)
+        _, cell, place, block, start, unseen, number = self._cells
         person = np.full(len(number), -1, np.int32)
-        np.take(near.reshape(-1).astype(np.int32), place, out=person[: len(place)], mode="clip")  # no copy of `out`
+        nearest = near_person.reshape(-1).astype(np.int32)
+        np.take(nearest, place, out=person[: len(place)], mode="clip")  # no copy of `out`
         return ShownCells(cell, place, block, start, unseen, person, number)
 
     def _cells_of(self, marked: Flags, views: Bytes) -> _MarkedCells:
@@ -167,15 +168,15 @@ class CellTables:
         others = sets.size.copy()
         count = _fill_cells(marked, views, sets.of_cell, cell, place, block, view_set, others)
         start = np.append(np.flatnonzero(np.diff(block[:count], prepend=-1)), count).astype(np.int32)
-        seen = np.concatenate([sets.seen[view_set[:count]], sets.seen])
-        unseen = np.where(np.ascontiguousarray(seen.T), np.int16(0), np.int16(UNSEEN))
+        seen_by = np.concatenate([sets.seen_by[view_set[:count]], sets.seen_by])
+        unseen = np.where(np.ascontiguousarray(seen_by.T), np.int16(0), np.int16(UNSEEN))
         number = np.concatenate([np.ones(count), others])
         return _MarkedCells(marked.copy(), cell[:count], place[:count], block[start[:-1]], start, unseen, number)
 
 
 @kernel
 def mark_map(reach: Reach, table: SumTable, marked: Flags) -> None:
-    """Mark the blocks (plane, row, column) in whose box a view's map has a level above its lowest."""
+    """Mark the blocks (plane, row, column) with a level of a view's map above its lowest in their boxes."""
     for z in range(marked.shape[0]):
         for j in range(marked.shape[1]):
             for i in range(marked.shape[2]):

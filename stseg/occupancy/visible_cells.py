@@ -30,7 +30,7 @@ class PixelAssignment(NamedTuple):
     Attributes
     ----------
     raster : int16 (v, u)
-        Person whose body is nearest at each raster pixel, -1 for none.
+        Person of the nearest body at each raster pixel, -1 for none.
     occupied : int32 (v + 1, u + 1)
         Number of raster pixels above and to the left that show a person.
     step : int
@@ -71,36 +71,39 @@ def fill_occupied(raster: NDArray[np.int16], occupied: Labels) -> None:
 
 @part
 def _overlap(first: int, extent: int, step: int, k: int) -> int:
-    """How many of the pixels first..first + extent - 1 lie in raster pixel k."""
+    """Number of the pixels first..first + extent - 1 in raster pixel k."""
     return min(first + extent, (k + 1) * step) - max(first, k * step)
 
 
 @part
-def _shows_a_person(shown: PixelAssignment, left: int, top: int, width: int, height: int) -> bool:
+def _shows_a_person(assigned: PixelAssignment, left: int, top: int, width: int, height: int) -> bool:
     # Unsigned places: none is negative, which is not asked here.
-    above, below = np.uint64(shown.row[np.uint64(top)]), np.uint64(shown.row[np.uint64(top + height - 1)] + 1)
-    first, stop = np.uint64(shown.column[np.uint64(left)]), np.uint64(shown.column[np.uint64(left + width - 1)] + 1)
-    table = shown.occupied
+    above, below = np.uint64(assigned.row[np.uint64(top)]), np.uint64(assigned.row[np.uint64(top + height - 1)] + 1)
+    first, stop = (
+        np.uint64(assigned.column[np.uint64(left)]),
+        np.uint64(assigned.column[np.uint64(left + width - 1)] + 1),
+    )
+    table = assigned.occupied
     return bool(table[below, stop] - table[below, first] != table[above, stop] - table[above, first])
 
 
 @part
 def _hidden_pixels(
-    shown: PixelAssignment, left: int, top: int, width: int, height: int, person: int, distance: float
+    assigned: PixelAssignment, left: int, top: int, width: int, height: int, person: int, distance: float
 ) -> int:
     """Pixels of a footprint that show a person other than `person`, nearer than a cell at `distance`."""
     hidden = 0
-    for j in range(shown.row[top], shown.row[top + height - 1] + 1):
-        for i in range(shown.column[left], shown.column[left + width - 1] + 1):
-            other = shown.raster[j, i]
-            if other >= 0 and other != person and shown.distance[other] < distance - SHOULDER:
-                hidden += _overlap(top, height, shown.step, j) * _overlap(left, width, shown.step, i)
+    for j in range(assigned.row[top], assigned.row[top + height - 1] + 1):
+        for i in range(assigned.column[left], assigned.column[left + width - 1] + 1):
+            other = assigned.raster[j, i]
+            if other >= 0 and other != person and assigned.distance[other] < distance - SHOULDER:
+                hidden += _overlap(top, height, assigned.step, j) * _overlap(left, width, assigned.step, i)
     return hidden
 
 
 @part
 def _others_inside(
-    shown: PixelAssignment,
+    assigned: PixelAssignment,
     table: SumTable,
     left: int,
     top: int,
@@ -111,34 +114,42 @@ def _others_inside(
 ) -> tuple[int, int]:
     """`_hidden_pixels`, and the sum of the likelihood levels of all pixels that show a person other than `person`."""
     hidden, total = 0, 0
-    above, below = np.uint64(shown.row[np.uint64(top)]), np.uint64(shown.row[np.uint64(top + height - 1)] + 1)
-    first, stop = np.uint64(shown.column[np.uint64(left)]), np.uint64(shown.column[np.uint64(left + width - 1)] + 1)
+    above, below = np.uint64(assigned.row[np.uint64(top)]), np.uint64(assigned.row[np.uint64(top + height - 1)] + 1)
+    first, stop = (
+        np.uint64(assigned.column[np.uint64(left)]),
+        np.uint64(assigned.column[np.uint64(left + width - 1)] + 1),
+    )
     for j in range(above, below):
-        v, end = max(top, j * shown.step), min(top + height, (j + 1) * shown.step)
+        v, end = max(top, j * assigned.step), min(top + height, (j + 1) * assigned.step)
         for i in range(first, stop):
-            other = shown.raster[j, i]
+            other = assigned.raster[j, i]
             if other >= 0 and other != person:
-                u, until = max(left, i * shown.step), min(left + width, (i + 1) * shown.step)
-                if shown.distance[np.uint64(other)] < distance - SHOULDER:
+                u, until = max(left, i * assigned.step), min(left + width, (i + 1) * assigned.step)
+                if assigned.distance[np.uint64(other)] < distance - SHOULDER:
                     hidden += (end - v) * (until - u)
                 total += int(sum_of(table.sums, u - table.left, v - table.top, until - table.left, end - table.top))
     return hidden, total
 
 
 @kernel
-def mark_people(reach: Reach, shown: PixelAssignment, marked: Flags) -> None:
-    """Mark the blocks (plane, row, column) in whose box a view shows a person."""
+def mark_people(reach: Reach, assigned: PixelAssignment, marked: Flags) -> None:
+    """Mark the blocks (plane, row, column) with a person of a view in their boxes."""
     for z in range(marked.shape[0]):
         for j in range(marked.shape[1]):
             for i in range(marked.shape[2]):
                 left, top, right, bottom = reach[z, j, i]
                 if right > 0 and not marked[z, j, i]:
-                    marked[z, j, i] = _shows_a_person(shown, left, top, right - left, bottom - top)
+                    marked[z, j, i] = _shows_a_person(assigned, left, top, right - left, bottom - top)
 
 
 @kernel
 def fill_share(
-    cells: ShownCells, marked: Flags, footprint: Footprints, shown: PixelAssignment, distance: Singles, share: Singles
+    cells: ShownCells,
+    marked: Flags,
+    footprint: Footprints,
+    assigned: PixelAssignment,
+    distance: Singles,
+    share: Singles,
 ) -> None:
     """Fill share (n,), 1 before, of the cells that a view sees: how much of each footprint no nearer person hides.
 
@@ -156,11 +167,11 @@ def fill_share(
             continue
         for k in range(cells.start[b], cells.start[b + 1]):
             left, top, width, height = footprint[np.uint64(cells.cell[k])]
-            nearest = cells.near[k]
-            if width == 0 or (nearest >= 0 and shown.separate[nearest]):
+            nearest = cells.near_person[k]
+            if width == 0 or (nearest >= 0 and assigned.separate[nearest]):
                 continue
-            if _shows_a_person(shown, left, top, width, height):
-                hidden = _hidden_pixels(shown, left, top, width, height, nearest, distance[cells.place[k]])
+            if _shows_a_person(assigned, left, top, width, height):
+                hidden = _hidden_pixels(assigned, left, top, width, height, nearest, distance[cells.place[k]])
                 share[k] = np.float32(1) - np.float32(hidden) / np.float32(np.int32(width) * np.int32(height))
 
 
@@ -171,7 +182,7 @@ def fill_map(
     people: Flags,
     footprint: Footprints,
     table: SumTable,
-    shown: PixelAssignment,
+    assigned: PixelAssignment,
     distance: Singles,
     levels: Levels,
     share: Singles,
@@ -186,7 +197,7 @@ def fill_map(
         block = np.uint64(cells.block[b])
         if marked[block]:
             for k in range(cells.start[b], cells.start[b + 1]):
-                levels[k], share[k] = _level_and_share(cells, k, people[block], footprint, table, shown, distance)
+                levels[k], share[k] = _level_and_share(cells, k, people[block], footprint, table, assigned, distance)
 
 
 @part
@@ -196,7 +207,7 @@ def _level_and_share(
     shows_people: bool,
     footprint: Footprints,
     table: SumTable,
-    shown: PixelAssignment,
+    assigned: PixelAssignment,
     distance: Singles,
 ) -> tuple[int, np.float32]:
     """Level and share of cell k; see `fill_map`."""
@@ -205,16 +216,16 @@ def _level_and_share(
         return UNSEEN, np.float32(1)
     u, v = left - table.left, top - table.top
     total, pixels = int(sum_of(table.sums, u, v, u + width, v + height)), np.int32(width) * np.int32(height)
-    nearest, visible = cells.near[k], np.float32(1)
-    is_open = shows_people and not (nearest >= 0 and shown.separate[nearest])
+    nearest, visible = cells.near_person[k], np.float32(1)
+    is_open = shows_people and not (nearest >= 0 and assigned.separate[nearest])
     if is_open and pixels == 1:
-        other = shown.raster[shown.row[np.uint64(top)], shown.column[np.uint64(left)]]
+        other = assigned.raster[assigned.row[np.uint64(top)], assigned.column[np.uint64(left)]]
         if other >= 0 and other != nearest:
-            is_hidden = shown.distance[np.uint64(other)] < distance[cells.place[k]] - SHOULDER
+            is_hidden = assigned.distance[np.uint64(other)] < distance[cells.place[k]] - SHOULDER
             visible, total = np.float32(0 if is_hidden else 1), total if is_hidden else 0
-    elif is_open and _shows_a_person(shown, left, top, width, height):
+    elif is_open and _shows_a_person(assigned, left, top, width, height):
         far = distance[cells.place[k]]
-        hidden, others = _others_inside(shown, table, left, top, width, height, nearest, far)
+        hidden, others = _others_inside(assigned, table, left, top, width, height, nearest, far)
         visible -= np.float32(hidden) / np.float32(pixels)
         if visible > 0:
             total -= others

@@ -36,9 +36,9 @@ _UNOCCLUDED = 0.99
 
 
 class _PreparedView(NamedTuple):
-    """What a view shows in a frame: its people, the blocks where it shows them, its map's sums or its boxes' fit."""
+    """Evidence of a view in a frame: its people, their blocks, the sums of its map or the fit of its boxes."""
 
-    shown: PixelAssignment
+    assignment: PixelAssignment
     people: Flags
     table: SumTable | None
     fit: Singles | None
@@ -48,7 +48,7 @@ class _Fused(NamedTuple):
     """The cells of a frame, the person near each ground cell, the views' terms, and their sums."""
 
     cells: ShownCells
-    near: Ints
+    near_person: Ints
     terms: FrameTerms
     sums: Sums
 
@@ -84,66 +84,67 @@ class Occupancy:
 
     def fuse(
         self,
-        seen: Sequence[ViewEvidence],
+        evidence: Sequence[ViewEvidence],
         explanation: Explanation,
         rates: Sequence[ErrorRates] | None = None,
         noise: BoxNoise = PRIOR_NOISE,
     ) -> SparseVolume:
         """A frame's log-odds, nats; nan where no view sees the cell.
 
-        The prior pi is one half within reach of a person of the explanation, whose existence is already
-        decided, and `occupied_share` elsewhere.
+        The prior pi is one half within reach of a person of the explanation, since existence is already
+        decided there, and `occupied_share` elsewhere.
 
         Parameters
         ----------
-        seen, explanation
+        evidence, explanation
             Evidence of each view, and the people that explain it.
         rates
             Error rates of each view; by default the first guess.
         noise
             Noise of boxes; by default the first guess.
         """
-        return self._volume(self._fused(seen, explanation, rates or self.new_error_rates().rates, noise))
+        return self._volume(self._fused(evidence, explanation, rates or self.new_error_rates().rates, noise))
 
     def fuse_and_learn(
         self,
         estimate: ErrorRateEstimate,
-        seen: Sequence[ViewEvidence],
+        evidence: Sequence[ViewEvidence],
         explanation: Explanation,
         noise: BoxNoise = PRIOR_NOISE,
     ) -> SparseVolume:
         """`fuse` of a session's next frame, followed by the update of the session's error rates."""
-        fused = self._fused(seen, explanation, estimate.rates, noise)
+        fused = self._fused(evidence, explanation, estimate.rates, noise)
         if estimate.next_is_due():
             self._learn(estimate, fused, explanation)
         return self._volume(fused)
 
     def _fused(
         self,
-        seen: Sequence[ViewEvidence],
+        evidence: Sequence[ViewEvidence],
         explanation: Explanation,
         rates: Sequence[ErrorRates],
         noise: BoxNoise,
     ) -> _Fused:
-        near = nearest_person(self._ground, explanation.people.ground, self.config.person_radius)
+        near_person = nearest_person(self._ground, explanation.people.ground, self.config.person_radius)
         views = [
-            None if view is None else self._prepared(i, view, explanation, near, noise) for i, view in enumerate(seen)
+            None if view is None else self._prepared(i, view, explanation, near_person, noise)
+            for i, view in enumerate(evidence)
         ]
         marked = [self._marked(i, view) for i, view in enumerate(views)]
-        everywhere = np.logical_or.reduce([self._beside_people(views, near), *marked])
-        cells = self._tables.shown(everywhere, near, self.views)
-        weights = clutter_weights(np.array([self._clutter(i, view) for i, view in enumerate(seen)]))
+        marked_blocks = np.logical_or.reduce([self._near_people(views, near_person), *marked])
+        cells = self._tables.cells_at(marked_blocks, near_person, self.views)
+        weights = clutter_weights(np.array([self._clutter(i, view) for i, view in enumerate(evidence)]))
         terms = self._terms(views, marked, cells, explanation, rates, weights.astype(np.float32))
-        return _Fused(cells, near, terms, Sums.of(terms))
+        return _Fused(cells, near_person, terms, Sums.of(terms))
 
     def _prepared(
-        self, i: int, view: Boxes | Singles, explanation: Explanation, near: Ints, noise: BoxNoise
+        self, i: int, view: Boxes | Singles, explanation: Explanation, near_person: Ints, noise: BoxNoise
     ) -> _PreparedView:
-        shown, people = self._assignment(i, explanation), self._tables.nothing_marked()
-        mark_people(self._tables.reach[i], shown, people)
+        assignment, people = self._assignment(i, explanation), self._tables.nothing_marked()
+        mark_people(self._tables.reach[i], assignment, people)
         if isinstance(view, Boxes):
-            return _PreparedView(shown, people, None, self._fit(i, view, explanation, near, noise))
-        return _PreparedView(shown, people, self._means.sum_table(i, view), None)
+            return _PreparedView(assignment, people, None, self._fit(i, view, explanation, near_person, noise))
+        return _PreparedView(assignment, people, self._means.sum_table(i, view), None)
 
     def _marked(self, i: int, view: _PreparedView | None) -> Flags:
         """The blocks at which a view shows a person or foreground."""
@@ -154,9 +155,9 @@ class Occupancy:
             mark_map(self._tables.reach[i], view.table, marked)
         return marked
 
-    def _beside_people(self, views: Sequence[_PreparedView | None], near: Ints) -> Flags:
-        """The blocks above the ground near somebody, and above what a box might show."""
-        marked, columns = self._tables.nothing_marked(), near >= 0
+    def _near_people(self, views: Sequence[_PreparedView | None], near_person: Ints) -> Flags:
+        """The blocks above the ground near people, and above the cells that a box might show."""
+        marked, columns = self._tables.nothing_marked(), near_person >= 0
         for view in views:
             if view is not None and view.fit is not None:
                 mark_fit(view.fit, columns.reshape(-1))
@@ -182,12 +183,12 @@ class Occupancy:
                 empty = view.table.lowest
             else:
                 empty = int(level_of_match(0.0, rates[i].miss, rates[i].clutter))
-                missing = np.where(view.shown.separate[:-1], 1.0, explanation.people.visibility[i])
+                missing = np.where(view.assignment.separate[:-1], 1.0, explanation.people.visibility[i])
                 confidence[i] = missing.astype(np.float32)
             np.bitwise_or(cells.unseen[i], np.int16(empty), out=levels[i])  # all bits of UNSEEN are set
             self._fill_view(i, view, marked[i].reshape(-1), cells, rates[i], levels[i], share[i])
         terms = np.stack([log_odds_terms(one) for one in rates])
-        return FrameTerms(levels, share, cells.near, terms, weights, confidence)
+        return FrameTerms(levels, share, cells.near_person, terms, weights, confidence)
 
     def _fill_view(
         self,
@@ -203,24 +204,24 @@ class Occupancy:
         footprint, distance = self.sampling.footprint[i].reshape(-1, 4), self.sampling.distance[i].reshape(-1)
         if view.table is not None:
             people = view.people.reshape(-1)
-            fill_map(cells, marked, people, footprint, view.table, view.shown, distance, levels, share)
+            fill_map(cells, marked, people, footprint, view.table, view.assignment, distance, levels, share)
         elif view.fit is not None:
             share[:] = 1.0
-            fill_share(cells, marked, footprint, view.shown, distance, share)
+            fill_share(cells, marked, footprint, view.assignment, distance, share)
             fill_levels(view.fit, self.heights, self.rig.grid.heights, cells, footprint, rates, levels)
 
     def _volume(self, fused: _Fused) -> SparseVolume:
         cell, sets = fused.cells.cell, self._tables.sets
-        total = fused.sums.total(fused.cells.near, self.config.effective_observations, (self.prior, NEAR_PRIOR))
-        empty = np.where(sets.seen.any(1), total[len(cell) :], np.float32(np.nan))
+        total = fused.sums.total(fused.cells.near_person, self.config.effective_observations, (self.prior, NEAR_PRIOR))
+        empty = np.where(sets.seen_by.any(1), total[len(cell) :], np.float32(np.nan))
         return SparseVolume(sets.of_cell, empty, cell, total[: len(cell)])
 
     def _learn(self, estimate: ErrorRateEstimate, fused: _Fused, explanation: Explanation) -> None:
         people, grid, cells, config = explanation.people, self.rig.grid, fused.cells, estimate.config
-        beside = np.flatnonzero(cells.near >= 0)
-        filled = inside_bodies(grid, fused.near, people.ground, people.height)
-        inside = np.zeros(len(cells.near), bool)
-        inside[beside] = filled.reshape(-1)[cells.cell[beside]]
+        near_cells = np.flatnonzero(cells.near_person >= 0)
+        filled = inside_bodies(grid, fused.near_person, people.ground, people.height)
+        inside = np.zeros(len(cells.near_person), bool)
+        inside[near_cells] = filled.reshape(-1)[cells.cell[near_cells]]
         body, reached = cells_per_person(grid, self.height_mean, self.config.person_radius)
         trials, errors = counts = np.empty((2, len(fused.terms.weight), 3))
         trusted = (people.evidence - people.view_evidence >= config.minimum_evidence) & (
@@ -230,9 +231,9 @@ class Occupancy:
             fused.terms, fused.sums, inside, cells.number, trusted, np.array(estimate.rates),
             self.config.effective_observations, self.prior, errors, trials,
         )  # fmt: skip
-        visible = np.maximum(self._tables.sets.size @ self._tables.sets.seen, 1)
+        visible = np.maximum(self._tables.sets.size @ self._tables.sets.seen_by, 1)
         units = np.column_stack([np.full(len(errors), body), visible, np.full(len(errors), reached - body)])
-        supported = inside[beside][(people.evidence >= config.minimum_evidence)[cells.near[beside]]]
+        supported = inside[near_cells][(people.evidence >= config.minimum_evidence)[cells.near_person[near_cells]]]
         filled_cells = np.array([len(supported), supported.sum()]) / reached
         estimate.learn(counts / units, filled_cells, estimate.interval)
 
@@ -256,7 +257,7 @@ class Occupancy:
         pillars = bodies.reshape(-1, 4).astype(np.float32)
         return pillars, PillarIndex.of(pillars, camera.size)
 
-    def _fit(self, i: int, view: Boxes, explanation: Explanation, near: Ints, noise: BoxNoise) -> Singles:
+    def _fit(self, i: int, view: Boxes, explanation: Explanation, near_person: Ints, noise: BoxNoise) -> Singles:
         """Log-likelihood of the best box of each height and ground cell; see `fill_fit`."""
         pillars = self._pillars[i]
         assert pillars is not None, "the view was to deliver boxes"
@@ -267,10 +268,10 @@ class Occupancy:
         width, height = map(float, self.rig.cameras[i].size)
         edges = edges.clip(0, [width - 1, height - 1] * 2)
         boxes = ViewBoxes(edges, *noise.of(view.score), owner, width, height)
-        fit = np.empty((len(self.heights), near.size), np.float32)
+        fit = np.empty((len(self.heights), near_person.size), np.float32)
         fill_fit(
             pillars[1], pillars[0], self._height_prior(np.array([self.height_mean]))[0],
-            self._height_prior(people.height), boxes, CellsByPerson.of(near, len(people)), fit,
+            self._height_prior(people.height), boxes, CellsByPerson.of(near_person, len(people)), fit,
         )  # fmt: skip
         return fit
 

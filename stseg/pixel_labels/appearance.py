@@ -18,7 +18,7 @@ from stseg.pixel_labels.label_likelihood import LabelLikelihood
 
 SLICES = 6
 """Slices of a body: about head, chest, belly, thighs, shins and feet."""
-_CERTAIN = 0.9
+_VISIBLE_SHARE = 0.9
 """Visible share from which a pixel counts as the person's when colours are learned."""
 _NOISE = 4.0
 """Noise of a sensor, grey levels (standard deviation)."""
@@ -141,7 +141,7 @@ def _add_colours(
         for v in range(edges[j, 1], edges[j, 3]):
             s = slice_of(v, rows.head[j], rows.feet[j])
             for u in range(edges[j, 0], edges[j, 2]):
-                if share[i] >= _CERTAIN:
+                if share[i] >= _VISIBLE_SHARE:
                     count[t, s] += 1.0
                     for a in range(3):
                         colour = float(image[v - corner[1], u - corner[0], a])

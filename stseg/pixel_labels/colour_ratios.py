@@ -1,4 +1,4 @@
-"""Log-ratio of colours: whose a pixel is where bodies overlap, by what each track wears (`appearance`).
+"""Log-ratio of colours of overlapping bodies at a pixel, by the clothes of each track (`appearance`).
 
     p(c | j, s) = (1 - e) N(c; mu_js, S_js) + e / 256^3
     a_j         = log p(c | j, s) - log [ sum_i p_i p(c | i, s) / sum_i p_i ]
@@ -24,7 +24,7 @@ _UNIFORM = 256.0**-3
 def colour_log_ratios(
     appearance: Appearance, likelihood: LabelLikelihood, rows: BodyRows, track: Ints, image: Bytes
 ) -> Singles:
-    """How much likelier a pixel's colour is for a person than for those who may cover it, in the mean.
+    """Log-ratio of a pixel's colour for a person to that for the mean of all who may cover it.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def colour_log_ratios(
     Returns
     -------
     float32 (m,)
-        Nats, at the pixels of each person's rectangle; 0 where nobody else may be.
+        Nats, at the pixels of each person's rectangle; 0 where no other person may be.
     """
     place = np.searchsorted(appearance.track, track)
     density, ratio = np.zeros((2, len(likelihood.people.share)), np.float32)

@@ -47,8 +47,8 @@ class LabelLikelihood(NamedTuple):
 
 def visible_shares(patches: Patches, distance: Floats) -> LabelLikelihood:
     """Visible shares from coverage; distance float64 (n,) of people from the camera, metres."""
-    edges, seen = patches.edges, patches.edges[:, 2] > patches.edges[:, 0]
-    left, top = edges[seen, :2].min(0, initial=np.iinfo(np.int64).max) if seen.any() else (0, 0)
+    edges, visible = patches.edges, patches.edges[:, 2] > patches.edges[:, 0]
+    left, top = edges[visible, :2].min(0, initial=np.iinfo(np.int64).max) if visible.any() else (0, 0)
     right, bottom = edges[:, 2:].max(0, initial=0)
     background = np.ones((bottom - top, right - left), np.float32)
     share = patches.share.copy()

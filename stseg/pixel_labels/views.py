@@ -64,14 +64,14 @@ class ViewLabels:
         worn = None
         if colours is not None and appearance is not None:
             worn = colour_log_ratios(appearance, likelihood, self.rows(people), people.track, colours)
-        seen = np.ascontiguousarray(foreground[likelihood.window])
-        problem = pixel_energy(likelihood, seen, across, down, self.config, worn)
+        probability = np.ascontiguousarray(foreground[likelihood.window])
+        problem = pixel_energy(likelihood, probability, across, down, self.config, worn)
         start = most_likely_labels(likelihood).flat[problem.pixel]
         labels[likelihood.window].flat[problem.pixel] = expand(problem.energy, admissible(problem.energy, start))
         return labels
 
     def learn(self, people: PlacedPeople, image: Bytes, sums: ColourSums) -> None:
-        """Add the colours of people whom nobody hides; image uint8 (v, u, 3)."""
+        """Add the colours of people who are not hidden; image uint8 (v, u, 3)."""
         likelihood = self.label_likelihood(people)
         sums.add(likelihood, self.rows(people), people.track, np.ascontiguousarray(image[likelihood.window]))
 

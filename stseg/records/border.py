@@ -29,12 +29,12 @@ class Border:
     @classmethod
     def of(cls, rig: Rig) -> Border:
         """The border of the views and the doors of `rig`, and of its area unless that is closed."""
-        grid, seen = rig.grid, np.zeros(rig.grid.shape[1:], bool)
+        grid, visible = rig.grid, np.zeros(rig.grid.shape[1:], bool)
         for camera in rig.cameras:
             image, ahead = camera.project(grid.ground, _TRUNK)
-            seen |= ahead & camera.inside(image)
-        area = seen & grid.inside()
-        within = seen | ~grid.inside() if rig.closed else area.copy()
+            visible |= ahead & camera.inside(image)
+        area = visible & grid.inside()
+        within = visible | ~grid.inside() if rig.closed else area.copy()
         for door in rig.doors:
             within &= ~grid.touching(door)
         inside = np.pad(within, 1, constant_values=rig.closed)
@@ -62,5 +62,5 @@ class Border:
         return np.asarray(self._framed[row, column])
 
     def inside(self, ground: Floats, width: float) -> Floats:
-        """How far inside ground points (n, 2) are: 0 at the border, 1 from `width` metres on, float64 (n,)."""
+        """Depth of ground points (n, 2) inside: 0 at the border, 1 from `width` metres on, float64 (n,)."""
         return np.minimum(self.away(ground) / width, 1.0)

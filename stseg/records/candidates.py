@@ -26,14 +26,14 @@ class Candidates:
         pairs = ((self.ground, other.ground), (self.height, other.height), (self.width, other.width))
         return Candidates(*map(np.concatenate, pairs))
 
-    def joined_apart(self, other: Candidates, apart: float) -> Candidates:
+    def joined_if_distant(self, other: Candidates, distance: float) -> Candidates:
         """This pool's candidates, then those of the other that stand `apart` metres or more from all before them."""
-        every = self.joined_with(other)
+        joined = self.joined_with(other)
         kept = list(range(len(self)))
-        for i in range(len(self), len(every)):
-            if not (np.hypot(*(every.ground[kept] - every.ground[i]).T) < apart).any():
+        for i in range(len(self), len(joined)):
+            if not (np.hypot(*(joined.ground[kept] - joined.ground[i]).T) < distance).any():
                 kept.append(i)
-        return every.at(kept)
+        return joined.at(kept)
 
     def after(self, number: int) -> Candidates:
         """All candidates but the first ones."""

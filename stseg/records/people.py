@@ -65,7 +65,7 @@ class Explanation:
     ghosts
         The rejected candidates.
     pixel_assignment : tuple of int16 arrays (v, u)
-        For each view the index of the person whose body is nearest at each raster pixel, -1 for none.
+        For each view the index of the person of the nearest body at each raster pixel, -1 for none.
     raster_step : tuple of int
         Image pixels to a raster pixel of `pixel_assignment`, for each view.
     box_assignment : tuple of int64 arrays (box,)
@@ -82,9 +82,9 @@ class Explanation:
     residual: Floats
 
 
-def empty_explanation(rig: Rig, seen: Sequence[ViewEvidence]) -> Explanation:
+def empty_explanation(rig: Rig, evidence: Sequence[ViewEvidence]) -> Explanation:
     """The explanation of a frame without people: every pixel and every box is unassigned."""
-    none, views = np.zeros(0), len(seen)
+    none, views = np.zeros(0), len(evidence)
     people = People(
         np.zeros((0, 2)), none, none, np.zeros((0, 2, 2)), none, np.zeros((views, 0)), np.zeros((views, 0)), none,
         np.zeros(0, np.int64), Sizes(none, none, none, none),
@@ -92,5 +92,5 @@ def empty_explanation(rig: Rig, seen: Sequence[ViewEvidence]) -> Explanation:
     # One raster pixel for the whole image, unassigned.
     steps = tuple(max(camera.size) for camera in rig.cameras)
     owner = tuple(np.full((1, 1), -1, np.int16) for _ in steps)
-    boxes = tuple(np.full(len(view) if isinstance(view, Boxes) else 0, -1, np.int64) for view in seen)
+    boxes = tuple(np.full(len(view) if isinstance(view, Boxes) else 0, -1, np.int64) for view in evidence)
     return Explanation(people, people, owner, steps, boxes, np.full(len(steps), np.nan))

@@ -66,9 +66,9 @@ class PredictedTracks:
         variance = self.sizes.height_variance
         off = height[:, None] - self.sizes.height
         tall = -0.5 * off**2 / variance + np.log(body.height_spread / np.sqrt(variance))
-        anybody = log_heavy_tailed((height - body.height_mean) / body.height_spread)
+        population = log_heavy_tailed((height - body.height_mean) / body.height_spread)
         squares = _squares(ground[:, None] - self.ground, self._precision)
-        shape = np.maximum(tall - anybody[:, None], LEAST_HEIGHT_RATIO)
+        shape = np.maximum(tall - population[:, None], LEAST_HEIGHT_RATIO)
         return np.asarray(self.existence - birth_log_odds + self._concentration - 0.5 * squares + shape)
 
     def place_log_density(self, track: Ints, ground: Floats) -> Floats:

@@ -20,8 +20,8 @@ def principal_axes(features: Sequence[Singles], number: int) -> Floats:
         Most axes.
     """
     scatter = np.zeros((features[0].shape[1],) * 2)
-    for own in features:
-        centred = own.astype(np.float64) - own.mean(axis=0, dtype=np.float64)
+    for camera_features in features:
+        centred = camera_features.astype(np.float64) - camera_features.mean(axis=0, dtype=np.float64)
         scatter += centred.T @ centred
     axes = np.linalg.eigh(scatter)[1][:, ::-1][:, :number]
     largest = np.abs(axes).argmax(axis=0)

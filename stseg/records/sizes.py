@@ -28,9 +28,9 @@ class Sizes:
 
     @classmethod
     def of_heights(cls, height: Floats, variance: Floats, body: BodyConfig) -> Sizes:
-        """Of heights with variances, metres and square metres, each (n,); widths by the population prior."""
-        anybody = cls.of_population(len(height), body)
-        return cls(height, variance, anybody.width, anybody.width_variance)
+        """Sizes of heights with variances, metres and square metres, each (n,); widths by the population prior."""
+        population = cls.of_population(len(height), body)
+        return cls(height, variance, population.width, population.width_variance)
 
     def at(self, chosen: Sequence[int] | Ints) -> Sizes:
         """Sizes of the chosen, in that order."""
@@ -83,11 +83,11 @@ def log_heavy_tailed(deviation: Floats) -> Floats:
     A Gaussian, with tails of a power law (its exponent, 4, makes the density smooth): coats, prams and children are far
     out more often than a Gaussian allows. Ten spreads cost 8 nats, not 50.
     """
-    away, near = np.abs(deviation), -0.5 * deviation**2
+    away, gaussian = np.abs(deviation), -0.5 * deviation**2
     if (away < _TAIL).all():
-        return np.asarray(near)
+        return np.asarray(gaussian)
     tail = 0.5 * _TAIL**2 + _TAIL**2 * np.log(np.maximum(away, _TAIL) / _TAIL)
-    return np.where(away < _TAIL, near, -tail)
+    return np.where(away < _TAIL, gaussian, -tail)
 
 
 _LEAST_PRECISION = 1e-6

@@ -32,9 +32,9 @@ class SparseVolume:
 
     @classmethod
     def whole(cls, volume: Singles) -> Self:
-        """Of the log-odds of all cells, float32 (plane, y, x)."""
-        every = np.arange(volume.size, dtype=np.int32)
-        return cls(np.zeros(volume.shape, np.int32), np.full(1, np.nan, np.float32), every, volume.reshape(-1))
+        """Volume of the log-odds of all cells, float32 (plane, y, x)."""
+        cells = np.arange(volume.size, dtype=np.int32)
+        return cls(np.zeros(volume.shape, np.int32), np.full(1, np.nan, np.float32), cells, volume.reshape(-1))
 
     @property
     def place(self) -> Labels:

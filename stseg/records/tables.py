@@ -108,7 +108,7 @@ WINDOW = np.dtype(
         ("index", "<i8"),
         ("solve_first", "<i8"),  # frames that were solved together, half open
         ("solve_stop", "<i8"),
-        ("commit_first", "<i8"),  # those of them whose labels were kept, half open
+        ("commit_first", "<i8"),  # those of them with labels that are kept, half open
         ("commit_stop", "<i8"),
         ("energy", "<i8"),  # of the cut, in quanta
         ("energy_quantum", "<f8"),  # nats
@@ -142,7 +142,7 @@ RATES = np.dtype(
 
 
 SHIFT = np.dtype([("frame", "<i8"), ("view", "<i4"), ("u", "<f4"), ("v", "<f4")])
-"""How far a colour view's picture has moved since its background was learned, pixels, every other second."""
+"""Shift of a colour view's picture since its background was learned, pixels, every other second."""
 
 
 ANSWER = np.dtype([("row", "<i8"), ("other", "<i8"), ("people", "u1")])
@@ -188,8 +188,8 @@ class Tracks:
         order = np.argsort(inverse, kind="stable")
         bounds = np.searchsorted(inverse[order], np.arange(len(ids) + 1))
         for row, start, stop in zip(rows, bounds[:-1], bounds[1:], strict=True):
-            own = self.trajectory[order[start:stop]]
-            row["first"], row["last"], row["frames"] = own["frame"].min(), own["frame"].max(), len(own)
-            row["score"] = own["score"].mean()
-            row["height"], row["width"] = np.median(own["height"]), np.median(own["width"])
+            track = self.trajectory[order[start:stop]]
+            row["first"], row["last"], row["frames"] = track["frame"].min(), track["frame"].max(), len(track)
+            row["score"] = track["score"].mean()
+            row["height"], row["width"] = np.median(track["height"]), np.median(track["width"])
         return rows

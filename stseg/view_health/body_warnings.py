@@ -9,11 +9,11 @@ import numpy as np
 from stseg.arrays import Rows
 from stseg.config import BodyConfig
 
-_ENOUGH = 30
+_LEAST_MEASUREMENTS = 30
 """Least number of measurements for a statement."""
-_FAR = 3.0
+_WIDTH_DEVIATIONS = 3.0
 """Spreads from the configured mean beyond which bodies are others than configured."""
-_TORN = 0.3
+_TORN_MISS_RATE = 0.3
 """Learned miss rate above which a view's bodies are torn; clean masks have 0.05 to 0.2."""
 
 
@@ -35,11 +35,11 @@ def body_warnings(cameras: Sequence[str], trajectory: Rows, rates: Rows, body: B
 
 
 def _sizes(trajectory: Rows, body: BodyConfig) -> list[str]:
-    if len(trajectory) < _ENOUGH:
+    if len(trajectory) < _LEAST_MEASUREMENTS:
         return []
     height, width = (float(np.median(trajectory[name])) for name in ("height", "width"))
     usual = float(body.width_of(np.array([height]))[0])
-    if width > usual + _FAR * body.width_spread:
+    if width > usual + _WIDTH_DEVIATIONS * body.width_spread:
         return [
             f"bodies are {width:.2f} m wide in the median, {usual:.2f} m were expected: are the masks too wide? "
             "[body] in the rig says whom the cameras watch"
@@ -51,6 +51,6 @@ def _torn(cameras: Sequence[str], rates: Rows) -> list[str]:
     warnings = []
     for view, name in enumerate(cameras):
         miss = rates["miss"][rates["view"] == view]
-        if len(miss) and (share := float(np.median(miss))) > _TORN:
+        if len(miss) and (share := float(np.median(miss))) > _TORN_MISS_RATE:
             warnings.append(f"view {name} misses {100 * share:.0f} % of people's bodies: are its masks torn or narrow?")
     return warnings

@@ -29,7 +29,7 @@ class ExcludedViews:
         self._since: list[int | None] = [None] * len(cameras)
 
     def events(
-        self, frame: int, seen: Sequence[Observation], evidence: Sequence[ViewEvidence], failures: ViewFailures
+        self, frame: int, observations: Sequence[Observation], evidence: Sequence[ViewEvidence], failures: ViewFailures
     ) -> Rows:
         """EVENT rows of kind `blind` of the next frame.
 
@@ -45,11 +45,11 @@ class ExcludedViews:
         reasons = []
         for k, name in enumerate(self._cameras):
             since = self._since[k]
-            excluded = seen[k] is not None and (evidence[k] is None or failures.excluded[k])
+            excluded = observations[k] is not None and (evidence[k] is None or failures.excluded[k])
             if excluded and since is None:
                 self._since[k] = frame
                 reasons.append(f"camera {name} {_reason(evidence[k], bool(failures.knocks.knocked[k]))}")
-            elif since is not None and not excluded and seen[k] is not None:
+            elif since is not None and not excluded and observations[k] is not None:
                 self._since[k] = None
                 reasons.append(f"camera {name} counts again, after {frame - since} frames")
         return np.array([(frame, b"blind", 0, 0, reason.encode()) for reason in reasons], EVENT)

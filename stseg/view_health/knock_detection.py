@@ -17,13 +17,13 @@ from scipy.fft import irfft2, rfft2
 
 from stseg.arrays import Bytes, Floats, Singles
 
-_LEAST = 20
+_LEAST_FRAMES = 20
 """Least number of scored frames on either side of a step."""
-_CLEAR = 6.0
+_STEP_ERRORS = 6.0
 """Least size of a step, in its standard errors."""
-_LARGE = 1.0
+_STEP_DEVIATIONS = 1.0
 """Least size of a step, in standard deviations of single frames; smaller ones are harmless."""
-_AROUND = 2
+_PEAK_RADIUS = 2
 """Radius of the sub-pixel centroid around a correlation peak, pixels."""
 
 
@@ -93,8 +93,8 @@ def _peak(likeness: Singles) -> Floats:
     middle = np.array(likeness.shape) // 2
     centred = np.roll(likeness, tuple(middle), (0, 1))
     v, u = map(int, np.unravel_index(int(np.argmax(centred)), centred.shape))
-    rows = np.arange(max(v - _AROUND, 0), min(v + _AROUND + 1, centred.shape[0]))
-    columns = np.arange(max(u - _AROUND, 0), min(u + _AROUND + 1, centred.shape[1]))
+    rows = np.arange(max(v - _PEAK_RADIUS, 0), min(v + _PEAK_RADIUS + 1, centred.shape[0]))
+    columns = np.arange(max(u - _PEAK_RADIUS, 0), min(u + _PEAK_RADIUS + 1, centred.shape[1]))
     weight = np.maximum(centred[np.ix_(rows, columns)], 0.0)
     centre = np.array([weight.sum(0) @ columns, weight.sum(1) @ rows]) / max(float(weight.sum()), 1e-12)
     return np.asarray(centre - middle[::-1])
@@ -109,29 +109,29 @@ def _edges(image: Bytes) -> Singles:
 
 
 def _step(agreement: Floats, view: int, least: float) -> Knock | None:
-    own = agreement[:, view] - _median(np.delete(agreement, view, axis=1))
-    rows = np.flatnonzero(np.isfinite(own))
-    if len(rows) < 2 * _LEAST:
+    relative = agreement[:, view] - _median(np.delete(agreement, view, axis=1))
+    rows = np.flatnonzero(np.isfinite(relative))
+    if len(rows) < 2 * _LEAST_FRAMES:
         return None
     # Outlier frames must not look like steps.
-    centre, wide = np.median(own[rows]), 6 * _spread(own[rows])
-    values = np.clip(own[rows], centre - wide, centre + wide)
+    centre, wide = np.median(relative[rows]), 6 * _spread(relative[rows])
+    values = np.clip(relative[rows], centre - wide, centre + wide)
     cut = _cut(values)
     before, after = values[:cut], values[cut:]
-    left = np.concatenate([before - before.mean(), after - after.mean()])
-    step, spread = float(before.mean() - after.mean()), max(float(left.std()), 1e-9)
-    errors = step / (spread * np.sqrt(_alike(left) * (1 / len(before) + 1 / len(after))))
+    residual = np.concatenate([before - before.mean(), after - after.mean()])
+    step, spread = float(before.mean() - after.mean()), max(float(residual.std()), 1e-9)
+    errors = step / (spread * np.sqrt(_frames_per_sample(residual) * (1 / len(before) + 1 / len(after))))
     # The clipped scores decide significance, the medians the size of the step.
-    drop = float(np.median(own[rows][:cut]) - np.median(own[rows][cut:]))
-    if errors < _CLEAR or step < _LARGE * spread or drop < least:
+    drop = float(np.median(relative[rows][:cut]) - np.median(relative[rows][cut:]))
+    if errors < _STEP_ERRORS or step < _STEP_DEVIATIONS * spread or drop < least:
         return None
-    seen = agreement[rows, view]
-    return Knock(view, int(rows[cut]), float(np.median(seen[:cut])), float(np.median(seen[cut:])), float(errors))
+    score = agreement[rows, view]
+    return Knock(view, int(rows[cut]), float(np.median(score[:cut])), float(np.median(score[cut:])), float(errors))
 
 
 def _cut(values: Floats) -> int:
     """Change point: number of values before it in the best fit of two levels, the first the higher."""
-    count = np.arange(_LEAST, len(values) - _LEAST + 1)
+    count = np.arange(_LEAST_FRAMES, len(values) - _LEAST_FRAMES + 1)
     total = np.concatenate([[0.0], np.cumsum(values)])
     before, after = total[count] / count, (total[-1] - total[count]) / (len(values) - count)
     return int(count[np.argmax((before - after) * np.sqrt(count * (len(values) - count)))])
@@ -150,8 +150,8 @@ def _spread(values: Floats) -> float:
     return 1.4826 * float(np.median(np.abs(values - np.median(values))))
 
 
-def _alike(left: Floats) -> float:
+def _frames_per_sample(residual: Floats) -> float:
     """Frames per independent frame under an AR(1) model of the scores."""
-    correlation = float((left[1:] * left[:-1]).sum() / max(float((left**2).sum()), 1e-12))
+    correlation = float((residual[1:] * residual[:-1]).sum() / max(float((residual**2).sum()), 1e-12))
     correlation = min(max(correlation, 0.0), 0.95)
     return (1 + correlation) / (1 - correlation)

@@ -1,7 +1,7 @@
 """Reprojection residuals: how far beside their places each view sees people.
 
 They are small for all views of a sound rig, and a knocked camera shows in its first frame. A view measures places well
-across its line of sight. People who are apart from all others in it are located along that direction by this view alone
+across its line of sight. People at a distance from all others in it are located along that direction by this view alone
 and compared with their places by all views. The mean of one frame is rough, the median over minutes good to a
 centimetre or two.
 """
@@ -16,9 +16,9 @@ from stseg.arrays import Flags, Floats, Ints
 from stseg.bodies.views import BoxView, PixelView, View, ViewObservation
 from stseg.records.candidates import Candidates
 
-_REACH, _STEP = 0.6, 0.05
+_GREATEST_RESIDUAL, _RESIDUAL_STEP = 0.6, 0.05
 """Range of the residual to either side, and its step, metres."""
-_SHIFTS = np.arange(-_REACH, _REACH + _STEP / 2, _STEP)
+_SHIFTS = np.arange(-_GREATEST_RESIDUAL, _GREATEST_RESIDUAL + _RESIDUAL_STEP / 2, _RESIDUAL_STEP)
 
 
 def reprojection_residuals(
@@ -33,15 +33,15 @@ def reprojection_residuals(
     ----------
     people
         Places by all views.
-    views, sights
-        The views, and what each shows; None where blind.
+    views, observations
+        The views, and the observation of each; None where blind.
     boxes : int64 (box,) each
-        For each view the person whom each box is assigned to, -1 for none.
+        For each view the person of each box by assignment, -1 for none.
 
     Returns
     -------
     float64 (view,)
-        Mean over people apart from all others, metres, positive to the right of the view; nan where there are none.
+        Mean over people who overlap no others, metres, positive to the right of the view; nan where there are none.
     """
     measured = np.full(len(views), np.nan)
     for k, (view, observation, owner) in enumerate(zip(views, observations, boxes, strict=True)):
@@ -53,14 +53,14 @@ def reprojection_residuals(
 
 
 def nearest_people(people: Candidates, view: View, observation: ViewObservation) -> Ints:
-    """The person whose body's middle is nearest to that of each box, within its height, int64 (box,); -1 for none."""
+    """Person of the body with the nearest middle to each box, within the body's height, int64 (box,); -1 for none."""
     if not len(people):
         return np.full(len(observation.edges), -1)
     bodies = view.table.boxes_of(people.ground, people.height)
     away = np.hypot(*np.moveaxis(_middles(observation.edges)[:, None] - _middles(bodies), -1, 0))
     nearest = np.nan_to_num(away, nan=np.inf).argmin(1)
-    near = away[np.arange(len(away)), nearest] < (bodies[:, 3] - bodies[:, 1])[nearest]
-    return np.asarray(np.where(near, nearest, -1))
+    within_height = away[np.arange(len(away)), nearest] < (bodies[:, 3] - bodies[:, 1])[nearest]
+    return np.asarray(np.where(within_height, nearest, -1))
 
 
 def _middles(edges: Floats) -> Floats:
@@ -69,17 +69,18 @@ def _middles(edges: Floats) -> Floats:
 
 
 def _of_view(people: Candidates, view: BoxView | PixelView, observation: ViewObservation, owner: Ints) -> Floats:
-    """Residual of each person, float64 (n,), metres; nan for those not apart."""
+    """Residual of each person, float64 (n,), metres; nan for those that overlap others."""
     found = np.full(len(people), np.nan)
     right = _right(people.ground, view)
-    ends = [view.table.boxes_of(people.ground + shift * right, people.height) for shift in (-_REACH, 0.0, _REACH)]
-    for j in np.flatnonzero(_apart(np.stack(ends), view)):
+    shifts = (-_GREATEST_RESIDUAL, 0.0, _GREATEST_RESIDUAL)
+    ends = [view.table.boxes_of(people.ground + shift * right, people.height) for shift in shifts]
+    for j in np.flatnonzero(_is_separate(np.stack(ends), view)):
         if isinstance(view, PixelView):
             found[j] = _by_pixels(people, int(j), right[j], view, observation)
-        elif len(own := np.flatnonzero(owner == j)):
+        elif len(boxes_of_person := np.flatnonzero(owner == j)):
             middles = [float(end[j, 0] + end[j, 2]) / 2 for end in ends]
-            shown = float(observation.edges[own[0], 0] + observation.edges[own[0], 2]) / 2
-            found[j] = np.interp(shown, middles, (-_REACH, 0.0, _REACH))
+            middle = float(observation.edges[boxes_of_person[0], 0] + observation.edges[boxes_of_person[0], 2]) / 2
+            found[j] = np.interp(middle, middles, shifts)
     return found
 
 
@@ -90,7 +91,7 @@ def _right(ground: Floats, view: View) -> Floats:
     return np.asarray(across / np.maximum(np.hypot(*across.T), 1e-9)[:, None])
 
 
-def _apart(ends: Floats, view: View) -> Flags:
+def _is_separate(ends: Floats, view: View) -> Flags:
     """Whether a body (3, n, 4) that is shifted to either side stays in the image, and clear of all others."""
     low, high = ends[:, :, :2].min(0), ends[:, :, 2:].max(0)
     inside = np.all((low >= 0) & (high <= np.array(view.camera.size) - 1), axis=1)
@@ -106,9 +107,9 @@ def _by_pixels(people: Candidates, j: int, right: Floats, view: PixelView, obser
     count = len(_SHIFTS)
     places = people.ground[j] + _SHIFTS[:, None] * right
     heights, widths = np.full(count, people.height[j]), np.full(count, people.width[j])
-    unassigned, anybody = np.full(view.shape, -1, np.int16), np.zeros(1, np.int64)
+    unassigned, person = np.full(view.shape, -1, np.int16), np.zeros(1, np.int64)
     pillars = view.tried(places[None], heights[None], widths[None])
-    sums, area = view.open_sums(observation.raster, unassigned, anybody, pillars)
+    sums, area = view.open_sums(observation.raster, unassigned, person, pillars)
     score = sums[0] / np.maximum(area[0], 1.0)
     weight = np.exp(score - score.max())
     return float(weight @ _SHIFTS / weight.sum())

@@ -1,7 +1,7 @@
 """Rig check of a finished run: reprojection residuals of each view over time.
 
 The residuals are those of the detector (`reprojection_residuals`), window by window. A wrong view draws detections
-towards itself: its residual understates its error, and views along the same line of sight get residuals too. With three
+towards itself: its residual understates its error. Views along the same line of sight get residuals too. With three
 views, or two that face each other, positions cannot decide which is wrong; all views as far off are reported.
 """
 
@@ -14,11 +14,11 @@ import numpy as np
 from stseg.arrays import Floats
 from stseg.view_health.knock_detection import Knock, find_knocks
 
-_LEAST = 5
+_LEAST_WINDOWS = 5
 """Windows with a residual that a view needs."""
-_CLEAR = 3.0
+_RESIDUAL_ERRORS = 3.0
 """Least residual in standard errors."""
-_ALIKE = 0.6
+_REPORTED_SHARE = 0.6
 """Share of the largest residual from which a view is reported too."""
 
 
@@ -48,20 +48,20 @@ def views_off(residuals: Floats, cell: float) -> list[ViewResidual]:
     cell
         Side of a cell, metres.
     """
-    median = np.array([_clear_median(own[np.isfinite(own)]) for own in residuals.T])
+    median = np.array([_clear_median(view_residuals[np.isfinite(view_residuals)]) for view_residuals in residuals.T])
     order = np.argsort(-np.abs(median), kind="stable")
     farthest = float(np.abs(median).max(initial=0.0))
-    named = [int(view) for view in order if abs(median[view]) >= _ALIKE * farthest]
+    named = [int(view) for view in order if abs(median[view]) >= _REPORTED_SHARE * farthest]
     return [ViewResidual(view, float(median[view])) for view in named] if farthest > cell else []
 
 
 def _clear_median(residuals: Floats) -> float:
     """The median, 0 where there are few measurements or it is not significant."""
-    if len(residuals) < _LEAST:
+    if len(residuals) < _LEAST_WINDOWS:
         return 0.0
     median = float(np.median(residuals))
     error = 1.4826 * float(np.median(np.abs(residuals - median))) / np.sqrt(len(residuals))
-    return median if abs(median) > _CLEAR * error else 0.0
+    return median if abs(median) > _RESIDUAL_ERRORS * error else 0.0
 
 
 def find_residual_step(residuals: Floats, cell: float) -> Knock | None:

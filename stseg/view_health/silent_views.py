@@ -9,7 +9,7 @@ import numpy as np
 from stseg.arrays import Floats, Ints, Rows
 from stseg.records.ghost_reasons import has_evidence
 
-_ENOUGH = 30
+_LEAST_CANDIDATES = 30
 """Least number of candidates for a statement on a view."""
 _SILENT_SHARE = 0.1
 """Share of the run for which a view may be silent without a break before there is a warning."""
@@ -34,38 +34,38 @@ def view_warnings(cameras: Sequence[str], candidates: Rows, frames: Ints, frame_
     person = candidates["status"] == 1
     warnings = []
     for view, name in enumerate(cameras):
-        own = parts[:, view]
-        if not has_evidence(own).any():
+        evidence = parts[:, view]
+        if not has_evidence(evidence).any():
             warnings.append(f"view {name} has no evidence on any candidate: is it blind, or its calibration wrong?")
             continue
-        warnings += _silent_interval(name, candidates["frame"], own, frames, frame_rate)
-        warnings += _weak_support(name, candidates["frame"][person], own[person], frames)
+        warnings += _silent_interval(name, candidates["frame"], evidence, frames, frame_rate)
+        warnings += _weak_support(name, candidates["frame"][person], evidence[person], frames)
     return warnings
 
 
-def _silent_interval(name: str, frame: Ints, own: Floats, frames: Ints, frame_rate: float) -> list[str]:
+def _silent_interval(name: str, frame: Ints, evidence: Floats, frames: Ints, frame_rate: float) -> list[str]:
     """Warning of the longest interval in which other views had evidence and this one had none."""
-    active_frames = np.unique(frame[has_evidence(own)])
+    active_frames = np.unique(frame[has_evidence(evidence)])
     all_frames = np.unique(frame)
     gaps = np.concatenate([[frames[0] - 1], active_frames, [frames[-1] + 1]])
     longest = int(np.argmax(np.diff(gaps)))
     start, stop = int(gaps[longest]) + 1, int(gaps[longest + 1])
     missed = int(((all_frames >= start) & (all_frames < stop)).sum())
-    if missed < max(_ENOUGH, _SILENT_SHARE * len(frames)):
+    if missed < max(_LEAST_CANDIDATES, _SILENT_SHARE * len(frames)):
         return []
     seconds = (stop - start) / frame_rate
     return [f"view {name} has no evidence in frames {start} to {stop - 1} ({seconds:.0f} s): did it end, or fail?"]
 
 
-def _weak_support(name: str, frame: Ints, own: Floats, frames: Ints) -> list[str]:
+def _weak_support(name: str, frame: Ints, evidence: Floats, frames: Ints) -> list[str]:
     """Warning of a view's negative or falling evidence for people in its view."""
-    informative = has_evidence(own)
-    frame, own = frame[informative], own[informative]
-    if len(own) >= _ENOUGH and np.median(own) < 0:
+    informative = has_evidence(evidence)
+    frame, evidence = frame[informative], evidence[informative]
+    if len(evidence) >= _LEAST_CANDIDATES and np.median(evidence) < 0:
         return [f"view {name} denies most people that the others see: is its calibration wrong?"]
     third = (frames[-1] - frames[0]) / 3
-    early, late = own[frame < frames[0] + third], own[frame > frames[-1] - third]
-    if min(len(early), len(late)) >= _ENOUGH and np.median(late) < 0.5 * np.median(early):
+    early, late = evidence[frame < frames[0] + third], evidence[frame > frames[-1] - third]
+    if min(len(early), len(late)) >= _LEAST_CANDIDATES and np.median(late) < 0.5 * np.median(early):
         first, last = np.median(early), np.median(late)
         return [f"view {name} drifts: its evidence for a person falls from {first:.1f} to {last:.1f} nats"]
     return []

@@ -161,7 +161,7 @@ def informedness(assignment: NDArray[np.int16], certain: Flags, foreground: Flag
     Parameters
     ----------
     assignment : int16 (v, u)
-        The person whose body is nearest at each raster pixel, -1 for none.
+        The person of the nearest body at each raster pixel, -1 for none.
     certain : bool (person,)
         People who count; pixels of others do not.
     foreground : bool (v, u)

@@ -101,10 +101,10 @@ def test_the_volume_without_explanation_is_filled_at_people() -> None:
 
 def test_duplicates_are_dropped_in_order() -> None:
     known, other = pool((0.0, 0.0), (1.0, 0.0)), pool((0.1, 0.0), (0.5, 0.5), (0.55, 0.5), (1.0, 0.3))
-    merged = known.joined_apart(other, 0.25)
+    merged = known.joined_if_distant(other, 0.25)
     np.testing.assert_array_equal(merged.ground, [[0.0, 0.0], [1.0, 0.0], [0.5, 0.5], [1.0, 0.3]])
-    assert len(pool().joined_apart(known, 0.25)) == 2
-    assert len(pool((0.0, 0.0), (0.05, 0.0)).joined_apart(pool(), 0.25)) == 2
+    assert len(pool().joined_if_distant(known, 0.25)) == 2
+    assert len(pool((0.0, 0.0), (0.05, 0.0)).joined_if_distant(pool(), 0.25)) == 2
 
 
 def test_who_is_in_a_pool_already_is_not_new_to_it() -> None:

@@ -45,7 +45,13 @@ def one_level(views: int = 1) -> ErrorRateEstimate:
 
 
 def teach(
-    view: int, shown: reference.Shown, near: Ints, inside: Flags, trusted: Flags, rates: list[ErrorRates], looks: float
+    view: int,
+    shown: reference.Shown,
+    near: Ints,
+    inside: Flags,
+    trusted: Flags,
+    rates: list[ErrorRates],
+    looks: float,
 ) -> tuple[Floats, Floats]:
     """What the kernel counts of one of several views of equal weight."""
     views, every = len(rates), np.tile(near.ravel(), len(inside)).astype(np.int32)

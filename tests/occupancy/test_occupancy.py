@@ -172,7 +172,7 @@ def test_likelihood_per_plane_by_definition(seed: int) -> None:
     tried = np.array([1.5, 1.65, 1.8])
     bodies = BodyTable.of(camera, grid).boxes(grid.ground.reshape(-1, 2), tried).reshape(3, 4, 4, 4)
     box_owner = rng.integers(-1, 2, len(found))
-    near = rng.integers(-1, 2, (4, 4))
+    near_person = rng.integers(-1, 2, (4, 4))
     edges = np.concatenate([shaken.pixel[:, :2], shaken.pixel[:, :2] + shaken.pixel[:, 2:]], 1)
     edges = edges.clip(0, [camera.size[0] - 1, camera.size[1] - 1] * 2)
     pillars, height = bodies.reshape(-1, 4).astype(np.float32), np.array([1.7, 1.6, 1.8])
@@ -180,25 +180,25 @@ def test_likelihood_per_plane_by_definition(seed: int) -> None:
     tolerance = np.tile(TOLERANCE, (len(found), 1))
     view = ViewBoxes(edges, tolerance, np.log(shaken.score), box_owner, 128.0, 96.0)
     fit = np.empty((3, 16), np.float32)
-    index, cells = PillarIndex.of(pillars, camera.size), CellsByPerson.of(near, 2)
+    index, cells = PillarIndex.of(pillars, camera.size), CellsByPerson.of(near_person, 2)
     fill_fit(index, pillars, prior[0], prior[1:], view, cells, fit)
     rates, levels = ErrorRates(0.1, 0.2, 0.3), np.empty((4, 16), np.int16)
     footprint = np.ones((4, 16, 4), np.int16)
     footprint[2, 5] = 0
     every = np.arange(levels.size, dtype=np.int32)
-    person = np.tile(near.ravel(), 4).astype(np.int32)
+    person = np.tile(near_person.ravel(), 4).astype(np.int32)
     unseen = np.zeros((1, levels.size), np.int16)
     listed = ShownCells(every, every % 16, every, every, unseen, person, np.ones(levels.size))
     fill_levels(fit, tried, grid.heights, listed, footprint.reshape(-1, 4), rates, levels.reshape(-1))
     for cell, (y, x) in enumerate(np.ndindex(4, 4)):
-        free = [b for b in range(len(found)) if box_owner[b] in (-1, near[y, x])]
-        clutter_rate = rates.clutter if near[y, x] < 0 else rates.near_clutter
+        free = [b for b in range(len(found)) if box_owner[b] in (-1, near_person[y, x])]
+        clutter_rate = rates.clutter if near_person[y, x] < 0 else rates.near_clutter
         for z, plane in enumerate(grid.heights):
             best = reference.plane_likelihood(
                 bodies[:, y, x].astype(np.float32),
                 tried,
                 plane,
-                float(height[near[y, x] + 1]),
+                float(height[near_person[y, x] + 1]),
                 0.1,
                 shaken,
                 free,
@@ -208,12 +208,12 @@ def test_likelihood_per_plane_by_definition(seed: int) -> None:
             assert levels[z, cell] == pytest.approx(expected, abs=0.6)
 
 
-@pytest.mark.parametrize(("near", "clutter"), [(-1, 0.01), (0, 0.2)])
-def test_a_box_says_as_much_as_its_match_is_worth(near: int, clutter: float) -> None:
+@pytest.mark.parametrize(("near_person", "clutter"), [(-1, 0.01), (0, 0.2)])
+def test_a_box_says_as_much_as_its_match_is_worth(near_person: int, clutter: float) -> None:
     """The terms of the rates by which L was made give back m + M (1 - m) / b, and an empty cell counts as M."""
     match, rates = np.linspace(0.05, 0.9, 18).astype(np.float32).reshape(-1, 1, 1), ErrorRates(0.15, 0.01, 0.2)
     likelihood = np.array([plane_likelihood(float(m), rates.miss, clutter) for m in match.flat]).reshape(match.shape)
-    said = log_odds_terms(rates)[near + 1, np.rint(likelihood * TOP_LEVEL).astype(int)]
+    said = log_odds_terms(rates)[near_person + 1, np.rint(likelihood * TOP_LEVEL).astype(int)]
     np.testing.assert_allclose(said, np.log(0.15 + match * 0.85 / clutter), atol=0.02)
     erring = clutter * likelihood / (clutter * likelihood + (1 - clutter) * (1 - likelihood))
     np.testing.assert_allclose(erring, match, atol=0.2 * clutter)
@@ -246,19 +246,19 @@ def volume_by_definition(
         if (footprints[:, 2] == 0).all():
             continue
         reached = np.hypot(*(people_at - place).T)
-        near = int(reached.argmin()) if len(people_at) and reached.min() <= CONFIG.person_radius else -1
+        near_person = int(reached.argmin()) if len(people_at) and reached.min() <= CONFIG.person_radius else -1
         terms, shares, speaking = [], [], []
         for i, (centre, shown) in enumerate(zip(centres, maps, strict=True)):
             if shown is None or footprints[i, 2] == 0:
                 continue
             away, people_away = float(np.hypot(*(place - centre))), np.hypot(*(people_at - centre).T)
             box = footprints[i].tolist()
-            share, mean = reference.left_to_cell(rounded(shown), box, explanation, i, near, away, people_away)
+            share, mean = reference.left_to_cell(rounded(shown), box, explanation, i, near_person, away, people_away)
             if share > 0:
                 terms.append(reference.log_odds_term(mean, RATES))
                 shares.append(share)
                 speaking.append(weights[i])
-        volume[z, y, x] = PRIOR if near < 0 else 0.0
+        volume[z, y, x] = PRIOR if near_person < 0 else 0.0
         if terms:
             volume[z, y, x] += CONFIG.effective_observations * reference.fused(terms, speaking, shares)
     return volume
@@ -363,10 +363,10 @@ def test_a_missing_box_says_less_of_somebody_hidden() -> None:
     half = replace(explanation.people, visibility=np.array([[0.5]]))
     whole_says = occupancy.fuse([no_boxes()], explanation).dense()
     half_says = occupancy.fuse([no_boxes()], replace(explanation, people=half)).dense()
-    near = np.hypot(*np.moveaxis(rig.grid.ground, -1, 0)) <= CONFIG.person_radius
-    assert (whole_says[0][near] < -CONFIG.effective_observations).all()
-    np.testing.assert_allclose(half_says[0][near], whole_says[0][near] / 2, rtol=1e-5)
-    np.testing.assert_array_equal(half_says[0][~near], whole_says[0][~near])
+    near_person = np.hypot(*np.moveaxis(rig.grid.ground, -1, 0)) <= CONFIG.person_radius
+    assert (whole_says[0][near_person] < -CONFIG.effective_observations).all()
+    np.testing.assert_allclose(half_says[0][near_person], whole_says[0][near_person] / 2, rtol=1e-5)
+    np.testing.assert_array_equal(half_says[0][~near_person], whole_says[0][~near_person])
 
 
 @pytest.mark.parametrize("kind", ["pixels", "boxes"])
@@ -403,8 +403,8 @@ def test_cells_kept_from_the_frame_before_are_those_of_this_one() -> None:
     for block in (0, 0, -1, 0):
         marked[:] = False
         marked.reshape(-1)[block] = True  # in place: what is kept is no view of it
-        near = np.full(COARSE.grid.shape[1:], block)
-        fresh = CellTables(occupancy.sampling.footprint).shown(marked, near, occupancy.views)
+        near_person = np.full(COARSE.grid.shape[1:], block)
+        fresh = CellTables(occupancy.sampling.footprint).cells_at(marked, near_person, occupancy.views)
         assert len(fresh.cell)
-        for own, other in zip(kept.shown(marked, near, occupancy.views), fresh, strict=True):
+        for own, other in zip(kept.cells_at(marked, near_person, occupancy.views), fresh, strict=True):
             np.testing.assert_array_equal(own, other)

@@ -63,12 +63,12 @@ class Proposals:
         found = self._pool(np.zeros((0, 2)))
         if self.config.source in ("volume", "both"):
             volume = fuse(evidence, empty_explanation(self.rig, evidence))
-            found = found.joined_apart(
+            found = found.joined_if_distant(
                 self._pool(volume_modes(volume, self.rig.grid, self.config.kernel_radius).ground), self._apart
             )
         if self.probability is not None:
             modes = probability_modes(self.probability, soft_maps(self.probability, evidence))
-            found = found.joined_apart(self._pool(modes.ground), self._apart)
+            found = found.joined_if_distant(self._pool(modes.ground), self._apart)
         return found
 
     @property

@@ -57,7 +57,7 @@ class FrameSearch:
             more = lattice_candidates(estimate, self.lattice_ground).new_to(estimate.pool)
             if proposals is not None:
                 spacing = estimate.evidence.prior.config.lattice_spacing
-                more, proposals = more.joined_apart(proposals, spacing), None
+                more, proposals = more.joined_if_distant(proposals, spacing), None
             moved = self._moved(estimate)
             if not len(more) and not len(moved):
                 break

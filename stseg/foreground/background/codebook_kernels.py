@@ -12,7 +12,7 @@ from stseg.foreground.background.posterior import EXPONENT_LIMIT, LOG_ODDS_LIMIT
 from stseg.kernels.accelerate import kernel
 
 _WHITE, _ZERO, _ONE, _HALF = np.float32(255), np.float32(0), np.float32(1), np.float32(0.5)
-_TWO, _TINY, _FAR = np.float32(2), np.float32(1e-6), np.float32(EXPONENT_LIMIT)
+_TWO, _TINY, _EXPONENT_LIMIT = np.float32(2), np.float32(1e-6), np.float32(EXPONENT_LIMIT)
 _OUTWARDS = np.float32(20)  # times faster than inwards do the bounds move
 
 
@@ -58,19 +58,19 @@ def evaluate(
                 ratio, off, length = from_ray(x0, x1, x2, m0, m1, m2)
                 low, high = max(bounds[v, u, k, 0], _TINY), max(bounds[v, u, k, 1], _TINY)
                 under, over = max(high - ratio, _ZERO) * length, max(ratio - low, _ZERO) * length
-                beyond = max(low - ratio, ratio - high, _ZERO) * length
+                excess = max(low - ratio, ratio - high, _ZERO) * length
                 flat, line = span + (high - low) * length, span + (_ONE - deep) * low * length
                 if weight[v, u, k] == total and outshines(
-                    _TWO * half * off, _TWO * half * beyond * beyond, area, flat, line, _ONE, doubt,
+                    _TWO * half * off, _TWO * half * excess * excess, area, flat, line, _ONE, doubt,
                     mimics / (_ONE + half * over * over),  # exp(-z) <= 1 / (1 + z)
                 ):  # fmt: skip
                     certain = True
                     break
                 across = half * off
-                if across > _FAR:
+                if across > _EXPONENT_LIMIT:
                     continue
                 density = weight[v, u, k] / (total * area)
-                lit += lit_share * density * math.exp(-across - half * beyond * beyond) / flat
+                lit += lit_share * density * math.exp(-across - half * excess * excess) / flat
                 slope = _TWO * min((ratio - deep * low) / ((_ONE - deep) * low), _ONE)
                 if slope > _ZERO:
                     dimmed += density * slope * math.exp(-across - half * over * over) / line
@@ -119,9 +119,9 @@ def teach(
                 m1 = min(gain[1] * mean[v, u, k, 1], _WHITE)
                 m2 = min(gain[2] * mean[v, u, k, 2], _WHITE)
                 ratio, off, length = from_ray(x0, x1, x2, m0, m1, m2)
-                beyond = max(bounds[v, u, k, 0] - ratio, ratio - bounds[v, u, k, 1], _ZERO) * length
-                if off + beyond * beyond <= distance:
-                    nearest, distance, nearest_ratio = k, off + beyond * beyond, ratio
+                excess = max(bounds[v, u, k, 0] - ratio, ratio - bounds[v, u, k, 1], _ZERO) * length
+                if off + excess * excess <= distance:
+                    nearest, distance, nearest_ratio = k, off + excess * excess, ratio
             if nearest < 0:
                 if frequency[v, u, 0] == _ZERO:
                     rarest = 0
@@ -200,9 +200,9 @@ def follow(
                 m1 = min(gain[1] * mean[v, u, k, 1], _WHITE)
                 m2 = min(gain[2] * mean[v, u, k, 2], _WHITE)
                 ratio, off, length = from_ray(x0, x1, x2, m0, m1, m2)
-                beyond = max(bounds[v, u, k, 0] - ratio, ratio - bounds[v, u, k, 1], _ZERO) * length
-                if off + beyond * beyond <= distance:
-                    nearest, distance, nearest_ratio = k, off + beyond * beyond, ratio
+                excess = max(bounds[v, u, k, 0] - ratio, ratio - bounds[v, u, k, 1], _ZERO) * length
+                if off + excess * excess <= distance:
+                    nearest, distance, nearest_ratio = k, off + excess * excess, ratio
             if nearest < 0:
                 if foreground >= _HALF and place >= 0:  # else a shadow, noise among background, or no place to spare
                     _begin(v, u, place, now, x0 / gain[0], x1 / gain[1], x2 / gain[2], mean, bounds, frequency, access)

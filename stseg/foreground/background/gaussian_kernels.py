@@ -31,7 +31,8 @@ MEAN, VARIANCE = 0, 3
 _WHITE, _ZERO, _ONE, _TWO, _HALF = (np.float32(value) for value in (255, 0, 1, 2, 0.5))
 _TINY, _SIXTEENTH, _TWO_PI = np.float32(1e-6), np.float32(1 / 16), np.float32(2 * math.pi)
 _SHORTEST = np.float32(1 / math.sqrt(3))  # no colour is shorter than this share of the sum of its channels
-_UNIFORM, _FAR, _THIRD, _NEVER = (np.float32(value) for value in (UNIFORM_DENSITY, EXPONENT_LIMIT, 1 / 3, np.inf))
+_UNIFORM, _EXPONENT_LIMIT = np.float32(UNIFORM_DENSITY), np.float32(EXPONENT_LIMIT)
+_THIRD, _NEVER = np.float32(1 / 3), np.float32(np.inf)
 
 
 class Priors(NamedTuple):
@@ -127,15 +128,15 @@ def _fill_margin(colour: Singles, gain: Singles, modes: Singles, v: int, priors:
         along = along / lengthwise[u]
         area, span = _TWO_PI * spread[u], np.sqrt(_TWO_PI * lengthwise[u])
         line = span + reach * _SHORTEST * (m0 + m1 + m2)
-        near = _ONE - _SIXTEENTH * (across + along)
-        near = near if near > _ZERO else _ZERO
+        closeness = _ONE - _SIXTEENTH * (across + along)
+        closeness = closeness if closeness > _ZERO else _ZERO
         level = _ONE - _SIXTEENTH * along
         level = level if level > _ZERO else _ZERO
-        near, level = near * near, level * level
-        near, level = near * near, level * level
-        near, level = near * near, level * level
-        person = _UNIFORM * area * line * level + _TWO * confusion * weight * near
-        excess = weight * near * level * line - doubt * span * person
+        closeness, level = closeness * closeness, level * level
+        closeness, level = closeness * closeness, level * level
+        closeness, level = closeness * closeness, level * level
+        person = _UNIFORM * area * line * level + _TWO * confusion * weight * closeness
+        excess = weight * closeness * level * line - doubt * span * person
         margin[u] = excess if weight > sure else _ZERO
 
 
@@ -159,18 +160,18 @@ def _densities(
         ratio = (x0 * m0 + x1 * m1 + x2 * m2) / brightness
         d0, d1, d2 = x0 - ratio * m0, x1 - ratio * m1, x2 - ratio * m2
         across = _HALF * (d0 * d0 + d1 * d1 + d2 * d2) / modes[k, VARIANCE, v, u]
-        if across > _FAR:
+        if across > _EXPONENT_LIMIT:
             continue
         decay = _HALF * brightness / modes[k, along_plane, v, u]
         area, span = _TWO_PI * modes[k, VARIANCE, v, u], np.sqrt(_TWO_PI * modes[k, along_plane, v, u])
         along = decay * (ratio - _ONE) * (ratio - _ONE)
-        if across + along < _FAR:
+        if across + along < _EXPONENT_LIMIT:
             lit += weight * np.exp(-across - along) / (area * span)
         if ratio > darkest:
             slope = _TWO * (min(ratio, _ONE) - darkest) / (_ONE - darkest)
-            beyond = along if ratio > _ONE else _ZERO
+            outside = along if ratio > _ONE else _ZERO
             line = span + (_ONE - darkest) * np.sqrt(brightness)
-            dimmed += weight * slope * np.exp(-across - beyond) / (area * line)
+            dimmed += weight * slope * np.exp(-across - outside) / (area * line)
     return lit, dimmed
 
 
@@ -253,7 +254,7 @@ def _fill_across(colour: Singles, gain: Singles, mode: Singles, v: int, along: S
 
 @wide_kernel
 def _used(modes: Singles, v: int) -> int:
-    """How many of the modes of row v are in use, up to the last that has any weight."""
+    """Number of the modes of row v in use, up to the last that has any weight."""
     for k in range(modes.shape[0] - 1, 0, -1):
         weight, highest = modes[k, modes.shape[1] - 1, v], _ZERO
         for u in range(len(weight)):
@@ -270,13 +271,13 @@ def _match(offset: Singles, modes: Singles, v: int, match_distance: np.float32, 
     best, length = np.empty(columns, np.float32), np.empty(columns, np.float32)
     best[:], nearest[:] = match_distance * match_distance, -1
     for k in range(count):
-        across, along, own = offset[k, 0], offset[k, 1], np.int32(k)
+        across, along, index = offset[k, 0], offset[k, 1], np.int32(k)
         spread, lengthwise, weight = modes[k, VARIANCE, v], modes[k, planes - 2, v], modes[k, planes - 1, v]
         for u in range(columns):
             distance = across[u] / spread[u] + along[u] / lengthwise[u]
             length[u] = distance if weight[u] > _ZERO else _NEVER
         for u in range(columns):
-            nearest[u] = own if length[u] <= best[u] else nearest[u]
+            nearest[u] = index if length[u] <= best[u] else nearest[u]
         for u in range(columns):
             best[u] = length[u] if length[u] <= best[u] else best[u]
 
@@ -284,7 +285,7 @@ def _match(offset: Singles, modes: Singles, v: int, match_distance: np.float32, 
 @wide_kernel
 def _fill_rate(
     nearest: Labels,
-    own: np.int32,
+    index: np.int32,
     weight: Singles,
     likelihood: Singles,
     fast: np.float32,
@@ -292,11 +293,11 @@ def _fill_rate(
     constants: Adaptation,
     rate: Singles,
 ) -> None:
-    """Set rate (u,) where the nearest mode is `own`, of weight (u,)."""
+    """Set rate (u,) where the nearest mode is `index`, of weight (u,)."""
     for u in range(len(rate)):
         pace = slow * likelihood[u] + fast * (_ONE - likelihood[u])
         pace = pace if weight[u] >= constants.background_weight else slow
-        rate[u] = pace if nearest[u] == own else rate[u]
+        rate[u] = pace if nearest[u] == index else rate[u]
 
 
 @wide_kernel
@@ -304,28 +305,28 @@ def _adapt(
     colour: Singles,
     gain: Singles,
     nearest: Labels,
-    own: np.int32,
+    index: np.int32,
     offset: Singles,
     rate: Singles,
     constants: Adaptation,
     mode: Singles,
     v: int,
 ) -> None:
-    """Move mode `own` (plane, v, u) towards the colours of row v that it matches; elsewhere its weight falls."""
+    """Move mode `index` (plane, v, u) towards the colours of row v that it matches; elsewhere its weight falls."""
     planes, _, columns = mode.shape
     pace, weight = np.empty(columns, np.float32), mode[planes - 1, v]
     for u in range(columns):
-        weight[u] = weight[u] * (_ONE - rate[u]) + (rate[u] if nearest[u] == own else _ZERO)
+        weight[u] = weight[u] * (_ONE - rate[u]) + (rate[u] if nearest[u] == index else _ZERO)
     for u in range(columns):
         share = rate[u] / (weight[u] if weight[u] > _ZERO else _ONE)
         share = share if share < _ONE else _ONE
-        pace[u] = share if nearest[u] == own else _ZERO
+        pace[u] = share if nearest[u] == index else _ZERO
     for c in range(3):
-        mean, shown = mode[c, v], colour[c]
+        mean, colours = mode[c, v], colour[c]
         for u in range(columns):
             value = gain[c] * mean[u]
             value = value if value < _WHITE else _WHITE
-            mean[u] += pace[u] * (shown[u] - value) / gain[c]
+            mean[u] += pace[u] * (colours[u] - value) / gain[c]
     if planes == VARIANCE + 2:
         _spread(offset[0], offset[1], _THIRD, _THIRD, pace, constants.least_across_sd, mode[VARIANCE, v])
     else:
@@ -378,14 +379,14 @@ def put_strongest_first(first: int, step: int, modes: Singles) -> None:
     count, planes, rows, columns = modes.shape
     for v in range(first, rows, step):
         for k in range(1, count):
-            own, strongest = modes[k, planes - 1, v], modes[0, planes - 1, v]
+            weight, strongest = modes[k, planes - 1, v], modes[0, planes - 1, v]
             higher = 0
             for u in range(columns):
-                higher += 1 if own[u] > strongest[u] else 0
+                higher += 1 if weight[u] > strongest[u] else 0
             if higher == 0:
                 continue
             for u in range(columns):
-                if own[u] > strongest[u]:
+                if weight[u] > strongest[u]:
                     for c in range(planes):
                         weaker = modes[0, c, v, u]
                         modes[0, c, v, u] = modes[k, c, v, u]

@@ -1,4 +1,4 @@
-"""What the two mixtures of Gaussians per pixel share: their state, and when it is learned."""
+"""State and learning times that the two mixtures of Gaussians per pixel share."""
 
 from __future__ import annotations
 

@@ -39,8 +39,8 @@ def bounded_log_odds(
 @kernel
 def doubt_of(foreground: float, unexplained: float, shadow: float) -> float:
     """Ratio of the densities of background and people from which on the log-odds are at their lower bound."""
-    known = (1.0 - unexplained) * (1.0 - shadow)
-    return _ROUNDING * foreground * math.exp(LOG_ODDS_LIMIT) / ((1.0 - foreground) * known)
+    lit_share = (1.0 - unexplained) * (1.0 - shadow)
+    return _ROUNDING * foreground * math.exp(LOG_ODDS_LIMIT) / ((1.0 - foreground) * lit_share)
 
 
 @kernel
@@ -65,9 +65,9 @@ def outshines(
     span, line
         The lengths over which it is spread along the ray where lit, and where dimmed, grey levels.
     """
-    near, level = max(_ONE - _SIXTEENTH * (across + along), _ZERO), max(_ONE - _SIXTEENTH * along, _ZERO)
-    near, level = near * near, level * level
-    near, level = near * near, level * level
-    near, level = near * near, level * level
-    person = _UNIFORM * area * line * level + _TWO * mimicry * weight * near
-    return bool(doubt * span * person < weight * near * level * line)
+    closeness, level = max(_ONE - _SIXTEENTH * (across + along), _ZERO), max(_ONE - _SIXTEENTH * along, _ZERO)
+    closeness, level = closeness * closeness, level * level
+    closeness, level = closeness * closeness, level * level
+    closeness, level = closeness * closeness, level * level
+    person = _UNIFORM * area * line * level + _TWO * mimicry * weight * closeness
+    return bool(doubt * span * person < weight * closeness * level * line)

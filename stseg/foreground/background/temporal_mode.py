@@ -48,9 +48,9 @@ def _gather(
         for u in range(frames.shape[2]):
             best, most = 0, 0
             for i in range(count):
-                near = _mark_companions(frames[:, v, u], i, reach_squared, companion)
-                if near > most:
-                    best, most = i, near
+                companions = _mark_companions(frames[:, v, u], i, reach_squared, companion)
+                if companions > most:
+                    best, most = i, companions
                 if 2 * most > count:
                     break
             _mark_companions(frames[:, v, u], best, reach_squared, companion)
@@ -69,11 +69,11 @@ def _gather(
 @kernel
 def _mark_companions(colours: NDArray[np.uint8], of: int, reach_squared: float, companion: NDArray[np.bool_]) -> int:
     """Mark which colours (n, 3) lie within reach of colour `of`, and count them."""
-    near = 0
+    count = 0
     for j in range(len(colours)):
         d0 = float(colours[j, 0]) - float(colours[of, 0])
         d1 = float(colours[j, 1]) - float(colours[of, 1])
         d2 = float(colours[j, 2]) - float(colours[of, 2])
         companion[j] = d0 * d0 + d1 * d1 + d2 * d2 <= reach_squared
-        near += companion[j]
-    return near
+        count += companion[j]
+    return count
