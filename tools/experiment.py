@@ -1,5 +1,6 @@
 """Run one experiment: python tools/experiment.py NAME [options], NAME --help for its options.
 
+compilers   do the ways in which kernels are compiled agree?
 few_views   two and three views of everything: scores, and how many of the points the run takes for wrong
 perturbed   mean and spread of scores over runs with perturbed area, grid, cameras and boxes
 same        do two commits give the same bits?
@@ -13,7 +14,7 @@ from __future__ import annotations
 import importlib
 import sys
 
-EXPERIMENTS = ("few_views", "perturbed", "same", "scaling", "spoil", "targets")
+EXPERIMENTS = ("compilers", "few_views", "perturbed", "same", "scaling", "spoil", "targets")
 """Each is the module `experiments.NAME` with a function `main`, which reads the command line."""
 
 

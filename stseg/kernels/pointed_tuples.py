@@ -1,19 +1,24 @@
 """Named tuples that kernels pass on by their address.
 
 Numba passes a tuple of arrays as some hundred numbers, taken apart and put together at each call, which is most of what
-there is to compile in kernels that pass a large one on. An address is one number. As plain Python, nothing changes.
+there is to compile in kernels that pass a large one on. An address is one number. As plain Python, and with numba's
+versions of LLVM 15, tuples are passed as they are.
 """
 
 from __future__ import annotations
 
 from typing import Any, TypeVar
 
+from llvmlite import binding
 from numba.core import cgutils, types
 from numba.core.imputils import impl_ret_borrowed
 from numba.core.typing.templates import AttributeTemplate
 from numba.extending import infer_getattr, lower_builtin, lower_getattr_generic, models, register_model, type_callable
 
 Fields = TypeVar("Fields")
+
+_BY_ADDRESS = binding.llvm_version_info[0] > 15
+"""Whether there are addresses: LLVM 15 makes invalid vector code of loops that read through them."""
 
 
 def pointed(fields: Fields) -> Fields:
@@ -50,13 +55,17 @@ class _PointedModel(models.PrimitiveModel):
 @type_callable(pointed)
 def _type_pointed(_: Any) -> Any:
     def typer(fields: Any) -> Any:
-        return Pointed(fields) if isinstance(fields, types.BaseNamedTuple) else None
+        if not isinstance(fields, types.BaseNamedTuple):
+            return None
+        return Pointed(fields) if _BY_ADDRESS else fields
 
     return typer
 
 
 @lower_builtin(pointed, types.BaseNamedTuple)
-def _lower_pointed(_: Any, builder: Any, __: Any, arguments: Any) -> Any:
+def _lower_pointed(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    if not _BY_ADDRESS:
+        return impl_ret_borrowed(context, builder, signature.return_type, arguments[0])
     return cgutils.alloca_once_value(builder, arguments[0])
 
 

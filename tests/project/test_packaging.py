@@ -1,8 +1,10 @@
-"""The conda recipe and the workflows agree with pyproject.toml."""
+"""The conda recipe and the workflows agree with pyproject.toml; the checks of CI are files that exist."""
 
 from __future__ import annotations
 
 import re
+import shutil
+import subprocess
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -27,17 +29,17 @@ def parsed(name: str) -> Any:
 
 def conda_form(requirement: str) -> str:
     """`Name>=1` as conda writes it: `name >=1`."""
-    found = re.fullmatch(r"([\w-]+)(.*)", requirement)
-    assert found is not None
-    name = found[1].lower()
-    return f"{_CONDA_NAMES.get(name, name)} {found[2]}"
+    parts = re.fullmatch(r"([\w-]+)(.*)", requirement)
+    assert parts is not None
+    name = parts[1].lower()
+    return f"{_CONDA_NAMES.get(name, name)} {parts[2]}"
 
 
 def test_the_conda_recipe_requires_what_the_wheel_does(project: dict[str, Any]) -> None:
     recipe = parsed("conda/recipe.yaml")
     assert recipe["package"] == {"name": project["name"], "version": project["version"]}
-    own = [f"python {project['requires-python']}", *map(conda_form, project["dependencies"])]
-    assert recipe["requirements"]["run"] == own
+    requirements = [f"python {project['requires-python']}", *map(conda_form, project["dependencies"])]
+    assert recipe["requirements"]["run"] == requirements
     entries = [f"{name} = {target}" for name, target in project["scripts"].items()]
     assert recipe["build"]["python"]["entry_points"] == entries
     assert (ROOT / recipe["about"]["license_file"]).is_file() and recipe["about"]["license"] == project["license"]
@@ -50,3 +52,12 @@ def test_the_workflows_run_supported_versions(project: dict[str, Any]) -> None:
     assert project["requires-python"] == f">={versions[0]}"
     steps = parsed(".github/workflows/platforms.yml")["jobs"]["wheel"]["steps"]
     assert {step["with"]["python-version"] for step in steps if "with" in step} <= set(versions)
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="no bash")
+def test_ci_names_rooms_and_tools_that_exist() -> None:
+    named = re.findall(r"(?:tests|tools)/[^\s\"]+", (ROOT / ".ci" / "run").read_text("utf-8"))
+    expanded = subprocess.run(["bash", "-c", f"echo {' '.join(named)}"], check=True, capture_output=True, text=True)
+    paths = expanded.stdout.split()
+    assert len(paths) > 10
+    assert [path for path in paths if not (ROOT / path).exists()] == []

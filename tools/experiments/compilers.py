@@ -1,0 +1,80 @@
+"""Do the ways in which kernels are compiled agree? Tracks one rig by each and compares the run files.
+
+    python tools/experiment.py compilers --work FOLDER [--rig RIG.toml] [--frames 0:12] [--python OTHER]
+
+The default run and one by plain `numba.njit` must give the same bits. With --python, that interpreter (another version
+of numba) tracks the rig, too: it must find the same people in the same frames, to a millimetre. Without --rig, a
+simulated scene is tracked. The exit status is 1 where runs differ. CPU seconds are printed beside: with an empty
+NUMBA_CACHE_DIR they are those of a first run.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import resource
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+from workbench import ROOT
+
+from experiments.same import differences, digests
+from stseg.io.runfile.runs import read_run
+
+_TOLERANCE = 1e-3
+"""Largest difference of the tracks of two versions of numba, metres."""
+_COMMAND = "import sys; from stseg.commands.main import main; sys.exit(main())"
+
+
+def command(python: str, words: list[str], **environment: str) -> float:
+    """Run a command of stseg by an interpreter; CPU seconds."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    subprocess.run(
+        [python, "-c", _COMMAND, *words],
+        env=os.environ | {"PYTHONPATH": str(ROOT)} | environment, stdout=subprocess.DEVNULL, check=True,
+    )  # fmt: skip
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+def track_difference(run_file: Path, other_file: Path) -> float:
+    """Largest difference of the tracks of two runs, metres; infinite where frames or ids differ."""
+    rows, others = (read_run(path).trajectory for path in (run_file, other_file))
+    if not all(np.array_equal(rows[name], others[name]) for name in ("frame", "id")):
+        return np.inf
+    return max((float(np.abs(rows[name] - others[name]).max(initial=0.0)) for name in ("x", "y")), default=0.0)
+
+
+def main() -> None:
+    """Compare, a line for each way."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--work", type=Path, required=True, help="folder for the scene and the run files")
+    parser.add_argument("--rig", type=Path)
+    parser.add_argument("--frames", default="0:12")
+    parser.add_argument("--python", help="an interpreter with another version of numba")
+    options = parser.parse_args()
+    options.work.mkdir(parents=True, exist_ok=True)
+    rig = options.rig
+    if rig is None:
+        rig = options.work / "scene" / "rig.toml"
+        scene = ["--scene", "easy", "--seconds", "2", "--size", "320,240", "--overwrite"]
+        command(sys.executable, ["simulate", str(rig.parent), *scene])
+
+    def run(name: str, python: str, **environment: str) -> Path:
+        output: Path = options.work / f"{name}.h5"
+        words = ["run", str(rig), "-o", str(output), "--frames", options.frames, "--workers", "1", "--overwrite"]
+        print(f"{name}: {command(python, words, **environment):.1f} CPU s", flush=True)
+        return output
+
+    default, failed = run("default", sys.executable), False
+    plain = run("plain", sys.executable, STSEG_PLAIN_NUMBA="1")
+    differing = differences(digests(default), digests(plain))
+    print(f"plain numba: {'differs: ' + ', '.join(differing) if differing else 'same bits'}")
+    failed |= bool(differing)
+    if options.python is not None:
+        distance = track_difference(default, run("other", options.python))
+        print(f"other numba: tracks differ by {1000 * distance:.3g} mm")
+        failed |= distance > _TOLERANCE
+    sys.exit(1 if failed else 0)
