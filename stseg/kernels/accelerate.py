@@ -23,13 +23,12 @@ _FAST_VERSIONS = ("0.68",)
 """Versions of numba whose internals `stseg.kernels.fast_compile` replaces."""
 _NOTE_INTERVAL = 10.0
 """Interval between notes on compilation, seconds."""
-_KERNELS_OF_RUN = 80
-"""Kernels that Python calls in a run of a rig, about; kernels that only kernels call are part of them."""
-
 COMPILED = hasattr(numba.njit(lambda: None), "py_func")
 """Whether kernels are compiled; else they are plain Python."""
 FAST = COMPILED and numba.__version__.rpartition(".")[0] in _FAST_VERSIONS and "STSEG_PLAIN_NUMBA" not in os.environ
 """Whether `stseg.kernels.fast_compile` compiles."""
+_KERNELS_OF_RUN = 80 if FAST else 250
+"""Kernels that are compiled for a run of a rig, about; the fast way makes those that only kernels call part of them."""
 
 if FAST:
     from stseg.kernels import fast_compile

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import argparse
 import os
-import resource
 import subprocess
 import sys
 from pathlib import Path
@@ -28,15 +27,20 @@ _TOLERANCE = 1e-3
 _COMMAND = "import sys; from stseg.commands.main import main; sys.exit(main())"
 
 
-def command(python: str, words: list[str], **environment: str) -> float:
-    """Run a command of stseg by an interpreter; CPU seconds."""
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    subprocess.run(
+def start(python: str, words: list[str], **environment: str) -> subprocess.Popen[bytes]:
+    """Start a command of stseg by an interpreter."""
+    return subprocess.Popen(
         [python, "-c", _COMMAND, *words],
-        env=os.environ | {"PYTHONPATH": str(ROOT)} | environment, stdout=subprocess.DEVNULL, check=True,
+        env=os.environ | {"PYTHONPATH": str(ROOT)} | environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
     )  # fmt: skip
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+def finish(name: str, process: subprocess.Popen[bytes]) -> None:
+    """Wait for a command and print its CPU seconds; stop where it fails."""
+    _, status, usage = os.wait4(process.pid, 0)
+    print(f"{name}: {usage.ru_utime + usage.ru_stime:.1f} CPU s", flush=True)
+    if status:
+        sys.exit(f"{name}: wait status {status}")
 
 
 def track_difference(run_file: Path, other_file: Path) -> float:
@@ -60,21 +64,25 @@ def main() -> None:
     if rig is None:
         rig = options.work / "scene" / "rig.toml"
         scene = ["--scene", "easy", "--seconds", "2", "--size", "320,240", "--overwrite"]
-        command(sys.executable, ["simulate", str(rig.parent), *scene])
-
-    def run(name: str, python: str, **environment: str) -> Path:
-        output: Path = options.work / f"{name}.h5"
-        words = ["run", str(rig), "-o", str(output), "--frames", options.frames, "--workers", "1", "--overwrite"]
-        print(f"{name}: {command(python, words, **environment):.1f} CPU s", flush=True)
-        return output
-
-    default, failed = run("default", sys.executable), False
-    plain = run("plain", sys.executable, STSEG_PLAIN_NUMBA="1")
-    differing = differences(digests(default), digests(plain))
-    print(f"plain numba: {'differs: ' + ', '.join(differing) if differing else 'same bits'}")
-    failed |= bool(differing)
+        finish("scene", start(sys.executable, ["simulate", str(rig.parent), *scene]))
+    ways: dict[str, tuple[str, dict[str, str]]] = {
+        "default": (sys.executable, {}),
+        "plain": (sys.executable, {"STSEG_PLAIN_NUMBA": "1"}),
+    }
     if options.python is not None:
-        distance = track_difference(default, run("other", options.python))
+        ways["other"] = options.python, {}
+    files = {name: options.work / f"{name}.h5" for name in ways}
+    words = ["run", str(rig), "--frames", options.frames, "--workers", "1", "--overwrite", "-o"]
+    processes = {
+        name: start(python, [*words, str(files[name])], **environment) for name, (python, environment) in ways.items()
+    }
+    for name, process in processes.items():
+        finish(name, process)
+    differing = differences(digests(files["default"]), digests(files["plain"]))
+    print(f"plain numba: {'differs: ' + ', '.join(differing) if differing else 'same bits'}")
+    failed = bool(differing)
+    if options.python is not None:
+        distance = track_difference(files["default"], files["other"])
         print(f"other numba: tracks differ by {1000 * distance:.3g} mm")
         failed |= distance > _TOLERANCE
     sys.exit(1 if failed else 0)
