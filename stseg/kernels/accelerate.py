@@ -20,7 +20,7 @@ from numba.core import event
 from stseg.kernels.cache import KernelCache
 
 _FAST_VERSIONS = ("0.68",)
-"""Versions of numba whose internals `stseg.kernels.fast_compile` replaces."""
+"""Versions of numba for which `stseg.kernels.fast_compile` is written."""
 _NOTE_INTERVAL = 10.0
 """Interval between notes on compilation, seconds."""
 COMPILED = hasattr(numba.njit(lambda: None), "py_func")
@@ -46,7 +46,7 @@ def kernel(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def wide_kernel(function: Callable[P, R]) -> Callable[P, R]:
-    """A kernel whose divisions are not checked: x / 0 is inf or nan, as in NumPy, and loops become vector code."""
+    """A kernel without checks of divisions: x / 0 is inf or nan, as in NumPy, and loops become vector code."""
     return _compiled(function, error_model="numpy")
 
 

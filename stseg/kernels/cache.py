@@ -119,7 +119,7 @@ def folder() -> Path:
 
 @cache
 def source_stamp(path: Path) -> str:
-    """Digest of a file and of all files whose kernels or constants are compiled into its kernels, and of how."""
+    """Digest of a file, of the files with kernels or constants that its kernels contain, and of the compiler."""
     sources, waiting = set(_COMPILING_FILES), [path]
     while waiting:
         source = waiting.pop()

@@ -23,7 +23,7 @@ from numba.core.runtime.nrt import rtsys
 from stseg.kernels.cache import KernelCache, KernelFiles, locked
 
 _EXPORTED_LINKAGES = ("external", "common")
-"""Linkages of names whose address other code may ask for."""
+"""Linkages of names with an address for other code."""
 _OPTIONS = {"nopython": True, "nogil": True, "no_cfunc_wrapper": True}
 _INNER_OPTIONS = {"no_cpython_wrapper": True}
 """An inner kernel has no form that Python could call."""

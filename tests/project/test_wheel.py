@@ -1,4 +1,4 @@
-"""What `pip install .` brings along: every module, also those of io/ where the link stseg/io is a plain file."""
+"""Contents of the wheel: every module, also those of io/ where the link stseg/io is a plain file."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_every_module_is_in_the_wheel(wheel: Path) -> None:
     names = {name for name in zipfile.ZipFile(wheel).namelist() if name.endswith((".py", "py.typed", ".yaml", ".js"))}
-    own = {path.relative_to(ROOT).as_posix() for path in (ROOT / "stseg").rglob("*.py")}
+    modules = {path.relative_to(ROOT).as_posix() for path in (ROOT / "stseg").rglob("*.py")}
     behind_the_link = {f"stseg/{path.relative_to(ROOT).as_posix()}" for path in (ROOT / "io").rglob("*.py")}
     assert {"stseg/io/track_csv.py", "stseg/io/calibrations/opencv_xml.py"} <= behind_the_link
     scripts = {path.relative_to(ROOT).as_posix() for path in (ROOT / "stseg").rglob("*.js")}
     assert "stseg/reporting/page/page.js" in scripts
-    assert names == own | behind_the_link | scripts | {"stseg/py.typed", "stseg/napari.yaml"}
+    assert names == modules | behind_the_link | scripts | {"stseg/py.typed", "stseg/napari.yaml"}
 
 
 def test_the_wheel_works_away_from_its_sources(wheel: Path, tmp_path: Path) -> None:

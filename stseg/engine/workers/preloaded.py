@@ -1,4 +1,4 @@
-"""What is done once for all workers, in the process that they are forked from: imports, and kernels from the cache."""
+"""Imports and kernels from the cache, loaded once in the process from which all workers are forked."""
 
 from __future__ import annotations
 
