@@ -1,15 +1,15 @@
 """Named tuples that kernels pass on by their address.
 
 Numba passes a tuple of arrays as some hundred numbers, taken apart and put together at each call, which is most of what
-there is to compile in kernels that pass a large one on. An address is one number. As plain Python, and with numba's
-versions of LLVM 15, tuples are passed as they are.
+there is to compile in kernels that pass a large one on. An address is one number. As plain Python, and with numba
+0.61, tuples are passed as they are.
 """
 
 from __future__ import annotations
 
 from typing import Any, TypeVar
 
-from llvmlite import binding
+import numba
 from numba.core import cgutils, types
 from numba.core.imputils import impl_ret_borrowed
 from numba.core.typing.templates import AttributeTemplate
@@ -17,8 +17,8 @@ from numba.extending import infer_getattr, lower_builtin, lower_getattr_generic,
 
 Fields = TypeVar("Fields")
 
-_BY_ADDRESS = binding.llvm_version_info[0] > 15
-"""Whether there are addresses: LLVM 15 makes invalid vector code of loops that read through them."""
+_BY_ADDRESS = tuple(map(int, numba.__version__.split(".")[:2])) > (0, 61)
+"""Whether there are addresses: LLVM 15, of numba 0.61, makes invalid vector code of loops that read through them."""
 
 
 def pointed(fields: Fields) -> Fields:
