@@ -117,7 +117,7 @@ def test_without_the_flag_a_film_holds_no_camera_pixel(run_path: Path, tmp_path:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "message"),
     [
         ([], "nothing to write"),
         (["--video", "a.avi"], "found the ending '.avi', expected a name that ends in .mp4"),
