@@ -148,7 +148,7 @@ def associated_tracks(
 def identity_problem(
     rig: Rig, config: Config, committed: Rows, appearance: Rows, constraints: Constraints = NO_CONSTRAINTS
 ) -> IdentityProblem:
-    """Whose the committed rows are, as a problem of which single decisions can be tried."""
+    """Identities of the committed rows, as a problem of which single decisions can be tried."""
     bridged, sizes = bridged_rows(committed, rig.frame_rate, config)
     return IdentityProblem.of(bridged, sizes, appearance, rig.frame_rate, Border.of(rig), config, constraints)
 

@@ -153,7 +153,7 @@ class _Prepared(NamedTuple):
 
 
 def two_cores() -> int:
-    """As many as a session has unless it is said."""
+    """Default number of cores of a session."""
     return 2
 
 

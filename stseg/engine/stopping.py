@@ -60,11 +60,11 @@ def stopping() -> Stopping | None:
 @contextmanager
 def stop_asked() -> Iterator[threading.Event]:
     """An event that the first interrupt or SIGTERM sets; the next does what it did before."""
-    own = Stopping()
-    _going_on.append(own)
-    own.begin()
+    run = Stopping()
+    _going_on.append(run)
+    run.begin()
     try:
-        yield own.asked
+        yield run.asked
     finally:
-        own.end()
-        _going_on.remove(own)
+        run.end()
+        _going_on.remove(run)

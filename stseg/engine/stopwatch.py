@@ -34,5 +34,5 @@ class Stopwatch:
     def take(self, window: int) -> Rows:
         """TIMING rows of all stages under the number of a window; the sums start anew."""
         with self._lock:
-            taken, self.seconds = self.seconds, {}
-        return np.array([(stage.encode(), window, s) for stage, s in taken.items()], TIMING)
+            seconds, self.seconds = self.seconds, {}
+        return np.array([(stage.encode(), window, s) for stage, s in seconds.items()], TIMING)

@@ -130,7 +130,7 @@ def is_solved_again(run: Run) -> bool:
 
 
 def answered_before(run: Run) -> AnsweredRows:
-    """What answers said of the committed rows of a run so far; raises FormatError where they name no such rows."""
+    """Earlier answers on the committed rows of a run; raises FormatError where they name no such rows."""
     table, number = run.answers, len(run.committed)
     last = np.maximum(table["row"], table["other"])
     if (last >= number).any():

@@ -32,7 +32,7 @@ _READY = 4
 
 @dataclass(frozen=True)
 class Forecast:
-    """What a run will cost.
+    """Cost of a run.
 
     Attributes
     ----------
@@ -104,7 +104,7 @@ def plan(
 
 
 def forecast(job: Job, counting: float, workers: int) -> Forecast:
-    """What a job will cost, from parts of it that are tracked now; counting took so many seconds."""
+    """Forecast of a job, from parts of it that are tracked now; `counting` is in seconds."""
     work, cuts = SegmentWorker(job), job.segments()
     frames = sum(segment.stop - segment.first for segment in cuts)
     parts = list(_parts(job))
@@ -123,8 +123,8 @@ def forecast(job: Job, counting: float, workers: int) -> Forecast:
         assemble(job, made, folder / "run.h5")
         joining, size = watch.lap(), (folder / "run.h5").stat().st_size
     # A segment is processed until its last window is solved: much of a short part, and little of a long one.
-    beyond = (fused.calls - tried) / len(parts)
-    processed = sum(segment.stop - segment.lead + beyond for segment in cuts)
+    excess = (fused.calls - tried) / len(parts)
+    processed = sum(segment.stop - segment.lead + excess for segment in cuts)
     learned = -(-frames // round(job.config.segments.background_period * job.recording.rig.frame_rate))
     return Forecast(
         frames, len(cuts), workers, counting, max(learning) * learned, tracking / fused.calls * processed,
@@ -153,7 +153,7 @@ class _Clock:
 
 
 class _Count:
-    """How often it is called: once for each frame that is looked at."""
+    """Number of calls, one for each frame that is fused."""
 
     def __init__(self) -> None:
         self.calls = 0

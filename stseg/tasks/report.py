@@ -207,7 +207,7 @@ def _read_instants(run: Run, recording: Recording, frames: Sequence[int], camera
 
 
 def _read_views(recording: Recording, frames: Sequence[int]) -> dict[int, tuple[Observation, ...]]:
-    """What the cameras delivered at these frames, which are in order."""
+    """Observations of these frames, which are in order, by frame."""
     with open_frames(recording.pictured(), frames[0], frames[-1] + 1) as frame_sets:
         return {frame_set.frame: frame_set.views for frame_set in frame_sets if frame_set.frame in frames}
 

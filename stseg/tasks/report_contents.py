@@ -114,7 +114,7 @@ def _facts(run: Run, span: Span) -> list[tuple[str, str]]:
 
 
 def _scores(trajectory: Rows, truth: Rows | None) -> list[tuple[str, str]]:
-    """How well the run agrees with the truth, within half a metre."""
+    """Scores of the run against the truth, within half a metre."""
     if truth is None or not len(truth):
         return []
     scores = evaluate(truth, trajectory)

@@ -104,7 +104,7 @@ def _named(name: str) -> SceneSpec:
 
 
 def _body(spec: SceneSpec) -> BodyPrior:
-    """What a rig says of a scene's bodies: nothing of people."""
+    """Body sizes of a scene for its rig file; none for people."""
     if not spec.length:
         return BodyPrior()
     low, high = spec.heights

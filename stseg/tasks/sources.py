@@ -61,7 +61,7 @@ class SourceSummary:
         return np.zeros((0, 4)) if self.detections is None else self.detections.kept.pixel
 
     def row(self) -> tuple[str, ...]:
-        """What it was recognised as, and what it holds, in words under `COLUMNS`."""
+        """Format and contents in words, under `COLUMNS`."""
         found, pixel = self.detections, self._pixel
         if found is None:
             return self.camera.name, self.source.source.kind, *[""] * (len(COLUMNS) - 2)

@@ -70,11 +70,11 @@ def check(
 
 def _print(found: RigCheck) -> None:
     console = Console(highlight=False, markup=False)
-    shown = Table(box=None, padding=(0, 2, 0, 0))
+    table = Table(box=None, padding=(0, 2, 0, 0))
     for name in COLUMNS:
-        shown.add_column(name, justify="left" if name == "camera" else "right")
+        table.add_column(name, justify="left" if name == "camera" else "right")
     for row in found.rows():
-        shown.add_row(*row)
-    console.print(shown)
+        table.add_row(*row)
+    console.print(table)
     for sentence in found.verdict:
         console.print(sentence, style=None if found.sound else "yellow", soft_wrap=True)

@@ -80,15 +80,15 @@ def calibrate_points(
 def _show(found: PointCalibration) -> None:
     """Print every point with its error, and a line and warnings of each camera."""
     console = Console(highlight=False, markup=False)
-    shown = Table(box=None, padding=(0, 2, 0, 0))
+    table = Table(box=None, padding=(0, 2, 0, 0))
     for heading in ("camera", "line", "x m", "y m", "z m", "off px", "off cm", ""):
-        shown.add_column(heading, justify="left" if heading in ("camera", "") else "right")
+        table.add_column(heading, justify="left" if heading in ("camera", "") else "right")
     for lines, fit in zip(found.lines, found.fits, strict=True):
         rows = zip(lines, fit.points.ground, fit.points.height, fit.off_pixel, fit.off_ground, fit.out, strict=True)
         for line, (x, y), z, pixel, ground, out in rows:
             places = (f"{x:.2f}", f"{y:.2f}", f"{z:.2f}", f"{pixel:.1f}", f"{100 * ground:.1f}")
-            shown.add_row(fit.camera.name, str(line), *places, "is it the right one?" if out else "")
-    console.print(shown)
+            table.add_row(fit.camera.name, str(line), *places, "is it the right one?" if out else "")
+    console.print(table)
     for fit in found.fits:
         console.print(_line(fit), soft_wrap=True)
         for words in fit_warnings(fit, found.recording.rig.grid):

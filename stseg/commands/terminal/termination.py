@@ -50,7 +50,7 @@ class Termination:
 
     @property
     def line(self) -> str:
-        """What there is to say of it."""
+        """Message for standard error."""
         return f"stseg: {'terminated' if self._number == signal.SIGTERM else 'interrupted'}"
 
     @property
@@ -119,9 +119,9 @@ def _end(number: int) -> None:
     if "multiprocessing" in sys.modules:
         for child in sys.modules["multiprocessing"].active_children():
             child.kill()
-    said, status = ("terminated", TERMINATED) if number == signal.SIGTERM else ("interrupted", INTERRUPTED)
+    word, status = ("terminated", TERMINATED) if number == signal.SIGTERM else ("interrupted", INTERRUPTED)
     with suppress(OSError, ValueError):
         error = sys.stderr.fileno()  # not the stream, in which a lock may be held
         cursor = "\x1b[?25h" if os.isatty(error) else ""  # a progress bar has hidden it
-        os.write(error, f"{cursor}stseg: {said}\n".encode())
+        os.write(error, f"{cursor}stseg: {word}\n".encode())
     os._exit(status)

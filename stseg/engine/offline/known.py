@@ -62,5 +62,5 @@ def _places(table: Rows) -> Rows:
 
 
 def digest(known: Rows) -> str:
-    """What tells known people apart from others, in words."""
+    """Digest of known people, in words."""
     return f"{len(known)} people, {blake2b(known.tobytes(), digest_size=8).hexdigest()}"

@@ -171,7 +171,7 @@ def _start(job: Job, cores: int) -> _Worker:
 
 
 class _Orders:
-    """What a worker is to do, by its pipe: segments, and between them or meanwhile the number of its cores."""
+    """Orders of a worker, by its pipe: segments, and between them or meanwhile the number of its cores."""
 
     def __init__(self, pipe: Connection, cores: int) -> None:
         self._pipe, self._cores = pipe, cores

@@ -1,4 +1,4 @@
-"""How many worker processes a run has, and the process that they are forked from.
+"""Number of worker processes of a run, and the process that they are forked from.
 
 Both are known here without importing any stage: what forks the workers imports the stages (`preloaded`)
 at the same time as the process of the command does.

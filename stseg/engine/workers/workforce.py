@@ -49,7 +49,7 @@ class Workforce:
             prepare_workers(self.workers)
 
     def caller(self, job: Job, note: Callable[[str], None]) -> Caller:
-        """How a call is made that this process need not wait for; `note` is called with lines about the work."""
+        """Caller of a function for which this process need not wait; `note` is called with lines about the work."""
         several = self.scheduler is None and self.processes(job) > 1
         return partial(called_beside, note) if several and FORKED else called_here
 
