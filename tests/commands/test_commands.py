@@ -155,7 +155,7 @@ def test_inspect_counts_people_by_the_minute_and_says_why_ghosts_were_dropped(ru
 def test_the_keys_of_the_json_are_documented(run_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["inspect", str(run_path), "--json"]) == 0
     page = (Path(__file__).parents[2] / "docs" / "outputs.md").read_text("utf-8")
-    _, _, listed = page.partition("## What `stseg inspect --json` prints")
+    _, _, listed = page.partition("## Keys of `stseg inspect --json`")
     cells = re.findall(r"^\| (`.*?`) \|", listed, re.MULTILINE)
     assert re.findall(r"`(\w+)`", " ".join(cells)) == list(json.loads(capsys.readouterr().out))
 
