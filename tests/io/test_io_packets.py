@@ -146,7 +146,7 @@ def test_a_damaged_picture_leaves_the_reduced_frames(tmp_path: Path, film: bytes
 @pytest.mark.parametrize("frame", [0, 3, 8])
 def test_frames_are_found_by_seeking_packets(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, frame: int) -> None:
     path = video(tmp_path / "film.avi", "MJPG")
-    monkeypatch.setattr(video_stream, "_NEAR", 1)
+    monkeypatch.setattr(video_stream, "_SEQUENTIAL_FRAMES", 1)
     one, other = (VideoStream(Source("video", path), CAMERA, times, factor=2) for times in (None, decoded(path)))
     assert one.skip(frame) == other.skip(frame) == frame
     np.testing.assert_array_equal(one.read(), other.read())
