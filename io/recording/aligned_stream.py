@@ -36,15 +36,15 @@ class AlignedStream:
 
     def read(self, frame: int) -> Observation:
         """The observation at a frame, None where the camera is blind; frames are read in rising order."""
-        tick, shown = frame - self.source.offset, self.source.shown
+        tick, frame_at_tick = frame - self.source.offset, self.source.frame_at_tick
         if tick < 0 or self.end < math.inf:
             return None
-        if shown is None:
+        if frame_at_tick is None:
             return self._own(tick)
-        if tick >= len(shown):
-            self.end = len(shown) + self.source.offset
+        if tick >= len(frame_at_tick):
+            self.end = len(frame_at_tick) + self.source.offset
             return None
-        number = int(shown[tick])
+        number = int(frame_at_tick[tick])
         if number >= self._next:
             self._last = self._own(number)
         return None if number < 0 else self._last
@@ -66,7 +66,7 @@ class AlignedStream:
     def align(self, source: CameraSource, frames: int) -> None:
         """Set the alignment of the stream's frames, and so its end."""
         self.source = source
-        self.end = source.offset + (frames if source.shown is None else len(source.shown))
+        self.end = source.offset + (frames if source.frame_at_tick is None else len(source.frame_at_tick))
 
     def close(self) -> None:
         self._stream.close()
@@ -124,7 +124,7 @@ def recording_length(streams: list[AlignedStream]) -> float:
         return max(stream.end for stream in streams)
     shortest, longest = min(required, key=_end), max(required, key=_end)
     if shortest.end < longest.end:
-        by_time = any(stream.source.shown is not None for stream in (shortest, longest))
+        by_time = any(stream.source.frame_at_tick is not None for stream in (shortest, longest))
         raise SourceError(
             shortest.source.source.path,
             f"camera {shortest.camera.name}",

@@ -159,7 +159,7 @@ def open_frames(
     if first < 0 or (stop is not None and stop < first):
         found = f"{first}:{'' if stop is None else stop}"
         raise ConfigError(recording.path, "frames", found, "first:stop, with 0 <= first <= stop")
-    return FrameReader(with_alignment(recording, streams.shown) if streams else recording, first, stop, streams)
+    return FrameReader(with_alignment(recording, streams.frame_at_tick) if streams else recording, first, stop, streams)
 
 
 def read_camera(
@@ -184,7 +184,7 @@ def read_camera(
         Where the source is missing, broken or not of the camera's size.
     """
     if streams:
-        recording = with_alignment(recording, streams.shown)
+        recording = with_alignment(recording, streams.frame_at_tick)
     with closing(
         open_aligned_stream(recording, camera_index, streams.times[camera_index] if streams else None)
     ) as stream:

@@ -92,7 +92,7 @@ class CameraSource:
         (`stseg.io.recording.time_alignment`).
     images
         Colour frames beside boxes, for pictures and colours; None where there are none.
-    shown : int64 (tick,)
+    frame_at_tick : int64 (tick,)
         The camera's own frame shown at each tick, -1 where it is blind; None where frame k is shown at tick k, or
         before alignment.
     """
@@ -103,7 +103,7 @@ class CameraSource:
     on_missing: Literal["error", "blind"] = "error"
     clock: ClockSource = "auto"
     images: Source | None = None
-    shown: Ints | None = field(default=None, compare=False, repr=False)
+    frame_at_tick: Ints | None = field(default=None, compare=False, repr=False)
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,21 +25,21 @@ class StreamIndex:
         Frames of the recording.
     times : float64 (n,) each
         Time stamps of all frames of each file of each camera, milliseconds; nan where there is none.
-    shown : int64 (tick,) or None each
-        `CameraSource.shown` of each camera.
+    frame_at_tick : int64 (tick,) or None each
+        `CameraSource.frame_at_tick` of each camera.
     notes
         Messages for the user, one line each.
     """
 
     length: int
     times: tuple[tuple[Floats, ...], ...]
-    shown: tuple[Ints | None, ...] = ()
+    frame_at_tick: tuple[Ints | None, ...] = ()
     notes: tuple[str, ...] = ()
 
     def coverage(self, recording: Recording) -> Flags:
         """Which frames of the indexed recording each camera shows, bool (camera, length)."""
         counts = [sum(map(len, files)) for files in self.times]
-        return coverage(with_alignment(recording, self.shown), counts, self.length)
+        return coverage(with_alignment(recording, self.frame_at_tick), counts, self.length)
 
     def multi_view_range(self, recording: Recording) -> tuple[int, int]:
         """First and stop of the part that at least two cameras show; all of it where a camera is required throughout.
@@ -77,10 +77,10 @@ def index_from_times(
 ) -> StreamIndex:
     """The index of a recording whose time stamps are known, float64 (n,) each; raises as `index_streams` does."""
     alignment = align_in_time(recording, times)
-    aligned = with_alignment(recording, alignment.shown)
+    aligned = with_alignment(recording, alignment.frame_at_tick)
     with ExitStack() as opened:
         streams = streams or open_aligned_streams(recording, opened)
         for stream, source, files in zip(streams, aligned.sources, times, strict=True):
             stream.align(source, sum(map(len, files)))
         length = int(recording_length(streams))
-    return StreamIndex(length, tuple(map(tuple, times)), alignment.shown, alignment.notes)
+    return StreamIndex(length, tuple(map(tuple, times)), alignment.frame_at_tick, alignment.notes)

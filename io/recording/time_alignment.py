@@ -45,13 +45,13 @@ class TimeAlignment:
 
     Attributes
     ----------
-    shown : int64 (tick,) or None each
-        `CameraSource.shown` of each camera.
+    frame_at_tick : int64 (tick,) or None each
+        `CameraSource.frame_at_tick` of each camera.
     notes
         Messages for the user, one line each.
     """
 
-    shown: tuple[Ints | None, ...]
+    frame_at_tick: tuple[Ints | None, ...]
     notes: tuple[str, ...]
 
 
@@ -97,25 +97,25 @@ def align_in_time(recording: Recording, times: Sequence[Sequence[Floats]]) -> Ti
         for camera, source, files in zip(recording.rig.cameras, recording.sources, times, strict=True)
     ]
     notes: dict[str, list[str]] = {}
-    shown: list[Ints | None] = []
+    frame_at_tick: list[Ints | None] = []
     for camera in cameras:
         trusted, note = _trusted_stamps(camera, [other for other in cameras if other is not camera], rate)
         if note:
             notes.setdefault(note, []).append(camera.name)
         if trusted is not None:
-            shown.append(nearest_frames(trusted.position, trusted.period))
+            frame_at_tick.append(nearest_frames(trusted.position, trusted.period))
         else:
-            shown.append(nearest_frames(camera.counted, 1.0) if camera.source.source.starts else None)
+            frame_at_tick.append(nearest_frames(camera.counted, 1.0) if camera.source.source.starts else None)
     lines = tuple(f"{', '.join(names)}: {note}" for note, names in notes.items())
-    return TimeAlignment(_with_common_end(recording, cameras, shown), lines)
+    return TimeAlignment(_with_common_end(recording, cameras, frame_at_tick), lines)
 
 
-def with_alignment(recording: Recording, shown: Sequence[Ints | None]) -> Recording:
-    """The recording with `shown` set for each camera; unchanged where `shown` is empty."""
-    if not shown:
+def with_alignment(recording: Recording, frame_at_tick: Sequence[Ints | None]) -> Recording:
+    """The recording with `frame_at_tick` set for each camera; unchanged where `frame_at_tick` is empty."""
+    if not frame_at_tick:
         return recording
-    pairs = zip(recording.sources, shown, strict=True)
-    return replace(recording, sources=tuple(replace(source, shown=numbers) for source, numbers in pairs))
+    pairs = zip(recording.sources, frame_at_tick, strict=True)
+    return replace(recording, sources=tuple(replace(source, frame_at_tick=numbers) for source, numbers in pairs))
 
 
 def nearest_frames(position: Floats, period: float) -> Ints:
@@ -136,18 +136,18 @@ def nearest_frames(position: Floats, period: float) -> Ints:
     free = float(np.clip(1.0 - period / 2, 0.0, _JITTER))
     reach = (max(1.0, period) + free) / 2
     places = [*position.tolist(), np.inf, np.inf]
-    shown = np.full(int(np.ceil(places[-3] + period / 2 - 1e-9)), -1, np.int64)
+    frame_at_tick = np.full(int(np.ceil(places[-3] + period / 2 - 1e-9)), -1, np.int64)
     last, new = -1, 0
-    for tick in range(len(shown)):
+    for tick in range(len(frame_at_tick)):
         new = max(new, last + 1)
         while abs(places[new + 1] - tick) < abs(places[new] - tick):
             new += 1
         away, since = abs(places[new] - tick), abs(places[last] - tick) if last >= 0 else np.inf
         if away <= min(reach, since + free):
-            shown[tick] = last = new
+            frame_at_tick[tick] = last = new
         elif since <= reach:
-            shown[tick] = last
-    return shown
+            frame_at_tick[tick] = last
+    return frame_at_tick
 
 
 def coverage(recording: Recording, counts: Sequence[int], length: int) -> Flags:
@@ -164,7 +164,7 @@ def coverage(recording: Recording, counts: Sequence[int], length: int) -> Flags:
     """
     flags = np.zeros((len(counts), length), bool)
     for flag, source, count in zip(flags, recording.sources, counts, strict=True):
-        shows = np.ones(count, bool) if source.shown is None else source.shown >= 0
+        shows = np.ones(count, bool) if source.frame_at_tick is None else source.frame_at_tick >= 0
         shows = shows[max(0, -source.offset) :][: max(0, length - max(0, source.offset))]
         first = max(0, source.offset)
         flag[first : first + len(shows)] = shows
@@ -221,20 +221,20 @@ def _end(camera: _CameraTimes) -> float:
 
 
 def _with_common_end(
-    recording: Recording, cameras: Sequence[_CameraTimes], shown: Sequence[Ints | None]
+    recording: Recording, cameras: Sequence[_CameraTimes], frame_at_tick: Sequence[Ints | None]
 ) -> tuple[Ints | None, ...]:
     """Give required cameras that are aligned by time a common end, where their ends nearly agree.
 
     The end is that of counted cameras, else the latest of all; cameras that end earlier are blind until then.
     """
     required = [k for k, camera in enumerate(cameras) if camera.source.on_missing == "error"]
-    counted = [cameras[k].source.offset + len(cameras[k].counted) for k in required if shown[k] is None]
-    timed = {k: cameras[k].source.offset + len(numbers) for k in required if (numbers := shown[k]) is not None}
+    counted = [cameras[k].source.offset + len(cameras[k].counted) for k in required if frame_at_tick[k] is None]
+    timed = {k: cameras[k].source.offset + len(numbers) for k in required if (numbers := frame_at_tick[k]) is not None}
     if not timed:
-        return tuple(shown)
-    end, made = max(counted or timed.values()), list(shown)
+        return tuple(frame_at_tick)
+    end, made = max(counted or timed.values()), list(frame_at_tick)
     for k, own_end in timed.items():
-        numbers = shown[k]
+        numbers = frame_at_tick[k]
         if numbers is not None and abs(own_end - end) <= _END_TOLERANCE * recording.rig.frame_rate:
             made[k] = np.append(numbers, np.full(max(0, end - own_end), -1))[: len(numbers) + end - own_end]
     return tuple(made)

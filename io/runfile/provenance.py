@@ -62,8 +62,8 @@ class Provenance:
     versions
         Of this package, Python and numerical libraries.
     sources : SOURCE (n,)
-    shown
-        `CameraSource.shown` by camera, int64 (tick,), of cameras aligned in time.
+    frame_at_tick
+        `CameraSource.frame_at_tick` by camera, int64 (tick,), of cameras aligned in time.
     """
 
     created: str
@@ -72,7 +72,7 @@ class Provenance:
     rig_path: Path
     versions: Mapping[str, str]
     sources: Rows
-    shown: Mapping[str, Ints] = field(default_factory=dict)
+    frame_at_tick: Mapping[str, Ints] = field(default_factory=dict)
 
 
 def gather_provenance(recording: Recording, config_text: str) -> Provenance:
@@ -86,9 +86,9 @@ def gather_provenance(recording: Recording, config_text: str) -> Provenance:
         _versions(),
         _sources(recording),
         {
-            camera.name: source.shown
+            camera.name: source.frame_at_tick
             for camera, source in zip(recording.rig.cameras, recording.sources, strict=True)
-            if source.shown is not None
+            if source.frame_at_tick is not None
         },
     )
 
@@ -102,16 +102,18 @@ def write_provenance(group: h5py.Group, provenance: Provenance) -> None:
     versions = [(name.encode(), number.encode()) for name, number in provenance.versions.items()]
     group["versions"] = np.array(versions, _VERSION)
     group.create_dataset("sources", data=provenance.sources, dtype=SOURCE)
-    for number, (camera, shown) in enumerate(provenance.shown.items()):
+    for number, (camera, frame_at_tick) in enumerate(provenance.frame_at_tick.items()):
         # By number: a camera's name may hold a slash.
-        dataset = group.create_dataset(f"shown/{number}", data=shown, compression="gzip", shuffle=True)
+        dataset = group.create_dataset(f"shown/{number}", data=frame_at_tick, compression="gzip", shuffle=True)
         dataset.attrs["camera"] = camera
 
 
 def read_provenance(group: h5py.Group) -> Provenance:
     """Read the group /provenance; ValueError where its values cannot be."""
-    shown = {str(read_attribute(dataset, "camera")): read_whole(dataset) for dataset in group.get("shown", {}).values()}
-    for camera, numbers in shown.items():
+    frame_at_tick = {
+        str(read_attribute(dataset, "camera")): read_whole(dataset) for dataset in group.get("shown", {}).values()
+    }
+    for camera, numbers in frame_at_tick.items():
         if numbers.ndim != 1 or numbers.dtype.kind != "i" or ((numbers < -1) | (numbers > limits.FRAMES)).any():
             raise ValueError(f"shown of camera {camera}: no frames by tick")
     return Provenance(
@@ -121,7 +123,7 @@ def read_provenance(group: h5py.Group) -> Provenance:
         Path(str(read_attribute(group, "rig_path"))),
         {name.decode(): number.decode() for name, number in read_whole(group["versions"]).tolist()},
         _checked_sources(group["sources"]),
-        shown,
+        frame_at_tick,
     )
 
 

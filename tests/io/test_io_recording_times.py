@@ -89,7 +89,9 @@ def test_other_rates_and_dropped_frames_are_put_right(
     assert messages.startswith("stseg: corner0, corner2: the time stamps vary; each tick shows the nearest frame")
     assert presence(run) == [(0, FRAMES - 1)] * 3
     assert np.median(distances_to_truth(run)) < 1.2 * np.median(distances_to_truth(whole)) + 0.01
-    blind = {name: np.flatnonzero(shown < 0).tolist() for name, shown in run.provenance.shown.items()}
+    blind = {
+        name: np.flatnonzero(frame_at_tick < 0).tolist() for name, frame_at_tick in run.provenance.frame_at_tick.items()
+    }
     assert blind == {"corner0": lost, "corner1": lost, "corner2": [9, 20, 21, 22, 23, *lost]}
     assert run.frames.tolist() == list(range(FRAMES))
 

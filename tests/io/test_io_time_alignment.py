@@ -69,23 +69,23 @@ def a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_frames_within_half_a_tick_of_their_numbers_show_them(off: list[float]) -> None:
     position = np.arange(len(off)) + np.array([0.0, *off[1:]])
     position = np.maximum.accumulate(position) + 1e-9 * np.arange(len(off))
-    shown = nearest_frames(position, 1.0)
-    assert shown[: len(off)].tolist() == list(range(len(shown[: len(off)])))
-    assert len(off) - 1 <= len(shown) <= len(off) + 1
+    frame_at_tick = nearest_frames(position, 1.0)
+    assert frame_at_tick[: len(off)].tolist() == list(range(len(frame_at_tick[: len(off)])))
+    assert len(off) - 1 <= len(frame_at_tick) <= len(off) + 1
 
 
 @settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.lists(st.floats(0.05, 6.0), min_size=1, max_size=60), st.floats(0.2, 4.0))
 def test_what_is_shown_is_near_and_in_order(steps: list[float], period: float) -> None:
     position = np.cumsum([0.0, *steps])
-    shown = nearest_frames(position, period)
-    ticks = np.flatnonzero(shown >= 0)
-    assert (np.diff(shown[ticks]) >= 0).all()
-    away = np.abs(position[shown[ticks]] - ticks)
-    least = np.abs(position[:, None] - np.arange(len(shown))).min(axis=0, initial=np.inf)
+    frame_at_tick = nearest_frames(position, period)
+    ticks = np.flatnonzero(frame_at_tick >= 0)
+    assert (np.diff(frame_at_tick[ticks]) >= 0).all()
+    away = np.abs(position[frame_at_tick[ticks]] - ticks)
+    least = np.abs(position[:, None] - np.arange(len(frame_at_tick))).min(axis=0, initial=np.inf)
     assert (away <= 0.75 * max(1.0, period)).all()
     assert (away <= least[ticks] + 0.5 * max(1.0, period)).all()
-    assert (least[np.flatnonzero(shown < 0)] > 0.25 * max(1.0, period)).all()
+    assert (least[np.flatnonzero(frame_at_tick < 0)] > 0.25 * max(1.0, period)).all()
 
 
 @pytest.mark.parametrize(
@@ -105,8 +105,8 @@ def test_a_frame_between_two_ticks_is_shown_steadily() -> None:
     """A late second frame, then frames that are a little early or late, half-way between ticks."""
     off = np.random.default_rng(3).uniform(-0.1, 0.1, 500)
     position = np.append(0.0, np.arange(1, 500) + 0.5 + off[1:])
-    shown = nearest_frames(position, 1.0)
-    assert shown[:499].tolist() in (list(range(499)), [0, *range(2, 500)])
+    frame_at_tick = nearest_frames(position, 1.0)
+    assert frame_at_tick[:499].tolist() in (list(range(499)), [0, *range(2, 500)])
 
 
 def test_dropped_frames_leave_holes() -> None:
@@ -165,16 +165,16 @@ def test_stamps_at_the_rigs_rate_are_those_of_the_numbers() -> None:
 
 def test_stamps_that_vary_are_believed() -> None:
     clock = decided((video(), WAVERING), (video(), every(1.0, 61)))
-    assert clock.shown[1] is None
-    assert clock.shown[0] is not None
-    assert np.flatnonzero(clock.shown[0] < 0).tolist() == [30]
+    assert clock.frame_at_tick[1] is None
+    assert clock.frame_at_tick[0] is not None
+    assert np.flatnonzero(clock.frame_at_tick[0] < 0).tolist() == [30]
     assert len(clock.notes) == 1
     assert clock.notes[0].startswith("cam1: the time stamps vary")
 
 
 def test_a_rate_of_all_headers_may_be_wrong() -> None:
     clock = decided((video(), every(0.5, 60)), (video(), every(0.5, 60)))
-    assert clock.shown == (None, None)
+    assert clock.frame_at_tick == (None, None)
     reported = "cam1, cam2: the time stamps say 20 frames per second, the rig 10; the frames are counted"
     assert [note.startswith(reported) for note in clock.notes] == [True]
 
@@ -182,28 +182,28 @@ def test_a_rate_of_all_headers_may_be_wrong() -> None:
 @pytest.mark.parametrize("other", [every(1.0, 60), WAVERING])
 def test_another_rate_counts_if_a_camera_keeps_the_rigs(other: Floats) -> None:
     clock = decided((video(), other), (video(), every(0.5, 120)))
-    assert clock.shown[1] is not None
-    assert clock.shown[1][:60].tolist() == list(range(0, 120, 2))
+    assert clock.frame_at_tick[1] is not None
+    assert clock.frame_at_tick[1][:60].tolist() == list(range(0, 120, 2))
     assert any("20 frames per second, the rig 10; each tick shows the nearest frame" in n for n in clock.notes)
 
 
 def test_a_camera_with_as_many_frames_has_a_header_that_is_wrong() -> None:
     clock = decided((video(), every(1.0, 60)), (video(), every(0.5, 60)))
-    assert clock.shown == (None, None)
+    assert clock.frame_at_tick == (None, None)
     assert "the frames are counted" in clock.notes[0]
 
 
 def test_clocks_that_drift_apart_are_held_together() -> None:
     clock = decided((video(), every(1.0, 2000)), (video(), every(1.001, 1998)))
-    assert clock.shown[1] is not None
-    assert (clock.shown[1][:3].tolist(), clock.shown[1][1900]) == ([0, 1, 2], 1898)
+    assert clock.frame_at_tick[1] is not None
+    assert (clock.frame_at_tick[1][:3].tolist(), clock.frame_at_tick[1][1900]) == ([0, 1, 2], 1898)
 
 
 def test_the_rig_may_say_what_is_believed() -> None:
     assert decided((video(clock="count"), WAVERING)) == TimeAlignment((None,), ())
     clock = decided((video(clock="stamps"), every(0.5, 60)))
-    assert clock.shown[0] is not None
-    assert clock.shown[0].tolist() == list(range(0, 60, 2))
+    assert clock.frame_at_tick[0] is not None
+    assert clock.frame_at_tick[0].tolist() == list(range(0, 60, 2))
     assert clock.notes == ()
     with pytest.raises(SourceError, match="camera cam1, clock: found files without time stamps that rise"):
         decided((video(clock="stamps"), np.full(3, np.nan)))
@@ -227,7 +227,7 @@ def test_ends_that_nearly_meet_are_made_to(blind: bool) -> None:
     missing = "blind" if blind else "error"
     sources = [video(on_missing=missing), video(on_missing=missing), video(on_missing=missing, offset=2)]
     clock = decided(*zip(sources, (every(1.0, 60), WAVERING[:55], np.append(WAVERING, [64.0, 65.0])), strict=True))
-    lengths = [None if own is None else len(own) for own in clock.shown]
+    lengths = [None if own is None else len(own) for own in clock.frame_at_tick]
     assert lengths == ([None, 56, 66] if blind else [None, 60, 58])
 
 
@@ -250,13 +250,13 @@ def test_seen_is_what_is_not_blind(cameras: list[tuple[int, int, bool]]) -> None
     rng = np.random.default_rng(0)
     sources, length = [], max(1, *(count + offset for count, offset, _ in cameras), 1)
     for count, offset, timed in cameras:
-        shown = np.where(rng.random(count) < 0.7, np.arange(count), -1) if timed else None
-        sources.append(video(offset=offset, shown=shown))
+        frame_at_tick = np.where(rng.random(count) < 0.7, np.arange(count), -1) if timed else None
+        sources.append(video(offset=offset, frame_at_tick=frame_at_tick))
     flags = coverage(recording(*sources), [count for count, _, _ in cameras], length)
     for own, source, (count, offset, _) in zip(flags, sources, cameras, strict=True):
         for frame in range(length):
             tick = frame - offset
-            expected = 0 <= tick < count and (source.shown is None or source.shown[tick] >= 0)
+            expected = 0 <= tick < count and (source.frame_at_tick is None or source.frame_at_tick[tick] >= 0)
             assert own[frame] == expected
 
 
@@ -327,13 +327,16 @@ def test_what_was_found_of_time_is_kept(uneven: Recording, tmp_path: Path) -> No
     for again in (kept, pickle.loads(pickle.dumps(streams))):
         assert isinstance(again, StreamIndex)
         assert (again.length, again.notes) == (streams.length, streams.notes)
-        for one, other in zip(again.shown, streams.shown, strict=True):
+        for one, other in zip(again.frame_at_tick, streams.frame_at_tick, strict=True):
             np.testing.assert_array_equal(none_as_empty(one), none_as_empty(other))
-    assert sorted(gather_provenance(with_alignment(uneven, streams.shown), "").shown) == ["cam2", "cam3"]
+    assert sorted(gather_provenance(with_alignment(uneven, streams.frame_at_tick), "").frame_at_tick) == [
+        "cam2",
+        "cam3",
+    ]
 
 
-def none_as_empty(shown: Ints | None) -> Ints:
-    return np.zeros(0, np.int64) if shown is None else shown
+def none_as_empty(frame_at_tick: Ints | None) -> Ints:
+    return np.zeros(0, np.int64) if frame_at_tick is None else frame_at_tick
 
 
 def test_the_rig_file_says_clock_and_starts(tmp_path: Path) -> None:

@@ -184,7 +184,7 @@ class Run:
             found = f"{len(cameras)} cameras and a grid of {recording.rig.grid.shape}"
             expected = f"the run's {len(self.cameras)} cameras and {self.views.shape}"
             raise FormatError(self.path, f"{layout.PROVENANCE}/rig", found, expected)
-        return with_alignment(recording, [provenance.shown.get(name) for name in self.cameras])
+        return with_alignment(recording, [provenance.frame_at_tick.get(name) for name in self.cameras])
 
     def require_fit(self) -> None:
         """Raise FormatError where tables of tracks do not fit each other or the frames."""

@@ -84,7 +84,7 @@ def assemble(job: Job, finished: Sequence[FinishedSegment], output: Path, call: 
         The tracks of the whole run.
     """
     views = read_run(finished[0].path).views
-    config, recording = format_config(job.config), with_alignment(job.recording, job.streams.shown)
+    config, recording = format_config(job.config), with_alignment(job.recording, job.streams.frame_at_tick)
     with (
         call(_associated, job, finished) as association,
         RunWriter(output, recording, views, config, overwrite=True, kept=job.volume) as writer,
