@@ -29,7 +29,7 @@ import numpy as np
 from workbench import ROOT, commit
 
 from stseg.io.outputs.simulated_scene import write_scene
-from stseg.simulation import NAMED, Film, SceneSpec
+from stseg.simulation import NAMED, SceneFilm, SceneSpec
 
 TABLE = ROOT / "docs" / "results" / "speed.csv"
 _ALLOWED = 1.25
@@ -110,7 +110,7 @@ def measure(workload: Workload, checkouts: Sequence[Path], work: Path, rounds: i
     """Milliseconds a frame set by each checkout (of `start`, of the whole run), and the first one's ratio by round."""
     rig, output = work / workload.name / workload.rig, work / f"{workload.name}.h5"
     if not rig.exists():
-        write_scene(rig.parent, Film(workload.scene), overwrite=True)
+        write_scene(rig.parent, SceneFilm(workload.scene), overwrite=True)
     for checkout in checkouts:  # compiles what is not in the cache
         cpu_of_run(checkout, rig, output, workload.many or workload.few)
     costs, ratios = [], []

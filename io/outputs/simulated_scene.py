@@ -62,7 +62,7 @@ class SimulatedFrame(Protocol):
 
 
 class SimulatedScene(Protocol):
-    """A scene that can be filmed, see `stseg.simulation.Film`."""
+    """A scene that can be filmed, see `stseg.simulation.SceneFilm`."""
 
     @property
     def rig(self) -> Rig: ...

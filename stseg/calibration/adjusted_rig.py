@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stseg.arrays import Floats, Ints
-from stseg.calibration.automatic.solution import Solution
+from stseg.calibration.automatic.solution import SolvedViews
 from stseg.calibration.pinhole import CENTRE, CLOCK, FOCAL, SIZE, as_camera, height_of_head, moved, on_plane
 from stseg.geometry import Camera, Grid
 
@@ -50,7 +50,7 @@ class ViewReport:
     clock_spread: float
 
 
-def scaled(solution: Solution, factor: float) -> Solution:
+def scaled(solution: SolvedViews, factor: float) -> SolvedViews:
     """The solution with all lengths multiplied by a factor, covariance included."""
     parameters = solution.adjustment.parameters
     views = np.array([moved(view, 0.0, np.zeros(2), factor) for view in parameters.views])
@@ -70,7 +70,7 @@ def scaled(solution: Solution, factor: float) -> Solution:
     return replace(solution, adjustment=adjustment, problem=replace(solution.problem, correspondences=correspondences))
 
 
-def centred(solution: Solution) -> Solution:
+def centred(solution: SolvedViews) -> SolvedViews:
     """The solution with the origin in the middle of the ground points and x along the first camera's right."""
     parameters = solution.adjustment.parameters
     middle = (parameters.points[:, :2].max(axis=0) + parameters.points[:, :2].min(axis=0)) / 2
@@ -91,14 +91,14 @@ def centred(solution: Solution) -> Solution:
     )
 
 
-def distance_factor(solution: Solution, view: int, pixels: Floats, metres: float) -> float:
+def distance_factor(solution: SolvedViews, view: int, pixels: Floats, metres: float) -> float:
     """Scale factor that puts two ground pixels (2, 2) of a view `metres` apart; nan above the horizon."""
     camera = solution.adjustment.parameters.views[view]
     ground = on_plane(camera, _size(solution, view), pixels, 0.0)
     return metres / float(np.linalg.norm(ground[1] - ground[0]))
 
 
-def cameras_of(solution: Solution, names: Sequence[str]) -> tuple[Camera, ...]:
+def cameras_of(solution: SolvedViews, names: Sequence[str]) -> tuple[Camera, ...]:
     """The adjusted cameras as `Camera` objects."""
     return tuple(
         as_camera(view, name, _size(solution, k))
@@ -106,12 +106,12 @@ def cameras_of(solution: Solution, names: Sequence[str]) -> tuple[Camera, ...]:
     )
 
 
-def offsets_of(solution: Solution) -> Ints:
+def offsets_of(solution: SolvedViews) -> Ints:
     """Offset of each stream in the rig file; 0 or below, so that every stream covers the recording's first frame."""
     return np.asarray(solution.delay.min() - solution.delay)
 
 
-def grid_of(solution: Solution, cell: float) -> Grid:
+def grid_of(solution: SolvedViews, cell: float) -> Grid:
     """A grid over the adjusted ground points."""
     ground = solution.adjustment.parameters.points[:, :2]
     lowest = np.floor((np.percentile(ground, 1, axis=0) - _MARGIN) / cell) * cell
@@ -120,12 +120,12 @@ def grid_of(solution: Solution, cell: float) -> Grid:
     return Grid((x[0], x[1]), (y[0], y[1]), cell)
 
 
-def reports_of(solution: Solution) -> list[ViewReport]:
+def reports_of(solution: SolvedViews) -> list[ViewReport]:
     """A report of each view."""
     return [_report(solution, view) for view in range(len(solution.delay))]
 
 
-def _report(solution: Solution, view: int) -> ViewReport:
+def _report(solution: SolvedViews, view: int) -> ViewReport:
     adjustment, correspondences = solution.adjustment, solution.problem.correspondences
     parameters, size = adjustment.parameters, _size(solution, view)
     rows = np.flatnonzero(correspondences.view == view)
@@ -153,6 +153,6 @@ def _report(solution: Solution, view: int) -> ViewReport:
     )
 
 
-def _size(solution: Solution, view: int) -> tuple[int, int]:
+def _size(solution: SolvedViews, view: int) -> tuple[int, int]:
     width, height = solution.problem.size[view].tolist()
     return width, height

@@ -32,7 +32,7 @@ _ITERATIONS = 40
 
 
 @dataclass(frozen=True)
-class Parameters:
+class BundleParameters:
     """Parameters of the adjustment.
 
     Attributes
@@ -52,7 +52,7 @@ class Parameters:
 
 
 @dataclass(frozen=True)
-class Problem:
+class BundleProblem:
     """Observations of the adjustment, and their weights.
 
     Attributes
@@ -103,12 +103,12 @@ class Adjustment:
         behind a camera.
     """
 
-    parameters: Parameters
+    parameters: BundleParameters
     covariance: Floats
     residual: Floats
 
 
-def adjust(parameters: Parameters, problem: Problem) -> Adjustment:
+def adjust(parameters: BundleParameters, problem: BundleProblem) -> Adjustment:
     """The maximum a posteriori parameters near the given ones."""
     damping, cost = 1e-3, _cost(parameters, problem)
     for _ in range(_ITERATIONS):
@@ -128,7 +128,7 @@ def adjust(parameters: Parameters, problem: Problem) -> Adjustment:
     return Adjustment(parameters, _covariance(reduced, parameters), residuals(parameters, problem))
 
 
-def _covariance(reduced: Floats, parameters: Parameters) -> Floats:
+def _covariance(reduced: Floats, parameters: BundleParameters) -> Floats:
     """Inverse of the reduced camera system in the subspace orthogonal to the gauge."""
     free = np.zeros((4, len(reduced)))
     free[3, CLOCK : SIZE * len(parameters.views) : SIZE] = 1.0
@@ -141,7 +141,7 @@ def _covariance(reduced: Floats, parameters: Parameters) -> Floats:
     return np.asarray(projector @ np.linalg.inv(projector @ reduced @ projector + stiff * basis @ basis.T) @ projector)
 
 
-def residuals(parameters: Parameters, problem: Problem) -> Floats:
+def residuals(parameters: BundleParameters, problem: BundleProblem) -> Floats:
     """Residuals of all observations, see `Adjustment`."""
     return _residuals(
         parameters.views[problem.correspondences.view],
@@ -151,7 +151,7 @@ def residuals(parameters: Parameters, problem: Problem) -> Floats:
     )
 
 
-def _residuals(views: Floats, toe_offset: Floats, points: Floats, problem: Problem) -> Floats:
+def _residuals(views: Floats, toe_offset: Floats, points: Floats, problem: BundleProblem) -> Floats:
     correspondences = problem.correspondences
     width, height = problem.size[correspondences.view].T.astype(float)
     velocity = correspondences.velocity[correspondences.point]
@@ -173,19 +173,19 @@ def _residuals(views: Floats, toe_offset: Floats, points: Floats, problem: Probl
     )
 
 
-def _squares(residual: Floats, problem: Problem) -> Floats:
+def _squares(residual: Floats, problem: BundleProblem) -> Floats:
     """Squared normalised residual of each endpoint, float64 (m, 2)."""
     return np.asarray(((np.nan_to_num(residual, nan=1e3) / problem.spread) ** 2).sum(axis=2))
 
 
-def _cost(parameters: Parameters, problem: Problem) -> float:
+def _cost(parameters: BundleParameters, problem: BundleProblem) -> float:
     square = _squares(residuals(parameters, problem), problem)
     robust = (square / (1.0 + square / _OUTLIER_RESIDUAL**2)).sum() / problem.redundancy
     heights = (((parameters.points[:, 2] - problem.height) / problem.height_spread) ** 2).sum()
     return float(robust + heights / problem.redundancy + _prior(parameters, problem)[0])
 
 
-def _prior(parameters: Parameters, problem: Problem) -> tuple[float, Floats, Floats]:
+def _prior(parameters: BundleParameters, problem: BundleProblem) -> tuple[float, Floats, Floats]:
     """Cost, half gradient and half Hessian of the prior on cameras and toe offset."""
     constrained = _PRIOR_SPREAD > 0
     weight = np.where(constrained, 1.0 / np.where(constrained, _PRIOR_SPREAD, 1.0) ** 2, 0.0)
@@ -235,7 +235,7 @@ class _System:
     between: Floats
 
 
-def _system(parameters: Parameters, problem: Problem) -> _System:
+def _system(parameters: BundleParameters, problem: BundleProblem) -> _System:
     correspondences = problem.correspondences
     of_view, of_point = parameters.views[correspondences.view], parameters.points[correspondences.point]
     residual = _residuals(of_view, parameters.toe_offset, of_point, problem)
@@ -266,7 +266,7 @@ def _system(parameters: Parameters, problem: Problem) -> _System:
 
 
 def _normal(
-    parameters: Parameters, problem: Problem, rows: Floats, by_point: Floats, weighted_residual: Floats
+    parameters: BundleParameters, problem: BundleProblem, rows: Floats, by_point: Floats, weighted_residual: Floats
 ) -> _System:
     """Normal equations from weighted Jacobians and residuals; observations of one point are consecutive."""
     first = np.flatnonzero(np.diff(problem.correspondences.point, prepend=-1))
@@ -300,7 +300,7 @@ def _reduced(system: _System, damping: float) -> tuple[Floats, Floats]:
     return cameras - flat_through @ flat_between.T, inverse
 
 
-def _stepped(parameters: Parameters, system: _System, damping: float) -> Parameters:
+def _stepped(parameters: BundleParameters, system: _System, damping: float) -> BundleParameters:
     reduced, inverse = _reduced(system, damping)
     by_people = np.einsum("nij,njk,nk->i", system.between, inverse, system.people_slope, optimize=True)
     # Nothing fixes the ground's turn and shift: a trace of stiffness keeps them where they are.

@@ -19,7 +19,7 @@ EMPTY_FRAMES = 40
 
 
 @dataclass(frozen=True, slots=True)
-class SimulatedFrame:
+class RenderedFrame:
     """One frame of the recording.
 
     Attributes
@@ -37,7 +37,7 @@ class SimulatedFrame:
     views: tuple[RenderedView, ...]
 
 
-class Film:
+class SceneFilm:
     """A scene and its cameras; frames are rendered on demand, so that it may be long.
 
     Parameters
@@ -76,10 +76,10 @@ class Film:
         for frame in range(-EMPTY_FRAMES, 0):
             yield tuple(viewer.empty(frame) for viewer in self.viewers)
 
-    def frame_sets(self) -> Iterator[SimulatedFrame]:
+    def frame_sets(self) -> Iterator[RenderedFrame]:
         """All frames in order, with every camera's view and the truth."""
         for crowd in (walk_routes if self.spec.routes else walk_freely)(self.spec):
             wide, length = self.spec.cylinder, self.spec.length or self.spec.cylinder
             bodies = upright_cylinders(crowd, wide, length) if wide else pose(crowd)
             views = tuple(viewer.view(crowd, bodies) for viewer in self.viewers)
-            yield SimulatedFrame(crowd.frame, crowd.truth(self.spec.area), views)
+            yield RenderedFrame(crowd.frame, crowd.truth(self.spec.area), views)

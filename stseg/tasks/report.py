@@ -25,7 +25,7 @@ from stseg.io.track_csv import read_tracks_csv
 from stseg.reporting.figures import Figure, Instant, camera_figures, ground_figures, slice_figures
 from stseg.reporting.page.html import png_bytes
 from stseg.reporting.page.page import report_page
-from stseg.reporting.pictures.film import Film
+from stseg.reporting.pictures.film import RunFilm
 from stseg.tasks.report_contents import page_contents
 
 _DEFAULT_INSTANTS = 3
@@ -143,7 +143,7 @@ def film(
 ) -> int:
     """Write the film, see `report`; the number of its frames."""
     numbers = frames_of_run(run, frames)
-    drawn = Film(run.recording.rig, run.views, run.trajectory)
+    drawn = RunFilm(run.recording.rig, run.views, run.trajectory)
     return write_film(output, _film_pictures(run, drawn, numbers, camera_images, reporter), run.frame_rate, overwrite)
 
 
@@ -231,7 +231,7 @@ def _write_figures(folder: Path, figures: Iterable[Figure], overwrite: bool) -> 
     return paths
 
 
-def _film_pictures(run: Run, film: Film, frames: Ints, camera_images: bool, reporter: Reporter) -> Iterator[Bytes]:
+def _film_pictures(run: Run, film: RunFilm, frames: Ints, camera_images: bool, reporter: Reporter) -> Iterator[Bytes]:
     with reporter.progress("drawing", len(frames)) as advance:
         if not camera_images:
             for frame in frames.tolist():

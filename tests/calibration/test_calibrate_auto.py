@@ -18,7 +18,7 @@ from stseg.calibration.automatic.auto import calibrate_from_people, require_merg
 from stseg.calibration.automatic.correspondence import match_endpoints
 from stseg.calibration.automatic.endpoints import Endpoints, path_of, upright_endpoints
 from stseg.calibration.automatic.single_view import view_of_upright
-from stseg.calibration.automatic.solution import Solution, refine
+from stseg.calibration.automatic.solution import SolvedViews, refine
 from stseg.calibration.automatic.view_alignment import ViewPaths, align, mirrored
 from stseg.calibration.automatic.view_merging import align_all, merge_views
 from stseg.calibration.bundle_adjustment import residuals
@@ -159,14 +159,14 @@ def scene() -> Walking:
 
 
 @pytest.fixture(scope="module")
-def solution(scene: Walking) -> Solution:
+def solution(scene: Walking) -> SolvedViews:
     return calibrate_from_people(NAMES, scene.views, lambda: None)
 
 
 NAMES = ["a", "b", "c"]
 
 
-def ground_errors(scene: Walking, solution: Solution) -> tuple[Floats, float]:
+def ground_errors(scene: Walking, solution: SolvedViews) -> tuple[Floats, float]:
     """Errors on the ground after the best similarity, metres, and its scale."""
     projected, true = [], []
     for camera, made in zip(scene.rig.cameras, cameras_of(solution, NAMES), strict=True):
@@ -180,7 +180,7 @@ def ground_errors(scene: Walking, solution: Solution) -> tuple[Floats, float]:
     return np.abs(factor * (x - x.mean()) - (y - y.mean())), float(abs(factor))
 
 
-def test_the_whole_way_finds_cameras_clocks_and_scale(scene: Walking, solution: Solution) -> None:
+def test_the_whole_way_finds_cameras_clocks_and_scale(scene: Walking, solution: SolvedViews) -> None:
     assert (solution.delay - solution.delay[0]).tolist() == DELAYS
     assert offsets_of(solution).tolist() == [-3, -7, 0]
     error, scale = ground_errors(scene, solution)
@@ -188,26 +188,26 @@ def test_the_whole_way_finds_cameras_clocks_and_scale(scene: Walking, solution: 
     assert scale == pytest.approx(1.0, abs=0.02)
 
 
-def test_focal_lengths_are_as_near_as_they_say(scene: Walking, solution: Solution) -> None:
+def test_focal_lengths_are_as_near_as_they_say(scene: Walking, solution: SolvedViews) -> None:
     for camera, report in zip(scene.rig.cameras, reports_of(solution), strict=True):
         assert camera.lens is not None
         assert abs(report.focal - camera.lens.matrix[0, 0]) < 4 * report.focal_spread + 1
         assert 0 < report.centre_spread < 0.5 and report.foot_pixels < 4 and report.observations > 100
 
 
-def test_the_grid_holds_those_who_walked(solution: Solution) -> None:
+def test_the_grid_holds_those_who_walked(solution: SolvedViews) -> None:
     grid, points = grid_of(solution, 0.1), solution.adjustment.parameters.points
     for axis, (low, high) in enumerate((grid.x, grid.y)):
         assert low < np.percentile(points[:, axis], 2) and np.percentile(points[:, axis], 98) < high
 
 
-def test_a_bare_floor_changes_nothing(scene: Walking, solution: Solution) -> None:
+def test_a_bare_floor_changes_nothing(scene: Walking, solution: SolvedViews) -> None:
     bare = [np.full((height, width, 3), 120, np.uint8) for width, height in scene.views.sizes]
     same, marks = sharpen_by_floor(scene.views, solution, bare)
     assert marks == 0 and same is solution
 
 
-def test_a_turned_and_scaled_solution_misses_what_it_missed(solution: Solution) -> None:
+def test_a_turned_and_scaled_solution_misses_what_it_missed(solution: SolvedViews) -> None:
     turned = scaled(centred(solution), 1.3)
     for one in (solution, turned):
         np.testing.assert_allclose(
@@ -215,13 +215,13 @@ def test_a_turned_and_scaled_solution_misses_what_it_missed(solution: Solution) 
         )
 
 
-def test_a_delay_that_is_a_frame_wrong_is_mended(scene: Walking, solution: Solution) -> None:
+def test_a_delay_that_is_a_frame_wrong_is_mended(scene: Walking, solution: SolvedViews) -> None:
     wrong = solution.delay + np.array([0, 0, 1])
     again = refine(scene.views, solution.adjustment.parameters.views.copy(), wrong, lambda: None)
     assert (again.delay - again.delay[0]).tolist() == DELAYS
 
 
-def test_a_known_distance_fixes_the_scale(solution: Solution) -> None:
+def test_a_known_distance_fixes_the_scale(solution: SolvedViews) -> None:
     pixel = np.array([[150.0, 250.0], [300.0, 260.0]])
     larger = scaled(solution, distance_factor(solution, 1, pixel, 3.0))
     assert distance_factor(larger, 1, pixel, 3.0) == pytest.approx(1.0)

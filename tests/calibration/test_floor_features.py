@@ -12,7 +12,7 @@ from stseg.arrays import Bytes, Floats
 from stseg.calibration.adjusted_rig import cameras_of
 from stseg.calibration.automatic.floor_features import Marks, floor_marks
 from stseg.calibration.automatic.solution import (
-    Solution,
+    SolvedViews,
     placed_views,
     refine,
     refine_with_marks,
@@ -82,7 +82,7 @@ def exact_marks(scene: Walking) -> Marks:
     return Marks(np.tile([0, 1], (int(visible.sum()), 1)), pixel[visible], 0 * ground[visible])
 
 
-def disagreement(solution: Solution, marks: Marks) -> float:
+def disagreement(solution: SolvedViews, marks: Marks) -> float:
     """Median distance of the two places that the views have a mark at, metres."""
     places: list[Floats] = [
         camera.back_project(marks.pixel[:, side]) for side, camera in enumerate(cameras_of(solution, ["a", "b"]))

@@ -19,7 +19,7 @@ from stseg.io.recording.recording import CameraSource, Recording, Source
 from stseg.io.runfile.runs import RunWriter
 from stseg.records.tables import TRAJECTORY, Tracks
 from stseg.reporting.pictures.colours import track_colour
-from stseg.reporting.pictures.film import Film
+from stseg.reporting.pictures.film import RunFilm
 from stseg.reporting.pictures.overlay import OverlayView
 
 VIVID = (20, 240, 160)
@@ -77,7 +77,7 @@ def is_close(pixel: Bytes, colour: tuple[int, int, int], tolerance: float) -> bo
 
 def test_pillars_and_the_plan_are_drawn_where_people_are(recording: Recording) -> None:
     rig = recording.rig
-    film = Film(rig, np.full(rig.grid.shape, 2, np.uint8), walk())
+    film = RunFilm(rig, np.full(rig.grid.shape, 2, np.uint8), walk())
     pictures = [film.picture(frame, (None, None)) for frame in (10, 15)]
     assert all(picture.shape == (film.size[1], film.size[0], 3) for picture in pictures)
     assert film.size[0] % 2 == film.size[1] % 2 == 0
@@ -165,7 +165,7 @@ def test_a_rig_of_one_camera_and_of_many_have_films(recording: Recording) -> Non
     for count in (1, 7):
         cameras = tuple(replace(front_camera("c", 2), name=f"c{k}") for k in range(count))
         rig = replace(recording.rig, cameras=cameras)
-        film = Film(rig, np.zeros(rig.grid.shape, np.uint8), walk()[:0])
+        film = RunFilm(rig, np.zeros(rig.grid.shape, np.uint8), walk()[:0])
         assert film.picture(3, (None,) * count).shape == (film.size[1], film.size[0], 3)
         sizes.append(film.size)
     assert sizes[0][0] < sizes[1][0] and sizes[1][0] < 3000

@@ -23,8 +23,8 @@ from stseg.io.recording.frames import open_frames, read_background
 from stseg.io.recording.rigs import read_recording
 from stseg.io.track_csv import read_tracks_csv
 from stseg.kernels.accelerate import python_form
-from stseg.simulation import NAMED, Film, Lamp, SceneSpec
-from stseg.simulation.crowd.social_forces import Crowd, walk_freely
+from stseg.simulation import NAMED, Lamp, SceneFilm, SceneSpec
+from stseg.simulation.crowd.social_forces import CrowdFrame, walk_freely
 from stseg.simulation.rendering import ray_casting as draw_module
 from stseg.simulation.rendering.body import PARTS, pose, upright_cylinders
 from stseg.simulation.rendering.cameras import build_rig, pixel_rays
@@ -38,16 +38,16 @@ TINY = NAMED["tiny"]
 NOISELESS = replace(TINY, noise=0.0, light_drift=0.0, shadows=0.0)
 
 
-def crowd_of(ground: Floats, phase: float = 0.7, swing: float = 1.0, heading: float = 0.4) -> Crowd:
+def crowd_of(ground: Floats, phase: float = 0.7, swing: float = 1.0, heading: float = 0.4) -> CrowdFrame:
     """People of many sizes at given places."""
     n = len(ground)
     ones = np.ones(n)
     heights = np.linspace(1.55, 1.9, n) if n > 1 else np.array([1.7])
-    return Crowd(0, np.arange(1, n + 1), ground, heading * ones, phase * ones, swing * ones, heights, ones)
+    return CrowdFrame(0, np.arange(1, n + 1), ground, heading * ones, phase * ones, swing * ones, heights, ones)
 
 
 def viewers(spec: SceneSpec) -> list[Viewer]:
-    return Film(spec).viewers
+    return SceneFilm(spec).viewers
 
 
 def test_people_who_dress_alike_do_so_in_tones_of_their_own() -> None:
@@ -99,7 +99,7 @@ def test_half_the_cameras_are_among_the_whole() -> None:
     for camera, twin in zip(few, many[::2], strict=True):
         np.testing.assert_array_equal(camera.projection, twin.projection)
     spec = replace(TINY, cameras=4, people=1)
-    whole, half = (next(Film(s).frame_sets()) for s in (spec, replace(spec, cameras=2)))
+    whole, half = (next(SceneFilm(s).frame_sets()) for s in (spec, replace(spec, cameras=2)))
     np.testing.assert_array_equal(whole.views[2].image, half.views[1].image)
 
 
@@ -299,7 +299,7 @@ def test_nobody_leaves_the_closed_room() -> None:
 def test_places_do_not_depend_on_the_views() -> None:
     spec = replace(TINY, cameras=1, noise=9.0, size=(32, 24))
     for one, other in zip(walk_freely(TINY), walk_freely(spec), strict=True):
-        for field in fields(Crowd):
+        for field in fields(CrowdFrame):
             np.testing.assert_array_equal(getattr(one, field.name), getattr(other, field.name))
 
 
@@ -307,7 +307,9 @@ def test_places_do_not_depend_on_the_views() -> None:
 
 
 def test_equal_scenes_are_equal_and_seeds_matter() -> None:
-    first, again, other = (list(islice(Film(spec).frame_sets(), 2)) for spec in (TINY, TINY, replace(TINY, seed=5)))
+    first, again, other = (
+        list(islice(SceneFilm(spec).frame_sets(), 2)) for spec in (TINY, TINY, replace(TINY, seed=5))
+    )
     for moment, twin, stranger in zip(first, again, other, strict=True):
         np.testing.assert_array_equal(moment.truth, twin.truth)
         for view, same, else_view in zip(moment.views, twin.views, stranger.views, strict=True):
@@ -318,7 +320,7 @@ def test_equal_scenes_are_equal_and_seeds_matter() -> None:
 
 
 def test_where_nobody_stands_frames_are_those_of_the_empty_room() -> None:
-    film = Film(NOISELESS)
+    film = SceneFilm(NOISELESS)
     empty = next(film.empty())
     moment = next(film.frame_sets())
     for image, view in zip(empty, moment.views, strict=True):
@@ -328,12 +330,12 @@ def test_where_nobody_stands_frames_are_those_of_the_empty_room() -> None:
 
 
 def test_noise_and_light_are_as_large_as_asked_for() -> None:
-    noisy, still = Film(replace(NOISELESS, people=0, noise=6.0)), Film(replace(NOISELESS, people=0))
+    noisy, still = SceneFilm(replace(NOISELESS, people=0, noise=6.0)), SceneFilm(replace(NOISELESS, people=0))
     rest = [view.image.astype(float) for view in next(still.frame_sets()).views]
     images = [view.image.astype(float) for view in next(noisy.frame_sets()).views]
     assert np.std(np.subtract(images, rest)) == pytest.approx(6.0, rel=0.05)
     assert abs(np.mean(np.subtract(images, rest))) < 0.3
-    drifting = Film(replace(NOISELESS, people=0, light_drift=0.2, light_period=1.0))
+    drifting = SceneFilm(replace(NOISELESS, people=0, light_drift=0.2, light_period=1.0))
     means = np.array([[view.image.mean() for view in moment.views] for moment in drifting.frame_sets()])
     swing = (means.max(axis=0) - means.min(axis=0)) / means.mean(axis=0) / 2
     np.testing.assert_allclose(swing, 0.2, atol=0.02)
@@ -341,7 +343,7 @@ def test_noise_and_light_are_as_large_as_asked_for() -> None:
 
 def test_lamps_are_switched_and_light_what_is_near() -> None:
     lamp = Lamp(1.5, on=0.3, off=0.6, place=(0.0, 0.0, 1.0), reach=1.0)
-    film = Film(replace(NOISELESS, people=0, lamps=(lamp,)))
+    film = SceneFilm(replace(NOISELESS, people=0, lamps=(lamp,)))
     images = [moment.views[0].image.astype(float) for moment in film.frame_sets()]
     viewer = film.viewers[0]
     far = np.hypot(*np.nan_to_num(viewer.room.ground, nan=99.0).transpose(2, 0, 1))
@@ -353,7 +355,7 @@ def test_lamps_are_switched_and_light_what_is_near() -> None:
 
 
 def test_a_cloud_comes_slowly_and_is_everywhere() -> None:
-    film = Film(replace(NOISELESS, people=0, lamps=(Lamp(-0.5, on=0.2, rise=0.4),)))
+    film = SceneFilm(replace(NOISELESS, people=0, lamps=(Lamp(-0.5, on=0.2, rise=0.4),)))
     means = np.array([moment.views[1].image.mean() for moment in film.frame_sets()])
     np.testing.assert_allclose(means[[0, 2, 4, 6, 9]] / means[0], [1, 1, 0.75, 0.5, 0.5], atol=0.02)
 
@@ -361,7 +363,7 @@ def test_a_cloud_comes_slowly_and_is_everywhere() -> None:
 def test_people_stand_in_the_light_of_lamps() -> None:
     spec = replace(NOISELESS, seconds=0.1, size=(160, 120))
     lit = replace(spec, lamps=(Lamp(0.4, on=0.0, place=(0.0, 0.0, 2.0), reach=2.0),))
-    dark, bright = (next(Film(one).frame_sets()).views[0] for one in (spec, lit))
+    dark, bright = (next(SceneFilm(one).frame_sets()).views[0] for one in (spec, lit))
     person = np.asarray(dark.instances > 0)
     assert person.any()
     np.testing.assert_array_equal(dark.instances, bright.instances)
@@ -422,7 +424,7 @@ def test_detector_sees_ghosts_now_and_then() -> None:
 
 def test_a_written_scene_reads_back(tmp_path: Path) -> None:
     spec = replace(TINY, seconds=0.4, quality=95)
-    film, reported = Film(spec), []
+    film, reported = SceneFilm(spec), []
     write_scene(tmp_path / "a", film, instances=True, progress=lambda done, of: reported.append((done, of)))
     assert reported == [(k, 4) for k in range(1, 5)]
     moments = list(film.frame_sets())
@@ -449,7 +451,7 @@ def test_a_written_scene_reads_back(tmp_path: Path) -> None:
 
 def test_a_full_folder_is_left_alone(tmp_path: Path) -> None:
     (tmp_path / "notes.txt").write_text("mine")
-    film = Film(replace(TINY, seconds=0.1))
+    film = SceneFilm(replace(TINY, seconds=0.1))
     with pytest.raises(OutputError, match="files in it"):
         write_scene(tmp_path, film)
     assert [file.name for file in tmp_path.iterdir()] == ["notes.txt"]
@@ -474,7 +476,7 @@ def test_a_scene_of_boxes_has_nothing_else(tmp_path: Path, capsys: pytest.Captur
     }  # fmt: skip
     assert "rig_boxes.toml: 2 frames" in capsys.readouterr().out
     spec = replace(NAMED["long"], seconds=0.4, cameras=2)
-    alone, whole_film = Film(spec), Film(replace(spec, kinds=KINDS))
+    alone, whole_film = SceneFilm(spec), SceneFilm(replace(spec, kinds=KINDS))
     for one, other in zip(alone.frame_sets(), whole_film.frame_sets(), strict=True):
         for view, whole in zip(one.views, other.views, strict=True):
             np.testing.assert_array_equal(view.boxes.pixel, whole.boxes.pixel)

@@ -20,9 +20,9 @@ from stseg.evaluation import evaluate
 from stseg.foreground.view_foreground import ViewForeground
 from stseg.kernels.accelerate import python_form
 from stseg.records.tables import APPEARANCE
-from stseg.simulation import NAMED, Film, Route, SceneSpec
+from stseg.simulation import NAMED, Route, SceneFilm, SceneSpec
 from stseg.simulation.crowd.script import walk_routes
-from stseg.simulation.film import SimulatedFrame as Filmed
+from stseg.simulation.film import RenderedFrame as Filmed
 from stseg.tracking.windows.windows import windows
 
 SCENES = ("crossing", "meeting", "meeting_heights", "border")
@@ -118,12 +118,12 @@ def test_things_happen_where_windows_end() -> None:
 
 @cache
 def filmed(name: str, stop: int) -> tuple[Filmed, ...]:
-    return tuple(islice(Film(NAMED[name]).frame_sets(), stop))
+    return tuple(islice(SceneFilm(NAMED[name]).frame_sets(), stop))
 
 
 def switches(name: str, kind: str, stop: int) -> int:
     """How often somebody is taken for somebody else in the first frames of a scene."""
-    rig, film = Film(NAMED[name]).rig, filmed(name, stop)
+    rig, film = SceneFilm(NAMED[name]).rig, filmed(name, stop)
     pipeline = Pipeline(rig, [kind] * len(rig.cameras), Config(), "cut")
     if kind == "boxes":
         moments = [Moment(seen.frame, tuple(view.boxes for view in seen.views)) for seen in film]

@@ -24,7 +24,7 @@ from workbench import commit
 from stseg import Tracker
 from stseg.arrays import Bytes, Floats, Observation
 from stseg.geometry import Rig
-from stseg.simulation import NAMED, Film
+from stseg.simulation import NAMED, SceneFilm
 from stseg.simulation.rendering.render import RenderedView
 
 Axes = dict[str, tuple[str, tuple[int, ...]]]
@@ -83,7 +83,7 @@ def crowd(people: int, width: int, views: int) -> Shown:
         NAMED["easy"], area=(10.0, 10.0), camera_distance=9.0, people=people, cameras=views, stay=60.0,
         seconds=(_READY + _MEASURED) / 10, frame_rate=10.0, size=(width, width * 3 // 4),
     )  # fmt: skip
-    film = Film(spec)
+    film = SceneFilm(spec)
     empty = list(film.empty())[-_EMPTY:]
     return Shown(
         film.rig, [one.views for one in film.frame_sets()], [[images[k] for images in empty] for k in range(views)]

@@ -25,7 +25,7 @@ from stseg.geometry import Rig
 from stseg.io.recording.frames import open_frames
 from stseg.io.recording.rigs import read_recording
 from stseg.io.track_csv import read_tracks_csv
-from stseg.simulation import NAMED, Film, Spoil
+from stseg.simulation import NAMED, SceneFilm, Spoil
 from stseg.simulation.crowd.social_forces import TRUTH
 from stseg.simulation.rendering.render import RenderedView
 from stseg.simulation.spoiling.errors import BOX_KINDS, MASK_KINDS, Moment
@@ -78,7 +78,7 @@ def crowd(people: int, views: int, seconds: float, seed: int = NAMED["easy"].see
     spec = replace(
         NAMED["easy"], people=people, cameras=whole, seconds=seconds, frame_rate=10.0, size=(320, 240), seed=seed
     )
-    film, frames, truth = Film(spec), [], [np.zeros(0, TRUTH)]
+    film, frames, truth = SceneFilm(spec), [], [np.zeros(0, TRUTH)]
     empty = np.zeros((0, 0, 3), np.uint8)
     for frame_set in film.frame_sets():
         frames.append(tuple(replace(view, image=empty) for view in frame_set.views))

@@ -17,7 +17,7 @@ from stseg.geometry import Rig
 from stseg.io.recording.frames import open_frames
 from stseg.io.recording.rigs import read_recording
 from stseg.io.track_csv import read_tracks_csv
-from stseg.simulation import NAMED, Film, SceneSpec, Spoil
+from stseg.simulation import NAMED, SceneFilm, SceneSpec, Spoil
 from stseg.simulation.rendering.render import RenderedView
 from stseg.simulation.spoiling.errors import BOX_KINDS, MASK_KINDS
 from stseg.simulation.spoiling.spoil import STRENGTHS
@@ -201,7 +201,7 @@ def filmed(spec: SceneSpec, kind: str) -> Callable[[int], Recorded]:
         views = [tuple(getattr(view, name) for view in one) for one in frames]
         if kind != "colour":
             return Recorded(rig, truth, views)
-        before = list(zip(*Film(spec).empty(), strict=True))
+        before = list(zip(*SceneFilm(spec).empty(), strict=True))
         empty = {camera.name: list(own) for camera, own in zip(rig.cameras, before, strict=True)}
         return Recorded(rig, truth, views, empty=empty)
 
@@ -210,7 +210,7 @@ def filmed(spec: SceneSpec, kind: str) -> Callable[[int], Recorded]:
 
 def _rendered(spec: SceneSpec, most: int, keep_images: bool) -> tuple[Rig, Rows, list[tuple[RenderedView, ...]]]:
     seconds = min(spec.seconds, most / spec.frame_rate)
-    film, frames, truth = Film(replace(spec, seconds=seconds)), [], []
+    film, frames, truth = SceneFilm(replace(spec, seconds=seconds)), [], []
     nothing = np.zeros((0, 0, 3), np.uint8)
     for frame_set in film.frame_sets():
         frames.append(tuple(view if keep_images else replace(view, image=nothing) for view in frame_set.views))

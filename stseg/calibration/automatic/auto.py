@@ -13,7 +13,7 @@ from stseg.calibration.automatic.floor_features import floor_marks
 from stseg.calibration.automatic.solution import (
     ROUNDS,
     CalibrationInput,
-    Solution,
+    SolvedViews,
     placed_views,
     refine,
     refine_with_marks,
@@ -35,7 +35,7 @@ def steps_of(views: int) -> int:
     return views + views * (views - 1) // 2 + ROUNDS
 
 
-def calibrate_from_people(names: Sequence[str], views: CalibrationInput, progress: Callable[[], None]) -> Solution:
+def calibrate_from_people(names: Sequence[str], views: CalibrationInput, progress: Callable[[], None]) -> SolvedViews:
     """Calibrate cameras from the feet and heads of walking people alone.
 
     Parameters
@@ -67,7 +67,9 @@ def calibrate_from_people(names: Sequence[str], views: CalibrationInput, progres
     return centred(solution)
 
 
-def sharpen_by_floor(views: CalibrationInput, solution: Solution, backgrounds: Sequence[Bytes]) -> tuple[Solution, int]:
+def sharpen_by_floor(
+    views: CalibrationInput, solution: SolvedViews, backgrounds: Sequence[Bytes]
+) -> tuple[SolvedViews, int]:
     """Refine a solution by floor features; returns their number too, 0 on a bare floor.
 
     Parameters
@@ -148,7 +150,7 @@ def _mirror(view: int, paths: Sequence[ViewPaths], merged: MergedViews, rate: fl
     return None
 
 
-def require_correspondences(names: Sequence[str], solution: Solution) -> None:
+def require_correspondences(names: Sequence[str], solution: SolvedViews) -> None:
     """Raise SourceError for a view with too few correspondences after the adjustment."""
     count = np.bincount(solution.problem.correspondences.view, minlength=len(names))
     worst = int(np.argmin(count))

@@ -14,7 +14,7 @@ from stseg.calibration.automatic.floor_features import Marks
 from stseg.calibration.automatic.single_view import FORWARD, axis_of_foot, view_of_upright
 from stseg.calibration.automatic.view_alignment import Alignment, ViewPaths
 from stseg.calibration.automatic.view_merging import MergedViews
-from stseg.calibration.bundle_adjustment import Adjustment, Parameters, Problem, adjust, same_make
+from stseg.calibration.bundle_adjustment import Adjustment, BundleParameters, BundleProblem, adjust, same_make
 from stseg.calibration.pinhole import CLOCK, height_of_head, moved
 
 _GATES = (0.8, 0.6, 0.5, 0.5, 0.5)
@@ -64,7 +64,7 @@ class CalibrationInput:
 
 
 @dataclass(frozen=True)
-class Solution:
+class SolvedViews:
     """Cameras on one ground.
 
     Attributes
@@ -78,7 +78,7 @@ class Solution:
     """
 
     adjustment: Adjustment
-    problem: Problem
+    problem: BundleProblem
     delay: Ints
 
 
@@ -111,7 +111,7 @@ def _placed(view: Floats, way: Alignment) -> Floats:
     return moved(view, float(np.angle(back.factor)), shift, abs(back.factor))
 
 
-def refine(views: CalibrationInput, start: Floats, delay: Ints, progress: Callable[[], None]) -> Solution:
+def refine(views: CalibrationInput, start: Floats, delay: Ints, progress: Callable[[], None]) -> SolvedViews:
     """Alternate correspondence and bundle adjustment, with shrinking gates.
 
     Parameters
@@ -125,7 +125,7 @@ def refine(views: CalibrationInput, start: Floats, delay: Ints, progress: Callab
     progress
         Called after each round.
     """
-    parameters = Parameters(start, np.array([FORWARD, 0.0]), np.zeros((0, 3)))
+    parameters = BundleParameters(start, np.array([FORWARD, 0.0]), np.zeros((0, 3)))
     spread = np.array([[0.07, 0.05], [0.03, 0.03]])
     for gate in _GATES:
         clock = parameters.views[:, CLOCK] - np.median(parameters.views[:, CLOCK])
@@ -139,7 +139,9 @@ def refine(views: CalibrationInput, start: Floats, delay: Ints, progress: Callab
     return solution
 
 
-def _round(views: CalibrationInput, parameters: Parameters, delay: Ints, gate: float, spread: Floats) -> Solution:
+def _round(
+    views: CalibrationInput, parameters: BundleParameters, delay: Ints, gate: float, spread: Floats
+) -> SolvedViews:
     ground = [
         axis_of_foot(view, size, endpoints.foot, float(parameters.toe_offset[0] + 0.5 * parameters.toe_offset[1]))
         for view, size, endpoints in zip(parameters.views, views.sizes, views.endpoints, strict=True)
@@ -148,7 +150,7 @@ def _round(views: CalibrationInput, parameters: Parameters, delay: Ints, gate: f
     matched = matched.of(even_rows(len(matched.frame), _MAX_POINTS))
     refined = len(parameters.points) > 0
     height = _heights(views, parameters, matched) if refined else np.full(len(matched.frame), views.person_height)
-    problem = Problem(
+    problem = BundleProblem(
         np.array(views.sizes),
         matched,
         _observation_spread(matched, spread),
@@ -160,10 +162,12 @@ def _round(views: CalibrationInput, parameters: Parameters, delay: Ints, gate: f
         np.ones(len(matched.view)),
     )
     points = np.column_stack([matched.ground, height])
-    return Solution(adjust(Parameters(parameters.views, parameters.toe_offset, points), problem), problem, delay)
+    return SolvedViews(
+        adjust(BundleParameters(parameters.views, parameters.toe_offset, points), problem), problem, delay
+    )
 
 
-def refine_with_marks(views: CalibrationInput, solution: Solution, marks: Marks) -> Solution:
+def refine_with_marks(views: CalibrationInput, solution: SolvedViews, marks: Marks) -> SolvedViews:
     """Repeat the adjustment with floor features as additional points."""
     if not len(marks):
         return solution
@@ -176,12 +180,12 @@ def refine_with_marks(views: CalibrationInput, solution: Solution, marks: Marks)
     adjustment = adjust(replace(parameters, points=points), joint)
     people, observations = len(parameters.points), len(problem.correspondences.view)
     parameters = replace(adjustment.parameters, points=adjustment.parameters.points[:people])
-    return Solution(
+    return SolvedViews(
         replace(adjustment, parameters=parameters, residual=adjustment.residual[:observations]), problem, solution.delay
     )
 
 
-def _with_marks(problem: Problem, marks: Marks) -> Problem:
+def _with_marks(problem: BundleProblem, marks: Marks) -> BundleProblem:
     """The problem with two observations of each floor feature, of which only the foot has weight."""
     correspondences, count = problem.correspondences, len(marks)
     pixel = marks.pixel.reshape(-1, 2)
@@ -205,7 +209,7 @@ def _with_marks(problem: Problem, marks: Marks) -> Problem:
     )
 
 
-def _heights(views: CalibrationInput, parameters: Parameters, matched: Correspondences) -> Floats:
+def _heights(views: CalibrationInput, parameters: BundleParameters, matched: Correspondences) -> Floats:
     """Body height of each point's track, shrunk towards the mean, metres, float64 (n,)."""
     observations: list[list[float]] = [[] for _ in range(int(matched.person.max(initial=-1)) + 1)]
     for view, (size, camera) in enumerate(zip(views.sizes, parameters.views, strict=True)):
@@ -236,7 +240,7 @@ def _observation_spread(matched: Correspondences, spread: Floats) -> Floats:
     return np.asarray(np.maximum(spread, (_MIN_PIXEL_SPREAD / length)[:, None, None]))
 
 
-def _residual_spread(solution: Solution) -> Floats:
+def _residual_spread(solution: SolvedViews) -> Floats:
     """Robust standard deviation of feet and heads along and across, in body lengths.
 
     The three parameters of each point reduce the residuals; the degrees of freedom correct for it.

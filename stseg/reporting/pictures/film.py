@@ -19,7 +19,7 @@ _MAX_VIEW_WIDTH, _MAX_WIDTH = 960, 1280  # width of a view, and of all views sid
 _MIN_HEIGHT = 720  # of the film, pixels
 
 
-class Film:
+class RunFilm:
     """A film's pictures, all of one size.
 
     Parameters

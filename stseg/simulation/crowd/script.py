@@ -8,7 +8,7 @@ import numpy as np
 
 from stseg.arrays import Floats
 from stseg.simulation.crowd.routes import Route
-from stseg.simulation.crowd.social_forces import Crowd, stride
+from stseg.simulation.crowd.social_forces import CrowdFrame, stride
 from stseg.simulation.random_streams import Topic, random_stream
 from stseg.simulation.scene import SceneSpec
 
@@ -18,7 +18,7 @@ _STANDING_SPEED = 0.05
 """Speed below which the heading stays, metres per second."""
 
 
-def walk_routes(spec: SceneSpec) -> Iterator[Crowd]:
+def walk_routes(spec: SceneSpec) -> Iterator[CrowdFrame]:
     """The crowd at every frame of a scene with routes; ids count the routes from 1."""
     heading = np.array([_initial_heading(route) for route in spec.routes])
     phase = random_stream(spec.seed, Topic.CROWD).uniform(0, 2 * np.pi, len(spec.routes))
@@ -32,7 +32,9 @@ def walk_routes(spec: SceneSpec) -> Iterator[Crowd]:
         phase = phase + 2 * np.pi * speed / spec.frame_rate / stride(height, swing)
         here = np.flatnonzero([route.is_there(time) for route in spec.routes])
         ground = np.array([spec.routes[k].ground(time) for k in here]).reshape(-1, 2)
-        yield Crowd(frame, here + 1, ground, heading[here], phase[here], swing[here], height[here], np.ones(len(here)))
+        yield CrowdFrame(
+            frame, here + 1, ground, heading[here], phase[here], swing[here], height[here], np.ones(len(here))
+        )
 
 
 def _initial_heading(route: Route) -> float:

@@ -32,7 +32,7 @@ _STRIDE, _STRIDE_RISE = 0.35, 0.41  # of the body's height, for two steps: at re
 
 
 @dataclass(frozen=True, slots=True)
-class Crowd:
+class CrowdFrame:
     """All pedestrians of a frame, also those just outside the area.
 
     Attributes
@@ -85,7 +85,7 @@ class Pedestrian:
     swing: float = 0.0
 
 
-def walk_freely(spec: SceneSpec) -> Iterator[Crowd]:
+def walk_freely(spec: SceneSpec) -> Iterator[CrowdFrame]:
     """Simulate the crowd of a scene, frame by frame."""
     planner = Planner(spec.area, spec.stay, random_stream(spec.seed, Topic.CROWD))
     arrivals: Arrivals = Regulars(spec) if spec.absence else Replacements(spec)
@@ -207,11 +207,11 @@ def stride(height: float | Floats, swing: float | Floats) -> float | Floats:
     return height * (_STRIDE + _STRIDE_RISE * swing)
 
 
-def _crowd(frame: int, pedestrians: list[Pedestrian]) -> Crowd:
+def _crowd(frame: int, pedestrians: list[Pedestrian]) -> CrowdFrame:
     def column(name: str) -> Floats:
         return np.array([getattr(pedestrian, name) for pedestrian in pedestrians], float)
 
     ground = np.array([pedestrian.ground for pedestrian in pedestrians]).reshape(-1, 2)
     ids = np.array([pedestrian.id for pedestrian in pedestrians], np.int64)
     names = ("heading", "phase", "swing", "height", "build")
-    return Crowd(frame, ids, ground, *(column(name) for name in names))
+    return CrowdFrame(frame, ids, ground, *(column(name) for name in names))

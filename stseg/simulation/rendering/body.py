@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stseg.arrays import Floats
-from stseg.simulation.crowd.social_forces import Crowd
+from stseg.simulation.crowd.social_forces import CrowdFrame
 
 _HIP, _THIGH, _SHIN, _ANKLE = 0.512, 0.245, 0.225, 0.042
 _SHOULDER, _UPPER_ARM, _FOREARM = 0.80, 0.165, 0.20
@@ -82,7 +82,7 @@ class Bodies:
         return np.asarray(self.centre[:, :, None] + signs @ self.axes)
 
 
-def pose(crowd: Crowd) -> Bodies:
+def pose(crowd: CrowdFrame) -> Bodies:
     """The bodies of a crowd as it stands and walks; the lower foot of each is on the ground."""
     joints = _skeleton(crowd.phase, crowd.swing)
     ends = np.stack([[joints[name] for name in part.ends] for part in PARTS])  # part, end, n, 3
@@ -97,7 +97,7 @@ def pose(crowd: Crowd) -> Bodies:
     return Bodies(centre, form, axes)
 
 
-def upright_cylinders(crowd: Crowd, width: float, length: float) -> Bodies:
+def upright_cylinders(crowd: CrowdFrame, width: float, length: float) -> Bodies:
     """The bodies of a crowd as upright cylinders, metres: ellipsoids in a stack, as many as a body has parts.
 
     Each reaches to the nearer end of the cylinder; they lie densely towards the ends, where they are flat. Between two

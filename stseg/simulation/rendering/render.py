@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from stseg.arrays import Boxes, Bytes, Floats, Ints, Singles
 from stseg.geometry import Camera
-from stseg.simulation.crowd.social_forces import Crowd
+from stseg.simulation.crowd.social_forces import CrowdFrame
 from stseg.simulation.random_streams import Topic, random_stream
 from stseg.simulation.rendering.body import Bodies
 from stseg.simulation.rendering.cameras import frame_seed, light_phase, pixel_rays
@@ -94,7 +94,7 @@ class Viewer:
         """The camera's frame of the empty room, uint8 (v, u, 3)."""
         return self._expose(self.room.image, self.room.depth, frame)
 
-    def view(self, crowd: Crowd, bodies: Bodies) -> RenderedView:
+    def view(self, crowd: CrowdFrame, bodies: Bodies) -> RenderedView:
         """The camera's frame of a crowd with its `bodies`, see `stseg.simulation.rendering.body.pose`."""
         drawing = self.draw(crowd, bodies)
         visible = np.empty((len(crowd.id), 5), np.int64)
@@ -108,7 +108,7 @@ class Viewer:
         image = self._expose(drawing.light, drawing.depth, crowd.frame)
         return RenderedView(image, drawing.instances, boxes)
 
-    def draw(self, crowd: Crowd, bodies: Bodies) -> Drawing:
+    def draw(self, crowd: CrowdFrame, bodies: Bodies) -> Drawing:
         """The crowd in the room."""
         image = self._with_shadows(bodies)
         depth = self.room.depth.copy()

@@ -16,7 +16,7 @@ from stseg.arrays import Boxes, Bytes, Floats, Rows
 from stseg.errors import ConfigError
 from stseg.geometry import Camera, Rig
 from stseg.geometry.reduction import BODY_HEIGHT
-from stseg.simulation.film import Film
+from stseg.simulation.film import SceneFilm
 from stseg.simulation.scene import Kind
 from stseg.simulation.spoiling.errors import BOX_KINDS, MASK_KINDS, Moment
 
@@ -70,7 +70,7 @@ class SpoiledView:
 
 @dataclass(frozen=True, slots=True)
 class SpoiledFrame:
-    """One frame of all cameras, as of `stseg.simulation.film.SimulatedFrame`."""
+    """One frame of all cameras, as of `stseg.simulation.film.RenderedFrame`."""
 
     frame: int
     truth: Rows
@@ -80,7 +80,7 @@ class SpoiledFrame:
 class SpoiledFilm:
     """A film with errors in its masks and boxes, one after the other in the order of `spoils`."""
 
-    def __init__(self, film: Film, spoils: Sequence[Spoil]) -> None:
+    def __init__(self, film: SceneFilm, spoils: Sequence[Spoil]) -> None:
         self.film, self.spoils = film, tuple(spoils)
         centre = np.array([[np.mean(film.rig.grid.x), np.mean(film.rig.grid.y)]])
         self._widths = [body_width(camera, centre) for camera in film.rig.cameras]

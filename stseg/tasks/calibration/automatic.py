@@ -21,7 +21,7 @@ from stseg.calibration.adjusted_rig import (
 )
 from stseg.calibration.automatic.auto import calibrate_from_people, sharpen_by_floor, steps_of
 from stseg.calibration.automatic.endpoints import Endpoints, concatenate_endpoints, upright_endpoints
-from stseg.calibration.automatic.solution import CalibrationInput, Solution
+from stseg.calibration.automatic.solution import CalibrationInput, SolvedViews
 from stseg.config import Config
 from stseg.engine.offline.backgrounds import make_foregrounds
 from stseg.engine.offline.frame_range import FrameRange
@@ -232,7 +232,7 @@ def _background_images(foregrounds: Sequence[ViewForeground]) -> list[Bytes]:
     ]
 
 
-def _recording(output: Path, streams: Recording, solution: Solution, cell: float) -> Recording:
+def _recording(output: Path, streams: Recording, solution: SolvedViews, cell: float) -> Recording:
     names = [camera.name for camera in streams.rig.cameras]
     rig = replace(streams.rig, grid=grid_of(solution, cell), cameras=cameras_of(solution, names))
     offsets = offsets_of(solution)
